@@ -1,0 +1,1 @@
+"""From HAL messages to a twist: pure functions, and one task around them."""

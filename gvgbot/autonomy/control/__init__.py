@@ -1,0 +1,1 @@
+"""Local GVG to a twist."""

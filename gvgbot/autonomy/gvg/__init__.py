@@ -1,0 +1,1 @@
+"""Scans to the local generalized Voronoi graph."""

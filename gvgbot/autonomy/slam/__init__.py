@@ -1,0 +1,1 @@
+"""Belief, vertex recognition and the GVG graph."""

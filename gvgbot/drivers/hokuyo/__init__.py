@@ -1,0 +1,1 @@
+"""Hokuyo laser over SCIP 2."""

@@ -1,0 +1,1 @@
+"""Kobuki base over its serial protocol."""

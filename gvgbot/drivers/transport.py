@@ -1,0 +1,165 @@
+"""Byte streams: a serial port, or an in-memory pipe, behind one small protocol."""
+
+import asyncio
+import contextlib
+import os
+from typing import Protocol
+
+import serial
+
+from gvgbot.clock import Clock
+from gvgbot.errors import DeviceLost
+
+
+class ByteStream(Protocol):
+    """Bytes both ways."""
+
+    async def read(self) -> bytes:
+        """Whatever has arrived, at least one byte. Raises DeviceLost when the other end is gone."""
+
+    def write(self, data: bytes) -> None:
+        """Send without waiting. Raises DeviceLost when the other end is gone."""
+
+    def close(self) -> None:
+        """Give the link up; closing twice is harmless."""
+
+
+class _PipeEnd:
+    """One end of an in-memory stream."""
+
+    def __init__(self) -> None:
+        self._arrived = bytearray()
+        self._readable = asyncio.Event()
+        self._closed = False
+        self.peer: _PipeEnd
+
+    async def read(self) -> bytes:
+        await self._readable.wait()
+        if not self._arrived:
+            raise DeviceLost("the link was closed")
+        data = bytes(self._arrived)
+        self._arrived.clear()
+        if not self._closed:
+            self._readable.clear()
+        return data
+
+    def write(self, data: bytes) -> None:
+        if self._closed:
+            raise DeviceLost("the link was closed")
+        if data:
+            self.peer._arrived += data
+            self.peer._readable.set()
+
+    def close(self) -> None:
+        for end in (self, self.peer):
+            end._closed = True
+            end._readable.set()
+
+
+def pipe() -> tuple[ByteStream, ByteStream]:
+    """Two joined ends: what is written to one is read from the other."""
+    here, there = _PipeEnd(), _PipeEnd()
+    here.peer, there.peer = there, here
+    return here, there
+
+
+class SerialStream:
+    """A serial port, or a pseudo-terminal, read by the event loop without blocking it."""
+
+    def __init__(self, path: str, baud: int) -> None:
+        """Open raw and exclusive. Raises DeviceLost when the port is absent or in use."""
+        try:
+            self._port = serial.Serial(path, baud, timeout=0, write_timeout=0, exclusive=True)
+        except (serial.SerialException, OSError, ValueError) as error:
+            raise DeviceLost(f"cannot open {path}: {error}") from error
+        self._path = path
+        self._fd = self._port.fileno()
+        self._arrived = bytearray()
+        self._readable = asyncio.Event()
+        self._gone = False
+        self._loop = asyncio.get_running_loop()
+        self._loop.add_reader(self._fd, self._on_readable)
+
+    def _on_readable(self) -> None:
+        try:
+            data = os.read(self._fd, 65536)
+        except BlockingIOError:
+            return
+        except OSError:
+            data = b""
+        if data:
+            self._arrived += data
+        else:
+            self._gone = True
+            self._loop.remove_reader(self._fd)
+        self._readable.set()
+
+    async def read(self) -> bytes:
+        """Whatever has arrived. Raises DeviceLost when the port is gone."""
+        await self._readable.wait()
+        if not self._arrived:
+            raise DeviceLost(f"{self._path} is gone: plug it in again")
+        data = bytes(self._arrived)
+        self._arrived.clear()
+        if not self._gone:
+            self._readable.clear()
+        return data
+
+    def write(self, data: bytes) -> None:
+        """Hand the bytes to the kernel; what does not fit is dropped, never waited for."""
+        try:
+            os.write(self._fd, data)
+        except BlockingIOError:
+            return
+        except OSError as error:
+            self._gone = True
+            self._readable.set()
+            raise DeviceLost(f"{self._path} is gone: plug it in again") from error
+
+    def close(self) -> None:
+        """Release the port."""
+        self._gone = True
+        self._loop.remove_reader(self._fd)
+        with contextlib.suppress(OSError, serial.SerialException):
+            self._port.close()
+
+
+class TwinDevice(Protocol):
+    """A simulated device without I/O: bytes in, bytes out, told the time (s)."""
+
+    def receive(self, data: bytes, now: float) -> bytes:
+        """Take bytes from the host; the bytes that answer them at once."""
+
+    def advance(self, now: float) -> bytes:
+        """The bytes that the device has sent by itself up to now."""
+
+    def next_due(self) -> float:
+        """When `advance` will next have something; inf if never."""
+
+
+async def serve_twin(twin: TwinDevice, stream: ByteStream, clock: Clock) -> None:
+    """Join a twin to a stream until cancelled or until the other end goes."""
+    wake = asyncio.Event()
+
+    async def listen() -> None:
+        while True:
+            data = await stream.read()
+            stream.write(twin.receive(data, clock.now()))
+            wake.set()
+
+    async def talk() -> None:
+        while True:
+            due = twin.next_due()
+            if due <= clock.now():
+                stream.write(twin.advance(clock.now()))
+                await asyncio.sleep(0)
+                continue
+            wake.clear()
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout_at(None if due == float("inf") else due):
+                    await wake.wait()
+
+    with contextlib.suppress(DeviceLost):
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(listen())
+            tasks.create_task(talk())

@@ -1,0 +1,33 @@
+"""The errors a user or the daemon can do something about."""
+
+
+class GvgbotError(Exception):
+    """A failure with one clear line that says what to do; the command line prints it and exits 1."""
+
+
+class UsageError(GvgbotError):
+    """The command or a file it names is wrong; the command line exits 2."""
+
+
+class ConfigError(UsageError):
+    """A configuration file or override is wrong: file, key path, value and what is allowed."""
+
+
+class WorldError(UsageError):
+    """A world file is missing, unreadable or unfit, or the start pose does not fit into it."""
+
+
+class DeviceLost(GvgbotError):
+    """The device fell silent or its link is gone: stop, and reopen with back-off."""
+
+
+class DeviceRefused(GvgbotError):
+    """The device answered that it cannot do what was asked."""
+
+
+class Unsafe(GvgbotError):
+    """Stand still until a person has looked."""
+
+
+class Deadlock(GvgbotError):
+    """In virtual time every task waits for something that nothing will ever do."""

@@ -1,0 +1,82 @@
+"""Planar geometry: angles, poses and twists, in metres, radians and seconds."""
+
+import math
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def wrap_angle(angle: float) -> float:
+    """The same direction in (-pi, pi]."""
+    wrapped = math.remainder(angle, math.tau)
+    return math.pi if wrapped == -math.pi else wrapped
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """A frame seen from another, named parent_child: `map_base` is the base in the map.
+
+    x, y in metres, theta in radians, anticlockwise; theta is not wrapped by construction.
+    """
+
+    x: float = 0.0
+    y: float = 0.0
+    theta: float = 0.0
+
+    def compose(self, other: "Pose") -> "Pose":
+        """a_b.compose(b_c) = a_c."""
+        c, s = math.cos(self.theta), math.sin(self.theta)
+        return Pose(
+            self.x + c * other.x - s * other.y,
+            self.y + s * other.x + c * other.y,
+            wrap_angle(self.theta + other.theta),
+        )
+
+    def inverse(self) -> "Pose":
+        """a_b.inverse() = b_a."""
+        c, s = math.cos(self.theta), math.sin(self.theta)
+        return Pose(
+            -c * self.x - s * self.y, s * self.x - c * self.y, wrap_angle(-self.theta)
+        )
+
+    def to(self, other: "Pose") -> "Pose":
+        """The motion from this pose to the other: a_b.to(a_c) = b_c."""
+        return self.inverse().compose(other)
+
+    def distance(self, other: "Pose") -> float:
+        """Metres between the two origins."""
+        return math.hypot(other.x - self.x, other.y - self.y)
+
+    def transform(self, points: Array) -> Array:
+        """Points (N, 2) or (2,) of the child frame, in the parent frame."""
+        c, s = math.cos(self.theta), math.sin(self.theta)
+        x, y = points[..., 0], points[..., 1]
+        out = np.empty_like(points)
+        out[..., 0] = self.x + c * x - s * y
+        out[..., 1] = self.y + s * x + c * y
+        return out
+
+    @property
+    def position(self) -> Array:
+        """The origin as an array (2,)."""
+        return np.array([self.x, self.y])
+
+    @classmethod
+    def from_array(cls, values: Array) -> Self:
+        """Pose from (x, y, theta)."""
+        return cls(float(values[0]), float(values[1]), float(values[2]))
+
+
+@dataclass(frozen=True, slots=True)
+class Twist:
+    """Velocity of the base in its own frame: m/s ahead, rad/s anticlockwise."""
+
+    linear: float = 0.0
+    angular: float = 0.0
+
+
+STANDSTILL = Twist()

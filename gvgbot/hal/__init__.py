@@ -1,0 +1,1 @@
+"""The hardware abstraction: frozen, stamped messages in SI units, and the device protocols."""

@@ -1,0 +1,84 @@
+"""What crosses the hardware abstraction: frozen values, each with the stamp of when it was true."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from gvgbot.geometry import Array, Pose, Twist
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scan:
+    """One laser sweep.
+
+    `ranges` (N,) in metres, read-only; NaN = nothing trusted, inf = nothing within range.
+    Beam i points to `angle_min + i * angle_increment` (rad) in the laser frame, anticlockwise.
+    `stamp` is the time of the first beam (s, monotonic); beam i is `i * time_increment` later.
+    """
+
+    stamp: float
+    ranges: Array
+    angle_min: float
+    angle_increment: float
+    range_min: float
+    range_max: float
+    time_increment: float = 0.0
+    base_laser: Pose = field(default_factory=Pose)
+
+    def __post_init__(self) -> None:
+        self.ranges.setflags(write=False)
+
+    @property
+    def bearings(self) -> Array:
+        """Beam directions (N,) in the laser frame, rad."""
+        return self.angle_min + self.angle_increment * np.arange(len(self.ranges))
+
+
+@dataclass(frozen=True, slots=True)
+class Odometry:
+    """Dead reckoning since the driver started: a pose, so a message that was missed costs nothing."""
+
+    stamp: float
+    odom_base: Pose
+    twist: Twist
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """What the base feels: bumper and cliff per side, wheels off the floor, motors overloaded."""
+
+    stamp: float
+    bumper_left: bool = False
+    bumper_centre: bool = False
+    bumper_right: bool = False
+    cliff_left: bool = False
+    cliff_centre: bool = False
+    cliff_right: bool = False
+    wheel_drop_left: bool = False
+    wheel_drop_right: bool = False
+    over_current: bool = False
+
+    @property
+    def bumper(self) -> bool:
+        """Whether any bumper is pressed."""
+        return self.bumper_left or self.bumper_centre or self.bumper_right
+
+    @property
+    def cliff(self) -> bool:
+        """Whether any cliff sensor sees no floor."""
+        return self.cliff_left or self.cliff_centre or self.cliff_right
+
+    @property
+    def wheel_drop(self) -> bool:
+        """Whether a wheel hangs in the air."""
+        return self.wheel_drop_left or self.wheel_drop_right
+
+
+@dataclass(frozen=True, slots=True)
+class Battery:
+    """State of the battery: volts, charge fraction 0..1, and whether it is being charged."""
+
+    stamp: float
+    voltage: float
+    fraction: float
+    charging: bool
