@@ -1,0 +1,151 @@
+"""The local GVG: meetpoints, ends and edges in sight, in the local frame, and where one is on it."""
+
+import heapq
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from gvgbot.geometry import Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LocalEdge:
+    """A stretch of GVG between two nodes: polyline (N, 2) from node a to node b, clearance (N,)."""
+
+    a: int
+    b: int
+    polyline: Array
+    clearance: Array
+    stations: Array  # metres along the polyline (N,)
+
+    @property
+    def length(self) -> float:
+        """Metres from end to end."""
+        return float(self.stations[-1])
+
+    def other(self, node: int) -> int:
+        """The node at the far end."""
+        return self.b if node == self.a else self.a
+
+
+class Branch(NamedTuple):
+    """One end of an edge: leaving node `a` of the edge if `forward`, else its node `b`."""
+
+    edge: int
+    forward: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LocalNode:
+    """A point where edges meet or stop.
+
+    `open` = the diagram goes on from here into space not yet seen. `weak` = branches too short to be
+    told from a corner as long as they are not wholly seen; they do not count towards `degree`.
+    """
+
+    position: Array
+    clearance: float
+    open: bool
+    branches: tuple[Branch, ...]
+    weak: frozenset[Branch]
+
+    @property
+    def degree(self) -> int:
+        """Number of departures that are certain."""
+        return len(self.branches) - len(self.weak)
+
+    @property
+    def settled(self) -> bool:
+        """Whether nothing unseen could change the departures."""
+        return not self.open and not self.weak
+
+    @property
+    def is_meetpoint(self) -> bool:
+        """Whether three or more certain edges leave here."""
+        return self.degree >= 3
+
+    @property
+    def is_endpoint(self) -> bool:
+        """Whether the edge certainly stops here."""
+        return self.settled and len(self.branches) == 1
+
+
+class Place(NamedTuple):
+    """A point on the local GVG: metres `station` along edge `edge`, `distance` metres from the query."""
+
+    edge: int
+    station: float
+    distance: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LocalGvg:
+    """Nodes by id and edges by id; ids mean nothing beyond this one graph."""
+
+    nodes: dict[int, LocalNode] = field(default_factory=dict)
+    edges: dict[int, LocalEdge] = field(default_factory=dict)
+
+    def place(self, point: Array) -> Place | None:
+        """The point of the graph nearest to a point (2,); None on an empty graph."""
+        best: Place | None = None
+        for key, edge in self.edges.items():
+            d = np.hypot(edge.polyline[:, 0] - point[0], edge.polyline[:, 1] - point[1])
+            i = int(np.argmin(d))
+            if best is None or d[i] < best.distance:
+                best = Place(key, float(edge.stations[i]), float(d[i]))
+        return best
+
+    def leaving(self, branch: Branch) -> Array:
+        """Polyline (N, 2) along a branch, from its node outwards."""
+        line = self.edges[branch.edge].polyline
+        return line if branch.forward else line[::-1]
+
+    def end_of(self, branch: Branch) -> int:
+        """The node where a branch arrives."""
+        edge = self.edges[branch.edge]
+        return edge.b if branch.forward else edge.a
+
+    def bearing(self, branch: Branch, clearance: float) -> float:
+        """Direction of a branch as it leaves its node's disc, rad in the local frame."""
+        line = self.leaving(branch)
+        away = np.hypot(*(line - line[0]).T)
+        reach = min(max(0.5, 0.9 * clearance), float(away.max()))
+        target = line[int(np.argmax(away >= reach))]
+        return float(np.arctan2(target[1] - line[0, 1], target[0] - line[0, 0]))
+
+    def routes(self, start: Place) -> dict[int, tuple[float, tuple[Branch, ...]]]:
+        """Shortest way from a place to every node: metres, and the branches that are driven.
+
+        The first branch is the rest of the edge on which the place lies.
+        """
+        edge = self.edges[start.edge]
+        queue = [
+            (start.station, edge.a, (Branch(start.edge, forward=False),)),
+            (edge.length - start.station, edge.b, (Branch(start.edge, forward=True),)),
+        ]
+        heapq.heapify(queue)
+        done: dict[int, tuple[float, tuple[Branch, ...]]] = {}
+        while queue:
+            metres, node, path = heapq.heappop(queue)
+            if node in done:
+                continue
+            done[node] = (metres, path)
+            for branch in self.nodes[node].branches:
+                far = self.end_of(branch)
+                if far not in done:
+                    heapq.heappush(queue, (metres + self.edges[branch.edge].length, far, (*path, branch)))
+        return done
+
+    def line_from(self, start: Place, path: tuple[Branch, ...]) -> tuple[Array, Array]:
+        """Polyline (N, 2) and clearance (N,) from a place along a path of `routes`."""
+        lines, clear = [], []
+        for i, branch in enumerate(path):
+            edge = self.edges[branch.edge]
+            line, room = edge.polyline, edge.clearance
+            if i == 0:
+                ahead = edge.stations >= start.station if branch.forward else edge.stations <= start.station
+                line, room = line[ahead], room[ahead]
+            lines.append(line if branch.forward else line[::-1])
+            clear.append(room if branch.forward else room[::-1])
+        return np.concatenate(lines), np.concatenate(clear)

@@ -1,0 +1,176 @@
+"""The rolling local map: what the last metres of scans say is free, occupied or unknown.
+
+It fills the laser's blind rear. It lives in the local frame (odometry corrected by scan matching),
+which never jumps: corrections of the global estimate do not move it.
+"""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import minimum_filter1d
+
+from gvgbot.geometry import Array, Pose
+from gvgbot.hal.messages import Scan
+from gvgbot.ranges import Range
+
+_HIT = 2  # votes that one hit gives an occupied cell
+_MAX_VOTES = 8  # a wall needs this many contrary scans, less the hits, before it is forgotten
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LocalMapConfig:
+    """Size and memory of the local map."""
+
+    half_width_m: Annotated[float, Range(3.0, 30.0)] = 8.0
+    cell_m: Annotated[float, Range(0.05, 0.2)] = 0.1
+    memory_m: Annotated[float, Range(5.0, 200.0)] = 30.0  # metres driven after which a cell is forgotten
+    bridge_gap_m: Annotated[float, Range(0.0, 1.0)] = 0.3  # neighbouring hits closer than this are one wall
+
+
+class LocalMap:
+    """A square window of cells around the robot, addressed in the local frame.
+
+    Per occupied cell it keeps the mean of the hits, so that walls are sharper than the cells.
+    """
+
+    def __init__(self, config: LocalMapConfig) -> None:
+        self._config = config
+        self._cell = config.cell_m
+        self._size = 2 * round(config.half_width_m / config.cell_m)
+        n = self._size
+        self._corner = np.array([-n // 2, -n // 2])  # indices of cell [0, 0]
+        self._free = np.zeros((n, n), bool)
+        self._votes = np.zeros((n, n), np.int16)
+        self._mean = np.zeros((n, n, 2))
+        self._seen_at = np.full((n, n), -np.inf, np.float32)  # metres driven when last seen
+        centres = ((np.arange(n) + 0.5) * self._cell).astype(np.float32)
+        self._offsets_x = np.broadcast_to(centres[:, None], (n, n))
+        self._offsets_y = np.broadcast_to(centres[None, :], (n, n))
+
+    def insert(self, scan: Scan, local_laser: Pose, travelled: float) -> None:
+        """Add a scan taken at the laser pose after so many metres driven."""
+        self._recentre(local_laser)
+        ranges = _without_single_dropouts(scan.ranges)
+        self._carve(scan, ranges, local_laser, travelled)
+        points = _bridged(local_laser.transform(_hits(scan, ranges, self._reach)), self._config.bridge_gap_m)
+        self._occupy(points, travelled)
+        self._forget(travelled)
+
+    def points(self) -> Array:
+        """Mean hits of the occupied cells (N, 2), local frame."""
+        return self._mean[self._votes > 0]
+
+    def known(self, points: Array) -> NDArray[np.bool_]:
+        """Whether the cell under each point (..., 2) is free or occupied rather than unknown."""
+        cells = np.floor(points / self._cell).astype(np.int64) - self._corner
+        inside = ((cells >= 0) & (cells < self._size)).all(axis=-1)
+        i, j = np.where(inside, cells[..., 0], 0), np.where(inside, cells[..., 1], 0)
+        return inside & (self._free[i, j] | (self._votes[i, j] > 0))
+
+    @property
+    def _reach(self) -> float:
+        return self._config.half_width_m * 1.2
+
+    def _recentre(self, local_laser: Pose) -> None:
+        wanted = np.floor(local_laser.position / self._cell).astype(np.int64) - self._size // 2
+        shift = wanted - self._corner
+        if np.abs(shift).max() * self._cell < 1.0:
+            return
+        self._corner = wanted
+        for name, empty in (("_free", False), ("_votes", 0), ("_mean", 0.0), ("_seen_at", -np.inf)):
+            setattr(self, name, _shifted(getattr(self, name), shift, empty))
+
+    def _carve(self, scan: Scan, ranges: Array, local_laser: Pose, travelled: float) -> None:
+        """Mark what the beams passed through as free, and vote against walls they passed."""
+        see = minimum_filter1d(np.where(np.isnan(ranges), 0.0, np.minimum(ranges, self._reach)), 3)
+        corner = self._corner * self._cell
+        dx = self._offsets_x + np.float32(corner[0] - local_laser.x)
+        dy = self._offsets_y + np.float32(corner[1] - local_laser.y)
+        seen_to = _range_towards(scan, see.astype(np.float32), dx, dy, local_laser.theta)
+        distance = np.sqrt(dx * dx + dy * dy)
+        passed = distance < seen_to - np.float32(0.8 * self._cell)
+        self._free |= passed
+        self._seen_at[passed] = travelled
+        i, j = np.nonzero(passed & (self._votes > 0))
+        if len(i):
+            self._vote_against(i, j, scan, see, local_laser)
+
+    def _vote_against(
+        self, i: NDArray[np.int64], j: NDArray[np.int64], scan: Scan, see: Array, local_laser: Pose
+    ) -> None:
+        d = self._mean[i, j] - local_laser.position
+        beyond = _range_towards(scan, see, d[:, 0], d[:, 1], local_laser.theta)
+        gone = np.hypot(d[:, 0], d[:, 1]) < beyond - 1.5 * self._cell
+        self._votes[i[gone], j[gone]] -= 1
+
+    def _occupy(self, points: Array, travelled: float) -> None:
+        cells = np.floor(points / self._cell).astype(np.int64) - self._corner
+        inside = ((cells >= 0) & (cells < self._size)).all(axis=1)
+        flat = cells[inside, 0] * self._size + cells[inside, 1]
+        cell, index, count = np.unique(flat, return_inverse=True, return_counts=True)
+        x = np.bincount(index, points[inside, 0]) / count
+        y = np.bincount(index, points[inside, 1]) / count
+        i, j = np.divmod(cell, self._size)
+        old = np.maximum(self._votes[i, j], 0)
+        share = (_HIT / (old + _HIT))[:, None]
+        self._mean[i, j] = (1 - share) * self._mean[i, j] + share * np.stack([x, y], axis=1)
+        self._votes[i, j] = np.minimum(old + _HIT, _MAX_VOTES)
+        self._seen_at[i, j] = travelled
+
+    def _forget(self, travelled: float) -> None:
+        stale = self._seen_at < travelled - self._config.memory_m
+        self._free[stale] = False
+        self._votes[stale] = 0
+
+
+def _shifted(array: NDArray[np.generic], shift: NDArray[np.int64], empty: object) -> NDArray[np.generic]:
+    """The array as seen from a corner moved by `shift` cells; what comes into view is empty."""
+    n = array.shape[0]
+    out = np.full_like(array, empty)
+    if np.abs(shift).max() >= n:
+        return out
+    source = tuple(slice(max(s, 0), n + min(s, 0)) for s in shift)
+    target = tuple(slice(max(-s, 0), n + min(-s, 0)) for s in shift)
+    out[target] = array[source]
+    return out
+
+
+def _without_single_dropouts(ranges: Array) -> Array:
+    """Ranges with each lone NaN between two readings replaced by the nearer of them."""
+    filled = ranges.copy()
+    inner, left, right = ranges[1:-1], ranges[:-2], ranges[2:]
+    lone = np.isnan(inner) & ~np.isnan(left) & ~np.isnan(right)
+    filled[1:-1][lone] = np.minimum(left[lone], right[lone])
+    return filled
+
+
+def _hits(scan: Scan, ranges: Array, reach: float) -> Array:
+    """End points (N, 2) of the beams that hit something within reach, laser frame."""
+    with np.errstate(invalid="ignore"):
+        hit = ranges < reach
+    bearings = scan.bearings[hit]
+    return ranges[hit, None] * np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
+
+
+def _bridged(points: Array, gap: float) -> Array:
+    """The points with intermediate ones wherever neighbours are close enough to be one wall."""
+    step = np.diff(points, axis=0)
+    length = np.hypot(step[:, 0], step[:, 1])
+    near = (length < gap) & (length > gap / 4)
+    start, step = points[:-1][near], step[near]
+    return np.concatenate([points, *(start + f * step for f in (0.25, 0.5, 0.75))])
+
+
+def _range_towards(
+    scan: Scan, see: NDArray[np.floating], dx: NDArray[np.floating], dy: NDArray[np.floating], theta: float
+) -> NDArray[np.floating]:
+    """How far the scan sees in the direction of each offset; 0 outside its field of view."""
+    turn = np.float32(2 * np.pi)
+    bearing = np.arctan2(dy, dx) - np.float32(theta + scan.angle_min)
+    bearing -= turn * np.floor(bearing / turn)
+    index = (bearing * np.float32(1 / scan.angle_increment) + np.float32(0.5)).astype(np.int32)
+    inside = index < len(see)
+    index[~inside] = 0
+    return np.where(inside, see[index], see.dtype.type(0))

@@ -1,0 +1,220 @@
+"""From the fine Voronoi graph to the reduced GVG: chains become edges, corner branches go.
+
+A dangling branch from vertex v to tip t has reach (length(v, t) + clearance(t)) / clearance(v). In a
+right-angled corner it is 1.41; a dead end worth a visit has more. Reach only grows while more of a
+branch is seen, so for a branch that ends in unseen space it is a lower bound.
+"""
+
+from dataclasses import dataclass, field
+from typing import Annotated
+
+import numpy as np
+
+from gvgbot.autonomy.gvg.local import Branch, LocalEdge, LocalGvg, LocalNode
+from gvgbot.autonomy.gvg.voronoi import FineGraph
+from gvgbot.geometry import Array
+from gvgbot.ranges import Range
+
+_SPACING = 0.1  # metres between the points of an edge
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReductionConfig:
+    """What is worth being a vertex."""
+
+    min_reach: Annotated[float, Range(1.45, 4.0)] = 1.85  # shorter dangling branches are corners
+    merge_m: Annotated[float, Range(0.0, 2.0)] = 0.6  # meetpoints closer than this are one
+    chord_ratio: Annotated[float, Range(0.5, 1.2)] = 0.9  # an edge's obstacles are this far apart, in clearances
+
+
+@dataclass(slots=True, eq=False)
+class _Chain:
+    a: int
+    b: int
+    points: Array
+    clearance: Array
+
+    def length(self) -> float:
+        return float(np.hypot(*np.diff(self.points, axis=0).T).sum())
+
+
+@dataclass(slots=True, eq=False)
+class _Draft:
+    """A multigraph under reduction: nodes, chains by id, and the chain ends at each node."""
+
+    position: dict[int, Array]
+    clearance: dict[int, float]
+    open: dict[int, bool]
+    chains: dict[int, _Chain] = field(default_factory=dict)
+    ends: dict[int, list[tuple[int, bool]]] = field(default_factory=dict)  # (chain, leaves its a)
+    serial: int = 0
+
+    def add(self, chain: _Chain) -> None:
+        key, self.serial = self.serial, self.serial + 1
+        self.chains[key] = chain
+        self.ends.setdefault(chain.a, []).append((key, True))
+        self.ends.setdefault(chain.b, []).append((key, False))
+
+    def remove(self, key: int) -> _Chain:
+        chain = self.chains.pop(key)
+        self.ends[chain.a].remove((key, True))
+        self.ends[chain.b].remove((key, False))
+        return chain
+
+    def degree(self, node: int) -> int:
+        return len(self.ends[node]) + self.open[node]
+
+    def reach(self, leaf: int) -> tuple[float, int, int]:
+        """Reach of the branch that ends at a leaf, its base and its chain."""
+        key, _ = self.ends[leaf][0]
+        chain = self.chains[key]
+        base = chain.b if chain.a == leaf else chain.a
+        return (chain.length() + self.clearance[leaf]) / self.clearance[base], base, key
+
+    def splice(self, node: int) -> None:
+        """Make one chain of the two that meet at a node."""
+        (first, out_a), (second, out_b) = self.ends[node]
+        if first == second:
+            return
+        one, two = self.remove(first), self.remove(second)
+        points, room = (one.points[::-1], one.clearance[::-1]) if out_a else (one.points, one.clearance)
+        start = one.b if out_a else one.a
+        more, wide = (two.points, two.clearance) if out_b else (two.points[::-1], two.clearance[::-1])
+        end = two.b if out_b else two.a
+        del self.ends[node]
+        self.add(
+            _Chain(start, end, np.concatenate([points, more[1:]]), np.concatenate([room, wide[1:]]))
+        )
+
+
+def reduce_graph(fine: FineGraph, config: ReductionConfig) -> LocalGvg:
+    """The local GVG of a fine graph."""
+    draft = _contract(fine)
+    _prune(draft, config.min_reach)
+    _merge(draft, config.merge_m)
+    _prune(draft, config.min_reach)
+    return _finish(draft, config.min_reach)
+
+
+def _contract(fine: FineGraph) -> _Draft:
+    """Chains of points with two neighbours become one edge each."""
+    neighbours: list[list[int]] = [[] for _ in range(len(fine.points))]
+    for a, b in fine.ridges.tolist():
+        neighbours[a].append(b)
+        neighbours[b].append(a)
+    keys = [i for i, n in enumerate(neighbours) if len(n) != 2 or fine.open_ended[i]]
+    if not keys and neighbours:
+        keys = [0]  # a ring without a vertex
+    draft = _Draft(
+        {i: fine.points[i] for i in keys},
+        {i: float(fine.clearance[i]) for i in keys},
+        {i: bool(fine.open_ended[i]) for i in keys},
+        ends={i: [] for i in keys},
+    )
+    is_key = set(keys)
+    walked: set[tuple[int, int]] = set()
+    for key in keys:
+        for first in neighbours[key]:
+            if (key, first) not in walked:
+                path = _walk(neighbours, is_key, key, first)
+                walked.add((path[-1], path[-2]))
+                walked.add((key, first))
+                draft.add(_Chain(key, path[-1], fine.points[path], fine.clearance[path]))
+    return draft
+
+
+def _walk(neighbours: list[list[int]], is_key: set[int], start: int, first: int) -> list[int]:
+    path = [start, first]
+    while path[-1] not in is_key:
+        one, two = neighbours[path[-1]]
+        path.append(two if one == path[-2] else one)
+    return path
+
+
+def _prune(draft: _Draft, min_reach: float) -> None:
+    """Drop corner branches in rounds, so that a dead end keeps the vertex both its corners hang on."""
+    while True:
+        doomed = []
+        for node, ends in draft.ends.items():
+            if len(ends) == 1 and not draft.open[node]:
+                reach, base, key = draft.reach(node)
+                if reach < min_reach and draft.degree(base) >= 3:
+                    doomed.append((node, base, key))
+        if not doomed:
+            return
+        for node, _, key in doomed:
+            draft.remove(key)
+            del draft.ends[node]
+        for base in dict.fromkeys(base for _, base, _ in doomed):
+            if base in draft.ends and len(draft.ends[base]) == 2 and not draft.open[base]:
+                draft.splice(base)
+
+
+def _merge(draft: _Draft, merge_m: float) -> None:
+    """Make one meetpoint of two that are joined by a very short edge."""
+    while True:
+        short = [
+            (chain.length(), key)
+            for key, chain in draft.chains.items()
+            if chain.a != chain.b and min(draft.degree(chain.a), draft.degree(chain.b)) >= 3
+        ]
+        if not short or min(short)[0] >= merge_m:
+            return
+        chain = draft.remove(min(short)[1])
+        keep, gone = chain.a, chain.b
+        centre = (draft.position[keep] + draft.position[gone]) / 2
+        draft.position[keep] = centre
+        draft.clearance[keep] = min(draft.clearance[keep], draft.clearance[gone])
+        draft.open[keep] = draft.open[keep] or draft.open[gone]
+        for key, out in draft.ends.pop(gone):
+            end = draft.chains[key]
+            if out:
+                end.a = keep
+            else:
+                end.b = keep
+            draft.ends[keep].append((key, out))
+        for key, out in draft.ends[keep]:
+            _attach(draft.chains[key], centre, at_start=out)
+
+
+def _attach(chain: _Chain, point: Array, *, at_start: bool) -> None:
+    """Let a chain begin (or end) at a node that has moved."""
+    index = 0 if at_start else len(chain.points)
+    chain.points = np.insert(chain.points, index, point, axis=0)
+    edge = chain.clearance[0] if at_start else chain.clearance[-1]
+    chain.clearance = np.insert(chain.clearance, index, edge)
+
+
+def _finish(draft: _Draft, min_reach: float) -> LocalGvg:
+    edges = {key: _edge(chain) for key, chain in draft.chains.items()}
+    nodes = {}
+    for node, ends in draft.ends.items():
+        branches = tuple(Branch(key, out) for key, out in ends)
+        weak = frozenset(
+            branch for branch in branches if _is_weak(draft, branch, node, min_reach)
+        ) if len(branches) + draft.open[node] >= 3 else frozenset()
+        nodes[node] = LocalNode(
+            draft.position[node], draft.clearance[node], draft.open[node], branches, weak
+        )
+    return LocalGvg(nodes, edges)
+
+
+def _is_weak(draft: _Draft, branch: Branch, node: int, min_reach: float) -> bool:
+    """Whether a branch ends open, and too soon to be told from a corner."""
+    chain = draft.chains[branch.edge]
+    tip = chain.b if branch.forward else chain.a
+    if tip == node or len(draft.ends[tip]) != 1 or not draft.open[tip]:
+        return False
+    return (chain.length() + draft.clearance[tip]) / draft.clearance[node] < min_reach
+
+
+def _edge(chain: _Chain) -> LocalEdge:
+    """Resample at even spacing and smooth the zigzag of the Voronoi vertices; ends stay."""
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(chain.points, axis=0).T))])
+    count = max(2, round(along[-1] / _SPACING) + 1)
+    at = np.linspace(0.0, along[-1], count)
+    line = np.stack([np.interp(at, along, chain.points[:, k]) for k in (0, 1)], axis=1)
+    for _ in range(2):
+        line[1:-1] = 0.25 * line[:-2] + 0.5 * line[1:-1] + 0.25 * line[2:]
+    stations = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+    return LocalEdge(chain.a, chain.b, line, np.interp(at, along, chain.clearance), stations)

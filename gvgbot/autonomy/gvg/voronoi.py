@@ -1,0 +1,132 @@
+"""Voronoi diagram of the local map's points, reduced to what is certain and passable.
+
+A Voronoi vertex whose maximal disc lies wholly in known space is a point of the real GVG, whatever
+the unseen rest of the building looks like; nothing else is used.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import Delaunay, QhullError
+
+from gvgbot.autonomy.gvg.local_map import LocalMap
+from gvgbot.geometry import Array
+
+_RING = np.stack([f(np.arange(16) * np.pi / 8) for f in (np.cos, np.sin)], axis=1)
+_MAX_UNKNOWN = 1  # of the sampled points of a disc
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FineGraph:
+    """Voronoi vertices and ridges of one connected piece, local frame.
+
+    points (N, 2) m, clearance (N,) m, ridges (M, 2) indices into points, and for each point whether
+    the diagram goes on from there into unknown space.
+    """
+
+    points: Array
+    clearance: Array
+    ridges: NDArray[np.int64]
+    open_ended: NDArray[np.bool_]
+
+
+EMPTY = FineGraph(np.empty((0, 2)), np.empty(0), np.empty((0, 2), np.int64), np.empty(0, bool))
+
+
+def fine_graph(
+    local_map: LocalMap, robot: Array, *, min_clearance: float, chord_ratio: float
+) -> FineGraph:
+    """The certain Voronoi graph around the robot (2,); EMPTY where there is none.
+
+    A ridge counts if its two generators are farther apart than the robot is wide, and than
+    `chord_ratio` times the clearance: neighbours along one wall are no pair of obstacles.
+    """
+    generators = local_map.points()
+    if len(generators) < 4:
+        return EMPTY
+    try:
+        triangles = Delaunay(generators)
+    except QhullError:
+        return EMPTY
+    centres, clearance = _circumcircles(generators[triangles.simplices])
+    wide = clearance >= min_clearance
+    certain = np.zeros(len(centres), bool)
+    certain[wide] = _disc_is_known(local_map, centres[wide], clearance[wide])
+    a, b, chord = _ridges(triangles, generators)
+    narrower = np.minimum(clearance[a], np.where(b < 0, np.inf, clearance[b]))
+    parts = chord >= np.maximum(2 * min_clearance, chord_ratio * narrower)
+    a, b = a[parts], b[parts]
+    joined = certain[a] & (b >= 0) & certain[b]
+    return _piece_of_robot(centres, clearance, a, b, joined, certain, wide, robot)
+
+
+def _circumcircles(corners: Array) -> tuple[Array, Array]:
+    """Centres (N, 2) and radii (N,) of triangles (N, 3, 2); infinite for degenerate ones."""
+    a, b, c = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    cross = 2 * (b[:, 0] * c[:, 1] - b[:, 1] * c[:, 0])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        bb, cc = (b * b).sum(axis=1), (c * c).sum(axis=1)
+        x = (c[:, 1] * bb - b[:, 1] * cc) / cross
+        y = (b[:, 0] * cc - c[:, 0] * bb) / cross
+    offset = np.stack([x, y], axis=1)
+    offset[~np.isfinite(offset).all(axis=1)] = 1e6
+    return a + offset, np.hypot(offset[:, 0], offset[:, 1])
+
+
+def _disc_is_known(local_map: LocalMap, centres: Array, radii: Array) -> NDArray[np.bool_]:
+    """Whether the maximal discs, but for a rim of two cells, lie in known space."""
+    outer = np.maximum(radii - 0.2, 0.5 * radii)
+    rings = np.concatenate([_RING, 0.5 * _RING[::2], np.zeros((1, 2))])
+    samples = centres[:, None, :] + outer[:, None, None] * rings
+    return (~local_map.known(samples)).sum(axis=1) <= _MAX_UNKNOWN
+
+
+def _ridges(triangles: Delaunay, generators: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
+    """Triangle pairs (a, b) that share an edge, b = -1 at the hull, and the edge's length."""
+    own = np.repeat(np.arange(len(triangles.simplices)), 3)
+    other = triangles.neighbors.ravel().astype(np.int64)
+    pair = triangles.simplices[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2)
+    once = (own < other) | (other < 0)
+    own, other, pair = own[once], other[once], pair[once]
+    gap = generators[pair[:, 0]] - generators[pair[:, 1]]
+    return own, other, np.hypot(gap[:, 0], gap[:, 1])
+
+
+def _piece_of_robot(
+    centres: Array,
+    clearance: Array,
+    a: NDArray[np.int64],
+    b: NDArray[np.int64],
+    joined: NDArray[np.bool_],
+    certain: NDArray[np.bool_],
+    wide: NDArray[np.bool_],
+    robot: Array,
+) -> FineGraph:
+    nodes = np.unique(np.concatenate([a[joined], b[joined]]))
+    if len(nodes) == 0:
+        return EMPTY
+    open_ended = np.zeros(len(centres), bool)
+    for here, there in ((a, b), (b, a)):
+        leads_out = (here >= 0) & certain[here] & ((there < 0) | (wide[there] & ~certain[there]))
+        open_ended[here[leads_out]] = True
+    number = np.full(len(centres), -1)
+    number[nodes] = np.arange(len(nodes))
+    ridges = np.stack([number[a[joined]], number[b[joined]]], axis=1)
+    n = len(nodes)
+    links = coo_array((np.ones(len(ridges)), (ridges[:, 0], ridges[:, 1])), (n, n))
+    _, piece = connected_components(links, directed=False)
+    distance = np.hypot(*(centres[nodes] - robot).T)
+    size = np.bincount(piece)
+    distance[size[piece] < 4] += 2.0  # crumbs lose against a real piece nearby
+    keep = piece == piece[np.argmin(distance)]
+    renumber = np.cumsum(keep) - 1
+    inside = keep[ridges[:, 0]]
+    return FineGraph(
+        centres[nodes[keep]],
+        clearance[nodes[keep]],
+        renumber[ridges[inside]],
+        open_ended[nodes[keep]],
+    )
