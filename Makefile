@@ -1,0 +1,57 @@
+# Everything sets itself up: python3 and a package index are all that is needed.
+PYTHON ?= python3
+BIN := .venv/bin
+SHELL := /bin/sh
+
+.PHONY: help explore test check static quick bench clean
+
+help:
+	@echo "make explore   a simulated robot maps the built-in office; prints where the map is"
+	@echo "make test      the whole test suite"
+	@echo "make check     format, lint, types, import rules, tests"
+	@echo "make quick     the tests that take under a second each"
+	@echo "make bench     time the inner loops"
+
+explore: .venv/core
+	@$(BIN)/gvgbot explore $(ARGS)
+
+test: .venv/dev
+	@$(BIN)/pytest $(ARGS)
+
+quick: .venv/dev
+	@$(BIN)/pytest -m "not slow and not hardware and not bench" $(ARGS)
+
+static: .venv/dev
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+check: static test
+
+bench: .venv/dev
+	@for file in benchmarks/bench_*.py; do $(BIN)/python "$$file" || exit 1; done
+
+clean:
+	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+
+# The stamps: what is installed for running, and for developing. A changed pyproject.toml renews them.
+.venv/core: pyproject.toml
+	@$(call make_venv)
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+	@touch $@
+
+.venv/dev: pyproject.toml
+	@$(call make_venv)
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@touch .venv/core $@
+
+define make_venv
+command -v $(PYTHON) >/dev/null || { \
+	echo "gvgbot needs Python 3.11 or newer, and there is no $(PYTHON): install it, or make PYTHON=/path/to/python" >&2; exit 1; }; \
+$(PYTHON) -c 'import sys; sys.version_info >= (3, 11) or sys.exit("gvgbot needs Python 3.11 or newer, and $(PYTHON) is %d.%d: install one, or make PYTHON=/path/to/python" % sys.version_info[:2])' || exit 1; \
+$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { \
+	echo "$(PYTHON) cannot make virtual environments: install its venv module (Debian: apt install python3-venv)" >&2; exit 1; }; \
+echo "setting up .venv (once)"; \
+$(PYTHON) -m venv .venv
+endef

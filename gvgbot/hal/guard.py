@@ -1,0 +1,184 @@
+"""The last gate before the motors: limits, staleness, contact, and obstacles on the raw scan."""
+
+from dataclasses import dataclass, field, replace
+from math import inf, isfinite, sqrt
+from typing import Annotated, Literal
+
+from gvgbot.geometry import STANDSTILL, Array, Twist
+from gvgbot.hal.messages import Contact, Odometry, Scan
+from gvgbot.hal.sweep import free_distance, has_sight, no_points, obstacle_points, seen_from
+from gvgbot.ranges import Range
+
+LONGEST_STEP = 0.1  # s; after a longer silence the ramps go on as if it had been this long
+TRUSTED_SHARE = 0.5  # a scan with a smaller share of trusted beams sees nothing: a covered laser
+CREEP = 0.01  # m/s; slower than this is a stop
+
+Reason = Literal[
+    "bad command",
+    "wheel drop",
+    "over-current",
+    "no scan",
+    "bumper",
+    "cliff",
+    "obstacle",
+    "obstacle near",
+]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GuardConfig:
+    """What the robot may do at most, whatever autonomy asks for."""
+
+    max_speed_mps: Annotated[float, Range(0.05, 0.7)] = 0.5
+    max_reverse_speed_mps: Annotated[float, Range(0.0, 0.3)] = 0.1  # the laser sees little behind
+    max_turn_rate_radps: Annotated[float, Range(0.1, 3.14)] = 1.5  # a gyro degrades when faster
+    max_acceleration_mps2: Annotated[float, Range(0.05, 3.0)] = 0.5
+    max_braking_mps2: Annotated[float, Range(0.05, 3.0)] = 1.0
+    max_angular_acceleration_radps2: Annotated[float, Range(0.1, 20.0)] = 3.5
+    max_scan_age_s: Annotated[float, Range(0.05, 2.0)] = 0.5
+    margin_m: Annotated[float, Range(0.0, 0.5)] = 0.02
+    response_time_s: Annotated[float, Range(0.0, 1.0)] = 0.05
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GuardState:
+    """What the guard remembers between calls.
+
+    `twist` is what it permitted last, at `stamp` (s). `track` is the odometry of about the last
+    `max_scan_age_s`, oldest first. `points` (N, 2) are the near returns of `scan`, m, odom frame.
+    """
+
+    twist: Twist = STANDSTILL
+    stamp: float | None = None
+    track: tuple[Odometry, ...] = ()
+    scan: Scan | None = None
+    points: Array = field(default_factory=no_points)
+
+
+@dataclass(frozen=True, slots=True)
+class Guard:
+    """Lets a twist through, slows it down or stops it, for a round robot of the given radius (m)."""
+
+    config: GuardConfig
+    radius: float
+
+    def permit(
+        self,
+        state: GuardState,
+        twist: Twist,
+        *,
+        stamp: float,
+        odometry: Odometry,
+        scan: Scan | None,
+        contact: Contact | None,
+    ) -> tuple[GuardState, Twist, Reason | None]:
+        """The twist that the motors get at `stamp` (s), and why, if safety changed it.
+
+        `scan` and `contact` are the newest, None before the first. Call it once per odometry.
+        """
+        state = self._observe(state, odometry, scan)
+        reason = self._fault(twist, stamp, state.scan, contact)
+        permitted = STANDSTILL
+        if reason is None:
+            wish = self._ramp(state, self._limit(twist), stamp)
+            permitted, reason = self._clear_way(state, wish, twist, odometry, contact)
+        return replace(state, twist=permitted, stamp=stamp), permitted, reason
+
+    def _observe(self, state: GuardState, odometry: Odometry, scan: Scan | None) -> GuardState:
+        """The state with this odometry, and with the near returns if the scan is a new one."""
+        track = state.track
+        if not track or track[-1] is not odometry:
+            too_old = odometry.stamp - self.config.max_scan_age_s - LONGEST_STEP
+            kept = track[1:] if track and track[0].stamp < too_old else track
+            track = (*kept, odometry)
+        if scan is None or scan is state.scan or not has_sight(scan, share=TRUSTED_SHARE):
+            return replace(state, track=track)
+        points = obstacle_points(scan, track, reach=self._reach())
+        return replace(state, track=track, scan=scan, points=points)
+
+    def _reach(self) -> float:
+        """How far from its centre (m) the robot can touch anything before the next scan is due."""
+        limits = self.config
+        blind = limits.max_scan_age_s + limits.response_time_s
+        speed = limits.max_speed_mps
+        stopping = speed * blind + speed**2 / (2.0 * limits.max_braking_mps2)
+        return stopping + self.radius + limits.margin_m
+
+    def _fault(
+        self, twist: Twist, stamp: float, scan: Scan | None, contact: Contact | None
+    ) -> Reason | None:
+        """What forbids any motion at all."""
+        if not (isfinite(twist.linear) and isfinite(twist.angular)):
+            return "bad command"
+        if contact is not None and contact.wheel_drop:
+            return "wheel drop"
+        if contact is not None and contact.over_current:
+            return "over-current"
+        if scan is None or stamp - scan.stamp > self.config.max_scan_age_s:
+            return "no scan"
+        return None
+
+    def _limit(self, twist: Twist) -> Twist:
+        """The twist on the same arc within the speed limits."""
+        limits = self.config
+        fastest = limits.max_speed_mps if twist.linear >= 0.0 else limits.max_reverse_speed_mps
+        scale = min(
+            1.0,
+            fastest / abs(twist.linear) if twist.linear else 1.0,
+            limits.max_turn_rate_radps / abs(twist.angular) if twist.angular else 1.0,
+        )
+        return Twist(scale * twist.linear, scale * twist.angular)
+
+    def _ramp(self, state: GuardState, target: Twist, stamp: float) -> Twist:
+        """As near to the target as the acceleration limits allow from the last twist."""
+        limits, last = self.config, state.twist
+        elapsed = LONGEST_STEP if state.stamp is None else stamp - state.stamp
+        elapsed = min(max(elapsed, 0.0), LONGEST_STEP)
+        slower = abs(target.linear) < abs(last.linear) or target.linear * last.linear < 0.0
+        change = elapsed * (limits.max_braking_mps2 if slower else limits.max_acceleration_mps2)
+        turn = elapsed * limits.max_angular_acceleration_radps2
+        return Twist(
+            min(max(target.linear, last.linear - change), last.linear + change),
+            min(max(target.angular, last.angular - turn), last.angular + turn),
+        )
+
+    def _clear_way(
+        self,
+        state: GuardState,
+        wish: Twist,
+        asked: Twist,
+        odometry: Odometry,
+        contact: Contact | None,
+    ) -> tuple[Twist, Reason | None]:
+        """The wish, slowed on its own arc so that the robot can stop before it hits anything."""
+        felt = felt_ahead(contact)
+        if felt is not None and (wish.linear > 0.0 or asked.linear > 0.0):
+            return (STANDSTILL if asked.linear > 0.0 else Twist(0.0, wish.angular)), felt
+        if wish.linear == 0.0:
+            return wish, None
+        fastest = self._fastest(state, wish, odometry)
+        if fastest >= abs(wish.linear):
+            return wish, None
+        if fastest < CREEP:
+            return Twist(0.0, wish.angular), "obstacle"
+        scale = fastest / abs(wish.linear)
+        return Twist(scale * wish.linear, scale * wish.angular), "obstacle near"
+
+    def _fastest(self, state: GuardState, wish: Twist, odometry: Odometry) -> float:
+        """The speed (m/s) from which the robot still stops in the free part of the wished arc."""
+        limits = self.config
+        points = seen_from(odometry.odom_base, state.points)
+        way = free_distance(points, wish, radius=self.radius, margin=limits.margin_m)
+        if way == inf:
+            return inf
+        delay = limits.max_braking_mps2 * limits.response_time_s
+        return sqrt(delay**2 + 2.0 * limits.max_braking_mps2 * way) - delay
+
+
+def felt_ahead(contact: Contact | None) -> Reason | None:
+    """What the robot has run into, or would fall off, if it went on."""
+    if contact is None:
+        return None
+    if contact.bumper:
+        return "bumper"
+    return "cliff" if contact.cliff else None

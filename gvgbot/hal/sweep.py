@@ -1,0 +1,126 @@
+"""What a round robot's footprint sweeps: how far it can drive on an arc before it touches."""
+
+from collections.abc import Sequence
+from math import cos, hypot, inf, sin, sqrt
+
+import numpy as np
+
+from gvgbot.geometry import Array, Pose, Twist, wrap_angle
+from gvgbot.hal.messages import Odometry, Scan
+
+STRAIGHT = 1e-3  # 1/m; a flatter arc departs less than a millimetre from a line in a metre
+TOUCH = 1e-3  # m; something this much nearer than the nearest return counts as hit
+
+
+def no_points() -> Array:
+    """An empty point set (0, 2)."""
+    return np.empty((0, 2))
+
+
+def has_sight(scan: Scan, *, share: float) -> bool:
+    """Whether at least this share of the beams is trusted (a range, or nothing within range)."""
+    trusted = len(scan.ranges) - np.count_nonzero(np.isnan(scan.ranges))
+    return bool(trusted >= share * len(scan.ranges)) and trusted > 0
+
+
+def obstacle_points(scan: Scan, track: Sequence[Odometry], *, reach: float) -> Array:
+    """Where the scan saw something within `reach` (m) of the base: (N, 2), m, odom frame.
+
+    Each beam counts from where the base was when it was measured, by the `track` of odometry.
+    """
+    mount = scan.base_laser
+    near = np.flatnonzero(scan.ranges < reach + hypot(mount.x, mount.y))
+    ranges = scan.ranges[near]
+    bearings = mount.theta + scan.angle_min + scan.angle_increment * near
+    x = mount.x + ranges * np.cos(bearings)
+    y = mount.y + ranges * np.sin(bearings)
+    first = pose_at(track, scan.stamp)
+    last = pose_at(track, scan.stamp + len(scan.ranges) * scan.time_increment)
+    return _placed(x, y, first, last, near / len(scan.ranges))
+
+
+def _placed(x: Array, y: Array, first: Pose, last: Pose, share: Array) -> Array:
+    """Points of a base that moves evenly from one pose to another, at each point's share of it."""
+    theta = first.theta + share * wrap_angle(last.theta - first.theta)
+    c, s = np.cos(theta), np.sin(theta)
+    points = np.empty((len(x), 2))
+    points[:, 0] = first.x + share * (last.x - first.x) + c * x - s * y
+    points[:, 1] = first.y + share * (last.y - first.y) + s * x + c * y
+    points.setflags(write=False)
+    return points
+
+
+def pose_at(track: Sequence[Odometry], stamp: float) -> Pose:
+    """`odom_base` at the stamp (s), between the neighbours on the track; never beyond its ends."""
+    later = track[-1]
+    if stamp >= later.stamp:
+        return later.odom_base
+    for earlier in reversed(track):
+        if earlier.stamp <= stamp:
+            share = (stamp - earlier.stamp) / (later.stamp - earlier.stamp)
+            return _between(earlier.odom_base, later.odom_base, share)
+        later = earlier
+    return later.odom_base
+
+
+def _between(first: Pose, last: Pose, share: float) -> Pose:
+    """The pose at a share of the way from the first to the last."""
+    return Pose(
+        first.x + share * (last.x - first.x),
+        first.y + share * (last.y - first.y),
+        wrap_angle(first.theta + share * wrap_angle(last.theta - first.theta)),
+    )
+
+
+def seen_from(odom_base: Pose, points: Array) -> tuple[Array, Array]:
+    """Points (N, 2) of the odom frame as x (N,) and y (N,) in the base frame, m."""
+    c, s = cos(odom_base.theta), sin(odom_base.theta)
+    x, y = points[:, 0] - odom_base.x, points[:, 1] - odom_base.y
+    return c * x + s * y, c * y - s * x
+
+
+def free_distance(
+    points: tuple[Array, Array], twist: Twist, *, radius: float, margin: float
+) -> float:
+    """How far (m) the base can go on the twist's arc until a point is within radius + margin.
+
+    `points` are x (N,) and y (N,) in the base frame, m. Where something ahead is already nearer
+    than that, the margin shrinks to what is left of it, so that a robot close to a wall may still
+    go along it or away from it. inf if nothing is in the way. `twist.linear` must not be 0.
+    """
+    x, y = points
+    if twist.linear < 0.0:
+        x, twist = -x, Twist(-twist.linear, -twist.angular)
+    ahead = x > 0.0  # the robot leaves everything else behind, for a quarter of a turn at least
+    x, y = x[ahead], y[ahead]
+    if not len(x):
+        return inf
+    nearest = sqrt(float(np.min(x * x + y * y)))
+    reach = max(radius, min(radius + margin, nearest - TOUCH))
+    curvature = twist.angular / twist.linear
+    if abs(curvature) < STRAIGHT:
+        return _free_line(x, y, reach)
+    return _free_arc(x, y if curvature > 0.0 else -y, reach, 1.0 / abs(curvature))
+
+
+def _free_line(x: Array, y: Array, reach: float) -> float:
+    """Free distance (m) straight ahead of a disc of radius `reach` (m)."""
+    hit = np.abs(y) < reach
+    if not hit.any():
+        return inf
+    x, y = x[hit], y[hit]
+    return max(0.0, float(np.min(x - np.sqrt(reach * reach - y * y))))
+
+
+def _free_arc(x: Array, y: Array, reach: float, turn: float) -> float:
+    """Free distance (m) of a disc of radius `reach` (m) on a left arc of radius `turn` (m)."""
+    below = turn - y  # the arc's centre is at (0, turn)
+    away = np.sqrt(x * x + below * below)
+    hit = np.abs(away - turn) < reach
+    if not hit.any():
+        return inf
+    x, below, away = x[hit], below[hit], away[hit]
+    abreast = np.arctan2(x, below)  # angle along the arc to where the point is abreast
+    cosine = (away * away + (turn - reach) * (turn + reach)) / (2.0 * turn * away)
+    half = np.arccos(np.maximum(cosine, -1.0))  # how much of that angle the disc spans
+    return turn * max(0.0, float(np.min(abreast - half)))
