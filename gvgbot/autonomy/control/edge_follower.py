@@ -1,0 +1,77 @@
+"""Driving along an edge: pure pursuit on its polyline, slower where it is narrow, bent or ends."""
+
+import math
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+
+from gvgbot.geometry import STANDSTILL, Array, Pose, Twist, wrap_angle
+from gvgbot.ranges import Range
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EdgeFollowerConfig:
+    """Speeds and look-ahead."""
+
+    max_speed_mps: Annotated[float, Range(0.05, 2.0)] = 0.6
+    max_turn_rate_radps: Annotated[float, Range(0.1, 4.0)] = 1.2
+    braking_mps2: Annotated[float, Range(0.05, 5.0)] = 0.4
+    look_ahead_m: Annotated[float, Range(0.1, 2.0)] = 0.25
+    look_ahead_s: Annotated[float, Range(0.0, 3.0)] = 0.5
+    turn_on_the_spot_rad: Annotated[float, Range(0.2, 3.0)] = 0.9
+    slow_clearance_m: Annotated[float, Range(0.1, 2.0)] = 0.6  # narrower than this, the robot slows down
+    min_speed_mps: Annotated[float, Range(0.01, 0.5)] = 0.15  # in the narrowest passage
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Track:
+    """What to drive along, local frame: polyline (N, 2), clearance (N,) and metres along it (N,)."""
+
+    polyline: Array
+    clearance: Array
+    stations: Array
+
+    @classmethod
+    def of(cls, polyline: Array, clearance: Array) -> "Track":
+        """A track from its polyline."""
+        steps = np.hypot(*np.diff(polyline, axis=0).T)
+        return cls(polyline, clearance, np.concatenate([[0.0], np.cumsum(steps)]))
+
+    @property
+    def length(self) -> float:
+        """Metres from end to end."""
+        return float(self.stations[-1])
+
+
+def follow(
+    track: Track, local_base: Pose, speed: float, robot_radius: float, config: EdgeFollowerConfig
+) -> Twist:
+    """The twist that drives along a track; standstill at its end. `speed` is the present one, m/s."""
+    d = np.hypot(track.polyline[:, 0] - local_base.x, track.polyline[:, 1] - local_base.y)
+    here = int(np.argmin(d))
+    remaining = track.length - float(track.stations[here])
+    ahead = config.look_ahead_m + config.look_ahead_s * max(speed, 0.0)
+    aim = int(np.searchsorted(track.stations, track.stations[here] + ahead))
+    target = track.polyline[min(aim, len(track.polyline) - 1)]
+    away = math.hypot(target[0] - local_base.x, target[1] - local_base.y)
+    if remaining < 0.05 and away < 0.1:
+        return STANDSTILL
+    angle = wrap_angle(math.atan2(target[1] - local_base.y, target[0] - local_base.x) - local_base.theta)
+    if abs(angle) > config.turn_on_the_spot_rad and away > 0.05:
+        return Twist(0.0, math.copysign(min(config.max_turn_rate_radps, 1.5 * abs(angle)), angle))
+    window = slice(here, max(here + 1, aim + 5))
+    limit = _speed_limit(float(track.clearance[window].min()), robot_radius, config)
+    limit = min(limit, math.sqrt(2 * config.braking_mps2 * max(remaining, away - 0.05, 0.0)))
+    curvature = 2 * math.sin(angle) / max(away, 0.1)
+    if abs(curvature) > 1e-6:
+        limit = min(limit, config.max_turn_rate_radps / abs(curvature))
+    limit *= max(0.2, math.cos(angle))
+    return Twist(limit, limit * curvature)
+
+
+def _speed_limit(clearance: float, robot_radius: float, config: EdgeFollowerConfig) -> float:
+    """Full speed in the open, linearly down to the least speed where the robot just fits."""
+    room = (clearance - robot_radius) / (config.slow_clearance_m - robot_radius)
+    slow, full = config.min_speed_mps, config.max_speed_mps
+    return slow + (full - slow) * min(1.0, max(0.0, room))

@@ -1,0 +1,80 @@
+"""What happened, as values; each becomes a line of events.jsonl."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class VertexAdded:
+    """A meetpoint or endpoint entered the map."""
+
+    stamp: float
+    vertex: int
+    kind: str
+    x: float
+    y: float
+    degree: int
+    clearance: float
+
+
+@dataclass(frozen=True, slots=True)
+class VertexRemoved:
+    """A vertex proved to be none on a closer look."""
+
+    stamp: float
+    vertex: int
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class EdgeJoined:
+    """Two half-edges proved to be the ends of one edge, by driving it or by seeing all of it."""
+
+    stamp: float
+    start: int
+    end: int
+    length: float
+    driven: bool
+
+
+@dataclass(frozen=True, slots=True)
+class LoopClosed:
+    """A known vertex was recognised after the robot had been away; with what the tests measured."""
+
+    stamp: float
+    vertex: int
+    away_m: float
+    mahalanobis: float
+    offset_m: float
+    inliers: float
+    rms_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """Where to go next, and why."""
+
+    stamp: float
+    vertex: int | None
+    bearing: float | None
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Recovery:
+    """The robot was stuck or lost its edge, and did something about it."""
+
+    stamp: float
+    action: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Finished:
+    """Exploration ended."""
+
+    stamp: float
+    outcome: str
+    reason: str
+
+
+Event = VertexAdded | VertexRemoved | EdgeJoined | LoopClosed | Decision | Recovery | Finished

@@ -1,0 +1,42 @@
+"""Shortest paths over the GVG graph, as half-edges to leave by."""
+
+import heapq
+from dataclasses import dataclass
+
+from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
+
+
+@dataclass(frozen=True, slots=True)
+class Approach:
+    """A way to arrive at a vertex: metres, the half-edge of arrival, and the departures on the way."""
+
+    metres: float
+    arrival: HalfEdgeId
+    departures: tuple[HalfEdgeId, ...] = ()
+
+
+def shortest_paths(graph: GvgGraph, starts: list[Approach]) -> dict[int, Approach]:
+    """The shortest approach to every vertex that can be reached, from one or more first arrivals.
+
+    Dijkstra on the multigraph; ties go to the smaller ids, so that equal runs stay equal.
+    """
+    queue = [(s.metres, i, s) for i, s in enumerate(starts)]
+    heapq.heapify(queue)
+    serial = len(queue)
+    done: dict[int, Approach] = {}
+    while queue:
+        _, _, here = heapq.heappop(queue)
+        vertex = here.arrival.vertex
+        if vertex in done or vertex not in graph.vertices:
+            continue
+        done[vertex] = here
+        for key, half in graph.vertices[vertex].half_edges.items():
+            if half.edge is None or half.blocked:
+                continue
+            edge = graph.edges[half.edge]
+            out = HalfEdgeId(vertex, key)
+            far = Approach(here.metres + edge.length, edge.other(out), (*here.departures, out))
+            if far.arrival.vertex not in done:
+                serial += 1
+                heapq.heappush(queue, (far.metres, serial, far))
+    return done

@@ -1,0 +1,387 @@
+"""From what is seen of the GVG to what is known of it: vertices matched, added, corrected and joined."""
+
+import math
+from dataclasses import dataclass, field
+from typing import Annotated
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from gvgbot.autonomy.events import EdgeJoined, Event, LoopClosed, VertexAdded, VertexRemoved
+from gvgbot.autonomy.gvg.local import Branch, LocalGvg, LocalNode
+from gvgbot.autonomy.slam import ekf
+from gvgbot.autonomy.slam.ekf import Belief
+from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Kind, Vertex
+from gvgbot.autonomy.slam.recognition import (
+    RecognitionConfig,
+    Sighting,
+    detection_covariance,
+    gate_distance,
+    looks_alike,
+    match_bearings,
+)
+from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig, register
+from gvgbot.geometry import Array, Pose
+from gvgbot.ranges import Range
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MappingConfig:
+    """How much must be seen before it is believed."""
+
+    trust_m: Annotated[float, Range(1.0, 30.0)] = 7.0  # vertices farther away are not yet believed
+    meetpoint_sightings: Annotated[int, Range(1, 50)] = 4
+    endpoint_sightings: Annotated[int, Range(1, 50)] = 6
+    misses: Annotated[int, Range(1, 50)] = 6  # sightings of a plain edge that refute a vertex
+    conflicts: Annotated[int, Range(1, 50)] = 4  # sightings that overrule an edge
+    update_every_m: Annotated[float, Range(0.1, 10.0)] = 1.0
+    recognise_within_m: Annotated[float, Range(1.0, 20.0)] = 5.0
+    min_inliers: Annotated[float, Range(0.1, 1.0)] = 0.6  # share of a vertex's walls found again
+    snapshot_m: Annotated[float, Range(1.0, 20.0)] = 6.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class View:
+    """All that one keyframe shows, in the local frame."""
+
+    stamp: float
+    travelled: float  # metres
+    local_base: Pose
+    gvg: LocalGvg
+    walls: Array  # (N, 2)
+
+
+@dataclass(slots=True, eq=False)
+class Correspondence:
+    """Which part of the local GVG is which part of the graph."""
+
+    vertex_of: dict[int, int] = field(default_factory=dict)
+    node_of: dict[int, int] = field(default_factory=dict)
+    half_edge_of: dict[Branch, HalfEdgeId] = field(default_factory=dict)
+    branch_of: dict[HalfEdgeId, Branch] = field(default_factory=dict)
+
+    def pair(self, node: int, vertex: int) -> None:
+        """Note that a local node is a vertex."""
+        self.vertex_of[node], self.node_of[vertex] = vertex, node
+
+    def pair_branch(self, branch: Branch, end: HalfEdgeId) -> None:
+        """Note that a local branch is a half-edge."""
+        self.half_edge_of[branch], self.branch_of[end] = end, branch
+
+
+@dataclass(slots=True, eq=False)
+class _Tentative:
+    """A vertex seen, but not often enough."""
+
+    position: Array
+    meetpoint: bool
+    seen_at: float
+    sightings: int = 1
+
+
+class Mapper:
+    """Keeps the belief and the graph; both are corrected by every view."""
+
+    def __init__(
+        self, config: MappingConfig, recognition: RecognitionConfig, matching: ScanMatchingConfig
+    ) -> None:
+        self._config, self._recognition, self._matching = config, recognition, matching
+        self.belief = Belief()
+        self.graph = GvgGraph()
+        self._tentative: list[_Tentative] = []
+        self._events: list[Event] = []
+
+    def move(self, motion: Pose, covariance: Array) -> None:
+        """Account for a motion of the base, with its covariance (3, 3)."""
+        self.belief = ekf.predict(self.belief, motion, covariance)
+
+    def observe(self, view: View) -> tuple[Correspondence, list[Event]]:
+        """Match a view with the map and learn from it."""
+        self._events = []
+        known = Correspondence()
+        sightings = self._sightings(view)
+        self._track(view, sightings, known)
+        self._recognise(view, sightings, known)
+        self._consider(view, sightings, known)
+        for node, vertex in list(known.vertex_of.items()):
+            self._refresh(view, sightings[node], view.gvg.nodes[node], self.graph.vertices[vertex], known)
+        self._refute(view, known)
+        self._join(view, known)
+        return known, self._events
+
+    # -- which vertex is it ------------------------------------------------------------------
+
+    def _sightings(self, view: View) -> dict[int, Sighting]:
+        base = view.local_base.position
+        return {
+            key: _sighting(view.gvg, node)
+            for key, node in view.gvg.nodes.items()
+            if (node.is_meetpoint or node.is_endpoint)
+            and np.hypot(*(node.position - base)) < self._config.trust_m
+        }
+
+    def _track(self, view: View, sightings: dict[int, Sighting], known: Correspondence) -> None:
+        """Vertices seen moments ago are told by their place in the local map."""
+        pairs = sorted(
+            (float(np.hypot(*(sighting.position - vertex.local.position))), node, vertex.id)
+            for vertex in self.graph.vertices.values()
+            if view.travelled - vertex.seen_at < self._recognition.tracked_m
+            for node, sighting in sightings.items()
+            if sighting.meetpoint == (vertex.kind == "meetpoint")
+        )
+        for metres, node, vertex_id in pairs:
+            if metres > self._recognition.same_place_m:
+                break
+            if node not in known.vertex_of and vertex_id not in known.node_of:
+                known.pair(node, vertex_id)
+
+    def _recognise(self, view: View, sightings: dict[int, Sighting], known: Correspondence) -> None:
+        """Vertices that were out of sight for long must pass all the tests."""
+        base = view.local_base.position
+        for node, sighting in sightings.items():
+            away = np.hypot(*(sighting.position - base))
+            if node in known.vertex_of or away > self._config.recognise_within_m:
+                continue
+            candidates = [
+                c for c in self._candidates(view, sighting) if c[1].id not in known.node_of
+            ]
+            for distance, vertex, metres in candidates:
+                if self._close_loop(view, sighting, vertex, distance, metres):
+                    known.pair(node, vertex.id)
+                    break
+
+    def _candidates(self, view: View, sighting: Sighting) -> list[tuple[float, Vertex, float]]:
+        """Known vertices, out of sight for long, inside the gate of a sighting; most likely first."""
+        found = []
+        for vertex in self.graph.vertices.values():
+            if view.travelled - vertex.seen_at < self._recognition.tracked_m:
+                continue
+            d2, metres = gate_distance(
+                self.belief, vertex, sighting, view.local_base, self._recognition
+            )
+            if d2 < self._recognition.gate or metres < self._recognition.same_place_m:
+                found.append((d2, vertex.id, vertex, metres))
+        return [(d2, vertex, metres) for d2, _, vertex, metres in sorted(found, key=lambda f: f[:2])]
+
+    def _close_loop(
+        self, view: View, sighting: Sighting, vertex: Vertex, distance: float, metres: float
+    ) -> bool:
+        """Recognise a vertex and correct the belief by it, if shape and walls agree."""
+        foreseen = view.local_base.compose(ekf.expected(self.belief, vertex.id)[0])
+        if not looks_alike(vertex, sighting, foreseen, self._recognition):
+            return False
+        turn_sigma = math.sqrt(float(self.belief.P[2, 2])) + 0.02
+        prior = Pose(float(sighting.position[0]), float(sighting.position[1]), foreseen.theta)
+        found = register(
+            vertex.snapshot,
+            cKDTree(view.walls),
+            view.walls,
+            prior,
+            np.diag([0.15**2, 0.15**2, turn_sigma**2]),
+            self._matching,
+        )
+        if found is None or found.inliers < self._config.min_inliers:
+            return False
+        away = view.travelled - vertex.seen_at
+        vertex.local, vertex.seen_at, vertex.updated_at = found.pose, view.travelled, view.travelled
+        vertex.visits += 1
+        R = found.covariance + np.diag([0.02**2, 0.02**2, 0.003**2])
+        base_vertex = view.local_base.to(found.pose)
+        turn = Pose(0.0, 0.0, base_vertex.theta)
+        rotation = np.array([[math.cos(turn.theta), -math.sin(turn.theta)], [math.sin(turn.theta), math.cos(turn.theta)]])
+        R[:2, :2] = rotation @ R[:2, :2] @ rotation.T
+        R[:2, 2] = rotation @ R[:2, 2]
+        R[2, :2] = R[:2, 2]
+        self.belief = ekf.update(self.belief, vertex.id, base_vertex, R)
+        self._events.append(
+            LoopClosed(view.stamp, vertex.id, away, distance, metres, found.inliers, found.rms)
+        )
+        return True
+
+    # -- what is new -------------------------------------------------------------------------
+
+    def _consider(self, view: View, sightings: dict[int, Sighting], known: Correspondence) -> None:
+        """Count sightings of what is not known yet, and believe what has been seen often enough."""
+        for node, sighting in sightings.items():
+            if node in known.vertex_of:
+                continue
+            tentative = self._remember(view, sighting)
+            needed = (
+                self._config.meetpoint_sightings if sighting.meetpoint else self._config.endpoint_sightings
+            )
+            near = np.hypot(*(sighting.position - view.local_base.position)) < 1.5
+            if tentative.sightings < needed or self._crowded(view, sighting):
+                continue
+            if self._candidates(view, sighting) and not (near and tentative.sightings >= 2 * needed):
+                continue  # it may be a known one: look at it from closer
+            self._tentative.remove(tentative)
+            known.pair(node, self._add(view, sighting).id)
+
+    def _crowded(self, view: View, sighting: Sighting) -> bool:
+        """Whether a vertex of this kind that is in sight stands here already."""
+        return any(
+            np.hypot(*(vertex.local.position - sighting.position)) < 0.5 * self._recognition.same_place_m
+            for vertex in self.graph.vertices.values()
+            if view.travelled - vertex.seen_at < self._recognition.tracked_m
+            and sighting.meetpoint == (vertex.kind == "meetpoint")
+        )
+
+    def _remember(self, view: View, sighting: Sighting) -> _Tentative:
+        self._tentative = [t for t in self._tentative if view.travelled - t.seen_at < 12.0]
+        for tentative in self._tentative:
+            if (
+                tentative.meetpoint == sighting.meetpoint
+                and np.hypot(*(tentative.position - sighting.position)) < 0.5
+            ):
+                tentative.position, tentative.seen_at = sighting.position, view.travelled
+                tentative.sightings += 1
+                return tentative
+        self._tentative.append(_Tentative(sighting.position, sighting.meetpoint, view.travelled))
+        return self._tentative[-1]
+
+    def _add(self, view: View, sighting: Sighting) -> Vertex:
+        kind: Kind = "meetpoint" if sighting.meetpoint else "endpoint"
+        local = Pose(float(sighting.position[0]), float(sighting.position[1]), 0.0)
+        vertex = Vertex(
+            self.graph.next_id(), kind, sighting.clearance, local, view.travelled, view.travelled
+        )
+        for bearing in sighting.bearings:
+            vertex.add_half_edge(bearing)
+        self.graph.vertices[vertex.id] = vertex
+        base_vertex = view.local_base.to(local)
+        R = np.zeros((3, 3))
+        R[:2, :2] = detection_covariance(math.hypot(base_vertex.x, base_vertex.y), self._recognition)
+        R[2, 2] = 1e-6
+        self.belief = ekf.add_vertex(self.belief, vertex.id, base_vertex, R)
+        self._picture(view, vertex)
+        place = self.belief.map_vertex(vertex.id)
+        self._events.append(
+            VertexAdded(
+                view.stamp, vertex.id, kind, place.x, place.y, vertex.degree, vertex.clearance
+            )
+        )
+        return vertex
+
+    def _picture(self, view: View, vertex: Vertex) -> None:
+        """Keep the walls around a vertex, to know them again."""
+        near = np.hypot(*(view.walls - vertex.local.position).T) < self._config.snapshot_m
+        vertex.snapshot = vertex.local.inverse().transform(view.walls[near])
+
+    # -- what is known better ----------------------------------------------------------------
+
+    def _refresh(
+        self, view: View, sighting: Sighting, node: LocalNode, vertex: Vertex, known: Correspondence
+    ) -> None:
+        """Sharpen a vertex by a further sighting."""
+        share = 1.0 / min(vertex.sightings + 1, 10)
+        position = (1 - share) * vertex.local.position + share * sighting.position
+        vertex.local = Pose(float(position[0]), float(position[1]), vertex.local.theta)
+        vertex.sightings += 1
+        vertex.misses = 0
+        vertex.seen_at = view.travelled
+        near = np.hypot(*(position - view.local_base.position)) < 1.0
+        if node.settled:
+            vertex.clearance += share * (sighting.clearance - vertex.clearance)
+        if near and vertex.visits == 1 and node.settled:
+            self._picture(view, vertex)
+        self._match_half_edges(view, node, vertex, known)
+        if view.travelled - vertex.updated_at > self._config.update_every_m:
+            vertex.updated_at = view.travelled
+            base_vertex = view.local_base.to(vertex.local)
+            R = detection_covariance(math.hypot(base_vertex.x, base_vertex.y), self._recognition)
+            self.belief = ekf.update(self.belief, vertex.id, base_vertex, R)
+
+    def _match_half_edges(
+        self, view: View, node: LocalNode, vertex: Vertex, known: Correspondence
+    ) -> None:
+        branches = [b for b in node.branches if b not in node.weak]
+        bearings = tuple(view.gvg.bearing(b, node.clearance) for b in branches)
+        turned = {k: h.bearing + vertex.local.theta for k, h in vertex.half_edges.items()}
+        matched = match_bearings(bearings, turned, math.radians(self._recognition.bearing_deg))
+        for i, key in matched.items():
+            half = vertex.half_edges[key]
+            half.sightings += 1
+            half.misses = 0
+            known.pair_branch(branches[i], HalfEdgeId(vertex.id, key))
+        for i, bearing in enumerate(bearings):
+            if i not in matched:
+                key = vertex.add_half_edge(bearing - vertex.local.theta)
+                known.pair_branch(branches[i], HalfEdgeId(vertex.id, key))
+        if node.settled:
+            self._doubt_half_edges(vertex, set(matched.values()), len(branches))
+
+    def _doubt_half_edges(self, vertex: Vertex, seen: set[int], degree: int) -> None:
+        """Drop departures that a clear view keeps not showing."""
+        for key, half in list(vertex.half_edges.items()):
+            if key in seen or vertex.degree <= degree:
+                continue
+            half.misses += 1
+            edge = self.graph.edge_at(HalfEdgeId(vertex.id, key))
+            if half.misses > self._config.misses and (edge is None or not edge.driven):
+                self.graph.remove_half_edge(HalfEdgeId(vertex.id, key))
+
+    def _refute(self, view: View, known: Correspondence) -> None:
+        """Remove vertices where a plain edge is seen to pass through."""
+        for vertex in list(self.graph.vertices.values()):
+            if vertex.id in known.node_of or view.travelled - vertex.seen_at > 6.0:
+                continue
+            if self._passes_through(view, vertex):
+                vertex.misses += 1
+                if vertex.misses > self._config.misses:
+                    self.graph.remove_vertex(vertex.id)
+                    self.belief = ekf.remove_vertex(self.belief, vertex.id)
+                    self._events.append(VertexRemoved(view.stamp, vertex.id, "an edge passes here"))
+
+    def _passes_through(self, view: View, vertex: Vertex) -> bool:
+        if np.hypot(*(vertex.local.position - view.local_base.position)) > 4.0:
+            return False
+        place = view.gvg.place(vertex.local.position)
+        if place is None or place.distance > 0.3:
+            return False
+        edge = view.gvg.edges[place.edge]
+        return self._recognition.same_place_m < place.station < edge.length - self._recognition.same_place_m
+
+    # -- what hangs together -----------------------------------------------------------------
+
+    def _join(self, view: View, known: Correspondence) -> None:
+        """Make edges of those that are in sight from end to end."""
+        for key, edge in view.gvg.edges.items():
+            a = known.half_edge_of.get(Branch(key, forward=True))
+            b = known.half_edge_of.get(Branch(key, forward=False))
+            if a is None or b is None or a == b:
+                continue
+            here, there = self.graph.edge_at(a), self.graph.edge_at(b)
+            if here is None and there is None:
+                self.join(view, a, b, edge.polyline, float(edge.clearance.min()), driven=False)
+            elif here is not there:
+                self._dispute(here, there)
+
+    def _dispute(self, *disputed: object) -> None:
+        """Sight speaks against edges believed so far; after a few times it wins."""
+        for edge in disputed:
+            if edge is not None:
+                edge.conflicts += 1
+                if edge.conflicts > self._config.conflicts and edge.id in self.graph.edges:
+                    self.graph.unjoin(edge)
+
+    def join(
+        self,
+        view: View,
+        a: HalfEdgeId,
+        b: HalfEdgeId,
+        local_line: Array,
+        min_clearance: float,
+        *,
+        driven: bool,
+    ) -> None:
+        """Make an edge of two frontiers; polyline (N, 2) from a to b in the local frame."""
+        line = self.graph.vertices[a.vertex].local.inverse().transform(local_line)
+        edge = self.graph.join(a, b, line, min_clearance, driven=driven)
+        self._events.append(EdgeJoined(view.stamp, a.vertex, b.vertex, edge.length, driven))
+
+
+def _sighting(gvg: LocalGvg, node: LocalNode) -> Sighting:
+    bearings = tuple(
+        gvg.bearing(branch, node.clearance) for branch in node.branches if branch not in node.weak
+    )
+    return Sighting(node.position, node.clearance, bearings, node.is_meetpoint)

@@ -1,0 +1,173 @@
+"""EKF-SLAM over the robot's pose and one pose per vertex.
+
+State x = (x, y, theta, then x, y, psi of each vertex), map frame; P its covariance. A vertex's frame has
+its origin on the vertex and the orientation that the local frame had when the vertex was first seen,
+so that bearings and snapshots stored with the vertex turn with it. Letters as in the literature:
+F, G Jacobians, H measurement Jacobian, K gain, S innovation covariance.
+"""
+
+import math
+from dataclasses import dataclass, field
+from typing import Annotated
+
+import numpy as np
+
+from gvgbot.geometry import Array, Pose, wrap_angle
+from gvgbot.ranges import Range
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OdometryNoise:
+    """How the variance of dead reckoning grows with distance, turning and time."""
+
+    along_m_per_sqrt_m: Annotated[float, Range(0.0, 1.0)] = 0.03
+    along_m_per_sqrt_rad: Annotated[float, Range(0.0, 1.0)] = 0.01
+    turn_rad_per_sqrt_rad: Annotated[float, Range(0.0, 1.0)] = 0.02
+    turn_rad_per_sqrt_m: Annotated[float, Range(0.0, 1.0)] = 0.01
+    turn_rad_per_sqrt_s: Annotated[float, Range(0.0, 1.0)] = 0.003
+
+    def covariance(self, motion: Pose, duration: float) -> Array:
+        """Covariance (3, 3) of a short motion, in the frame of its start.
+
+        White noise on distance and heading along an almost straight stretch of length d: heading
+        noise that accrues evenly shows up sideways with d^2/3 and correlated with d/2.
+        """
+        d, turn = math.hypot(motion.x, motion.y), abs(motion.theta)
+        along = self.along_m_per_sqrt_m**2 * d + self.along_m_per_sqrt_rad**2 * turn
+        heading = (
+            self.turn_rad_per_sqrt_rad**2 * turn
+            + self.turn_rad_per_sqrt_m**2 * d
+            + self.turn_rad_per_sqrt_s**2 * duration
+        )
+        sideways = heading * d * d / 3 + self.along_m_per_sqrt_rad**2 * turn
+        return np.array(
+            [
+                [along + 1e-8, 0.0, 0.0],
+                [0.0, sideways + 1e-8, heading * d / 2],
+                [0.0, heading * d / 2, heading + 1e-10],
+            ]
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Belief:
+    """Mean x (3 + 3n,) and covariance P of the robot and the vertices, in the order of `ids`."""
+
+    x: Array = field(default_factory=lambda: np.zeros(3))
+    P: Array = field(default_factory=lambda: np.zeros((3, 3)))
+    ids: tuple[int, ...] = ()
+
+    @property
+    def map_base(self) -> Pose:
+        """The robot's pose."""
+        return Pose.from_array(self.x[:3])
+
+    def _at(self, vertex: int) -> int:
+        return 3 + 3 * self.ids.index(vertex)
+
+    def map_vertex(self, vertex: int) -> Pose:
+        """The pose of a vertex's frame."""
+        i = self._at(vertex)
+        return Pose.from_array(self.x[i : i + 3])
+
+    def vertex_covariance(self, vertex: int) -> Array:
+        """Position covariance (2, 2) of a vertex, m^2."""
+        i = self._at(vertex)
+        return self.P[i : i + 2, i : i + 2]
+
+
+def predict(belief: Belief, motion: Pose, Q: Array) -> Belief:
+    """The belief after a motion (base seen from where it was) with covariance Q (3, 3)."""
+    c, s = math.cos(belief.x[2]), math.sin(belief.x[2])
+    moved = belief.map_base.compose(motion)
+    F = np.array(
+        [
+            [1.0, 0.0, -s * motion.x - c * motion.y],
+            [0.0, 1.0, c * motion.x - s * motion.y],
+            [0.0, 0.0, 1.0],
+        ]
+    )
+    G = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    x, P = belief.x.copy(), belief.P.copy()
+    x[:3] = moved.x, moved.y, moved.theta
+    P[:3, 3:] = F @ P[:3, 3:]
+    P[3:, :3] = P[:3, 3:].T
+    P[:3, :3] = F @ P[:3, :3] @ F.T + G @ Q @ G.T
+    return Belief(x, P, belief.ids)
+
+
+def add_vertex(belief: Belief, vertex: int, base_vertex: Pose, R: Array) -> Belief:
+    """The belief with a vertex first seen at a pose in the base frame, with covariance R (3, 3)."""
+    n = len(belief.x)
+    c, s = math.cos(belief.x[2]), math.sin(belief.x[2])
+    placed = belief.map_base.compose(base_vertex)
+    J_r = np.array(
+        [
+            [1.0, 0.0, -s * base_vertex.x - c * base_vertex.y],
+            [0.0, 1.0, c * base_vertex.x - s * base_vertex.y],
+            [0.0, 0.0, 1.0],
+        ]
+    )
+    J_z = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    P = np.zeros((n + 3, n + 3))
+    P[:n, :n] = belief.P
+    P[n:, :n] = J_r @ belief.P[:3]
+    P[:n, n:] = P[n:, :n].T
+    P[n:, n:] = J_r @ belief.P[:3, :3] @ J_r.T + J_z @ R @ J_z.T
+    x = np.concatenate([belief.x, [placed.x, placed.y, placed.theta]])
+    return Belief(x, P, (*belief.ids, vertex))
+
+
+def remove_vertex(belief: Belief, vertex: int) -> Belief:
+    """The belief without a vertex that proved to be none."""
+    i = 3 + 3 * belief.ids.index(vertex)
+    keep = np.delete(np.arange(len(belief.x)), slice(i, i + 3))
+    ids = tuple(v for v in belief.ids if v != vertex)
+    return Belief(belief.x[keep], belief.P[np.ix_(keep, keep)], ids)
+
+
+def expected(belief: Belief, vertex: int) -> tuple[Pose, Array]:
+    """Pose of a vertex in the base frame, and its Jacobian H (3, 3 + 3n)."""
+    i = 3 + 3 * belief.ids.index(vertex)
+    base_vertex = belief.map_base.to(belief.map_vertex(vertex))
+    c, s = math.cos(belief.x[2]), math.sin(belief.x[2])
+    H = np.zeros((3, len(belief.x)))
+    H[:2, :2] = [[-c, -s], [s, -c]]
+    H[:2, 2] = base_vertex.y, -base_vertex.x
+    H[:2, i : i + 2] = [[c, s], [-s, c]]
+    H[2, 2], H[2, i + 2] = -1.0, 1.0
+    return base_vertex, H
+
+
+def innovation(belief: Belief, vertex: int, base_vertex: Pose, R: Array) -> tuple[Array, Array, Array]:
+    """Measured minus expected pose of a vertex r, its covariance S, and H.
+
+    R of shape (2, 2) uses the position alone, (3, 3) the heading as well.
+    """
+    k = len(R)
+    foreseen, H = expected(belief, vertex)
+    r = np.array(
+        [
+            base_vertex.x - foreseen.x,
+            base_vertex.y - foreseen.y,
+            wrap_angle(base_vertex.theta - foreseen.theta),
+        ]
+    )[:k]
+    H = H[:k]
+    return r, H @ belief.P @ H.T + R, H
+
+
+def update(belief: Belief, vertex: int, base_vertex: Pose, R: Array) -> Belief:
+    """The belief after seeing a vertex again; Joseph form, positive whatever the gain."""
+    r, S, H = innovation(belief, vertex, base_vertex, R)
+    K = np.linalg.solve(S, H @ belief.P).T
+    x = belief.x + K @ r
+    x[2::3] = np.array([wrap_angle(a) for a in x[2::3]])
+    I_KH = np.eye(len(x)) - K @ H
+    P = I_KH @ belief.P @ I_KH.T + K @ R @ K.T
+    return Belief(x, (P + P.T) / 2, belief.ids)
+
+
+def mahalanobis(r: Array, S: Array) -> float:
+    """Squared Mahalanobis distance of an innovation."""
+    return float(r @ np.linalg.solve(S, r))

@@ -1,0 +1,170 @@
+"""The GVG graph: vertices with half-edges in rotation order, and edges that pair them.
+
+A half-edge is one end of an edge at a vertex; one without an edge is a frontier. Pairing half-edges
+rather than vertices makes self-loops and parallel edges ordinary.
+"""
+
+import math
+from dataclasses import dataclass, field
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from gvgbot.geometry import Array, Pose, wrap_angle
+
+Kind = Literal["meetpoint", "endpoint"]
+
+
+class HalfEdgeId(NamedTuple):
+    """A half-edge: its vertex and its key at that vertex."""
+
+    vertex: int
+    key: int
+
+
+@dataclass(slots=True, eq=False)
+class HalfEdge:
+    """A departure from a vertex; bearing in the vertex's frame, rad."""
+
+    bearing: float
+    edge: int | None = None
+    blocked: bool = False
+    sightings: int = 1
+    misses: int = 0
+
+    @property
+    def open(self) -> bool:
+        """Whether it is a frontier: nothing known beyond it, and no reason not to go there."""
+        return self.edge is None and not self.blocked
+
+
+@dataclass(slots=True, eq=False)
+class Vertex:
+    """A meetpoint or endpoint. Its pose is in the belief; `local` is where the local map has it."""
+
+    id: int
+    kind: Kind
+    clearance: float
+    local: Pose
+    seen_at: float  # metres driven when last seen
+    updated_at: float  # metres driven when it last corrected the belief
+    half_edges: dict[int, HalfEdge] = field(default_factory=dict)
+    snapshot: Array = field(default_factory=lambda: np.empty((0, 2)))  # walls around it, vertex frame
+    sightings: int = 1
+    misses: int = 0
+    visits: int = 1
+    serial: int = 0
+
+    def add_half_edge(self, bearing: float) -> int:
+        """The key of a new half-edge."""
+        key, self.serial = self.serial, self.serial + 1
+        self.half_edges[key] = HalfEdge(wrap_angle(bearing))
+        return key
+
+    def clockwise_from(self, key: int) -> list[int]:
+        """All half-edges in clockwise order after one; that one comes last."""
+        start = self.half_edges[key].bearing
+
+        def turn(other: int) -> float:
+            angle = (start - self.half_edges[other].bearing) % math.tau
+            return angle if other != key else math.tau + 1.0
+
+        return sorted(self.half_edges, key=lambda k: (turn(k), k))
+
+    @property
+    def degree(self) -> int:
+        """Number of departures."""
+        return len(self.half_edges)
+
+
+@dataclass(slots=True, eq=False)
+class Edge:
+    """A stretch of GVG between two half-edges; polyline (N, 2) from a to b in the frame of a's vertex."""
+
+    id: int
+    a: HalfEdgeId
+    b: HalfEdgeId
+    polyline: Array
+    length: float
+    min_clearance: float
+    driven: bool = False
+    traversals: int = 0
+    conflicts: int = 0
+
+    def other(self, end: HalfEdgeId) -> HalfEdgeId:
+        """The half-edge at the far end."""
+        return self.b if end == self.a else self.a
+
+
+@dataclass(slots=True, eq=False)
+class GvgGraph:
+    """Vertices and edges by id, in order of discovery."""
+
+    vertices: dict[int, Vertex] = field(default_factory=dict)
+    edges: dict[int, Edge] = field(default_factory=dict)
+    serial: int = 0
+
+    def next_id(self) -> int:
+        """An id never used before."""
+        self.serial += 1
+        return self.serial
+
+    def half_edge(self, end: HalfEdgeId) -> HalfEdge | None:
+        """The half-edge, or None if it is no more."""
+        vertex = self.vertices.get(end.vertex)
+        return None if vertex is None else vertex.half_edges.get(end.key)
+
+    def edge_at(self, end: HalfEdgeId) -> Edge | None:
+        """The edge of a half-edge, None for a frontier."""
+        half = self.half_edge(end)
+        return None if half is None or half.edge is None else self.edges[half.edge]
+
+    def join(
+        self, a: HalfEdgeId, b: HalfEdgeId, polyline: Array, min_clearance: float, *, driven: bool
+    ) -> Edge:
+        """Make an edge of two frontiers; polyline (N, 2) from a to b in the frame of a's vertex."""
+        length = float(np.hypot(*np.diff(polyline, axis=0).T).sum())
+        edge = Edge(self.next_id(), a, b, polyline, length, min_clearance, driven, int(driven))
+        self.edges[edge.id] = edge
+        for end in (a, b):
+            self.vertices[end.vertex].half_edges[end.key].edge = edge.id
+        return edge
+
+    def unjoin(self, edge: Edge) -> None:
+        """Take an edge out again; its half-edges become frontiers."""
+        del self.edges[edge.id]
+        for end in (edge.a, edge.b):
+            half = self.half_edge(end)
+            if half is not None:
+                half.edge = None
+
+    def remove_half_edge(self, end: HalfEdgeId) -> None:
+        """Take a half-edge out, with its edge."""
+        edge = self.edge_at(end)
+        if edge is not None:
+            self.unjoin(edge)
+        del self.vertices[end.vertex].half_edges[end.key]
+
+    def remove_vertex(self, vertex: int) -> None:
+        """Take a vertex out; the edges that ended there become frontiers at their other ends."""
+        for key in list(self.vertices[vertex].half_edges):
+            self.remove_half_edge(HalfEdgeId(vertex, key))
+        del self.vertices[vertex]
+
+    def frontiers(self) -> list[HalfEdgeId]:
+        """All open half-edges."""
+        return [
+            HalfEdgeId(v.id, key)
+            for v in self.vertices.values()
+            for key, half in v.half_edges.items()
+            if half.open
+        ]
+
+    def blocked(self) -> list[HalfEdgeId]:
+        """All half-edges that were given up."""
+        return [
+            HalfEdgeId(v.id, key)
+            for v in self.vertices.values()
+            for key, half in v.half_edges.items()
+            if half.blocked
+        ]

@@ -1,0 +1,86 @@
+"""Which known vertex is this? Tests in the order of their cost; what fails all of them is new.
+
+A vertex seen moments ago is told by its place in the local map alone. One not seen for a while must
+pass the Mahalanobis gate with the full joint covariance, then degree, clearance and bearings under the
+best rotation of the departures, and last the registration of the walls around it.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+
+from gvgbot.autonomy.slam.ekf import Belief, innovation, mahalanobis
+from gvgbot.autonomy.slam.graph import Vertex
+from gvgbot.geometry import Array, Pose, wrap_angle
+from gvgbot.ranges import Range
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RecognitionConfig:
+    """Gates of the tests."""
+
+    tracked_m: Annotated[float, Range(1.0, 100.0)] = 12.0  # driven since last seen: told by place alone
+    same_place_m: Annotated[float, Range(0.2, 2.0)] = 0.8
+    gate: Annotated[float, Range(1.0, 50.0)] = 13.8  # squared Mahalanobis distance, 2 degrees of freedom
+    clearance_m: Annotated[float, Range(0.05, 2.0)] = 0.3
+    bearing_deg: Annotated[float, Range(5.0, 90.0)] = 40.0
+    detection_sigma_m: Annotated[float, Range(0.01, 1.0)] = 0.08
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sighting:
+    """A vertex as seen now: position (2,) and bearings in the local frame."""
+
+    position: Array
+    clearance: float
+    bearings: tuple[float, ...]
+    meetpoint: bool
+
+
+def detection_covariance(distance: float, config: RecognitionConfig) -> Array:
+    """Covariance (2, 2) of a vertex position seen from a distance, m^2."""
+    return np.eye(2) * (config.detection_sigma_m**2 + (0.015 * distance) ** 2)
+
+
+def match_bearings(seen: tuple[float, ...], known: dict[int, float], limit: float) -> dict[int, int]:
+    """Pairs of directions that agree, closest first: index of `seen` -> key of `known`."""
+    pairs = sorted(
+        (abs(wrap_angle(a - b)), i, key) for i, a in enumerate(seen) for key, b in known.items()
+    )
+    matched: dict[int, int] = {}
+    for angle, i, key in pairs:
+        if angle > limit:
+            break
+        if i not in matched and key not in matched.values():
+            matched[i] = key
+    return matched
+
+
+def gate_distance(
+    belief: Belief, vertex: Vertex, sighting: Sighting, local_base: Pose, config: RecognitionConfig
+) -> tuple[float, float]:
+    """Squared Mahalanobis distance and metres between a sighting and a known vertex."""
+    seen = local_base.inverse().transform(sighting.position)
+    R = detection_covariance(float(np.hypot(*seen)), config)
+    r, S, _ = innovation(belief, vertex.id, Pose(float(seen[0]), float(seen[1])), R)
+    return mahalanobis(r, S), float(np.hypot(*r))
+
+
+def looks_alike(
+    vertex: Vertex, sighting: Sighting, local_vertex: Pose, config: RecognitionConfig
+) -> bool:
+    """Whether kind, degree, clearance and bearings agree, the vertex's frame seen at `local_vertex`.
+
+    A degree that differs by one passes: of a pair of close meetpoints either may be seen as one.
+    """
+    if (vertex.kind == "meetpoint") != sighting.meetpoint:
+        return False
+    if abs(vertex.degree - len(sighting.bearings)) > 1:
+        return False
+    if abs(vertex.clearance - sighting.clearance) > max(config.clearance_m, 0.15 * vertex.clearance):
+        return False
+    known = {key: half.bearing + local_vertex.theta for key, half in vertex.half_edges.items()}
+    matched = match_bearings(sighting.bearings, known, math.radians(config.bearing_deg))
+    return len(matched) >= min(len(known), len(sighting.bearings))

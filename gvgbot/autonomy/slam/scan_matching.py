@@ -1,0 +1,106 @@
+"""Registration of points on the walls of a map: Gauss-Newton, point to line, with a prior.
+
+The prior is the odometry's own covariance, so the direction that the walls do not constrain (along a
+bare corridor) is left to odometry.
+"""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from gvgbot.geometry import Array, Pose, wrap_angle
+from gvgbot.ranges import Range
+
+_NEIGHBOURS = 5
+_FLATNESS = 0.08  # smallest over largest spread of the neighbours of a point on a wall
+_ITERATIONS = 6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ScanMatchingConfig:
+    """How far points are paired, and how much one pair is worth."""
+
+    max_pair_m: Annotated[float, Range(0.05, 1.0)] = 0.25
+    pair_sigma_m: Annotated[float, Range(0.005, 0.5)] = 0.03
+    independent_share: Annotated[float, Range(0.001, 1.0)] = 0.1  # neighbouring pairs err together
+    min_pairs: Annotated[int, Range(10, 1000)] = 40
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Registration:
+    """A pose with its covariance (3, 3) in its own frame, and how well the points lie on the walls."""
+
+    pose: Pose
+    covariance: Array
+    inliers: float  # share of the points that found a wall
+    rms: float  # metres from the walls
+
+
+def register(
+    points: Array, tree: cKDTree, walls: Array, prior: Pose, Q: Array, config: ScanMatchingConfig
+) -> Registration | None:
+    """The pose that lays points (N, 2) of its frame onto wall points (M, 2), near a prior.
+
+    Q (3, 3) is the prior's covariance in the prior's own frame. None when too few points find a wall.
+    """
+    information = np.linalg.inv(Q)
+    step = np.zeros(3)  # of the pose, in the prior's frame
+    pose, A = prior, information
+    inliers, rms = 0.0, 0.0
+    for _ in range(_ITERATIONS):
+        world = pose.transform(points)
+        pairs = _pairs(world, tree, walls, config.max_pair_m)
+        if pairs is None or len(pairs[0]) < config.min_pairs:
+            return None
+        index, normal, residual = pairs
+        weight = config.independent_share / config.pair_sigma_m**2
+        weight = weight / np.maximum(1.0, np.abs(residual) / (2 * config.pair_sigma_m))
+        J = _jacobian(points[index], normal, pose, prior)
+        A = information + (J * weight[:, None]).T @ J
+        change = -np.linalg.solve(A, information @ step + J.T @ (weight * residual))
+        step = step + change
+        pose = prior.compose(Pose.from_array(step))
+        inliers, rms = len(index) / len(points), float(np.sqrt(np.mean(residual**2)))
+        if np.abs(change).max() < 1e-4:
+            break
+    return Registration(pose, np.linalg.inv(A), inliers, rms)
+
+
+def motion_between(before: Pose, after: Pose) -> Pose:
+    """The motion from one pose to another, in the frame of the first."""
+    moved = before.to(after)
+    return Pose(moved.x, moved.y, wrap_angle(moved.theta))
+
+
+def _pairs(world: Array, tree: cKDTree, walls: Array, reach: float) -> tuple[Array, Array, Array] | None:
+    """Indices of the points near a wall, the wall's normals (K, 2), and signed distances (K,)."""
+    distance, near = tree.query(world, k=_NEIGHBOURS, distance_upper_bound=max(reach, 0.35))
+    found = np.isfinite(distance[:, 2]) & (distance[:, 0] < reach)
+    index = np.nonzero(found)[0]
+    if len(index) == 0:
+        return None
+    present = np.isfinite(distance[index])
+    group = walls[np.where(present, near[index], near[index][:, :1])]
+    weight = present / present.sum(axis=1, keepdims=True)
+    centre = (weight[..., None] * group).sum(axis=1)
+    d = group - centre[:, None]
+    xx, yy, xy = ((weight * p).sum(axis=1) for p in (d[..., 0] ** 2, d[..., 1] ** 2, d[..., 0] * d[..., 1]))
+    angle = 0.5 * np.arctan2(2 * xy, xx - yy)  # of the wall
+    spread = np.hypot((xx - yy) / 2, xy)
+    large, small = (xx + yy) / 2 + spread, (xx + yy) / 2 - spread
+    flat = small < _FLATNESS * large
+    normal = np.stack([-np.sin(angle), np.cos(angle)], axis=1)
+    residual = ((world[index] - centre) * normal).sum(axis=1)
+    keep = flat & (np.abs(residual) < reach)
+    return index[keep], normal[keep], residual[keep]
+
+
+def _jacobian(points: Array, normal: Array, pose: Pose, prior: Pose) -> Array:
+    """Derivative (K, 3) of the distances by a step of the pose in the prior's frame."""
+    c, s = np.cos(prior.theta), np.sin(prior.theta)
+    along = np.stack([c * normal[:, 0] + s * normal[:, 1], -s * normal[:, 0] + c * normal[:, 1]], axis=1)
+    c, s = np.cos(pose.theta), np.sin(pose.theta)
+    turned = np.stack([-s * points[:, 0] - c * points[:, 1], c * points[:, 0] - s * points[:, 1]], axis=1)
+    return np.concatenate([along, (turned * normal).sum(axis=1)[:, None]], axis=1)
