@@ -1,0 +1,193 @@
+"""The Kobuki base behind the HAL: it is listened to, driven, and stopped when anything is amiss."""
+
+import asyncio
+import contextlib
+import math
+from dataclasses import dataclass
+from typing import Annotated
+
+from gvgbot.clock import Clock
+from gvgbot.drivers.kobuki.commands import (
+    ALL_POWER,
+    NO_OUTPUT,
+    BaseControl,
+    Command,
+    Extra,
+    GpOutput,
+    Melody,
+    Output,
+    RequestExtra,
+    SoundSequence,
+    encode_commands,
+)
+from gvgbot.drivers.kobuki.feedback import FeedbackReader, Identity, LinkStatistics
+from gvgbot.drivers.kobuki.wheel_odometry import WHEEL_BASE, Heading
+from gvgbot.drivers.transport import ByteStream
+from gvgbot.errors import DeviceLost
+from gvgbot.geometry import STANDSTILL, Twist
+from gvgbot.hal.latest import Latest
+from gvgbot.hal.messages import Battery, Contact, Odometry
+from gvgbot.ranges import Range
+
+_STOP_REPEAT_S = 0.1  # while the base is to stand, it is told so again this often
+_IDENTITY_RETRY_S = 0.5
+_ALL_EXTRAS = Extra.HARDWARE | Extra.FIRMWARE | Extra.UDID
+_STOP = BaseControl(0, 0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KobukiConfig:
+    """The link to the base, its limits, and when silence is dangerous."""
+
+    port: str = "/dev/kobuki"
+    baud: Annotated[int, Range(9600, 1_000_000)] = 115_200
+    heading: Heading = "gyro"
+    max_speed_mps: Annotated[float, Range(0.01, 0.7)] = 0.7  # of the faster wheel
+    max_turn_rate_radps: Annotated[float, Range(0.01, math.pi)] = math.pi
+    deadman_s: Annotated[float, Range(0.05, 2.0)] = 0.5  # without drive(): stop
+    silence_stop_s: Annotated[float, Range(0.05, 2.0)] = 0.5  # without feedback: stop
+    silence_lost_s: Annotated[float, Range(0.1, 10.0)] = 1.0  # without feedback: give up
+    link_delay_s: Annotated[float, Range(0.0, 0.1)] = 0.0  # from measuring to arrival, at best
+    identity_attempts: Annotated[int, Range(0, 100)] = 10
+
+
+class KobukiBase:
+    """A base on a byte stream. `run` serves the link; everything else may be used beside it."""
+
+    def __init__(self, stream: ByteStream, config: KobukiConfig, clock: Clock) -> None:
+        self._stream = stream
+        self._config = config
+        self._clock = clock
+        self._feedback = FeedbackReader(config.heading, config.link_delay_s)
+        self._newest = Latest[Odometry]()
+        self._identity_asked = 0
+        self._identity_due = -math.inf
+        self._output = ALL_POWER
+        self._started = clock.now()
+        self._driven = -math.inf
+        self._stopped = -math.inf
+
+    async def run(self) -> None:
+        """Serve the link until cancelled. Raises DeviceLost when the base is silent or gone."""
+        self._started = self._clock.now()
+        try:
+            while True:
+                self._watch()
+                data = await self._read(until=self._next_watch())
+                odometry = self._feedback.take(data, self._clock.now())
+                if odometry is not None:
+                    self._newest.put(odometry)
+                self._ask_identity()
+        finally:
+            self._send(_STOP)
+
+    async def next_odometry(self) -> Odometry:
+        """The newest odometry not handed out before; waits for one."""
+        return await self._newest.next()
+
+    def drive(self, twist: Twist) -> Twist:
+        """Send the twist now, within the limits; the twist that the bytes really stand for.
+
+        While the base is silent it is told to stand whatever is asked. It never raises: a link that
+        is gone is for `run` to report.
+        """
+        self._driven = self._clock.now()
+        if self._driven >= self._heard + self._config.silence_stop_s:
+            twist = STANDSTILL
+        control = BaseControl.from_twist(_limited(twist, self._config))
+        return control.twist if self._send(control) else STANDSTILL
+
+    def play(self, melody: Melody) -> None:
+        """Play one of the base's tunes."""
+        self._send(SoundSequence(melody))
+
+    def switch(self, *, on: Output = NO_OUTPUT, off: Output = NO_OUTPUT) -> None:
+        """Switch outputs, power and LEDs; all others stay as they are, power on from the start."""
+        self._output = (self._output | on) & ~off
+        self._send(GpOutput(self._output))
+
+    @property
+    def contact(self) -> Contact | None:
+        """The newest contact state, None before the first."""
+        return self._feedback.contact
+
+    @property
+    def battery(self) -> Battery | None:
+        """The newest battery state, None before the first."""
+        return self._feedback.battery
+
+    @property
+    def identity(self) -> Identity:
+        """What the base has answered so far about itself."""
+        return self._feedback.identity
+
+    @property
+    def statistics(self) -> LinkStatistics:
+        """Counters of the link."""
+        return self._feedback.statistics
+
+    @property
+    def slip_rate(self) -> float:
+        """Turn rate by the gyro minus by the wheels, smoothed, rad/s; large when a wheel slips."""
+        return self._feedback.slip_rate
+
+    @property
+    def _heard(self) -> float:
+        return max(self._started, self._feedback.heard)
+
+    def _watch(self) -> None:
+        """Stop the base if that is due; give up if it has been silent for too long."""
+        now = self._clock.now()
+        if now >= self._lost_due():
+            raise DeviceLost(
+                f"no feedback from the base for {self._config.silence_lost_s:g} s: "
+                f"check that it is switched on and its cable is plugged in ({self._config.port})"
+            )
+        if now >= self._stop_due():
+            self._stopped = now
+            self._send(_STOP)
+
+    def _next_watch(self) -> float:
+        return min(self._stop_due(), self._lost_due())
+
+    def _stop_due(self) -> float:
+        deadman = self._driven + self._config.deadman_s
+        silence = self._heard + self._config.silence_stop_s
+        return max(min(deadman, silence), self._stopped + _STOP_REPEAT_S)
+
+    def _lost_due(self) -> float:
+        return self._heard + self._config.silence_lost_s
+
+    def _ask_identity(self) -> None:
+        """Ask now and then, from the first frame on, until all is answered or it seems useless."""
+        now = self._clock.now()
+        if self._feedback.heard < self._started or now < self._identity_due:
+            return
+        if self._identity_asked < self._config.identity_attempts and not self.identity.is_complete:
+            self._identity_asked += 1
+            self._identity_due = now + _IDENTITY_RETRY_S
+            self._send(RequestExtra(_ALL_EXTRAS))
+
+    async def _read(self, until: float) -> bytes:
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(max(0.0, until - self._clock.now())):
+                return await self._stream.read()
+        return b""
+
+    def _send(self, command: Command) -> bool:
+        try:
+            self._stream.write(encode_commands([command]))
+        except DeviceLost:
+            return False
+        return True
+
+
+def _limited(twist: Twist, config: KobukiConfig) -> Twist:
+    """The twist on the same arc, slowed to the limits; standstill if it is not a number."""
+    if not (math.isfinite(twist.linear) and math.isfinite(twist.angular)):
+        return STANDSTILL
+    fast_wheel = abs(twist.linear) + abs(twist.angular) * WHEEL_BASE / 2
+    share = max(
+        1.0, fast_wheel / config.max_speed_mps, abs(twist.angular) / config.max_turn_rate_radps
+    )
+    return Twist(twist.linear / share, twist.angular / share)

@@ -1,0 +1,200 @@
+"""The base's byte stream made into HAL messages, without I/O: bytes and their arrival time in."""
+
+import math
+from dataclasses import dataclass
+
+from gvgbot.drivers.kobuki.device_clock import DeviceClock, advance_clock, start_clock
+from gvgbot.drivers.kobuki.frames import BadFrame, FrameParser
+from gvgbot.drivers.kobuki.payloads import (
+    CoreSensors,
+    FeedbackPart,
+    FirmwareVersion,
+    HardwareVersion,
+    Inertia,
+    Udid,
+    decode_feedback,
+)
+from gvgbot.drivers.kobuki.sub_payloads import Truncated, Unknown
+from gvgbot.drivers.kobuki.wheel_odometry import (
+    Heading,
+    WheelOdometry,
+    WheelReading,
+    advance_odometry,
+    doubt,
+    start_odometry,
+    wheel_travels,
+)
+from gvgbot.hal.messages import Battery, Contact, Odometry
+
+FRAME_PERIOD = 0.02  # s, of the base's stream
+_JUMP_M = 0.25  # a wheel does not go this far between two frames,
+_JUMP_SPEED = 2.0  # m/s, nor this fast over a longer gap
+_JUMPS_BELIEVED = 3  # readings in a row that agree against the old one
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """Who the base says it is; None where it has not answered."""
+
+    hardware: str | None = None
+    firmware: str | None = None
+    udid: str | None = None
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether the base has answered everything."""
+        return None not in (self.hardware, self.firmware, self.udid)
+
+
+@dataclass(frozen=True, slots=True)
+class LinkStatistics:
+    """What came over the link since the driver started.
+
+    `missed_frames` are gaps in the base's own counter, `malformed` frames with a right checksum
+    and a wrong inside, `doubted` readings of the encoders too far off to be used.
+    """
+
+    frames: int = 0
+    bad_frames: int = 0
+    skipped_bytes: int = 0
+    missed_frames: int = 0
+    malformed: int = 0
+    unknown_parts: int = 0
+    doubted: int = 0
+    resets: int = 0
+
+
+class FeedbackReader:
+    """What the base has reported so far: `contact`, `battery`, `identity`, counters, odometry."""
+
+    def __init__(self, heading: Heading, link_delay: float) -> None:
+        self._heading = heading
+        self._link_delay = link_delay
+        self._parser = FrameParser()
+        self._clock: DeviceClock | None = None
+        self._odometry: WheelOdometry | None = None
+        self._odometry_elapsed = 0.0  # s of the base's time at the last reading used
+        self._extras: dict[type, str] = {}
+        self._missed = self._malformed = self._unknown = self._doubted = 0
+        self.contact: Contact | None = None
+        self.battery: Battery | None = None
+        self.heard = -math.inf  # arrival of the last frame of use, s
+
+    def take(self, data: bytes, arrival: float) -> Odometry | None:
+        """The newest odometry that these bytes complete, if any."""
+        newest: Odometry | None = None
+        for frame in self._parser.feed(data):
+            if not isinstance(frame, BadFrame):
+                newest = self._take_parts(decode_feedback(frame.payload), arrival) or newest
+        return newest
+
+    @property
+    def identity(self) -> Identity:
+        """What the base has answered so far about itself."""
+        known = self._extras
+        return Identity(known.get(HardwareVersion), known.get(FirmwareVersion), known.get(Udid))
+
+    @property
+    def slip_rate(self) -> float:
+        """Turn rate by the gyro minus by the wheels, smoothed, rad/s."""
+        return 0.0 if self._odometry is None else self._odometry.slip_rate
+
+    @property
+    def statistics(self) -> LinkStatistics:
+        """Counters of the link."""
+        return LinkStatistics(
+            frames=self._parser.frames,
+            bad_frames=self._parser.bad_frames,
+            skipped_bytes=self._parser.skipped_bytes,
+            missed_frames=self._missed,
+            malformed=self._malformed,
+            unknown_parts=self._unknown,
+            doubted=self._doubted,
+            resets=0 if self._clock is None else self._clock.resets,
+        )
+
+    def _take_parts(self, parts: list[FeedbackPart], arrival: float) -> Odometry | None:
+        if isinstance(parts[-1], Truncated):
+            self._malformed += 1
+            return None
+        core: CoreSensors | None = None
+        inertia: Inertia | None = None
+        for part in parts:
+            match part:
+                case CoreSensors():
+                    core = part
+                case Inertia():
+                    inertia = part
+                case HardwareVersion(version) | FirmwareVersion(version):
+                    self._extras[type(part)] = str(version)
+                case Udid():
+                    self._extras[Udid] = str(part)
+                case Unknown():
+                    self._unknown += 1
+                case _:
+                    pass
+        return None if core is None else self._take_core(core, inertia, arrival)
+
+    def _take_core(
+        self, core: CoreSensors, inertia: Inertia | None, arrival: float
+    ) -> Odometry | None:
+        self.heard = arrival
+        before = self._clock
+        clock = _clock_after(before, core.stamp_ms, arrival - self._link_delay)
+        self._clock = clock
+        self._missed += max(0, round(clock.step / FRAME_PERIOD) - 1)
+        self.contact = _contact(core, clock.stamp)
+        self.battery = _battery(core, clock.stamp)
+        if inertia is None:
+            return None
+        reading = WheelReading(core.left_encoder, core.right_encoder, inertia.angle, inertia.rate)
+        is_new = before is None or clock.resets > before.resets
+        return self._take_reading(reading, clock, is_new=is_new)
+
+    def _take_reading(
+        self, reading: WheelReading, clock: DeviceClock, *, is_new: bool
+    ) -> Odometry | None:
+        state = self._odometry
+        if state is None or is_new or state.implausible >= _JUMPS_BELIEVED:
+            self._odometry = start_odometry(reading, None if state is None else state.odom_base)
+            self._odometry_elapsed = clock.elapsed
+            return None
+        dt = clock.elapsed - self._odometry_elapsed
+        if dt <= 0.0:
+            return None
+        if max(map(abs, wheel_travels(state.reading, reading))) > max(_JUMP_M, _JUMP_SPEED * dt):
+            self._doubted += 1
+            self._odometry = doubt(state)
+            return None
+        state = advance_odometry(state, reading, dt, self._heading)
+        self._odometry, self._odometry_elapsed = state, clock.elapsed
+        return Odometry(clock.stamp, state.odom_base, state.twist)
+
+
+def _clock_after(clock: DeviceClock | None, raw_ms: int, arrival: float) -> DeviceClock:
+    if clock is None:
+        return start_clock(raw_ms, arrival)
+    return advance_clock(clock, raw_ms, arrival)
+
+
+def _contact(core: CoreSensors, stamp: float) -> Contact:
+    return Contact(
+        stamp,
+        bumper_left=bool(core.bumper & 4),
+        bumper_centre=bool(core.bumper & 2),
+        bumper_right=bool(core.bumper & 1),
+        cliff_left=bool(core.cliff & 4),
+        cliff_centre=bool(core.cliff & 2),
+        cliff_right=bool(core.cliff & 1),
+        wheel_drop_left=bool(core.wheel_drop & 2),
+        wheel_drop_right=bool(core.wheel_drop & 1),
+        over_current=core.over_current != 0,
+    )
+
+
+def _battery(core: CoreSensors, stamp: float) -> Battery:
+    """Charge from the voltage alone, along the line between nearly empty and full."""
+    low_v, low_fraction, full_v = 13.2, 0.05, 16.5
+    slope = (1.0 - low_fraction) / (full_v - low_v)
+    fraction = low_fraction + slope * (core.voltage - low_v)
+    return Battery(stamp, core.voltage, min(1.0, max(0.0, fraction)), core.charging)

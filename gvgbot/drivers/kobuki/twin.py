@@ -1,0 +1,292 @@
+"""A simulated Kobuki base that speaks the real one's bytes, joined to a body that moves."""
+
+import math
+from collections import deque
+from dataclasses import dataclass
+from typing import Annotated, Protocol
+
+import numpy as np
+
+from gvgbot.drivers.kobuki.commands import (
+    BaseControl,
+    Command,
+    Extra,
+    GetGain,
+    GpOutput,
+    RequestExtra,
+    SetGain,
+    decode_commands,
+)
+from gvgbot.drivers.kobuki.frames import BadFrame, FrameParser, encode_frame
+from gvgbot.drivers.kobuki.odometry_error import PROFILES, ErringSensors, OdometryProfile
+from gvgbot.drivers.kobuki.payloads import (
+    GYRO_DIGIT,
+    CliffAdc,
+    ControllerInfo,
+    CoreSensors,
+    DockIr,
+    FeedbackPart,
+    FirmwareVersion,
+    GpInput,
+    HardwareVersion,
+    Inertia,
+    MotorCurrent,
+    RawGyro,
+    Udid,
+    Version,
+    encode_feedback,
+)
+from gvgbot.drivers.kobuki.wheel_odometry import TICK, WHEEL_BASE
+from gvgbot.geometry import STANDSTILL, Pose, Twist, wrap_angle
+from gvgbot.ranges import Range
+
+_PERIOD_MS = 20
+_PERIOD = _PERIOD_MS / 1000  # s
+_MAX_WHEEL_SPEED = 0.7  # m/s
+_GYRO_SAMPLES = 2.08  # per frame on average: the sensor runs by its own clock
+_RAW_BIAS = math.radians(-0.45)  # rad/s: only the processed rate has it removed
+_FACTORY_GAINS = ControllerInfo(0, 100_000, 100, 2_000)
+_EARLY = 1e-9  # s: a command this much too late for its cycle still counts
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KobukiTwinConfig:
+    """The simulated base: what it says it is, and how it errs."""
+
+    odometry: OdometryProfile = "kobuki"
+    command_timeout_s: Annotated[float, Range(0.1, 60.0)] = 1.5
+    dead_time_s: Annotated[float, Range(0.0, 1.0)] = 0.06  # from a command to its first effect
+    battery_v: Annotated[float, Range(0.0, 25.5)] = 16.1
+    battery_drain_v_per_h: Annotated[float, Range(0.0, 10.0)] = 0.5
+    hardware_version: str = "1.0.4"
+    firmware_version: str = "1.2.0"
+
+
+class Body(Protocol):
+    """What the twin moves: a differential-drive robot in some world."""
+
+    def advance(self, now: float) -> None:
+        """Move up to `now` (s) as commanded; a time already passed changes nothing."""
+
+    def command(self, linear: float, angular: float) -> None:
+        """Head for this twist (m/s, rad/s), within the body's own accelerations."""
+
+    @property
+    def left_travel(self) -> float:
+        """Metres that the left wheel has turned, signed, since the body was made."""
+
+    @property
+    def right_travel(self) -> float:
+        """Metres that the right wheel has turned, signed, since the body was made."""
+
+    @property
+    def pose(self) -> Pose:
+        """True pose, world_base."""
+
+    @property
+    def bumper(self) -> tuple[bool, bool, bool]:
+        """Which bumpers are pressed: left, centre, right."""
+
+
+@dataclass(slots=True)
+class _Felt:
+    """What the base's sensors have added up to: metres, radians, and the latest cycle's speeds."""
+
+    left: float
+    right: float
+    angle: float
+    left_speed: float = 0.0
+    right_speed: float = 0.0
+    rate: float = 0.0
+
+
+class KobukiTwin:
+    """A base without I/O. It streams from its first `advance`, which is when it is powered on."""
+
+    def __init__(self, config: KobukiTwinConfig, body: Body, seed: int) -> None:
+        rng = np.random.default_rng(seed)
+        self._config = config
+        self._body = body
+        self._sensors = ErringSensors(PROFILES[config.odometry], rng)
+        self._rng = rng
+        encoders = rng.integers(0, 65536, 2).tolist()
+        self._felt = _Felt(encoders[0] * TICK, encoders[1] * TICK, rng.uniform(-math.pi, math.pi))
+        self._udid = Udid(tuple(rng.integers(1, 2**32, 3).tolist()))
+        self._parser = FrameParser()
+        self._pending: deque[tuple[float, Twist]] = deque()
+        self._commanded = -math.inf
+        self._moving = False
+        self._replies: list[FeedbackPart] = []
+        self._gains = _FACTORY_GAINS
+        self._output = 0
+        self._power_on: float | None = None
+        self._cycles = 0
+        self._true = (body.left_travel, body.right_travel, body.pose.theta)
+        self._gyro_id = 0
+        self._gyro_due = 0.0
+
+    @property
+    def output(self) -> int:
+        """The general-purpose output word last received."""
+        return self._output
+
+    @property
+    def sensors(self) -> ErringSensors:
+        """The errors drawn for this base."""
+        return self._sensors
+
+    @property
+    def received(self) -> FrameParser:
+        """The parser of the host's bytes, with its counters."""
+        return self._parser
+
+    def receive(self, data: bytes, now: float) -> bytes:
+        """Take the host's bytes. The base answers within its stream, so never at once."""
+        for frame in self._parser.feed(data):
+            if not isinstance(frame, BadFrame):
+                for command in decode_commands(frame.payload):
+                    self._obey(command, now)
+        return b""
+
+    def next_due(self) -> float:
+        """When the next frame leaves (s); at once before the first."""
+        return 0.0 if self._power_on is None else self._power_on + self._cycles * _PERIOD
+
+    def advance(self, now: float) -> bytes:
+        """The one frame that is due, if one is."""
+        if self._power_on is None:
+            self._power_on = now
+            self._body.advance(now)
+            self._true = self._truth()
+        due = self.next_due()
+        if now < due:
+            return b""
+        self._move(due)
+        frame = encode_frame(encode_feedback(self._parts()))
+        self._cycles += 1
+        return frame
+
+    def _obey(self, command: Command, now: float) -> None:
+        match command:
+            case BaseControl():
+                self._commanded = now
+                self._pending.append((now + self._config.dead_time_s, _limited(command.twist)))
+            case RequestExtra(flags):
+                self._replies += self._extras(flags)
+            case SetGain(kind, p, i, d):
+                self._gains = ControllerInfo(kind, p, i, d) if kind else _FACTORY_GAINS
+            case GetGain():
+                self._replies.append(self._gains)
+            case GpOutput(flags):
+                self._output = flags
+            case _:
+                pass
+
+    def _extras(self, flags: int) -> list[FeedbackPart]:
+        parts: list[FeedbackPart] = []
+        if flags & Extra.HARDWARE:
+            parts.append(HardwareVersion(_version(self._config.hardware_version)))
+        if flags & Extra.FIRMWARE:
+            parts.append(FirmwareVersion(_version(self._config.firmware_version)))
+        if flags & Extra.UDID:
+            parts.append(self._udid)
+        return parts
+
+    def _move(self, now: float) -> None:
+        """Let the body move through this cycle and feel what it did, then heed commands."""
+        self._body.advance(now)
+        before, self._true = self._true, self._truth()
+        left, right = self._true[0] - before[0], self._true[1] - before[1]
+        turn = wrap_angle(self._true[2] - before[2])
+        left, right, turn = self._sensors.feel(left, right, turn, _PERIOD)
+        felt = self._felt
+        felt.left += left
+        felt.right += right
+        felt.angle += turn
+        felt.left_speed, felt.right_speed = left / _PERIOD, right / _PERIOD
+        felt.rate = turn / _PERIOD
+        self._heed(now)
+
+    def _heed(self, now: float) -> None:
+        """Pass on what became due in this cycle, and stop if the host has been silent too long."""
+        while self._pending and self._pending[0][0] <= now + _EARLY:
+            _, twist = self._pending.popleft()
+            self._moving = twist != STANDSTILL
+            self._body.command(twist.linear, twist.angular)
+        if self._moving and now > self._commanded + self._config.command_timeout_s:
+            self._moving = False
+            self._body.command(0.0, 0.0)
+
+    def _truth(self) -> tuple[float, float, float]:
+        return self._body.left_travel, self._body.right_travel, self._body.pose.theta
+
+    def _parts(self) -> list[FeedbackPart]:
+        felt = self._felt
+        replies, self._replies = self._replies, []
+        return [
+            self._core(),
+            DockIr(0, 0, 0),
+            Inertia(_wrapped_cdeg(felt.angle), _s16(math.degrees(100 * felt.rate))),
+            CliffAdc(1700, 1900, 1650),
+            MotorCurrent(_current(felt.left_speed), _current(felt.right_speed)),
+            self._gyro(),
+            GpInput(0, (4095, 4095, 4095, 4095), (0xFF0, 0, 0)),
+            *replies,
+        ]
+
+    def _core(self) -> CoreSensors:
+        felt = self._felt
+        left, centre, right = self._body.bumper
+        drained = self._config.battery_drain_v_per_h * self._cycles * _PERIOD / 3600
+        return CoreSensors(
+            stamp_ms=_PERIOD_MS * self._cycles % 65536,
+            bumper=4 * left + 2 * centre + right,
+            wheel_drop=0,
+            cliff=0,
+            left_encoder=math.floor(felt.left / TICK + 0.5) % 65536,
+            right_encoder=math.floor(felt.right / TICK + 0.5) % 65536,
+            left_pwm=_pwm(felt.left_speed),
+            right_pwm=_pwm(felt.right_speed),
+            buttons=0,
+            charger=0,
+            battery_dv=max(0, round(10 * (self._config.battery_v - drained))),
+            over_current=0,
+        )
+
+    def _gyro(self) -> RawGyro:
+        """Two samples, sometimes three; z carries the bias that the processed rate has not."""
+        self._gyro_due += _GYRO_SAMPLES
+        count = int(self._gyro_due)
+        self._gyro_due -= count
+        first = self._gyro_id
+        self._gyro_id = (first + count) % 256
+        z = _s16((self._felt.rate + _RAW_BIAS) / GYRO_DIGIT)
+        return RawGyro(first, ((0, 0, z),) * count)
+
+
+def _limited(twist: Twist) -> Twist:
+    """The twist on the same arc, slowed until the faster wheel can follow."""
+    share = max(1.0, (abs(twist.linear) + abs(twist.angular) * WHEEL_BASE / 2) / _MAX_WHEEL_SPEED)
+    return Twist(twist.linear / share, twist.angular / share)
+
+
+def _version(text: str) -> Version:
+    major, minor, patch = map(int, text.split("."))
+    return Version(major, minor, patch)
+
+
+def _wrapped_cdeg(angle: float) -> int:
+    return (round(math.degrees(100 * angle)) + 18000) % 36000 - 18000
+
+
+def _s16(value: float) -> int:
+    return max(-32768, min(32767, round(value)))
+
+
+def _pwm(speed: float) -> int:
+    return max(-127, min(127, round(127 * speed / _MAX_WHEEL_SPEED)))
+
+
+def _current(speed: float) -> int:
+    """Motor current in 10 mA: some to turn at all, more when faster."""
+    return 0 if speed == 0.0 else min(255, round(1 + 40 * abs(speed)))

@@ -1,0 +1,89 @@
+"""Dead reckoning: encoder counts and the gyro's heading to a pose, as a function state to state."""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from gvgbot.geometry import Pose, Twist, wrap_angle
+
+Heading = Literal["gyro", "wheels"]
+
+TICK = 0.0000852920904977  # m of travel per encoder count
+WHEEL_BASE = 0.230  # m between the wheels
+_WRAP = 65536  # encoder counts
+_SLIP_MEMORY_S = 0.5  # time constant of the reported slip rate
+
+
+@dataclass(frozen=True, slots=True)
+class WheelReading:
+    """What a frame says about motion: 16-bit encoders, gyro heading (rad) and turn rate (rad/s)."""
+
+    left_encoder: int
+    right_encoder: int
+    angle: float
+    rate: float
+
+
+@dataclass(frozen=True, slots=True)
+class WheelOdometry:
+    """Where the base is, `odom_base`, how it moves, and the reading that this is based on.
+
+    `slip_rate` (rad/s, smoothed) is the turn rate of the gyro minus that of the wheels;
+    `implausible` counts readings in a row that jumped too far to be believed.
+    """
+
+    odom_base: Pose
+    twist: Twist
+    reading: WheelReading
+    slip_rate: float = 0.0
+    implausible: int = 0
+
+
+def start_odometry(reading: WheelReading, odom_base: Pose | None = None) -> WheelOdometry:
+    """Standing at `odom_base` (the origin by default), whatever encoders and gyro count from."""
+    return WheelOdometry(odom_base or Pose(), Twist(), reading)
+
+
+def advance_odometry(
+    state: WheelOdometry, reading: WheelReading, dt: float, heading: Heading
+) -> WheelOdometry:
+    """The state after `dt` seconds (> 0) at whose end the wheels and the gyro read this.
+
+    The heading's change is the gyro's or the wheels', and the way goes along the mean heading.
+    """
+    left, right = wheel_travels(state.reading, reading)
+    by_wheels = (right - left) / WHEEL_BASE
+    by_gyro = wrap_angle(reading.angle - state.reading.angle)
+    turn = by_gyro if heading == "gyro" else by_wheels
+    travel = (left + right) / 2
+    rate = reading.rate if heading == "gyro" else by_wheels / dt
+    blend = dt / (dt + _SLIP_MEMORY_S)
+    slip_rate = state.slip_rate + blend * ((by_gyro - by_wheels) / dt - state.slip_rate)
+    pose = _moved(state.odom_base, travel, turn)
+    return WheelOdometry(pose, Twist(travel / dt, rate), reading, slip_rate)
+
+
+def wheel_travels(before: WheelReading, after: WheelReading) -> tuple[float, float]:
+    """Metres that the left and the right wheel went, each less than half an encoder turn-over."""
+    return (
+        TICK * _signed(after.left_encoder - before.left_encoder),
+        TICK * _signed(after.right_encoder - before.right_encoder),
+    )
+
+
+def doubt(state: WheelOdometry) -> WheelOdometry:
+    """The state with one more unbelievable reading, which changes nothing else."""
+    return replace(state, implausible=state.implausible + 1)
+
+
+def _moved(odom_base: Pose, travel: float, turn: float) -> Pose:
+    middle = odom_base.theta + turn / 2
+    return Pose(
+        odom_base.x + travel * math.cos(middle),
+        odom_base.y + travel * math.sin(middle),
+        wrap_angle(odom_base.theta + turn),
+    )
+
+
+def _signed(counts: int) -> int:
+    return (counts + _WRAP // 2) % _WRAP - _WRAP // 2
