@@ -1,0 +1,252 @@
+"""The simulated world: an occupancy bitmap, and its files in map_server form."""
+
+import math
+import warnings
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+from PIL import Image, UnidentifiedImageError
+from scipy import ndimage
+
+from gvgbot.drivers.ray_casting import Mask, RayCaster
+from gvgbot.errors import WorldError
+from gvgbot.geometry import Array, Pose
+
+OCCUPIED_THRESHOLD = 0.65  # map_server's customary values, for files that leave them out
+FREE_THRESHOLD = 0.196
+FREE_GREY, OCCUPIED_GREY = 254, 0  # what map_saver writes
+
+
+@dataclass(frozen=True, eq=False)
+class World:
+    """Walls as a bitmap: `occupied` (rows, columns) squares of `resolution_m`, row 0 lowest.
+
+    `origin` is the lower left corner of the bitmap in the world frame, m. Outside the bitmap all
+    is empty. The bitmap is read-only.
+    """
+
+    occupied: Mask
+    resolution_m: float
+    origin: tuple[float, float] = (0.0, 0.0)
+    name: str = "world"
+
+    def __post_init__(self) -> None:
+        self.occupied.setflags(write=False)
+
+    @property
+    def extent(self) -> tuple[float, float, float, float]:
+        """Least x, least y, greatest x, greatest y of the bitmap, m."""
+        rows, columns = self.occupied.shape
+        x, y = self.origin
+        return x, y, x + columns * self.resolution_m, y + rows * self.resolution_m
+
+    def contains(self, x: float, y: float) -> bool:
+        """Whether the point lies on the bitmap."""
+        x0, y0, x1, y1 = self.extent
+        return x0 <= x < x1 and y0 <= y < y1
+
+    def cast(self, pose: Pose, bearings: Array, max_range: float) -> Array:
+        """Ranges (N,) in m from a sensor at `pose` along ascending bearings (N,) in its frame.
+
+        inf where nothing is within `max_range`, zeros from inside a wall. Raises ValueError
+        unless the bearings ascend and span at most one turn.
+        """
+        return self._caster.cast(pose.x, pose.y, bearings + pose.theta, max_range)
+
+    def clear_of_walls(self, x: float, y: float) -> float:
+        """A distance in m that surely holds no wall: short of the true one by about two cells."""
+        column = math.floor((x - self.origin[0]) / self.resolution_m)
+        row = math.floor((y - self.origin[1]) / self.resolution_m)
+        rows, columns = self.occupied.shape
+        if not (0 <= row < rows and 0 <= column < columns):
+            return 0.0
+        return float(self._clearance[row, column])
+
+    def wall_offsets(self, x: float, y: float, reach: float) -> Array:
+        """From (x, y) to the nearest point of each occupied square within `reach`: (N, 2), m."""
+        res, (x0, y0) = self.resolution_m, self.origin
+        first_row = max(0, math.floor((y - reach - y0) / res))
+        first_column = max(0, math.floor((x - reach - x0) / res))
+        end_row = max(0, math.floor((y + reach - y0) / res) + 1)
+        end_column = max(0, math.floor((x + reach - x0) / res) + 1)
+        rows, columns = np.nonzero(self.occupied[first_row:end_row, first_column:end_column])
+        left = x0 + res * (columns + first_column)
+        bottom = y0 + res * (rows + first_row)
+        dx = np.minimum(np.maximum(left - x, 0.0), left + res - x)
+        dy = np.minimum(np.maximum(bottom - y, 0.0), bottom + res - y)
+        near = np.hypot(dx, dy) <= reach
+        return np.column_stack((dx[near], dy[near]))
+
+    @cached_property
+    def _caster(self) -> RayCaster:
+        return RayCaster(self.occupied, self.resolution_m, self.origin)
+
+    @cached_property
+    def _clearance(self) -> NDArray[np.float32]:
+        """Distance between cell centres less a cell's diagonal, m."""
+        if not self.occupied.any():
+            return np.full(self.occupied.shape, np.inf, dtype=np.float32)
+        cells = ndimage.distance_transform_edt(~self.occupied) - math.sqrt(2)
+        return np.maximum(cells * self.resolution_m, 0.0).astype(np.float32)
+
+
+def check_start(world: World, pose: Pose, radius: float) -> None:
+    """Raise WorldError unless a round robot of this radius (m) fits at the pose."""
+    where = f"start ({pose.x:.2f}, {pose.y:.2f}) in world {world.name}"
+    if not world.contains(pose.x, pose.y):
+        x0, y0, x1, y1 = world.extent
+        raise WorldError(
+            f"{where}: outside the map; choose x in {x0:.2f}..{x1:.2f} and y in {y0:.2f}..{y1:.2f}"
+        )
+    gaps = np.hypot(*world.wall_offsets(pose.x, pose.y, radius).T)
+    if gaps.size and gaps.min() == 0.0:
+        raise WorldError(f"{where}: inside a wall; choose a start in free space")
+    if gaps.size and gaps.min() < radius:
+        raise WorldError(
+            f"{where}: a wall is {gaps.min():.3f} m away, but the robot's radius is "
+            f"{radius:.3f} m; choose a start further from walls"
+        )
+
+
+def load_world(path: Path) -> World:
+    """The world that a map_server YAML file describes.
+
+    A pixel is a wall where its occupancy exceeds `occupied_thresh`; unknown pixels are free.
+    Raises WorldError, in one line, for whatever is wrong with the file or its image.
+    """
+    entries = _Entries(path, _read_yaml(path))
+    resolution = entries.number("resolution")
+    if resolution <= 0.0:
+        raise entries.error("resolution", "must be greater than 0 (metres per pixel)")
+    origin = entries.origin()
+    negate = entries.negate()
+    threshold = entries.fraction("occupied_thresh", OCCUPIED_THRESHOLD)
+    entries.fraction("free_thresh", FREE_THRESHOLD)
+    entries.require_trinary()
+    shade = _read_shade(path, entries.image())
+    occupancy = shade if negate else 1.0 - shade
+    occupied = np.ascontiguousarray(np.flipud(occupancy > threshold))
+    return World(occupied, resolution, origin, path.stem)
+
+
+def save_world(world: World, directory: Path) -> Path:
+    """Write NAME.yaml and NAME.png into the directory, made if absent; the YAML's path."""
+    directory.mkdir(parents=True, exist_ok=True)
+    image = directory / f"{world.name}.png"
+    grey = np.where(world.occupied, OCCUPIED_GREY, FREE_GREY).astype(np.uint8)
+    Image.fromarray(np.flipud(grey)).save(image)
+    entries = {
+        "image": image.name,
+        "resolution": float(world.resolution_m),
+        "origin": [float(world.origin[0]), float(world.origin[1]), 0.0],
+        "negate": 0,
+        "occupied_thresh": OCCUPIED_THRESHOLD,
+        "free_thresh": FREE_THRESHOLD,
+    }
+    path = directory / f"{world.name}.yaml"
+    path.write_text(yaml.safe_dump(entries, sort_keys=False), encoding="utf-8")
+    return path
+
+
+def _read_yaml(path: Path) -> dict[str, Any]:
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise WorldError(f"{path}: no such file; give the path of a map_server YAML file") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise WorldError(f"{path}: cannot be read as text ({_line(error)})") from None
+    except yaml.YAMLError as error:
+        raise WorldError(f"{path}: not valid YAML ({_line(error)})") from None
+    if not isinstance(content, dict):
+        raise WorldError(f"{path}: not a map_server file; it must hold `key: value` lines")
+    return content
+
+
+def _read_shade(path: Path, image: Path) -> Array:
+    """Brightness 0..1 of each pixel, the mean of its colours; row 0 at the top."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            with Image.open(image) as picture:
+                return _brightness(picture)
+    except FileNotFoundError:
+        raise WorldError(f"{path}: key image: no such file {image}; correct the name") from None
+    except UnidentifiedImageError:
+        raise WorldError(f"{path}: key image: {image} is not an image; use PGM or PNG") from None
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+        raise WorldError(f"{path}: key image: cannot read {image} ({_line(error)})") from None
+
+
+def _brightness(picture: Image.Image) -> Array:
+    if picture.mode.startswith("I"):
+        return np.asarray(picture, dtype=np.float64) / 65535.0
+    if picture.mode in ("1", "L", "LA"):
+        return np.asarray(picture.convert("L"), dtype=np.float64) / 255.0
+    colours = np.asarray(picture.convert("RGB"), dtype=np.float64) / 255.0
+    return np.asarray(colours.mean(axis=2))
+
+
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split())
+
+
+@dataclass(frozen=True, slots=True)
+class _Entries:
+    """The keys of one world file; every complaint names the file and the key."""
+
+    path: Path
+    content: dict[str, Any]
+
+    def error(self, key: str, complaint: str) -> WorldError:
+        return WorldError(f"{self.path}: key {key}: {complaint}")
+
+    def required(self, key: str) -> Any:
+        if key not in self.content:
+            raise self.error(key, "missing; add it, as map_server files have it")
+        return self.content[key]
+
+    def number(self, key: str) -> float:
+        value = self.required(key)
+        if not _is_number(value):
+            raise self.error(key, f"must be a number, not {value!r}")
+        return float(value)
+
+    def fraction(self, key: str, default: float) -> float:
+        value = self.number(key) if key in self.content else default
+        if not 0.0 <= value <= 1.0:
+            raise self.error(key, f"must be from 0 to 1, not {value!r}")
+        return value
+
+    def origin(self) -> tuple[float, float]:
+        value = self.required("origin")
+        if not (isinstance(value, list) and len(value) == 3 and all(map(_is_number, value))):
+            raise self.error("origin", f"must be three numbers [x, y, yaw], not {value!r}")
+        if value[2] != 0:
+            raise self.error("origin", f"yaw must be 0, not {value[2]!r}; turn the image instead")
+        return float(value[0]), float(value[1])
+
+    def negate(self) -> bool:
+        value = self.content.get("negate", 0)
+        if value not in (0, 1):
+            raise self.error("negate", f"must be 0 or 1, not {value!r}")
+        return bool(value)
+
+    def require_trinary(self) -> None:
+        mode = self.content.get("mode", "trinary")
+        if mode not in ("trinary", "scale"):
+            raise self.error("mode", f"must be trinary or scale, not {mode!r}; save the map so")
+
+    def image(self) -> Path:
+        value = self.required("image")
+        if not (isinstance(value, str) and value):
+            raise self.error("image", f"must be a file name, not {value!r}")
+        return self.path.parent / value
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
