@@ -159,7 +159,9 @@ async def serve_twin(twin: TwinDevice, stream: ByteStream, clock: Clock) -> None
                 async with asyncio.timeout_at(None if due == float("inf") else due):
                     await wake.wait()
 
-    with contextlib.suppress(DeviceLost):
+    try:
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(listen())
             tasks.create_task(talk())
+    except* DeviceLost:
+        pass  # the other end has gone
