@@ -1,0 +1,65 @@
+"""The base's counter on the host's clock."""
+
+import numpy as np
+import pytest
+
+from gvgbot.drivers.kobuki.device_clock import DeviceClock, advance_clock, start_clock
+
+
+def test_late_frames_are_stamped_by_when_they_were_made() -> None:
+    """Truth: frame k is made at 100 + 0.02 k and arrives up to 30 ms later, sometimes at once."""
+    rng = np.random.default_rng(1)
+    made = 100.0 + 0.02 * np.arange(5000)
+    arrivals = np.maximum.accumulate(made + rng.exponential(0.01, made.size).clip(0.0, 0.03))
+    clock = start_clock(65000, arrivals[0])
+    errors = []
+    for k in range(1, made.size):
+        clock = advance_clock(clock, (65000 + 20 * k) % 65536, arrivals[k])
+        errors.append(clock.stamp - made[k])
+        assert clock.step == pytest.approx(0.02)
+    assert np.abs(errors[200:]).max() < 0.002
+    assert clock.resets == 0
+
+
+def test_clocks_of_different_speed_do_not_drift_apart() -> None:
+    """Truth: the base's clock loses 100 ppm for an hour."""
+    clock = start_clock(0, 0.0)
+    for k in range(1, 180_000):
+        clock = advance_clock(clock, 20 * k % 65536, 0.02 * k * 1.0001)
+    assert clock.stamp == pytest.approx(0.02 * 179_999 * 1.0001, abs=0.001)
+
+
+def test_a_gap_is_measured_by_the_bases_own_counter() -> None:
+    clock = advance_clock(start_clock(65500, 5.0), 264, 5.31)
+    assert clock.step == pytest.approx(0.3)
+    assert clock.stamp == pytest.approx(5.3, abs=1e-3)
+
+
+def test_a_burst_after_a_stall_keeps_its_spacing_and_is_no_reset() -> None:
+    clock = start_clock(0, 0.0)
+    for k in range(1, 251):
+        clock = advance_clock(clock, 20 * k, max(0.02 * k, 4.0 if k > 50 else 0.0))
+        assert clock.stamp == pytest.approx(0.02 * k, abs=2e-3)
+    assert clock.resets == 0
+
+
+def test_a_counter_that_jumps_ahead_of_time_is_a_new_start() -> None:
+    clock = advance_clock(start_clock(10_000, 1.0), 0, 1.5)
+    assert (clock.resets, clock.step) == (1, 0.0)
+    assert clock.stamp == 1.5
+
+
+def test_stamps_rise_even_when_the_first_frame_came_very_late() -> None:
+    clock: DeviceClock = start_clock(0, 1.0)
+    stamps = [clock.stamp]
+    for k in range(1, 20):
+        clock = advance_clock(clock, 20 * k, 1.0 + 0.001 * k)
+        stamps.append(clock.stamp)
+    assert np.all(np.diff(stamps) > 0.0)
+
+
+def test_a_repeated_frame_takes_no_time() -> None:
+    once = advance_clock(start_clock(0, 0.0), 20, 0.02)
+    twice = advance_clock(once, 20, 0.021)
+    assert twice.step == 0.0
+    assert twice.stamp == pytest.approx(once.stamp)

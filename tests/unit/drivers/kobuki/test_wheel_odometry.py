@@ -1,0 +1,112 @@
+"""Dead reckoning against closed forms."""
+
+import math
+from collections.abc import Iterator
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gvgbot.drivers.kobuki.wheel_odometry import (
+    Heading,
+    WheelOdometry,
+    WheelReading,
+    advance_odometry,
+    start_odometry,
+    wheel_travels,
+)
+from gvgbot.geometry import Pose, Twist, wrap_angle
+
+TICKS_PER_M = 11724.41658
+HALF_BASE = 0.115  # m
+DT = 0.02  # s
+
+
+def readings(twist: Twist, seconds: float, start: WheelReading) -> Iterator[WheelReading]:
+    """What ideal wheels and an ideal gyro read along an arc, from the start reading on."""
+    left = (twist.linear - HALF_BASE * twist.angular) * TICKS_PER_M
+    right = (twist.linear + HALF_BASE * twist.angular) * TICKS_PER_M
+    for k in range(round(seconds / DT) + 1):
+        t = k * DT
+        yield WheelReading(
+            (start.left_encoder + round(left * t)) % 65536,
+            (start.right_encoder + round(right * t)) % 65536,
+            wrap_angle(start.angle + twist.angular * t),
+            twist.angular,
+        )
+
+
+def reckon(twist: Twist, seconds: float, start: WheelReading, heading: Heading) -> WheelOdometry:
+    first, *rest = readings(twist, seconds, start)
+    state = start_odometry(first)
+    for reading in rest:
+        state = advance_odometry(state, reading, DT, heading)
+    return state
+
+
+def arc(twist: Twist, seconds: float) -> Pose:
+    turn = twist.angular * seconds
+    if turn == 0.0:
+        return Pose(twist.linear * seconds, 0.0, 0.0)
+    radius = twist.linear / twist.angular
+    return Pose(radius * math.sin(turn), radius * (1 - math.cos(turn)), wrap_angle(turn))
+
+
+@pytest.mark.parametrize("heading", ["gyro", "wheels"])
+@pytest.mark.parametrize(
+    "twist",
+    [Twist(0.3, 0.0), Twist(-0.2, 0.0), Twist(0.3, 0.5), Twist(0.5, -2.0), Twist(0.0, 3.0)],
+    ids=str,
+)
+def test_an_arc_is_reckoned_to_where_geometry_says(heading: Heading, twist: Twist) -> None:
+    start = WheelReading(65000, 500, math.radians(170), 0.0)
+    state = reckon(twist, 10.0, start, heading)
+    truth = arc(twist, 10.0)
+    assert state.odom_base.distance(truth) < 1e-3
+    assert abs(wrap_angle(state.odom_base.theta - truth.theta)) < 2e-3
+    assert state.twist.linear == pytest.approx(twist.linear, abs=0.005)
+    assert state.twist.angular == pytest.approx(twist.angular, abs=0.05)
+
+
+@given(st.integers(0, 65535), st.integers(0, 65535), st.floats(-math.pi, math.pi))
+def test_where_encoders_and_gyro_begin_does_not_matter(left: int, right: int, at: float) -> None:
+    twist = Twist(0.4, 0.8)
+    here = reckon(twist, 1.0, WheelReading(left, right, at, 0.0), "gyro").odom_base
+    origin = reckon(twist, 1.0, WheelReading(0, 0, 0.0, 0.0), "gyro").odom_base
+    assert here.distance(origin) < 1e-9
+    assert abs(wrap_angle(here.theta - origin.theta)) < 1e-9
+
+
+@given(st.integers(0, 65535), st.integers(-32767, 32767))
+def test_encoders_wrap_in_both_directions(start: int, counts: int) -> None:
+    before = WheelReading(start, start, 0.0, 0.0)
+    after = WheelReading((start + counts) % 65536, (start - counts) % 65536, 0.0, 0.0)
+    left, right = wheel_travels(before, after)
+    assert left == pytest.approx(counts / TICKS_PER_M)
+    assert right == pytest.approx(-counts / TICKS_PER_M)
+
+
+def test_only_the_gyro_notices_a_wheel_that_spins_in_place() -> None:
+    """One wheel spins 5 cm while the base stands: no turn, and a slip rate that shows it."""
+    before = WheelReading(0, 0, 0.0, 0.0)
+    after = WheelReading(0, round(0.05 * TICKS_PER_M), 0.0, 0.0)
+    by_gyro = advance_odometry(start_odometry(before), after, DT, "gyro")
+    by_wheels = advance_odometry(start_odometry(before), after, DT, "wheels")
+    assert by_gyro.odom_base.theta == 0.0
+    assert by_wheels.odom_base.theta == pytest.approx(0.05 / 0.23, rel=1e-3)
+    assert by_gyro.slip_rate < 0.0
+
+
+def test_two_steps_and_one_long_step_agree_on_a_straight_line() -> None:
+    a, b, c = (WheelReading(k * 100, k * 100, 0.3, 0.0) for k in range(3))
+    twice = advance_odometry(advance_odometry(start_odometry(a), b, DT, "gyro"), c, DT, "gyro")
+    once = advance_odometry(start_odometry(a), c, 2 * DT, "gyro")
+    assert twice.odom_base.distance(once.odom_base) < 1e-12
+    assert twice.twist == once.twist
+
+
+def test_a_restart_keeps_the_pose() -> None:
+    pose = Pose(1.0, 2.0, 0.5)
+    state = start_odometry(WheelReading(7, 9, 1.0, 0.2), pose)
+    assert state.odom_base == pose
+    assert state.twist == Twist()
