@@ -36,8 +36,8 @@ class GuardConfig:
     max_braking_mps2: Annotated[float, Range(0.05, 3.0)] = 1.0
     max_angular_acceleration_radps2: Annotated[float, Range(0.1, 20.0)] = 3.5
     max_scan_age_s: Annotated[float, Range(0.05, 2.0)] = 0.5
-    margin_m: Annotated[float, Range(0.0, 0.5)] = 0.02
-    response_time_s: Annotated[float, Range(0.0, 1.0)] = 0.05
+    margin_m: Annotated[float, Range(0.0, 0.5)] = 0.015
+    response_time_s: Annotated[float, Range(0.0, 1.0)] = 0.1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,7 +57,7 @@ class GuardState:
 
 @dataclass(frozen=True, slots=True)
 class Guard:
-    """Lets a twist through, slows it down or stops it, for a round robot of the given radius (m)."""
+    """Lets a twist through, slows it or stops it, for a round robot of the given radius (m)."""
 
     config: GuardConfig
     radius: float

@@ -19,8 +19,8 @@ def no_points() -> Array:
 
 def has_sight(scan: Scan, *, share: float) -> bool:
     """Whether at least this share of the beams is trusted (a range, or nothing within range)."""
-    trusted = len(scan.ranges) - np.count_nonzero(np.isnan(scan.ranges))
-    return bool(trusted >= share * len(scan.ranges)) and trusted > 0
+    trusted = len(scan.ranges) - int(np.count_nonzero(np.isnan(scan.ranges)))
+    return trusted > 0 and trusted >= share * len(scan.ranges)
 
 
 def obstacle_points(scan: Scan, track: Sequence[Odometry], *, reach: float) -> Array:

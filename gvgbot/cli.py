@@ -1,0 +1,173 @@
+"""The command line: arguments in, exit status out, one clear line for every failure."""
+
+import argparse
+import re
+import sys
+from collections.abc import Sequence
+from math import isfinite
+from pathlib import Path
+from typing import Any, NoReturn
+
+from gvgbot import __version__
+from gvgbot.errors import GvgbotError, UsageError
+
+SUCCESS, FAILURE, BAD_USAGE, INTERRUPTED = 0, 1, 2, 130
+NEGATIVE_NUMBER = re.compile(r"-\.?\d")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit status: 0 done, 1 failed, 2 asked wrongly."""
+    options = _parser().parse_args(arguments)
+    try:
+        status = options.command(options)
+    except KeyboardInterrupt:
+        return _fail("interrupted", INTERRUPTED)
+    except UsageError as error:
+        return _fail(str(error), BAD_USAGE)
+    except GvgbotError as error:
+        return _fail(str(error), FAILURE)
+    except BrokenPipeError:  # the reader of our output has gone, as `head` does
+        sys.stderr.close()
+        return FAILURE
+    return int(status)
+
+
+def _fail(message: str, status: int) -> int:
+    """Say why on stderr, a line each; the status."""
+    for line in message.splitlines():
+        print(f"gvgbot: {line}", file=sys.stderr)
+    return status
+
+
+class _Parser(argparse.ArgumentParser):
+    """Says what is wrong in one line, and takes -1e-3 for a number, not for an option."""
+
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(**settings)
+        self._negative_number_matcher = NEGATIVE_NUMBER
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(BAD_USAGE, f"{self.prog}: {message} (see {self.prog} --help)\n")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog="gvgbot",
+        description="A robot that maps a building by itself, along its generalized Voronoi graph.",
+    )
+    parser.add_argument("--version", action="version", version=f"gvgbot {__version__}")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    _add_explore(commands)
+    _add_run(commands)
+    return parser
+
+
+def _add_explore(commands: "argparse._SubParsersAction[_Parser]") -> None:
+    explore = commands.add_parser(
+        "explore",
+        help="explore a simulated world and leave a map",
+        description="Explore a simulated world through the twins of the devices, as fast as this "
+        "machine can, and write a run directory with the map. Exits 0 only if all was explored.",
+        epilog="example: gvgbot explore --world office --seed 3 --out runs/office-3",
+    )
+    explore.add_argument(
+        "--world", metavar="NAME|YAML", help="a built-in world, or a map_server YAML"
+    )
+    explore.add_argument(
+        "--start",
+        nargs=3,
+        type=number,
+        metavar=("X", "Y", "THETA"),
+        help="where to start in the world: metres, metres, radians",
+    )
+    explore.add_argument("--seed", type=seed, metavar="N", help="of all randomness")
+    explore.add_argument("--config", type=Path, metavar="C.yaml", help="default: sim.yaml")
+    _add_overrides(explore)
+    explore.add_argument(
+        "--out", type=Path, metavar="DIR", help="run directory (default: a new one in runs/)"
+    )
+    explore.add_argument(
+        "--real-time", action="store_true", help="at the pace of a real robot, not faster"
+    )
+    explore.set_defaults(command=_explore)
+
+
+def _add_run(commands: "argparse._SubParsersAction[_Parser]") -> None:
+    run = commands.add_parser(
+        "run",
+        help="the daemon: explore with the devices of the configuration",
+        description="Run the daemon in real time, on the devices of the configuration or on their "
+        "twins, until it is stopped (SIGINT or SIGTERM).",
+        epilog="example: gvgbot run turtlebot2.yaml",
+    )
+    run.add_argument(
+        "config", nargs="?", type=Path, metavar="CONFIG", help="default: sim.yaml, no hardware"
+    )
+    _add_overrides(run)
+    run.add_argument(
+        "--out", type=Path, metavar="DIR", help="run directory (default: a new one in runs/)"
+    )
+    run.set_defaults(command=_run)
+
+
+def _add_overrides(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--set",
+        dest="overrides",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="override a configuration key, such as twin.base.odometry=worn; repeatable",
+    )
+
+
+def number(text: str) -> float:
+    """A finite number. Raises ValueError."""
+    value = float(text)
+    if not isfinite(value):
+        raise ValueError(text)
+    return value
+
+
+def seed(text: str) -> int:
+    """A whole number, not negative. Raises ValueError."""
+    value = int(text)
+    if value < 0:
+        raise ValueError(text)
+    return value
+
+
+def _explore(options: argparse.Namespace) -> int:
+    from gvgbot.config import load_config
+
+    config = load_config(options.config, _overrides(options))
+    from gvgbot import daemon
+
+    return daemon.explore(config, out=options.out, real_time=options.real_time)
+
+
+def _run(options: argparse.Namespace) -> int:
+    from gvgbot.config import load_config
+
+    config = load_config(options.config, options.overrides)
+    from gvgbot import daemon
+
+    return daemon.run(config, out=options.out)
+
+
+def _overrides(options: argparse.Namespace) -> list[str]:
+    """The --set options, then what the short options say about the twins."""
+    overrides = list(options.overrides)
+    if options.world is not None:
+        overrides.append(f"twin.world={_quoted(options.world)}")
+    if options.start is not None:
+        overrides.append(f"twin.start={options.start}")
+    if options.seed is not None:
+        overrides.append(f"twin.seed={options.seed}")
+    return overrides
+
+
+def _quoted(text: str) -> str:
+    """The text as a YAML string, so that a world named 7 stays a name."""
+    escaped = text.replace("'", "''")
+    return f"'{escaped}'"

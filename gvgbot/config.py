@@ -1,0 +1,74 @@
+"""The configuration: one frozen tree of what every part of the robot needs to know."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from importlib.resources import files
+from pathlib import Path
+from typing import Annotated
+
+from gvgbot.autonomy.mission import ExplorationConfig
+from gvgbot.autonomy.pipeline import AutonomyConfig
+from gvgbot.drivers.hokuyo.driver import HokuyoConfig
+from gvgbot.drivers.hokuyo.twin import HokuyoTwinConfig
+from gvgbot.drivers.kobuki.driver import KobukiConfig
+from gvgbot.drivers.kobuki.twin import KobukiTwinConfig
+from gvgbot.hal.guard import GuardConfig
+from gvgbot.ranges import Range
+from gvgbot.strict_yaml import load
+
+DEFAULT = "sim.yaml"
+NAME = re.compile(r"[A-Za-z0-9_-]+")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RobotConfig:
+    """The robot as a body: its name on the network, its footprint and its limits."""
+
+    name: str = "gvgbot"
+    radius_m: Annotated[float, Range(0.05, 2.0)] = 0.177
+    limits: GuardConfig = field(default_factory=GuardConfig)
+
+    def __post_init__(self) -> None:
+        """Raises ValueError for a name that cannot be part of a topic."""
+        if NAME.fullmatch(self.name) is None:
+            raise ValueError(f"name = {self.name!r}: must be letters, digits, - and _ only")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TwinConfig:
+    """The simulated world and devices."""
+
+    enabled: bool = True  # false: the devices are real, and the robot moves
+    world: str = "office"  # a built-in world, or the path of a map_server YAML
+    start: tuple[float, float, float] | None = None  # x (m), y (m), theta (rad); None: the world's
+    seed: Annotated[int, Range(0, 2**32 - 1)] = 1
+    laser: HokuyoTwinConfig = field(default_factory=HokuyoTwinConfig)
+    base: KobukiTwinConfig = field(default_factory=KobukiTwinConfig)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Config:
+    """The root of every configuration file: a section for each part, named after its module."""
+
+    robot: RobotConfig = field(default_factory=RobotConfig)
+    laser: HokuyoConfig = field(default_factory=HokuyoConfig)
+    base: KobukiConfig = field(default_factory=KobukiConfig)
+    twin: TwinConfig = field(default_factory=TwinConfig)
+    autonomy: AutonomyConfig = field(default_factory=AutonomyConfig)
+    exploration: ExplorationConfig = field(default_factory=ExplorationConfig)
+
+
+def load_config(path: Path | None = None, overrides: Sequence[str] = ()) -> Config:
+    """The configuration of a file, or of a packaged one by its name; None: the simulation.
+
+    Raises ConfigError that lists every mistake of the file and of the overrides (`a.b=c`).
+    """
+    return load(Config, packaged(DEFAULT if path is None else path), overrides)
+
+
+def packaged(path: Path | str) -> Path:
+    """The path itself if it exists, else the packaged file of that name if there is one."""
+    inside = Path(str(files("gvgbot") / "configs")) / Path(path).name
+    is_bare_name = Path(path).name == str(path)
+    return inside if is_bare_name and not Path(path).exists() and inside.exists() else Path(path)
