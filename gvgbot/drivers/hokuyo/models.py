@@ -2,8 +2,35 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import Self
+
+import numpy as np
+
+from gvgbot.geometry import Array
+
+_NUMBER_KEYS = ("DMIN", "DMAX", "ARES", "AMIN", "AMAX", "AFRT", "SCAN")
+_IDENTITY_KEYS = ("VEND", "PROD", "FIRM", "PROT", "SERI")
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """What the laser says it is."""
+
+    vendor: str
+    product: str
+    firmware: str
+    protocol: str
+    serial: str
+
+    @classmethod
+    def from_lines(cls, lines: Mapping[str, str]) -> Self:
+        """Read the lines of a VV reply; those that are missing come out empty."""
+        return cls(*(lines.get(key, "") for key in _IDENTITY_KEYS))
+
+    def lines(self) -> dict[str, str]:
+        """The lines of the VV reply; the inverse of `from_lines`."""
+        return dict(zip(_IDENTITY_KEYS, astuple(self), strict=True))
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +65,12 @@ class Parameters:
         """Direction of a step in the laser frame, rad."""
         return (step - self.front_step) * self.step_angle
 
+    @property
+    def bearings(self) -> Array:
+        """Directions (N,) of all steps from the first to the last in the laser frame, rad."""
+        steps = np.arange(self.first_step, self.last_step + 1, dtype=np.float64)
+        return (steps - self.front_step) * self.step_angle
+
     @classmethod
     def from_lines(cls, lines: Mapping[str, str]) -> Self:
         """Read the lines of a PP reply. Raises ValueError when they make no sense."""
@@ -57,19 +90,8 @@ class Parameters:
 
     def lines(self) -> dict[str, str]:
         """The lines of the PP reply; the inverse of `from_lines`."""
-        numbers = (
-            self.range_min_mm,
-            self.range_max_mm,
-            self.steps_per_turn,
-            self.first_step,
-            self.last_step,
-            self.front_step,
-            self.rpm,
-        )
-        return {"MODL": self.model, **dict(zip(_NUMBER_KEYS, map(str, numbers), strict=True))}
-
-
-_NUMBER_KEYS = ("DMIN", "DMAX", "ARES", "AMIN", "AMAX", "AFRT", "SCAN")
+        model, *numbers = astuple(self)
+        return {"MODL": model, **dict(zip(_NUMBER_KEYS, map(str, numbers), strict=True))}
 
 
 @dataclass(frozen=True, slots=True)

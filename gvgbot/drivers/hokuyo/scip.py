@@ -22,6 +22,7 @@ from gvgbot.drivers.hokuyo.scip_codec import (
     with_checksum,
 )
 from gvgbot.drivers.hokuyo.scip_messages import (
+    ACCEPTED,
     SCAN_DATA,
     USER_STRING,
     BadReply,
@@ -91,11 +92,16 @@ def parse_message(message: bytes) -> Message:
     try:
         status = _status(status_line)
         request = parse_request(echo)
-        if request is not None and (payload or status == SCAN_DATA):
+        if request is not None and _carries_scan(request, status, payload):
             return _scan(request, status, payload)
         return _reply(echo, status, payload)
     except DamagedError as error:
         return BadReply(str(error), message)
+
+
+def _carries_scan(request: ScanRequest, status: str, payload: bytes) -> bool:
+    single = request.is_single_shot and status == ACCEPTED and payload != b""
+    return single or status == SCAN_DATA
 
 
 def _parse_or_recover(message: bytes) -> list[Message]:

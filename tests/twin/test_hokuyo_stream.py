@@ -1,0 +1,366 @@
+"""The laser driver against the simulated laser, in virtual time."""
+
+import asyncio
+import contextlib
+import math
+from collections.abc import Awaitable, Callable, Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+
+from gvgbot.clock import LoopClock, run_in_virtual_time
+from gvgbot.drivers.hokuyo.driver import HokuyoConfig, HokuyoLaser
+from gvgbot.drivers.hokuyo.models import MODELS
+from gvgbot.drivers.hokuyo.twin import HokuyoTwin, HokuyoTwinConfig
+from gvgbot.drivers.transport import ByteStream, TwinDevice, pipe, serve_twin
+from gvgbot.errors import DeviceLost, DeviceRefused
+from gvgbot.geometry import Array
+from gvgbot.hal.messages import Scan
+
+pytestmark = pytest.mark.twin
+
+PERFECT = HokuyoTwinConfig(range_sigma_m=0.0, dropout_fraction=0.0)
+QUANTISATION = 0.0005 + 1e-9  # m
+
+
+@dataclass
+class World:
+    """Ranges that name their scan, and a record of when they were asked for."""
+
+    beams: int = 1081
+    stamps: list[float] = field(default_factory=list)
+
+    def __call__(self, stamp: float) -> Array:
+        self.stamps.append(stamp)
+        return self.ranges(len(self.stamps) - 1)
+
+    def ranges(self, scan_number: int) -> Array:
+        ranges = 1.0 + 0.01 * scan_number + np.linspace(0.0, 2.0, self.beams)
+        ranges[::100] = math.inf
+        return ranges
+
+
+@dataclass
+class Bench:
+    """A driver and a twin on the two ends of a link."""
+
+    laser: HokuyoLaser
+    link: ByteStream
+    served: asyncio.Task[None]
+    running: asyncio.Task[None]
+    clock: LoopClock
+
+    async def scans(self, count: int) -> list[Scan]:
+        return [await self.laser.next_scan() for _ in range(count)]
+
+
+class Deaf:
+    """A device that answers nothing."""
+
+    def receive(self, data: bytes, now: float) -> bytes:
+        return b""
+
+    def advance(self, now: float) -> bytes:
+        return b""
+
+    def next_due(self) -> float:
+        return math.inf
+
+
+class Scripted(Deaf):
+    """A device that gives fixed replies to commands, and others to a twin."""
+
+    def __init__(self, replies: dict[bytes, bytes], twin: TwinDevice) -> None:
+        self.replies = replies
+        self.twin = twin
+
+    def receive(self, data: bytes, now: float) -> bytes:
+        return b"".join(self.answer(command, now) for command in data.splitlines(keepends=True))
+
+    def answer(self, command: bytes, now: float) -> bytes:
+        scripted = self.replies.get(command)
+        return self.twin.receive(command, now) if scripted is None else scripted
+
+    def advance(self, now: float) -> bytes:
+        return self.twin.advance(now)
+
+    def next_due(self) -> float:
+        return self.twin.next_due()
+
+
+def on_bench(
+    twin: TwinDevice,
+    scenario: Callable[[Bench], Awaitable[None]],
+    config: HokuyoConfig | None = None,
+    first: Callable[[ByteStream, LoopClock], Awaitable[None]] | None = None,
+) -> None:
+    """Run the scenario with the driver and the twin at work; `first` has the link before that."""
+
+    async def main() -> None:
+        here, there = pipe()
+        clock = LoopClock()
+        async with asyncio.TaskGroup() as tasks:
+            served = tasks.create_task(serve_twin(twin, there, clock))
+            if first is not None:
+                await first(here, clock)
+            laser = HokuyoLaser(here, config or HokuyoConfig(), clock)
+            running = tasks.create_task(until_lost(laser))
+            await scenario(Bench(laser, here, served, running, clock))
+            running.cancel()
+            served.cancel()
+
+    run_in_virtual_time(main())
+
+
+async def until_lost(laser: HokuyoLaser) -> None:
+    with contextlib.suppress(DeviceLost):
+        await laser.run()
+
+
+def quantised(ranges: Array) -> Callable[[Array], bool]:
+    return lambda measured: np.allclose(measured, ranges, rtol=0.0, atol=QUANTISATION)
+
+
+def increments(values: Iterable[float]) -> Array:
+    return np.diff(np.array(list(values)))
+
+
+def test_a_utm_30lx_gives_every_fourth_of_its_scans() -> None:
+    world = World()
+
+    async def scenario(bench: Bench) -> None:
+        scans = await bench.scans(50)
+        assert increments(world.stamps) == pytest.approx(0.1)
+        assert increments(scan.stamp for scan in scans) == pytest.approx(0.1, abs=0.0021)
+        assert (await bench.scans(1))[0].stamp - scans[0].stamp == pytest.approx(5.0, abs=0.002)
+
+    on_bench(HokuyoTwin(PERFECT, world, seed=1), scenario)
+
+
+def test_ranges_are_those_of_the_world_to_half_a_millimetre() -> None:
+    world = World()
+
+    async def scenario(bench: Bench) -> None:
+        for number, scan in enumerate(await bench.scans(5)):
+            assert quantised(world.ranges(number))(scan.ranges)
+
+    on_bench(HokuyoTwin(PERFECT, world, seed=1), scenario)
+
+
+@pytest.mark.parametrize("drift_ppm", [-90.0, 0.0, 90.0])
+@pytest.mark.parametrize("start_ms", [0, 2**24 - 5000])
+def test_stamps_keep_within_two_milliseconds_of_the_truth(drift_ppm: float, start_ms: int) -> None:
+    world = World()
+    twin_config = HokuyoTwinConfig(clock_drift_ppm=drift_ppm, clock_start_ms=start_ms)
+
+    async def scenario(bench: Bench) -> None:
+        stamps = [scan.stamp for scan in await bench.scans(1200)]
+        assert np.abs(np.array(stamps) - world.stamps[: len(stamps)]).max() < 0.002
+        assert bench.laser.link.clock_resets == 0
+
+    on_bench(HokuyoTwin(twin_config, world, seed=2), scenario)
+
+
+def test_a_urg_04lx_is_stamped_at_its_first_beam() -> None:
+    parameters = MODELS["URG-04LX"].parameters
+    world = World(beams=682)
+
+    async def scenario(bench: Bench) -> None:
+        scans = await bench.scans(20)
+        first_beam = 44 * 0.1 / 1024
+        for stamp, scan in zip(world.stamps, scans, strict=False):
+            assert scan.stamp == pytest.approx(stamp + first_beam, abs=0.002)
+        assert scans[0].bearings == pytest.approx(parameters.bearings)
+        assert scans[0].bearings[[0, -1]] == pytest.approx(np.radians([-119.53, 119.88]), abs=1e-4)
+        assert scans[0].time_increment == pytest.approx(0.1 / 1024)
+        assert scans[0].range_max == 5.6
+
+    config = HokuyoConfig(skip=0)
+    twin = HokuyoTwin(HokuyoTwinConfig(model="URG-04LX"), world, seed=3)
+    on_bench(twin, scenario, config)
+
+
+def test_a_bad_checksum_loses_only_its_own_scan() -> None:
+    world = World()
+    config = HokuyoTwinConfig(range_sigma_m=0.0, dropout_fraction=0.0, bad_checksum_fraction=0.3)
+
+    async def scenario(bench: Bench) -> None:
+        scans = await bench.scans(100)
+        link = bench.laser.link
+        assert link.bad_messages > 10
+        assert link.scans + link.bad_messages == len(world.stamps)
+        for scan in scans:
+            number = int(np.argmin(np.abs(np.array(world.stamps) - scan.stamp)))
+            assert quantised(world.ranges(number))(scan.ranges)
+
+    on_bench(HokuyoTwin(config, world, seed=4), scenario, HokuyoConfig(missed_scans=20))
+
+
+@pytest.mark.parametrize(
+    "left_over",
+    [b"MD0000108000000\n", b"TM0\n", b"BM\n", b"MD00", b"MD0000108001200;x.1\nVV\n", b"RS\n"],
+)
+def test_it_opens_whatever_the_last_program_left_behind(left_over: bytes) -> None:
+    async def first(link: ByteStream, clock: LoopClock) -> None:
+        link.write(left_over)
+        await clock.sleep_until(clock.now() + 5.01)
+
+    async def scenario(bench: Bench) -> None:
+        started = bench.clock.now()
+        (scan,) = await bench.scans(1)
+        assert bench.clock.now() - started < 0.5
+        assert started < scan.stamp < bench.clock.now()
+
+    on_bench(HokuyoTwin(PERFECT, World(), seed=5), scenario, first=first)
+
+
+def test_identity_and_parameters_are_those_of_the_laser() -> None:
+    async def scenario(bench: Bench) -> None:
+        assert bench.laser.identity is None
+        await bench.scans(1)
+        assert bench.laser.parameters == MODELS["UTM-30LX"].parameters
+        assert bench.laser.identity is not None
+        assert "UTM-30LX" in bench.laser.identity.product
+
+    on_bench(HokuyoTwin(PERFECT, World(), seed=6), scenario)
+
+
+def test_clusters_keep_the_nearest_range_and_point_to_their_middle() -> None:
+    async def scenario(bench: Bench) -> None:
+        (scan,) = await bench.scans(1)
+        assert len(scan.ranges) == 361
+        assert scan.ranges[1:] == pytest.approx(nearest[1:], abs=QUANTISATION)
+        middle = MODELS["UTM-30LX"].parameters.bearings[1::3]
+        assert scan.bearings[: len(middle)] == pytest.approx(middle)
+
+    ranges = World().ranges(0)
+    nearest = [min(ranges[i : i + 3]) for i in range(0, 1081, 3)]
+    twin = HokuyoTwin(PERFECT, lambda stamp: ranges, seed=7)
+    on_bench(twin, scenario, HokuyoConfig(cluster=3))
+
+
+def test_noise_and_dropouts_are_as_configured() -> None:
+    async def scenario(bench: Bench) -> None:
+        ranges = np.array([scan.ranges for scan in await bench.scans(100)])
+        assert np.isnan(ranges).mean() == pytest.approx(0.005, rel=0.1)
+        assert np.nanstd(ranges) == pytest.approx(0.01, rel=0.02)
+        assert np.nanmean(ranges) == pytest.approx(3.0, abs=1e-3)
+
+    twin = HokuyoTwin(HokuyoTwinConfig(), lambda stamp: np.full(1081, 3.0), seed=8)
+    on_bench(twin, scenario)
+
+
+def test_a_silent_laser_is_lost_within_a_few_seconds() -> None:
+    async def scenario(bench: Bench) -> None:
+        await bench.scans(3)
+        bench.served.cancel()
+        silent_since = bench.clock.now()
+        await bench.running
+        assert 0.3 < bench.clock.now() - silent_since < 4.0
+        assert bench.laser.link.restarts == 1
+
+    on_bench(HokuyoTwin(PERFECT, World(), seed=9), scenario)
+
+
+def test_a_laser_that_never_answers_is_lost() -> None:
+    async def main() -> None:
+        here, there = pipe()
+        clock = LoopClock()
+        async with asyncio.TaskGroup() as tasks:
+            served = tasks.create_task(serve_twin(Deaf(), there, clock))
+            with pytest.raises(DeviceLost, match="does not answer"):
+                await HokuyoLaser(here, HokuyoConfig(), clock).run()
+            served.cancel()
+
+    run_in_virtual_time(main())
+
+
+def test_a_cut_cable_is_noticed_at_once() -> None:
+    async def scenario(bench: Bench) -> None:
+        await bench.scans(3)
+        cut = bench.clock.now()
+        bench.link.close()
+        await bench.running
+        assert bench.clock.now() == cut
+
+    on_bench(HokuyoTwin(PERFECT, World(), seed=10), scenario)
+
+
+def test_a_stream_that_stopped_is_started_again() -> None:
+    async def scenario(bench: Bench) -> None:
+        await bench.scans(3)
+        stopped = bench.clock.now()
+        twin.receive(b"QT\n", stopped)
+        (scan,) = await bench.scans(1)
+        assert scan.stamp - stopped < 0.5
+        assert bench.laser.link.restarts == 1
+
+    twin = HokuyoTwin(PERFECT, World(), seed=11)
+    on_bench(twin, scenario)
+
+
+def test_a_reset_clock_costs_no_scan_its_stamp() -> None:
+    world = World()
+
+    async def scenario(bench: Bench) -> None:
+        await bench.scans(3)
+        twin.receive(b"RS\n", bench.clock.now())
+        scans = await bench.scans(10)
+        stamps = [scan.stamp for scan in scans]
+        assert stamps == pytest.approx(world.stamps[-10:], abs=0.002)
+        assert bench.laser.link.clock_resets == 1
+
+    twin = HokuyoTwin(HokuyoTwinConfig(clock_start_ms=9_000_000), world, seed=12)
+    on_bench(twin, scenario)
+
+
+def test_the_laser_is_switched_off_when_the_driver_is_cancelled() -> None:
+    twin = HokuyoTwin(PERFECT, World(), seed=13)
+
+    async def scenario(bench: Bench) -> None:
+        await bench.scans(2)
+        assert twin.next_due() < math.inf
+        bench.running.cancel()
+        await bench.clock.sleep_until(bench.clock.now() + 0.01)
+        assert twin.next_due() == math.inf
+
+    on_bench(twin, scenario)
+
+
+def test_a_refused_stream_is_reported_with_its_status() -> None:
+    async def main() -> None:
+        here, there = pipe()
+        clock = LoopClock()
+        command = b"MD0000108001300\n"
+        twin = Scripted({command: command + b"0Ll\n\n"}, HokuyoTwin(PERFECT, World(), seed=14))
+        async with asyncio.TaskGroup() as tasks:
+            served = tasks.create_task(serve_twin(twin, there, clock))
+            with pytest.raises(DeviceRefused, match="status 0L"):
+                await HokuyoLaser(here, HokuyoConfig(), clock).run()
+            served.cancel()
+
+    run_in_virtual_time(main())
+
+
+class ScipOne(Scripted):
+    """A laser as old ones wake up: nothing but SCIP2.0 gets through to the twin."""
+
+    def __init__(self, twin: TwinDevice) -> None:
+        super().__init__({b"TM2\n": b"TM2\nE\n\n", b"QT\n": b"QT\nE\n\n"}, twin)
+
+    def answer(self, command: bytes, now: float) -> bytes:
+        if command == b"SCIP2.0\n":
+            self.replies = {}
+            return b"SCIP2.0\n0\n\n"
+        return super().answer(command, now)
+
+
+def test_a_laser_in_scip_1_is_switched_over() -> None:
+    laser_in_scip_1 = ScipOne(HokuyoTwin(PERFECT, World(), seed=15))
+
+    async def scenario(bench: Bench) -> None:
+        await bench.scans(2)
+        assert laser_in_scip_1.replies == {}
+
+    on_bench(laser_in_scip_1, scenario)
