@@ -1,0 +1,181 @@
+"""Scans with their poses -> occupancy grid: how likely every cell is part of a wall.
+
+Each scan votes once per cell around it: every cell looks up, by its direction from the laser, how
+far the beams saw free space. A cell that holds a hit gains, one that was seen through loses.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvgbot.geometry import Array, Pose
+from gvgbot.hal.messages import Scan
+
+UNKNOWN = -1
+
+Cells = NDArray[np.int8]
+Indices = NDArray[np.int64]
+
+_HIT, _MISS, _CERTAIN = 18, -15, 60  # log odds in tenths: a vote each way, and where votes saturate
+_DIRECTIONS = 4096  # per turn, finer than the beams
+_ANGLES = (np.arange(_DIRECTIONS) + 0.5) * (math.tau / _DIRECTIONS) - math.pi
+_TOWARDS = np.column_stack([np.cos(_ANGLES), np.sin(_ANGLES)])
+_EDGE_M = 0.5  # of unknown cells left around the known ones
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OccupancyGrid:
+    """Occupancy in percent, -1 where unknown: `cells` (rows, columns), row 0 at the bottom.
+
+    `origin` is the outer corner of cell [0, 0] (m, map frame), `resolution_m` a cell's side.
+    The array is read-only.
+    """
+
+    cells: Cells
+    resolution_m: float
+    origin: tuple[float, float]
+
+    def __post_init__(self) -> None:
+        self.cells.setflags(write=False)
+
+
+def occupancy_grid(
+    scans: Sequence[tuple[Pose, Scan]], resolution_m: float = 0.05, max_range_m: float = 12.0
+) -> OccupancyGrid:
+    """The grid that scans see from `map_base` poses; what is farther than the range counts not.
+
+    A scan counts as taken at one instant, from its one pose. NaN beams say nothing; inf beams
+    say that there is nothing up to the laser's range. Without any scan one unknown cell.
+    """
+    lasers = [(map_base.compose(scan.base_laser), scan) for map_base, scan in scans]
+    reach = min(max_range_m, max((scan.range_max for _, scan in lasers), default=0.0))
+    disc = _Disc.of_radius(reach, resolution_m)
+    votes, corner = _canvas([laser for laser, _ in lasers], disc)
+    for map_laser, scan in lasers:
+        _vote(votes, corner, disc, map_laser, scan)
+    return _finished(votes, corner, resolution_m)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Disc:
+    """Distance (m) and direction (index) of cells from the middle one, (2 half + 1) square."""
+
+    reach: float
+    cell: float
+    half: int
+    distance: NDArray[np.float32]
+    direction: NDArray[np.int16]
+
+    @classmethod
+    def of_radius(cls, reach: float, cell: float) -> Self:
+        half = math.ceil(reach / cell) + 2
+        axis = np.arange(-half, half + 1, dtype=np.float32) * np.float32(cell)
+        y, x = axis[:, None], axis[None, :]
+        turns = np.arctan2(y, x) / np.float32(math.tau) + np.float32(0.5)
+        direction = (turns * _DIRECTIONS).astype(np.int16) % _DIRECTIONS
+        return cls(reach, cell, half, np.hypot(x, y), direction)
+
+
+def _canvas(lasers: Sequence[Pose], disc: _Disc) -> tuple[Cells, Indices]:
+    """Votes of zero for all that can be seen, and the (row, column) of their first cell."""
+    if not lasers:
+        return np.zeros((1, 1), np.int8), np.zeros(2, np.int64)
+    places = np.array([_cell(laser, disc.cell) for laser in lasers])
+    corner = places.min(axis=0) - disc.half
+    rows, columns = places.max(axis=0) + disc.half + 1 - corner
+    return np.zeros((rows, columns), np.int8), corner
+
+
+def _cell(pose: Pose, cell: float) -> tuple[int, int]:
+    """(row, column) of the cell that a pose stands on."""
+    return math.floor(pose.y / cell), math.floor(pose.x / cell)
+
+
+def _vote(votes: Cells, corner: Indices, disc: _Disc, map_laser: Pose, scan: Scan) -> None:
+    """Add what one scan saw to the votes around its laser."""
+    here = np.array(_cell(map_laser, disc.cell))
+    half = _half_width(disc, scan)
+    row, column = here - corner - half
+    window = votes[row : row + 2 * half + 1, column : column + 2 * half + 1]
+    hits = _hits(disc, map_laser, scan) - here + half
+    free = _seen_through(disc, half, _free_ranges(disc, map_laser, scan))
+    free[hits[:, 0], hits[:, 1]] = False
+    window += free.view(np.int8) * np.int8(_MISS)
+    window[hits[:, 0], hits[:, 1]] += np.int8(_HIT)
+    np.clip(window, -_CERTAIN, _CERTAIN, out=window)
+
+
+def _half_width(disc: _Disc, scan: Scan) -> int:
+    """Cells from the laser's cell to the border of a window that holds all that the scan saw."""
+    seen = np.minimum(scan.ranges, scan.range_max)
+    farthest = float(np.fmax.reduce(seen, initial=0.0))
+    return min(disc.half, math.ceil(farthest / disc.cell) + 2)
+
+
+def _hits(disc: _Disc, map_laser: Pose, scan: Scan) -> Indices:
+    """(row, column) of the cells that beams ended in (N, 2)."""
+    hit = scan.ranges <= disc.reach
+    ranges, bearings = scan.ranges[hit], scan.bearings[hit]
+    ends = np.column_stack([ranges * np.cos(bearings), ranges * np.sin(bearings)])
+    return np.floor(map_laser.transform(ends)[:, ::-1] / disc.cell).astype(np.int64)
+
+
+def _seen_through(disc: _Disc, half: int, free_ranges: Array) -> NDArray[np.bool_]:
+    """Which cells of a window (2 half + 1 square) are nearer than it is free in their direction."""
+    inner = slice(disc.half - half, disc.half + half + 1)
+    limits = free_ranges.astype(np.float32)[disc.direction[inner, inner]]
+    return disc.distance[inner, inner] < limits
+
+
+def _free_ranges(disc: _Disc, map_laser: Pose, scan: Scan) -> Array:
+    """How far (m) it is free from the middle of the laser's cell, in every direction."""
+    along_beams = np.append(_free_along_beams(disc, scan), 0.0)
+    free = along_beams[_beams(map_laser, scan)]
+    row, column = _cell(map_laser, disc.cell)
+    middle = np.array([column + 0.5, row + 0.5]) * disc.cell
+    return np.where(free > 0.0, free + _TOWARDS @ (map_laser.position - middle), 0.0)
+
+
+def _free_along_beams(disc: _Disc, scan: Scan) -> Array:
+    """How far (m) from the laser every beam and both its neighbours saw nothing; NaN as 0."""
+    free = np.where(np.isposinf(scan.ranges), scan.range_max, scan.ranges - disc.cell)
+    least = free.copy()
+    least[1:] = np.fmin(least[1:], free[:-1])
+    least[:-1] = np.fmin(least[:-1], free[1:])
+    least[np.isnan(free)] = 0.0
+    return np.clip(least, 0.0, disc.reach)
+
+
+def _beams(map_laser: Pose, scan: Scan) -> Indices:
+    """The beam that looks in each direction of the map; where none does, one past the last."""
+    step = scan.angle_increment
+    turn = (_ANGLES - map_laser.theta - scan.angle_min) * math.copysign(1.0, step)
+    beams: Indices = ((turn + abs(step) / 2.0) % math.tau / abs(step)).astype(np.int64)
+    return np.minimum(beams, len(scan.ranges))
+
+
+def _finished(votes: Cells, corner: Indices, cell: float) -> OccupancyGrid:
+    """The votes as percent, cut to the known cells and a margin."""
+    rows, columns = np.flatnonzero(votes.any(axis=1)), np.flatnonzero(votes.any(axis=0))
+    if not len(rows):
+        return OccupancyGrid(np.full((1, 1), UNKNOWN, np.int8), cell, (0.0, 0.0))
+    edge = math.ceil(_EDGE_M / cell)
+    bottom, left = max(0, int(rows[0]) - edge), max(0, int(columns[0]) - edge)
+    cut = votes[bottom : rows[-1] + edge + 1, left : columns[-1] + edge + 1]
+    row, column = int(corner[0]) + bottom, int(corner[1]) + left
+    return OccupancyGrid(_PERCENT[cut], cell, (column * cell, row * cell))
+
+
+def _percentages() -> Cells:
+    """Occupancy in percent for every int8 vote, by the vote as an index; no vote is unknown."""
+    votes = np.arange(256).astype(np.uint8).view(np.int8)
+    percent = np.rint(100.0 / (1.0 + np.exp(-votes / 10.0))).astype(np.int8)
+    percent[0] = UNKNOWN
+    return percent
+
+
+_PERCENT = _percentages()  # a negative vote counts from the end, as indices do

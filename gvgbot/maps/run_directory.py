@@ -1,0 +1,141 @@
+"""The directory that a run writes: whole files at once, events line by line."""
+
+import json
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from enum import Enum
+from pathlib import Path
+from types import TracebackType
+from typing import IO, Any, Self
+
+import numpy as np
+
+from gvgbot.errors import GvgbotError, UsageError
+from gvgbot.maps.atomic_files import write_files
+
+EVENTS = "events.jsonl"
+SUMMARY = "summary.json"
+
+
+class RunDirectory:
+    """Where a run leaves its map; closes its list of events as a context manager or by `close`."""
+
+    def __init__(self, path: Path) -> None:
+        """Open the directory of a run, made if it is missing; its events go on where they ended.
+
+        Raises UsageError if the directory cannot be written to.
+        """
+        self.path = path
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+            self._events: IO[str] = (path / EVENTS).open("a", encoding="utf-8")
+        except OSError as error:
+            raise _unfit(path, error) from error
+
+    @classmethod
+    def create(cls, out: Path | None = None, *, world: str, runs: Path = Path("runs")) -> Self:
+        """The directory of a new run: `out`, or the next free `runs/<world>-<n>`.
+
+        The events and the summary of an earlier run in `out` go; its other files stay until this
+        run replaces them. Raises UsageError if the directory cannot be written to.
+        """
+        path = _next_free(runs, world) if out is None else out
+        run = cls(path)
+        try:
+            run._events.truncate(0)
+            (path / SUMMARY).unlink(missing_ok=True)
+        except OSError as error:
+            run.close()
+            raise _unfit(path, error) from error
+        return run
+
+    def write(self, contents: Mapping[str, bytes | str]) -> None:
+        """Replace these files together; if that fails (GvgbotError), the old ones stand."""
+        write_files(self.path, contents)
+
+    def write_summary(self, summary: Mapping[str, object]) -> None:
+        """Replace `summary.json`; a number that is not finite becomes null."""
+        text = json.dumps(plain(summary), indent=2, ensure_ascii=False, allow_nan=False)
+        self.write({SUMMARY: text + "\n"})
+
+    def append_event(self, event: object) -> None:
+        """Add a line to `events.jsonl`: the fields of a dataclass after its name as `event`.
+
+        Raises TypeError if the event is no dataclass, GvgbotError if the line cannot be written.
+        """
+        line = {"event": _snake_case(type(event).__name__)} | _fields(event)
+        try:
+            self._events.write(json.dumps(line, ensure_ascii=False, allow_nan=False) + "\n")
+            self._events.flush()
+        except OSError as error:
+            raise GvgbotError(f"cannot write {self.path / EVENTS}: {error.strerror}") from error
+
+    def close(self) -> None:
+        """No more events."""
+        self._events.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+def plain(value: object) -> Any:
+    """The value as JSON has it: dataclasses as objects, arrays as lists, paths as text.
+
+    Numbers that are not finite become null, since JSON has no word for them.
+    """
+    match value:
+        case Enum():
+            return plain(value.value)
+        case float() | np.floating():
+            return float(value) if math.isfinite(value) else None
+        case None | str() | bool() | int():
+            return value
+        case np.generic() | np.ndarray():
+            return plain(value.tolist())
+        case Mapping():
+            return {str(key): plain(item) for key, item in value.items()}
+        case list() | tuple():
+            return [plain(item) for item in value]
+        case _ if is_dataclass(value):
+            return _fields(value)
+        case _:
+            return str(value)
+
+
+def _fields(value: Any) -> dict[str, Any]:
+    return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+
+
+def _snake_case(name: str) -> str:
+    return re.sub(r"(?<=.)([A-Z])", r"_\1", name).lower()
+
+
+def _next_free(runs: Path, world: str) -> Path:
+    """The first `<world>-<n>` that did not exist; making it is what claims it."""
+    number = 1
+    while True:
+        path = runs / f"{world}-{number}"
+        try:
+            path.mkdir(parents=True)
+        except FileExistsError:
+            number += 1
+        except OSError as error:
+            raise _unfit(path, error) from error
+        else:
+            return path
+
+
+def _unfit(path: Path, error: OSError) -> UsageError:
+    if path.exists() and not path.is_dir():
+        return UsageError(f"cannot write a run to {path}: it is a file, choose another directory")
+    return UsageError(f"cannot write a run to {path}: {error.strerror}, choose another directory")

@@ -1,0 +1,70 @@
+"""Trajectories and their TUM form: a line `t x y z qx qy qz qw` per pose."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from gvgbot.errors import UsageError
+from gvgbot.geometry import Array, Pose
+
+_TUM_LINE = "%.6f %.6f %.6f 0 0 0 %.9f %.9f\n"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trajectory:
+    """Poses over time: `stamps` (N,) in s, `poses` (N, 3) as x, y (m), theta (rad); read-only."""
+
+    stamps: Array
+    poses: Array
+
+    def __post_init__(self) -> None:
+        if self.poses.shape != (len(self.stamps), 3):
+            raise ValueError(f"{len(self.stamps)} stamps but poses of shape {self.poses.shape}")
+        self.stamps.setflags(write=False)
+        self.poses.setflags(write=False)
+
+    @property
+    def positions(self) -> Array:
+        """x, y (N, 2) in m."""
+        return self.poses[:, :2]
+
+
+def to_trajectory(stamped_poses: Iterable[tuple[float, Pose]]) -> Trajectory:
+    """The trajectory through poses with their stamps (s)."""
+    rows = [(stamp, pose.x, pose.y, pose.theta) for stamp, pose in stamped_poses]
+    table = np.array(rows, np.float64).reshape(-1, 4)
+    return Trajectory(table[:, 0], table[:, 1:])
+
+
+def encode_tum(trajectory: Trajectory) -> str:
+    """The trajectory in TUM form: planar, so z, qx and qy are 0; qw is never negative."""
+    half = np.remainder(trajectory.poses[:, 2] + np.pi, 2.0 * np.pi) / 2.0 - np.pi / 2.0
+    rows = np.column_stack([trajectory.stamps, trajectory.positions, np.sin(half), np.cos(half)])
+    return "".join(_TUM_LINE % tuple(row) for row in rows.tolist())
+
+
+def decode_tum(text: str) -> Trajectory:
+    """The planar part of a TUM trajectory, theta in (-pi, pi]; lines that begin with # are skipped.
+
+    Raises UsageError, with the line's number, if a line is not eight finite numbers.
+    """
+    lines = enumerate(text.splitlines(), start=1)
+    rows = [_row(line, number) for number, line in lines if line.strip() and line[0] != "#"]
+    table = np.array(rows, np.float64).reshape(-1, 8)
+    qx, qy, qz, qw = table[:, 4:].T
+    theta = np.arctan2(2.0 * (qw * qz + qx * qy), qw**2 + qx**2 - qy**2 - qz**2)
+    return Trajectory(table[:, 0], np.column_stack([table[:, 1:3], theta]))
+
+
+def _row(line: str, number: int) -> list[float]:
+    try:
+        row = [float(word) for word in line.split()]
+    except ValueError:
+        row = []
+    if len(row) != 8 or not all(map(math.isfinite, row)) or not any(row[4:]):
+        raise UsageError(
+            f"line {number} of the trajectory is not t x y z qx qy qz qw: {line[:60]!r}"
+        )
+    return row
