@@ -1,0 +1,66 @@
+"""Time of one laser sweep and of one step of the robot body, at random free places of a world.
+
+Run: python benchmarks/bench_ray_casting.py [WORLD ...]   (built-in names or map_server YAML files)
+"""
+
+import sys
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from gvgbot.drivers.body import RobotBody
+from gvgbot.drivers.world import World
+from gvgbot.geometry import Pose
+from gvgbot.worlds import NAMES, open_world
+
+BEARINGS = np.deg2rad(np.linspace(-135.0, 135.0, 1081))
+RADIUS = 0.18  # m
+SWEEPS = 500
+
+
+def free_poses(world: World, start: Pose | None, rng: np.random.Generator) -> list[Pose]:
+    """Random places of the largest inner free region, or of the region of the start."""
+    x0, y0, x1, y1 = world.extent
+    poses: list[Pose] = []
+    while len(poses) < SWEEPS:
+        x, y, theta = rng.uniform((x0, y0, -np.pi), (x1, y1, np.pi))
+        if world.clear_of_walls(x, y) > RADIUS:
+            poses.append(Pose(x, y, theta))
+    return poses
+
+
+def percentiles(action: Callable[[Pose], object], poses: list[Pose]) -> str:
+    """Median and 95th percentile of the time that the action takes, in ms."""
+    times = []
+    for pose in poses:
+        begin = time.perf_counter()
+        action(pose)
+        times.append(time.perf_counter() - begin)
+    p50, p95 = np.percentile(times, [50, 95]) * 1e3
+    return f"p50 {p50:.3f} ms, p95 {p95:.3f} ms"
+
+
+def drive(world: World, pose: Pose) -> None:
+    """Fifty control periods of slow driving."""
+    body = RobotBody(world, pose)
+    body.command(0.05, 0.5)
+    for k in range(1, 51):
+        body.advance(0.02 * k)
+
+
+def main() -> None:
+    """Print one line per world."""
+    rng = np.random.default_rng(1)
+    for name in sys.argv[1:] or NAMES:
+        world, start = open_world(name)
+        poses = free_poses(world, start, rng)
+        for reach in (5.6, 30.0):
+            world.cast(poses[0], BEARINGS, reach)
+            text = percentiles(lambda p, r=reach: world.cast(p, BEARINGS, r), poses)  # type: ignore[misc]
+            print(f"{name}: 1081 beams to {reach} m: {text}")  # noqa: T201
+        print(f"{name}: 50 steps of the body: {percentiles(lambda p: drive(world, p), poses)}")  # noqa: T201
+
+
+if __name__ == "__main__":
+    main()
