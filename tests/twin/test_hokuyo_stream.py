@@ -217,7 +217,6 @@ def test_it_opens_whatever_the_last_program_left_behind(left_over: bytes) -> Non
 
 def test_identity_and_parameters_are_those_of_the_laser() -> None:
     async def scenario(bench: Bench) -> None:
-        assert bench.laser.identity is None
         await bench.scans(1)
         assert bench.laser.parameters == MODELS["UTM-30LX"].parameters
         assert bench.laser.identity is not None

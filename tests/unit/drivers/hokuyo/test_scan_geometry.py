@@ -1,0 +1,106 @@
+"""Readings to ranges and bearings, against the tables of the makers."""
+
+import math
+
+import numpy as np
+import pytest
+
+from gvgbot.drivers.hokuyo.driver import HokuyoConfig, scan_geometry
+from gvgbot.drivers.hokuyo.models import MODELS, Identity, Parameters, find_model
+from gvgbot.drivers.hokuyo.scip_messages import ScanRequest
+from gvgbot.geometry import Array, Pose
+from gvgbot.hal.messages import Scan
+
+UNLISTED = Parameters("UST-10LX", 20, 30000, 1440, 0, 1080, 540, 2400)
+
+
+def scan_of(parameters: Parameters, readings: list[int], config: HokuyoConfig) -> Scan:
+    request = ScanRequest("MD", parameters.first_step, parameters.last_step)
+    geometry = scan_geometry(config, parameters, request)
+    return geometry.scan(np.array(readings, np.int32), 1.0)
+
+
+def ranges_of(parameters: Parameters, readings: list[int], **config: float) -> Array:
+    return scan_of(parameters, readings, HokuyoConfig(**config)).ranges  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("parameters", "readings", "ranges"),
+    [
+        pytest.param(
+            MODELS["URG-04LX"].parameters,
+            [0, 1, 6, 7, 10, 19, 20, 5600, 5601],
+            [math.inf] + [math.nan] * 5 + [0.02, 5.6, math.inf],
+            id="URG-04LX",
+        ),
+        pytest.param(
+            MODELS["UTM-30LX"].parameters,
+            [0, 1, 2, 3, 5, 22, 23, 30000, 45000, 65533],
+            [math.nan, math.inf] + [math.nan] * 4 + [0.023, 30.0, math.inf, math.inf],
+            id="UTM-30LX",
+        ),
+        pytest.param(
+            UNLISTED, [0, 19, 20, 30000, 65533], [math.nan] * 2 + [0.02, 30.0, math.inf], id="else"
+        ),
+    ],
+)
+def test_codes_and_ranges_are_told_apart(
+    parameters: Parameters, readings: list[int], ranges: list[float]
+) -> None:
+    np.testing.assert_allclose(ranges_of(parameters, readings), ranges)
+
+
+def test_configured_limits_narrow_those_of_the_laser() -> None:
+    ranges = ranges_of(
+        MODELS["UTM-30LX"].parameters, [1, 5, 99, 100, 4000, 4001], min_range_m=0.1, max_range_m=4.0
+    )
+    np.testing.assert_allclose(ranges, [math.inf, math.nan, math.nan, 0.1, 4.0, math.inf])
+
+
+def test_the_mount_is_where_the_configuration_says() -> None:
+    config = HokuyoConfig(x_m=0.1, y_m=-0.02, yaw_deg=90.0)
+    scan = scan_of(MODELS["UTM-30LX"].parameters, [1000], config)
+    assert scan.base_laser == Pose(0.1, -0.02, math.pi / 2)
+
+
+@pytest.mark.parametrize(
+    ("name", "first_deg", "last_deg", "beams", "period"),
+    [("URG-04LX", -119.53, 119.88, 682, 0.1), ("UTM-30LX", -135.0, 135.0, 1081, 0.025)],
+)
+def test_bearings_and_times_are_the_makers(
+    name: str, first_deg: float, last_deg: float, beams: int, period: float
+) -> None:
+    parameters = MODELS[name].parameters
+    assert np.degrees(parameters.bearings[[0, -1]]) == pytest.approx(
+        [first_deg, last_deg], abs=0.01
+    )
+    assert len(parameters.bearings) == beams
+    assert parameters.period == pytest.approx(period)
+    assert parameters.bearing(parameters.front_step) == 0.0
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_parameters_come_back_from_their_lines(name: str) -> None:
+    parameters = MODELS[name].parameters
+    assert Parameters.from_lines(parameters.lines()) == parameters
+    assert find_model(parameters.model) is MODELS[name]
+
+
+def test_an_identity_comes_back_from_its_lines() -> None:
+    identity = Identity("maker", "product", "1.0", "SCIP 2.0", "H1")
+    assert Identity.from_lines(identity.lines()) == identity
+
+
+@pytest.mark.parametrize(
+    "change", [{"DMIN": "x"}, {"ARES": "0"}, {"SCAN": "0"}, {"AMAX": "-3"}, {"DMAX": "20"}]
+)
+def test_parameters_that_make_no_sense_are_refused(change: dict[str, str]) -> None:
+    with pytest.raises(ValueError, match=r"implausible|invalid"):
+        Parameters.from_lines(MODELS["URG-04LX"].parameters.lines() | change)
+
+
+def test_a_missing_parameter_is_named() -> None:
+    lines = MODELS["URG-04LX"].parameters.lines()
+    del lines["ARES"]
+    with pytest.raises(ValueError, match="ARES"):
+        Parameters.from_lines(lines)

@@ -1,0 +1,222 @@
+"""The simulated laser answers as SCIP 2 says, command by command."""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gvgbot.drivers.hokuyo.models import MODELS
+from gvgbot.drivers.hokuyo.scip import ScipParser, decode_time
+from gvgbot.drivers.hokuyo.scip_messages import Reply, ScanReply
+from gvgbot.drivers.hokuyo.twin import HokuyoTwin, HokuyoTwinConfig
+from gvgbot.drivers.hokuyo.twin_readings import clustered, noisy_readings
+from gvgbot.geometry import Array
+
+VECTORS = {
+    vector["name"]: vector
+    for vector in json.loads(
+        (Path(__file__).parents[3] / "data" / "scip_vectors.json").read_text("ascii")
+    )["vectors"]
+}
+RANGES = np.linspace(0.5, 4.0, 1081)
+
+
+def laser(**config: object) -> HokuyoTwin:
+    quiet = {"range_sigma_m": 0.0, "dropout_fraction": 0.0, "clock_drift_ppm": 0.0}
+    return HokuyoTwin(HokuyoTwinConfig(**{**quiet, **config}), lambda stamp: RANGES, 0)  # type: ignore[arg-type]
+
+
+def status(twin: HokuyoTwin, command: str, now: float = 0.0) -> str:
+    echo, line, *_ = twin.receive(command.encode() + b"\n", now).decode().split("\n")
+    assert echo == command
+    assert line == VECTORS[f"status {line[:2]}"]["rx"]
+    return line[:2]
+
+
+def frames(twin: HokuyoTwin, until: float) -> list[tuple[float, ScanReply]]:
+    """All scans sent until then, each with when it was sent."""
+    parser, sent = ScipParser(), []
+    while (now := twin.next_due()) <= until:
+        for message in parser.feed(twin.advance(now)):
+            assert isinstance(message, ScanReply)
+            sent.append((now, message))
+    return sent
+
+
+@pytest.mark.parametrize(
+    ("model", "name"), [("URG-04LX", "PP URG-04LX"), ("UTM-30LX", "PP UTM-30LX")]
+)
+def test_pp_answers_with_the_bytes_of_the_real_laser(model: str, name: str) -> None:
+    assert laser(model=model).receive(b"PP\n", 0.0) == VECTORS[name]["rx"].encode()
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["QT with string", "unknown command", "GD laser off", "TM0", "TM2 already off"],
+)
+def test_simple_commands_answer_as_in_the_examples(name: str) -> None:
+    vector = VECTORS[name]
+    assert laser().receive(vector["tx"].encode(), 0.0) == vector["rx"].encode()
+
+
+@pytest.mark.parametrize(
+    ("command", "expected"),
+    [
+        ("MDx000108001000", "01"),
+        ("MD0000x08001000", "02"),
+        ("MD00001080x1000", "03"),
+        ("MD000010800100x", "07"),
+        ("MD0000108001x00", "06"),
+        ("MD0000108101000", "04"),
+        ("MD0500049901000", "05"),
+        ("MD00001080", "0C"),
+        ("MD00001080010000", "0D"),
+        ("MD0000108001000;seventeen letters", "0G"),
+        ("MD0000108001000;a-b", "0H"),
+        ("GD0000108101", "04"),
+    ],
+)
+def test_a_wrong_command_is_refused_with_its_status(command: str, expected: str) -> None:
+    twin = laser()
+    assert status(twin, command) == expected
+    assert twin.next_due() == math.inf
+
+
+@pytest.mark.parametrize(
+    ("commands", "statuses"),
+    [
+        (["BM", "BM", "QT", "BM"], ["00", "02", "00", "00"]),
+        (["TM0", "TM0", "TM2", "TM2"], ["00", "02", "00", "03"]),
+        (["MD0000108001000", "TM0", "QT", "TM0"], ["00", "10", "00", "00"]),
+        (
+            ["TM0", "MD0000108001000", "PP", "TM2", "MD0000108001000"],
+            ["00", "10", "10", "00", "00"],
+        ),
+        (["MD0000108001000", "BM", "RS", "GD0000108001"], ["00", "02", "00", "10"]),
+    ],
+    ids="-".join,
+)
+def test_the_answer_depends_on_the_state(commands: list[str], statuses: list[str]) -> None:
+    twin = laser()
+    assert [status(twin, command) for command in commands] == statuses
+
+
+@pytest.mark.parametrize("ending", [b"\n", b"\r", b"\r\n", b"\n\n\r"])
+def test_every_terminator_ends_a_command(ending: bytes) -> None:
+    assert laser().receive(b"\nQT" + ending + b"VV", 0.0) == b"QT\n00P\n\n"
+
+
+@given(st.lists(st.binary(max_size=60)))
+def test_noise_never_raises_and_the_next_command_is_answered(noise: list[bytes]) -> None:
+    twin = laser()
+    for chunk in noise:
+        twin.receive(chunk, 0.0)
+    assert twin.receive(b"\nTM2\nQT\n", 0.0).endswith(b"QT\n00P\n\n")
+
+
+def test_an_endless_command_is_forgotten() -> None:
+    twin = laser()
+    for _ in range(100):
+        assert twin.receive(b"M" * 1000, 0.0) == b""
+    assert twin.receive(b"\nQT\n", 0.0) == b"QT\n00P\n\n"
+
+
+def test_the_clock_counts_milliseconds_in_24_bits_until_reset() -> None:
+    twin = laser(clock_start_ms=2**24 - 1000)
+    twin.receive(b"TM0\n", 0.0)
+
+    def time_at(now: float) -> int:
+        (message,) = ScipParser().feed(twin.receive(b"TM1\n", now))
+        assert isinstance(message, Reply)
+        return decode_time(message)
+
+    assert [time_at(0.0), time_at(0.9995), time_at(1.0)] == [2**24 - 1000, 2**24 - 1, 0]
+    twin.receive(b"RS\nTM0\n", 5.0)
+    assert time_at(5.25) == 250
+
+
+@pytest.mark.parametrize(
+    ("model", "period", "last"), [("UTM-30LX", 0.025, 1080), ("URG-04LX", 0.1, 725)]
+)
+def test_scans_leave_on_the_grid_of_the_motor(model: str, period: float, last: int) -> None:
+    ranges = RANGES if model == "UTM-30LX" else RANGES[:682]
+    config = HokuyoTwinConfig(model=model, clock_drift_ppm=0.0)  # type: ignore[arg-type]
+    twin = HokuyoTwin(config, lambda stamp: ranges, 0)
+    first = MODELS[model].parameters.first_step
+    assert status(twin, f"MD{first:04}{last:04}01200", 1.01) == "00"
+    sent = frames(twin, 3.0)
+    expected = np.arange(math.ceil(1.01 / period), 1000)[::3] * period
+    sweep = last * period / MODELS[model].parameters.steps_per_turn
+    assert [now for now, _ in sent] == pytest.approx(expected[: len(sent)] + sweep + 0.00475)
+    assert [scan.stamp for _, scan in sent] == pytest.approx(expected[: len(sent)] * 1000)
+    assert len(sent) > 5
+
+
+def test_a_counted_stream_counts_down_and_switches_the_laser_off() -> None:
+    twin = laser()
+    assert status(twin, "MD0000108001003;run 7") == "00"
+    sent = [scan for _, scan in frames(twin, 1.0)]
+    assert [scan.request.count for scan in sent] == [2, 1, 0]
+    assert {scan.request.string for scan in sent} == {"run 7"}
+    assert status(twin, "GD0000108001") == "10"
+
+
+def test_the_world_is_asked_once_per_scan_sent_and_at_its_time() -> None:
+    asked: list[float] = []
+
+    def sense(stamp: float) -> Array:
+        asked.append(stamp)
+        return RANGES
+
+    twin = HokuyoTwin(HokuyoTwinConfig(), sense, 0)
+    status(twin, "MD0000108001400")
+    while (now := twin.next_due()) < 2.0:
+        before = len(asked)
+        twin.advance(now)
+        assert asked[before:] in ([], [now])
+    assert asked == pytest.approx(np.arange(0.0, 2.0, 0.125))
+
+
+def test_a_sector_is_cut_out_of_the_full_turn() -> None:
+    twin = laser()
+    twin.receive(b"BM\n", 0.0)
+    (message,) = ScipParser().feed(twin.receive(b"GD0100010701\n", 1.0))
+    assert isinstance(message, ScanReply)
+    assert message.ranges / 1000.0 == pytest.approx(RANGES[100:108], abs=0.0006)
+
+
+def test_two_character_ranges_end_at_4095_mm() -> None:
+    config = HokuyoTwinConfig(dropout_fraction=0.0)
+    twin = HokuyoTwin(config, lambda stamp: np.full(1081, 9.0), 0)
+    twin.receive(b"BM\n", 0.0)
+    (message,) = ScipParser().feed(twin.receive(b"GS0100010701\n", 1.0))
+    assert isinstance(message, ScanReply)
+    assert message.ranges.tolist() == [4095] * 8
+
+
+def test_a_cluster_sends_its_smallest_range_that_is_no_error() -> None:
+    readings = np.array([701, 5, 700, 702, 650, 800, 3, 900, 1000, 900], np.int32)
+    assert clustered(readings, 4, 23).tolist() == [700, 650, 900]
+    assert clustered(np.array([2, 1, 900], np.int32), 2, 23).tolist() == [2, 900]
+
+
+def test_readings_have_the_noise_and_the_codes_of_the_model() -> None:
+    model = MODELS["UTM-30LX"]
+    rng = np.random.default_rng(5)
+    truth = np.full(200_000, 10.0)
+    readings = noisy_readings(truth, model, 0.02, 0.01, rng)
+    valid = readings[readings >= 23]
+    assert np.count_nonzero(readings == model.failure_code) == pytest.approx(2000, abs=150)
+    assert len(valid) + np.count_nonzero(readings == model.failure_code) == len(readings)
+    assert valid.std() == pytest.approx(20.0, abs=0.2)
+    assert valid.mean() == pytest.approx(10_000, abs=0.2)
+
+
+def test_what_cannot_be_measured_comes_as_a_code() -> None:
+    truth = np.array([math.inf, 31.0, 30.0, 0.0, 0.0225, 0.023, math.nan])
+    readings = noisy_readings(truth, MODELS["UTM-30LX"], 0.0, 0.0, np.random.default_rng(0))
+    assert readings.tolist() == [1, 1, 30000, 2, 2, 23, 1]
