@@ -18,33 +18,24 @@ from gvgbot.drivers.kobuki.commands import (
     decode_commands,
 )
 from gvgbot.drivers.kobuki.frames import BadFrame, FrameParser, encode_frame
+from gvgbot.drivers.kobuki.instruments import Instruments
 from gvgbot.drivers.kobuki.odometry_error import PROFILES, ErringSensors, OdometryProfile
 from gvgbot.drivers.kobuki.payloads import (
-    GYRO_DIGIT,
-    CliffAdc,
     ControllerInfo,
-    CoreSensors,
-    DockIr,
     FeedbackPart,
     FirmwareVersion,
-    GpInput,
     HardwareVersion,
-    Inertia,
-    MotorCurrent,
-    RawGyro,
     Udid,
     Version,
     encode_feedback,
 )
-from gvgbot.drivers.kobuki.wheel_odometry import TICK, WHEEL_BASE
+from gvgbot.drivers.kobuki.wheel_odometry import WHEEL_BASE
 from gvgbot.geometry import STANDSTILL, Pose, Twist, wrap_angle
 from gvgbot.ranges import Range
 
 _PERIOD_MS = 20
 _PERIOD = _PERIOD_MS / 1000  # s
 _MAX_WHEEL_SPEED = 0.7  # m/s
-_GYRO_SAMPLES = 2.08  # per frame on average: the sensor runs by its own clock
-_RAW_BIAS = math.radians(-0.45)  # rad/s: only the processed rate has it removed
 _FACTORY_GAINS = ControllerInfo(0, 100_000, 100, 2_000)
 _EARLY = 1e-9  # s: a command this much too late for its cycle still counts
 
@@ -88,18 +79,6 @@ class Body(Protocol):
         """Which bumpers are pressed: left, centre, right."""
 
 
-@dataclass(slots=True)
-class _Felt:
-    """What the base's sensors have added up to: metres, radians, and the latest cycle's speeds."""
-
-    left: float
-    right: float
-    angle: float
-    left_speed: float = 0.0
-    right_speed: float = 0.0
-    rate: float = 0.0
-
-
 class KobukiTwin:
     """A base without I/O. It streams from its first `advance`, which is when it is powered on."""
 
@@ -108,9 +87,7 @@ class KobukiTwin:
         self._config = config
         self._body = body
         self._sensors = ErringSensors(PROFILES[config.odometry], rng)
-        self._rng = rng
-        encoders = rng.integers(0, 65536, 2).tolist()
-        self._felt = _Felt(encoders[0] * TICK, encoders[1] * TICK, rng.uniform(-math.pi, math.pi))
+        self._instruments = Instruments(rng)
         self._udid = Udid(tuple(rng.integers(1, 2**32, 3).tolist()))
         self._parser = FrameParser()
         self._pending: deque[tuple[float, Twist]] = deque()
@@ -122,8 +99,6 @@ class KobukiTwin:
         self._power_on: float | None = None
         self._cycles = 0
         self._true = (body.left_travel, body.right_travel, body.pose.theta)
-        self._gyro_id = 0
-        self._gyro_due = 0.0
 
     @property
     def output(self) -> int:
@@ -162,9 +137,19 @@ class KobukiTwin:
         if now < due:
             return b""
         self._move(due)
-        frame = encode_frame(encode_feedback(self._parts()))
+        replies, self._replies = self._replies, []
+        parts = [*self._instruments.read(self._stamp_ms, self._body.bumper, self._volts), *replies]
         self._cycles += 1
-        return frame
+        return encode_frame(encode_feedback(parts))
+
+    @property
+    def _stamp_ms(self) -> int:
+        return _PERIOD_MS * self._cycles
+
+    @property
+    def _volts(self) -> float:
+        hours = self._stamp_ms / 3_600_000
+        return self._config.battery_v - hours * self._config.battery_drain_v_per_h
 
     def _obey(self, command: Command, now: float) -> None:
         match command:
@@ -199,12 +184,7 @@ class KobukiTwin:
         left, right = self._true[0] - before[0], self._true[1] - before[1]
         turn = wrap_angle(self._true[2] - before[2])
         left, right, turn = self._sensors.feel(left, right, turn, _PERIOD)
-        felt = self._felt
-        felt.left += left
-        felt.right += right
-        felt.angle += turn
-        felt.left_speed, felt.right_speed = left / _PERIOD, right / _PERIOD
-        felt.rate = turn / _PERIOD
+        self._instruments.turn(left, right, turn, _PERIOD)
         self._heed(now)
 
     def _heed(self, now: float) -> None:
@@ -220,49 +200,6 @@ class KobukiTwin:
     def _truth(self) -> tuple[float, float, float]:
         return self._body.left_travel, self._body.right_travel, self._body.pose.theta
 
-    def _parts(self) -> list[FeedbackPart]:
-        felt = self._felt
-        replies, self._replies = self._replies, []
-        return [
-            self._core(),
-            DockIr(0, 0, 0),
-            Inertia(_wrapped_cdeg(felt.angle), _s16(math.degrees(100 * felt.rate))),
-            CliffAdc(1700, 1900, 1650),
-            MotorCurrent(_current(felt.left_speed), _current(felt.right_speed)),
-            self._gyro(),
-            GpInput(0, (4095, 4095, 4095, 4095), (0xFF0, 0, 0)),
-            *replies,
-        ]
-
-    def _core(self) -> CoreSensors:
-        felt = self._felt
-        left, centre, right = self._body.bumper
-        drained = self._config.battery_drain_v_per_h * self._cycles * _PERIOD / 3600
-        return CoreSensors(
-            stamp_ms=_PERIOD_MS * self._cycles % 65536,
-            bumper=4 * left + 2 * centre + right,
-            wheel_drop=0,
-            cliff=0,
-            left_encoder=math.floor(felt.left / TICK + 0.5) % 65536,
-            right_encoder=math.floor(felt.right / TICK + 0.5) % 65536,
-            left_pwm=_pwm(felt.left_speed),
-            right_pwm=_pwm(felt.right_speed),
-            buttons=0,
-            charger=0,
-            battery_dv=max(0, round(10 * (self._config.battery_v - drained))),
-            over_current=0,
-        )
-
-    def _gyro(self) -> RawGyro:
-        """Two samples, sometimes three; z carries the bias that the processed rate has not."""
-        self._gyro_due += _GYRO_SAMPLES
-        count = int(self._gyro_due)
-        self._gyro_due -= count
-        first = self._gyro_id
-        self._gyro_id = (first + count) % 256
-        z = _s16((self._felt.rate + _RAW_BIAS) / GYRO_DIGIT)
-        return RawGyro(first, ((0, 0, z),) * count)
-
 
 def _limited(twist: Twist) -> Twist:
     """The twist on the same arc, slowed until the faster wheel can follow."""
@@ -273,20 +210,3 @@ def _limited(twist: Twist) -> Twist:
 def _version(text: str) -> Version:
     major, minor, patch = map(int, text.split("."))
     return Version(major, minor, patch)
-
-
-def _wrapped_cdeg(angle: float) -> int:
-    return (round(math.degrees(100 * angle)) + 18000) % 36000 - 18000
-
-
-def _s16(value: float) -> int:
-    return max(-32768, min(32767, round(value)))
-
-
-def _pwm(speed: float) -> int:
-    return max(-127, min(127, round(127 * speed / _MAX_WHEEL_SPEED)))
-
-
-def _current(speed: float) -> int:
-    """Motor current in 10 mA: some to turn at all, more when faster."""
-    return 0 if speed == 0.0 else min(255, round(1 + 40 * abs(speed)))

@@ -171,6 +171,16 @@ def test_silence_stops_the_base_and_then_loses_it() -> None:
     assert (MOVE in [control for t, control in bench.controls() if t < 0.99]) is True
 
 
+def test_half_a_second_of_silence_stops_the_base_long_before_the_deadman() -> None:
+    async def script(bench: Bench) -> None:
+        await bench.stream(0.5, Twist(0.2, 0.0))
+        await asyncio.sleep(0.9)
+
+    bench = play(script, KobukiConfig(deadman_s=2.0))
+    stops = [t for t, control in bench.controls(since=0.02) if control == STOP]
+    assert stops[0] == pytest.approx(0.48 + 0.5)
+
+
 def test_a_link_that_is_cut_is_reported_by_run_alone() -> None:
     async def main() -> None:
         bench = Bench()
@@ -281,11 +291,12 @@ def test_a_single_absurd_reading_moves_nothing() -> None:
     assert bench.base.statistics.doubted == 1
 
 
-def test_encoders_that_start_anew_do_not_move_the_robot() -> None:
+def test_encoders_that_start_anew_do_not_move_the_robot_but_count_from_there() -> None:
+    """Of the 9 steps after the jump, as many as it takes to believe it may be lost."""
     steps = [core(k, 60 * k, 60 * k) for k in range(10)]
-    steps += [core(k, 30_000, 30_000) for k in range(10, 20)]
+    steps += [core(k, 30_000 + 60 * k, 30_000 + 60 * k) for k in range(10, 20)]
     odometry, _ = odometry_after(*steps)
-    assert odometry.odom_base.x == pytest.approx(9 * 60 / TICKS_PER_M)
+    assert 14 * 60 / TICKS_PER_M < odometry.odom_base.x <= 18 * 60 / TICKS_PER_M
 
 
 def test_lost_frames_lose_no_way_and_are_counted() -> None:
@@ -293,6 +304,11 @@ def test_lost_frames_lose_no_way_and_are_counted() -> None:
     odometry, bench = odometry_after(*steps)
     assert odometry.odom_base.x == pytest.approx(8 * 60 / TICKS_PER_M)
     assert bench.base.statistics.missed_frames == 4
+
+
+def test_speed_over_lost_frames_is_the_mean_speed() -> None:
+    odometry, _ = odometry_after(*[core(k, 60 * k, 60 * k) for k in (0, 1, 2, 7)])
+    assert odometry.twist.linear == pytest.approx(60 / TICKS_PER_M / 0.02)
 
 
 def test_contact_and_battery_are_those_of_the_newest_frame() -> None:
