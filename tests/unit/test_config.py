@@ -1,0 +1,89 @@
+"""The configuration tree and the files that come with the package."""
+
+import math
+from pathlib import Path
+
+import pytest
+
+from gvgbot.config import Config, load_config, packaged
+from gvgbot.errors import ConfigError
+from gvgbot.strict_yaml import as_mapping
+
+
+def test_without_a_file_the_robot_is_simulated() -> None:
+    config = load_config()
+    assert config.twin.enabled
+    assert config.twin.world == "office"
+
+
+def test_the_defaults_of_the_code_never_move_a_real_robot() -> None:
+    assert Config().twin.enabled
+
+
+def test_the_simulated_robot_has_a_kobuki_and_ten_scans_a_second() -> None:
+    config = load_config(Path("sim.yaml"))
+    assert config.robot.radius_m == 0.177
+    assert config.twin.laser.model == "UTM-30LX"
+    assert 40 / (config.laser.skip + 1) == 10
+    assert config.twin.base.odometry == "kobuki"
+
+
+def test_the_turtlebot_is_real() -> None:
+    config = load_config(Path("turtlebot2.yaml"))
+    assert not config.twin.enabled
+    assert config.base.port.startswith("/dev/")
+    assert config.laser.port.startswith("/dev/")
+
+
+def test_a_file_of_the_user_wins_over_a_packaged_one_of_the_same_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("sim.yaml").write_text("robot: {name: mine}", encoding="utf-8")
+    assert load_config(Path("sim.yaml")).robot.name == "mine"
+
+
+def test_a_path_with_a_folder_is_never_a_packaged_file(tmp_path: Path) -> None:
+    assert packaged(tmp_path / "sim.yaml") == tmp_path / "sim.yaml"
+
+
+def test_a_start_pose_has_three_numbers() -> None:
+    assert load_config(None, ["twin.start=[0, -8.2, 1]"]).twin.start == (0.0, -8.2, 1.0)
+
+
+@pytest.mark.parametrize("name", ["a/b", "a b", "*", "", "ä"])
+def test_a_name_that_cannot_be_part_of_a_topic_is_refused(name: str) -> None:
+    with pytest.raises(ConfigError, match="letters, digits"):
+        load_config(None, [f"robot.name='{name}'"])
+
+
+def test_an_unknown_odometry_profile_lists_the_known_ones() -> None:
+    with pytest.raises(ConfigError, match="must be one of perfect, kobuki, worn, wheels"):
+        load_config(None, ["twin.base.odometry=ideal"])
+
+
+def test_every_number_of_the_default_configuration_is_finite() -> None:
+    def numbers(value: object) -> list[float]:
+        if isinstance(value, dict):
+            return [n for item in value.values() for n in numbers(item)]
+        if isinstance(value, list):
+            return [n for item in value for n in numbers(item)]
+        return [value] if isinstance(value, int | float) else []
+
+    found = numbers(as_mapping(load_config()))
+    assert len(found) > 20
+    assert all(math.isfinite(n) for n in found)
+
+
+def test_the_defaults_are_within_their_own_ranges() -> None:
+    def settings(value: object, path: str = "") -> list[str]:
+        if not isinstance(value, dict):
+            return [f"{path}={value}"] if isinstance(value, bool | int | float) else []
+        prefix = f"{path}." if path else ""
+        return [one for key in value for one in settings(value[key], f"{prefix}{key}")]
+
+    mapping = as_mapping(Config())
+    overrides = [
+        text.replace("True", "true").replace("False", "false") for text in settings(mapping)
+    ]
+    assert as_mapping(load_config(None, overrides))["autonomy"] == mapping["autonomy"]

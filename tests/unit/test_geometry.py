@@ -1,0 +1,101 @@
+"""Poses and angles obey the laws of the plane."""
+
+import cmath
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gvgbot.geometry import STANDSTILL, Pose, Twist, wrap_angle
+
+angles = st.floats(-50.0, 50.0)
+lengths = st.floats(-100.0, 100.0)
+poses = st.builds(Pose, lengths, lengths, angles)
+
+
+def homogeneous(pose: Pose) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+    c, s = math.cos(pose.theta), math.sin(pose.theta)
+    return np.array([[c, -s, pose.x], [s, c, pose.y], [0.0, 0.0, 1.0]])
+
+
+def is_same(one: Pose, other: Pose) -> bool:
+    return bool(np.allclose(homogeneous(one), homogeneous(other), atol=1e-9))
+
+
+@given(angles)
+def test_a_wrapped_angle_is_the_same_direction_in_the_half_open_turn(angle: float) -> None:
+    wrapped = wrap_angle(angle)
+    assert -math.pi < wrapped <= math.pi
+    assert cmath.rect(1.0, wrapped) == pytest.approx(cmath.rect(1.0, angle), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("angle", "wrapped"),
+    [(0.0, 0.0), (math.pi, math.pi), (-math.pi, math.pi), (3 * math.pi, math.pi), (-0.5, -0.5)],
+)
+def test_the_ends_of_the_turn_wrap_to_plus_pi(angle: float, wrapped: float) -> None:
+    assert wrap_angle(angle) == pytest.approx(wrapped)
+
+
+@given(poses, poses)
+def test_composition_is_the_product_of_homogeneous_matrices(a: Pose, b: Pose) -> None:
+    assert np.allclose(homogeneous(a.compose(b)), homogeneous(a) @ homogeneous(b), atol=1e-9)
+
+
+@given(poses)
+def test_a_pose_composed_with_its_inverse_is_the_identity(pose: Pose) -> None:
+    assert is_same(pose.compose(pose.inverse()), Pose())
+    assert is_same(pose.inverse().compose(pose), Pose())
+
+
+@given(poses, poses, poses)
+def test_composition_is_associative(a: Pose, b: Pose, c: Pose) -> None:
+    assert is_same(a.compose(b).compose(c), a.compose(b.compose(c)))
+
+
+@given(poses, poses)
+def test_the_motion_to_a_pose_leads_there(a: Pose, b: Pose) -> None:
+    assert is_same(a.compose(a.to(b)), b)
+
+
+@given(poses, poses, poses)
+def test_a_motion_does_not_depend_on_the_frame_it_is_seen_from(a: Pose, b: Pose, c: Pose) -> None:
+    assert is_same(a.to(b), c.compose(a).to(c.compose(b)))
+
+
+@given(poses, st.lists(st.tuples(lengths, lengths), min_size=1, max_size=5))
+def test_points_transform_as_poses_do(pose: Pose, points: list[tuple[float, float]]) -> None:
+    moved = pose.transform(np.array(points))
+    for point, (x, y) in zip(moved, points, strict=True):
+        assert point == pytest.approx(pose.compose(Pose(x, y)).position, abs=1e-9)
+
+
+@given(poses, st.tuples(lengths, lengths), st.tuples(lengths, lengths))
+def test_a_transform_keeps_distances(
+    pose: Pose, one: tuple[float, float], other: tuple[float, float]
+) -> None:
+    moved = pose.transform(np.array([one, other]))
+    assert math.dist(*moved) == pytest.approx(math.dist(one, other), abs=1e-9)
+
+
+def test_a_single_point_transforms_without_a_batch() -> None:
+    assert Pose(1.0, 2.0, math.pi / 2).transform(np.array([3.0, 0.0])) == pytest.approx([1.0, 5.0])
+
+
+def test_a_quarter_turn_points_to_the_left() -> None:
+    there = Pose(1.0, 0.0, math.pi / 2).compose(Pose(2.0, 0.0))
+    assert (there.x, there.y) == pytest.approx((1.0, 2.0))
+
+
+def test_distance_is_between_origins_whatever_the_headings() -> None:
+    assert Pose(1.0, 1.0, 3.0).distance(Pose(4.0, 5.0, -1.0)) == pytest.approx(5.0)
+
+
+def test_a_pose_is_read_from_an_array() -> None:
+    assert Pose.from_array(np.array([1.0, 2.0, 0.5])) == Pose(1.0, 2.0, 0.5)
+
+
+def test_a_standstill_does_not_move() -> None:
+    assert Twist(0.0, 0.0) == STANDSTILL
