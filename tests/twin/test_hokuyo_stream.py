@@ -58,7 +58,11 @@ class Bench:
 class Deaf:
     """A device that answers nothing."""
 
+    def __init__(self) -> None:
+        self.heard = b""
+
     def receive(self, data: bytes, now: float) -> bytes:
+        self.heard += data
         return b""
 
     def advance(self, now: float) -> bytes:
@@ -68,10 +72,55 @@ class Deaf:
         return math.inf
 
 
+class SlowLink:
+    """A twin whose scans take 30 ms to come over."""
+
+    def __init__(self, twin: TwinDevice) -> None:
+        self.twin = twin
+        self.parts: list[tuple[float, bytes]] = []
+
+    def receive(self, data: bytes, now: float) -> bytes:
+        return self.twin.receive(data, now)
+
+    def advance(self, now: float) -> bytes:
+        frame = self.twin.advance(now)
+        size = len(frame) // 3 + 1
+        self.parts += [(now + 0.01 * i, frame[i * size : (i + 1) * size]) for i in range(4)]
+        sent = b"".join(part for due, part in self.parts if due <= now)
+        self.parts = [(due, part) for due, part in self.parts if due > now]
+        return sent
+
+    def next_due(self) -> float:
+        return min(self.twin.next_due(), *(due for due, _ in self.parts), math.inf)
+
+
+class FrozenClock:
+    """A twin that after some scans sends the last one over and over."""
+
+    def __init__(self, twin: TwinDevice, good_scans: int) -> None:
+        self.twin = twin
+        self.good_scans = good_scans
+        self.last = b""
+
+    def receive(self, data: bytes, now: float) -> bytes:
+        return self.twin.receive(data, now)
+
+    def advance(self, now: float) -> bytes:
+        frame = self.twin.advance(now)
+        if frame and self.good_scans > 0:
+            self.good_scans -= 1
+            self.last = frame
+        return self.last if frame else b""
+
+    def next_due(self) -> float:
+        return self.twin.next_due()
+
+
 class Scripted(Deaf):
     """A device that gives fixed replies to commands, and others to a twin."""
 
     def __init__(self, replies: dict[bytes, bytes], twin: TwinDevice) -> None:
+        super().__init__()
         self.replies = replies
         self.twin = twin
 
@@ -181,6 +230,26 @@ def test_a_urg_04lx_is_stamped_at_its_first_beam() -> None:
     on_bench(twin, scenario, config)
 
 
+def test_stamps_do_not_depend_on_how_long_a_scan_takes_to_come_over() -> None:
+    world = World()
+
+    async def scenario(bench: Bench) -> None:
+        stamps = [scan.stamp for scan in await bench.scans(50)]
+        assert stamps == pytest.approx(world.stamps[: len(stamps)], abs=0.002)
+
+    on_bench(SlowLink(HokuyoTwin(PERFECT, world, seed=16)), scenario)
+
+
+def test_a_frozen_laser_is_lost() -> None:
+    async def scenario(bench: Bench) -> None:
+        await bench.scans(5)
+        await bench.running
+        assert bench.laser.link.repeated_scans > 0
+        assert bench.laser.link.scans == 5
+
+    on_bench(FrozenClock(HokuyoTwin(PERFECT, World(), seed=17), 5), scenario)
+
+
 def test_a_bad_checksum_loses_only_its_own_scan() -> None:
     world = World()
     config = HokuyoTwinConfig(range_sigma_m=0.0, dropout_fraction=0.0, bad_checksum_fraction=0.3)
@@ -267,9 +336,13 @@ def test_a_laser_that_never_answers_is_lost() -> None:
         here, there = pipe()
         clock = LoopClock()
         async with asyncio.TaskGroup() as tasks:
-            served = tasks.create_task(serve_twin(Deaf(), there, clock))
+            deaf = Deaf()
+            served = tasks.create_task(serve_twin(deaf, there, clock))
             with pytest.raises(DeviceLost, match="does not answer"):
                 await HokuyoLaser(here, HokuyoConfig(), clock).run()
+            assert clock.now() < 5.0
+            # The bare line feed ends whatever an earlier program had half sent.
+            assert deaf.heard.startswith(b"\nTM2\nQT\n")
             served.cancel()
 
     run_in_virtual_time(main())

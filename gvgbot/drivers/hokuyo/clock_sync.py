@@ -31,15 +31,15 @@ def follow(clock_map: ClockMap | None, stamp_ms: int, arrival: float) -> ClockMa
     """The map after a scan with this stamp began to arrive at host time `arrival` (s).
 
     Delays only ever add, so the offset follows the lower envelope of arrival minus stamp; it
-    rises no faster than two clocks can drift. A clock that jumped starts a new map.
+    rises no faster than two clocks can drift. A clock that jumped starts a new map: taken for an
+    advance, a jump to either side puts the stamp far ahead of its arrival.
     """
     if clock_map is None:
         return ClockMap(stamp_ms, 0.0, arrival)
     advance_ms = (stamp_ms - clock_map.stamp_ms) % WRAP_MS
     elapsed = clock_map.elapsed + advance_ms / 1000.0
     latest_offset = arrival - elapsed
-    went_back = advance_ms >= WRAP_MS // 2
-    if went_back or latest_offset < clock_map.offset - RESET_LEAD:
+    if latest_offset < clock_map.offset - RESET_LEAD:
         return ClockMap(stamp_ms, 0.0, arrival, clock_map.resets + 1)
     highest_offset = clock_map.offset + LARGEST_DRIFT * advance_ms / 1000.0
     return ClockMap(stamp_ms, elapsed, min(latest_offset, highest_offset), clock_map.resets)

@@ -160,3 +160,23 @@ def test_a_cut_scan_does_not_take_the_next_one_with_it() -> None:
         messages = ScipParser().feed(cut[:length] + whole)
         assert isinstance(messages[-1], ScanReply)
         assert messages[-1].stamp == 1
+
+
+def test_a_scan_without_one_of_its_blocks_is_bad() -> None:
+    whole = next(v["rx"] for v in VECTORS if v["name"] == "MD 64 points (exact lines)").encode()
+    start = whole.index(b"\n", whole.index(b"99b\n") + 4) + 1
+    assert isinstance(read_one(whole[:start] + whole[start + 66 :]), BadReply)
+
+
+@pytest.mark.parametrize("wrong", [b"M", b"J", b"\r", b"\x00"])
+def test_a_block_that_ends_without_line_feed_is_bad(wrong: bytes) -> None:
+    whole = next(v["rx"] for v in VECTORS if v["name"] == "MD 64 points (exact lines)").encode()
+    end = whole.index(b"\n", whole.index(b"99b\n") + 4) + 66
+    assert whole[end : end + 1] == b"\n"
+    assert isinstance(read_one(whole[:end] + wrong + whole[end + 1 :]), BadReply)
+
+
+@pytest.mark.parametrize("echo", [b"MD000000040100", b"MD0000000401", b"D0000000401000", b"MD"])
+def test_a_scan_whose_echo_is_damaged_is_bad(echo: bytes) -> None:
+    whole = next(v["rx"] for v in VECTORS if v["name"] == "MD 5 points").encode()
+    assert isinstance(read_one(echo + whole[whole.index(b"\n") :]), BadReply)
