@@ -163,7 +163,7 @@ def test_a_cut_scan_does_not_take_the_next_one_with_it() -> None:
 
 
 def test_a_scan_without_one_of_its_blocks_is_bad() -> None:
-    whole = next(v["rx"] for v in VECTORS if v["name"] == "MD 64 points (exact lines)").encode()
+    whole = next(v["rx"] for v in VECTORS if v["name"] == "MS 33 points").encode()
     start = whole.index(b"\n", whole.index(b"99b\n") + 4) + 1
     assert isinstance(read_one(whole[:start] + whole[start + 66 :]), BadReply)
 
