@@ -1,0 +1,216 @@
+"""What the robot is about: explore every frontier, give up what cannot be reached, say why it ends."""
+
+import math
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+import numpy as np
+
+from gvgbot.autonomy.control.edge_follower import Track
+from gvgbot.autonomy.events import Decision, Event, Finished, Recovery
+from gvgbot.autonomy.exploration.ears import ear_next, nearest_frontier
+from gvgbot.autonomy.gvg.local import Branch
+from gvgbot.autonomy.mapping import Correspondence, Mapper, View
+from gvgbot.autonomy.slam.graph import HalfEdgeId
+from gvgbot.autonomy.whereabouts import Passage, Situation, Whereabouts
+from gvgbot.ranges import Range
+
+_LEAST_LOOP_M = 4.0  # an edge with both ends in sight is left to sight unless so much of it was driven
+
+Outcome = Literal["explored", "explored_with_blocked", "failed"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExplorationConfig:
+    """When to give up."""
+
+    patience_m: Annotated[float, Range(5.0, 1000.0)] = 60.0  # driven beyond twice the way to a frontier
+    patience_s: Annotated[float, Range(10.0, 3600.0)] = 60.0  # without coming nearer to anything
+    look_around_s: Annotated[float, Range(0.5, 60.0)] = 3.0  # standing at the end of sight before turning
+    nothing_in_sight_s: Annotated[float, Range(2.0, 600.0)] = 20.0  # without any edge before giving up
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Drive:
+    """Follow a track; `blind_end` if it stops only because sight does."""
+
+    track: Track
+    blind_end: bool
+
+
+@dataclass(frozen=True, slots=True)
+class LookAround:
+    """Turn on the spot by an angle, rad."""
+
+    angle: float
+
+
+@dataclass(frozen=True, slots=True)
+class Stand:
+    """Stay where you are."""
+
+
+Order = Drive | LookAround | Stand
+
+
+class Mission:
+    """Chooses the frontier to explore, and the order that brings the robot nearer to it."""
+
+    def __init__(self, config: ExplorationConfig, mapper: Mapper) -> None:
+        self._config, self._mapper = config, mapper
+        self.where = Whereabouts()
+        self.target: HalfEdgeId | None = None
+        self.outcome: Outcome | None = None
+        self.reason = ""
+        self._budget_m = math.inf  # of `travelled`, for the present target
+        self._last_progress = 0.0  # stamp
+        self._travelled_then = 0.0
+        self._looked_around = 0
+        self._lost_since: float | None = None
+        self._events: list[Event] = []
+
+    def advance(self, view: View, known: Correspondence) -> tuple[Order, list[Event]]:
+        """The order for the next keyframe interval."""
+        self._events = []
+        place = view.gvg.place(view.local_base.position)
+        if place is None or place.distance > 1.5:
+            return self._search(view), self._events
+        self._lost_since = None
+        base = view.local_base.position
+        passage = self.where.follow(view.gvg, place, known, base)
+        if passage is not None:
+            self._account_for(view, known, passage)
+        here = Situation(
+            view.gvg, known, self._mapper.graph, self.where, place, view.local_base
+        )
+        self._watch_progress(view)
+        order = self._decide(view, here)
+        return order, self._events
+
+    # -- the edge under the wheels -------------------------------------------------------------
+
+    def _account_for(self, view: View, known: Correspondence, passage: Passage) -> None:
+        """Count a traversal, or close the edge that was driven from a vertex now out of sight."""
+        graph, left, arrived = self._mapper.graph, passage.left, passage.arrived
+        if left is None or arrived is None or left == arrived:
+            return
+        edge = graph.edge_at(left)
+        if edge is not None:
+            edge.traversals += 1
+            return
+        far, near = graph.half_edge(arrived), graph.half_edge(left)
+        if far is None or near is None or not (far.open and near.open):
+            return
+        if left in known.branch_of and passage.driven < _LEAST_LOOP_M:
+            return
+        clearance = min(graph.vertices[end.vertex].clearance for end in (left, arrived))
+        self._mapper.join(view, left, arrived, passage.line, clearance, driven=True)
+
+    # -- where next ------------------------------------------------------------------------------
+
+    def _decide(self, view: View, here: Situation) -> Order:
+        graph = self._mapper.graph
+        target = self.target
+        half = None if target is None else graph.half_edge(target)
+        if target is None or half is None or not half.open:
+            self.target = self._choose(view, here)
+        if self.outcome is not None:
+            return Stand()
+        path = here.ahead() if self.target is None else here.path_to(self.target)
+        if path is None:
+            self._give_up(view, "no way leads there")
+            return Stand()
+        return self._drive(view, here, path)
+
+    def _choose(self, view: View, here: Situation) -> HalfEdgeId | None:
+        """The next frontier: by the ear rule at the vertex just found, else the nearest."""
+        graph = self._mapper.graph
+        if not graph.vertices:
+            return None
+        chosen, reason = self._ear(here), "ear"
+        if chosen is None:
+            nearest = nearest_frontier(graph, here.starts())
+            if nearest is None:
+                self._finish(view)
+                return None
+            chosen, reason = nearest[0], "nearest frontier"
+        self._commit(view, here, chosen, reason)
+        return chosen
+
+    def _ear(self, here: Situation) -> HalfEdgeId | None:
+        """The ear rule at the end of the edge just explored."""
+        graph = self._mapper.graph
+        if self.target is None or graph.half_edge(self.target) is None:
+            return None
+        edge = graph.edge_at(self.target)
+        return None if edge is None else ear_next(graph, edge.other(self.target))
+
+    def _commit(self, view: View, here: Situation, chosen: HalfEdgeId, reason: str) -> None:
+        starts = here.starts()
+        away = max((s.metres for s in starts), default=0.0)
+        total = sum(e.length for e in self._mapper.graph.edges.values())
+        self._budget_m = view.travelled + 2 * (away + total) + self._config.patience_m
+        self._looked_around = 0
+        vertex = self._mapper.graph.vertices[chosen.vertex]
+        psi = self._mapper.belief.map_vertex(chosen.vertex).theta
+        bearing = vertex.half_edges[chosen.key].bearing + psi
+        self._events.append(Decision(view.stamp, chosen.vertex, bearing, reason))
+
+    def _drive(self, view: View, here: Situation, path: tuple[Branch, ...]) -> Order:
+        track = Track.of(*view.gvg.line_from(here.place, path))
+        end = view.gvg.end_of(path[-1])
+        blind = end not in here.known.vertex_of
+        waited = view.stamp - self._last_progress
+        if blind and track.length < 0.3 and waited > self._config.look_around_s:
+            self._last_progress = view.stamp
+            self._looked_around += 1
+            if self._looked_around > 2:
+                self._give_up(view, "nothing more is to be seen there")
+                return Stand()
+            self._events.append(Recovery(view.stamp, "look around", "standing at the end of sight"))
+            return LookAround(math.tau)
+        return Drive(track, blind)
+
+    # -- giving up ---------------------------------------------------------------------------------
+
+    def _watch_progress(self, view: View) -> None:
+        if view.travelled > self._travelled_then + 0.3:
+            self._travelled_then, self._last_progress = view.travelled, view.stamp
+        if self.target is not None and view.travelled > self._budget_m:
+            self._give_up(view, "driven too far without reaching it")
+        elif view.stamp - self._last_progress > self._config.patience_s:
+            self._last_progress = view.stamp
+            self._give_up(view, "no progress")
+
+    def _give_up(self, view: View, reason: str) -> None:
+        """Mark the target as blocked, or fail if there is none."""
+        half = None if self.target is None else self._mapper.graph.half_edge(self.target)
+        if half is None:
+            self._end(view, "failed", reason)
+            return
+        half.blocked = True
+        self._events.append(Recovery(view.stamp, "give up a frontier", reason))
+        self.target = None
+
+    def _search(self, view: View) -> Order:
+        """No edge in sight: look around, and give up after a while."""
+        if self._lost_since is None:
+            self._lost_since = view.stamp
+            self._events.append(Recovery(view.stamp, "look around", "no edge in sight"))
+        elif view.stamp - self._lost_since > self._config.nothing_in_sight_s:
+            self._end(view, "failed", "no edge in sight: there are no walls within range, or no way out")
+            return Stand()
+        return LookAround(math.tau)
+
+    def _finish(self, view: View) -> None:
+        graph = self._mapper.graph
+        if graph.frontiers():
+            self._end(view, "explored_with_blocked", f"{len(graph.frontiers())} frontiers cannot be reached")
+        elif graph.blocked():
+            self._end(view, "explored_with_blocked", f"{len(graph.blocked())} frontiers were given up")
+        else:
+            self._end(view, "explored", "no frontier is left")
+
+    def _end(self, view: View, outcome: Outcome, reason: str) -> None:
+        self.outcome, self.reason = outcome, reason
+        self._events.append(Finished(view.stamp, outcome, reason))

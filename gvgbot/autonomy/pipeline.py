@@ -1,0 +1,224 @@
+"""Every stage from HAL messages to a twist, in the order of the flow. No I/O, no clock, no chance."""
+
+import math
+from collections import deque
+from dataclasses import dataclass, field
+from typing import Annotated
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from gvgbot.autonomy.control.edge_follower import EdgeFollowerConfig, follow
+from gvgbot.autonomy.events import Event
+from gvgbot.autonomy.gvg.local import LocalGvg
+from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
+from gvgbot.autonomy.gvg.reduction import ReductionConfig, reduce_graph
+from gvgbot.autonomy.gvg.voronoi import fine_graph
+from gvgbot.autonomy.mapping import Mapper, MappingConfig, View
+from gvgbot.autonomy.mission import Drive, ExplorationConfig, LookAround, Mission, Order, Stand
+from gvgbot.autonomy.slam.ekf import OdometryNoise
+from gvgbot.autonomy.slam.recognition import RecognitionConfig
+from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig, register
+from gvgbot.geometry import STANDSTILL, Array, Pose, Twist, wrap_angle
+from gvgbot.hal.messages import Odometry, Scan
+from gvgbot.ranges import Range
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KeyframeConfig:
+    """How much motion makes a new look worth its cost."""
+
+    distance_m: Annotated[float, Range(0.02, 2.0)] = 0.25
+    turn_rad: Annotated[float, Range(0.02, 2.0)] = 0.25
+    interval_s: Annotated[float, Range(0.1, 10.0)] = 1.0
+    matched_beams: Annotated[int, Range(50, 5000)] = 270
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AutonomyConfig:
+    """All parts of autonomy, by their module's name."""
+
+    keyframe: KeyframeConfig = field(default_factory=KeyframeConfig)
+    local_map: LocalMapConfig = field(default_factory=lambda: LocalMapConfig(half_width_m=10.0))
+    reduction: ReductionConfig = field(default_factory=ReductionConfig)
+    edge_follower: EdgeFollowerConfig = field(default_factory=EdgeFollowerConfig)
+    mapping: MappingConfig = field(default_factory=MappingConfig)
+    recognition: RecognitionConfig = field(default_factory=RecognitionConfig)
+    scan_matching: ScanMatchingConfig = field(default_factory=ScanMatchingConfig)
+    odometry_noise: OdometryNoise = field(default_factory=OdometryNoise)
+    passage_margin_m: Annotated[float, Range(0.0, 0.5)] = 0.015  # beyond the radius, on each side
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Keyframe:
+    """A scan that was used, with the pose it was taken at."""
+
+    scan: Scan
+    odom_base: Pose
+    local_base: Pose
+    map_base: Pose
+
+
+class Pipeline:
+    """The robot's mind: feed it odometry and scans, ask it for twists."""
+
+    def __init__(
+        self, config: AutonomyConfig, exploration: ExplorationConfig, robot_radius: float
+    ) -> None:
+        self._config, self._radius = config, robot_radius
+        self._local_map = LocalMap(config.local_map)
+        self.mapper = Mapper(config.mapping, config.recognition, config.scan_matching)
+        self.mission = Mission(exploration, self.mapper)
+        self._odometry: deque[Odometry] = deque(maxlen=64)
+        self._local_odom: Pose | None = None
+        self._last: Keyframe | None = None
+        self._turning_to: float | None = None  # odom heading still to turn through, unwrapped sum
+        self._turned = 0.0
+        self._twist = STANDSTILL
+        self._order: Order = Stand()
+        self.gvg = LocalGvg()
+        self.keyframes: list[Keyframe] = []
+        self.travelled = 0.0
+
+    # -- state -----------------------------------------------------------------------------------
+
+    @property
+    def map_base(self) -> Pose:
+        """The pose as believed now."""
+        if self._last is None or not self._odometry:
+            return Pose()
+        moved = self._last.odom_base.to(self._odometry[-1].odom_base)
+        return self.mapper.belief.map_base.compose(moved)
+
+    def _odom_base_at(self, stamp: float) -> Pose | None:
+        """Odometry interpolated at a stamp; the nearest when it lies outside what is kept."""
+        log = self._odometry
+        if not log:
+            return None
+        for late, early in zip(reversed(log), list(reversed(log))[1:], strict=False):
+            if early.stamp <= stamp:
+                if stamp >= late.stamp:
+                    return late.odom_base
+                share = (stamp - early.stamp) / (late.stamp - early.stamp)
+                motion = early.odom_base.to(late.odom_base)
+                part = Pose(share * motion.x, share * motion.y, share * motion.theta)
+                return early.odom_base.compose(part)
+        return log[0].odom_base
+
+    # -- perception, per scan --------------------------------------------------------------------
+
+    def perceive(self, scan: Scan) -> list[Event]:
+        """Learn from a scan, if it was taken somewhere new; what happened."""
+        odom_base = self._odom_base_at(scan.stamp)
+        if odom_base is None or self.mission.outcome is not None or not self._worth_a_look(scan, odom_base):
+            return []
+        local_base = self._localise(scan, odom_base)
+        self._local_map.insert(scan, local_base.compose(scan.base_laser), self.travelled)
+        fine = fine_graph(
+            self._local_map,
+            local_base.position,
+            min_clearance=self._radius + self._config.passage_margin_m,
+            chord_ratio=self._config.reduction.chord_ratio,
+        )
+        self.gvg = reduce_graph(fine, self._config.reduction)
+        view = View(scan.stamp, self.travelled, local_base, self.gvg, self._local_map.points())
+        known, seen = self.mapper.observe(view)
+        self._keep(scan, odom_base, local_base)
+        if self._turning():
+            return seen
+        if len(self.keyframes) == 1:
+            self._turn(_blind_angle(scan))
+            return seen
+        order, done = self.mission.advance(view, known)
+        self._obey(order)
+        return seen + done
+
+    def _worth_a_look(self, scan: Scan, odom_base: Pose) -> bool:
+        if self._last is None:
+            return True
+        moved, c = self._last.odom_base.to(odom_base), self._config.keyframe
+        return (
+            math.hypot(moved.x, moved.y) >= c.distance_m
+            or abs(moved.theta) >= c.turn_rad
+            or scan.stamp - self._last.scan.stamp >= c.interval_s
+        )
+
+    def _localise(self, scan: Scan, odom_base: Pose) -> Pose:
+        """The base in the local frame: odometry, corrected by matching the scan with the local map."""
+        if self._last is None:
+            return Pose()
+        motion = self._last.odom_base.to(odom_base)
+        self.travelled += math.hypot(motion.x, motion.y)
+        Q = self._config.odometry_noise.covariance(motion, scan.stamp - self._last.scan.stamp)
+        prior = self._last.local_base.compose(motion)
+        local_base, covariance = self._match(scan, prior, Q)
+        before = self._last.local_base.to(local_base)
+        c, s = math.cos(motion.theta), math.sin(motion.theta)
+        R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        self.mapper.move(before, R @ covariance @ R.T)
+        return local_base
+
+    def _match(self, scan: Scan, prior: Pose, Q: Array) -> tuple[Pose, Array]:
+        """The base in the local frame, and the covariance of the motion, in the frame of the new pose."""
+        walls = self._local_map.points()
+        points = _sampled(scan, self._config.keyframe.matched_beams)
+        if len(walls) < 50 or len(points) < 50:
+            return prior, Q
+        found = register(points, cKDTree(walls), walls, prior, Q, self._config.scan_matching)
+        if found is None or found.inliers < 0.5:
+            return prior, Q
+        return found.pose, found.covariance + np.diag([0.004**2, 0.004**2, 0.0006**2])
+
+    def _keep(self, scan: Scan, odom_base: Pose, local_base: Pose) -> None:
+        self._last = Keyframe(scan, odom_base, local_base, self.mapper.belief.map_base)
+        self.keyframes.append(self._last)
+
+    # -- control, per odometry message -------------------------------------------------------------
+
+    def control(self, odometry: Odometry) -> Twist:
+        """The twist to drive now."""
+        if self._odometry:
+            self._turned += wrap_angle(odometry.odom_base.theta - self._odometry[-1].odom_base.theta)
+        self._odometry.append(odometry)
+        if self._last is None:
+            return STANDSTILL
+        if self._turning():
+            return Twist(0.0, self._config.edge_follower.max_turn_rate_radps * 0.8)
+        match self._order:
+            case Drive(track=track):
+                local_base = self._last.local_base.compose(self._last.odom_base.to(odometry.odom_base))
+                self._twist = follow(
+                    track, local_base, self._twist.linear, self._radius, self._config.edge_follower
+                )
+                return self._twist
+            case _:
+                return STANDSTILL
+
+    def _obey(self, order: Order) -> None:
+        if isinstance(order, LookAround):
+            self._turn(order.angle)
+        self._order = order
+
+    def _turn(self, angle: float) -> None:
+        self._turned, self._turning_to = 0.0, angle
+
+    def _turning(self) -> bool:
+        if self._turning_to is not None and self._turned >= self._turning_to:
+            self._turning_to = None
+        return self._turning_to is not None
+
+
+def _blind_angle(scan: Scan) -> float:
+    """How far to turn so that every direction has been seen, with some overlap; rad."""
+    seen = scan.angle_increment * (len(scan.ranges) - 1)
+    return max(0.0, math.tau - seen) + 0.2
+
+
+def _sampled(scan: Scan, count: int) -> Array:
+    """End points (N, 2) of evenly chosen beams that hit something, base frame."""
+    step = max(1, len(scan.ranges) // count)
+    ranges, bearings = scan.ranges[::step], scan.bearings[::step]
+    with np.errstate(invalid="ignore"):
+        hit = ranges < 12.0
+    r, b = ranges[hit], bearings[hit]
+    return scan.base_laser.transform(np.stack([r * np.cos(b), r * np.sin(b)], axis=1))

@@ -1,0 +1,208 @@
+"""Where the robot is on the graph, and how to get from there to a frontier."""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from gvgbot.autonomy.exploration.paths import Approach, shortest_paths
+from gvgbot.autonomy.gvg.local import Branch, LocalGvg, Place
+from gvgbot.autonomy.mapping import Correspondence
+from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
+from gvgbot.geometry import Array, Pose, wrap_angle
+
+_LOOP_M = 0.4  # a trail that comes this near to itself has been driven back
+_AWAY_M = 0.7  # nearer to a vertex than this, the trail does not tell its edges apart
+_BACK_M = 0.8  # how far back along the trail one looks to tell ahead from behind
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Passage:
+    """A change of edge: the half-edges that the old edge left by and arrives at, and its polyline."""
+
+    left: HalfEdgeId | None
+    arrived: HalfEdgeId | None
+    line: Array  # (N, 2) local frame
+    driven: float  # metres of it
+
+
+@dataclass(slots=True, eq=False)
+class Whereabouts:
+    """The half-edge by which the robot's edge leaves its last vertex, and the way driven since."""
+
+    on_edge: HalfEdgeId | None = None
+    trail: list[Array] = field(default_factory=list)  # local frame, without detours
+
+    @property
+    def trail_length(self) -> float:
+        """Metres driven along the edge since its vertex."""
+        points = np.array(self.trail)
+        return float(np.hypot(*np.diff(points, axis=0).T).sum()) if len(points) > 1 else 0.0
+
+    def follow(
+        self, gvg: LocalGvg, place: Place, known: Correspondence, base: Array
+    ) -> "Passage | None":
+        """Account for the robot's present place; the change of edge, if there was one."""
+        edge = gvg.edges[place.edge]
+        ends = [
+            (metres, known.half_edge_of[branch], node)
+            for branch, metres, node in (
+                (Branch(place.edge, forward=True), place.station, edge.a),
+                (Branch(place.edge, forward=False), edge.length - place.station, edge.b),
+            )
+            if branch in known.half_edge_of
+        ]
+        passage = None
+        if ends and all(end != self.on_edge for _, end, _ in ends):
+            _, end, node = min(ends)
+            passage = self._passage(gvg, place, known, node)
+            self.on_edge, self.trail = end, [gvg.nodes[node].position]
+        self._extend(base)
+        return passage
+
+    def _passage(self, gvg: LocalGvg, place: Place, known: Correspondence, node: int) -> Passage:
+        centre = gvg.nodes[node].position
+        trail = np.array(self.trail).reshape(-1, 2)
+        d = np.hypot(*(trail - centre).T)
+        if len(trail) and d.min() < _AWAY_M:  # the robot is past the node already
+            trail = trail[: int(np.argmin(d)) + 1]
+            rest = centre[None]
+        else:
+            towards = Branch(place.edge, forward=node == gvg.edges[place.edge].b)
+            rest, _ = gvg.line_from(place, (towards,))
+        driven = float(np.hypot(*np.diff(trail, axis=0).T).sum())
+        arrived = self._arrival(gvg, place, known, node, trail)
+        return Passage(self.on_edge, arrived, np.concatenate([trail, rest]), driven)
+
+    def _arrival(
+        self, gvg: LocalGvg, place: Place, known: Correspondence, node: int, trail: Array
+    ) -> HalfEdgeId | None:
+        """The half-edge by which a trail came to a node, or comes to it if that is still ahead."""
+        key = place.edge
+        away = np.hypot(*(trail - gvg.nodes[node].position).T) > _AWAY_M
+        if away.any():
+            came_over = gvg.place(trail[np.nonzero(away)[0][-1]])
+            if came_over is not None and came_over.distance < _AWAY_M:
+                key = came_over.edge
+        branches = gvg.nodes[node].branches
+        ends = [known.half_edge_of[b] for b in branches if b.edge == key and b in known.half_edge_of]
+        return ends[0] if ends else None
+
+    def _extend(self, base: Array) -> None:
+        if len(self.trail) > 3:
+            d = np.hypot(*(np.array(self.trail) - base).T)
+            back = int(np.argmax(d < _LOOP_M))
+            if d[back] < _LOOP_M and back < len(self.trail) - 3:
+                del self.trail[back + 1 :]
+        if not self.trail or np.hypot(*(self.trail[-1] - base)) > 0.1:
+            self.trail.append(base)
+
+    def backwards(self, gvg: LocalGvg, place: Place, local_base: Pose) -> Branch:
+        """The way along the robot's local edge that leads back to where it came from."""
+        edge = gvg.edges[place.edge]
+        if len(self.trail) > 1:
+            points = np.array(self.trail)
+            back = np.cumsum(np.hypot(*np.diff(points[::-1], axis=0).T))
+            i = len(points) - 2 - min(int(np.searchsorted(back, _BACK_M)), len(points) - 2)
+            d = np.hypot(*(edge.polyline - points[i]).T)
+            offset = float(edge.stations[int(np.argmin(d))]) - place.station
+            if abs(offset) > 0.15:
+                return Branch(place.edge, forward=offset > 0)
+        i = min(int(np.searchsorted(edge.stations, place.station)), len(edge.polyline) - 2)
+        dx, dy = edge.polyline[i + 1] - edge.polyline[i]
+        same = abs(wrap_angle(math.atan2(dy, dx) - local_base.theta)) < math.pi / 2
+        return Branch(place.edge, forward=not same)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Situation:
+    """The robot on the local GVG and on the graph at one keyframe."""
+
+    gvg: LocalGvg
+    known: Correspondence
+    graph: GvgGraph
+    where: Whereabouts
+    place: Place
+    local_base: Pose
+
+    def starts(self) -> list[Approach]:
+        """The first vertices that the robot can reach along the edge it is on."""
+        routes = self.gvg.routes(self.place)
+        found = []
+        for node, vertex in self.known.vertex_of.items():
+            if node not in routes:
+                continue
+            metres, path = routes[node]
+            passed = {self.gvg.end_of(branch) for branch in path[:-1]}
+            if not passed & self.known.vertex_of.keys():
+                arrival = self.known.half_edge_of.get(Branch(path[-1].edge, not path[-1].forward))
+                found.append(Approach(metres, arrival or HalfEdgeId(vertex, -1)))
+        return found + self._out_of_sight({a.arrival.vertex for a in found})
+
+    def _out_of_sight(self, in_sight: set[int]) -> list[Approach]:
+        """The ends of the robot's edge that the local map no longer, or not yet, shows."""
+        end = self.where.on_edge
+        if end is None or self.graph.half_edge(end) is None:
+            return []
+        driven = self.where.trail_length
+        found = [Approach(driven, end)]
+        edge = self.graph.edge_at(end)
+        if edge is not None:
+            found.append(Approach(max(0.0, edge.length - driven), edge.other(end)))
+        return [a for a in found if a.arrival.vertex not in in_sight]
+
+    def path_to(self, target: HalfEdgeId) -> tuple[Branch, ...] | None:
+        """Branches to drive, as far as they are in sight, towards and into a frontier."""
+        if self.where.on_edge == target:
+            return self._extended((self._away_from(target),))
+        approach = shortest_paths(self.graph, self.starts()).get(target.vertex)
+        if approach is None:
+            return None
+        departures = (*approach.departures, target)
+        first = departures[0].vertex
+        path = self._to_vertex(first)
+        if path is None:
+            return None
+        for departure in departures if first in self.known.node_of else ():
+            branch = self.known.branch_of.get(departure)
+            if branch is None:
+                break
+            path = (*path, branch)
+            if self.gvg.end_of(branch) not in self.known.vertex_of:
+                return self._extended(path)
+        return path
+
+    def ahead(self) -> tuple[Branch, ...]:
+        """Straight on along the present edge, as far as it is in sight."""
+        back = self.where.backwards(self.gvg, self.place, self.local_base)
+        return self._extended((Branch(back.edge, not back.forward),))
+
+    def _away_from(self, end: HalfEdgeId) -> Branch:
+        branch = self.known.branch_of.get(end)
+        if branch is not None and branch.edge == self.place.edge:
+            return branch
+        back = self.where.backwards(self.gvg, self.place, self.local_base)
+        return Branch(back.edge, not back.forward)
+
+    def _to_vertex(self, vertex: int) -> tuple[Branch, ...] | None:
+        node = self.known.node_of.get(vertex)
+        if node is not None:
+            found = self.gvg.routes(self.place).get(node)
+            return None if found is None else found[1]
+        back = self.where.backwards(self.gvg, self.place, self.local_base)
+        if self.where.on_edge is not None and self.where.on_edge.vertex == vertex:
+            return self._extended((back,))
+        return self._extended((Branch(back.edge, not back.forward),))
+
+    def _extended(self, path: tuple[Branch, ...]) -> tuple[Branch, ...]:
+        """The path and on through points that are no vertices, to the end of what is in sight."""
+        while True:
+            end = self.gvg.end_of(path[-1])
+            node = self.gvg.nodes[end]
+            if end in self.known.vertex_of or node.degree != 2:
+                return path
+            arrived = Branch(path[-1].edge, not path[-1].forward)
+            onwards = [b for b in node.branches if b not in node.weak and b != arrived]
+            if len(onwards) != 1 or any(b.edge == onwards[0].edge for b in path):
+                return path
+            path = (*path, onwards[0])
