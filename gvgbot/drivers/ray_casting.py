@@ -78,7 +78,7 @@ class RayCaster:
         """
         _require_fan(directions)
         region = self._region_at(x, y)
-        if region == 0:
+        if region == 0 or len(directions) == 0:
             return np.zeros(len(directions))
         faces = self._faces_of(region).facing(x, y, reach)
         face, beam = _crossings(faces, directions)

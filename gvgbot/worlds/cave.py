@@ -98,7 +98,8 @@ def _carve_passage(canvas: Canvas, ends: Array, radii: Array, rng: np.random.Gen
 def _worn(occupied: Mask) -> Mask:
     """The walls with their edges smoothed, and without thin or small pieces of rock."""
     smooth = ndimage.gaussian_filter(occupied.astype(np.float64), 4.0, mode="nearest") > 0.5
-    disc = np.hypot(*np.mgrid[-2:3, -2:3]) <= LEAST_WALL / 2
+    across = np.arange(LEAST_WALL) - (LEAST_WALL - 1) / 2
+    disc = np.hypot(across, across[:, None]) <= LEAST_WALL / 2
     padded = np.pad(smooth, LEAST_WALL, constant_values=True)
     thick = ndimage.binary_opening(padded, disc)[LEAST_WALL:-LEAST_WALL, LEAST_WALL:-LEAST_WALL]
     rocks, _ = ndimage.label(thick)

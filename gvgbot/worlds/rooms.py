@@ -32,7 +32,8 @@ def rooms(seed: int = 0) -> tuple[World, Pose]:
         middles[i, j] = x + SIDES[0][i] / 2, y + SIDES[1][j] / 2
     for here, there in _open_doors(rng):
         canvas.carve_path([middles[here], middles[there]], float(rng.choice(DOORS)))
-    return canvas.world("rooms"), Pose(*middles[1, 1], 0.0)
+    x, y = middles[1, 1]
+    return canvas.world("rooms"), Pose(x + 1.0, y + 0.5, 0.0)
 
 
 def _open_doors(rng: np.random.Generator) -> list[Door]:
