@@ -128,8 +128,8 @@ def load_world(path: Path) -> World:
     threshold = entries.fraction("occupied_thresh", OCCUPIED_THRESHOLD)
     entries.fraction("free_thresh", FREE_THRESHOLD)
     entries.require_trinary()
-    shade = _read_shade(path, entries.image())
-    occupancy = shade if negate else 1.0 - shade
+    grey = _read_grey(path, entries.image())
+    occupancy = (grey if negate else 255.0 - grey) / 255.0
     occupied = np.ascontiguousarray(np.flipud(occupancy > threshold))
     return World(occupied, resolution, origin, path.stem)
 
@@ -167,13 +167,13 @@ def _read_yaml(path: Path) -> dict[str, Any]:
     return content
 
 
-def _read_shade(path: Path, image: Path) -> Array:
-    """Brightness 0..1 of each pixel, the mean of its colours; row 0 at the top."""
+def _read_grey(path: Path, image: Path) -> Array:
+    """Brightness 0..255 of each pixel, the mean of its colours; row 0 at the top."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
             with Image.open(image) as picture:
-                return _brightness(picture)
+                return _grey(picture)
     except FileNotFoundError:
         raise WorldError(f"{path}: key image: no such file {image}; correct the name") from None
     except UnidentifiedImageError:
@@ -182,13 +182,12 @@ def _read_shade(path: Path, image: Path) -> Array:
         raise WorldError(f"{path}: key image: cannot read {image} ({_line(error)})") from None
 
 
-def _brightness(picture: Image.Image) -> Array:
+def _grey(picture: Image.Image) -> Array:
     if picture.mode.startswith("I"):
-        return np.asarray(picture, dtype=np.float64) / 65535.0
+        return np.asarray(picture, dtype=np.float64) / 257.0  # sixteen bits
     if picture.mode in ("1", "L", "LA"):
-        return np.asarray(picture.convert("L"), dtype=np.float64) / 255.0
-    colours = np.asarray(picture.convert("RGB"), dtype=np.float64) / 255.0
-    return np.asarray(colours.mean(axis=2))
+        return np.asarray(picture.convert("L"), dtype=np.float64)
+    return np.asarray(np.asarray(picture.convert("RGB")).mean(axis=2))
 
 
 def _line(error: Exception) -> str:

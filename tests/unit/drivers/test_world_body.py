@@ -43,10 +43,11 @@ def test_a_straight_run_into_a_wall_ends_in_touch_with_it() -> None:
     assert (body.contacts, body.bumper) == (1, (False, True, False))
 
 
-@pytest.mark.parametrize("gap", [1.0, 7.0])
-def test_no_wall_is_jumped_over_however_long_the_step(gap: float) -> None:
-    body = RobotBody(walled(5.0), Pose(3.0, 5.0, 0.2))
-    body.command(3.0, 0.0)
+@pytest.mark.parametrize(("gap", "speed"), [(1.0, 3.0), (7.0, 3.0), (1.0, 80.0)])
+def test_no_wall_is_jumped_over_however_long_the_step(gap: float, speed: float) -> None:
+    config = BodyConfig(max_acceleration_mps2=1000.0)
+    body = RobotBody(walled(5.0), Pose(3.0, 5.0, 0.2), config)
+    body.command(speed, 0.0)
     for k in range(1, 5):
         body.advance(gap * k)
         assert body.pose.x <= 5.0 - RADIUS + 1e-5
@@ -89,6 +90,18 @@ def test_wheel_travel_follows_the_speed_ramps(steps: int) -> None:
     assert body.left_travel + body.right_travel == pytest.approx(2 * way)
     assert body.right_travel - body.left_travel == pytest.approx(turn * BASE)
     assert body.distance_m == pytest.approx(way)
+
+
+def test_a_curve_driven_while_accelerating_is_the_integral_of_its_ramps() -> None:
+    body = RobotBody(OPEN, Pose())
+    body.command(0.7, 2.0)
+    body.advance(1.5)
+    time = (np.arange(150_000) + 0.5) * 1e-5
+    speed, rate = np.minimum(1.0 * time, 0.7), np.minimum(6.0 * time, 2.0)
+    theta = np.cumsum(rate) * 1e-5
+    x, y = (float(np.sum(speed * f(theta)) * 1e-5) for f in (np.cos, np.sin))
+    assert (body.pose.x, body.pose.y) == pytest.approx((x, y), abs=1e-3)
+    assert body.pose.theta == pytest.approx(theta[-1], abs=1e-3)
 
 
 def test_braking_takes_the_way_of_the_acceleration_limit() -> None:
@@ -173,6 +186,14 @@ def test_a_robot_in_touch_can_back_off_and_releases_its_bumper() -> None:
     body.advance(4.5)
     assert body.bumper == (False, False, False)
     assert body.pose.x < 5.0 - RADIUS - 0.1
+
+
+def test_a_robot_put_too_near_a_wall_can_leave_but_not_approach_it() -> None:
+    for speed, x in ((0.2, 4.9), (-0.2, 4.9 - 0.2 * 3.0 + 0.2**2 / 2)):
+        body = RobotBody(walled(5.0), Pose(4.9, 5.0, 0.0))
+        body.command(speed, 0.0)
+        body.advance(3.0)
+        assert body.pose.x == pytest.approx(x)
 
 
 def test_a_robot_in_touch_can_turn_and_roll_along_the_wall() -> None:

@@ -65,7 +65,7 @@ def test_the_last_image_row_is_the_lowest_and_lies_at_the_origin(tmp_path: Path)
     [
         b"P5\n# by hand\n3 2\n255\n" + bytes([0, 255, 255, 255, 255, 0]),
         b"P2\n3 2\n255\n0 255 255\n255 255 0\n",
-        b"P5\n3 2\n65535\n" + b"\0\0" + b"\xff\xff" * 4 + b"\0\0",
+        b"P5\n3 2\n65535\n" + b"\x50\0" + b"\xff\xff" * 4 + b"\0\0",
     ],
     ids=["binary", "plain", "sixteen bits"],
 )

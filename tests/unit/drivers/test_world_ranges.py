@@ -109,8 +109,9 @@ def test_a_whole_turn_of_beams_begins_and_ends_alike() -> None:
 
 
 def test_nothing_is_seen_beyond_the_greatest_range() -> None:
-    ranges = room(70, 30).cast(Pose(1.0, 1.5, 0.0), np.array([0.0, 1.0, math.pi / 2]), 3.0)
-    np.testing.assert_allclose(ranges, [np.inf, 1.5 / math.sin(1.0), 1.5])
+    bearings = np.array([0.0, 0.6, 1.0, math.pi / 2])
+    ranges = room(70, 30).cast(Pose(1.0, 1.5, 0.0), bearings, 2.0)
+    np.testing.assert_allclose(ranges, [np.inf, np.inf, 1.5 / math.sin(1.0), 1.5])
 
 
 def test_a_world_without_walls_returns_nothing() -> None:
