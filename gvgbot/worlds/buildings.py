@@ -68,8 +68,8 @@ def _street_grid(
         canvas.carve(x0, GRID_MARGIN, x1, ends[1, -1])
     for y0, y1 in zip(starts[1], ends[1], strict=True):
         canvas.carve(GRID_MARGIN, y0, ends[0, -1], y1)
-    middle = (starts[:, 0] + ends[:, 0]) / 2
-    return canvas.world(name), Pose(middle[0], middle[1] + 3.0, math.pi / 2)
+    x, y = ((starts[:, 0] + ends[:, 0]) / 2).tolist()
+    return canvas.world(name), Pose(x, y + 3.0, math.pi / 2)
 
 
 def comb(_seed: int = 0) -> tuple[World, Pose]:

@@ -74,6 +74,7 @@ def test_the_same_seed_draws_the_same_world(name: str, seed: int) -> None:
     (first, here), (second, there) = builtin(name, seed), builtin(name, seed)
     assert np.array_equal(first.occupied, second.occupied)
     assert here == there
+    assert {type(value) for value in (here.x, here.y, here.theta)} == {float}  # fit for any encoder
     assert (first.name, first.resolution_m) == (name, 0.05)
 
 
