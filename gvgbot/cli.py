@@ -3,7 +3,7 @@
 import argparse
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import isfinite
 from pathlib import Path
 from typing import Any, NoReturn
@@ -11,25 +11,31 @@ from typing import Any, NoReturn
 from gvgbot import __version__
 from gvgbot.errors import GvgbotError, UsageError
 
-SUCCESS, FAILURE, BAD_USAGE, INTERRUPTED = 0, 1, 2, 130
+FAILURE, BAD_USAGE, INTERRUPTED = 1, 2, 130
 NEGATIVE_NUMBER = re.compile(r"-\.?\d")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command and return its exit status: 0 done, 1 failed, 2 asked wrongly."""
+    """Run one command and return its exit status; wrong arguments raise SystemExit(2)."""
     options = _parser().parse_args(arguments)
+    return status_of(lambda: options.command(options))
+
+
+def status_of(command: Callable[[], int]) -> int:
+    """The command's own exit status, or 1 if it failed, 2 if it was asked wrongly, 130 if stopped.
+
+    The reason goes to stderr; only a mistake of the program leaves a traceback.
+    """
     try:
-        status = options.command(options)
+        return command()
     except KeyboardInterrupt:
         return _fail("interrupted", INTERRUPTED)
     except UsageError as error:
         return _fail(str(error), BAD_USAGE)
     except GvgbotError as error:
         return _fail(str(error), FAILURE)
-    except BrokenPipeError:  # the reader of our output has gone, as `head` does
-        sys.stderr.close()
+    except BrokenPipeError:  # whoever read our output has gone, as `head` does
         return FAILURE
-    return int(status)
 
 
 def _fail(message: str, status: int) -> int:

@@ -1,7 +1,7 @@
 """The last gate before the motors: limits, staleness, contact, and obstacles on the raw scan."""
 
 from dataclasses import dataclass, field, replace
-from math import inf, isfinite, sqrt
+from math import copysign, isfinite, sqrt
 from typing import Annotated, Literal
 
 from gvgbot.geometry import STANDSTILL, Array, Twist
@@ -150,29 +150,29 @@ class Guard:
         odometry: Odometry,
         contact: Contact | None,
     ) -> tuple[Twist, Reason | None]:
-        """The wish, slowed on its own arc so that the robot can stop before it hits anything."""
+        """The wish, slowed until the robot can stop before it hits something; it may turn."""
         felt = felt_ahead(contact)
         if felt is not None and (wish.linear > 0.0 or asked.linear > 0.0):
             return (STANDSTILL if asked.linear > 0.0 else Twist(0.0, wish.angular)), felt
         if wish.linear == 0.0:
             return wish, None
-        fastest = self._fastest(state, wish, odometry)
-        if fastest >= abs(wish.linear):
-            return wish, None
-        if fastest < CREEP:
-            return Twist(0.0, wish.angular), "obstacle"
-        scale = fastest / abs(wish.linear)
-        return Twist(scale * wish.linear, scale * wish.angular), "obstacle near"
-
-    def _fastest(self, state: GuardState, wish: Twist, odometry: Odometry) -> float:
-        """The speed (m/s) from which the robot still stops in the free part of the wished arc."""
-        limits = self.config
         points = seen_from(odometry.odom_base, state.points)
+        speed = self._safe_speed(points, wish)
+        if speed == abs(wish.linear):
+            return wish, None
+        if speed > 0.0:  # the slower robot turns as asked, so it is on a tighter arc
+            speed = self._safe_speed(points, replace(wish, linear=copysign(speed, wish.linear)))
+        if speed < CREEP:
+            return replace(wish, linear=0.0), "obstacle"
+        return replace(wish, linear=copysign(speed, wish.linear)), "obstacle near"
+
+    def _safe_speed(self, points: tuple[Array, Array], wish: Twist) -> float:
+        """The speed (m/s), at most the wished, that can be braked in the free part of the arc."""
+        limits = self.config
         way = free_distance(points, wish, radius=self.radius, margin=limits.margin_m)
-        if way == inf:
-            return inf
         delay = limits.max_braking_mps2 * limits.response_time_s
-        return sqrt(delay**2 + 2.0 * limits.max_braking_mps2 * way) - delay
+        stoppable = sqrt(delay**2 + 2.0 * limits.max_braking_mps2 * way) - delay
+        return min(abs(wish.linear), stoppable)
 
 
 def felt_ahead(contact: Contact | None) -> Reason | None:

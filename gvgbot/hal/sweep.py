@@ -1,7 +1,7 @@
 """What a round robot's footprint sweeps: how far it can drive on an arc before it touches."""
 
 from collections.abc import Sequence
-from math import cos, hypot, inf, sin, sqrt
+from math import cos, hypot, inf, sin
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from gvgbot.geometry import Array, Pose, Twist, wrap_angle
 from gvgbot.hal.messages import Odometry, Scan
 
 STRAIGHT = 1e-3  # 1/m; a flatter arc departs less than a millimetre from a line in a metre
-TOUCH = 1e-3  # m; something this much nearer than the nearest return counts as hit
+LEAST = 1.0 / 3.0  # share of the margin that is kept when the robot is within it already
 
 
 def no_points() -> Array:
@@ -84,9 +84,9 @@ def free_distance(
 ) -> float:
     """How far (m) the base can go on the twist's arc until a point is within radius + margin.
 
-    `points` are x (N,) and y (N,) in the base frame, m. Where something ahead is already nearer
-    than that, the margin shrinks to what is left of it, so that a robot close to a wall may still
-    go along it or away from it. inf if nothing is in the way. `twist.linear` must not be 0.
+    `points` are x (N,) and y (N,) in the base frame, m. When something ahead is nearer than that
+    already, radius + LEAST * margin is enough, so that a robot close to a wall can go along it
+    and leave it. inf if nothing is in the way. `twist.linear` must not be 0.
     """
     x, y = points
     if twist.linear < 0.0:
@@ -95,8 +95,8 @@ def free_distance(
     x, y = x[ahead], y[ahead]
     if not len(x):
         return inf
-    nearest = sqrt(float(np.min(x * x + y * y)))
-    reach = max(radius, min(radius + margin, nearest - TOUCH))
+    is_close = float(np.min(x * x + y * y)) < (radius + margin) ** 2
+    reach = radius + (LEAST * margin if is_close else margin)
     curvature = twist.angular / twist.linear
     if abs(curvature) < STRAIGHT:
         return _free_line(x, y, reach)
@@ -104,7 +104,7 @@ def free_distance(
 
 
 def _free_line(x: Array, y: Array, reach: float) -> float:
-    """Free distance (m) straight ahead of a disc of radius `reach` (m)."""
+    """Free distance (m) straight ahead, where no point may come nearer than `reach` (m)."""
     hit = np.abs(y) < reach
     if not hit.any():
         return inf
@@ -113,7 +113,7 @@ def _free_line(x: Array, y: Array, reach: float) -> float:
 
 
 def _free_arc(x: Array, y: Array, reach: float, turn: float) -> float:
-    """Free distance (m) of a disc of radius `reach` (m) on a left arc of radius `turn` (m)."""
+    """Free distance (m) on a left arc of radius `turn` (m), likewise."""
     below = turn - y  # the arc's centre is at (0, turn)
     away = np.sqrt(x * x + below * below)
     hit = np.abs(away - turn) < reach

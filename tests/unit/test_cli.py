@@ -1,0 +1,130 @@
+"""The command line says in one line what is wrong, with the right exit status."""
+
+from pathlib import Path
+
+import pytest
+
+from gvgbot import __version__
+from gvgbot.cli import main, status_of
+from gvgbot.errors import ConfigError, DeviceLost, Unsafe, UsageError, WorldError
+
+Captured = pytest.CaptureFixture[str]
+
+
+def said(captured: Captured) -> list[str]:
+    output = captured.readouterr()
+    assert output.out == ""
+    return output.err.splitlines()
+
+
+BAD_ARGUMENTS = {
+    "no command": ([], "COMMAND"),
+    "unknown command": (["dance"], "dance"),
+    "unknown option": (["explore", "--wrold", "office"], "--wrold"),
+    "two numbers for a start": (["explore", "--start", "1", "2"], "--start"),
+    "a start that is no number": (["explore", "--start", "1", "2", "north"], "north"),
+    "a start that is not finite": (["explore", "--start", "1", "nan", "0"], "nan"),
+    "a seed that is no number": (["explore", "--seed", "x"], "--seed"),
+    "a negative seed": (["explore", "--seed", "-1"], "--seed"),
+    "two configurations": (["run", "a.yaml", "b.yaml"], "b.yaml"),
+}
+
+
+@pytest.mark.parametrize(("arguments", "named"), BAD_ARGUMENTS.values(), ids=BAD_ARGUMENTS)
+def test_bad_arguments_are_one_line_that_names_them_and_exit_2(
+    arguments: list[str], named: str, capsys: Captured
+) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main(arguments)
+    assert caught.value.code == 2
+    (line,) = said(capsys)
+    assert named in line
+    assert "--help" in line
+
+
+BAD_CONFIGURATIONS = {
+    "missing file": (["run", "absent.yaml"], "absent.yaml: cannot read the file"),
+    "missing file to explore": (["explore", "--config", "absent.yaml"], "absent.yaml"),
+    "override without value": (["explore", "--set", "robot.name"], "must be key=value"),
+    "unknown key": (["explore", "--set", "robot.nmae=x"], "did you mean robot.name?"),
+    "unknown profile": (["explore", "--set", "twin.base.odometry=ideal"], "one of perfect"),
+    "seed out of range": (["explore", "--seed", str(2**40)], "twin.seed"),
+}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"), BAD_CONFIGURATIONS.values(), ids=BAD_CONFIGURATIONS
+)
+def test_a_bad_configuration_is_one_line_that_names_it_and_exits_2(
+    arguments: list[str],
+    named: str,
+    capsys: Captured,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(arguments) == 2
+    (line,) = said(capsys)
+    assert line.startswith("gvgbot: ")
+    assert named in line
+
+
+def test_every_mistake_of_a_configuration_has_its_own_line(
+    capsys: Captured, tmp_path: Path
+) -> None:
+    path = tmp_path / "bad.yaml"
+    path.write_text("{robto: {}, laser: {skip: many}}", encoding="utf-8")
+    assert main(["run", str(path), "--set", "base.heading=nose"]) == 2
+    assert len(said(capsys)) == 3
+
+
+def raising(error: BaseException) -> int:
+    raise error
+
+
+@pytest.mark.parametrize(
+    ("error", "status"),
+    [
+        (UsageError("no such world"), 2),
+        (ConfigError("no such world"), 2),
+        (WorldError("no such world"), 2),
+        (DeviceLost("no such world"), 1),
+        (Unsafe("no such world"), 1),
+    ],
+    ids=lambda value: type(value).__name__,
+)
+def test_an_error_becomes_its_line_and_its_exit_status(
+    error: Exception, status: int, capsys: Captured
+) -> None:
+    assert status_of(lambda: raising(error)) == status
+    assert said(capsys) == ["gvgbot: no such world"]
+
+
+def test_an_interrupted_command_says_so_and_exits_as_shells_expect(capsys: Captured) -> None:
+    assert status_of(lambda: raising(KeyboardInterrupt())) == 128 + 2
+    assert said(capsys) == ["gvgbot: interrupted"]
+
+
+def test_a_mistake_of_the_program_is_not_hidden() -> None:
+    with pytest.raises(ZeroDivisionError):
+        status_of(lambda: raising(ZeroDivisionError()))
+
+
+@pytest.mark.parametrize("status", [0, 1])
+def test_the_exit_status_of_a_command_is_passed_on(status: int) -> None:
+    assert status_of(lambda: status) == status
+
+
+@pytest.mark.parametrize("command", ["explore", "run"])
+def test_every_command_explains_itself_with_an_example(command: str, capsys: Captured) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main([command, "--help"])
+    assert caught.value.code == 0
+    assert f"example: gvgbot {command}" in " ".join(capsys.readouterr().out.split())
+
+
+def test_the_version_is_the_package_s(capsys: Captured) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main(["--version"])
+    assert caught.value.code == 0
+    assert capsys.readouterr().out == f"gvgbot {__version__}\n"
