@@ -8,7 +8,7 @@ from dataclasses import fields, is_dataclass
 from enum import Enum
 from pathlib import Path
 from types import TracebackType
-from typing import IO, Any, Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -30,7 +30,7 @@ class RunDirectory:
         self.path = path
         try:
             path.mkdir(parents=True, exist_ok=True)
-            self._events: IO[str] = (path / EVENTS).open("a", encoding="utf-8")
+            self._events = (path / EVENTS).open("ab", buffering=0)
         except OSError as error:
             raise _unfit(path, error) from error
 
@@ -65,10 +65,10 @@ class RunDirectory:
 
         Raises TypeError if the event is no dataclass, GvgbotError if the line cannot be written.
         """
-        line = {"event": _snake_case(type(event).__name__)} | _fields(event)
+        record = {"event": _snake_case(type(event).__name__)} | _fields(event)
+        line = json.dumps(record, ensure_ascii=False, allow_nan=False) + "\n"
         try:
-            self._events.write(json.dumps(line, ensure_ascii=False, allow_nan=False) + "\n")
-            self._events.flush()
+            self._events.write(line.encode())
         except OSError as error:
             raise GvgbotError(f"cannot write {self.path / EVENTS}: {error.strerror}") from error
 

@@ -1,0 +1,163 @@
+"""A drawing surface with smooth lines: drawn at three times the size, then reduced.
+
+Indexed colours, one byte per large pixel, keep it small; text comes last, on the reduced image.
+"""
+
+import io
+from collections.abc import Sequence
+from enum import IntEnum, auto, unique
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+from gvgbot.geometry import Array
+
+OVERSAMPLING = 3
+_STRIP = 64  # rows of the finished image that are reduced at a time
+
+Point = tuple[float, float]
+
+
+@unique
+class Ink(IntEnum):
+    """The colours, after the 101 shades of grey from 0 (white) to 100 (a wall).
+
+    They come from Okabe and Ito's palette, which colour-blind readers tell apart.
+    """
+
+    UNKNOWN = 101
+    WHITE = auto()
+    BLACK = auto()
+    GREY = auto()
+    SKY = auto()
+    BLUE = auto()
+    GREEN = auto()
+    RED = auto()
+    PURPLE = auto()
+    ORANGE = auto()
+
+
+_COLOURS = {
+    Ink.UNKNOWN: (238, 238, 238),
+    Ink.WHITE: (255, 255, 255),
+    Ink.BLACK: (20, 20, 20),
+    Ink.GREY: (120, 120, 120),
+    Ink.SKY: (86, 180, 233),
+    Ink.BLUE: (0, 90, 150),
+    Ink.GREEN: (0, 120, 85),
+    Ink.RED: (213, 94, 0),
+    Ink.PURPLE: (170, 51, 119),
+    Ink.ORANGE: (230, 159, 0),
+}
+
+
+class Canvas:
+    """A white image of `width` by `height` pixels; y grows downwards, and sizes are in pixels."""
+
+    def __init__(self, width: int, height: int) -> None:
+        self._large = Image.new("P", (width * OVERSAMPLING, height * OVERSAMPLING), Ink.WHITE)
+        self._large.putpalette(_palette())
+        self._pen = ImageDraw.Draw(self._large)
+        self._texts: list[tuple[Point, str, int, Ink, str]] = []
+
+    def raster(self, shades: NDArray[np.uint8], corner: Point, size: Point) -> None:
+        """Palette indices (rows, columns), first row at the top, stretched over a rectangle."""
+        left, top = (round(value * OVERSAMPLING) for value in corner)
+        right, bottom = (
+            round((begin + extent) * OVERSAMPLING)
+            for begin, extent in zip(corner, size, strict=True)
+        )
+        stretched = Image.fromarray(shades).resize(
+            (right - left, bottom - top), Image.Resampling.NEAREST
+        )
+        self._large.paste(stretched, (left, top))
+
+    def box(self, corner: Point, size: Point, *, fill: Ink, outline: Ink | None = None) -> None:
+        """An upright rectangle from its upper left corner, with a border one pixel wide."""
+        far = (corner[0] + size[0], corner[1] + size[1])
+        self._pen.rectangle(_flat([corner, far]), fill, outline, OVERSAMPLING)
+
+    def frame(self, corner: Point, size: Point) -> None:
+        """A thin border; all that was drawn outside of it so far is wiped away."""
+        far = (corner[0] + size[0], corner[1] + size[1])
+        width, height = self._large.size
+        self.box((0.0, 0.0), (width, corner[1]), fill=Ink.WHITE)
+        self.box((0.0, 0.0), (corner[0], height), fill=Ink.WHITE)
+        self.box((far[0], 0.0), (width, height), fill=Ink.WHITE)
+        self.box((0.0, far[1]), (width, height), fill=Ink.WHITE)
+        self._pen.rectangle(_flat([corner, far]), None, Ink.GREY, OVERSAMPLING)
+
+    def line(self, points: Array, ink: Ink, width: float) -> None:
+        """A line through points (N, 2) with round joints and ends; a point alone draws nothing."""
+        if len(points) < 2:
+            return
+        thick = max(1, round(width * OVERSAMPLING))
+        self._pen.line(_flat(points), ink, thick, joint="curve" if thick > 3 else None)
+        if thick > 3:
+            for end in (points[0], points[-1]):
+                self.disc((float(end[0]), float(end[1])), width / 2, fill=ink)
+
+    def polygon(self, points: Array, *, fill: Ink | None, outline: Ink, width: float) -> None:
+        """A closed outline through points (N, 2)."""
+        if fill is not None:
+            self._pen.polygon(_flat(points), fill)
+        self.line(np.concatenate([points, points[:2]]), outline, width)
+
+    def disc(self, centre: Point, radius: float, *, fill: Ink) -> None:
+        """A filled circle."""
+        x, y = centre
+        self._pen.ellipse(_flat([(x - radius, y - radius), (x + radius, y + radius)]), fill)
+
+    def text(
+        self, at: Point, words: str, size: int, ink: Ink = Ink.BLACK, anchor: str = "lm"
+    ) -> None:
+        """Words with a white halo; the anchor is Pillow's (horizontal l m r, vertical t m b)."""
+        self._texts.append((at, words, size, ink, anchor))
+
+    def png(self) -> bytes:
+        """The finished picture as a PNG file."""
+        image = self._reduced()
+        pen = ImageDraw.Draw(image)
+        for at, words, size, ink, anchor in self._texts:
+            pen.text(
+                at,
+                words,
+                _COLOURS[ink],
+                _font(size),
+                anchor,
+                stroke_width=2,
+                stroke_fill=_COLOURS[Ink.WHITE],
+            )
+        file = io.BytesIO()
+        image.save(file, "PNG", optimize=False)
+        return file.getvalue()
+
+    def _reduced(self) -> Image.Image:
+        width, height = self._large.size
+        image = Image.new("RGB", (width // OVERSAMPLING, height // OVERSAMPLING))
+        for top in range(0, image.height, _STRIP):
+            bottom = min(top + _STRIP, image.height)
+            strip = self._large.crop((0, top * OVERSAMPLING, width, bottom * OVERSAMPLING))
+            image.paste(strip.convert("RGB").reduce(OVERSAMPLING), (0, top))
+        return image
+
+
+def text_width(words: str, size: int) -> float:
+    """How wide (pixels) the words are."""
+    return float(_font(size).getlength(words))
+
+
+def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
+    return ImageFont.load_default(size)
+
+
+def _palette() -> list[int]:
+    shades = [(255 - round(2.2 * percent),) * 3 for percent in range(Ink.UNKNOWN)]
+    return [level for colour in [*shades, *(_COLOURS[ink] for ink in Ink)] for level in colour]
+
+
+def _flat(points: Array | Sequence[Point]) -> list[float]:
+    """Coordinates on the large image, one after the other."""
+    flat: list[float] = (np.asarray(points, np.float64) * OVERSAMPLING).ravel().tolist()
+    return flat

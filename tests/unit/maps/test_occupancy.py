@@ -1,0 +1,218 @@
+"""Grids of rooms whose walls are known exactly: ranges come from ray-box geometry."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from numpy.typing import NDArray
+from PIL import Image
+
+from gvgbot.geometry import Array, Pose
+from gvgbot.hal.messages import Scan
+from gvgbot.maps.map_server import encode_map_server, write_map_server
+from gvgbot.maps.occupancy import OccupancyGrid, occupancy_grid
+
+CELL = 0.05
+# walls in the middle of cells: left, bottom, right, top
+ROOM = (-2.025, -1.025, 4.025, 3.025)
+
+
+def room_ranges(map_laser: Pose, bearings: Array) -> Array:
+    """Distance from inside the room to its walls."""
+    left, bottom, right, top = ROOM
+    c, s = np.cos(bearings + map_laser.theta), np.sin(bearings + map_laser.theta)
+    with np.errstate(divide="ignore"):
+        across = np.abs(np.where(c > 0, right - map_laser.x, left - map_laser.x) / c)
+        along = np.abs(np.where(s > 0, top - map_laser.y, bottom - map_laser.y) / s)
+    nearest: Array = np.minimum(across, along)
+    return nearest
+
+
+def a_scan(
+    map_base: Pose, *, beams: int = 1440, fov: float = math.tau, base_laser: Pose | None = None
+) -> Scan:
+    mount = Pose() if base_laser is None else base_laser
+    step = fov / beams
+    bearings = np.linspace(-fov / 2, fov / 2, beams, endpoint=False)
+    ranges = room_ranges(map_base.compose(mount), bearings)
+    return Scan(0.0, ranges, -fov / 2, step, 0.02, 30.0, base_laser=mount)
+
+
+def open_hall(ranges: Array, range_max: float = 5.6) -> Scan:
+    step = math.tau / len(ranges)
+    return Scan(0.0, ranges, -math.pi, step, 0.02, range_max)
+
+
+def centres(grid: OccupancyGrid) -> tuple[Array, Array]:
+    """x (columns,) and y (rows,) of the cells."""
+    rows, columns = grid.cells.shape
+    x = (np.arange(columns, dtype=np.float64) + 0.5) * grid.resolution_m
+    y = (np.arange(rows, dtype=np.float64) + 0.5) * grid.resolution_m
+    return grid.origin[0] + x, grid.origin[1] + y
+
+
+def outside_by(grid: OccupancyGrid) -> Array:
+    """How far each cell's centre is outside the walls, the larger of both axes; < 0 inside."""
+    left, bottom, right, top = ROOM
+    x, y = centres(grid)
+    over_x = np.maximum(left - x, x - right)
+    over_y = np.maximum(bottom - y, y - top)
+    return np.maximum(over_x[None, :], over_y[:, None])
+
+
+POSES = [
+    Pose(0.0, 0.0, 0.0),
+    Pose(1.013, 0.77, 2.0),
+    Pose(3.1, 2.2, -3.0),
+    Pose(-1.5, 2.46, 0.7),
+    Pose(2.2, -0.41, -1.2),
+]
+
+
+def check_room(grid: OccupancyGrid) -> None:
+    outside = outside_by(grid)
+    on_wall = np.abs(outside) < 1e-6
+    assert (grid.cells[on_wall] > 65).mean() > 0.99
+    assert (grid.cells[outside < -1.5 * CELL] < 5).all()
+    assert (grid.cells[outside < -1.5 * CELL] >= 0).all()
+    assert (grid.cells[outside > 0.5 * CELL] == -1).all()
+
+
+def test_a_room_has_walls_where_geometry_says_free_inside_and_unknown_outside() -> None:
+    check_room(occupancy_grid([(pose, a_scan(pose)) for pose in POSES], CELL))
+
+
+def test_a_mounted_laser_draws_the_same_room() -> None:
+    mount = Pose(0.21, -0.13, 2.5)
+    scans = [(pose, a_scan(pose, base_laser=mount)) for pose in POSES]
+    check_room(occupancy_grid(scans, CELL))
+
+
+def test_half_a_turn_of_view_sees_only_its_half() -> None:
+    pose = Pose(1.0, 1.0, math.pi / 2)
+    grid = occupancy_grid([(pose, a_scan(pose, fov=math.pi))], CELL)
+    _, y = centres(grid)
+    assert (grid.cells[y < 1.0 - 2 * CELL] == -1).all()
+    inside = outside_by(grid) < -1.5 * CELL
+    assert (grid.cells[inside & (y > 1.0 + 2 * CELL)[:, None]] >= 0).mean() > 0.99
+
+
+def test_one_look_is_enough_for_map_server() -> None:
+    grid = occupancy_grid([(POSES[0], a_scan(POSES[0], beams=7200))], CELL)
+    outside = outside_by(grid)
+    assert (grid.cells[outside < -1.5 * CELL] < 19.6).all()
+    assert (grid.cells[np.abs(outside) < 1e-6] > 65).mean() > 0.99
+
+
+def test_nothing_in_range_is_free_to_the_range_of_the_laser() -> None:
+    grid = occupancy_grid([(Pose(1.0, 2.0, 0.3), open_hall(np.full(720, np.inf)))], CELL)
+    free = (grid.cells >= 0).sum() * CELL**2
+    assert free == pytest.approx(math.pi * 5.6**2, rel=0.01)
+    assert grid.cells.max() < 50
+
+
+def test_beyond_the_carving_range_nothing_is_marked() -> None:
+    ranges = np.full(720, 8.0)
+    grid = occupancy_grid([(Pose(), open_hall(ranges, 30.0))], CELL, max_range_m=3.0)
+    assert (grid.cells >= 0).sum() * CELL**2 == pytest.approx(math.pi * 3.0**2, rel=0.02)
+    assert grid.cells.max() < 50
+
+
+def test_untrusted_beams_say_nothing() -> None:
+    ranges = np.full(720, 4.0)
+    ranges[:360] = np.nan  # bearings below zero
+    grid = occupancy_grid([(Pose(), open_hall(ranges))], CELL)
+    x, y = centres(grid)
+    below = np.broadcast_to((y < -CELL)[:, None], grid.cells.shape)
+    assert (grid.cells[below] == -1).all()
+    half_disc = (np.hypot(x[None, :], y[:, None]) < 3.9) & (y > 2 * CELL)[:, None]
+    assert (grid.cells[half_disc] >= 0).mean() > 0.98
+
+
+def test_single_untrusted_beams_leave_no_spokes_and_single_misses_no_holes() -> None:
+    poses = [Pose(0.1 * k, 0.0, 0.05 * k) for k in range(10)]
+    rng = np.random.default_rng(1)
+    scans = []
+    for pose in poses:
+        scan = a_scan(pose)
+        ranges = scan.ranges.copy()
+        ranges[rng.random(len(ranges)) < 0.01] = np.nan
+        ranges[rng.random(len(ranges)) < 0.01] = np.inf
+        fields = (scan.angle_min, scan.angle_increment, scan.range_min, scan.range_max)
+        scans.append((pose, Scan(0.0, ranges, *fields)))
+    grid = occupancy_grid(scans, CELL)
+    outside = outside_by(grid)
+    assert (grid.cells[outside < -1.5 * CELL] < 19.6).mean() > 0.999
+    assert (grid.cells[outside > 1.5 * CELL] == -1).mean() > 0.99
+
+
+def test_somebody_who_went_away_is_forgotten() -> None:
+    person = np.full(720, np.inf)
+    person[350:370] = 2.0
+    with_person = [(Pose(), open_hall(person.copy()))] * 20
+    without = [(Pose(), open_hall(np.full(720, np.inf)))] * 10
+    at_person = occupancy_grid(with_person, CELL)
+    assert percent_at(at_person, 2.0, 0.0) > 95
+    assert percent_at(occupancy_grid(with_person + without, CELL), 2.0, 0.0) < 19
+
+
+def percent_at(grid: OccupancyGrid, x: float, y: float) -> int:
+    column = math.floor((x - grid.origin[0]) / grid.resolution_m)
+    row = math.floor((y - grid.origin[1]) / grid.resolution_m)
+    return int(grid.cells[row, column])
+
+
+def test_a_thousand_scans_of_one_place_do_not_overflow() -> None:
+    scans = [(POSES[0], a_scan(POSES[0], beams=360))] * 1000
+    grid = occupancy_grid(scans, CELL)
+    assert percent_at(grid, 0.0, 0.0) == 0
+    assert percent_at(grid, ROOM[2], 0.0) == 100
+
+
+def test_a_clockwise_laser_draws_the_same_room() -> None:
+    scans = []
+    for pose in POSES:
+        scan = a_scan(pose)
+        mirrored = scan.ranges[::-1].copy()
+        last = scan.angle_min + scan.angle_increment * (len(mirrored) - 1)
+        scans.append((pose, Scan(0.0, mirrored, last, -scan.angle_increment, 0.02, 30.0)))
+    check_room(occupancy_grid(scans, CELL))
+
+
+@pytest.mark.parametrize("ranges", [[], [np.full(360, np.nan)]])
+def test_without_a_trusted_beam_all_is_unknown(ranges: list[Array]) -> None:
+    grid = occupancy_grid([(Pose(), open_hall(values)) for values in ranges], CELL)
+    assert (grid.cells == -1).all()
+    assert grid.cells.dtype == np.int8
+
+
+def trinary(directory: Path) -> tuple[NDArray[np.int_], tuple[float, ...], float]:
+    """What map_server makes of the files: -1, 0, 100 (row 0 at the bottom), origin, resolution."""
+    meta = yaml.safe_load((directory / "map.yaml").read_text())
+    with Image.open(directory / meta["image"]) as image:
+        assert image.mode == "L"
+        levels = np.asarray(image)
+    assert set(np.unique(levels)) <= {0, 205, 254}
+    assert meta["negate"] == 0
+    occupied = (255 - levels.astype(float)) / 255
+    cells = np.full(levels.shape, -1)
+    cells[occupied > meta["occupied_thresh"]] = 100
+    cells[occupied < meta["free_thresh"]] = 0
+    return cells[::-1], tuple(meta["origin"]), meta["resolution"]
+
+
+def test_map_server_loads_what_was_written(tmp_path: Path) -> None:
+    percent = np.array([[-1, 0, 19], [50, 66, 100]], np.int8)
+    write_map_server(OccupancyGrid(percent, 0.05, (-1.25, 2.5)), tmp_path)
+    cells, origin, resolution = trinary(tmp_path)
+    assert cells.tolist() == [[-1, 0, 0], [-1, 100, 100]]
+    assert origin == (-1.25, 2.5, 0.0)
+    assert resolution == 0.05
+
+
+def test_the_first_row_of_the_image_is_the_top() -> None:
+    grid = OccupancyGrid(np.array([[0, 0], [100, -1]], np.int8), 0.1, (0.0, 0.0))
+    image = encode_map_server(grid)["map.pgm"]
+    assert image == b"P5\n2 2\n255\n" + bytes([0, 205, 254, 254])

@@ -1,0 +1,145 @@
+import json
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gvgbot.errors import GvgbotError, UsageError
+from gvgbot.maps.run_directory import RunDirectory
+
+
+@dataclass(frozen=True)
+class LoopClosed:
+    stamp: float
+    vertex: int
+    offset_m: float
+
+
+def names(directory: Path) -> set[str]:
+    return {path.name for path in directory.iterdir()}
+
+
+def test_runs_of_a_world_are_numbered(tmp_path: Path) -> None:
+    for _ in range(2):
+        RunDirectory.create(world="office", runs=tmp_path / "runs").close()
+    RunDirectory.create(world="cave", runs=tmp_path / "runs").close()
+    assert names(tmp_path / "runs") == {"office-1", "office-2", "cave-1"}
+
+
+def test_a_directory_that_was_asked_for_is_made_with_its_parents(tmp_path: Path) -> None:
+    with RunDirectory.create(tmp_path / "a" / "b", world="office") as run:
+        run.write({"map.pgm": b"P5", "map.yaml": "image: map.pgm — ü\n"})
+    assert (tmp_path / "a" / "b" / "map.pgm").read_bytes() == b"P5"
+    assert (tmp_path / "a" / "b" / "map.yaml").read_text("utf-8") == "image: map.pgm — ü\n"
+
+
+@pytest.mark.parametrize("out", ["file", "file/below"])
+def test_a_file_in_the_way_is_a_usage_error(tmp_path: Path, out: str) -> None:
+    (tmp_path / "file").write_text("mine")
+    with pytest.raises(UsageError, match=r"cannot write a run to .*file"):
+        RunDirectory.create(tmp_path / out, world="office")
+    assert (tmp_path / "file").read_text() == "mine"
+
+
+def test_a_file_where_the_runs_should_go_is_a_usage_error(tmp_path: Path) -> None:
+    (tmp_path / "runs").write_text("mine")
+    with pytest.raises(UsageError, match="cannot write a run"):
+        RunDirectory.create(world="office", runs=tmp_path / "runs")
+
+
+def test_a_directory_that_cannot_be_written_is_a_usage_error(tmp_path: Path) -> None:
+    (tmp_path / "events.jsonl").mkdir()
+    with pytest.raises(UsageError, match="directory"):
+        RunDirectory.create(tmp_path, world="office")
+
+
+def test_a_failed_write_keeps_the_whole_old_set(tmp_path: Path) -> None:
+    with RunDirectory(tmp_path) as run:
+        run.write({"map.geojson": "old", "map.png": b"old"})
+        before = names(tmp_path)
+        with pytest.raises(GvgbotError, match=r"missing/map\.png"):
+            run.write({"map.geojson": "new", "map.yaml": "new", "missing/map.png": b"new"})
+        with pytest.raises(UnicodeEncodeError):
+            run.write({"map.geojson": "new", "map.yaml": "\ud800"})
+    assert names(tmp_path) == before
+    assert (tmp_path / "map.geojson").read_text() == "old"
+
+
+def test_the_rubble_of_a_killed_run_does_not_stay(tmp_path: Path) -> None:
+    (tmp_path / ".map.png.tmp").write_bytes(b"half")
+    with RunDirectory(tmp_path) as run:
+        run.write({"map.png": b"whole"})
+    assert names(tmp_path) == {"map.png", "events.jsonl"}
+
+
+def test_every_event_is_a_line_that_is_there_at_once(tmp_path: Path) -> None:
+    with RunDirectory.create(tmp_path, world="office") as run:
+        for stamp in (1.5, 2.5):
+            run.append_event(LoopClosed(stamp, 7, 0.04))
+            last = (tmp_path / "events.jsonl").read_text().splitlines()[-1]
+            assert json.loads(last) == {
+                "event": "loop_closed",
+                "stamp": stamp,
+                "vertex": 7,
+                "offset_m": 0.04,
+            }
+        assert (tmp_path / "events.jsonl").read_text().count("\n") == 2
+
+
+def test_an_opened_run_goes_on_and_a_new_one_begins_anew(tmp_path: Path) -> None:
+    with RunDirectory.create(tmp_path, world="office") as run:
+        run.append_event(LoopClosed(1.0, 1, 0.0))
+        run.write_summary({"outcome": "explored"})
+    with RunDirectory(tmp_path) as run:
+        run.append_event(LoopClosed(2.0, 2, 0.0))
+    lines = (tmp_path / "events.jsonl").read_text().splitlines()
+    assert [json.loads(line)["stamp"] for line in lines] == [1.0, 2.0]
+    assert (tmp_path / "summary.json").exists()
+    RunDirectory.create(tmp_path, world="office").close()
+    assert (tmp_path / "events.jsonl").read_text() == ""
+    assert not (tmp_path / "summary.json").exists()
+
+
+def test_a_summary_is_strict_json_whatever_is_in_it(tmp_path: Path) -> None:
+    with RunDirectory(tmp_path) as run:
+        run.write_summary(
+            {
+                "outcome": "stopped",
+                "distance_m": np.float32(1.5),
+                "duration_s": math.inf,
+                "wall_s": math.nan,
+                "vertices": np.int64(3),
+                "completed": np.bool_(False),
+                "seed": None,
+                "config": {"out": Path("runs"), "laser": LoopClosed(1.0, 2, math.nan)},
+                "axes": np.array([[1.0, math.nan]]),
+                "pair": (1, "two"),
+            }
+        )
+
+    def refuse(word: str) -> None:
+        raise AssertionError(word)
+
+    assert json.loads((tmp_path / "summary.json").read_text(), parse_constant=refuse) == {
+        "outcome": "stopped",
+        "distance_m": 1.5,
+        "duration_s": None,
+        "wall_s": None,
+        "vertices": 3,
+        "completed": False,
+        "seed": None,
+        "config": {"out": "runs", "laser": {"stamp": 1.0, "vertex": 2, "offset_m": None}},
+        "axes": [[1.0, None]],
+        "pair": [1, "two"],
+    }
+
+
+def test_a_full_disk_is_reported_in_one_line(tmp_path: Path) -> None:
+    if not Path("/dev/full").exists():
+        pytest.skip("no device that is always full")
+    (tmp_path / "events.jsonl").symlink_to("/dev/full")
+    complaint = r"cannot write .*events\.jsonl: No space left"
+    with RunDirectory(tmp_path) as run, pytest.raises(GvgbotError, match=complaint):
+        run.append_event(LoopClosed(1.0, 1, 0.0))
