@@ -51,7 +51,7 @@ def test_a_slow_reader_sees_fresh_values_not_a_queue() -> None:
             writer = tasks.create_task(write(box))
             while not writer.done():
                 seen.append((await box.next(), clock.now()))
-                await clock.sleep_until(clock.now() + 0.255)
+                await clock.sleep_until(clock.now() + 0.2525)
         return seen
 
     seen = run_in_virtual_time(run())
