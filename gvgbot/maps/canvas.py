@@ -14,7 +14,7 @@ from PIL import Image, ImageDraw, ImageFont
 from gvgbot.geometry import Array
 
 OVERSAMPLING = 3
-_STRIP = 64  # rows of the finished image that are reduced at a time
+_STRIP = 64  # rows that are stretched or reduced at a time
 
 Point = tuple[float, float]
 
@@ -63,30 +63,33 @@ class Canvas:
 
     def raster(self, shades: NDArray[np.uint8], corner: Point, size: Point) -> None:
         """Palette indices (rows, columns), first row at the top, stretched over a rectangle."""
-        left, top = (round(value * OVERSAMPLING) for value in corner)
-        right, bottom = (
-            round((begin + extent) * OVERSAMPLING)
-            for begin, extent in zip(corner, size, strict=True)
-        )
-        stretched = Image.fromarray(shades).resize(
-            (right - left, bottom - top), Image.Resampling.NEAREST
-        )
-        self._large.paste(stretched, (left, top))
+        left, top, right, bottom = _flat([corner, (corner[0] + size[0], corner[1] + size[1])])
+        width, tall = round(right) - round(left), (bottom - top) / len(shades)
+        for first in range(0, len(shades), _STRIP):
+            strip = shades[first : first + _STRIP]
+            begin = round(top + tall * first)
+            end = round(top + tall * (first + len(strip)))
+            stretched = Image.fromarray(strip).resize(
+                (width, end - begin), Image.Resampling.NEAREST
+            )
+            self._large.paste(stretched, (round(left), begin))
 
     def box(self, corner: Point, size: Point, *, fill: Ink, outline: Ink | None = None) -> None:
         """An upright rectangle from its upper left corner, with a border one pixel wide."""
-        far = (corner[0] + size[0], corner[1] + size[1])
-        self._pen.rectangle(_flat([corner, far]), fill, outline, OVERSAMPLING)
+        self._pen.rectangle(_corners(corner, size), fill, outline, OVERSAMPLING)
 
     def frame(self, corner: Point, size: Point) -> None:
-        """A thin border; all that was drawn outside of it so far is wiped away."""
-        far = (corner[0] + size[0], corner[1] + size[1])
-        width, height = self._large.size
-        self.box((0.0, 0.0), (width, corner[1]), fill=Ink.WHITE)
-        self.box((0.0, 0.0), (corner[0], height), fill=Ink.WHITE)
-        self.box((far[0], 0.0), (width, height), fill=Ink.WHITE)
-        self.box((0.0, far[1]), (width, height), fill=Ink.WHITE)
-        self._pen.rectangle(_flat([corner, far]), None, Ink.GREY, OVERSAMPLING)
+        """A border one pixel wide; all that was drawn outside of it so far is wiped away."""
+        left, top = (round(value) for value in corner)
+        width, height = (round(value) for value in size)
+        whole = self._large.size  # more than enough on any side
+        self.box((0, 0), (whole[0], top), fill=Ink.WHITE)
+        self.box((0, 0), (left, whole[1]), fill=Ink.WHITE)
+        self.box((left + width, 0), whole, fill=Ink.WHITE)
+        self.box((0, top + height), whole, fill=Ink.WHITE)
+        self._pen.rectangle(
+            _corners((left, top), (width, height)), outline=Ink.GREY, width=OVERSAMPLING
+        )
 
     def line(self, points: Array, ink: Ink, width: float) -> None:
         """A line through points (N, 2) with round joints and ends; a point alone draws nothing."""
@@ -155,6 +158,12 @@ def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
 def _palette() -> list[int]:
     shades = [(255 - round(2.2 * percent),) * 3 for percent in range(Ink.UNKNOWN)]
     return [level for colour in [*shades, *(_COLOURS[ink] for ink in Ink)] for level in colour]
+
+
+def _corners(corner: Point, size: Point) -> list[float]:
+    """The upper left pixel of a rectangle and its last, which belongs to it, on the large image."""
+    left, top, right, bottom = _flat([corner, (corner[0] + size[0], corner[1] + size[1])])
+    return [left, top, max(left, right - 1), max(top, bottom - 1)]
 
 
 def _flat(points: Array | Sequence[Point]) -> list[float]:

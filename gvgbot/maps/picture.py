@@ -18,7 +18,7 @@ _WIDTH, _TALLEST, _NARROWEST = 1544, 1700, 900  # pixels of the map; a tall one 
 _MARGIN = 28  # pixels around everything
 _ID_SIZE = 16  # pixels
 _SIGMAS = 3.0  # of the ellipses
-_ASTRAY = 0.15  # of the map's size: how far odometry may leave it before it is cut off
+_ASTRAY = 0.15  # of the map's size: how far odometry and ellipses may leave it uncut
 
 _NO_POINTS = np.empty((0, 2))
 
@@ -55,7 +55,15 @@ def _content(graph: RouteGraph, grid: OccupancyGrid | None, path: Array, raw: Ar
     """The part of the map frame that is worth showing."""
     corners = _NO_POINTS if grid is None else _known_corners(grid)
     box = box_around(np.concatenate([corners, graph.points, path]))
-    return box.stretched(raw, _ASTRAY * float(box.size.max()))
+    astray = [raw, *(_ellipse_corners(vertex) for vertex in graph.vertices)]
+    return box.stretched(np.concatenate(astray), _ASTRAY * float(box.size.max()))
+
+
+def _ellipse_corners(vertex: MapVertex) -> Array:
+    """Two opposite corners (2, 2) of the upright box around a vertex's ellipse, m, map frame."""
+    variances = np.array([vertex.covariance[0], vertex.covariance[3]])
+    reach = _SIGMAS * np.sqrt(np.maximum(variances, 0.0))
+    return np.array([vertex.position - reach, vertex.position + reach])
 
 
 def _known_corners(grid: OccupancyGrid) -> Array:
