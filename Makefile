@@ -53,5 +53,5 @@ $(PYTHON) -c 'import sys; sys.version_info >= (3, 11) or sys.exit("gvgbot needs 
 $(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { \
 	echo "$(PYTHON) cannot make virtual environments: install its venv module (Debian: apt install python3-venv)" >&2; exit 1; }; \
 echo "setting up .venv (once)"; \
-$(PYTHON) -m venv .venv
+$(BIN)/python -c 'import pip, sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null || $(PYTHON) -m venv --clear .venv
 endef
