@@ -39,9 +39,7 @@ class Pose:
     def inverse(self) -> "Pose":
         """a_b.inverse() = b_a."""
         c, s = math.cos(self.theta), math.sin(self.theta)
-        return Pose(
-            -c * self.x - s * self.y, s * self.x - c * self.y, wrap_angle(-self.theta)
-        )
+        return Pose(-c * self.x - s * self.y, s * self.x - c * self.y, wrap_angle(-self.theta))
 
     def to(self, other: "Pose") -> "Pose":
         """The motion from this pose to the other: a_b.to(a_c) = b_c."""

@@ -11,7 +11,7 @@ from gvgbot.autonomy.events import EdgeJoined, Event, LoopClosed, VertexAdded, V
 from gvgbot.autonomy.gvg.local import Branch, LocalGvg, LocalNode
 from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.ekf import Belief
-from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Kind, Vertex
+from gvgbot.autonomy.slam.graph import Edge, GvgGraph, HalfEdgeId, Kind, Vertex
 from gvgbot.autonomy.slam.recognition import (
     RecognitionConfig,
     Sighting,
@@ -23,6 +23,11 @@ from gvgbot.autonomy.slam.recognition import (
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig, register
 from gvgbot.geometry import Array, Pose
 from gvgbot.ranges import Range
+
+
+_REGISTRATION_FLOOR = np.diag(
+    [0.02**2, 0.02**2, 0.003**2]
+)  # what registration cannot know of itself
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,11 +49,22 @@ class MappingConfig:
 class View:
     """All that one keyframe shows, in the local frame."""
 
+    keyframe: int  # its number, from 0
     stamp: float
     travelled: float  # metres
     local_base: Pose
     gvg: LocalGvg
     walls: Array  # (N, 2)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Observation:
+    """A vertex as measured at a keyframe: its pose in the base frame, and R (2, 2) or (3, 3)."""
+
+    keyframe: int
+    vertex: int
+    base_vertex: Pose
+    R: Array
 
 
 @dataclass(slots=True, eq=False)
@@ -88,6 +104,7 @@ class Mapper:
         self._config, self._recognition, self._matching = config, recognition, matching
         self.belief = Belief()
         self.graph = GvgGraph()
+        self.observations: list[Observation] = []
         self._tentative: list[_Tentative] = []
         self._events: list[Event] = []
 
@@ -104,7 +121,9 @@ class Mapper:
         self._recognise(view, sightings, known)
         self._consider(view, sightings, known)
         for node, vertex in list(known.vertex_of.items()):
-            self._refresh(view, sightings[node], view.gvg.nodes[node], self.graph.vertices[vertex], known)
+            self._refresh(
+                view, sightings[node], view.gvg.nodes[node], self.graph.vertices[vertex], known
+            )
         self._refute(view, known)
         self._join(view, known)
         return known, self._events
@@ -161,7 +180,9 @@ class Mapper:
             )
             if d2 < self._recognition.gate or metres < self._recognition.same_place_m:
                 found.append((d2, vertex.id, vertex, metres))
-        return [(d2, vertex, metres) for d2, _, vertex, metres in sorted(found, key=lambda f: f[:2])]
+        return [
+            (d2, vertex, metres) for d2, _, vertex, metres in sorted(found, key=lambda f: f[:2])
+        ]
 
     def _close_loop(
         self, view: View, sighting: Sighting, vertex: Vertex, distance: float, metres: float
@@ -185,14 +206,9 @@ class Mapper:
         away = view.travelled - vertex.seen_at
         vertex.local, vertex.seen_at, vertex.updated_at = found.pose, view.travelled, view.travelled
         vertex.visits += 1
-        R = found.covariance + np.diag([0.02**2, 0.02**2, 0.003**2])
         base_vertex = view.local_base.to(found.pose)
-        turn = Pose(0.0, 0.0, base_vertex.theta)
-        rotation = np.array([[math.cos(turn.theta), -math.sin(turn.theta)], [math.sin(turn.theta), math.cos(turn.theta)]])
-        R[:2, :2] = rotation @ R[:2, :2] @ rotation.T
-        R[:2, 2] = rotation @ R[:2, 2]
-        R[2, :2] = R[:2, 2]
-        self.belief = ekf.update(self.belief, vertex.id, base_vertex, R)
+        R = _turned(found.covariance, base_vertex.theta) + _REGISTRATION_FLOOR
+        self._measure(view, vertex, base_vertex, R)
         self._events.append(
             LoopClosed(view.stamp, vertex.id, away, distance, metres, found.inliers, found.rms)
         )
@@ -207,12 +223,16 @@ class Mapper:
                 continue
             tentative = self._remember(view, sighting)
             needed = (
-                self._config.meetpoint_sightings if sighting.meetpoint else self._config.endpoint_sightings
+                self._config.meetpoint_sightings
+                if sighting.meetpoint
+                else self._config.endpoint_sightings
             )
             near = np.hypot(*(sighting.position - view.local_base.position)) < 1.5
             if tentative.sightings < needed or self._crowded(view, sighting):
                 continue
-            if self._candidates(view, sighting) and not (near and tentative.sightings >= 2 * needed):
+            if self._candidates(view, sighting) and not (
+                near and tentative.sightings >= 2 * needed
+            ):
                 continue  # it may be a known one: look at it from closer
             self._tentative.remove(tentative)
             known.pair(node, self._add(view, sighting).id)
@@ -220,7 +240,8 @@ class Mapper:
     def _crowded(self, view: View, sighting: Sighting) -> bool:
         """Whether a vertex of this kind that is in sight stands here already."""
         return any(
-            np.hypot(*(vertex.local.position - sighting.position)) < 0.5 * self._recognition.same_place_m
+            np.hypot(*(vertex.local.position - sighting.position))
+            < 0.5 * self._recognition.same_place_m
             for vertex in self.graph.vertices.values()
             if view.travelled - vertex.seen_at < self._recognition.tracked_m
             and sighting.meetpoint == (vertex.kind == "meetpoint")
@@ -250,9 +271,12 @@ class Mapper:
         self.graph.vertices[vertex.id] = vertex
         base_vertex = view.local_base.to(local)
         R = np.zeros((3, 3))
-        R[:2, :2] = detection_covariance(math.hypot(base_vertex.x, base_vertex.y), self._recognition)
+        R[:2, :2] = detection_covariance(
+            math.hypot(base_vertex.x, base_vertex.y), self._recognition
+        )
         R[2, 2] = 1e-6
         self.belief = ekf.add_vertex(self.belief, vertex.id, base_vertex, R)
+        self.observations.append(Observation(view.keyframe, vertex.id, base_vertex, R))
         self._picture(view, vertex)
         place = self.belief.map_vertex(vertex.id)
         self._events.append(
@@ -289,7 +313,12 @@ class Mapper:
             vertex.updated_at = view.travelled
             base_vertex = view.local_base.to(vertex.local)
             R = detection_covariance(math.hypot(base_vertex.x, base_vertex.y), self._recognition)
-            self.belief = ekf.update(self.belief, vertex.id, base_vertex, R)
+            self._measure(view, vertex, base_vertex, R)
+
+    def _measure(self, view: View, vertex: Vertex, base_vertex: Pose, R: Array) -> None:
+        """Correct the belief by a vertex seen again."""
+        self.belief = ekf.update(self.belief, vertex.id, base_vertex, R)
+        self.observations.append(Observation(view.keyframe, vertex.id, base_vertex, R))
 
     def _match_half_edges(
         self, view: View, node: LocalNode, vertex: Vertex, known: Correspondence
@@ -339,7 +368,11 @@ class Mapper:
         if place is None or place.distance > 0.3:
             return False
         edge = view.gvg.edges[place.edge]
-        return self._recognition.same_place_m < place.station < edge.length - self._recognition.same_place_m
+        return (
+            self._recognition.same_place_m
+            < place.station
+            < edge.length - self._recognition.same_place_m
+        )
 
     # -- what hangs together -----------------------------------------------------------------
 
@@ -356,12 +389,12 @@ class Mapper:
             elif here is not there:
                 self._dispute(here, there)
 
-    def _dispute(self, *disputed: object) -> None:
+    def _dispute(self, *disputed: Edge | None) -> None:
         """Sight speaks against edges believed so far; after a few times it wins."""
         for edge in disputed:
             if edge is not None:
                 edge.conflicts += 1
-                if edge.conflicts > self._config.conflicts and edge.id in self.graph.edges:
+                if edge.conflicts > self._config.conflicts:
                     self.graph.unjoin(edge)
 
     def join(
@@ -378,6 +411,13 @@ class Mapper:
         line = self.graph.vertices[a.vertex].local.inverse().transform(local_line)
         edge = self.graph.join(a, b, line, min_clearance, driven=driven)
         self._events.append(EdgeJoined(view.stamp, a.vertex, b.vertex, edge.length, driven))
+
+
+def _turned(covariance: Array, angle: float) -> Array:
+    """A pose covariance (3, 3) of a frame, seen from one against which that frame is turned."""
+    c, s = math.cos(angle), math.sin(angle)
+    G = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    return G @ covariance @ G.T
 
 
 def _sighting(gvg: LocalGvg, node: LocalNode) -> Sighting:

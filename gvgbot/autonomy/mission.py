@@ -15,7 +15,9 @@ from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.autonomy.whereabouts import Passage, Situation, Whereabouts
 from gvgbot.ranges import Range
 
-_LEAST_LOOP_M = 4.0  # an edge with both ends in sight is left to sight unless so much of it was driven
+_LEAST_LOOP_M = (
+    4.0  # an edge with both ends in sight is left to sight unless so much of it was driven
+)
 
 Outcome = Literal["explored", "explored_with_blocked", "failed"]
 
@@ -24,10 +26,16 @@ Outcome = Literal["explored", "explored_with_blocked", "failed"]
 class ExplorationConfig:
     """When to give up."""
 
-    patience_m: Annotated[float, Range(5.0, 1000.0)] = 60.0  # driven beyond twice the way to a frontier
+    patience_m: Annotated[float, Range(5.0, 1000.0)] = (
+        60.0  # driven beyond twice the way to a frontier
+    )
     patience_s: Annotated[float, Range(10.0, 3600.0)] = 60.0  # without coming nearer to anything
-    look_around_s: Annotated[float, Range(0.5, 60.0)] = 3.0  # standing at the end of sight before turning
-    nothing_in_sight_s: Annotated[float, Range(2.0, 600.0)] = 20.0  # without any edge before giving up
+    look_around_s: Annotated[float, Range(0.5, 60.0)] = (
+        3.0  # standing at the end of sight before turning
+    )
+    nothing_in_sight_s: Annotated[float, Range(2.0, 600.0)] = (
+        20.0  # without any edge before giving up
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,9 +88,7 @@ class Mission:
         passage = self.where.follow(view.gvg, place, known, base)
         if passage is not None:
             self._account_for(view, known, passage)
-        here = Situation(
-            view.gvg, known, self._mapper.graph, self.where, place, view.local_base
-        )
+        here = Situation(view.gvg, known, self._mapper.graph, self.where, place, view.local_base)
         self._watch_progress(view)
         order = self._decide(view, here)
         return order, self._events
@@ -198,16 +204,24 @@ class Mission:
             self._lost_since = view.stamp
             self._events.append(Recovery(view.stamp, "look around", "no edge in sight"))
         elif view.stamp - self._lost_since > self._config.nothing_in_sight_s:
-            self._end(view, "failed", "no edge in sight: there are no walls within range, or no way out")
+            self._end(
+                view, "failed", "no edge in sight: there are no walls within range, or no way out"
+            )
             return Stand()
         return LookAround(math.tau)
 
     def _finish(self, view: View) -> None:
         graph = self._mapper.graph
         if graph.frontiers():
-            self._end(view, "explored_with_blocked", f"{len(graph.frontiers())} frontiers cannot be reached")
+            self._end(
+                view,
+                "explored_with_blocked",
+                f"{len(graph.frontiers())} frontiers cannot be reached",
+            )
         elif graph.blocked():
-            self._end(view, "explored_with_blocked", f"{len(graph.blocked())} frontiers were given up")
+            self._end(
+                view, "explored_with_blocked", f"{len(graph.blocked())} frontiers were given up"
+            )
         else:
             self._end(view, "explored", "no frontier is left")
 

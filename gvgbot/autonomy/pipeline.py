@@ -19,9 +19,15 @@ from gvgbot.autonomy.mission import Drive, ExplorationConfig, LookAround, Missio
 from gvgbot.autonomy.slam.ekf import OdometryNoise
 from gvgbot.autonomy.slam.recognition import RecognitionConfig
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig, register
+from gvgbot.autonomy.slam.smoothing import Constraint, smooth
 from gvgbot.geometry import STANDSTILL, Array, Pose, Twist, wrap_angle
 from gvgbot.hal.messages import Odometry, Scan
 from gvgbot.ranges import Range
+
+
+_LEAST_POINTS = 50  # fewer say nothing about a pose
+_LEAST_INLIERS = 0.5  # of the beams must find a wall, or the match is not believed
+_MATCHING_FLOOR = np.diag([0.004**2, 0.004**2, 0.0006**2])  # what matching cannot know of itself
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,7 +52,15 @@ class AutonomyConfig:
     recognition: RecognitionConfig = field(default_factory=RecognitionConfig)
     scan_matching: ScanMatchingConfig = field(default_factory=ScanMatchingConfig)
     odometry_noise: OdometryNoise = field(default_factory=OdometryNoise)
-    passage_margin_m: Annotated[float, Range(0.0, 0.5)] = 0.015  # beyond the radius, on each side
+    passage_margin_m: Annotated[float, Range(0.0, 0.5)] = 0.03  # beyond the radius, on each side
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Step:
+    """The motion from one keyframe to the next, with its covariance (3, 3), in the first one's frame."""
+
+    motion: Pose
+    covariance: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,6 +92,7 @@ class Pipeline:
         self._order: Order = Stand()
         self.gvg = LocalGvg()
         self.keyframes: list[Keyframe] = []
+        self.steps: list[Step] = []
         self.travelled = 0.0
 
     # -- state -----------------------------------------------------------------------------------
@@ -110,7 +125,11 @@ class Pipeline:
     def perceive(self, scan: Scan) -> list[Event]:
         """Learn from a scan, if it was taken somewhere new; what happened."""
         odom_base = self._odom_base_at(scan.stamp)
-        if odom_base is None or self.mission.outcome is not None or not self._worth_a_look(scan, odom_base):
+        if (
+            odom_base is None
+            or self.mission.outcome is not None
+            or not self._worth_a_look(scan, odom_base)
+        ):
             return []
         local_base = self._localise(scan, odom_base)
         self._local_map.insert(scan, local_base.compose(scan.base_laser), self.travelled)
@@ -121,7 +140,14 @@ class Pipeline:
             chord_ratio=self._config.reduction.chord_ratio,
         )
         self.gvg = reduce_graph(fine, self._config.reduction)
-        view = View(scan.stamp, self.travelled, local_base, self.gvg, self._local_map.points())
+        view = View(
+            len(self.keyframes),
+            scan.stamp,
+            self.travelled,
+            local_base,
+            self.gvg,
+            self._local_map.points(),
+        )
         known, seen = self.mapper.observe(view)
         self._keep(scan, odom_base, local_base)
         if self._turning():
@@ -151,23 +177,22 @@ class Pipeline:
         self.travelled += math.hypot(motion.x, motion.y)
         Q = self._config.odometry_noise.covariance(motion, scan.stamp - self._last.scan.stamp)
         prior = self._last.local_base.compose(motion)
-        local_base, covariance = self._match(scan, prior, Q)
-        before = self._last.local_base.to(local_base)
-        c, s = math.cos(motion.theta), math.sin(motion.theta)
-        R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        self.mapper.move(before, R @ covariance @ R.T)
+        local_base, covariance = self._match(scan, prior, _turned(Q, -motion.theta))
+        step = Step(self._last.local_base.to(local_base), _turned(covariance, motion.theta))
+        self.steps.append(step)
+        self.mapper.move(step.motion, step.covariance)
         return local_base
 
     def _match(self, scan: Scan, prior: Pose, Q: Array) -> tuple[Pose, Array]:
-        """The base in the local frame, and the covariance of the motion, in the frame of the new pose."""
+        """The base in the local frame, and its covariance given the last one; in the base frame."""
         walls = self._local_map.points()
         points = _sampled(scan, self._config.keyframe.matched_beams)
-        if len(walls) < 50 or len(points) < 50:
+        if len(walls) < _LEAST_POINTS or len(points) < _LEAST_POINTS:
             return prior, Q
         found = register(points, cKDTree(walls), walls, prior, Q, self._config.scan_matching)
-        if found is None or found.inliers < 0.5:
+        if found is None or found.inliers < _LEAST_INLIERS:
             return prior, Q
-        return found.pose, found.covariance + np.diag([0.004**2, 0.004**2, 0.0006**2])
+        return found.pose, found.covariance + _MATCHING_FLOOR
 
     def _keep(self, scan: Scan, odom_base: Pose, local_base: Pose) -> None:
         self._last = Keyframe(scan, odom_base, local_base, self.mapper.belief.map_base)
@@ -178,7 +203,9 @@ class Pipeline:
     def control(self, odometry: Odometry) -> Twist:
         """The twist to drive now."""
         if self._odometry:
-            self._turned += wrap_angle(odometry.odom_base.theta - self._odometry[-1].odom_base.theta)
+            self._turned += wrap_angle(
+                odometry.odom_base.theta - self._odometry[-1].odom_base.theta
+            )
         self._odometry.append(odometry)
         if self._last is None:
             return STANDSTILL
@@ -186,7 +213,9 @@ class Pipeline:
             return Twist(0.0, self._config.edge_follower.max_turn_rate_radps * 0.8)
         match self._order:
             case Drive(track=track):
-                local_base = self._last.local_base.compose(self._last.odom_base.to(odometry.odom_base))
+                local_base = self._last.local_base.compose(
+                    self._last.odom_base.to(odometry.odom_base)
+                )
                 self._twist = follow(
                     track, local_base, self._twist.linear, self._radius, self._config.edge_follower
                 )
@@ -208,6 +237,13 @@ class Pipeline:
         return self._turning_to is not None
 
 
+def _turned(covariance: Array, angle: float) -> Array:
+    """A motion covariance (3, 3) in a frame turned by -angle against its own."""
+    c, s = math.cos(angle), math.sin(angle)
+    G = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    return G @ covariance @ G.T
+
+
 def _blind_angle(scan: Scan) -> float:
     """How far to turn so that every direction has been seen, with some overlap; rad."""
     seen = scan.angle_increment * (len(scan.ranges) - 1)
@@ -222,3 +258,25 @@ def _sampled(scan: Scan, count: int) -> Array:
         hit = ranges < 12.0
     r, b = ranges[hit], bearings[hit]
     return scan.base_laser.transform(np.stack([r * np.cos(b), r * np.sin(b)], axis=1))
+
+
+def smoothed(pipeline: Pipeline) -> tuple[list[Pose], dict[int, Pose]]:
+    """The best estimate of all keyframes (map_base) and vertices (map_vertex), past ones included."""
+    keyframes, mapper = pipeline.keyframes, pipeline.mapper
+    ids = {vertex: len(keyframes) + i for i, vertex in enumerate(mapper.belief.ids)}
+    start = [k.map_base for k in keyframes] + [mapper.belief.map_vertex(v) for v in ids]
+    constraints = [
+        Constraint(i, i + 1, step.motion, np.linalg.inv(step.covariance))
+        for i, step in enumerate(pipeline.steps)
+    ]
+    for seen in mapper.observations:
+        if seen.vertex in ids:
+            information = np.zeros((3, 3))
+            k = len(seen.R)
+            information[:k, :k] = np.linalg.inv(seen.R)
+            constraints.append(
+                Constraint(seen.keyframe, ids[seen.vertex], seen.base_vertex, information)
+            )
+    x = smooth(np.array([(p.x, p.y, p.theta) for p in start]).reshape(-1, 3), constraints)
+    poses = [Pose.from_array(row) for row in x]
+    return poses[: len(keyframes)], {vertex: poses[i] for vertex, i in ids.items()}

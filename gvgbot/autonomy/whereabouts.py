@@ -64,8 +64,9 @@ class Whereabouts:
         centre = gvg.nodes[node].position
         trail = np.array(self.trail).reshape(-1, 2)
         d = np.hypot(*(trail - centre).T)
-        if len(trail) and d.min() < _AWAY_M:  # the robot is past the node already
-            trail = trail[: int(np.argmin(d)) + 1]
+        farthest = int(np.argmax(d)) if len(trail) else 0  # a self-loop starts at the node, too
+        if len(trail) and d[farthest:].min() < _AWAY_M:  # the robot is past the node already
+            trail = trail[: farthest + int(np.argmin(d[farthest:])) + 1]
             rest = centre[None]
         else:
             towards = Branch(place.edge, forward=node == gvg.edges[place.edge].b)
@@ -85,7 +86,9 @@ class Whereabouts:
             if came_over is not None and came_over.distance < _AWAY_M:
                 key = came_over.edge
         branches = gvg.nodes[node].branches
-        ends = [known.half_edge_of[b] for b in branches if b.edge == key and b in known.half_edge_of]
+        ends = [
+            known.half_edge_of[b] for b in branches if b.edge == key and b in known.half_edge_of
+        ]
         return ends[0] if ends else None
 
     def _extend(self, base: Array) -> None:

@@ -31,7 +31,7 @@ class Scan:
     @property
     def bearings(self) -> Array:
         """Beam directions (N,) in the laser frame, rad."""
-        return self.angle_min + self.angle_increment * np.arange(len(self.ranges))
+        return self.angle_min + self.angle_increment * np.arange(len(self.ranges), dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True)

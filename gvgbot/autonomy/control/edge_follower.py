@@ -20,7 +20,9 @@ class EdgeFollowerConfig:
     look_ahead_m: Annotated[float, Range(0.1, 2.0)] = 0.25
     look_ahead_s: Annotated[float, Range(0.0, 3.0)] = 0.5
     turn_on_the_spot_rad: Annotated[float, Range(0.2, 3.0)] = 0.9
-    slow_clearance_m: Annotated[float, Range(0.1, 2.0)] = 0.6  # narrower than this, the robot slows down
+    slow_clearance_m: Annotated[float, Range(0.1, 2.0)] = (
+        0.6  # narrower than this, the robot slows down
+    )
     min_speed_mps: Annotated[float, Range(0.01, 0.5)] = 0.15  # in the narrowest passage
 
 
@@ -57,7 +59,9 @@ def follow(
     away = math.hypot(target[0] - local_base.x, target[1] - local_base.y)
     if remaining < 0.05 and away < 0.1:
         return STANDSTILL
-    angle = wrap_angle(math.atan2(target[1] - local_base.y, target[0] - local_base.x) - local_base.theta)
+    angle = wrap_angle(
+        math.atan2(target[1] - local_base.y, target[0] - local_base.x) - local_base.theta
+    )
     if abs(angle) > config.turn_on_the_spot_rad and away > 0.05:
         return Twist(0.0, math.copysign(min(config.max_turn_rate_radps, 1.5 * abs(angle)), angle))
     window = slice(here, max(here + 1, aim + 5))

@@ -134,7 +134,9 @@ class LocalGvg:
             for branch in self.nodes[node].branches:
                 far = self.end_of(branch)
                 if far not in done:
-                    heapq.heappush(queue, (metres + self.edges[branch.edge].length, far, (*path, branch)))
+                    heapq.heappush(
+                        queue, (metres + self.edges[branch.edge].length, far, (*path, branch))
+                    )
         return done
 
     def line_from(self, start: Place, path: tuple[Branch, ...]) -> tuple[Array, Array]:
@@ -144,7 +146,11 @@ class LocalGvg:
             edge = self.edges[branch.edge]
             line, room = edge.polyline, edge.clearance
             if i == 0:
-                ahead = edge.stations >= start.station if branch.forward else edge.stations <= start.station
+                ahead = (
+                    edge.stations >= start.station
+                    if branch.forward
+                    else edge.stations <= start.station
+                )
                 line, room = line[ahead], room[ahead]
             lines.append(line if branch.forward else line[::-1])
             clear.append(room if branch.forward else room[::-1])

@@ -25,8 +25,12 @@ class LocalMapConfig:
 
     half_width_m: Annotated[float, Range(3.0, 30.0)] = 8.0
     cell_m: Annotated[float, Range(0.05, 0.2)] = 0.1
-    memory_m: Annotated[float, Range(5.0, 200.0)] = 30.0  # metres driven after which a cell is forgotten
-    bridge_gap_m: Annotated[float, Range(0.0, 1.0)] = 0.3  # neighbouring hits closer than this are one wall
+    memory_m: Annotated[float, Range(5.0, 200.0)] = (
+        30.0  # metres driven after which a cell is forgotten
+    )
+    bridge_gap_m: Annotated[float, Range(0.0, 1.0)] = (
+        0.3  # neighbouring hits closer than this are one wall
+    )
 
 
 class LocalMap:
@@ -54,7 +58,9 @@ class LocalMap:
         self._recentre(local_laser)
         ranges = _without_single_dropouts(scan.ranges)
         self._carve(scan, ranges, local_laser, travelled)
-        points = _bridged(local_laser.transform(_hits(scan, ranges, self._reach)), self._config.bridge_gap_m)
+        points = _bridged(
+            local_laser.transform(_hits(scan, ranges, self._reach)), self._config.bridge_gap_m
+        )
         self._occupy(points, travelled)
         self._forget(travelled)
 
@@ -125,7 +131,9 @@ class LocalMap:
         self._votes[stale] = 0
 
 
-def _shifted(array: NDArray[np.generic], shift: NDArray[np.int64], empty: object) -> NDArray[np.generic]:
+def _shifted(
+    array: NDArray[np.generic], shift: NDArray[np.int64], empty: object
+) -> NDArray[np.generic]:
     """The array as seen from a corner moved by `shift` cells; what comes into view is empty."""
     n = array.shape[0]
     out = np.full_like(array, empty)
@@ -164,7 +172,11 @@ def _bridged(points: Array, gap: float) -> Array:
 
 
 def _range_towards(
-    scan: Scan, see: NDArray[np.floating], dx: NDArray[np.floating], dy: NDArray[np.floating], theta: float
+    scan: Scan,
+    see: NDArray[np.floating],
+    dx: NDArray[np.floating],
+    dy: NDArray[np.floating],
+    theta: float,
 ) -> NDArray[np.floating]:
     """How far the scan sees in the direction of each offset; 0 outside its field of view."""
     turn = np.float32(2 * np.pi)

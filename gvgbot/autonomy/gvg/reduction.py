@@ -24,7 +24,9 @@ class ReductionConfig:
 
     min_reach: Annotated[float, Range(1.45, 4.0)] = 1.85  # shorter dangling branches are corners
     merge_m: Annotated[float, Range(0.0, 2.0)] = 0.6  # meetpoints closer than this are one
-    chord_ratio: Annotated[float, Range(0.5, 1.2)] = 0.9  # an edge's obstacles are this far apart, in clearances
+    chord_ratio: Annotated[float, Range(0.5, 1.2)] = (
+        0.9  # an edge's obstacles are this far apart, in clearances
+    )
 
 
 @dataclass(slots=True, eq=False)
@@ -77,9 +79,13 @@ class _Draft:
         if first == second:
             return
         one, two = self.remove(first), self.remove(second)
-        points, room = (one.points[::-1], one.clearance[::-1]) if out_a else (one.points, one.clearance)
+        points, room = (
+            (one.points[::-1], one.clearance[::-1]) if out_a else (one.points, one.clearance)
+        )
         start = one.b if out_a else one.a
-        more, wide = (two.points, two.clearance) if out_b else (two.points[::-1], two.clearance[::-1])
+        more, wide = (
+            (two.points, two.clearance) if out_b else (two.points[::-1], two.clearance[::-1])
+        )
         end = two.b if out_b else two.a
         del self.ends[node]
         self.add(
@@ -190,9 +196,11 @@ def _finish(draft: _Draft, min_reach: float) -> LocalGvg:
     nodes = {}
     for node, ends in draft.ends.items():
         branches = tuple(Branch(key, out) for key, out in ends)
-        weak = frozenset(
-            branch for branch in branches if _is_weak(draft, branch, node, min_reach)
-        ) if len(branches) + draft.open[node] >= 3 else frozenset()
+        weak = (
+            frozenset(branch for branch in branches if _is_weak(draft, branch, node, min_reach))
+            if len(branches) + draft.open[node] >= 3
+            else frozenset()
+        )
         nodes[node] = LocalNode(
             draft.position[node], draft.clearance[node], draft.open[node], branches, weak
         )

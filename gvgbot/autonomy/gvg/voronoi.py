@@ -84,7 +84,9 @@ def _disc_is_known(local_map: LocalMap, centres: Array, radii: Array) -> NDArray
     return (~local_map.known(samples)).sum(axis=1) <= _MAX_UNKNOWN
 
 
-def _ridges(triangles: Delaunay, generators: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
+def _ridges(
+    triangles: Delaunay, generators: Array
+) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
     """Triangle pairs (a, b) that share an edge, b = -1 at the hull, and the edge's length."""
     own = np.repeat(np.arange(len(triangles.simplices)), 3)
     other = triangles.neighbors.ravel().astype(np.int64)

@@ -139,7 +139,9 @@ def expected(belief: Belief, vertex: int) -> tuple[Pose, Array]:
     return base_vertex, H
 
 
-def innovation(belief: Belief, vertex: int, base_vertex: Pose, R: Array) -> tuple[Array, Array, Array]:
+def innovation(
+    belief: Belief, vertex: int, base_vertex: Pose, R: Array
+) -> tuple[Array, Array, Array]:
     """Measured minus expected pose of a vertex r, its covariance S, and H.
 
     R of shape (2, 2) uses the position alone, (3, 3) the heading as well.

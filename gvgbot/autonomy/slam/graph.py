@@ -49,7 +49,9 @@ class Vertex:
     seen_at: float  # metres driven when last seen
     updated_at: float  # metres driven when it last corrected the belief
     half_edges: dict[int, HalfEdge] = field(default_factory=dict)
-    snapshot: Array = field(default_factory=lambda: np.empty((0, 2)))  # walls around it, vertex frame
+    snapshot: Array = field(
+        default_factory=lambda: np.empty((0, 2))
+    )  # walls around it, vertex frame
     sightings: int = 1
     misses: int = 0
     visits: int = 1

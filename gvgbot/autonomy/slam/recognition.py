@@ -21,9 +21,13 @@ from gvgbot.ranges import Range
 class RecognitionConfig:
     """Gates of the tests."""
 
-    tracked_m: Annotated[float, Range(1.0, 100.0)] = 12.0  # driven since last seen: told by place alone
+    tracked_m: Annotated[float, Range(1.0, 100.0)] = (
+        12.0  # driven since last seen: told by place alone
+    )
     same_place_m: Annotated[float, Range(0.2, 2.0)] = 0.8
-    gate: Annotated[float, Range(1.0, 50.0)] = 13.8  # squared Mahalanobis distance, 2 degrees of freedom
+    gate: Annotated[float, Range(1.0, 50.0)] = (
+        13.8  # squared Mahalanobis distance, 2 degrees of freedom
+    )
     clearance_m: Annotated[float, Range(0.05, 2.0)] = 0.3
     bearing_deg: Annotated[float, Range(5.0, 90.0)] = 40.0
     detection_sigma_m: Annotated[float, Range(0.01, 1.0)] = 0.08
@@ -44,7 +48,9 @@ def detection_covariance(distance: float, config: RecognitionConfig) -> Array:
     return np.eye(2) * (config.detection_sigma_m**2 + (0.015 * distance) ** 2)
 
 
-def match_bearings(seen: tuple[float, ...], known: dict[int, float], limit: float) -> dict[int, int]:
+def match_bearings(
+    seen: tuple[float, ...], known: dict[int, float], limit: float
+) -> dict[int, int]:
     """Pairs of directions that agree, closest first: index of `seen` -> key of `known`."""
     pairs = sorted(
         (abs(wrap_angle(a - b)), i, key) for i, a in enumerate(seen) for key, b in known.items()
@@ -79,7 +85,9 @@ def looks_alike(
         return False
     if abs(vertex.degree - len(sighting.bearings)) > 1:
         return False
-    if abs(vertex.clearance - sighting.clearance) > max(config.clearance_m, 0.15 * vertex.clearance):
+    if abs(vertex.clearance - sighting.clearance) > max(
+        config.clearance_m, 0.15 * vertex.clearance
+    ):
         return False
     known = {key: half.bearing + local_vertex.theta for key, half in vertex.half_edges.items()}
     matched = match_bearings(sighting.bearings, known, math.radians(config.bearing_deg))

@@ -74,7 +74,9 @@ def motion_between(before: Pose, after: Pose) -> Pose:
     return Pose(moved.x, moved.y, wrap_angle(moved.theta))
 
 
-def _pairs(world: Array, tree: cKDTree, walls: Array, reach: float) -> tuple[Array, Array, Array] | None:
+def _pairs(
+    world: Array, tree: cKDTree, walls: Array, reach: float
+) -> tuple[Array, Array, Array] | None:
     """Indices of the points near a wall, the wall's normals (K, 2), and signed distances (K,)."""
     distance, near = tree.query(world, k=_NEIGHBOURS, distance_upper_bound=max(reach, 0.35))
     found = np.isfinite(distance[:, 2]) & (distance[:, 0] < reach)
@@ -86,7 +88,9 @@ def _pairs(world: Array, tree: cKDTree, walls: Array, reach: float) -> tuple[Arr
     weight = present / present.sum(axis=1, keepdims=True)
     centre = (weight[..., None] * group).sum(axis=1)
     d = group - centre[:, None]
-    xx, yy, xy = ((weight * p).sum(axis=1) for p in (d[..., 0] ** 2, d[..., 1] ** 2, d[..., 0] * d[..., 1]))
+    xx, yy, xy = (
+        (weight * p).sum(axis=1) for p in (d[..., 0] ** 2, d[..., 1] ** 2, d[..., 0] * d[..., 1])
+    )
     angle = 0.5 * np.arctan2(2 * xy, xx - yy)  # of the wall
     spread = np.hypot((xx - yy) / 2, xy)
     large, small = (xx + yy) / 2 + spread, (xx + yy) / 2 - spread
@@ -100,7 +104,11 @@ def _pairs(world: Array, tree: cKDTree, walls: Array, reach: float) -> tuple[Arr
 def _jacobian(points: Array, normal: Array, pose: Pose, prior: Pose) -> Array:
     """Derivative (K, 3) of the distances by a step of the pose in the prior's frame."""
     c, s = np.cos(prior.theta), np.sin(prior.theta)
-    along = np.stack([c * normal[:, 0] + s * normal[:, 1], -s * normal[:, 0] + c * normal[:, 1]], axis=1)
+    along = np.stack(
+        [c * normal[:, 0] + s * normal[:, 1], -s * normal[:, 0] + c * normal[:, 1]], axis=1
+    )
     c, s = np.cos(pose.theta), np.sin(pose.theta)
-    turned = np.stack([-s * points[:, 0] - c * points[:, 1], c * points[:, 0] - s * points[:, 1]], axis=1)
+    turned = np.stack(
+        [-s * points[:, 0] - c * points[:, 1], c * points[:, 0] - s * points[:, 1]], axis=1
+    )
     return np.concatenate([along, (turned * normal).sum(axis=1)[:, None]], axis=1)

@@ -1,0 +1,67 @@
+"""The task around the pipeline: newest scan and odometry in, twist out, and a stop on every way out."""
+
+import asyncio
+from collections.abc import Callable
+
+from gvgbot.autonomy.events import Event
+from gvgbot.autonomy.pipeline import Pipeline
+from gvgbot.geometry import STANDSTILL
+from gvgbot.hal.devices import Base, Laser
+from gvgbot.hal.guard import Guard, GuardState
+from gvgbot.hal.messages import Odometry, Scan
+
+
+class Loop:
+    """Perception per scan, control per odometry message, until the mission has an outcome.
+
+    `on_events` gets what happened after each scan, `on_cycle` the odometry of each control cycle.
+    """
+
+    def __init__(
+        self,
+        laser: Laser,
+        base: Base,
+        pipeline: Pipeline,
+        guard: Guard,
+        *,
+        on_events: Callable[[list[Event]], None],
+        on_cycle: Callable[[Odometry], None],
+    ) -> None:
+        self._laser, self._base, self._pipeline, self._guard = laser, base, pipeline, guard
+        self._on_events, self._on_cycle = on_events, on_cycle
+        self._scan: Scan | None = None
+        self._guard_state = GuardState()
+        self.stopped_for: str | None = None
+
+    async def run(self) -> None:
+        """Drive until done; the base stands still when this returns or is cancelled."""
+        try:
+            async with asyncio.TaskGroup() as tasks:
+                perceiving = tasks.create_task(self._perceive(), name="perceive")
+                tasks.create_task(self._control(perceiving), name="control")
+        finally:
+            self._base.drive(STANDSTILL)
+
+    async def _perceive(self) -> None:
+        while self._pipeline.mission.outcome is None:
+            scan = await self._laser.next_scan()
+            events = self._pipeline.perceive(scan)
+            self._scan = scan
+            if events:
+                self._on_events(events)
+
+    async def _control(self, perceiving: asyncio.Task[None]) -> None:
+        while self._pipeline.mission.outcome is None:
+            odometry = await self._base.next_odometry()
+            wish = self._pipeline.control(odometry)
+            self._guard_state, twist, self.stopped_for = self._guard.permit(
+                self._guard_state,
+                wish,
+                stamp=odometry.stamp,
+                odometry=odometry,
+                scan=self._scan,
+                contact=self._base.contact,
+            )
+            self._base.drive(twist)
+            self._on_cycle(odometry)
+        perceiving.cancel()

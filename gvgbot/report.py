@@ -1,0 +1,130 @@
+"""What a run leaves: the map, its picture, the trajectories and the summary, as files by name."""
+
+import tempfile
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from gvgbot.autonomy.pipeline import Pipeline, smoothed
+from gvgbot.autonomy.slam.graph import Edge, Vertex
+from gvgbot.drivers.world import World, save_world
+from gvgbot.geometry import Array, Pose
+from gvgbot.hal.messages import Odometry
+from gvgbot.maps import geojson
+from gvgbot.maps.map_server import encode_map_server
+from gvgbot.maps.occupancy import occupancy_grid
+from gvgbot.maps.picture import draw_map
+from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
+from gvgbot.maps.trajectory import Trajectory, encode_tum, to_trajectory
+
+_PERIOD = 0.1  # s between the rows of a trajectory
+
+
+@dataclass(slots=True)
+class Journey:
+    """The way of the robot, ten rows a second."""
+
+    stamps: list[float] = field(default_factory=list)
+    keyframes: list[int] = field(default_factory=list)  # the last one before each row
+    odom_base: list[Pose] = field(default_factory=list)
+    map_base: list[Pose] = field(default_factory=list)
+    world_base: list[Pose] = field(default_factory=list)  # simulation only
+
+    def record(self, odometry: Odometry, pipeline: Pipeline, world_base: Pose | None) -> None:
+        """Take down a control cycle, if a row is due."""
+        if not pipeline.keyframes or (
+            self.stamps and odometry.stamp < self.stamps[-1] + _PERIOD - 1e-3
+        ):
+            return
+        self.stamps.append(odometry.stamp)
+        self.keyframes.append(len(pipeline.keyframes) - 1)
+        self.odom_base.append(odometry.odom_base)
+        self.map_base.append(pipeline.map_base)
+        if world_base is not None:
+            self.world_base.append(world_base)
+
+
+def map_files(pipeline: Pipeline, journey: Journey, title: str) -> dict[str, bytes | str]:
+    """All files of a run but summary and events, by name."""
+    keyframes, vertices = smoothed(pipeline)
+    graph = route_graph(pipeline, vertices)
+    scans = [(pose, k.scan) for pose, k in zip(keyframes, pipeline.keyframes, strict=True)]
+    grid = occupancy_grid(scans)
+    estimate = _trajectory(journey, _corrected(journey, pipeline, keyframes))
+    start = pipeline.keyframes[0].odom_base if pipeline.keyframes else Pose()
+    odometry = _trajectory(journey, [start.to(pose) for pose in journey.odom_base])
+    files: dict[str, bytes | str] = {
+        "map.geojson": geojson.encode(graph),
+        "map.png": draw_map(graph, grid=grid, estimate=estimate, odometry=odometry, title=title),
+        "estimate.tum": encode_tum(estimate),
+        "online.tum": encode_tum(_trajectory(journey, journey.map_base)),
+        "odometry.tum": encode_tum(odometry),
+    }
+    if journey.world_base:
+        files["truth.tum"] = encode_tum(_trajectory(journey, journey.world_base))
+    return files | encode_map_server(grid)
+
+
+def _trajectory(journey: Journey, poses: list[Pose]) -> Trajectory:
+    return to_trajectory(zip(journey.stamps, poses, strict=True))
+
+
+def _corrected(journey: Journey, pipeline: Pipeline, keyframes: list[Pose]) -> list[Pose]:
+    """The journey hung on the smoothed keyframes: map_base of each row."""
+    return [
+        keyframes[k].compose(pipeline.keyframes[k].odom_base.to(odom_base))
+        for k, odom_base in zip(journey.keyframes, journey.odom_base, strict=True)
+    ]
+
+
+def route_graph(pipeline: Pipeline, vertices: dict[int, Pose]) -> RouteGraph:
+    """The GVG graph with vertices at the given poses (map_vertex)."""
+    mapper = pipeline.mapper
+    return RouteGraph(
+        tuple(
+            _map_vertex(vertex, vertices[vertex.id], mapper.belief.vertex_covariance(vertex.id))
+            for vertex in mapper.graph.vertices.values()
+        ),
+        tuple(_map_edge(edge, vertices) for edge in mapper.graph.edges.values()),
+    )
+
+
+def _map_vertex(vertex: Vertex, pose: Pose, covariance: Array) -> MapVertex:
+    halves = [(h.bearing + pose.theta, h.edge is None) for h in vertex.half_edges.values()]
+    (xx, xy), (yx, yy) = covariance.tolist()
+    return MapVertex(
+        id=vertex.id,
+        kind=vertex.kind,
+        position=(pose.x, pose.y),
+        degree=vertex.degree,
+        bearings=tuple(bearing for bearing, _ in halves),
+        clearance=vertex.clearance,
+        covariance=(xx, xy, yx, yy),
+        frontiers=tuple(bearing for bearing, open_ in halves if open_),
+        visits=vertex.visits,
+    )
+
+
+def _map_edge(edge: Edge, vertices: dict[int, Pose]) -> MapEdge:
+    """An edge whose polyline is bent so that it ends on its vertices."""
+    line = vertices[edge.a.vertex].transform(edge.polyline)
+    start, end = vertices[edge.a.vertex].position, vertices[edge.b.vertex].position
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+    share = (along / max(along[-1], 1e-9))[:, None]
+    line = line + (1 - share) * (start - line[0]) + share * (end - line[-1])
+    return MapEdge(
+        start=edge.a.vertex,
+        end=edge.b.vertex,
+        polyline=line,
+        length=edge.length,
+        min_clearance=edge.min_clearance,
+        traversals=edge.traversals,
+    )
+
+
+def world_files(world: World) -> dict[str, bytes | str]:
+    """The simulated world itself in map_server form, to score a run against."""
+    with tempfile.TemporaryDirectory() as directory:
+        save_world(replace(world, name="world"), Path(directory))
+        return {f"{path.name}": path.read_bytes() for path in sorted(Path(directory).iterdir())}

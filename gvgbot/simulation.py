@@ -1,0 +1,70 @@
+"""The simulated robot: one world, one body, and the twins of both devices on in-memory streams."""
+
+import asyncio
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gvgbot.clock import Clock
+from gvgbot.config import Config
+from gvgbot.drivers.body import BodyConfig, RobotBody
+from gvgbot.drivers.hokuyo.models import MODELS
+from gvgbot.drivers.hokuyo.twin import HokuyoTwin
+from gvgbot.drivers.kobuki.twin import KobukiTwin
+from gvgbot.drivers.transport import ByteStream, pipe, serve_twin
+from gvgbot.drivers.world import World, check_start
+from gvgbot.geometry import Array, Pose
+from gvgbot.worlds import open_world
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A world and where the robot starts in it."""
+
+    world: World
+    start: Pose
+
+
+def open_place(config: Config) -> Place:
+    """The configured world. Raises WorldError if it cannot be had or the start does not fit."""
+    world, default = open_world(config.twin.world)
+    start = Pose(*config.twin.start) if config.twin.start is not None else default or Pose()
+    check_start(world, start, config.robot.radius_m)
+    return Place(world, start)
+
+
+class Simulation:
+    """Both twins in one world; `laser` and `base` are the drivers' ends of their streams."""
+
+    def __init__(self, config: Config, place: Place, clock: Clock) -> None:
+        self.place = place
+        self.body = RobotBody(
+            place.world, place.start, BodyConfig(radius_m=config.robot.radius_m), clock.now()
+        )
+        self._clock = clock
+        mount = config.laser.base_laser
+        model = MODELS[config.twin.laser.model]
+
+        def sense(stamp: float) -> Array:
+            self.body.advance(stamp)
+            world_laser = self.body.pose.compose(mount)
+            return place.world.cast(world_laser, model.parameters.bearings, model.usable_mm / 1000)
+
+        laser_seed, base_seed = np.random.SeedSequence(config.twin.seed).generate_state(2)
+        self._laser_twin = HokuyoTwin(config.twin.laser, sense, int(laser_seed))
+        self._base_twin = KobukiTwin(config.twin.base, self.body, int(base_seed))
+        self.laser, self._laser_end = pipe()
+        self.base, self._base_end = pipe()
+
+    async def run(self) -> None:
+        """Let the devices work until cancelled."""
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(self._serve_laser(), name="laser twin")
+            tasks.create_task(self._serve_base(), name="base twin")
+
+    async def _serve_laser(self) -> None:
+        await serve_twin(self._laser_twin, self._laser_end, self._clock)
+
+    async def _serve_base(self) -> None:
+        await serve_twin(self._base_twin, self._base_end, self._clock)
