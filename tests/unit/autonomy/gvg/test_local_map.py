@@ -1,0 +1,188 @@
+"""The local map against the walls that the scans were cast at."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
+from gvgbot.geometry import Array, Pose
+from gvgbot.hal.messages import Scan
+from tests.unit.autonomy.sights import carved, line, looked, sweep
+
+ROOM = carved([(-3.0, -2.0, 3.0, 2.0)])
+ORIGIN = Pose()
+
+
+def cells_of(x0: float, y0: float, x1: float, y1: float) -> Array:
+    """The centres (N, 2) of the cells of a rectangle."""
+    x, y = np.meshgrid(np.arange(x0, x1, 0.1) + 0.05, np.arange(y0, y1, 0.1) + 0.05)
+    return np.stack([x.ravel(), y.ravel()], axis=1)
+
+
+def wall_points_near(local_map: LocalMap, x: float, y: float, reach: float = 0.3) -> int:
+    return int((np.hypot(*(local_map.points() - [x, y]).T) < reach).sum())
+
+
+def off_the_walls(points: Array) -> Array:
+    """Metres (N,) from the nearest wall of the room."""
+    return np.minimum(np.abs(np.abs(points[:, 0]) - 3.0), np.abs(np.abs(points[:, 1]) - 2.0))
+
+
+# -- one scan -------------------------------------------------------------------------------------
+
+
+def test_all_between_the_robot_and_the_walls_is_known() -> None:
+    assert looked(ROOM, [ORIGIN]).known(cells_of(-2.9, -1.9, 2.8, 1.8)).all()
+
+
+def test_nothing_behind_the_walls_is_known() -> None:
+    local_map = looked(ROOM, [ORIGIN])
+    for beyond in (cells_of(3.2, -2, 6, 2), cells_of(-6, -2, -3.3, 2), cells_of(-3, 2.2, 3, 6)):
+        assert not local_map.known(beyond).any()
+
+
+def test_nothing_outside_the_field_of_view_is_known() -> None:
+    local_map = looked(ROOM, [Pose(0.0, 0.0, math.pi / 2)], field_of_view=math.pi)
+    assert local_map.known(cells_of(-2.5, 0.3, 2.5, 1.8)).all()
+    assert not local_map.known(cells_of(-2.5, -1.8, 2.5, -0.3)).any()
+
+
+def test_what_a_pillar_hides_is_unknown() -> None:
+    hidden = carved([(-3.0, -2.0, 3.0, 2.0)], [(1.0, -0.4, 1.2, 0.4)])
+    local_map = looked(hidden, [ORIGIN])
+    assert not local_map.known(cells_of(1.5, -0.3, 2.7, 0.3)).any()
+    assert local_map.known(cells_of(1.5, 1.2, 2.7, 1.7)).all()
+
+
+def test_what_is_out_of_the_window_is_unknown() -> None:
+    local_map = looked(ROOM, [ORIGIN], config=LocalMapConfig(half_width_m=3.0))
+    assert not local_map.known(np.array([[50.0, 0.0], [0.0, -50.0], [1e6, 1e6]])).any()
+
+
+@pytest.mark.parametrize("sigma", [0.0, 0.01])
+def test_points_lie_on_the_walls_more_sharply_than_the_cells_are_large(sigma: float) -> None:
+    rng = np.random.default_rng(1)
+    points = looked(ROOM, line(-0.5, 0, 0.5, 0, 0.0, 9), sigma=sigma, rng=rng).points()
+    off = off_the_walls(points)
+    corner = (np.abs(points[:, 0]) > 2.85) & (np.abs(points[:, 1]) > 1.85)  # a cell of two walls
+    assert off[~corner].max() < 0.02 + 2 * sigma
+    assert off.max() < 0.06 + 2 * sigma
+
+
+def test_walls_have_no_gap_where_beams_fall_less_than_the_bridge_apart() -> None:
+    points = looked(ROOM, [ORIGIN]).points()
+    for wall in (points[points[:, 1] > 1.95], points[points[:, 1] < -1.95]):
+        x = np.sort(wall[:, 0])
+        assert np.diff(x).max() < 0.2
+        assert (x[0], x[-1]) == pytest.approx((-3.0, 3.0), abs=0.1)
+
+
+# -- faults of the laser ----------------------------------------------------------------------
+
+
+def with_faults(scan: Scan, faulty: list[int], value: float) -> Scan:
+    ranges = scan.ranges.copy()
+    ranges[faulty] = value
+    return Scan(0.0, ranges, scan.angle_min, scan.angle_increment, 0.1, 30.0)
+
+
+def after(scan: Scan) -> LocalMap:
+    local_map = LocalMap(LocalMapConfig())
+    local_map.insert(scan, ORIGIN, 0.0)
+    return local_map
+
+
+def test_a_single_dropout_hides_nothing() -> None:
+    scan = sweep(ROOM, ORIGIN)
+    faulty = after(with_faults(scan, list(range(5, 1080, 7)), math.nan))
+    assert faulty.known(cells_of(-2.9, -1.9, 2.8, 1.8)).all()
+    assert off_the_walls(faulty.points()).max() < 0.1
+
+
+def test_a_block_of_lost_beams_is_unknown_rather_than_free() -> None:
+    lost = after(with_faults(sweep(ROOM, ORIGIN), list(range(480, 601)), math.nan))
+    assert not lost.known(cells_of(1.0, -0.2, 2.8, 0.2)).any()
+    assert lost.known(cells_of(-2.8, -0.2, -1.0, 0.2)).all()
+
+
+def test_beams_that_hit_nothing_show_free_space_without_a_wall() -> None:
+    empty = after(with_faults(sweep(ROOM, ORIGIN), list(range(1081)), math.inf))
+    assert empty.known(cells_of(-5, -5, 5, 5)).all()
+    assert len(empty.points()) == 0
+
+
+def test_the_scan_itself_is_left_as_it_was() -> None:
+    scan = with_faults(sweep(ROOM, ORIGIN), [100, 300], math.nan)
+    before = scan.ranges.copy()
+    after(scan)
+    assert np.array_equal(scan.ranges, before, equal_nan=True)
+
+
+# -- many scans ----------------------------------------------------------------------
+
+
+def test_a_wall_that_was_taken_away_is_forgotten_after_a_few_scans() -> None:
+    furnished = carved([(-3.0, -2.0, 3.0, 2.0)], [(1.0, -0.4, 1.2, 0.4)])
+    local_map = looked(furnished, [ORIGIN] * 10)
+    assert wall_points_near(local_map, 1.0, 0.0) > 0
+    for _ in range(8):
+        local_map.insert(sweep(ROOM, ORIGIN), ORIGIN, 0.0)
+    assert wall_points_near(local_map, 1.0, 0.0) == 0
+    assert local_map.known(cells_of(1.5, -0.3, 2.7, 0.3)).all()
+
+
+def test_a_wall_that_appears_is_there_after_one_scan() -> None:
+    furnished = carved([(-3.0, -2.0, 3.0, 2.0)], [(1.0, -0.4, 1.2, 0.4)])
+    local_map = looked(ROOM, [ORIGIN] * 10)
+    local_map.insert(sweep(furnished, ORIGIN), ORIGIN, 0.0)
+    assert wall_points_near(local_map, 1.0, 0.0) > 3
+
+
+def test_standing_walls_survive_a_hundred_noisy_scans_from_all_over_the_room() -> None:
+    rng = np.random.default_rng(5)
+    poses = [Pose(*rng.uniform((-2.5, -1.5, -3.0), (2.5, 1.5, 3.0))) for _ in range(100)]
+    local_map = looked(ROOM, poses, sigma=0.01, rng=rng)
+    for x in np.arange(-2.8, 2.9, 0.2):
+        assert wall_points_near(local_map, x, 2.0, 0.15) > 0
+        assert wall_points_near(local_map, x, -2.0, 0.15) > 0
+
+
+def test_what_was_seen_too_many_metres_ago_is_forgotten() -> None:
+    local_map = LocalMap(LocalMapConfig(memory_m=5.0))
+    local_map.insert(sweep(ROOM, ORIGIN), ORIGIN, 0.0)
+    blind = Scan(0.0, np.full(100, math.nan), -1.0, 0.02, 0.1, 30.0)
+    local_map.insert(blind, ORIGIN, 4.9)
+    assert local_map.known(np.zeros((1, 2))).all()
+    local_map.insert(blind, ORIGIN, 5.1)
+    assert not local_map.known(cells_of(-3, -2, 3, 2)).any()
+    assert len(local_map.points()) == 0
+
+
+def test_scrolling_loses_nothing_that_stays_in_the_window() -> None:
+    """A small window that follows the robot agrees with a large one that need not scroll."""
+    crossing = carved([(-8.0, -1.0, 8.0, 1.0), (-0.6, -4.0, 0.8, 4.0)])
+    path = line(-2.0, 0.0, 2.0, 0.3, 0.0, 30)
+    small = looked(crossing, path, config=LocalMapConfig(half_width_m=5.0))
+    large = looked(crossing, path, config=LocalMapConfig(half_width_m=30.0))
+    always_inside = cells_of(-2.0, -3.5, 2.0, 3.5)
+    assert small.known(always_inside).any()
+    assert np.array_equal(small.known(always_inside), large.known(always_inside))
+    walls, same = (p[np.abs(p[:, 0]) < 1.9] for p in (small.points(), large.points()))
+    assert len(walls) > 50
+    assert np.allclose(walls, same)
+
+
+@settings(max_examples=10)
+@given(st.floats(-20, 20), st.floats(-20, 20), st.floats(-3.1, 3.1))
+def test_the_frame_that_scans_are_inserted_in_changes_nothing_but_the_frame(
+    x: float, y: float, theta: float
+) -> None:
+    local_world = Pose(x, y, theta)
+    points = looked(ROOM, line(-1, 0, 1, 0, 0.0, 3), local_world=local_world).points()
+    back = local_world.inverse().transform(points)
+    off = off_the_walls(back)
+    assert np.quantile(off, 0.95) < 0.02
+    assert off.max() < 0.08

@@ -1,0 +1,142 @@
+"""Registration finds an offset that is known, and only in directions that the walls constrain."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial import cKDTree
+
+from gvgbot.autonomy.slam.scan_matching import (
+    Registration,
+    ScanMatchingConfig,
+    motion_between,
+    register,
+)
+from gvgbot.drivers.world import World
+from gvgbot.geometry import Array, Pose, wrap_angle
+from gvgbot.worlds import builtin
+from tests.unit.autonomy.sights import carved, looked, sweep
+
+CORNER = carved([(-3.0, -1.0, 1.0, 1.0), (-1.0, -5.0, 1.0, 1.0)])  # an L of two corridors
+CORRIDOR = carved([(-9.0, -1.0, 9.0, 1.0)])
+Q = np.diag([0.1**2, 0.1**2, 0.05**2])
+CONFIG = ScanMatchingConfig()
+
+
+def hits(world: World, world_laser: Pose, rng: np.random.Generator | None = None) -> Array:
+    """Points (N, 2) that a scan hits within six metres, laser frame."""
+    scan = sweep(world, world_laser, sigma=0.01, rng=rng)
+    near = scan.ranges < 6.0
+    r, b = scan.ranges[near], scan.bearings[near]
+    return np.stack([r * np.cos(b), r * np.sin(b)], axis=1)[::3]
+
+
+def matched(
+    world: World,
+    truth: Pose,
+    offset: Pose,
+    *,
+    rng: np.random.Generator | None = None,
+    prior_covariance: Array = Q,
+) -> Registration:
+    """What registration makes of a prior that is wrong by an offset."""
+    walls = looked(world, [truth.compose(Pose(-0.2, 0.0, 0.05))]).points()
+    prior = truth.compose(offset)
+    points = hits(world, truth, rng)
+    found = register(points, cKDTree(walls), walls, prior, prior_covariance, CONFIG)
+    assert found is not None
+    return found
+
+
+offsets = st.builds(
+    Pose, st.floats(-0.1, 0.1), st.floats(-0.1, 0.1), st.floats(math.radians(-3), math.radians(3))
+)
+
+
+@settings(max_examples=25)
+@given(offsets)
+def test_a_known_offset_is_found_in_a_bend(offset: Pose) -> None:
+    truth = Pose(0.1, -0.2, 0.4)
+    found = matched(CORNER, truth, offset)
+    assert truth.distance(found.pose) < 0.01
+    assert math.degrees(abs(wrap_angle(found.pose.theta - truth.theta))) < 0.2
+    assert found.inliers > 0.9
+    assert found.rms < 0.02
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_known_offset_is_found_in_an_office_with_a_noisy_laser(seed: int) -> None:
+    world, truth = builtin("office")
+    rng = np.random.default_rng(seed)
+    offset = Pose(*rng.uniform((-0.1, -0.1, -0.05), (0.1, 0.1, 0.05)))
+    at_the_corner = Pose(truth.x, 4.3, truth.theta + 0.3)
+    found = matched(world, at_the_corner, offset, rng=rng)
+    assert at_the_corner.distance(found.pose) < 0.015
+    assert math.degrees(abs(wrap_angle(found.pose.theta - at_the_corner.theta))) < 0.2
+
+
+@pytest.mark.parametrize("heading", [0.0, 0.7, -2.0])
+def test_along_a_bare_corridor_the_prior_is_all_there_is(heading: float) -> None:
+    truth = Pose(0.0, 0.2, heading)
+    offset = truth.to(Pose(0.08, 0.26, heading + 0.02))  # eight along, six across
+    found = matched(CORRIDOR, truth, offset)
+    assert found.pose.y == pytest.approx(0.2, abs=0.01)
+    assert found.pose.theta == pytest.approx(heading, abs=0.004)
+    assert found.pose.x == pytest.approx(0.08, abs=0.01)
+    prior = truth.compose(offset)
+    c, s = math.cos(prior.theta), math.sin(prior.theta)
+    along, across = np.array([c, -s, 0.0]), np.array([s, c, 0.0])  # in the prior's frame
+    assert along @ found.covariance @ along == pytest.approx(0.1**2, rel=0.1)
+    assert across @ found.covariance @ across < 0.1 * 0.1**2
+
+
+@settings(max_examples=25)
+@given(offsets, st.integers(0, 2**32 - 1))
+def test_registration_only_adds_knowledge(offset: Pose, seed: int) -> None:
+    """The covariance stays positive, and in no direction grows beyond the prior's."""
+    rng = np.random.default_rng(seed)
+    root = rng.normal(0.0, 0.1, (3, 3))
+    prior_covariance = root @ root.T + 1e-4 * np.eye(3)
+    found = matched(CORNER, Pose(), offset, rng=rng, prior_covariance=prior_covariance)
+    assert np.linalg.eigvalsh(found.covariance).min() > 0.0
+    assert np.linalg.eigvalsh(prior_covariance - found.covariance).min() > -1e-9
+
+
+def test_a_certain_prior_is_not_moved() -> None:
+    truth, offset = Pose(), Pose(0.03, -0.02, 0.01)
+    found = matched(CORNER, truth, offset, prior_covariance=1e-10 * np.eye(3))
+    assert found.pose.distance(offset) < 1e-3
+
+
+def test_the_frame_of_the_walls_does_not_matter() -> None:
+    """Walls and prior moved together give the pose moved with them and the same covariance."""
+    offset, frame = Pose(0.06, -0.05, 0.03), Pose(4.0, -7.0, 2.0)
+    walls, points = looked(CORNER, [Pose()]).points(), hits(CORNER, Pose())
+    here = register(points, cKDTree(walls), walls, offset, Q, CONFIG)
+    walls = frame.transform(walls)
+    there = register(points, cKDTree(walls), walls, frame.compose(offset), Q, CONFIG)
+    assert here is not None
+    assert there is not None
+    assert frame.compose(here.pose).distance(there.pose) < 1e-4
+    assert np.allclose(here.covariance, there.covariance, rtol=1e-3)
+
+
+def test_points_far_from_all_walls_are_no_match() -> None:
+    walls = looked(CORNER, [Pose()]).points()
+    points = hits(CORNER, Pose())
+    assert register(points, cKDTree(walls), walls, Pose(40.0, 0.0, 0.0), Q, CONFIG) is None
+
+
+def test_too_few_points_are_no_match() -> None:
+    walls = looked(CORNER, [Pose()]).points()
+    points = hits(CORNER, Pose())[: CONFIG.min_pairs - 1]
+    assert register(points, cKDTree(walls), walls, Pose(), Q, CONFIG) is None
+
+
+@given(offsets, offsets)
+def test_the_motion_between_two_poses_leads_from_one_to_the_other(a: Pose, b: Pose) -> None:
+    there = a.compose(motion_between(a, b))
+    assert there.distance(b) < 1e-12
+    assert wrap_angle(there.theta - b.theta) == pytest.approx(0.0, abs=1e-12)

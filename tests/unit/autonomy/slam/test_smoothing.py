@@ -1,0 +1,129 @@
+"""The pose graph against exact worlds and a dense least squares solver."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import least_squares
+
+from gvgbot.autonomy.slam.smoothing import Constraint, smooth
+from gvgbot.geometry import Array, Pose, wrap_angle
+
+seeds = st.integers(0, 2**32 - 1)
+
+
+def relative(x: Array, a: int, b: int) -> Pose:
+    return Pose.from_array(x[a]).to(Pose.from_array(x[b]))
+
+
+def loop(n: int) -> Array:
+    """Poses (n, 3) round a circle of 5 m, beginning at the origin."""
+    angle = np.arange(n) * math.tau / n
+    return np.stack([5 * np.sin(angle), 5 - 5 * np.cos(angle), angle], axis=1)
+
+
+def difference(x: Array, y: Array) -> Array:
+    d = x - y
+    d[:, 2] = [wrap_angle(a) for a in d[:, 2]]
+    return d
+
+
+def random_information(rng: np.random.Generator) -> Array:
+    root = rng.normal(0.0, 1.0, (3, 3))
+    return 100 * (root @ root.T + np.eye(3))
+
+
+@settings(max_examples=20)
+@given(seeds)
+def test_exact_constraints_of_a_loop_give_the_exact_poses_back(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    truth = loop(24)
+    pairs = [(i, i + 1) for i in range(23)] + [(23, 0), (4, 17)]
+    constraints = [
+        Constraint(a, b, relative(truth, a, b), random_information(rng)) for a, b in pairs
+    ]
+    start = truth + rng.normal(0.0, 0.1, truth.shape)
+    start[0] = truth[0]
+    assert np.abs(difference(smooth(start, constraints), truth)).max() < 1e-5
+
+
+@settings(max_examples=10)
+@given(seeds)
+def test_the_result_is_that_of_a_dense_solver(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    truth = loop(8)
+    pairs = [(i, i + 1) for i in range(7)] + [(7, 0), (1, 5), (6, 2)]
+    constraints = []
+    for a, b in pairs:
+        z = relative(truth, a, b)
+        error = rng.normal(0.0, 0.05, 3)
+        z = Pose(z.x + error[0], z.y + error[1], z.theta + error[2])
+        constraints.append(Constraint(a, b, z, random_information(rng)))
+    start = truth + np.concatenate([np.zeros((1, 3)), rng.normal(0.0, 0.05, (7, 3))])
+
+    def residuals(free: Array) -> Array:
+        x = np.concatenate([truth[:1], free.reshape(-1, 3)])
+        rows = []
+        for c in constraints:
+            seen = relative(x, c.a, c.b)
+            r = np.array([seen.x - c.a_b.x, seen.y - c.a_b.y, wrap_angle(seen.theta - c.a_b.theta)])
+            rows.append(np.linalg.cholesky(c.information).T @ r)
+        return np.concatenate(rows)
+
+    solved = least_squares(residuals, start[1:].ravel(), xtol=1e-12, ftol=1e-12, gtol=1e-12)
+    dense = np.concatenate([truth[:1], np.asarray(solved.x).reshape(-1, 3)])
+    assert np.abs(difference(smooth(start, constraints), dense)).max() < 1e-4
+
+
+@given(seeds)
+def test_the_first_pose_stays_where_it_is(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    x = rng.uniform(-3, 3, (5, 3))
+    constraints = [
+        Constraint(i, i + 1, Pose(*rng.uniform(-1, 1, 3)), random_information(rng))
+        for i in range(4)
+    ]
+    assert smooth(x, constraints)[0] == pytest.approx(x[0], abs=1e-6)
+
+
+def test_a_chain_without_a_loop_is_dead_reckoning() -> None:
+    steps = [Pose(1.0, 0.1, 0.5), Pose(0.5, 0.0, -1.0), Pose(2.0, -0.3, 3.0)]
+    poses = [Pose(1.0, 2.0, 0.3)]
+    for step in steps:
+        poses.append(poses[-1].compose(step))
+    start = np.array([[p.x + 0.3 * (i > 0), p.y, p.theta] for i, p in enumerate(poses)])
+    constraints = [Constraint(i, i + 1, step, np.eye(3)) for i, step in enumerate(steps)]
+    expected = np.array([[p.x, p.y, p.theta] for p in poses])
+    assert np.abs(difference(smooth(start, constraints), expected)).max() < 1e-6
+
+
+def test_a_position_measurement_leaves_the_heading_to_others() -> None:
+    """A vertex seen without its heading: information 0 there, and the heading of another sight."""
+    place_only = np.diag([100.0, 100.0, 0.0])
+    constraints = [
+        Constraint(0, 1, Pose(1.0, 0.0, 0.5), np.diag([100.0, 100.0, 100.0])),
+        Constraint(0, 1, Pose(1.2, 0.0, -2.0), place_only),
+    ]
+    x = smooth(np.zeros((2, 3)), constraints)
+    assert x[1] == pytest.approx([1.1, 0.0, 0.5], abs=1e-6)
+
+
+def test_a_loop_closure_spreads_the_error_evenly_over_equal_steps() -> None:
+    """Ten steps of 1.02 m measured on a way of 10 m known exactly: every step is 1 m."""
+    constraints = [Constraint(i, i + 1, Pose(1.02, 0.0, 0.0), np.eye(3)) for i in range(10)]
+    constraints.append(Constraint(0, 10, Pose(10.0, 0.0, 0.0), 1e8 * np.eye(3)))
+    start = np.stack([np.arange(11) * 1.02, np.zeros(11), np.zeros(11)], axis=1)
+    assert smooth(start, constraints)[:, 0] == pytest.approx(np.arange(11.0), abs=1e-5)
+
+
+def test_without_constraints_nothing_moves() -> None:
+    x = np.arange(9.0).reshape(3, 3)
+    assert np.array_equal(smooth(x, []), x)
+
+
+def test_the_poses_handed_in_are_left_alone() -> None:
+    x = np.zeros((2, 3))
+    smooth(x, [Constraint(0, 1, Pose(1.0, 0.0, 0.0), np.eye(3))])
+    assert not x.any()
