@@ -16,6 +16,7 @@ from gvgbot.drivers.kobuki.twin import KobukiTwinConfig
 from gvgbot.hal.guard import GuardConfig
 from gvgbot.ranges import Range
 from gvgbot.strict_yaml import load
+from gvgbot.topics import TelemetryConfig
 
 DEFAULT = "sim.yaml"
 NAME = re.compile(r"[A-Za-z0-9_-]+")
@@ -57,6 +58,7 @@ class Config:
     twin: TwinConfig = field(default_factory=TwinConfig)
     autonomy: AutonomyConfig = field(default_factory=AutonomyConfig)
     exploration: ExplorationConfig = field(default_factory=ExplorationConfig)
+    telemetry: TelemetryConfig = field(default_factory=TelemetryConfig)
 
 
 def load_config(path: Path | None = None, overrides: Sequence[str] = ()) -> Config:

@@ -25,6 +25,9 @@ from gvgbot.geometry import Array, Pose
 from gvgbot.ranges import Range
 
 
+_CLOSE_M = 1.5  # as near as one needs to be to tell vertices apart
+_PASSED_M = 1.0  # the robot has been through a point of its edge if it was this near
+_LEFT_BEHIND_M = 1.5  # and has left it if it is so much farther away now
 _REGISTRATION_FLOOR = np.diag(
     [0.02**2, 0.02**2, 0.003**2]
 )  # what registration cannot know of itself
@@ -87,12 +90,13 @@ class Correspondence:
 
 @dataclass(slots=True, eq=False)
 class _Tentative:
-    """A vertex seen, but not often enough."""
+    """A vertex seen, but not often enough; `nearest` is how near to it the robot has been, m."""
 
     position: Array
     meetpoint: bool
     seen_at: float
-    sightings: int = 1
+    nearest: float = math.inf
+    sightings: int = 0
 
 
 class Mapper:
@@ -135,7 +139,7 @@ class Mapper:
         return {
             key: _sighting(view.gvg, node)
             for key, node in view.gvg.nodes.items()
-            if (node.is_meetpoint or node.is_endpoint)
+            if (node.is_meetpoint or node.is_endpoint or node.is_suspect)
             and np.hypot(*(node.position - base)) < self._config.trust_m
         }
 
@@ -221,21 +225,31 @@ class Mapper:
         for node, sighting in sightings.items():
             if node in known.vertex_of:
                 continue
-            tentative = self._remember(view, sighting)
-            needed = (
-                self._config.meetpoint_sightings
-                if sighting.meetpoint
-                else self._config.endpoint_sightings
-            )
-            near = np.hypot(*(sighting.position - view.local_base.position)) < 1.5
-            if tentative.sightings < needed or self._crowded(view, sighting):
+            away = float(np.hypot(*(sighting.position - view.local_base.position)))
+            tentative = self._remember(view, sighting, away)
+            if not self._believable(tentative, sighting, view.gvg.nodes[node], away):
                 continue
-            if self._candidates(view, sighting) and not (
-                near and tentative.sightings >= 2 * needed
-            ):
+            doubled = 2 * self._config.meetpoint_sightings
+            examined = away < _CLOSE_M and tentative.sightings >= doubled
+            if self._crowded(view, sighting) or (self._candidates(view, sighting) and not examined):
                 continue  # it may be a known one: look at it from closer
             self._tentative.remove(tentative)
             known.pair(node, self._add(view, sighting).id)
+
+    def _believable(
+        self, tentative: _Tentative, sighting: Sighting, node: LocalNode, away: float
+    ) -> bool:
+        """Whether a vertex has been seen often enough; a suspect must have been passed, too.
+
+        A side edge that could not be seen to the end while passing is not forgotten: it becomes a
+        frontier, and a closer look decides.
+        """
+        config = self._config
+        if node.is_suspect:
+            passed = tentative.nearest < _PASSED_M and away > tentative.nearest + _LEFT_BEHIND_M
+            return passed and tentative.sightings >= config.meetpoint_sightings
+        needed = config.meetpoint_sightings if sighting.meetpoint else config.endpoint_sightings
+        return tentative.sightings >= needed
 
     def _crowded(self, view: View, sighting: Sighting) -> bool:
         """Whether a vertex of this kind that is in sight stands here already."""
@@ -247,18 +261,21 @@ class Mapper:
             and sighting.meetpoint == (vertex.kind == "meetpoint")
         )
 
-    def _remember(self, view: View, sighting: Sighting) -> _Tentative:
+    def _remember(self, view: View, sighting: Sighting, away: float) -> _Tentative:
         self._tentative = [t for t in self._tentative if view.travelled - t.seen_at < 12.0]
         for tentative in self._tentative:
             if (
                 tentative.meetpoint == sighting.meetpoint
                 and np.hypot(*(tentative.position - sighting.position)) < 0.5
             ):
-                tentative.position, tentative.seen_at = sighting.position, view.travelled
-                tentative.sightings += 1
-                return tentative
-        self._tentative.append(_Tentative(sighting.position, sighting.meetpoint, view.travelled))
-        return self._tentative[-1]
+                break
+        else:
+            tentative = _Tentative(sighting.position, sighting.meetpoint, view.travelled)
+            self._tentative.append(tentative)
+        tentative.position, tentative.seen_at = sighting.position, view.travelled
+        tentative.nearest = min(tentative.nearest, away)
+        tentative.sightings += 1
+        return tentative
 
     def _add(self, view: View, sighting: Sighting) -> Vertex:
         kind: Kind = "meetpoint" if sighting.meetpoint else "endpoint"
@@ -323,21 +340,23 @@ class Mapper:
     def _match_half_edges(
         self, view: View, node: LocalNode, vertex: Vertex, known: Correspondence
     ) -> None:
-        branches = [b for b in node.branches if b not in node.weak]
+        """Pair the branches of a node with the half-edges of its vertex; certain new ones are added."""
+        branches = sorted(node.branches, key=lambda branch: branch in node.weak)
         bearings = tuple(view.gvg.bearing(b, node.clearance) for b in branches)
         turned = {k: h.bearing + vertex.local.theta for k, h in vertex.half_edges.items()}
-        matched = match_bearings(bearings, turned, math.radians(self._recognition.bearing_deg))
-        for i, key in matched.items():
-            half = vertex.half_edges[key]
-            half.sightings += 1
-            half.misses = 0
-            known.pair_branch(branches[i], HalfEdgeId(vertex.id, key))
-        for i, bearing in enumerate(bearings):
-            if i not in matched:
-                key = vertex.add_half_edge(bearing - vertex.local.theta)
-                known.pair_branch(branches[i], HalfEdgeId(vertex.id, key))
+        limit = math.radians(self._recognition.bearing_deg)
+        matched = match_bearings(bearings, turned, limit)
+        seen = set(matched.values())
+        for i, branch in enumerate(branches):
+            if i in matched:
+                vertex.half_edges[matched[i]].misses = 0
+                known.pair_branch(branch, HalfEdgeId(vertex.id, matched[i]))
+            elif branch not in node.weak:
+                key = vertex.add_half_edge(bearings[i] - vertex.local.theta)
+                seen.add(key)
+                known.pair_branch(branch, HalfEdgeId(vertex.id, key))
         if node.settled:
-            self._doubt_half_edges(vertex, set(matched.values()), len(branches))
+            self._doubt_half_edges(vertex, seen, node.degree)
 
     def _doubt_half_edges(self, vertex: Vertex, seen: set[int], degree: int) -> None:
         """Drop departures that a clear view keeps not showing."""
@@ -357,9 +376,33 @@ class Mapper:
             if self._passes_through(view, vertex):
                 vertex.misses += 1
                 if vertex.misses > self._config.misses:
-                    self.graph.remove_vertex(vertex.id)
-                    self.belief = ekf.remove_vertex(self.belief, vertex.id)
-                    self._events.append(VertexRemoved(view.stamp, vertex.id, "an edge passes here"))
+                    self._remove(view, vertex)
+
+    def _remove(self, view: View, vertex: Vertex) -> None:
+        """Take a vertex out; of two edges that met there one is made."""
+        ends = [HalfEdgeId(vertex.id, key) for key, h in vertex.half_edges.items() if h.edge is not None]
+        joined = [self.graph.edges[vertex.half_edges[end.key].edge or 0] for end in ends]
+        self.graph.remove_vertex(vertex.id)
+        if len(joined) == 2 and joined[0] is not joined[1]:
+            far = [edge.other(end) for edge, end in zip(joined, ends, strict=True)]
+            lines = [
+                self._outwards(edge, end, far_end)
+                for edge, end, far_end in zip(joined, ends, far, strict=True)
+            ]
+            line = np.concatenate([lines[0][::-1], lines[1][1:]])
+            start = self._place_of(far[0].vertex).inverse().transform(line)
+            clearance = min(edge.min_clearance for edge in joined)
+            self.graph.join(*far, start, clearance, driven=all(edge.driven for edge in joined))
+        self.belief = ekf.remove_vertex(self.belief, vertex.id)
+        self._events.append(VertexRemoved(view.stamp, vertex.id, "an edge passes here"))
+
+    def _place_of(self, vertex: int) -> Pose:
+        return self.belief.map_vertex(vertex)
+
+    def _outwards(self, edge: Edge, end: HalfEdgeId, far: HalfEdgeId) -> Array:
+        """Polyline (N, 2) of an edge from one of its ends, map frame."""
+        line = self._place_of(edge.a.vertex).transform(edge.polyline)
+        return line if edge.a == end and far == edge.b else line[::-1]
 
     def _passes_through(self, view: View, vertex: Vertex) -> bool:
         if np.hypot(*(vertex.local.position - view.local_base.position)) > 4.0:
@@ -421,7 +464,8 @@ def _turned(covariance: Array, angle: float) -> Array:
 
 
 def _sighting(gvg: LocalGvg, node: LocalNode) -> Sighting:
-    bearings = tuple(
-        gvg.bearing(branch, node.clearance) for branch in node.branches if branch not in node.weak
-    )
-    return Sighting(node.position, node.clearance, bearings, node.is_meetpoint)
+    branches = node.branches if node.is_suspect else [b for b in node.branches if b not in node.weak]
+    bearings = [gvg.bearing(branch, node.clearance) for branch in branches]
+    if node.is_suspect and node.lead is not None:
+        bearings.append(node.lead)
+    return Sighting(node.position, node.clearance, tuple(bearings), not node.is_endpoint)

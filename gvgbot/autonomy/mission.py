@@ -75,6 +75,7 @@ class Mission:
         self._travelled_then = 0.0
         self._looked_around = 0
         self._lost_since: float | None = None
+        self._stranded_since: float | None = None
         self._events: list[Event] = []
 
     def advance(self, view: View, known: Correspondence) -> tuple[Order, list[Event]]:
@@ -122,10 +123,12 @@ class Mission:
             self.target = self._choose(view, here)
         if self.outcome is not None:
             return Stand()
+        if self.target is None and graph.frontiers():
+            return self._wait_for_a_way(view, here)
         path = here.ahead() if self.target is None else here.path_to(self.target)
         if path is None:
-            self._give_up(view, "no way leads there")
-            return Stand()
+            return self._wait_for_a_way(view, here)
+        self._stranded_since = None
         return self._drive(view, here, path)
 
     def _choose(self, view: View, here: Situation) -> HalfEdgeId | None:
@@ -139,6 +142,7 @@ class Mission:
             if nearest is None:
                 self._finish(view)
                 return None
+            self._stranded_since = None
             chosen, reason = nearest[0], "nearest frontier"
         self._commit(view, here, chosen, reason)
         return chosen
@@ -162,12 +166,22 @@ class Mission:
         bearing = vertex.half_edges[chosen.key].bearing + psi
         self._events.append(Decision(view.stamp, chosen.vertex, bearing, reason))
 
+    def _wait_for_a_way(self, view: View, here: Situation) -> Order:
+        """Drive on until a known vertex comes into sight, before a frontier is given up."""
+        if self._stranded_since is None:
+            self._stranded_since = view.stamp
+            self._events.append(Recovery(view.stamp, "drive on", "no way leads to the frontier"))
+        if view.stamp - self._stranded_since > self._config.patience_s:
+            self._stranded_since = None
+            self._give_up(view, "no way leads there")
+        return self._drive(view, here, here.ahead())
+
     def _drive(self, view: View, here: Situation, path: tuple[Branch, ...]) -> Order:
         track = Track.of(*view.gvg.line_from(here.place, path))
         end = view.gvg.end_of(path[-1])
         blind = end not in here.known.vertex_of
         waited = view.stamp - self._last_progress
-        if blind and track.length < 0.3 and waited > self._config.look_around_s:
+        if track.length < 0.3 and waited > self._config.look_around_s:
             self._last_progress = view.stamp
             self._looked_around += 1
             if self._looked_around > 2:
@@ -211,8 +225,12 @@ class Mission:
         return LookAround(math.tau)
 
     def _finish(self, view: View) -> None:
+        """No frontier can be reached; if there are any, only after having looked around for a way."""
         graph = self._mapper.graph
         if graph.frontiers():
+            since = self._stranded_since
+            if since is None or view.stamp - since < self._config.patience_s:
+                return
             self._end(
                 view,
                 "explored_with_blocked",

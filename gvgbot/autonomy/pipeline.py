@@ -267,10 +267,10 @@ def smoothed(pipeline: Pipeline) -> tuple[list[Pose], dict[int, Pose]]:
     start = [k.map_base for k in keyframes] + [mapper.belief.map_vertex(v) for v in ids]
     constraints = [
         Constraint(i, i + 1, step.motion, np.linalg.inv(step.covariance))
-        for i, step in enumerate(pipeline.steps)
+        for i, step in enumerate(pipeline.steps[: len(keyframes) - 1])
     ]
     for seen in mapper.observations:
-        if seen.vertex in ids:
+        if seen.vertex in ids and seen.keyframe < len(keyframes):
             information = np.zeros((3, 3))
             k = len(seen.R)
             information[:k, :k] = np.linalg.inv(seen.R)

@@ -40,13 +40,14 @@ class Branch(NamedTuple):
 class LocalNode:
     """A point where edges meet or stop.
 
-    `open` = the diagram goes on from here into space not yet seen. `weak` = branches too short to be
-    told from a corner as long as they are not wholly seen; they do not count towards `degree`.
+    `lead` = direction (rad) in which the diagram goes on from here into space not yet seen. `weak` =
+    branches too short to be told from a corner as long as they are not wholly seen; they do not count
+    towards `degree`.
     """
 
     position: Array
     clearance: float
-    open: bool
+    lead: float | None
     branches: tuple[Branch, ...]
     weak: frozenset[Branch]
 
@@ -58,12 +59,17 @@ class LocalNode:
     @property
     def settled(self) -> bool:
         """Whether nothing unseen could change the departures."""
-        return not self.open and not self.weak
+        return self.lead is None and not self.weak
 
     @property
     def is_meetpoint(self) -> bool:
         """Whether three or more certain edges leave here."""
         return self.degree >= 3
+
+    @property
+    def is_suspect(self) -> bool:
+        """Whether this is a point of an edge where one more edge may leave into unseen space."""
+        return self.degree == 2 and not self.settled
 
     @property
     def is_endpoint(self) -> bool:

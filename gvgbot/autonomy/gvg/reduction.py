@@ -5,6 +5,7 @@ right-angled corner it is 1.41; a dead end worth a visit has more. Reach only gr
 branch is seen, so for a branch that ends in unseen space it is a lower bound.
 """
 
+import math
 from dataclasses import dataclass, field
 from typing import Annotated
 
@@ -24,9 +25,7 @@ class ReductionConfig:
 
     min_reach: Annotated[float, Range(1.45, 4.0)] = 1.85  # shorter dangling branches are corners
     merge_m: Annotated[float, Range(0.0, 2.0)] = 0.6  # meetpoints closer than this are one
-    chord_ratio: Annotated[float, Range(0.5, 1.2)] = (
-        0.9  # an edge's obstacles are this far apart, in clearances
-    )
+    chord_ratio: Annotated[float, Range(0.2, 1.2)] = 0.5  # least gap between an edge's obstacles, in clearances
 
 
 @dataclass(slots=True, eq=False)
@@ -46,7 +45,7 @@ class _Draft:
 
     position: dict[int, Array]
     clearance: dict[int, float]
-    open: dict[int, bool]
+    lead: dict[int, float | None]
     chains: dict[int, _Chain] = field(default_factory=dict)
     ends: dict[int, list[tuple[int, bool]]] = field(default_factory=dict)  # (chain, leaves its a)
     serial: int = 0
@@ -64,7 +63,10 @@ class _Draft:
         return chain
 
     def degree(self, node: int) -> int:
-        return len(self.ends[node]) + self.open[node]
+        return len(self.ends[node]) + self.open(node)
+
+    def open(self, node: int) -> bool:
+        return self.lead[node] is not None
 
     def reach(self, leaf: int) -> tuple[float, int, int]:
         """Reach of the branch that ends at a leaf, its base and its chain."""
@@ -99,6 +101,7 @@ def reduce_graph(fine: FineGraph, config: ReductionConfig) -> LocalGvg:
     _prune(draft, config.min_reach)
     _merge(draft, config.merge_m)
     _prune(draft, config.min_reach)
+    _doubt_stumps(draft, config.min_reach)
     return _finish(draft, config.min_reach)
 
 
@@ -108,13 +111,14 @@ def _contract(fine: FineGraph) -> _Draft:
     for a, b in fine.ridges.tolist():
         neighbours[a].append(b)
         neighbours[b].append(a)
-    keys = [i for i, n in enumerate(neighbours) if len(n) != 2 or fine.open_ended[i]]
+    lead = [None if math.isnan(angle) else angle for angle in fine.lead.tolist()]
+    keys = [i for i, n in enumerate(neighbours) if len(n) != 2 or lead[i] is not None]
     if not keys and neighbours:
         keys = [0]  # a ring without a vertex
     draft = _Draft(
         {i: fine.points[i] for i in keys},
         {i: float(fine.clearance[i]) for i in keys},
-        {i: bool(fine.open_ended[i]) for i in keys},
+        {i: lead[i] for i in keys},
         ends={i: [] for i in keys},
     )
     is_key = set(keys)
@@ -142,7 +146,7 @@ def _prune(draft: _Draft, min_reach: float) -> None:
     while True:
         doomed = []
         for node, ends in draft.ends.items():
-            if len(ends) == 1 and not draft.open[node]:
+            if len(ends) == 1 and not draft.open(node):
                 reach, base, key = draft.reach(node)
                 if reach < min_reach and draft.degree(base) >= 3:
                     doomed.append((node, base, key))
@@ -152,8 +156,20 @@ def _prune(draft: _Draft, min_reach: float) -> None:
             draft.remove(key)
             del draft.ends[node]
         for base in dict.fromkeys(base for _, base, _ in doomed):
-            if base in draft.ends and len(draft.ends[base]) == 2 and not draft.open[base]:
+            if base in draft.ends and len(draft.ends[base]) == 2 and not draft.open(base):
                 draft.splice(base)
+
+
+def _doubt_stumps(draft: _Draft, min_reach: float) -> None:
+    """What is seen of a branch from its tip up to where sight ends may be nothing but a corner."""
+    for node, ends in draft.ends.items():
+        if len(ends) == 1 and not draft.open(node):
+            reach, base, key = draft.reach(node)
+            if reach < min_reach and len(draft.ends[base]) == 1:
+                chain = draft.chains[key]
+                way = chain.points[0] - chain.points[-1]
+                inwards = way if chain.a == node else -way
+                draft.lead[node] = math.atan2(inwards[1], inwards[0])
 
 
 def _merge(draft: _Draft, merge_m: float) -> None:
@@ -171,7 +187,8 @@ def _merge(draft: _Draft, merge_m: float) -> None:
         centre = (draft.position[keep] + draft.position[gone]) / 2
         draft.position[keep] = centre
         draft.clearance[keep] = min(draft.clearance[keep], draft.clearance[gone])
-        draft.open[keep] = draft.open[keep] or draft.open[gone]
+        if draft.lead[keep] is None:
+            draft.lead[keep] = draft.lead[gone]
         for key, out in draft.ends.pop(gone):
             end = draft.chains[key]
             if out:
@@ -196,22 +213,18 @@ def _finish(draft: _Draft, min_reach: float) -> LocalGvg:
     nodes = {}
     for node, ends in draft.ends.items():
         branches = tuple(Branch(key, out) for key, out in ends)
-        weak = (
-            frozenset(branch for branch in branches if _is_weak(draft, branch, node, min_reach))
-            if len(branches) + draft.open[node] >= 3
-            else frozenset()
-        )
+        weak = frozenset(b for b in branches if _is_weak(draft, b, node, min_reach))
         nodes[node] = LocalNode(
-            draft.position[node], draft.clearance[node], draft.open[node], branches, weak
+            draft.position[node], draft.clearance[node], draft.lead[node], branches, weak
         )
     return LocalGvg(nodes, edges)
 
 
 def _is_weak(draft: _Draft, branch: Branch, node: int, min_reach: float) -> bool:
-    """Whether a branch ends open, and too soon to be told from a corner."""
+    """Whether a branch ends where sight does, too soon to be told from a corner."""
     chain = draft.chains[branch.edge]
     tip = chain.b if branch.forward else chain.a
-    if tip == node or len(draft.ends[tip]) != 1 or not draft.open[tip]:
+    if tip == node or len(draft.ends[tip]) != 1 or not draft.open(tip) or draft.degree(node) < 3:
         return False
     return (chain.length() + draft.clearance[tip]) / draft.clearance[node] < min_reach
 

@@ -23,17 +23,17 @@ _MAX_UNKNOWN = 1  # of the sampled points of a disc
 class FineGraph:
     """Voronoi vertices and ridges of one connected piece, local frame.
 
-    points (N, 2) m, clearance (N,) m, ridges (M, 2) indices into points, and for each point whether
-    the diagram goes on from there into unknown space.
+    points (N, 2) m, clearance (N,) m, ridges (M, 2) indices into points, and for each point the
+    direction (rad) in which the diagram goes on from there into unknown space, NaN if it does not.
     """
 
     points: Array
     clearance: Array
     ridges: NDArray[np.int64]
-    open_ended: NDArray[np.bool_]
+    lead: Array
 
 
-EMPTY = FineGraph(np.empty((0, 2)), np.empty(0), np.empty((0, 2), np.int64), np.empty(0, bool))
+EMPTY = FineGraph(np.empty((0, 2)), np.empty(0), np.empty((0, 2), np.int64), np.empty(0))
 
 
 def fine_graph(
@@ -55,12 +55,20 @@ def fine_graph(
     wide = clearance >= min_clearance
     certain = np.zeros(len(centres), bool)
     certain[wide] = _disc_is_known(local_map, centres[wide], clearance[wide])
-    a, b, chord = _ridges(triangles, generators)
-    narrower = np.minimum(clearance[a], np.where(b < 0, np.inf, clearance[b]))
-    parts = chord >= np.maximum(2 * min_clearance, chord_ratio * narrower)
-    a, b = a[parts], b[parts]
+    a, b, pair = _ridges(triangles)
+    p, q = generators[pair[:, 0]], generators[pair[:, 1]]
+    chord = np.hypot(*(p - q).T)
+    narrowest = _least_clearance(centres, clearance, a, b, p, q)
+    parts = chord >= np.maximum(2 * min_clearance, chord_ratio * narrowest)
+    a, b, p, q = a[parts], b[parts], p[parts], q[parts]
     joined = certain[a] & (b >= 0) & certain[b]
-    return _piece_of_robot(centres, clearance, a, b, joined, certain, wide, robot)
+    lead = np.full(len(centres), np.nan)
+    for here, there in ((a, b), (b, a)):
+        out = (here >= 0) & certain[here] & ((there < 0) | (wide[there] & ~certain[there]))
+        goal = np.where((there < 0)[:, None], (p + q) / 2, centres[there])[out]
+        towards = goal - centres[here[out]]
+        lead[here[out]] = np.arctan2(towards[:, 1], towards[:, 0])
+    return _piece_of_robot(centres, clearance, np.stack([a[joined], b[joined]], axis=1), lead, robot)
 
 
 def _circumcircles(corners: Array) -> tuple[Array, Array]:
@@ -84,39 +92,39 @@ def _disc_is_known(local_map: LocalMap, centres: Array, radii: Array) -> NDArray
     return (~local_map.known(samples)).sum(axis=1) <= _MAX_UNKNOWN
 
 
-def _ridges(
-    triangles: Delaunay, generators: Array
-) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
-    """Triangle pairs (a, b) that share an edge, b = -1 at the hull, and the edge's length."""
+def _ridges(triangles: Delaunay) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int32]]:
+    """Triangle pairs (a, b) that share an edge, b = -1 at the hull, and the edge's two generators."""
     own = np.repeat(np.arange(len(triangles.simplices)), 3)
     other = triangles.neighbors.ravel().astype(np.int64)
     pair = triangles.simplices[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2)
     once = (own < other) | (other < 0)
-    own, other, pair = own[once], other[once], pair[once]
-    gap = generators[pair[:, 0]] - generators[pair[:, 1]]
-    return own, other, np.hypot(gap[:, 0], gap[:, 1])
+    return own[once], other[once], pair[once]
+
+
+def _least_clearance(
+    centres: Array, clearance: Array, a: NDArray[np.int64], b: NDArray[np.int64], p: Array, q: Array
+) -> Array:
+    """Least clearance along ridges from centre a to centre b between the generators p and q.
+
+    A ridge that passes between its generators is a door: it is as wide as half their distance there.
+    """
+    far = np.where((b < 0)[:, None], 2 * p - centres[a], centres[b])
+    middle = (p + q) / 2
+    between = ((centres[a] - middle) * (far - middle)).sum(axis=1) < 0
+    ends = np.minimum(clearance[a], np.where(b < 0, np.inf, clearance[b]))
+    return np.where(between, np.hypot(*(p - q).T) / 2, ends)
 
 
 def _piece_of_robot(
-    centres: Array,
-    clearance: Array,
-    a: NDArray[np.int64],
-    b: NDArray[np.int64],
-    joined: NDArray[np.bool_],
-    certain: NDArray[np.bool_],
-    wide: NDArray[np.bool_],
-    robot: Array,
+    centres: Array, clearance: Array, ridges: NDArray[np.int64], lead: Array, robot: Array
 ) -> FineGraph:
-    nodes = np.unique(np.concatenate([a[joined], b[joined]]))
+    """The connected piece that is nearest to the robot."""
+    nodes = np.unique(ridges)
     if len(nodes) == 0:
         return EMPTY
-    open_ended = np.zeros(len(centres), bool)
-    for here, there in ((a, b), (b, a)):
-        leads_out = (here >= 0) & certain[here] & ((there < 0) | (wide[there] & ~certain[there]))
-        open_ended[here[leads_out]] = True
     number = np.full(len(centres), -1)
     number[nodes] = np.arange(len(nodes))
-    ridges = np.stack([number[a[joined]], number[b[joined]]], axis=1)
+    ridges = number[ridges]
     n = len(nodes)
     links = coo_array((np.ones(len(ridges)), (ridges[:, 0], ridges[:, 1])), (n, n))
     _, piece = connected_components(links, directed=False)
@@ -130,5 +138,5 @@ def _piece_of_robot(
         centres[nodes[keep]],
         clearance[nodes[keep]],
         renumber[ridges[inside]],
-        open_ended[nodes[keep]],
+        lead[nodes[keep]],
     )

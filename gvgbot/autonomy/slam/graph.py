@@ -29,7 +29,6 @@ class HalfEdge:
     bearing: float
     edge: int | None = None
     blocked: bool = False
-    sightings: int = 1
     misses: int = 0
 
     @property

@@ -1,0 +1,143 @@
+"""Devices that are opened again when they are lost, for a daemon that must not give up."""
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Generic, Protocol, TypeVar
+
+import structlog
+
+from gvgbot.clock import Clock
+from gvgbot.errors import DeviceLost, DeviceRefused
+from gvgbot.geometry import STANDSTILL, Pose, Twist
+from gvgbot.hal.devices import Base, Laser
+from gvgbot.hal.latest import Latest
+from gvgbot.hal.messages import Battery, Contact, Odometry, Scan
+
+FIRST_RETRY, LAST_RETRY = 0.5, 5.0  # s; each wait is twice the one before
+
+log = structlog.get_logger()
+
+
+class _Device(Protocol):
+    async def run(self) -> None: ...
+
+
+D = TypeVar("D", bound=_Device)
+Opened = tuple[D, Callable[[], None]]  # the device, and what gives its link up
+
+
+class _Reopening(Generic[D]):
+    """Opens a device, serves it until it is lost, waits a while, and so on until cancelled.
+
+    `away` says why the device cannot be used just now; None when it can.
+    """
+
+    def __init__(self, name: str, open_device: Callable[[], Opened[D]], clock: Clock) -> None:
+        """`open_device` raises DeviceLost when that is not possible."""
+        self.away: str | None = "not there yet"
+        self._name, self._open, self._clock = name, open_device, clock
+        self._retry = FIRST_RETRY
+        self._since: float | None = None  # when it was lost; None before it was ever there
+        self._device: D | None = None
+
+    async def run(self) -> None:
+        """Serve the device until cancelled, whatever happens to it."""
+        while True:
+            try:
+                await self._serve()
+            except* (DeviceLost, DeviceRefused) as failures:
+                self._lost(_text(failures))
+            await self._clock.sleep_until(self._clock.now() + self._retry)
+            self._retry = min(2 * self._retry, LAST_RETRY)
+
+    async def _serve(self) -> None:
+        device, close = self._open()
+        try:
+            async with asyncio.TaskGroup() as tasks:
+                self._device = device
+                tasks.create_task(device.run(), name=self._name)
+                tasks.create_task(self._pass_on(device), name=f"{self._name} values")
+        finally:
+            self._device = None  # a closed link must not be written to: its number may be reused
+            close()
+
+    async def _pass_on(self, device: D) -> None:
+        raise NotImplementedError
+
+    def _lost(self, reason: str) -> None:
+        if reason != self.away:
+            event = f"{self._name} lost" if self.away is None else f"waiting for the {self._name}"
+            log.warning(event, reason=reason)
+        if self.away is None:
+            self._since = self._clock.now()
+        self.away = reason
+
+    def _heard(self) -> None:
+        """Note that a value has come."""
+        if self.away is None:
+            return
+        after = None if self._since is None else round(self._clock.now() - self._since, 1)
+        log.info(f"{self._name} is there" if after is None else f"{self._name} back", after_s=after)
+        self.away, self._retry = None, FIRST_RETRY
+
+
+class ReopeningLaser(_Reopening[Laser]):
+    """A laser that is lost only for a while."""
+
+    def __init__(self, open_device: Callable[[], Opened[Laser]], clock: Clock) -> None:
+        super().__init__("laser", open_device, clock)
+        self._scans: Latest[Scan] = Latest()
+
+    async def next_scan(self) -> Scan:
+        """The newest scan not handed out before; waits for one."""
+        return await self._scans.next()
+
+    async def _pass_on(self, device: Laser) -> None:
+        while True:
+            self._scans.put(await device.next_scan())
+            self._heard()
+
+
+class ReopeningBase(_Reopening[Base]):
+    """A base that is lost only for a while; its odometry goes on from where it ended.
+
+    What moved the robot while nobody listened to it is not in there.
+    """
+
+    def __init__(self, open_device: Callable[[], Opened[Base]], clock: Clock) -> None:
+        super().__init__("base", open_device, clock)
+        self._newest: Latest[Odometry] = Latest()
+
+    async def next_odometry(self) -> Odometry:
+        """The newest odometry not handed out before; waits for one."""
+        return await self._newest.next()
+
+    def drive(self, twist: Twist) -> Twist:
+        """Send the twist now; what the base will really do."""
+        return STANDSTILL if self._device is None else self._device.drive(twist)
+
+    @property
+    def contact(self) -> Contact | None:
+        """The newest contact state, None before the first."""
+        return None if self._device is None else self._device.contact
+
+    @property
+    def battery(self) -> Battery | None:
+        """The newest battery state, None before the first."""
+        return None if self._device is None else self._device.battery
+
+    async def _pass_on(self, device: Base) -> None:
+        last, first = self._newest.value, await device.next_odometry()
+        # odom_base of now = where it ended, and the motion since the device was opened again
+        origin = (last.odom_base if last else Pose()).compose(first.odom_base.inverse())
+        odometry = first
+        while True:
+            self._newest.put(replace(odometry, odom_base=origin.compose(odometry.odom_base)))
+            self._heard()
+            odometry = await device.next_odometry()
+
+
+def _text(failures: BaseExceptionGroup[Exception]) -> str:
+    failure = failures.exceptions[0]
+    return _text(failure) if isinstance(failure, BaseExceptionGroup) else str(failure)

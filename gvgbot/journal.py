@@ -1,0 +1,67 @@
+"""What is worth a line in the log: changes of state, each once, and nothing per cycle."""
+
+from dataclasses import dataclass
+
+import structlog
+
+from gvgbot.autonomy import events
+from gvgbot.topics import State
+
+PASSING_S = 1.0  # an obstacle that holds the robot for less is part of driving
+
+log = structlog.get_logger()
+
+
+def log_event(event: events.Event) -> None:
+    """A line for what people want to know; the rest is in the list of events."""
+    match event:
+        case events.VertexAdded():
+            log.info(
+                "vertex added",
+                vertex=event.vertex,
+                kind=event.kind,
+                x=round(event.x, 2),
+                y=round(event.y, 2),
+            )
+        case events.LoopClosed():
+            log.info("loop closed", vertex=event.vertex, away_m=round(event.away_m, 1))
+        case events.Recovery():
+            log.info("recovery", action=event.action, reason=event.reason)
+        case events.Finished():
+            log.info("finished", outcome=event.outcome, reason=event.reason)
+        case _:
+            pass
+
+
+@dataclass(slots=True)
+class GuardJournal:
+    """Says when the guard holds the robot, and when it lets go again."""
+
+    _reason: str | None = None
+    _since: float = 0.0  # stamp
+    _said: str | None = None
+
+    def note(self, reason: str | None, stamp: float) -> None:
+        """Take note of what the guard did in the control cycle at a stamp, s."""
+        if reason == "obstacle near":  # it slows the robot down, it does not hold it
+            reason = None
+        if reason != self._reason:
+            self._reason, self._since = reason, stamp
+        if reason == self._said or (
+            reason in (None, "obstacle") and stamp - self._since < PASSING_S
+        ):
+            return
+        if reason is None:
+            log.info("guard released", was=self._said)
+        else:
+            log.warning("guard stopped", reason=reason)
+        self._said = reason
+
+
+def status_line(state: State) -> str:
+    """The state in a few words, for the service manager."""
+    if state.phase == "starting":
+        return f"starting: {state.reason}" if state.reason else "starting"
+    graph = f"{state.vertices} vertices, {state.frontiers} frontiers"
+    what = state.outcome or state.phase
+    return f"{what}: {state.reason}; {graph}" if state.reason else f"{what}: {graph}"

@@ -1,0 +1,55 @@
+"""Drivers on the links of a configuration: serial ports, or the twins of a simulation."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from gvgbot.clock import Clock
+from gvgbot.config import Config
+from gvgbot.drivers.hokuyo.driver import HokuyoLaser
+from gvgbot.drivers.kobuki.driver import KobukiBase
+from gvgbot.drivers.transport import ByteStream, SerialStream
+from gvgbot.errors import DeviceLost
+from gvgbot.simulation import Simulation
+
+Close = Callable[[], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Links:
+    """Opens devices, as often as they are lost; without a simulation they are real."""
+
+    config: Config
+    clock: Clock
+    simulation: Simulation | None
+
+    def open_laser(self) -> tuple[HokuyoLaser, Close]:
+        """A laser to be run, and what closes its link. Raises DeviceLost."""
+        config = self.config.laser
+        if self.simulation is None:
+            stream, close = _open_port("laser", config.port, config.baud)
+        else:
+            stream, close = self.simulation.laser, _leave_open
+        return HokuyoLaser(stream, config, self.clock), close
+
+    def open_base(self) -> tuple[KobukiBase, Close]:
+        """A base to be run, and what closes its link. Raises DeviceLost."""
+        config = self.config.base
+        if self.simulation is None:
+            stream, close = _open_port("base", config.port, config.baud)
+        else:
+            stream, close = self.simulation.base, _leave_open
+            if self.config.twin.base.odometry == "wheels":
+                config = replace(config, heading="wheels")
+        return KobukiBase(stream, config, self.clock), close
+
+
+def _open_port(name: str, port: str, baud: int) -> tuple[ByteStream, Close]:
+    try:
+        stream = SerialStream(port, baud)
+    except DeviceLost as error:
+        raise DeviceLost(f"{error}: plug the {name} in, or set {name}.port") from error
+    return stream, stream.close
+
+
+def _leave_open() -> None:
+    """The twin stays at the other end."""

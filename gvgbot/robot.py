@@ -1,0 +1,195 @@
+"""The robot in real time: explores, stands when done, reports, saves, and outlives lost devices."""
+
+import asyncio
+import contextlib
+from collections.abc import Awaitable, Callable
+from typing import Protocol
+
+import structlog
+
+from gvgbot.autonomy import events
+from gvgbot.autonomy.loop import Loop
+from gvgbot.clock import Clock, LoopClock
+from gvgbot.errors import GvgbotError
+from gvgbot.geometry import STANDSTILL
+from gvgbot.hal.guard import Guard
+from gvgbot.hal.messages import Odometry
+from gvgbot.hal.reopening import ReopeningBase, ReopeningLaser
+from gvgbot.journal import GuardJournal, log_event, status_line
+from gvgbot.links import Links
+from gvgbot.service import Notifier
+from gvgbot.session import Session
+from gvgbot.simulation import Simulation
+from gvgbot.snapshots import state
+from gvgbot.topics import STATE, State
+
+SAVE_EVERY = 30.0  # s at least between two savings while the map grows
+STUCK_AFTER = 1.0  # s without a control cycle, though the base is there
+
+log = structlog.get_logger()
+
+
+class Network(Protocol):
+    """Where the robot is watched from."""
+
+    def publish(self, state: State) -> None:
+        """Send without waiting."""
+
+    async def answer(self) -> None:
+        """Answer queries until cancelled."""
+
+
+class Robot:
+    """One exploration as a daemon. `off_loop` runs a function that takes long, and waits for it."""
+
+    def __init__(
+        self,
+        session: Session,
+        notifier: Notifier,
+        network: Network | None,
+        off_loop: Callable[[Callable[[], None]], Awaitable[None]] = asyncio.to_thread,
+    ) -> None:
+        self._session, self._notifier = session, notifier
+        self._network, self._off_loop = network, off_loop
+        self._pipeline = session.pipeline
+        self._grown, self._finished = asyncio.Event(), asyncio.Event()
+        self._odometry: Odometry | None = None
+        self._cycles, self._sequence = 0, 0
+        self._ready = False
+        self._guard = GuardJournal()
+        self._clock: Clock
+        self._laser: ReopeningLaser
+        self._base: ReopeningBase
+        self._loop: Loop
+
+    # -- the tasks ---------------------------------------------------------------------------------
+
+    async def serve(self, stopped: Awaitable[str], links: Links | None = None) -> None:
+        """Live until `stopped` returns; the base stands still then.
+
+        Raises an ExceptionGroup of GvgbotError if the list of events cannot be written.
+        """
+        self._clock = LoopClock()
+        links = self._open_links() if links is None else links
+        self._prepare(links)
+        work = {
+            "laser": self._laser.run(),
+            "base": self._base.run(),
+            "explore": self._explore(),
+            "beat": self._beat(),
+            "save": self._keep_saved(),
+        }
+        if links.simulation is not None:
+            work["twins"] = links.simulation.run()
+        if self._network is not None:
+            work["network"] = self._network.answer()
+        async with asyncio.TaskGroup() as tasks:
+            serving = [tasks.create_task(task, name=name) for name, task in work.items()]
+            log.info("stopping", signal=await stopped)
+            self._notifier.stopping()
+            for task in serving:
+                task.cancel()
+
+    def _open_links(self) -> Links:
+        session = self._session
+        if session.place is not None:
+            session.simulation = Simulation(session.config, session.place, self._clock)
+        return Links(session.config, self._clock, session.simulation)
+
+    def _prepare(self, links: Links) -> None:
+        robot = self._session.config.robot
+        self._laser = ReopeningLaser(links.open_laser, self._clock)
+        self._base = ReopeningBase(links.open_base, self._clock)
+        self._loop = Loop(
+            self._laser,
+            self._base,
+            self._pipeline,
+            Guard(robot.limits, robot.radius_m),
+            on_events=self._on_events,
+            on_cycle=self._on_cycle,
+        )
+
+    async def _explore(self) -> None:
+        """Explore to the end, and then stand there."""
+        await self._loop.run()
+        self._finished.set()
+        self._grown.set()
+        while True:
+            self._note(await self._base.next_odometry())
+            self._base.drive(STANDSTILL)
+
+    async def _keep_saved(self) -> None:
+        """Save now and then while the map grows, and when it is finished."""
+        while not self._finished.is_set():
+            await self._grown.wait()
+            self._grown.clear()
+            await self._save()
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(SAVE_EVERY):
+                    await self._finished.wait()
+        await self._save()
+        log.info("standing still until stopped", map=str(self._session.directory.path))
+
+    async def _save(self) -> None:
+        try:
+            await self._off_loop(self._session.saving(unfinished="still exploring"))
+        except GvgbotError as error:
+            log.warning("map not saved", reason=str(error))
+
+    async def _beat(self) -> None:
+        """Tell everybody how things are, a few times a second."""
+        due = self._clock.now()
+        while True:
+            self._report()
+            due = max(due + 1.0 / STATE.rate_hz, self._clock.now())
+            await self._clock.sleep_until(due)
+
+    # -- what happens ------------------------------------------------------------------------------
+
+    def _on_events(self, happened: list[events.Event]) -> None:
+        self._session.on_events(happened)
+        for event in happened:
+            log_event(event)
+            if isinstance(event, events.VertexAdded):
+                self._grown.set()
+
+    def _on_cycle(self, odometry: Odometry) -> None:
+        self._note(odometry)
+        self._session.on_cycle(odometry, self._base.contact)
+        if not self._ready and self._pipeline.keyframes:  # a scan and odometry made the first
+            self._ready = True
+            self._notifier.ready()
+        if self._ready:
+            self._guard.note(self._loop.stopped_for, odometry.stamp)
+
+    def _note(self, odometry: Odometry) -> None:
+        self._odometry, self._cycles = odometry, self._cycles + 1
+
+    def _report(self) -> None:
+        """Publish the state; tell the service manager, unless the control loop is stuck."""
+        now = self._state()
+        self._sequence += 1
+        if self._network is not None:
+            self._network.publish(now)
+        self._notifier.status(status_line(now))
+        stuck = now.cycle_age is not None and now.cycle_age > STUCK_AFTER
+        if not stuck or self._base.away is not None:
+            self._notifier.alive()
+
+    def _state(self) -> State:
+        return state(
+            self._pipeline,
+            self._odometry,
+            self._base.battery,
+            stamp=self._clock.now(),
+            sequence=self._sequence,
+            cycles=self._cycles,
+            noise=self._session.config.autonomy.odometry_noise,
+            away=self._away(),
+            guard=self._loop.stopped_for,
+        )
+
+    def _away(self) -> str | None:
+        """Which devices are missing, and why; None if they are all there."""
+        devices = {"base": self._base.away, "laser": self._laser.away}
+        return "; ".join(f"no {name}: {why}" for name, why in devices.items() if why) or None

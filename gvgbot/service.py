@@ -1,0 +1,156 @@
+"""Life as a service: what systemd is told, the signals that end it, and the log."""
+
+import asyncio
+import contextlib
+import os
+import signal
+import socket
+from collections.abc import Callable, Mapping
+from functools import partial
+from types import TracebackType
+from typing import Any, Self, TextIO, cast
+
+import structlog
+from structlog.typing import EventDict, Processor, WrappedLogger
+
+_STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_SEVERITY = {"debug": 7, "info": 6, "warning": 4, "error": 3, "critical": 2}  # as syslog counts
+
+
+class Notifier:
+    """Tells the service manager how things are; does nothing if there is none."""
+
+    def __init__(self, address: str | None) -> None:
+        """`address` is a socket's path, or `@` and an abstract name; None: nobody listens."""
+        self._address = None if not address else address.replace("@", "\0", 1)
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC)
+        self._socket.setblocking(False)
+        self._status = ""
+
+    @classmethod
+    def from_environment(cls) -> "Notifier":
+        """For the service manager that started this process, if one did."""
+        return cls(os.environ.get("NOTIFY_SOCKET"))
+
+    def ready(self) -> None:
+        """The robot works."""
+        self._send("READY=1")
+
+    def stopping(self) -> None:
+        """The robot is about to end."""
+        self._send("STOPPING=1")
+
+    def alive(self) -> None:
+        """The control loop is not stuck."""
+        self._send("WATCHDOG=1")
+
+    def status(self, text: str) -> None:
+        """What the robot does, for people; sent only when it has changed."""
+        if text != self._status:
+            self._status = text
+            self._send(f"STATUS={text}")
+
+    def close(self) -> None:
+        """No more messages."""
+        self._socket.close()
+
+    def _send(self, message: str) -> None:
+        if self._address is not None:
+            with contextlib.suppress(OSError):  # a manager that does not listen is its own affair
+                self._socket.sendto(message.encode(), self._address)
+
+
+class StopSignals:
+    """Remembers that the process was asked to end; as a context manager it takes those signals.
+
+    Being asked again changes nothing: shells, supervisors and impatient people send signals twice.
+    """
+
+    def __init__(self) -> None:
+        self._asked: str | None = None
+        self._tell: Callable[[], object] | None = None
+        self._before: dict[signal.Signals, Any] = {}
+
+    async def wait(self) -> str:
+        """The name of the first signal; waits for one."""
+        loop, asked = asyncio.get_running_loop(), asyncio.Event()
+        self._tell = partial(loop.call_soon_threadsafe, asked.set)
+        try:
+            if self._asked is None:
+                await asked.wait()
+        finally:
+            self._tell = None
+        assert self._asked is not None
+        return self._asked
+
+    def _take(self, number: int, frame: object) -> None:
+        self._asked = self._asked or signal.Signals(number).name
+        if self._tell is not None:
+            self._tell()
+
+    def __enter__(self) -> Self:
+        self._before = {number: signal.signal(number, self._take) for number in _STOP_SIGNALS}
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+
+
+class _Unbreakable:
+    """A text stream that may go away, as a terminal does, without taking the robot with it."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        with contextlib.suppress(OSError):
+            self._stream.write(text)
+        return len(text)
+
+    def flush(self) -> None:
+        with contextlib.suppress(OSError):
+            self._stream.flush()
+
+
+def set_up_logging(stream: TextIO, environment: Mapping[str, str]) -> None:
+    """Log to the stream: for people, or as JSON with a severity where a journal reads along."""
+    journal = "JOURNAL_STREAM" in environment
+    structlog.configure(
+        processors=_for_journal() if journal else _for_people(colors=stream.isatty()),
+        wrapper_class=structlog.make_filtering_bound_logger("info"),
+        logger_factory=structlog.PrintLoggerFactory(cast(TextIO, _Unbreakable(stream))),
+        cache_logger_on_first_use=False,
+    )
+
+
+def _for_people(*, colors: bool) -> list[Processor]:
+    return [
+        structlog.processors.add_log_level,
+        _without_none,
+        structlog.processors.TimeStamper(fmt="%H:%M:%S", utc=False),
+        structlog.dev.ConsoleRenderer(colors=colors, sort_keys=False),
+    ]
+
+
+def _for_journal() -> list[Processor]:
+    return [
+        structlog.processors.add_log_level,
+        _without_none,
+        structlog.processors.JSONRenderer(ensure_ascii=False),
+        _with_severity,
+    ]
+
+
+def _without_none(logger: WrappedLogger, method: str, event: EventDict) -> EventDict:
+    return {key: value for key, value in event.items() if value is not None}
+
+
+def _with_severity(logger: WrappedLogger, method: str, line: Any) -> str:
+    """The line with the prefix by which the journal knows its severity."""
+    return f"<{_SEVERITY.get(method, 6)}>{line}"

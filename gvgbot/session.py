@@ -1,0 +1,117 @@
+"""One exploration: the mind, the way it went, and what both leave in the run directory."""
+
+import copy
+import time
+from collections.abc import Callable
+from functools import partial
+
+from gvgbot import __version__
+from gvgbot.autonomy import events
+from gvgbot.autonomy.pipeline import Pipeline
+from gvgbot.config import Config
+from gvgbot.geometry import Pose
+from gvgbot.hal.messages import Contact, Odometry
+from gvgbot.maps.run_directory import RunDirectory
+from gvgbot.report import Journey, map_files, world_files
+from gvgbot.simulation import Place, Simulation
+
+
+class Session:
+    """What an exploration knows and has counted. `place` is None where the robot is real."""
+
+    def __init__(self, config: Config, directory: RunDirectory, place: Place | None) -> None:
+        self.config, self.directory, self.place = config, directory, place
+        self.pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
+        self.journey = Journey()
+        self.simulation: Simulation | None = None
+        self._counts = {events.LoopClosed: 0, events.Recovery: 0}
+        self._contacts, self._in_contact = 0, False
+        self._started = time.perf_counter()
+        self._first_stamp: float | None = None
+        self._last_stamp = 0.0
+
+    def on_events(self, happened: list[events.Event]) -> None:
+        """Take down what happened."""
+        for event in happened:
+            self.directory.append_event(event)
+            if type(event) in self._counts:
+                self._counts[type(event)] += 1
+
+    def on_cycle(self, odometry: Odometry, contact: Contact | None) -> None:
+        """Take down a control cycle."""
+        if self._first_stamp is None:
+            self._first_stamp = odometry.stamp
+        self._last_stamp = odometry.stamp
+        touching = contact is not None and contact.bumper
+        self._contacts += touching and not self._in_contact
+        self._in_contact = touching
+        self.journey.record(odometry, self.pipeline, self._truth(odometry.stamp))
+
+    def _truth(self, stamp: float) -> Pose | None:
+        """world_base at a stamp, where it is known."""
+        if self.simulation is None:
+            return None
+        self.simulation.body.advance(stamp)
+        return self.simulation.body.pose
+
+    def save(self) -> None:
+        """Write the map and the summary. Raises GvgbotError if they cannot be written."""
+        self.saving(unfinished="stopped from outside")()
+
+    def saving(self, *, unfinished: str) -> Callable[[], None]:
+        """A function that writes the map as it is now, even if it is called later or in a thread.
+
+        `unfinished` is the reason that the summary gives as long as there is no outcome.
+        """
+        summary = self._summary(unfinished)
+        return partial(self._write, still(self.pipeline), still_journey(self.journey), summary)
+
+    def _write(self, pipeline: Pipeline, journey: Journey, summary: dict[str, object]) -> None:
+        name = self.config.robot.name if self.place is None else self.place.world.name
+        files = map_files(pipeline, journey, name)
+        if self.place is not None:
+            files |= world_files(self.place.world)
+        self.directory.write(files)
+        self.directory.write_summary(summary)
+
+    def _summary(self, unfinished: str) -> dict[str, object]:
+        mission, graph = self.pipeline.mission, self.pipeline.mapper.graph
+        return {
+            "outcome": mission.outcome or "stopped",
+            "reason": mission.reason or unfinished,
+            "distance_m": self.pipeline.travelled,
+            "duration_s": self._last_stamp - (self._first_stamp or 0.0),
+            "wall_s": time.perf_counter() - self._started,
+            "vertices": len(graph.vertices),
+            "edges": len(graph.edges),
+            "loop_closures": self._counts[events.LoopClosed],
+            "contacts": self._contacts,
+            "recoveries": self._counts[events.Recovery],
+            "seed": self.config.twin.seed,
+            "version": __version__,
+            "config": self.config,
+        }
+
+
+def still(pipeline: Pipeline) -> Pipeline:
+    """A copy, for reports, that does not change as the pipeline goes on.
+
+    What is only ever appended to is copied as a list, what is changed in place is copied deeply.
+    """
+    copied = copy.copy(pipeline)
+    copied.keyframes, copied.steps = pipeline.keyframes.copy(), pipeline.steps.copy()
+    copied.mapper = copy.copy(pipeline.mapper)
+    copied.mapper.observations = pipeline.mapper.observations.copy()
+    copied.mapper.graph = copy.deepcopy(pipeline.mapper.graph)
+    return copied
+
+
+def still_journey(journey: Journey) -> Journey:
+    """A copy that does not grow."""
+    return Journey(
+        journey.stamps.copy(),
+        journey.keyframes.copy(),
+        journey.odom_base.copy(),
+        journey.map_base.copy(),
+        journey.world_base.copy(),
+    )
