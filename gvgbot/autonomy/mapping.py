@@ -26,8 +26,8 @@ from gvgbot.ranges import Range
 
 
 _CLOSE_M = 1.5  # as near as one needs to be to tell vertices apart
-_PASSED_M = 1.0  # the robot has been through a point of its edge if it was this near
-_LEFT_BEHIND_M = 1.5  # and has left it if it is so much farther away now
+_PASSED_M = 1.0  # from so near, what cannot be seen of an edge must be driven to
+_LEFT_BEHIND_M = 0.3  # the robot has passed a point if it was nearer by this
 _REGISTRATION_FLOOR = np.diag(
     [0.02**2, 0.02**2, 0.003**2]
 )  # what registration cannot know of itself
@@ -97,6 +97,7 @@ class _Tentative:
     seen_at: float
     nearest: float = math.inf
     sightings: int = 0
+    near_sightings: int = 0
 
 
 class Mapper:
@@ -241,13 +242,14 @@ class Mapper:
     ) -> bool:
         """Whether a vertex has been seen often enough; a suspect must have been passed, too.
 
-        A side edge that could not be seen to the end while passing is not forgotten: it becomes a
+        A side edge that could not be seen to the end in passing is not forgotten: it becomes a
         frontier, and a closer look decides.
         """
         config = self._config
         if node.is_suspect:
-            passed = tentative.nearest < _PASSED_M and away > tentative.nearest + _LEFT_BEHIND_M
-            return passed and tentative.sightings >= config.meetpoint_sightings
+            passed = away > tentative.nearest + _LEFT_BEHIND_M
+            enough = config.meetpoint_sightings * (1 if passed else 2)
+            return tentative.near_sightings >= enough
         needed = config.meetpoint_sightings if sighting.meetpoint else config.endpoint_sightings
         return tentative.sightings >= needed
 
@@ -275,6 +277,7 @@ class Mapper:
         tentative.position, tentative.seen_at = sighting.position, view.travelled
         tentative.nearest = min(tentative.nearest, away)
         tentative.sightings += 1
+        tentative.near_sightings += away < _PASSED_M
         return tentative
 
     def _add(self, view: View, sighting: Sighting) -> Vertex:

@@ -72,7 +72,7 @@ class Mission:
         self.reason = ""
         self._budget_m = math.inf  # of `travelled`, for the present target
         self._last_progress = 0.0  # stamp
-        self._travelled_then = 0.0
+        self._travelled_then = -math.inf
         self._looked_around = 0
         self._lost_since: float | None = None
         self._stranded_since: float | None = None

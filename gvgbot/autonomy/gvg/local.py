@@ -68,8 +68,8 @@ class LocalNode:
 
     @property
     def is_suspect(self) -> bool:
-        """Whether this is a point of an edge where one more edge may leave into unseen space."""
-        return self.degree == 2 and not self.settled
+        """Whether this may be a meetpoint, by edges of which too little is seen to be certain."""
+        return self.degree < 3 <= len(self.branches) + (self.lead is not None)
 
     @property
     def is_endpoint(self) -> bool:
