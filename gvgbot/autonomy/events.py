@@ -45,8 +45,7 @@ class LoopClosed:
     away_m: float
     mahalanobis: float
     offset_m: float
-    inliers: float
-    rms_m: float
+    agreement: float  # share of its walls found again
 
 
 @dataclass(frozen=True, slots=True)

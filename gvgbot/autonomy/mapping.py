@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.events import EdgeJoined, Event, LoopClosed, VertexAdded, VertexRemoved
 from gvgbot.autonomy.gvg.local import Branch, LocalGvg, LocalNode
+from gvgbot.autonomy.gvg.local_map import LocalMap
 from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.slam.graph import Edge, GvgGraph, HalfEdgeId, Kind, Vertex
@@ -20,11 +21,12 @@ from gvgbot.autonomy.slam.recognition import (
     looks_alike,
     match_bearings,
 )
-from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig, register
+from gvgbot.autonomy.slam.scan_matching import Registration, ScanMatchingConfig, register
 from gvgbot.geometry import Array, Pose
 from gvgbot.ranges import Range
 
 
+_WALL_M = 0.15  # a point so near to a wall lies on it
 _CLOSE_M = 1.5  # as near as one needs to be to tell vertices apart
 _PASSED_M = 1.0  # from so near, what cannot be seen of an edge must be driven to
 _LEFT_BEHIND_M = 0.3  # the robot has passed a point if it was nearer by this
@@ -57,7 +59,7 @@ class View:
     travelled: float  # metres
     local_base: Pose
     gvg: LocalGvg
-    walls: Array  # (N, 2)
+    local_map: LocalMap
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -192,32 +194,51 @@ class Mapper:
     def _close_loop(
         self, view: View, sighting: Sighting, vertex: Vertex, distance: float, metres: float
     ) -> bool:
-        """Recognise a vertex and correct the belief by it, if shape and walls agree."""
+        """Recognise a vertex and correct the belief by it, if its shape and the walls agree.
+
+        Walls that have changed cannot hide a vertex that stands where it should and looks alike.
+        """
         foreseen = view.local_base.compose(ekf.expected(self.belief, vertex.id)[0])
         if not looks_alike(vertex, sighting, foreseen, self._recognition):
             return False
-        turn_sigma = math.sqrt(float(self.belief.P[2, 2])) + 0.02
         prior = Pose(float(sighting.position[0]), float(sighting.position[1]), foreseen.theta)
-        found = register(
-            vertex.snapshot,
-            cKDTree(view.walls),
-            view.walls,
-            prior,
-            np.diag([0.15**2, 0.15**2, turn_sigma**2]),
-            self._matching,
-        )
-        if found is None or found.inliers < self._config.min_inliers:
-            return False
-        away = view.travelled - vertex.seen_at
-        vertex.local, vertex.seen_at, vertex.updated_at = found.pose, view.travelled, view.travelled
-        vertex.visits += 1
-        base_vertex = view.local_base.to(found.pose)
-        R = _turned(found.covariance, base_vertex.theta) + _REGISTRATION_FLOOR
-        self._measure(view, vertex, base_vertex, R)
+        found, agreement = self._register(view, vertex, prior)
+        if found is not None and agreement >= self._config.min_inliers:
+            local, covariance = found.pose, found.covariance + _REGISTRATION_FLOOR
+        else:
+            away = np.hypot(*(sighting.position - view.local_base.position))
+            if away > _CLOSE_M or metres > 0.5 * self._recognition.same_place_m:
+                return False
+            local, covariance = prior, detection_covariance(float(away), self._recognition)
         self._events.append(
-            LoopClosed(view.stamp, vertex.id, away, distance, metres, found.inliers, found.rms)
+            LoopClosed(
+                view.stamp, vertex.id, view.travelled - vertex.seen_at, distance, metres, agreement
+            )
         )
+        vertex.local, vertex.seen_at, vertex.updated_at = local, view.travelled, view.travelled
+        vertex.visits += 1
+        base_vertex = view.local_base.to(local)
+        R = _turned(covariance, base_vertex.theta) if len(covariance) == 3 else covariance
+        self._measure(view, vertex, base_vertex, R)
         return True
+
+    def _register(
+        self, view: View, vertex: Vertex, prior: Pose
+    ) -> tuple[Registration | None, float]:
+        """A vertex's frame laid onto the local map, and the share of its walls found where seen."""
+        walls = view.local_map.points()
+        turn_sigma = math.sqrt(float(self.belief.P[2, 2])) + 0.02
+        Q = np.diag([0.15**2, 0.15**2, turn_sigma**2])
+        tree = cKDTree(walls)
+        found = register(vertex.snapshot, tree, walls, prior, Q, self._matching)
+        if found is None:
+            return None, 0.0
+        laid = found.pose.transform(vertex.snapshot)
+        laid = laid[view.local_map.known(laid)]
+        if len(laid) < self._matching.min_pairs:
+            return None, 0.0
+        distance, _ = tree.query(laid, distance_upper_bound=_WALL_M)
+        return found, float(np.isfinite(distance).mean())
 
     # -- what is new -------------------------------------------------------------------------
 
@@ -308,8 +329,9 @@ class Mapper:
 
     def _picture(self, view: View, vertex: Vertex) -> None:
         """Keep the walls around a vertex, to know them again."""
-        near = np.hypot(*(view.walls - vertex.local.position).T) < self._config.snapshot_m
-        vertex.snapshot = vertex.local.inverse().transform(view.walls[near])
+        walls = view.local_map.points()
+        near = np.hypot(*(walls - vertex.local.position).T) < self._config.snapshot_m
+        vertex.snapshot = vertex.local.inverse().transform(walls[near])
 
     # -- what is known better ----------------------------------------------------------------
 

@@ -137,7 +137,7 @@ class Pipeline:
             self._local_map,
             local_base.position,
             min_clearance=self._radius + self._config.passage_margin_m,
-            chord_ratio=self._config.reduction.chord_ratio,
+            roughness=self._config.reduction.roughness_m,
         )
         self.gvg = reduce_graph(fine, self._config.reduction)
         view = View(
@@ -145,8 +145,7 @@ class Pipeline:
             scan.stamp,
             self.travelled,
             local_base,
-            self.gvg,
-            self._local_map.points(),
+            self.gvg, self._local_map,
         )
         known, seen = self.mapper.observe(view)
         self._keep(scan, odom_base, local_base)

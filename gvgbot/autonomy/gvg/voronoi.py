@@ -37,12 +37,13 @@ EMPTY = FineGraph(np.empty((0, 2)), np.empty(0), np.empty((0, 2), np.int64), np.
 
 
 def fine_graph(
-    local_map: LocalMap, robot: Array, *, min_clearance: float, chord_ratio: float
+    local_map: LocalMap, robot: Array, *, min_clearance: float, roughness: float
 ) -> FineGraph:
     """The certain Voronoi graph around the robot (2,); EMPTY where there is none.
 
-    A ridge counts if its two generators are farther apart than the robot is wide, and than
-    `chord_ratio` times the clearance: neighbours along one wall are no pair of obstacles.
+    A ridge counts if the robot (of radius `min_clearance`) fits between its two generators, and if
+    they cannot be two bumps of one flat wall: a disc of radius r touches two bumps of height h on a
+    wall if they are less than sqrt(8 h r) apart. `roughness` is that h, m.
     """
     generators = local_map.points()
     if len(generators) < 4:
@@ -59,7 +60,7 @@ def fine_graph(
     p, q = generators[pair[:, 0]], generators[pair[:, 1]]
     chord = np.hypot(*(p - q).T)
     narrowest = _least_clearance(centres, clearance, a, b, p, q)
-    parts = chord >= np.maximum(2 * min_clearance, chord_ratio * narrowest)
+    parts = chord >= np.maximum(2 * min_clearance, np.sqrt(8 * roughness * narrowest))
     a, b, p, q = a[parts], b[parts], p[parts], q[parts]
     joined = certain[a] & (b >= 0) & certain[b]
     lead = np.full(len(centres), np.nan)
