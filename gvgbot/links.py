@@ -9,6 +9,7 @@ from gvgbot.drivers.hokuyo.driver import HokuyoLaser
 from gvgbot.drivers.kobuki.driver import KobukiBase
 from gvgbot.drivers.transport import ByteStream, SerialStream
 from gvgbot.errors import DeviceLost
+from gvgbot.hal.devices import Base, Laser
 from gvgbot.simulation import Simulation
 
 Close = Callable[[], None]
@@ -22,7 +23,7 @@ class Links:
     clock: Clock
     simulation: Simulation | None
 
-    def open_laser(self) -> tuple[HokuyoLaser, Close]:
+    def open_laser(self) -> tuple[Laser, Close]:
         """A laser to be run, and what closes its link. Raises DeviceLost."""
         config = self.config.laser
         if self.simulation is None:
@@ -31,7 +32,7 @@ class Links:
             stream, close = self.simulation.laser, _leave_open
         return HokuyoLaser(stream, config, self.clock), close
 
-    def open_base(self) -> tuple[KobukiBase, Close]:
+    def open_base(self) -> tuple[Base, Close]:
         """A base to be run, and what closes its link. Raises DeviceLost."""
         config = self.config.base
         if self.simulation is None:

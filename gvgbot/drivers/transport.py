@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import errno
 import os
 from typing import Protocol
 
@@ -71,7 +72,7 @@ class SerialStream:
         try:
             self._port = serial.Serial(path, baud, timeout=0, write_timeout=0, exclusive=True)
         except (serial.SerialException, OSError, ValueError) as error:
-            raise DeviceLost(f"cannot open {path}: {error}") from error
+            raise DeviceLost(f"cannot open {path}: {_obstacle(error)}") from error
         self._path = path
         self._fd = self._port.fileno()
         self._arrived = bytearray()
@@ -122,6 +123,19 @@ class SerialStream:
         self._loop.remove_reader(self._fd)
         with contextlib.suppress(OSError, serial.SerialException):
             self._port.close()
+
+
+def _obstacle(error: Exception) -> str:
+    """Why a port does not open, in the words of the system rather than of a library."""
+    match getattr(error, "errno", None):
+        case None:
+            return str(error)
+        case errno.EAGAIN | errno.EBUSY:
+            return "another program uses it"
+        case errno.EACCES:
+            return "permission denied, join the group dialout"
+        case number:
+            return os.strerror(number)
 
 
 class TwinDevice(Protocol):
