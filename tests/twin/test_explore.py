@@ -304,7 +304,7 @@ def test_the_same_seed_leaves_the_same_bytes_and_another_one_does_not(tmp_path: 
 
 
 def test_another_process_with_other_hashes_leaves_the_same_bytes(tmp_path: Path) -> None:
-    case = lollipop()
+    case = tee()
     here = explore(case, tmp_path / "here", "--seed", "5")
     world = tmp_path / "here" / "building.yaml"
     start = [str(value) for value in (case.start.x, case.start.y, case.start.theta)]

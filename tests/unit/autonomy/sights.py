@@ -81,8 +81,8 @@ def looked(
 
 def fine(local_map: LocalMap, robot: tuple[float, float]) -> FineGraph:
     """The fine Voronoi graph around the robot, for a robot of RADIUS."""
-    ratio = ReductionConfig().chord_ratio
-    return fine_graph(local_map, np.array(robot), min_clearance=RADIUS, chord_ratio=ratio)
+    roughness = ReductionConfig().roughness_m
+    return fine_graph(local_map, np.array(robot), min_clearance=RADIUS, roughness=roughness)
 
 
 def seen(local_map: LocalMap, robot: tuple[float, float]) -> LocalGvg:

@@ -1,0 +1,93 @@
+"""Ways over a local GVG drawn by hand, with a dead end, a loop and parallel edges."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gvgbot.autonomy.gvg.local import Branch, LocalGvg, Place
+from tests.unit.autonomy.local_graphs import drawn
+
+#        4
+#        | 2 m
+#  1 --- 2 --- 3      1-2: 3 m, 2-3: 2 m, and a second way from 2 to 3 of 6 m below;
+#        +-----+      at 3 a loop of 4 m from 3 to itself.
+POINTS = {1: (0.0, 0.0), 2: (3.0, 0.0), 3: (5.0, 0.0), 4: (3.0, 2.0)}
+GVG = drawn(
+    POINTS,
+    {
+        10: (1, 2, []),
+        11: (2, 3, []),
+        12: (2, 4, []),
+        13: (3, 2, [(5.0, -2.0), (3.0, -2.0)]),
+        14: (3, 3, [(6.0, 0.0), (6.0, 1.0), (5.0, 1.0)]),
+    },
+)
+
+
+def test_the_nearest_place_is_named_by_its_edge_and_station() -> None:
+    place = GVG.place(np.array([1.0, 0.3]))
+    assert place is not None
+    assert place == pytest.approx((10, 1.0, 0.3), abs=0.05)
+
+
+def test_on_an_empty_graph_there_is_no_place() -> None:
+    assert LocalGvg().place(np.zeros(2)) is None
+
+
+def test_a_branch_leads_from_its_node_to_the_other_end() -> None:
+    assert GVG.end_of(Branch(10, forward=True)) == 2
+    assert GVG.end_of(Branch(10, forward=False)) == 1
+    assert GVG.leaving(Branch(13, forward=False))[0] == pytest.approx(POINTS[2])
+    assert GVG.leaving(Branch(13, forward=False))[-1] == pytest.approx(POINTS[3])
+
+
+@pytest.mark.parametrize(
+    ("branch", "bearing"),
+    [
+        (Branch(10, forward=False), math.pi),
+        (Branch(11, forward=True), 0.0),
+        (Branch(12, forward=True), math.pi / 2),
+        (Branch(13, forward=False), -math.pi / 2),
+    ],
+)
+def test_a_bearing_is_the_direction_in_which_the_branch_leaves(
+    branch: Branch, bearing: float
+) -> None:
+    assert math.cos(GVG.bearing(branch, 1.0) - bearing) == pytest.approx(1.0, abs=1e-3)
+
+
+def test_routes_from_the_middle_of_an_edge_are_those_measured_by_hand() -> None:
+    routes = GVG.routes(Place(10, 1.0, 0.0))
+    assert {node: metres for node, (metres, _) in routes.items()} == pytest.approx(
+        {1: 1.0, 2: 2.0, 4: 4.0, 3: 4.0}
+    )
+    assert routes[3][1] == (Branch(10, forward=True), Branch(11, forward=True))
+
+
+def test_of_two_ways_to_a_node_the_shorter_one_is_driven() -> None:
+    routes = GVG.routes(Place(13, 2.5, 0.0))  # 2.5 m from node 3, 3.5 m from node 2
+    metres = [routes[node][0] for node in (1, 2, 3)]
+    assert metres == pytest.approx([6.5, 3.5, 2.5])
+    assert routes[2][1] == (Branch(13, forward=True),)
+    assert routes[3][1] == (Branch(13, forward=False),)
+
+
+def test_from_the_middle_of_a_loop_both_ways_lead_to_its_node() -> None:
+    for station, forward in ((1.0, False), (3.0, True)):
+        metres, path = GVG.routes(Place(14, station, 0.0))[3]
+        assert metres == pytest.approx(1.0)
+        assert path == (Branch(14, forward),)
+
+
+@given(st.sampled_from(sorted(GVG.edges)), st.floats(0.0, 1.0))
+def test_the_line_of_a_route_is_as_long_as_the_route(edge: int, share: float) -> None:
+    start = Place(edge, share * GVG.edges[edge].length, 0.0)
+    for node, (metres, path) in GVG.routes(start).items():
+        line, clearance = GVG.line_from(start, path)
+        assert len(line) == len(clearance)
+        length = float(np.hypot(*np.diff(line, axis=0).T).sum())
+        assert metres - 0.11 <= length <= metres + 1e-9  # begins at the next point of the edge
+        assert line[-1] == pytest.approx(POINTS[node])
