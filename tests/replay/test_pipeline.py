@@ -1,0 +1,169 @@
+"""A recorded sequence of HAL messages drives a fresh pipeline to the same bits."""
+
+import asyncio
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from gvgbot.autonomy.events import Event, LoopClosed
+from gvgbot.autonomy.loop import Loop
+from gvgbot.autonomy.pipeline import Pipeline, smoothed
+from gvgbot.clock import LoopClock, run_in_virtual_time
+from gvgbot.config import Config, load_config
+from gvgbot.drivers.hokuyo.driver import HokuyoLaser
+from gvgbot.drivers.kobuki.driver import KobukiBase
+from gvgbot.geometry import Pose, Twist
+from gvgbot.hal.guard import Guard
+from gvgbot.hal.messages import Odometry, Scan
+from gvgbot.maps import geojson
+from gvgbot.report import route_graph
+from gvgbot.simulation import Place, Simulation
+from tests.unit.autonomy.sights import carved
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(60)]
+
+Message = Scan | Odometry
+Answer = list[Event] | Twist
+# A dead end that leads to a ring of corridors: a meetpoint, an endpoint, and a loop to close.
+LOLLIPOP = carved(
+    [
+        (-6.0, -1.0, 0.0, 1.0),
+        (-1.0, -1.0, 9.0, 1.0),
+        (-1.0, 7.0, 9.0, 9.0),
+        (-1.0, -1.0, 1.0, 9.0),
+        (7.0, -1.0, 9.0, 9.0),
+    ]
+)
+START = Pose(-3.5, -0.1, 0.2)
+
+
+class RecordedPipeline(Pipeline):
+    """Takes down each message that it gets, and what it answers."""
+
+    def __init__(self, config: Config) -> None:
+        super().__init__(config.autonomy, config.exploration, config.robot.radius_m)
+        self.messages: list[Message] = []
+        self.answers: list[Answer] = []
+
+    def perceive(self, scan: Scan) -> list[Event]:
+        answer = super().perceive(scan)
+        self.messages.append(scan)
+        self.answers.append(answer)
+        return answer
+
+    def control(self, odometry: Odometry) -> Twist:
+        answer = super().control(odometry)
+        self.messages.append(odometry)
+        self.answers.append(answer)
+        return answer
+
+
+def events_of(pipeline: RecordedPipeline) -> list[Event]:
+    return [event for answer in pipeline.answers if isinstance(answer, list) for event in answer]
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A drive through the twins."""
+
+    config: Config
+    pipeline: RecordedPipeline
+
+
+async def drive_through_the_twins(config: Config, pipeline: Pipeline) -> None:
+    clock = LoopClock()
+    simulation = Simulation(config, Place(LOLLIPOP, START), clock)
+    laser = HokuyoLaser(simulation.laser, config.laser, clock)
+    base = KobukiBase(simulation.base, config.base, clock)
+    guard = Guard(config.robot.limits, config.robot.radius_m)
+    loop = Loop(laser, base, pipeline, guard, on_events=lambda _: None, on_cycle=lambda _: None)
+    async with asyncio.TaskGroup() as tasks:
+        serving = [tasks.create_task(part.run()) for part in (laser, base, simulation)]
+        await loop.run()
+        for task in serving:
+            task.cancel()
+
+
+@pytest.fixture(scope="module")
+def drive() -> Drive:
+    config = load_config()
+    pipeline = RecordedPipeline(config)
+    run_in_virtual_time(drive_through_the_twins(config, pipeline))
+    return Drive(config, pipeline)
+
+
+def replayed(drive: Drive) -> RecordedPipeline:
+    fresh = RecordedPipeline(drive.config)
+    for message in drive.pipeline.messages:
+        if isinstance(message, Scan):
+            fresh.perceive(message)
+        else:
+            fresh.control(message)
+    return fresh
+
+
+def test_the_recorded_drive_is_a_whole_exploration(drive: Drive) -> None:
+    assert drive.pipeline.mission.outcome == "explored"
+    assert len(drive.pipeline.mapper.graph.vertices) == 2
+    assert len(drive.pipeline.mapper.graph.edges) == 2
+    assert any(isinstance(event, LoopClosed) for event in events_of(drive.pipeline))
+
+
+def test_a_replay_answers_every_message_with_the_same_twist_and_events(drive: Drive) -> None:
+    assert replayed(drive).answers == drive.pipeline.answers
+
+
+def test_a_replay_leaves_the_same_map_to_the_last_bit(drive: Drive) -> None:
+    first, again = drive.pipeline, replayed(drive)
+    one, other = first.mapper.belief, again.mapper.belief
+    assert one.ids == other.ids
+    assert one.x.tobytes() == other.x.tobytes()
+    assert one.P.tobytes() == other.P.tobytes()
+    maps = [geojson.encode(route_graph(p, smoothed(p)[1])) for p in (first, again)]
+    assert maps[0] == maps[1]
+
+
+def test_a_replay_makes_the_same_keyframes(drive: Drive) -> None:
+    again = replayed(drive)
+    assert len(again.keyframes) == len(drive.pipeline.keyframes)
+    for one, other in zip(again.keyframes, drive.pipeline.keyframes, strict=True):
+        assert one.local_base == other.local_base
+        assert one.map_base == other.map_base
+        assert one.scan is other.scan
+
+
+def test_messages_are_only_read(drive: Drive) -> None:
+    scans = [m for m in drive.pipeline.messages if isinstance(m, Scan)]
+    before = [scan.ranges.copy() for scan in scans]
+    replayed(drive)
+    for scan, ranges in zip(scans, before, strict=True):
+        assert np.array_equal(scan.ranges, ranges, equal_nan=True)
+        assert not scan.ranges.flags.writeable
+
+
+def test_a_range_that_differs_by_a_centimetre_is_another_drive(drive: Drive) -> None:
+    """The comparison above is fine enough to see it."""
+    fresh = RecordedPipeline(drive.config)
+    for message in drive.pipeline.messages:
+        if isinstance(message, Odometry):
+            fresh.control(message)
+        else:
+            nearer = message.ranges - 0.01 * (message.stamp > 3.0)
+            fresh.perceive(replace(message, ranges=nearer))
+    assert fresh.answers != drive.pipeline.answers
+
+
+def test_a_message_too_many_after_the_end_changes_nothing(drive: Drive) -> None:
+    again = replayed(drive)
+    last = next(m for m in reversed(drive.pipeline.messages) if isinstance(m, Scan))
+    belief = again.mapper.belief
+    assert again.perceive(last) == []
+    assert again.mapper.belief is belief
+
+
+def test_no_twist_is_beyond_the_limits_of_the_follower(drive: Drive) -> None:
+    limits = drive.config.autonomy.edge_follower
+    twists = [answer for answer in drive.pipeline.answers if isinstance(answer, Twist)]
+    assert max(abs(t.linear) for t in twists) <= limits.max_speed_mps
+    assert max(abs(t.angular) for t in twists) <= limits.max_turn_rate_radps
