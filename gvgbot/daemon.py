@@ -101,10 +101,9 @@ def run(config: Config, *, out: Path | None) -> int:
         signals = stack.enter_context(StopSignals())
         telemetry = _telemetry(config, stack)
         directory = stack.enter_context(RunDirectory.create(out, world=name))
-        notifier = stack.enter_context(contextlib.closing(Notifier.from_environment()))
         session = Session(config, directory, place)
         _announce(session)
-        robot = Robot(session, notifier, telemetry)
+        robot = Robot(session, Notifier.from_environment(), telemetry)
         try:
             with asyncio.Runner() as runner:
                 runner.run(robot.serve(signals.wait()))

@@ -1,12 +1,13 @@
 """Drivers on the links of a configuration: serial ports, or the twins of a simulation."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from gvgbot.clock import Clock
 from gvgbot.config import Config
 from gvgbot.drivers.hokuyo.driver import HokuyoLaser
 from gvgbot.drivers.kobuki.driver import KobukiBase
+from gvgbot.drivers.kobuki.feedback import FeedbackReader
 from gvgbot.drivers.transport import ByteStream, SerialStream
 from gvgbot.errors import DeviceLost
 from gvgbot.hal.devices import Base, Laser
@@ -15,13 +16,17 @@ from gvgbot.simulation import Simulation
 Close = Callable[[], None]
 
 
-@dataclass(frozen=True, slots=True)
 class Links:
-    """Opens devices, as often as they are lost; without a simulation they are real."""
+    """Opens devices, as often as they are lost; without a simulation they are real.
 
-    config: Config
-    clock: Clock
-    simulation: Simulation | None
+    The odometry of a base that is opened again goes on from where it ended.
+    """
+
+    def __init__(self, config: Config, clock: Clock, simulation: Simulation | None) -> None:
+        if simulation is not None and config.twin.base.odometry == "wheels":
+            config = replace(config, base=replace(config.base, heading="wheels"))
+        self.config, self.clock, self.simulation = config, clock, simulation
+        self.feedback = FeedbackReader(config.base.heading, config.base.link_delay_s)
 
     def open_laser(self) -> tuple[Laser, Close]:
         """A laser to be run, and what closes its link. Raises DeviceLost."""
@@ -39,9 +44,7 @@ class Links:
             stream, close = _open_port("base", config.port, config.baud)
         else:
             stream, close = self.simulation.base, _leave_open
-            if self.config.twin.base.odometry == "wheels":
-                config = replace(config, heading="wheels")
-        return KobukiBase(stream, config, self.clock), close
+        return KobukiBase(stream, config, self.clock, self.feedback), close
 
 
 def _open_port(name: str, port: str, baud: int) -> tuple[ByteStream, Close]:

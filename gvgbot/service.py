@@ -23,8 +23,6 @@ class Notifier:
     def __init__(self, address: str | None) -> None:
         """`address` is a socket's path, or `@` and an abstract name; None: nobody listens."""
         self._address = None if not address else address.replace("@", "\0", 1)
-        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC)
-        self._socket.setblocking(False)
         self._status = ""
 
     @classmethod
@@ -50,14 +48,14 @@ class Notifier:
             self._status = text
             self._send(f"STATUS={text}")
 
-    def close(self) -> None:
-        """No more messages."""
-        self._socket.close()
-
     def _send(self, message: str) -> None:
-        if self._address is not None:
-            with contextlib.suppress(OSError):  # a manager that does not listen is its own affair
-                self._socket.sendto(message.encode(), self._address)
+        if self._address is None:
+            return
+        with (
+            contextlib.suppress(OSError),  # a manager that does not listen is its own affair
+            socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK) as link,
+        ):
+            link.sendto(message.encode(), self._address)
 
 
 class StopSignals:

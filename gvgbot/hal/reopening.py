@@ -2,14 +2,13 @@
 
 import asyncio
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Generic, Protocol, TypeVar
 
 import structlog
 
 from gvgbot.clock import Clock
 from gvgbot.errors import DeviceLost, DeviceRefused
-from gvgbot.geometry import STANDSTILL, Pose, Twist
+from gvgbot.geometry import STANDSTILL, Twist
 from gvgbot.hal.devices import Base, Laser
 from gvgbot.hal.latest import Latest
 from gvgbot.hal.messages import Battery, Contact, Odometry, Scan
@@ -100,9 +99,10 @@ class ReopeningLaser(_Reopening[Laser]):
 
 
 class ReopeningBase(_Reopening[Base]):
-    """A base that is lost only for a while; its odometry goes on from where it ended.
+    """A base that is lost only for a while.
 
-    What moved the robot while nobody listened to it is not in there.
+    What is opened again must go on with the odometry of what was lost: poses are passed on as they
+    come.
     """
 
     def __init__(self, open_device: Callable[[], Opened[Base]], clock: Clock) -> None:
@@ -128,14 +128,9 @@ class ReopeningBase(_Reopening[Base]):
         return None if self._device is None else self._device.battery
 
     async def _pass_on(self, device: Base) -> None:
-        last, first = self._newest.value, await device.next_odometry()
-        # odom_base of now = where it ended, and the motion since the device was opened again
-        origin = (last.odom_base if last else Pose()).compose(first.odom_base.inverse())
-        odometry = first
         while True:
-            self._newest.put(replace(odometry, odom_base=origin.compose(odometry.odom_base)))
+            self._newest.put(await device.next_odometry())
             self._heard()
-            odometry = await device.next_odometry()
 
 
 def _text(failures: BaseExceptionGroup[Exception]) -> str:

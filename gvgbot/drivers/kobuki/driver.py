@@ -54,11 +54,21 @@ class KobukiConfig:
 class KobukiBase:
     """A base on a byte stream. `run` serves the link; everything else may be used beside it."""
 
-    def __init__(self, stream: ByteStream, config: KobukiConfig, clock: Clock) -> None:
+    def __init__(
+        self,
+        stream: ByteStream,
+        config: KobukiConfig,
+        clock: Clock,
+        feedback: FeedbackReader | None = None,
+    ) -> None:
+        """With the `feedback` of a driver whose link was lost, the odometry goes on from its end.
+
+        The base's counters go on by themselves, so that motion in the meantime is not lost.
+        """
         self._stream = stream
         self._config = config
         self._clock = clock
-        self._feedback = FeedbackReader(config.heading, config.link_delay_s)
+        self._feedback = feedback or FeedbackReader(config.heading, config.link_delay_s)
         self._newest = Latest[Odometry]()
         self._identity_asked = 0
         self._identity_due = -math.inf

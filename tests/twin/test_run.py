@@ -1,0 +1,203 @@
+"""The daemon in virtual time: how it starts, goes on without a device, ends, and what it leaves."""
+
+import asyncio
+import json
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import pytest
+import structlog
+
+from gvgbot.clock import Clock
+from gvgbot.errors import DeviceLost
+from gvgbot.geometry import Pose, Twist
+from gvgbot.hal.devices import Base, Laser
+from gvgbot.hal.messages import Contact, Odometry
+from gvgbot.links import Close, Links
+from tests.twin.run_rig import STOP, Daemon, base_commands
+
+pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(120)]
+
+MAP = {"map.geojson", "map.yaml", "map.pgm", "map.png", "summary.json", "events.jsonl"}
+WAYS = {"estimate.tum", "online.tum", "odometry.tum", "truth.tum"}
+
+
+@pytest.fixture
+def daemon(tmp_path: Path) -> Iterator[Daemon]:
+    rig = Daemon(tmp_path / "run")
+    with rig.session.directory:
+        yield rig
+
+
+async def ten_seconds(clock: Clock) -> None:
+    await clock.sleep_until(10.0)
+
+
+def test_the_last_command_on_the_wire_is_a_stop_though_the_robot_was_driving(
+    daemon: Daemon,
+) -> None:
+    daemon.run(ten_seconds)
+    commands = base_commands(bytes(daemon.cable.written))
+    assert daemon.network.states[-1].phase == "exploring"
+    assert commands[-1] == STOP
+    driving = [command for command in commands if command != STOP]
+    assert len(driving) > 100
+    assert commands.index(driving[-1]) < len(commands) - 1
+
+
+def test_a_stopped_daemon_leaves_a_complete_run(daemon: Daemon) -> None:
+    daemon.run(ten_seconds)
+    path = daemon.session.directory.path
+    assert {file.name for file in path.iterdir()} >= MAP | WAYS
+    summary = json.loads((path / "summary.json").read_text())
+    assert summary["outcome"] == "stopped"
+    assert summary["duration_s"] == pytest.approx(10.0, abs=0.5)
+
+
+def test_the_state_is_published_five_times_a_second_with_the_truth_in_it(daemon: Daemon) -> None:
+    truth: list[Pose] = []
+
+    async def story(clock: Clock) -> None:
+        await clock.sleep_until(10.0)
+        truth.append(daemon.place)
+
+    daemon.run(story)
+    states = daemon.network.states
+    assert len(states) == pytest.approx(50, abs=1)
+    assert [state.sequence for state in states] == list(range(len(states)))
+    assert all(b.stamp - a.stamp == pytest.approx(0.2) for a, b in pairwise(states))
+    assert states[-1].cycles == pytest.approx(50 * 10, abs=25)
+    start = daemon.session.place
+    assert start is not None
+    map_base = start.start.to(truth[0])
+    assert states[-1].pose == pytest.approx((map_base.x, map_base.y, map_base.theta), abs=0.15)
+
+
+def test_the_service_manager_hears_ready_once_signs_of_life_and_stopping(daemon: Daemon) -> None:
+    daemon.run(ten_seconds)
+    told = daemon.manager.told
+    assert daemon.manager.count("READY=1") == 1
+    assert daemon.manager.count("WATCHDOG=1") == pytest.approx(50, abs=1)
+    assert daemon.manager.count("STOPPING=1") == 1
+    assert "WATCHDOG=1" not in told[told.index("STOPPING=1") :]
+    assert any(line.startswith("STATUS=exploring") for line in told)
+
+
+def test_a_finished_daemon_saves_the_map_and_stands_until_it_is_stopped(daemon: Daemon) -> None:
+    path = daemon.session.directory.path
+    seen: list[Any] = []
+
+    async def story(clock: Clock) -> None:
+        while not daemon.network.states or daemon.network.states[-1].phase != "finished":
+            await clock.sleep_until(clock.now() + 1.0)
+        await clock.sleep_until(clock.now() + 3.0)
+        seen.append(json.loads((path / "summary.json").read_text())["outcome"])
+        seen.append(daemon.place)
+        await clock.sleep_until(clock.now() + 30.0)
+        seen.append(daemon.place)
+
+    with structlog.testing.capture_logs() as logs:
+        daemon.run(story)
+    assert seen[0] == "explored"
+    assert seen[1] == seen[2]
+    assert daemon.network.states[-1].outcome == "explored"
+    assert daemon.network.states[-1].cycle_age == pytest.approx(0.0, abs=0.1)
+    assert [log["event"] for log in logs].count("finished") == 1
+    late = base_commands(bytes(daemon.cable.written))[-1000:]  # of 50 a second
+    assert set(late) == {STOP}
+
+
+def test_a_robot_goes_on_where_it_was_after_its_base_was_lost_for_a_while(
+    daemon: Daemon,
+) -> None:
+    standing: list[Pose] = []
+    truth: list[Pose] = []
+
+    async def story(clock: Clock) -> None:
+        await clock.sleep_until(8.0)
+        daemon.cable.is_cut = True
+        await clock.sleep_until(11.0)
+        standing.append(daemon.place)
+        await clock.sleep_until(20.0)
+        standing.append(daemon.place)
+        daemon.cable.is_cut = False
+        await clock.sleep_until(35.0)
+        truth.append(daemon.place)
+
+    with structlog.testing.capture_logs() as logs:
+        daemon.run(story)
+    assert standing[0] == standing[1]
+    halted = [state for state in daemon.network.states if 11.0 < state.stamp < 20.0]
+    assert {state.phase for state in halted} == {"halted"}
+    assert all("no base" in state.reason for state in halted)
+    assert daemon.network.states[-1].phase == "exploring"
+    events = [log["event"] for log in logs]
+    assert (events.count("base lost"), events.count("base back")) == (1, 1)
+    assert daemon.session.place is not None
+    map_base = daemon.session.place.start.to(truth[0])
+    x, y, _ = daemon.network.states[-1].pose
+    assert math.hypot(x - map_base.x, y - map_base.y) < 0.2
+    assert standing[1].distance(truth[0]) > 0.3  # it has driven on
+    assert daemon.manager.count("WATCHDOG=1") == pytest.approx(5 * 35, abs=3)
+
+
+class NoPorts(Links):
+    def open_laser(self) -> tuple[Laser, Close]:
+        raise DeviceLost("cannot open /dev/hokuyo")
+
+    def open_base(self) -> tuple[Base, Close]:
+        raise DeviceLost("cannot open /dev/kobuki")
+
+
+def test_missing_ports_are_waited_for_and_said_once_each(daemon: Daemon) -> None:
+    with structlog.testing.capture_logs() as logs:
+        daemon.run_on(NoPorts, 600.0)
+    waiting = [log for log in logs if log["event"].startswith("waiting")]
+    assert sorted(log["reason"] for log in waiting) == [
+        "cannot open /dev/hokuyo",
+        "cannot open /dev/kobuki",
+    ]
+    last = daemon.network.states[-1]
+    assert last.phase == "starting"
+    assert "/dev/hokuyo" in last.reason
+    assert "/dev/kobuki" in last.reason
+    assert daemon.manager.count("READY=1") == 0
+    assert daemon.manager.count("WATCHDOG=1") > 2000
+    daemon.session.save()
+    assert {file.name for file in daemon.session.directory.path.iterdir()} >= MAP
+
+
+class Frozen:
+    """A base whose odometry comes once and never again, though it does not complain."""
+
+    contact: Contact | None = None
+    battery = None
+
+    def __init__(self) -> None:
+        self._told = False
+
+    async def run(self) -> None:
+        await asyncio.Event().wait()
+
+    async def next_odometry(self) -> Odometry:
+        if self._told:
+            await asyncio.Event().wait()
+        self._told = True
+        return Odometry(asyncio.get_running_loop().time(), Pose(), Twist(0.0, 0.0))
+
+    def drive(self, twist: Twist) -> Twist:
+        return twist
+
+
+class FrozenLinks(NoPorts):
+    def open_base(self) -> tuple[Base, Close]:
+        return Frozen(), lambda: None
+
+
+def test_a_control_loop_that_is_stuck_gives_no_sign_of_life(daemon: Daemon) -> None:
+    daemon.run_on(FrozenLinks, 30.0)
+    assert daemon.manager.count("WATCHDOG=1") < 10
+    assert daemon.network.states[-1].cycle_age == pytest.approx(30.0, abs=0.5)
