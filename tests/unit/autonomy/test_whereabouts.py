@@ -1,0 +1,222 @@
+"""Which edge the robot is on, drawn by hand: passing vertices, turning back, loops, late sight."""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+
+from gvgbot.autonomy.gvg.local import Branch, LocalGvg
+from gvgbot.autonomy.mapping import Correspondence
+from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex
+from gvgbot.autonomy.whereabouts import Passage, Situation, Whereabouts
+from gvgbot.geometry import Pose
+from tests.unit.autonomy.local_graphs import Point, drawn, resampled
+
+EAST, WEST = 0, 1  # keys of the half-edges of each vertex along the corridor
+
+
+def known_as(pairs: dict[Branch, HalfEdgeId], nodes: dict[int, int]) -> Correspondence:
+    known = Correspondence()
+    for node, vertex in nodes.items():
+        known.pair(node, vertex)
+    for branch, end in pairs.items():
+        known.pair_branch(branch, end)
+    return known
+
+
+@dataclass
+class Walk:
+    """Whereabouts on the way along points, in sight of one local GVG after another."""
+
+    where: Whereabouts = field(default_factory=Whereabouts)
+    passages: list[Passage] = field(default_factory=list)
+
+    def along(self, gvg: LocalGvg, known: Correspondence, *corners: Point) -> "Walk":
+        for point in resampled(list(corners)):
+            place = gvg.place(point)
+            assert place is not None
+            passage = self.where.follow(gvg, place, known, point)
+            if passage is not None:
+                self.passages.append(passage)
+        return self
+
+
+# A corridor from an end at x = 0 (vertex 1) by a meetpoint at x = 6 (vertex 2, its branch south)
+# to an end at x = 12 (vertex 3), all in sight.
+CORRIDOR = drawn(
+    {1: (0.0, 0.0), 2: (6.0, 0.0), 3: (12.0, 0.0), 4: (6.0, -3.0)},
+    {10: (1, 2, []), 11: (2, 3, []), 12: (2, 4, [])},
+)
+ENDS = {
+    Branch(10, forward=True): HalfEdgeId(1, EAST),
+    Branch(10, forward=False): HalfEdgeId(2, WEST),
+    Branch(11, forward=True): HalfEdgeId(2, EAST),
+    Branch(11, forward=False): HalfEdgeId(3, WEST),
+    Branch(12, forward=True): HalfEdgeId(2, 2),
+}
+ALL_KNOWN = known_as(ENDS, {1: 1, 2: 2, 3: 3})
+
+
+def test_passing_a_meetpoint_is_a_passage_from_the_edge_before_it() -> None:
+    walk = Walk().along(CORRIDOR, ALL_KNOWN, (1.0, 0.0), (11.0, 0.0))
+    first, passed = walk.passages
+    assert first.left is None
+    assert first.arrived == HalfEdgeId(1, EAST)
+    assert (passed.left, passed.arrived) == (HalfEdgeId(1, EAST), HalfEdgeId(2, WEST))
+    assert passed.line[0] == pytest.approx([0.0, 0.0])
+    assert passed.line[-1] == pytest.approx([6.0, 0.0])
+    assert passed.driven == pytest.approx(6.0, abs=0.3)
+    assert walk.where.on_edge == HalfEdgeId(2, EAST)
+
+
+def test_turning_at_a_meetpoint_is_a_passage_too() -> None:
+    walk = Walk().along(CORRIDOR, ALL_KNOWN, (1.0, 0.0), (6.0, 0.0), (6.0, -2.0))
+    assert [p.arrived for p in walk.passages[1:]] == [HalfEdgeId(2, WEST)]
+    assert walk.where.on_edge == HalfEdgeId(2, 2)
+
+
+def test_going_to_a_dead_end_and_back_is_no_passage() -> None:
+    walk = Walk().along(CORRIDOR, ALL_KNOWN, (5.0, 0.0), (0.3, 0.0), (5.0, 0.0))
+    assert len(walk.passages) == 1  # the first sight of the edge
+    assert walk.where.on_edge == HalfEdgeId(2, WEST)
+
+
+def test_a_way_back_is_taken_off_the_trail() -> None:
+    walk = Walk().along(CORRIDOR, ALL_KNOWN, (5.0, 0.0), (1.0, 0.0))
+    assert walk.where.trail_length == pytest.approx(5.0, abs=0.3)  # from the meetpoint at 6 m
+    walk.along(CORRIDOR, ALL_KNOWN, (1.0, 0.0), (5.0, 0.0))
+    assert walk.where.trail_length < 1.7
+
+
+def test_a_meetpoint_seen_only_after_it_was_passed_is_still_passed_by_the_edge_before() -> None:
+    """The vertex enters the map when the robot is already a metre beyond it."""
+    unknown = known_as({Branch(10, forward=True): HalfEdgeId(1, EAST)}, {1: 1})
+    walk = Walk().along(CORRIDOR, unknown, (1.0, 0.0), (7.0, 0.0))
+    assert len(walk.passages) == 1
+    walk.along(CORRIDOR, ALL_KNOWN, (7.1, 0.0), (8.0, 0.0))
+    (passed,) = walk.passages[1:]
+    assert (passed.left, passed.arrived) == (HalfEdgeId(1, EAST), HalfEdgeId(2, WEST))
+    assert passed.line[-1] == pytest.approx([6.0, 0.0])
+    assert passed.driven == pytest.approx(6.0, abs=0.3)
+
+
+# A loop of 28 m that leaves vertex 1 at the origin to the east and comes back from the north, in
+# three sights: the beginning, the far side, and the end.
+LOOP: list[Point] = [(0.0, 0.0), (8.0, 0.0), (8.0, 6.0), (0.0, 6.0), (0.0, 0.0)]
+STEM = {1: (0.0, 0.0), 2: (-4.0, 0.0)}
+BEGIN = drawn(
+    {**STEM, 3: (5.0, 0.0), 4: (0.0, 2.0)},
+    {20: (1, 3, []), 21: (1, 4, []), 22: (1, 2, [])},
+    unseen={3: 0.0, 4: math.pi / 2},
+)
+FAR = drawn({5: (8.0, 2.0), 6: (2.0, 6.0)}, {30: (5, 6, [(8.0, 6.0)])}, unseen={5: -1.6, 6: 3.1})
+KNOWN_AT_1 = {
+    Branch(20, forward=True): HalfEdgeId(1, 0),
+    Branch(21, forward=True): HalfEdgeId(1, 1),
+    Branch(22, forward=True): HalfEdgeId(1, 2),
+}
+RETURN = drawn(
+    {**STEM, 3: (5.0, 0.0), 4: (3.0, 6.0)},
+    {20: (1, 3, []), 21: (1, 4, [(0.0, 6.0)]), 22: (1, 2, [])},
+    unseen={3: 0.0, 4: 0.0},
+)
+
+
+def test_a_loop_leaves_by_one_half_edge_and_arrives_by_the_other() -> None:
+    walk = Walk().along(BEGIN, known_as(KNOWN_AT_1, {1: 1}), (1.0, 0.0), (4.5, 0.0))
+    assert walk.where.on_edge == HalfEdgeId(1, 0)
+    walk.along(FAR, known_as({}, {}), (5.0, 0.0), (8.0, 0.0), (8.0, 6.0), (3.0, 6.0))
+    walk.along(RETURN, known_as(KNOWN_AT_1, {1: 1}), (3.0, 6.0), (0.0, 6.0), (0.0, 1.0))
+    (closed,) = walk.passages[1:]
+    assert (closed.left, closed.arrived) == (HalfEdgeId(1, 0), HalfEdgeId(1, 1))
+    length = float(np.hypot(*np.diff(closed.line, axis=0).T).sum())
+    assert length == pytest.approx(28.0, abs=1.0)
+    assert closed.line[0] == pytest.approx([0.0, 0.0])
+    assert closed.line[-1] == pytest.approx([0.0, 0.0])
+
+
+def test_the_whole_of_a_loop_in_sight_is_one_edge_without_a_passage() -> None:
+    ring = drawn(STEM, {20: (1, 1, LOOP[1:-1]), 22: (1, 2, [])})
+    known = known_as(
+        {
+            Branch(20, forward=True): HalfEdgeId(1, 0),
+            Branch(20, forward=False): HalfEdgeId(1, 1),
+            Branch(22, forward=True): HalfEdgeId(1, 2),
+        },
+        {1: 1},
+    )
+    walk = Walk().along(ring, known, (1.0, 0.0), *LOOP[1:-1], (0.0, 1.0))
+    assert len(walk.passages) == 1
+
+
+# -- ways -------------------------------------------------------------------------------------
+
+
+def corridor_graph() -> GvgGraph:
+    """Three vertices; the first edge is known, the second and the branch south are frontiers."""
+    graph = GvgGraph()
+    for name, x, keys in ((1, 0.0, 1), (2, 6.0, 3), (3, 12.0, 2)):
+        graph.vertices[name] = Vertex(name, "meetpoint", 1.0, Pose(x, 0.0), 0.0, 0.0)
+        for _ in range(keys):
+            graph.vertices[name].add_half_edge(0.0)
+    line = np.array([[0.0, 0.0], [6.0, 0.0]])
+    graph.serial = 3
+    graph.join(HalfEdgeId(1, EAST), HalfEdgeId(2, WEST), line, 1.0, driven=True)
+    return graph
+
+
+def situation(x: float, known: Correspondence = ALL_KNOWN) -> Situation:
+    place = CORRIDOR.place(np.array([x, 0.0]))
+    assert place is not None
+    where = Whereabouts(HalfEdgeId(1, EAST), [np.array([0.0, 0.0]), np.array([x, 0.0])])
+    return Situation(CORRIDOR, known, corridor_graph(), where, place, Pose(x, 0.0, 0.0))
+
+
+def test_the_first_vertices_within_reach_are_the_ends_of_the_edge_with_their_distances() -> None:
+    starts = {s.arrival: s.metres for s in situation(2.0).starts()}
+    assert starts == pytest.approx({HalfEdgeId(1, EAST): 2.0, HalfEdgeId(2, WEST): 4.0})
+
+
+def test_an_end_out_of_sight_is_as_far_as_the_trail_and_the_edge_say() -> None:
+    only_first = known_as({Branch(10, forward=True): HalfEdgeId(1, EAST)}, {1: 1})
+    starts = {s.arrival: s.metres for s in situation(2.0, only_first).starts()}
+    assert starts[HalfEdgeId(2, WEST)] == pytest.approx(4.0, abs=0.1)
+
+
+@pytest.mark.parametrize("x", [1.0, 4.0])
+@pytest.mark.parametrize(("key", "end"), [(EAST, (12.0, 0.0)), (2, (6.0, -3.0))])
+def test_the_way_to_a_frontier_goes_into_it(x: float, key: int, end: Point) -> None:
+    here = situation(x)
+    path = here.path_to(HalfEdgeId(2, key))
+    assert path is not None
+    line, _ = CORRIDOR.line_from(here.place, path)
+    assert line[0] == pytest.approx([x, 0.0], abs=0.11)
+    assert line[-1] == pytest.approx(end)
+
+
+def test_there_is_no_way_to_a_frontier_of_another_piece_of_the_graph() -> None:
+    here = situation(2.0, known_as({Branch(10, forward=True): HalfEdgeId(1, EAST)}, {1: 1}))
+    assert here.path_to(HalfEdgeId(3, 1)) is None
+
+
+@pytest.mark.parametrize(("heading", "end"), [(0.0, (6.0, 0.0)), (math.pi, (0.0, 0.0))])
+def test_without_a_trail_ahead_is_where_the_robot_faces(heading: float, end: Point) -> None:
+    place = CORRIDOR.place(np.array([3.0, 0.0]))
+    assert place is not None
+    here = Situation(
+        CORRIDOR, ALL_KNOWN, corridor_graph(), Whereabouts(), place, Pose(3.0, 0.0, heading)
+    )
+    line, _ = CORRIDOR.line_from(place, here.ahead())
+    assert line[-1] == pytest.approx(end)
+
+
+@pytest.mark.parametrize("heading", [0.0, math.pi])
+def test_with_a_trail_ahead_is_away_from_where_the_robot_came_from(heading: float) -> None:
+    walk = Walk().along(CORRIDOR, ALL_KNOWN, (1.0, 0.0), (3.0, 0.0))
+    place = CORRIDOR.place(np.array([3.0, 0.0]))
+    assert place is not None
+    pose = Pose(3.0, 0.0, heading)
+    here = Situation(CORRIDOR, ALL_KNOWN, corridor_graph(), walk.where, place, pose)
+    line, _ = CORRIDOR.line_from(place, here.ahead())
+    assert line[-1] == pytest.approx([6.0, 0.0])
