@@ -49,7 +49,11 @@ def map_files(pipeline: Pipeline, journey: Journey, title: str) -> dict[str, byt
     """All files of a run but summary and events, by name."""
     keyframes, vertices = smoothed(pipeline)
     graph = route_graph(pipeline, vertices)
-    scans = [(pose, k.scan) for pose, k in zip(keyframes, pipeline.keyframes, strict=True)]
+    scans = [
+        (pose, keyframe.scan)
+        for pose, keyframe in zip(keyframes, pipeline.keyframes, strict=True)
+        if keyframe.scan is not None
+    ]
     grid = occupancy_grid(scans)
     estimate = _trajectory(journey, _corrected(journey, pipeline, keyframes))
     start = pipeline.keyframes[0].odom_base if pipeline.keyframes else Pose()

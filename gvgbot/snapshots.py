@@ -58,5 +58,5 @@ def pose_covariance(pipeline: Pipeline, odometry: Odometry | None, noise: Odomet
         return belief.P[:3, :3]
     last = pipeline.keyframes[-1]
     motion = last.odom_base.to(odometry.odom_base)
-    growth = noise.covariance(motion, max(0.0, odometry.stamp - last.scan.stamp))
+    growth = noise.covariance(motion, max(0.0, odometry.stamp - last.stamp))
     return predict(belief, motion, growth).P[:3, :3]

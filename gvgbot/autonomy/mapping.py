@@ -320,12 +320,38 @@ class Mapper:
         self.observations.append(Observation(view.keyframe, vertex.id, base_vertex, R))
         self._picture(view, vertex)
         place = self.belief.map_vertex(vertex.id)
+        self._split_edge_at(vertex, place)
         self._events.append(
             VertexAdded(
                 view.stamp, vertex.id, kind, place.x, place.y, vertex.degree, vertex.clearance
             )
         )
         return vertex
+
+    def _split_edge_at(self, vertex: Vertex, map_vertex: Pose) -> None:
+        """Make two edges of one that was joined before this vertex on it was found."""
+        for edge in list(self.graph.edges.values()):
+            line = map_vertex.inverse().transform(
+                self.belief.map_vertex(edge.a.vertex).transform(edge.polyline)
+            )
+            away = np.hypot(*line.T)
+            at = int(np.argmin(away))
+            ends = min(np.hypot(*(line[at] - end)) for end in (line[0], line[-1]))
+            if away[at] > self._recognition.same_place_m or ends < self._recognition.same_place_m:
+                continue
+            parts = line[: at + 1][::-1], line[at:]
+            known = {key: half.bearing for key, half in vertex.half_edges.items()}
+            directions = tuple(_direction(part) for part in parts)
+            limit = math.radians(self._recognition.bearing_deg)
+            matched = match_bearings(directions, known, limit)
+            if len(matched) < 2:
+                continue
+            self.graph.unjoin(edge)
+            for i, (part, far) in enumerate(zip(parts, (edge.a, edge.b), strict=True)):
+                near = HalfEdgeId(vertex.id, matched[i])
+                part = np.concatenate([np.zeros((1, 2)), part])
+                self.graph.join(near, far, part, edge.min_clearance, driven=edge.driven)
+            return
 
     def _picture(self, view: View, vertex: Vertex) -> None:
         """Keep the walls around a vertex, to know them again."""
@@ -479,6 +505,13 @@ class Mapper:
         line = self.graph.vertices[a.vertex].local.inverse().transform(local_line)
         edge = self.graph.join(a, b, line, min_clearance, driven=driven)
         self._events.append(EdgeJoined(view.stamp, a.vertex, b.vertex, edge.length, driven))
+
+
+def _direction(line: Array) -> float:
+    """Direction (rad) of a polyline (N, 2) a metre from the origin, where it starts."""
+    away = np.hypot(*line.T)
+    x, y = line[int(np.argmax(away > 1.0))] if away.max() > 1.0 else line[-1]
+    return math.atan2(y, x)
 
 
 def _turned(covariance: Array, angle: float) -> Array:

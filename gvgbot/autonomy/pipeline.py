@@ -25,6 +25,7 @@ from gvgbot.hal.messages import Odometry, Scan
 from gvgbot.ranges import Range
 
 
+_SCAN_EVERY_M, _SCAN_EVERY_RAD = 0.45, 0.4  # scans that are kept for the occupancy grid
 _LEAST_POINTS = 50  # fewer say nothing about a pose
 _LEAST_INLIERS = 0.5  # of the beams must find a wall, or the match is not believed
 _MATCHING_FLOOR = np.diag([0.004**2, 0.004**2, 0.0006**2])  # what matching cannot know of itself
@@ -65,12 +66,13 @@ class Step:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Keyframe:
-    """A scan that was used, with the pose it was taken at."""
+    """The poses at which a scan was used; the scan itself only where it shows something new."""
 
-    scan: Scan
+    stamp: float
     odom_base: Pose
     local_base: Pose
     map_base: Pose
+    scan: Scan | None
 
 
 class Pipeline:
@@ -86,6 +88,7 @@ class Pipeline:
         self._odometry: deque[Odometry] = deque(maxlen=64)
         self._local_odom: Pose | None = None
         self._last: Keyframe | None = None
+        self._kept: Pose | None = None  # local_base of the last scan that was kept
         self._turning_to: float | None = None  # odom heading still to turn through, unwrapped sum
         self._turned = 0.0
         self._twist = STANDSTILL
@@ -165,7 +168,7 @@ class Pipeline:
         return (
             math.hypot(moved.x, moved.y) >= c.distance_m
             or abs(moved.theta) >= c.turn_rad
-            or scan.stamp - self._last.scan.stamp >= c.interval_s
+            or scan.stamp - self._last.stamp >= c.interval_s
         )
 
     def _localise(self, scan: Scan, odom_base: Pose) -> Pose:
@@ -174,7 +177,7 @@ class Pipeline:
             return Pose()
         motion = self._last.odom_base.to(odom_base)
         self.travelled += math.hypot(motion.x, motion.y)
-        Q = self._config.odometry_noise.covariance(motion, scan.stamp - self._last.scan.stamp)
+        Q = self._config.odometry_noise.covariance(motion, scan.stamp - self._last.stamp)
         prior = self._last.local_base.compose(motion)
         local_base, covariance = self._match(scan, prior, _turned(Q, -motion.theta))
         step = Step(self._last.local_base.to(local_base), _turned(covariance, motion.theta))
@@ -194,7 +197,17 @@ class Pipeline:
         return found.pose, found.covariance + _MATCHING_FLOOR
 
     def _keep(self, scan: Scan, odom_base: Pose, local_base: Pose) -> None:
-        self._last = Keyframe(scan, odom_base, local_base, self.mapper.belief.map_base)
+        map_base = self.mapper.belief.map_base
+        moved = self._kept.to(local_base) if self._kept is not None else None
+        if (
+            moved is None
+            or math.hypot(moved.x, moved.y) > _SCAN_EVERY_M
+            or abs(moved.theta) > _SCAN_EVERY_RAD
+        ):
+            self._kept = local_base
+            self._last = Keyframe(scan.stamp, odom_base, local_base, map_base, scan)
+        else:
+            self._last = Keyframe(scan.stamp, odom_base, local_base, map_base, None)
         self.keyframes.append(self._last)
 
     # -- control, per odometry message -------------------------------------------------------------

@@ -78,18 +78,18 @@ class Whereabouts:
     def _arrival(
         self, gvg: LocalGvg, place: Place, known: Correspondence, node: int, trail: Array
     ) -> HalfEdgeId | None:
-        """The half-edge by which a trail came to a node, or comes to it if that is still ahead."""
-        key = place.edge
+        """The half-edge by which a trail came to a node, or comes to it if that is still ahead.
+
+        It may have come through points that are no vertices (yet).
+        """
         away = np.hypot(*(trail - gvg.nodes[node].position).T) > _AWAY_M
-        if away.any():
-            came_over = gvg.place(trail[np.nonzero(away)[0][-1]])
-            if came_over is not None and came_over.distance < _AWAY_M:
-                key = came_over.edge
-        branches = gvg.nodes[node].branches
-        ends = [
-            known.half_edge_of[b] for b in branches if b.edge == key and b in known.half_edge_of
-        ]
-        return ends[0] if ends else None
+        came_over = gvg.place(trail[np.nonzero(away)[0][-1]]) if away.any() else None
+        if came_over is None or came_over.distance > _AWAY_M:
+            came_over = place
+        _, path = gvg.routes(came_over).get(node, (0.0, ()))
+        if not path or any(gvg.end_of(branch) in known.vertex_of for branch in path[:-1]):
+            return None
+        return known.half_edge_of.get(Branch(path[-1].edge, not path[-1].forward))
 
     def _extend(self, base: Array) -> None:
         if len(self.trail) > 3:

@@ -1,4 +1,4 @@
-"""A drawing surface with smooth lines: drawn at three times the size, then reduced.
+"""A drawing surface with smooth lines: drawn at twice the size, then reduced.
 
 Indexed colours, one byte per large pixel, keep it small; text comes last, on the reduced image.
 """
@@ -13,7 +13,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from gvgbot.geometry import Array
 
-OVERSAMPLING = 3
+OVERSAMPLING = 2
 _STRIP = 64  # rows that are stretched or reduced at a time
 
 Point = tuple[float, float]
