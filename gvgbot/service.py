@@ -87,7 +87,11 @@ class StopSignals:
             self._tell()
 
     def __enter__(self) -> Self:
-        self._before = {number: signal.signal(number, self._take) for number in _STOP_SIGNALS}
+        for number in _STOP_SIGNALS:
+            before = signal.getsignal(number)
+            if number is signal.SIGHUP and before is signal.SIG_IGN:
+                continue  # started by nohup: to outlive its terminal
+            self._before[number] = signal.signal(number, self._take)
         return self
 
     def __exit__(

@@ -1,0 +1,171 @@
+"""The daemon as a process of its own, as a person or a service manager starts it."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import tty
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from queue import Queue
+from typing import Any
+
+import msgspec
+import pytest
+import zenoh
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(60)]
+
+RUN = {
+    "map.geojson",
+    "map.yaml",
+    "map.pgm",
+    "map.png",
+    "summary.json",
+    "events.jsonl",
+    "estimate.tum",
+    "online.tum",
+    "odometry.tum",
+    "truth.tum",
+}
+PATIENCE = 20.0  # s, for a busy machine
+
+
+@pytest.fixture
+def endpoint() -> str:
+    """An address on this machine that nobody listens on."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+
+
+@contextmanager
+def gvgbot(*arguments: str, cwd: Path) -> Iterator["subprocess.Popen[str]"]:
+    """A gvgbot process with its log on a pipe; whatever happens, it does not outlive the test."""
+    command = [sys.executable, "-m", "gvgbot", *arguments]
+    environment = {k: v for k, v in os.environ.items() if k not in ("NOTIFY_SOCKET",)}
+    with subprocess.Popen(
+        command,
+        cwd=cwd,
+        env=environment,
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        start_new_session=True,
+    ) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+@contextmanager
+def client(endpoint: str) -> Iterator[zenoh.Session]:
+    """A plain program on the network, which waits until the robot is there."""
+    config = zenoh.Config()
+    for key, value in {
+        "mode": "client",
+        "connect/endpoints": [endpoint],
+        "connect/timeout_ms": round(PATIENCE * 1000),
+        "scouting/multicast/enabled": False,
+    }.items():
+        config.insert_json5(key, json.dumps(value))
+    with zenoh.open(config) as session:
+        yield session
+
+
+def until_driving(samples: "Queue[zenoh.Sample]") -> tuple[str, list[dict[str, Any]]]:
+    """The encoding and all states up to the first one that says that the robot has driven."""
+    states: list[dict[str, Any]] = []
+    while True:
+        sample = samples.get(timeout=PATIENCE)
+        states.append(msgspec.msgpack.decode(sample.payload.to_bytes()))
+        if states[-1]["distance"] > 0.0:
+            return str(sample.encoding), states
+
+
+def ask(session: zenoh.Session, selector: str) -> tuple[str, bytes]:
+    """The encoding and the payload of the only answer."""
+    (reply,) = list(session.get(selector, timeout=PATIENCE))
+    assert reply.ok is not None
+    return str(reply.ok.encoding), reply.ok.payload.to_bytes()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_running_robot_is_watched_asked_and_stopped(
+    number: signal.Signals, endpoint: str, tmp_path: Path
+) -> None:
+    out = tmp_path / "run"
+    arguments = ["--out", str(out), "--set", f"telemetry.listen=[{endpoint}]"]
+    with gvgbot("run", *arguments, cwd=tmp_path) as process, client(endpoint) as session:
+        samples: Queue[zenoh.Sample] = Queue()
+        with session.declare_subscriber("gvgbot/*/state", samples.put):
+            encoding, states = until_driving(samples)
+            token = list(session.liveliness().get("gvgbot/*/alive"))
+            as_json, as_msgpack = (
+                ask(session, "gvgbot/sim/state?format=json"),
+                ask(session, "gvgbot/sim/state"),
+            )
+        process.send_signal(number)
+        process.send_signal(number)  # as impatient people do
+        log, _ = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0, log
+    assert encoding == as_msgpack[0] == "application/msgpack;gvgbot.State.v1"
+    numbers = [state["sequence"] for state in states]
+    assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+    assert [str(reply.ok.key_expr) for reply in token if reply.ok] == ["gvgbot/sim/alive"]
+    assert as_json[0] == "application/json"
+    assert json.loads(as_json[1])["sequence"] >= numbers[-1]
+    assert msgspec.msgpack.decode(as_msgpack[1])["phase"] == "exploring"
+    assert {path.name for path in out.iterdir()} >= RUN
+    assert json.loads((out / "summary.json").read_text())["outcome"] == "stopped"
+    assert f"signal={number.name}" in log
+    assert "Traceback" not in log
+
+
+def test_an_address_in_use_is_one_line_and_leaves_nothing(endpoint: str, tmp_path: Path) -> None:
+    host, _, port = endpoint.removeprefix("tcp/").partition(":")
+    with socket.create_server((host, int(port))):
+        arguments = ["--out", "run", "--set", f"telemetry.listen=[{endpoint}]"]
+        with gvgbot("run", *arguments, cwd=tmp_path) as process:
+            log, _ = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 1
+    (line,) = log.splitlines()
+    assert endpoint in line
+    assert "in use" in line
+    assert "telemetry.listen" in line
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_missing_port_is_named_and_waited_for(tmp_path: Path) -> None:
+    settings = ["telemetry.enabled=false", "laser.port=/no/laser", "base.port=/no/base"]
+    arguments = [word for setting in settings for word in ("--set", setting)]
+    with gvgbot("run", "turtlebot2.yaml", *arguments, cwd=tmp_path) as process:
+        assert process.stdout is not None
+        lines = [process.stdout.readline() for _ in range(3)]
+        process.send_signal(signal.SIGTERM)
+        log, _ = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0, log
+    (laser,) = [line for line in lines if "/no/laser: No such file" in line]
+    (base,) = [line for line in lines if "/no/base: No such file" in line]
+    assert "laser.port" in laser
+    assert "base.port" in base
+
+
+def test_the_base_can_be_stopped_from_outside(tmp_path: Path) -> None:
+    here, there = os.openpty()
+    tty.setraw(there)
+    config = tmp_path / "robot.yaml"
+    config.write_text(f"{{twin: {{enabled: false}}, base: {{port: {os.ttyname(there)}}}}}")
+    command = [sys.executable, "-m", "gvgbot.stop_base", str(config)]
+    try:
+        done = subprocess.run(command, check=False, capture_output=True, timeout=PATIENCE)
+        assert done.returncode == 0, done.stderr
+        # header, length, base control of speed 0 and radius 0, and the XOR of 06 01 04
+        assert os.read(here, 100) == bytes.fromhex("aa55 06 01 04 0000 0000 03")
+    finally:
+        os.close(here)
+        os.close(there)

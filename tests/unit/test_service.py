@@ -1,0 +1,233 @@
+"""What the service manager, the log and the signals hear and say."""
+
+import asyncio
+import io
+import json
+import os
+import signal
+import socket
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import structlog
+
+from gvgbot.autonomy.events import Decision, Finished, LoopClosed, Recovery, VertexAdded
+from gvgbot.clock import run_in_virtual_time
+from gvgbot.journal import GuardJournal, log_event, status_line
+from gvgbot.service import Notifier, StopSignals, set_up_logging
+from tests.unit.test_telemetry import EXAMPLE
+
+
+@pytest.fixture
+def manager(tmp_path: Path) -> Iterator[socket.socket]:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
+        manager.bind(str(tmp_path / "notify"))
+        manager.setblocking(False)
+        yield manager
+
+
+def heard(manager: socket.socket) -> list[bytes]:
+    messages = []
+    while True:
+        try:
+            messages.append(manager.recv(4096))
+        except BlockingIOError:
+            return messages
+
+
+def test_a_service_manager_hears_one_datagram_for_each_message(manager: socket.socket) -> None:
+    notifier = Notifier(manager.getsockname())
+    notifier.ready()
+    notifier.alive()
+    notifier.stopping()
+    assert heard(manager) == [b"READY=1", b"WATCHDOG=1", b"STOPPING=1"]
+
+
+def test_a_status_is_sent_when_it_has_changed(manager: socket.socket) -> None:
+    notifier = Notifier(manager.getsockname())
+    for text in ("exploring", "exploring", "finished: große Halle"):
+        notifier.status(text)
+    assert heard(manager) == [b"STATUS=exploring", "STATUS=finished: große Halle".encode()]
+
+
+def test_a_name_with_an_at_sign_is_an_abstract_one() -> None:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
+        manager.bind(f"\0gvgbot-test-{os.getpid()}")
+        manager.setblocking(False)
+        Notifier(f"@gvgbot-test-{os.getpid()}").ready()
+        assert heard(manager) == [b"READY=1"]
+
+
+def test_the_manager_is_found_in_the_environment(
+    manager: socket.socket, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("NOTIFY_SOCKET", manager.getsockname())
+    Notifier.from_environment().ready()
+    assert heard(manager) == [b"READY=1"]
+
+
+@pytest.mark.parametrize("address", [None, "", "/nowhere/at/all"])
+def test_a_manager_that_does_not_listen_is_no_trouble(address: str | None) -> None:
+    notifier = Notifier(address)
+    notifier.ready()
+    notifier.alive()
+
+
+def test_a_manager_that_is_too_slow_does_not_hold_up_the_robot(manager: socket.socket) -> None:
+    notifier = Notifier(manager.getsockname())
+    for _ in range(10_000):  # more than any queue takes
+        notifier.alive()
+    assert 0 < len(heard(manager)) < 10_000
+
+
+# -- signals ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_ends_the_waiting_and_is_named(number: signal.Signals) -> None:
+    async def main() -> str:
+        async with asyncio.TaskGroup() as tasks:
+            waiting = tasks.create_task(signals.wait())
+            await asyncio.sleep(1.0)
+            assert not waiting.done()
+            signal.raise_signal(number)
+        return waiting.result()
+
+    with StopSignals() as signals:
+        assert run_in_virtual_time(main()) == number.name
+
+
+def test_a_signal_that_came_before_anybody_waited_is_not_lost() -> None:
+    with StopSignals() as signals:
+        signal.raise_signal(signal.SIGTERM)
+        assert run_in_virtual_time(signals.wait()) == "SIGTERM"
+
+
+def test_signals_after_the_first_change_nothing() -> None:
+    with StopSignals() as signals:
+        signal.raise_signal(signal.SIGINT)
+        assert run_in_virtual_time(signals.wait()) == "SIGINT"
+        signal.raise_signal(signal.SIGTERM)
+        signal.raise_signal(signal.SIGINT)
+        assert run_in_virtual_time(signals.wait()) == "SIGINT"
+
+
+def test_signals_are_what_they_were_afterwards() -> None:
+    before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
+    with StopSignals():
+        assert signal.getsignal(signal.SIGINT) != before[0]
+    assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
+
+
+def test_a_robot_started_by_nohup_outlives_its_terminal() -> None:
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with StopSignals():
+            assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+# -- the log ---------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def _fresh_log() -> Iterator[None]:
+    yield
+    structlog.reset_defaults()
+
+
+@pytest.mark.usefixtures("_fresh_log")
+@pytest.mark.parametrize(("method", "prefix"), [("info", "<6>"), ("warning", "<4>")])
+def test_a_journal_gets_json_with_its_severity(method: str, prefix: str) -> None:
+    stream = io.StringIO()
+    set_up_logging(stream, {"JOURNAL_STREAM": "8:1234"})
+    getattr(structlog.get_logger(), method)("laser lost", port="/dev/hokuyo", after_s=None)
+    (line,) = stream.getvalue().splitlines()
+    assert line.startswith(prefix)
+    assert json.loads(line.removeprefix(prefix)) == {
+        "event": "laser lost",
+        "port": "/dev/hokuyo",
+        "level": method,
+    }
+
+
+@pytest.mark.usefixtures("_fresh_log")
+def test_people_get_a_line_without_escapes_where_there_is_no_terminal() -> None:
+    stream = io.StringIO()
+    set_up_logging(stream, {})
+    structlog.get_logger().info("laser lost", port="/dev/hokuyo")
+    structlog.get_logger().debug("cycle")
+    (line,) = stream.getvalue().splitlines()
+    assert "laser lost" in line
+    assert "port=/dev/hokuyo" in line
+    assert "\x1b" not in line
+
+
+class HungUp(io.StringIO):
+    def write(self, text: str) -> int:
+        raise OSError(5, "Input/output error")
+
+
+@pytest.mark.usefixtures("_fresh_log")
+def test_a_terminal_that_is_gone_does_not_end_the_robot() -> None:
+    set_up_logging(HungUp(), {})
+    structlog.get_logger().info("still here")
+
+
+def test_what_happens_is_logged_but_for_details() -> None:
+    with structlog.testing.capture_logs() as logs:
+        log_event(VertexAdded(1.0, 3, "meetpoint", 1.234, 5.678, 3, 1.0))
+        log_event(Decision(1.0, 3, 0.5, "nearest frontier"))
+        log_event(LoopClosed(2.0, 3, 25.04, 1.0, 0.1, 0.9))
+        log_event(Recovery(3.0, "look around", "no edge in sight"))
+        log_event(Finished(4.0, "explored", "no frontier is left"))
+    events = [log["event"] for log in logs]
+    assert events == ["vertex added", "loop closed", "recovery", "finished"]
+    assert (logs[0]["vertex"], logs[0]["x"], logs[0]["y"]) == (3, 1.23, 5.68)
+
+
+def guard_lines(reasons: list[tuple[float, str | None]]) -> list[tuple[str, str]]:
+    journal = GuardJournal()
+    with structlog.testing.capture_logs() as logs:
+        for stamp, reason in reasons:
+            journal.note(reason, stamp)
+    return [(log["event"], log.get("reason") or log["was"]) for log in logs]
+
+
+def every_cycle(start: float, end: float, reason: str | None) -> list[tuple[float, str | None]]:
+    return [(start + 0.02 * i, reason) for i in range(round((end - start) / 0.02))]
+
+
+def test_a_stop_and_its_end_are_a_line_each_however_long_it_lasts() -> None:
+    cycles = [
+        *every_cycle(0, 2, None),
+        *every_cycle(2, 9, "bumper"),
+        *every_cycle(9, 12, None),
+    ]
+    assert guard_lines(cycles) == [("guard stopped", "bumper"), ("guard released", "bumper")]
+
+
+def test_slowing_down_and_short_stops_before_obstacles_are_no_news() -> None:
+    cycles = [
+        *every_cycle(0, 5, "obstacle near"),
+        *every_cycle(5, 5.5, "obstacle"),
+        *every_cycle(5.5, 8, None),
+    ]
+    assert guard_lines(cycles) == []
+
+
+def test_an_obstacle_that_keeps_the_robot_is_news() -> None:
+    assert guard_lines(every_cycle(0, 5, "obstacle")) == [("guard stopped", "obstacle")]
+
+
+def test_a_stop_that_flickers_is_said_once() -> None:
+    cycles: list[tuple[float, str | None]] = []
+    for i in range(10):
+        cycles += [(0.4 * i, "cliff"), (0.4 * i + 0.2, None)]
+    assert guard_lines(cycles) == [("guard stopped", "cliff")]
+
+
+def test_the_status_says_what_counts() -> None:
+    assert status_line(EXAMPLE) == "exploring: 3 vertices, 4 frontiers"
