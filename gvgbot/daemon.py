@@ -39,6 +39,9 @@ def explore(config: Config, *, out: Path | None, real_time: bool) -> int:
         try:
             with asyncio.Runner(loop_factory=factory) as runner:
                 runner.run(explore_once(session, progress))
+        except GvgbotError as error:
+            session.failure = str(error)
+            raise
         finally:
             progress.clear()
             session.save()
@@ -108,6 +111,7 @@ def run(config: Config, *, out: Path | None) -> int:
             with asyncio.Runner() as runner:
                 runner.run(robot.serve(signals.wait()))
         except* GvgbotError as failures:
+            session.failure = str(_first(failures))
             raise _first(failures) from None
         finally:
             session.save()

@@ -24,6 +24,7 @@ class Session:
         self.pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
         self.journey = Journey()
         self.simulation: Simulation | None = None
+        self.failure: str | None = None  # what ended the run, if it was neither mission nor person
         self._counts = {events.LoopClosed: 0, events.Recovery: 0}
         self._contacts, self._in_contact = 0, False
         self._started = time.perf_counter()
@@ -77,8 +78,8 @@ class Session:
     def _summary(self, unfinished: str) -> dict[str, object]:
         mission, graph = self.pipeline.mission, self.pipeline.mapper.graph
         return {
-            "outcome": mission.outcome or "stopped",
-            "reason": mission.reason or unfinished,
+            "outcome": mission.outcome or ("failed" if self.failure else "stopped"),
+            "reason": mission.reason or self.failure or unfinished,
             "distance_m": self.pipeline.travelled,
             "duration_s": self._last_stamp - (self._first_stamp or 0.0),
             "wall_s": time.perf_counter() - self._started,

@@ -57,6 +57,13 @@ def test_a_stopped_daemon_leaves_a_complete_run(daemon: Daemon) -> None:
     assert summary["duration_s"] == pytest.approx(10.0, abs=0.5)
 
 
+def test_a_run_that_ended_by_a_fault_says_so_in_its_summary(daemon: Daemon) -> None:
+    daemon.session.failure = "the base does not answer"
+    daemon.run(ten_seconds)
+    summary = json.loads((daemon.session.directory.path / "summary.json").read_text())
+    assert (summary["outcome"], summary["reason"]) == ("failed", "the base does not answer")
+
+
 def test_the_state_is_published_five_times_a_second_with_the_truth_in_it(daemon: Daemon) -> None:
     truth: list[Pose] = []
 
