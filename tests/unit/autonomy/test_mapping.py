@@ -1,0 +1,223 @@
+"""From sights of hand-drawn local GVGs to vertices and edges."""
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gvgbot.autonomy.events import EdgeJoined, Event, VertexAdded, VertexRemoved
+from gvgbot.autonomy.gvg.local import Branch, LocalGvg
+from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
+from gvgbot.autonomy.mapping import Correspondence, Mapper, MappingConfig, View
+from gvgbot.autonomy.slam.graph import HalfEdgeId
+from gvgbot.autonomy.slam.recognition import RecognitionConfig
+from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
+from gvgbot.geometry import Pose
+from tests.unit.autonomy.local_graphs import Point, drawn
+
+CONFIG = MappingConfig()
+NOTHING_SEEN = LocalMap(LocalMapConfig())
+
+# A tee at x = 3 whose branch goes south to a dead end; the corridor goes on unseen at both ends.
+TEE_POINTS = {1: (-2.0, 0.0), 2: (3.0, 0.0), 3: (6.0, 0.0), 4: (3.0, -4.0)}
+TEE_LINES: dict[int, tuple[int, int, list[Point]]] = {
+    10: (1, 2, []),
+    11: (2, 3, []),
+    12: (2, 4, []),
+}
+UNSEEN = {1: math.pi, 3: 0.0}
+TEE = drawn(TEE_POINTS, TEE_LINES, unseen=UNSEEN)
+PLAIN = drawn({1: (-2.0, 0.0), 3: (6.0, 0.0)}, {10: (1, 3, [])}, unseen=UNSEEN)
+TWO_ENDS = drawn({1: (-1.0, 0.0), 2: (4.0, 0.0)}, {10: (1, 2, [])})
+
+
+class Seen:
+    """A mapper fed with views, one every ten centimetres or where the robot stands."""
+
+    def __init__(self) -> None:
+        self.mapper = Mapper(CONFIG, RecognitionConfig(), ScanMatchingConfig())
+        self.events: list[Event] = []
+        self.known = Correspondence()
+        self._count = 0
+
+    def look(self, gvg: LocalGvg, times: int = 1, at: Pose | None = None) -> "Seen":
+        for _ in range(times):
+            view = View(
+                self._count, float(self._count), 0.1 * self._count, at or Pose(), gvg, NOTHING_SEEN
+            )
+            self.known, events = self.mapper.observe(view)
+            self.events += events
+            self._count += 1
+        return self
+
+    def places(self, kind: str) -> list[Point]:
+        belief = self.mapper.belief
+        found = [v.id for v in self.mapper.graph.vertices.values() if v.kind == kind]
+        return [(belief.map_vertex(v).x, belief.map_vertex(v).y) for v in found]
+
+
+def of_type(events: Iterable[Event], kind: type) -> list[Event]:
+    return [event for event in events if isinstance(event, kind)]
+
+
+def test_a_meetpoint_is_believed_after_some_sightings_and_not_before() -> None:
+    seen = Seen().look(TEE, CONFIG.meetpoint_sightings - 1)
+    assert seen.places("meetpoint") == []
+    seen.look(TEE)
+    assert seen.places("meetpoint") == [pytest.approx((3.0, 0.0), abs=1e-3)]
+    (added,) = of_type(seen.events, VertexAdded)
+    assert isinstance(added, VertexAdded)
+    assert (added.x, added.y) == pytest.approx((3.0, 0.0))
+    assert added.degree == 3
+
+
+def test_a_dead_end_is_believed_later_than_a_meetpoint() -> None:
+    assert CONFIG.endpoint_sightings > CONFIG.meetpoint_sightings
+    seen = Seen().look(TEE, CONFIG.endpoint_sightings - 1)
+    assert seen.places("endpoint") == []
+    assert seen.look(TEE).places("endpoint") == [pytest.approx((3.0, -4.0), abs=1e-3)]
+
+
+def test_an_end_of_sight_is_no_vertex() -> None:
+    seen = Seen().look(TEE, 50)
+    assert len(seen.mapper.graph.vertices) == 2
+    assert not Seen().look(PLAIN, 50).mapper.graph.vertices
+
+
+def test_what_is_too_far_to_be_trusted_is_not_believed() -> None:
+    far = Pose(3.0 + CONFIG.trust_m + 0.5, 0.0)
+    assert Seen().look(TEE, 50, at=far).places("meetpoint") == []
+
+
+def test_departures_have_the_bearings_of_the_branches_and_are_frontiers() -> None:
+    seen = Seen().look(TEE, CONFIG.meetpoint_sightings)
+    (vertex,) = seen.mapper.graph.vertices.values()
+    psi = seen.mapper.belief.map_vertex(vertex.id).theta
+    bearings = sorted((h.bearing + psi) % math.tau for h in vertex.half_edges.values())
+    assert bearings == pytest.approx([0.0, math.pi, 1.5 * math.pi], abs=1e-3)
+    assert len(seen.mapper.graph.frontiers()) == 3
+
+
+def test_an_edge_in_sight_from_end_to_end_is_joined_once() -> None:
+    seen = Seen().look(TEE, 30)
+    (edge,) = seen.mapper.graph.edges.values()
+    assert edge.length == pytest.approx(4.0, abs=0.01)
+    assert not edge.driven
+    assert len(of_type(seen.events, EdgeJoined)) == 1
+    assert len(seen.mapper.graph.frontiers()) == 2
+
+
+def test_two_dead_ends_in_sight_are_a_whole_map() -> None:
+    seen = Seen().look(TWO_ENDS, 30)
+    assert sorted(seen.places("endpoint")) == [
+        pytest.approx((-1.0, 0.0), abs=1e-3),
+        pytest.approx((4.0, 0.0), abs=1e-3),
+    ]
+    assert len(seen.mapper.graph.edges) == 1
+    assert seen.mapper.graph.frontiers() == []
+
+
+def test_the_parts_of_a_view_are_named_after_the_vertices_and_half_edges() -> None:
+    seen = Seen().look(TEE, 30)
+    vertex = seen.known.vertex_of[2]
+    assert seen.known.node_of[vertex] == 2
+    for branch in (Branch(10, forward=False), Branch(11, forward=True), Branch(12, forward=True)):
+        end = seen.known.half_edge_of[branch]
+        assert end.vertex == vertex
+        assert seen.known.branch_of[end] == branch
+        half = seen.mapper.graph.half_edge(end)
+        assert half is not None
+        psi = seen.mapper.graph.vertices[vertex].local.theta
+        assert math.cos(half.bearing + psi - TEE.bearing(branch, 1.0)) > 0.99
+
+
+def test_a_vertex_is_found_again_where_it_was_and_not_added_twice() -> None:
+    jittered = {k: (x + 0.1, y - 0.1) for k, (x, y) in TEE_POINTS.items()}
+    other = drawn(jittered, TEE_LINES, unseen=UNSEEN)
+    seen = Seen()
+    for _ in range(20):
+        seen.look(TEE).look(other)
+    assert len(seen.mapper.graph.vertices) == 2
+    (place,) = seen.places("meetpoint")
+    assert place == pytest.approx((3.05, -0.05), abs=0.1)
+
+
+def test_a_vertex_through_which_a_plain_edge_runs_is_taken_back() -> None:
+    seen = Seen().look(TEE, CONFIG.meetpoint_sightings)
+    seen.look(PLAIN, CONFIG.misses)
+    assert len(seen.mapper.graph.vertices) == 1
+    seen.look(PLAIN, 1)
+    assert len(seen.mapper.graph.vertices) == 0
+    assert seen.mapper.belief.ids == ()
+    assert len(of_type(seen.events, VertexRemoved)) == 1
+
+
+def test_a_departure_that_a_clear_view_keeps_not_showing_is_dropped() -> None:
+    lines = {**TEE_LINES, 13: (2, 5, [])}
+    crossing = drawn({**TEE_POINTS, 5: (3.0, 4.0)}, lines, unseen={**UNSEEN, 5: math.pi / 2})
+    seen = Seen().look(crossing, CONFIG.meetpoint_sightings)
+    (vertex,) = seen.mapper.graph.vertices.values()
+    assert vertex.degree == 4
+    seen.look(TEE, CONFIG.misses + 1)
+    assert vertex.degree == 3
+
+
+def test_a_departure_seen_only_later_is_added() -> None:
+    seen = Seen().look(TEE, 20)
+    lines = {**TEE_LINES, 13: (2, 5, [])}
+    crossing = drawn({**TEE_POINTS, 5: (3.0, 4.0)}, lines, unseen={**UNSEEN, 5: math.pi / 2})
+    seen.look(crossing, 5)
+    vertex = seen.mapper.graph.vertices[seen.known.vertex_of[2]]
+    assert vertex.degree == 4
+    assert len(seen.mapper.graph.edges) == 1
+
+
+def test_the_robot_s_uncertainty_is_in_the_place_of_a_vertex_seen_later() -> None:
+    """A drive between the sights adds to the covariance of what is seen after it only."""
+    seen = Seen().look(TEE, CONFIG.meetpoint_sightings)
+    first = np.trace(seen.mapper.belief.vertex_covariance(seen.known.vertex_of[2]))
+    seen.mapper.move(Pose(20.0, 0.0, 0.0), 0.5 * np.eye(3))
+    seen.look(TWO_ENDS, CONFIG.endpoint_sightings)
+    belief = seen.mapper.belief
+    later = np.trace(belief.vertex_covariance(seen.known.vertex_of[2]))
+    assert later > first + 0.9  # at least the 0.5 in x and in y
+
+
+SIGHTS = [TEE, PLAIN, TWO_ENDS, LocalGvg()]
+
+
+@given(st.lists(st.tuples(st.integers(0, 3), st.integers(1, 9)), max_size=12))
+def test_graph_and_belief_agree_after_any_sequence_of_contradicting_sights(
+    looks: list[tuple[int, int]],
+) -> None:
+    seen = Seen()
+    for sight, times in looks:
+        seen.look(SIGHTS[sight], times)
+    graph, belief = seen.mapper.graph, seen.mapper.belief
+    assert set(belief.ids) == graph.vertices.keys()
+    assert len(belief.x) == 3 + 3 * len(graph.vertices)
+    degrees = sum(vertex.degree for vertex in graph.vertices.values())
+    assert degrees == 2 * len(graph.edges) + len(graph.frontiers()) + len(graph.blocked())
+    for edge in graph.edges.values():
+        assert graph.edge_at(edge.a) is graph.edge_at(edge.b) is edge
+    for end in seen.known.branch_of:
+        assert end.vertex in graph.vertices
+    assert np.linalg.eigvalsh(belief.P).min() > -1e-12
+
+
+def test_a_driven_edge_keeps_its_line_in_the_frame_of_its_first_vertex() -> None:
+    seen = Seen().look(TWO_ENDS, 30)
+    graph = seen.mapper.graph
+    (edge,) = graph.edges.values()
+    graph.unjoin(edge)
+    line = np.array([[-1.0, 0.0], [2.0, 1.0], [4.0, 0.0]])
+    view = View(99, 99.0, 9.9, Pose(), TWO_ENDS, NOTHING_SEEN)
+    seen.mapper.join(view, edge.a, edge.b, line, 0.5, driven=True)
+    (edge,) = graph.edges.values()
+    back = graph.vertices[edge.a.vertex].local.transform(edge.polyline)
+    assert back == pytest.approx(line)
+    assert edge.driven
+    assert graph.edge_at(HalfEdgeId(*edge.b)) is edge

@@ -1,0 +1,214 @@
+"""What the robot decides in small hand-drawn situations, and how each of them ends."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from gvgbot.autonomy.events import Decision, Event, Finished, Recovery
+from gvgbot.autonomy.gvg.local import LocalGvg
+from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
+from gvgbot.autonomy.mapping import Mapper, MappingConfig, View
+from gvgbot.autonomy.mission import Drive, ExplorationConfig, LookAround, Mission, Order, Stand
+from gvgbot.autonomy.slam.graph import HalfEdgeId
+from gvgbot.autonomy.slam.recognition import RecognitionConfig
+from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
+from gvgbot.geometry import Pose
+from tests.unit.autonomy.local_graphs import Point, drawn
+
+CONFIG = ExplorationConfig()
+NOTHING_SEEN = LocalMap(LocalMapConfig())
+
+# A corridor with a tee at x = 3, its branch to the south; all three arms go on unseen.
+TEE = drawn(
+    {1: (-3.0, 0.0), 2: (3.0, 0.0), 3: (8.0, 0.0), 4: (3.0, -4.0)},
+    {10: (1, 2, []), 11: (2, 3, []), 12: (2, 4, [])},
+    unseen={1: math.pi, 3: 0.0, 4: -math.pi / 2},
+)
+PLAIN = drawn({1: (-3.0, 0.0), 3: (8.0, 0.0)}, {10: (1, 3, [])}, unseen={1: math.pi, 3: 0.0})
+CLOSED = drawn({1: (-1.0, 0.0), 2: (4.0, 0.0)}, {10: (1, 2, [])})
+
+
+class Robot:
+    """A mission and its mapper, fed with one view after another."""
+
+    def __init__(self) -> None:
+        self.mapper = Mapper(MappingConfig(), RecognitionConfig(), ScanMatchingConfig())
+        self.mission = Mission(CONFIG, self.mapper)
+        self.events: list[Event] = []
+        self.stamp = self.travelled = 0.0
+        self.pose = Pose()
+        self._count = 0
+
+    def look(self, gvg: LocalGvg, *, period: float = 0.5) -> Order:
+        """The order after one more view from where the robot is."""
+        view = View(self._count, self.stamp, self.travelled, self.pose, gvg, NOTHING_SEEN)
+        known, seen = self.mapper.observe(view)
+        order, done = self.mission.advance(view, known)
+        self.events += [*seen, *done]
+        self.stamp, self._count = self.stamp + period, self._count + 1
+        return order
+
+    def stand(self, gvg: LocalGvg, times: int, *, period: float = 0.5) -> Order:
+        """The last order after some views from the same place."""
+        return [self.look(gvg, period=period) for _ in range(times)][-1]
+
+    def drive(self, gvg: LocalGvg, *corners: Point) -> Order:
+        """The last order on the way along corners, a view every quarter of a metre."""
+        order: Order = Stand()
+        for (x0, y0), (x1, y1) in pairwise(corners):
+            count = max(1, round(math.hypot(x1 - x0, y1 - y0) / 0.25))
+            for share in np.arange(1, count + 1) / count:
+                x, y = x0 + share * (x1 - x0), y0 + share * (y1 - y0)
+                here = Pose(float(x), float(y), math.atan2(y1 - y0, x1 - x0))
+                self.travelled += self.pose.distance(here)
+                self.pose = here
+                order = self.look(gvg)
+        return order
+
+    def said(self, kind: type) -> list[Event]:
+        return [event for event in self.events if isinstance(event, kind)]
+
+
+def end_of(order: Order) -> Point:
+    assert isinstance(order, Drive)
+    x, y = order.track.polyline[-1]
+    return float(x), float(y)
+
+
+def test_before_the_first_vertex_the_robot_drives_on_along_its_edge() -> None:
+    order = Robot().look(PLAIN)
+    assert end_of(order) == pytest.approx((8.0, 0.0))
+    assert isinstance(order, Drive)
+    assert order.blind_end
+
+
+def test_as_soon_as_a_vertex_is_known_the_robot_goes_for_a_frontier_of_it() -> None:
+    robot = Robot()
+    order = robot.stand(TEE, 8)
+    (decision,) = robot.said(Decision)
+    assert isinstance(decision, Decision)
+    target = robot.mission.target
+    assert target is not None
+    assert decision.vertex == target.vertex
+    half = robot.mapper.graph.half_edge(target)
+    assert half is not None
+    assert half.open
+    ahead = {0.0: (8.0, 0.0), -math.pi / 2: (3.0, -4.0), math.pi: (-3.0, 0.0)}
+    assert decision.bearing is not None
+    bearing = min(ahead, key=lambda b: -math.cos(b - float(decision.bearing or 0.0)))
+    assert end_of(order) == pytest.approx(ahead[bearing])
+
+
+def test_a_target_is_kept_until_it_is_explored() -> None:
+    robot = Robot()
+    robot.stand(TEE, 8)
+    chosen = robot.mission.target
+    robot.stand(TEE, 50)
+    assert robot.mission.target == chosen
+    assert len(robot.said(Decision)) == 1
+
+
+def test_a_map_without_frontiers_is_explored() -> None:
+    robot = Robot()
+    order: Order = robot.look(CLOSED)
+    while robot.mission.outcome is None and robot.stamp < 60.0:
+        order = robot.look(CLOSED)
+    assert robot.mission.outcome == "explored"
+    assert isinstance(order, Stand)
+    (end,) = robot.said(Finished)
+    assert isinstance(end, Finished)
+    assert end.outcome == "explored"
+    assert end.reason
+
+
+def test_without_an_edge_in_sight_the_robot_looks_around_and_then_gives_up() -> None:
+    robot = Robot()
+    orders = []
+    while robot.mission.outcome is None and robot.stamp < 100.0:
+        orders.append(robot.look(LocalGvg()))
+    assert all(isinstance(order, LookAround) for order in orders[:-1])
+    assert robot.mission.outcome == "failed"
+    assert robot.stamp == pytest.approx(CONFIG.nothing_in_sight_s, abs=1.5)
+    assert len(robot.said(Finished)) == 1
+
+
+def test_an_edge_that_comes_back_into_sight_in_time_ends_the_search() -> None:
+    robot = Robot()
+    robot.stand(LocalGvg(), 20)
+    assert isinstance(robot.look(PLAIN), Drive)
+    robot.stand(LocalGvg(), 20)
+    assert robot.mission.outcome is None
+
+
+def test_the_end_of_sight_is_looked_around_at_twice_before_a_frontier_is_given_up() -> None:
+    """The robot stands at the eastern end of sight and nothing more comes into view."""
+    robot = Robot()
+    robot.stand(TEE, 8)
+    (vertex,) = robot.mapper.graph.vertices.values()
+    half = vertex.half_edges
+    east = next(key for key, h in half.items() if math.cos(h.bearing) > 0.9)
+    robot.mission.target = HalfEdgeId(vertex.id, east)
+    robot.drive(TEE, (0.0, 0.0), (8.0, 0.0))
+    robot.stand(TEE, 40)
+    looks = [
+        e for e in robot.said(Recovery) if isinstance(e, Recovery) and e.action == "look around"
+    ]
+    gave_up = [e for e in robot.said(Recovery) if isinstance(e, Recovery) and "give up" in e.action]
+    assert len(looks) == 2
+    assert len(gave_up) == 1
+    assert half[east].blocked
+    assert robot.mission.outcome is None  # there are others
+    assert robot.mission.target is not None
+    assert robot.mission.target.key != east
+
+
+def test_a_robot_that_cannot_move_gives_up_its_target_after_its_patience() -> None:
+    robot = Robot()
+    robot.stand(TEE, 8)
+    first = robot.mission.target
+    robot.stand(TEE, round(CONFIG.patience_s / 0.5) + 2)
+    assert first is not None
+    half = robot.mapper.graph.half_edge(first)
+    assert half is not None
+    assert half.blocked
+
+
+def test_with_everything_given_up_the_outcome_says_so() -> None:
+    robot = Robot()
+    while robot.mission.outcome is None and robot.stamp < 10 * CONFIG.patience_s:
+        robot.look(TEE)
+    assert robot.mission.outcome == "explored_with_blocked"
+    assert len(robot.mapper.graph.blocked()) == 3
+    assert len(robot.said(Finished)) == 1
+
+
+def test_turning_into_the_first_open_street_on_the_left_after_driving_an_edge() -> None:
+    """From the east to a crossing whose arms all go on: left of westbound is south."""
+    crossing = drawn(
+        {1: (-4.0, 0.0), 2: (0.0, 0.0), 3: (6.0, 0.0), 4: (0.0, -4.0), 5: (0.0, 4.0)},
+        {10: (1, 2, []), 11: (2, 3, []), 12: (2, 4, []), 13: (2, 5, [])},
+        unseen={1: math.pi, 4: -math.pi / 2, 5: math.pi / 2},
+    )
+    robot = Robot()
+    robot.pose = Pose(5.0, 0.0, math.pi)
+    order = robot.drive(crossing, (5.0, 0.0), (1.5, 0.0))
+    assert end_of(order) == pytest.approx((0.0, -4.0))
+
+
+def test_the_passing_of_a_vertex_counts_a_traversal_of_the_edge_driven() -> None:
+    both = drawn(
+        {1: (0.0, 0.0), 2: (5.0, 0.0), 3: (10.0, 0.0), 4: (5.0, -3.0)},
+        {10: (1, 2, []), 11: (2, 3, []), 12: (2, 4, [])},
+        unseen={4: -math.pi / 2},
+    )
+    robot = Robot()
+    robot.pose = Pose(2.5, 0.0, 0.0)
+    robot.stand(both, 8)
+    robot.drive(both, (2.5, 0.0), (7.0, 0.0))
+    traversals = {
+        tuple(sorted((edge.a.vertex, edge.b.vertex))): edge.traversals
+        for edge in robot.mapper.graph.edges.values()
+    }
+    assert sorted(traversals.values()) == [0, 1]
