@@ -1,7 +1,6 @@
 """The simulated robot: one world, one body, and the twins of both devices on in-memory streams."""
 
 import asyncio
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,7 +34,10 @@ def open_place(config: Config) -> Place:
 
 
 class Simulation:
-    """Both twins in one world; `laser` and `base` are the drivers' ends of their streams."""
+    """Both twins in one world; `laser` and `base` are the drivers' ends of their streams.
+
+    Whoever joins `laser_twin` and `base_twin` to other streams does not call `run`.
+    """
 
     def __init__(self, config: Config, place: Place, clock: Clock) -> None:
         self.place = place
@@ -52,8 +54,8 @@ class Simulation:
             return place.world.cast(world_laser, model.parameters.bearings, model.usable_mm / 1000)
 
         laser_seed, base_seed = np.random.SeedSequence(config.twin.seed).generate_state(2)
-        self._laser_twin = HokuyoTwin(config.twin.laser, sense, int(laser_seed))
-        self._base_twin = KobukiTwin(config.twin.base, self.body, int(base_seed))
+        self.laser_twin = HokuyoTwin(config.twin.laser, sense, int(laser_seed))
+        self.base_twin = KobukiTwin(config.twin.base, self.body, int(base_seed))
         self.laser, self._laser_end = pipe()
         self.base, self._base_end = pipe()
 
@@ -64,7 +66,7 @@ class Simulation:
             tasks.create_task(self._serve_base(), name="base twin")
 
     async def _serve_laser(self) -> None:
-        await serve_twin(self._laser_twin, self._laser_end, self._clock)
+        await serve_twin(self.laser_twin, self._laser_end, self._clock)
 
     async def _serve_base(self) -> None:
-        await serve_twin(self._base_twin, self._base_end, self._clock)
+        await serve_twin(self.base_twin, self._base_end, self._clock)

@@ -71,6 +71,7 @@ class Mission:
         self.outcome: Outcome | None = None
         self.reason = ""
         self._budget_m = math.inf  # of `travelled`, for the present target
+        self._newest_m = 0.0  # of the target edge that has been driven
         self._last_progress = 0.0  # stamp
         self._travelled_then = -math.inf
         self._looked_around = 0
@@ -160,6 +161,7 @@ class Mission:
         away = max((s.metres for s in starts), default=0.0)
         total = sum(e.length for e in self._mapper.graph.edges.values())
         self._budget_m = view.travelled + 2 * (away + total) + self._config.patience_m
+        self._newest_m = 0.0
         self._looked_around = 0
         vertex = self._mapper.graph.vertices[chosen.vertex]
         psi = self._mapper.belief.map_vertex(chosen.vertex).theta
@@ -196,6 +198,9 @@ class Mission:
     def _watch_progress(self, view: View) -> None:
         if view.travelled > self._travelled_then + 0.3:
             self._travelled_then, self._last_progress = view.travelled, view.stamp
+        if self.where.on_edge == self.target and self.where.trail_length > self._newest_m + 0.5:
+            self._newest_m = self.where.trail_length  # new ground: as long as there is more, go on
+            self._budget_m = max(self._budget_m, view.travelled + self._config.patience_m)
         if self.target is not None and view.travelled > self._budget_m:
             self._give_up(view, "driven too far without reaching it")
         elif view.stamp - self._last_progress > self._config.patience_s:

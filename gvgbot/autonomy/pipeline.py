@@ -26,6 +26,8 @@ from gvgbot.ranges import Range
 
 
 _SCAN_EVERY_M, _SCAN_EVERY_RAD = 0.45, 0.4  # scans that are kept for the occupancy grid
+_MATCHED_RANGE_M = 24.0
+_LONGEST_GAP_M = 0.5  # between two beams, for their even spacing
 _LEAST_POINTS = 50  # fewer say nothing about a pose
 _LEAST_INLIERS = 0.5  # of the beams must find a wall, or the match is not believed
 _MATCHING_FLOOR = np.diag([0.004**2, 0.004**2, 0.0006**2])  # what matching cannot know of itself
@@ -38,7 +40,7 @@ class KeyframeConfig:
     distance_m: Annotated[float, Range(0.02, 2.0)] = 0.25
     turn_rad: Annotated[float, Range(0.02, 2.0)] = 0.25
     interval_s: Annotated[float, Range(0.1, 10.0)] = 1.0
-    matched_beams: Annotated[int, Range(50, 5000)] = 270
+    matched_points: Annotated[int, Range(50, 5000)] = 300
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,6 +49,9 @@ class AutonomyConfig:
 
     keyframe: KeyframeConfig = field(default_factory=KeyframeConfig)
     local_map: LocalMapConfig = field(default_factory=lambda: LocalMapConfig(half_width_m=10.0))
+    far_map: LocalMapConfig = field(
+        default_factory=lambda: LocalMapConfig(half_width_m=20.0, cell_m=0.25, bridge_gap_m=0.0)
+    )  # only matched with: the end of a long corridor is what tells how far one has come
     reduction: ReductionConfig = field(default_factory=ReductionConfig)
     edge_follower: EdgeFollowerConfig = field(default_factory=EdgeFollowerConfig)
     mapping: MappingConfig = field(default_factory=MappingConfig)
@@ -83,6 +88,7 @@ class Pipeline:
     ) -> None:
         self._config, self._radius = config, robot_radius
         self._local_map = LocalMap(config.local_map)
+        self._far_map = LocalMap(config.far_map)
         self.mapper = Mapper(config.mapping, config.recognition, config.scan_matching)
         self.mission = Mission(exploration, self.mapper)
         self._odometry: deque[Odometry] = deque(maxlen=64)
@@ -135,7 +141,8 @@ class Pipeline:
         ):
             return []
         local_base = self._localise(scan, odom_base)
-        self._local_map.insert(scan, local_base.compose(scan.base_laser), self.travelled)
+        for local_map in (self._local_map, self._far_map):
+            local_map.insert(scan, local_base.compose(scan.base_laser), self.travelled)
         fine = fine_graph(
             self._local_map,
             local_base.position,
@@ -187,8 +194,9 @@ class Pipeline:
 
     def _match(self, scan: Scan, prior: Pose, Q: Array) -> tuple[Pose, Array]:
         """The base in the local frame, and its covariance given the last one; in the base frame."""
-        walls = self._local_map.points()
-        points = _sampled(scan, self._config.keyframe.matched_beams)
+        far = self._far_map.points()
+        walls = np.concatenate([self._local_map.points(), far[~self._local_map.covers(far)]])
+        points = _sampled(scan, self._config.keyframe.matched_points)
         if len(walls) < _LEAST_POINTS or len(points) < _LEAST_POINTS:
             return prior, Q
         found = register(points, cKDTree(walls), walls, prior, Q, self._config.scan_matching)
@@ -263,13 +271,19 @@ def _blind_angle(scan: Scan) -> float:
 
 
 def _sampled(scan: Scan, count: int) -> Array:
-    """End points (N, 2) of evenly chosen beams that hit something, base frame."""
-    step = max(1, len(scan.ranges) // count)
-    ranges, bearings = scan.ranges[::step], scan.bearings[::step]
+    """About so many end points (N, 2), evenly spaced along what the beams hit; base frame.
+
+    Evenly in space, not in angle: far walls tell most about the heading, and have few beams.
+    """
     with np.errstate(invalid="ignore"):
-        hit = ranges < 12.0
-    r, b = ranges[hit], bearings[hit]
-    return scan.base_laser.transform(np.stack([r * np.cos(b), r * np.sin(b)], axis=1))
+        hit = scan.ranges < _MATCHED_RANGE_M
+    r, b = scan.ranges[hit], scan.bearings[hit]
+    points = np.stack([r * np.cos(b), r * np.sin(b)], axis=1)
+    gaps = np.hypot(*np.diff(points, axis=0).T)
+    along = np.concatenate([[0.0], np.cumsum(np.minimum(gaps, _LONGEST_GAP_M))])
+    step = max(float(along[-1]) / count, 1e-6)
+    chosen = np.unique(np.floor(along / step), return_index=True)[1]
+    return scan.base_laser.transform(points[chosen])
 
 
 def smoothed(pipeline: Pipeline) -> tuple[list[Pose], dict[int, Pose]]:

@@ -24,7 +24,7 @@ class LocalMapConfig:
     """Size and memory of the local map."""
 
     half_width_m: Annotated[float, Range(3.0, 30.0)] = 8.0
-    cell_m: Annotated[float, Range(0.05, 0.2)] = 0.1
+    cell_m: Annotated[float, Range(0.05, 0.5)] = 0.1
     memory_m: Annotated[float, Range(5.0, 200.0)] = (
         30.0  # metres driven after which a cell is forgotten
     )
@@ -67,6 +67,12 @@ class LocalMap:
     def points(self) -> Array:
         """Mean hits of the occupied cells (N, 2), local frame."""
         return self._mean[self._votes > 0]
+
+    def covers(self, points: Array) -> NDArray[np.bool_]:
+        """Whether each point (N, 2) lies in the window."""
+        cells = np.floor(points / self._cell).astype(np.int64) - self._corner
+        inside: NDArray[np.bool_] = ((cells >= 0) & (cells < self._size)).all(axis=-1)
+        return inside
 
     def known(self, points: Array) -> NDArray[np.bool_]:
         """Whether the cell under each point (..., 2) is free or occupied rather than unknown."""

@@ -24,7 +24,7 @@ class ScanMatchingConfig:
 
     max_pair_m: Annotated[float, Range(0.05, 1.0)] = 0.25
     pair_sigma_m: Annotated[float, Range(0.005, 0.5)] = 0.03
-    independent_share: Annotated[float, Range(0.001, 1.0)] = 0.1  # neighbouring pairs err together
+    independent_share: Annotated[float, Range(0.001, 1.0)] = 0.3  # neighbouring pairs err together
     min_pairs: Annotated[int, Range(10, 1000)] = 40
 
 

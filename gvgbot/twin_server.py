@@ -1,0 +1,66 @@
+"""`gvgbot twin`: both simulated devices in one world, on pseudo-terminals, in real time."""
+
+import asyncio
+import contextlib
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+
+from gvgbot.clock import LoopClock
+from gvgbot.config import Config
+from gvgbot.drivers.pty import PtyPort
+from gvgbot.drivers.transport import serve_twin
+from gvgbot.service import StopSignals
+from gvgbot.simulation import Place, Simulation, open_place
+
+
+def serve(
+    config: Config, laser_link: Path | None, base_link: Path | None, announce: Callable[[str], None]
+) -> int:
+    """Serve the twins until a signal comes, and tell where they are; the exit status.
+
+    Raises UsageError for a world that cannot be used or a link that cannot be made.
+    """
+    place = open_place(config)
+    with StopSignals() as signals, asyncio.Runner() as runner:
+        runner.run(_serve(config, place, (laser_link, base_link), announce, signals.wait()))
+    return 0
+
+
+async def _serve(
+    config: Config,
+    place: Place,
+    links: tuple[Path | None, Path | None],
+    announce: Callable[[str], None],
+    stopped: Awaitable[object],
+) -> None:
+    simulation = Simulation(config, place, LoopClock())
+    with contextlib.ExitStack() as stack:
+        laser, base = (stack.enter_context(contextlib.closing(PtyPort(link))) for link in links)
+        announce(_greeting(place, laser, base))
+        await serve_on(simulation, laser, base, stopped)
+
+
+async def serve_on(
+    simulation: Simulation, laser: PtyPort, base: PtyPort, stopped: Awaitable[object]
+) -> None:
+    """Serve the twins of a simulation on these ports until `stopped` returns."""
+    clock = LoopClock()
+    async with asyncio.TaskGroup() as tasks:
+        serving = [
+            tasks.create_task(serve_twin(simulation.laser_twin, laser, clock), name="laser twin"),
+            tasks.create_task(serve_twin(simulation.base_twin, base, clock), name="base twin"),
+        ]
+        await stopped
+        for task in serving:
+            task.cancel()
+
+
+def _greeting(place: Place, laser: PtyPort, base: PtyPort) -> str:
+    start = place.start
+    return (
+        f"world: {place.world.name}, start {start.x:g} {start.y:g} {start.theta:g}\n"
+        f"laser: {laser.path}\n"
+        f"base:  {base.path}\n"
+        f"try: gvgbot check --set twin.enabled=false --set laser.port={laser.path} "
+        f"--set base.port={base.path}"
+    )
