@@ -110,11 +110,11 @@ async def at_once(function: Callable[[], None]) -> None:
 
 
 class Daemon:
-    """A daemon in a corridor around two corners, and all that can be seen of it from outside."""
+    """A daemon in a corridor around three corners, and all that can be seen of it from outside."""
 
     def __init__(self, out: Path) -> None:
-        canvas = Canvas(12.0, 12.0)
-        canvas.carve_path([(2.0, 2.0), (10.0, 2.0), (10.0, 10.0), (2.0, 10.0)], 1.4)
+        canvas = Canvas(14.0, 14.0)
+        canvas.carve_path([(2.0, 2.0), (12.0, 2.0), (12.0, 12.0), (2.0, 12.0), (2.0, 5.0)], 1.4)
         place = Place(canvas.world("corridor"), Pose(5.0, 2.1, 0.3))
         self.config = Config(
             robot=RobotConfig(name="tester"),

@@ -131,7 +131,7 @@ def test_a_robot_goes_on_where_it_was_after_its_base_was_lost_for_a_while(
         await clock.sleep_until(20.0)
         standing.append(daemon.place)
         daemon.cable.is_cut = False
-        await clock.sleep_until(35.0)
+        await clock.sleep_until(32.0)
         truth.append(daemon.place)
 
     with structlog.testing.capture_logs() as logs:
@@ -140,7 +140,7 @@ def test_a_robot_goes_on_where_it_was_after_its_base_was_lost_for_a_while(
     halted = [state for state in daemon.network.states if 11.0 < state.stamp < 20.0]
     assert {state.phase for state in halted} == {"halted"}
     assert all("no base" in state.reason for state in halted)
-    assert daemon.network.states[-1].phase == "exploring"
+    assert {state.phase for state in daemon.network.states if state.stamp > 26.0} == {"exploring"}
     events = [log["event"] for log in logs]
     assert (events.count("base lost"), events.count("base back")) == (1, 1)
     assert daemon.session.place is not None
@@ -148,7 +148,7 @@ def test_a_robot_goes_on_where_it_was_after_its_base_was_lost_for_a_while(
     x, y, _ = daemon.network.states[-1].pose
     assert math.hypot(x - map_base.x, y - map_base.y) < 0.2
     assert standing[1].distance(truth[0]) > 0.3  # it has driven on
-    assert daemon.manager.count("WATCHDOG=1") == pytest.approx(5 * 35, abs=3)
+    assert daemon.manager.count("WATCHDOG=1") == pytest.approx(5 * 32, abs=3)
 
 
 class NoPorts(Links):
