@@ -177,6 +177,23 @@ def test_a_right_angled_bend_is_no_vertex(width: float) -> None:
     assert len(gvg.edges) == 1
 
 
+@pytest.mark.parametrize(("width", "depth"), [(0.8, 0.3), (1.2, 0.5), (2.0, 0.4)])
+def test_an_alcove_less_deep_than_the_clearance_before_it_is_no_branch(
+    width: float, depth: float
+) -> None:
+    world = carved([(-6.0, -1.0, 6.0, 1.0), (-width / 2, -1.0 - depth, width / 2, 1.0)])
+    gvg = seen(looked(world, line(-2.0, 0.0, 2.0, 0.0, 0.0)), (0.0, 0.0))
+    assert not len(meetpoints(gvg))
+
+
+def test_a_recess_much_deeper_than_the_clearance_before_it_is_a_dead_end() -> None:
+    world = carved([(-6.0, -1.0, 6.0, 1.0), (-0.6, -4.0, 0.6, 1.0)])
+    gvg = seen(looked(world, line(-2.0, 0.0, 2.0, 0.0, 0.0)), (0.0, 0.0))
+    assert is_near(meetpoints(gvg), [(0.0, -(1.2**2) / 16)], NOISY)
+    ends = endpoints(gvg)
+    assert is_near(ends[ends[:, 1] < -1.0], [(0.0, -3.4)], NOISY)
+
+
 # -- doors ----------------------------------------------------------------------------------------
 
 

@@ -104,6 +104,18 @@ def test_registration_only_adds_knowledge(offset: Pose, seed: int) -> None:
     assert np.linalg.eigvalsh(prior_covariance - found.covariance).min() > -1e-9
 
 
+@pytest.mark.parametrize("sigma", [0.002, 0.005, 0.01])
+def test_prior_and_walls_are_weighed_by_their_certainty(sigma: float) -> None:
+    """Across a corridor, all else held: the share k = 1 - P/Q of the offset is taken back."""
+    offset = 0.01
+    prior_covariance = np.diag([1e-12, sigma**2, 1e-12])
+    found = matched(CORRIDOR, Pose(), Pose(0.0, offset, 0.0), prior_covariance=prior_covariance)
+    exact = matched(CORRIDOR, Pose(), Pose(0.0, offset, 0.0))  # where the walls alone put it
+    gain = 1.0 - float(found.covariance[1, 1]) / sigma**2
+    assert 0.05 < gain < 0.98
+    assert found.pose.y == pytest.approx(offset + gain * (exact.pose.y - offset), abs=3e-4)
+
+
 def test_a_certain_prior_is_not_moved() -> None:
     truth, offset = Pose(), Pose(0.03, -0.02, 0.01)
     found = matched(CORNER, truth, offset, prior_covariance=1e-10 * np.eye(3))
