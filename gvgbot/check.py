@@ -4,9 +4,10 @@ The robot is told to stand, and nothing else.
 """
 
 import asyncio
-from collections.abc import Callable, Iterator
+import contextlib
+from collections.abc import Awaitable, Callable, Coroutine, Iterator
 from dataclasses import asdict, dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -19,14 +20,15 @@ from gvgbot.hal.messages import Battery, Contact, Scan
 from gvgbot.links import Links
 from gvgbot.simulation import Simulation, open_place
 
-PATIENCE = 10.0  # s for a device's first message; a laser that has just been switched on takes some
+PATIENCE = 10.0  # s for a device's first message
 LISTEN = 3.0  # s of messages that are judged
+SETTLE = 1.0  # s at the start that rates are not judged by
 RATE_TOLERANCE = 0.05
 LOW_BATTERY, EMPTY_BATTERY = 14.0, 13.2  # V
-CALM_JITTER = 0.008  # s; more is a link that hands out bytes late
+CALM = 0.008  # s: a link that varies by more hands out its bytes late
 BASE_RATE = 50.0  # Hz
-MALFORMED = ("bad_frames", "bad_messages", "malformed", "missed_frames", "repeated_scans")
-STREAM_COUNTS = ("frames", "scans")
+HARMLESS_COUNTS = ("frames", "scans")
+SEEN_SHARE = 0.2  # of the beams; a laser that sees less is covered or dirty
 
 Verdict = Literal["ok", "warn", "fail"]
 
@@ -41,34 +43,34 @@ class Line:
     remedy: str = ""
 
     def __str__(self) -> str:
-        remedy = f"\n{'':22}-> {self.remedy}" if self.remedy and self.verdict != "ok" else ""
-        return f"{self.verdict:4}  {self.subject:14}  {self.finding}{remedy}"
+        line = f"{self.verdict:5} {self.subject:14} {self.finding}"
+        return line if self.verdict == "ok" or not self.remedy else f"{line}: {self.remedy}"
 
 
 @dataclass(slots=True)
 class Heard:
-    """When messages were true and when they came, s; `failure` is why there were no more."""
+    """What came: when it was true, when it arrived (s), and how many had come by then.
+
+    `failure` says why nothing more came.
+    """
 
     stamps: list[float] = field(default_factory=list)
     arrivals: list[float] = field(default_factory=list)
+    counts: list[int] = field(default_factory=list)
     failure: str | None = None
-
-    def note(self, stamp: float, now: float) -> None:
-        """Take down a message."""
-        self.stamps.append(stamp)
-        self.arrivals.append(now)
 
     @property
     def rate(self) -> float:
-        """Messages per second of the device's time; 0 for less than two."""
-        if len(self.stamps) < 2:
+        """Messages per second, 0 if there were too few to tell."""
+        if len(self.arrivals) < 2:
             return 0.0
-        return (len(self.stamps) - 1) / (self.stamps[-1] - self.stamps[0])
+        return (self.counts[-1] - self.counts[0]) / (self.arrivals[-1] - self.arrivals[0])
 
     @property
-    def delays(self) -> "np.ndarray[tuple[int], np.dtype[np.float64]]":
-        """From being true to being here (N,), s."""
-        return np.array(self.arrivals) - np.array(self.stamps)
+    def delay(self) -> tuple[float, float]:
+        """From being true to being here: least and 95th percentile, s."""
+        delays = np.subtract(self.arrivals, self.stamps)
+        return float(delays.min()), float(np.percentile(delays, 95))
 
 
 def check(config: Config, say: Callable[[str], None]) -> int:
@@ -76,27 +78,27 @@ def check(config: Config, say: Callable[[str], None]) -> int:
 
     Twins are looked at in virtual time. Raises WorldError for a world that cannot be used.
     """
-    lines = [Line("ok", "configuration", _devices(config))]
+    say(str(Line("ok", "configuration", _summary(config))))
     with asyncio.Runner(loop_factory=VirtualTimeLoop if config.twin.enabled else None) as runner:
-        lines += runner.run(_examine(config))
+        lines = runner.run(examine(config))
     for line in lines:
         say(str(line))
     failures = sum(line.verdict == "fail" for line in lines)
-    say("all is well" if not failures else f"{failures} of {len(lines)} points failed")
+    say("ready to drive" if not failures else f"{failures} of {len(lines)} points failed")
     return min(failures, 1)
 
 
-def _devices(config: Config) -> str:
+def _summary(config: Config) -> str:
     if config.twin.enabled:
-        return f"robot {config.robot.name}, on twins in the world {config.twin.world}"
+        return f"robot {config.robot.name}, twins in the world {config.twin.world}"
     return f"robot {config.robot.name}, laser {config.laser.port}, base {config.base.port}"
 
 
-async def _examine(config: Config) -> list[Line]:
+async def examine(config: Config) -> list[Line]:
+    """The verdicts on the laser and the base. Raises WorldError."""
     clock = LoopClock()
     simulation = Simulation(config, open_place(config), clock) if config.twin.enabled else None
     links = Links(config, clock, simulation)
-    laser, base = asyncio.Task[list[Line]], asyncio.Task[list[Line]]
     async with asyncio.TaskGroup() as tasks:
         twins = None if simulation is None else tasks.create_task(simulation.run())
         laser = tasks.create_task(_examine_laser(links, clock))
@@ -111,16 +113,17 @@ async def _examine_laser(links: Links, clock: Clock) -> list[Line]:
     try:
         laser, close = links.open_laser()
     except DeviceLost as error:
-        return [_absent("laser", str(error))]
+        return [Line("fail", "laser", str(error))]
     assert isinstance(laser, HokuyoLaser)
     scans: list[Scan] = []
 
-    async def listen() -> float:
+    async def next_stamp() -> float:
         scans.append(await laser.next_scan())
         return scans[-1].stamp
 
-    heard = await _listen(laser.run, listen, clock)
-    close()
+    with contextlib.ExitStack() as stack:
+        stack.callback(close)
+        heard = await _listen(laser.run, next_stamp, lambda: laser.link.scans, clock)
     return list(_laser_lines(laser, scans, heard))
 
 
@@ -128,16 +131,138 @@ async def _examine_base(links: Links, clock: Clock) -> list[Line]:
     try:
         base, close = links.open_base()
     except DeviceLost as error:
-        return [_absent("base", str(error))]
+        return [Line("fail", "base", str(error))]
     assert isinstance(base, KobukiBase)
 
-    async def listen() -> float:
+    async def next_stamp() -> float:
         return (await base.next_odometry()).stamp
 
-    heard = await _listen(base.run, listen, clock)
-    close()
+    with contextlib.ExitStack() as stack:
+        stack.callback(close)
+        heard = await _listen(base.run, next_stamp, lambda: base.statistics.frames, clock)
     return list(_base_lines(base, heard))
 
 
-def _absent(name: str, reason: str) -> Line:
-    return Line("fail", name, reason, f"check cable and power, and {name}.port")
+async def _listen(
+    run: Callable[[], Coroutine[Any, Any, None]],
+    next_stamp: Callable[[], Awaitable[float]],
+    count: Callable[[], int],
+    clock: Clock,
+) -> Heard:
+    """Serve a device until it has been heard for long enough, or fails."""
+    heard = Heard()
+
+    async def listen() -> None:
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(PATIENCE):
+                await next_stamp()
+            await clock.sleep_until(clock.now() + SETTLE)
+            async with asyncio.timeout(LISTEN):
+                await next_stamp()  # came while nobody listened
+                while True:
+                    heard.stamps.append(await next_stamp())
+                    heard.arrivals.append(clock.now())
+                    heard.counts.append(count())
+
+    try:
+        async with asyncio.TaskGroup() as tasks:
+            serving = tasks.create_task(run())
+            await listen()
+            serving.cancel()
+    except* (DeviceLost, DeviceRefused) as failures:
+        heard.failure = str(failures.exceptions[0])
+    return heard
+
+
+def _laser_lines(laser: HokuyoLaser, scans: list[Scan], heard: Heard) -> Iterator[Line]:
+    identity = laser.identity
+    if identity is not None:
+        yield Line("ok", "laser", f"{identity.product}, serial {identity.serial}")
+        yield Line("ok", "laser firmware", f"{identity.firmware}, {identity.protocol}")
+    if heard.failure is not None or not heard.arrivals:
+        yield Line("fail", "laser", heard.failure or "sends no scans", "switch it off and on")
+        return
+    yield _steadiness("laser rate", heard, None)
+    yield _link("laser link", laser.link)
+    yield _timing("laser clock", heard)
+    seen = float(np.mean([np.mean(~np.isnan(scan.ranges)) for scan in scans]))
+    yield Line(
+        "ok" if seen >= SEEN_SHARE else "fail",
+        "laser view",
+        f"{len(scans[-1].ranges)} beams, {seen:.0%} of them of use",
+        "uncover and clean its window",
+    )
+
+
+def _base_lines(base: KobukiBase, heard: Heard) -> Iterator[Line]:
+    identity = base.identity
+    if heard.failure is not None or not heard.arrivals:
+        yield Line("fail", "base", heard.failure or "sends no odometry", "switch it off and on")
+        return
+    yield Line(
+        "ok" if identity.is_complete else "warn",
+        "base",
+        f"hardware {identity.hardware}, firmware {identity.firmware}, UDID {identity.udid}",
+        "the base does not answer: check the wire from the computer to it",
+    )
+    yield _steadiness("base rate", heard, BASE_RATE)
+    yield _link("base link", base.statistics)
+    yield _timing("base clock", heard)
+    if base.battery is not None:
+        yield _battery(base.battery)
+    if base.contact is not None:
+        yield _contact(base.contact)
+
+
+def _steadiness(subject: str, heard: Heard, nominal: float | None) -> Line:
+    right = nominal is None or abs(heard.rate / nominal - 1.0) <= RATE_TOLERANCE
+    wanted = "" if nominal is None else f" of {nominal:g}"
+    return Line(
+        "ok" if right and heard.rate > 0.0 else "fail",
+        subject,
+        f"{heard.rate:.1f}{wanted} messages per second",
+        "check the cable, and what else the computer is busy with",
+    )
+
+
+def _link(subject: str, statistics: Any) -> Line:
+    counts = {key: value for key, value in asdict(statistics).items() if isinstance(value, int)}
+    good = sum(counts.pop(key, 0) for key in HARMLESS_COUNTS)
+    damage = {key.replace("_", " "): value for key, value in counts.items() if value}
+    told = ", ".join(f"{value} {key}" for key, value in damage.items()) or "no damage"
+    return Line(
+        "warn" if damage else "ok",
+        subject,
+        f"{good} messages, {told}",
+        "try another cable or port, away from motors",
+    )
+
+
+def _timing(subject: str, heard: Heard) -> Line:
+    least, most = heard.delay
+    return Line(
+        "ok" if most - least <= CALM else "warn",
+        subject,
+        f"messages arrive {1000 * least:.1f} to {1000 * most:.1f} ms after they were true",
+        "set the port's latency_timer to 1, as systemd/60-gvgbot.rules does",
+    )
+
+
+def _battery(battery: Battery) -> Line:
+    finding = f"{battery.voltage:.1f} V, {battery.fraction:.0%}"
+    finding += ", charging" if battery.charging else ""
+    empty, low = battery.voltage < EMPTY_BATTERY, battery.voltage < LOW_BATTERY
+    verdict: Verdict = "fail" if empty else "warn" if low else "ok"
+    return Line(verdict, "battery", finding, "charge it")
+
+
+def _contact(contact: Contact) -> Line:
+    felt = {
+        "bumper": contact.bumper,
+        "cliff": contact.cliff,
+        "wheel drop": contact.wheel_drop,
+        "over-current": contact.over_current,
+    }
+    pressed = ", ".join(name for name, is_felt in felt.items() if is_felt)
+    remedy = "put the robot on a flat floor, away from walls and stairs"
+    return Line("warn" if pressed else "ok", "contact", pressed or "none", remedy)

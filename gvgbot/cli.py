@@ -65,6 +65,8 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     _add_explore(commands)
     _add_run(commands)
+    _add_twin(commands)
+    _add_check(commands)
     return parser
 
 
@@ -116,6 +118,41 @@ def _add_run(commands: "argparse._SubParsersAction[_Parser]") -> None:
     run.set_defaults(command=_run)
 
 
+def _add_twin(commands: "argparse._SubParsersAction[_Parser]") -> None:
+    twin = commands.add_parser(
+        "twin",
+        help="simulated devices on pseudo-terminals",
+        description="Serve the twins of laser and base in one world, on pseudo-terminals that any "
+        "program can open like a serial port, until stopped (SIGINT or SIGTERM).",
+        epilog="example: gvgbot twin --laser-link /tmp/laser --base-link /tmp/base",
+    )
+    _add_config(twin)
+    for name in ("laser", "base"):
+        twin.add_argument(
+            f"--{name}-link", type=Path, metavar="P", help=f"a stable name for the {name}'s port"
+        )
+    twin.set_defaults(command=_twin)
+
+
+def _add_check(commands: "argparse._SubParsersAction[_Parser]") -> None:
+    check = commands.add_parser(
+        "check",
+        help="look at the devices without moving the robot",
+        description="Open the devices of the configuration, or its twins, listen for some seconds, "
+        "and say of each point whether it is as it should be. The robot does not move.",
+        epilog="example: gvgbot check turtlebot2.yaml --set base.port=/dev/ttyUSB0",
+    )
+    _add_config(check)
+    check.set_defaults(command=_check)
+
+
+def _add_config(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "config", nargs="?", type=Path, metavar="CONFIG", help="default: sim.yaml, no hardware"
+    )
+    _add_overrides(parser)
+
+
 def _add_overrides(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--set",
@@ -159,6 +196,29 @@ def _run(options: argparse.Namespace) -> int:
     from gvgbot import daemon
 
     return daemon.run(config, out=options.out)
+
+
+def _twin(options: argparse.Namespace) -> int:
+    from gvgbot.config import load_config
+
+    config = load_config(options.config, options.overrides)
+    from gvgbot import twin_server
+
+    return twin_server.serve(config, options.laser_link, options.base_link, _say)
+
+
+def _check(options: argparse.Namespace) -> int:
+    from gvgbot.config import load_config
+
+    config = load_config(options.config, options.overrides)
+    from gvgbot.check import check
+
+    return check(config, _say)
+
+
+def _say(text: str) -> None:
+    """A line to a person, at once, even into a pipe."""
+    print(text, flush=True)
 
 
 def _overrides(options: argparse.Namespace) -> list[str]:

@@ -11,7 +11,7 @@ from gvgbot.drivers.body import BodyConfig, RobotBody
 from gvgbot.drivers.hokuyo.models import MODELS
 from gvgbot.drivers.hokuyo.twin import HokuyoTwin
 from gvgbot.drivers.kobuki.twin import KobukiTwin
-from gvgbot.drivers.transport import ByteStream, pipe, serve_twin
+from gvgbot.drivers.transport import pipe, serve_twin
 from gvgbot.drivers.world import World, check_start
 from gvgbot.geometry import Array, Pose
 from gvgbot.worlds import open_world
