@@ -431,7 +431,9 @@ class Mapper:
 
     def _remove(self, view: View, vertex: Vertex) -> None:
         """Take a vertex out; of two edges that met there one is made."""
-        ends = [HalfEdgeId(vertex.id, key) for key, h in vertex.half_edges.items() if h.edge is not None]
+        ends = [
+            HalfEdgeId(vertex.id, key) for key, h in vertex.half_edges.items() if h.edge is not None
+        ]
         joined = [self.graph.edges[vertex.half_edges[end.key].edge or 0] for end in ends]
         self.graph.remove_vertex(vertex.id)
         if len(joined) == 2 and joined[0] is not joined[1]:
@@ -522,7 +524,9 @@ def _turned(covariance: Array, angle: float) -> Array:
 
 
 def _sighting(gvg: LocalGvg, node: LocalNode) -> Sighting:
-    branches = node.branches if node.is_suspect else [b for b in node.branches if b not in node.weak]
+    branches = (
+        node.branches if node.is_suspect else [b for b in node.branches if b not in node.weak]
+    )
     bearings = [gvg.bearing(branch, node.clearance) for branch in branches]
     if node.is_suspect and node.lead is not None:
         bearings.append(node.lead)

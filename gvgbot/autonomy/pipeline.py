@@ -155,7 +155,8 @@ class Pipeline:
             scan.stamp,
             self.travelled,
             local_base,
-            self.gvg, self._local_map,
+            self.gvg,
+            self._local_map,
         )
         known, seen = self.mapper.observe(view)
         self._keep(scan, odom_base, local_base)

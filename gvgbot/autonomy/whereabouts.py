@@ -100,8 +100,13 @@ class Whereabouts:
         if not self.trail or np.hypot(*(self.trail[-1] - base)) > 0.1:
             self.trail.append(base)
 
-    def backwards(self, gvg: LocalGvg, place: Place, local_base: Pose) -> Branch:
-        """The way along the robot's local edge that leads back to where it came from."""
+    def backwards(
+        self, gvg: LocalGvg, place: Place, known: Correspondence, local_base: Pose
+    ) -> Branch:
+        """The way along the robot's local edge that leads to the vertex that its edge leaves from."""
+        out = None if self.on_edge is None else known.branch_of.get(self.on_edge)
+        if out is not None and out.edge == place.edge:
+            return Branch(out.edge, not out.forward)
         edge = gvg.edges[place.edge]
         if len(self.trail) > 1:
             points = np.array(self.trail)
@@ -175,16 +180,19 @@ class Situation:
                 return self._extended(path)
         return path
 
+    def _back(self) -> Branch:
+        return self.where.backwards(self.gvg, self.place, self.known, self.local_base)
+
     def ahead(self) -> tuple[Branch, ...]:
         """Straight on along the present edge, as far as it is in sight."""
-        back = self.where.backwards(self.gvg, self.place, self.local_base)
+        back = self._back()
         return self._extended((Branch(back.edge, not back.forward),))
 
     def _away_from(self, end: HalfEdgeId) -> Branch:
         branch = self.known.branch_of.get(end)
         if branch is not None and branch.edge == self.place.edge:
             return branch
-        back = self.where.backwards(self.gvg, self.place, self.local_base)
+        back = self._back()
         return Branch(back.edge, not back.forward)
 
     def _to_vertex(self, vertex: int) -> tuple[Branch, ...] | None:
@@ -192,7 +200,7 @@ class Situation:
         if node is not None:
             found = self.gvg.routes(self.place).get(node)
             return None if found is None else found[1]
-        back = self.where.backwards(self.gvg, self.place, self.local_base)
+        back = self._back()
         if self.where.on_edge is not None and self.where.on_edge.vertex == vertex:
             return self._extended((back,))
         return self._extended((Branch(back.edge, not back.forward),))

@@ -25,7 +25,9 @@ class ReductionConfig:
 
     min_reach: Annotated[float, Range(1.45, 4.0)] = 1.85  # shorter dangling branches are corners
     merge_m: Annotated[float, Range(0.0, 2.0)] = 0.6  # meetpoints closer than this are one
-    roughness_m: Annotated[float, Range(0.0, 0.2)] = 0.03  # unevenness of a flat wall, noise included
+    roughness_m: Annotated[float, Range(0.0, 0.2)] = (
+        0.03  # unevenness of a flat wall, noise included
+    )
 
 
 @dataclass(slots=True, eq=False)

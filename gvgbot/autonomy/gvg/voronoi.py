@@ -69,7 +69,9 @@ def fine_graph(
         goal = np.where((there < 0)[:, None], (p + q) / 2, centres[there])[out]
         towards = goal - centres[here[out]]
         lead[here[out]] = np.arctan2(towards[:, 1], towards[:, 0])
-    return _piece_of_robot(centres, clearance, np.stack([a[joined], b[joined]], axis=1), lead, robot)
+    return _piece_of_robot(
+        centres, clearance, np.stack([a[joined], b[joined]], axis=1), lead, robot
+    )
 
 
 def _circumcircles(corners: Array) -> tuple[Array, Array]:

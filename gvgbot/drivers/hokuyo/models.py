@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import astuple, dataclass
-from typing import Self
+from typing import Literal, Self
 
 import numpy as np
 
@@ -109,24 +109,63 @@ class Model:
     failure_code: int
 
 
+_MAKER = "(Hokuyo Automatic Co.,Ltd.)"
+_URG_CODES = (0, 6, 7)
+_UTM_CODES = (1, 2, 5)
+_UST_CODES = (65533, 0, 0)
+
+
+def _model(
+    name: str,
+    numbers: tuple[int, int, int, int, int, int, int],
+    usable_mm: int,
+    codes: tuple[int, int, int],
+    *,
+    product: str = "",
+    modl: str = "",
+) -> Model:
+    """A row of the catalogue: the numbers in the order of the PP reply."""
+    parameters = Parameters((modl or name) + _MAKER, *numbers)
+    return Model(parameters, product or f"SOKUIKI Sensor {name}", usable_mm, *codes)
+
+
 MODELS: dict[str, Model] = {
-    "URG-04LX": Model(
-        Parameters("URG-04LX(Hokuyo Automatic Co.,Ltd.)", 20, 5600, 1024, 44, 725, 384, 600),
-        product="SOKUIKI Sensor URG-04LX",
-        usable_mm=5600,
-        nothing_code=0,
-        near_code=6,
-        failure_code=7,
+    "URG-04LX": _model("URG-04LX", (20, 5600, 1024, 44, 725, 384, 600), 5600, _URG_CODES),
+    "URG-04LX-UG01": _model(  # in its PP reply it calls itself by the name of the other
+        "URG-04LX-UG01",
+        (20, 5600, 1024, 44, 725, 384, 600),
+        5600,
+        _URG_CODES,
+        product="SOKUIKI Sensor URG-04LX-UG01(Simple-URG)",
+        modl="URG-04LX",
     ),
-    "UTM-30LX": Model(
-        Parameters("UTM-30LX(Hokuyo Automatic Co.,Ltd.)", 23, 60000, 1440, 0, 1080, 540, 2400),
+    "UBG-04LX-F01": _model("UBG-04LX-F01", (20, 5600, 1024, 44, 725, 384, 2140), 5600, _URG_CODES),
+    "UBG-05LX-F01": _model("UBG-05LX-F01", (20, 5600, 1024, 44, 725, 384, 2140), 5600, _URG_CODES),
+    "UHG-08LX": _model("UHG-08LX", (30, 11000, 1024, 0, 768, 384, 900), 8000, _URG_CODES),
+    "UTM-30LX": _model(
+        "UTM-30LX",
+        (23, 60000, 1440, 0, 1080, 540, 2400),
+        30000,
+        _UTM_CODES,
         product="SOKUIKI Sensor TOP-URG UTM-30LX",
-        usable_mm=30000,
-        nothing_code=1,
-        near_code=2,
-        failure_code=5,
     ),
+    "UTM-30LX-EW": _model("UTM-30LX-EW", (23, 60000, 1440, 0, 1080, 540, 2400), 30000, _UST_CODES),
+    "UXM-30LX-E": _model("UXM-30LX-E", (100, 100000, 1440, 0, 760, 380, 1200), 30000, _UTM_CODES),
+    "UST-10LX": _model("UST-10LX", (20, 30000, 1440, 0, 1080, 540, 2400), 10000, _UST_CODES),
+    "UST-20LX": _model("UST-20LX", (20, 60000, 1440, 0, 1080, 540, 2400), 20000, _UST_CODES),
 }
+ModelName = Literal[
+    "URG-04LX",
+    "URG-04LX-UG01",
+    "UBG-04LX-F01",
+    "UBG-05LX-F01",
+    "UHG-08LX",
+    "UTM-30LX",
+    "UTM-30LX-EW",
+    "UXM-30LX-E",
+    "UST-10LX",
+    "UST-20LX",
+]
 
 
 def find_model(name: str) -> Model | None:

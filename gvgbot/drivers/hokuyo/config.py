@@ -1,0 +1,54 @@
+"""How the laser is connected, mounted and read."""
+
+import math
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from gvgbot.geometry import Pose
+from gvgbot.ranges import Range
+
+Echo = Literal["single", "first", "last", "strongest"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HokuyoConfig:
+    """How the laser is connected, mounted and read."""
+
+    port: str = "/dev/ttyACM0"  # or tcp://host:10940
+    baud: Annotated[int, Range(19200, 750000)] = 115200  # means nothing on USB and Ethernet
+    link: Literal["auto", "usb", "serial", "tcp"] = "auto"
+    rate_hz: Annotated[float, Range(0.5, 50.0)] = 10.0  # scans a second, as near as the motor does
+    skip: Annotated[int, Range(0, 9)] | None = None  # scans left out between two; beats rate_hz
+    cluster: Annotated[int, Range(1, 99)] = 1  # steps per beam
+    adapt: bool = True  # to a link that is too slow: coarser, shorter or fewer scans
+    echo: Echo = "single"  # which of several returns along a beam; needs a multi-echo laser
+    intensities: bool = False
+    user_string: str = ""  # marks the scans asked for; up to 16 letters and digits
+    x_m: float = 0.0  # of the laser on the base
+    y_m: float = 0.0
+    yaw_deg: Annotated[float, Range(-180.0, 180.0)] = 0.0
+    upside_down: bool = False
+    first_angle_deg: Annotated[float, Range(-180.0, 180.0)] = -180.0  # of the laser as mounted:
+    last_angle_deg: Annotated[float, Range(-180.0, 180.0)] = 180.0  # beams outside are left out
+    min_range_m: Annotated[float, Range(0.0, 10.0)] = 0.0  # the laser's own limit holds too
+    max_range_m: Annotated[float, Range(0.5, 100.0)] = 30.0
+    processing_latency_s: Annotated[float, Range(0.0, 0.1)] = 0.00475  # last beam to first byte
+    synchronise: bool = True  # ask the laser for its time before the scans
+    reply_timeout_s: Annotated[float, Range(0.15, 10.0)] = 1.0
+    opening_patience_s: Annotated[float, Range(1.0, 60.0)] = 4.0  # with a laser that boots
+    missed_scans: Annotated[int, Range(1, 100)] = 3  # before the stream is started again
+
+    def __post_init__(self) -> None:
+        """Raise ValueError for angles in the wrong order."""
+        if self.last_angle_deg <= self.first_angle_deg:
+            raise ValueError("last_angle_deg must be greater than first_angle_deg")
+
+    @property
+    def base_laser(self) -> Pose:
+        """The laser on the base."""
+        return Pose(self.x_m, self.y_m, math.radians(self.yaw_deg))
+
+    @property
+    def wants_intensities(self) -> bool:
+        """Whether the laser must send intensities: they tell which echo is the strongest."""
+        return self.intensities or self.echo == "strongest"

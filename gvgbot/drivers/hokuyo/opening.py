@@ -1,0 +1,124 @@
+"""Brings a laser to rest whatever state it is in: streaming, asleep, broken or at another rate."""
+
+from collections.abc import Iterator
+from typing import Protocol, runtime_checkable
+
+import structlog
+
+from gvgbot.drivers.hokuyo.dialogue import Dialogue
+from gvgbot.drivers.hokuyo.scip_messages import ACCEPTED
+from gvgbot.errors import DeviceLost, DeviceRefused
+
+BIT_RATES = (19200, 115200, 57600, 38400, 250000, 500000, 750000)  # bit/s, likely ones first
+TRIES_AT_A_RATE = 2
+SCIP_1 = "E"  # what a laser that still speaks SCIP 1.1 answers
+ABNORMAL = "0L"
+UPDATING = "0I"  # waits for firmware; a reset ends it
+MAX_REFUSALS = 3
+REBOOT_TAKES = 1.0  # s from the second RB until the link drops
+BETWEEN_REBOOTS = 0.3  # s at most: the second RB must follow within a second
+
+log = structlog.get_logger()
+
+
+@runtime_checkable
+class Tunable(Protocol):
+    """A stream whose bit rate can be set."""
+
+    def set_baud(self, baud: int) -> None:
+        """Send and receive at this rate (bit/s) from now on."""
+
+
+async def quiet(dialogue: Dialogue, *, patience: float) -> None:
+    """End whatever the laser was doing, and drop all that it had sent.
+
+    `patience` (s) is how long a laser that says nothing may take to boot. Raises DeviceLost, or
+    DeviceRefused if it does not come to rest.
+    """
+    until = dialogue.clock.now() + patience
+    refusals = 0
+    while True:
+        status = await _stopped(dialogue)
+        if status == ACCEPTED:
+            return
+        if status is None and dialogue.clock.now() >= until:
+            raise DeviceLost("the laser does not answer: check its power and cable")
+        if status is not None:
+            refusals += 1
+            await _cure(dialogue, status, refusals)
+
+
+async def _stopped(dialogue: Dialogue) -> str | None:
+    """The status of the answer to a stop; None without one."""
+    dialogue.break_off()
+    dialogue.send("TM2")
+    dialogue.send("QT")
+    reply = await dialogue.reply_to("QT")
+    return None if reply is None else reply.status
+
+
+async def _cure(dialogue: Dialogue, status: str, refusals: int) -> None:
+    """Do what brings a laser that answers so nearer to rest. Raises DeviceRefused."""
+    if refusals > MAX_REFUSALS:
+        raise DeviceRefused(f"the laser answers QT with status {status}: switch it off and on")
+    if status == SCIP_1:
+        dialogue.send("SCIP2.0")
+    elif status == UPDATING:
+        dialogue.send("RS")
+    elif status == ABNORMAL:
+        await reboot(dialogue)
+
+
+async def reboot(dialogue: Dialogue) -> None:
+    """Restart the laser, and wait while it goes down. Raises DeviceLost if the link drops."""
+    log.warning("laser reboots", reason="abnormal state")
+    dialogue.link.reboots += 1
+    for _ in range(2):
+        dialogue.send("RB")
+        await dialogue.reply_to("RB", BETWEEN_REBOOTS)
+    await dialogue.clock.sleep_until(dialogue.clock.now() + REBOOT_TAKES)
+
+
+async def tune(dialogue: Dialogue, wanted: int, *, patience: float) -> int:
+    """Bring the laser to rest at whatever bit rate it listens to, and set it to the wanted one.
+
+    Returns the rate (bit/s) at which both sides are then. A stream that cannot change its rate
+    counts as being at the wanted one. Raises DeviceLost or DeviceRefused.
+    """
+    stream = dialogue.stream
+    if not isinstance(stream, Tunable):
+        await quiet(dialogue, patience=patience)
+        return wanted
+    found = await _search(dialogue, stream, wanted, patience)
+    return found if found == wanted else await _set_rate(dialogue, stream, found, wanted)
+
+
+async def _search(dialogue: Dialogue, stream: Tunable, wanted: int, patience: float) -> int:
+    """The rate at which the laser is at rest now. Raises DeviceLost or DeviceRefused."""
+    for baud, tries in _rates(wanted):
+        stream.set_baud(baud)
+        try:
+            await quiet(dialogue, patience=tries * dialogue.timeout - dialogue.timeout / 2)
+        except DeviceLost:
+            continue
+        return baud
+    stream.set_baud(wanted)
+    await quiet(dialogue, patience=patience)
+    return wanted
+
+
+def _rates(wanted: int) -> Iterator[tuple[int, int]]:
+    yield wanted, TRIES_AT_A_RATE
+    yield from ((baud, 1) for baud in BIT_RATES if baud != wanted)
+
+
+async def _set_rate(dialogue: Dialogue, stream: Tunable, found: int, wanted: int) -> int:
+    dialogue.send(f"SS{wanted:06}")
+    reply = await dialogue.reply_to(f"SS{wanted:06}")
+    if reply is None or reply.status != ACCEPTED:
+        log.warning("laser keeps its bit rate", baud=found, wanted=wanted)
+        return found
+    stream.set_baud(wanted)
+    await quiet(dialogue, patience=dialogue.timeout)
+    log.info("laser changed its bit rate", before=found, baud=wanted)
+    return wanted
