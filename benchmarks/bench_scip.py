@@ -7,8 +7,9 @@ from collections.abc import Callable
 import numpy as np
 
 from gvgbot.clock import LoopClock, run_in_virtual_time
-from gvgbot.drivers.hokuyo.driver import HokuyoConfig, HokuyoLaser, scan_geometry
+from gvgbot.drivers.hokuyo.driver import HokuyoConfig, HokuyoLaser
 from gvgbot.drivers.hokuyo.models import MODELS
+from gvgbot.drivers.hokuyo.scan_geometry import scan_geometry
 from gvgbot.drivers.hokuyo.scip import ScipParser, encode_scan
 from gvgbot.drivers.hokuyo.scip_codec import block, to_characters, to_values, unblock
 from gvgbot.drivers.hokuyo.scip_messages import ScanReply, ScanRequest

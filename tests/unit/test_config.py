@@ -24,7 +24,7 @@ def test_the_simulated_robot_has_a_kobuki_and_ten_scans_a_second() -> None:
     config = load_config(Path("sim.yaml"))
     assert config.robot.radius_m == 0.177
     assert config.twin.laser.model == "UTM-30LX"
-    assert 40 / (config.laser.skip + 1) == 10
+    assert config.laser.rate_hz == 10.0
     assert config.twin.base.odometry == "kobuki"
 
 

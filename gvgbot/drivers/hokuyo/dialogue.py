@@ -55,10 +55,10 @@ class Dialogue:
             return reply
         raise DeviceLost(f"the laser does not answer {command}")
 
-    async def reply_to(self, command: str, timeout: float | None = None) -> Reply | None:
-        """The next reply that echoes the command; None when none comes in time (s)."""
+    async def reply_to(self, command: str, within: float | None = None) -> Reply | None:
+        """The next reply that echoes the command; None when none comes `within` s."""
         with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(self.timeout if timeout is None else timeout):
+            async with asyncio.timeout(self.timeout if within is None else within):
                 while True:
                     for message, _ in await self.receive():
                         if isinstance(message, Reply) and message.echo == command:

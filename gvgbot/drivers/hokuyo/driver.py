@@ -2,114 +2,77 @@
 
 import asyncio
 import contextlib
-import math
-from dataclasses import dataclass, field
-from typing import Annotated
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import structlog
 
 from gvgbot.clock import Clock
-from gvgbot.drivers.hokuyo.clock_sync import ClockMap, follow
-from gvgbot.drivers.hokuyo.models import Identity, Parameters, find_model
-from gvgbot.drivers.hokuyo.scan_geometry import ScanGeometry
-from gvgbot.drivers.hokuyo.scip import ScipParser, encode_command
-from gvgbot.drivers.hokuyo.scip_messages import (
-    ACCEPTED,
-    BadReply,
-    Message,
-    Reply,
-    ScanReply,
-    ScanRequest,
+from gvgbot.drivers.hokuyo import clock_sync
+from gvgbot.drivers.hokuyo.clock_sync import ClockMap, Synchronisation, TimeSample
+from gvgbot.drivers.hokuyo.config import HokuyoConfig
+from gvgbot.drivers.hokuyo.dialogue import Arrival, Dialogue, Refusal
+from gvgbot.drivers.hokuyo.models import Identity, Parameters
+from gvgbot.drivers.hokuyo.modes import Mode, choose_mode, link_rate
+from gvgbot.drivers.hokuyo.opening import ABNORMAL, quiet, reboot, tune
+from gvgbot.drivers.hokuyo.scan_geometry import (
+    ScanGeometry,
+    arrival_delay,
+    one_per_step,
+    scan_geometry,
 )
+from gvgbot.drivers.hokuyo.scip import decode_time
+from gvgbot.drivers.hokuyo.scip_codec import DamagedError, Values
+from gvgbot.drivers.hokuyo.scip_messages import BadReply, Message, Reply, ScanReply, ScanRequest
+from gvgbot.drivers.hokuyo.statistics import LinkStatistics
 from gvgbot.drivers.transport import ByteStream
 from gvgbot.errors import DeviceLost, DeviceRefused
-from gvgbot.geometry import Pose
 from gvgbot.hal.latest import Latest
 from gvgbot.hal.messages import Scan
-from gvgbot.ranges import Range
 
-QUIET_ATTEMPTS = 3  # a QT can be lost as a scan starts
-ASK_ATTEMPTS = 2
+__all__ = ["HokuyoConfig", "HokuyoLaser", "LinkStatistics"]
+
 SHORTEST_SILENCE = 0.2  # s; links deliver in bursts
-SCIP_1_STATUS = "E"  # what a laser that still speaks SCIP 1.1 answers to QT
+TIME_SAMPLES = 12  # of the laser's clock
+UNKNOWN_COMMAND = frozenset({"0C", "0D", "0E", "0F"})  # firmware generations disagree on which
+BROKEN = range(50, 98)  # statuses of hardware trouble
+SIMPLER = {"NE": "ND", "ND": "MD", "ME": "MD"}  # what to ask for when a command is unknown
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class HokuyoConfig:
-    """How the laser is connected, mounted and read."""
-
-    port: str = "/dev/ttyACM0"
-    baud: Annotated[int, Range(19200, 750000)] = 115200
-    skip: Annotated[int, Range(0, 9)] = 3  # scans left out between two; 3 makes 40 Hz 10 Hz
-    cluster: Annotated[int, Range(1, 99)] = 1  # steps per beam
-    x_m: float = 0.0  # of the laser on the base
-    y_m: float = 0.0
-    yaw_deg: Annotated[float, Range(-180.0, 180.0)] = 0.0
-    min_range_m: Annotated[float, Range(0.0, 10.0)] = 0.0  # the laser's own limit holds too
-    max_range_m: Annotated[float, Range(0.5, 100.0)] = 30.0
-    processing_latency_s: Annotated[float, Range(0.0, 0.1)] = 0.00475  # last beam to first byte
-    reply_timeout_s: Annotated[float, Range(0.15, 10.0)] = 1.0
-    missed_scans: Annotated[int, Range(1, 100)] = 3  # before the stream is started again
-
-    @property
-    def base_laser(self) -> Pose:
-        """The laser on the base."""
-        return Pose(self.x_m, self.y_m, math.radians(self.yaw_deg))
-
-
-@dataclass(slots=True)
-class LinkStatistics:
-    """What happened on the link since the driver was made."""
-
-    scans: int = 0
-    bad_messages: int = 0  # damaged: dropped, the stream goes on
-    stray_messages: int = 0  # whole, but not what was asked for
-    repeated_scans: int = 0  # the same stamp again: the laser is frozen
-    restarts: int = 0
-    clock_resets: int = 0
-
-
-def scan_geometry(
-    config: HokuyoConfig, parameters: Parameters, request: ScanRequest
-) -> ScanGeometry:
-    """The geometry of the requested scans; models outside the catalogue get their own limits."""
-    model = find_model(parameters.model)
-    first_beam = request.start + (request.group - 1) / 2
-    usable_mm = parameters.range_max_mm if model is None else model.usable_mm
-    return ScanGeometry(
-        base_laser=config.base_laser,
-        angle_min=parameters.bearing(first_beam),
-        angle_increment=request.group * parameters.step_angle,
-        time_increment=request.group * parameters.step_time,
-        first_beam_delay=first_beam * parameters.step_time,
-        arrival_delay=request.end * parameters.step_time + config.processing_latency_s,
-        shortest_mm=max(parameters.range_min_mm, round(config.min_range_m * 1000)),
-        longest_mm=min(usable_mm, round(config.max_range_m * 1000)),
-        nothing_code=None if model is None else model.nothing_code,
-    )
+log = structlog.get_logger()
 
 
 @dataclass(slots=True)
 class _Stream:
-    """A running MD stream."""
+    """A running stream of scans; `delay` and `silence` in s."""
 
     request: ScanRequest
     geometry: ScanGeometry
+    delay: float
     silence: float
-    clock_map: ClockMap | None = field(default=None)
+    sync: Synchronisation | None = None
+    clock_map: ClockMap | None = None
 
 
 class HokuyoLaser:
     """Serves one laser over one byte stream; after DeviceLost make a new one on a new stream."""
 
     def __init__(self, stream: ByteStream, config: HokuyoConfig, clock: Clock) -> None:
-        self.link = LinkStatistics()
-        self._wire = stream
         self._config = config
-        self._clock = clock
-        self._parser = ScipParser()
-        self._began = 0.0
+        self._dialogue = Dialogue(stream, clock, config.reply_timeout_s)
         self._scans: Latest[Scan] = Latest()
+        self._baud = config.baud
         self._identity: Identity | None = None
         self._parameters: Parameters | None = None
+        self._mode: Mode | None = None
+        self._status: Mapping[str, str] = {}
+        self._sync: Synchronisation | None = None
+        self._intensities: Values | None = None
+
+    @property
+    def link(self) -> LinkStatistics:
+        """What has happened on the link."""
+        return self._dialogue.link
 
     @property
     def identity(self) -> Identity | None:
@@ -121,65 +84,137 @@ class HokuyoLaser:
         """The laser's geometry and timing; None until it is open."""
         return self._parameters
 
+    @property
+    def status(self) -> Mapping[str, str]:
+        """The laser's own account of its state, by the keys of its II reply; empty until open."""
+        return self._status
+
+    @property
+    def mode(self) -> Mode | None:
+        """The scans that are asked for, and what was changed to fit the link; None until open."""
+        return self._mode
+
+    @property
+    def synchronisation(self) -> Synchronisation | None:
+        """How the laser's clock stood when it was opened; None if it was not asked or silent."""
+        return self._sync
+
+    @property
+    def intensities(self) -> Values | None:
+        """Those of the newest scan (N,), without unit, beam by beam; None if not asked for."""
+        return self._intensities
+
     async def next_scan(self) -> Scan:
         """The newest scan not handed out before; waits for one."""
         return await self._scans.next()
 
     async def run(self) -> None:
         """Open the laser and stream until cancelled. Raises DeviceLost or DeviceRefused."""
+        patience = self._config.opening_patience_s
+        before: ClockMap | None = None
         try:
-            await self._quiet()
-            stream = self._prepare(await self._open())
+            self._baud = await tune(self._dialogue, self._baud, patience=patience)
+            parameters = await self._open()
             while True:
-                await self._ask(stream.request.text())
+                self._sync = await self._synchronise()
+                stream = await self._start(parameters)
+                stream.clock_map = before
                 await self._stream_until_silence(stream)
+                before = stream.clock_map
                 self.link.restarts += 1
-                await self._quiet()
+                await quiet(self._dialogue, patience=2 * self._config.reply_timeout_s)
         finally:
             with contextlib.suppress(DeviceLost):
-                self._send("QT")
+                self._dialogue.send("QT")
 
-    async def _quiet(self) -> None:
-        """End whatever the laser was doing, and drop all that it had sent."""
-        status = None
-        for _ in range(QUIET_ATTEMPTS):
-            self._wire.write(b"\n")  # completes, and so discards, a command cut in half
-            self._send("TM2")
-            self._send("QT")
-            reply = await self._reply_to("QT")
-            status = None if reply is None else reply.status
-            if status == ACCEPTED:
-                return
-            if status == SCIP_1_STATUS:
-                self._send("SCIP2.0")
-        if status is None:
-            raise DeviceLost("the laser does not answer: check its power and cable")
-        raise DeviceRefused(f"the laser answers QT with status {status}: switch it off and on")
+    # -- opening -----------------------------------------------------------------------------------
 
     async def _open(self) -> Parameters:
-        self._identity = Identity.from_lines((await self._ask("VV")).fields)
-        reply = await self._ask("PP")
+        self._identity = Identity.from_lines((await self._dialogue.ask("VV")).fields)
+        reply = await self._dialogue.ask("PP")
         try:
             self._parameters = Parameters.from_lines(reply.fields)
         except ValueError as error:
             raise DeviceRefused(f"the laser's PP reply makes no sense: {error}") from error
+        with contextlib.suppress(Refusal):
+            self._status = (await self._dialogue.ask("II")).fields
+        self._mode = self._choose(self._parameters)
+        if self._mode.adapted is not None:
+            log.warning("laser mode fitted to its link", change=self._mode.adapted)
         return self._parameters
 
-    def _prepare(self, parameters: Parameters) -> _Stream:
+    def _choose(self, parameters: Parameters) -> Mode:
+        port = self._config.port
+        name = port if port.startswith("tcp:") else str(Path(port).resolve())
+        baud = link_rate(self._config, self._baud, name, self._status.get("SBPS", ""))
+        try:
+            return choose_mode(self._config, parameters, baud)
+        except ValueError as error:
+            raise DeviceRefused(str(error)) from error
+
+    async def _synchronise(self) -> Synchronisation | None:
+        """How the clocks stand to each other, as far as the laser tells."""
+        if not self._config.synchronise:
+            return None
+        samples: list[TimeSample] = []
+        try:
+            await self._dialogue.ask("TM0")
+            while len(samples) < TIME_SAMPLES:
+                samples.append(await self._time_sample())
+        except (Refusal, DamagedError) as error:
+            log.info("laser does not tell its time", reason=str(error))
+        self._dialogue.send("TM2")
+        await self._dialogue.reply_to("TM2")
+        return clock_sync.synchronise(samples)
+
+    async def _time_sample(self) -> TimeSample:
+        """Raises Refusal or DamagedError."""
+        sent = self._dialogue.clock.now()
+        reply = await self._dialogue.ask("TM1")
+        return TimeSample(sent, decode_time(reply), self._dialogue.clock.now())
+
+    async def _start(self, parameters: Parameters) -> _Stream:
+        """Start the scans, simpler ones if the laser does not know those that were asked for."""
+        assert self._mode is not None
+        while True:
+            request = self._mode.request
+            try:
+                await self._dialogue.ask(request.text())
+            except Refusal as refusal:
+                await self._give_way(refusal, request)
+            else:
+                return self._stream(request, parameters)
+
+    async def _give_way(self, refusal: Refusal, request: ScanRequest) -> None:
+        """Ask for less from now on, or reboot the laser. Raises the refusal if neither helps."""
+        simpler = SIMPLER.get(request.command)
+        if refusal.status == ABNORMAL and not self.link.reboots:
+            await reboot(self._dialogue)
+            await quiet(self._dialogue, patience=self._config.opening_patience_s)
+        elif refusal.status in UNKNOWN_COMMAND and simpler is not None:
+            log.warning("laser has no such scans", command=request.command, instead=simpler)
+            change = f"command {simpler} instead of {request.command}: the laser does not know it"
+            self._mode = Mode(replace(request, command=simpler), change)
+        else:
+            raise refusal
+
+    def _stream(self, request: ScanRequest, parameters: Parameters) -> _Stream:
         config = self._config
-        request = ScanRequest(
-            "MD", parameters.first_step, parameters.last_step, config.cluster, config.skip
-        )
-        interval = parameters.period * (config.skip + 1)
+        interval = parameters.period * (request.skip + 1)
         return _Stream(
             request,
             scan_geometry(config, parameters, request),
+            arrival_delay(config, parameters, request),
             max(SHORTEST_SILENCE, config.missed_scans * interval),
+            self._sync,
         )
+
+    # -- streaming ---------------------------------------------------------------------------------
 
     async def _stream_until_silence(self, stream: _Stream) -> None:
         """Hand on scans until they stop coming. Raises DeviceLost if not one came."""
         if not await self._scan_within(self._config.reply_timeout_s + stream.silence, stream):
+            self._dialogue.send("RS")
             raise DeviceLost("the laser answers but sends no scans: switch it off and on")
         while await self._scan_within(stream.silence, stream):
             pass
@@ -187,12 +222,12 @@ class HokuyoLaser:
     async def _scan_within(self, seconds: float, stream: _Stream) -> bool:
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(seconds):
-                while not self._hand_on(await self._receive(), stream):
+                while not self._hand_on(await self._dialogue.receive(), stream):
                     pass
                 return True
         return False
 
-    def _hand_on(self, arrivals: list[tuple[Message, float]], stream: _Stream) -> bool:
+    def _hand_on(self, arrivals: list[Arrival], stream: _Stream) -> bool:
         """Whether there was a scan among the messages."""
         scans = [self._take(message, arrival, stream) for message, arrival in arrivals]
         fresh = [scan for scan in scans if scan is not None]
@@ -205,52 +240,38 @@ class HokuyoLaser:
         match message:
             case ScanReply(request=stream.request):
                 return self._timed_scan(message, arrival, stream)
+            case Reply(command=command, status=status) if command == stream.request.text():
+                self._no_scan(status)
             case BadReply():
-                self.link.bad_messages += 1
+                pass  # counted as it was heard
             case _:
                 self.link.stray_messages += 1
         return None
+
+    def _no_scan(self, status: str) -> None:
+        """What a status in place of a scan means. Raises DeviceLost if there will be none."""
+        self.link.refused_scans += 1
+        if status == ABNORMAL or (status.isdecimal() and int(status) in BROKEN):
+            raise DeviceLost(f"the laser reports a fault of its own, status {status}")
 
     def _timed_scan(self, reply: ScanReply, arrival: float, stream: _Stream) -> Scan | None:
         before = stream.clock_map
         if before is not None and reply.stamp == before.stamp_ms:
             self.link.repeated_scans += 1
             return None
-        stream.clock_map = follow(before, reply.stamp, arrival)
-        self.link.clock_resets = stream.clock_map.resets
-        return stream.geometry.scan(reply.ranges, stream.clock_map.host_stamp)
+        now = self._follow(stream, reply.stamp, arrival)
+        stream.clock_map, stream.sync = now, None
+        ranges, intensities = one_per_step(reply, self._config.echo)
+        if intensities is not None:
+            self._intensities = intensities[::-1] if stream.geometry.is_reversed else intensities
+        return stream.geometry.scan(ranges, now.host_stamp)
 
-    async def _ask(self, command: str) -> Reply:
-        """The reply to a command. Raises DeviceLost or DeviceRefused."""
-        for _ in range(ASK_ATTEMPTS):
-            self._send(command)
-            reply = await self._reply_to(command)
-            if reply is None:
-                continue
-            if reply.status != ACCEPTED:
-                raise DeviceRefused(f"the laser answers {command} with status {reply.status}")
-            return reply
-        raise DeviceLost(f"the laser does not answer {command}")
-
-    async def _reply_to(self, command: str) -> Reply | None:
-        """The next reply that echoes the command; None when none comes in time."""
-        with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(self._config.reply_timeout_s):
-                while True:
-                    for message, _ in await self._receive():
-                        if isinstance(message, Reply) and message.echo == command:
-                            return message
-        return None
-
-    async def _receive(self) -> list[tuple[Message, float]]:
-        """The messages that the next bytes complete, and when each one's first byte arrived (s)."""
-        continues = self._parser.pending > 0
-        data = await self._wire.read()
-        now = self._clock.now()
-        first_began = self._began if continues else now
-        messages = self._parser.feed(data)
-        self._began = now if messages else first_began
-        return [(message, now if i else first_began) for i, message in enumerate(messages)]
-
-    def _send(self, command: str) -> None:
-        self._wire.write(encode_command(command))
+    def _follow(self, stream: _Stream, stamp_ms: int, arrival: float) -> ClockMap:
+        """The laser's clock after this scan; a synchronisation just made begins a new map."""
+        before, now = stream.clock_map, None
+        if before is not None:
+            now = clock_sync.follow(before, stamp_ms, arrival)
+            self.link.clock_resets += now.resets - before.resets
+        if now is None or stream.sync is not None:
+            now = clock_sync.start(stamp_ms, arrival, delay=stream.delay, sync=stream.sync)
+        return now
