@@ -26,7 +26,9 @@ class Links:
         if simulation is not None and config.twin.base.odometry == "wheels":
             config = replace(config, base=replace(config.base, heading="wheels"))
         self.config, self.clock, self.simulation = config, clock, simulation
-        self.feedback = FeedbackReader(config.base.heading, config.base.link_delay_s)
+        self.feedback = FeedbackReader(
+            config.base.heading, config.base.link_delay_s, config.base.geometry
+        )
 
     def open_laser(self) -> tuple[Laser, Close]:
         """A laser to be run, and what closes its link. Raises DeviceLost."""

@@ -45,6 +45,7 @@ async def serve_on(
 ) -> None:
     """Serve the twins of a simulation on these ports until `stopped` returns."""
     clock = LoopClock()
+    simulation.plug_base = base.plug
     async with asyncio.TaskGroup() as tasks:
         serving = [
             tasks.create_task(serve_twin(simulation.laser_twin, laser, clock), name="laser twin"),

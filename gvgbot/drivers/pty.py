@@ -34,7 +34,7 @@ class PtyPort:
         self._arrived = bytearray()
         self._readable = asyncio.Event()
         self._rest = b""  # of the message that the kernel has taken in part
-        self.plug(is_plugged=True)
+        self.plug(True)
 
     @property
     def path(self) -> str | None:
@@ -43,7 +43,7 @@ class PtyPort:
             return None
         return os.ttyname(self._client) if self._link is None else str(self._link)
 
-    def plug(self, *, is_plugged: bool) -> None:
+    def plug(self, is_plugged: bool) -> None:
         """Plug in or unplug; clients of an unplugged terminal see it hang up."""
         if is_plugged and self._device is None:
             self._open()

@@ -18,8 +18,7 @@ from gvgbot.drivers.kobuki.sub_payloads import (
 )
 from gvgbot.geometry import Twist
 
-WHEEL_BASE_MM = 230
-_HALF_BASE_MM = WHEEL_BASE_MM / 2
+WHEEL_BASE_MM = 230.0
 _EPSILON = 1e-4  # m/s and rad/s: less counts as zero
 _S16_MAX = 32767
 _NOTE_PERIOD_S = 0.00000275  # one digit of a note's period
@@ -36,31 +35,36 @@ class BaseControl:
     radius_mm: int
 
     @classmethod
-    def from_twist(cls, twist: Twist) -> Self:
+    def from_twist(cls, twist: Twist, wheel_base_mm: float = WHEEL_BASE_MM) -> Self:
         """The command nearest to the twist; numbers are cut towards zero, so it is never faster.
 
         An arc too wide for the field is sent as straight ahead: the widest arc that fits would
         turn many times faster than asked.
         """
         v, w = 1000 * twist.linear, twist.angular
+        half_base = wheel_base_mm / 2
         if abs(w) < _EPSILON:
             return cls(_s16(v), 0)
         radius = v / w
         if abs(twist.linear) < _EPSILON or abs(radius) <= 1:
-            return cls(_s16(_HALF_BASE_MM * w), 1)
+            return cls(_s16(half_base * w), 1)
         if abs(radius) > _S16_MAX:
             return cls(_s16(v), 0)
-        return cls(_s16((radius + math.copysign(_HALF_BASE_MM, radius)) * w), int(radius))
+        return cls(_s16((radius + math.copysign(half_base, radius)) * w), int(radius))
 
     @property
     def twist(self) -> Twist:
-        """What the base does on this command, m/s and rad/s."""
-        speed, radius = self.speed_mmps, self.radius_mm
+        """What a Kobuki does on this command, m/s and rad/s."""
+        return self.twist_on(WHEEL_BASE_MM)
+
+    def twist_on(self, wheel_base_mm: float) -> Twist:
+        """What a base with its wheels so far apart does on this command, m/s and rad/s."""
+        speed, radius, half_base = self.speed_mmps, self.radius_mm, wheel_base_mm / 2
         if radius == 0:
             return Twist(speed / 1000, 0.0)
         if radius == 1:
-            return Twist(0.0, speed / _HALF_BASE_MM)
-        angular = speed / (radius + math.copysign(_HALF_BASE_MM, radius))
+            return Twist(0.0, speed / half_base)
+        angular = speed / (radius + math.copysign(half_base, radius))
         return Twist(radius * angular / 1000, angular)
 
 

@@ -21,7 +21,7 @@ from gvgbot.drivers.kobuki.commands import (
     encode_commands,
 )
 from gvgbot.drivers.kobuki.feedback import FeedbackReader, Identity, LinkStatistics
-from gvgbot.drivers.kobuki.wheel_odometry import WHEEL_BASE, Heading
+from gvgbot.drivers.kobuki.wheel_odometry import TICK_ANGLE, WHEEL_BASE, DriveGeometry, Heading
 from gvgbot.drivers.transport import ByteStream
 from gvgbot.errors import DeviceLost
 from gvgbot.geometry import STANDSTILL, Twist
@@ -42,13 +42,20 @@ class KobukiConfig:
     port: str = "/dev/kobuki"
     baud: Annotated[int, Range(9600, 1_000_000)] = 115_200
     heading: Heading = "gyro"
-    max_speed_mps: Annotated[float, Range(0.01, 0.7)] = 0.7  # of the faster wheel
+    wheel_base_m: Annotated[float, Range(0.05, 2.0)] = WHEEL_BASE
+    wheel_radius_m: Annotated[float, Range(0.01, 0.5)] = 0.035
+    max_speed_mps: Annotated[float, Range(0.01, 2.0)] = 0.7  # of the faster wheel
     max_turn_rate_radps: Annotated[float, Range(0.01, math.pi)] = math.pi
     deadman_s: Annotated[float, Range(0.05, 2.0)] = 0.5  # without drive(): stop
     silence_stop_s: Annotated[float, Range(0.05, 2.0)] = 0.5  # without feedback: stop
     silence_lost_s: Annotated[float, Range(0.1, 10.0)] = 1.0  # without feedback: give up
     link_delay_s: Annotated[float, Range(0.0, 0.1)] = 0.0  # from measuring to arrival, at best
     identity_attempts: Annotated[int, Range(0, 100)] = 10
+
+    @property
+    def geometry(self) -> DriveGeometry:
+        """The wheels."""
+        return DriveGeometry(self.wheel_base_m, TICK_ANGLE * self.wheel_radius_m)
 
 
 class KobukiBase:
@@ -68,7 +75,9 @@ class KobukiBase:
         self._stream = stream
         self._config = config
         self._clock = clock
-        self._feedback = feedback or FeedbackReader(config.heading, config.link_delay_s)
+        self._feedback = feedback or FeedbackReader(
+            config.heading, config.link_delay_s, config.geometry
+        )
         self._newest = Latest[Odometry]()
         self._identity_asked = 0
         self._identity_due = -math.inf
@@ -104,8 +113,9 @@ class KobukiBase:
         self._driven = self._clock.now()
         if self._driven >= self._heard + self._config.silence_stop_s:
             twist = STANDSTILL
-        control = BaseControl.from_twist(_limited(twist, self._config))
-        return control.twist if self._send(control) else STANDSTILL
+        wheel_base_mm = 1000 * self._config.wheel_base_m
+        control = BaseControl.from_twist(_limited(twist, self._config), wheel_base_mm)
+        return control.twist_on(wheel_base_mm) if self._send(control) else STANDSTILL
 
     def play(self, melody: Melody) -> None:
         """Play one of the base's tunes."""
@@ -196,7 +206,7 @@ def _limited(twist: Twist, config: KobukiConfig) -> Twist:
     """The twist on the same arc, slowed to the limits; standstill if it is not a number."""
     if not (math.isfinite(twist.linear) and math.isfinite(twist.angular)):
         return STANDSTILL
-    fast_wheel = abs(twist.linear) + abs(twist.angular) * WHEEL_BASE / 2
+    fast_wheel = abs(twist.linear) + abs(twist.angular) * config.wheel_base_m / 2
     share = max(
         1.0, fast_wheel / config.max_speed_mps, abs(twist.angular) / config.max_turn_rate_radps
     )

@@ -16,6 +16,8 @@ from gvgbot.drivers.kobuki.payloads import (
 )
 from gvgbot.drivers.kobuki.sub_payloads import Truncated, Unknown
 from gvgbot.drivers.kobuki.wheel_odometry import (
+    KOBUKI,
+    DriveGeometry,
     Heading,
     WheelOdometry,
     WheelReading,
@@ -67,8 +69,12 @@ class LinkStatistics:
 class FeedbackReader:
     """What the base has reported so far: `contact`, `battery`, `identity`, counters, odometry."""
 
-    def __init__(self, heading: Heading, link_delay: float) -> None:
+    def __init__(
+        self, heading: Heading, link_delay: float, geometry: DriveGeometry = KOBUKI
+    ) -> None:
+        """`link_delay` (s) is the least time from measuring to arrival."""
         self._heading = heading
+        self._geometry = geometry
         self._link_delay = link_delay
         self._parser = FrameParser()
         self._clock: DeviceClock | None = None
@@ -162,11 +168,12 @@ class FeedbackReader:
         dt = clock.elapsed - self._odometry_elapsed
         if dt <= 0.0:
             return None
-        if max(map(abs, wheel_travels(state.reading, reading))) > max(_JUMP_M, _JUMP_SPEED * dt):
+        travels = wheel_travels(state.reading, reading, self._geometry.tick)
+        if max(map(abs, travels)) > max(_JUMP_M, _JUMP_SPEED * dt):
             self._doubted += 1
             self._odometry = doubt(state)
             return None
-        state = advance_odometry(state, reading, dt, self._heading)
+        state = advance_odometry(state, reading, dt, self._heading, self._geometry)
         self._odometry, self._odometry_elapsed = state, clock.elapsed
         return Odometry(clock.stamp, state.odom_base, state.twist)
 

@@ -22,19 +22,28 @@ _GYRO_SAMPLES = 2.08  # per frame on average: the sensor runs by its own clock
 _RAW_BIAS = math.radians(-0.45)  # rad/s: only the processed rate has it removed
 _FULL_PWM_SPEED = 0.7  # m/s
 _CLIFF_FLOOR = CliffAdc(1700, 1900, 1650)  # readings over a flat floor
+_NO_DOCK = DockIr(0, 0, 0)
 _OPEN_INPUTS = GpInput(0, (4095, 4095, 4095, 4095), (0xFF0, 0, 0))
 
 
 class Instruments:
     """Encoders and gyro that count from anywhere, as a base does that has run before."""
 
-    def __init__(self, rng: np.random.Generator) -> None:
+    def __init__(self, rng: np.random.Generator, tick: float = TICK) -> None:
+        """`tick` is the travel of a wheel per encoder count, m."""
         encoders = rng.integers(0, _WORD, 2).tolist()
-        self._left, self._right = encoders[0] * TICK, encoders[1] * TICK  # m
+        self._tick = tick
+        self._left, self._right = encoders[0] * tick, encoders[1] * tick  # m
         self._angle = float(rng.uniform(-math.pi, math.pi))  # rad
         self._left_speed = self._right_speed = self._rate = 0.0
         self._gyro_id = 0
         self._gyro_due = 0.0
+
+    def restart(self) -> None:
+        """Count from nothing, as after switching on."""
+        self._left = self._right = self._angle = 0.0
+        self._left_speed = self._right_speed = self._rate = 0.0
+        self._gyro_id, self._gyro_due = 0, 0.0
 
     def turn(self, left: float, right: float, turn: float, dt: float) -> None:
         """Add what was felt within dt seconds: travel of both wheels (m) and turn (rad)."""
@@ -44,12 +53,16 @@ class Instruments:
         self._left_speed, self._right_speed, self._rate = left / dt, right / dt, turn / dt
 
     def read(
-        self, stamp_ms: int, bumper: tuple[bool, bool, bool], volts: float
+        self,
+        stamp_ms: int,
+        bumper: tuple[bool, bool, bool],
+        volts: float,
+        dock_ir: DockIr = _NO_DOCK,
     ) -> list[FeedbackPart]:
         """The standard part of one frame; bumper is left, centre, right."""
         return [
             self._core(stamp_ms, bumper, volts),
-            DockIr(0, 0, 0),
+            dock_ir,
             Inertia(_wrapped_cdeg(self._angle), _s16(math.degrees(100 * self._rate))),
             _CLIFF_FLOOR,
             MotorCurrent(_current(self._left_speed), _current(self._right_speed)),
@@ -64,8 +77,8 @@ class Instruments:
             bumper=4 * left + 2 * centre + right,
             wheel_drop=0,
             cliff=0,
-            left_encoder=math.floor(self._left / TICK + 0.5) % _WORD,
-            right_encoder=math.floor(self._right / TICK + 0.5) % _WORD,
+            left_encoder=math.floor(self._left / self._tick + 0.5) % _WORD,
+            right_encoder=math.floor(self._right / self._tick + 0.5) % _WORD,
             left_pwm=_pwm(self._left_speed),
             right_pwm=_pwm(self._right_speed),
             buttons=0,

@@ -71,6 +71,10 @@ class ErringSensors:
             turn + self.gyro_bias * dt + self._error.gyro_walk * math.sqrt(dt) * walk,
         )
 
+    def slip(self, wheel: int, travel: float) -> None:
+        """Let a wheel (0 left, 1 right) spin for so much more travel (m) as it goes on rolling."""
+        self._slip[wheel] += travel
+
     def _meet_slips(self, travel: float) -> None:
         """Let one wheel begin to slip, as often as the profile says."""
         if self._error.slips_per_m and self._rng.random() < self._error.slips_per_m * travel:

@@ -2,7 +2,7 @@
 
 import math
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated, Protocol
 
 import numpy as np
@@ -19,9 +19,11 @@ from gvgbot.drivers.kobuki.commands import (
 )
 from gvgbot.drivers.kobuki.frames import BadFrame, FrameParser, encode_frame
 from gvgbot.drivers.kobuki.instruments import Instruments
+from gvgbot.drivers.kobuki.mishaps import Mishap, MishapConfig, Mishaps
 from gvgbot.drivers.kobuki.odometry_error import PROFILES, ErringSensors, OdometryProfile
 from gvgbot.drivers.kobuki.payloads import (
     ControllerInfo,
+    DockIr,
     FeedbackPart,
     FirmwareVersion,
     HardwareVersion,
@@ -29,13 +31,14 @@ from gvgbot.drivers.kobuki.payloads import (
     Version,
     encode_feedback,
 )
-from gvgbot.drivers.kobuki.wheel_odometry import WHEEL_BASE
+from gvgbot.drivers.kobuki.wheel_odometry import KOBUKI, DriveGeometry
+from gvgbot.drivers.link_faults import LinkFaultConfig
 from gvgbot.geometry import STANDSTILL, Pose, Twist, wrap_angle
 from gvgbot.ranges import Range
 
 _PERIOD_MS = 20
 _PERIOD = _PERIOD_MS / 1000  # s
-_MAX_WHEEL_SPEED = 0.7  # m/s
+_SLIP_TRAVEL = 0.05  # m that a wheel spins in a slip
 _FACTORY_GAINS = ControllerInfo(0, 100_000, 100, 2_000)
 _EARLY = 1e-9  # s: a command this much too late for its cycle still counts
 
@@ -46,11 +49,16 @@ class KobukiTwinConfig:
 
     odometry: OdometryProfile = "kobuki"
     command_timeout_s: Annotated[float, Range(0.1, 60.0)] = 1.5
+    has_command_timeout: bool = True  # false: drives on for ever on its last command
+    max_wheel_speed_mps: Annotated[float, Range(0.1, 5.0)] = 0.7
+    motor_power_delay_s: Annotated[float, Range(0.0, 1.0)] = 0.0  # first motion after standing
     dead_time_s: Annotated[float, Range(0.0, 1.0)] = 0.06  # from a command to its first effect
     battery_v: Annotated[float, Range(0.0, 25.5)] = 16.1
     battery_drain_v_per_h: Annotated[float, Range(0.0, 10.0)] = 0.5
     hardware_version: str = "1.0.4"
     firmware_version: str = "1.2.0"
+    mishaps: MishapConfig = field(default_factory=MishapConfig)
+    link: LinkFaultConfig = field(default_factory=LinkFaultConfig)
 
 
 class Body(Protocol):
@@ -82,12 +90,21 @@ class Body(Protocol):
 class KobukiTwin:
     """A base without I/O. It streams from its first `advance`, which is when it is powered on."""
 
-    def __init__(self, config: KobukiTwinConfig, body: Body, seed: int) -> None:
+    def __init__(
+        self,
+        config: KobukiTwinConfig,
+        body: Body,
+        seed: int,
+        geometry: DriveGeometry = KOBUKI,
+    ) -> None:
         rng = np.random.default_rng(seed)
         self._config = config
         self._body = body
+        self._geometry = geometry
+        self._mishaps = Mishaps(config.mishaps, seed)
+        self._dock_ir = DockIr(0, 0, 0)
         self._sensors = ErringSensors(PROFILES[config.odometry], rng)
-        self._instruments = Instruments(rng)
+        self._instruments = Instruments(rng, geometry.tick)
         self._udid = Udid(tuple(rng.integers(1, 2**32, 3).tolist()))
         self._parser = FrameParser()
         self._pending: deque[tuple[float, Twist]] = deque()
@@ -97,6 +114,7 @@ class KobukiTwin:
         self._gains = _FACTORY_GAINS
         self._output = 0
         self._power_on: float | None = None
+        self._new_at = 0.0  # when it was first switched on, s
         self._cycles = 0
         self._true = (body.left_travel, body.right_travel, body.pose.theta)
 
@@ -115,8 +133,23 @@ class KobukiTwin:
         """The parser of the host's bytes, with its counters."""
         return self._parser
 
+    @property
+    def mishaps(self) -> Mishaps:
+        """What has befallen the base."""
+        return self._mishaps
+
+    def inject(self, mishap: Mishap, duration: float) -> None:
+        """Let a mishap begin with the next frame, for so long (s)."""
+        self._mishaps.inject(mishap, duration)
+
+    def show_dock(self, *, left: int, centre: int, right: int) -> None:
+        """Let the dock's beams fall on the receivers, one bit per beam."""
+        self._dock_ir = DockIr(right, centre, left)
+
     def receive(self, data: bytes, now: float) -> bytes:
         """Take the host's bytes. The base answers within its stream, so never at once."""
+        if self._power_on is not None and now < self._power_on:
+            return b""
         for frame in self._parser.feed(data):
             if not isinstance(frame, BadFrame):
                 for command in decode_commands(frame.payload):
@@ -130,32 +163,61 @@ class KobukiTwin:
     def advance(self, now: float) -> bytes:
         """The one frame that is due, if one is."""
         if self._power_on is None:
-            self._power_on = now
-            self._body.advance(now)
-            self._true = self._truth()
+            self._power_on = self._new_at = now
         due = self.next_due()
         if now < due:
             return b""
+        for mishap in self._mishaps.advance(due):
+            self._suffer(mishap, due)
+        return self._frame(due) if due == self.next_due() else b""
+
+    def _suffer(self, mishap: str, now: float) -> None:
+        """Let the sudden mishaps have their effect; the lasting ones have theirs on the frames."""
+        match mishap:
+            case "slip":
+                self._sensors.slip(self._cycles % 2, _SLIP_TRAVEL)
+            case "over-current":
+                self._halt()
+            case "reboot":
+                self._reboot(now)
+
+    def _reboot(self, now: float) -> None:
+        """Forget everything, stand, and start anew after a while."""
+        self._halt()
+        self._power_on, self._cycles = now + self._config.mishaps.boot_s, 0
+        self._instruments.restart()
+        self._parser, self._replies, self._output = FrameParser(), [], 0
+
+    def _halt(self) -> None:
+        """Cut the motors, whatever was commanded."""
+        self._pending.clear()
+        self._moving = False
+        self._body.command(0.0, 0.0)
+
+    def _frame(self, due: float) -> bytes:
+        if self._cycles == 0:  # nothing was felt before
+            self._body.advance(due)
+            self._true = self._truth()
         self._move(due)
         replies, self._replies = self._replies, []
-        parts = [*self._instruments.read(self._stamp_ms, self._body.bumper, self._volts), *replies]
+        parts = self._instruments.read(
+            self._stamp_ms, self._body.bumper, self._volts(due), self._dock_ir
+        )
         self._cycles += 1
-        return encode_frame(encode_feedback(parts))
+        return encode_frame(encode_feedback(self._mishaps.spoil([*parts, *replies])))
 
     @property
     def _stamp_ms(self) -> int:
         return _PERIOD_MS * self._cycles
 
-    @property
-    def _volts(self) -> float:
-        hours = self._stamp_ms / 3_600_000
+    def _volts(self, now: float) -> float:
+        hours = (now - self._new_at) / 3600.0
         return self._config.battery_v - hours * self._config.battery_drain_v_per_h
 
     def _obey(self, command: Command, now: float) -> None:
         match command:
             case BaseControl():
-                self._commanded = now
-                self._pending.append((now + self._config.dead_time_s, _limited(command.twist)))
+                self._obey_motion(command.twist_on(1000 * self._geometry.wheel_base), now)
             case RequestExtra(flags):
                 self._replies += self._extras(flags)
             case SetGain(kind, p, i, d):
@@ -166,6 +228,17 @@ class KobukiTwin:
                 self._output = flags
             case _:
                 pass
+
+    def _obey_motion(self, twist: Twist, now: float) -> None:
+        """Take a command in its turn; motors that stand get their power a little later."""
+        self._commanded = now
+        if self._mishaps.is_on("over-current"):
+            return
+        due = now + self._config.dead_time_s
+        if not self._moving and not self._pending and twist != STANDSTILL:
+            due += self._config.motor_power_delay_s
+        last = self._pending[-1][0] if self._pending else due
+        self._pending.append((max(due, last), self._limited(twist)))
 
     def _extras(self, flags: int) -> list[FeedbackPart]:
         parts: list[FeedbackPart] = []
@@ -193,18 +266,19 @@ class KobukiTwin:
             _, twist = self._pending.popleft()
             self._moving = twist != STANDSTILL
             self._body.command(twist.linear, twist.angular)
-        if self._moving and now > self._commanded + self._config.command_timeout_s:
+        late = now > self._commanded + self._config.command_timeout_s
+        if self._moving and late and self._config.has_command_timeout:
             self._moving = False
             self._body.command(0.0, 0.0)
 
     def _truth(self) -> tuple[float, float, float]:
         return self._body.left_travel, self._body.right_travel, self._body.pose.theta
 
-
-def _limited(twist: Twist) -> Twist:
-    """The twist on the same arc, slowed until the faster wheel can follow."""
-    share = max(1.0, (abs(twist.linear) + abs(twist.angular) * WHEEL_BASE / 2) / _MAX_WHEEL_SPEED)
-    return Twist(twist.linear / share, twist.angular / share)
+    def _limited(self, twist: Twist) -> Twist:
+        """The twist on the same arc, slowed until the faster wheel can follow."""
+        fast_wheel = abs(twist.linear) + abs(twist.angular) * self._geometry.wheel_base / 2
+        share = max(1.0, fast_wheel / self._config.max_wheel_speed_mps)
+        return Twist(twist.linear / share, twist.angular / share)
 
 
 def _version(text: str) -> Version:

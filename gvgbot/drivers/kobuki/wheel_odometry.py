@@ -10,8 +10,20 @@ Heading = Literal["gyro", "wheels"]
 
 TICK = 0.0000852920904977  # m of travel per encoder count
 WHEEL_BASE = 0.230  # m between the wheels
+TICK_ANGLE = 0.002436916871363930  # rad of a wheel's turn per encoder count
 _WRAP = 65536  # encoder counts
 _SLIP_MEMORY_S = 0.5  # time constant of the reported slip rate
+
+
+@dataclass(frozen=True, slots=True)
+class DriveGeometry:
+    """Distance of the wheels (m), and travel of a wheel per encoder count (m)."""
+
+    wheel_base: float = WHEEL_BASE
+    tick: float = TICK
+
+
+KOBUKI = DriveGeometry()
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,14 +57,18 @@ def start_odometry(reading: WheelReading, odom_base: Pose | None = None) -> Whee
 
 
 def advance_odometry(
-    state: WheelOdometry, reading: WheelReading, dt: float, heading: Heading
+    state: WheelOdometry,
+    reading: WheelReading,
+    dt: float,
+    heading: Heading,
+    geometry: DriveGeometry = KOBUKI,
 ) -> WheelOdometry:
     """The state after `dt` seconds (> 0) at whose end the wheels and the gyro read this.
 
     The heading's change is the gyro's or the wheels', and the way goes along the mean heading.
     """
-    left, right = wheel_travels(state.reading, reading)
-    by_wheels = (right - left) / WHEEL_BASE
+    left, right = wheel_travels(state.reading, reading, geometry.tick)
+    by_wheels = (right - left) / geometry.wheel_base
     by_gyro = wrap_angle(reading.angle - state.reading.angle)
     turn = by_gyro if heading == "gyro" else by_wheels
     travel = (left + right) / 2
@@ -63,11 +79,13 @@ def advance_odometry(
     return WheelOdometry(pose, Twist(travel / dt, rate), reading, slip_rate)
 
 
-def wheel_travels(before: WheelReading, after: WheelReading) -> tuple[float, float]:
+def wheel_travels(
+    before: WheelReading, after: WheelReading, tick: float = TICK
+) -> tuple[float, float]:
     """Metres that the left and the right wheel went, each less than half an encoder turn-over."""
     return (
-        TICK * _signed(after.left_encoder - before.left_encoder),
-        TICK * _signed(after.right_encoder - before.right_encoder),
+        tick * _signed(after.left_encoder - before.left_encoder),
+        tick * _signed(after.right_encoder - before.right_encoder),
     )
 
 

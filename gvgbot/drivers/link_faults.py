@@ -1,0 +1,166 @@
+"""A bad link between a twin and its driver: delays, damage, silence, and a cable that is pulled."""
+
+import math
+from collections import Counter, deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+import numpy as np
+
+from gvgbot.drivers.fault_schedule import FaultSchedule, Rate
+from gvgbot.drivers.transport import TwinDevice
+from gvgbot.ranges import Range
+
+_CHIP_BYTES = 62  # a USB serial converter sends at once when it has gathered this many
+PerThousand = Annotated[float, Range(0.0, 1000.0)]
+PerHour = Annotated[float, Range(0.0, 36_000.0)]
+LinkFault = Literal["silence", "unplug"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LinkFaultConfig:
+    """What is wrong with the link. Delays apply towards the host, damage to bytes both ways."""
+
+    latency_s: Annotated[float, Range(0.0, 1.0)] = 0.0
+    jitter_s: Annotated[float, Range(0.0, 1.0)] = 0.0  # at most, beyond the latency
+    chip_timer_s: Annotated[float, Range(0.0, 0.255)] = (
+        0.0  # an FTDI's latency timer; usually 16 ms
+    )
+    flipped_bits_per_kb: PerThousand = 0.0
+    lost_bytes_per_kb: PerThousand = 0.0
+    inserted_bytes_per_kb: PerThousand = 0.0
+    cut_messages_per_k: PerThousand = 0.0
+    silences_per_h: PerHour = 0.0
+    silence_s: Annotated[float, Range(0.0, 3600.0)] = 2.0
+    unplugs_per_h: PerHour = 0.0
+    unplugged_s: Annotated[float, Range(0.0, 3600.0)] = 3.0
+
+
+class FaultyLink:
+    """A twin behind a bad link: a twin itself, as seen from the host. Same seed, same faults."""
+
+    def __init__(
+        self,
+        device: TwinDevice,
+        config: LinkFaultConfig,
+        seed: int,
+        plug: Callable[[bool], None] = lambda _: None,
+    ) -> None:
+        """`plug` is told when the cable is pulled (False) and plugged in again (True)."""
+        self._device, self._config, self._plug = device, config, plug
+        self._damage = _Damage(config, np.random.default_rng((seed, 1)))
+        self._jitter = np.random.default_rng((seed, 2))
+        rates = {
+            "silence": Rate(config.silences_per_h, config.silence_s),
+            "unplug": Rate(config.unplugs_per_h, config.unplugged_s),
+        }
+        self._schedule = FaultSchedule(rates, np.random.default_rng((seed, 3)))
+        self._under_way: deque[tuple[float, bytes]] = deque()
+        self._chip, self._chip_due = b"", math.inf
+        self._is_plugged = True
+
+    @property
+    def counts(self) -> Counter[str]:
+        """How often each kind of fault has happened."""
+        return self._schedule.counts + self._damage.counts
+
+    def inject(self, fault: LinkFault, duration: float) -> None:
+        """Let the device fall silent, or pull its cable, for so long (s)."""
+        self._schedule.inject(fault, duration)
+
+    def receive(self, data: bytes, now: float) -> bytes:
+        """Take the host's bytes; those that the device answers at once and that arrive at once."""
+        if self._is_plugged:
+            self._post(self._device.receive(self._damage.done_to(data), now), now)
+        return self._arrived(now)
+
+    def advance(self, now: float) -> bytes:
+        """What arrives at the host up to now."""
+        self._schedule.advance(now)
+        if self._is_plugged == self._schedule.is_on("unplug"):
+            self._is_plugged = not self._is_plugged
+            self._under_way.clear()
+            self._chip, self._chip_due = b"", math.inf
+            self._plug(self._is_plugged)
+        if self._device.next_due() <= now:
+            self._post(self._device.advance(now), now)
+        return self._arrived(now)
+
+    def next_due(self) -> float:
+        """When something arrives, or the device or a fault is due."""
+        first = self._under_way[0][0] if self._under_way else math.inf
+        return min(self._device.next_due(), self._schedule.next_due(), self._chip_due, first)
+
+    def _post(self, message: bytes, now: float) -> None:
+        """Send a message on its way, unless nothing gets through just now."""
+        if not message or not self._is_plugged or self._schedule.is_on("silence"):
+            return
+        message = self._damage.done_to(self._damage.cut(message))
+        timer = self._config.chip_timer_s
+        if timer == 0.0:
+            self._send(message, now)
+            return
+        self._chip += message
+        whole = len(self._chip) - len(self._chip) % _CHIP_BYTES
+        self._send(self._chip[:whole], now)
+        self._chip = self._chip[whole:]
+        self._chip_due = (math.floor(now / timer) + 1) * timer if self._chip else math.inf
+
+    def _send(self, data: bytes, now: float) -> None:
+        """Hand bytes to the wire, on which nothing overtakes."""
+        if data:
+            jitter = self._config.jitter_s
+            late = self._config.latency_s + (self._jitter.uniform(0.0, jitter) if jitter else 0.0)
+            last = self._under_way[-1][0] if self._under_way else -math.inf
+            self._under_way.append((max(now + late, last), data))
+
+    def _arrived(self, now: float) -> bytes:
+        if self._chip_due <= now:
+            self._send(self._chip, self._chip_due)
+            self._chip, self._chip_due = b"", math.inf
+        arrived = []
+        while self._under_way and self._under_way[0][0] <= now:
+            arrived.append(self._under_way.popleft()[1])
+        return b"".join(arrived)
+
+
+class _Damage:
+    """Bytes in, damaged bytes out."""
+
+    def __init__(self, config: LinkFaultConfig, rng: np.random.Generator) -> None:
+        self.counts: Counter[str] = Counter()
+        self._rng = rng
+        self._cut = config.cut_messages_per_k / 1000
+        self._flipped = config.flipped_bits_per_kb / 1000
+        self._lost = config.lost_bytes_per_kb / 1000
+        self._inserted = config.inserted_bytes_per_kb / 1000
+        self._is_harmless = not (self._flipped or self._lost or self._inserted)
+
+    def cut(self, message: bytes) -> bytes:
+        """The message, or now and then only its beginning."""
+        if self._cut == 0.0 or self._rng.random() >= self._cut:
+            return message
+        self.counts["cut message"] += 1
+        return message[: int(self._rng.integers(len(message)))]
+
+    def done_to(self, data: bytes) -> bytes:
+        """The bytes with bits flipped, bytes lost and bytes put in."""
+        if self._is_harmless or not data:
+            return data
+        wire = np.frombuffer(data, np.uint8).copy()
+        hit = self._drawn(len(wire), self._flipped, "flipped bit")
+        wire[hit] ^= (1 << self._rng.integers(0, 8, int(hit.sum()))).astype(np.uint8)
+        wire = wire[~self._drawn(len(wire), self._lost, "lost byte")]
+        places = np.flatnonzero(self._drawn(len(wire), self._inserted, "inserted byte"))
+        return np.insert(
+            wire, places, self._rng.integers(0, 256, len(places)).astype(np.uint8)
+        ).tobytes()
+
+    def _drawn(
+        self, size: int, share: float, name: str
+    ) -> "np.ndarray[tuple[int], np.dtype[np.bool_]]":
+        """Which of so many bytes a fault hits."""
+        hit = self._rng.random(size) < share
+        self.counts[name] += int(hit.sum())
+        return hit
