@@ -1,11 +1,11 @@
 """Explore many worlds with many seeds and print a table: outcome, accuracy, path, speed, memory.
 
-    python benchmarks/explore_table.py [--worlds office grid PATH.yaml:X:Y:THETA ...] [--seeds 1 2 3]
+    python benchmarks/explore_table.py [--worlds office PATH.yaml:X:Y:THETA ...] [--seeds 1 2 3]
                                        [--set key=value ...] [--jobs 2] [--scorer score.py]
 
-The scorer is any program that is called as `score.py RUN_DIR WORLD.yaml X Y THETA` and prints JSON with
-recall, precision, edge_recall, vertex_rmse_m, path_ratio and min_clearance_m; without it the table
-has only what the run says of itself.
+The scorer is any program that is called as `score.py RUN_DIR WORLD.yaml X Y THETA` and prints JSON
+with recall, precision, edge_recall, vertex_rmse_m, path_ratio and min_clearance_m; without it the
+table has only what the run says of itself.
 """
 
 import argparse
@@ -50,12 +50,14 @@ def main() -> int:
     print("world          seed outcome   " + " ".join(f"{t:>6}" for _, t, _ in COLUMNS))
     with tempfile.TemporaryDirectory() as scratch, ThreadPoolExecutor(options.jobs) as pool:
         out = Path(options.out or scratch)
-        runs = pool.map(lambda job: _run(*job, out, options), jobs)
+        runs = pool.map(lambda job: _run(job[0], job[1], out, options), jobs)
         return 1 - min([_show(row) for row in runs], default=1)
 
 
 def _options() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
     there = [world for world in LITERATURE if Path(world.split(":")[0]).exists()]
     parser.add_argument("--worlds", nargs="+", default=there + WORLDS)
     parser.add_argument("--seeds", nargs="+", type=int, default=[1, 2, 3, 4, 5])
@@ -103,13 +105,16 @@ def _score(directory: Path, start: list[str], scorer: Path) -> dict[str, Any]:
 
 def _show(row: dict[str, Any]) -> int:
     """Print a row; 1 if the world was explored."""
-    cells = [
-        form.format(row[key]) if row.get(key) is not None else "-" for key, _, form in COLUMNS
-    ]
+    cells = [form.format(row[key]) if row.get(key) is not None else "-" for key, _, form in COLUMNS]
     outcome = str(row.get("outcome", "crashed"))
-    print(f"{row['world']:14} {row['seed']:4} {outcome:9} " + " ".join(f"{c:>6}" for c in cells), flush=True)
+    print(
+        f"{row['world']:14} {row['seed']:4} {outcome:9} " + " ".join(f"{c:>6}" for c in cells),
+        flush=True,
+    )
     if outcome != "explored":
-        print(f"    {row['said'].splitlines()[-1] if row['said'] else row.get('reason')}", flush=True)
+        print(
+            f"    {row['said'].splitlines()[-1] if row['said'] else row.get('reason')}", flush=True
+        )
     return int(outcome == "explored")
 
 

@@ -2,7 +2,7 @@
 
 
 class GvgbotError(Exception):
-    """A failure with one clear line that says what to do; the command line prints it and exits 1."""
+    """A failure with one clear line that says what to do; the command line exits with 1."""
 
 
 class UsageError(GvgbotError):

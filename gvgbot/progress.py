@@ -46,6 +46,7 @@ def _line(pipeline: Pipeline, simulated: float, wall: float) -> str:
     frontiers = len(graph.frontiers())
     full = round(_BAR * (1 - frontiers / ends)) if ends else 0
     return (
-        f"[{'#' * full}{'.' * (_BAR - full)}] {len(graph.vertices)} vertices, {frontiers} frontiers, "
+        f"[{'#' * full}{'.' * (_BAR - full)}] "
+        f"{len(graph.vertices)} vertices, {frontiers} frontiers, "
         f"{pipeline.travelled:.0f} m, {simulated:.0f} s, {simulated / max(wall, 1e-3):.0f}x"
     )

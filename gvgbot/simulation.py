@@ -1,6 +1,7 @@
 """The simulated robot: one world, one body, and the twins of both devices on in-memory streams."""
 
 import asyncio
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,13 +9,18 @@ import numpy as np
 from gvgbot.clock import Clock
 from gvgbot.config import Config
 from gvgbot.drivers.body import BodyConfig, RobotBody
+from gvgbot.drivers.cable import Cable
 from gvgbot.drivers.hokuyo.models import MODELS
 from gvgbot.drivers.hokuyo.twin import HokuyoTwin
 from gvgbot.drivers.kobuki.twin import KobukiTwin
+from gvgbot.drivers.link_faults import FaultyLink
 from gvgbot.drivers.transport import pipe, serve_twin
 from gvgbot.drivers.world import World, check_start
 from gvgbot.geometry import Array, Pose
 from gvgbot.worlds import open_world
+
+
+_SECTORS = 6  # of a sweep, each seen from one pose
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,23 +47,41 @@ class Simulation:
 
     def __init__(self, config: Config, place: Place, clock: Clock) -> None:
         self.place = place
-        self.body = RobotBody(
-            place.world, place.start, BodyConfig(radius_m=config.robot.radius_m), clock.now()
-        )
+        shape = BodyConfig(radius_m=config.robot.radius_m, wheel_base_m=config.base.wheel_base_m)
+        self.body = RobotBody(place.world, place.start, shape, clock.now())
         self._clock = clock
         mount = config.laser.base_laser
         model = MODELS[config.twin.laser.model]
+        bearings, reach = model.parameters.bearings, model.usable_mm / 1000
 
         def sense(stamp: float) -> Array:
+            """What a sweep that begins at a stamp sees, the body going on as it moves then."""
             self.body.advance(stamp)
-            world_laser = self.body.pose.compose(mount)
-            return place.world.cast(world_laser, model.parameters.bearings, model.usable_mm / 1000)
+            seen = []
+            for beams in np.array_split(np.arange(len(bearings)), _SECTORS):
+                late = (
+                    model.parameters.first_step + float(beams.mean())
+                ) * model.parameters.step_time
+                moved = Pose(self.body.linear * late, 0.0, self.body.angular * late)
+                world_laser = self.body.pose.compose(moved).compose(mount)
+                seen.append(place.world.cast(world_laser, bearings[beams], reach))
+            return np.concatenate(seen)
 
         laser_seed, base_seed = np.random.SeedSequence(config.twin.seed).generate_state(2)
         self.laser_twin = HokuyoTwin(config.twin.laser, sense, int(laser_seed))
-        self.base_twin = KobukiTwin(config.twin.base, self.body, int(base_seed))
+        cable = Cable()
+        self.plug_base: Callable[[bool], None] = cable.plug  # of the link that is in use
+        self.base_twin = FaultyLink(
+            KobukiTwin(config.twin.base, self.body, int(base_seed), config.base.geometry),
+            config.twin.base.link,
+            int(base_seed),
+            self._pull_base,
+        )
         self.laser, self._laser_end = pipe()
-        self.base, self._base_end = pipe()
+        self.base, self._base_end = cable.host, cable.device
+
+    def _pull_base(self, is_plugged: bool) -> None:
+        self.plug_base(is_plugged)
 
     async def run(self) -> None:
         """Let the devices work until cancelled."""

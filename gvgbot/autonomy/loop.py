@@ -1,4 +1,4 @@
-"""The task around the pipeline: newest scan and odometry in, twist out, and a stop on every way out."""
+"""The task around the pipeline: scans and odometry in, twists out, a stop on every way out."""
 
 import asyncio
 from collections.abc import Callable

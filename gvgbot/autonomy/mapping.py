@@ -25,7 +25,6 @@ from gvgbot.autonomy.slam.scan_matching import Registration, ScanMatchingConfig,
 from gvgbot.geometry import Array, Pose
 from gvgbot.ranges import Range
 
-
 _WALL_M = 0.15  # a point so near to a wall lies on it
 _CLOSE_M = 1.5  # as near as one needs to be to tell vertices apart
 _PASSED_M = 1.0  # from so near, what cannot be seen of an edge must be driven to

@@ -4,8 +4,6 @@ import math
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-import numpy as np
-
 from gvgbot.autonomy.control.edge_follower import Track
 from gvgbot.autonomy.events import Decision, Event, Finished, Recovery
 from gvgbot.autonomy.exploration.ears import ear_next, nearest_frontier
@@ -15,9 +13,8 @@ from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.autonomy.whereabouts import Passage, Situation, Whereabouts
 from gvgbot.ranges import Range
 
-_LEAST_LOOP_M = (
-    4.0  # an edge with both ends in sight is left to sight unless so much of it was driven
-)
+_LEAST_LOOP_M = 4.0  # an edge with both ends in sight is left to sight unless so much was driven
+_LONGEST_VIEW_S = 2.0  # a longer gap between views is an outage, not a lack of progress
 
 Outcome = Literal["explored", "explored_with_blocked", "failed"]
 
@@ -73,6 +70,7 @@ class Mission:
         self._budget_m = math.inf  # of `travelled`, for the present target
         self._newest_m = 0.0  # of the target edge that has been driven
         self._last_progress = 0.0  # stamp
+        self._last_view = math.inf  # stamp
         self._travelled_then = -math.inf
         self._looked_around = 0
         self._lost_since: float | None = None
@@ -92,7 +90,7 @@ class Mission:
             self._account_for(view, known, passage)
         here = Situation(view.gvg, known, self._mapper.graph, self.where, place, view.local_base)
         self._watch_progress(view)
-        order = self._decide(view, here)
+        order = Stand() if self.outcome is not None else self._decide(view, here)
         return order, self._events
 
     # -- the edge under the wheels -------------------------------------------------------------
@@ -111,8 +109,7 @@ class Mission:
             return
         if left in known.branch_of and passage.driven < _LEAST_LOOP_M:
             return
-        clearance = min(graph.vertices[end.vertex].clearance for end in (left, arrived))
-        self._mapper.join(view, left, arrived, passage.line, clearance, driven=True)
+        self._mapper.join(view, left, arrived, passage.line, passage.narrowest, driven=True)
 
     # -- where next ------------------------------------------------------------------------------
 
@@ -198,6 +195,8 @@ class Mission:
     def _watch_progress(self, view: View) -> None:
         if view.travelled > self._travelled_then + 0.3:
             self._travelled_then, self._last_progress = view.travelled, view.stamp
+        self._last_progress += max(0.0, view.stamp - self._last_view - _LONGEST_VIEW_S)
+        self._last_view = view.stamp
         if self.where.on_edge == self.target and self.where.trail_length > self._newest_m + 0.5:
             self._newest_m = self.where.trail_length  # new ground: as long as there is more, go on
             self._budget_m = max(self._budget_m, view.travelled + self._config.patience_m)
@@ -208,10 +207,12 @@ class Mission:
             self._give_up(view, "no progress")
 
     def _give_up(self, view: View, reason: str) -> None:
-        """Mark the target as blocked, or fail if there is none."""
+        """Mark the target as blocked; without one, that is the end."""
+        self._looked_around = 0
         half = None if self.target is None else self._mapper.graph.half_edge(self.target)
         if half is None:
-            self._end(view, "failed", reason)
+            known = bool(self._mapper.graph.vertices)
+            self._end(view, "explored_with_blocked" if known else "failed", reason)
             return
         half.blocked = True
         self._events.append(Recovery(view.stamp, "give up a frontier", reason))

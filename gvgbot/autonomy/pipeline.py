@@ -1,4 +1,4 @@
-"""Every stage from HAL messages to a twist, in the order of the flow. No I/O, no clock, no chance."""
+"""Every stage from HAL messages to a twist, in the order of the flow. No I/O, clock or chance."""
 
 import math
 from collections import deque
@@ -21,11 +21,12 @@ from gvgbot.autonomy.slam.recognition import RecognitionConfig
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig, register
 from gvgbot.autonomy.slam.smoothing import Constraint, smooth
 from gvgbot.geometry import STANDSTILL, Array, Pose, Twist, wrap_angle
+from gvgbot.hal.deskew import deskewed
 from gvgbot.hal.messages import Odometry, Scan
 from gvgbot.ranges import Range
 
-
 _SCAN_EVERY_M, _SCAN_EVERY_RAD = 0.45, 0.4  # scans that are kept for the occupancy grid
+_LEAST_SPAN_S = 0.04  # over which odometry tells a velocity
 _MATCHED_RANGE_M = 24.0
 _LONGEST_GAP_M = 0.5  # between two beams, for their even spacing
 _LEAST_POINTS = 50  # fewer say nothing about a pose
@@ -63,7 +64,7 @@ class AutonomyConfig:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Step:
-    """The motion from one keyframe to the next, with its covariance (3, 3), in the first one's frame."""
+    """The motion from one keyframe to the next, and its covariance (3, 3), in the first frame."""
 
     motion: Pose
     covariance: Array
@@ -129,6 +130,17 @@ class Pipeline:
                 return early.odom_base.compose(part)
         return log[0].odom_base
 
+    def _motion_during(self, scan: Scan) -> Pose:
+        """Motion of the base during a sweep, from the odometry nearest to it in time."""
+        duration = scan.time_increment * len(scan.ranges)
+        end = min(scan.stamp + duration, self._odometry[-1].stamp)
+        span = max(duration, _LEAST_SPAN_S)
+        before, after = self._odom_base_at(end - span), self._odom_base_at(end)
+        if duration == 0.0 or before is None or after is None:
+            return Pose()
+        motion, share = before.to(after), duration / span
+        return Pose(share * motion.x, share * motion.y, share * motion.theta)
+
     # -- perception, per scan --------------------------------------------------------------------
 
     def perceive(self, scan: Scan) -> list[Event]:
@@ -140,6 +152,7 @@ class Pipeline:
             or not self._worth_a_look(scan, odom_base)
         ):
             return []
+        scan = deskewed(scan, self._motion_during(scan))
         local_base = self._localise(scan, odom_base)
         for local_map in (self._local_map, self._far_map):
             local_map.insert(scan, local_base.compose(scan.base_laser), self.travelled)
@@ -180,7 +193,7 @@ class Pipeline:
         )
 
     def _localise(self, scan: Scan, odom_base: Pose) -> Pose:
-        """The base in the local frame: odometry, corrected by matching the scan with the local map."""
+        """The base in the local frame: odometry, corrected by matching the scan with the map."""
         if self._last is None:
             return Pose()
         motion = self._last.odom_base.to(odom_base)
@@ -288,7 +301,7 @@ def _sampled(scan: Scan, count: int) -> Array:
 
 
 def smoothed(pipeline: Pipeline) -> tuple[list[Pose], dict[int, Pose]]:
-    """The best estimate of all keyframes (map_base) and vertices (map_vertex), past ones included."""
+    """The best estimate of all keyframes (map_base) and vertices (map_vertex)."""
     keyframes, mapper = pipeline.keyframes, pipeline.mapper
     ids = {vertex: len(keyframes) + i for i, vertex in enumerate(mapper.belief.ids)}
     start = [k.map_base for k in keyframes] + [mapper.belief.map_vertex(v) for v in ids]

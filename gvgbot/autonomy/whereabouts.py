@@ -18,12 +18,13 @@ _BACK_M = 0.8  # how far back along the trail one looks to tell ahead from behin
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Passage:
-    """A change of edge: the half-edges that the old edge left by and arrives at, and its polyline."""
+    """A change of edge: the half-edges that the old edge leaves and arrives by, its polyline."""
 
     left: HalfEdgeId | None
     arrived: HalfEdgeId | None
     line: Array  # (N, 2) local frame
     driven: float  # metres of it
+    narrowest: float  # least clearance on it, m
 
 
 @dataclass(slots=True, eq=False)
@@ -32,6 +33,7 @@ class Whereabouts:
 
     on_edge: HalfEdgeId | None = None
     trail: list[Array] = field(default_factory=list)  # local frame, without detours
+    narrowest: float = math.inf  # least clearance since the vertex, m
 
     @property
     def trail_length(self) -> float:
@@ -57,6 +59,9 @@ class Whereabouts:
             _, end, node = min(ends)
             passage = self._passage(gvg, place, known, node)
             self.on_edge, self.trail = end, [gvg.nodes[node].position]
+            self.narrowest = math.inf
+        here = int(np.searchsorted(edge.stations, place.station))
+        self.narrowest = min(self.narrowest, float(edge.clearance[here]))
         self._extend(base)
         return passage
 
@@ -67,18 +72,19 @@ class Whereabouts:
         farthest = int(np.argmax(d)) if len(trail) else 0  # a self-loop starts at the node, too
         if len(trail) and d[farthest:].min() < _AWAY_M:  # the robot is past the node already
             trail = trail[: farthest + int(np.argmin(d[farthest:])) + 1]
-            rest = centre[None]
+            rest, rooms = centre[None], np.array([gvg.nodes[node].clearance])
         else:
             towards = Branch(place.edge, forward=node == gvg.edges[place.edge].b)
-            rest, _ = gvg.line_from(place, (towards,))
+            rest, rooms = gvg.line_from(place, (towards,))
         driven = float(np.hypot(*np.diff(trail, axis=0).T).sum())
         arrived = self._arrival(gvg, place, known, node, trail)
-        return Passage(self.on_edge, arrived, np.concatenate([trail, rest]), driven)
+        narrowest = min(self.narrowest, float(rooms.min()))
+        return Passage(self.on_edge, arrived, np.concatenate([trail, rest]), driven, narrowest)
 
     def _arrival(
         self, gvg: LocalGvg, place: Place, known: Correspondence, node: int, trail: Array
     ) -> HalfEdgeId | None:
-        """The half-edge by which a trail came to a node, or comes to it if that is still ahead.
+        """The half-edge by which a trail came to a node, or comes to it if that is ahead.
 
         It may have come through points that are no vertices (yet).
         """

@@ -133,6 +133,8 @@ class Guard:
         """As near to the target as the acceleration limits allow from the last twist."""
         limits, last = self.config, state.twist
         elapsed = LONGEST_STEP if state.stamp is None else stamp - state.stamp
+        if elapsed > limits.max_scan_age_s:  # nobody has driven meanwhile: the base has stopped
+            last = STANDSTILL
         elapsed = min(max(elapsed, 0.0), LONGEST_STEP)
         slower = abs(target.linear) < abs(last.linear) or target.linear * last.linear < 0.0
         change = elapsed * (limits.max_braking_mps2 if slower else limits.max_acceleration_mps2)

@@ -36,7 +36,7 @@ class Scan:
 
 @dataclass(frozen=True, slots=True)
 class Odometry:
-    """Dead reckoning since the driver started: a pose, so a message that was missed costs nothing."""
+    """Dead reckoning since the driver started: a pose, so a missed message costs nothing."""
 
     stamp: float
     odom_base: Pose

@@ -28,7 +28,7 @@ class EdgeFollowerConfig:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Track:
-    """What to drive along, local frame: polyline (N, 2), clearance (N,) and metres along it (N,)."""
+    """What to drive along, local frame: polyline (N, 2), clearance and metres along it (N,)."""
 
     polyline: Array
     clearance: Array

@@ -1,7 +1,7 @@
 """The ear rule: which edge to take at a vertex, and where to go when none is left there.
 
-Always turning to the first frontier clockwise of the arrival keeps one face of the graph on the left,
-so that the robot comes back to mapped ground after each face: one ear after another.
+Always turning to the first frontier clockwise of the arrival keeps one face of the graph on the
+left, so that the robot comes back to mapped ground after each face: one ear after another.
 """
 
 from gvgbot.autonomy.exploration.paths import Approach, shortest_paths
@@ -19,7 +19,7 @@ def ear_next(graph: GvgGraph, arrival: HalfEdgeId) -> HalfEdgeId | None:
 
 
 def nearest_frontier(graph: GvgGraph, starts: list[Approach]) -> tuple[HalfEdgeId, Approach] | None:
-    """The frontier at the vertex with the shortest way, by the ear rule there; None if out of reach."""
+    """The frontier at the vertex with the shortest way, by the ear rule; None if out of reach."""
     reachable = shortest_paths(graph, starts)
     for vertex, approach in sorted(reachable.items(), key=lambda item: (item[1].metres, item[0])):
         frontier = ear_next(graph, HalfEdgeId(vertex, approach.arrival.key))

@@ -8,7 +8,7 @@ from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
 
 @dataclass(frozen=True, slots=True)
 class Approach:
-    """A way to arrive at a vertex: metres, the half-edge of arrival, and the departures on the way."""
+    """A way to a vertex: metres, the half-edge of arrival, and the departures on the way."""
 
     metres: float
     arrival: HalfEdgeId

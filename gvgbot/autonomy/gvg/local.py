@@ -1,4 +1,4 @@
-"""The local GVG: meetpoints, ends and edges in sight, in the local frame, and where one is on it."""
+"""The local GVG: meetpoints, ends and edges in sight, in the local frame."""
 
 import heapq
 from dataclasses import dataclass, field
@@ -40,9 +40,9 @@ class Branch(NamedTuple):
 class LocalNode:
     """A point where edges meet or stop.
 
-    `lead` = direction (rad) in which the diagram goes on from here into space not yet seen. `weak` =
-    branches too short to be told from a corner as long as they are not wholly seen; they do not count
-    towards `degree`.
+    `lead` = direction (rad) in which the diagram goes on from here into space not yet seen. `weak`
+    = branches too short to be told from a corner as long as they are not wholly seen; they do not
+    count towards `degree`.
     """
 
     position: Array
@@ -78,7 +78,7 @@ class LocalNode:
 
 
 class Place(NamedTuple):
-    """A point on the local GVG: metres `station` along edge `edge`, `distance` metres from the query."""
+    """A point of the local GVG: metres `station` along `edge`, `distance` m from the query."""
 
     edge: int
     station: float
@@ -126,7 +126,7 @@ class LocalGvg:
         The first branch is the rest of the edge on which the place lies.
         """
         edge = self.edges[start.edge]
-        queue = [
+        queue: list[tuple[float, int, tuple[Branch, ...]]] = [
             (start.station, edge.a, (Branch(start.edge, forward=False),)),
             (edge.length - start.station, edge.b, (Branch(start.edge, forward=True),)),
         ]

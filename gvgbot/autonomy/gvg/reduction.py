@@ -1,8 +1,8 @@
 """From the fine Voronoi graph to the reduced GVG: chains become edges, corner branches go.
 
-A dangling branch from vertex v to tip t has reach (length(v, t) + clearance(t)) / clearance(v). In a
-right-angled corner it is 1.41; a dead end worth a visit has more. Reach only grows while more of a
-branch is seen, so for a branch that ends in unseen space it is a lower bound.
+A dangling branch from vertex v to tip t has reach (length(v, t) + clearance(t)) / clearance(v). In
+a right-angled corner it is 1.41; a dead end worth a visit has more. Reach only grows while more of
+a branch is seen, so for a branch that ends in unseen space it is a lower bound.
 """
 
 import math
@@ -144,7 +144,7 @@ def _walk(neighbours: list[list[int]], is_key: set[int], start: int, first: int)
 
 
 def _prune(draft: _Draft, min_reach: float) -> None:
-    """Drop corner branches in rounds, so that a dead end keeps the vertex both its corners hang on."""
+    """Drop corner branches in rounds: a dead end keeps the vertex that both its corners hang on."""
     while True:
         doomed = []
         for node, ends in draft.ends.items():

@@ -1,9 +1,9 @@
 """EKF-SLAM over the robot's pose and one pose per vertex.
 
-State x = (x, y, theta, then x, y, psi of each vertex), map frame; P its covariance. A vertex's frame has
-its origin on the vertex and the orientation that the local frame had when the vertex was first seen,
-so that bearings and snapshots stored with the vertex turn with it. Letters as in the literature:
-F, G Jacobians, H measurement Jacobian, K gain, S innovation covariance.
+State x = (x, y, theta, then x, y, psi of each vertex), map frame; P its covariance. A vertex's
+frame has its origin on the vertex and the orientation that the local frame had when the vertex was
+first seen, so that bearings and snapshots stored with the vertex turn with it. Letters as in the
+literature: F, G Jacobians, H measurement Jacobian, K gain, S innovation covariance.
 """
 
 import math
@@ -40,13 +40,16 @@ class OdometryNoise:
             + self.turn_rad_per_sqrt_s**2 * duration
         )
         sideways = heading * d * d / 3 + self.along_m_per_sqrt_rad**2 * turn
-        return np.array(
+        c, s = (motion.x / d, motion.y / d) if d > 0.0 else (1.0, 0.0)
+        chord = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        along_chord = np.array(
             [
                 [along + 1e-8, 0.0, 0.0],
                 [0.0, sideways + 1e-8, heading * d / 2],
                 [0.0, heading * d / 2, heading + 1e-10],
             ]
         )
+        return chord @ along_chord @ chord.T
 
 
 @dataclass(frozen=True, slots=True, eq=False)

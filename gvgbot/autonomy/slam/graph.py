@@ -80,7 +80,7 @@ class Vertex:
 
 @dataclass(slots=True, eq=False)
 class Edge:
-    """A stretch of GVG between two half-edges; polyline (N, 2) from a to b in the frame of a's vertex."""
+    """A stretch of GVG between half-edges a and b; polyline (N, 2) in the frame of a's vertex."""
 
     id: int
     a: HalfEdgeId

@@ -1,8 +1,8 @@
 """Which known vertex is this? Tests in the order of their cost; what fails all of them is new.
 
-A vertex seen moments ago is told by its place in the local map alone. One not seen for a while must
-pass the Mahalanobis gate with the full joint covariance, then degree, clearance and bearings under the
-best rotation of the departures, and last the registration of the walls around it.
+A vertex seen moments ago is told by its place in the local map alone. One not seen for a while
+must pass the Mahalanobis gate with the full joint covariance, then degree, clearance and bearings
+under the best pairing of the departures, and last the registration of the walls around it.
 """
 
 import math
@@ -77,7 +77,7 @@ def gate_distance(
 def looks_alike(
     vertex: Vertex, sighting: Sighting, local_vertex: Pose, config: RecognitionConfig
 ) -> bool:
-    """Whether kind, degree, clearance and bearings agree, the vertex's frame seen at `local_vertex`.
+    """Whether kind, degree, clearance and bearings agree, the vertex's frame at `local_vertex`.
 
     A degree that differs by one passes: of a pair of close meetpoints either may be seen as one.
     """

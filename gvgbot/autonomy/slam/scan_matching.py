@@ -1,17 +1,20 @@
 """Registration of points on the walls of a map: Gauss-Newton, point to line, with a prior.
 
-The prior is the odometry's own covariance, so the direction that the walls do not constrain (along a
-bare corridor) is left to odometry.
+The prior is the odometry's own covariance, so the direction that the walls do not constrain (along
+a bare corridor) is left to odometry.
 """
 
 from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from gvgbot.geometry import Array, Pose, wrap_angle
 from gvgbot.ranges import Range
+
+Index = NDArray[np.intp]
 
 _NEIGHBOURS = 5
 _FLATNESS = 0.08  # smallest over largest spread of the neighbours of a point on a wall
@@ -30,7 +33,7 @@ class ScanMatchingConfig:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Registration:
-    """A pose with its covariance (3, 3) in its own frame, and how well the points lie on the walls."""
+    """A pose, its covariance (3, 3) in its own frame, and how well the points lie on the walls."""
 
     pose: Pose
     covariance: Array
@@ -76,7 +79,7 @@ def motion_between(before: Pose, after: Pose) -> Pose:
 
 def _pairs(
     world: Array, tree: cKDTree, walls: Array, reach: float
-) -> tuple[Array, Array, Array] | None:
+) -> tuple[Index, Array, Array] | None:
     """Indices of the points near a wall, the wall's normals (K, 2), and signed distances (K,)."""
     distance, near = tree.query(world, k=_NEIGHBOURS, distance_upper_bound=max(reach, 0.35))
     found = np.isfinite(distance[:, 2]) & (distance[:, 0] < reach)

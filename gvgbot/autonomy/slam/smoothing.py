@@ -1,16 +1,19 @@
 """The whole trajectory and all vertices at once: a pose graph over keyframes and vertices.
 
-The EKF is the measure of uncertainty while driving; this corrects the past by what was learnt later.
-Gauss-Newton on relative SE(2) poses, solved sparsely.
+The EKF is the measure of uncertainty while driving; this corrects the past by what was learnt
+later. Gauss-Newton on relative SE(2) poses, solved sparsely.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.linalg import spsolve
 
 from gvgbot.geometry import Array, Pose
+
+Index = NDArray[np.intp]
 
 _ITERATIONS = 8
 _CONVERGED = 1e-5  # metres and radians
@@ -45,7 +48,7 @@ def smooth(poses: Array, constraints: list[Constraint]) -> Array:
     return x
 
 
-def _step(x: Array, a: Array, b: Array, z: Array, W: Array) -> Array:
+def _step(x: Array, a: Index, b: Index, z: Array, W: Array) -> Array:
     """One Gauss-Newton step (N, 3)."""
     r, A, B = _residuals(x, a, b, z)
     blocks = [
@@ -72,8 +75,8 @@ def _step(x: Array, a: Array, b: Array, z: Array, W: Array) -> Array:
     return -np.asarray(spsolve(H.tocsc(), g.ravel())).reshape(-1, 3)
 
 
-def _residuals(x: Array, a: Array, b: Array, z: Array) -> tuple[Array, Array, Array]:
-    """Expected minus measured relative poses r (K, 3), and their Jacobians by both poses (K, 3, 3)."""
+def _residuals(x: Array, a: Index, b: Index, z: Array) -> tuple[Array, Array, Array]:
+    """Expected minus measured relative poses r (K, 3), and Jacobians by both poses (K, 3, 3)."""
     c, s = np.cos(x[a, 2]), np.sin(x[a, 2])
     d = x[b] - x[a]
     expected = np.stack([c * d[:, 0] + s * d[:, 1], -s * d[:, 0] + c * d[:, 1], d[:, 2]], axis=1)

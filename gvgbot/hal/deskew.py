@@ -1,0 +1,38 @@
+"""A sweep as one instant: every beam moved to where it would be seen from when the first was taken."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from gvgbot.geometry import Pose
+from gvgbot.hal.messages import Scan
+
+_STILL_M, _STILL_RAD = 1e-3, 2e-4  # less motion than this during a sweep does not show
+
+
+def deskewed(scan: Scan, motion: Pose) -> Scan:
+    """The scan as if taken at its stamp; `motion` is that of the base during the whole sweep.
+
+    The base is taken to move evenly. Directions that no beam looked into are NaN.
+    """
+    if abs(motion.x) + abs(motion.y) < _STILL_M and abs(motion.theta) < _STILL_RAD:
+        return replace(scan, time_increment=0.0)
+    share = np.arange(len(scan.ranges)) / len(scan.ranges)
+    turn = share * motion.theta
+    mount, seen = scan.base_laser, np.isfinite(scan.ranges)
+    far = np.where(seen, scan.ranges, 0.0)
+    bearings = scan.bearings + mount.theta
+    x, y = mount.x + far * np.cos(bearings), mount.y + far * np.sin(bearings)
+    moved_x = share * motion.x + np.cos(turn) * x - np.sin(turn) * y - mount.x
+    moved_y = share * motion.y + np.sin(turn) * x + np.cos(turn) * y - mount.y
+    ranges = np.where(seen, np.hypot(moved_x, moved_y), scan.ranges)
+    towards = np.where(seen, np.arctan2(moved_y, moved_x), bearings + turn) - mount.theta
+    away = np.remainder(towards - scan.bearings + np.pi, 2 * np.pi) - np.pi
+    index = np.arange(len(ranges)) + away / scan.angle_increment
+    order = np.argsort(index, kind="stable")
+    index, ranges = index[order], ranges[order]
+    wanted = np.arange(len(ranges))
+    after = np.clip(np.searchsorted(index, wanted), 1, len(index) - 1)
+    nearest = after - (wanted - index[after - 1] < index[after] - wanted)
+    taken = np.abs(index[nearest] - wanted) <= 1.0
+    return replace(scan, ranges=np.where(taken, ranges[nearest], np.nan), time_increment=0.0)
