@@ -107,6 +107,8 @@ class Model:
     nothing_code: int
     near_code: int
     failure_code: int
+    is_multi_echo: bool = False
+    tells_state: bool = False  # knows %ST, as newer firmware does
 
 
 _MAKER = "(Hokuyo Automatic Co.,Ltd.)"
@@ -123,10 +125,19 @@ def _model(
     *,
     product: str = "",
     modl: str = "",
+    is_multi_echo: bool = False,
+    tells_state: bool = False,
 ) -> Model:
     """A row of the catalogue: the numbers in the order of the PP reply."""
     parameters = Parameters((modl or name) + _MAKER, *numbers)
-    return Model(parameters, product or f"SOKUIKI Sensor {name}", usable_mm, *codes)
+    return Model(
+        parameters,
+        product or f"SOKUIKI Sensor {name}",
+        usable_mm,
+        *codes,
+        is_multi_echo=is_multi_echo,
+        tells_state=tells_state,
+    )
 
 
 MODELS: dict[str, Model] = {
@@ -150,9 +161,15 @@ MODELS: dict[str, Model] = {
         product="SOKUIKI Sensor TOP-URG UTM-30LX",
     ),
     "UTM-30LX-EW": _model("UTM-30LX-EW", (23, 60000, 1440, 0, 1080, 540, 2400), 30000, _UST_CODES),
-    "UXM-30LX-E": _model("UXM-30LX-E", (100, 100000, 1440, 0, 760, 380, 1200), 30000, _UTM_CODES),
-    "UST-10LX": _model("UST-10LX", (20, 30000, 1440, 0, 1080, 540, 2400), 10000, _UST_CODES),
-    "UST-20LX": _model("UST-20LX", (20, 60000, 1440, 0, 1080, 540, 2400), 20000, _UST_CODES),
+    "UXM-30LX-E": _model(
+        "UXM-30LX-E", (100, 100000, 1440, 0, 760, 380, 1200), 30000, _UTM_CODES, is_multi_echo=True
+    ),
+    "UST-10LX": _model(
+        "UST-10LX", (20, 30000, 1440, 0, 1080, 540, 2400), 10000, _UST_CODES, tells_state=True
+    ),
+    "UST-20LX": _model(
+        "UST-20LX", (20, 60000, 1440, 0, 1080, 540, 2400), 20000, _UST_CODES, tells_state=True
+    ),
 }
 ModelName = Literal[
     "URG-04LX",

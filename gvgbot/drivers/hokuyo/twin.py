@@ -1,76 +1,24 @@
 """A simulated Hokuyo laser that speaks SCIP 2: bytes in, bytes out, told the time."""
 
 import math
-from collections import deque
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
-from typing import Annotated, Literal
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
-from gvgbot.drivers.hokuyo.clock_sync import WRAP_MS
-from gvgbot.drivers.hokuyo.models import MODELS, Identity
-from gvgbot.drivers.hokuyo.scip import encode_reply, encode_scan
-from gvgbot.drivers.hokuyo.scip_codec import encode_number
-from gvgbot.drivers.hokuyo.scip_messages import (
-    ACCEPTED,
-    SCAN_DATA,
-    Reply,
-    ScanReply,
-    ScanRequest,
-    parse_request,
-)
-from gvgbot.drivers.hokuyo.twin_commands import CommandReader, scan_fault, string_fault
-from gvgbot.drivers.hokuyo.twin_readings import LARGEST_TWO_CHARACTERS, clustered, noisy_readings
+from gvgbot.drivers.fault_schedule import FaultSchedule
+from gvgbot.drivers.hokuyo.scip_messages import SCAN_DATA
+from gvgbot.drivers.hokuyo.twin_answers import Answers, LaserOn, Standby, Streaming, status_reply
+from gvgbot.drivers.hokuyo.twin_commands import CommandReader
+from gvgbot.drivers.hokuyo.twin_config import HokuyoTwinConfig, LaserMishap, LaserMishapConfig
+from gvgbot.drivers.hokuyo.twin_head import ROUNDING, Head
+from gvgbot.drivers.hokuyo.twin_line import Line
 from gvgbot.geometry import Array
-from gvgbot.ranges import Range
 
-DENIED = "10"
-UNDEFINED = "0E"
-ALREADY_ON = "02"
-ALREADY_OFF = "03"
-ROUNDING = 1e-6  # of a scan or a millisecond, so that whole numbers stay whole
+__all__ = ["HokuyoTwin", "HokuyoTwinConfig", "LaserMishapConfig"]
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class HokuyoTwinConfig:
-    """Which laser is simulated, and its imperfections."""
-
-    model: Literal["UTM-30LX", "URG-04LX"] = "UTM-30LX"
-    range_sigma_m: Annotated[float, Range(0.0, 1.0)] = 0.01
-    dropout_fraction: Annotated[float, Range(0.0, 1.0)] = 0.005
-    bad_checksum_fraction: Annotated[float, Range(0.0, 1.0)] = 0.0  # of the scans
-    processing_latency_s: Annotated[float, Range(0.0, 0.1)] = 0.00475  # last beam to first byte
-    clock_drift_ppm: Annotated[float, Range(-1000.0, 1000.0)] = 50.0
-    clock_start_ms: Annotated[int, Range(0, WRAP_MS - 1)] = 0
-
-
-@dataclass(frozen=True, slots=True)
-class _Standby:
-    """Laser off."""
-
-
-@dataclass(frozen=True, slots=True)
-class _LaserOn:
-    """Measuring, but sending only on demand."""
-
-
-@dataclass(frozen=True, slots=True)
-class _TimeMode:
-    """Laser off, answering with the time."""
-
-
-@dataclass(slots=True)
-class _Streaming:
-    """Sending scans; `frames` are the ones measured but not yet sent, each with its time."""
-
-    request: ScanRequest
-    scan_number: int
-    is_complete: bool = False
-    frames: deque[tuple[float, bytes]] = field(default_factory=deque)
-
-
-_Phase = _Standby | _LaserOn | _TimeMode | _Streaming
+UNSTABLE = "0M"
 
 
 class HokuyoTwin:
@@ -81,183 +29,162 @@ class HokuyoTwin:
     """
 
     def __init__(
-        self, config: HokuyoTwinConfig, sense: Callable[[float], Array], seed: int
+        self,
+        config: HokuyoTwinConfig,
+        sense: Callable[[float], Array],
+        seed: int,
+        plug: Callable[[bool], None] = lambda _: None,
     ) -> None:
+        """`plug` is told when the laser leaves its link to reboot (False), and returns (True)."""
         self._config = config
-        self._model = MODELS[config.model]
-        self._sense = sense
-        self._rng = np.random.default_rng(seed)
+        self._head = Head(config, sense, seed)
+        self._answers = Answers(config, self._head)
         self._reader = CommandReader()
-        self._phase: _Phase = _Standby()
-        self._clock_rate = 1000.0 * (1.0 + config.clock_drift_ppm * 1e-6)  # ms per s
-        self._clock_start_ms = float(config.clock_start_ms)
+        self._line = Line(config.serial_baud)
+        self._mishaps = FaultSchedule(config.mishaps.rates, np.random.default_rng((seed, 6)))
+        self._plug = plug
+        self._awake_at = config.boot_s
+        self._is_down = False
+        self._heard_early = b""
+        self._newest: tuple[float, bytes] | None = None  # frame that waits for a busy line
+        self._last_frame = b""
+
+    @property
+    def baud(self) -> int:
+        """The bit rate that the laser listens and sends at; 0 where there is none."""
+        return self._answers.baud
+
+    @property
+    def counts(self) -> Counter[str]:
+        """How often each mishap has happened."""
+        return self._mishaps.counts
+
+    def inject(self, mishap: LaserMishap, duration: float = 0.0) -> None:
+        """Let it happen at the next moment the laser does something, for so long (s)."""
+        self._mishaps.inject(mishap, duration)
 
     def receive(self, data: bytes, now: float) -> bytes:
-        """Take bytes from the host; the replies to the commands they complete."""
-        return b"".join(self._answer(text, now) for text in self._reader.feed(data))
-
-    def next_due(self) -> float:
-        """When the next scan is measured or sent; inf when none is."""
-        phase = self._phase
-        if not isinstance(phase, _Streaming):
-            return math.inf
-        return min(self._next_stamp(phase), phase.frames[0][0] if phase.frames else math.inf)
+        """Take bytes from the host; the replies to the commands they complete, and what is due."""
+        self._suffer(now)
+        if now < self._awake_at:
+            if not self._is_down:
+                self._heard_early += data
+            return b""
+        self._wake(now)
+        self._listen(data, now)
+        return self._line.out(now)
 
     def advance(self, now: float) -> bytes:
-        """Measure and send what is due; the bytes of the scans sent."""
-        sent = []
-        while isinstance(phase := self._phase, _Streaming) and self.next_due() <= now:
-            if self._next_stamp(phase) <= self.next_due():
+        """Do what is due; the bytes that have gone out."""
+        self._suffer(now)
+        if now < self._awake_at:
+            return b""
+        self._wake(now)
+        while isinstance(phase := self._answers.phase, Streaming) and self._scan_due(phase) <= now:
+            if self._next_stamp(phase) <= self._scan_due(phase):
                 self._measure(phase)
             else:
-                sent.append(self._send(phase))
-        return b"".join(sent)
+                self._send(phase)
+        self._send_newest(now)
+        return self._line.out(now)
 
-    def _next_stamp(self, phase: _Streaming) -> float:
-        return math.inf if phase.is_complete else phase.scan_number * self._model.parameters.period
+    def next_due(self) -> float:
+        """When the laser next does something by itself; inf if never."""
+        phase, dues = self._answers.phase, [self._mishaps.next_due(), self._line.next_due()]
+        if self._is_down or self._heard_early:
+            return min(self._awake_at, dues[0])
+        if self._answers.restarts_at is not None:
+            dues.append(self._answers.restarts_at)
+        if self._newest is not None:
+            dues.append(max(self._newest[0], self._line.free_at))
+        if isinstance(phase, Streaming):
+            dues.append(self._scan_due(phase))
+        return min(dues)
 
-    def _measure(self, phase: _Streaming) -> None:
-        stamp = self._next_stamp(phase)
-        if phase.request.count:
-            phase.request = replace(phase.request, count=phase.request.count - 1)
-            phase.is_complete = phase.request.count == 0
-        frame = self._spoil(self._scan(phase.request, SCAN_DATA, stamp))
-        phase.frames.append((stamp + self._latency(phase.request), frame))
-        phase.scan_number += phase.request.skip + 1
+    # -- power -------------------------------------------------------------------------------------
 
-    def _send(self, phase: _Streaming) -> bytes:
-        _, frame = phase.frames.popleft()
+    def _suffer(self, now: float) -> None:
+        """Let the mishaps happen that are due, and the reboot that was asked for."""
+        began = self._mishaps.advance(now)
+        if "abnormal" in began:
+            self._answers.is_abnormal = True
+            self._answers.phase = Standby()
+        asked = self._answers.restarts_at
+        if not self._is_down and ("reboot" in began or (asked is not None and asked <= now)):
+            self._go_down(now)
+
+    def _go_down(self, now: float) -> None:
+        self._is_down, self._awake_at = True, now + self._config.reboot_s
+        self._heard_early, self._newest = b"", None
+        self._line.clear()
+        self._answers.power_up()
+        self._plug(False)
+
+    def _wake(self, now: float) -> None:
+        """Come back from a reboot, and answer what was asked while the laser booted."""
+        if self._is_down:
+            self._is_down = False
+            self._head.reset_clock(self._awake_at)
+            self._plug(True)
+        if self._heard_early:
+            early, self._heard_early = self._heard_early, b""
+            self._listen(early, now)
+
+    def _listen(self, data: bytes, now: float) -> None:
+        for text in self._reader.feed(data):
+            due = self._answer_due(now)
+            self._line.put(self._answers.answer(text, now), due)
+            if not isinstance(self._answers.phase, Streaming):
+                self._newest = None
+            self._line.baud = self._answers.baud
+
+    def _answer_due(self, now: float) -> float:
+        measures = isinstance(self._answers.phase, Streaming | LaserOn)
+        if not (measures and self._config.answers_once_per_turn):
+            return now
+        return (math.floor(now / self._head.period + ROUNDING) + 1) * self._head.period
+
+    # -- scans -------------------------------------------------------------------------------------
+
+    def _next_stamp(self, phase: Streaming) -> float:
+        return math.inf if phase.is_complete else phase.scan_number * self._head.period
+
+    def _scan_due(self, phase: Streaming) -> float:
+        return min(self._next_stamp(phase), phase.frames[0][0] if phase.frames else math.inf)
+
+    def _measure(self, phase: Streaming) -> None:
+        number, request = phase.scan_number, phase.request
+        phase.scan_number += request.skip + 1
+        if self._mishaps.is_on("stalled"):
+            return
+        if request.count:
+            phase.request = request = replace(request, count=request.count - 1)
+            phase.is_complete = request.count == 0
+        due = number * self._head.period + self._head.latency(request)
+        phase.frames.append((due, self._frame(phase, number)))
+
+    def _frame(self, phase: Streaming, number: int) -> bytes:
+        """What goes out for a scan, as the laser is just now."""
+        if self._mishaps.is_on("unstable"):
+            return status_reply(phase.request.text(), UNSTABLE)
+        if not (self._mishaps.is_on("frozen") and self._last_frame):
+            self._last_frame = self._head.frame(
+                phase.request, SCAN_DATA, number, is_blind=self._mishaps.is_on("blind")
+            )
+        return self._last_frame
+
+    def _send(self, phase: Streaming) -> None:
+        """Put a frame on the line; on a busy one it takes the place of another that waits."""
+        due, frame = phase.frames.popleft()
+        if self._line.free_at > due:
+            self._newest = (due, frame)
+        else:
+            self._line.put(frame, due)
         if phase.is_complete and not phase.frames:
-            self._phase = _Standby()
-        return frame
+            self._answers.phase = Standby()
 
-    def _latency(self, request: ScanRequest) -> float:
-        """From step 0 of a scan to the first byte of its frame, s."""
-        sweep = request.end * self._model.parameters.step_time
-        return sweep + self._config.processing_latency_s
-
-    def _scan(self, request: ScanRequest, status: str, stamp: float) -> bytes:
-        first, shortest = self._model.parameters.first_step, self._model.parameters.range_min_mm
-        ranges = self._sense(stamp)[request.start - first : request.end - first + 1]
-        config = self._config
-        readings = noisy_readings(
-            ranges, self._model, config.range_sigma_m, config.dropout_fraction, self._rng
-        )
-        if request.width == 2:
-            readings = np.minimum(readings, LARGEST_TWO_CHARACTERS)
-        values = clustered(readings, request.group, shortest)
-        return encode_scan(ScanReply(request, status, self._device_ms(stamp), values))
-
-    def _spoil(self, frame: bytes) -> bytes:
-        if self._rng.random() >= self._config.bad_checksum_fraction:
-            return frame
-        middle = len(frame) // 2
-        return frame[:middle] + bytes((frame[middle] ^ 1,)) + frame[middle + 1 :]
-
-    def _device_ms(self, now: float) -> int:
-        return math.floor(now * self._clock_rate + self._clock_start_ms + ROUNDING) % WRAP_MS
-
-    def _answer(self, text: str, now: float) -> bytes:
-        command, _, string = text.partition(";")
-        fault = string_fault(string)
-        if fault is not None:
-            return _status(text, fault)
-        if command[:2] in {"MD", "MS", "GD", "GS"}:
-            return self._answer_scan(text, command, now)
-        if isinstance(self._phase, _TimeMode) and command in {"PP", "II", "BM", "QT"}:
-            return _status(text, DENIED)
-        lines = self._information(command, now)
-        if lines is not None:
-            return _key_lines(text, lines)
-        return self._answer_state(text, command, now)
-
-    def _information(self, command: str, now: float) -> Mapping[str, str] | None:
-        parameters = self._model.parameters
-        match command:
-            case "VV":
-                return Identity(
-                    "Hokuyo Automatic Co.,Ltd.",
-                    self._model.product,
-                    "1.0.0",
-                    "SCIP 2.0",
-                    "H0000001",
-                ).lines()
-            case "PP":
-                return parameters.lines()
-            case "II":
-                return {
-                    "MODL": parameters.model,
-                    "LASR": "ON" if isinstance(self._phase, _LaserOn | _Streaming) else "OFF",
-                    "SCSP": f"Initial({parameters.rpm}[rpm])",
-                    "MESM": "CLASSIC",
-                    "SBPS": "USB Full Speed",
-                    "TIME": f"{self._device_ms(now):06X}",
-                    "STAT": "Sensor works well.",
-                }
-        return None
-
-    def _answer_state(self, text: str, command: str, now: float) -> bytes:
-        match command, self._phase:
-            case "BM", _LaserOn() | _Streaming():
-                return _status(text, ALREADY_ON)
-            case "BM", _:
-                self._phase = _LaserOn()
-            case "QT", _:
-                self._phase = _Standby()
-            case "RS", _:
-                self._phase = _Standby()
-                self._clock_start_ms = -now * self._clock_rate
-            case "TM0" | "TM1" | "TM2", _:
-                return self._answer_time(text, command, now)
-            case _:
-                return _status(text, UNDEFINED)
-        return _status(text, ACCEPTED)
-
-    def _answer_time(self, text: str, command: str, now: float) -> bytes:
-        match command, self._phase:
-            case "TM0", _TimeMode():
-                return _status(text, ALREADY_ON)
-            case "TM0", _Streaming():
-                return _status(text, DENIED)
-            case "TM0", _:
-                self._phase = _TimeMode()
-            case "TM2", _TimeMode():
-                self._phase = _Standby()
-            case "TM2", _:
-                return _status(text, ALREADY_OFF)
-            case _:
-                time = encode_number(self._device_ms(now), 4).decode("ascii")
-                return encode_reply(Reply(text, ACCEPTED, (time,)))
-        return _status(text, ACCEPTED)
-
-    def _answer_scan(self, text: str, command: str, now: float) -> bytes:
-        fault = scan_fault(command, self._model.parameters)
-        if fault is not None:
-            return _status(text, fault)
-        request = parse_request(text.encode("ascii"))
-        if request is None:
-            return _status(text, UNDEFINED)
-        if request.is_single_shot:
-            return self._answer_single(request, text, now)
-        if isinstance(self._phase, _TimeMode):
-            return _status(text, DENIED)
-        scans_so_far = now / self._model.parameters.period
-        self._phase = _Streaming(request, math.ceil(scans_so_far - ROUNDING))
-        return _status(text, ACCEPTED)
-
-    def _answer_single(self, request: ScanRequest, text: str, now: float) -> bytes:
-        if not isinstance(self._phase, _LaserOn | _Streaming):
-            return _status(text, DENIED)
-        period = self._model.parameters.period
-        latest = math.floor((now - self._latency(request)) / period + ROUNDING)
-        return self._scan(request, ACCEPTED, max(0, latest) * period)
-
-
-def _status(echo: str, status: str) -> bytes:
-    return encode_reply(Reply(echo, status))
-
-
-def _key_lines(echo: str, lines: Mapping[str, str]) -> bytes:
-    return encode_reply(
-        Reply(echo, ACCEPTED, tuple(f"{key}:{value}" for key, value in lines.items()))
-    )
+    def _send_newest(self, now: float) -> None:
+        if self._newest is not None and self._line.free_at <= now:
+            due, frame = self._newest
+            self._newest = None
+            self._line.put(frame, max(due, self._line.free_at))

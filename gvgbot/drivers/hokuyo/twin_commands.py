@@ -6,6 +6,7 @@ from gvgbot.drivers.hokuyo.models import Parameters
 
 COMMAND_LIMIT = 128  # bytes without a terminator before they are forgotten
 STRING_LIMIT = 16
+BIT_RATES = frozenset({"019200", "038400", "057600", "115200", "250000", "500000", "750000"})
 
 _STRING = re.compile(r"[A-Za-z0-9 ._+@]*")
 _FIELDS = (  # characters of a scan command, and the status when they are no number
@@ -37,9 +38,14 @@ def string_fault(string: str) -> str | None:
     return None if _STRING.fullmatch(string) else "0H"
 
 
+def bit_rate_fault(digits: str) -> str | None:
+    """The status that refuses this bit rate; None if it is good."""
+    return None if digits in BIT_RATES else "03"
+
+
 def scan_fault(command: str, parameters: Parameters) -> str | None:
     """The status that refuses this Mx or Gx command (without user string); None if it is good."""
-    length = 12 if command.startswith("G") else 15
+    length = 12 if command[0] in "GH" else 15
     if len(command) != length:
         return "0C" if len(command) < length else "0D"
     for field, status in _FIELDS:

@@ -1,6 +1,9 @@
-"""From true ranges to what a laser would read: noise, error codes, clusters."""
+"""From true ranges to what a laser would read: noise, error codes, echoes, clusters."""
+
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gvgbot.drivers.hokuyo.models import Model
 from gvgbot.drivers.hokuyo.scip_codec import Values
@@ -8,6 +11,11 @@ from gvgbot.geometry import Array
 
 LARGEST_TWO_CHARACTERS = 4095  # mm
 NO_RANGE = np.int32(np.iinfo(np.int32).max)
+WALL_INTENSITY = 12_000.0  # at no distance; half of it at INTENSITY_RANGE
+INTENSITY_RANGE = 1000.0  # mm
+THIN_INTENSITY = 300  # of something that lets most of the light through
+
+Indices = NDArray[np.intp]
 
 
 def noisy_readings(
@@ -26,11 +34,49 @@ def noisy_readings(
     return readings
 
 
-def clustered(readings: Values, group: int, shortest_mm: int) -> Values:
-    """The smallest range of each group of steps, or its first error code if it has no range."""
+def intensities_of(readings: Values, shortest_mm: int) -> Values:
+    """How much light comes back (N,), without unit; little with an error code."""
+    strength = WALL_INTENSITY / (1.0 + np.maximum(readings, 0) / INTENSITY_RANGE)
+    return np.where(readings < shortest_mm, 100, strength).astype(np.int32)
+
+
+@dataclass(frozen=True, slots=True)
+class Echoes:
+    """Readings and intensities (sum of echoes,), and how many of them each step has (steps,)."""
+
+    readings: Values
+    intensities: Values
+    counts: Values
+
+
+def with_thin_things(
+    readings: Values,
+    intensities: Values,
+    shortest_mm: int,
+    fraction: float,
+    rng: np.random.Generator,
+) -> Echoes:
+    """Readings of which some have a weak echo before them, half as far away."""
+    is_double = (rng.random(len(readings)) < fraction) & (readings >= 2 * shortest_mm)
+    places = np.flatnonzero(is_double)
+    return Echoes(
+        np.insert(readings, places, readings[places] // 2).astype(np.int32),
+        np.insert(intensities, places, THIN_INTENSITY).astype(np.int32),
+        (1 + is_double).astype(np.int32),
+    )
+
+
+def picks(readings: Values, group: int, shortest_mm: int) -> Indices:
+    """Which reading stands for each group of steps: the smallest that is a range, or the first."""
     if group == 1:
-        return readings
+        return np.arange(len(readings))
     rows = np.full(-(-len(readings) // group) * group, NO_RANGE, np.int32)
     rows[: len(readings)] = np.where(readings < shortest_mm, NO_RANGE, readings)
-    smallest: Values = rows.reshape(-1, group).min(axis=1)
-    return np.where(smallest == NO_RANGE, readings[::group], smallest)
+    nearest = rows.reshape(-1, group).argmin(axis=1)
+    chosen: Indices = np.arange(len(nearest)) * group + nearest
+    return chosen
+
+
+def clustered(readings: Values, group: int, shortest_mm: int) -> Values:
+    """The smallest range of each group of steps, or its first error code if it has no range."""
+    return readings if group == 1 else readings[picks(readings, group, shortest_mm)]

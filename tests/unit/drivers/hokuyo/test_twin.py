@@ -162,7 +162,7 @@ def test_a_counted_stream_counts_down_and_switches_the_laser_off() -> None:
     sent = [scan for _, scan in frames(twin, 1.0)]
     assert [scan.request.count for scan in sent] == [2, 1, 0]
     assert {scan.request.string for scan in sent} == {"run 7"}
-    assert status(twin, "GD0000108001") == "10"
+    assert status(twin, "GD0000108001", 1.0) == "10"
 
 
 def test_the_world_is_asked_once_per_scan_sent_and_at_its_time() -> None:

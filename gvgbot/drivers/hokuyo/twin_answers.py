@@ -1,0 +1,230 @@
+"""What a simulated laser answers to each command, and the state that this leaves it in."""
+
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from gvgbot.drivers.hokuyo.models import Identity
+from gvgbot.drivers.hokuyo.scip import encode_reply
+from gvgbot.drivers.hokuyo.scip_codec import encode_number
+from gvgbot.drivers.hokuyo.scip_messages import ACCEPTED, Reply, ScanRequest, parse_request
+from gvgbot.drivers.hokuyo.twin_commands import bit_rate_fault, scan_fault, string_fault
+from gvgbot.drivers.hokuyo.twin_config import HokuyoTwinConfig
+from gvgbot.drivers.hokuyo.twin_head import Head
+
+DENIED = "10"
+UNDEFINED = "0E"
+ABNORMAL = "0L"
+ONCE_MORE = "01"  # of RB: only the second one counts
+ALREADY_ON = "02"
+ALREADY_OFF = "03"
+SCIP_1_ANSWER = "E"
+TWICE_WITHIN = 1.0  # s between two RB
+SCAN_COMMANDS = frozenset(a + b for a in "MGNH" for b in "DSE") - {"NS", "HS"}
+
+
+@dataclass(frozen=True, slots=True)
+class Standby:
+    """Laser off."""
+
+
+@dataclass(frozen=True, slots=True)
+class LaserOn:
+    """Measuring, but sending only on demand."""
+
+
+@dataclass(frozen=True, slots=True)
+class TimeMode:
+    """Laser off, answering with the time."""
+
+
+@dataclass(frozen=True, slots=True)
+class Asleep:
+    """Laser and motor off until it is asked for scans."""
+
+
+@dataclass(slots=True)
+class Streaming:
+    """Sending scans; `frames` are the ones measured but not yet sent, each with its time."""
+
+    request: ScanRequest
+    scan_number: int
+    is_complete: bool = False
+    frames: deque[tuple[float, bytes]] = field(default_factory=deque)
+
+
+Phase = Standby | LaserOn | TimeMode | Asleep | Streaming
+STATES = {Standby: "000", TimeMode: "002", LaserOn: "003", Streaming: "004", Asleep: "005"}
+
+
+class Answers:
+    """The laser's side of the dialogue. `phase` is what it is doing, `baud` its bit rate.
+
+    `restarts_at` is when it will go down because it was told to (s); None if it was not.
+    """
+
+    def __init__(self, config: HokuyoTwinConfig, head: Head) -> None:
+        self.phase: Phase = Standby()
+        self.baud = config.serial_baud
+        self.is_abnormal = config.starts_abnormal
+        self.speaks_scip_1 = config.starts_in_scip_1
+        self.restarts_at: float | None = None
+        self._config = config
+        self._head = head
+        self._asked_to_restart: float | None = None
+
+    def power_up(self) -> None:
+        """Begin again, as after a reboot: what ailed the laser is gone."""
+        self.phase = Standby()
+        self.speaks_scip_1 = self._config.starts_in_scip_1
+        self.is_abnormal = False
+        self.restarts_at = self._asked_to_restart = None
+
+    def answer(self, text: str, now: float) -> bytes:
+        """The reply to one command, without its terminator."""
+        if self.speaks_scip_1:
+            self.speaks_scip_1 = text != "SCIP2.0"
+            return status_reply(text, "0" if text == "SCIP2.0" else SCIP_1_ANSWER)
+        command, _, string = text.partition(";")
+        fault = string_fault(string)
+        if fault is not None:
+            return status_reply(text, fault)
+        lines = None if isinstance(self.phase, TimeMode) else self._information(command, now)
+        if lines is not None:
+            return _key_lines(text, lines)
+        if self.is_abnormal and command != "RB":
+            return status_reply(text, ABNORMAL)
+        if command[:2] in SCAN_COMMANDS and command[2:3] != "":
+            return self._answer_scan(text, command, now)
+        return self._answer_state(text, command, now)
+
+    def _information(self, command: str, now: float) -> Mapping[str, str] | None:
+        model = self._head.model
+        match command:
+            case "VV":
+                return Identity(
+                    "Hokuyo Automatic Co.,Ltd.",
+                    model.product,
+                    "1.0.0",
+                    "SCIP 2.0",
+                    self._config.serial_number,
+                ).lines()
+            case "PP":
+                return model.parameters.lines()
+            case "II":
+                return self._condition(now)
+        return None
+
+    def _condition(self, now: float) -> Mapping[str, str]:
+        parameters = self._head.model.parameters
+        return {
+            "MODL": parameters.model,
+            "LASR": "ON" if isinstance(self.phase, LaserOn | Streaming) else "OFF",
+            "SCSP": f"Initial({parameters.rpm}[rpm])",
+            "MESM": "CLASSIC",
+            "SBPS": f"{self.baud}[bps]" if self.baud else "USB Full Speed",
+            "TIME": f"{self._head.device_ms(now):06X}",
+            "STAT": "Sensor is in abnormal state." if self.is_abnormal else "Sensor works well.",
+        }
+
+    def _answer_state(self, text: str, command: str, now: float) -> bytes:
+        """The reply to what is no question and no scan."""
+        if command[:2] in {"SS", "CR", "DB"} or (command[:2] == "HS" and len(command) == 3):
+            return status_reply(text, self._set(command))
+        if command in {"TM0", "TM1", "TM2"}:
+            return self._answer_time(text, command, now)
+        if command == "%ST" and self._head.model.tells_state:
+            state = "900" if self.is_abnormal else STATES[type(self.phase)]
+            return encode_reply(Reply(text, ACCEPTED, (state,)))
+        if command == "RB":
+            return status_reply(text, self._restart(now))
+        return status_reply(text, self._switch(command, now))
+
+    def _switch(self, command: str, now: float) -> str:
+        """Change the phase; the status."""
+        match command, self.phase:
+            case "BM" | "QT" | "PP" | "II" | "VV", TimeMode():
+                return DENIED
+            case "BM", LaserOn() | Streaming():
+                return ALREADY_ON
+            case "BM", _:
+                self.phase = LaserOn()
+            case "QT", Streaming() if self._head.is_lucky(self._config.lost_stop_fraction):
+                return ACCEPTED
+            case "QT", _:
+                self.phase = Standby()
+            case "RS" | "RT", _:
+                self.phase = Standby()
+                self._head.reset_clock(now)
+            case "%SL", _:
+                self.phase = Asleep()
+            case _:
+                return UNDEFINED
+        return ACCEPTED
+
+    def _set(self, command: str) -> str:
+        """The status of a command that sets something."""
+        if not command[2:].isdecimal():
+            return "01"
+        if command.startswith("SS"):
+            fault = bit_rate_fault(command[2:])
+            if fault is None and self.baud:
+                self.baud = int(command[2:])
+            return fault or ACCEPTED
+        return ACCEPTED
+
+    def _restart(self, now: float) -> str:
+        asked, self._asked_to_restart = self._asked_to_restart, now
+        if asked is None or now - asked > TWICE_WITHIN:
+            return ONCE_MORE
+        self.restarts_at = now + 1.0
+        return ACCEPTED
+
+    def _answer_time(self, text: str, command: str, now: float) -> bytes:
+        match command, self.phase:
+            case "TM0", TimeMode():
+                return status_reply(text, ALREADY_ON)
+            case "TM0", Streaming():
+                return status_reply(text, DENIED)
+            case "TM0", _:
+                self.phase = TimeMode()
+            case "TM2", TimeMode():
+                self.phase = Standby()
+            case "TM2", _:
+                return status_reply(text, ALREADY_OFF)
+            case _:
+                time = encode_number(self._head.device_ms(now), 4).decode("ascii")
+                return encode_reply(Reply(text, ACCEPTED, (time,)))
+        return status_reply(text, ACCEPTED)
+
+    def _answer_scan(self, text: str, command: str, now: float) -> bytes:
+        fault = self._scan_fault(command)
+        if fault is not None:
+            return status_reply(text, fault)
+        request = parse_request(text.encode("ascii"))
+        if request is None:
+            return status_reply(text, UNDEFINED)
+        if request.is_single_shot:
+            if not isinstance(self.phase, LaserOn | Streaming):
+                return status_reply(text, DENIED)
+            return self._head.frame(request, ACCEPTED, self._head.latest_scan(request, now))
+        if isinstance(self.phase, TimeMode):
+            return status_reply(text, DENIED)
+        self.phase = Streaming(request, self._head.next_scan(now))
+        return status_reply(text, ACCEPTED)
+
+    def _scan_fault(self, command: str) -> str | None:
+        if command[0] in "NH" and not self._head.model.is_multi_echo:
+            return UNDEFINED
+        return scan_fault(command, self._head.model.parameters)
+
+
+def status_reply(echo: str, status: str) -> bytes:
+    """A reply that is nothing but a status."""
+    return encode_reply(Reply(echo, status))
+
+
+def _key_lines(echo: str, lines: Mapping[str, str]) -> bytes:
+    return encode_reply(
+        Reply(echo, ACCEPTED, tuple(f"{key}:{value}" for key, value in lines.items()))
+    )

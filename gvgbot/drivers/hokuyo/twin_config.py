@@ -1,0 +1,68 @@
+"""Which laser is simulated, and its imperfections."""
+
+from dataclasses import dataclass, field
+from typing import Annotated, Literal
+
+from gvgbot.drivers.fault_schedule import Rate
+from gvgbot.drivers.hokuyo.clock_sync import WRAP_MS
+from gvgbot.drivers.hokuyo.models import ModelName
+from gvgbot.drivers.link_faults import LinkFaultConfig
+from gvgbot.ranges import Range
+
+LaserMishap = Literal["reboot", "frozen", "stalled", "unstable", "abnormal", "blind"]
+Fraction = Annotated[float, Range(0.0, 1.0)]
+PerHour = Annotated[float, Range(0.0, 36_000.0)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LaserMishapConfig:
+    """How often a simulated laser has each mishap, and how long one lasts."""
+
+    reboots_per_h: PerHour = 0.0
+    freezes_per_h: PerHour = 0.0  # the last scan comes over and over
+    stalls_per_h: PerHour = 0.0  # answers, but sends no scans
+    unstable_per_h: PerHour = 0.0  # says that it cannot measure just now
+    abnormal_per_h: PerHour = 0.0  # refuses everything until it is rebooted
+    blinds_per_h: PerHour = 0.0  # error codes instead of ranges
+    duration_s: Annotated[float, Range(0.0, 60.0)] = 1.0
+
+    @property
+    def rates(self) -> dict[str, Rate]:
+        """By name of the mishap."""
+        lasting: dict[LaserMishap, float] = {
+            "frozen": self.freezes_per_h,
+            "stalled": self.stalls_per_h,
+            "unstable": self.unstable_per_h,
+            "blind": self.blinds_per_h,
+        }
+        sudden: dict[LaserMishap, float] = {
+            "reboot": self.reboots_per_h,
+            "abnormal": self.abnormal_per_h,
+        }
+        rates = {str(name): Rate(per_h, self.duration_s) for name, per_h in lasting.items()}
+        return rates | {str(name): Rate(per_h, 0.0) for name, per_h in sudden.items()}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HokuyoTwinConfig:
+    """Which laser is simulated, and its imperfections."""
+
+    model: ModelName = "UTM-30LX"
+    range_sigma_m: Fraction = 0.01
+    dropout_fraction: Fraction = 0.005
+    double_echo_fraction: Fraction = 0.02  # beams that something thin reflects on their way
+    bad_checksum_fraction: Fraction = 0.0  # of the scans
+    lost_stop_fraction: Fraction = 0.0  # of the QT that come while scans are sent
+    processing_latency_s: Annotated[float, Range(0.0, 0.1)] = 0.00475  # last beam to first byte
+    answers_once_per_turn: bool = False  # while it measures, as real lasers do
+    clock_drift_ppm: Annotated[float, Range(-1000.0, 1000.0)] = 50.0
+    clock_start_ms: Annotated[int, Range(0, WRAP_MS - 1)] = 0
+    motor_error_ppm: Annotated[float, Range(-50_000.0, 50_000.0)] = 0.0
+    serial_baud: Annotated[int, Range(0, 750_000)] = 0  # 0: USB or Ethernet
+    boot_s: Annotated[float, Range(0.0, 60.0)] = 0.0  # of silence after power-up
+    reboot_s: Annotated[float, Range(0.0, 60.0)] = 1.5  # likewise after a reboot
+    starts_in_scip_1: bool = False
+    starts_abnormal: bool = False
+    serial_number: str = "H0000001"
+    mishaps: LaserMishapConfig = field(default_factory=LaserMishapConfig)
+    link: LinkFaultConfig = field(default_factory=LinkFaultConfig)

@@ -1,0 +1,102 @@
+"""The measuring half of a simulated laser: its clock, its motor, and the scans it makes."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from gvgbot.drivers.hokuyo.clock_sync import WRAP_MS
+from gvgbot.drivers.hokuyo.models import MODELS
+from gvgbot.drivers.hokuyo.scip import encode_scan
+from gvgbot.drivers.hokuyo.scip_codec import Values
+from gvgbot.drivers.hokuyo.scip_messages import ScanReply, ScanRequest
+from gvgbot.drivers.hokuyo.twin_config import HokuyoTwinConfig
+from gvgbot.drivers.hokuyo.twin_readings import (
+    LARGEST_TWO_CHARACTERS,
+    clustered,
+    intensities_of,
+    noisy_readings,
+    picks,
+    with_thin_things,
+)
+from gvgbot.geometry import Array
+
+ROUNDING = 1e-6  # of a scan or a millisecond, so that whole numbers stay whole
+
+
+class Head:
+    """Turns the world into frames, on the grid of its motor and the stamps of its clock."""
+
+    def __init__(
+        self, config: HokuyoTwinConfig, sense: Callable[[float], Array], seed: int
+    ) -> None:
+        self.model = MODELS[config.model]
+        self.period = self.model.parameters.period * (1.0 + config.motor_error_ppm * 1e-6)
+        self._config = config
+        self._sense = sense
+        self._rng = np.random.default_rng(seed)
+        self._rate = 1000.0 * (1.0 + config.clock_drift_ppm * 1e-6)  # ms per s
+        self._start_ms = float(config.clock_start_ms)
+
+    def device_ms(self, now: float) -> int:
+        """The laser's clock at a time (s)."""
+        return math.floor(now * self._rate + self._start_ms + ROUNDING) % WRAP_MS
+
+    def reset_clock(self, now: float) -> None:
+        """Let the clock begin again from zero."""
+        self._start_ms = -now * self._rate
+
+    def next_scan(self, now: float) -> int:
+        """The number of the first scan that begins from now on."""
+        return math.ceil(now / self.period - ROUNDING)
+
+    def latest_scan(self, request: ScanRequest, now: float) -> int:
+        """The number of the last scan that is finished by now."""
+        return max(0, math.floor((now - self.latency(request)) / self.period + ROUNDING))
+
+    def latency(self, request: ScanRequest) -> float:
+        """From step 0 of a scan to the first byte of its frame, s."""
+        sweep = request.end * self.period / self.model.parameters.steps_per_turn
+        return sweep + self._config.processing_latency_s
+
+    def frame(
+        self, request: ScanRequest, status: str, number: int, *, is_blind: bool = False
+    ) -> bytes:
+        """The message with the scan of this number, measured now."""
+        stamp = number * self.period
+        config, model = self._config, self.model
+        first = model.parameters.first_step
+        ranges = self._sense(stamp)[request.start - first : request.end - first + 1]
+        dropouts = 1.0 if is_blind else config.dropout_fraction
+        readings = noisy_readings(ranges, model, config.range_sigma_m, dropouts, self._rng)
+        scan = ScanReply(request, status, self.device_ms(stamp), readings)
+        return self._spoil(encode_scan(self._filled(scan, readings)))
+
+    def _filled(self, scan: ScanReply, readings: Values) -> ScanReply:
+        """The scan with what its command asks for: clusters, echoes, intensities."""
+        request, shortest = scan.request, self.model.parameters.range_min_mm
+        if request.width == 2:
+            readings = np.minimum(readings, LARGEST_TWO_CHARACTERS)
+        if request.numbers == 1 and not request.is_multi_echo:
+            return replace(scan, ranges=clustered(readings, request.group, shortest))
+        strengths = intensities_of(readings, shortest)
+        chosen = picks(readings, request.group, shortest)
+        readings, strengths = readings[chosen], strengths[chosen]
+        if not request.is_multi_echo:
+            return replace(scan, ranges=readings, intensities=strengths)
+        echoes = with_thin_things(
+            readings, strengths, shortest, self._config.double_echo_fraction, self._rng
+        )
+        wanted = echoes.intensities if request.numbers == 2 else None
+        return replace(scan, ranges=echoes.readings, intensities=wanted, echoes=echoes.counts)
+
+    def _spoil(self, frame: bytes) -> bytes:
+        if self._rng.random() >= self._config.bad_checksum_fraction:
+            return frame
+        middle = len(frame) // 2
+        return frame[:middle] + bytes((frame[middle] ^ 1,)) + frame[middle + 1 :]
+
+    def is_lucky(self, fraction: float) -> bool:
+        """Whether something that happens to this fraction happens now."""
+        return fraction > 0.0 and bool(self._rng.random() < fraction)
