@@ -1,7 +1,9 @@
 """The base's millisecond counter on the host's clock: unwrapped, free of the link's jitter.
 
 A frame can arrive late but never early, so the smallest difference of arrival and counter seen is
-the true one. It is let grow slowly, since the two clocks do not run at quite the same speed.
+the true one. It is let grow slowly, since the two clocks do not run at quite the same speed. A base
+that starts anew counts from nothing: after a silence, the counter then shows less than its length.
+If that was not seen, all frames come late from then on, for longer than any link stalls.
 """
 
 from dataclasses import dataclass, replace
@@ -9,6 +11,9 @@ from dataclasses import dataclass, replace
 _WRAP_MS = 65536
 _DRIFT = 2e-4  # s/s that the envelope may rise: more than two cheap crystals differ
 _RESET_S = 1.0  # a counter this far ahead of the host's clock has started anew
+_GAP_S = 0.1  # a silence this much longer or shorter by the counter has seen a restart
+_LATE_S = 0.1  # this much behind the envelope, a frame is late;
+_LATE_BELIEVED_S = 2.0  # and the counter has started anew when all have been for so long
 _SHORTEST_STEP_S = 1e-3  # stamps on the host's clock rise at least by this
 
 
@@ -26,22 +31,41 @@ class DeviceClock:
     stamp: float
     step: float = 0.0
     resets: int = 0
+    late_since: float | None = None  # arrival of the first of the frames that are all late, s
+    arrival: float = 0.0  # of the frame, s
 
 
 def start_clock(raw_ms: int, arrival: float) -> DeviceClock:
     """The clock after the first frame, whose arrival (s) is all there is to go by."""
-    return DeviceClock(raw_ms, offset=arrival, elapsed=0.0, stamp=arrival)
+    return DeviceClock(raw_ms, offset=arrival, elapsed=0.0, stamp=arrival, arrival=arrival)
 
 
 def advance_clock(clock: DeviceClock, raw_ms: int, arrival: float) -> DeviceClock:
     """The clock after a frame with this counter that arrived at `arrival` (s, host)."""
     step = (raw_ms - clock.raw_ms) % _WRAP_MS / 1000
     elapsed = clock.elapsed + step
-    if elapsed + clock.offset > arrival + _RESET_S:
+    late_since = _late_since(clock, arrival - elapsed, arrival)
+    if (
+        elapsed + clock.offset > arrival + _RESET_S
+        or (step > _GAP_S and _is_restart(raw_ms, step, silence=arrival - clock.arrival))
+        or (late_since is not None and arrival - late_since > _LATE_BELIEVED_S)
+    ):
         started = start_clock(raw_ms, max(arrival, clock.stamp + _SHORTEST_STEP_S))
         return replace(started, resets=clock.resets + 1)
     offset = min(clock.offset + _DRIFT * step, arrival - elapsed)
     stamp = elapsed + offset
     if step > 0.0:
         stamp = max(stamp, clock.stamp + _SHORTEST_STEP_S)
-    return DeviceClock(raw_ms, offset, elapsed, stamp, step, clock.resets)
+    return DeviceClock(raw_ms, offset, elapsed, stamp, step, clock.resets, late_since, arrival)
+
+
+def _is_restart(raw_ms: int, step: float, silence: float) -> bool:
+    """Whether a counter after a silence (s) began during it rather than going on through it."""
+    return raw_ms / 1000 <= silence and abs(step - silence) > _GAP_S
+
+
+def _late_since(clock: DeviceClock, offset: float, arrival: float) -> float | None:
+    """Since when all frames have been late, with one that suggests this offset (s)."""
+    if offset - clock.offset <= _LATE_S:
+        return None
+    return arrival if clock.late_since is None else clock.late_since

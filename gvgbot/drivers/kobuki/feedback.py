@@ -26,11 +26,14 @@ from gvgbot.drivers.kobuki.wheel_odometry import (
     start_odometry,
     wheel_travels,
 )
+from gvgbot.geometry import wrap_angle
 from gvgbot.hal.messages import Battery, Contact, Odometry
 
 FRAME_PERIOD = 0.02  # s, of the base's stream
 _JUMP_M = 0.25  # a wheel does not go this far between two frames,
 _JUMP_SPEED = 2.0  # m/s, nor this fast over a longer gap
+_JUMP_TURN = 0.35  # rad between two frames that no base turns,
+_JUMP_TURN_RATE = 6.0  # rad/s, nor this fast over a longer gap
 _JUMPS_BELIEVED = 3  # readings in a row that agree against the old one
 
 
@@ -168,14 +171,21 @@ class FeedbackReader:
         dt = clock.elapsed - self._odometry_elapsed
         if dt <= 0.0:
             return None
-        travels = wheel_travels(state.reading, reading, self._geometry.tick)
-        if max(map(abs, travels)) > max(_JUMP_M, _JUMP_SPEED * dt):
+        if self._is_absurd(state.reading, reading, dt):
             self._doubted += 1
             self._odometry = doubt(state)
             return None
         state = advance_odometry(state, reading, dt, self._heading, self._geometry)
         self._odometry, self._odometry_elapsed = state, clock.elapsed
         return Odometry(clock.stamp, state.odom_base, state.twist)
+
+    def _is_absurd(self, before: WheelReading, after: WheelReading, dt: float) -> bool:
+        """Whether no base gets from one reading to the other in dt seconds."""
+        travels = wheel_travels(before, after, self._geometry.tick)
+        turn = abs(wrap_angle(after.angle - before.angle))
+        return max(map(abs, travels)) > max(_JUMP_M, _JUMP_SPEED * dt) or (
+            turn > max(_JUMP_TURN, _JUMP_TURN_RATE * dt)
+        )
 
 
 def _clock_after(clock: DeviceClock | None, raw_ms: int, arrival: float) -> DeviceClock:

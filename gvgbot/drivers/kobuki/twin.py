@@ -235,7 +235,8 @@ class KobukiTwin:
         if self._mishaps.is_on("over-current"):
             return
         due = now + self._config.dead_time_s
-        if not self._moving and not self._pending and twist != STANDSTILL:
+        is_idle = not self._moving and all(each == STANDSTILL for _, each in self._pending)
+        if is_idle and twist != STANDSTILL:
             due += self._config.motor_power_delay_s
         last = self._pending[-1][0] if self._pending else due
         self._pending.append((max(due, last), self._limited(twist)))

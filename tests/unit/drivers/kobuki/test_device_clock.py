@@ -63,3 +63,20 @@ def test_a_repeated_frame_takes_no_time() -> None:
     twice = advance_clock(once, 20, 0.021)
     assert twice.step == 0.0
     assert twice.stamp == pytest.approx(once.stamp)
+
+
+@pytest.mark.parametrize("last_ms", [500, 5000, 60_000, 64_600, 65_500])
+def test_a_restart_in_a_silence_is_noticed_whatever_the_counter_was(last_ms: int) -> None:
+    """Truth: after 1 s without frames the base has been on for 40 ms."""
+    clock = advance_clock(start_clock(last_ms - 20, 9.98), last_ms, 10.0)
+    for k in range(200):
+        clock = advance_clock(clock, 40 + 20 * k, 11.0 + 0.02 * k)
+    assert clock.stamp == pytest.approx(11.0 + 0.02 * 199, abs=0.11)
+    assert clock.resets <= 1
+
+
+def test_a_long_silence_without_a_restart_is_none() -> None:
+    """The counter turns over within the silence, which is when a restart looks most alike."""
+    for raw_ms in range(0, 65536, 997):
+        clock = advance_clock(start_clock(raw_ms, 0.0), (raw_ms + 3000) % 65536, 3.01)
+        assert (clock.resets, clock.step) == (0, 3.0)
