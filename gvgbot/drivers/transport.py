@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import errno
 import os
+import termios
 from typing import Protocol
 
 import serial
@@ -48,13 +49,21 @@ class _PipeEnd:
         if self._closed:
             raise DeviceLost("the link was closed")
         if data:
-            self.peer._arrived += data
-            self.peer._readable.set()
+            self.peer.arrive(data)
+
+    def arrive(self, data: bytes) -> None:
+        """Take what the other end has written."""
+        self._arrived += data
+        self._readable.set()
 
     def close(self) -> None:
-        for end in (self, self.peer):
-            end._closed = True
-            end._readable.set()
+        self.hang_up()
+        self.peer.hang_up()
+
+    def hang_up(self) -> None:
+        """Know that the link is closed."""
+        self._closed = True
+        self._readable.set()
 
 
 def pipe() -> tuple[ByteStream, ByteStream]:
@@ -116,6 +125,13 @@ class SerialStream:
             self._gone = True
             self._readable.set()
             raise DeviceLost(f"{self._path} is gone: plug it in again") from error
+
+    def set_baud(self, baud: int) -> None:
+        """Send and receive at this rate (bit/s) from now on. Raises DeviceLost."""
+        try:
+            self._port.baudrate = baud
+        except (serial.SerialException, OSError, ValueError, termios.error) as error:
+            raise DeviceLost(f"{self._path} does not take {baud} bit/s") from error
 
     def close(self) -> None:
         """Release the port."""
