@@ -19,7 +19,6 @@ from gvgbot.drivers.world import World, check_start
 from gvgbot.geometry import Array, Pose
 from gvgbot.worlds import open_world
 
-
 _SECTORS = 6  # of a sweep, each seen from one pose
 
 
