@@ -22,7 +22,7 @@ def serve(
     """
     place = open_place(config)
     with StopSignals() as signals, asyncio.Runner() as runner:
-        runner.run(_serve(config, place, (laser_link, base_link), announce, signals.wait()))
+        runner.run(_serve(config, place, (laser_link, base_link), announce, signals.wait))
     return 0
 
 
@@ -31,13 +31,13 @@ async def _serve(
     place: Place,
     links: tuple[Path | None, Path | None],
     announce: Callable[[str], None],
-    stopped: Awaitable[object],
+    stopped: Callable[[], Awaitable[object]],
 ) -> None:
     simulation = Simulation(config, place, LoopClock())
     with contextlib.ExitStack() as stack:
         laser, base = (stack.enter_context(contextlib.closing(PtyPort(link))) for link in links)
         announce(_greeting(place, laser, base))
-        await serve_on(simulation, laser, base, stopped)
+        await serve_on(simulation, laser, base, stopped())
 
 
 async def serve_on(

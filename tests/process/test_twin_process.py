@@ -1,0 +1,182 @@
+"""The twins on pseudo-terminals, as other programs meet them, and what the daemon sends there."""
+
+import os
+import select
+import signal
+import subprocess
+import sys
+import tty
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import reduce
+from itertools import pairwise
+from operator import xor
+from pathlib import Path
+
+import pytest
+
+from tests.twin.run_rig import base_commands
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(90)]
+PATIENCE = 30.0  # s, for a busy machine
+GET_GAIN = bytes.fromhex("aa55 03 0e 01 00 0c")
+GAINS = bytes.fromhex("150d 00 a0860100 64000000 d0070000")
+
+
+@contextmanager
+def gvgbot(*arguments: str, cwd: Path) -> Iterator["subprocess.Popen[str]"]:
+    """A gvgbot process; whatever happens, it does not outlive the test."""
+    with subprocess.Popen(
+        [sys.executable, "-m", "gvgbot", *arguments],
+        cwd=cwd,
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        start_new_session=True,
+    ) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+@contextmanager
+def twins(cwd: Path, *settings: str) -> Iterator["subprocess.Popen[str]"]:
+    """Both twins, at `laser` and `base` in the directory."""
+    arguments = [word for setting in settings for word in ("--set", setting)]
+    links = ("--laser-link", str(cwd / "laser"), "--base-link", str(cwd / "base"))
+    with gvgbot("twin", *links, *arguments, cwd=cwd) as process:
+        assert process.stdout is not None
+        while "base:" not in (line := process.stdout.readline()):
+            assert line, "the twins did not start"
+        yield process
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[int]:
+    """A client that changes no setting of the port, as `cat` does not."""
+    client = os.open(path, os.O_RDWR | os.O_NOCTTY)
+    try:
+        yield client
+    finally:
+        os.close(client)
+
+
+def collect(client: int, enough: Callable[[bytes], bool]) -> bytes:
+    """What can be read until it is enough."""
+    data = b""
+    while not enough(data):
+        if select.select([client], [], [], 0.1)[0]:
+            data += os.read(client, 4096)
+    return data
+
+
+def frames(data: bytes) -> list[bytes]:
+    """Whole frames with a right checksum from the first header on; there must be nothing else."""
+    found = []
+    data = data[data.index(b"\xaa\x55") :]
+    while len(data) > 3 and len(data) >= data[2] + 4:
+        frame, data = data[: data[2] + 4], data[data[2] + 4 :]
+        assert frame[:2] == b"\xaa\x55"
+        assert reduce(xor, frame[2:]) == 0
+        found.append(frame)
+    return found
+
+
+def test_any_program_can_talk_to_the_base_and_come_and_go(tmp_path: Path) -> None:
+    with twins(tmp_path):
+        for _ in range(2):
+            with opened(tmp_path / "base") as client:
+                stream = frames(collect(client, lambda data: len(data) > 2000))
+                stamps = [int.from_bytes(frame[5:7], "little") for frame in stream]
+                assert {(b - a) % 65536 for a, b in pairwise(stamps[5:])} == {20}
+                os.write(client, GET_GAIN)
+                answer = collect(client, lambda data: GAINS in data)
+                assert GET_GAIN not in answer  # it would be, if the terminal echoed
+
+
+def test_a_client_that_does_not_read_loses_whole_frames_only(tmp_path: Path) -> None:
+    with twins(tmp_path), opened(tmp_path / "base") as client:
+        collect(client, lambda data: len(data) > 1000)
+        select.select([], [], [], 2.0)  # which makes 8 kB, and the terminal holds 4
+        stream = frames(collect(client, lambda data: len(data) > 12_000))
+        stamps = [int.from_bytes(frame[5:7], "little") for frame in stream]
+        steps = {(b - a) % 65536 for a, b in pairwise(stamps)}
+        assert min(steps) == 20
+        assert max(steps) > 200
+
+
+def test_stopped_twins_leave_no_links(tmp_path: Path) -> None:
+    with twins(tmp_path) as process:
+        process.send_signal(signal.SIGTERM)
+        log, _ = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0, log
+    assert not list(tmp_path.iterdir())
+    assert "Traceback" not in log
+
+
+def test_a_file_in_the_place_of_a_link_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "base").write_text("precious")
+    with gvgbot("twin", "--base-link", "base", cwd=tmp_path) as process:
+        log, _ = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 2
+    assert len(log.splitlines()) == 1
+    assert "base" in log
+    assert (tmp_path / "base").read_text() == "precious"
+
+
+def test_check_finds_the_twins_well_and_a_missing_port_not(tmp_path: Path) -> None:
+    ports = [f"laser.port={tmp_path / 'laser'}", f"base.port={tmp_path / 'base'}"]
+    arguments = [word for setting in ["twin.enabled=false", *ports] for word in ("--set", setting)]
+    with twins(tmp_path, "twin.base.firmware_version=1.1.4"):
+        with gvgbot("check", *arguments, cwd=tmp_path) as process:
+            well, _ = process.communicate(timeout=PATIENCE)
+        assert process.returncode == 0, well
+        assert "UTM-30LX" in well
+        assert "firmware 1.1.4" in well
+        assert "16.1 V" in well
+        with gvgbot("check", *arguments, "--set", "base.port=/no/base", cwd=tmp_path) as process:
+            ill, _ = process.communicate(timeout=PATIENCE)
+        assert process.returncode == 1
+        (failed,) = [line for line in ill.splitlines() if line.startswith("fail")]
+        assert "/no/base" in failed
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
+def test_a_moving_robot_is_told_to_stand_as_its_daemon_ends(
+    number: signal.Signals, tmp_path: Path
+) -> None:
+    here, there = os.openpty()
+    tty.setraw(there)
+    settings = ["twin.enabled=false", "telemetry.enabled=false"]
+    settings += [f"laser.port={tmp_path / 'laser'}", f"base.port={os.ttyname(there)}"]
+    arguments = [word for setting in settings for word in ("--set", setting)]
+    with (
+        twins(tmp_path, "twin.base.odometry=perfect"),
+        opened(tmp_path / "base") as base,
+        gvgbot("run", *arguments, cwd=tmp_path) as process,
+    ):
+        sent, asked = b"", False
+        while process.poll() is None:
+            for source in select.select([here, base], [], [], 0.05)[0]:
+                data = os.read(source, 4096)
+                os.write(base if source == here else here, data)
+                sent += data if source == here else b""
+            if not asked and any(speed for speed, _ in base_commands(whole(sent))[-3:]):
+                process.send_signal(number)
+                asked = True
+        if select.select([here], [], [], 0.1)[0]:
+            sent += os.read(here, 4096)
+    os.close(here)
+    os.close(there)
+    speeds = [speed for speed, _ in base_commands(sent)]
+    assert any(speeds[-60:])
+    assert speeds[-1] == 0
+
+
+def whole(data: bytes) -> bytes:
+    """The data without the frame that has not come to its end."""
+    end = 0
+    while end + 3 <= len(data) and end + data[end + 2] + 4 <= len(data):
+        end += data[end + 2] + 4
+    return data[:end]
