@@ -9,9 +9,10 @@ import time
 
 import numpy as np
 
+from gvgbot.autonomy.estimate import smoothed
 from gvgbot.autonomy.events import Event
 from gvgbot.autonomy.loop import Loop
-from gvgbot.autonomy.pipeline import Pipeline, smoothed
+from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.config import Config, load_config
 from gvgbot.drivers.hokuyo.driver import HokuyoLaser

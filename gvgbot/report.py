@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from gvgbot.autonomy.pipeline import Pipeline, smoothed
+from gvgbot.autonomy.estimate import smoothed
+from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.graph import Edge, Vertex
 from gvgbot.drivers.world import World, save_world
 from gvgbot.geometry import Array, Pose

@@ -1,4 +1,4 @@
-"""From what is seen of the GVG to what is known of it: vertices matched, added, corrected and joined."""
+"""From what is seen of the GVG to what is known of it: vertices matched, added and joined."""
 
 import math
 from dataclasses import dataclass, field
@@ -7,9 +7,9 @@ from typing import Annotated
 import numpy as np
 from scipy.spatial import cKDTree
 
+from gvgbot.autonomy.candidates import Candidates, CandidatesConfig
 from gvgbot.autonomy.events import EdgeJoined, Event, LoopClosed, VertexAdded, VertexRemoved
 from gvgbot.autonomy.gvg.local import Branch, LocalGvg, LocalNode
-from gvgbot.autonomy.gvg.local_map import LocalMap
 from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.slam.graph import Edge, GvgGraph, HalfEdgeId, Kind, Vertex
@@ -22,83 +22,28 @@ from gvgbot.autonomy.slam.recognition import (
     match_bearings,
 )
 from gvgbot.autonomy.slam.scan_matching import Registration, ScanMatchingConfig, register
-from gvgbot.geometry import Array, Pose
+from gvgbot.autonomy.topology import split_edge_at, take_out
+from gvgbot.autonomy.views import Correspondence, Observation, View
+from gvgbot.geometry import Array, Pose, rotated_covariance
 from gvgbot.ranges import Range
 
 _WALL_M = 0.15  # a point so near to a wall lies on it
 _CLOSE_M = 1.5  # as near as one needs to be to tell vertices apart
-_PASSED_M = 1.0  # from so near, what cannot be seen of an edge must be driven to
-_LEFT_BEHIND_M = 0.3  # the robot has passed a point if it was nearer by this
-_REGISTRATION_FLOOR = np.diag(
-    [0.02**2, 0.02**2, 0.003**2]
-)  # what registration cannot know of itself
+_REGISTRATION_FLOOR = np.diag([4e-4, 4e-4, 9e-6])  # what registration cannot know of itself
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MappingConfig:
     """How much must be seen before it is believed."""
 
+    candidates: CandidatesConfig = field(default_factory=CandidatesConfig)
     trust_m: Annotated[float, Range(1.0, 30.0)] = 7.0  # vertices farther away are not yet believed
-    meetpoint_sightings: Annotated[int, Range(1, 50)] = 4
-    endpoint_sightings: Annotated[int, Range(1, 50)] = 6
     misses: Annotated[int, Range(1, 50)] = 6  # sightings of a plain edge that refute a vertex
     conflicts: Annotated[int, Range(1, 50)] = 4  # sightings that overrule an edge
     update_every_m: Annotated[float, Range(0.1, 10.0)] = 1.0
     recognise_within_m: Annotated[float, Range(1.0, 20.0)] = 5.0
     min_inliers: Annotated[float, Range(0.1, 1.0)] = 0.6  # share of a vertex's walls found again
     snapshot_m: Annotated[float, Range(1.0, 20.0)] = 6.0
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class View:
-    """All that one keyframe shows, in the local frame."""
-
-    keyframe: int  # its number, from 0
-    stamp: float
-    travelled: float  # metres
-    local_base: Pose
-    gvg: LocalGvg
-    local_map: LocalMap
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Observation:
-    """A vertex as measured at a keyframe: its pose in the base frame, and R (2, 2) or (3, 3)."""
-
-    keyframe: int
-    vertex: int
-    base_vertex: Pose
-    R: Array
-
-
-@dataclass(slots=True, eq=False)
-class Correspondence:
-    """Which part of the local GVG is which part of the graph."""
-
-    vertex_of: dict[int, int] = field(default_factory=dict)
-    node_of: dict[int, int] = field(default_factory=dict)
-    half_edge_of: dict[Branch, HalfEdgeId] = field(default_factory=dict)
-    branch_of: dict[HalfEdgeId, Branch] = field(default_factory=dict)
-
-    def pair(self, node: int, vertex: int) -> None:
-        """Note that a local node is a vertex."""
-        self.vertex_of[node], self.node_of[vertex] = vertex, node
-
-    def pair_branch(self, branch: Branch, end: HalfEdgeId) -> None:
-        """Note that a local branch is a half-edge."""
-        self.half_edge_of[branch], self.branch_of[end] = end, branch
-
-
-@dataclass(slots=True, eq=False)
-class _Tentative:
-    """A vertex seen, but not often enough; `nearest` is how near to it the robot has been, m."""
-
-    position: Array
-    meetpoint: bool
-    seen_at: float
-    nearest: float = math.inf
-    sightings: int = 0
-    near_sightings: int = 0
 
 
 class Mapper:
@@ -111,7 +56,7 @@ class Mapper:
         self.belief = Belief()
         self.graph = GvgGraph()
         self.observations: list[Observation] = []
-        self._tentative: list[_Tentative] = []
+        self._unbelieved = Candidates(config.candidates)
         self._events: list[Event] = []
 
     def move(self, motion: Pose, covariance: Array) -> None:
@@ -176,7 +121,7 @@ class Mapper:
                     break
 
     def _candidates(self, view: View, sighting: Sighting) -> list[tuple[float, Vertex, float]]:
-        """Known vertices, out of sight for long, inside the gate of a sighting; most likely first."""
+        """Known vertices, long out of sight, inside the gate of a sighting; most likely first."""
         found = []
         for vertex in self.graph.vertices.values():
             if view.travelled - vertex.seen_at < self._recognition.tracked_m:
@@ -217,8 +162,9 @@ class Mapper:
         vertex.local, vertex.seen_at, vertex.updated_at = local, view.travelled, view.travelled
         vertex.visits += 1
         base_vertex = view.local_base.to(local)
-        R = _turned(covariance, base_vertex.theta) if len(covariance) == 3 else covariance
-        self._measure(view, vertex, base_vertex, R)
+        if len(covariance) == 3:
+            covariance = rotated_covariance(covariance, base_vertex.theta)
+        self._measure(view, vertex, base_vertex, covariance)
         return True
 
     def _register(
@@ -247,31 +193,14 @@ class Mapper:
             if node in known.vertex_of:
                 continue
             away = float(np.hypot(*(sighting.position - view.local_base.position)))
-            tentative = self._remember(view, sighting, away)
-            if not self._believable(tentative, sighting, view.gvg.nodes[node], away):
+            candidate = self._unbelieved.note(sighting, away, view.travelled)
+            if not self._unbelieved.is_believable(candidate, view.gvg.nodes[node], away):
                 continue
-            doubled = 2 * self._config.meetpoint_sightings
-            examined = away < _CLOSE_M and tentative.sightings >= doubled
+            examined = away < _CLOSE_M and self._unbelieved.is_examined(candidate)
             if self._crowded(view, sighting) or (self._candidates(view, sighting) and not examined):
                 continue  # it may be a known one: look at it from closer
-            self._tentative.remove(tentative)
+            self._unbelieved.drop(candidate)
             known.pair(node, self._add(view, sighting).id)
-
-    def _believable(
-        self, tentative: _Tentative, sighting: Sighting, node: LocalNode, away: float
-    ) -> bool:
-        """Whether a vertex has been seen often enough; a suspect must have been passed, too.
-
-        A side edge that could not be seen to the end in passing is not forgotten: it becomes a
-        frontier, and a closer look decides.
-        """
-        config = self._config
-        if node.is_suspect:
-            passed = away > tentative.nearest + _LEFT_BEHIND_M
-            enough = config.meetpoint_sightings * (1 if passed else 2)
-            return tentative.near_sightings >= enough
-        needed = config.meetpoint_sightings if sighting.meetpoint else config.endpoint_sightings
-        return tentative.sightings >= needed
 
     def _crowded(self, view: View, sighting: Sighting) -> bool:
         """Whether a vertex of this kind that is in sight stands here already."""
@@ -282,23 +211,6 @@ class Mapper:
             if view.travelled - vertex.seen_at < self._recognition.tracked_m
             and sighting.meetpoint == (vertex.kind == "meetpoint")
         )
-
-    def _remember(self, view: View, sighting: Sighting, away: float) -> _Tentative:
-        self._tentative = [t for t in self._tentative if view.travelled - t.seen_at < 12.0]
-        for tentative in self._tentative:
-            if (
-                tentative.meetpoint == sighting.meetpoint
-                and np.hypot(*(tentative.position - sighting.position)) < 0.5
-            ):
-                break
-        else:
-            tentative = _Tentative(sighting.position, sighting.meetpoint, view.travelled)
-            self._tentative.append(tentative)
-        tentative.position, tentative.seen_at = sighting.position, view.travelled
-        tentative.nearest = min(tentative.nearest, away)
-        tentative.sightings += 1
-        tentative.near_sightings += away < _PASSED_M
-        return tentative
 
     def _add(self, view: View, sighting: Sighting) -> Vertex:
         kind: Kind = "meetpoint" if sighting.meetpoint else "endpoint"
@@ -319,38 +231,19 @@ class Mapper:
         self.observations.append(Observation(view.keyframe, vertex.id, base_vertex, R))
         self._picture(view, vertex)
         place = self.belief.map_vertex(vertex.id)
-        self._split_edge_at(vertex, place)
+        split_edge_at(
+            self.graph,
+            self.belief,
+            vertex,
+            reach=self._recognition.same_place_m,
+            angle=math.radians(self._recognition.bearing_deg),
+        )
         self._events.append(
             VertexAdded(
                 view.stamp, vertex.id, kind, place.x, place.y, vertex.degree, vertex.clearance
             )
         )
         return vertex
-
-    def _split_edge_at(self, vertex: Vertex, map_vertex: Pose) -> None:
-        """Make two edges of one that was joined before this vertex on it was found."""
-        for edge in list(self.graph.edges.values()):
-            line = map_vertex.inverse().transform(
-                self.belief.map_vertex(edge.a.vertex).transform(edge.polyline)
-            )
-            away = np.hypot(*line.T)
-            at = int(np.argmin(away))
-            ends = min(np.hypot(*(line[at] - end)) for end in (line[0], line[-1]))
-            if away[at] > self._recognition.same_place_m or ends < self._recognition.same_place_m:
-                continue
-            parts = line[: at + 1][::-1], line[at:]
-            known = {key: half.bearing for key, half in vertex.half_edges.items()}
-            directions = tuple(_direction(part) for part in parts)
-            limit = math.radians(self._recognition.bearing_deg)
-            matched = match_bearings(directions, known, limit)
-            if len(matched) < 2:
-                continue
-            self.graph.unjoin(edge)
-            for i, (part, far) in enumerate(zip(parts, (edge.a, edge.b), strict=True)):
-                near = HalfEdgeId(vertex.id, matched[i])
-                part = np.concatenate([np.zeros((1, 2)), part])
-                self.graph.join(near, far, part, edge.min_clearance, driven=edge.driven)
-            return
 
     def _picture(self, view: View, vertex: Vertex) -> None:
         """Keep the walls around a vertex, to know them again."""
@@ -390,7 +283,7 @@ class Mapper:
     def _match_half_edges(
         self, view: View, node: LocalNode, vertex: Vertex, known: Correspondence
     ) -> None:
-        """Pair the branches of a node with the half-edges of its vertex; certain new ones are added."""
+        """Pair a node's branches with the half-edges of its vertex; add certain new ones."""
         branches = sorted(node.branches, key=lambda branch: branch in node.weak)
         bearings = tuple(view.gvg.bearing(b, node.clearance) for b in branches)
         turned = {k: h.bearing + vertex.local.theta for k, h in vertex.half_edges.items()}
@@ -426,35 +319,10 @@ class Mapper:
             if self._passes_through(view, vertex):
                 vertex.misses += 1
                 if vertex.misses > self._config.misses:
-                    self._remove(view, vertex)
-
-    def _remove(self, view: View, vertex: Vertex) -> None:
-        """Take a vertex out; of two edges that met there one is made."""
-        ends = [
-            HalfEdgeId(vertex.id, key) for key, h in vertex.half_edges.items() if h.edge is not None
-        ]
-        joined = [self.graph.edges[vertex.half_edges[end.key].edge or 0] for end in ends]
-        self.graph.remove_vertex(vertex.id)
-        if len(joined) == 2 and joined[0] is not joined[1]:
-            far = [edge.other(end) for edge, end in zip(joined, ends, strict=True)]
-            lines = [
-                self._outwards(edge, end, far_end)
-                for edge, end, far_end in zip(joined, ends, far, strict=True)
-            ]
-            line = np.concatenate([lines[0][::-1], lines[1][1:]])
-            start = self._place_of(far[0].vertex).inverse().transform(line)
-            clearance = min(edge.min_clearance for edge in joined)
-            self.graph.join(*far, start, clearance, driven=all(edge.driven for edge in joined))
-        self.belief = ekf.remove_vertex(self.belief, vertex.id)
-        self._events.append(VertexRemoved(view.stamp, vertex.id, "an edge passes here"))
-
-    def _place_of(self, vertex: int) -> Pose:
-        return self.belief.map_vertex(vertex)
-
-    def _outwards(self, edge: Edge, end: HalfEdgeId, far: HalfEdgeId) -> Array:
-        """Polyline (N, 2) of an edge from one of its ends, map frame."""
-        line = self._place_of(edge.a.vertex).transform(edge.polyline)
-        return line if edge.a == end and far == edge.b else line[::-1]
+                    take_out(self.graph, self.belief, vertex)
+                    self.belief = ekf.remove_vertex(self.belief, vertex.id)
+                    reason = "an edge passes here"
+                    self._events.append(VertexRemoved(view.stamp, vertex.id, reason))
 
     def _passes_through(self, view: View, vertex: Vertex) -> bool:
         if np.hypot(*(vertex.local.position - view.local_base.position)) > 4.0:
@@ -506,20 +374,6 @@ class Mapper:
         line = self.graph.vertices[a.vertex].local.inverse().transform(local_line)
         edge = self.graph.join(a, b, line, min_clearance, driven=driven)
         self._events.append(EdgeJoined(view.stamp, a.vertex, b.vertex, edge.length, driven))
-
-
-def _direction(line: Array) -> float:
-    """Direction (rad) of a polyline (N, 2) a metre from the origin, where it starts."""
-    away = np.hypot(*line.T)
-    x, y = line[int(np.argmax(away > 1.0))] if away.max() > 1.0 else line[-1]
-    return math.atan2(y, x)
-
-
-def _turned(covariance: Array, angle: float) -> Array:
-    """A pose covariance (3, 3) of a frame, seen from one against which that frame is turned."""
-    c, s = math.cos(angle), math.sin(angle)
-    G = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    return G @ covariance @ G.T
 
 
 def _sighting(gvg: LocalGvg, node: LocalNode) -> Sighting:

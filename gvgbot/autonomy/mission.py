@@ -1,4 +1,4 @@
-"""What the robot is about: explore every frontier, give up what cannot be reached, say why it ends."""
+"""What the robot is about: explore every frontier, give up what is out of reach, say why."""
 
 import math
 from dataclasses import dataclass
@@ -8,8 +8,9 @@ from gvgbot.autonomy.control.edge_follower import Track
 from gvgbot.autonomy.events import Decision, Event, Finished, Recovery
 from gvgbot.autonomy.exploration.ears import ear_next, nearest_frontier
 from gvgbot.autonomy.gvg.local import Branch
-from gvgbot.autonomy.mapping import Correspondence, Mapper, View
+from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.slam.graph import HalfEdgeId
+from gvgbot.autonomy.views import Correspondence, View
 from gvgbot.autonomy.whereabouts import Passage, Situation, Whereabouts
 from gvgbot.ranges import Range
 
@@ -231,7 +232,7 @@ class Mission:
         return LookAround(math.tau)
 
     def _finish(self, view: View) -> None:
-        """No frontier can be reached; if there are any, only after having looked around for a way."""
+        """No frontier can be reached; if there are any, only after having looked for a way."""
         graph = self._mapper.graph
         if graph.frontiers():
             since = self._stranded_since

@@ -7,8 +7,8 @@ import numpy as np
 
 from gvgbot.autonomy.exploration.paths import Approach, shortest_paths
 from gvgbot.autonomy.gvg.local import Branch, LocalGvg, Place
-from gvgbot.autonomy.mapping import Correspondence
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
+from gvgbot.autonomy.views import Correspondence
 from gvgbot.geometry import Array, Pose, wrap_angle
 
 _LOOP_M = 0.4  # a trail that comes this near to itself has been driven back
@@ -109,7 +109,7 @@ class Whereabouts:
     def backwards(
         self, gvg: LocalGvg, place: Place, known: Correspondence, local_base: Pose
     ) -> Branch:
-        """The way along the robot's local edge that leads to the vertex that its edge leaves from."""
+        """The way along the robot's local edge to the vertex that its edge leaves from."""
         out = None if self.on_edge is None else known.branch_of.get(self.on_edge)
         if out is not None and out.edge == place.edge:
             return Branch(out.edge, not out.forward)

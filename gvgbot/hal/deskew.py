@@ -1,4 +1,4 @@
-"""A sweep as one instant: every beam moved to where it would be seen from when the first was taken."""
+"""A sweep as one instant: each beam as it would be seen from where the first was taken."""
 
 from dataclasses import replace
 

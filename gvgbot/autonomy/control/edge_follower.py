@@ -49,7 +49,7 @@ class Track:
 def follow(
     track: Track, local_base: Pose, speed: float, robot_radius: float, config: EdgeFollowerConfig
 ) -> Twist:
-    """The twist that drives along a track; standstill at its end. `speed` is the present one, m/s."""
+    """The twist that drives along a track; standstill at its end. `speed` is what it is, m/s."""
     d = np.hypot(track.polyline[:, 0] - local_base.x, track.polyline[:, 1] - local_base.y)
     here = int(np.argmin(d))
     remaining = track.length - float(track.stations[here])

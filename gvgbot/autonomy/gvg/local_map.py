@@ -79,7 +79,8 @@ class LocalMap:
         cells = np.floor(points / self._cell).astype(np.int64) - self._corner
         inside = ((cells >= 0) & (cells < self._size)).all(axis=-1)
         i, j = np.where(inside, cells[..., 0], 0), np.where(inside, cells[..., 1], 0)
-        return inside & (self._free[i, j] | (self._votes[i, j] > 0))
+        known: NDArray[np.bool_] = inside & (self._free[i, j] | (self._votes[i, j] > 0))
+        return known
 
     @property
     def _reach(self) -> float:
@@ -165,7 +166,8 @@ def _hits(scan: Scan, ranges: Array, reach: float) -> Array:
     with np.errstate(invalid="ignore"):
         hit = ranges < reach
     bearings = scan.bearings[hit]
-    return ranges[hit, None] * np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
+    directions: Array = np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
+    return ranges[hit, None] * directions
 
 
 def _bridged(points: Array, gap: float) -> Array:

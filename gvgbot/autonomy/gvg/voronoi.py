@@ -92,11 +92,12 @@ def _disc_is_known(local_map: LocalMap, centres: Array, radii: Array) -> NDArray
     outer = np.maximum(radii - 0.2, 0.5 * radii)
     rings = np.concatenate([_RING, 0.5 * _RING[::2], np.zeros((1, 2))])
     samples = centres[:, None, :] + outer[:, None, None] * rings
-    return (~local_map.known(samples)).sum(axis=1) <= _MAX_UNKNOWN
+    unknown: NDArray[np.int64] = (~local_map.known(samples)).sum(axis=1)
+    return unknown <= _MAX_UNKNOWN
 
 
 def _ridges(triangles: Delaunay) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int32]]:
-    """Triangle pairs (a, b) that share an edge, b = -1 at the hull, and the edge's two generators."""
+    """Triangles (a, b) that share an edge, b = -1 at the hull, and the edge's two generators."""
     own = np.repeat(np.arange(len(triangles.simplices)), 3)
     other = triangles.neighbors.ravel().astype(np.int64)
     pair = triangles.simplices[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2)
@@ -109,7 +110,7 @@ def _least_clearance(
 ) -> Array:
     """Least clearance along ridges from centre a to centre b between the generators p and q.
 
-    A ridge that passes between its generators is a door: it is as wide as half their distance there.
+    A ridge that passes between its generators is a door: it is half their distance wide there.
     """
     far = np.where((b < 0)[:, None], 2 * p - centres[a], centres[b])
     middle = (p + q) / 2

@@ -49,7 +49,8 @@ class OdometryNoise:
                 [0.0, heading * d / 2, heading + 1e-10],
             ]
         )
-        return chord @ along_chord @ chord.T
+        rotated: Array = chord @ along_chord @ chord.T
+        return rotated
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from gvgbot.geometry import Array, Pose, wrap_angle
+from gvgbot.geometry import Array, Pose
 from gvgbot.ranges import Range
 
 Index = NDArray[np.intp]
 
 _NEIGHBOURS = 5
 _FLATNESS = 0.08  # smallest over largest spread of the neighbours of a point on a wall
+_REACH_M = 0.35  # as far away as neighbours on one wall may be
 _ITERATIONS = 6
 
 
@@ -28,6 +29,7 @@ class ScanMatchingConfig:
     max_pair_m: Annotated[float, Range(0.05, 1.0)] = 0.25
     pair_sigma_m: Annotated[float, Range(0.005, 0.5)] = 0.03
     independent_share: Annotated[float, Range(0.001, 1.0)] = 0.3  # neighbouring pairs err together
+    points: Annotated[int, Range(50, 5000)] = 300  # of a scan that are matched
     min_pairs: Annotated[int, Range(10, 1000)] = 40
 
 
@@ -46,7 +48,7 @@ def register(
 ) -> Registration | None:
     """The pose that lays points (N, 2) of its frame onto wall points (M, 2), near a prior.
 
-    Q (3, 3) is the prior's covariance in the prior's own frame. None when too few points find a wall.
+    Q (3, 3) is the prior's covariance in its own frame. None when too few points find a wall.
     """
     information = np.linalg.inv(Q)
     step = np.zeros(3)  # of the pose, in the prior's frame
@@ -58,8 +60,11 @@ def register(
         if pairs is None or len(pairs[0]) < config.min_pairs:
             return None
         index, normal, residual = pairs
-        weight = config.independent_share / config.pair_sigma_m**2
-        weight = weight / np.maximum(1.0, np.abs(residual) / (2 * config.pair_sigma_m))
+        weight = (
+            config.independent_share
+            / config.pair_sigma_m**2
+            / np.maximum(1.0, np.abs(residual) / (2 * config.pair_sigma_m))
+        )
         J = _jacobian(points[index], normal, pose, prior)
         A = information + (J * weight[:, None]).T @ J
         change = -np.linalg.solve(A, information @ step + J.T @ (weight * residual))
@@ -71,19 +76,13 @@ def register(
     return Registration(pose, np.linalg.inv(A), inliers, rms)
 
 
-def motion_between(before: Pose, after: Pose) -> Pose:
-    """The motion from one pose to another, in the frame of the first."""
-    moved = before.to(after)
-    return Pose(moved.x, moved.y, wrap_angle(moved.theta))
-
-
 def _pairs(
     world: Array, tree: cKDTree, walls: Array, reach: float
 ) -> tuple[Index, Array, Array] | None:
     """Indices of the points near a wall, the wall's normals (K, 2), and signed distances (K,)."""
-    distance, near = tree.query(world, k=_NEIGHBOURS, distance_upper_bound=max(reach, 0.35))
-    found = np.isfinite(distance[:, 2]) & (distance[:, 0] < reach)
-    index = np.nonzero(found)[0]
+    found = tree.query(world, k=_NEIGHBOURS, distance_upper_bound=max(reach, _REACH_M))
+    distance, near = np.asarray(found[0]), np.asarray(found[1])
+    index = np.nonzero(np.isfinite(distance[:, 2]) & (distance[:, 0] < reach))[0]
     if len(index) == 0:
         return None
     present = np.isfinite(distance[index])

@@ -11,10 +11,11 @@ from hypothesis import strategies as st
 from gvgbot.autonomy.events import EdgeJoined, Event, VertexAdded, VertexRemoved
 from gvgbot.autonomy.gvg.local import Branch, LocalGvg
 from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
-from gvgbot.autonomy.mapping import Correspondence, Mapper, MappingConfig, View
+from gvgbot.autonomy.mapping import Mapper, MappingConfig
 from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.autonomy.slam.recognition import RecognitionConfig
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
+from gvgbot.autonomy.views import Correspondence, View
 from gvgbot.geometry import Pose
 from tests.unit.autonomy.local_graphs import Point, drawn
 
@@ -64,7 +65,7 @@ def of_type(events: Iterable[Event], kind: type) -> list[Event]:
 
 
 def test_a_meetpoint_is_believed_after_some_sightings_and_not_before() -> None:
-    seen = Seen().look(TEE, CONFIG.meetpoint_sightings - 1)
+    seen = Seen().look(TEE, CONFIG.candidates.meetpoint_sightings - 1)
     assert seen.places("meetpoint") == []
     seen.look(TEE)
     assert seen.places("meetpoint") == [pytest.approx((3.0, 0.0), abs=1e-3)]
@@ -75,8 +76,8 @@ def test_a_meetpoint_is_believed_after_some_sightings_and_not_before() -> None:
 
 
 def test_a_dead_end_is_believed_later_than_a_meetpoint() -> None:
-    assert CONFIG.endpoint_sightings > CONFIG.meetpoint_sightings
-    seen = Seen().look(TEE, CONFIG.endpoint_sightings - 1)
+    assert CONFIG.candidates.endpoint_sightings > CONFIG.candidates.meetpoint_sightings
+    seen = Seen().look(TEE, CONFIG.candidates.endpoint_sightings - 1)
     assert seen.places("endpoint") == []
     assert seen.look(TEE).places("endpoint") == [pytest.approx((3.0, -4.0), abs=1e-3)]
 
@@ -93,7 +94,7 @@ def test_what_is_too_far_to_be_trusted_is_not_believed() -> None:
 
 
 def test_departures_have_the_bearings_of_the_branches_and_are_frontiers() -> None:
-    seen = Seen().look(TEE, CONFIG.meetpoint_sightings)
+    seen = Seen().look(TEE, CONFIG.candidates.meetpoint_sightings)
     (vertex,) = seen.mapper.graph.vertices.values()
     psi = seen.mapper.belief.map_vertex(vertex.id).theta
     bearings = sorted((h.bearing + psi) % math.tau for h in vertex.half_edges.values())
@@ -146,7 +147,7 @@ def test_a_vertex_is_found_again_where_it_was_and_not_added_twice() -> None:
 
 
 def test_a_vertex_through_which_a_plain_edge_runs_is_taken_back() -> None:
-    seen = Seen().look(TEE, CONFIG.meetpoint_sightings)
+    seen = Seen().look(TEE, CONFIG.candidates.meetpoint_sightings)
     seen.look(PLAIN, CONFIG.misses)
     assert len(seen.mapper.graph.vertices) == 1
     seen.look(PLAIN, 1)
@@ -158,7 +159,7 @@ def test_a_vertex_through_which_a_plain_edge_runs_is_taken_back() -> None:
 def test_a_departure_that_a_clear_view_keeps_not_showing_is_dropped() -> None:
     lines = {**TEE_LINES, 13: (2, 5, [])}
     crossing = drawn({**TEE_POINTS, 5: (3.0, 4.0)}, lines, unseen={**UNSEEN, 5: math.pi / 2})
-    seen = Seen().look(crossing, CONFIG.meetpoint_sightings)
+    seen = Seen().look(crossing, CONFIG.candidates.meetpoint_sightings)
     (vertex,) = seen.mapper.graph.vertices.values()
     assert vertex.degree == 4
     seen.look(TEE, CONFIG.misses + 1)
@@ -177,10 +178,10 @@ def test_a_departure_seen_only_later_is_added() -> None:
 
 def test_the_robot_s_uncertainty_is_in_the_place_of_a_vertex_seen_later() -> None:
     """A drive between the sights adds to the covariance of what is seen after it only."""
-    seen = Seen().look(TEE, CONFIG.meetpoint_sightings)
+    seen = Seen().look(TEE, CONFIG.candidates.meetpoint_sightings)
     first = np.trace(seen.mapper.belief.vertex_covariance(seen.known.vertex_of[2]))
     seen.mapper.move(Pose(20.0, 0.0, 0.0), 0.5 * np.eye(3))
-    seen.look(TWO_ENDS, CONFIG.endpoint_sightings)
+    seen.look(TWO_ENDS, CONFIG.candidates.endpoint_sightings)
     belief = seen.mapper.belief
     later = np.trace(belief.vertex_covariance(seen.known.vertex_of[2]))
     assert later > first + 0.9  # at least the 0.5 in x and in y

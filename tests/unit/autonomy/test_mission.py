@@ -9,11 +9,12 @@ import pytest
 from gvgbot.autonomy.events import Decision, Event, Finished, Recovery
 from gvgbot.autonomy.gvg.local import LocalGvg
 from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
-from gvgbot.autonomy.mapping import Mapper, MappingConfig, View
+from gvgbot.autonomy.mapping import Mapper, MappingConfig
 from gvgbot.autonomy.mission import Drive, ExplorationConfig, LookAround, Mission, Order, Stand
 from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.autonomy.slam.recognition import RecognitionConfig
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
+from gvgbot.autonomy.views import View
 from gvgbot.geometry import Pose
 from tests.unit.autonomy.local_graphs import Point, drawn
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from gvgbot.autonomy.gvg.local import Branch, LocalGvg
-from gvgbot.autonomy.mapping import Correspondence
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex
+from gvgbot.autonomy.views import Correspondence
 from gvgbot.autonomy.whereabouts import Passage, Situation, Whereabouts
 from gvgbot.geometry import Pose
 from tests.unit.autonomy.local_graphs import Point, drawn, resampled

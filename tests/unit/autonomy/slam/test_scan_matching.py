@@ -11,7 +11,6 @@ from scipy.spatial import cKDTree
 from gvgbot.autonomy.slam.scan_matching import (
     Registration,
     ScanMatchingConfig,
-    motion_between,
     register,
 )
 from gvgbot.drivers.world import World
@@ -145,10 +144,3 @@ def test_too_few_points_are_no_match() -> None:
     walls = looked(CORNER, [Pose()]).points()
     points = hits(CORNER, Pose())[: CONFIG.min_pairs - 1]
     assert register(points, cKDTree(walls), walls, Pose(), Q, CONFIG) is None
-
-
-@given(offsets, offsets)
-def test_the_motion_between_two_poses_leads_from_one_to_the_other(a: Pose, b: Pose) -> None:
-    there = a.compose(motion_between(a, b))
-    assert there.distance(b) < 1e-12
-    assert wrap_angle(there.theta - b.theta) == pytest.approx(0.0, abs=1e-12)

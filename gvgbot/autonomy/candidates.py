@@ -1,0 +1,89 @@
+"""Vertices that have been seen, but not yet often enough to be believed."""
+
+import math
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+
+from gvgbot.autonomy.gvg.local import LocalNode
+from gvgbot.autonomy.slam.recognition import Sighting
+from gvgbot.geometry import Array
+from gvgbot.ranges import Range
+
+_PASSED_M = 1.0  # from so near, what cannot be seen of an edge must be driven to
+_LEFT_BEHIND_M = 0.3  # the robot has passed a point if it was nearer by this
+_SAME_M = 0.5  # sightings nearer than this are of one candidate
+_MEMORY_M = 12.0  # driven, after which a candidate is forgotten
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CandidatesConfig:
+    """How often something must be seen before it is believed."""
+
+    meetpoint_sightings: Annotated[int, Range(1, 50)] = 4
+    endpoint_sightings: Annotated[int, Range(1, 50)] = 6
+
+
+@dataclass(slots=True, eq=False)
+class Candidate:
+    """A vertex not yet believed; `nearest` is how near to it the robot has been, m."""
+
+    position: Array
+    meetpoint: bool
+    seen_at: float  # metres driven
+    nearest: float = math.inf
+    sightings: int = 0
+    near_sightings: int = 0
+
+
+class Candidates:
+    """Counts the sightings of each candidate."""
+
+    def __init__(self, config: CandidatesConfig) -> None:
+        self._config = config
+        self._all: list[Candidate] = []
+
+    def note(self, sighting: Sighting, away: float, travelled: float) -> Candidate:
+        """The candidate of a sighting from `away` metres, with this sighting counted."""
+        self._all = [c for c in self._all if travelled - c.seen_at < _MEMORY_M]
+        candidate = self._nearest(sighting)
+        if candidate is None:
+            candidate = Candidate(sighting.position, sighting.meetpoint, travelled)
+            self._all.append(candidate)
+        candidate.position, candidate.seen_at = sighting.position, travelled
+        candidate.nearest = min(candidate.nearest, away)
+        candidate.sightings += 1
+        candidate.near_sightings += away < _PASSED_M
+        return candidate
+
+    def _nearest(self, sighting: Sighting) -> Candidate | None:
+        for candidate in self._all:
+            apart = np.hypot(*(candidate.position - sighting.position))
+            if candidate.meetpoint == sighting.meetpoint and apart < _SAME_M:
+                return candidate
+        return None
+
+    def is_believable(self, candidate: Candidate, node: LocalNode, away: float) -> bool:
+        """Whether it has been seen often enough; a suspect must have been passed, too.
+
+        A side edge that could not be seen to the end in passing is not forgotten: it becomes a
+        frontier, and a closer look decides.
+        """
+        if node.is_suspect:
+            passed = away > candidate.nearest + _LEFT_BEHIND_M
+            enough = self._config.meetpoint_sightings * (1 if passed else 2)
+            return candidate.near_sightings >= enough
+        return candidate.sightings >= self._needed(candidate)
+
+    def is_examined(self, candidate: Candidate) -> bool:
+        """Whether it has been seen twice as often as needed: enough to tell it from a known one."""
+        return candidate.sightings >= 2 * self._config.meetpoint_sightings
+
+    def _needed(self, candidate: Candidate) -> int:
+        config = self._config
+        return config.meetpoint_sightings if candidate.meetpoint else config.endpoint_sightings
+
+    def drop(self, candidate: Candidate) -> None:
+        """Forget a candidate, for it is a vertex now."""
+        self._all.remove(candidate)

@@ -1,0 +1,65 @@
+"""The base in the local frame: odometry, corrected by laying each scan onto the local map."""
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
+from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig, register
+from gvgbot.geometry import Array, Pose
+from gvgbot.hal.messages import Scan
+
+_RANGE_M = 24.0  # of the beams that are matched
+_LONGEST_GAP_M = 0.5  # between two beams, for their even spacing
+_LEAST_POINTS = 50  # fewer say nothing about a pose
+_LEAST_INLIERS = 0.5  # of the beams must find a wall, or the match is not believed
+_FLOOR = np.diag([0.004**2, 0.004**2, 0.0006**2])  # what matching cannot know of itself
+
+
+class LocalMaps:
+    """The local map that the GVG is drawn from, and a coarse one that reaches farther.
+
+    The far one is only matched with: the end of a long corridor tells how far one has come.
+    """
+
+    def __init__(
+        self, near: LocalMapConfig, far: LocalMapConfig, matching: ScanMatchingConfig
+    ) -> None:
+        self.near, self._far = LocalMap(near), LocalMap(far)
+        self._matching = matching
+
+    def insert(self, scan: Scan, local_base: Pose, travelled: float) -> None:
+        """Add a scan taken by the base at a pose in the local frame, after so many metres."""
+        local_laser = local_base.compose(scan.base_laser)
+        self.near.insert(scan, local_laser, travelled)
+        self._far.insert(scan, local_laser, travelled)
+
+    def match(self, scan: Scan, prior: Pose, Q: Array) -> tuple[Pose, Array]:
+        """The pose of the base near a prior with covariance Q (3, 3), and its covariance.
+
+        Both covariances are in the frame of the base. Without enough walls it is the prior.
+        """
+        far = self._far.points()
+        walls = np.concatenate([self.near.points(), far[~self.near.covers(far)]])
+        points = _sampled(scan, self._matching.points)
+        if min(len(walls), len(points)) < _LEAST_POINTS:
+            return prior, Q
+        found = register(points, cKDTree(walls), walls, prior, Q, self._matching)
+        if found is None or found.inliers < _LEAST_INLIERS:
+            return prior, Q
+        return found.pose, found.covariance + _FLOOR
+
+
+def _sampled(scan: Scan, count: int) -> Array:
+    """About so many end points (N, 2), evenly spaced along what the beams hit; base frame.
+
+    Evenly in space, not in angle: far walls tell most about the heading, and have few beams.
+    """
+    with np.errstate(invalid="ignore"):
+        hit = scan.ranges < _RANGE_M
+    r, b = scan.ranges[hit], scan.bearings[hit]
+    points = np.stack([r * np.cos(b), r * np.sin(b)], axis=1)
+    gaps = np.hypot(*np.diff(points, axis=0).T)
+    along = np.concatenate([[0.0], np.cumsum(np.minimum(gaps, _LONGEST_GAP_M))])
+    step = max(float(along[-1]) / count, 1e-6)
+    chosen = np.unique(np.floor(along / step), return_index=True)[1]
+    return scan.base_laser.transform(points[chosen])

@@ -1,0 +1,56 @@
+"""The last second of odometry: where the base was at the stamp of a scan, and how it moved then."""
+
+from collections import deque
+
+from gvgbot.geometry import Pose
+from gvgbot.hal.messages import Odometry, Scan
+
+_KEPT = 64  # messages
+_LEAST_SPAN_S = 0.04  # over which odometry tells a velocity
+
+
+class OdometryLog:
+    """The newest odometry messages, oldest first."""
+
+    def __init__(self) -> None:
+        self._kept: deque[Odometry] = deque(maxlen=_KEPT)
+
+    def append(self, odometry: Odometry) -> None:
+        """Keep a message, and let the oldest go."""
+        self._kept.append(odometry)
+
+    @property
+    def newest(self) -> Odometry | None:
+        """The newest message, None before the first."""
+        return self._kept[-1] if self._kept else None
+
+    def odom_base_at(self, stamp: float) -> Pose | None:
+        """`odom_base` at a stamp, between two messages; the nearest one outside what is kept."""
+        later: Odometry | None = None
+        for earlier in reversed(self._kept):
+            if earlier.stamp <= stamp:
+                return earlier.odom_base if later is None else _between(earlier, later, stamp)
+            later = earlier
+        return None if later is None else later.odom_base
+
+    def motion_during(self, scan: Scan) -> Pose:
+        """Motion of the base during a sweep, by the odometry nearest to it in time."""
+        duration = scan.time_increment * len(scan.ranges)
+        if duration == 0.0 or self.newest is None:
+            return Pose()
+        span = max(duration, _LEAST_SPAN_S)
+        end = min(scan.stamp + duration, self.newest.stamp)
+        before, after = self.odom_base_at(end - span), self.odom_base_at(end)
+        if before is None or after is None:
+            return Pose()
+        return _part(before.to(after), duration / span)
+
+
+def _between(earlier: Odometry, later: Odometry, stamp: float) -> Pose:
+    share = (stamp - earlier.stamp) / (later.stamp - earlier.stamp)
+    return earlier.odom_base.compose(_part(earlier.odom_base.to(later.odom_base), share))
+
+
+def _part(motion: Pose, share: float) -> Pose:
+    """A share of a short motion."""
+    return Pose(share * motion.x, share * motion.y, share * motion.theta)

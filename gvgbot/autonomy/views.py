@@ -1,0 +1,48 @@
+"""What one keyframe shows, and which part of it is which part of the map."""
+
+from dataclasses import dataclass, field
+
+from gvgbot.autonomy.gvg.local import Branch, LocalGvg
+from gvgbot.autonomy.gvg.local_map import LocalMap
+from gvgbot.autonomy.slam.graph import HalfEdgeId
+from gvgbot.geometry import Array, Pose
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class View:
+    """All that one keyframe shows, in the local frame."""
+
+    keyframe: int  # its number, from 0
+    stamp: float
+    travelled: float  # metres
+    local_base: Pose
+    gvg: LocalGvg
+    local_map: LocalMap
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Observation:
+    """A vertex as measured at a keyframe: its pose in the base frame, and R (2, 2) or (3, 3)."""
+
+    keyframe: int
+    vertex: int
+    base_vertex: Pose
+    R: Array
+
+
+@dataclass(slots=True, eq=False)
+class Correspondence:
+    """Which part of the local GVG is which part of the graph."""
+
+    vertex_of: dict[int, int] = field(default_factory=dict)
+    node_of: dict[int, int] = field(default_factory=dict)
+    half_edge_of: dict[Branch, HalfEdgeId] = field(default_factory=dict)
+    branch_of: dict[HalfEdgeId, Branch] = field(default_factory=dict)
+
+    def pair(self, node: int, vertex: int) -> None:
+        """Note that a local node is a vertex."""
+        self.vertex_of[node], self.node_of[vertex] = vertex, node
+
+    def pair_branch(self, branch: Branch, end: HalfEdgeId) -> None:
+        """Note that a local branch is a half-edge."""
+        self.half_edge_of[branch], self.branch_of[end] = end, branch
