@@ -1,10 +1,13 @@
 """What crosses the hardware abstraction: frozen values, each with the stamp of when it was true."""
 
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
 from gvgbot.geometry import Array, Pose, Twist
+
+DockBeam = Literal["near left", "near centre", "near right", "far left", "far centre", "far right"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,3 +85,13 @@ class Battery:
     voltage: float
     fraction: float
     charging: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Docking:
+    """Which of the charging dock's beams each receiver of the base sees."""
+
+    stamp: float
+    left: frozenset[DockBeam] = frozenset()
+    centre: frozenset[DockBeam] = frozenset()
+    right: frozenset[DockBeam] = frozenset()

@@ -21,12 +21,13 @@ from gvgbot.drivers.kobuki.commands import (
     encode_commands,
 )
 from gvgbot.drivers.kobuki.feedback import FeedbackReader, Identity, LinkStatistics
+from gvgbot.drivers.kobuki.limits import Accelerations, ramped, slowed
 from gvgbot.drivers.kobuki.wheel_odometry import TICK_ANGLE, WHEEL_BASE, DriveGeometry, Heading
 from gvgbot.drivers.transport import ByteStream
 from gvgbot.errors import DeviceLost
 from gvgbot.geometry import STANDSTILL, Twist
 from gvgbot.hal.latest import Latest
-from gvgbot.hal.messages import Battery, Contact, Odometry
+from gvgbot.hal.messages import Battery, Contact, Docking, Odometry
 from gvgbot.ranges import Range
 
 _STOP_REPEAT_S = 0.1  # while the base is to stand, it is told so again this often
@@ -46,6 +47,9 @@ class KobukiConfig:
     wheel_radius_m: Annotated[float, Range(0.01, 0.5)] = 0.035
     max_speed_mps: Annotated[float, Range(0.01, 2.0)] = 0.7  # of the faster wheel
     max_turn_rate_radps: Annotated[float, Range(0.01, math.pi)] = math.pi
+    max_acceleration_mps2: Annotated[float, Range(0.05, 100.0)] | None = None  # None: no ramp
+    max_braking_mps2: Annotated[float, Range(0.05, 100.0)] | None = None  # a stop is never put off
+    max_angular_acceleration_radps2: Annotated[float, Range(0.1, 1000.0)] | None = None
     deadman_s: Annotated[float, Range(0.05, 2.0)] = 0.5  # without drive(): stop
     silence_stop_s: Annotated[float, Range(0.05, 2.0)] = 0.5  # without feedback: stop
     silence_lost_s: Annotated[float, Range(0.1, 10.0)] = 1.0  # without feedback: give up
@@ -56,6 +60,15 @@ class KobukiConfig:
     def geometry(self) -> DriveGeometry:
         """The wheels."""
         return DriveGeometry(self.wheel_base_m, TICK_ANGLE * self.wheel_radius_m)
+
+    @property
+    def accelerations(self) -> Accelerations:
+        """The limits of the ramps; inf where there is none."""
+        return Accelerations(
+            self.max_acceleration_mps2 or math.inf,
+            self.max_braking_mps2 or math.inf,
+            self.max_angular_acceleration_radps2 or math.inf,
+        )
 
 
 class KobukiBase:
@@ -83,7 +96,9 @@ class KobukiBase:
         self._identity_due = -math.inf
         self._output = ALL_POWER
         self._started = clock.now()
+        self._accelerations = config.accelerations
         self._driven = -math.inf
+        self._twist = STANDSTILL
         self._stopped = -math.inf
 
     async def run(self) -> None:
@@ -110,12 +125,13 @@ class KobukiBase:
         While the base is silent it is told to stand whatever is asked. It never raises: a link that
         is gone is for `run` to report.
         """
-        self._driven = self._clock.now()
+        before, self._driven = self._driven, self._clock.now()
         if self._driven >= self._heard + self._config.silence_stop_s:
             twist = STANDSTILL
         wheel_base_mm = 1000 * self._config.wheel_base_m
-        control = BaseControl.from_twist(_limited(twist, self._config), wheel_base_mm)
-        return control.twist_on(wheel_base_mm) if self._send(control) else STANDSTILL
+        control = BaseControl.from_twist(self._permitted(twist, before), wheel_base_mm)
+        self._twist = control.twist_on(wheel_base_mm) if self._send(control) else STANDSTILL
+        return self._twist
 
     def play(self, melody: Melody) -> None:
         """Play one of the base's tunes."""
@@ -137,6 +153,11 @@ class KobukiBase:
         return self._feedback.battery
 
     @property
+    def docking(self) -> Docking | None:
+        """The newest sight of the charging dock, None before the first."""
+        return self._feedback.docking
+
+    @property
     def identity(self) -> Identity:
         """What the base has answered so far about itself."""
         return self._feedback.identity
@@ -151,6 +172,11 @@ class KobukiBase:
         """Turn rate by the gyro minus by the wheels, smoothed, rad/s; large when a wheel slips."""
         return self._feedback.slip_rate
 
+    def _permitted(self, twist: Twist, last_driven: float) -> Twist:
+        config = self._config
+        twist = slowed(twist, config.max_speed_mps, config.max_turn_rate_radps, config.wheel_base_m)
+        return ramped(twist, self._twist, self._driven - last_driven, self._accelerations)
+
     @property
     def _heard(self) -> float:
         return max(self._started, self._feedback.heard)
@@ -164,7 +190,7 @@ class KobukiBase:
                 f"check that it is switched on and its cable is plugged in ({self._config.port})"
             )
         if now >= self._stop_due():
-            self._stopped = now
+            self._stopped, self._twist = now, STANDSTILL
             self._send(_STOP)
 
     def _next_watch(self) -> float:
@@ -200,14 +226,3 @@ class KobukiBase:
         except DeviceLost:
             return False
         return True
-
-
-def _limited(twist: Twist, config: KobukiConfig) -> Twist:
-    """The twist on the same arc, slowed to the limits; standstill if it is not a number."""
-    if not (math.isfinite(twist.linear) and math.isfinite(twist.angular)):
-        return STANDSTILL
-    fast_wheel = abs(twist.linear) + abs(twist.angular) * config.wheel_base_m / 2
-    share = max(
-        1.0, fast_wheel / config.max_speed_mps, abs(twist.angular) / config.max_turn_rate_radps
-    )
-    return Twist(twist.linear / share, twist.angular / share)

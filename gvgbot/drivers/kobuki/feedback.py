@@ -2,11 +2,13 @@
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 from gvgbot.drivers.kobuki.device_clock import DeviceClock, advance_clock, start_clock
 from gvgbot.drivers.kobuki.frames import BadFrame, FrameParser
 from gvgbot.drivers.kobuki.payloads import (
     CoreSensors,
+    DockIr,
     FeedbackPart,
     FirmwareVersion,
     HardwareVersion,
@@ -27,13 +29,22 @@ from gvgbot.drivers.kobuki.wheel_odometry import (
     wheel_travels,
 )
 from gvgbot.geometry import wrap_angle
-from gvgbot.hal.messages import Battery, Contact, Odometry
+from gvgbot.hal.messages import Battery, Contact, DockBeam, Docking, Odometry
 
 FRAME_PERIOD = 0.02  # s, of the base's stream
 _JUMP_M = 0.25  # a wheel does not go this far between two frames,
 _JUMP_SPEED = 2.0  # m/s, nor this fast over a longer gap
 _JUMP_TURN = 0.35  # rad between two frames that no base turns,
 _JUMP_TURN_RATE = 6.0  # rad/s, nor this fast over a longer gap
+_SLIP_RATE, _GRIP_RATE = 0.2, 0.1  # rad/s: a slip begins above the one and ends below the other
+_DOCK_BEAMS: tuple[DockBeam, ...] = (
+    "near left",
+    "near centre",
+    "near right",
+    "far centre",
+    "far left",
+    "far right",
+)  # from bit 0
 _JUMPS_BELIEVED = 3  # readings in a row that agree against the old one
 
 
@@ -56,7 +67,8 @@ class LinkStatistics:
     """What came over the link since the driver started.
 
     `missed_frames` are gaps in the base's own counter, `malformed` frames with a right checksum
-    and a wrong inside, `doubted` readings of the encoders too far off to be used.
+    and a wrong inside, `doubted` readings of the encoders too far off to be used. `slips` are the
+    times that gyro and wheels began to disagree.
     """
 
     frames: int = 0
@@ -67,10 +79,11 @@ class LinkStatistics:
     unknown_parts: int = 0
     doubted: int = 0
     resets: int = 0
+    slips: int = 0
 
 
 class FeedbackReader:
-    """What the base has reported so far: `contact`, `battery`, `identity`, counters, odometry."""
+    """What the base has reported so far: contact, battery, dock, identity, counters, odometry."""
 
     def __init__(
         self, heading: Heading, link_delay: float, geometry: DriveGeometry = KOBUKI
@@ -87,6 +100,9 @@ class FeedbackReader:
         self._missed = self._malformed = self._unknown = self._doubted = 0
         self.contact: Contact | None = None
         self.battery: Battery | None = None
+        self.docking: Docking | None = None
+        self._slips = 0
+        self._is_slipping = False
         self.heard = -math.inf  # arrival of the last frame of use, s
 
     def take(self, data: bytes, arrival: float) -> Odometry | None:
@@ -120,6 +136,7 @@ class FeedbackReader:
             unknown_parts=self._unknown,
             doubted=self._doubted,
             resets=0 if self._clock is None else self._clock.resets,
+            slips=self._slips,
         )
 
     def _take_parts(self, parts: list[FeedbackPart], arrival: float) -> Odometry | None:
@@ -128,12 +145,15 @@ class FeedbackReader:
             return None
         core: CoreSensors | None = None
         inertia: Inertia | None = None
+        dock: DockIr | None = None
         for part in parts:
             match part:
                 case CoreSensors():
                     core = part
                 case Inertia():
                     inertia = part
+                case DockIr():
+                    dock = part
                 case HardwareVersion(version) | FirmwareVersion(version):
                     self._extras[type(part)] = str(version)
                 case Udid():
@@ -142,7 +162,12 @@ class FeedbackReader:
                     self._unknown += 1
                 case _:
                     pass
-        return None if core is None else self._take_core(core, inertia, arrival)
+        if core is None:
+            return None
+        odometry = self._take_core(core, inertia, arrival)
+        if dock is not None and self.contact is not None:
+            self.docking = _docking(dock, self.contact.stamp)
+        return odometry
 
     def _take_core(
         self, core: CoreSensors, inertia: Inertia | None, arrival: float
@@ -177,7 +202,14 @@ class FeedbackReader:
             return None
         state = advance_odometry(state, reading, dt, self._heading, self._geometry)
         self._odometry, self._odometry_elapsed = state, clock.elapsed
+        self._watch_slip(abs(state.slip_rate))
         return Odometry(clock.stamp, state.odom_base, state.twist)
+
+    def _watch_slip(self, rate: float) -> None:
+        """Count the slips, by how much gyro and wheels disagree (rad/s)."""
+        if rate > _SLIP_RATE and not self._is_slipping:
+            self._slips += 1
+        self._is_slipping = rate > (_GRIP_RATE if self._is_slipping else _SLIP_RATE)
 
     def _is_absurd(self, before: WheelReading, after: WheelReading, dt: float) -> bool:
         """Whether no base gets from one reading to the other in dt seconds."""
@@ -215,3 +247,12 @@ def _battery(core: CoreSensors, stamp: float) -> Battery:
     slope = (1.0 - low_fraction) / (full_v - low_v)
     fraction = low_fraction + slope * (core.voltage - low_v)
     return Battery(stamp, core.voltage, min(1.0, max(0.0, fraction)), core.charging)
+
+
+def _docking(dock: DockIr, stamp: float) -> Docking:
+    return Docking(stamp, _beams(dock.left), _beams(dock.centre), _beams(dock.right))
+
+
+@lru_cache(maxsize=256)
+def _beams(bits: int) -> frozenset[DockBeam]:
+    return frozenset(beam for bit, beam in enumerate(_DOCK_BEAMS) if bits >> bit & 1)
