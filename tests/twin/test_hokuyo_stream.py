@@ -1,10 +1,7 @@
 """The laser driver against the simulated laser, in virtual time."""
 
 import asyncio
-import contextlib
 import math
-from collections.abc import Awaitable, Callable, Iterable
-from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
@@ -13,166 +10,23 @@ from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.drivers.hokuyo.driver import HokuyoConfig, HokuyoLaser
 from gvgbot.drivers.hokuyo.models import MODELS
 from gvgbot.drivers.hokuyo.twin import HokuyoTwin, HokuyoTwinConfig
-from gvgbot.drivers.transport import ByteStream, TwinDevice, pipe, serve_twin
+from gvgbot.drivers.transport import ByteStream, pipe, serve_twin
 from gvgbot.errors import DeviceLost, DeviceRefused
-from gvgbot.geometry import Array
-from gvgbot.hal.messages import Scan
+from tests.twin.hokuyo_bench import (
+    PERFECT,
+    QUANTISATION,
+    Bench,
+    Deaf,
+    FrozenClock,
+    Scripted,
+    SlowLink,
+    World,
+    increments,
+    on_bench,
+    quantised,
+)
 
 pytestmark = pytest.mark.twin
-
-PERFECT = HokuyoTwinConfig(range_sigma_m=0.0, dropout_fraction=0.0)
-QUANTISATION = 0.0005 + 1e-9  # m
-
-
-@dataclass
-class World:
-    """Ranges that name their scan, and a record of when they were asked for."""
-
-    beams: int = 1081
-    stamps: list[float] = field(default_factory=list)
-
-    def __call__(self, stamp: float) -> Array:
-        self.stamps.append(stamp)
-        return self.ranges(len(self.stamps) - 1)
-
-    def ranges(self, scan_number: int) -> Array:
-        ranges = 1.0 + 0.01 * scan_number + np.linspace(0.0, 2.0, self.beams)
-        ranges[::100] = math.inf
-        return ranges
-
-
-@dataclass
-class Bench:
-    """A driver and a twin on the two ends of a link."""
-
-    laser: HokuyoLaser
-    link: ByteStream
-    served: asyncio.Task[None]
-    running: asyncio.Task[None]
-    clock: LoopClock
-
-    async def scans(self, count: int) -> list[Scan]:
-        return [await self.laser.next_scan() for _ in range(count)]
-
-
-class Deaf:
-    """A device that answers nothing."""
-
-    def __init__(self) -> None:
-        self.heard = b""
-
-    def receive(self, data: bytes, now: float) -> bytes:
-        self.heard += data
-        return b""
-
-    def advance(self, now: float) -> bytes:
-        return b""
-
-    def next_due(self) -> float:
-        return math.inf
-
-
-class SlowLink:
-    """A twin whose scans take 30 ms to come over."""
-
-    def __init__(self, twin: TwinDevice) -> None:
-        self.twin = twin
-        self.parts: list[tuple[float, bytes]] = []
-
-    def receive(self, data: bytes, now: float) -> bytes:
-        return self.twin.receive(data, now)
-
-    def advance(self, now: float) -> bytes:
-        frame = self.twin.advance(now)
-        size = len(frame) // 3 + 1
-        self.parts += [(now + 0.01 * i, frame[i * size : (i + 1) * size]) for i in range(4)]
-        sent = b"".join(part for due, part in self.parts if due <= now)
-        self.parts = [(due, part) for due, part in self.parts if due > now]
-        return sent
-
-    def next_due(self) -> float:
-        return min(self.twin.next_due(), *(due for due, _ in self.parts), math.inf)
-
-
-class FrozenClock:
-    """A twin that after some scans sends the last one over and over."""
-
-    def __init__(self, twin: TwinDevice, good_scans: int) -> None:
-        self.twin = twin
-        self.good_scans = good_scans
-        self.last = b""
-
-    def receive(self, data: bytes, now: float) -> bytes:
-        return self.twin.receive(data, now)
-
-    def advance(self, now: float) -> bytes:
-        frame = self.twin.advance(now)
-        if frame and self.good_scans > 0:
-            self.good_scans -= 1
-            self.last = frame
-        return self.last if frame else b""
-
-    def next_due(self) -> float:
-        return self.twin.next_due()
-
-
-class Scripted(Deaf):
-    """A device that gives fixed replies to commands, and others to a twin."""
-
-    def __init__(self, replies: dict[bytes, bytes], twin: TwinDevice) -> None:
-        super().__init__()
-        self.replies = replies
-        self.twin = twin
-
-    def receive(self, data: bytes, now: float) -> bytes:
-        return b"".join(self.answer(command, now) for command in data.splitlines(keepends=True))
-
-    def answer(self, command: bytes, now: float) -> bytes:
-        scripted = self.replies.get(command)
-        return self.twin.receive(command, now) if scripted is None else scripted
-
-    def advance(self, now: float) -> bytes:
-        return self.twin.advance(now)
-
-    def next_due(self) -> float:
-        return self.twin.next_due()
-
-
-def on_bench(
-    twin: TwinDevice,
-    scenario: Callable[[Bench], Awaitable[None]],
-    config: HokuyoConfig | None = None,
-    first: Callable[[ByteStream, LoopClock], Awaitable[None]] | None = None,
-) -> None:
-    """Run the scenario with the driver and the twin at work; `first` has the link before that."""
-
-    async def main() -> None:
-        here, there = pipe()
-        clock = LoopClock()
-        async with asyncio.TaskGroup() as tasks:
-            served = tasks.create_task(serve_twin(twin, there, clock))
-            if first is not None:
-                await first(here, clock)
-            laser = HokuyoLaser(here, config or HokuyoConfig(), clock)
-            running = tasks.create_task(until_lost(laser))
-            await scenario(Bench(laser, here, served, running, clock))
-            running.cancel()
-            served.cancel()
-
-    run_in_virtual_time(main())
-
-
-async def until_lost(laser: HokuyoLaser) -> None:
-    with contextlib.suppress(DeviceLost):
-        await laser.run()
-
-
-def quantised(ranges: Array) -> Callable[[Array], bool]:
-    return lambda measured: np.allclose(measured, ranges, rtol=0.0, atol=QUANTISATION)
-
-
-def increments(values: Iterable[float]) -> Array:
-    return np.diff(np.array(list(values)))
 
 
 def test_a_utm_30lx_gives_every_fourth_of_its_scans() -> None:
@@ -413,26 +267,3 @@ def test_a_refused_stream_is_reported_with_its_status() -> None:
             served.cancel()
 
     run_in_virtual_time(main())
-
-
-class ScipOne(Scripted):
-    """A laser as old ones wake up: nothing but SCIP2.0 gets through to the twin."""
-
-    def __init__(self, twin: TwinDevice) -> None:
-        super().__init__({b"TM2\n": b"TM2\nE\n\n", b"QT\n": b"QT\nE\n\n"}, twin)
-
-    def answer(self, command: bytes, now: float) -> bytes:
-        if command == b"SCIP2.0\n":
-            self.replies = {}
-            return b"SCIP2.0\n0\n\n"
-        return super().answer(command, now)
-
-
-def test_a_laser_in_scip_1_is_switched_over() -> None:
-    laser_in_scip_1 = ScipOne(HokuyoTwin(PERFECT, World(), seed=15))
-
-    async def scenario(bench: Bench) -> None:
-        await bench.scans(2)
-        assert laser_in_scip_1.replies == {}
-
-    on_bench(laser_in_scip_1, scenario)

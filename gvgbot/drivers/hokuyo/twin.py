@@ -52,7 +52,7 @@ class HokuyoTwin:
     @property
     def baud(self) -> int:
         """The bit rate that the laser listens and sends at; 0 where there is none."""
-        return self._answers.baud
+        return self._line.baud
 
     @property
     def counts(self) -> Counter[str]:
@@ -72,7 +72,7 @@ class HokuyoTwin:
             return b""
         self._wake(now)
         self._listen(data, now)
-        return self._line.out(now)
+        return self._out(now)
 
     def advance(self, now: float) -> bytes:
         """Do what is due; the bytes that have gone out."""
@@ -86,7 +86,14 @@ class HokuyoTwin:
             else:
                 self._send(phase)
         self._send_newest(now)
-        return self._line.out(now)
+        return self._out(now)
+
+    def _out(self, now: float) -> bytes:
+        """The bytes that have gone out; only after the last one a new bit rate takes effect."""
+        sent = self._line.out(now)
+        if self._line.next_due() == math.inf:
+            self._line.baud = self._answers.baud
+        return sent
 
     def next_due(self) -> float:
         """When the laser next does something by itself; inf if never."""
@@ -136,7 +143,6 @@ class HokuyoTwin:
             self._line.put(self._answers.answer(text, now), due)
             if not isinstance(self._answers.phase, Streaming):
                 self._newest = None
-            self._line.baud = self._answers.baud
 
     def _answer_due(self, now: float) -> float:
         measures = isinstance(self._answers.phase, Streaming | LaserOn)

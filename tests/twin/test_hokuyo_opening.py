@@ -1,0 +1,222 @@
+"""The driver opens a simulated laser whatever state it finds it in."""
+
+import asyncio
+
+import pytest
+
+from gvgbot.clock import LoopClock, run_in_virtual_time
+from gvgbot.drivers.hokuyo.driver import HokuyoConfig, HokuyoLaser
+from gvgbot.drivers.hokuyo.twin import HokuyoTwin, HokuyoTwinConfig
+from gvgbot.drivers.transport import ByteStream, pipe, serve_twin
+from gvgbot.errors import DeviceLost, DeviceRefused
+from tests.twin.hokuyo_bench import PERFECT, Bench, Scripted, World, on_bench
+
+pytestmark = pytest.mark.twin
+
+
+def twin_of(world: World | None = None, **config: object) -> HokuyoTwin:
+    quiet = {"range_sigma_m": 0.0, "dropout_fraction": 0.0}
+    settings = HokuyoTwinConfig(**{**quiet, **config})  # type: ignore[arg-type]
+    return HokuyoTwin(settings, world or World(), seed=21)
+
+
+async def opens_within(bench: Bench, seconds: float) -> None:
+    """Fail unless a scan comes in time, and is of just now."""
+    began = bench.clock.now()
+    async with asyncio.timeout(seconds):
+        (scan,) = await bench.scans(1)
+    assert began - 0.1 < scan.stamp < bench.clock.now()
+    assert bench.clock.now() - scan.stamp < 0.1
+
+
+@pytest.mark.parametrize(
+    ("config", "seconds"),
+    [
+        pytest.param({"boot_s": 3.3}, 4.6, id="still boots"),
+        pytest.param({"starts_in_scip_1": True}, 0.5, id="SCIP 1.1"),
+        pytest.param({"starts_in_scip_1": True, "boot_s": 2.0}, 3.5, id="SCIP 1.1 after booting"),
+        pytest.param({"starts_abnormal": True}, 6.0, id="abnormal"),
+        pytest.param({"answers_once_per_turn": True}, 0.8, id="answers once per turn"),
+        pytest.param(
+            {"answers_once_per_turn": True, "model": "URG-04LX"}, 1.0, id="a slow one likewise"
+        ),
+    ],
+)
+def test_it_opens_a_laser_that_is(config: dict[str, object], seconds: float) -> None:
+    async def scenario(bench: Bench) -> None:
+        await opens_within(bench, seconds)
+
+    beams = 682 if "model" in config else 1081
+    on_bench(twin_of(World(beams=beams), **config), scenario)
+
+
+def test_an_abnormal_laser_is_rebooted_once() -> None:
+    async def scenario(bench: Bench) -> None:
+        await bench.scans(3)
+        assert bench.laser.link.reboots == 1
+
+    on_bench(twin_of(starts_abnormal=True), scenario)
+
+
+def test_a_laser_that_stays_abnormal_is_refused() -> None:
+    async def main() -> None:
+        here, there = pipe()
+        clock = LoopClock()
+        twin = Scripted({b"QT\n": b"QT\n0Ll\n\n"}, twin_of())
+        async with asyncio.TaskGroup() as tasks:
+            served = tasks.create_task(serve_twin(twin, there, clock))
+            with pytest.raises(DeviceRefused, match="status 0L"):
+                await HokuyoLaser(here, HokuyoConfig(), clock).run()
+            served.cancel()
+
+    run_in_virtual_time(main())
+
+
+def test_a_stop_that_was_lost_is_sent_again() -> None:
+    """Two of three QT do not stop the stream, and the time cannot be asked while it runs."""
+
+    async def first(link: ByteStream, clock: LoopClock) -> None:
+        link.write(b"MD0000108001300\n")
+        await clock.sleep_until(clock.now() + 1.0)
+
+    async def scenario(bench: Bench) -> None:
+        await opens_within(bench, 2.0)
+
+    on_bench(twin_of(lost_stop_fraction=0.67), scenario, first=first)
+
+
+@pytest.mark.parametrize("backlog_s", [0.5, 5.0, 60.0])
+def test_no_scan_of_a_stale_backlog_is_handed_on(backlog_s: float) -> None:
+    world = World()
+
+    async def first(link: ByteStream, clock: LoopClock) -> None:
+        link.write(b"MD0000108001300\n")  # the very scans that the driver will ask for
+        await clock.sleep_until(clock.now() + backlog_s)
+
+    async def scenario(bench: Bench) -> None:
+        opened = bench.clock.now()
+        scans = await bench.scans(3)
+        assert all(scan.stamp > opened - 0.002 for scan in scans)
+        assert scans[-1].stamp == pytest.approx(world.stamps[-1], abs=0.002)
+
+    on_bench(twin_of(world), scenario, first=first)
+
+
+class HostPort:
+    """The host's end of a serial line."""
+
+    def __init__(self, stream: ByteStream, baud: int) -> None:
+        self.baud = baud
+        self.read, self.write, self.close = stream.read, stream.write, stream.close
+
+    def set_baud(self, baud: int) -> None:
+        self.baud = baud
+
+
+class SerialLine:
+    """A laser on a serial line: only where both ends keep the same bit rate do bytes make sense."""
+
+    def __init__(self, device: HokuyoTwin, host: HostPort) -> None:
+        self.device, self.host = device, host
+        self.next_due = device.next_due
+
+    def carried(self, data: bytes, baud: int) -> bytes:
+        if baud == self.host.baud:
+            return data
+        return bytes((byte * 5 + 0x93) % 256 | 0x80 for byte in data)
+
+    def receive(self, data: bytes, now: float) -> bytes:
+        baud = self.device.baud
+        return self.carried(self.device.receive(self.carried(data, baud), now), baud)
+
+    def advance(self, now: float) -> bytes:
+        baud = self.device.baud
+        return self.carried(self.device.advance(now), baud)
+
+
+async def serve_rated(device: HokuyoTwin, wanted: int) -> tuple[HokuyoLaser, HostPort]:
+    """A laser driver that has had three scans over a serial line."""
+    here, there = pipe()
+    clock = LoopClock()
+    line = HostPort(here, wanted)
+    laser = HokuyoLaser(line, HokuyoConfig(baud=wanted, link="serial"), clock)
+    async with asyncio.TaskGroup() as tasks:
+        served = tasks.create_task(serve_twin(SerialLine(device, line), there, clock))
+        running = tasks.create_task(laser.run())
+        for _ in range(3):
+            await laser.next_scan()
+        running.cancel()
+        served.cancel()
+    return laser, line
+
+
+@pytest.mark.parametrize("found", [19200, 57600, 115200, 750000])
+def test_a_laser_at_another_bit_rate_is_found_and_changed(found: int) -> None:
+    async def main() -> None:
+        device = twin_of(World(beams=682), model="URG-04LX", serial_baud=found)
+        laser, line = await serve_rated(device, 115200)
+        assert device.baud == line.baud == 115200
+        assert laser.link.scans == 3
+
+    run_in_virtual_time(main())
+
+
+class StubbornTwin(HokuyoTwin):
+    """A laser that does not change its bit rate."""
+
+    def receive(self, data: bytes, now: float) -> bytes:
+        if data.startswith(b"SS"):
+            return data + b"03S\n\n"
+        return super().receive(data, now)
+
+
+def test_a_laser_that_keeps_its_bit_rate_is_read_at_it() -> None:
+    async def main() -> None:
+        config = HokuyoTwinConfig(model="URG-04LX", serial_baud=57600)
+        device = StubbornTwin(config, World(beams=682), seed=4)
+        laser, line = await serve_rated(device, 115200)
+        assert device.baud == line.baud == 57600
+        assert laser.mode is not None
+        assert laser.mode.adapted is not None  # what fits into 115200 does not into 57600
+        assert (laser.mode.request.cluster, laser.mode.request.skip) == (2, 1)
+
+    run_in_virtual_time(main())
+
+
+def test_a_laser_that_drops_its_link_to_reboot_is_lost_and_opens_again() -> None:
+    async def main() -> None:
+        clock = LoopClock()
+        ends = [pipe(), pipe()]
+        wire = [ends[0]]
+
+        def plug(is_plugged: bool) -> None:
+            if is_plugged:
+                wire.append(ends[1])
+            else:
+                wire[0][0].close()
+
+        device = HokuyoTwin(HokuyoTwinConfig(starts_abnormal=True), World(), 3, plug)
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(serve_twin(device, ends[0][1], clock))
+            with pytest.raises(DeviceLost, match="closed"):
+                await HokuyoLaser(ends[0][0], HokuyoConfig(), clock).run()
+            await clock.sleep_until(device.next_due())
+            device.advance(clock.now())
+            assert len(wire) == 2
+            served = tasks.create_task(serve_twin(device, ends[1][1], clock))
+            laser = HokuyoLaser(ends[1][0], HokuyoConfig(), clock)
+            running = tasks.create_task(laser.run())
+            await laser.next_scan()
+            running.cancel()
+            served.cancel()
+
+    run_in_virtual_time(main())
+
+
+def test_the_perfect_twin_needs_no_cure() -> None:
+    async def scenario(bench: Bench) -> None:
+        await opens_within(bench, 0.3)
+        link = bench.laser.link
+        assert (link.reboots, link.restarts, link.unanswered) == (0, 0, 0)
+
+    on_bench(HokuyoTwin(PERFECT, World(), seed=6), scenario)
