@@ -1,0 +1,86 @@
+"""Writes topics.md, the reference of what travels on the network, from gvgbot/topics.py.
+
+    python docs/make_topics.py
+
+Fields are explained by the comments that they have in the source.
+"""
+
+import inspect
+import re
+from pathlib import Path
+from typing import Literal, get_args, get_origin, get_type_hints
+
+import msgspec
+
+from gvgbot.topics import TOPICS, Topic, alive_key
+
+PAGE = Path(__file__).with_name("topics.md")
+FIELD = re.compile(r"^    (?P<name>\w+): (?P<type>[^#\n]*?)(?:  # (?P<comment>.*))?$", re.MULTILINE)
+HEAD = """\
+# Topics
+
+<!-- Written by docs/make_topics.py from gvgbot/topics.py: change the table there, not here. -->
+
+What a robot says over zenoh. `ROBOT` is its `robot.name`; `*` in that place listens to all of
+them. A payload is one MessagePack map from field name to value; the encoding of each sample carries
+its type and version. Units are SI, angles are in radians.
+
+A queryable topic answers a `get` with its newest sample, and in JSON to `KEY?format=json`.
+"""
+ALIVE = """\
+## `{key}`
+
+A liveliness token, without payload: there as long as the robot is on the network. A robot that
+hangs can keep it, so look at `cycles` and `cycle_age` of its state, too.
+"""
+
+
+def page() -> str:
+    """The whole page, Markdown."""
+    return "\n".join(
+        [HEAD, _overview(), *map(_section, TOPICS), ALIVE.format(key=alive_key("ROBOT"))]
+    )
+
+
+def _overview() -> str:
+    rows = [
+        "| key | payload | Hz | priority | kept for latecomers | queryable |",
+        "|---|---|---|---|---|---|",
+    ]
+    for topic in TOPICS:
+        cells = (
+            f"`{topic.key('ROBOT')}`",
+            f"`{topic.encoding}`",
+            f"{topic.rate_hz:g}",
+            topic.priority,
+            str(topic.history or "none"),
+            "yes" if topic.queryable else "no",
+        )
+        rows.append(f"| {' | '.join(cells)} |")
+    rows.append(f"| `{alive_key('ROBOT')}` | liveliness token | | | | |")
+    return "\n".join(rows) + "\n"
+
+
+def _section(topic: Topic) -> str:
+    text = inspect.getdoc(topic.payload) or ""
+    rows = ["| field | type | meaning |", "|---|---|---|"]
+    rows += [f"| {' | '.join(cells)} |" for cells in _fields(topic.payload)]
+    table = "\n".join(rows)
+    return f"## `{topic.key('ROBOT')}`: {topic.payload.__name__}\n\n{text}\n\n{table}\n"
+
+
+def _fields(payload: type[msgspec.Struct]) -> list[tuple[str, str, str]]:
+    """Name, type and comment of each field, as the source has them."""
+    found = {m["name"]: m for m in FIELD.finditer(inspect.getsource(payload))}
+    hints = get_type_hints(payload)
+    rows = []
+    for name in payload.__struct_fields__:
+        kind, comment = (found[name]["type"], found[name]["comment"]) if name in found else ("", "")
+        if get_origin(hints[name]) is Literal:
+            kind, comment = "str", comment or ", ".join(get_args(hints[name]))
+        rows.append((f"`{name}`", f"`{kind}`".replace("|", "\\|"), comment or ""))
+    return rows
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")
