@@ -160,7 +160,9 @@ MODELS: dict[str, Model] = {
         _UTM_CODES,
         product="SOKUIKI Sensor TOP-URG UTM-30LX",
     ),
-    "UTM-30LX-EW": _model("UTM-30LX-EW", (23, 60000, 1440, 0, 1080, 540, 2400), 30000, _UST_CODES),
+    "UTM-30LX-EW": _model(
+        "UTM-30LX-EW", (23, 60000, 1440, 0, 1080, 540, 2400), 30000, _UST_CODES, is_multi_echo=True
+    ),
     "UXM-30LX-E": _model(
         "UXM-30LX-E", (100, 100000, 1440, 0, 760, 380, 1200), 30000, _UTM_CODES, is_multi_echo=True
     ),
