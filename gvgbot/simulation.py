@@ -52,6 +52,7 @@ class Simulation:
         mount = config.laser.base_laser
         model = MODELS[config.twin.laser.model]
         bearings, reach = model.parameters.bearings, model.usable_mm / 1000
+        flipped = config.laser.upside_down
 
         def sense(stamp: float) -> Array:
             """What a sweep that begins at a stamp sees, the body going on as it moves then."""
@@ -63,7 +64,7 @@ class Simulation:
                 ) * model.parameters.step_time
                 moved = Pose(self.body.linear * late, 0.0, self.body.angular * late)
                 world_laser = self.body.pose.compose(moved).compose(mount)
-                seen.append(place.world.cast(world_laser, bearings[beams], reach))
+                seen.append(_looked(place.world, world_laser, bearings[beams], reach, flipped))
             return np.concatenate(seen)
 
         laser_seed, base_seed = np.random.SeedSequence(config.twin.seed).generate_state(2)
@@ -93,3 +94,10 @@ class Simulation:
 
     async def _serve_base(self) -> None:
         await serve_twin(self.base_twin, self._base_end, self._clock)
+
+
+def _looked(world: World, world_laser: Pose, bearings: Array, reach: float, flipped: bool) -> Array:
+    """Ranges (N,) in m along bearings (N,) of the laser, which may hang upside down."""
+    if not flipped:
+        return world.cast(world_laser, bearings, reach)
+    return world.cast(world_laser, -bearings[::-1], reach)[::-1]
