@@ -80,7 +80,7 @@ def check(config: Config, say: Callable[[str], None]) -> int:
     """
     say(str(Line("ok", "configuration", _summary(config))))
     with asyncio.Runner(loop_factory=VirtualTimeLoop if config.twin.enabled else None) as runner:
-        lines = runner.run(examine(config))
+        lines = runner.run(_examine_all(config))
     for line in lines:
         say(str(line))
     failures = sum(line.verdict == "fail" for line in lines)
@@ -94,10 +94,14 @@ def _summary(config: Config) -> str:
     return f"robot {config.robot.name}, laser {config.laser.port}, base {config.base.port}"
 
 
-async def examine(config: Config) -> list[Line]:
-    """The verdicts on the laser and the base. Raises WorldError."""
+async def _examine_all(config: Config) -> list[Line]:
+    place = open_place(config) if config.twin.enabled else None
+    return await examine(config, None if place is None else Simulation(config, place, LoopClock()))
+
+
+async def examine(config: Config, simulation: Simulation | None) -> list[Line]:
+    """The verdicts on the laser and the base of a simulation, or on the real ones."""
     clock = LoopClock()
-    simulation = Simulation(config, open_place(config), clock) if config.twin.enabled else None
     links = Links(config, clock, simulation)
     async with asyncio.TaskGroup() as tasks:
         twins = None if simulation is None else tasks.create_task(simulation.run())

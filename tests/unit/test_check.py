@@ -1,0 +1,67 @@
+"""What the check says about devices that are well, and about those that are not."""
+
+import pytest
+
+from gvgbot.check import check, examine
+from gvgbot.clock import LoopClock, run_in_virtual_time
+from gvgbot.config import load_config
+from gvgbot.geometry import Pose
+from gvgbot.simulation import Simulation, open_place
+
+
+CONFIG = load_config()
+
+
+def said(*overrides: str) -> tuple[int, dict[str, tuple[str, str]]]:
+    """The exit status, and by subject the verdict and what follows it."""
+    lines: list[str] = []
+    status = check(load_config(None, overrides), lines.append)
+    table = [(line[:5].strip(), line[6:20].strip(), line[21:]) for line in lines[:-1]]
+    return status, {subject: (verdict, finding) for verdict, subject, finding in table}
+
+
+def test_sound_twins_pass_on_every_point() -> None:
+    status, points = said()
+    assert status == 0
+    assert {verdict for verdict, _ in points.values()} == {"ok"}
+    assert set(points) >= {"laser", "laser rate", "base", "base rate", "battery", "contact"}
+    assert points["base rate"][1].startswith("50.0 of 50")
+    assert points["laser rate"][1].startswith("10.0")
+
+
+ILLS = {
+    "empty battery": ("twin.base.battery_v=12.9", "battery", "fail", "charge it"),
+    "low battery": ("twin.base.battery_v=13.6", "battery", "warn", "charge it"),
+    "slow converter": ("twin.base.link.jitter_s=0.016", "base clock", "warn", "latency_timer"),
+    "damaged bytes": ("twin.base.link.lost_bytes_per_kb=0.3", "base link", "warn", "cable"),
+    "silent base": ("twin.base.link.silences_per_h=36000", "base", "fail", "switched on"),
+    "lifted robot": ("twin.base.mishaps.wheel_drops_per_h=36000", "contact", "warn", "floor"),
+}
+
+
+@pytest.mark.parametrize(("override", "subject", "verdict", "remedy"), ILLS.values(), ids=ILLS)
+def test_what_is_wrong_is_named_with_a_remedy(
+    override: str, subject: str, verdict: str, remedy: str
+) -> None:
+    overrides = [override]
+    if "silences" in override:
+        overrides.append("twin.base.link.silence_s=60")
+    if "wheel_drops" in override:
+        overrides.append("twin.base.mishaps.duration_s=60")
+    status, points = said(*overrides)
+    assert points[subject][0] == verdict
+    assert remedy in points[subject][1]
+    assert status == (1 if verdict == "fail" else 0)
+
+
+def test_the_robot_is_not_moved() -> None:
+    async def main() -> tuple[int, float, Pose]:
+        simulation = Simulation(CONFIG, open_place(CONFIG), LoopClock())
+        lines = await examine(CONFIG, simulation)
+        body = simulation.body
+        return len(lines), abs(body.left_travel) + abs(body.right_travel), body.pose
+
+    count, travel, pose = run_in_virtual_time(main())
+    assert count > 8
+    assert travel == 0.0
+    assert pose == open_place(CONFIG).start
