@@ -8,7 +8,6 @@ from gvgbot.config import load_config
 from gvgbot.geometry import Pose
 from gvgbot.simulation import Simulation, open_place
 
-
 CONFIG = load_config()
 
 

@@ -40,7 +40,7 @@ _STOP = BaseControl(0, 0)
 class KobukiConfig:
     """The link to the base, its limits, and when silence is dangerous."""
 
-    port: str = "/dev/kobuki"
+    port: str = "/dev/gvgbot-base"
     baud: Annotated[int, Range(9600, 1_000_000)] = 115_200
     heading: Heading = "gyro"
     wheel_base_m: Annotated[float, Range(0.05, 2.0)] = WHEEL_BASE
