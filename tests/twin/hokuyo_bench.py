@@ -81,7 +81,8 @@ class SlowLink:
     def advance(self, now: float) -> bytes:
         frame = self.twin.advance(now)
         size = len(frame) // 3 + 1
-        self.parts += [(now + 0.01 * i, frame[i * size : (i + 1) * size]) for i in range(4)]
+        if frame:
+            self.parts += [(now + 0.01 * i, frame[i * size : (i + 1) * size]) for i in range(4)]
         sent = b"".join(part for due, part in self.parts if due <= now)
         self.parts = [(due, part) for due, part in self.parts if due > now]
         return sent

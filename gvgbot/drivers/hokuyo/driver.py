@@ -35,6 +35,8 @@ __all__ = ["HokuyoConfig", "HokuyoLaser", "LinkStatistics"]
 
 SHORTEST_SILENCE = 0.2  # s; links deliver in bursts
 TIME_SAMPLES = 12  # of the laser's clock
+CONVERTER_BEAT = 0.016  # s; a serial converter's usual latency timer
+GOLDEN = 0.618034  # its multiples spread evenly over a beat
 UNKNOWN_COMMAND = frozenset({"0C", "0D", "0E", "0F"})  # firmware generations disagree on which
 BROKEN = range(50, 98)  # statuses of hardware trouble
 SIMPLER = {"NE": "ND", "ND": "MD", "ME": "MD"}  # what to ask for when a command is unknown
@@ -161,6 +163,7 @@ class HokuyoLaser:
             await self._dialogue.ask("TM0")
             while len(samples) < TIME_SAMPLES:
                 samples.append(await self._time_sample())
+                await self._pause(len(samples))
         except (Refusal, DamagedError) as error:
             log.info("laser does not tell its time", reason=str(error))
         self._dialogue.send("TM2")
@@ -172,6 +175,11 @@ class HokuyoLaser:
         sent = self._dialogue.clock.now()
         reply = await self._dialogue.ask("TM1")
         return TimeSample(sent, decode_time(reply), self._dialogue.clock.now())
+
+    async def _pause(self, number: int) -> None:
+        """Wait a while that is never the same: converters hand out bytes on a beat of their own."""
+        clock = self._dialogue.clock
+        await clock.sleep_until(clock.now() + CONVERTER_BEAT * (number * GOLDEN % 1.0))
 
     async def _start(self, parameters: Parameters) -> _Stream:
         """Start the scans, simpler ones if the laser does not know those that were asked for."""
