@@ -86,8 +86,7 @@ class Mapper:
         return {
             key: _sighting(view.gvg, node)
             for key, node in view.gvg.nodes.items()
-            if (node.is_meetpoint or node.is_endpoint or node.is_suspect)
-            and np.hypot(*(node.position - base)) < self._config.trust_m
+            if node.may_be_vertex and np.hypot(*(node.position - base)) < self._config.trust_m
         }
 
     def _track(self, view: View, sightings: dict[int, Sighting], known: Correspondence) -> None:

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from gvgbot.autonomy.control.edge_follower import Track
 from gvgbot.autonomy.events import Decision, Event, Finished, Recovery
 from gvgbot.autonomy.exploration.ears import ear_next, nearest_frontier
+from gvgbot.autonomy.exploration.paths import shortest_paths
 from gvgbot.autonomy.gvg.local import Branch
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.slam.graph import HalfEdgeId
@@ -15,6 +16,7 @@ from gvgbot.autonomy.whereabouts import Passage, Situation, Whereabouts
 from gvgbot.ranges import Range
 
 _LEAST_LOOP_M = 4.0  # an edge with both ends in sight is left to sight unless so much was driven
+_WORTH_TURNING_M = 1.0  # a new frontier must be so much nearer than the old one
 _LONGEST_VIEW_S = 2.0  # a longer gap between views is an outage, not a lack of progress
 
 Outcome = Literal["explored", "explored_with_blocked", "failed"]
@@ -73,9 +75,11 @@ class Mission:
         self._last_progress = 0.0  # stamp
         self._last_view = math.inf  # stamp
         self._travelled_then = -math.inf
+        self._frontiers: set[HalfEdgeId] = set()  # that were known at the last view
         self._looked_around = 0
         self._lost_since: float | None = None
         self._stranded_since: float | None = None
+        self._examining_since: float | None = None
         self._events: list[Event] = []
 
     def advance(self, view: View, known: Correspondence) -> tuple[Order, list[Event]]:
@@ -120,10 +124,14 @@ class Mission:
         half = None if target is None else graph.half_edge(target)
         if target is None or half is None or not half.open:
             self.target = self._choose(view, here)
+        else:
+            self.target = self._reconsidered(view, here, target)
         if self.outcome is not None:
             return Stand()
         if self.target is None and graph.frontiers():
             return self._wait_for_a_way(view, here)
+        if self.target is None and graph.vertices:
+            return self._examine(view, here)
         path = here.ahead() if self.target is None else here.path_to(self.target)
         if path is None:
             return self._wait_for_a_way(view, here)
@@ -146,6 +154,22 @@ class Mission:
         self._commit(view, here, chosen, reason)
         return chosen
 
+    def _reconsidered(self, view: View, here: Situation, target: HalfEdgeId) -> HalfEdgeId:
+        """The target, or a frontier found just now that is nearer than what is left of the way."""
+        frontiers = set(self._mapper.graph.frontiers())
+        found, self._frontiers = frontiers - self._frontiers, frontiers
+        if not found or self.where.on_edge == target:
+            return target
+        starts = here.starts()
+        way = shortest_paths(self._mapper.graph, starts).get(target.vertex)
+        nearest = nearest_frontier(self._mapper.graph, starts)
+        if nearest is None or nearest[0].vertex not in {end.vertex for end in found}:
+            return target
+        if way is not None and nearest[1].metres > way.metres - _WORTH_TURNING_M:
+            return target
+        self._commit(view, here, nearest[0], "nearer frontier")
+        return nearest[0]
+
     def _ear(self, here: Situation) -> HalfEdgeId | None:
         """The ear rule at the end of the edge just explored."""
         graph = self._mapper.graph
@@ -161,6 +185,7 @@ class Mission:
         self._budget_m = view.travelled + 2 * (away + total) + self._config.patience_m
         self._newest_m = 0.0
         self._looked_around = 0
+        self._examining_since = None
         vertex = self._mapper.graph.vertices[chosen.vertex]
         psi = self._mapper.belief.map_vertex(chosen.vertex).theta
         bearing = vertex.half_edges[chosen.key].bearing + psi
@@ -231,24 +256,30 @@ class Mission:
             return Stand()
         return LookAround(math.tau)
 
-    def _finish(self, view: View) -> None:
-        """No frontier can be reached; if there are any, only after having looked for a way."""
-        graph = self._mapper.graph
-        if graph.frontiers():
-            since = self._stranded_since
-            if since is None or view.stamp - since < self._config.patience_s:
-                return
-            self._end(
-                view,
-                "explored_with_blocked",
-                f"{len(graph.frontiers())} frontiers cannot be reached",
-            )
-        elif graph.blocked():
-            self._end(
-                view, "explored_with_blocked", f"{len(graph.blocked())} frontiers were given up"
-            )
+    def _examine(self, view: View, here: Situation) -> Order:
+        """Go where something in sight may prove to be a vertex, before all is called explored."""
+        if self._examining_since is None:
+            self._examining_since = view.stamp
+        paths = sorted(
+            (metres, node, path)
+            for node, (metres, path) in here.gvg.routes(here.place).items()
+            if node not in here.known.vertex_of and here.gvg.nodes[node].may_be_vertex
+        )
+        if paths and view.stamp - self._examining_since < self._config.patience_s:
+            return self._drive(view, here, paths[0][2])
+        blocked = len(self._mapper.graph.blocked())
+        if blocked:
+            self._end(view, "explored_with_blocked", f"{blocked} frontiers were given up")
         else:
             self._end(view, "explored", "no frontier is left")
+        return Stand()
+
+    def _finish(self, view: View) -> None:
+        """Some frontiers cannot be reached: that is the end, after having looked for a way."""
+        since = self._stranded_since
+        frontiers = len(self._mapper.graph.frontiers())
+        if frontiers and since is not None and view.stamp - since >= self._config.patience_s:
+            self._end(view, "explored_with_blocked", f"{frontiers} frontiers cannot be reached")
 
     def _end(self, view: View, outcome: Outcome, reason: str) -> None:
         self.outcome, self.reason = outcome, reason

@@ -72,6 +72,11 @@ class LocalNode:
         return self.degree < 3 <= len(self.branches) + (self.lead is not None)
 
     @property
+    def may_be_vertex(self) -> bool:
+        """Whether this is a vertex, or may prove to be one on a closer look."""
+        return self.is_meetpoint or self.is_suspect or self.is_endpoint
+
+    @property
     def is_endpoint(self) -> bool:
         """Whether the edge certainly stops here."""
         return self.settled and len(self.branches) == 1
