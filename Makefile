@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 SHELL := /bin/sh
 
-.PHONY: help explore test check static quick bench clean
+.PHONY: help explore test check static quick bench fuzz clean
 
 help:
 	@echo "make explore   a simulated robot maps the built-in office; prints where the map is"
@@ -11,6 +11,7 @@ help:
 	@echo "make check     format, lint, types, import rules, tests"
 	@echo "make quick     the tests that take under a second each"
 	@echo "make bench     time the inner loops"
+	@echo "make fuzz      throw mutated bytes at the parsers for a minute each"
 
 explore: .venv/core
 	@$(BIN)/gvgbot explore $(ARGS)
@@ -31,6 +32,12 @@ check: static test
 
 bench: .venv/dev
 	@for file in benchmarks/bench_*.py; do $(BIN)/python "$$file" || exit 1; done
+
+FUZZ_SECONDS ?= 60
+fuzz: .venv/dev
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check atheris
+	@for file in tests/fuzz/fuzz_*.py; do \
+		$(BIN)/python "$$file" -max_total_time=$(FUZZ_SECONDS) -rss_limit_mb=1024 -timeout=10 || exit 1; done
 
 clean:
 	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
