@@ -30,6 +30,16 @@ def report(name: str, measured_us: float, budget_us: float) -> None:
     print(f"{name:40} {measured_us:8.1f} us  (budget {budget_us:.0f}){verdict}")
 
 
+def parsed(frame: bytes) -> Callable[[], object]:
+    parser = ScipParser()
+
+    def one_scan() -> None:
+        (scan,) = parser.feed(frame)
+        assert isinstance(scan, ScanReply)
+
+    return one_scan
+
+
 def twin_scan() -> Callable[[], object]:
     twin = HokuyoTwin(HokuyoTwinConfig(), lambda stamp: RANGES, seed=1)
     twin.receive(b"MD0000108001000\n", 0.0)
@@ -57,7 +67,7 @@ async def stream(scans: int) -> None:
     here, there = pipe()
     clock = LoopClock()
     twin = HokuyoTwin(HokuyoTwinConfig(), lambda stamp: RANGES, seed=1)
-    laser = HokuyoLaser(here, HokuyoConfig(skip=0), clock)
+    laser = HokuyoLaser(here, HokuyoConfig(rate_hz=40.0), clock)
     async with asyncio.TaskGroup() as tasks:
         running = [
             tasks.create_task(serve_twin(twin, there, clock)),
@@ -76,6 +86,9 @@ def main() -> None:
     scan = ScanReply(request, "99", 4096, readings)
     frame = encode_scan(scan)
     report("decode data blocks", microseconds(lambda: to_values(unblock(data), 3)), 25)
+    strong = ScanReply(ScanRequest("ME", 0, 1080), "99", 4096, readings, readings)
+    report("check and decode a frame, MD", microseconds(parsed(frame)), 25)
+    report("check and decode a frame, ME", microseconds(parsed(encode_scan(strong))), 30)
     report("encode a frame", microseconds(lambda: encode_scan(scan)), 60)
     report("driver: bytes to Scan", microseconds(driver_scan(frame, request)), 100)
     report("twin: ranges to bytes", microseconds(twin_scan()), 150)

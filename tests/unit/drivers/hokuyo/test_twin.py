@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 from gvgbot.drivers.hokuyo.models import MODELS
 from gvgbot.drivers.hokuyo.scip import ScipParser, decode_time
-from gvgbot.drivers.hokuyo.scip_messages import Reply, ScanReply
+from gvgbot.drivers.hokuyo.scip_messages import Message, Reply, ScanReply
 from gvgbot.drivers.hokuyo.twin import HokuyoTwin, HokuyoTwinConfig
+from gvgbot.drivers.hokuyo.twin_line import Line
 from gvgbot.drivers.hokuyo.twin_readings import clustered, noisy_readings
 from gvgbot.geometry import Array
 
@@ -220,3 +221,117 @@ def test_what_cannot_be_measured_comes_as_a_code() -> None:
     truth = np.array([math.inf, 31.0, 30.0, 0.0, 0.0225, 0.023, math.nan])
     readings = noisy_readings(truth, MODELS["UTM-30LX"], 0.0, 0.0, np.random.default_rng(0))
     assert readings.tolist() == [1, 1, 30000, 2, 2, 23, 1]
+
+
+def replies(twin: HokuyoTwin, command: bytes, now: float = 0.0) -> list[Message]:
+    return ScipParser().feed(twin.receive(command, now))
+
+
+def test_a_reboot_needs_two_commands_within_a_second() -> None:
+    vector = "".join(VECTORS[name]["rx"] for name in ("RB first", "RB second within 1 s")).encode()
+    twin = laser(reboot_s=1.5)
+    assert twin.receive(b"RB\n", 0.0) + twin.receive(b"RB\n", 0.5) == vector
+    assert twin.receive(b"QT\n", 1.4) == b"QT\n00P\n\n"  # it takes a second until it goes
+    assert twin.next_due() == pytest.approx(1.5)
+    assert twin.advance(1.5) == b""
+    assert twin.receive(b"QT\n", 2.9) == b""
+    assert twin.receive(b"QT\n", 3.1) == b"QT\n00P\n\n"
+    twin.receive(b"TM0\n", 4.0)
+    (time,) = replies(twin, b"TM1\n", 4.0)
+    assert isinstance(time, Reply)
+    assert decode_time(time) == 1000  # since it woke at 3.0 s
+    slow = laser()
+    assert slow.receive(b"RB\n", 0.0) == slow.receive(b"RB\n", 1.5) == b"RB\n01Q\n\n"
+
+
+def test_a_reboot_is_told_to_the_link() -> None:
+    told: list[bool] = []
+    twin = HokuyoTwin(HokuyoTwinConfig(reboot_s=2.0), lambda stamp: RANGES, 0, told.append)
+    twin.receive(b"RB\nRB\n", 0.0)
+    twin.advance(1.0)
+    assert told == [False]
+    twin.advance(3.0)
+    assert told == [False, True]
+
+
+def test_commands_during_booting_are_answered_together_afterwards() -> None:
+    twin = laser(boot_s=2.0)
+    assert twin.receive(b"QT\n", 0.5) + twin.receive(b"TM2\n", 1.5) == b""
+    assert twin.next_due() == 2.0
+    assert twin.advance(2.0) == b"QT\n00P\n\nTM2\n03S\n\n"
+
+
+def test_scip_1_ends_with_its_command() -> None:
+    twin = laser(starts_in_scip_1=True)
+    assert twin.receive(b"QT\n", 0.0) == b"QT\nE\n\n"
+    assert twin.receive(b"SCIP2.0\n", 0.0) == b"SCIP2.0\n0\n\n"
+    assert twin.receive(b"QT\n", 0.0) == b"QT\n00P\n\n"
+    assert status(laser(), "SCIP2.0") == "0E"  # nothing to leave: it is spoken already
+
+
+def test_an_abnormal_laser_says_who_it_is_and_refuses_the_rest() -> None:
+    twin = laser(starts_abnormal=True)
+    for command in ("QT", "BM", "TM0", "RS", "MD0000108001000"):
+        assert status(twin, command) == "0L"
+    for command in ("VV", "PP", "II"):
+        assert status(twin, command) == "00"
+    assert status(twin, "RB") == "01"
+
+
+@pytest.mark.parametrize(
+    ("commands", "state"),
+    [
+        ([], "000"),
+        (["TM0"], "002"),
+        (["BM"], "003"),
+        (["MD0000108001000"], "004"),
+        (["%SL"], "005"),
+    ],
+    ids=str,
+)
+def test_newer_lasers_tell_their_state(commands: list[str], state: str) -> None:
+    twin = laser(model="UST-10LX")
+    for command in commands:
+        status(twin, command)
+    (reply,) = replies(twin, b"%ST\n")
+    assert reply == Reply("%ST", "00", (state,))
+    assert status(laser(), "%ST") == "0E"
+
+
+@pytest.mark.parametrize("command", ["GD", "GS", "GE", "HD", "HE"])
+def test_single_scans_come_in_every_form(command: str) -> None:
+    twin = laser(model="UTM-30LX-EW", double_echo_fraction=0.2)
+    twin.receive(b"BM\n", 0.0)
+    (scan,) = replies(twin, f"{command}0000108001\n".encode(), 1.0)
+    assert isinstance(scan, ScanReply)
+    assert scan.status == "00"
+    assert (scan.intensities is None) == (not command.endswith("E"))
+    assert (scan.echoes is None) == command.startswith("G")
+    if scan.echoes is None:
+        assert scan.ranges / 1000.0 == pytest.approx(RANGES, abs=0.0006)
+    else:
+        last = scan.ranges[np.cumsum(scan.echoes) - 1]
+        assert last / 1000.0 == pytest.approx(RANGES, abs=0.0006)
+        assert 100 < np.count_nonzero(scan.echoes == 2) < 350
+    assert status(laser(model="URG-04LX"), "HD0044072501") == "0E"
+
+
+def test_a_busy_laser_answers_when_a_turn_is_over() -> None:
+    twin = laser(model="URG-04LX", answers_once_per_turn=True)
+    twin.receive(b"BM\n", 0.0)
+    assert twin.receive(b"II\n", 0.234) == b""
+    assert twin.next_due() == pytest.approx(0.3)
+    assert twin.advance(twin.next_due()).startswith(b"II\n00P\n")
+
+
+@given(st.integers(19200, 750000), st.binary(min_size=1, max_size=3000))
+def test_a_line_hands_out_every_byte_at_its_rate(baud: int, data: bytes) -> None:
+    line = Line(baud)
+    line.put(data, 1.0)
+    seen, last = b"", 1.0
+    while (due := line.next_due()) < math.inf:
+        last = due
+        seen += line.out(due)
+        assert len(seen) * 10 / baud == pytest.approx(due - 1.0)
+    assert seen == data
+    assert last == pytest.approx(1.0 + len(data) * 10 / baud)
