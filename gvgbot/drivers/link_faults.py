@@ -69,6 +69,10 @@ class FaultyLink:
         """Let the device fall silent, or pull its cable, for so long (s)."""
         self._schedule.inject(fault, duration)
 
+    def is_on(self, fault: LinkFault) -> bool:
+        """Whether nothing gets through for this reason."""
+        return self._schedule.is_on(fault)
+
     def receive(self, data: bytes, now: float) -> bytes:
         """Take the host's bytes; those that the device answers at once and that arrive at once."""
         if self._is_plugged:

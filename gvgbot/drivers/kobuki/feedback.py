@@ -106,11 +106,15 @@ class FeedbackReader:
         self.heard = -math.inf  # arrival of the last frame of use, s
 
     def take(self, data: bytes, arrival: float) -> Odometry | None:
-        """The newest odometry that these bytes complete, if any."""
+        """The newest odometry that these bytes complete, if any.
+
+        Of frames that come together, each was made at least a period before the next.
+        """
         newest: Odometry | None = None
-        for frame in self._parser.feed(data):
-            if not isinstance(frame, BadFrame):
-                newest = self._take_parts(decode_feedback(frame.payload), arrival) or newest
+        frames = [frame for frame in self._parser.feed(data) if not isinstance(frame, BadFrame)]
+        for later, frame in zip(reversed(range(len(frames))), frames, strict=True):
+            made_by = arrival - later * FRAME_PERIOD
+            newest = self._take_parts(decode_feedback(frame.payload), made_by) or newest
         return newest
 
     @property
