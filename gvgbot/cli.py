@@ -79,16 +79,19 @@ def _add_explore(commands: "argparse._SubParsersAction[_Parser]") -> None:
         epilog="example: gvgbot explore --world office --seed 3 --out runs/office-3",
     )
     explore.add_argument(
-        "--world", metavar="NAME|YAML", help="a built-in world, or a map_server YAML"
+        "--world",
+        metavar="NAME|YAML",
+        help="a built-in world (office, grid, rooms, cave and others), or a map_server YAML",
     )
     explore.add_argument(
         "--start",
         nargs=3,
         type=number,
         metavar=("X", "Y", "THETA"),
-        help="where to start in the world: metres, metres, radians",
+        help="where to start in the world: metres, metres, radians (default: the world's own start, "
+        "or 0 0 0)",
     )
-    explore.add_argument("--seed", type=seed, metavar="N", help="of all randomness")
+    explore.add_argument("--seed", type=seed, metavar="N", help="draws all errors of the devices")
     explore.add_argument("--config", type=Path, metavar="C.yaml", help="default: sim.yaml")
     _add_overrides(explore)
     explore.add_argument(
