@@ -14,7 +14,7 @@ from gvgbot.drivers.hokuyo.models import MODELS
 from gvgbot.drivers.hokuyo.twin import HokuyoTwin
 from gvgbot.drivers.kobuki.twin import KobukiTwin
 from gvgbot.drivers.link_faults import FaultyLink
-from gvgbot.drivers.transport import pipe, serve_twin
+from gvgbot.drivers.transport import serve_twin
 from gvgbot.drivers.world import World, check_start
 from gvgbot.geometry import Array, Pose
 from gvgbot.worlds import open_world
@@ -68,17 +68,26 @@ class Simulation:
             return np.concatenate(seen)
 
         laser_seed, base_seed = np.random.SeedSequence(config.twin.seed).generate_state(2)
-        self.laser_twin = HokuyoTwin(config.twin.laser, sense, int(laser_seed))
-        cable = Cable()
+        cable, laser_cable = Cable(), Cable()
         self.plug_base: Callable[[bool], None] = cable.plug  # of the link that is in use
+        self.plug_laser: Callable[[bool], None] = laser_cable.plug
+        self.laser_twin = FaultyLink(
+            HokuyoTwin(config.twin.laser, sense, int(laser_seed)),
+            config.twin.laser.link,
+            int(laser_seed),
+            self._pull_laser,
+        )
         self.base_twin = FaultyLink(
             KobukiTwin(config.twin.base, self.body, int(base_seed), config.base.geometry),
             config.twin.base.link,
             int(base_seed),
             self._pull_base,
         )
-        self.laser, self._laser_end = pipe()
+        self.laser, self._laser_end = laser_cable.host, laser_cable.device
         self.base, self._base_end = cable.host, cable.device
+
+    def _pull_laser(self, is_plugged: bool) -> None:
+        self.plug_laser(is_plugged)
 
     def _pull_base(self, is_plugged: bool) -> None:
         self.plug_base(is_plugged)

@@ -46,6 +46,7 @@ async def serve_on(
     """Serve the twins of a simulation on these ports until `stopped` returns."""
     clock = LoopClock()
     simulation.plug_base = base.plug
+    simulation.plug_laser = laser.plug
     async with asyncio.TaskGroup() as tasks:
         serving = [
             tasks.create_task(serve_twin(simulation.laser_twin, laser, clock), name="laser twin"),
