@@ -88,8 +88,8 @@ def _add_explore(commands: "argparse._SubParsersAction[_Parser]") -> None:
         nargs=3,
         type=number,
         metavar=("X", "Y", "THETA"),
-        help="where to start in the world: metres, metres, radians (default: the world's own start, "
-        "or 0 0 0)",
+        help="where to start in the world: metres, metres, radians (default: a built-in world's "
+        "own start, else 0 0 0)",
     )
     explore.add_argument("--seed", type=seed, metavar="N", help="draws all errors of the devices")
     explore.add_argument("--config", type=Path, metavar="C.yaml", help="default: sim.yaml")
