@@ -75,15 +75,37 @@ def play_on_a_terminal(story: Story) -> None:
     asyncio.run(main())
 
 
-PLAYERS = [pytest.param(play_in_memory(name), id=name) for name in CONFIGS]
-PLAYERS.append(pytest.param(play_on_a_terminal, id="terminal", marks=pytest.mark.slow))
+def play_on_hardware(port: str) -> Callable[[Story], None]:
+    async def main(story: Story) -> None:
+        clock = LoopClock()
+        config = load_config(None, [f"base.port={port}", "twin.enabled=false"])
+        base, close = Links(config, clock, None).open_base()
+        async with asyncio.TaskGroup() as tasks:
+            serving = tasks.create_task(base.run())
+            await story(base, clock)
+            serving.cancel()
+        close()
+
+    return lambda story: asyncio.run(main(story))
+
+
+PLAYERS = [
+    *(pytest.param(play_in_memory(name), id=name) for name in CONFIGS),
+    pytest.param(play_on_a_terminal, id="terminal", marks=pytest.mark.slow),
+    pytest.param(None, id="hardware", marks=pytest.mark.hardware),
+]
 
 
 @pytest.fixture(params=PLAYERS)
 def play(request: pytest.FixtureRequest) -> Callable[[Story], None]:
-    """Tell a story to a base that is being served."""
-    player: Callable[[Story], None] = request.param
-    return player
+    """Tell a story to a base that is being served; a real one needs 0.2 m of free way ahead."""
+    if request.param is not None:
+        player: Callable[[Story], None] = request.param
+        return player
+    port = request.config.getoption("--base-port")
+    if port is None:
+        pytest.skip("needs --base-port")
+    return play_on_hardware(port)
 
 
 def test_odometry_comes_steadily_with_rising_stamps_that_are_not_in_the_future(
