@@ -239,6 +239,20 @@ def test_stamps_are_right_in_spite_of_jitter_and_drift(
     on_rig(scenario, link=link, config=config, clock_drift_ppm=drift_ppm)
 
 
+@pytest.mark.parametrize("sync", [True, False])
+def test_a_reboot_to_the_same_time_of_its_clock_is_no_trap(*, sync: bool) -> None:
+    """A clock that began again stands a little further than at the last scan before."""
+
+    async def scenario(rig: Rig) -> None:
+        for uptime in (2.0, 0.8, 0.9, 1.0, 1.1, 1.2):
+            await rig.clock.sleep_until(rig.clock.now() + uptime + 1.5)
+            rig.twin.inject("reboot")
+        await rig.clock.sleep_until(rig.clock.now() + 10.0)
+        assert np.abs(rig.errors).max() < 0.010
+
+    on_rig(scenario, config=HokuyoConfig(synchronise=sync))
+
+
 def test_a_chip_that_collects_bytes_costs_little_of_the_stamps() -> None:
     async def scenario(rig: Rig) -> None:
         await rig.clock.sleep_until(90.0)

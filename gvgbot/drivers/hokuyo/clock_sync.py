@@ -71,6 +71,11 @@ class ClockMap:
             return self.elapsed + self.anchor
         return self.elapsed + MEAN_TRUNCATION + self.offset - self.delay
 
+    @property
+    def known_delay(self) -> float:
+        """How late a scan arrives if nothing holds it up, as far as is known (s)."""
+        return self.delay if self.anchor is None else self.least
+
 
 def start(
     stamp_ms: int, arrival: float, *, delay: float, sync: Synchronisation | None = None
@@ -101,8 +106,7 @@ def follow(clock_map: ClockMap, stamp_ms: int, arrival: float) -> ClockMap:
     elapsed = clock_map.elapsed + advance_ms / 1000.0
     latest_offset = arrival - elapsed
     if latest_offset < clock_map.offset - RESET_LEAD:
-        delay = clock_map.delay if clock_map.anchor is None else clock_map.least
-        return ClockMap(stamp_ms, 0.0, arrival, delay, clock_map.resets + 1)
+        return ClockMap(stamp_ms, 0.0, arrival, clock_map.known_delay, clock_map.resets + 1)
     highest_offset = clock_map.offset + LARGEST_DRIFT * advance_ms / 1000.0
     moved = replace(
         clock_map, stamp_ms=stamp_ms, elapsed=elapsed, offset=min(latest_offset, highest_offset)

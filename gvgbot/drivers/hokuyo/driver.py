@@ -54,6 +54,7 @@ class _Stream:
     silence: float
     sync: Synchronisation | None = None
     clock_map: ClockMap | None = None
+    is_fresh: bool = True  # no scan has come yet; the map is that of an earlier stream
 
 
 class HokuyoLaser:
@@ -268,18 +269,22 @@ class HokuyoLaser:
             self.link.repeated_scans += 1
             return None
         now = self._follow(stream, reply.stamp, arrival)
-        stream.clock_map, stream.sync = now, None
+        stream.clock_map, stream.is_fresh = now, False
         ranges, intensities = one_per_step(reply, self._config.echo)
         if intensities is not None:
             self._intensities = intensities[::-1] if stream.geometry.is_reversed else intensities
         return stream.geometry.scan(ranges, now.host_stamp)
 
     def _follow(self, stream: _Stream, stamp_ms: int, arrival: float) -> ClockMap:
-        """The laser's clock after this scan; a synchronisation just made begins a new map."""
-        before, now = stream.clock_map, None
-        if before is not None:
-            now = clock_sync.follow(before, stamp_ms, arrival)
+        """The laser's clock after this scan; a stream that was started again begins a new map.
+
+        Nothing in a new stream is old, and the laser may have rebooted unnoticed in between.
+        """
+        before = stream.clock_map
+        now = None if before is None else clock_sync.follow(before, stamp_ms, arrival)
+        if before is not None and now is not None:
             self.link.clock_resets += now.resets - before.resets
-        if now is None or stream.sync is not None:
-            now = clock_sync.start(stamp_ms, arrival, delay=stream.delay, sync=stream.sync)
+        if now is None or stream.is_fresh:
+            delay = stream.delay if before is None else before.known_delay
+            now = clock_sync.start(stamp_ms, arrival, delay=delay, sync=stream.sync)
         return now
