@@ -20,12 +20,7 @@ from typing import Any
 
 from gvgbot.worlds import builtin
 
-NEIGHBOUR = Path(__file__).parents[2] / "shared"
 WORLDS = ["office", "grid", "jittered", "rooms", "cave"]
-LITERATURE = [
-    f"{NEIGHBOUR}/worlds/iros_grid.yaml:0:6:1.186",
-    f"{NEIGHBOUR}/worlds/cim.yaml:0:-8.2:0",
-]
 COLUMNS = (
     ("recall", "recall", "{:.3f}"),
     ("precision", "prec", "{:.3f}"),
@@ -58,12 +53,11 @@ def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
-    there = [world for world in LITERATURE if Path(world.split(":")[0]).exists()]
-    parser.add_argument("--worlds", nargs="+", default=there + WORLDS)
+    parser.add_argument("--worlds", nargs="+", default=WORLDS)
     parser.add_argument("--seeds", nargs="+", type=int, default=[1, 2, 3, 4, 5])
     parser.add_argument("--set", dest="overrides", nargs="+", default=[])
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
-    parser.add_argument("--scorer", type=Path, default=NEIGHBOUR / "eval" / "score.py")
+    parser.add_argument("--scorer", type=Path)
     parser.add_argument("--out", help="keep the run directories here")
     return parser.parse_args()
 
@@ -95,8 +89,8 @@ def _start(name: str) -> list[str]:
     return [str(pose.x), str(pose.y), str(pose.theta)]
 
 
-def _score(directory: Path, start: list[str], scorer: Path) -> dict[str, Any]:
-    if not scorer.exists():
+def _score(directory: Path, start: list[str], scorer: Path | None) -> dict[str, Any]:
+    if scorer is None:
         return {}
     command = [sys.executable, str(scorer), str(directory), str(directory / "world.yaml"), *start]
     done = subprocess.run(command, capture_output=True, text=True, check=False)

@@ -39,8 +39,8 @@ def explore(config: Config, *, out: Path | None, real_time: bool) -> int:
         try:
             with asyncio.Runner(loop_factory=factory) as runner:
                 runner.run(explore_once(session, progress))
-        except GvgbotError as error:
-            session.failure = str(error)
+        except Exception as error:
+            session.failure = str(error) or type(error).__name__
             raise
         finally:
             progress.clear()
@@ -84,7 +84,8 @@ def _conclude(session: Session) -> int:
     mission, graph = session.pipeline.mission, session.pipeline.mapper.graph
     print(
         f"{mission.outcome}: {mission.reason}; {len(graph.vertices)} vertices, "
-        f"{len(graph.edges)} edges, {session.pipeline.travelled:.0f} m driven"
+        f"{len(graph.edges)} edges, {session.pipeline.travelled:.0f} m driven",
+        file=sys.stdout if mission.outcome == "explored" else sys.stderr,
     )
     print(f"map:     {session.directory.path / 'map.geojson'}")
     print(f"picture: {session.directory.path / 'map.png'}")

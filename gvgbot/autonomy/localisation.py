@@ -58,6 +58,8 @@ def _sampled(scan: Scan, count: int) -> Array:
         hit = scan.ranges < _RANGE_M
     r, b = scan.ranges[hit], scan.bearings[hit]
     points = np.stack([r * np.cos(b), r * np.sin(b)], axis=1)
+    if len(points) == 0:
+        return points
     gaps = np.hypot(*np.diff(points, axis=0).T)
     along = np.concatenate([[0.0], np.cumsum(np.minimum(gaps, _LONGEST_GAP_M))])
     step = max(float(along[-1]) / count, 1e-6)

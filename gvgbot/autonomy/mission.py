@@ -237,8 +237,11 @@ class Mission:
         self._looked_around = 0
         half = None if self.target is None else self._mapper.graph.half_edge(self.target)
         if half is None:
-            known = bool(self._mapper.graph.vertices)
-            self._end(view, "explored_with_blocked" if known else "failed", reason)
+            if self._mapper.graph.vertices:
+                given_up = len(self._mapper.graph.frontiers()) + len(self._mapper.graph.blocked())
+                self._end(view, "explored_with_blocked", f"{given_up} frontiers left: {reason}")
+            else:
+                self._end(view, "failed", f"no vertex found, perhaps no way out: {reason}")
             return
         half.blocked = True
         self._events.append(Recovery(view.stamp, "give up a frontier", reason))

@@ -136,6 +136,6 @@ def _next_free(runs: Path, world: str) -> Path:
 
 
 def _unfit(path: Path, error: OSError) -> UsageError:
-    if path.exists() and not path.is_dir():
+    if isinstance(error, FileExistsError | NotADirectoryError):
         return UsageError(f"cannot write a run to {path}: it is a file, choose another directory")
     return UsageError(f"cannot write a run to {path}: {error.strerror}, choose another directory")

@@ -76,6 +76,6 @@ def follow(
 
 def _speed_limit(clearance: float, robot_radius: float, config: EdgeFollowerConfig) -> float:
     """Full speed in the open, linearly down to the least speed where the robot just fits."""
-    room = (clearance - robot_radius) / (config.slow_clearance_m - robot_radius)
+    room = (clearance - robot_radius) / max(config.slow_clearance_m - robot_radius, 0.01)
     slow, full = config.min_speed_mps, config.max_speed_mps
     return slow + (full - slow) * min(1.0, max(0.0, room))
