@@ -8,6 +8,7 @@ from gvgbot.config import Config
 from gvgbot.drivers.hokuyo.driver import HokuyoLaser
 from gvgbot.drivers.kobuki.driver import KobukiBase
 from gvgbot.drivers.kobuki.feedback import FeedbackReader
+from gvgbot.drivers.tcp import SCHEME, TcpStream
 from gvgbot.drivers.transport import ByteStream, SerialStream
 from gvgbot.errors import DeviceLost
 from gvgbot.hal.devices import Base, Laser
@@ -51,7 +52,7 @@ class Links:
 
 def _open_port(name: str, port: str, baud: int) -> tuple[ByteStream, Close]:
     try:
-        stream = SerialStream(port, baud)
+        stream = TcpStream(port) if port.startswith(SCHEME) else SerialStream(port, baud)
     except DeviceLost as error:
         raise DeviceLost(f"{error}: plug the {name} in, or set {name}.port") from error
     return stream, stream.close

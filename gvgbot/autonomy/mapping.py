@@ -359,6 +359,10 @@ class Mapper:
                 if edge.conflicts > self._config.conflicts:
                     self.graph.unjoin(edge)
 
+    def in_local_frame(self, view: View, vertex: int) -> Pose:
+        """Where a vertex, seen lately or not, stands in the local frame."""
+        return view.local_base.compose(ekf.expected(self.belief, vertex)[0])
+
     def join(
         self,
         view: View,

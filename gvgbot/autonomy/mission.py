@@ -4,6 +4,8 @@ import math
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
+import numpy as np
+
 from gvgbot.autonomy.control.edge_follower import Track
 from gvgbot.autonomy.events import Decision, Event, Finished, Recovery
 from gvgbot.autonomy.exploration.ears import ear_next, nearest_frontier
@@ -11,6 +13,7 @@ from gvgbot.autonomy.exploration.paths import shortest_paths
 from gvgbot.autonomy.gvg.local import Branch
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.slam.graph import HalfEdgeId
+from gvgbot.autonomy.start_edge import StartEdge, is_at_start
 from gvgbot.autonomy.views import Correspondence, View
 from gvgbot.autonomy.whereabouts import Passage, Situation, Whereabouts
 from gvgbot.ranges import Range
@@ -75,6 +78,7 @@ class Mission:
         self._last_progress = 0.0  # stamp
         self._last_view = math.inf  # stamp
         self._travelled_then = -math.inf
+        self._start_edge: StartEdge | None = None
         self._frontiers: set[HalfEdgeId] = set()  # that were known at the last view
         self._looked_around = 0
         self._lost_since: float | None = None
@@ -93,6 +97,7 @@ class Mission:
         passage = self.where.follow(view.gvg, place, known, base)
         if passage is not None:
             self._account_for(view, known, passage)
+        self._close_start_edge(view, view.gvg.edges[place.edge].clearance_at(place.station))
         here = Situation(view.gvg, known, self._mapper.graph, self.where, place, view.local_base)
         self._watch_progress(view)
         order = Stand() if self.outcome is not None else self._decide(view, here)
@@ -103,6 +108,9 @@ class Mission:
     def _account_for(self, view: View, known: Correspondence, passage: Passage) -> None:
         """Count a traversal, or close the edge that was driven from a vertex now out of sight."""
         graph, left, arrived = self._mapper.graph, passage.left, passage.arrived
+        if left is None and arrived is not None and self._start_edge is None:
+            line = graph.vertices[arrived.vertex].local.inverse().transform(passage.line)
+            self._start_edge = StartEdge(arrived, line, passage.narrowest)
         if left is None or arrived is None or left == arrived:
             return
         edge = graph.edge_at(left)
@@ -116,6 +124,23 @@ class Mission:
             return
         self._mapper.join(view, left, arrived, passage.line, passage.narrowest, driven=True)
 
+    def _close_start_edge(self, view: View, clearance: float) -> None:
+        """Join the edge that the robot started on, when it comes there from the other end."""
+        start, on_edge, graph = self._start_edge, self.where.on_edge, self._mapper.graph
+        if start is None or on_edge is None or on_edge == start.end:
+            return
+        ends = (graph.half_edge(on_edge), graph.half_edge(start.end))
+        if any(half is None or not half.open for half in ends):
+            return
+        if self.where.trail_length < _LEAST_LOOP_M or not is_at_start(
+            self._mapper.belief, clearance
+        ):
+            return
+        rest = self._mapper.in_local_frame(view, start.end.vertex).transform(start.line)
+        line = np.concatenate([np.array(self.where.trail), rest])
+        narrowest = min(self.where.narrowest, start.narrowest)
+        self._mapper.join(view, on_edge, start.end, line, narrowest, driven=True)
+
     # -- where next ------------------------------------------------------------------------------
 
     def _decide(self, view: View, here: Situation) -> Order:
@@ -124,6 +149,7 @@ class Mission:
         half = None if target is None else graph.half_edge(target)
         if target is None or half is None or not half.open:
             self.target = self._choose(view, here)
+            self._frontiers = set(graph.frontiers())
         else:
             self.target = self._reconsidered(view, here, target)
         if self.outcome is not None:

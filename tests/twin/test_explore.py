@@ -319,3 +319,10 @@ def test_another_process_with_other_hashes_leaves_the_same_bytes(tmp_path: Path)
     )
     for name in REPEATED:
         assert (here.path / name).read_bytes() == (there / name).read_bytes()
+
+
+def test_the_edge_of_the_start_is_not_driven_twice(tmp_path: Path) -> None:
+    """Around the ring corridor of 6 m mean radius, into no more than the mouth of its alcove."""
+    assert main(["explore", "--world", "ring", "--seed", "2", "--out", str(tmp_path)]) == 0
+    summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
+    assert summary["distance_m"] < math.tau * 6.0 * 1.2

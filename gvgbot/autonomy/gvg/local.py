@@ -24,6 +24,10 @@ class LocalEdge:
         """Metres from end to end."""
         return float(self.stations[-1])
 
+    def clearance_at(self, station: float) -> float:
+        """Clearance so many metres along the edge."""
+        return float(np.interp(station, self.stations, self.clearance))
+
     def other(self, node: int) -> int:
         """The node at the far end."""
         return self.b if node == self.a else self.a

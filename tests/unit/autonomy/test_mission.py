@@ -64,6 +64,7 @@ class Robot:
                 x, y = x0 + share * (x1 - x0), y0 + share * (y1 - y0)
                 here = Pose(float(x), float(y), math.atan2(y1 - y0, x1 - x0))
                 self.travelled += self.pose.distance(here)
+                self.mapper.move(self.pose.to(here), np.eye(3) * 1e-6)
                 self.pose = here
                 order = self.look(gvg)
         return order
