@@ -23,7 +23,7 @@ from gvgbot.hal.deskew import deskewed
 from gvgbot.hal.messages import Odometry, Scan
 from gvgbot.ranges import Range
 
-_SCAN_EVERY_M, _SCAN_EVERY_RAD = 0.45, 0.4  # scans that are kept for the occupancy grid
+_SCAN_EVERY_M, _SCAN_EVERY_RAD = 0.7, 0.5  # scans that are kept for the occupancy grid
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
