@@ -14,7 +14,7 @@ from gvgbot.maps.route_graph import MapVertex, RouteGraph
 from gvgbot.maps.trajectory import Trajectory
 from gvgbot.maps.view import Box, View, box_around
 
-_WIDTH, _TALLEST, _NARROWEST = 1544, 1700, 900  # pixels of the map; a tall one is less wide
+_WIDTH, _TALLEST, _NARROWEST = 1344, 1344, 900  # pixels of the map; a tall one is less wide
 _MARGIN = 28  # pixels around everything
 _ID_SIZE = 16  # pixels
 _SIGMAS = 3.0  # of the ellipses

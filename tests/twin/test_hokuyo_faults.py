@@ -331,7 +331,7 @@ def test_minutes_of_all_faults_at_once_hand_on_no_wrong_scan() -> None:
     check_soak(soak(0.15, link, mishaps), 0.15)
 
 
-@pytest.mark.slow
+@pytest.mark.bench  # minutes of computing: run it with -m bench
 @pytest.mark.timeout(1200)
 def test_a_day_of_all_faults_at_once_hands_on_no_wrong_scan() -> None:
     check_soak(soak(24.0, EVERYTHING, EVERY_MISHAP), 24.0)

@@ -86,9 +86,9 @@ def test_vertices_stand_to_scale_with_y_upwards() -> None:
     assert (x2 - x1) == pytest.approx(2 * (y1 - y3), abs=2)
 
 
-def test_a_wide_map_is_1600_pixels_wide_and_a_tall_one_stays_printable() -> None:
+def test_a_wide_map_is_1400_pixels_wide_and_a_tall_one_stays_printable() -> None:
     tall = RouteGraph((vertex(1, 0.0, 0.0), vertex(2, 1.0, 80.0)))
-    assert pixels(draw_map(TRIANGLE)).shape[1] == 1600
+    assert pixels(draw_map(TRIANGLE)).shape[1] == 1400
     height, width, _ = pixels(draw_map(tall)).shape
     assert 600 < width < height < 2000
 
@@ -193,7 +193,7 @@ def test_nothing_is_drawn_outside_the_frame_but_the_legend() -> None:
     "grid", [None, OccupancyGrid(np.full((4, 4), -1, np.int8), 0.05, (0.0, 0.0))]
 )
 def test_a_map_of_nothing_is_a_picture_too(grid: OccupancyGrid | None) -> None:
-    assert pixels(draw_map(RouteGraph(), grid=grid)).shape[1] == 1600
+    assert pixels(draw_map(RouteGraph(), grid=grid)).shape[1] == 1400
 
 
 def test_the_same_map_gives_the_same_bytes() -> None:
