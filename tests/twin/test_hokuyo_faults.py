@@ -318,7 +318,8 @@ def check_soak(rig: Rig, hours: float) -> None:
     assert min(faults[name] for name in EVERY_MISHAP.rates) > 0
     assert min(faults[name] for name in ("silence", "unplug", "flipped bit", "lost byte")) > 0
     assert np.diff(rig.arrivals).max() < 15.0  # several faults may follow each other
-    # A stream that begins with the scan of a laser that froze is stamped too late, once.
+    # Single scans after a restart have been seen stamped too late, by up to 0.6 s; why is not
+    # known (perhaps a stream that begins with a frozen scan).
     assert np.percentile(np.abs(rig.errors), 99.0) < 0.006
     for name in ("bad_messages", "repeated_scans", "refused_scans", "restarts", "reboots"):
         assert rig.total(name) > 0, name
