@@ -36,6 +36,7 @@ from gvgbot.drivers.hokuyo.scip_messages import (
 END = b"\n\n"
 MESSAGE_LIMIT = 65536  # bytes; the largest multi-echo frame takes a third of it
 
+_END = re.compile(re.escape(END))  # a regular expression finds it sooner than `find` does
 _KEY_COMMANDS = frozenset({"VV", "PP", "II"})
 _STAMP_CHARACTERS = frozenset({4, 11})
 _ECHO = re.compile(rf"(?:[%$]?[A-Z]{{2}}|SCIP)[0-9.]*(?:;{USER_STRING})?".encode())
@@ -51,6 +52,7 @@ class ScipParser:
 
     def __init__(self) -> None:
         self._buffer = bytearray()
+        self._searched = 0  # bytes in which no message ends
 
     @property
     def pending(self) -> int:
@@ -68,12 +70,15 @@ class ScipParser:
     def _next_message(self) -> bytes | None:
         """The next message with its first line feed of two, or what fills the buffer."""
         self._drop_empty_lines()
-        end = self._buffer.find(END, 0, MESSAGE_LIMIT)
-        if end < 0:
-            return self._take(MESSAGE_LIMIT) if len(self._buffer) >= MESSAGE_LIMIT else None
-        message = self._take(end + 1)
-        del self._buffer[:1]
-        return message
+        end = _END.search(self._buffer, self._searched, MESSAGE_LIMIT)
+        if end is not None:
+            message = self._take(end.start() + 1)
+            del self._buffer[:1]
+            return message
+        if len(self._buffer) >= MESSAGE_LIMIT:
+            return self._take(MESSAGE_LIMIT)
+        self._searched = max(0, len(self._buffer) - 1)
+        return None
 
     def _drop_empty_lines(self) -> None:
         while self._buffer.startswith(b"\n"):
@@ -82,6 +87,7 @@ class ScipParser:
     def _take(self, length: int) -> bytes:
         taken = bytes(self._buffer[:length])
         del self._buffer[:length]
+        self._searched = 0
         return taken
 
 

@@ -19,6 +19,8 @@ _WEIGHTS = {
     2: np.array([64.0, 1.0], np.float32),
     3: np.array([4096.0, 64.0, 1.0], np.float32),
 }
+# By the sum modulo 256, which leaves the six bits that count as they are.
+_CHECKSUMS = bytes((total & LARGEST_DIGIT) + OFFSET for total in range(256))
 
 
 class DamagedError(ValueError):
@@ -84,27 +86,19 @@ def unblock(data: bytes) -> Characters:
     tail = data[full * ROW :]
     if tail and tail[-1] != LINE_FEED:
         raise DamagedError("block length")
-    rows = np.frombuffer(data, np.uint8, full * ROW).reshape(full, ROW)
-    _check_rows(rows)
-    last = checked(tail[:-1]) if tail else b""
-    out = np.empty(full * BLOCK + len(last), np.uint8)
-    out[: full * BLOCK].reshape(full, BLOCK)[:] = rows[:, :BLOCK]
-    out[full * BLOCK :] = np.frombuffer(last, np.uint8)
-    out -= OFFSET
-    return out
-
-
-def _check_rows(rows: Characters) -> None:
-    if not (rows[:, BLOCK + 1] == LINE_FEED).all():
+    rows = np.frombuffer(data, np.uint8, full * ROW).reshape(full, ROW)[:, :BLOCK]
+    if data[BLOCK + 1 : full * ROW : ROW] != b"\n" * full:
         raise DamagedError("block length")
-    if not (_row_sums(rows[:, :BLOCK]) == rows[:, BLOCK]).all():
+    if data[BLOCK : full * ROW : ROW] != _row_checksums(rows):
         raise DamagedError("line checksum")
+    last = checked(tail[:-1]) if tail else b""
+    return np.frombuffer(rows.tobytes() + last, np.uint8) - np.uint8(OFFSET)
 
 
-def _row_sums(rows: Characters) -> Characters:
-    """Checksums of rows of bytes; sums may wrap at 256, which six bits do not see."""
+def _row_checksums(rows: Characters) -> bytes:
+    """The checksum of each row of bytes."""
     sums: Characters = np.add.reduce(rows, axis=1, dtype=np.uint8)
-    return (sums & np.uint8(LARGEST_DIGIT)) + np.uint8(OFFSET)
+    return sums.tobytes().translate(_CHECKSUMS)
 
 
 def block(characters: Characters) -> bytes:
@@ -113,7 +107,7 @@ def block(characters: Characters) -> bytes:
     full = len(text) // BLOCK
     rows = np.empty((full, ROW), np.uint8)
     rows[:, :BLOCK] = text[: full * BLOCK].reshape(full, BLOCK)
-    rows[:, BLOCK] = _row_sums(rows[:, :BLOCK])
+    rows[:, BLOCK] = np.frombuffer(_row_checksums(rows[:, :BLOCK]), np.uint8)
     rows[:, BLOCK + 1] = LINE_FEED
     tail = text[full * BLOCK :].tobytes()
     return rows.tobytes() + (with_checksum(tail) + b"\n" if tail else b"")

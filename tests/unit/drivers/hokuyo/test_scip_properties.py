@@ -111,6 +111,12 @@ def test_any_chunking_gives_the_same_messages(parts: list[bytes], cuts: list[int
     assert feed_in_chunks(data, cuts) == feed_in_chunks(data, [])
 
 
+@given(scans(), scans())
+def test_scans_that_come_byte_by_byte_are_read(first: ScanReply, second: ScanReply) -> None:
+    data = encode_scan(first) + b"\n" + encode_scan(second)
+    assert feed_in_chunks(data, list(range(len(data)))) == [listed(first), listed(second)]
+
+
 @given(st.binary(max_size=400), scans())
 @example(
     b"MD0000108001000\n99b\n", ScanReply(ScanRequest("MD", 0, 0), "99", 7, np.zeros(1, np.int32))
