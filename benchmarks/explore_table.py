@@ -1,7 +1,7 @@
 """Explore many worlds with many seeds and print a table: outcome, accuracy, path, speed, memory.
 
-    python benchmarks/explore_table.py [--worlds office PATH.yaml:X:Y:THETA ...] [--seeds 1 2 3]
-                                       [--set key=value ...] [--jobs 2] [--scorer score.py]
+    python benchmarks/explore_table.py [--worlds office floor_plan:7 PATH.yaml:X:Y:THETA ...]
+                                       [--seeds 1 2 3] [--set key=value ...] [--jobs 2] [--scorer score.py]
 
 The scorer is any program that is called as `score.py RUN_DIR WORLD.yaml X Y THETA` and prints JSON
 with recall, precision, edge_recall, vertex_rmse_m, path_ratio and min_clearance_m; without it the
@@ -63,7 +63,7 @@ def _options() -> argparse.Namespace:
 
 
 def _run(world: str, seed: int, out: Path, options: argparse.Namespace) -> dict[str, Any]:
-    path, *start = world.split(":")
+    path, *start = world.rsplit(":", 3) if world.count(":") > 2 else [world]
     name = Path(path).stem
     directory = out / f"{name}-{seed}"
     command = [sys.executable, "-m", "gvgbot", "explore", "--world", path, "--seed", str(seed)]

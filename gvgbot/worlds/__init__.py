@@ -8,6 +8,7 @@ from gvgbot.errors import WorldError
 from gvgbot.geometry import Pose
 from gvgbot.worlds.buildings import comb, grid, hall, jittered, office, ring, spiral
 from gvgbot.worlds.cave import cave
+from gvgbot.worlds.floor_plan import floor_plan
 from gvgbot.worlds.rooms import rooms
 
 _MAKERS: dict[str, Callable[[int], tuple[World, Pose]]] = {
@@ -20,31 +21,38 @@ _MAKERS: dict[str, Callable[[int], tuple[World, Pose]]] = {
     "spiral": spiral,
     "ring": ring,
     "hall": hall,
+    "floor_plan": floor_plan,
 }
 NAMES: tuple[str, ...] = tuple(_MAKERS)
 
 
-def builtin(name: str, seed: int = 0) -> tuple[World, Pose]:
-    """The built-in world of this name and a free start pose (world_base).
+def builtin(name: str) -> tuple[World, Pose]:
+    """A built-in world and a free start pose in it (world frame).
 
-    Worlds that are not drawn at random ignore the seed. Raises WorldError for an unknown name.
+    `name` is one of NAMES; a world that is drawn at random takes a seed behind a colon, as in
+    `floor_plan:7`, else 0. Raises WorldError for an unknown name.
     """
-    if name not in _MAKERS:
-        raise WorldError(f"unknown world {name!r}; the built-in worlds are {', '.join(NAMES)}")
-    return _MAKERS[name](seed)
+    maker, _, seed = name.partition(":")
+    if maker not in _MAKERS or (":" in name and not seed.isdecimal()):
+        raise WorldError(_unknown(name))
+    return _MAKERS[maker](int(seed or 0))
 
 
-def open_world(name_or_path: str, seed: int = 0) -> tuple[World, Pose | None]:
+def open_world(name_or_path: str) -> tuple[World, Pose | None]:
     """A built-in world with its start pose, or the world of a map_server YAML file without one.
 
     Raises WorldError when it is neither, or the file is unfit.
     """
-    if name_or_path in _MAKERS:
-        return builtin(name_or_path, seed)
+    if name_or_path.partition(":")[0] in _MAKERS:
+        return builtin(name_or_path)
     path = Path(name_or_path)
     if not path.exists() and path.suffix not in (".yaml", ".yml"):
-        raise WorldError(
-            f"unknown world {name_or_path!r}: give a map_server YAML file or one of the built-in "
-            f"worlds {', '.join(NAMES)}"
-        )
+        raise WorldError(_unknown(name_or_path))
     return load_world(path), None
+
+
+def _unknown(name: str) -> str:
+    return (
+        f"unknown world {name!r}: give a map_server YAML file or one of the built-in worlds "
+        f"{', '.join(NAMES)} (NAME:SEED draws another one of its kind)"
+    )
