@@ -135,6 +135,21 @@ class Scripted(Deaf):
         return self.twin.next_due()
 
 
+class LosesStops(Scripted):
+    """A laser that says yes to a stop and goes on, so many times."""
+
+    def __init__(self, twin: TwinDevice, losses: int) -> None:
+        super().__init__({b"QT\n": b"QT\n00P\n\n"}, twin)
+        self.losses = losses
+
+    def answer(self, command: bytes, now: float) -> bytes:
+        if command == b"QT\n":
+            self.losses -= 1
+            if self.losses < 0:
+                return self.twin.receive(command, now)
+        return super().answer(command, now)
+
+
 def on_bench(
     twin: TwinDevice,
     scenario: Callable[[Bench], Awaitable[None]],

@@ -253,6 +253,22 @@ def test_a_reboot_to_the_same_time_of_its_clock_is_no_trap(*, sync: bool) -> Non
     on_rig(scenario, config=HokuyoConfig(synchronise=sync))
 
 
+@pytest.mark.parametrize("sync", [True, False])
+def test_a_stream_that_begins_with_an_old_scan_stamps_none_too_late(*, sync: bool) -> None:
+    """The laser freezes while nobody listens, and then sends what it measured long ago."""
+
+    async def scenario(rig: Rig) -> None:
+        await rig.good_scan(2.0)
+        rig.link.inject("unplug", 3.0)
+        await rig.clock.sleep_until(rig.clock.now() + 2.8)
+        rig.twin.inject("frozen", 1.0)
+        await rig.clock.sleep_until(rig.clock.now() + 5.0)
+        assert rig.total("repeated_scans") > 0
+        assert np.abs(rig.errors).max() < 0.002
+
+    on_rig(scenario, config=HokuyoConfig(synchronise=sync))
+
+
 def test_a_chip_that_collects_bytes_costs_little_of_the_stamps() -> None:
     async def scenario(rig: Rig) -> None:
         await rig.clock.sleep_until(90.0)

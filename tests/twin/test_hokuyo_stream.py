@@ -18,6 +18,7 @@ from tests.twin.hokuyo_bench import (
     Bench,
     Deaf,
     FrozenClock,
+    LosesStops,
     Scripted,
     SlowLink,
     World,
@@ -136,6 +137,20 @@ def test_it_opens_whatever_the_last_program_left_behind(left_over: bytes) -> Non
         assert started < scan.stamp < bench.clock.now()
 
     on_bench(HokuyoTwin(PERFECT, World(), seed=5), scenario, first=first)
+
+
+@pytest.mark.parametrize("losses", [1, 2])
+def test_a_lost_stop_costs_no_synchronisation(losses: int) -> None:
+    async def first(link: ByteStream, clock: LoopClock) -> None:
+        link.write(b"MD0000108001300\n")
+        await clock.sleep_until(clock.now() + 1.0)
+
+    async def scenario(bench: Bench) -> None:
+        await bench.scans(1)
+        assert bench.laser.synchronisation is not None
+
+    twin = LosesStops(HokuyoTwin(PERFECT, World(), seed=18), losses)
+    on_bench(twin, scenario, first=first)
 
 
 def test_identity_and_parameters_are_those_of_the_laser() -> None:

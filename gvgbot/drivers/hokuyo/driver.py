@@ -37,6 +37,8 @@ SHORTEST_SILENCE = 0.2  # s; links deliver in bursts
 TIME_SAMPLES = 12  # of the laser's clock
 CONVERTER_BEAT = 0.016  # s; a serial converter's usual latency timer
 GOLDEN = 0.618034  # its multiples spread evenly over a beat
+DENIED = "10"  # of TM0: the laser still measures
+LOST_STOPS = 3  # in a row; a stop that comes as a scan begins can be lost
 UNKNOWN_COMMAND = frozenset({"0C", "0D", "0E", "0F"})  # firmware generations disagree on which
 BROKEN = range(50, 98)  # statuses of hardware trouble
 SIMPLER = {"NE": "ND", "ND": "MD", "ME": "MD"}  # what to ask for when a command is unknown
@@ -54,7 +56,8 @@ class _Stream:
     silence: float
     sync: Synchronisation | None = None
     clock_map: ClockMap | None = None
-    is_fresh: bool = True  # no scan has come yet; the map is that of an earlier stream
+    is_fresh: bool = True  # no scan was handed on yet
+    is_doubted: bool = False  # the first one fits no synchronisation
 
 
 class HokuyoLaser:
@@ -161,7 +164,7 @@ class HokuyoLaser:
             return None
         samples: list[TimeSample] = []
         try:
-            await self._dialogue.ask("TM0")
+            await self._enter_time_mode()
             while len(samples) < TIME_SAMPLES:
                 samples.append(await self._time_sample())
                 await self._pause(len(samples))
@@ -170,6 +173,19 @@ class HokuyoLaser:
         self._dialogue.send("TM2")
         await self._dialogue.reply_to("TM2")
         return clock_sync.synchronise(samples)
+
+    async def _enter_time_mode(self) -> None:
+        """Raises Refusal if the laser cannot."""
+        for _ in range(LOST_STOPS):
+            try:
+                await self._dialogue.ask("TM0")
+            except Refusal as refusal:
+                if refusal.status != DENIED:
+                    raise
+                await quiet(self._dialogue, patience=2 * self._config.reply_timeout_s)
+            else:
+                return
+        raise Refusal("TM0", DENIED)
 
     async def _time_sample(self) -> TimeSample:
         """Raises Refusal or DamagedError."""
@@ -268,8 +284,11 @@ class HokuyoLaser:
         if before is not None and reply.stamp == before.stamp_ms:
             self.link.repeated_scans += 1
             return None
-        now = self._follow(stream, reply.stamp, arrival)
-        stream.clock_map, stream.is_fresh = now, False
+        stream.clock_map = now = self._follow(stream, reply.stamp, arrival)
+        if stream.is_fresh and now.anchor is None and not stream.is_doubted:
+            stream.is_doubted = True  # a frozen laser begins with an old scan; the next one decides
+            return None
+        stream.is_fresh = False
         ranges, intensities = one_per_step(reply, self._config.echo)
         if intensities is not None:
             self._intensities = intensities[::-1] if stream.geometry.is_reversed else intensities
