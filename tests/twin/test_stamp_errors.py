@@ -1,0 +1,42 @@
+"""Stamps tell when a value was true, however late it arrives and however fast a clock runs."""
+
+import numpy as np
+import pytest
+
+from gvgbot.drivers.hokuyo.driver import HokuyoConfig
+from gvgbot.drivers.link_faults import LinkFaultConfig
+from tests.twin.stamp_errors import odometry_stamp_errors, rms, scan_stamp_errors
+
+pytestmark = pytest.mark.twin
+SCANS, FRAMES = 600, 3000  # a minute of each
+
+
+@pytest.mark.parametrize("drift_ppm", [-50.0, 50.0])
+@pytest.mark.parametrize(
+    ("sync", "latency", "limit"),
+    [
+        pytest.param(True, 0.0, 0.0015, id="synchronised"),
+        pytest.param(False, 0.0, 0.0015, id="arrivals only"),
+        pytest.param(True, 0.004, 0.0035, id="half of a one-sided latency is found out"),
+    ],
+)
+def test_scans_are_stamped_right_in_spite_of_jitter_and_drift(
+    drift_ppm: float, latency: float, limit: float, *, sync: bool
+) -> None:
+    link = LinkFaultConfig(latency_s=latency, jitter_s=0.005)
+    errors = scan_stamp_errors(link, drift_ppm, HokuyoConfig(synchronise=sync))
+    assert len(errors) > 0.95 * SCANS
+    assert rms(errors) < limit
+
+
+@pytest.mark.parametrize("drift_ppm", [-50.0, 50.0])
+def test_odometry_is_stamped_right_in_spite_of_jitter_and_drift(drift_ppm: float) -> None:
+    errors = odometry_stamp_errors(LinkFaultConfig(jitter_s=0.005), drift_ppm)
+    assert len(errors) > 0.95 * FRAMES
+    assert rms(errors) < 0.0005
+    assert np.abs(errors).max() < 0.001
+
+
+def test_a_constant_latency_is_the_error_of_stamps_that_know_none() -> None:
+    errors = odometry_stamp_errors(LinkFaultConfig(latency_s=0.003), drift_ppm=0.0)
+    assert errors == pytest.approx(0.003, abs=1e-6)
