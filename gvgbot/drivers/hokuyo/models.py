@@ -99,22 +99,28 @@ class Model:
     """A laser of the catalogue: its parameters, and the readings it sends in place of a range.
 
     `usable_mm` is the range the maker guarantees, which can be less than the largest reading.
+    `link` is what it says of a link that has no bit rate.
     """
 
     parameters: Parameters
-    product: str
+    identity: Identity  # of one with no serial number yet
     usable_mm: int
     nothing_code: int
     near_code: int
     failure_code: int
-    is_multi_echo: bool = False
-    tells_state: bool = False  # knows %ST, as newer firmware does
+    link: str
+    is_multi_echo: bool
+    is_adjustable: bool  # knows CR, HS and DB
+    is_newer: bool  # knows %ST and %SL
 
 
-_MAKER = "(Hokuyo Automatic Co.,Ltd.)"
 _URG_CODES = (0, 6, 7)
 _UTM_CODES = (1, 2, 5)
 _UST_CODES = (65533, 0, 0)
+_USB, _ETHERNET = "USB Full Speed", "Ethernet 100 [Mbps]"
+_URG_FIRMWARE = "3.3.00(16/Apr./2008)"
+_UTM_FIRMWARE = "1.1.0 (2011-09-30)"
+_UST_FIRMWARE = "2.23.0000"
 
 
 def _model(
@@ -125,18 +131,27 @@ def _model(
     *,
     product: str = "",
     modl: str = "",
+    link: str = _USB,
     is_multi_echo: bool = False,
-    tells_state: bool = False,
 ) -> Model:
     """A row of the catalogue: the numbers in the order of the PP reply."""
-    parameters = Parameters((modl or name) + _MAKER, *numbers)
+    is_urg, is_newer = codes == _URG_CODES, name.startswith("UST")
+    firmware = _UST_FIRMWARE if is_newer else _URG_FIRMWARE if is_urg else _UTM_FIRMWARE
     return Model(
-        parameters,
-        product or f"SOKUIKI Sensor {name}",
+        Parameters(f"{modl or name}(Hokuyo Automatic Co.,Ltd.)", *numbers),
+        Identity(
+            "Hokuyo Automatic Co., Ltd." if is_newer else "Hokuyo Automatic Co.,Ltd.",
+            product or f"SOKUIKI Sensor {name}",
+            firmware,
+            "SCIP 2.2" if is_newer else "SCIP 2.0",
+            "",
+        ),
         usable_mm,
         *codes,
+        link=link,
         is_multi_echo=is_multi_echo,
-        tells_state=tells_state,
+        is_adjustable=is_urg,
+        is_newer=is_newer,
     )
 
 
@@ -161,16 +176,36 @@ MODELS: dict[str, Model] = {
         product="SOKUIKI Sensor TOP-URG UTM-30LX",
     ),
     "UTM-30LX-EW": _model(
-        "UTM-30LX-EW", (23, 60000, 1440, 0, 1080, 540, 2400), 30000, _UST_CODES, is_multi_echo=True
+        "UTM-30LX-EW",
+        (23, 60000, 1440, 0, 1080, 540, 2400),
+        30000,
+        _UST_CODES,
+        link=_ETHERNET,
+        is_multi_echo=True,
     ),
     "UXM-30LX-E": _model(
-        "UXM-30LX-E", (100, 100000, 1440, 0, 760, 380, 1200), 30000, _UTM_CODES, is_multi_echo=True
+        "UXM-30LX-E",
+        (100, 100000, 1440, 0, 760, 380, 1200),
+        30000,
+        _UTM_CODES,
+        product="SOKUIKI Sensor Tough-URG UXM-30LX-E",
+        is_multi_echo=True,
     ),
     "UST-10LX": _model(
-        "UST-10LX", (20, 30000, 1440, 0, 1080, 540, 2400), 10000, _UST_CODES, tells_state=True
+        "UST-10LX",
+        (20, 30000, 1440, 0, 1080, 540, 2400),
+        10000,
+        _UST_CODES,
+        product="UST-10LX",
+        link=_ETHERNET,
     ),
     "UST-20LX": _model(
-        "UST-20LX", (20, 60000, 1440, 0, 1080, 540, 2400), 20000, _UST_CODES, tells_state=True
+        "UST-20LX",
+        (20, 60000, 1440, 0, 1080, 540, 2400),
+        20000,
+        _UST_CODES,
+        product="UST-20LX",
+        link=_ETHERNET,
     ),
 }
 ModelName = Literal[

@@ -116,12 +116,12 @@ def link_rate(config: HokuyoConfig, baud: int, port_name: str, sbps: str) -> int
     """The link's bit/s, None where it is faster than any scan.
 
     `port_name` is the configured port with links resolved, `sbps` the laser's own account of its
-    bit rate, which says USB on lasers that have nothing else.
+    bit rate, which says USB or Ethernet on lasers that have nothing else.
     """
-    is_usb = "ttyACM" in port_name or "USB" in sbps
+    is_fast = "ttyACM" in port_name or "USB" in sbps or "Ethernet" in sbps
     match config.link:
         case "serial":
             return baud
-        case "auto" if not is_usb and not port_name.startswith("tcp:"):
+        case "auto" if not is_fast and not port_name.startswith("tcp:"):
             return baud
     return None

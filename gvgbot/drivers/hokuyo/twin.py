@@ -12,8 +12,9 @@ from gvgbot.drivers.hokuyo.scip_messages import SCAN_DATA
 from gvgbot.drivers.hokuyo.twin_answers import Answers, LaserOn, Standby, Streaming, status_reply
 from gvgbot.drivers.hokuyo.twin_commands import CommandReader
 from gvgbot.drivers.hokuyo.twin_config import HokuyoTwinConfig, LaserMishap, LaserMishapConfig
-from gvgbot.drivers.hokuyo.twin_head import ROUNDING, Head
+from gvgbot.drivers.hokuyo.twin_head import Head
 from gvgbot.drivers.hokuyo.twin_line import Line
+from gvgbot.drivers.hokuyo.twin_settings import BROKEN
 from gvgbot.geometry import Array
 
 __all__ = ["HokuyoTwin", "HokuyoTwinConfig", "LaserMishapConfig"]
@@ -92,7 +93,7 @@ class HokuyoTwin:
         """The bytes that have gone out; only after the last one a new bit rate takes effect."""
         sent = self._line.out(now)
         if self._line.next_due() == math.inf:
-            self._line.baud = self._answers.baud
+            self._line.baud = self._answers.settings.baud
         return sent
 
     def next_due(self) -> float:
@@ -124,7 +125,7 @@ class HokuyoTwin:
         self._is_down, self._awake_at = True, now + self._config.reboot_s
         self._heard_early, self._newest = b"", None
         self._line.clear()
-        self._answers.power_up()
+        self._answers.power_up(now)
         self._plug(False)
 
     def _wake(self, now: float) -> None:
@@ -148,12 +149,12 @@ class HokuyoTwin:
         measures = isinstance(self._answers.phase, Streaming | LaserOn)
         if not (measures and self._config.answers_once_per_turn):
             return now
-        return (math.floor(now / self._head.period + ROUNDING) + 1) * self._head.period
+        return self._head.turn_end(now)
 
     # -- scans -------------------------------------------------------------------------------------
 
     def _next_stamp(self, phase: Streaming) -> float:
-        return math.inf if phase.is_complete else phase.scan_number * self._head.period
+        return math.inf if phase.is_complete else self._head.scan_start(phase.scan_number)
 
     def _scan_due(self, phase: Streaming) -> float:
         return min(self._next_stamp(phase), phase.frames[0][0] if phase.frames else math.inf)
@@ -166,13 +167,19 @@ class HokuyoTwin:
         if request.count:
             phase.request = request = replace(request, count=request.count - 1)
             phase.is_complete = request.count == 0
-        due = number * self._head.period + self._head.latency(request)
+        due = self._head.scan_start(number) + self._head.latency(request)
         phase.frames.append((due, self._frame(phase, number)))
+        phase.measured += 1
 
     def _frame(self, phase: Streaming, number: int) -> bytes:
         """What goes out for a scan, as the laser is just now."""
+        status = self._answers.settings.instead_of_scan(phase.measured)
+        if status == BROKEN:
+            self._answers.settings.is_broken = phase.is_complete = True
         if self._mishaps.is_on("unstable"):
-            return status_reply(phase.request.text(), UNSTABLE)
+            status = UNSTABLE
+        if status is not None:
+            return status_reply(phase.request.text(), status) if status else b""
         if not (self._mishaps.is_on("frozen") and self._last_frame):
             self._last_frame = self._head.frame(
                 phase.request, SCAN_DATA, number, is_blind=self._mishaps.is_on("blind")
@@ -182,9 +189,9 @@ class HokuyoTwin:
     def _send(self, phase: Streaming) -> None:
         """Put a frame on the line; on a busy one it takes the place of another that waits."""
         due, frame = phase.frames.popleft()
-        if self._line.free_at > due:
+        if frame and self._line.free_at > due:
             self._newest = (due, frame)
-        else:
+        elif frame:
             self._line.put(frame, due)
         if phase.is_complete and not phase.frames:
             self._answers.phase = Standby()

@@ -2,19 +2,21 @@
 
 from collections import deque
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
-from gvgbot.drivers.hokuyo.models import Identity
 from gvgbot.drivers.hokuyo.scip import encode_reply
 from gvgbot.drivers.hokuyo.scip_codec import encode_number
 from gvgbot.drivers.hokuyo.scip_messages import ACCEPTED, Reply, ScanRequest, parse_request
-from gvgbot.drivers.hokuyo.twin_commands import bit_rate_fault, scan_fault, string_fault
+from gvgbot.drivers.hokuyo.twin_commands import scan_fault, string_fault
 from gvgbot.drivers.hokuyo.twin_config import HokuyoTwinConfig
 from gvgbot.drivers.hokuyo.twin_head import Head
+from gvgbot.drivers.hokuyo.twin_settings import BROKEN, LENGTHS, Settings
 
 DENIED = "10"
 UNDEFINED = "0E"
 ABNORMAL = "0L"
+NOT_CONTROLLED = "01"  # the laser does not light up
+NO_SUCH_CODE = "01"  # of TM
 ONCE_MORE = "01"  # of RB: only the second one counts
 ALREADY_ON = "02"
 ALREADY_OFF = "03"
@@ -50,6 +52,7 @@ class Streaming:
     request: ScanRequest
     scan_number: int
     is_complete: bool = False
+    measured: int = 0
     frames: deque[tuple[float, bytes]] = field(default_factory=deque)
 
 
@@ -58,14 +61,14 @@ STATES = {Standby: "000", TimeMode: "002", LaserOn: "003", Streaming: "004", Asl
 
 
 class Answers:
-    """The laser's side of the dialogue. `phase` is what it is doing, `baud` its bit rate.
+    """The laser's side of the dialogue. `phase` is what it is doing.
 
     `restarts_at` is when it will go down because it was told to (s); None if it was not.
     """
 
     def __init__(self, config: HokuyoTwinConfig, head: Head) -> None:
         self.phase: Phase = Standby()
-        self.baud = config.serial_baud
+        self.settings = Settings(config, head)
         self.is_abnormal = config.starts_abnormal
         self.speaks_scip_1 = config.starts_in_scip_1
         self.restarts_at: float | None = None
@@ -73,9 +76,10 @@ class Answers:
         self._head = head
         self._asked_to_restart: float | None = None
 
-    def power_up(self) -> None:
+    def power_up(self, now: float) -> None:
         """Begin again, as after a reboot: what ailed the laser is gone."""
         self.phase = Standby()
+        self.settings.reset(now, wholly=True)
         self.speaks_scip_1 = self._config.starts_in_scip_1
         self.is_abnormal = False
         self.restarts_at = self._asked_to_restart = None
@@ -89,7 +93,7 @@ class Answers:
         fault = string_fault(string)
         if fault is not None:
             return status_reply(text, fault)
-        lines = None if isinstance(self.phase, TimeMode) else self._information(command, now)
+        lines = self._information(command, now)
         if lines is not None:
             return _key_lines(text, lines)
         if self.is_abnormal and command != "RB":
@@ -102,38 +106,39 @@ class Answers:
         model = self._head.model
         match command:
             case "VV":
-                return Identity(
-                    "Hokuyo Automatic Co.,Ltd.",
-                    model.product,
-                    "1.0.0",
-                    "SCIP 2.0",
-                    self._config.serial_number,
-                ).lines()
-            case "PP":
+                return replace(model.identity, serial=self._config.serial_number).lines()
+            case "PP" if not isinstance(self.phase, TimeMode):
                 return model.parameters.lines()
             case "II":
                 return self._condition(now)
         return None
 
     def _condition(self, now: float) -> Mapping[str, str]:
-        parameters = self._head.model.parameters
+        model, baud = self._head.model, self.settings.baud
+        is_on = isinstance(self.phase, LaserOn | Streaming)
+        ms = self._head.device_ms(now)
         return {
-            "MODL": parameters.model,
-            "LASR": "ON" if isinstance(self.phase, LaserOn | Streaming) else "OFF",
-            "SCSP": f"Initial({parameters.rpm}[rpm])",
-            "MESM": "CLASSIC",
-            "SBPS": f"{self.baud}[bps]" if self.baud else "USB Full Speed",
-            "TIME": f"{self._head.device_ms(now):06X}",
-            "STAT": "Sensor is in abnormal state." if self.is_abnormal else "Sensor works well.",
+            "MODL": model.parameters.model,
+            "LASR": "ON" if is_on else "OFF",
+            "SCSP": f"Initial({model.parameters.rpm}[rpm])",
+            "MESM": ("Measuring" if model.is_newer else "CLASSIC") if is_on else "IDLE",
+            "SBPS": f"{baud}[bps]" if baud else model.link,
+            "TIME": encode_number(ms, 4).decode("ascii") if model.is_newer else f"{ms:06X}",
+            "STAT": self._health(),
         }
+
+    def _health(self) -> str:
+        if self.is_abnormal or self.settings.is_broken:
+            return "Sensor is in abnormal state."
+        return "Stable 000 no error." if self._head.model.is_newer else "Sensor works well."
 
     def _answer_state(self, text: str, command: str, now: float) -> bytes:
         """The reply to what is no question and no scan."""
-        if command[:2] in {"SS", "CR", "DB"} or (command[:2] == "HS" and len(command) == 3):
-            return status_reply(text, self._set(command))
-        if command in {"TM0", "TM1", "TM2"}:
+        if command[:2] in LENGTHS:
+            return status_reply(text, self._set(command, now))
+        if command[:2] == "TM" and len(command) == 3:
             return self._answer_time(text, command, now)
-        if command == "%ST" and self._head.model.tells_state:
+        if command == "%ST" and self._head.model.is_newer:
             state = "900" if self.is_abnormal else STATES[type(self.phase)]
             return encode_reply(Reply(text, ACCEPTED, (state,)))
         if command == "RB":
@@ -147,6 +152,8 @@ class Answers:
                 return DENIED
             case "BM", LaserOn() | Streaming():
                 return ALREADY_ON
+            case "BM", _ if self.settings.is_broken:
+                return NOT_CONTROLLED
             case "BM", _:
                 self.phase = LaserOn()
             case "QT", Streaming() if self._head.is_lucky(self._config.lost_stop_fraction):
@@ -156,22 +163,21 @@ class Answers:
             case "RS" | "RT", _:
                 self.phase = Standby()
                 self._head.reset_clock(now)
-            case "%SL", _:
+                self.settings.reset(now, wholly=command == "RS")
+            case "%SL", _ if self._head.model.is_newer:
                 self.phase = Asleep()
             case _:
                 return UNDEFINED
         return ACCEPTED
 
-    def _set(self, command: str) -> str:
+    def _set(self, command: str, now: float) -> str:
         """The status of a command that sets something."""
-        if not command[2:].isdecimal():
-            return "01"
-        if command.startswith("SS"):
-            fault = bit_rate_fault(command[2:])
-            if fault is None and self.baud:
-                self.baud = int(command[2:])
-            return fault or ACCEPTED
-        return ACCEPTED
+        if isinstance(self.phase, TimeMode):
+            return DENIED
+        status = self.settings.answer(command, now)
+        if self.settings.is_broken:
+            self.phase = Standby()
+        return status
 
     def _restart(self, now: float) -> str:
         asked, self._asked_to_restart = self._asked_to_restart, now
@@ -192,15 +198,19 @@ class Answers:
                 self.phase = Standby()
             case "TM2", _:
                 return status_reply(text, ALREADY_OFF)
-            case _:
+            case "TM1", _:
                 time = encode_number(self._head.device_ms(now), 4).decode("ascii")
                 return encode_reply(Reply(text, ACCEPTED, (time,)))
+            case _:
+                return status_reply(text, NO_SUCH_CODE)
         return status_reply(text, ACCEPTED)
 
     def _answer_scan(self, text: str, command: str, now: float) -> bytes:
         fault = self._scan_fault(command)
         if fault is not None:
             return status_reply(text, fault)
+        if self.settings.is_broken:
+            return status_reply(text, BROKEN)
         request = parse_request(text.encode("ascii"))
         if request is None:
             return status_reply(text, UNDEFINED)

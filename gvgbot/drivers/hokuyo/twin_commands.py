@@ -38,11 +38,6 @@ def string_fault(string: str) -> str | None:
     return None if _STRING.fullmatch(string) else "0H"
 
 
-def bit_rate_fault(digits: str) -> str | None:
-    """The status that refuses this bit rate; None if it is good."""
-    return None if digits in BIT_RATES else "03"
-
-
 def scan_fault(command: str, parameters: Parameters) -> str | None:
     """The status that refuses this Mx or Gx command (without user string); None if it is good."""
     length = 12 if command[0] in "GH" else 15
