@@ -107,11 +107,7 @@ class KobukiBase:
         try:
             while True:
                 self._watch()
-                data = await self._read(until=self._next_watch())
-                odometry = self._feedback.take(data, self._clock.now())
-                if odometry is not None:
-                    self._newest.put(odometry)
-                self._ask_identity()
+                await self._listen(until=self._next_watch())
         finally:
             self._send(_STOP)
 
@@ -214,11 +210,18 @@ class KobukiBase:
             self._identity_due = now + _IDENTITY_RETRY_S
             self._send(RequestExtra(_ALL_EXTRAS))
 
-    async def _read(self, until: float) -> bytes:
+    async def _listen(self, until: float) -> None:
+        """Take what the base sends; a timer for each frame would cost more than its reading."""
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(max(0.0, until - self._clock.now())):
-                return await self._stream.read()
-        return b""
+                while True:
+                    self._take(await self._stream.read())
+
+    def _take(self, data: bytes) -> None:
+        odometry = self._feedback.take(data, self._clock.now())
+        if odometry is not None:
+            self._newest.put(odometry)
+        self._ask_identity()
 
     def _send(self, command: Command) -> bool:
         try:
