@@ -132,7 +132,9 @@ def _add_twin(commands: "argparse._SubParsersAction[_Parser]") -> None:
     _add_config(twin)
     for name in ("laser", "base"):
         twin.add_argument(
-            f"--{name}-link", type=Path, metavar="P", help=f"a stable name for the {name}'s port"
+            f"--{name}-link",
+            metavar="P",
+            help=f"a stable name for the {name}'s port, or tcp://host:number to be reached there",
         )
     twin.set_defaults(command=_twin)
 

@@ -1,4 +1,4 @@
-"""`gvgbot twin`: both simulated devices in one world, on pseudo-terminals, in real time."""
+"""`gvgbot twin`: both simulated devices in one world, on ports of their own, in real time."""
 
 import asyncio
 import contextlib
@@ -8,13 +8,17 @@ from pathlib import Path
 from gvgbot.clock import LoopClock
 from gvgbot.config import Config
 from gvgbot.drivers.pty import PtyPort
+from gvgbot.drivers.tcp import SCHEME
+from gvgbot.drivers.tcp_port import TcpPort
 from gvgbot.drivers.transport import serve_twin
 from gvgbot.service import StopSignals
 from gvgbot.simulation import Place, Simulation, open_place
 
+Port = PtyPort | TcpPort
+
 
 def serve(
-    config: Config, laser_link: Path | None, base_link: Path | None, announce: Callable[[str], None]
+    config: Config, laser_link: str | None, base_link: str | None, announce: Callable[[str], None]
 ) -> int:
     """Serve the twins until a signal comes, and tell where they are; the exit status.
 
@@ -29,19 +33,19 @@ def serve(
 async def _serve(
     config: Config,
     place: Place,
-    links: tuple[Path | None, Path | None],
+    links: tuple[str | None, str | None],
     announce: Callable[[str], None],
     stopped: Callable[[], Awaitable[object]],
 ) -> None:
     simulation = Simulation(config, place, LoopClock())
     with contextlib.ExitStack() as stack:
-        laser, base = (stack.enter_context(contextlib.closing(PtyPort(link))) for link in links)
+        laser, base = (stack.enter_context(contextlib.closing(_port(link))) for link in links)
         announce(_greeting(place, laser, base))
         await serve_on(simulation, laser, base, stopped())
 
 
 async def serve_on(
-    simulation: Simulation, laser: PtyPort, base: PtyPort, stopped: Awaitable[object]
+    simulation: Simulation, laser: Port, base: Port, stopped: Awaitable[object]
 ) -> None:
     """Serve the twins of a simulation on these ports until `stopped` returns."""
     clock = LoopClock()
@@ -57,7 +61,14 @@ async def serve_on(
             task.cancel()
 
 
-def _greeting(place: Place, laser: PtyPort, base: PtyPort) -> str:
+def _port(link: str | None) -> Port:
+    """What clients will open there. Raises UsageError."""
+    if link is not None and link.startswith(SCHEME):
+        return TcpPort(link)
+    return PtyPort(None if link is None else Path(link))
+
+
+def _greeting(place: Place, laser: Port, base: Port) -> str:
     start = place.start
     return (
         f"world: {place.world.name}, start {start.x:g} {start.y:g} {start.theta:g}\n"

@@ -3,6 +3,7 @@
 import os
 import select
 import signal
+import socket
 import subprocess
 import sys
 import tty
@@ -104,6 +105,19 @@ def test_a_client_that_does_not_read_loses_whole_frames_only(tmp_path: Path) -> 
         steps = {(b - a) % 65536 for a, b in pairwise(stamps)}
         assert min(steps) == 20
         assert max(steps) > 200
+
+
+def test_a_laser_on_ethernet_is_reached_by_its_address(tmp_path: Path) -> None:
+    links = ("--laser-link", "tcp://127.0.0.1:0", "--base-link", str(tmp_path / "base"))
+    with gvgbot("twin", *links, "--set", "twin.laser.model=UST-10LX", cwd=tmp_path) as process:
+        assert process.stdout is not None
+        while not (line := process.stdout.readline()).startswith("laser:"):
+            assert line, "the twins did not start"
+        number = int(line.rpartition(":")[2])
+        for _ in range(2):
+            with socket.create_connection(("127.0.0.1", number), timeout=PATIENCE) as client:
+                client.sendall(b"QT\n")
+                assert client.recv(100) == b"QT\n00P\n\n"
 
 
 def test_stopped_twins_leave_no_links(tmp_path: Path) -> None:
