@@ -1,6 +1,7 @@
 """Time: one monotonic clock for everything, and an event loop whose clock can jump."""
 
 import asyncio
+import math
 import selectors
 from typing import Any, Protocol
 
@@ -55,11 +56,13 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
     def __init__(self) -> None:
         self._jumping = _JumpingSelector()
         super().__init__(self._jumping)
-        self._clock_resolution = 1e-9
 
     def time(self) -> float:
         """Virtual seconds since the loop was made."""
-        return self._jumping.now
+        now = self._jumping.now
+        # A timer that fired early would be set again, and two such tasks would stop time for ever.
+        self._clock_resolution = math.ulp(now)
+        return now
 
 
 def run_in_virtual_time(main: Any) -> Any:

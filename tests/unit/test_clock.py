@@ -1,6 +1,7 @@
 """Virtual time: it jumps, it is orderly, and it reports what would hang."""
 
 import asyncio
+import math
 import time
 
 import pytest
@@ -148,3 +149,22 @@ def test_the_same_program_runs_on_the_real_clock() -> None:
     assert 0.014 <= time.perf_counter() - before < 5.0
     assert [name for name, _ in log].count("odometry") == 15
     assert [name for name, _ in log].count("scan") == 3
+
+
+def test_two_tasks_that_wait_for_the_next_instant_do_not_stop_time() -> None:
+    """Each wakes the other up, so that the loop is never idle; timers must not fire early."""
+
+    async def wait(clock: LoopClock, stamp: float) -> int:
+        rounds = 0
+        while clock.now() < stamp and rounds < 1000:
+            await clock.sleep_until(stamp)
+            rounds += 1
+        return rounds
+
+    async def main() -> list[int]:
+        clock = LoopClock()
+        await clock.sleep_until(5.1)
+        later = math.nextafter(clock.now(), math.inf)
+        return await asyncio.gather(wait(clock, later), wait(clock, later))
+
+    assert max(run_in_virtual_time(main())) <= 2
