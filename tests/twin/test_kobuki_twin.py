@@ -131,6 +131,14 @@ def test_requests_are_answered_at_the_end_of_the_next_frame_only() -> None:
     assert len(rig.frame()) == 7
 
 
+def test_requests_repeated_within_a_cycle_are_answered_once() -> None:
+    rig = Rig()
+    for _ in range(10):
+        rig.send(*[RequestExtra(0x0B), GetGain()] * 10)
+    answers = rig.frame()[7:]
+    assert [type(a) for a in answers] == [HardwareVersion, FirmwareVersion, Udid, ControllerInfo]
+
+
 def test_gains_are_kept_and_the_factorys_come_back() -> None:
     rig = Rig()
     rig.send(SetGain(1, 50_000, 200, 1_000), GetGain())

@@ -110,7 +110,7 @@ class KobukiTwin:
         self._pending: deque[tuple[float, Twist]] = deque()
         self._commanded = -math.inf
         self._moving = False
-        self._replies: list[FeedbackPart] = []
+        self._replies: dict[type, FeedbackPart] = {}  # one of a kind, that they fit into a frame
         self._gains = _FACTORY_GAINS
         self._output = 0
         self._power_on: float | None = None
@@ -186,7 +186,7 @@ class KobukiTwin:
         self._halt()
         self._power_on, self._cycles = now + self._config.mishaps.boot_s, 0
         self._instruments.restart()
-        self._parser, self._replies, self._output = FrameParser(), [], 0
+        self._parser, self._replies, self._output = FrameParser(), {}, 0
 
     def _halt(self) -> None:
         """Cut the motors, whatever was commanded."""
@@ -199,7 +199,7 @@ class KobukiTwin:
             self._body.advance(due)
             self._true = self._truth()
         self._move(due)
-        replies, self._replies = self._replies, []
+        replies, self._replies = self._replies.values(), {}
         parts = self._instruments.read(
             self._stamp_ms, self._body.bumper, self._volts(due), self._dock_ir
         )
@@ -219,11 +219,11 @@ class KobukiTwin:
             case BaseControl():
                 self._obey_motion(command.twist_on(1000 * self._geometry.wheel_base), now)
             case RequestExtra(flags):
-                self._replies += self._extras(flags)
+                self._reply(self._extras(flags))
             case SetGain(kind, p, i, d):
                 self._gains = ControllerInfo(kind, p, i, d) if kind else _FACTORY_GAINS
             case GetGain():
-                self._replies.append(self._gains)
+                self._reply([self._gains])
             case GpOutput(flags):
                 self._output = flags
             case _:
@@ -240,6 +240,9 @@ class KobukiTwin:
             due += self._config.motor_power_delay_s
         last = self._pending[-1][0] if self._pending else due
         self._pending.append((max(due, last), self._limited(twist)))
+
+    def _reply(self, parts: list[FeedbackPart]) -> None:
+        self._replies |= {type(part): part for part in parts}
 
     def _extras(self, flags: int) -> list[FeedbackPart]:
         parts: list[FeedbackPart] = []
