@@ -2,7 +2,7 @@
 
 import math
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -27,16 +27,21 @@ class World:
     """Walls as a bitmap: `occupied` (rows, columns) squares of `resolution_m`, row 0 lowest.
 
     `origin` is the lower left corner of the bitmap in the world frame, m. Outside the bitmap all
-    is empty. The bitmap is read-only.
+    is empty. `glass` marks the occupied squares that light can pass; None where there are none.
+    `people` is how many walk about in it, unless configured otherwise. Bitmaps are read-only.
     """
 
     occupied: Mask
     resolution_m: float
     origin: tuple[float, float] = (0.0, 0.0)
     name: str = "world"
+    glass: Mask | None = None
+    people: int = 0
 
     def __post_init__(self) -> None:
         self.occupied.setflags(write=False)
+        if self.glass is not None:
+            self.glass.setflags(write=False)
 
     @property
     def extent(self) -> tuple[float, float, float, float]:
@@ -53,8 +58,8 @@ class World:
     def cast(self, pose: Pose, bearings: Array, max_range: float) -> Array:
         """Ranges (N,) in m from a sensor at `pose` along ascending bearings (N,) in its frame.
 
-        inf where nothing is within `max_range`, zeros from inside a wall. Raises ValueError
-        unless the bearings ascend and span at most one turn.
+        inf where nothing is within `max_range`, zeros from inside a wall. Glass counts as a wall.
+        Raises ValueError unless the bearings ascend and span at most one turn.
         """
         return self._caster.cast(pose.x, pose.y, bearings + pose.theta, max_range)
 
@@ -65,7 +70,7 @@ class World:
         rows, columns = self.occupied.shape
         if not (0 <= row < rows and 0 <= column < columns):
             return 0.0
-        return float(self._clearance[row, column])
+        return float(self.clearance[row, column])
 
     def wall_offsets(self, x: float, y: float, reach: float) -> Array:
         """From (x, y) to the nearest point of each occupied square within `reach`: (N, 2), m."""
@@ -83,12 +88,19 @@ class World:
         return np.column_stack((dx[near], dy[near]))
 
     @cached_property
+    def without_glass(self) -> "World":
+        """The world with all glass taken away."""
+        if self.glass is None:
+            return self
+        return replace(self, occupied=self.occupied & ~self.glass, glass=None)
+
+    @cached_property
     def _caster(self) -> RayCaster:
         return RayCaster(self.occupied, self.resolution_m, self.origin)
 
     @cached_property
-    def _clearance(self) -> NDArray[np.float32]:
-        """Distance between cell centres less a cell's diagonal, m."""
+    def clearance(self) -> NDArray[np.float32]:
+        """`clear_of_walls` of each square: the way from its centre to a wall's, less a diagonal."""
         if not self.occupied.any():
             return np.full(self.occupied.shape, np.inf, dtype=np.float32)
         cells = ndimage.distance_transform_edt(~self.occupied) - math.sqrt(2)

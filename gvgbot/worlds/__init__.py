@@ -8,8 +8,12 @@ from gvgbot.errors import WorldError
 from gvgbot.geometry import Pose
 from gvgbot.worlds.buildings import comb, grid, hall, jittered, office, ring, spiral
 from gvgbot.worlds.cave import cave
+from gvgbot.worlds.clutter import clutter
+from gvgbot.worlds.difficult_plans import crowd, doors, glass, narrow
 from gvgbot.worlds.floor_plan import floor_plan
+from gvgbot.worlds.open_hall import open_hall
 from gvgbot.worlds.rooms import rooms
+from gvgbot.worlds.slopes import slopes
 
 _MAKERS: dict[str, Callable[[int], tuple[World, Pose]]] = {
     "office": office,
@@ -22,6 +26,13 @@ _MAKERS: dict[str, Callable[[int], tuple[World, Pose]]] = {
     "ring": ring,
     "hall": hall,
     "floor_plan": floor_plan,
+    "narrow": narrow,
+    "doors": doors,
+    "clutter": clutter,
+    "slopes": slopes,
+    "open_hall": open_hall,
+    "glass": glass,
+    "crowd": crowd,
 }
 NAMES: tuple[str, ...] = tuple(_MAKERS)
 

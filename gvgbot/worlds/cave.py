@@ -1,14 +1,14 @@
 """A cave: winding passages of changing width between chambers, drawn from a seed."""
 
-from collections.abc import Iterator
-
 import numpy as np
 from scipy import ndimage
 
 from gvgbot.drivers.ray_casting import Mask
 from gvgbot.drivers.world import World
 from gvgbot.geometry import Array, Pose
-from gvgbot.worlds.canvas import RESOLUTION, Canvas
+from gvgbot.worlds.canvas import Canvas
+from gvgbot.worlds.lattice import lattice_links
+from gvgbot.worlds.morphology import has_wide_passages, without_thin_walls
 
 SIDE = 30.0  # m
 CHAMBERS = 5  # per side
@@ -19,10 +19,6 @@ LOOPS = 6  # closed ways around rock
 CHAMBER_RADII = (1.0, 1.7)  # m
 PASSAGE_RADII = (0.65, 0.95)  # m
 LEAST_PASSAGE = 1.0  # m
-LEAST_WALL = 4  # cells
-LEAST_ROCK = 1.5  # m^2: smaller islands of wall are taken away
-
-Link = tuple[int, int]
 
 
 def cave(seed: int = 0) -> tuple[World, Pose]:
@@ -31,23 +27,11 @@ def cave(seed: int = 0) -> tuple[World, Pose]:
     while True:
         chambers, radii = _chambers(rng)
         canvas = Canvas(SIDE, SIDE)
-        for a, b in _links(rng):
+        for a, b in lattice_links(CHAMBERS, LOOPS, rng):
             _carve_passage(canvas, chambers[[a, b]], radii[[a, b]], rng)
         canvas.occupied = _worn(canvas.occupied)
         if has_wide_passages(canvas.occupied, LEAST_PASSAGE):
             return canvas.world("cave"), Pose(float(chambers[0, 0]), float(chambers[0, 1]), 0.0)
-
-
-def has_wide_passages(occupied: Mask, width: float) -> bool:
-    """Whether a disc of this diameter (m) gets along every way through one connected free space."""
-    depth = ndimage.distance_transform_edt(~occupied) * RESOLUTION
-    ways, wide_ways = _topology(depth > 0.0), _topology(depth > width / 2)
-    return ways == wide_ways and ways[0] == 1
-
-
-def _topology(free: Mask) -> tuple[int, int]:
-    """Connected free spaces, and islands of wall with the outer wall."""
-    return ndimage.label(free)[1], ndimage.label(~free, np.ones((3, 3)))[1]
 
 
 def _chambers(rng: np.random.Generator) -> tuple[Array, Array]:
@@ -56,29 +40,6 @@ def _chambers(rng: np.random.Generator) -> tuple[Array, Array]:
     regular = np.stack(np.meshgrid(line, line), axis=-1).reshape(-1, 2)
     centres = regular + rng.uniform(-JITTER, JITTER, regular.shape)
     return centres, rng.uniform(*CHAMBER_RADII, len(centres))
-
-
-def _links(rng: np.random.Generator) -> list[Link]:
-    """Pairs of neighbouring chambers: a random tree over all of them, and some more for loops."""
-    pairs = [*_neighbours()]
-    group = list(range(CHAMBERS**2))
-    tree: list[Link] = []
-    spare: list[Link] = []
-    for a, b in (pairs[i] for i in rng.permutation(len(pairs))):
-        if group[a] == group[b]:
-            spare.append((a, b))
-            continue
-        group = [group[a] if g == group[b] else g for g in group]
-        tree.append((a, b))
-    return tree + spare[:LOOPS]
-
-
-def _neighbours() -> Iterator[Link]:
-    for k in range(CHAMBERS**2):
-        if (k + 1) % CHAMBERS:
-            yield k, k + 1
-        if k + CHAMBERS < CHAMBERS**2:
-            yield k, k + CHAMBERS
 
 
 def _carve_passage(canvas: Canvas, ends: Array, radii: Array, rng: np.random.Generator) -> None:
@@ -98,12 +59,4 @@ def _carve_passage(canvas: Canvas, ends: Array, radii: Array, rng: np.random.Gen
 def _worn(occupied: Mask) -> Mask:
     """The walls with their edges smoothed, and without thin or small pieces of rock."""
     smooth = ndimage.gaussian_filter(occupied.astype(np.float64), 4.0, mode="nearest") > 0.5
-    across = np.arange(LEAST_WALL) - (LEAST_WALL - 1) / 2
-    disc = np.hypot(across, across[:, None]) <= LEAST_WALL / 2
-    padded = np.pad(smooth, LEAST_WALL, constant_values=True)
-    thick = ndimage.binary_opening(padded, disc)[LEAST_WALL:-LEAST_WALL, LEAST_WALL:-LEAST_WALL]
-    rocks, _ = ndimage.label(thick)
-    large = np.bincount(rocks.ravel()) * RESOLUTION**2 >= LEAST_ROCK
-    large[0] = False
-    worn: Mask = large[rocks]
-    return worn
+    return without_thin_walls(smooth)

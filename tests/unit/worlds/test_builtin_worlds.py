@@ -9,9 +9,17 @@ from scipy import ndimage
 from gvgbot.drivers.ray_casting import Mask
 from gvgbot.drivers.world import World, check_start, save_world
 from gvgbot.errors import WorldError
+from gvgbot.geometry import Array
 from gvgbot.worlds import NAMES, builtin, open_world
 
-DRAWN = ("jittered", "rooms", "cave", "floor_plan")
+DRAWN = (
+    *("jittered", "rooms", "cave", "floor_plan", "narrow", "doors", "clutter", "slopes"),
+    *("open_hall", "glass", "crowd"),
+)
+TIGHT = ("doors", "clutter")  # with gaps that a robot does not fit through
+RESOLUTIONS = {"doors": 0.025, "clutter": 0.02}  # m, where not 0.05
+KOBUKI = 0.354  # m across
+SEEDS = range(3)
 LOOPS = {
     "office": 3,
     "grid": 16,
@@ -22,17 +30,25 @@ LOOPS = {
     "spiral": 0,
     "ring": 1,
     "hall": 4,
+    "slopes": 2,
 }
 SAMPLES = [*NAMES, *(f"{name}:{seed}" for name in DRAWN for seed in (1, 2))]
 every_world = pytest.mark.parametrize("name", SAMPLES)
 
 
-def shrunk(free: Mask, width: float) -> Mask:
-    """Where the centre of a disc of this diameter (m) can be, cells of 5 cm."""
-    reach = width / 2 / 0.05
-    k = int(reach)
-    disc = np.hypot(*np.mgrid[-k : k + 1, -k : k + 1]) <= reach
-    return np.asarray(ndimage.binary_erosion(free, disc))
+def kind(name: str) -> str:
+    return name.partition(":")[0]
+
+
+def depth(world: World) -> Array:
+    """From every free cell to the nearest wall, centre to centre, m."""
+    cells: Array = ndimage.distance_transform_edt(~world.occupied)
+    return cells * world.resolution_m
+
+
+def shrunk(world: World, width: float) -> Mask:
+    """Where the centre of a disc of this diameter (m) can be."""
+    return np.asarray(depth(world) > width / 2)
 
 
 def topology(free: Mask) -> tuple[int, int]:
@@ -44,16 +60,15 @@ def topology(free: Mask) -> tuple[int, int]:
 def test_free_space_is_in_one_piece_with_the_promised_loops(name: str) -> None:
     world, _ = builtin(name)
     pieces, loops = topology(~world.occupied)
-    assert (pieces, loops) == (1, LOOPS.get(name.partition(":")[0], loops))
+    assert (pieces, loops) == (1, LOOPS.get(kind(name), loops))
 
 
-@every_world
+@pytest.mark.parametrize("name", [name for name in SAMPLES if kind(name) not in TIGHT])
 def test_a_passage_is_wide_or_there_is_none(name: str) -> None:
     world, _ = builtin(name)
-    free = ~world.occupied
-    whole = topology(free)
+    whole = topology(~world.occupied)
     for width in (0.3, 0.6, 0.8):
-        assert topology(shrunk(free, width)) == whole
+        assert topology(shrunk(world, width)) == whole
 
 
 @every_world
@@ -77,7 +92,7 @@ def test_the_same_seed_draws_the_same_world(name: str) -> None:
     assert np.array_equal(first.occupied, second.occupied)
     assert here == there
     assert {type(value) for value in (here.x, here.y, here.theta)} == {float}  # fit for any encoder
-    assert (first.name, first.resolution_m) == (name.partition(":")[0], 0.05)
+    assert (first.name, first.resolution_m) == (kind(name), RESOLUTIONS.get(kind(name), 0.05))
 
 
 @pytest.mark.parametrize("name", DRAWN)
@@ -85,6 +100,76 @@ def test_another_seed_draws_another_world(name: str) -> None:
     worlds = [builtin(f"{name}:{seed}")[0] for seed in range(3)]
     for a, b in ((0, 1), (1, 2), (0, 2)):
         assert not np.array_equal(worlds[a].occupied, worlds[b].occupied)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_narrow_corridors_are_a_metre_wide(seed: int) -> None:
+    world, start = builtin(f"narrow:{seed}")
+    row, column = int(start.y / 0.05), int(start.x / 0.05)
+    assert 0.5 <= depth(world)[row, column] <= 0.57  # half, and at most a cell's diagonal
+
+
+def test_some_doors_are_narrower_than_the_robot_and_some_are_not() -> None:
+    rooms_shut, rooms_open = 0, 0
+    for seed in SEEDS:
+        world, _ = builtin(f"doors:{seed}")
+        assert topology(~world.occupied)[0] == 1
+        rooms_shut += topology(shrunk(world, KOBUKI))[0] - 1
+        rooms_open += topology(shrunk(world, 1.0))[0] - topology(shrunk(world, KOBUKI))[0]
+    assert rooms_shut > 0
+    assert rooms_open > 0
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_furnished_room_has_thin_legs_that_the_robot_fits_between_or_not(seed: int) -> None:
+    world, _ = builtin(f"clutter:{seed}")
+    boxes = ndimage.find_objects(ndimage.label(world.occupied, np.ones((3, 3)))[0])
+    sides = np.array([(part.stop - part.start) * 0.02 for box in boxes for part in box])
+    legs = sides[sides < 0.2]  # of two legs that touch, not more
+    assert len(legs) > 100
+    assert np.isin(np.rint(legs * 100), (4, 6)).mean() > 0.9
+    islands, islands_to_a_robot = (
+        topology(free)[1] for free in (~world.occupied, shrunk(world, KOBUKI))
+    )
+    assert 5 < islands_to_a_robot < islands - 10
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_walls_on_slopes_follow_no_axis(seed: int) -> None:
+    assert share_along_axes(builtin(f"slopes:{seed}")[0]) < 0.25
+    assert share_along_axes(builtin(f"floor_plan:{seed}")[0]) > 0.8
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_in_the_middle_of_the_open_hall_a_short_laser_sees_nothing(seed: int) -> None:
+    world, _ = builtin(f"open_hall:{seed}")
+    assert depth(world).max() > 5.6
+    assert topology(~world.occupied)[1] >= 6  # round the pillars
+
+
+@every_world
+def test_glass_is_wall_and_stands_only_in_the_world_of_that_name(name: str) -> None:
+    world, _ = builtin(name)
+    assert (world.glass is not None) == (kind(name) == "glass")
+    if world.glass is not None:
+        assert np.array_equal(world.glass & world.occupied, world.glass)
+        assert 0.02 < world.glass.sum() / world.occupied.sum() < 0.3
+        assert topology(~world.without_glass.occupied)[1] > topology(~world.occupied)[1]
+
+
+@every_world
+def test_only_the_crowd_has_people_of_its_own(name: str) -> None:
+    assert (builtin(name)[0].people > 0) == (kind(name) == "crowd")
+
+
+def share_along_axes(world: World) -> float:
+    """The share of the walls' length whose smoothed normal is within 5 degrees of an axis."""
+    smooth = ndimage.gaussian_filter((~world.occupied).astype(np.float64), 4.0)
+    across, along = np.gradient(smooth)
+    strength = np.hypot(across, along)
+    turned = np.abs((np.rad2deg(np.arctan2(across, along)) + 45.0) % 90.0 - 45.0)
+    edge = strength > 0.6 * strength.max()
+    return float((turned[edge] < 5.0).mean())
 
 
 def test_the_office_is_of_the_size_of_a_floor() -> None:
