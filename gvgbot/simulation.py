@@ -19,6 +19,7 @@ from gvgbot.drivers.world import World, check_start
 from gvgbot.geometry import Array, Pose
 from gvgbot.worlds import open_world
 
+_DOCK_IN_SIGHT = 6.0  # m; a dock's beams end before
 _SECTORS = 6  # of a sweep, each seen from one pose
 
 
@@ -78,13 +79,20 @@ class Simulation:
             self._pull_laser,
         )
         self.base_twin = FaultyLink(
-            KobukiTwin(config.twin.base, self.body, int(base_seed), config.base.geometry),
+            KobukiTwin(
+                config.twin.base, self.body, int(base_seed), config.base.geometry, self._look
+            ),
             config.twin.base.link,
             int(base_seed),
             self._pull_base,
         )
         self.laser, self._laser_end = laser_cable.host, laser_cable.device
         self.base, self._base_end = cable.host, cable.device
+
+    def _look(self, bearing: float) -> float:
+        """Distance (m) from the body to the next wall in a direction (rad) of its own."""
+        world = self.place.world
+        return float(world.cast(self.body.pose, np.array([bearing]), _DOCK_IN_SIGHT)[0])
 
     def _pull_laser(self, is_plugged: bool) -> None:
         self.plug_laser(is_plugged)

@@ -15,6 +15,7 @@ from gvgbot.drivers.kobuki.payloads import (
     MotorCurrent,
     RawGyro,
 )
+from gvgbot.drivers.kobuki.power import Power
 from gvgbot.drivers.kobuki.wheel_odometry import TICK
 
 _WORD = 65536
@@ -22,7 +23,6 @@ _GYRO_SAMPLES = 2.08  # per frame on average: the sensor runs by its own clock
 _RAW_BIAS = math.radians(-0.45)  # rad/s: only the processed rate has it removed
 _FULL_PWM_SPEED = 0.7  # m/s
 _CLIFF_FLOOR = CliffAdc(1700, 1900, 1650)  # readings over a flat floor
-_NO_DOCK = DockIr(0, 0, 0)
 _OPEN_INPUTS = GpInput(0, (4095, 4095, 4095, 4095), (0xFF0, 0, 0))
 
 
@@ -56,12 +56,12 @@ class Instruments:
         self,
         stamp_ms: int,
         bumper: tuple[bool, bool, bool],
-        volts: float,
-        dock_ir: DockIr = _NO_DOCK,
+        power: Power,
+        dock_ir: DockIr,
     ) -> list[FeedbackPart]:
         """The standard part of one frame; bumper is left, centre, right."""
         return [
-            self._core(stamp_ms, bumper, volts),
+            self._core(stamp_ms, bumper, power),
             dock_ir,
             Inertia(_wrapped_cdeg(self._angle), _s16(math.degrees(100 * self._rate))),
             _CLIFF_FLOOR,
@@ -70,7 +70,7 @@ class Instruments:
             _OPEN_INPUTS,
         ]
 
-    def _core(self, stamp_ms: int, bumper: tuple[bool, bool, bool], volts: float) -> CoreSensors:
+    def _core(self, stamp_ms: int, bumper: tuple[bool, bool, bool], power: Power) -> CoreSensors:
         left, centre, right = bumper
         return CoreSensors(
             stamp_ms=stamp_ms % _WORD,
@@ -82,8 +82,8 @@ class Instruments:
             left_pwm=_pwm(self._left_speed),
             right_pwm=_pwm(self._right_speed),
             buttons=0,
-            charger=0,
-            battery_dv=max(0, round(10 * volts)),
+            charger=power.charger,
+            battery_dv=max(0, round(10 * power.volts)),
             over_current=0,
         )
 

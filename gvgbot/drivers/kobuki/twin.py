@@ -2,8 +2,8 @@
 
 import math
 from collections import deque
-from dataclasses import dataclass, field
-from typing import Annotated, Protocol
+from collections.abc import Callable
+from typing import Protocol
 
 import numpy as np
 
@@ -15,12 +15,15 @@ from gvgbot.drivers.kobuki.commands import (
     GpOutput,
     RequestExtra,
     SetGain,
+    Sound,
+    SoundSequence,
     decode_commands,
 )
+from gvgbot.drivers.kobuki.dock import Dock
 from gvgbot.drivers.kobuki.frames import BadFrame, FrameParser, encode_frame
 from gvgbot.drivers.kobuki.instruments import Instruments
-from gvgbot.drivers.kobuki.mishaps import Mishap, MishapConfig, Mishaps
-from gvgbot.drivers.kobuki.odometry_error import PROFILES, ErringSensors, OdometryProfile
+from gvgbot.drivers.kobuki.mishaps import Mishap, Mishaps
+from gvgbot.drivers.kobuki.odometry_error import PROFILES, ErringSensors
 from gvgbot.drivers.kobuki.payloads import (
     ControllerInfo,
     DockIr,
@@ -31,34 +34,20 @@ from gvgbot.drivers.kobuki.payloads import (
     Version,
     encode_feedback,
 )
+from gvgbot.drivers.kobuki.power import Power
+from gvgbot.drivers.kobuki.twin_config import KobukiTwinConfig
 from gvgbot.drivers.kobuki.wheel_odometry import KOBUKI, DriveGeometry
-from gvgbot.drivers.link_faults import LinkFaultConfig
 from gvgbot.geometry import STANDSTILL, Pose, Twist, wrap_angle
-from gvgbot.ranges import Range
+
+__all__ = ["KobukiTwin", "KobukiTwinConfig"]
 
 _PERIOD_MS = 20
 _PERIOD = _PERIOD_MS / 1000  # s
 _SLIP_TRAVEL = 0.05  # m that a wheel spins in a slip
 _FACTORY_GAINS = ControllerInfo(0, 100_000, 100, 2_000)
+_FIRST_WITH_GAINS = (1, 2)  # firmware
+_SOUNDS_KEPT = 32
 _EARLY = 1e-9  # s: a command this much too late for its cycle still counts
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class KobukiTwinConfig:
-    """The simulated base: what it says it is, and how it errs."""
-
-    odometry: OdometryProfile = "kobuki"
-    command_timeout_s: Annotated[float, Range(0.1, 60.0)] = 1.5
-    has_command_timeout: bool = True  # false: drives on for ever on its last command
-    max_wheel_speed_mps: Annotated[float, Range(0.1, 5.0)] = 0.7
-    motor_power_delay_s: Annotated[float, Range(0.0, 1.0)] = 0.0  # first motion after standing
-    dead_time_s: Annotated[float, Range(0.0, 1.0)] = 0.06  # from a command to its first effect
-    battery_v: Annotated[float, Range(0.0, 25.5)] = 16.1
-    battery_drain_v_per_h: Annotated[float, Range(0.0, 10.0)] = 0.5
-    hardware_version: str = "1.0.4"
-    firmware_version: str = "1.2.0"
-    mishaps: MishapConfig = field(default_factory=MishapConfig)
-    link: LinkFaultConfig = field(default_factory=LinkFaultConfig)
 
 
 class Body(Protocol):
@@ -88,7 +77,10 @@ class Body(Protocol):
 
 
 class KobukiTwin:
-    """A base without I/O. It streams from its first `advance`, which is when it is powered on."""
+    """A base without I/O. It streams from its first `advance`, which is when it is powered on.
+
+    `played` are the last sounds it was told to play.
+    """
 
     def __init__(
         self,
@@ -96,13 +88,22 @@ class KobukiTwin:
         body: Body,
         seed: int,
         geometry: DriveGeometry = KOBUKI,
+        look: Callable[[float], float] = lambda _: math.inf,
     ) -> None:
+        """`look(bearing)` is the distance (m) from the body to the next wall (rad, its frame)."""
         rng = np.random.default_rng(seed)
         self._config = config
         self._body = body
         self._geometry = geometry
         self._mishaps = Mishaps(config.mishaps, seed)
-        self._dock_ir = DockIr(0, 0, 0)
+        self._dock = None if config.dock is None else Dock(Pose(*config.dock))
+        self._look = look
+        self._shown = DockIr(0, 0, 0)
+        self._power = Power(
+            config.battery_v, config.battery_drain_v_per_h, config.battery_charge_v_per_h
+        )
+        self._has_adapter = config.has_adapter
+        self.played: deque[Sound | SoundSequence] = deque(maxlen=_SOUNDS_KEPT)
         self._sensors = ErringSensors(PROFILES[config.odometry], rng)
         self._instruments = Instruments(rng, geometry.tick)
         self._udid = Udid(tuple(rng.integers(1, 2**32, 3).tolist()))
@@ -114,13 +115,12 @@ class KobukiTwin:
         self._gains = _FACTORY_GAINS
         self._output = 0
         self._power_on: float | None = None
-        self._new_at = 0.0  # when it was first switched on, s
         self._cycles = 0
         self._true = (body.left_travel, body.right_travel, body.pose.theta)
 
     @property
     def output(self) -> int:
-        """The general-purpose output word last received."""
+        """The general-purpose output word last received: outputs, power, and LEDs."""
         return self._output
 
     @property
@@ -143,8 +143,12 @@ class KobukiTwin:
         self._mishaps.inject(mishap, duration)
 
     def show_dock(self, *, left: int, centre: int, right: int) -> None:
-        """Let the dock's beams fall on the receivers, one bit per beam."""
-        self._dock_ir = DockIr(right, centre, left)
+        """Let a dock's beams fall on the receivers, one bit per beam, wherever the base is."""
+        self._shown = DockIr(right, centre, left)
+
+    def plug_adapter(self, is_plugged: bool) -> None:
+        """Plug in the charger's cable, or pull it out."""
+        self._has_adapter = is_plugged
 
     def receive(self, data: bytes, now: float) -> bytes:
         """Take the host's bytes. The base answers within its stream, so never at once."""
@@ -163,7 +167,7 @@ class KobukiTwin:
     def advance(self, now: float) -> bytes:
         """The one frame that is due, if one is."""
         if self._power_on is None:
-            self._power_on = self._new_at = now
+            self._power_on = now
         due = self.next_due()
         if now < due:
             return b""
@@ -200,8 +204,9 @@ class KobukiTwin:
             self._true = self._truth()
         self._move(due)
         replies, self._replies = self._replies.values(), {}
+        self._charge()
         parts = self._instruments.read(
-            self._stamp_ms, self._body.bumper, self._volts(due), self._dock_ir
+            self._stamp_ms, self._body.bumper, self._power, self._dock_beams()
         )
         self._cycles += 1
         return encode_frame(encode_feedback(self._mishaps.spoil([*parts, *replies])))
@@ -210,9 +215,17 @@ class KobukiTwin:
     def _stamp_ms(self) -> int:
         return _PERIOD_MS * self._cycles
 
-    def _volts(self, now: float) -> float:
-        hours = (now - self._new_at) / 3600.0
-        return self._config.battery_v - hours * self._config.battery_drain_v_per_h
+    def _charge(self) -> None:
+        """Let the battery feel this cycle."""
+        is_docked = self._dock is not None and self._dock.holds(self._body.pose)
+        self._power.source = "adapter" if self._has_adapter else "dock" if is_docked else None
+        self._power.advance(_PERIOD)
+
+    def _dock_beams(self) -> DockIr:
+        if self._dock is None:
+            return self._shown
+        seen, shown = self._dock.shines_on(self._body.pose, self._look), self._shown
+        return DockIr(seen.right | shown.right, seen.centre | shown.centre, seen.left | shown.left)
 
     def _obey(self, command: Command, now: float) -> None:
         match command:
@@ -220,14 +233,21 @@ class KobukiTwin:
                 self._obey_motion(command.twist_on(1000 * self._geometry.wheel_base), now)
             case RequestExtra(flags):
                 self._reply(self._extras(flags))
-            case SetGain(kind, p, i, d):
+            case SetGain(kind, p, i, d) if self._has_gains:
                 self._gains = ControllerInfo(kind, p, i, d) if kind else _FACTORY_GAINS
-            case GetGain():
+            case GetGain() if self._has_gains:
                 self._reply([self._gains])
             case GpOutput(flags):
                 self._output = flags
+            case Sound() | SoundSequence():
+                self.played.append(command)
             case _:
                 pass
+
+    @property
+    def _has_gains(self) -> bool:
+        version = _version(self._config.firmware_version)
+        return (version.major, version.minor) >= _FIRST_WITH_GAINS
 
     def _obey_motion(self, twist: Twist, now: float) -> None:
         """Take a command in its turn; motors that stand get their power a little later."""
