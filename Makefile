@@ -10,7 +10,7 @@ help:
 	@echo "make test      the whole test suite"
 	@echo "make check     format, lint, types, import rules, tests"
 	@echo "make quick     the tests that take under a second each"
-	@echo "make bench     time the inner loops"
+	@echo "make bench     time the inner loops and the drivers, targets beside"
 	@echo "make fuzz      throw mutated bytes at the parsers for a minute each"
 
 explore: .venv/core
@@ -31,13 +31,12 @@ static: .venv/dev
 check: static test
 
 bench: .venv/dev
-	@for file in benchmarks/bench_*.py; do $(BIN)/python "$$file" || exit 1; done
+	@for file in benchmarks/bench_*.py; do $(BIN)/python -m "benchmarks.$$(basename "$$file" .py)" || exit 1; done
 
 FUZZ_SECONDS ?= 60
-fuzz: .venv/dev
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check atheris
+fuzz: .venv/fuzz
 	@for file in tests/fuzz/fuzz_*.py; do \
-		$(BIN)/python "$$file" -max_total_time=$(FUZZ_SECONDS) -rss_limit_mb=1024 -timeout=10 || exit 1; done
+		$(BIN)/python -m "tests.fuzz.$$(basename "$$file" .py)" -max_total_time=$(FUZZ_SECONDS) -rss_limit_mb=1024 -timeout=10 || exit 1; done
 
 clean:
 	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
@@ -52,6 +51,10 @@ clean:
 	@$(call make_venv)
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
 	@touch .venv/core $@
+
+.venv/fuzz: .venv/dev
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[fuzz]'
+	@touch $@
 
 define make_venv
 command -v $(PYTHON) >/dev/null || { \
