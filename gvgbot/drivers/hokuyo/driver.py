@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -67,6 +68,7 @@ class HokuyoLaser:
         self._config = config
         self._dialogue = Dialogue(stream, clock, config.reply_timeout_s)
         self._scans: Latest[Scan] = Latest()
+        self._last_scan = -math.inf  # when it came, s
         self._baud = config.baud
         self._identity: Identity | None = None
         self._parameters: Parameters | None = None
@@ -241,8 +243,16 @@ class HokuyoLaser:
         if not await self._scan_within(self._config.reply_timeout_s + stream.silence, stream):
             self._dialogue.send("RS")
             raise DeviceLost("the laser answers but sends no scans: switch it off and on")
-        while await self._scan_within(stream.silence, stream):
-            pass
+        clock = self._dialogue.clock
+        while (until := self._last_scan + stream.silence) > clock.now():
+            await self._listen(stream, until - clock.now())
+
+    async def _listen(self, stream: _Stream, seconds: float) -> None:
+        """Hand on what comes; a timer for each scan would cost more than its checksums."""
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(seconds):
+                while True:
+                    self._hand_on(await self._dialogue.receive(), stream)
 
     async def _scan_within(self, seconds: float, stream: _Stream) -> bool:
         with contextlib.suppress(TimeoutError):
@@ -258,6 +268,7 @@ class HokuyoLaser:
         fresh = [scan for scan in scans if scan is not None]
         for scan in fresh:
             self._scans.put(scan)
+            self._last_scan = self._dialogue.clock.now()
         self.link.scans += len(fresh)
         return bool(fresh)
 
