@@ -43,7 +43,9 @@ class TwinConfig:
     enabled: bool = True  # false: the devices are real, and the robot moves
     world: str = "office"  # a built-in world, or the path of a map_server YAML
     start: tuple[float, float, float] | None = None  # x (m), y (m), theta (rad); None: the world's
+    people: Annotated[int | None, Range(0, 100)] = None  # who walk about; None: the world's own
     seed: Annotated[int, Range(0, 2**32 - 1)] = 1
+    time_limit_s: Annotated[float, Range(1.0, 1e6)] = 14_400.0  # simulated; then `explore` ends
     laser: HokuyoTwinConfig = field(default_factory=HokuyoTwinConfig)
     base: KobukiTwinConfig = field(default_factory=KobukiTwinConfig)
 

@@ -15,7 +15,7 @@ from gvgbot.config import Config
 from gvgbot.errors import GvgbotError
 from gvgbot.hal.guard import Guard
 from gvgbot.hal.messages import Odometry
-from gvgbot.links import Links
+from gvgbot.links import Devices, Links
 from gvgbot.maps.run_directory import RunDirectory
 from gvgbot.progress import Progress
 from gvgbot.robot import Robot
@@ -30,8 +30,9 @@ log = structlog.get_logger()
 def explore(config: Config, *, out: Path | None, real_time: bool) -> int:
     """Explore a simulated world, print where the map is, and return the exit status.
 
-    Raises UsageError for a world or directory that cannot be used, GvgbotError when a device fails.
+    Raises UsageError for a world or directory that cannot be used.
     """
+    set_up_logging(sys.stderr, os.environ, "warning")
     place = open_place(config)
     with RunDirectory.create(out, world=place.world.name) as directory:
         session, progress = Session(config, directory, place), Progress()
@@ -49,42 +50,47 @@ def explore(config: Config, *, out: Path | None, real_time: bool) -> int:
 
 
 async def explore_once(session: Session, progress: Progress) -> None:
-    """Explore with the twins until there is an outcome. Raises GvgbotError when a device fails."""
+    """Explore with the twins until there is an outcome, or no more time.
+
+    The robot stands while a device is away; what is missing at the end is the session's failure.
+    """
     assert session.place is not None
     clock = LoopClock()
     session.simulation = Simulation(session.config, session.place, clock)
-    links = Links(session.config, clock, session.simulation)
-    (laser, _), (base, _) = links.open_laser(), links.open_base()
+    devices = Devices(Links(session.config, clock, session.simulation))
 
     def on_cycle(odometry: Odometry) -> None:
-        session.on_cycle(odometry, base.contact)
+        session.on_cycle(odometry, devices.base.contact)
         progress.show(session.pipeline, odometry.stamp)
 
     robot = session.config.robot
     guard = Guard(robot.limits, robot.radius_m)
     loop = Loop(
-        laser, base, session.pipeline, guard, on_events=session.on_events, on_cycle=on_cycle
+        devices.laser,
+        devices.base,
+        session.pipeline,
+        guard,
+        on_events=session.on_events,
+        on_cycle=on_cycle,
     )
-    try:
-        async with asyncio.TaskGroup() as tasks:
-            serving = [
-                tasks.create_task(laser.run(), name="laser"),
-                tasks.create_task(base.run(), name="base"),
-                tasks.create_task(session.simulation.run(), name="twins"),
-            ]
-            await loop.run()
-            for task in serving:
-                task.cancel()
-    except* GvgbotError as failures:
-        raise _first(failures) from None
+    limit = session.config.twin.time_limit_s
+    async with asyncio.TaskGroup() as tasks:
+        serving = tasks.create_task(devices.run(), name="devices")
+        try:
+            async with asyncio.timeout(limit):
+                await loop.run()
+        except TimeoutError:
+            session.failure = devices.away or f"not explored after {limit:g} s"
+        serving.cancel()
 
 
 def _conclude(session: Session) -> int:
     """Print the outcome and where the map is; the exit status."""
     mission, graph = session.pipeline.mission, session.pipeline.mapper.graph
     print(
-        f"{mission.outcome}: {mission.reason}; {len(graph.vertices)} vertices, "
-        f"{len(graph.edges)} edges, {session.pipeline.travelled:.0f} m driven",
+        f"{mission.outcome or 'failed'}: {mission.reason or session.failure}; "
+        f"{len(graph.vertices)} vertices, {len(graph.edges)} edges, "
+        f"{session.pipeline.travelled:.0f} m driven",
         file=sys.stdout if mission.outcome == "explored" else sys.stderr,
     )
     print(f"map:     {session.directory.path / 'map.geojson'}")

@@ -1,5 +1,6 @@
 """Drivers on the links of a configuration: serial ports, or the twins of a simulation."""
 
+import asyncio
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -12,6 +13,7 @@ from gvgbot.drivers.tcp import SCHEME, TcpStream
 from gvgbot.drivers.transport import ByteStream, SerialStream
 from gvgbot.errors import DeviceLost
 from gvgbot.hal.devices import Base, Laser
+from gvgbot.hal.reopening import ReopeningBase, ReopeningLaser
 from gvgbot.simulation import Simulation
 
 Close = Callable[[], None]
@@ -48,6 +50,29 @@ class Links:
         else:
             stream, close = self.simulation.base, _leave_open
         return KobukiBase(stream, config, self.clock, self.feedback), close
+
+
+class Devices:
+    """The laser and the base on their links, opened again for as long as they are lost."""
+
+    def __init__(self, links: Links) -> None:
+        self.laser = ReopeningLaser(links.open_laser, links.clock)
+        self.base = ReopeningBase(links.open_base, links.clock)
+        self._simulation = links.simulation
+
+    async def run(self) -> None:
+        """Serve them, and the twins at the other ends, until cancelled."""
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(self.laser.run(), name="laser")
+            tasks.create_task(self.base.run(), name="base")
+            if self._simulation is not None:
+                tasks.create_task(self._simulation.run(), name="twins")
+
+    @property
+    def away(self) -> str | None:
+        """Which devices are missing, and why; None if they are all there."""
+        devices = {"base": self.base.away, "laser": self.laser.away}
+        return "; ".join(f"no {name}: {why}" for name, why in devices.items() if why) or None
 
 
 def _open_port(name: str, port: str, baud: int) -> tuple[ByteStream, Close]:

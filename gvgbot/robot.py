@@ -14,9 +14,8 @@ from gvgbot.errors import GvgbotError
 from gvgbot.geometry import STANDSTILL
 from gvgbot.hal.guard import Guard
 from gvgbot.hal.messages import Odometry
-from gvgbot.hal.reopening import ReopeningBase, ReopeningLaser
 from gvgbot.journal import GuardJournal, log_event, status_line
-from gvgbot.links import Links
+from gvgbot.links import Devices, Links
 from gvgbot.service import Notifier
 from gvgbot.session import Session
 from gvgbot.simulation import Simulation
@@ -58,8 +57,7 @@ class Robot:
         self._ready = False
         self._guard = GuardJournal()
         self._clock: Clock
-        self._laser: ReopeningLaser
-        self._base: ReopeningBase
+        self._devices: Devices
         self._loop: Loop
 
     # -- the tasks ---------------------------------------------------------------------------------
@@ -73,14 +71,11 @@ class Robot:
         links = self._open_links() if links is None else links
         self._prepare(links)
         work = {
-            "laser": self._laser.run(),
-            "base": self._base.run(),
+            "devices": self._devices.run(),
             "explore": self._explore(),
             "beat": self._beat(),
             "save": self._keep_saved(),
         }
-        if links.simulation is not None:
-            work["twins"] = links.simulation.run()
         if self._network is not None:
             work["network"] = self._network.answer()
         async with asyncio.TaskGroup() as tasks:
@@ -98,11 +93,10 @@ class Robot:
 
     def _prepare(self, links: Links) -> None:
         robot = self._session.config.robot
-        self._laser = ReopeningLaser(links.open_laser, self._clock)
-        self._base = ReopeningBase(links.open_base, self._clock)
+        self._devices = Devices(links)
         self._loop = Loop(
-            self._laser,
-            self._base,
+            self._devices.laser,
+            self._devices.base,
             self._pipeline,
             Guard(robot.limits, robot.radius_m),
             on_events=self._on_events,
@@ -115,8 +109,8 @@ class Robot:
         self._finished.set()
         self._grown.set()
         while True:
-            self._note(await self._base.next_odometry())
-            self._base.drive(STANDSTILL)
+            self._note(await self._devices.base.next_odometry())
+            self._devices.base.drive(STANDSTILL)
 
     async def _keep_saved(self) -> None:
         """Save now and then while the map grows, and when it is finished."""
@@ -155,7 +149,7 @@ class Robot:
 
     def _on_cycle(self, odometry: Odometry) -> None:
         self._note(odometry)
-        self._session.on_cycle(odometry, self._base.contact)
+        self._session.on_cycle(odometry, self._devices.base.contact)
         if not self._ready and self._pipeline.keyframes:  # a scan and odometry made the first
             self._ready = True
             self._notifier.ready()
@@ -173,23 +167,18 @@ class Robot:
             self._network.publish(now)
         self._notifier.status(status_line(now))
         stuck = now.cycle_age is not None and now.cycle_age > STUCK_AFTER
-        if not stuck or self._base.away is not None:
+        if not stuck or self._devices.base.away is not None:
             self._notifier.alive()
 
     def _state(self) -> State:
         return state(
             self._pipeline,
             self._odometry,
-            self._base.battery,
+            self._devices.base.battery,
             stamp=self._clock.now(),
             sequence=self._sequence,
             cycles=self._cycles,
             noise=self._session.config.autonomy.odometry_noise,
-            away=self._away(),
+            away=self._devices.away,
             guard=self._loop.stopped_for,
         )
-
-    def _away(self) -> str | None:
-        """Which devices are missing, and why; None if they are all there."""
-        devices = {"base": self._base.away, "laser": self._laser.away}
-        return "; ".join(f"no {name}: {why}" for name, why in devices.items() if why) or None

@@ -8,7 +8,7 @@ import socket
 from collections.abc import Callable, Mapping
 from functools import partial
 from types import TracebackType
-from typing import Any, Self, TextIO, cast
+from typing import Any, Literal, Self, TextIO, cast
 
 import structlog
 from structlog.typing import EventDict, Processor, WrappedLogger
@@ -120,12 +120,14 @@ class _Unbreakable:
             self._stream.flush()
 
 
-def set_up_logging(stream: TextIO, environment: Mapping[str, str]) -> None:
+def set_up_logging(
+    stream: TextIO, environment: Mapping[str, str], least: Literal["info", "warning"] = "info"
+) -> None:
     """Log to the stream: for people, or as JSON with a severity where a journal reads along."""
     journal = "JOURNAL_STREAM" in environment
     structlog.configure(
         processors=_for_journal() if journal else _for_people(colors=stream.isatty()),
-        wrapper_class=structlog.make_filtering_bound_logger("info"),
+        wrapper_class=structlog.make_filtering_bound_logger(least),
         logger_factory=structlog.PrintLoggerFactory(cast(TextIO, _Unbreakable(stream))),
         cache_logger_on_first_use=False,
     )

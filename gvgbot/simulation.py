@@ -14,6 +14,8 @@ from gvgbot.drivers.hokuyo.models import MODELS
 from gvgbot.drivers.hokuyo.twin import HokuyoTwin
 from gvgbot.drivers.kobuki.twin import KobukiTwin
 from gvgbot.drivers.link_faults import FaultyLink
+from gvgbot.drivers.people import People, Walkways
+from gvgbot.drivers.sight import Sight
 from gvgbot.drivers.transport import serve_twin
 from gvgbot.drivers.world import World, check_start
 from gvgbot.geometry import Array, Pose
@@ -25,18 +27,26 @@ _SECTORS = 6  # of a sweep, each seen from one pose
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A world and where the robot starts in it."""
+    """A world, where the robot starts in it, and where people walk, if there are any."""
 
     world: World
     start: Pose
+    walkways: Walkways | None = None
 
 
 def open_place(config: Config) -> Place:
-    """The configured world. Raises WorldError if it cannot be had or the start does not fit."""
+    """The configured world.
+
+    Raises WorldError if it cannot be had, the start does not fit, or people have no room.
+    """
     world, default = open_world(config.twin.world)
     start = Pose(*config.twin.start) if config.twin.start is not None else default or Pose()
     check_start(world, start, config.robot.radius_m)
-    return Place(world, start)
+    return Place(world, start, Walkways(world, start) if _people_count(config, world) else None)
+
+
+def _people_count(config: Config, world: World) -> int:
+    return world.people if config.twin.people is None else config.twin.people
 
 
 class Simulation:
@@ -48,7 +58,14 @@ class Simulation:
     def __init__(self, config: Config, place: Place, clock: Clock) -> None:
         self.place = place
         shape = BodyConfig(radius_m=config.robot.radius_m, wheel_base_m=config.base.wheel_base_m)
-        self.body = RobotBody(place.world, place.start, shape, clock.now())
+        seeds = np.random.SeedSequence(config.twin.seed).generate_state(4)
+        laser_seed, base_seed, people_seed, glass_seed = (int(seed) for seed in seeds)
+        people = None
+        if place.walkways is not None:
+            count = _people_count(config, place.world)
+            people = People(place.walkways, count, people_seed, clock.now())
+        self.body = RobotBody(place.world, place.start, shape, clock.now(), people)
+        sight = Sight(place.world, people, glass_seed)
         self._clock = clock
         mount = config.laser.base_laser
         model = MODELS[config.twin.laser.model]
@@ -65,25 +82,25 @@ class Simulation:
                 ) * model.parameters.step_time
                 moved = Pose(self.body.linear * late, 0.0, self.body.angular * late)
                 world_laser = self.body.pose.compose(moved).compose(mount)
-                seen.append(_looked(place.world, world_laser, bearings[beams], reach, flipped))
+                seen.append(_looked(sight, world_laser, bearings[beams], reach, flipped))
             return np.concatenate(seen)
 
-        laser_seed, base_seed = np.random.SeedSequence(config.twin.seed).generate_state(2)
         cable, laser_cable = Cable(), Cable()
+        self._laser_has_usb = config.twin.laser.serial_baud == 0
         self.plug_base: Callable[[bool], None] = cable.plug  # of the link that is in use
         self.plug_laser: Callable[[bool], None] = laser_cable.plug
         self.laser_twin = FaultyLink(
-            HokuyoTwin(config.twin.laser, sense, int(laser_seed)),
+            HokuyoTwin(config.twin.laser, sense, laser_seed, self._reboot_laser),
             config.twin.laser.link,
-            int(laser_seed),
+            laser_seed,
             self._pull_laser,
         )
         self.base_twin = FaultyLink(
             KobukiTwin(
-                config.twin.base, self.body, int(base_seed), config.base.geometry, self._look
+                config.twin.base, self.body, base_seed, config.base.geometry, self._look
             ),
             config.twin.base.link,
-            int(base_seed),
+            base_seed,
             self._pull_base,
         )
         self.laser, self._laser_end = laser_cable.host, laser_cable.device
@@ -96,6 +113,11 @@ class Simulation:
 
     def _pull_laser(self, is_plugged: bool) -> None:
         self.plug_laser(is_plugged)
+
+    def _reboot_laser(self, is_back: bool) -> None:
+        """A laser on USB takes its link along when it reboots; a serial line stays."""
+        if self._laser_has_usb:
+            self.plug_laser(is_back)
 
     def _pull_base(self, is_plugged: bool) -> None:
         self.plug_base(is_plugged)
@@ -113,8 +135,8 @@ class Simulation:
         await serve_twin(self.base_twin, self._base_end, self._clock)
 
 
-def _looked(world: World, world_laser: Pose, bearings: Array, reach: float, flipped: bool) -> Array:
+def _looked(sight: Sight, world_laser: Pose, bearings: Array, reach: float, flipped: bool) -> Array:
     """Ranges (N,) in m along bearings (N,) of the laser, which may hang upside down."""
     if not flipped:
-        return world.cast(world_laser, bearings, reach)
-    return world.cast(world_laser, -bearings[::-1], reach)[::-1]
+        return sight.look(world_laser, bearings, reach)
+    return sight.look(world_laser, -bearings[::-1], reach)[::-1]

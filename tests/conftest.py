@@ -1,6 +1,9 @@
 """Settings of every test: the same examples on every machine, however busy it is."""
 
+from collections.abc import Iterator
+
 import pytest
+import structlog
 from hypothesis import settings
 
 settings.register_profile("dev", max_examples=50, derandomize=True, deadline=None, database=None)
@@ -11,3 +14,10 @@ settings.load_profile("dev")
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--laser-port", help="a real laser's port, for -m hardware")
     parser.addoption("--base-port", help="a real base's port, for -m hardware")
+
+
+@pytest.fixture(autouse=True)
+def _fresh_log() -> Iterator[None]:
+    """A command sets up the log for its process; the next test starts from nothing."""
+    yield
+    structlog.reset_defaults()

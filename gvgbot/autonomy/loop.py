@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 from gvgbot.autonomy.events import Event
 from gvgbot.autonomy.pipeline import Pipeline
+from gvgbot.errors import DeviceLost
 from gvgbot.geometry import STANDSTILL
 from gvgbot.hal.devices import Base, Laser
 from gvgbot.hal.guard import Guard, GuardState
@@ -44,7 +45,11 @@ class Loop:
 
     async def _perceive(self) -> None:
         while self._pipeline.mission.outcome is None:
-            scan = await self._laser.next_scan()
+            try:
+                scan = await self._laser.next_scan()
+            except DeviceLost:
+                self._scan = None  # the guard stops now, not when the last scan is too old
+                continue
             events = self._pipeline.perceive(scan)
             self._scan = scan
             if events:

@@ -6,6 +6,7 @@ from gvgbot.geometry import Pose
 from gvgbot.hal.messages import Odometry, Scan
 
 _KEPT = 64  # messages
+_LONGEST_GAP_S = 0.3  # without odometry; nobody knows what the base did in a longer one
 _LEAST_SPAN_S = 0.04  # over which odometry tells a velocity
 
 
@@ -25,10 +26,17 @@ class OdometryLog:
         return self._kept[-1] if self._kept else None
 
     def odom_base_at(self, stamp: float) -> Pose | None:
-        """`odom_base` at a stamp, between two messages; the nearest one outside what is kept."""
+        """`odom_base` at a stamp, between two messages; the oldest one before what is kept.
+
+        None if the odometry nearest in time is too far from it, as in an outage of the base.
+        """
+        if self.newest is None or stamp - self.newest.stamp > _LONGEST_GAP_S:
+            return None
         later: Odometry | None = None
         for earlier in reversed(self._kept):
             if earlier.stamp <= stamp:
+                if later is not None and later.stamp - earlier.stamp > _LONGEST_GAP_S:
+                    return None
                 return earlier.odom_base if later is None else _between(earlier, later, stamp)
             later = earlier
         return None if later is None else later.odom_base

@@ -1,4 +1,4 @@
-"""When a twin's faults happen: drawn at random at given rates, or injected by call."""
+"""When a twin's faults happen: drawn at random, at set times, or injected by call."""
 
 import math
 from collections import Counter
@@ -12,10 +12,14 @@ _HOUR = 3600.0  # s
 
 @dataclass(frozen=True, slots=True)
 class Rate:
-    """How often a fault begins, and how long it lasts, s."""
+    """How often a fault begins, and how long it lasts, s.
+
+    It also begins so many seconds after the first `advance`, each of `at`.
+    """
 
     per_h: float
     duration: float
+    at: tuple[float, ...] = ()
 
 
 class FaultSchedule:
@@ -27,6 +31,7 @@ class FaultSchedule:
         self._rng = rng
         self._starts: dict[str, float] | None = None  # drawn when the time is first known
         self._ends: dict[str, float] = {}
+        self._planned: list[tuple[float, str]] = []  # set times still to come, earliest first
         self._injected: list[tuple[str, float]] = []
 
     def inject(self, name: str, duration: float) -> None:
@@ -37,10 +42,16 @@ class FaultSchedule:
         """The faults that have begun up to now (s), in order of name."""
         if self._starts is None:
             self._starts = {name: self._next_start(name, now) for name in self._rates}
+            self._planned = sorted(
+                (now + late, name) for name, rate in self._rates.items() for late in rate.at
+            )
         self._ends = {name: end for name, end in self._ends.items() if end > now}
         began = {name: self._rates[name].duration for name in self._due(self._starts, now)}
         for name, duration in began.items():
             self._starts[name] = self._next_start(name, now + duration)
+        while self._planned and self._planned[0][0] <= now:
+            _, name = self._planned.pop(0)
+            began[name] = self._rates[name].duration
         began |= dict(self._injected)
         self._injected.clear()
         for name, duration in began.items():
@@ -57,7 +68,8 @@ class FaultSchedule:
         if self._injected:
             return -math.inf
         starts = () if self._starts is None else self._starts.values()
-        return min((*starts, *self._ends.values()), default=math.inf)
+        planned = (stamp for stamp, _ in self._planned[:1])
+        return min((*starts, *planned, *self._ends.values()), default=math.inf)
 
     def _due(self, starts: Mapping[str, float], now: float) -> list[str]:
         return [name for name, start in starts.items() if start <= now]

@@ -9,21 +9,26 @@ from typing import Annotated, Literal
 import numpy as np
 
 from gvgbot.drivers.fault_schedule import FaultSchedule, Rate
+from gvgbot.drivers.serial_line import SerialLine
 from gvgbot.drivers.transport import TwinDevice
 from gvgbot.ranges import Range
 
 _CHIP_BYTES = 62  # a USB serial converter sends at once when it has gathered this many
+_BACKLOG = 0.5  # s: a device leaves messages out when the line is so far behind
 PerThousand = Annotated[float, Range(0.0, 1000.0)]
+Moment = Annotated[float, Range(0.0, 86_400.0)]  # s
 PerHour = Annotated[float, Range(0.0, 36_000.0)]
 LinkFault = Literal["silence", "unplug"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinkFaultConfig:
-    """What is wrong with the link. Delays apply towards the host, damage to bytes both ways."""
+    """What is wrong with the link. Damage and bit rate apply to bytes both ways."""
 
-    latency_s: Annotated[float, Range(0.0, 1.0)] = 0.0
+    latency_s: Annotated[float, Range(0.0, 1.0)] = 0.0  # towards the host
     jitter_s: Annotated[float, Range(0.0, 1.0)] = 0.0  # at most, beyond the latency
+    command_latency_s: Annotated[float, Range(0.0, 1.0)] = 0.0  # towards the device
+    baud: Annotated[int, Range(0, 4_000_000)] = 0  # bit/s; 0: so fast that it does not matter
     chip_timer_s: Annotated[float, Range(0.0, 0.255)] = (
         0.0  # an FTDI's latency timer; usually 16 ms
     )
@@ -34,7 +39,8 @@ class LinkFaultConfig:
     silences_per_h: PerHour = 0.0
     silence_s: Annotated[float, Range(0.0, 3600.0)] = 2.0
     unplugs_per_h: PerHour = 0.0
-    unplugged_s: Annotated[float, Range(0.0, 3600.0)] = 3.0
+    unplugs_at_s: tuple[Moment, ...] = ()  # since the twin was first served
+    unplugged_s: Annotated[float, Range(0.0, 86_400.0)] = 3.0
 
 
 class FaultyLink:
@@ -53,9 +59,11 @@ class FaultyLink:
         self._jitter = np.random.default_rng((seed, 2))
         rates = {
             "silence": Rate(config.silences_per_h, config.silence_s),
-            "unplug": Rate(config.unplugs_per_h, config.unplugged_s),
+            "unplug": Rate(config.unplugs_per_h, config.unplugged_s, config.unplugs_at_s),
         }
         self._schedule = FaultSchedule(rates, np.random.default_rng((seed, 3)))
+        self._commands, self._wire = SerialLine(config.baud), SerialLine(config.baud)
+        self._lost: Counter[str] = Counter()
         self._under_way: deque[tuple[float, bytes]] = deque()
         self._chip, self._chip_due = b"", math.inf
         self._is_plugged = True
@@ -63,11 +71,16 @@ class FaultyLink:
     @property
     def counts(self) -> Counter[str]:
         """How often each kind of fault has happened."""
-        return self._schedule.counts + self._damage.counts
+        return self._schedule.counts + self._damage.counts + self._lost
 
     def inject(self, fault: LinkFault, duration: float) -> None:
         """Let the device fall silent, or pull its cable, for so long (s)."""
         self._schedule.inject(fault, duration)
+
+    def change(self, config: LinkFaultConfig) -> None:
+        """Delay and damage what is sent from now on so; the rates of other faults stay."""
+        self._config = self._damage.config = config
+        self._commands.baud = self._wire.baud = config.baud
 
     def is_on(self, fault: LinkFault) -> bool:
         """Whether nothing gets through for this reason."""
@@ -76,7 +89,9 @@ class FaultyLink:
     def receive(self, data: bytes, now: float) -> bytes:
         """Take the host's bytes; those that the device answers at once and that arrive at once."""
         if self._is_plugged:
-            self._post(self._device.receive(self._damage.done_to(data), now), now)
+            late = now + self._config.command_latency_s
+            self._commands.put(self._damage.done_to(data), late)
+            self._deliver(now)
         return self._arrived(now)
 
     def advance(self, now: float) -> bytes:
@@ -84,9 +99,11 @@ class FaultyLink:
         self._schedule.advance(now)
         if self._is_plugged == self._schedule.is_on("unplug"):
             self._is_plugged = not self._is_plugged
-            self._under_way.clear()
+            for way in (self._commands, self._wire, self._under_way):
+                way.clear()
             self._chip, self._chip_due = b"", math.inf
             self._plug(self._is_plugged)
+        self._deliver(now)
         if self._device.next_due() <= now:
             self._post(self._device.advance(now), now)
         return self._arrived(now)
@@ -94,15 +111,29 @@ class FaultyLink:
     def next_due(self) -> float:
         """When something arrives, or the device or a fault is due."""
         first = self._under_way[0][0] if self._under_way else math.inf
-        return min(self._device.next_due(), self._schedule.next_due(), self._chip_due, first)
+        wires = min(self._commands.next_due(), self._wire.next_due())
+        return min(self._device.next_due(), self._schedule.next_due(), self._chip_due, first, wires)
+
+    def _deliver(self, now: float) -> None:
+        """Hand the device what has come through to it."""
+        data = self._commands.out(now)
+        if data:
+            self._post(self._device.receive(data, now), now)
 
     def _post(self, message: bytes, now: float) -> None:
         """Send a message on its way, unless nothing gets through just now."""
         if not message or not self._is_plugged or self._schedule.is_on("silence"):
             return
-        message = self._damage.done_to(self._damage.cut(message))
-        timer = self._config.chip_timer_s
-        if timer == 0.0:
+        if self._wire.free_at > now + _BACKLOG:
+            self._lost["dropped message"] += 1
+            return
+        self._wire.put(self._damage.done_to(self._damage.cut(message)), now)
+        self._convert(now)
+
+    def _convert(self, now: float) -> None:
+        """Let the serial converter take what has come over the wire."""
+        message, timer = self._wire.out(now), self._config.chip_timer_s
+        if timer == 0.0 or not message:
             self._send(message, now)
             return
         self._chip += message
@@ -120,6 +151,7 @@ class FaultyLink:
             self._under_way.append((max(now + late, last), data))
 
     def _arrived(self, now: float) -> bytes:
+        self._convert(now)
         if self._chip_due <= now:
             self._send(self._chip, self._chip_due)
             self._chip, self._chip_due = b"", math.inf
@@ -134,29 +166,29 @@ class _Damage:
 
     def __init__(self, config: LinkFaultConfig, rng: np.random.Generator) -> None:
         self.counts: Counter[str] = Counter()
+        self.config = config
         self._rng = rng
-        self._cut = config.cut_messages_per_k / 1000
-        self._flipped = config.flipped_bits_per_kb / 1000
-        self._lost = config.lost_bytes_per_kb / 1000
-        self._inserted = config.inserted_bytes_per_kb / 1000
-        self._is_harmless = not (self._flipped or self._lost or self._inserted)
 
     def cut(self, message: bytes) -> bytes:
         """The message, or now and then only its beginning."""
-        if self._cut == 0.0 or self._rng.random() >= self._cut:
+        share = self.config.cut_messages_per_k / 1000
+        if share == 0.0 or self._rng.random() >= share:
             return message
         self.counts["cut message"] += 1
         return message[: int(self._rng.integers(len(message)))]
 
     def done_to(self, data: bytes) -> bytes:
         """The bytes with bits flipped, bytes lost and bytes put in."""
-        if self._is_harmless or not data:
+        config = self.config
+        rates = (config.flipped_bits_per_kb, config.lost_bytes_per_kb, config.inserted_bytes_per_kb)
+        if not any(rates) or not data:
             return data
+        flipped, lost, inserted = (rate / 1000 for rate in rates)
         wire = np.frombuffer(data, np.uint8).copy()
-        hit = self._drawn(len(wire), self._flipped, "flipped bit")
+        hit = self._drawn(len(wire), flipped, "flipped bit")
         wire[hit] ^= (1 << self._rng.integers(0, 8, int(hit.sum()))).astype(np.uint8)
-        wire = wire[~self._drawn(len(wire), self._lost, "lost byte")]
-        places = np.flatnonzero(self._drawn(len(wire), self._inserted, "inserted byte"))
+        wire = wire[~self._drawn(len(wire), lost, "lost byte")]
+        places = np.flatnonzero(self._drawn(len(wire), inserted, "inserted byte"))
         return np.insert(
             wire, places, self._rng.integers(0, 256, len(places)).astype(np.uint8)
         ).tobytes()

@@ -13,7 +13,10 @@ class Laser(Protocol):
         """Serve the link until cancelled. Raises DeviceLost or DeviceRefused."""
 
     async def next_scan(self) -> Scan:
-        """The newest scan not handed out before; waits for one."""
+        """The newest scan not handed out before; waits for one.
+
+        May raise DeviceLost at the moment when the laser is lost, and be asked again.
+        """
 
 
 class Base(Protocol):

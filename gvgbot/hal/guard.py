@@ -74,10 +74,11 @@ class Guard:
     ) -> tuple[GuardState, Twist, Reason | None]:
         """The twist that the motors get at `stamp` (s), and why, if safety changed it.
 
-        `scan` and `contact` are the newest, None before the first. Call it once per odometry.
+        `scan` and `contact` are the newest, None before the first and while there is no laser.
+        Call it once per odometry.
         """
         state = self._observe(state, odometry, scan)
-        reason = self._fault(twist, stamp, state.scan, contact)
+        reason = self._fault(twist, stamp, None if scan is None else state.scan, contact)
         permitted = STANDSTILL
         if reason is None:
             wish = self._ramp(state, self._limit(twist), stamp)

@@ -29,7 +29,8 @@ Opened = tuple[D, Callable[[], None]]  # the device, and what gives its link up
 class _Reopening(Generic[D]):
     """Opens a device, serves it until it is lost, waits a while, and so on until cancelled.
 
-    `away` says why the device cannot be used just now; None when it can.
+    `away` says why the device cannot be used just now; None when it can. `reconnects` counts how
+    often it came back.
     """
 
     def __init__(self, name: str, open_device: Callable[[], Opened[D]], clock: Clock) -> None:
@@ -38,6 +39,7 @@ class _Reopening(Generic[D]):
         self._name, self._open, self._clock = name, open_device, clock
         self._retry = FIRST_RETRY
         self._since: float | None = None  # when it was lost; None before it was ever there
+        self.reconnects = 0
         self._device: D | None = None
 
     async def run(self) -> None:
@@ -78,6 +80,7 @@ class _Reopening(Generic[D]):
             return
         after = None if self._since is None else round(self._clock.now() - self._since, 1)
         log.info(f"{self._name} is there" if after is None else f"{self._name} back", after_s=after)
+        self.reconnects += after is not None
         self.away, self._retry = None, FIRST_RETRY
 
 
@@ -86,11 +89,22 @@ class ReopeningLaser(_Reopening[Laser]):
 
     def __init__(self, open_device: Callable[[], Opened[Laser]], clock: Clock) -> None:
         super().__init__("laser", open_device, clock)
-        self._scans: Latest[Scan] = Latest()
+        self._scans: Latest[Scan | DeviceLost] = Latest()
 
     async def next_scan(self) -> Scan:
-        """The newest scan not handed out before; waits for one."""
-        return await self._scans.next()
+        """The newest scan not handed out before; waits for one.
+
+        Raises DeviceLost once for each time that the laser is lost; ask again to wait for it.
+        """
+        found = await self._scans.next()
+        if isinstance(found, DeviceLost):
+            raise found
+        return found
+
+    def _lost(self, reason: str) -> None:
+        if self.away is None:
+            self._scans.put(DeviceLost(reason))
+        super()._lost(reason)
 
     async def _pass_on(self, device: Laser) -> None:
         while True:

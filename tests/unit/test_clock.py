@@ -161,7 +161,7 @@ def test_two_tasks_that_wait_for_the_next_instant_do_not_stop_time() -> None:
             rounds += 1
         return rounds
 
-    async def main() -> list[int]:
+    async def main() -> tuple[int, int]:
         clock = LoopClock()
         await clock.sleep_until(5.1)
         later = math.nextafter(clock.now(), math.inf)

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from gvgbot.drivers.fault_schedule import Rate
 from gvgbot.drivers.hokuyo.clock_sync import WRAP_MS
 from gvgbot.drivers.hokuyo.models import ModelName
-from gvgbot.drivers.link_faults import LinkFaultConfig
+from gvgbot.drivers.link_faults import LinkFaultConfig, Moment
 from gvgbot.ranges import Range
 
 LaserMishap = Literal["reboot", "frozen", "stalled", "unstable", "abnormal", "blind"]
@@ -19,6 +19,7 @@ class LaserMishapConfig:
     """How often a simulated laser has each mishap, and how long one lasts."""
 
     reboots_per_h: PerHour = 0.0
+    reboots_at_s: tuple[Moment, ...] = ()  # since the twin was first served
     freezes_per_h: PerHour = 0.0  # the last scan comes over and over
     stalls_per_h: PerHour = 0.0  # answers, but sends no scans
     unstable_per_h: PerHour = 0.0  # says that it cannot measure just now
@@ -35,12 +36,12 @@ class LaserMishapConfig:
             "unstable": self.unstable_per_h,
             "blind": self.blinds_per_h,
         }
-        sudden: dict[LaserMishap, float] = {
-            "reboot": self.reboots_per_h,
-            "abnormal": self.abnormal_per_h,
+        sudden: dict[LaserMishap, Rate] = {
+            "reboot": Rate(self.reboots_per_h, 0.0, self.reboots_at_s),
+            "abnormal": Rate(self.abnormal_per_h, 0.0),
         }
         rates = {str(name): Rate(per_h, self.duration_s) for name, per_h in lasting.items()}
-        return rates | {str(name): Rate(per_h, 0.0) for name, per_h in sudden.items()}
+        return rates | {str(name): rate for name, rate in sudden.items()}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

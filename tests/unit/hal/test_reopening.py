@@ -54,13 +54,16 @@ class Port:
         self.closed += 1
 
 
-def live(port: Port, seconds: float) -> list[Scan]:
-    """Serve a laser on the port for so long; the scans that somebody who waits for them gets."""
-    scans: list[Scan] = []
+def live(port: Port, seconds: float) -> list[float | str]:
+    """Serve a laser on the port for so long; stamps of scans, and losses, as they are noticed."""
+    noticed: list[float | str] = []
 
     async def collect(laser: ReopeningLaser) -> None:
         while True:
-            scans.append(await laser.next_scan())
+            try:
+                noticed.append(round((await laser.next_scan()).stamp, 6))
+            except DeviceLost as loss:
+                noticed.append(str(loss))
 
     async def main() -> None:
         laser = ReopeningLaser(port.open, LoopClock())
@@ -71,7 +74,7 @@ def live(port: Port, seconds: float) -> list[Scan]:
                 task.cancel()
 
     run_in_virtual_time(main())
-    return scans
+    return noticed
 
 
 def test_a_port_that_stays_away_is_tried_with_doubling_pauses_up_to_two_seconds() -> None:
@@ -83,10 +86,14 @@ def test_a_port_that_stays_away_is_tried_with_doubling_pauses_up_to_two_seconds(
 @pytest.mark.parametrize("failure", [DeviceLost("silent"), DeviceRefused("laser off")], ids=str)
 def test_scans_go_on_after_a_laser_was_lost_and_pauses_are_short_again(failure: Exception) -> None:
     port = Port([ShortLivedLaser(failure), ShortLivedLaser(failure)])
-    scans = live(port, 2.0)
     # open at 0, lost at 0.6, again at 1.1, lost at 1.7
-    assert [scan.stamp for scan in scans] == pytest.approx([0.1, 1.2])
+    assert live(port, 2.0) == [0.1, str(failure), 1.2, str(failure)]
     assert port.asked == pytest.approx([0.0, 1.1])
+
+
+def test_who_waits_for_a_scan_is_told_once_that_the_laser_is_lost() -> None:
+    port = Port([ShortLivedLaser(DeviceLost("silent"))])
+    assert live(port, 60.0) == [0.1, "silent"]
 
 
 def test_every_link_is_closed_once() -> None:

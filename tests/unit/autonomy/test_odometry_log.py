@@ -1,0 +1,42 @@
+"""Where the base was at the stamp of a scan, if anything is known of that time."""
+
+import pytest
+
+from gvgbot.autonomy.odometry_log import OdometryLog
+from gvgbot.geometry import Pose, Twist
+from gvgbot.hal.messages import Odometry
+
+
+def driven(*stamps: float) -> OdometryLog:
+    """Odometry at these stamps of a base that drives ahead at 0.5 m/s."""
+    log = OdometryLog()
+    for stamp in stamps:
+        log.append(Odometry(stamp, Pose(0.5 * stamp, 0.0, 0.0), Twist(0.5, 0.0)))
+    return log
+
+
+def test_between_two_messages_the_base_was_in_proportion() -> None:
+    found = driven(1.0, 1.1).odom_base_at(1.04)
+    assert found is not None
+    assert found.x == pytest.approx(0.52)
+
+
+def test_a_scan_that_is_a_little_newer_than_odometry_was_taken_at_its_place() -> None:
+    assert driven(1.0, 1.02).odom_base_at(1.1) == Pose(0.51, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    "stamp", [1.5, 3.0, 7.9, 9.0], ids=["just after", "in", "at the end", "on"]
+)
+def test_nobody_knows_where_the_base_was_in_an_outage(stamp: float) -> None:
+    assert driven(0.98, 1.0, 8.0).odom_base_at(stamp) is None
+
+
+def test_after_an_outage_the_base_is_known_again() -> None:
+    found = driven(1.0, 8.0, 8.02).odom_base_at(8.01)
+    assert found is not None
+    assert found.x == pytest.approx(4.005)
+
+
+def test_before_the_first_message_nothing_is_known() -> None:
+    assert OdometryLog().odom_base_at(1.0) is None
