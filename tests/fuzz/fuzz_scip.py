@@ -35,7 +35,7 @@ FLOOD = b"\xff"  # a first byte that has the rest repeated
 def one_input(data: bytes) -> None:
     """Noise as it comes, and in replies with good checksums, which guessing would rarely make."""
     read(data)
-    if data.startswith(FLOOD) and data != FLOOD:
+    if data.startswith(FLOOD):
         flood(data[1:])
     read_reply(data[1:])
     read_scan(data[1:])
@@ -51,7 +51,9 @@ def read(data: bytes) -> None:
 
 
 def flood(data: bytes) -> None:
-    """The same over and over must not be remembered for ever."""
+    """The same over and over, of which no message ends, must not be remembered for ever."""
+    if not data or b"\n\n" in 2 * data:
+        return
     parser = ScipParser()
     piece = data * (MESSAGE_LIMIT // 8 // len(data) + 1)
     for _ in range(16):
