@@ -13,8 +13,8 @@ from gvgbot.drivers.hokuyo.twin_answers import Answers, LaserOn, Standby, Stream
 from gvgbot.drivers.hokuyo.twin_commands import CommandReader
 from gvgbot.drivers.hokuyo.twin_config import HokuyoTwinConfig, LaserMishap, LaserMishapConfig
 from gvgbot.drivers.hokuyo.twin_head import Head
-from gvgbot.drivers.hokuyo.twin_line import Line
 from gvgbot.drivers.hokuyo.twin_settings import BROKEN
+from gvgbot.drivers.serial_line import SerialLine
 from gvgbot.geometry import Array
 
 __all__ = ["HokuyoTwin", "HokuyoTwinConfig", "LaserMishapConfig"]
@@ -41,7 +41,7 @@ class HokuyoTwin:
         self._head = Head(config, sense, seed)
         self._answers = Answers(config, self._head)
         self._reader = CommandReader()
-        self._line = Line(config.serial_baud)
+        self._line = SerialLine(config.serial_baud)
         self._mishaps = FaultSchedule(config.mishaps.rates, np.random.default_rng((seed, 6)))
         self._plug = plug
         self._awake_at = config.boot_s

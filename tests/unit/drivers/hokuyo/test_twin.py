@@ -13,8 +13,8 @@ from gvgbot.drivers.hokuyo.models import MODELS
 from gvgbot.drivers.hokuyo.scip import ScipParser, decode_time
 from gvgbot.drivers.hokuyo.scip_messages import Message, Reply, ScanReply
 from gvgbot.drivers.hokuyo.twin import HokuyoTwin, HokuyoTwinConfig
-from gvgbot.drivers.hokuyo.twin_line import Line
 from gvgbot.drivers.hokuyo.twin_readings import clustered, noisy_readings
+from gvgbot.drivers.serial_line import SerialLine
 from gvgbot.geometry import Array
 
 VECTORS = {
@@ -326,7 +326,7 @@ def test_a_busy_laser_answers_when_a_turn_is_over() -> None:
 
 @given(st.integers(19200, 750000), st.binary(min_size=1, max_size=3000))
 def test_a_line_hands_out_every_byte_at_its_rate(baud: int, data: bytes) -> None:
-    line = Line(baud)
+    line = SerialLine(baud)
     line.put(data, 1.0)
     seen, last = b"", 1.0
     while (due := line.next_due()) < math.inf:

@@ -1,4 +1,4 @@
-"""The wire out of a simulated laser: one byte after the other at its bit rate."""
+"""A simulated serial line: one byte after the other, at its bit rate."""
 
 import math
 from collections import deque
@@ -7,7 +7,7 @@ BITS_PER_BYTE = 10
 PIECE = 256  # bytes handed over at once, after the first one
 
 
-class Line:
+class SerialLine:
     """Bytes in the order they were sent, each when its last bit is out."""
 
     def __init__(self, baud: int) -> None:
