@@ -6,17 +6,19 @@ from typing import Annotated
 
 import numpy as np
 
+from gvgbot.drivers.people import People
 from gvgbot.drivers.world import World
 from gvgbot.geometry import Array, Pose, wrap_angle
 from gvgbot.ranges import Range
 
 MAX_STRIDE = 0.01  # m of travel per integration step, so that no wall is jumped over
 MAX_STEP = 0.02  # s per integration step, so that an arc driven while accelerating stays an arc
-TOUCH = 1e-3  # m: nearer than this, a wall presses the bumper
-RELEASE = 0.01  # m: this far from all walls, a contact is over
+TOUCH = 1e-3  # m: nearer than this, a wall or a person presses the bumper
+RELEASE = 0.01  # m: this far from both, a contact is over
 OVERLAP = 1e-6  # m of overlap forgiven, so that the robot can roll along a wall that it touches
 SNUG = 1e-4  # m: a robot as near as this cannot get nearer
 HALVINGS = 10  # of a blocked stride, to find the place of contact
+NOTHING = np.empty((0, 2))
 BUMPER_EDGE = math.pi / 6  # rad: the centre bumper reaches this far to either side
 
 
@@ -35,11 +37,16 @@ class RobotBody:
 
     `pose` is world_base. `left_travel` and `right_travel` are what the wheels have rolled, m, slip
     against a wall included; `distance_m` is the way that the robot itself has come. `contacts`
-    counts separate collisions.
+    counts separate collisions, with walls and with people, who walk on as the body advances.
     """
 
     def __init__(
-        self, world: World, start: Pose, config: BodyConfig | None = None, stamp: float = 0.0
+        self,
+        world: World,
+        start: Pose,
+        config: BodyConfig | None = None,
+        stamp: float = 0.0,
+        people: People | None = None,
     ) -> None:
         self.config = config or BodyConfig()
         self.pose = start
@@ -47,6 +54,7 @@ class RobotBody:
         self.distance_m = 0.0
         self.contacts = 0
         self._world = world
+        self._people = people
         self._now = stamp
         self._linear = self._angular = 0.0
         self._target_linear = self._target_angular = 0.0
@@ -58,6 +66,12 @@ class RobotBody:
 
     def advance(self, now: float) -> None:
         """Move on to the time `now`, s; an earlier time than the last is ignored."""
+        while self._people is not None and self._people.next_step <= now:
+            self._drive_until(self._people.next_step)
+            self._people.step(self.pose, self.config.radius_m)
+        self._drive_until(now)
+
+    def _drive_until(self, now: float) -> None:
         gap = now - self._now
         if gap <= 0.0:
             return
@@ -71,8 +85,8 @@ class RobotBody:
 
     @property
     def bumper(self) -> tuple[bool, bool, bool]:
-        """Whether a wall presses the left, centre and right third of the front half."""
-        near = self._walls_within(self.config.radius_m + TOUCH)
+        """Whether something presses the left, centre and right third of the front half."""
+        near = self._obstacles(self.pose.x, self.pose.y, self.config.radius_m + TOUCH)
         if len(near) == 0:
             return False, False, False
         bearings = np.arctan2(near[:, 1], near[:, 0]) - self.pose.theta
@@ -123,7 +137,7 @@ class RobotBody:
     def _free_share(self, x: float, y: float, dx: float, dy: float) -> float:
         """How much of the stride can be made, 0..1; keeps count of the contacts."""
         reach = self.config.radius_m + RELEASE
-        if self._world.clear_of_walls(x + dx, y + dy) > reach:
+        if len(self._obstacles(x + dx, y + dy, reach)) == 0:
             self._in_contact = False
             return 1.0
         before, after = self._gap(x, y), self._gap(x + dx, y + dy)
@@ -146,16 +160,17 @@ class RobotBody:
         return low
 
     def _gap(self, x: float, y: float) -> float:
-        """Distance from a place to the nearest wall, m; inf beyond the robot's own surroundings."""
-        reach = self.config.radius_m + RELEASE
-        offsets = self._world.wall_offsets(x, y, reach)
+        """Distance from a place to the nearest obstacle, m; inf beyond the robot's surroundings."""
+        offsets = self._obstacles(x, y, self.config.radius_m + RELEASE)
         return float(np.hypot(offsets[:, 0], offsets[:, 1]).min(initial=math.inf))
 
-    def _walls_within(self, reach: float) -> Array:
-        x, y = self.pose.x, self.pose.y
-        if self._world.clear_of_walls(x, y) > reach:
-            return np.empty((0, 2))
-        return self._world.wall_offsets(x, y, reach)
+    def _obstacles(self, x: float, y: float, reach: float) -> Array:
+        """From a place to the nearest point of each wall square and person in reach: (N, 2), m."""
+        far = self._world.clear_of_walls(x, y) > reach
+        walls = NOTHING if far else self._world.wall_offsets(x, y, reach)
+        if self._people is None:
+            return walls
+        return np.concatenate((walls, self._people.offsets(x, y, reach)))
 
 
 def _ramp(speed: float, target: float, limit: float, duration: float) -> tuple[float, float]:
