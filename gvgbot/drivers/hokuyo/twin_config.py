@@ -51,6 +51,7 @@ class HokuyoTwinConfig:
     model: ModelName = "UTM-30LX"
     range_sigma_m: Fraction = 0.01
     dropout_fraction: Fraction = 0.005
+    mixed_pixel_fraction: Fraction = 0.0  # of the beams at an edge: between near and far
     double_echo_fraction: Fraction = 0.02  # beams that something thin reflects on their way
     bad_checksum_fraction: Fraction = 0.0  # of the scans
     lost_stop_fraction: Fraction = 0.0  # of the QT that come while scans are sent

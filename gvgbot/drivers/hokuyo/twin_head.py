@@ -18,6 +18,7 @@ from gvgbot.drivers.hokuyo.twin_readings import (
     intensities_of,
     noisy_readings,
     picks,
+    with_mixed_pixels,
     with_thin_things,
 )
 from gvgbot.geometry import Array
@@ -93,6 +94,7 @@ class Head:
         first = model.parameters.first_step
         ranges = self._sense(stamp)[request.start - first : request.end - first + 1]
         dropouts = config.dropout_fraction * (LESS_DROPOUTS if self.is_sensitive else 1.0)
+        ranges = with_mixed_pixels(ranges, config.mixed_pixel_fraction, self._rng)
         dropouts = 1.0 if is_blind else dropouts
         readings = noisy_readings(ranges, model, config.range_sigma_m, dropouts, self._rng)
         scan = ScanReply(request, status, self.device_ms(stamp), readings)

@@ -14,8 +14,21 @@ NO_RANGE = np.int32(np.iinfo(np.int32).max)
 WALL_INTENSITY = 12_000.0  # at no distance; half of it at INTENSITY_RANGE
 INTENSITY_RANGE = 1000.0  # mm
 THIN_INTENSITY = 300  # of something that lets most of the light through
+LEAST_EDGE = 0.1  # m between what two neighbouring beams meet, for an edge
 
 Indices = NDArray[np.intp]
+
+
+def with_mixed_pixels(ranges: Array, fraction: float, rng: np.random.Generator) -> Array:
+    """Ranges (N,) in m of which this fraction, at edges, lie anywhere between near and far.
+
+    A beam at an edge is one whose next neighbour meets something much nearer or farther.
+    """
+    if fraction == 0.0:
+        return ranges
+    step = np.diff(np.where(np.isfinite(ranges), ranges, np.nan), append=np.nan)
+    mixed = (np.abs(step) > LEAST_EDGE) & (rng.random(len(ranges)) < fraction)
+    return np.where(mixed, ranges + rng.random(len(ranges)) * step, ranges)
 
 
 def noisy_readings(
