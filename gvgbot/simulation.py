@@ -96,9 +96,7 @@ class Simulation:
             self._pull_laser,
         )
         self.base_twin = FaultyLink(
-            KobukiTwin(
-                config.twin.base, self.body, base_seed, config.base.geometry, self._look
-            ),
+            KobukiTwin(config.twin.base, self.body, base_seed, config.base.geometry, self._look),
             config.twin.base.link,
             base_seed,
             self._pull_base,
