@@ -18,6 +18,7 @@ from gvgbot.hal.messages import Scan
 UNKNOWN = -1
 
 Cells = NDArray[np.int8]
+Seconds = NDArray[np.float32]
 Indices = NDArray[np.int64]
 
 _HIT, _MISS, _CERTAIN = 18, -15, 60  # log odds in tenths: a vote each way, and where votes saturate
@@ -32,15 +33,19 @@ class OccupancyGrid:
     """Occupancy in percent, -1 where unknown: `cells` (rows, columns), row 0 at the bottom.
 
     `origin` is the outer corner of cell [0, 0] (m, map frame), `resolution_m` a cell's side.
-    The array is read-only.
+    `seen_s`, shaped like the cells, says how long (s) after the first scan each was first seen,
+    inf for never; it is None where nobody knows. The arrays are read-only.
     """
 
     cells: Cells
     resolution_m: float
     origin: tuple[float, float]
+    seen_s: Seconds | None = None
 
     def __post_init__(self) -> None:
         self.cells.setflags(write=False)
+        if self.seen_s is not None:
+            self.seen_s.setflags(write=False)
 
 
 def occupancy_grid(
@@ -49,15 +54,16 @@ def occupancy_grid(
     """The grid that scans see from `map_base` poses; what is farther than the range counts not.
 
     A scan counts as taken at one instant, from its one pose. NaN beams say nothing; inf beams
-    say that there is nothing up to the laser's range. Without any scan one unknown cell.
+    say that there is nothing up to the laser's range. Scans come in the order of their stamps.
+    Without any scan one unknown cell.
     """
     lasers = [(map_base.compose(scan.base_laser), scan) for map_base, scan in scans]
     reach = min(max_range_m, max((scan.range_max for _, scan in lasers), default=0.0))
     disc = _Disc.of_radius(reach, resolution_m)
-    votes, corner = _canvas([laser for laser, _ in lasers], disc)
+    ballot = _Ballot.around([laser for laser, _ in lasers], disc)
     for map_laser, scan in lasers:
-        _vote(votes, corner, disc, map_laser, scan)
-    return _finished(votes, corner, resolution_m)
+        _vote(ballot, disc, map_laser, scan, age=scan.stamp - scans[0][1].stamp)
+    return _finished(ballot, resolution_m)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,14 +86,22 @@ class _Disc:
         return cls(reach, cell, half, np.hypot(x, y), direction)
 
 
-def _canvas(lasers: Sequence[Pose], disc: _Disc) -> tuple[Cells, Indices]:
-    """Votes of zero for all that can be seen, and the (row, column) of their first cell."""
-    if not lasers:
-        return np.zeros((1, 1), np.int8), np.zeros(2, np.int64)
-    places = np.array([_cell(laser, disc.cell) for laser in lasers])
-    corner = places.min(axis=0) - disc.half
-    rows, columns = places.max(axis=0) + disc.half + 1 - corner
-    return np.zeros((rows, columns), np.int8), corner
+@dataclass(frozen=True, slots=True, eq=False)
+class _Ballot:
+    """Votes, and when each cell was first seen (s); `corner` is (row, column) of the first cell."""
+
+    votes: Cells
+    seen_s: Seconds
+    corner: Indices
+
+    @classmethod
+    def around(cls, lasers: Sequence[Pose], disc: _Disc) -> Self:
+        """No vote yet for all that can be seen from the lasers."""
+        places = np.array([_cell(laser, disc.cell) for laser in lasers or [Pose()]])
+        corner = places.min(axis=0) - disc.half
+        rows, columns = places.max(axis=0) + disc.half + 1 - corner
+        seen_s = np.full((rows, columns), np.inf, np.float32)
+        return cls(np.zeros((rows, columns), np.int8), seen_s, corner)
 
 
 def _cell(pose: Pose, cell: float) -> tuple[int, int]:
@@ -95,18 +109,21 @@ def _cell(pose: Pose, cell: float) -> tuple[int, int]:
     return math.floor(pose.y / cell), math.floor(pose.x / cell)
 
 
-def _vote(votes: Cells, corner: Indices, disc: _Disc, map_laser: Pose, scan: Scan) -> None:
-    """Add what one scan saw to the votes around its laser."""
+def _vote(ballot: _Ballot, disc: _Disc, map_laser: Pose, scan: Scan, *, age: float) -> None:
+    """Add what one scan saw, `age` seconds after the first, to the votes around its laser."""
     here = np.array(_cell(map_laser, disc.cell))
     half = _half_width(disc, scan)
-    row, column = here - corner - half
-    window = votes[row : row + 2 * half + 1, column : column + 2 * half + 1]
+    row, column = here - ballot.corner - half
+    around = np.s_[row : row + 2 * half + 1, column : column + 2 * half + 1]
+    window, seen_s = ballot.votes[around], ballot.seen_s[around]
     hits = _hits(disc, map_laser, scan) - here + half
     free = _seen_through(disc, half, _free_ranges(disc, map_laser, scan))
     free[hits[:, 0], hits[:, 1]] = False
     window += free.view(np.int8) * np.int8(_MISS)
     window[hits[:, 0], hits[:, 1]] += np.int8(_HIT)
     np.clip(window, -_CERTAIN, _CERTAIN, out=window)
+    free[hits[:, 0], hits[:, 1]] = True
+    seen_s[free & np.isinf(seen_s)] = age
 
 
 def _half_width(disc: _Disc, scan: Scan) -> int:
@@ -158,16 +175,18 @@ def _beams(map_laser: Pose, scan: Scan) -> Indices:
     return np.minimum(beams, len(scan.ranges))
 
 
-def _finished(votes: Cells, corner: Indices, cell: float) -> OccupancyGrid:
+def _finished(ballot: _Ballot, cell: float) -> OccupancyGrid:
     """The votes as percent, cut to the known cells and a margin."""
+    votes = ballot.votes
     rows, columns = np.flatnonzero(votes.any(axis=1)), np.flatnonzero(votes.any(axis=0))
     if not len(rows):
         return OccupancyGrid(np.full((1, 1), UNKNOWN, np.int8), cell, (0.0, 0.0))
     edge = math.ceil(_EDGE_M / cell)
     bottom, left = max(0, int(rows[0]) - edge), max(0, int(columns[0]) - edge)
-    cut = votes[bottom : rows[-1] + edge + 1, left : columns[-1] + edge + 1]
-    row, column = int(corner[0]) + bottom, int(corner[1]) + left
-    return OccupancyGrid(_PERCENT[cut], cell, (column * cell, row * cell))
+    cut = np.s_[bottom : rows[-1] + edge + 1, left : columns[-1] + edge + 1]
+    row, column = int(ballot.corner[0]) + bottom, int(ballot.corner[1]) + left
+    origin = (column * cell, row * cell)
+    return OccupancyGrid(_PERCENT[votes[cut]], cell, origin, ballot.seen_s[cut].copy())
 
 
 def _percentages() -> Cells:

@@ -9,9 +9,10 @@ import yaml
 from numpy.typing import NDArray
 from PIL import Image
 
+from gvgbot.errors import UsageError
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
-from gvgbot.maps.map_server import encode_map_server, write_map_server
+from gvgbot.maps.map_server import encode_map_server, read_map_server, write_map_server
 from gvgbot.maps.occupancy import OccupancyGrid, occupancy_grid
 
 CELL = 0.05
@@ -216,3 +217,65 @@ def test_the_first_row_of_the_image_is_the_top() -> None:
     grid = OccupancyGrid(np.array([[0, 0], [100, -1]], np.int8), 0.1, (0.0, 0.0))
     image = encode_map_server(grid)["map.pgm"]
     assert image == b"P5\n2 2\n255\n" + bytes([0, 205, 254, 254])
+
+
+def test_every_cell_knows_which_scan_saw_it_first() -> None:
+    places = [Pose(0.0, 0.0, 0.0), Pose(2.0, 0.0, 0.0), Pose(0.5, 0.0, 0.0)]
+    stamps = [100.0, 104.0, 109.0]
+    ranges = np.full(720, 3.0)
+    scans = [
+        (pose, Scan(stamp, ranges, -math.pi, math.tau / 720, 0.02, 5.6))
+        for pose, stamp in zip(places, stamps, strict=True)
+    ]
+    grid = occupancy_grid(scans, CELL)
+    assert grid.seen_s is not None
+    x, y = centres(grid)
+    first = np.hypot(x[None, :], y[:, None])
+    second = np.hypot(x[None, :] - 2.0, y[:, None])
+    third = np.hypot(x[None, :] - 0.5, y[:, None])
+    assert (grid.seen_s[first < 2.85] == 0.0).all()
+    assert (grid.seen_s[(second < 2.85) & (first > 3.15)] == 4.0).all()
+    assert (grid.seen_s[(third < 2.85) & (first > 3.15) & (second > 3.15)] == 9.0).all()
+    nowhere = np.minimum(np.minimum(first, second), third) > 3.15
+    assert nowhere.any()
+    assert np.isinf(grid.seen_s[nowhere]).all()
+
+
+def test_a_grid_that_was_written_can_be_read(tmp_path: Path) -> None:
+    percent = np.array([[0, 50, 100], [-1, 0, 100]], np.int8)
+    seen_s = np.array([[0.0, 3.7, 90000.0], [np.inf, 65534.0, 12.2]], np.float32)
+    write_map_server(OccupancyGrid(percent, 0.05, (-1.25, 2.5), seen_s), tmp_path)
+    grid = read_map_server(tmp_path)
+    assert grid.cells.tolist() == [[0, -1, 100], [-1, 0, 100]]
+    assert (grid.resolution_m, grid.origin) == (0.05, (-1.25, 2.5))
+    assert grid.seen_s is not None
+    assert grid.seen_s.tolist() == [[0.0, 3.0, 65534.0], [math.inf, 65534.0, 12.0]]
+
+
+def test_a_grid_without_a_record_of_what_was_seen_can_be_read(tmp_path: Path) -> None:
+    write_map_server(OccupancyGrid(np.zeros((2, 3), np.int8), 0.05, (0.0, 0.0)), tmp_path)
+    assert read_map_server(tmp_path).seen_s is None
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("map.yaml", b"resolution: 0.05"),
+        ("map.yaml", b"resolution: -1\norigin: [0, 0, 0]"),
+        ("map.yaml", b"[}"),
+        ("map.yaml", b"\xff\xfe\x00"),
+        ("map.pgm", b"P5\n3 2\n255\n"),
+        ("map.pgm", b""),
+        ("map.pgm", b"P6\n1 1\n255\nabc"),
+        ("seen.png", b"no image"),
+    ],
+)
+def test_a_damaged_grid_is_a_usage_error_in_one_line(
+    tmp_path: Path, name: str, content: bytes
+) -> None:
+    seen_s = np.zeros((2, 3), np.float32)
+    write_map_server(OccupancyGrid(np.zeros((2, 3), np.int8), 0.05, (0.0, 0.0), seen_s), tmp_path)
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(UsageError, match=name) as caught:
+        read_map_server(tmp_path)
+    assert "\n" not in str(caught.value)
