@@ -19,6 +19,7 @@ from gvgbot.drivers.kobuki.commands import (
     decode_commands,
     encode_commands,
 )
+from gvgbot.drivers.kobuki.frames import MIN_PAYLOAD
 from gvgbot.geometry import Twist
 
 HALF_BASE = 0.115  # m
@@ -39,6 +40,13 @@ commands: st.SearchStrategy[Any] = st.one_of(
 @given(st.lists(commands, min_size=1, max_size=8))
 def test_commands_of_one_frame_read_back_as_they_were_sent(sent: list[Command]) -> None:
     assert decode_commands(encode_commands(sent)[3:-1]) == sent
+
+
+@given(st.binary(min_size=1, max_size=255))
+def test_no_payload_raises_and_what_was_read_is_sent_as_the_same_bytes(payload: bytes) -> None:
+    commands = decode_commands(payload)
+    if len(payload) >= MIN_PAYLOAD:
+        assert encode_commands(commands)[3:-1] == payload
 
 
 def wheels(twist: Twist) -> tuple[float, float]:
