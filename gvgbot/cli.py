@@ -12,6 +12,7 @@ from gvgbot import __version__
 from gvgbot.errors import GvgbotError, UsageError
 
 FAILURE, BAD_USAGE, INTERRUPTED = 1, 2, 130
+MOST_FRAMES = 200
 NEGATIVE_NUMBER = re.compile(r"-\.?\d")
 
 
@@ -67,6 +68,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_run(commands)
     _add_twin(commands)
     _add_check(commands)
+    _add_map(commands)
     return parser
 
 
@@ -151,6 +153,41 @@ def _add_check(commands: "argparse._SubParsersAction[_Parser]") -> None:
     check.set_defaults(command=_check)
 
 
+def _add_map(commands: "argparse._SubParsersAction[_Parser]") -> None:
+    maps = commands.add_parser(
+        "map",
+        help="pictures and facts of a saved map",
+        description="Look at the map that a run left in its directory.",
+        epilog="example: gvgbot map show runs/office-1 --animate",
+    )
+    actions = maps.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    show = actions.add_parser(
+        "show",
+        help="draw the map, or how it grew",
+        description="Draw the map of a run as a PNG; with --frames N moments of the exploration "
+        "side by side; with --animate as a GIF in which everything appears as it was found.",
+        epilog="example: gvgbot map show runs/office-1 --animate --out film.gif",
+    )
+    show.add_argument("run", type=Path, metavar="RUN_DIR", help="the directory of a run")
+    show.add_argument(
+        "--out",
+        type=Path,
+        metavar="FILE",
+        help="default: picture.png, strip.png or film.gif in the run directory",
+    )
+    show.add_argument("--animate", action="store_true", help="a GIF of the exploration")
+    show.add_argument("--frames", type=frames, metavar="N", help="moments to draw, 2 to 200")
+    show.set_defaults(command=_map_show)
+    info = actions.add_parser(
+        "info",
+        help="counts, lengths, extent and accuracy",
+        description="Say in a few lines what a map holds and how well it is known.",
+        epilog="example: gvgbot map info runs/office-1",
+    )
+    info.add_argument("run", type=Path, metavar="RUN_DIR", help="the directory of a run")
+    info.set_defaults(command=_map_info)
+
+
 def _add_config(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "config", nargs="?", type=Path, metavar="CONFIG", help="default: sim.yaml, no hardware"
@@ -181,6 +218,14 @@ def seed(text: str) -> int:
     """A whole number, not negative. Raises ValueError."""
     value = int(text)
     if value < 0:
+        raise ValueError(text)
+    return value
+
+
+def frames(text: str) -> int:
+    """A number of pictures that still makes a film. Raises ValueError."""
+    value = int(text)
+    if not 2 <= value <= MOST_FRAMES:
         raise ValueError(text)
     return value
 
@@ -219,6 +264,23 @@ def _check(options: argparse.Namespace) -> int:
     from gvgbot.check import check
 
     return check(config, _say)
+
+
+def _map_show(options: argparse.Namespace) -> int:
+    from gvgbot.maps.show import show
+
+    path = show(options.run, options.out, animate=options.animate, frames=options.frames)
+    _say(f"picture: {path}")
+    return 0
+
+
+def _map_info(options: argparse.Namespace) -> int:
+    from gvgbot.maps.saved_run import SavedRun
+    from gvgbot.maps.show import facts
+
+    for line in facts(SavedRun.read(options.run)):
+        _say(line)
+    return 0
 
 
 def _say(text: str) -> None:

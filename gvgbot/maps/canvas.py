@@ -6,6 +6,7 @@ Indexed colours, one byte per large pixel, keep it small; text comes last, on th
 import io
 from collections.abc import Sequence
 from enum import IntEnum, auto, unique
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ OVERSAMPLING = 2
 _STRIP = 64  # rows that are stretched or reduced at a time
 
 Point = tuple[float, float]
+Colour = tuple[int, int, int]
 
 
 @unique
@@ -38,7 +40,7 @@ class Ink(IntEnum):
     ORANGE = auto()
 
 
-_COLOURS = {
+_COLOURS: dict[Ink, Colour] = {
     Ink.UNKNOWN: (238, 238, 238),
     Ink.WHITE: (255, 255, 255),
     Ink.BLACK: (20, 20, 20),
@@ -120,6 +122,10 @@ class Canvas:
 
     def png(self) -> bytes:
         """The finished picture as a PNG file."""
+        return png(self.image())
+
+    def image(self) -> Image.Image:
+        """The finished picture in RGB."""
         image = self._reduced()
         pen = ImageDraw.Draw(image)
         for at, words, size, ink, anchor in self._texts:
@@ -132,9 +138,7 @@ class Canvas:
                 stroke_width=2,
                 stroke_fill=_COLOURS[Ink.WHITE],
             )
-        file = io.BytesIO()
-        image.save(file, "PNG", optimize=False)
-        return file.getvalue()
+        return image
 
     def _reduced(self) -> Image.Image:
         width, height = self._large.size
@@ -144,6 +148,49 @@ class Canvas:
             strip = self._large.crop((0, top * OVERSAMPLING, width, bottom * OVERSAMPLING))
             image.paste(strip.convert("RGB").reduce(OVERSAMPLING), (0, top))
         return image
+
+
+def png(image: Image.Image) -> bytes:
+    """The picture as a PNG file."""
+    file = io.BytesIO()
+    image.save(file, "PNG", optimize=False)
+    return file.getvalue()
+
+
+def indexed(image: Image.Image) -> Image.Image:
+    """An RGB picture in the nearest colours of one palette: inks, greys, and blends of two inks.
+
+    Pictures that share a palette differ only where they were drawn differently.
+    """
+    palette = np.array(_blended_palette())
+    used = image.getcolors(image.width * image.height) or []
+    nearest = np.zeros(1 << 24, np.uint8)  # by the code of a colour
+    for _, colour in used:
+        nearest[_code(np.array(colour))] = np.argmin(((palette - colour) ** 2).sum(axis=1))
+    picture = Image.fromarray(nearest[_code(np.asarray(image))])
+    picture.putpalette(palette.ravel().tolist())
+    return picture
+
+
+def _code(colours: NDArray[np.integer]) -> NDArray[np.int64]:
+    """Red, green, blue (..., 3) as one number (...)."""
+    code: NDArray[np.int64] = colours.astype(np.int64) @ np.array([1 << 16, 1 << 8, 1])
+    return code
+
+
+def _blended_palette() -> list[Colour]:
+    """At most 256 colours, as red, green, blue."""
+    greys = [(level, level, level) for level in range(0, 256, 5)]
+    inks = [_COLOURS[ink] for ink in Ink]
+    blends = [_blend(*two, share) for two in combinations(inks, 2) for share in (0.25, 0.5, 0.75)]
+    return [*inks, *greys, *blends]
+
+
+def _blend(one: Colour, other: Colour, share: float) -> Colour:
+    red, green, blue = (
+        round(share * a + (1.0 - share) * b) for a, b in zip(one, other, strict=True)
+    )
+    return red, green, blue
 
 
 def text_width(words: str, size: int) -> float:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,6 +15,7 @@ _ROW = 36.0
 _SIGN = 46.0  # width that a sign takes
 _GAP = 30.0  # between an entry and the next
 _LONGEST_BAR = 260.0
+_BAR_SHARE = 0.25  # of the legend's width that the bar may take
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +51,9 @@ FRONTIER = Entry(
     "frontier left",
     lambda canvas, at: symbols.draw_frontier(canvas, (at[0] - 16.0, at[1]), 0.0),
 )
+WAY = replace(ESTIMATE, label="path")
+FRONTIER_NOW = replace(FRONTIER, label="frontier")
+ROBOT = Entry("robot", lambda canvas, at: symbols.draw_robot(canvas, at, 0.0))
 START = Entry("start", lambda canvas, at: symbols.draw_start(canvas, at, math.pi / 2))
 
 
@@ -100,7 +104,7 @@ def arranged(entries: Iterable[Entry], caption: str, *, width: float, scale: flo
         if rows[-1] and sum(e.width for e in rows[-1]) + entry.width - _GAP > width:
             rows.append([])
         rows[-1].append(entry)
-    length = round_length(_LONGEST_BAR / scale)
+    length = round_length(min(_LONGEST_BAR, _BAR_SHARE * width) / scale)
     return Legend(rows, caption, length, length * scale)
 
 

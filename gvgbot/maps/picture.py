@@ -1,7 +1,7 @@
 """The map as a picture that could stand in a paper: grid, graph, uncertainty and trajectories."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sized
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from gvgbot.maps.canvas import Canvas, Ink, Point
 from gvgbot.maps.occupancy import UNKNOWN, OccupancyGrid
 from gvgbot.maps.route_graph import MapVertex, RouteGraph
 from gvgbot.maps.trajectory import Trajectory
-from gvgbot.maps.view import Box, View, box_around
+from gvgbot.maps.view import Box, View, box_around, pair
 
 _WIDTH, _TALLEST, _NARROWEST = 1344, 1344, 900  # pixels of the map; a tall one is less wide
 _MARGIN = 28  # pixels around everything
@@ -34,26 +34,27 @@ def draw_map(
     """A PNG of all that is given, in the map frame with x to the right, cut to what is known."""
     path = _NO_POINTS if estimate is None else estimate.positions
     raw = _NO_POINTS if odometry is None else odometry.positions
-    view = _fitted(_content(graph, grid, path, raw))
+    box = _content(graph, grid, path, raw)
+    view = View.fitted(box, (_MARGIN, _MARGIN), width=_WIDTH, height=_TALLEST).centred(_NARROWEST)
     width = max(view.size[0], _NARROWEST)
     signs = legend.arranged(
         _entries(graph, path, raw), _caption(graph, title), width=width, scale=view.scale
     )
     bottom = view.corner[1] + view.size[1]
     canvas = Canvas(round(width) + 2 * _MARGIN, round(bottom + signs.height) + _MARGIN)
-    _draw_ground(canvas, view, grid)
+    draw_ground(canvas, view, grid)
     symbols.draw_odometry(canvas, view.pixels(raw))
     _draw_graph(canvas, view, graph, path)
     if estimate is not None and len(path):
-        symbols.draw_start(canvas, _pixel(view, path[0]), float(estimate.poses[0, 2]))
-    canvas.frame(_pair(view.corner), _pair(view.size))
+        symbols.draw_start(canvas, view.pixel(path[0]), float(estimate.poses[0, 2]))
+    canvas.frame(pair(view.corner), pair(view.size))
     signs.draw(canvas, (_MARGIN, bottom + _MARGIN / 2), width)
     return canvas.png()
 
 
 def _content(graph: RouteGraph, grid: OccupancyGrid | None, path: Array, raw: Array) -> Box:
     """The part of the map frame that is worth showing."""
-    corners = _NO_POINTS if grid is None else _known_corners(grid)
+    corners = _NO_POINTS if grid is None else known_corners(grid)
     box = box_around(np.concatenate([corners, graph.points, path]))
     astray = [raw, *(_ellipse_corners(vertex) for vertex in graph.vertices)]
     return box.stretched(np.concatenate(astray), _ASTRAY * float(box.size.max()))
@@ -66,7 +67,7 @@ def _ellipse_corners(vertex: MapVertex) -> Array:
     return np.array([vertex.position - reach, vertex.position + reach])
 
 
-def _known_corners(grid: OccupancyGrid) -> Array:
+def known_corners(grid: OccupancyGrid) -> Array:
     """Two opposite corners (2, 2) of the known cells, m, map frame; (0, 2) if none is known."""
     known = grid.cells != UNKNOWN
     rows, columns = np.flatnonzero(known.any(axis=1)), np.flatnonzero(known.any(axis=0))
@@ -76,22 +77,15 @@ def _known_corners(grid: OccupancyGrid) -> Array:
     return np.asarray(grid.origin) + cells * grid.resolution_m
 
 
-def _fitted(box: Box) -> View:
-    """The view of the box, in the middle of the picture if it is narrow."""
-    view = View.fitted(box, (_MARGIN, _MARGIN), width=_WIDTH, height=_TALLEST)
-    spare = max(0.0, _NARROWEST - float(view.size[0]))
-    return View(view.box, view.corner + np.array([spare / 2, 0.0]), view.scale)
-
-
-def _draw_ground(canvas: Canvas, view: View, grid: OccupancyGrid | None) -> None:
+def draw_ground(canvas: Canvas, view: View, grid: OccupancyGrid | None) -> None:
     """Unknown everywhere, and over it the occupancy grid."""
-    canvas.box(_pair(view.corner), _pair(view.size), fill=Ink.UNKNOWN)
+    canvas.box(pair(view.corner), pair(view.size), fill=Ink.UNKNOWN)
     if grid is None:
         return
     rows, columns = grid.cells.shape
     size = np.array([columns, rows]) * grid.resolution_m
     upper_left = np.array([grid.origin[0], grid.origin[1] + size[1]])
-    canvas.raster(_shades(grid), _pixel(view, upper_left), _pair(size * view.scale))
+    canvas.raster(_shades(grid), view.pixel(upper_left), pair(size * view.scale))
 
 
 def _shades(grid: OccupancyGrid) -> NDArray[np.uint8]:
@@ -106,12 +100,12 @@ def _draw_graph(canvas: Canvas, view: View, graph: RouteGraph, path: Array) -> N
         symbols.draw_edge(canvas, view.pixels(edge.polyline))
     symbols.draw_estimate(canvas, view.pixels(path))
     for vertex in graph.vertices:
-        at = _pixel(view, vertex.position)
+        at = view.pixel(vertex.position)
         symbols.draw_ellipse(canvas, at, _half_axes(vertex) * view.scale)
         for bearing in vertex.frontiers:
             symbols.draw_frontier(canvas, at, bearing)
     for vertex in graph.vertices:
-        _draw_vertex(canvas, vertex, _pixel(view, vertex.position))
+        _draw_vertex(canvas, vertex, view.pixel(vertex.position))
 
 
 def _draw_vertex(canvas: Canvas, vertex: MapVertex, at: Point) -> None:
@@ -161,17 +155,13 @@ def _entries(graph: RouteGraph, path: Array, raw: Array) -> Iterator[legend.Entr
 
 def _caption(graph: RouteGraph, title: str) -> str:
     length = sum(edge.length for edge in graph.edges)
-    vertices, edges = len(graph.vertices), len(graph.edges)
-    facts = (
-        f"{vertices} {'vertex' if vertices == 1 else 'vertices'}, "
-        f"{edges} {'edge' if edges == 1 else 'edges'} of {length:.0f} m"
-    )
+    facts = f"{counts(graph.vertices, graph.edges)} of {length:.0f} m"
     return f"{title}: {facts}" if title else facts
 
 
-def _pixel(view: View, point: Array | Point) -> Point:
-    return _pair(view.pixels(np.asarray(point)))
-
-
-def _pair(values: Array) -> Point:
-    return float(values[0]), float(values[1])
+def counts(vertices: Sized, edges: Sized) -> str:
+    """How many there are, in words."""
+    return (
+        f"{len(vertices)} {'vertex' if len(vertices) == 1 else 'vertices'}, "
+        f"{len(edges)} {'edge' if len(edges) == 1 else 'edges'}"
+    )

@@ -66,6 +66,14 @@ def draw_start(canvas: Canvas, at: Point, heading: float) -> None:
     canvas.polygon(points, fill=Ink.BLACK, outline=Ink.WHITE, width=1.3)
 
 
+def draw_robot(canvas: Canvas, at: Point, heading: float) -> None:
+    """A round robot with its nose ahead; the heading is anticlockwise from the right."""
+    canvas.disc(at, 11.0, fill=Ink.WHITE)
+    canvas.disc(at, 9.5, fill=Ink.BLACK)
+    nose = np.asarray(at) + 8.0 * np.array([math.cos(heading), -math.sin(heading)])
+    canvas.line(np.array([at, nose]), Ink.WHITE, 3.0)
+
+
 def _thinned(points: Array) -> Array:
     """The points (N, 2) without those that a line of pixels cannot tell apart."""
     if len(points) < 2:

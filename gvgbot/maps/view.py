@@ -58,6 +58,11 @@ class View:
         scale = float(min(width / box.size[0], height / box.size[1]))
         return cls(box, np.array(corner), scale)
 
+    def centred(self, width: float) -> "View":
+        """The view in the middle of so many pixels, if it is narrower."""
+        spare = max(0.0, width - float(self.size[0]))
+        return View(self.box, self.corner + np.array([spare / 2, 0.0]), self.scale)
+
     @property
     def size(self) -> Array:
         """Width and height (2,), pixels."""
@@ -68,3 +73,12 @@ class View:
         upper_left = np.array([self.box.low[0], self.box.high[1]])
         flipped: Array = (points - upper_left) * np.array([1.0, -1.0])
         return self.corner + self.scale * flipped
+
+    def pixel(self, point: Array | tuple[float, float]) -> tuple[float, float]:
+        """Where one point of the map lies in the picture."""
+        return pair(self.pixels(np.asarray(point)))
+
+
+def pair(values: Array) -> tuple[float, float]:
+    """An array (2,) as two floats."""
+    return float(values[0]), float(values[1])

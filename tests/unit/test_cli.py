@@ -26,6 +26,9 @@ BAD_ARGUMENTS = {
     "a start that is not finite": (["explore", "--start", "1", "nan", "0"], "nan"),
     "a seed that is no number": (["explore", "--seed", "x"], "--seed"),
     "a negative seed": (["explore", "--seed", "-1"], "--seed"),
+    "no action on a map": (["map"], "COMMAND"),
+    "one frame": (["map", "show", ".", "--frames", "1"], "--frames"),
+    "too many frames": (["map", "show", ".", "--frames", "100000"], "--frames"),
     "two configurations": (["run", "a.yaml", "b.yaml"], "b.yaml"),
 }
 
@@ -48,6 +51,8 @@ BAD_CONFIGURATIONS = {
     "override without value": (["explore", "--set", "robot.name"], "must be key=value"),
     "unknown key": (["explore", "--set", "robot.nmae=x"], "did you mean robot.name?"),
     "unknown profile": (["explore", "--set", "twin.base.odometry=ideal"], "one of perfect"),
+    "no run to show": (["map", "show", "absent"], "absent is no run directory"),
+    "no run to tell of": (["map", "info", "absent"], "absent is no run directory"),
     "seed out of range": (["explore", "--seed", str(2**40)], "twin.seed"),
 }
 
@@ -115,10 +120,10 @@ def test_the_exit_status_of_a_command_is_passed_on(status: int) -> None:
     assert status_of(lambda: status) == status
 
 
-@pytest.mark.parametrize("command", ["explore", "run"])
+@pytest.mark.parametrize("command", ["explore", "run", "map show", "map info"])
 def test_every_command_explains_itself_with_an_example(command: str, capsys: Captured) -> None:
     with pytest.raises(SystemExit) as caught:
-        main([command, "--help"])
+        main([*command.split(), "--help"])
     assert caught.value.code == 0
     assert f"example: gvgbot {command}" in " ".join(capsys.readouterr().out.split())
 

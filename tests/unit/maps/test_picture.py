@@ -12,7 +12,7 @@ from PIL import Image
 from gvgbot.geometry import Array
 from gvgbot.maps.legend import round_length
 from gvgbot.maps.occupancy import OccupancyGrid
-from gvgbot.maps.picture import draw_map, widest_gap
+from gvgbot.maps.picture import counts, draw_map, widest_gap
 from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
 from gvgbot.maps.trajectory import Trajectory
 from gvgbot.maps.view import View, box_around
@@ -212,6 +212,11 @@ def test_the_same_map_gives_the_same_bytes() -> None:
 )
 def test_an_id_stands_where_no_edge_leaves(bearings: tuple[float, ...], middle: float) -> None:
     assert widest_gap(bearings) == pytest.approx(middle)
+
+
+def test_one_is_not_many() -> None:
+    assert counts([1], []) == "1 vertex, 0 edges"
+    assert counts([], [1]) == "0 vertices, 1 edge"
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,85 @@
+"""How a map grew: which of its parts had been found by when."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from gvgbot.geometry import Array, wrap_angle
+from gvgbot.maps.edge_history import edges_found
+from gvgbot.maps.occupancy import UNKNOWN, OccupancyGrid
+from gvgbot.maps.route_graph import MapEdge, MapVertex
+from gvgbot.maps.saved_run import SavedRun
+
+_DEPARTURE_M = 0.5  # how far along an edge its bearing at the vertex shows
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Growth:
+    """The parts of a run's last map, each with the time (s after the first row of the estimate).
+
+    What the robot believed in between and gave up again is not in it.
+    """
+
+    run: SavedRun
+    vertex_found: dict[int, float]
+    edge_found: tuple[float, ...]  # in the order of the graph's edges
+
+    @classmethod
+    def of(cls, run: SavedRun) -> Self:
+        """The growth of a run whose estimate has a row at least."""
+        begin = float(run.estimate.stamps[0])
+        added = {e.vertex: e.stamp - begin for e in run.events[::-1] if e.event == "vertex_added"}
+        vertices = {vertex.id: added.get(vertex.id, 0.0) for vertex in run.graph.vertices}
+        return cls(run, vertices, edges_found(run, vertices, begin))
+
+    @property
+    def duration(self) -> float:
+        """From the first row of the estimate to the last, s."""
+        return float(self.run.estimate.stamps[-1] - self.run.estimate.stamps[0])
+
+    def path(self, time: float) -> Array:
+        """x, y, theta (N, 3) of the way so far; the last row is where the robot is."""
+        estimate = self.run.estimate
+        rows = int(np.searchsorted(estimate.stamps - estimate.stamps[0], time, side="right"))
+        return estimate.poses[: max(1, rows)]
+
+    def grid(self, time: float) -> OccupancyGrid:
+        """The last grid, as far as it had been seen."""
+        grid = self.run.grid
+        if grid.seen_s is None or time >= self.duration:
+            return grid
+        cells = np.where(grid.seen_s <= time, grid.cells, UNKNOWN).astype(np.int8)
+        return OccupancyGrid(cells, grid.resolution_m, grid.origin)
+
+    def graph(self, time: float) -> tuple[list[MapVertex], list[MapEdge]]:
+        """The vertices and edges found by then."""
+        vertices = [v for v in self.run.graph.vertices if self.vertex_found[v.id] <= time]
+        found = zip(self.run.graph.edges, self.edge_found, strict=True)
+        return vertices, [edge for edge, since in found if since <= time]
+
+
+def frontiers(vertex: MapVertex, edges: Sequence[MapEdge]) -> list[float]:
+    """The bearings (rad, map frame) of a vertex that none of these edges leaves along."""
+    left = list(vertex.bearings)
+    for direction in _departures(vertex, edges):
+        if left:
+            left.remove(min(left, key=lambda bearing: abs(wrap_angle(bearing - direction))))
+    return left
+
+
+def _departures(vertex: MapVertex, edges: Sequence[MapEdge]) -> list[float]:
+    """The directions (rad, map frame) in which edges leave a vertex, twice for a loop."""
+    lines = [edge.polyline for edge in edges if edge.start == vertex.id]
+    lines += [edge.polyline[::-1] for edge in edges if edge.end == vertex.id]
+    ways = [_point_along(line, _DEPARTURE_M) - line[0] for line in lines]
+    return [math.atan2(way[1], way[0]) for way in ways]
+
+
+def _point_along(line: Array, distance: float) -> Array:
+    """The point (2,) of a line (N, 2) so far (m) from its start, its end if it is shorter."""
+    far = np.hypot(*(line - line[0]).T) >= distance
+    point: Array = line[np.argmax(far)] if far.any() else line[-1]
+    return point

@@ -1,0 +1,106 @@
+"""A run directory, read back."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Self, TypeVar
+
+import msgspec
+
+from gvgbot.errors import UsageError
+from gvgbot.maps import geojson
+from gvgbot.maps.map_server import read_map_server
+from gvgbot.maps.occupancy import OccupancyGrid
+from gvgbot.maps.route_graph import RouteGraph
+from gvgbot.maps.run_directory import EVENTS, SUMMARY
+from gvgbot.maps.trajectory import Trajectory, decode_tum
+
+T = TypeVar("T")
+
+
+class Happening(msgspec.Struct, frozen=True):
+    """A line of the events: what the growth of the map needs of it, the rest is dropped."""
+
+    event: str
+    stamp: float  # s
+    vertex: int | None = None
+    start: int | None = None
+    end: int | None = None
+    length: float = 0.0  # m
+
+
+class Summary(msgspec.Struct, frozen=True):
+    """How a run ended; distances in m, durations in s of the robot's clock."""
+
+    outcome: str
+    reason: str
+    distance_m: float
+    duration_s: float
+    loop_closures: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SavedRun:
+    """What a run left, in the map frame; `summary` is None if it was killed before it wrote one."""
+
+    name: str
+    graph: RouteGraph
+    grid: OccupancyGrid
+    estimate: Trajectory
+    odometry: Trajectory
+    events: tuple[Happening, ...]
+    summary: Summary | None
+
+    @classmethod
+    def read(cls, directory: Path) -> Self:
+        """The run in a directory. Raises UsageError if a file is missing or damaged."""
+        if not (directory / "map.geojson").exists():
+            raise UsageError(f"{directory} is no run directory: there is no map.geojson in it")
+        return cls(
+            name=directory.resolve().name,
+            graph=_decoded(directory / "map.geojson", geojson.decode),
+            grid=read_map_server(directory),
+            estimate=_decoded(directory / "estimate.tum", decode_tum),
+            odometry=_decoded(directory / "odometry.tum", decode_tum),
+            events=_events(directory / EVENTS),
+            summary=_summary(directory / SUMMARY),
+        )
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text("utf-8")
+    except OSError as error:
+        raise UsageError(f"cannot read {path}: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise UsageError(f"cannot read {path}: not text in UTF-8") from error
+
+
+def _decoded(path: Path, decode: Callable[[str], T]) -> T:
+    """What a file's text says; errors name the file."""
+    text = _text(path)
+    try:
+        return decode(text)
+    except UsageError as error:
+        raise UsageError(f"{path}: {error}") from error
+
+
+def _events(path: Path) -> tuple[Happening, ...]:
+    """All whole lines: the last one of a run that was killed may be cut short."""
+    *lines, _ = _text(path).split("\n")
+    happenings = []
+    for number, line in enumerate(lines, start=1):
+        try:
+            happenings.append(msgspec.json.decode(line, type=Happening))
+        except msgspec.MsgspecError as error:
+            raise UsageError(f"{path}, line {number} is no event: {error}") from error
+    return tuple(happenings)
+
+
+def _summary(path: Path) -> Summary | None:
+    if not path.exists():
+        return None
+    try:
+        return msgspec.json.decode(_text(path), type=Summary)
+    except msgspec.MsgspecError as error:
+        raise UsageError(f"{path} is no summary of a run: {error}") from error

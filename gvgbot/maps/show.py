@@ -1,0 +1,90 @@
+"""What `gvgbot map` does: pictures of a run that was saved, and its facts in words."""
+
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from gvgbot.errors import UsageError
+from gvgbot.maps import film
+from gvgbot.maps.atomic_files import write_files
+from gvgbot.maps.growth import Growth
+from gvgbot.maps.picture import draw_map, known_corners
+from gvgbot.maps.route_graph import MapVertex, RouteGraph
+from gvgbot.maps.saved_run import SavedRun
+
+FRAMES = 60  # of a film, if nobody says how many
+
+
+def show(directory: Path, out: Path | None, *, animate: bool, frames: int | None) -> Path:
+    """Draw a run and return the path of the picture: a film, a strip of moments, or its last map.
+
+    Raises UsageError if the run cannot be read or drawn so, GvgbotError if nothing can be written.
+    """
+    name = "film.gif" if animate else "picture.png" if frames is None else "strip.png"
+    out, suffix = out or directory / name, Path(name).suffix
+    if out.suffix.lower() != suffix:
+        raise UsageError(f"{out}: this picture is a {suffix[1:].upper()}, let its name end so")
+    run = SavedRun.read(directory)
+    if not out.parent.is_dir():
+        raise UsageError(f"cannot write {out}: there is no directory {out.parent}")
+    write_files(out.parent, {out.name: _drawn(run, animate=animate, frames=frames)})
+    return out
+
+
+def _drawn(run: SavedRun, *, animate: bool, frames: int | None) -> bytes:
+    if not animate and frames is None:
+        return draw_map(
+            run.graph,
+            grid=run.grid,
+            estimate=run.estimate,
+            odometry=run.odometry,
+            title=run.name,
+        )
+    if not len(run.estimate.stamps):
+        raise UsageError(f"{run.name} has nothing to animate: the robot never got going")
+    growth = Growth.of(run)
+    return film.gif(growth, frames or FRAMES) if animate else film.strip(growth, frames or FRAMES)
+
+
+def facts(run: SavedRun) -> Iterator[str]:
+    """What there is to know of a map, in lines."""
+    graph, kinds = run.graph, Counter(vertex.kind for vertex in run.graph.vertices)
+    if run.summary is not None:
+        yield f"outcome    {run.summary.outcome}: {run.summary.reason}"
+        yield f"driven     {run.summary.distance_m:.1f} m in {film.clock(run.summary.duration_s)}"
+        yield f"closures   {run.summary.loop_closures}"
+    yield (
+        f"vertices   {len(graph.vertices)}: {kinds['meetpoint']} meetpoints, "
+        f"{kinds['endpoint']} endpoints"
+    )
+    yield f"frontiers  {sum(len(vertex.frontiers) for vertex in graph.vertices)} left"
+    yield f"edges      {len(graph.edges)} of {sum(e.length for e in graph.edges):.1f} m in all"
+    if graph.edges:
+        yield f"narrowest  {min(edge.min_clearance for edge in graph.edges):.2f} m to the walls"
+    if len(corners := known_corners(run.grid)):
+        width, height = corners[1] - corners[0]
+        yield f"extent     {width:.1f} m x {height:.1f} m, {_free_area(run):.0f} m^2 of it free"
+    if graph.vertices:
+        yield _accuracy(graph)
+
+
+def _free_area(run: SavedRun) -> float:
+    return float(np.count_nonzero(run.grid.cells == 0) * run.grid.resolution_m**2)
+
+
+def _accuracy(graph: RouteGraph) -> str:
+    sigmas = {vertex.id: _sigma(vertex) for vertex in graph.vertices}
+    worst = max(sigmas, key=lambda number: sigmas[number])
+    median = float(np.median(list(sigmas.values())))
+    return (
+        f"accuracy   sigma of a vertex {median:.3f} m (median), {sigmas[worst]:.3f} m at worst "
+        f"(vertex {worst}), as the robot estimates it"
+    )
+
+
+def _sigma(vertex: MapVertex) -> float:
+    """The standard deviation (m) of a vertex in the direction in which it is largest."""
+    variances = np.linalg.eigvalsh(np.array(vertex.covariance).reshape(2, 2))
+    return float(np.sqrt(max(0.0, variances[-1])))

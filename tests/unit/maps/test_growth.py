@@ -1,0 +1,81 @@
+"""What was found by when, in a run whose every event is known."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gvgbot.maps.growth import Growth, frontiers
+from gvgbot.maps.saved_run import SavedRun
+from tests.unit.maps.small_run import GRAPH, UP, edge, vertex, write_run
+
+
+@pytest.fixture
+def growth(tmp_path: Path) -> Growth:
+    return Growth.of(SavedRun.read(write_run(tmp_path / "run")))
+
+
+@pytest.mark.parametrize(
+    ("time", "vertices", "edges"),
+    [
+        (0.0, {1}, set()),
+        (5.0, {1, 3}, set()),
+        (7.0, {1, 3}, {(1, 2), (2, 3)}),  # one edge as yet: nothing of vertex 2 is known
+        (8.5, {1, 2, 3}, {(1, 2), (2, 3)}),
+        (10.0, {1, 2, 3, 4}, {(1, 2), (2, 3), (3, 4)}),
+    ],
+)
+def test_vertices_and_edges_are_there_from_their_events_on(
+    growth: Growth, time: float, vertices: set[int], edges: set[tuple[int, int]]
+) -> None:
+    found = growth.graph(time)
+    assert {v.id for v in found[0]} == vertices
+    assert {(e.start, e.end) for e in found[1]} == edges
+
+
+def test_the_path_ends_where_the_robot_is(growth: Growth) -> None:
+    assert growth.duration == pytest.approx(10.0)
+    assert growth.path(0.0) == pytest.approx(np.zeros((1, 3)))
+    assert growth.path(3.25)[-1] == pytest.approx([3.2, 0.0, 0.0])
+    assert len(growth.path(10.0)) == 101
+
+
+def test_the_grid_is_known_as_far_as_it_had_been_seen(growth: Growth) -> None:
+    x = -1.0 + 0.1 * np.arange(120)
+    known = np.asarray((growth.grid(3.0).cells >= 0).all(axis=0))
+    assert known[x < 4.9].all()  # whole seconds are kept: two metres ahead, less one
+    assert not known[x >= 6.1].any()
+    assert (growth.grid(10.0).cells >= 0).all()
+
+
+def test_without_a_record_of_what_was_seen_the_whole_grid_is_there(tmp_path: Path) -> None:
+    directory = write_run(tmp_path / "run")
+    (directory / "seen.png").unlink()
+    growth = Growth.of(SavedRun.read(directory))
+    assert (growth.grid(0.0).cells >= 0).all()
+
+
+def test_an_edge_that_no_event_names_waits_for_its_ends_and_for_being_seen(
+    tmp_path: Path,
+) -> None:
+    directory = write_run(tmp_path / "run")
+    lines = (directory / "events.jsonl").read_text().splitlines(keepends=True)
+    (directory / "events.jsonl").write_text("".join(x for x in lines if "joined" not in x))
+    first, second, last = Growth.of(SavedRun.read(directory)).edge_found
+    assert first == pytest.approx(8.0)  # vertex 2
+    assert second == pytest.approx(8.0, abs=0.2)  # (10, 0) is two metres ahead
+    assert last == pytest.approx(9.0)  # vertex 4
+
+
+def test_a_frontier_is_a_bearing_that_no_known_edge_leaves_along() -> None:
+    middle = GRAPH.vertices[1]
+    assert frontiers(middle, []) == [0.0, math.pi, UP]
+    assert frontiers(middle, GRAPH.edges[:1]) == [0.0, UP]
+    assert frontiers(middle, GRAPH.edges) == [UP]
+
+
+def test_a_loop_takes_both_of_its_bearings() -> None:
+    meetpoint = vertex(1, 0.0, 0.0, (0.1, 1.6, -3.1))
+    loop = edge(1, 1, (0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0), (0.0, 0.0))
+    assert frontiers(meetpoint, [loop]) == [-3.1]

@@ -1,0 +1,121 @@
+"""`gvgbot map` on a run that is known to the last number, and on damaged ones."""
+
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from gvgbot.cli import main
+from tests.unit.maps.small_run import write_run
+
+Captured = pytest.CaptureFixture[str]
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Path:
+    return write_run(tmp_path / "corridor-1")
+
+
+@pytest.mark.parametrize(
+    ("options", "name", "kind"),
+    [
+        ([], "picture.png", "PNG"),
+        (["--frames", "3"], "strip.png", "PNG"),
+        (["--animate", "--frames", "3"], "film.gif", "GIF"),
+    ],
+)
+def test_a_picture_goes_into_the_run_directory_or_where_it_is_wanted(
+    run: Path, tmp_path: Path, options: list[str], name: str, kind: str, capsys: Captured
+) -> None:
+    assert main(["map", "show", str(run), *options]) == 0
+    assert capsys.readouterr().out == f"picture: {run / name}\n"
+    wanted = tmp_path / f"wanted.{kind.lower()}"
+    assert main(["map", "show", str(run), *options, "--out", str(wanted)]) == 0
+    assert wanted.read_bytes() == (run / name).read_bytes()
+    with Image.open(wanted) as image:
+        assert image.format == kind
+        assert getattr(image, "n_frames", 1) == (3 if kind == "GIF" else 1)
+
+
+def test_info_says_what_the_map_holds(run: Path, capsys: Captured) -> None:
+    assert main(["map", "info", str(run)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    words = {line.split()[0]: " ".join(line.split()[1:]) for line in lines}
+    assert words["outcome"] == "explored: no frontier is left"
+    assert words["driven"] == "10.0 m in 0:10"
+    assert words["vertices"] == "4: 3 meetpoints, 1 endpoints"
+    assert words["frontiers"] == "4 left"
+    assert words["edges"] == "3 of 11.0 m in all"
+    assert words["narrowest"] == "0.90 m to the walls"
+    assert words["extent"] == "12.0 m x 4.0 m, 46 m^2 of it free"  # 38 of 40 rows
+    assert words["accuracy"].startswith("sigma of a vertex 0.050 m (median), 0.080 m at worst")
+
+
+def test_a_run_that_was_killed_can_still_be_looked_at(run: Path, capsys: Captured) -> None:
+    (run / "summary.json").unlink()
+    with (run / "events.jsonl").open("a") as events:
+        events.write('{"event": "vertex_a')
+    assert main(["map", "info", str(run)]) == 0
+    assert "outcome" not in capsys.readouterr().out
+    assert main(["map", "show", str(run), "--frames", "2"]) == 0
+
+
+DAMAGES: dict[str, tuple[str, str]] = {
+    "no graph": ("map.geojson", "{"),
+    "no trajectory": ("estimate.tum", "1 2 3\n"),
+    "no odometry": ("odometry.tum", "1 2 3 0 0 0 0 nan\n"),
+    "no event": ("events.jsonl", "[]\n"),
+    "an event without a stamp": ("events.jsonl", '{"event": "finished"}\n'),
+    "no summary": ("summary.json", "{}"),
+    "no grid": ("map.pgm", "P5"),
+}
+
+
+@pytest.mark.parametrize(("name", "content"), DAMAGES.values(), ids=DAMAGES)
+@pytest.mark.parametrize("action", ["show", "info"])
+def test_a_damaged_file_is_one_line_that_names_it(
+    run: Path, action: str, name: str, content: str, capsys: Captured
+) -> None:
+    (run / name).write_text(content)
+    assert main(["map", action, str(run)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert name in line
+
+
+@pytest.mark.parametrize("name", ["map.geojson", "estimate.tum", "map.yaml", "map.pgm"])
+def test_a_missing_file_is_one_line_that_names_it(run: Path, name: str, capsys: Captured) -> None:
+    (run / name).unlink()
+    assert main(["map", "show", str(run)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert name in line
+
+
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        (["--out", "film.gif"], "film.gif"),
+        (["--animate", "--out", "film.png"], "film.png"),
+        (["--out", "nowhere/map.png"], "nowhere"),
+    ],
+)
+def test_an_unfit_output_is_one_line_that_names_it(
+    run: Path,
+    tmp_path: Path,
+    options: list[str],
+    named: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: Captured,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["map", "show", str(run), *options]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert named in line
+
+
+def test_a_run_that_never_began_has_a_map_but_no_film(run: Path, capsys: Captured) -> None:
+    for name in ("estimate.tum", "odometry.tum", "events.jsonl"):
+        (run / name).write_text("")
+    assert main(["map", "show", str(run)]) == 0
+    capsys.readouterr()
+    assert main(["map", "show", str(run), "--animate"]) == 2
+    assert "nothing to animate" in capsys.readouterr().err
