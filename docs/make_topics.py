@@ -62,11 +62,20 @@ def _overview() -> str:
 
 
 def _section(topic: Topic) -> str:
-    text = inspect.getdoc(topic.payload) or ""
+    parts = [f"## `{topic.key('ROBOT')}`: {topic.payload.__name__}\n\n{_explained(topic.payload)}"]
+    hints = get_type_hints(topic.payload).values()
+    within = dict.fromkeys(
+        h for h in hints if isinstance(h, type) and issubclass(h, msgspec.Struct)
+    )
+    parts += [f"### {part.__name__}\n\n{_explained(part)}" for part in within]
+    return "\n".join(parts)
+
+
+def _explained(payload: type[msgspec.Struct]) -> str:
     rows = ["| field | type | meaning |", "|---|---|---|"]
-    rows += [f"| {' | '.join(cells)} |" for cells in _fields(topic.payload)]
+    rows += [f"| {' | '.join(cells)} |" for cells in _fields(payload)]
     table = "\n".join(rows)
-    return f"## `{topic.key('ROBOT')}`: {topic.payload.__name__}\n\n{text}\n\n{table}\n"
+    return f"{inspect.getdoc(payload) or ''}\n\n{table}\n"
 
 
 def _fields(payload: type[msgspec.Struct]) -> list[tuple[str, str, str]]:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from gvgbot.clock import Clock
 from gvgbot.config import Config
-from gvgbot.drivers.hokuyo.driver import HokuyoLaser
+from gvgbot.drivers.hokuyo.driver import HokuyoLaser, LinkStatistics
 from gvgbot.drivers.kobuki.driver import KobukiBase
 from gvgbot.drivers.kobuki.feedback import FeedbackReader
 from gvgbot.drivers.tcp import SCHEME, TcpStream
@@ -15,6 +15,7 @@ from gvgbot.errors import DeviceLost
 from gvgbot.hal.devices import Base, Laser
 from gvgbot.hal.reopening import ReopeningBase, ReopeningLaser
 from gvgbot.simulation import Simulation
+from gvgbot.topics import LinkHealth
 
 Close = Callable[[], None]
 
@@ -29,6 +30,8 @@ class Links:
         if simulation is not None and config.twin.base.odometry == "wheels":
             config = replace(config, base=replace(config.base, heading="wheels"))
         self.config, self.clock, self.simulation = config, clock, simulation
+        self._laser_link = LinkStatistics()
+        self._laser: HokuyoLaser | None = None
         self.feedback = FeedbackReader(
             config.base.heading, config.base.link_delay_s, config.base.geometry
         )
@@ -40,7 +43,8 @@ class Links:
             stream, close = _open_port("laser", config.port, config.baud)
         else:
             stream, close = self.simulation.laser, _leave_open
-        return HokuyoLaser(stream, config, self.clock), close
+        self._laser = HokuyoLaser(stream, config, self.clock, self._laser_link)
+        return self._laser, close
 
     def open_base(self) -> tuple[Base, Close]:
         """A base to be run, and what closes its link. Raises DeviceLost."""
@@ -51,28 +55,69 @@ class Links:
             stream, close = self.simulation.base, _leave_open
         return KobukiBase(stream, config, self.clock, self.feedback), close
 
+    def laser_health(self, *, connected: bool, reconnects: int) -> LinkHealth:
+        """What has come from the laser."""
+        link = self._laser_link
+        return LinkHealth(
+            connected=connected,
+            messages=link.scans,
+            damaged=link.bad_messages,
+            lost=link.missed_scans,
+            reconnects=reconnects,
+            clock_offset=None if self._laser is None else self._laser.clock_offset,
+        )
+
+    def base_health(self, *, connected: bool, reconnects: int) -> LinkHealth:
+        """What has come from the base."""
+        statistics = self.feedback.statistics
+        return LinkHealth(
+            connected=connected,
+            messages=statistics.frames,
+            damaged=statistics.bad_frames + statistics.malformed,
+            lost=statistics.missed_frames,
+            reconnects=reconnects,
+            clock_offset=self.feedback.clock_offset,
+        )
+
 
 class Devices:
     """The laser and the base on their links, opened again for as long as they are lost."""
 
     def __init__(self, links: Links) -> None:
+        self._links = links
         self.laser = ReopeningLaser(links.open_laser, links.clock)
         self.base = ReopeningBase(links.open_base, links.clock)
-        self._simulation = links.simulation
 
     async def run(self) -> None:
         """Serve them, and the twins at the other ends, until cancelled."""
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(self.laser.run(), name="laser")
             tasks.create_task(self.base.run(), name="base")
-            if self._simulation is not None:
-                tasks.create_task(self._simulation.run(), name="twins")
+            if self._links.simulation is not None:
+                tasks.create_task(self._links.simulation.run(), name="twins")
 
     @property
     def away(self) -> str | None:
         """Which devices are missing, and why; None if they are all there."""
         devices = {"base": self.base.away, "laser": self.laser.away}
         return "; ".join(f"no {name}: {why}" for name, why in devices.items() if why) or None
+
+    @property
+    def laser_health(self) -> LinkHealth:
+        """What has come over the laser's link."""
+        is_there, reconnects = self.laser.away is None, self.laser.reconnects
+        return self._links.laser_health(connected=is_there, reconnects=reconnects)
+
+    @property
+    def base_health(self) -> LinkHealth:
+        """What has come over the base's link."""
+        is_there, reconnects = self.base.away is None, self.base.reconnects
+        return self._links.base_health(connected=is_there, reconnects=reconnects)
+
+    @property
+    def slips(self) -> int:
+        """How often gyro and wheels began to disagree."""
+        return self._links.feedback.statistics.slips
 
 
 def _open_port(name: str, port: str, baud: int) -> tuple[ByteStream, Close]:

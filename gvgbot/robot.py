@@ -181,4 +181,8 @@ class Robot:
             noise=self._session.config.autonomy.odometry_noise,
             away=self._devices.away,
             guard=self._loop.stopped_for,
+            contacts=self._session.contacts,
+            slips=self._devices.slips,
+            laser=self._devices.laser_health,
+            base=self._devices.base_health,
         )

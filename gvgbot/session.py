@@ -26,7 +26,8 @@ class Session:
         self.simulation: Simulation | None = None
         self.failure: str | None = None  # what ended the run, if it was neither mission nor person
         self._counts = {events.LoopClosed: 0, events.Recovery: 0}
-        self._contacts, self._in_contact = 0, False
+        self.contacts = 0  # times that a bumper was pressed
+        self._in_contact = False
         self._started = time.perf_counter()
         self._first_stamp: float | None = None
         self._last_stamp = 0.0
@@ -44,7 +45,7 @@ class Session:
             self._first_stamp = odometry.stamp
         self._last_stamp = odometry.stamp
         touching = contact is not None and contact.bumper
-        self._contacts += touching and not self._in_contact
+        self.contacts += touching and not self._in_contact
         self._in_contact = touching
         self.journey.record(odometry, self.pipeline, self._truth(odometry.stamp))
 
@@ -86,7 +87,7 @@ class Session:
             "vertices": len(graph.vertices),
             "edges": len(graph.edges),
             "loop_closures": self._counts[events.LoopClosed],
-            "contacts": self._contacts,
+            "contacts": self.contacts,
             "recoveries": self._counts[events.Recovery],
             "seed": self.config.twin.seed,
             "version": __version__,

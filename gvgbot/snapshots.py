@@ -4,7 +4,7 @@ from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.ekf import OdometryNoise, predict
 from gvgbot.geometry import STANDSTILL, Array
 from gvgbot.hal.messages import Battery, Odometry
-from gvgbot.topics import Phase, State
+from gvgbot.topics import LinkHealth, Phase, State
 
 
 def state(
@@ -18,6 +18,10 @@ def state(
     noise: OdometryNoise,
     away: str | None,
     guard: str | None,
+    contacts: int,
+    slips: int,
+    laser: LinkHealth,
+    base: LinkHealth,
 ) -> State:
     """The state at `stamp`; `odometry` is the last control cycle's, `away` says what is missing."""
     mission, graph, map_base = pipeline.mission, pipeline.mapper.graph, pipeline.map_base
@@ -40,6 +44,10 @@ def state(
         frontiers=len(graph.frontiers()),
         distance=pipeline.travelled,
         guard=guard,
+        contacts=contacts,
+        slips=slips,
+        laser=laser,
+        base=base,
     )
 
 

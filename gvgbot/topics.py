@@ -32,6 +32,17 @@ class TelemetryConfig:
             raise ValueError("listen is empty: give an address, or set enabled: false")
 
 
+class LinkHealth(msgspec.Struct, frozen=True, kw_only=True):
+    """What has come over the link to a device since the robot's program began."""
+
+    connected: bool  # whether its values come just now
+    messages: int  # that were understood: scans of a laser, frames of a base
+    damaged: int  # that came, but not whole
+    lost: int  # that the device's own stamps or counter show to be missing
+    reconnects: int  # how often it came back after it was lost
+    clock_offset: float | None  # s, the robot's clock minus the device's; None while unknown
+
+
 class State(msgspec.Struct, frozen=True, kw_only=True):
     """The robot in a nutshell. SI units; poses in the map frame, whose origin is the start.
 
@@ -55,6 +66,10 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
     frontiers: int
     distance: float  # m driven
     guard: str | None  # why the guard changes what autonomy wants; None while it does not
+    contacts: int  # times that a bumper was pressed
+    slips: int  # times that gyro and wheels began to disagree
+    laser: LinkHealth
+    base: LinkHealth
 
 
 @dataclass(frozen=True, slots=True)

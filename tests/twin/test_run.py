@@ -139,6 +139,8 @@ def test_a_robot_goes_on_where_it_was_after_its_base_was_lost_for_a_while(
     assert standing[0] == standing[1]
     halted = [state for state in daemon.network.states if 11.0 < state.stamp < 20.0]
     assert {state.phase for state in halted} == {"halted"}
+    assert {(state.laser.connected, state.base.connected) for state in halted} == {(True, False)}
+    assert [daemon.network.states[at].base.reconnects for at in (30, -1)] == [0, 1]
     assert all("no base" in state.reason for state in halted)
     assert {state.phase for state in daemon.network.states if state.stamp > 26.0} == {"exploring"}
     events = [log["event"] for log in logs]

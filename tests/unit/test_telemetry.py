@@ -19,7 +19,7 @@ from gvgbot.geometry import STANDSTILL, Pose
 from gvgbot.hal.messages import Odometry
 from gvgbot.snapshots import pose_covariance
 from gvgbot.telemetry import _session_config
-from gvgbot.topics import STATE, TOPICS, State, TelemetryConfig, alive_key
+from gvgbot.topics import STATE, TOPICS, LinkHealth, State, TelemetryConfig, alive_key
 
 EXAMPLE = State(
     stamp=12.5,
@@ -39,6 +39,14 @@ EXAMPLE = State(
     frontiers=4,
     distance=31.5,
     guard=None,
+    contacts=1,
+    slips=2,
+    laser=LinkHealth(
+        connected=True, messages=100, damaged=3, lost=4, reconnects=0, clock_offset=-2.5
+    ),
+    base=LinkHealth(
+        connected=False, messages=500, damaged=0, lost=9, reconnects=2, clock_offset=None
+    ),
 )
 PLAIN = {
     "stamp": 12.5,
@@ -58,6 +66,24 @@ PLAIN = {
     "frontiers": 4,
     "distance": 31.5,
     "guard": None,
+    "contacts": 1,
+    "slips": 2,
+    "laser": {
+        "connected": True,
+        "messages": 100,
+        "damaged": 3,
+        "lost": 4,
+        "reconnects": 0,
+        "clock_offset": -2.5,
+    },
+    "base": {
+        "connected": False,
+        "messages": 500,
+        "damaged": 0,
+        "lost": 9,
+        "reconnects": 2,
+        "clock_offset": None,
+    },
 }
 
 

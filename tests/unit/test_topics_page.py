@@ -4,7 +4,7 @@ import msgspec
 import pytest
 
 from docs.make_topics import PAGE, page
-from gvgbot.topics import TOPICS, Topic, alive_key
+from gvgbot.topics import STATE, TOPICS, LinkHealth, Topic, alive_key
 
 by_name = pytest.mark.parametrize("topic", TOPICS, ids=lambda topic: topic.name)
 
@@ -22,7 +22,8 @@ def test_the_page_is_current() -> None:
 @by_name
 def test_every_field_that_travels_has_a_row(topic: Topic) -> None:
     names = [field.name for field in msgspec.structs.fields(topic.payload)]
-    rows = [line.split("|")[1].strip() for line in section(topic).splitlines() if line[:2] == "| "]
+    table = section(topic).split("\n### ")[0]
+    rows = [line.split("|")[1].strip() for line in table.splitlines() if line[:2] == "| "]
     assert rows == ["field", *(f"`{name}`" for name in names)]
 
 
@@ -43,3 +44,9 @@ def test_every_topic_is_listed_with_its_encoding(topic: Topic) -> None:
 
 def test_the_liveliness_token_is_listed() -> None:
     assert f"`{alive_key('ROBOT')}`" in PAGE.read_text(encoding="utf-8")
+
+
+def test_what_travels_within_a_payload_is_explained_too() -> None:
+    text = section(STATE).split("\n### LinkHealth\n")[1]
+    rows = [line.split("|")[1].strip() for line in text.splitlines() if line[:2] == "| "]
+    assert rows == ["field", *(f"`{name}`" for name in LinkHealth.__struct_fields__)]

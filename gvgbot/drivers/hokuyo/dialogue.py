@@ -26,9 +26,11 @@ class Refusal(DeviceRefused):
 class Dialogue:
     """Sends commands and hears messages. Raises DeviceLost whenever the link is gone."""
 
-    def __init__(self, stream: ByteStream, clock: Clock, reply_timeout: float) -> None:
-        """`reply_timeout` in s."""
-        self.link = LinkStatistics()
+    def __init__(
+        self, stream: ByteStream, clock: Clock, reply_timeout: float, link: LinkStatistics
+    ) -> None:
+        """`reply_timeout` in s; `link` counts on."""
+        self.link = link
         self.clock = clock
         self.stream = stream
         self.timeout = reply_timeout

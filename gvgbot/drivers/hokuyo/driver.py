@@ -49,10 +49,11 @@ log = structlog.get_logger()
 
 @dataclass(slots=True)
 class _Stream:
-    """A running stream of scans; `delay` and `silence` in s."""
+    """A running stream of scans; `interval`, `delay` and `silence` in s."""
 
     request: ScanRequest
     geometry: ScanGeometry
+    interval: float
     delay: float
     silence: float
     sync: Synchronisation | None = None
@@ -64,9 +65,19 @@ class _Stream:
 class HokuyoLaser:
     """Serves one laser over one byte stream; after DeviceLost make a new one on a new stream."""
 
-    def __init__(self, stream: ByteStream, config: HokuyoConfig, clock: Clock) -> None:
+    def __init__(
+        self,
+        stream: ByteStream,
+        config: HokuyoConfig,
+        clock: Clock,
+        link: LinkStatistics | None = None,
+    ) -> None:
+        """With the `link` of a driver that was lost, its counters go on."""
         self._config = config
-        self._dialogue = Dialogue(stream, clock, config.reply_timeout_s)
+        link = link or LinkStatistics()
+        self._dialogue = Dialogue(stream, clock, config.reply_timeout_s, link)
+        self._reboots_before = link.reboots
+        self._clock_map: ClockMap | None = None
         self._scans: Latest[Scan] = Latest()
         self._last_scan = -math.inf  # when it came, s
         self._baud = config.baud
@@ -106,6 +117,12 @@ class HokuyoLaser:
     def synchronisation(self) -> Synchronisation | None:
         """How the laser's clock stood when it was opened; None if it was not asked or silent."""
         return self._sync
+
+    @property
+    def clock_offset(self) -> float | None:
+        """The host's clock minus the laser's at the newest scan (s); None before the first."""
+        now = self._clock_map
+        return None if now is None else now.host_stamp - now.stamp_ms / 1000.0
 
     @property
     def intensities(self) -> Values | None:
@@ -215,7 +232,7 @@ class HokuyoLaser:
     async def _give_way(self, refusal: Refusal, request: ScanRequest) -> None:
         """Ask for less from now on, or reboot the laser. Raises the refusal if neither helps."""
         simpler = SIMPLER.get(request.command)
-        if refusal.status == ABNORMAL and not self.link.reboots:
+        if refusal.status == ABNORMAL and self.link.reboots == self._reboots_before:
             await reboot(self._dialogue)
             await quiet(self._dialogue, patience=self._config.opening_patience_s)
         elif refusal.status in UNKNOWN_COMMAND and simpler is not None:
@@ -231,6 +248,7 @@ class HokuyoLaser:
         return _Stream(
             request,
             scan_geometry(config, parameters, request),
+            interval,
             arrival_delay(config, parameters, request),
             max(SHORTEST_SILENCE, config.missed_scans * interval),
             self._sync,
@@ -295,7 +313,10 @@ class HokuyoLaser:
         if before is not None and reply.stamp == before.stamp_ms:
             self.link.repeated_scans += 1
             return None
-        stream.clock_map = now = self._follow(stream, reply.stamp, arrival)
+        stream.clock_map = self._clock_map = now = self._follow(stream, reply.stamp, arrival)
+        if before is not None:
+            scans_later = round((now.host_stamp - before.host_stamp) / stream.interval)
+            self.link.missed_scans += max(0, scans_later - 1)
         if stream.is_fresh and now.anchor is None and not stream.is_doubted:
             stream.is_doubted = True  # a frozen laser begins with an old scan; the next one decides
             return None

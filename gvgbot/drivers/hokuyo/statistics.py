@@ -8,6 +8,7 @@ class LinkStatistics:
     """What happened on the link since the driver was made."""
 
     scans: int = 0
+    missed_scans: int = 0  # gaps in the stamps of those that came
     bad_messages: int = 0  # damaged: dropped, the stream goes on
     stray_messages: int = 0  # whole, but not what was asked for
     repeated_scans: int = 0  # the same stamp again: the laser is frozen

@@ -129,6 +129,11 @@ class FeedbackReader:
         return 0.0 if self._odometry is None else self._odometry.slip_rate
 
     @property
+    def clock_offset(self) -> float | None:
+        """The host's clock minus the time that the base has counted (s); None before a frame."""
+        return None if self._clock is None else self._clock.offset
+
+    @property
     def statistics(self) -> LinkStatistics:
         """Counters of the link."""
         return LinkStatistics(
