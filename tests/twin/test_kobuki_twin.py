@@ -134,7 +134,7 @@ def test_requests_are_answered_at_the_end_of_the_next_frame_only() -> None:
 def test_requests_repeated_within_a_cycle_are_answered_once() -> None:
     rig = Rig()
     for _ in range(10):
-        rig.send(*[RequestExtra(0x0B), GetGain()] * 10)
+        rig.send(*10 * (RequestExtra(0x0B), GetGain()))
     answers = rig.frame()[7:]
     assert [type(a) for a in answers] == [HardwareVersion, FirmwareVersion, Udid, ControllerInfo]
 
@@ -255,3 +255,36 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_another_start() -> 
     a, b = Rig(seed=5).core(), Rig(seed=6).core()
     assert a.left_encoder != b.left_encoder
     assert a.right_encoder != b.right_encoder
+
+
+@pytest.mark.parametrize(
+    ("firmware", "reply"),
+    [
+        ("1.0.0", "0a02 6800 0b02 7b00"),
+        ("1.1.0", "0a02 6800 0b02 6e00"),
+        ("1.1.1", "0a02 6800 0b02 6f00"),
+        ("1.1.4", "0a04 04000100 0b04 04010100"),
+    ],
+)
+def test_early_firmware_tells_versions_in_two_bytes(firmware: str, reply: str) -> None:
+    twin = KobukiTwin(KobukiTwinConfig(firmware_version=firmware), IdealBody(), 0)
+    twin.receive(encode_commands([RequestExtra(0x03)]), 0.0)
+    assert twin.advance(twin.next_due())[:-1].endswith(bytes.fromhex(reply))
+
+
+def test_a_base_may_leave_questions_unanswered_for_a_while() -> None:
+    rig = Rig()
+    rig.twin.inject("no replies", 0.05)
+    answered = []
+    for _ in range(6):
+        rig.send(RequestExtra(0x0B))
+        answered.append(len(rig.frame()) - 7)
+    assert answered == [0, 0, 0, 3, 3, 3]
+
+
+def test_buttons_have_the_bases_bits() -> None:
+    rig = Rig()
+    rig.twin.hold_buttons(0x05)
+    assert rig.core().buttons == 0x05
+    rig.twin.hold_buttons(0)
+    assert rig.core().buttons == 0

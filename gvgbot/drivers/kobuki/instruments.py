@@ -38,6 +38,7 @@ class Instruments:
         self._left_speed = self._right_speed = self._rate = 0.0
         self._gyro_id = 0
         self._gyro_due = 0.0
+        self.buttons = 0  # that are held, one bit each
 
     def restart(self) -> None:
         """Count from nothing, as after switching on."""
@@ -81,7 +82,7 @@ class Instruments:
             right_encoder=math.floor(self._right / self._tick + 0.5) % _WORD,
             left_pwm=_pwm(self._left_speed),
             right_pwm=_pwm(self._right_speed),
-            buttons=0,
+            buttons=self.buttons,
             charger=power.charger,
             battery_dv=max(0, round(10 * power.volts)),
             over_current=0,

@@ -21,6 +21,7 @@ Mishap = Literal[
     "reboot",
     "short part",
     "unknown part",
+    "no replies",
 ]
 PerHour = Annotated[float, Range(0.0, 36_000.0)]
 
@@ -44,6 +45,7 @@ class MishapConfig:
     reboots_per_h: PerHour = 0.0
     short_parts_per_h: PerHour = 0.0
     unknown_parts_per_h: PerHour = 0.0
+    no_replies_per_h: PerHour = 0.0  # to what it is asked
     duration_s: Annotated[float, Range(0.0, 60.0)] = 0.5
     boot_s: Annotated[float, Range(0.0, 60.0)] = 1.0  # from a reboot to the first frame
 
@@ -58,6 +60,7 @@ class MishapConfig:
             "low battery": self.low_batteries_per_h,
             "short part": self.short_parts_per_h,
             "unknown part": self.unknown_parts_per_h,
+            "no replies": self.no_replies_per_h,
         }
         sudden: dict[Mishap, float] = {"slip": self.slips_per_h, "reboot": self.reboots_per_h}
         rates = {str(name): Rate(per_h, self.duration_s) for name, per_h in lasting.items()}

@@ -10,7 +10,6 @@ import numpy as np
 from gvgbot.drivers.kobuki.commands import (
     BaseControl,
     Command,
-    Extra,
     GetGain,
     GpOutput,
     RequestExtra,
@@ -25,16 +24,12 @@ from gvgbot.drivers.kobuki.instruments import Instruments
 from gvgbot.drivers.kobuki.mishaps import Mishap, Mishaps
 from gvgbot.drivers.kobuki.odometry_error import PROFILES, ErringSensors
 from gvgbot.drivers.kobuki.payloads import (
-    ControllerInfo,
     DockIr,
-    FeedbackPart,
-    FirmwareVersion,
-    HardwareVersion,
     Udid,
-    Version,
     encode_feedback,
 )
 from gvgbot.drivers.kobuki.power import Power
+from gvgbot.drivers.kobuki.twin_answers import Answers
 from gvgbot.drivers.kobuki.twin_config import KobukiTwinConfig
 from gvgbot.drivers.kobuki.wheel_odometry import KOBUKI, DriveGeometry
 from gvgbot.geometry import STANDSTILL, Pose, Twist, wrap_angle
@@ -44,8 +39,6 @@ __all__ = ["KobukiTwin", "KobukiTwinConfig"]
 _PERIOD_MS = 20
 _PERIOD = _PERIOD_MS / 1000  # s
 _SLIP_TRAVEL = 0.05  # m that a wheel spins in a slip
-_FACTORY_GAINS = ControllerInfo(0, 100_000, 100, 2_000)
-_FIRST_WITH_GAINS = (1, 2)  # firmware
 _SOUNDS_KEPT = 32
 _EARLY = 1e-9  # s: a command this much too late for its cycle still counts
 
@@ -106,13 +99,12 @@ class KobukiTwin:
         self.played: deque[Sound | SoundSequence] = deque(maxlen=_SOUNDS_KEPT)
         self._sensors = ErringSensors(PROFILES[config.odometry], rng)
         self._instruments = Instruments(rng, geometry.tick)
-        self._udid = Udid(tuple(rng.integers(1, 2**32, 3).tolist()))
+        udid = Udid(tuple(rng.integers(1, 2**32, 3).tolist()))
+        self._answers = Answers(config.hardware_version, config.firmware_version, udid)
         self._parser = FrameParser()
         self._pending: deque[tuple[float, Twist]] = deque()
         self._commanded = -math.inf
         self._moving = False
-        self._replies: dict[type, FeedbackPart] = {}  # one of a kind, that they fit into a frame
-        self._gains = _FACTORY_GAINS
         self._output = 0
         self._power_on: float | None = None
         self._cycles = 0
@@ -145,6 +137,10 @@ class KobukiTwin:
     def show_dock(self, *, left: int, centre: int, right: int) -> None:
         """Let a dock's beams fall on the receivers, one bit per beam, wherever the base is."""
         self._shown = DockIr(right, centre, left)
+
+    def hold_buttons(self, bits: int) -> None:
+        """Hold the buttons down whose bits are set (B0 is bit 0), and let go of the others."""
+        self._instruments.buttons = bits
 
     def plug_adapter(self, is_plugged: bool) -> None:
         """Plug in the charger's cable, or pull it out."""
@@ -190,7 +186,8 @@ class KobukiTwin:
         self._halt()
         self._power_on, self._cycles = now + self._config.mishaps.boot_s, 0
         self._instruments.restart()
-        self._parser, self._replies, self._output = FrameParser(), {}, 0
+        self._parser, self._output = FrameParser(), 0
+        self._answers.take()
 
     def _halt(self) -> None:
         """Cut the motors, whatever was commanded."""
@@ -203,13 +200,15 @@ class KobukiTwin:
             self._body.advance(due)
             self._true = self._truth()
         self._move(due)
-        replies, self._replies = self._replies.values(), {}
+        replies = self._answers.take()
         self._charge()
         parts = self._instruments.read(
             self._stamp_ms, self._body.bumper, self._power, self._dock_beams()
         )
         self._cycles += 1
-        return encode_frame(encode_feedback(self._mishaps.spoil([*parts, *replies])))
+        if not self._mishaps.is_on("no replies"):
+            parts += replies
+        return encode_frame(encode_feedback(self._mishaps.spoil(parts)))
 
     @property
     def _stamp_ms(self) -> int:
@@ -231,23 +230,14 @@ class KobukiTwin:
         match command:
             case BaseControl():
                 self._obey_motion(command.twist_on(1000 * self._geometry.wheel_base), now)
-            case RequestExtra(flags):
-                self._reply(self._extras(flags))
-            case SetGain(kind, p, i, d) if self._has_gains:
-                self._gains = ControllerInfo(kind, p, i, d) if kind else _FACTORY_GAINS
-            case GetGain() if self._has_gains:
-                self._reply([self._gains])
+            case RequestExtra() | SetGain() | GetGain():
+                self._answers.hear(command)
             case GpOutput(flags):
                 self._output = flags
             case Sound() | SoundSequence():
                 self.played.append(command)
             case _:
                 pass
-
-    @property
-    def _has_gains(self) -> bool:
-        version = _version(self._config.firmware_version)
-        return (version.major, version.minor) >= _FIRST_WITH_GAINS
 
     def _obey_motion(self, twist: Twist, now: float) -> None:
         """Take a command in its turn; motors that stand get their power a little later."""
@@ -260,19 +250,6 @@ class KobukiTwin:
             due += self._config.motor_power_delay_s
         last = self._pending[-1][0] if self._pending else due
         self._pending.append((max(due, last), self._limited(twist)))
-
-    def _reply(self, parts: list[FeedbackPart]) -> None:
-        self._replies |= {type(part): part for part in parts}
-
-    def _extras(self, flags: int) -> list[FeedbackPart]:
-        parts: list[FeedbackPart] = []
-        if flags & Extra.HARDWARE:
-            parts.append(HardwareVersion(_version(self._config.hardware_version)))
-        if flags & Extra.FIRMWARE:
-            parts.append(FirmwareVersion(_version(self._config.firmware_version)))
-        if flags & Extra.UDID:
-            parts.append(self._udid)
-        return parts
 
     def _move(self, now: float) -> None:
         """Let the body move through this cycle and feel what it did, then heed commands."""
@@ -303,8 +280,3 @@ class KobukiTwin:
         fast_wheel = abs(twist.linear) + abs(twist.angular) * self._geometry.wheel_base / 2
         share = max(1.0, fast_wheel / self._config.max_wheel_speed_mps)
         return Twist(twist.linear / share, twist.angular / share)
-
-
-def _version(text: str) -> Version:
-    major, minor, patch = map(int, text.split("."))
-    return Version(major, minor, patch)
