@@ -114,6 +114,7 @@ class HokuyoTwin:
     def _suffer(self, now: float) -> None:
         """Let the mishaps happen that are due, and the reboot that was asked for."""
         began = self._mishaps.advance(now)
+        self._answers.is_unstable = self._mishaps.is_on("unstable")
         if "abnormal" in began:
             self._answers.is_abnormal = True
             self._answers.phase = Standby()

@@ -58,6 +58,7 @@ class Streaming:
 
 Phase = Standby | LaserOn | TimeMode | Asleep | Streaming
 STATES = {Standby: "000", TimeMode: "002", LaserOn: "003", Streaming: "004", Asleep: "005"}
+FAILED, UNSTABLE_DIGIT = "900", "1"
 
 
 class Answers:
@@ -70,6 +71,7 @@ class Answers:
         self.phase: Phase = Standby()
         self.settings = Settings(config, head)
         self.is_abnormal = config.starts_abnormal
+        self.is_unstable = False
         self.speaks_scip_1 = config.starts_in_scip_1
         self.restarts_at: float | None = None
         self._config = config
@@ -96,7 +98,7 @@ class Answers:
         lines = self._information(command, now)
         if lines is not None:
             return _key_lines(text, lines)
-        if self.is_abnormal and command != "RB":
+        if self.is_abnormal and command not in {"RB", "%ST"}:
             return status_reply(text, ABNORMAL)
         if command[:2] in SCAN_COMMANDS and command[2:3] != "":
             return self._answer_scan(text, command, now)
@@ -127,6 +129,13 @@ class Answers:
             "STAT": self._health(),
         }
 
+    def _state(self) -> str:
+        """Three digits, as %ST tells it."""
+        if self.is_abnormal:
+            return FAILED
+        state = STATES[type(self.phase)]
+        return UNSTABLE_DIGIT + state[1:] if self.is_unstable else state
+
     def _health(self) -> str:
         if self.is_abnormal or self.settings.is_broken:
             return "Sensor is in abnormal state."
@@ -139,8 +148,7 @@ class Answers:
         if command[:2] == "TM" and len(command) == 3:
             return self._answer_time(text, command, now)
         if command == "%ST" and self._head.model.is_newer:
-            state = "900" if self.is_abnormal else STATES[type(self.phase)]
-            return encode_reply(Reply(text, ACCEPTED, (state,)))
+            return encode_reply(Reply(text, ACCEPTED, (self._state(),)))
         if command == "RB":
             return status_reply(text, self._restart(now))
         return status_reply(text, self._switch(command, now))

@@ -209,3 +209,16 @@ def test_a_malfunction_in_mid_stream_says_so(drill: str, statuses: list[str]) ->
     goes_on = isinstance(messages[-1], ScanReply)
     assert goes_on == (drill == "DB03")
     assert (ask(twin, "BM", 10.0).status == "01") == (not goes_on)
+
+
+@pytest.mark.parametrize(
+    ("commands", "state"),
+    [([], "100"), (["TM0"], "102"), (["BM"], "103"), (["MD0000108001000"], "104")],
+    ids=str,
+)
+def test_newer_lasers_tell_that_they_become_unstable(commands: list[str], state: str) -> None:
+    twin = laser("UST-10LX")
+    told(twin, *commands)
+    twin.inject("unstable", 1.0)
+    assert ask(twin, "%ST").lines == (state,)
+    assert ask(laser("UST-10LX", starts_abnormal=True), "%ST").lines == ("900",)
