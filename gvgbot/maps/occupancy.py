@@ -180,7 +180,8 @@ def _finished(ballot: _Ballot, cell: float) -> OccupancyGrid:
     votes = ballot.votes
     rows, columns = np.flatnonzero(votes.any(axis=1)), np.flatnonzero(votes.any(axis=0))
     if not len(rows):
-        return OccupancyGrid(np.full((1, 1), UNKNOWN, np.int8), cell, (0.0, 0.0))
+        never = np.full((1, 1), np.inf, np.float32)
+        return OccupancyGrid(np.full((1, 1), UNKNOWN, np.int8), cell, (0.0, 0.0), never)
     edge = math.ceil(_EDGE_M / cell)
     bottom, left = max(0, int(rows[0]) - edge), max(0, int(columns[0]) - edge)
     cut = np.s_[bottom : rows[-1] + edge + 1, left : columns[-1] + edge + 1]

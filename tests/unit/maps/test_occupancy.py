@@ -187,6 +187,8 @@ def test_without_a_trusted_beam_all_is_unknown(ranges: list[Array]) -> None:
     grid = occupancy_grid([(Pose(), open_hall(values)) for values in ranges], CELL)
     assert (grid.cells == -1).all()
     assert grid.cells.dtype == np.int8
+    assert grid.seen_s is not None  # or the record of an earlier run would stay beside the map
+    assert np.isinf(grid.seen_s).all()
 
 
 def trinary(directory: Path) -> tuple[NDArray[np.int_], tuple[float, ...], float]:
