@@ -57,18 +57,12 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         self._jumping = _JumpingSelector()
         super().__init__(self._jumping)
 
-    @property
-    def _clock_resolution(self) -> float:
-        """How early a timer may fire, s: not at all, or two that wait anew never let time pass."""
-        return math.ulp(self.time())
-
-    @_clock_resolution.setter
-    def _clock_resolution(self, resolution: float) -> None:
-        """The base class sets that of the real clock."""
-
     def time(self) -> float:
         """Virtual seconds since the loop was made."""
-        return self._jumping.now
+        now = self._jumping.now
+        # A timer that fired early would be set again, and two such tasks would stop time for ever.
+        self._clock_resolution = math.ulp(now)
+        return now
 
 
 def run_in_virtual_time(main: Any) -> Any:
