@@ -6,9 +6,11 @@ import math
 import numpy as np
 import pytest
 
+from gvgbot.clock import LoopClock
 from gvgbot.drivers.hokuyo.driver import HokuyoConfig
 from gvgbot.drivers.hokuyo.models import MODELS
 from gvgbot.drivers.hokuyo.twin import HokuyoTwin, HokuyoTwinConfig
+from gvgbot.drivers.transport import ByteStream
 from gvgbot.geometry import Array
 from gvgbot.hal.messages import Scan
 from tests.twin.hokuyo_bench import QUANTISATION, Bench, World, on_bench
@@ -174,3 +176,34 @@ def test_a_motor_off_its_nominal_speed_costs_nothing() -> None:
         await asyncio.sleep(0)
 
     on_bench(twin_of(world, motor_error_ppm=3000.0), scenario)
+
+
+async def slowed(link: ByteStream, clock: LoopClock) -> None:
+    """What a host before us did: the motor at its slowest level, 540 rpm."""
+    link.write(b"CR10\n")
+    await link.read()
+
+
+def test_a_motor_that_somebody_slowed_down_is_lived_with() -> None:
+    async def scenario(bench: Bench) -> None:
+        stamps = [scan.stamp for scan in await bench.scans(50)]
+        assert np.diff(stamps) == pytest.approx(60 / 540, abs=0.002)
+        assert bench.laser.link.restarts == 0
+
+    on_bench(twin_of(World(beams=682), model="URG-04LX"), scenario, first=slowed)
+
+
+async def sabotaged(link: ByteStream, clock: LoopClock) -> None:
+    """A host before us wanted a malfunction that mends itself, in mid-stream."""
+    link.write(b"DB03\n")
+    await link.read()
+
+
+def test_scans_come_again_after_a_malfunction_that_mends_itself() -> None:
+    async def scenario(bench: Bench) -> None:
+        stamps = [scan.stamp for scan in await bench.scans(60)]
+        gaps = np.diff(stamps)
+        assert (gaps > 0.5).any()  # ten scans are not made
+        assert gaps[-10:] == pytest.approx(0.1, abs=0.002)
+
+    on_bench(twin_of(World(beams=682), model="URG-04LX"), scenario, first=sabotaged)

@@ -170,11 +170,10 @@ class HokuyoTwin:
             phase.is_complete = request.count == 0
         due = self._head.scan_start(number) + self._head.latency(request)
         phase.frames.append((due, self._frame(phase, number)))
-        phase.measured += 1
 
     def _frame(self, phase: Streaming, number: int) -> bytes:
         """What goes out for a scan, as the laser is just now."""
-        status = self._answers.settings.instead_of_scan(phase.measured)
+        status = self._answers.settings.instead_of_scan()
         if status == BROKEN:
             self._answers.settings.is_broken = phase.is_complete = True
         if self._mishaps.is_on("unstable"):

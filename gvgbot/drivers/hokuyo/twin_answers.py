@@ -52,7 +52,6 @@ class Streaming:
     request: ScanRequest
     scan_number: int
     is_complete: bool = False
-    measured: int = 0
     frames: deque[tuple[float, bytes]] = field(default_factory=deque)
 
 

@@ -16,7 +16,7 @@ BREAK_NOW = frozenset({1, 2})  # parameters of DB
 HALT_AND_GO_ON, HALT_AND_BREAK, BREAK = 3, 4, 5  # in the midst of a stream
 END = 10
 
-SCANS_BEFORE = 20  # of a stream, until its malfunction begins
+SCANS_BEFORE = 20  # that are sent until the malfunction begins
 SCANS_CHECKED = 10  # that are not made while the laser looks into it
 CHECKING, RESUMED, BROKEN, SILENCE = "21", "98", "50", ""
 
@@ -31,6 +31,7 @@ class Settings:
         self._head = head
         self._level = 0
         self._drill: int | None = None
+        self._drilled = 0  # scans since it was asked for
 
     def reset(self, now: float, *, wholly: bool) -> None:
         """As shipped; unless `wholly`, motor and bit rate stay as they are."""
@@ -58,9 +59,9 @@ class Settings:
                 return self._set_sensitivity(int(digits))
         return self._set_drill(int(digits))
 
-    def instead_of_scan(self, count: int) -> str | None:
-        """The status that takes the place of this scan of a stream, from 0; None: the scan."""
-        late = count - SCANS_BEFORE
+    def instead_of_scan(self) -> str | None:
+        """The status that takes the place of the next scan of a stream; None: the scan itself."""
+        late, self._drilled = self._drilled - SCANS_BEFORE, self._drilled + 1
         if self._drill is None or late < 0:
             return None
         if self._drill == BREAK:
@@ -118,6 +119,6 @@ class Settings:
             return "02"
         if self.is_broken:
             return "05"
-        self._drill = wanted
+        self._drill, self._drilled = wanted, 0
         self.is_broken = wanted in BREAK_NOW
         return ACCEPTED
