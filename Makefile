@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 SHELL := /bin/sh
 
-.PHONY: help explore test check static quick bench fuzz clean
+.PHONY: help explore test check static quick bench bench-explore fuzz clean
 
 help:
 	@echo "make explore   a simulated robot maps the built-in office; prints where the map is"
@@ -32,6 +32,10 @@ check: static test
 
 bench: .venv/dev
 	@for file in benchmarks/bench_*.py; do $(BIN)/python -m "benchmarks.$$(basename "$$file" .py)" || exit 1; done
+
+PLANS ?= 100
+bench-explore: .venv/dev
+	@nice -n 10 $(BIN)/python -m benchmarks.explore_table --plans $(PLANS) --lasers UTM-30LX URG-04LX $(ARGS)
 
 FUZZ_SECONDS ?= 60
 fuzz: .venv/fuzz

@@ -1,26 +1,44 @@
-"""Explore many worlds with many seeds and print a table: outcome, accuracy, path, speed, memory.
+"""Explore many worlds and print a table: outcome, accuracy, path, speed, memory; then a summary.
 
-    python benchmarks/explore_table.py [--worlds office floor_plan:7 PATH.yaml:X:Y:THETA ...]
-                                       [--seeds 1 2 3] [--set key=value ...] [--jobs 2] [--scorer score.py]
+    python -m benchmarks.explore_table [--worlds office floor_plan:7 PATH.yaml:X:Y:THETA ...]
+        [--seeds 1 2 3] [--plans N] [--lasers UTM-30LX URG-04LX] [--rough] [--people N]
+        [--set key=value ...] [--jobs N] [--out DIR]
 
-The scorer is any program that is called as `score.py RUN_DIR WORLD.yaml X Y THETA` and prints JSON
-with recall, precision, edge_recall, vertex_rmse_m, path_ratio and min_clearance_m; without it the
-table has only what the run says of itself.
+Each world is explored with each seed and each laser, then each of the floor plans 1 to N, with its
+own number as seed. Runs are scored against the true GVG of their worlds (benchmarks.score_run). DIR
+keeps the run directories and a line for each in results.jsonl. A run that is in there already is
+shown, but not run again unless it crashed: take another DIR when the program has changed.
+
+A run fails if it did not explore all, touched something or could not be scored. The exit status is
+0 only if no run failed.
 """
 
 import argparse
 import json
 import os
+import re
+import shlex
 import subprocess
 import sys
 import tempfile
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
+from statistics import fmean, median
 from typing import Any
 
-from gvgbot.worlds import builtin
+from benchmarks.score_run import score_run
+from gvgbot.drivers.hokuyo.models import MODELS
+from gvgbot.errors import GvgbotError
+from gvgbot.worlds import NAMES
 
-WORLDS = ["office", "grid", "jittered", "rooms", "cave"]
+RESULTS = "results.jsonl"
+WORLDS = [name for name in NAMES if name != "floor_plan"]
+ROUGH = ["twin.laser.range_sigma_m=0.03", "twin.laser.dropout_fraction=0.02"]
+PEOPLE_EVERY = 10  # runs
+INTERRUPTED = 130
+CRASHED = "crashed"
+ONE_CORE = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}  # so that --jobs counts cores
 COLUMNS = (
     ("recall", "recall", "{:.3f}"),
     ("precision", "prec", "{:.3f}"),
@@ -28,8 +46,8 @@ COLUMNS = (
     ("vertex_rmse_m", "rmse", "{:.3f}"),
     ("path_ratio", "ratio", "{:.3f}"),
     ("min_clearance_m", "clear", "{:.3f}"),
-    ("estimate_ate_m", "ate", "{:.3f}"),
-    ("mean_speed", "m/s", "{:.2f}"),
+    ("ate_m", "ate", "{:.3f}"),
+    ("mean_speed_mps", "m/s", "{:.2f}"),
     ("contacts", "hits", "{}"),
     ("loop_closures", "clos", "{}"),
     ("recoveries", "recov", "{}"),
@@ -37,79 +55,189 @@ COLUMNS = (
     ("memory_mb", "MB", "{:.0f}"),
 )
 
-
-def main() -> int:
-    """Run the table; 0 if every run explored its world."""
-    options = _options()
-    jobs = [(world, seed) for world in options.worlds for seed in options.seeds]
-    print("world          seed outcome   " + " ".join(f"{t:>6}" for _, t, _ in COLUMNS))
-    with tempfile.TemporaryDirectory() as scratch, ThreadPoolExecutor(options.jobs) as pool:
-        out = Path(options.out or scratch)
-        runs = pool.map(lambda job: _run(job[0], job[1], out, options), jobs)
-        return 1 - min([_show(row) for row in runs], default=1)
+Row = dict[str, Any]
+Command = tuple[str, ...]  # arguments of `gvgbot`, but for the run directory
 
 
-def _options() -> argparse.Namespace:
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run and print the table and the summary; 0 if no run failed."""
+    options = _options(arguments)
+    out = _out(options.out)
+    print(f"results: {out / RESULTS}")
+    print("world            laser    seed outcome  " + " ".join(f"{t:>6}" for _, t, _ in COLUMNS))
+    rows = []
+    try:
+        for row in _rows(commands(options), out, options.jobs):
+            rows.append(row)
+            print(line(row), flush=True)
+    except KeyboardInterrupt:
+        print(f"interrupted; --out {out} goes on from here", file=sys.stderr)
+        return INTERRUPTED
+    print("\n".join(summary(rows)))
+    return int(any(has_failed(row) for row in rows))
+
+
+def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
-    parser.add_argument("--worlds", nargs="+", default=WORLDS)
-    parser.add_argument("--seeds", nargs="+", type=int, default=[1, 2, 3, 4, 5])
+    parser.add_argument("--worlds", nargs="*", default=WORLDS)
+    parser.add_argument("--seeds", nargs="+", type=int, default=[1])
+    parser.add_argument("--plans", type=int, default=0, help="how many floor plans")
+    parser.add_argument("--lasers", nargs="+", choices=tuple(MODELS), default=["UTM-30LX"])
+    parser.add_argument("--rough", action="store_true", help=f"sets {' '.join(ROUGH)}")
+    parser.add_argument(
+        "--people", type=int, default=0, help=f"how many, in one of {PEOPLE_EVERY} runs"
+    )
     parser.add_argument("--set", dest="overrides", nargs="+", default=[])
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
-    parser.add_argument("--scorer", type=Path)
-    parser.add_argument("--out", help="keep the run directories here")
-    return parser.parse_args()
+    parser.add_argument("--out", type=Path, help="default: a new directory in runs/")
+    return parser.parse_args(arguments)
 
 
-def _run(world: str, seed: int, out: Path, options: argparse.Namespace) -> dict[str, Any]:
+def _out(wanted: Path | None) -> Path:
+    parent = Path("runs") if wanted is None else wanted
+    parent.mkdir(parents=True, exist_ok=True)
+    return Path(tempfile.mkdtemp(prefix="table-", dir=parent)) if wanted is None else wanted
+
+
+def commands(options: argparse.Namespace) -> list[Command]:
+    """What to run. The lasers take turns, each in the same worlds with the same seeds and people.
+
+    Seed and laser are always in a command, so that it repeats its run whatever the defaults.
+    """
+    worlds = [(world, seed) for world in options.worlds for seed in options.seeds]
+    worlds += [(f"floor_plan:{number}", number) for number in range(1, options.plans + 1)]
+    return [
+        _command(world, seed, [f"twin.laser.model={laser}", *_settings(options, number)])
+        for number, (world, seed) in enumerate(worlds, start=1)
+        for laser in options.lasers
+    ]
+
+
+def _settings(options: argparse.Namespace, number: int) -> list[str]:
+    """What all runs have in common, and the people in some of them."""
+    has_people = options.people and number % PEOPLE_EVERY == 0
+    people = [f"twin.people={options.people}"] if has_people else []
+    return [*(ROUGH if options.rough else []), *people, *options.overrides]
+
+
+def _command(world: str, seed: int, settings: list[str]) -> Command:
     path, *start = world.rsplit(":", 3) if world.count(":") > 2 else [world]
-    name = Path(path).stem
-    directory = out / f"{name}-{seed}"
-    command = [sys.executable, "-m", "gvgbot", "explore", "--world", path, "--seed", str(seed)]
-    command += ["--out", str(directory)]
-    command += ["--start", *start] if start else []
-    command += [word for item in options.overrides for word in ("--set", item)]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-    assert process.stdout is not None
-    said = process.stdout.read()
-    _, status, usage = os.wait4(process.pid, 0)
-    row: dict[str, Any] = {"world": name, "seed": seed, "status": status, "said": said.strip()}
-    row["memory_mb"] = usage.ru_maxrss / 1024
-    summary = directory / "summary.json"
-    if summary.exists():
-        row |= json.loads(summary.read_text(encoding="utf-8"))
-        row["speed_factor"] = row["duration_s"] / row["wall_s"]
-        row |= _score(directory, start or _start(path), options.scorer)
-    return row
+    place = ["--world", path, *(["--start", *start] if start else []), "--seed", str(seed)]
+    return "explore", *place, *(word for item in settings for word in ("--set", item))
 
 
-def _start(name: str) -> list[str]:
-    pose = builtin(name)[1]
-    return [str(pose.x), str(pose.y), str(pose.theta)]
+def _rows(wanted: list[Command], out: Path, jobs: int) -> Iterator[Row]:
+    """The results that are in `out`, then the others as they come; each is kept at once."""
+    results = out / RESULTS
+    results.touch()
+    known = [json.loads(text) for text in results.read_text(encoding="utf-8").splitlines()]
+    kept = {row["command"]: row for row in known if row["outcome"] != CRASHED}
+    yield from (kept[text] for text in map(_text, wanted) if text in kept)
+    with ThreadPoolExecutor(jobs) as pool, results.open("a", encoding="utf-8") as file:
+        runs = [pool.submit(run, c, out / _slug(c)) for c in wanted if _text(c) not in kept]
+        try:
+            for done in as_completed(runs):
+                row = done.result()
+                file.write(json.dumps(row) + "\n")
+                file.flush()
+                yield row
+        finally:
+            pool.shutdown(cancel_futures=True)
 
 
-def _score(directory: Path, start: list[str], scorer: Path | None) -> dict[str, Any]:
-    if scorer is None:
-        return {}
-    command = [sys.executable, str(scorer), str(directory), str(directory / "world.yaml"), *start]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    return json.loads(done.stdout) if done.returncode == 0 else {"said": done.stderr[-300:]}
+def _text(command: Command) -> str:
+    return shlex.join(["gvgbot", *command])
 
 
-def _show(row: dict[str, Any]) -> int:
-    """Print a row; 1 if the world was explored."""
-    cells = [form.format(row[key]) if row.get(key) is not None else "-" for key, _, form in COLUMNS]
-    outcome = str(row.get("outcome", "crashed"))
-    print(
-        f"{row['world']:14} {row['seed']:4} {outcome:9} " + " ".join(f"{c:>6}" for c in cells),
-        flush=True,
+def _slug(command: Command) -> str:
+    return re.sub(r"[^\w.]+", "-", "_".join(command[1:])).strip("-")
+
+
+def run(command: Command, directory: Path) -> Row:
+    """Explore once, as a process of its own, and score what it leaves."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "gvgbot", *command, "--out", str(directory)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        env=os.environ | ONE_CORE,
     )
-    if outcome != "explored":
-        print(
-            f"    {row['said'].splitlines()[-1] if row['said'] else row.get('reason')}", flush=True
-        )
-    return int(outcome == "explored")
+    assert process.stdout is not None
+    with process.stdout:
+        said = process.stdout.read().strip().splitlines() or [""]
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    row = _named(command) | {"status": process.returncode, "memory_mb": usage.ru_maxrss / 1024}
+    try:
+        row |= _outcome(directory)
+    except OSError:
+        return row | {"outcome": CRASHED, "reason": said[-1]}
+    try:
+        return row | score_run(directory)
+    except (GvgbotError, OSError) as error:
+        return row | {"reason": f"not scored: {error}"}
+
+
+def _outcome(directory: Path) -> Row:
+    """What a run says of itself."""
+    found: Row = json.loads((directory / "summary.json").read_text(encoding="utf-8"))
+    del found["config"]
+    return found | {"speed_factor": found["duration_s"] / found["wall_s"]}
+
+
+def _named(command: Command) -> Row:
+    """What a row says of the run before it has run."""
+    world, seed = (command[command.index(key) + 1] for key in ("--world", "--seed"))
+    laser = next(word.partition("=")[2] for word in command if word.startswith("twin.laser.model"))
+    return {"command": _text(command), "world": Path(world).stem, "laser": laser, "seed": int(seed)}
+
+
+def has_failed(row: Row) -> bool:
+    """Whether the run did not explore all, touched something, or could not be scored."""
+    return row["status"] != 0 or row.get("contacts") != 0 or "recall" not in row
+
+
+def line(row: Row) -> str:
+    """A row of the table."""
+    cells = [form.format(row[key]) if row.get(key) is not None else "-" for key, _, form in COLUMNS]
+    name = f"{row['world']:16} {row['laser']:8} {row['seed']:4} {row['outcome']:8}"
+    return f"{name} " + " ".join(f"{cell:>6}" for cell in cells)
+
+
+def summary(rows: list[Row]) -> list[str]:
+    """For each laser what its runs have in common, the worst of them, and those that failed."""
+    lasers = dict.fromkeys(row["laser"] for row in rows)
+    return [text for laser in lasers for text in _of_laser(laser, rows)]
+
+
+def _of_laser(laser: str, rows: list[Row]) -> Iterator[str]:
+    rows = [row for row in rows if row["laser"] == laser]
+    explored = sum(row["status"] == 0 for row in rows)
+    yield f"\n{laser}: {explored} of {len(rows)} runs explored all ({explored / len(rows):.1%})"
+    for key in ("recall", "precision", "edge_recall"):
+        if scored := [row for row in rows if row.get(key) is not None]:
+            worst = min(scored, key=lambda row: float(row[key]))
+            mean = fmean(row[key] for row in scored)
+            yield f"  {key:11} mean {mean:.3f}, worst {worst[key]:.3f} ({_title(worst)})"
+    for key, name, pick in (
+        ("contacts", "contacts, all together", sum),
+        ("path_ratio", "median way over shortest tour", median),
+        ("mean_speed_mps", "mean speed, m/s", fmean),
+        ("min_clearance_m", "least clearance, m", min),
+    ):
+        if values := [row[key] for row in rows if row.get(key) is not None]:
+            yield f"  {name}: {pick(values):.3g}"
+    failed = [row for row in rows if has_failed(row)]
+    yield f"  failed: {len(failed)}"
+    for row in failed:
+        hits = f"{row['contacts']} contacts; " if row.get("contacts") else ""
+        yield f"    {row['command']}\n      {hits}{row['outcome']}: {row['reason']}"
+
+
+def _title(row: Row) -> str:
+    return f"{row['world']}, seed {row['seed']}"
 
 
 if __name__ == "__main__":

@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import KDTree, Voronoi
 
-from gvgbot.drivers.world import World
-from gvgbot.errors import WorldError
-from gvgbot.geometry import Array
+from gvgbot.drivers.world import World, check_start
+from gvgbot.geometry import Array, Pose
 
 CORNER_REACH = 1.6  # a branch of less is a corner's
 DEAD_END_REACH = 2.2  # a branch of more belongs into every map; what is between is optional
@@ -64,6 +63,7 @@ def reference_gvg(world: World, start: tuple[float, float], radius: float) -> Re
 
     Beyond its edges the bitmap counts as wall. Raises WorldError for a start without room.
     """
+    check_start(world, Pose(*start), radius)
     fine = _fine_graph(world, start, radius)
     if not fine:
         return Reference()
@@ -77,26 +77,30 @@ def reference_gvg(world: World, start: tuple[float, float], radius: float) -> Re
 def _fine_graph(world: World, start: tuple[float, float], radius: float) -> nx.Graph:
     """Voronoi vertices and ridges of the reachable part, without those that walls' steps make."""
     cells = _Cells.of(world)
-    generators, is_reachable = cells.around(start, radius)
+    room = radius + cells.size / 2  # from the centres of wall cells
+    generators, is_reachable = cells.around(start, room)
     diagram = Voronoi(generators)
     points = diagram.vertices
     clearance = np.asarray(KDTree(generators).query(points)[0])
-    is_good = (clearance >= radius) & cells.at(is_reachable, points)
     a, b = np.asarray(diagram.ridge_vertices).T
     p, q = generators[diagram.ridge_points.T]
-    kept = (a >= 0) & (b >= 0) & is_good[a] & is_good[b]
     chord = np.hypot(*(p - q).T)
-    is_rough = chord < np.maximum(
-        max(2 * radius, WALL_STEP * cells.size), CHORD * np.minimum(clearance[a], clearance[b])
-    )
+    to_a, to_b = points[a] - (p + q) / 2, points[b] - (p + q) / 2
+    is_gap = np.sum(to_a * to_b, axis=1) < 0.0  # passes between its generators, narrowest there
+    ends = np.minimum(clearance[a], clearance[b])
+    narrowest = np.where(is_gap, chord / 2, ends)
+    kept = (a >= 0) & (b >= 0) & (narrowest >= room)
+    is_rough = chord < np.maximum(max(2 * radius, WALL_STEP * cells.size), CHORD * ends)
     graph = nx.Graph()
     for i, j, rough in zip(a[kept].tolist(), b[kept].tolist(), is_rough[kept], strict=True):
         graph.add_edge(i, j, is_rough=bool(rough))
     for node, data in graph.nodes.items():
         data.update(position=points[node], clearance=float(clearance[node]))
     _peel(graph)
-    pieces = sorted(nx.connected_components(graph), key=len)
-    return graph.subgraph(pieces[-1]).copy() if pieces else graph
+    is_there = cells.at(is_reachable, points)
+    pieces = [list(p) for p in nx.connected_components(graph) if is_there[list(p)].any()]
+    piece = max(pieces, key=lambda nodes: int(is_there[nodes].sum()), default=[])
+    return graph.subgraph(piece).copy()
 
 
 def _peel(graph: nx.Graph) -> None:
@@ -128,22 +132,26 @@ class _Cells:
         size = world.resolution_m / parts
         return cls(np.pad(walls, 1, constant_values=True), size, np.array(world.origin) - size)
 
-    def around(self, start: tuple[float, float], radius: float) -> tuple[Array, NDArray[np.bool_]]:
-        """Centres (N, 2) of the walls around the free space of the start; where the robot gets."""
-        free = self._piece(~self.walls, start)
-        border = ndimage.binary_dilation(free, np.ones((3, 3), dtype=np.bool_)) & ~free
-        rows, columns = np.nonzero(border)
-        centres = self.corner + self.size * (np.column_stack((columns, rows)) + 0.5)
-        room = ndimage.distance_transform_edt(~border) * self.size >= radius
-        return centres, self._piece(free & room, start)
+    def around(self, start: tuple[float, float], room: float) -> tuple[Array, NDArray[np.bool_]]:
+        """Centres (N, 2) of the walls around the free space of the start, and where it has room.
 
-    def _piece(self, mask: NDArray[np.bool_], start: tuple[float, float]) -> NDArray[np.bool_]:
-        """The connected part of a mask that holds the start."""
-        labels, _ = ndimage.label(mask)
-        (label,) = self.at(labels, np.array([start]))
-        if label == 0:
-            raise WorldError(f"no room for the robot at {start}")
-        return np.asarray(labels == label)
+        The latter are the cells that hang together next to the start; ways that are hardly wide
+        enough may be cut.
+        """
+        labels, _ = ndimage.label(~self.walls)
+        free = labels == self.at(labels, np.array([start]))
+        border = ndimage.binary_dilation(free, np.ones((3, 3), dtype=np.bool_)) & ~free
+        distance = ndimage.distance_transform_edt(~border) * self.size
+        spacious, count = ndimage.label(free & (distance >= room))
+        gaps = np.hypot(*(self._centres(spacious > 0) - start).T)
+        if count:
+            spacious = spacious == spacious[spacious > 0][gaps.argmin()]
+        return self._centres(border), np.asarray(spacious, dtype=np.bool_)
+
+    def _centres(self, cells: NDArray[np.bool_]) -> Array:
+        """Of the cells that are set, (N, 2) m, row by row."""
+        rows, columns = np.nonzero(cells)
+        return np.asarray(self.corner + self.size * (np.column_stack((columns, rows)) + 0.5))
 
     def at(self, cells: NDArray[Cell], points: Array) -> NDArray[Cell]:
         """The cells that points (N, 2) lie in; 0 outside."""
