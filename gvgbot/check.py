@@ -115,7 +115,7 @@ async def examine(config: Config, simulation: Simulation | None) -> list[Line]:
 
 async def _examine_laser(links: Links, clock: Clock) -> list[Line]:
     try:
-        laser, close = links.open_laser()
+        laser, close = await links.open_laser()
     except DeviceLost as error:
         return [Line("fail", "laser", str(error))]
     assert isinstance(laser, HokuyoLaser)
@@ -133,7 +133,7 @@ async def _examine_laser(links: Links, clock: Clock) -> list[Line]:
 
 async def _examine_base(links: Links, clock: Clock) -> list[Line]:
     try:
-        base, close = links.open_base()
+        base, close = await links.open_base()
     except DeviceLost as error:
         return [Line("fail", "base", str(error))]
     assert isinstance(base, KobukiBase)

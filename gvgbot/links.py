@@ -10,7 +10,7 @@ from gvgbot.drivers.hokuyo.driver import HokuyoLaser, LinkStatistics
 from gvgbot.drivers.kobuki.driver import KobukiBase
 from gvgbot.drivers.kobuki.feedback import FeedbackReader
 from gvgbot.drivers.tcp import SCHEME, TcpStream
-from gvgbot.drivers.transport import ByteStream, SerialStream
+from gvgbot.drivers.transport import ByteStream, open_serial
 from gvgbot.errors import DeviceLost
 from gvgbot.hal.devices import Base, Laser
 from gvgbot.hal.reopening import ReopeningBase, ReopeningLaser
@@ -36,21 +36,21 @@ class Links:
             config.base.heading, config.base.link_delay_s, config.base.geometry
         )
 
-    def open_laser(self) -> tuple[Laser, Close]:
+    async def open_laser(self) -> tuple[Laser, Close]:
         """A laser to be run, and what closes its link. Raises DeviceLost."""
         config = self.config.laser
         if self.simulation is None:
-            stream, close = _open_port("laser", config.port, config.baud)
+            stream, close = await _open_port("laser", config.port, config.baud)
         else:
             stream, close = self.simulation.laser, _leave_open
         self._laser = HokuyoLaser(stream, config, self.clock, self._laser_link)
         return self._laser, close
 
-    def open_base(self) -> tuple[Base, Close]:
+    async def open_base(self) -> tuple[Base, Close]:
         """A base to be run, and what closes its link. Raises DeviceLost."""
         config = self.config.base
         if self.simulation is None:
-            stream, close = _open_port("base", config.port, config.baud)
+            stream, close = await _open_port("base", config.port, config.baud)
         else:
             stream, close = self.simulation.base, _leave_open
         return KobukiBase(stream, config, self.clock, self.feedback), close
@@ -120,9 +120,9 @@ class Devices:
         return self._links.feedback.statistics.slips
 
 
-def _open_port(name: str, port: str, baud: int) -> tuple[ByteStream, Close]:
+async def _open_port(name: str, port: str, baud: int) -> tuple[ByteStream, Close]:
     try:
-        stream = TcpStream(port) if port.startswith(SCHEME) else SerialStream(port, baud)
+        stream = TcpStream(port) if port.startswith(SCHEME) else await open_serial(port, baud)
     except DeviceLost as error:
         raise DeviceLost(f"{error}: plug the {name} in, or set {name}.port") from error
     return stream, stream.close

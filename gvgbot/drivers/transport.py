@@ -5,6 +5,7 @@ import contextlib
 import errno
 import os
 import termios
+from collections.abc import Callable
 from typing import Protocol
 
 import serial
@@ -73,20 +74,35 @@ def pipe() -> tuple[ByteStream, ByteStream]:
     return here, there
 
 
+def open_port(path: str, baud: int) -> serial.Serial:
+    """A serial port, raw and exclusive; waits for it.
+
+    Raises DeviceLost when the port is absent or in use.
+    """
+    try:
+        return serial.Serial(path, baud, timeout=0, write_timeout=0, exclusive=True)
+    except (serial.SerialException, OSError, ValueError) as error:
+        raise DeviceLost(f"cannot open {path}: {_obstacle(error)}") from error
+
+
+async def open_serial(
+    path: str, baud: int, opening: Callable[[str, int], serial.Serial] = open_port
+) -> "SerialStream":
+    """A stream on a port that may take its time to open. Raises DeviceLost."""
+    return SerialStream(path, baud, await asyncio.to_thread(opening, path, baud))
+
+
 class SerialStream:
     """A serial port, or a pseudo-terminal, read by the event loop without blocking it."""
 
-    def __init__(self, path: str, baud: int) -> None:
-        """Open raw and exclusive. Raises DeviceLost when the port is absent or in use."""
-        try:
-            self._port = serial.Serial(path, baud, timeout=0, write_timeout=0, exclusive=True)
-        except (serial.SerialException, OSError, ValueError) as error:
-            raise DeviceLost(f"cannot open {path}: {_obstacle(error)}") from error
+    def __init__(self, path: str, baud: int, port: serial.Serial | None = None) -> None:
+        """On an open `port`, or on one that is opened now. Raises DeviceLost if it cannot be."""
+        self._port = port or open_port(path, baud)
         self._path = path
         self._fd = self._port.fileno()
         self._arrived = bytearray()
         self._readable = asyncio.Event()
-        self._gone = False
+        self._gone = self._is_closed = False
         self._loop = asyncio.get_running_loop()
         self._loop.add_reader(self._fd, self._on_readable)
 
@@ -134,11 +150,26 @@ class SerialStream:
             raise DeviceLost(f"{self._path} does not take {baud} bit/s") from error
 
     def close(self) -> None:
-        """Release the port."""
-        self._gone = True
+        """Release the port; one that has bytes still to send is closed when they are sent."""
+        if self._is_closed:
+            return
+        self._gone = self._is_closed = True
         self._loop.remove_reader(self._fd)
-        with contextlib.suppress(OSError, serial.SerialException):
-            self._port.close()
+        if _has_unsent(self._port):  # which the kernel may wait for
+            self._loop.run_in_executor(None, _close, self._port)
+        else:
+            _close(self._port)
+
+
+def _has_unsent(port: serial.Serial) -> bool:
+    with contextlib.suppress(OSError, serial.SerialException):
+        return bool(port.out_waiting)
+    return False
+
+
+def _close(port: serial.Serial) -> None:
+    with contextlib.suppress(OSError, serial.SerialException):
+        port.close()
 
 
 def _obstacle(error: Exception) -> str:

@@ -1,7 +1,7 @@
 """Devices that are opened again when they are lost, for a daemon that must not give up."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from typing import Generic, Protocol, TypeVar
 
 import structlog
@@ -24,6 +24,7 @@ class _Device(Protocol):
 
 D = TypeVar("D", bound=_Device)
 Opened = tuple[D, Callable[[], None]]  # the device, and what gives its link up
+Open = Callable[[], Awaitable[Opened[D]]]
 
 
 class _Reopening(Generic[D]):
@@ -33,7 +34,7 @@ class _Reopening(Generic[D]):
     often it came back.
     """
 
-    def __init__(self, name: str, open_device: Callable[[], Opened[D]], clock: Clock) -> None:
+    def __init__(self, name: str, open_device: Open[D], clock: Clock) -> None:
         """`open_device` raises DeviceLost when that is not possible."""
         self.away: str | None = "not there yet"
         self._name, self._open, self._clock = name, open_device, clock
@@ -53,7 +54,7 @@ class _Reopening(Generic[D]):
             self._retry = min(2 * self._retry, LAST_RETRY)
 
     async def _serve(self) -> None:
-        device, close = self._open()
+        device, close = await self._open()
         try:
             async with asyncio.TaskGroup() as tasks:
                 self._device = device
@@ -87,7 +88,7 @@ class _Reopening(Generic[D]):
 class ReopeningLaser(_Reopening[Laser]):
     """A laser that is lost only for a while."""
 
-    def __init__(self, open_device: Callable[[], Opened[Laser]], clock: Clock) -> None:
+    def __init__(self, open_device: Open[Laser], clock: Clock) -> None:
         super().__init__("laser", open_device, clock)
         self._scans: Latest[Scan | DeviceLost] = Latest()
 
@@ -119,7 +120,7 @@ class ReopeningBase(_Reopening[Base]):
     come.
     """
 
-    def __init__(self, open_device: Callable[[], Opened[Base]], clock: Clock) -> None:
+    def __init__(self, open_device: Open[Base], clock: Clock) -> None:
         super().__init__("base", open_device, clock)
         self._newest: Latest[Odometry] = Latest()
 

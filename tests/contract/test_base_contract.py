@@ -27,7 +27,7 @@ async def in_memory(config: Config) -> AsyncIterator[Base]:
     """The base of a configuration on an in-memory stream, being served."""
     clock = LoopClock()
     simulation = Simulation(config, open_place(config), clock)
-    base, close = Links(config, clock, simulation).open_base()
+    base, close = await Links(config, clock, simulation).open_base()
     async with asyncio.TaskGroup() as tasks:
         work = [tasks.create_task(simulation.run()), tasks.create_task(base.run())]
         yield base
@@ -44,7 +44,7 @@ async def on_a_terminal(config: Config) -> AsyncIterator[Base]:
     with closing(PtyPort()) as port:
         settings = [f"base.port={port.path}", "twin.enabled=false"]
         there = load_config(None, settings)
-        base, close = Links(there, clock, None).open_base()
+        base, close = await Links(there, clock, None).open_base()
         async with asyncio.TaskGroup() as tasks:
             work = [
                 tasks.create_task(serve_twin(simulation.base_twin, port, clock)),
@@ -79,7 +79,7 @@ def play_on_hardware(port: str) -> Callable[[Story], None]:
     async def main(story: Story) -> None:
         clock = LoopClock()
         config = load_config(None, [f"base.port={port}", "twin.enabled=false"])
-        base, close = Links(config, clock, None).open_base()
+        base, close = await Links(config, clock, None).open_base()
         async with asyncio.TaskGroup() as tasks:
             serving = tasks.create_task(base.run())
             await story(base, clock)

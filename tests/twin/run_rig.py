@@ -74,7 +74,7 @@ class CabledLinks(Links):
 
     cable: Cable
 
-    def open_base(self) -> tuple[Base, Close]:
+    async def open_base(self) -> tuple[Base, Close]:
         return KobukiBase(self.cable, self.config.base, self.clock, self.feedback), lambda: None
 
 

@@ -154,10 +154,10 @@ def test_a_robot_goes_on_where_it_was_after_its_base_was_lost_for_a_while(
 
 
 class NoPorts(Links):
-    def open_laser(self) -> tuple[Laser, Close]:
+    async def open_laser(self) -> tuple[Laser, Close]:
         raise DeviceLost("cannot open /dev/hokuyo")
 
-    def open_base(self) -> tuple[Base, Close]:
+    async def open_base(self) -> tuple[Base, Close]:
         raise DeviceLost("cannot open /dev/kobuki")
 
 
@@ -202,7 +202,7 @@ class Frozen:
 
 
 class FrozenLinks(NoPorts):
-    def open_base(self) -> tuple[Base, Close]:
+    async def open_base(self) -> tuple[Base, Close]:
         return Frozen(), lambda: None
 
 

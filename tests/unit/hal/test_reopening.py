@@ -44,7 +44,7 @@ class Port:
     asked: list[float] = field(default_factory=list)
     closed: int = 0
 
-    def open(self) -> Opened[ShortLivedLaser]:
+    async def open(self) -> Opened[ShortLivedLaser]:
         self.asked.append(asyncio.get_running_loop().time())
         if not self.lasers:
             raise DeviceLost("no such port")
@@ -155,7 +155,7 @@ def with_a_base(story: Callable[[ReopeningBase, list[Wheels]], Awaitable[None]])
     async def main() -> None:
         opened: list[Wheels] = []
 
-        def open_device() -> Opened[Wheels]:
+        async def open_device() -> Opened[Wheels]:
             opened.append(Wheels())
             return opened[-1], lambda: None
 
@@ -168,9 +168,13 @@ def with_a_base(story: Callable[[ReopeningBase, list[Wheels]], Awaitable[None]])
     run_in_virtual_time(main())
 
 
+async def never() -> Opened[Wheels]:
+    raise DeviceLost("no such port")
+
+
 def test_before_it_is_opened_a_base_can_be_driven_in_vain() -> None:
     async def main() -> None:
-        base = ReopeningBase(lambda: (Wheels(), lambda: None), LoopClock())
+        base = ReopeningBase(never, LoopClock())
         assert base.drive(Twist(0.3, 0.0)) == STANDSTILL
         assert base.contact is None
         assert base.battery is None
