@@ -83,9 +83,15 @@ def check(config: Config, say: Callable[[str], None]) -> int:
         lines = runner.run(_examine_all(config))
     for line in lines:
         say(str(line))
-    failures = sum(line.verdict == "fail" for line in lines)
-    say("ready to drive" if not failures else f"{failures} of {len(lines)} points failed")
-    return min(failures, 1)
+    say(_conclusion([line.verdict for line in lines]))
+    return int(any(line.verdict == "fail" for line in lines))
+
+
+def _conclusion(verdicts: list[Verdict]) -> str:
+    failed, doubtful = verdicts.count("fail"), verdicts.count("warn")
+    if failed:
+        return f"{failed} of {len(verdicts)} points failed"
+    return f"ready to drive, {doubtful} to look at" if doubtful else "ready to drive"
 
 
 def _summary(config: Config) -> str:
@@ -183,10 +189,12 @@ def _laser_lines(laser: HokuyoLaser, scans: list[Scan], heard: Heard) -> Iterato
     if identity is not None:
         yield Line("ok", "laser", f"{identity.product}, serial {identity.serial}")
         yield Line("ok", "laser firmware", f"{identity.firmware}, {identity.protocol}")
-    if heard.failure is not None or not heard.arrivals:
-        yield Line("fail", "laser", heard.failure or "sends no scans", "switch it off and on")
+    parameters, mode = laser.parameters, laser.mode
+    if heard.failure is not None or not heard.arrivals or parameters is None or mode is None:
+        yield _absence("laser", heard, "sends no scans")
         return
-    yield _steadiness("laser rate", heard, None)
+    nominal = 1.0 / (parameters.period * (mode.request.skip + 1))
+    yield _steadiness("laser rate", heard, nominal)
     yield _link("laser link", laser.link)
     yield _timing("laser clock", heard)
     seen = float(np.mean([np.mean(~np.isnan(scan.ranges)) for scan in scans]))
@@ -201,7 +209,7 @@ def _laser_lines(laser: HokuyoLaser, scans: list[Scan], heard: Heard) -> Iterato
 def _base_lines(base: KobukiBase, heard: Heard) -> Iterator[Line]:
     identity = base.identity
     if heard.failure is not None or not heard.arrivals:
-        yield Line("fail", "base", heard.failure or "sends no odometry", "switch it off and on")
+        yield _absence("base", heard, "sends no odometry")
         return
     yield Line(
         "ok" if identity.is_complete else "warn",
@@ -218,13 +226,20 @@ def _base_lines(base: KobukiBase, heard: Heard) -> Iterator[Line]:
         yield _contact(base.contact)
 
 
-def _steadiness(subject: str, heard: Heard, nominal: float | None) -> Line:
-    right = nominal is None or abs(heard.rate / nominal - 1.0) <= RATE_TOLERANCE
-    wanted = "" if nominal is None else f" of {nominal:g}"
+def _absence(device: str, heard: Heard, silence: str) -> Line:
+    """That there is nothing to judge; a failure brings its own remedy."""
+    if heard.failure is not None:
+        return Line("fail", device, heard.failure)
+    remedy = f"check that {device}.port is its port, then switch it off and on"
+    return Line("fail", device, silence, remedy)
+
+
+def _steadiness(subject: str, heard: Heard, nominal: float) -> Line:
+    is_right = abs(heard.rate / nominal - 1.0) <= RATE_TOLERANCE
     return Line(
-        "ok" if right and heard.rate > 0.0 else "fail",
+        "ok" if is_right else "fail",
         subject,
-        f"{heard.rate:.1f}{wanted} messages per second",
+        f"{heard.rate:.1f} of {nominal:g} messages per second",
         "check the cable, and what else the computer is busy with",
     )
 
@@ -248,7 +263,8 @@ def _timing(subject: str, heard: Heard) -> Line:
         "ok" if most - least <= CALM else "warn",
         subject,
         f"messages arrive {1000 * least:.1f} to {1000 * most:.1f} ms after they were true",
-        "set the port's latency_timer to 1, as systemd/60-gvgbot.rules does",
+        "set the port's latency_timer to 1, as systemd/60-gvgbot.rules does, "
+        "and see what else the computer is busy with",
     )
 
 

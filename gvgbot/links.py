@@ -124,7 +124,7 @@ async def _open_port(name: str, port: str, baud: int) -> tuple[ByteStream, Close
     try:
         stream = TcpStream(port) if port.startswith(SCHEME) else await open_serial(port, baud)
     except DeviceLost as error:
-        raise DeviceLost(f"{error}: plug the {name} in, or set {name}.port") from error
+        raise DeviceLost(f"{error}, or set {name}.port") from error
     return stream, stream.close
 
 

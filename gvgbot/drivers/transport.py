@@ -173,16 +173,18 @@ def _close(port: serial.Serial) -> None:
 
 
 def _obstacle(error: Exception) -> str:
-    """Why a port does not open, in the words of the system rather than of a library."""
+    """Why a port does not open, in the words of the system, and what to do about it."""
     match getattr(error, "errno", None):
         case None:
-            return str(error)
+            return f"{error}: check its name"
         case errno.EAGAIN | errno.EBUSY:
-            return "another program uses it"
+            return "another program uses it: stop that one"
         case errno.EACCES:
-            return "permission denied, join the group dialout"
+            return "permission denied: join the group dialout"
+        case errno.ENOENT | errno.ENODEV | errno.ENXIO:
+            return "there is no such port: plug it in"
         case number:
-            return os.strerror(number)
+            return f"{os.strerror(number)}: check its name"
 
 
 class TwinDevice(Protocol):

@@ -1,10 +1,19 @@
 """What the check says about devices that are well, and about those that are not."""
 
+import contextlib
+import errno
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
 import pytest
+import serial
 
 from gvgbot.check import check, examine
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.config import load_config
+from gvgbot.drivers.transport import _obstacle
 from gvgbot.geometry import Pose
 from gvgbot.simulation import Simulation, open_place
 
@@ -25,7 +34,7 @@ def test_sound_twins_pass_on_every_point() -> None:
     assert {verdict for verdict, _ in points.values()} == {"ok"}
     assert set(points) >= {"laser", "laser rate", "base", "base rate", "battery", "contact"}
     assert points["base rate"][1].startswith("50.0 of 50")
-    assert points["laser rate"][1].startswith("10.0")
+    assert points["laser rate"][1].startswith("10.0 of 10")
 
 
 ILLS = {
@@ -33,6 +42,7 @@ ILLS = {
     "low battery": ("twin.base.battery_v=13.6", "battery", "warn", "charge it"),
     "slow converter": ("twin.base.link.jitter_s=0.016", "base clock", "warn", "latency_timer"),
     "damaged bytes": ("twin.base.link.lost_bytes_per_kb=0.3", "base link", "warn", "cable"),
+    "few scans": ("twin.laser.bad_checksum_fraction=0.2", "laser rate", "fail", "cable"),
     "silent base": ("twin.base.link.silences_per_h=36000", "base", "fail", "switched on"),
     "lifted robot": ("twin.base.mishaps.wheel_drops_per_h=36000", "contact", "warn", "floor"),
 }
@@ -51,6 +61,64 @@ def test_what_is_wrong_is_named_with_a_remedy(
     assert points[subject][0] == verdict
     assert remedy in points[subject][1]
     assert status == (1 if verdict == "fail" else 0)
+
+
+def test_the_rate_is_compared_with_what_the_laser_was_asked_for() -> None:
+    """Of the 40 scans a second that a UTM-30LX measures, its data sheet says."""
+    _, points = said("laser.rate_hz=40")
+    assert points["laser rate"][1].startswith("40.0 of 40")
+
+
+@contextmanager
+def terminal(*, is_busy: bool) -> Iterator[str]:
+    """What to open; a busy one has been opened by another program already."""
+    device, client = os.openpty()
+    path = os.ttyname(client)
+    with contextlib.ExitStack() as stack:
+        stack.callback(os.close, device)
+        stack.callback(os.close, client)
+        if is_busy:
+            stack.enter_context(serial.Serial(path, exclusive=True))
+        yield path
+
+
+def at_ports(laser: str, base: str) -> dict[str, tuple[str, str]]:
+    ports = [f"laser.port={laser}", f"base.port={base}"]
+    status, points = said("twin.enabled=false", *ports)
+    assert status == 1
+    return points
+
+
+def test_a_port_that_is_not_there_or_none_is_named_with_what_to_do(tmp_path: Path) -> None:
+    absent = str(tmp_path / "absent")
+    points = at_ports(absent, str(tmp_path))
+    for device, port, remedy in (("laser", absent, "plug it in"), ("base", tmp_path, "its name")):
+        verdict, finding = points[device]
+        assert verdict == "fail"
+        assert str(port) in finding
+        assert remedy in finding
+        assert f"set {device}.port" in finding
+
+
+def test_a_port_that_another_program_holds_is_not_to_be_plugged_in(tmp_path: Path) -> None:
+    with terminal(is_busy=True) as path:
+        verdict, finding = at_ports(path, str(tmp_path))["laser"]
+    assert verdict == "fail"
+    assert "another program uses it: stop that one" in finding
+    assert "plug" not in finding
+
+
+def test_a_port_that_is_not_ours_to_open_says_which_group_to_join() -> None:
+    assert "dialout" in _obstacle(PermissionError(errno.EACCES, "Permission denied"))
+
+
+@pytest.mark.timeout(60)
+def test_a_port_where_nobody_answers_is_told_from_one_that_is_not_there(tmp_path: Path) -> None:
+    with terminal(is_busy=False) as path:
+        verdict, finding = at_ports(str(tmp_path), path)["base"]
+    assert verdict == "fail"
+    assert "no feedback" in finding
+    assert "switched on" in finding
 
 
 def test_the_robot_is_not_moved() -> None:
