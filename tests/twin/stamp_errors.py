@@ -15,7 +15,7 @@ from gvgbot.geometry import Array, Pose
 from tests.twin.hokuyo_bench import Bench, World, on_bench
 
 SETTLING = 60.0  # s in which errors do not count
-MEASURED = 60.0  # s after that
+MEASURED = 20.0  # s after that
 FRAME_PERIOD = 0.02  # s of the base's clock
 FRAME_WAY = 0.006  # m that the body rolls in one
 
