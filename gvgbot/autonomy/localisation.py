@@ -1,5 +1,7 @@
 """The base in the local frame: odometry, corrected by laying each scan onto the local map."""
 
+import math
+
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -12,6 +14,9 @@ _RANGE_M = 24.0  # of the beams that are matched
 _LONGEST_GAP_M = 0.5  # between two beams, for their even spacing
 _LEAST_POINTS = 50  # fewer say nothing about a pose
 _LEAST_INLIERS = 0.5  # of the beams must find a wall, or the match is not believed
+_CLEARLY = 0.02  # better agreement of beams and walls than this is no chance
+_SEARCH_M, _SEARCH_STEP_M = 1.0, 0.25  # around the pose by odometry
+_LOST = np.diag([0.5**2, 0.5**2, 0.05**2])  # of a base that nobody heard for a while
 _FLOOR = np.diag([0.004**2, 0.004**2, 0.0006**2])  # what matching cannot know of itself
 
 
@@ -38,15 +43,38 @@ class LocalMaps:
 
         Both covariances are in the frame of the base. Without enough walls it is the prior.
         """
+        return self._best(scan, [prior], Q)
+
+    def find(self, scan: Scan, prior: Pose, Q: Array) -> tuple[Pose, Array]:
+        """As `match`, where nobody saw the way that the base took: it is searched for around.
+
+        Wheels tell how far it went and how much it turned, but not which of it came first.
+        """
+        return self._best(scan, _around(prior), Q + _LOST)
+
+    def _best(self, scan: Scan, priors: list[Pose], Q: Array) -> tuple[Pose, Array]:
+        """The match from the first prior, unless that from another one is clearly better."""
         far = self._far.points()
         walls = np.concatenate([self.near.points(), far[~self.near.covers(far)]])
         points = _sampled(scan, self._matching.points)
         if min(len(walls), len(points)) < _LEAST_POINTS:
-            return prior, Q
-        found = register(points, cKDTree(walls), walls, prior, Q, self._matching)
-        if found is None or found.inliers < _LEAST_INLIERS:
-            return prior, Q
-        return found.pose, found.covariance + _FLOOR
+            return priors[0], Q
+        tree, best, agreement = cKDTree(walls), None, 0.0
+        for prior in priors:
+            found = register(points, tree, walls, prior, Q, self._matching)
+            if found is None or found.inliers < _LEAST_INLIERS:
+                continue
+            now = found.inliers * (1.0 - found.rms / self._matching.max_pair_m)
+            if now > agreement + _CLEARLY:
+                best, agreement = found, now
+        return (priors[0], Q) if best is None else (best.pose, best.covariance + _FLOOR)
+
+
+def _around(prior: Pose) -> list[Pose]:
+    """The pose, and others with its heading, nearest first."""
+    steps = np.arange(-_SEARCH_M, _SEARCH_M + 1e-9, _SEARCH_STEP_M)
+    offsets = sorted((math.hypot(x, y), x, y) for x in steps for y in steps)
+    return [prior.compose(Pose(x, y, 0.0)) for away, x, y in offsets if away <= _SEARCH_M]
 
 
 def _sampled(scan: Scan, count: int) -> Array:

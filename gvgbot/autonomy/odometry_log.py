@@ -1,6 +1,7 @@
 """The last second of odometry: where the base was at the stamp of a scan, and how it moved then."""
 
 from collections import deque
+from itertools import pairwise
 
 from gvgbot.geometry import Pose
 from gvgbot.hal.messages import Odometry, Scan
@@ -40,6 +41,13 @@ class OdometryLog:
                 return earlier.odom_base if later is None else _between(earlier, later, stamp)
             later = earlier
         return None if later is None else later.odom_base
+
+    def has_gap_since(self, stamp: float) -> bool:
+        """Whether the base was not heard for a while after a stamp: its way then is not known."""
+        return any(
+            later.stamp > stamp and later.stamp - earlier.stamp > _LONGEST_GAP_S
+            for earlier, later in pairwise(self._kept)
+        )
 
     def motion_during(self, scan: Scan) -> Pose:
         """Motion of the base during a sweep, by the odometry nearest to it in time."""

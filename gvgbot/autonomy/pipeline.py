@@ -125,7 +125,8 @@ class Pipeline:
             min_clearance=self._radius + self._config.passage_margin_m,
             roughness=self._config.reduction.roughness_m,
         )
-        self.gvg = reduce_graph(fine, self._config.reduction)
+        meetpoints = self.mapper.meetpoints(local_base, self._config.local_map.half_width_m)
+        self.gvg = reduce_graph(fine, self._config.reduction, meetpoints)
         view = View(
             len(self.keyframes),
             scan.stamp,
@@ -163,9 +164,10 @@ class Pipeline:
         self.travelled += math.hypot(motion.x, motion.y)
         noise = self._config.odometry_noise.covariance(motion, scan.stamp - self._last.stamp)
         prior = self._last.local_base.compose(motion)
-        local_base, covariance = self._maps.match(
-            scan, prior, rotated_covariance(noise, -motion.theta)
+        match = (
+            self._maps.find if self._odometry.has_gap_since(self._last.stamp) else self._maps.match
         )
+        local_base, covariance = match(scan, prior, rotated_covariance(noise, -motion.theta))
         moved = self._last.local_base.to(local_base)
         step = Step(moved, rotated_covariance(covariance, motion.theta))
         self.steps.append(step)

@@ -1,5 +1,6 @@
 """Explorations in which a device goes away and comes back, against the geometry of their world."""
 
+import asyncio
 import json
 import math
 from collections import Counter
@@ -8,7 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gvgbot.geometry import Array
+from gvgbot.autonomy.loop import Loop
+from gvgbot.autonomy.pipeline import Pipeline
+from gvgbot.clock import LoopClock, run_in_virtual_time
+from gvgbot.config import load_config
+from gvgbot.geometry import Array, Pose, wrap_angle
+from gvgbot.hal.guard import Guard
+from gvgbot.hal.messages import Odometry
+from gvgbot.links import Devices, Links
+from gvgbot.simulation import Simulation, open_place
 from tests.twin.test_explore import Case, Point, Run, explore, lollipop, matched
 
 pytestmark = [pytest.mark.slow, pytest.mark.twin, pytest.mark.timeout(120)]
@@ -99,6 +108,48 @@ def test_the_robot_has_rolled_while_nobody_heard_the_base(runs: dict[str, Run]) 
     before = truth_at(runs["base unplugged"], AT[0] - 0.1)
     after = truth_at(runs["base unplugged"], AT[0] + AWAY)
     assert math.dist(before[1:3], after[1:3]) > 0.2
+
+
+def test_a_robot_that_rolled_and_was_turned_while_its_base_was_away_finds_its_place() -> None:
+    """Wheels and gyro add up alike whether it rolled or turned first, half a metre apart."""
+    wheels: list[Odometry] = []
+
+    async def main() -> tuple[Pose, Pose, Pose]:
+        config, clock = load_config(None, ["twin.world=rooms"]), LoopClock()
+        simulation = Simulation(config, open_place(config), clock)
+        devices, body = Devices(Links(config, clock, simulation)), simulation.body
+        pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
+        guard = Guard(config.robot.limits, config.robot.radius_m)
+        loop = Loop(
+            devices.laser,
+            devices.base,
+            pipeline,
+            guard,
+            on_events=lambda _: None,
+            on_cycle=wheels.append,
+        )
+        async with asyncio.TaskGroup() as tasks:
+            work = [tasks.create_task(devices.run()), tasks.create_task(loop.run())]
+            await clock.sleep_until(31.0)
+            assert body.linear > 0.4
+            simulation.base_twin.inject("unplug", 8.0)
+            await clock.sleep_until(34.0)
+            assert body.linear == 0.0
+            body.command(0.0, 0.5)
+            await clock.sleep_until(37.0)
+            body.command(0.0, 0.0)
+            await clock.sleep_until(43.0)
+            for task in work:
+                task.cancel()
+        body.advance(clock.now())
+        start = simulation.place.start
+        odom_base = wheels[-1].odom_base
+        return body.pose, start.compose(odom_base), start.compose(pipeline.map_base)
+
+    truth, dead_reckoning, believed = run_in_virtual_time(main())
+    assert truth.distance(dead_reckoning) > 0.4
+    assert truth.distance(believed) < 0.1
+    assert abs(wrap_angle(truth.theta - believed.theta)) < math.radians(2)
 
 
 def test_devices_that_never_come_back_end_the_exploration_with_a_line_and_a_map(

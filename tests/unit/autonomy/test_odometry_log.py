@@ -40,3 +40,8 @@ def test_after_an_outage_the_base_is_known_again() -> None:
 
 def test_before_the_first_message_nothing_is_known() -> None:
     assert OdometryLog().odom_base_at(1.0) is None
+
+
+@pytest.mark.parametrize(("since", "gap"), [(0.98, True), (1.0, True), (7.99, True), (8.0, False)])
+def test_an_outage_is_known_until_the_base_was_heard_again(since: float, gap: bool) -> None:
+    assert driven(0.98, 1.0, 8.0, 8.02).has_gap_since(since) is gap
