@@ -150,6 +150,22 @@ class LosesStops(Scripted):
         return super().answer(command, now)
 
 
+class CutsReply(Scripted):
+    """A laser whose first reply to a command is cut in the middle of a line."""
+
+    def __init__(self, twin: TwinDevice, command: bytes) -> None:
+        super().__init__({}, twin)
+        self.command = command
+        self.cuts = 0
+
+    def answer(self, command: bytes, now: float) -> bytes:
+        reply = super().answer(command, now)
+        if command != self.command or self.cuts:
+            return reply
+        self.cuts += 1
+        return reply[: len(reply) - 5]
+
+
 def on_bench(
     twin: TwinDevice,
     scenario: Callable[[Bench], Awaitable[None]],

@@ -16,6 +16,7 @@ from tests.twin.hokuyo_bench import (
     PERFECT,
     QUANTISATION,
     Bench,
+    CutsReply,
     Deaf,
     FrozenClock,
     LosesStops,
@@ -151,6 +152,14 @@ def test_a_lost_stop_costs_no_synchronisation(losses: int) -> None:
 
     twin = LosesStops(HokuyoTwin(PERFECT, World(), seed=18), losses)
     on_bench(twin, scenario, first=first)
+
+
+def test_a_cut_reply_costs_one_time_out_and_not_two() -> None:
+    async def scenario(bench: Bench) -> None:
+        await bench.scans(1)
+        assert bench.laser.link.unanswered == 1
+
+    on_bench(CutsReply(HokuyoTwin(PERFECT, World(), seed=19), b"VV\n"), scenario)
 
 
 def test_identity_and_parameters_are_those_of_the_laser() -> None:

@@ -34,6 +34,7 @@ class Dialogue:
         self.clock = clock
         self.stream = stream
         self.timeout = reply_timeout
+        self.answered = 0.0  # when the first byte of the last reply arrived, s
         self._parser = ScipParser()
         self._began = 0.0
 
@@ -51,6 +52,7 @@ class Dialogue:
             self.send(command)
             reply = await self.reply_to(command)
             if reply is None:
+                self._parser = ScipParser()  # the rest of a reply that was cut will not come
                 continue
             if reply.status != ACCEPTED:
                 raise Refusal(command, reply.status)
@@ -62,8 +64,9 @@ class Dialogue:
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(self.timeout if within is None else within):
                 while True:
-                    for message, _ in await self.receive():
+                    for message, arrival in await self.receive():
                         if isinstance(message, Reply) and message.echo == command:
+                            self.answered = arrival
                             return message
         self.link.unanswered += 1
         return None

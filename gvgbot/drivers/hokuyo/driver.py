@@ -210,7 +210,7 @@ class HokuyoLaser:
         """Raises Refusal or DamagedError."""
         sent = self._dialogue.clock.now()
         reply = await self._dialogue.ask("TM1")
-        return TimeSample(sent, decode_time(reply), self._dialogue.clock.now())
+        return TimeSample(sent, decode_time(reply), self._dialogue.answered)
 
     async def _pause(self, number: int) -> None:
         """Wait a while that is never the same: converters hand out bytes on a beat of their own."""
