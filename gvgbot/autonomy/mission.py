@@ -103,6 +103,14 @@ class Mission:
         order = Stand() if self.outcome is not None else self._decide(view, here)
         return order, self._events
 
+    def skip(self, seconds: float) -> None:
+        """Let no patience run out by a time in which nothing was to be seen."""
+        self._last_progress += seconds
+        self._last_view += seconds
+        self._lost_since = _later(self._lost_since, seconds)
+        self._stranded_since = _later(self._stranded_since, seconds)
+        self._examining_since = _later(self._examining_since, seconds)
+
     # -- the edge under the wheels -------------------------------------------------------------
 
     def _account_for(self, view: View, known: Correspondence, passage: Passage) -> None:
@@ -313,3 +321,7 @@ class Mission:
     def _end(self, view: View, outcome: Outcome, reason: str) -> None:
         self.outcome, self.reason = outcome, reason
         self._events.append(Finished(view.stamp, outcome, reason))
+
+
+def _later(stamp: float | None, seconds: float) -> float | None:
+    return None if stamp is None else stamp + seconds

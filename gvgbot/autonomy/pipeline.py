@@ -23,6 +23,7 @@ from gvgbot.hal.deskew import deskewed
 from gvgbot.hal.messages import Odometry, Scan
 from gvgbot.ranges import Range
 
+_LONGEST_GAP_S = 2.0  # between keyframes; a longer one is an outage of a device
 _SCAN_EVERY_M, _SCAN_EVERY_RAD = 0.7, 0.5  # scans that are kept for the occupancy grid
 
 
@@ -116,6 +117,8 @@ class Pipeline:
             or not self._worth_a_look(scan, odom_base)
         ):
             return []
+        if self._last is not None:
+            self.mission.skip(max(0.0, scan.stamp - self._last.stamp - _LONGEST_GAP_S))
         scan = deskewed(scan, self._odometry.motion_during(scan))
         local_base = self._localise(scan, odom_base)
         self._maps.insert(scan, local_base, self.travelled)

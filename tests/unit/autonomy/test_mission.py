@@ -136,6 +136,17 @@ def test_without_an_edge_in_sight_the_robot_looks_around_and_then_gives_up() -> 
     assert len(robot.said(Finished)) == 1
 
 
+def test_an_outage_costs_no_patience() -> None:
+    """As if the robot had been asleep: it searches for as long as it would have without."""
+    robot, outage = Robot(), 300.0
+    robot.stand(LocalGvg(), 10)
+    robot.stamp += outage
+    robot.mission.skip(outage)
+    while robot.mission.outcome is None and robot.stamp < 1000.0:
+        robot.look(LocalGvg())
+    assert robot.stamp == pytest.approx(outage + CONFIG.nothing_in_sight_s, abs=1.5)
+
+
 def test_an_edge_that_comes_back_into_sight_in_time_ends_the_search() -> None:
     robot = Robot()
     robot.stand(LocalGvg(), 20)
