@@ -153,6 +153,27 @@ def test_a_robot_goes_on_where_it_was_after_its_base_was_lost_for_a_while(
     assert daemon.manager.count("WATCHDOG=1") == pytest.approx(5 * 32, abs=3)
 
 
+def test_a_robot_stands_while_its_laser_is_unplugged_and_then_goes_on(daemon: Daemon) -> None:
+    places: list[Pose] = []
+
+    async def story(clock: Clock) -> None:
+        await clock.sleep_until(8.0)
+        assert daemon.session.simulation is not None
+        daemon.session.simulation.laser_twin.inject("unplug", 6.0)
+        for stamp in (9.0, 13.5, 25.0):
+            await clock.sleep_until(stamp)
+            places.append(daemon.place)
+
+    daemon.run(story)
+    assert places[0] == places[1]
+    assert places[1].distance(places[2]) > 0.3
+    away = [state for state in daemon.network.states if 8.3 < state.stamp < 13.5]
+    assert {state.phase for state in away} == {"halted"}
+    assert all("no laser" in state.reason and state.guard == "no scan" for state in away)
+    last = daemon.network.states[-1]
+    assert (last.phase, last.laser.connected, last.laser.reconnects) == ("exploring", True, 1)
+
+
 class NoPorts(Links):
     async def open_laser(self) -> tuple[Laser, Close]:
         raise DeviceLost("cannot open /dev/hokuyo")
