@@ -13,7 +13,7 @@ from gvgbot.hal.devices import Base, Laser
 from gvgbot.hal.latest import Latest
 from gvgbot.hal.messages import Battery, Contact, Odometry, Scan
 
-FIRST_RETRY, LAST_RETRY = 0.5, 2.0  # s; each wait is twice the one before
+FIRST_RETRY, LAST_RETRY = 0.5, 1.0  # s; each wait is twice the one before
 
 log = structlog.get_logger()
 
