@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 from gvgbot.autonomy.candidates import Candidates, CandidatesConfig
 from gvgbot.autonomy.events import EdgeJoined, Event, LoopClosed, VertexAdded, VertexRemoved
 from gvgbot.autonomy.gvg.local import Branch, LocalGvg, LocalNode
+from gvgbot.autonomy.gvg.reduction import KnownVertices
 from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.slam.graph import Edge, GvgGraph, HalfEdgeId, Kind, Vertex
@@ -40,6 +41,7 @@ class MappingConfig:
     trust_m: Annotated[float, Range(1.0, 30.0)] = 7.0  # vertices farther away are not yet believed
     misses: Annotated[int, Range(1, 50)] = 6  # sightings of a plain edge that refute a vertex
     conflicts: Annotated[int, Range(1, 50)] = 4  # sightings that overrule an edge
+    surplus: Annotated[int, Range(1, 50)] = 3  # sightings in a row that add a departure to a vertex
     update_every_m: Annotated[float, Range(0.1, 10.0)] = 1.0
     recognise_within_m: Annotated[float, Range(1.0, 20.0)] = 5.0
     min_inliers: Annotated[float, Range(0.1, 1.0)] = 0.6  # share of a vertex's walls found again
@@ -62,6 +64,15 @@ class Mapper:
     def move(self, motion: Pose, covariance: Array) -> None:
         """Account for a motion of the base, with its covariance (3, 3)."""
         self.belief = ekf.predict(self.belief, motion, covariance)
+
+    def known_around(self, local_base: Pose, within_m: float) -> KnownVertices:
+        """The vertices around the base, seen lately or not, in the local frame."""
+        local_map = local_base.compose(self.belief.map_base.inverse())
+        positions = local_map.transform(self.belief.x[3:].reshape(-1, 3)[:, :2])
+        near = np.hypot(*(positions - local_base.position).T) < within_m
+        kinds = [self.graph.vertices[self.belief.ids[i]].kind for i in np.flatnonzero(near)]
+        is_meetpoint = np.array([kind == "meetpoint" for kind in kinds], dtype=np.bool_)
+        return KnownVertices(positions[near][is_meetpoint], positions[near][~is_meetpoint])
 
     def observe(self, view: View) -> tuple[Correspondence, list[Event]]:
         """Match a view with the map and learn from it."""
@@ -288,17 +299,17 @@ class Mapper:
         turned = {k: h.bearing + vertex.local.theta for k, h in vertex.half_edges.items()}
         limit = math.radians(self._recognition.bearing_deg)
         matched = match_bearings(bearings, turned, limit)
-        seen = set(matched.values())
-        for i, branch in enumerate(branches):
-            if i in matched:
-                vertex.half_edges[matched[i]].misses = 0
-                known.pair_branch(branch, HalfEdgeId(vertex.id, matched[i]))
-            elif branch not in node.weak:
-                key = vertex.add_half_edge(bearings[i] - vertex.local.theta)
-                seen.add(key)
-                known.pair_branch(branch, HalfEdgeId(vertex.id, key))
-        if node.settled:
-            self._doubt_half_edges(vertex, seen, node.degree)
+        unmatched = [i for i, b in enumerate(branches) if i not in matched and b not in node.weak]
+        vertex.surplus = vertex.surplus + 1 if unmatched else 0
+        if vertex.surplus >= self._config.surplus:
+            vertex.surplus = 0
+            for i in unmatched:
+                matched[i] = vertex.add_half_edge(bearings[i] - vertex.local.theta)
+        for i, key in matched.items():
+            vertex.half_edges[key].misses = 0
+            known.pair_branch(branches[i], HalfEdgeId(vertex.id, key))
+        if node.lead is None and len(matched) == len(branches):
+            self._doubt_half_edges(vertex, set(matched.values()), len(branches))
 
     def _doubt_half_edges(self, vertex: Vertex, seen: set[int], degree: int) -> None:
         """Drop departures that a clear view keeps not showing."""
@@ -318,10 +329,7 @@ class Mapper:
             if self._passes_through(view, vertex):
                 vertex.misses += 1
                 if vertex.misses > self._config.misses:
-                    take_out(self.graph, self.belief, vertex)
-                    self.belief = ekf.remove_vertex(self.belief, vertex.id)
-                    reason = "an edge passes here"
-                    self._events.append(VertexRemoved(view.stamp, vertex.id, reason))
+                    self.remove(view, vertex, "an edge passes here")
 
     def _passes_through(self, view: View, vertex: Vertex) -> bool:
         if np.hypot(*(vertex.local.position - view.local_base.position)) > 4.0:
@@ -349,15 +357,26 @@ class Mapper:
             if here is None and there is None:
                 self.join(view, a, b, edge.polyline, float(edge.clearance.min()), driven=False)
             elif here is not there:
-                self._dispute(here, there)
+                self._dispute(view, known, here, there)
 
-    def _dispute(self, *disputed: Edge | None) -> None:
+    def _dispute(self, view: View, known: Correspondence, *disputed: Edge | None) -> None:
         """Sight speaks against edges believed so far; after a few times it wins."""
         for edge in disputed:
-            if edge is not None:
-                edge.conflicts += 1
-                if edge.conflicts > self._config.conflicts:
-                    self.graph.unjoin(edge)
+            if edge is None:
+                continue
+            edge.conflicts += 1
+            if edge.conflicts > self._config.conflicts:
+                self.graph.unjoin(edge)
+                for end in (edge.a, edge.b):
+                    vertex = self.graph.vertices[end.vertex]
+                    if vertex.kind == "endpoint" and vertex.id not in known.node_of:
+                        self.remove(view, vertex, "its edge ends elsewhere")
+
+    def remove(self, view: View, vertex: Vertex, reason: str) -> None:
+        """Take a vertex out of the map; of two edges that met there one is made."""
+        take_out(self.graph, self.belief, vertex)
+        self.belief = ekf.remove_vertex(self.belief, vertex.id)
+        self._events.append(VertexRemoved(view.stamp, vertex.id, reason))
 
     def in_local_frame(self, view: View, vertex: int) -> Pose:
         """Where a vertex, seen lately or not, stands in the local frame."""

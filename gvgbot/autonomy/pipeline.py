@@ -128,8 +128,8 @@ class Pipeline:
             min_clearance=self._radius + self._config.passage_margin_m,
             roughness=self._config.reduction.roughness_m,
         )
-        meetpoints = self.mapper.meetpoints(local_base, self._config.local_map.half_width_m)
-        self.gvg = reduce_graph(fine, self._config.reduction, meetpoints)
+        known_vertices = self.mapper.known_around(local_base, self._config.local_map.half_width_m)
+        self.gvg = reduce_graph(fine, self._config.reduction, known_vertices)
         view = View(
             len(self.keyframes),
             scan.stamp,

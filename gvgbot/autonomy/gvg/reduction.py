@@ -17,13 +17,29 @@ from gvgbot.geometry import Array
 from gvgbot.ranges import Range
 
 _SPACING = 0.1  # metres between the points of an edge
+_MERGE_HYSTERESIS = 1.5  # by which factor an edge must differ to overrule what the map says of it
+_REACH_HYSTERESIS = 1.12
+_ENDPOINT_M = 0.6  # a point so near to a known endpoint is that endpoint
+_NOWHERE: Array = np.empty((0, 2))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class KnownVertices:
+    """Where the map has meetpoints (N, 2) and endpoints (M, 2), local frame.
+
+    What is near a threshold, one meetpoint or two, a corner or a dead end, stays as it was decided
+    at first, unless sight says clearly otherwise.
+    """
+
+    meetpoints: Array = field(default_factory=lambda: _NOWHERE)
+    endpoints: Array = field(default_factory=lambda: _NOWHERE)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReductionConfig:
     """What is worth being a vertex."""
 
-    min_reach: Annotated[float, Range(1.45, 4.0)] = 1.85  # shorter dangling branches are corners
+    min_reach: Annotated[float, Range(1.45, 4.0)] = 1.7  # shorter dangling branches are corners
     merge_m: Annotated[float, Range(0.0, 2.0)] = 0.6  # meetpoints closer than this are one
     roughness_m: Annotated[float, Range(0.0, 0.2)] = (
         0.03  # unevenness of a flat wall, noise included
@@ -97,12 +113,15 @@ class _Draft:
         )
 
 
-def reduce_graph(fine: FineGraph, config: ReductionConfig) -> LocalGvg:
+def reduce_graph(
+    fine: FineGraph, config: ReductionConfig, known: KnownVertices | None = None
+) -> LocalGvg:
     """The local GVG of a fine graph."""
+    known = known or KnownVertices()
     draft = _contract(fine)
-    _prune(draft, config.min_reach)
-    _merge(draft, config.merge_m)
-    _prune(draft, config.min_reach)
+    _prune(draft, config.min_reach, known.endpoints)
+    _merge(draft, config.merge_m, known.meetpoints)
+    _prune(draft, config.min_reach, known.endpoints)
     _doubt_stumps(draft, config.min_reach)
     return _finish(draft, config.min_reach)
 
@@ -143,14 +162,16 @@ def _walk(neighbours: list[list[int]], is_key: set[int], start: int, first: int)
     return path
 
 
-def _prune(draft: _Draft, min_reach: float) -> None:
+def _prune(draft: _Draft, min_reach: float, endpoints: Array) -> None:
     """Drop corner branches in rounds: a dead end keeps the vertex that both its corners hang on."""
     while True:
         doomed = []
         for node, ends in draft.ends.items():
             if len(ends) == 1 and not draft.open(node):
                 reach, base, key = draft.reach(node)
-                if reach < min_reach and draft.degree(base) >= 3:
+                if draft.degree(base) >= 3 and _is_corner(
+                    reach / min_reach, draft.position[node], draft.position[base], endpoints
+                ):
                     doomed.append((node, base, key))
         if not doomed:
             return
@@ -160,6 +181,19 @@ def _prune(draft: _Draft, min_reach: float) -> None:
         for base in dict.fromkeys(base for _, base, _ in doomed):
             if base in draft.ends and len(draft.ends[base]) == 2 and not draft.open(base):
                 draft.splice(base)
+
+
+def _is_corner(reach: float, tip: Array, base: Array, endpoints: Array) -> bool:
+    """Whether a branch is a corner, by its reach in units of the least; the map decides if near."""
+    if not 1 / _REACH_HYSTERESIS < reach < _REACH_HYSTERESIS:
+        return reach < 1.0
+    if _is_near(tip, endpoints):
+        return False
+    return reach < 1.0 or _is_near(base, endpoints)
+
+
+def _is_near(point: Array, known: Array) -> bool:
+    return bool((np.hypot(*(known - point).T) < _ENDPOINT_M).any())
 
 
 def _doubt_stumps(draft: _Draft, min_reach: float) -> None:
@@ -174,15 +208,18 @@ def _doubt_stumps(draft: _Draft, min_reach: float) -> None:
                 draft.lead[node] = math.atan2(inwards[1], inwards[0])
 
 
-def _merge(draft: _Draft, merge_m: float) -> None:
+def _merge(draft: _Draft, merge_m: float, meetpoints: Array) -> None:
     """Make one meetpoint of two that are joined by a very short edge."""
     while True:
         short = [
-            (chain.length(), key)
+            (length, key)
             for key, chain in draft.chains.items()
-            if chain.a != chain.b and min(draft.degree(chain.a), draft.degree(chain.b)) >= 3
+            if chain.a != chain.b
+            and min(draft.degree(chain.a), draft.degree(chain.b)) >= 3
+            and (length := chain.length()) < _MERGE_HYSTERESIS * merge_m
+            and length < merge_m * _known_length(draft, chain, merge_m, meetpoints)
         ]
-        if not short or min(short)[0] >= merge_m:
+        if not short:
             return
         chain = draft.remove(min(short)[1])
         keep, gone = chain.a, chain.b
@@ -200,6 +237,16 @@ def _merge(draft: _Draft, merge_m: float) -> None:
             draft.ends[keep].append((key, out))
         for key, out in draft.ends[keep]:
             _attach(draft.chains[key], centre, at_start=out)
+
+
+def _known_length(draft: _Draft, chain: _Chain, merge_m: float, meetpoints: Array) -> float:
+    """By what the map stretches the length below which a chain's ends are one: it holds one or two.
+
+    Which of the known meetpoints are meant is decided by the distance to the middle of the chain.
+    """
+    middle = (draft.position[chain.a] + draft.position[chain.b]) / 2
+    known = int((np.hypot(*(meetpoints - middle).T) < _MERGE_HYSTERESIS * merge_m).sum())
+    return (1.0, _MERGE_HYSTERESIS, 1 / _MERGE_HYSTERESIS)[min(known, 2)]
 
 
 def _attach(chain: _Chain, point: Array, *, at_start: bool) -> None:

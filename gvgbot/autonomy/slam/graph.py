@@ -53,6 +53,7 @@ class Vertex:
     )  # walls around it, vertex frame
     sightings: int = 1
     misses: int = 0
+    surplus: int = 0  # sightings in a row with a departure that is not known
     visits: int = 1
     serial: int = 0
 

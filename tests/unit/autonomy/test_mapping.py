@@ -176,6 +176,27 @@ def test_a_departure_seen_only_later_is_added() -> None:
     assert len(seen.mapper.graph.edges) == 1
 
 
+def test_a_departure_seen_once_between_clear_views_is_not_added() -> None:
+    lines = {**TEE_LINES, 13: (2, 5, [])}
+    crossing = drawn({**TEE_POINTS, 5: (3.0, 4.0)}, lines, unseen={**UNSEEN, 5: math.pi / 2})
+    seen = Seen().look(TEE, 20)
+    for _ in range(10):
+        seen.look(crossing, CONFIG.surplus - 1).look(TEE, 1)
+    assert seen.mapper.graph.vertices[seen.known.vertex_of[2]].degree == 3
+
+
+def test_a_dead_end_whose_edge_proves_to_end_elsewhere_is_taken_back() -> None:
+    """The branch goes south to (3, -4); later it is seen to turn east and to end at (7, -4)."""
+    points = {**TEE_POINTS, 4: (7.0, -4.0)}
+    bent = drawn(points, {**TEE_LINES, 12: (2, 4, [(3.0, -3.2)])}, unseen=UNSEEN)
+    seen = Seen().look(TEE, 20)
+    assert seen.places("endpoint") == [pytest.approx((3.0, -4.0))]
+    seen.look(bent, 30, at=Pose(3.0, -2.0, 0.0))
+    assert seen.places("endpoint") == [pytest.approx((7.0, -4.0))]
+    assert len(seen.mapper.graph.edges) == 1
+    assert {end.vertex for end in seen.mapper.graph.frontiers()} == {seen.known.vertex_of[2]}
+
+
 def test_the_robot_s_uncertainty_is_in_the_place_of_a_vertex_seen_later() -> None:
     """A drive between the sights adds to the covariance of what is seen after it only."""
     seen = Seen().look(TEE, CONFIG.candidates.meetpoint_sightings)

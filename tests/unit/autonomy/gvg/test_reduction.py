@@ -1,0 +1,97 @@
+"""What is near a threshold stays as the map has it: hand-drawn fine graphs, lengths by design."""
+
+import numpy as np
+import pytest
+
+from gvgbot.autonomy.gvg.local import LocalGvg
+from gvgbot.autonomy.gvg.reduction import KnownVertices, ReductionConfig, reduce_graph
+from gvgbot.autonomy.gvg.voronoi import FineGraph
+from gvgbot.geometry import Array
+
+CONFIG = ReductionConfig(min_reach=1.7, merge_m=0.6)
+CLEARANCE = 1.0  # m, everywhere
+
+
+def fine(lines: list[tuple[tuple[float, float], tuple[float, float]]]) -> FineGraph:
+    """A fine graph of straight chains, with a point about every 5 cm and all ends closed."""
+    points: list[tuple[float, float]] = []
+    ridges = []
+
+    def index(point: Array) -> int:
+        place = (round(float(point[0]), 6), round(float(point[1]), 6))
+        if place not in points:
+            points.append(place)
+        return points.index(place)
+
+    for a, b in lines:
+        start, end = np.array(a), np.array(b)
+        count = max(2, round(float(np.hypot(*(end - start))) / 0.05) + 1)
+        chain = [index(p) for p in np.linspace(start, end, count)]
+        ridges += list(zip(chain[:-1], chain[1:], strict=True))
+    n = len(points)
+    return FineGraph(np.array(points), np.full(n, CLEARANCE), np.array(ridges), np.full(n, np.nan))
+
+
+def crossing(offset: float) -> FineGraph:
+    """A long street with a long side street on either hand, the two so many metres apart."""
+    a, b = (-offset / 2, 0.0), (offset / 2, 0.0)
+    return fine([((-6, 0), a), (a, b), (b, (6, 0)), (a, (-offset / 2, 6)), (b, (offset / 2, -6))])
+
+
+def degrees(gvg: LocalGvg) -> list[int]:
+    """Of all meetpoints."""
+    return sorted(node.degree for node in gvg.nodes.values() if node.degree >= 3)
+
+
+ONE = KnownVertices(meetpoints=np.array([[0.0, 0.0]]))
+TWO = KnownVertices(meetpoints=np.array([[-0.35, 0.0], [0.35, 0.0]]))
+FAR = KnownVertices(meetpoints=np.array([[5.0, 5.0]]))
+
+
+@pytest.mark.parametrize(
+    ("offset", "known", "expected"),
+    [
+        (0.5, None, [4]),
+        (0.7, None, [3, 3]),
+        (0.5, FAR, [4]),
+        (0.7, FAR, [3, 3]),
+        (0.8, ONE, [4]),  # within half as much again as the threshold: one it stays
+        (0.95, ONE, [3, 3]),
+        (0.5, TWO, [3, 3]),
+        (0.35, TWO, [4]),
+    ],
+)
+def test_two_close_meetpoints_stay_one_or_two(
+    offset: float, known: KnownVertices | None, expected: list[int]
+) -> None:
+    assert degrees(reduce_graph(crossing(offset), CONFIG, known)) == expected
+
+
+def branching(reach: float) -> FineGraph:
+    """A street with a dangling branch of the given reach at its middle."""
+    length = reach * CLEARANCE - CLEARANCE
+    return fine([((-6, 0), (0, 0)), ((0, 0), (6, 0)), ((0, 0), (0, length))])
+
+
+def ended(y: float) -> KnownVertices:
+    """The map has an endpoint on the branch."""
+    return KnownVertices(endpoints=np.array([[0.0, y]]))
+
+
+@pytest.mark.parametrize(
+    ("reach", "known", "is_kept"),
+    [
+        (1.65, None, False),
+        (1.75, None, True),
+        (1.65, ended(0.65), True),  # a known dead end
+        (1.45, ended(0.45), False),
+        (1.8, ended(0.0), False),  # the map has the dead end at the foot of the branch
+        (1.95, ended(0.0), True),
+        (1.65, ended(5.0), False),
+    ],
+)
+def test_a_branch_near_the_least_reach_stays_what_it_was(
+    reach: float, known: KnownVertices | None, is_kept: bool
+) -> None:
+    gvg = reduce_graph(branching(reach), CONFIG, known)
+    assert degrees(gvg) == ([3] if is_kept else [])
