@@ -1,5 +1,7 @@
 """What is near a threshold stays as the map has it: hand-drawn fine graphs, lengths by design."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -27,7 +29,7 @@ def fine(lines: list[tuple[tuple[float, float], tuple[float, float]]]) -> FineGr
         start, end = np.array(a), np.array(b)
         count = max(2, round(float(np.hypot(*(end - start))) / 0.05) + 1)
         chain = [index(p) for p in np.linspace(start, end, count)]
-        ridges += list(zip(chain[:-1], chain[1:], strict=True))
+        ridges += list(pairwise(chain))
     n = len(points)
     return FineGraph(np.array(points), np.full(n, CLEARANCE), np.array(ridges), np.full(n, np.nan))
 
