@@ -137,10 +137,11 @@ class RobotBody:
     def _free_share(self, x: float, y: float, dx: float, dy: float) -> float:
         """How much of the stride can be made, 0..1; keeps count of the contacts."""
         reach = self.config.radius_m + RELEASE
-        if len(self._obstacles(x + dx, y + dy, reach)) == 0:
+        after = self._gap(x + dx, y + dy)
+        if after == math.inf:
             self._in_contact = False
             return 1.0
-        before, after = self._gap(x, y), self._gap(x + dx, y + dy)
+        before = self._gap(x, y)
         floor = self.config.radius_m - OVERLAP
         if after >= floor or after > before or dx == dy == 0.0:
             self._in_contact = self._in_contact and after < reach
