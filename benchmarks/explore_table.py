@@ -152,7 +152,7 @@ def _text(command: Command) -> str:
 
 
 def _slug(command: Command) -> str:
-    return re.sub(r"[^\w.]+", "-", "_".join(command[1:])).strip("-")
+    return re.sub(r"[^\w.]+", "-", " ".join(command[1:])).strip("-")
 
 
 def run(command: Command, directory: Path) -> Row:
@@ -202,7 +202,8 @@ def has_failed(row: Row) -> bool:
 def line(row: Row) -> str:
     """A row of the table."""
     cells = [form.format(row[key]) if row.get(key) is not None else "-" for key, _, form in COLUMNS]
-    name = f"{row['world']:16} {row['laser']:8} {row['seed']:4} {row['outcome']:8}"
+    outcome = row["outcome"].removeprefix("explored_with_")
+    name = f"{row['world']:16} {row['laser']:8} {row['seed']:4} {outcome:8}"
     return f"{name} " + " ".join(f"{cell:>6}" for cell in cells)
 
 
