@@ -102,7 +102,7 @@ def test_a_failure_is_listed_with_the_command_that_repeats_it(changes: Row) -> N
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(120)
+@pytest.mark.timeout(300)
 def test_runs_are_scored_and_kept_and_not_run_again(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
