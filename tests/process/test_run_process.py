@@ -149,8 +149,8 @@ def test_a_missing_port_is_named_and_waited_for(tmp_path: Path) -> None:
         process.send_signal(signal.SIGTERM)
         log, _ = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, log
-    (laser,) = [line for line in lines if "/no/laser: No such file" in line]
-    (base,) = [line for line in lines if "/no/base: No such file" in line]
+    (laser,) = [line for line in lines if "/no/laser: there is no such port" in line]
+    (base,) = [line for line in lines if "/no/base: there is no such port" in line]
     assert "laser.port" in laser
     assert "base.port" in base
 
