@@ -30,6 +30,8 @@ from gvgbot.ranges import Range
 
 _WALL_M = 0.15  # a point so near to a wall lies on it
 _CLOSE_M = 1.5  # as near as one needs to be to tell vertices apart
+_BESIDE_M = 0.4  # walls that agree only so far off are another vertex's
+_KNOWN_SHARE = 0.4  # of a vertex's walls must lie where something has been seen
 _REGISTRATION_FLOOR = np.diag([4e-4, 4e-4, 9e-6])  # what registration cannot know of itself
 
 
@@ -44,8 +46,28 @@ class MappingConfig:
     surplus: Annotated[int, Range(1, 50)] = 3  # sightings in a row that add a departure to a vertex
     update_every_m: Annotated[float, Range(0.1, 10.0)] = 1.0
     recognise_within_m: Annotated[float, Range(1.0, 20.0)] = 5.0
-    min_inliers: Annotated[float, Range(0.1, 1.0)] = 0.6  # share of a vertex's walls found again
+    min_inliers: Annotated[float, Range(0.1, 1.0)] = 0.7  # share of a vertex's walls found again
+    min_inliers_far: Annotated[float, Range(0.1, 1.0)] = (
+        0.9  # of one that is not where it should be
+    )
+    margin: Annotated[float, Range(0.0, 50.0)] = 9.0  # in squared Mahalanobis distance, to the next
     snapshot_m: Annotated[float, Range(1.0, 20.0)] = 6.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Match:
+    """A known vertex laid onto a sighting: its frame there, and how well it fits.
+
+    `covariance` (2, 2) or (3, 3) is of the measurement in the base frame, `distance` the squared
+    Mahalanobis distance, `metres` the offset.
+    """
+
+    vertex: Vertex
+    local: Pose
+    covariance: Array
+    agreement: float
+    distance: float
+    metres: float
 
 
 class Mapper:
@@ -70,9 +92,10 @@ class Mapper:
         local_map = local_base.compose(self.belief.map_base.inverse())
         positions = local_map.transform(self.belief.x[3:].reshape(-1, 3)[:, :2])
         near = np.hypot(*(positions - local_base.position).T) < within_m
-        kinds = [self.graph.vertices[self.belief.ids[i]].kind for i in np.flatnonzero(near)]
-        is_meetpoint = np.array([kind == "meetpoint" for kind in kinds], dtype=np.bool_)
-        return KnownVertices(positions[near][is_meetpoint], positions[near][~is_meetpoint])
+        degrees = np.array(
+            [self.graph.vertices[self.belief.ids[i]].degree for i in np.flatnonzero(near)], int
+        )
+        return KnownVertices(positions[near], degrees)
 
     def observe(self, view: View) -> tuple[Correspondence, list[Event]]:
         """Match a view with the map and learn from it."""
@@ -116,19 +139,26 @@ class Mapper:
                 known.pair(node, vertex_id)
 
     def _recognise(self, view: View, sightings: dict[int, Sighting], known: Correspondence) -> None:
-        """Vertices that were out of sight for long must pass all the tests."""
-        base = view.local_base.position
+        """Vertices that were out of sight for long must pass all the tests.
+
+        Two that pass are too many, unless one lies far deeper in its gate: the next view decides.
+        """
         for node, sighting in sightings.items():
-            away = np.hypot(*(sighting.position - base))
-            if node in known.vertex_of or away > self._config.recognise_within_m:
+            away = float(np.hypot(*(sighting.position - view.local_base.position)))
+            unclear = view.gvg.nodes[node].is_suspect and away > _CLOSE_M
+            if node in known.vertex_of or unclear or away > self._config.recognise_within_m:
                 continue
-            candidates = [
-                c for c in self._candidates(view, sighting) if c[1].id not in known.node_of
+            matches = [
+                match
+                for distance, vertex, metres in self._candidates(view, sighting)
+                if vertex.id not in known.node_of
+                and (match := self._compare(view, sighting, vertex, distance, metres)) is not None
             ]
-            for distance, vertex, metres in candidates:
-                if self._close_loop(view, sighting, vertex, distance, metres):
-                    known.pair(node, vertex.id)
-                    break
+            if matches and all(
+                other.distance > matches[0].distance + self._config.margin for other in matches[1:]
+            ):
+                self._close_loop(view, matches[0])
+                known.pair(node, matches[0].vertex.id)
 
     def _candidates(self, view: View, sighting: Sighting) -> list[tuple[float, Vertex, float]]:
         """Known vertices, long out of sight, inside the gate of a sighting; most likely first."""
@@ -145,37 +175,53 @@ class Mapper:
             (d2, vertex, metres) for d2, _, vertex, metres in sorted(found, key=lambda f: f[:2])
         ]
 
-    def _close_loop(
+    def _compare(
         self, view: View, sighting: Sighting, vertex: Vertex, distance: float, metres: float
-    ) -> bool:
-        """Recognise a vertex and correct the belief by it, if its shape and the walls agree.
+    ) -> _Match | None:
+        """The vertex found where a sighting is, if its shape and the walls agree.
 
         Walls that have changed cannot hide a vertex that stands where it should and looks alike.
         """
         foreseen = view.local_base.compose(ekf.expected(self.belief, vertex.id)[0])
         if not looks_alike(vertex, sighting, foreseen, self._recognition):
-            return False
+            return None
         prior = Pose(float(sighting.position[0]), float(sighting.position[1]), foreseen.theta)
         found, agreement = self._register(view, vertex, prior)
-        if found is not None and agreement >= self._config.min_inliers:
-            local, covariance = found.pose, found.covariance + _REGISTRATION_FLOOR
-        else:
-            away = np.hypot(*(sighting.position - view.local_base.position))
-            if away > _CLOSE_M or metres > 0.5 * self._recognition.same_place_m:
-                return False
-            local, covariance = prior, detection_covariance(float(away), self._recognition)
+        surprising = metres > self._recognition.same_place_m
+        least = self._config.min_inliers_far if surprising else self._config.min_inliers
+        if found is not None and agreement >= least:
+            if np.hypot(*(found.pose.position - sighting.position)) > _BESIDE_M:
+                return None  # it stands beside what is seen
+            covariance = rotated_covariance(
+                found.covariance + _REGISTRATION_FLOOR, view.local_base.to(found.pose).theta
+            )
+            return _Match(vertex, found.pose, covariance, agreement, distance, metres)
+        away = float(np.hypot(*(sighting.position - view.local_base.position)))
+        if away > _CLOSE_M or metres > 0.5 * self._recognition.same_place_m:
+            return None
+        covariance = detection_covariance(away, self._recognition)
+        return _Match(vertex, prior, covariance, agreement, distance, metres)
+
+    def _close_loop(self, view: View, match: _Match) -> None:
+        """Correct the belief by a vertex that has been recognised."""
+        vertex = match.vertex
         self._events.append(
             LoopClosed(
-                view.stamp, vertex.id, view.travelled - vertex.seen_at, distance, metres, agreement
+                view.stamp,
+                vertex.id,
+                view.travelled - vertex.seen_at,
+                match.distance,
+                match.metres,
+                match.agreement,
             )
         )
-        vertex.local, vertex.seen_at, vertex.updated_at = local, view.travelled, view.travelled
+        vertex.local, vertex.seen_at, vertex.updated_at = (
+            match.local,
+            view.travelled,
+            view.travelled,
+        )
         vertex.visits += 1
-        base_vertex = view.local_base.to(local)
-        if len(covariance) == 3:
-            covariance = rotated_covariance(covariance, base_vertex.theta)
-        self._measure(view, vertex, base_vertex, covariance)
-        return True
+        self._measure(view, vertex, view.local_base.to(match.local), match.covariance)
 
     def _register(
         self, view: View, vertex: Vertex, prior: Pose
@@ -190,7 +236,7 @@ class Mapper:
             return None, 0.0
         laid = found.pose.transform(vertex.snapshot)
         laid = laid[view.local_map.known(laid)]
-        if len(laid) < self._matching.min_pairs:
+        if len(laid) < max(self._matching.min_pairs, _KNOWN_SHARE * len(vertex.snapshot)):
             return None, 0.0
         distance, _ = tree.query(laid, distance_upper_bound=_WALL_M)
         return found, float(np.isfinite(distance).mean())

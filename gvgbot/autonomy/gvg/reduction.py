@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import Annotated
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gvgbot.autonomy.gvg.local import Branch, LocalEdge, LocalGvg, LocalNode
 from gvgbot.autonomy.gvg.voronoi import FineGraph
@@ -17,22 +18,33 @@ from gvgbot.geometry import Array
 from gvgbot.ranges import Range
 
 _SPACING = 0.1  # metres between the points of an edge
-_MERGE_HYSTERESIS = 1.5  # by which factor an edge must differ to overrule what the map says of it
+_MERGE_HYSTERESIS = 1.3  # by which factor an edge must differ to overrule what the map says of it
 _REACH_HYSTERESIS = 1.12
 _ENDPOINT_M = 0.6  # a point so near to a known endpoint is that endpoint
-_NOWHERE: Array = np.empty((0, 2))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class KnownVertices:
-    """Where the map has meetpoints (N, 2) and endpoints (M, 2), local frame.
+    """Where the map has vertices (N, 2), local frame, and their degrees (N,).
 
     What is near a threshold, one meetpoint or two, a corner or a dead end, stays as it was decided
     at first, unless sight says clearly otherwise.
     """
 
-    meetpoints: Array = field(default_factory=lambda: _NOWHERE)
-    endpoints: Array = field(default_factory=lambda: _NOWHERE)
+    positions: Array = field(default_factory=lambda: np.empty((0, 2)))
+    degrees: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
+
+    @property
+    def endpoints(self) -> Array:
+        """Positions (M, 2) of the endpoints."""
+        found: Array = self.positions[self.degrees == 1]
+        return found
+
+    def degrees_near(self, point: Array, reach: float) -> list[int]:
+        """Degrees of the meetpoints within `reach` m of a point (2,)."""
+        near = np.hypot(*(self.positions - point).T) < reach
+        found: list[int] = self.degrees[near & (self.degrees > 1)].tolist()
+        return found
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,7 +132,7 @@ def reduce_graph(
     known = known or KnownVertices()
     draft = _contract(fine)
     _prune(draft, config.min_reach, known.endpoints)
-    _merge(draft, config.merge_m, known.meetpoints)
+    _merge(draft, config.merge_m, known)
     _prune(draft, config.min_reach, known.endpoints)
     _doubt_stumps(draft, config.min_reach)
     return _finish(draft, config.min_reach)
@@ -208,7 +220,7 @@ def _doubt_stumps(draft: _Draft, min_reach: float) -> None:
                 draft.lead[node] = math.atan2(inwards[1], inwards[0])
 
 
-def _merge(draft: _Draft, merge_m: float, meetpoints: Array) -> None:
+def _merge(draft: _Draft, merge_m: float, known: KnownVertices) -> None:
     """Make one meetpoint of two that are joined by a very short edge."""
     while True:
         short = [
@@ -216,8 +228,7 @@ def _merge(draft: _Draft, merge_m: float, meetpoints: Array) -> None:
             for key, chain in draft.chains.items()
             if chain.a != chain.b
             and min(draft.degree(chain.a), draft.degree(chain.b)) >= 3
-            and (length := chain.length()) < _MERGE_HYSTERESIS * merge_m
-            and length < merge_m * _known_length(draft, chain, merge_m, meetpoints)
+            and (length := chain.length()) < merge_m * _known_length(draft, chain, merge_m, known)
         ]
         if not short:
             return
@@ -239,14 +250,18 @@ def _merge(draft: _Draft, merge_m: float, meetpoints: Array) -> None:
             _attach(draft.chains[key], centre, at_start=out)
 
 
-def _known_length(draft: _Draft, chain: _Chain, merge_m: float, meetpoints: Array) -> float:
-    """By what the map stretches the length below which a chain's ends are one: it holds one or two.
+def _known_length(draft: _Draft, chain: _Chain, merge_m: float, known: KnownVertices) -> float:
+    """By what the map stretches the length below which a chain's ends are one meetpoint.
 
-    Which of the known meetpoints are meant is decided by the distance to the middle of the chain.
+    One known meetpoint around with all the departures of both: they are one. Two: they are not.
     """
+    if chain.length() > _MERGE_HYSTERESIS * merge_m:
+        return 0.0
     middle = (draft.position[chain.a] + draft.position[chain.b]) / 2
-    known = int((np.hypot(*(meetpoints - middle).T) < _MERGE_HYSTERESIS * merge_m).sum())
-    return (1.0, _MERGE_HYSTERESIS, 1 / _MERGE_HYSTERESIS)[min(known, 2)]
+    degrees = known.degrees_near(middle, _MERGE_HYSTERESIS * merge_m)
+    if len(degrees) == 1 and degrees[0] >= draft.degree(chain.a) + draft.degree(chain.b) - 2:
+        return _MERGE_HYSTERESIS
+    return 1.0 if len(degrees) < 2 else 1 / _MERGE_HYSTERESIS
 
 
 def _attach(chain: _Chain, point: Array, *, at_start: bool) -> None:

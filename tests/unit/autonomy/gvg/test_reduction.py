@@ -45,9 +45,10 @@ def degrees(gvg: LocalGvg) -> list[int]:
     return sorted(node.degree for node in gvg.nodes.values() if node.degree >= 3)
 
 
-ONE = KnownVertices(meetpoints=np.array([[0.0, 0.0]]))
-TWO = KnownVertices(meetpoints=np.array([[-0.35, 0.0], [0.35, 0.0]]))
-FAR = KnownVertices(meetpoints=np.array([[5.0, 5.0]]))
+ONE = KnownVertices(np.array([[0.0, 0.0]]), np.array([4]))
+FIRST_OF_TWO = KnownVertices(np.array([[-0.35, 0.0]]), np.array([3]))
+TWO = KnownVertices(np.array([[-0.35, 0.0], [0.35, 0.0]]), np.array([3, 3]))
+FAR = KnownVertices(np.array([[5.0, 5.0]]), np.array([4]))
 
 
 @pytest.mark.parametrize(
@@ -57,8 +58,9 @@ FAR = KnownVertices(meetpoints=np.array([[5.0, 5.0]]))
         (0.7, None, [3, 3]),
         (0.5, FAR, [4]),
         (0.7, FAR, [3, 3]),
-        (0.8, ONE, [4]),  # within half as much again as the threshold: one it stays
-        (0.95, ONE, [3, 3]),
+        (0.7, ONE, [4]),  # not much more than the threshold: one it stays
+        (0.85, ONE, [3, 3]),
+        (0.7, FIRST_OF_TWO, [3, 3]),
         (0.5, TWO, [3, 3]),
         (0.35, TWO, [4]),
     ],
@@ -77,7 +79,7 @@ def branching(reach: float) -> FineGraph:
 
 def ended(y: float) -> KnownVertices:
     """The map has an endpoint on the branch."""
-    return KnownVertices(endpoints=np.array([[0.0, y]]))
+    return KnownVertices(np.array([[0.0, y]]), np.array([1]))
 
 
 @pytest.mark.parametrize(
