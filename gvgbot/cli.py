@@ -83,7 +83,7 @@ def _add_explore(commands: "argparse._SubParsersAction[_Parser]") -> None:
     explore.add_argument(
         "--world",
         metavar="NAME|YAML",
-        help="a built-in world (office, grid, rooms, cave and others), or a map_server YAML",
+        help="a built-in world (office, cave, floor_plan:7 and others), or a map_server YAML",
     )
     explore.add_argument(
         "--start",
