@@ -124,18 +124,24 @@ class Mapper:
         }
 
     def _track(self, view: View, sightings: dict[int, Sighting], known: Correspondence) -> None:
-        """Vertices seen moments ago are told by their place in the local map."""
+        """Vertices seen moments ago are told by their place in the local map.
+
+        What was taken for a fork in a room may prove to be its end, and the other way round.
+        """
         pairs = sorted(
-            (float(np.hypot(*(sighting.position - vertex.local.position))), node, vertex.id)
+            (
+                sighting.meetpoint != (vertex.kind == "meetpoint"),
+                float(np.hypot(*(sighting.position - vertex.local.position))),
+                node,
+                vertex.id,
+            )
             for vertex in self.graph.vertices.values()
             if view.travelled - vertex.seen_at < self._recognition.tracked_m
             for node, sighting in sightings.items()
-            if sighting.meetpoint == (vertex.kind == "meetpoint")
         )
-        for metres, node, vertex_id in pairs:
-            if metres > self._recognition.same_place_m:
-                break
-            if node not in known.vertex_of and vertex_id not in known.node_of:
+        for changed, metres, node, vertex_id in pairs:
+            reach = self._recognition.same_place_m * (0.5 if changed else 1.0)
+            if metres < reach and node not in known.vertex_of and vertex_id not in known.node_of:
                 known.pair(node, vertex_id)
 
     def _recognise(self, view: View, sightings: dict[int, Sighting], known: Correspondence) -> None:
@@ -246,7 +252,7 @@ class Mapper:
     def _consider(self, view: View, sightings: dict[int, Sighting], known: Correspondence) -> None:
         """Count sightings of what is not known yet, and believe what has been seen often enough."""
         for node, sighting in sightings.items():
-            if node in known.vertex_of:
+            if node in known.vertex_of or node in view.doubted:
                 continue
             away = float(np.hypot(*(sighting.position - view.local_base.position)))
             candidate = self._unbelieved.note(sighting, away, view.travelled)
@@ -272,7 +278,7 @@ class Mapper:
         kind: Kind = "meetpoint" if sighting.meetpoint else "endpoint"
         local = Pose(float(sighting.position[0]), float(sighting.position[1]), 0.0)
         vertex = Vertex(
-            self.graph.next_id(), kind, sighting.clearance, local, view.travelled, view.travelled
+            self.graph.next_id(), sighting.clearance, local, view.travelled, view.travelled
         )
         for bearing in sighting.bearings:
             vertex.add_half_edge(bearing)
@@ -372,23 +378,23 @@ class Mapper:
         for vertex in list(self.graph.vertices.values()):
             if vertex.id in known.node_of or view.travelled - vertex.seen_at > 6.0:
                 continue
-            if self._passes_through(view, vertex):
+            if self._passes_through(view, vertex, known):
                 vertex.misses += 1
                 if vertex.misses > self._config.misses:
                     self.remove(view, vertex, "an edge passes here")
 
-    def _passes_through(self, view: View, vertex: Vertex) -> bool:
+    def _passes_through(self, view: View, vertex: Vertex, known: Correspondence) -> bool:
+        """Whether an edge is seen where a vertex should be, or another vertex at its end there."""
         if np.hypot(*(vertex.local.position - view.local_base.position)) > 4.0:
             return False
         place = view.gvg.place(vertex.local.position)
         if place is None or place.distance > 0.3:
             return False
         edge = view.gvg.edges[place.edge]
-        return (
-            self._recognition.same_place_m
-            < place.station
-            < edge.length - self._recognition.same_place_m
-        )
+        reach = self._recognition.same_place_m
+        from_end = min(place.station, edge.length - place.station)
+        end = edge.a if place.station < edge.length / 2 else edge.b
+        return from_end > reach or end in known.vertex_of
 
     # -- what hangs together -----------------------------------------------------------------
 
@@ -417,6 +423,12 @@ class Mapper:
                     vertex = self.graph.vertices[end.vertex]
                     if vertex.kind == "endpoint" and vertex.id not in known.node_of:
                         self.remove(view, vertex, "its edge ends elsewhere")
+
+    def forget_strays(self, view: View) -> None:
+        """Take out the vertices that hang together with nothing."""
+        for vertex in list(self.graph.vertices.values()):
+            if all(half.edge is None for half in vertex.half_edges.values()):
+                self.remove(view, vertex, "nothing leads there")
 
     def remove(self, view: View, vertex: Vertex, reason: str) -> None:
         """Take a vertex out of the map; of two edges that met there one is made."""

@@ -42,7 +42,6 @@ class Vertex:
     """A meetpoint or endpoint. Its pose is in the belief; `local` is where the local map has it."""
 
     id: int
-    kind: Kind
     clearance: float
     local: Pose
     seen_at: float  # metres driven when last seen
@@ -77,6 +76,11 @@ class Vertex:
     def degree(self) -> int:
         """Number of departures."""
         return len(self.half_edges)
+
+    @property
+    def kind(self) -> Kind:
+        """An endpoint has one departure."""
+        return "meetpoint" if self.degree > 1 else "endpoint"
 
 
 @dataclass(slots=True, eq=False)

@@ -18,7 +18,7 @@ def streets(columns: int, rows: int) -> tuple[GvgGraph, dict[tuple[int, int], in
     ids = {place: graph.next_id() for place in places}
     for (x, y), vertex in ids.items():
         local = Pose(STREET * x, STREET * y)
-        graph.vertices[vertex] = Vertex(vertex, "meetpoint", 1.0, local, 0.0, 0.0)
+        graph.vertices[vertex] = Vertex(vertex, 1.0, local, 0.0, 0.0)
     for x, y in places:
         for dx, dy in ((1, 0), (0, 1)):
             if (x + dx, y + dy) in ids:
@@ -47,7 +47,7 @@ def random_multigraph(rng: np.random.Generator) -> GvgGraph:
     """Up to eight vertices, with self-loops, parallel edges, frontiers and blocked departures."""
     graph = GvgGraph()
     for _ in range(int(rng.integers(1, 9))):
-        vertex = Vertex(graph.next_id(), "meetpoint", 1.0, Pose(), 0.0, 0.0)
+        vertex = Vertex(graph.next_id(), 1.0, Pose(), 0.0, 0.0)
         graph.vertices[vertex.id] = vertex
     vertices = list(graph.vertices.values())
     for _ in range(int(rng.integers(0, 14))):

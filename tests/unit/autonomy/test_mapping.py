@@ -197,6 +197,36 @@ def test_a_dead_end_whose_edge_proves_to_end_elsewhere_is_taken_back() -> None:
     assert {end.vertex for end in seen.mapper.graph.frontiers()} == {seen.known.vertex_of[2]}
 
 
+def test_a_fork_in_a_room_that_proves_to_be_its_end_becomes_a_dead_end() -> None:
+    """Two short branches into corners are seen first, and none of them later."""
+    corners = {**TEE_POINTS, 5: (2.0, -4.6), 6: (4.0, -4.6)}
+    lines = {**TEE_LINES, 13: (4, 5, []), 14: (4, 6, [])}
+    unseen = {**UNSEEN, 5: -2.4, 6: -0.7}
+    seen = Seen().look(drawn(corners, lines, unseen=unseen), 20)
+    assert len(seen.places("meetpoint")) == 2
+    seen.look(TEE, CONFIG.misses + 2)
+    assert len(seen.places("meetpoint")) == 1
+    assert seen.places("endpoint") == [pytest.approx((3.0, -4.0), abs=0.01)]
+    assert len(seen.mapper.graph.edges) == 1
+
+
+def test_a_vertex_beside_the_one_that_is_seen_is_taken_back() -> None:
+    """Two meetpoints half a metre apart were believed; sight shows one, at the first of them."""
+    lines: dict[int, tuple[int, int, list[Point]]] = {
+        10: (1, 2, []),
+        11: (2, 5, []),
+        12: (2, 4, []),
+        13: (5, 3, []),
+        14: (5, 6, []),
+    }
+    points = {**TEE_POINTS, 5: (3.6, 0.0), 6: (3.6, 4.0)}
+    pair = drawn(points, lines, unseen={**UNSEEN, 6: math.pi / 2})
+    seen = Seen().look(pair, 20)
+    assert len(seen.places("meetpoint")) == 2
+    seen.look(TEE, CONFIG.misses + 2)
+    assert len(seen.places("meetpoint")) == 1
+
+
 def test_the_robot_s_uncertainty_is_in_the_place_of_a_vertex_seen_later() -> None:
     """A drive between the sights adds to the covariance of what is seen after it only."""
     seen = Seen().look(TEE, CONFIG.candidates.meetpoint_sightings)

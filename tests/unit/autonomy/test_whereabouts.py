@@ -157,7 +157,7 @@ def corridor_graph() -> GvgGraph:
     """Three vertices; the first edge is known, the second and the branch south are frontiers."""
     graph = GvgGraph()
     for name, x, keys in ((1, 0.0, 1), (2, 6.0, 3), (3, 12.0, 2)):
-        graph.vertices[name] = Vertex(name, "meetpoint", 1.0, Pose(x, 0.0), 0.0, 0.0)
+        graph.vertices[name] = Vertex(name, 1.0, Pose(x, 0.0), 0.0, 0.0)
         for _ in range(keys):
             graph.vertices[name].add_half_edge(0.0)
     line = np.array([[0.0, 0.0], [6.0, 0.0]])

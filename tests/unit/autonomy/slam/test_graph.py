@@ -16,7 +16,7 @@ LINE = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 4.0]])  # 7 m
 
 
 def add_vertex(graph: GvgGraph, *bearings: float, at: tuple[float, float] = (0.0, 0.0)) -> Vertex:
-    vertex = Vertex(graph.next_id(), "meetpoint", 1.0, Pose(*at), 0.0, 0.0)
+    vertex = Vertex(graph.next_id(), 1.0, Pose(*at), 0.0, 0.0)
     for bearing in bearings:
         vertex.add_half_edge(bearing)
     graph.vertices[vertex.id] = vertex

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.spatial.distance import mahalanobis as scipy_mahalanobis
 
 from gvgbot.autonomy.slam.ekf import Belief, add_vertex, predict
-from gvgbot.autonomy.slam.graph import Kind, Vertex
+from gvgbot.autonomy.slam.graph import Vertex
 from gvgbot.autonomy.slam.recognition import (
     RecognitionConfig,
     Sighting,
@@ -28,8 +28,8 @@ TEE = (0.0, math.pi, -math.pi / 2)
 bearings = st.lists(st.floats(-math.pi, math.pi), max_size=5).map(tuple)
 
 
-def vertex(*directions: float, kind: Kind = "meetpoint", clearance: float = 1.2) -> Vertex:
-    made = Vertex(1, kind, clearance, Pose(), 0.0, 0.0)
+def vertex(*directions: float, clearance: float = 1.2) -> Vertex:
+    made = Vertex(1, clearance, Pose(), 0.0, 0.0)
     for direction in directions:
         made.add_half_edge(direction)
     return made
