@@ -314,8 +314,11 @@ class Mission:
     def _finish(self, view: View) -> None:
         """Some frontiers cannot be reached: that is the end, after having looked for a way."""
         since = self._stranded_since
+        if since is None or view.stamp - since < self._config.patience_s:
+            return
+        self._mapper.forget_strays(view)
         frontiers = len(self._mapper.graph.frontiers())
-        if frontiers and since is not None and view.stamp - since >= self._config.patience_s:
+        if frontiers:
             self._end(view, "explored_with_blocked", f"{frontiers} frontiers cannot be reached")
 
     def _end(self, view: View, outcome: Outcome, reason: str) -> None:
