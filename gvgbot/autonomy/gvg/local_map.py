@@ -97,7 +97,8 @@ class LocalMap:
 
     def _carve(self, scan: Scan, ranges: Array, local_laser: Pose, travelled: float) -> None:
         """Mark what the beams passed through as free, and vote against walls they passed."""
-        see = minimum_filter1d(np.where(np.isnan(ranges), 0.0, np.minimum(ranges, self._reach)), 3)
+        reach = min(self._reach, scan.range_max)  # as far as a beam without an echo is free
+        see = minimum_filter1d(np.where(np.isnan(ranges), 0.0, np.minimum(ranges, reach)), 3)
         corner = self._corner * self._cell
         dx = self._offsets_x + np.float32(corner[0] - local_laser.x)
         dy = self._offsets_y + np.float32(corner[1] - local_laser.y)

@@ -114,6 +114,21 @@ def test_beams_that_hit_nothing_show_free_space_without_a_wall() -> None:
     assert len(empty.points()) == 0
 
 
+def test_beams_that_hit_nothing_show_no_more_than_the_laser_can_see() -> None:
+    local_map = after(sweep(ROOM, ORIGIN, reach=1.5))
+    cells = cells_of(-3, -2, 3, 2)
+    away = np.hypot(*cells.T)
+    assert local_map.known(cells[away < 1.3]).all()
+    assert not local_map.known(cells[away > 1.5]).any()
+
+
+def test_walls_beyond_the_reach_of_the_laser_are_not_forgotten() -> None:
+    local_map = looked(ROOM, [ORIGIN])
+    for _ in range(20):
+        local_map.insert(sweep(ROOM, ORIGIN, reach=1.5), ORIGIN, 0.0)
+    assert wall_points_near(local_map, 0.0, 2.0) > 0
+
+
 def test_the_scan_itself_is_left_as_it_was() -> None:
     scan = with_faults(sweep(ROOM, ORIGIN), [100, 300], math.nan)
     before = scan.ranges.copy()
