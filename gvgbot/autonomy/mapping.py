@@ -147,7 +147,7 @@ class Mapper:
     def _recognise(self, view: View, sightings: dict[int, Sighting], known: Correspondence) -> None:
         """Vertices that were out of sight for long must pass all the tests.
 
-        Two that pass are too many, unless one lies far deeper in its gate: the next view decides.
+        Two that pass are too many: the next view decides.
         """
         for node, sighting in sightings.items():
             away = float(np.hypot(*(sighting.position - view.local_base.position)))
@@ -160,11 +160,29 @@ class Mapper:
                 if vertex.id not in known.node_of
                 and (match := self._compare(view, sighting, vertex, distance, metres)) is not None
             ]
-            if matches and all(
-                other.distance > matches[0].distance + self._config.margin for other in matches[1:]
-            ):
-                self._close_loop(view, matches[0])
-                known.pair(node, matches[0].vertex.id)
+            best = self._beyond_doubt(matches, sighting)
+            if best is not None:
+                self._close_loop(view, best)
+                known.pair(node, best.vertex.id)
+
+    def _beyond_doubt(self, matches: list[_Match], sighting: Sighting) -> _Match | None:
+        """The match that lies far deeper in its gate than any other elsewhere in the building.
+
+        Of two close together, the one whose walls lie nearer to what is seen.
+        """
+        if not matches:
+            return None
+        first = matches[0]
+        here = self.belief.map_vertex(first.vertex.id)
+        neighbours = []
+        for match in matches:
+            if here.distance(self.belief.map_vertex(match.vertex.id)) < _CLOSE_M:
+                neighbours.append(match)
+            elif match.distance < first.distance + self._config.margin:
+                return None
+        return min(
+            neighbours, key=lambda m: float(np.hypot(*(m.local.position - sighting.position)))
+        )
 
     def _candidates(self, view: View, sighting: Sighting) -> list[tuple[float, Vertex, float]]:
         """Known vertices, long out of sight, inside the gate of a sighting; most likely first."""

@@ -271,6 +271,9 @@ class Mission:
         self._looked_around = 0
         half = None if self.target is None else self._mapper.graph.half_edge(self.target)
         if half is None:
+            self._mapper.forget_strays(view)
+            if self._mapper.graph.vertices and not self._mapper.graph.frontiers():
+                return
             if self._mapper.graph.vertices:
                 given_up = len(self._mapper.graph.frontiers()) + len(self._mapper.graph.blocked())
                 self._end(view, "explored_with_blocked", f"{given_up} frontiers left: {reason}")
