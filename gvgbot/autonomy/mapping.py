@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.candidates import Candidates, CandidatesConfig
 from gvgbot.autonomy.events import EdgeJoined, Event, LoopClosed, VertexAdded, VertexRemoved
-from gvgbot.autonomy.gvg.local import Branch, LocalGvg, LocalNode
+from gvgbot.autonomy.gvg.local import Branch, LocalEdge, LocalGvg, LocalNode
 from gvgbot.autonomy.gvg.reduction import KnownVertices
 from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.ekf import Belief
@@ -30,6 +30,7 @@ from gvgbot.ranges import Range
 
 _WALL_M = 0.15  # a point so near to a wall lies on it
 _CLOSE_M = 1.5  # as near as one needs to be to tell vertices apart
+_AT_END_M = 0.5  # so near to the end of a dead end, it has been driven
 _BESIDE_M = 0.4  # walls that agree only so far off are another vertex's
 _KNOWN_SHARE = 0.4  # of a vertex's walls must lie where something has been seen
 _REGISTRATION_FLOOR = np.diag([4e-4, 4e-4, 9e-6])  # what registration cannot know of itself
@@ -74,9 +75,15 @@ class Mapper:
     """Keeps the belief and the graph; both are corrected by every view."""
 
     def __init__(
-        self, config: MappingConfig, recognition: RecognitionConfig, matching: ScanMatchingConfig
+        self,
+        config: MappingConfig,
+        recognition: RecognitionConfig,
+        matching: ScanMatchingConfig,
+        *,
+        drive_dead_ends: bool = False,
     ) -> None:
         self._config, self._recognition, self._matching = config, recognition, matching
+        self._drive_dead_ends = drive_dead_ends
         self.belief = Belief()
         self.graph = GvgGraph()
         self.observations: list[Observation] = []
@@ -424,10 +431,18 @@ class Mapper:
             if a is None or b is None or a == b:
                 continue
             here, there = self.graph.edge_at(a), self.graph.edge_at(b)
+            if self._drive_dead_ends and self._is_far_end(view, edge):
+                continue
             if here is None and there is None:
                 self.join(view, a, b, edge.polyline, float(edge.clearance.min()), driven=False)
             elif here is not there:
                 self._dispute(view, known, here, there)
+
+    def _is_far_end(self, view: View, edge: LocalEdge) -> bool:
+        """Whether an edge ends in a dead end where the robot is not."""
+        ends = (view.gvg.nodes[edge.a], view.gvg.nodes[edge.b])
+        base = view.local_base.position
+        return any(n.is_endpoint and np.hypot(*(n.position - base)) > _AT_END_M for n in ends)
 
     def _dispute(self, view: View, known: Correspondence, *disputed: Edge | None) -> None:
         """Sight speaks against edges believed so far; after a few times it wins."""

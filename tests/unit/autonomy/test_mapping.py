@@ -38,8 +38,10 @@ TWO_ENDS = drawn({1: (-1.0, 0.0), 2: (4.0, 0.0)}, {10: (1, 2, [])})
 class Seen:
     """A mapper fed with views, one every ten centimetres or where the robot stands."""
 
-    def __init__(self) -> None:
-        self.mapper = Mapper(CONFIG, RecognitionConfig(), ScanMatchingConfig())
+    def __init__(self, *, drive_dead_ends: bool = False) -> None:
+        self.mapper = Mapper(
+            CONFIG, RecognitionConfig(), ScanMatchingConfig(), drive_dead_ends=drive_dead_ends
+        )
         self.events: list[Event] = []
         self.known = Correspondence()
         self._count = 0
@@ -225,6 +227,18 @@ def test_a_vertex_beside_the_one_that_is_seen_is_taken_back() -> None:
     assert len(seen.places("meetpoint")) == 2
     seen.look(TEE, CONFIG.misses + 2)
     assert len(seen.places("meetpoint")) == 1
+
+
+def test_a_dead_end_to_be_driven_is_joined_only_from_its_end() -> None:
+    points = {**TEE_POINTS, 4: (3.0, -2.0)}
+    far = drawn(points, TEE_LINES, unseen=UNSEEN)
+    seen = Seen(drive_dead_ends=True).look(far, 20)
+    assert len(seen.mapper.graph.vertices) == 2
+    assert len(seen.mapper.graph.edges) == 0
+    moved = Pose(3.0, -1.7)
+    seen.mapper.move(moved, np.zeros((3, 3)))
+    seen.look(far, 1, at=moved)
+    assert len(seen.mapper.graph.edges) == 1
 
 
 def test_the_robot_s_uncertainty_is_in_the_place_of_a_vertex_seen_later() -> None:
