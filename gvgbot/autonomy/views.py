@@ -2,10 +2,14 @@
 
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from gvgbot.autonomy.gvg.local import Branch, LocalGvg
 from gvgbot.autonomy.gvg.local_map import LocalMap
 from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.geometry import Array, Pose
+
+_RIM_M = 0.25  # a point so near to a node's disc may shape it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -18,6 +22,16 @@ class View:
     local_base: Pose
     gvg: LocalGvg
     local_map: LocalMap
+    doubted: frozenset[int] = frozenset()  # nodes that may be there for a while only
+
+
+def touching(gvg: LocalGvg, points: Array) -> frozenset[int]:
+    """The nodes that would be elsewhere, or not at all, without obstacles (N, 2)."""
+    return frozenset(
+        key
+        for key, node in gvg.nodes.items()
+        if (np.hypot(*(points - node.position).T) < node.clearance + _RIM_M).any()
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
