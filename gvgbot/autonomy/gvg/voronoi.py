@@ -17,6 +17,7 @@ from gvgbot.geometry import Array
 
 _RING = np.stack([f(np.arange(16) * np.pi / 8) for f in (np.cos, np.sin)], axis=1)
 _MAX_UNKNOWN = 1  # of the sampled points of a disc
+_NOTHING: Array = np.empty((0, 2))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,15 +38,21 @@ EMPTY = FineGraph(np.empty((0, 2)), np.empty(0), np.empty((0, 2), np.int64), np.
 
 
 def fine_graph(
-    local_map: LocalMap, robot: Array, *, min_clearance: float, roughness: float
+    local_map: LocalMap,
+    robot: Array,
+    *,
+    min_clearance: float,
+    roughness: float,
+    felt: Array = _NOTHING,
 ) -> FineGraph:
     """The certain Voronoi graph around the robot (2,); EMPTY where there is none.
 
     A ridge counts if the robot (of radius `min_clearance`) fits between its two generators, and if
     they cannot be two bumps of one flat wall: a disc of radius r touches two bumps of height h on a
-    wall if they are less than sqrt(8 h r) apart. `roughness` is that h, m.
+    wall if they are less than sqrt(8 h r) apart. `roughness` is that h, m. `felt` are obstacles
+    (N, 2) that the map does not show.
     """
-    generators = local_map.points()
+    generators = np.concatenate([local_map.points(), felt])
     if len(generators) < 4:
         return EMPTY
     try:
