@@ -3,12 +3,13 @@
 import asyncio
 from collections.abc import Callable
 
+from gvgbot.autonomy.control.reflexes import Felt
 from gvgbot.autonomy.events import Event
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.errors import DeviceLost
 from gvgbot.geometry import STANDSTILL
 from gvgbot.hal.devices import Base, Laser
-from gvgbot.hal.guard import Guard, GuardState
+from gvgbot.hal.guard import Guard, GuardState, Reason
 from gvgbot.hal.messages import Odometry, Scan
 
 
@@ -32,7 +33,7 @@ class Loop:
         self._on_events, self._on_cycle = on_events, on_cycle
         self._scan: Scan | None = None
         self._guard_state = GuardState()
-        self.stopped_for: str | None = None
+        self.stopped_for: Reason | None = None
 
     async def run(self) -> None:
         """Drive until done; the base stands still when this returns or is cancelled."""
@@ -58,14 +59,15 @@ class Loop:
     async def _control(self, perceiving: asyncio.Task[None]) -> None:
         while self._pipeline.mission.outcome is None:
             odometry = await self._base.next_odometry()
-            wish = self._pipeline.control(odometry)
+            contact = self._base.contact
+            wish = self._pipeline.control(odometry, Felt(contact, self.stopped_for))
             self._guard_state, twist, self.stopped_for = self._guard.permit(
                 self._guard_state,
                 wish,
                 stamp=odometry.stamp,
                 odometry=odometry,
                 scan=self._scan,
-                contact=self._base.contact,
+                contact=contact,
             )
             self._base.drive(twist)
             self._on_cycle(odometry)

@@ -9,6 +9,7 @@ import numpy as np
 from gvgbot.autonomy.control.edge_follower import Track
 from gvgbot.autonomy.events import Decision, Event, Finished, Recovery
 from gvgbot.autonomy.exploration.ears import ear_next, nearest_frontier
+from gvgbot.autonomy.exploration.obstructions import Obstructions
 from gvgbot.autonomy.exploration.paths import shortest_paths
 from gvgbot.autonomy.gvg.local import Branch
 from gvgbot.autonomy.mapping import Mapper
@@ -27,8 +28,9 @@ Outcome = Literal["explored", "explored_with_blocked", "failed"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ExplorationConfig:
-    """When to give up."""
+    """What is worth a drive, and when to give up."""
 
+    drive_dead_ends: bool = False  # although the end of a dead end can be seen from its mouth
     patience_m: Annotated[float, Range(5.0, 1000.0)] = (
         60.0  # driven beyond twice the way to a frontier
     )
@@ -36,6 +38,11 @@ class ExplorationConfig:
     look_around_s: Annotated[float, Range(0.5, 60.0)] = (
         3.0  # standing at the end of sight before turning
     )
+    in_the_way_s: Annotated[float, Range(1.0, 600.0)] = (
+        10.0  # behind something before another way is tried
+    )
+    retry_after_s: Annotated[float, Range(0.0, 3600.0)] = 20.0  # and at the end, that way again,
+    retries: Annotated[int, Range(0, 20)] = 3  # so many times
     nothing_in_sight_s: Annotated[float, Range(2.0, 600.0)] = (
         20.0  # without any edge before giving up
     )
@@ -81,6 +88,10 @@ class Mission:
         self._start_edge: StartEdge | None = None
         self._frontiers: set[HalfEdgeId] = set()  # that were known at the last view
         self._looked_around = 0
+        self._obstructions = Obstructions(config.retries, config.retry_after_s)
+        self._obstructed = ""  # why there is no way on, since the last view
+        self._held = False
+        self._held_since: float | None = None
         self._lost_since: float | None = None
         self._stranded_since: float | None = None
         self._examining_since: float | None = None
@@ -98,8 +109,10 @@ class Mission:
         if passage is not None:
             self._account_for(view, known, passage)
         self._close_start_edge(view, view.gvg.edges[place.edge].clearance_at(place.station))
-        here = Situation(view.gvg, known, self._mapper.graph, self.where, place, view.local_base)
+        graph = self._mapper.graph
+        here = Situation(view.gvg, known, graph, self.where, place, view.local_base, view.doubted)
         self._watch_progress(view)
+        self._watch_the_way(view)
         order = Stand() if self.outcome is not None else self._decide(view, here)
         return order, self._events
 
@@ -107,9 +120,18 @@ class Mission:
         """Let no patience run out by a time in which nothing was to be seen."""
         self._last_progress += seconds
         self._last_view += seconds
+        self._held_since = _later(self._held_since, seconds)
         self._lost_since = _later(self._lost_since, seconds)
         self._stranded_since = _later(self._stranded_since, seconds)
         self._examining_since = _later(self._examining_since, seconds)
+
+    def hold(self) -> None:
+        """Note that the robot cannot go on just now: somebody may be in its way."""
+        self._held = True
+
+    def obstruct(self, reason: str) -> None:
+        """Note that there is no way on."""
+        self._obstructed = reason
 
     # -- the edge under the wheels -------------------------------------------------------------
 
@@ -162,6 +184,9 @@ class Mission:
             self.target = self._reconsidered(view, here, target)
         if self.outcome is not None:
             return Stand()
+        if self.target is None and self._obstructions.waiting:
+            self._last_progress = view.stamp
+            return Stand()
         if self.target is None and graph.frontiers():
             return self._wait_for_a_way(view, here)
         if self.target is None and graph.vertices:
@@ -180,6 +205,8 @@ class Mission:
         chosen, reason = self._ear(here), "ear"
         if chosen is None:
             nearest = nearest_frontier(graph, here.starts())
+            if nearest is None and self._reopen(view):
+                nearest = nearest_frontier(graph, here.starts())
             if nearest is None:
                 self._finish(view)
                 return None
@@ -240,7 +267,9 @@ class Mission:
         end = view.gvg.end_of(path[-1])
         blind = end not in here.known.vertex_of
         waited = view.stamp - self._last_progress
-        if track.length < 0.3 and waited > self._config.look_around_s:
+        if track.length < 0.3 and blind and end in view.doubted:
+            self._held = True
+        elif track.length < 0.3 and waited > self._config.look_around_s:
             self._last_progress = view.stamp
             self._looked_around += 1
             if self._looked_around > 2:
@@ -249,6 +278,41 @@ class Mission:
             self._events.append(Recovery(view.stamp, "look around", "standing at the end of sight"))
             return LookAround(math.tau)
         return Drive(track, blind)
+
+    # -- something in the way ----------------------------------------------------------------------
+
+    def _watch_the_way(self, view: View) -> None:
+        """Wait a little for what stands in the way, then try another one."""
+        if self._held and self._held_since is None:
+            self._held_since = view.stamp
+        if view.stamp == self._last_progress:
+            self._held_since = None
+        self._held = False
+        waited = 0.0 if self._held_since is None else view.stamp - self._held_since
+        if not self._obstructed and waited > self._config.in_the_way_s:
+            self._obstructed = "something stands in the way"
+        if self._obstructed:
+            self._block(view, self._obstructed)
+            self._obstructed, self._held_since = "", None
+
+    def _block(self, view: View, reason: str) -> None:
+        """Close the edge under the wheels, or else the target, for a while."""
+        end = self.where.on_edge if self.target is not None else None
+        edge = None if end is None else self._mapper.graph.edge_at(end)
+        ends = (self.target,) if edge is None else (edge.a, edge.b)
+        closed = [end for end in ends if end is not None]
+        if not closed:
+            return
+        self._obstructions.close(self._mapper.graph, closed, view.stamp)
+        self._events.append(Recovery(view.stamp, "try another way", reason))
+        self.target = None
+
+    def _reopen(self, view: View) -> bool:
+        """Open what was closed long enough ago; whether there was something."""
+        opened = self._obstructions.open(self._mapper.graph, view.stamp)
+        if opened:
+            self._events.append(Recovery(view.stamp, "try again", "nothing else is left"))
+        return opened
 
     # -- giving up ---------------------------------------------------------------------------------
 
@@ -275,7 +339,7 @@ class Mission:
             if self._mapper.graph.vertices and not self._mapper.graph.frontiers():
                 return
             if self._mapper.graph.vertices:
-                given_up = len(self._mapper.graph.frontiers()) + len(self._mapper.graph.blocked())
+                given_up = len(self._mapper.graph.frontiers()) + self._given_up()
                 self._end(view, "explored_with_blocked", f"{given_up} frontiers left: {reason}")
             else:
                 self._end(view, "failed", f"no vertex found, perhaps no way out: {reason}")
@@ -307,12 +371,17 @@ class Mission:
         )
         if paths and view.stamp - self._examining_since < self._config.patience_s:
             return self._drive(view, here, paths[0][2])
-        blocked = len(self._mapper.graph.blocked())
+        blocked = self._given_up()
         if blocked:
             self._end(view, "explored_with_blocked", f"{blocked} frontiers were given up")
         else:
             self._end(view, "explored", "no frontier is left")
         return Stand()
+
+    def _given_up(self) -> int:
+        """How many frontiers were given up."""
+        graph = self._mapper.graph
+        return sum(graph.edge_at(end) is None for end in graph.blocked())
 
     def _finish(self, view: View) -> None:
         """Some frontiers cannot be reached: that is the end, after having looked for a way."""

@@ -4,25 +4,42 @@ import math
 from dataclasses import dataclass, field
 from typing import Annotated
 
+import numpy as np
+
 from gvgbot.autonomy.control.edge_follower import EdgeFollowerConfig, follow
-from gvgbot.autonomy.events import Event
+from gvgbot.autonomy.control.reflexes import (
+    Felt,
+    Held,
+    Hit,
+    Incident,
+    Moment,
+    PutDown,
+    ReflexConfig,
+    Reflexes,
+)
+from gvgbot.autonomy.events import Event, Recovery
 from gvgbot.autonomy.gvg.local import LocalGvg
 from gvgbot.autonomy.gvg.local_map import LocalMapConfig
 from gvgbot.autonomy.gvg.reduction import ReductionConfig, reduce_graph
 from gvgbot.autonomy.gvg.voronoi import fine_graph
+from gvgbot.autonomy.hazards import HazardConfig, Hazards
 from gvgbot.autonomy.localisation import LocalMaps
 from gvgbot.autonomy.mapping import Mapper, MappingConfig
 from gvgbot.autonomy.mission import Drive, ExplorationConfig, LookAround, Mission, Order, Stand
+from gvgbot.autonomy.newcomers import Newcomers, NewcomersConfig
 from gvgbot.autonomy.odometry_log import OdometryLog
 from gvgbot.autonomy.slam.ekf import OdometryNoise
 from gvgbot.autonomy.slam.recognition import RecognitionConfig
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
-from gvgbot.autonomy.views import View
+from gvgbot.autonomy.views import View, touching
 from gvgbot.geometry import STANDSTILL, Array, Pose, Twist, rotated_covariance, wrap_angle
 from gvgbot.hal.deskew import deskewed
 from gvgbot.hal.messages import Odometry, Scan
+from gvgbot.hal.sweep import free_distance, seen_from
 from gvgbot.ranges import Range
 
+_NOTHING_FELT = Felt()
+_LIFTED = np.diag([0.3**2, 0.3**2, 0.1**2])  # how far a robot is carried that is put down again
 _LONGEST_GAP_S = 2.0  # between keyframes; a longer one is an outage of a device
 _SCAN_EVERY_M, _SCAN_EVERY_RAD = 0.7, 0.5  # scans that are kept for the occupancy grid
 
@@ -47,6 +64,9 @@ class AutonomyConfig:
     )  # only matched with: the end of a long corridor is what tells how far one has come
     reduction: ReductionConfig = field(default_factory=ReductionConfig)
     edge_follower: EdgeFollowerConfig = field(default_factory=EdgeFollowerConfig)
+    reflexes: ReflexConfig = field(default_factory=ReflexConfig)
+    hazards: HazardConfig = field(default_factory=HazardConfig)
+    newcomers: NewcomersConfig = field(default_factory=NewcomersConfig)
     mapping: MappingConfig = field(default_factory=MappingConfig)
     recognition: RecognitionConfig = field(default_factory=RecognitionConfig)
     scan_matching: ScanMatchingConfig = field(default_factory=ScanMatchingConfig)
@@ -81,9 +101,19 @@ class Pipeline:
     ) -> None:
         self._config, self._radius = config, robot_radius
         self._maps = LocalMaps(config.local_map, config.far_map, config.scan_matching)
-        self.mapper = Mapper(config.mapping, config.recognition, config.scan_matching)
+        self.mapper = Mapper(
+            config.mapping,
+            config.recognition,
+            config.scan_matching,
+            drive_dead_ends=exploration.drive_dead_ends,
+        )
         self.mission = Mission(exploration, self.mapper)
         self._odometry = OdometryLog()
+        self._reflexes = Reflexes(config.reflexes)
+        self._hazards = Hazards(config.hazards)
+        self._newcomers = Newcomers(config.newcomers)
+        self._incidents: list[tuple[str, str]] = []  # action and reason, since the last scan
+        self._was_lifted = self._look_now = False
         self._last: Keyframe | None = None
         self._kept: Pose | None = None  # local_base of the last scan that was kept
         self._turning_to: float | None = None  # odom heading still to turn through, unwrapped sum
@@ -110,23 +140,29 @@ class Pipeline:
 
     def perceive(self, scan: Scan) -> list[Event]:
         """Learn from a scan, if it was taken somewhere new; what happened."""
+        happened: list[Event] = [Recovery(scan.stamp, *what) for what in self._incidents]
+        self._incidents.clear()
         odom_base = self._odometry.odom_base_at(scan.stamp)
         if (
             odom_base is None
             or self.mission.outcome is not None
+            or self._reflexes.is_lifted
             or not self._worth_a_look(scan, odom_base)
         ):
-            return []
+            return happened
         if self._last is not None:
             self.mission.skip(max(0.0, scan.stamp - self._last.stamp - _LONGEST_GAP_S))
         scan = deskewed(scan, self._odometry.motion_during(scan))
         local_base = self._localise(scan, odom_base)
+        scan = self._newcomers.sift(scan, local_base, self._maps.near)
         self._maps.insert(scan, local_base, self.travelled)
+        self._hazards.forget(self.travelled)
         fine = fine_graph(
             self._maps.near,
             local_base.position,
             min_clearance=self._radius + self._config.passage_margin_m,
             roughness=self._config.reduction.roughness_m,
+            felt=self._hazards.points,
         )
         known_vertices = self.mapper.known_around(local_base, self._config.local_map.half_width_m)
         self.gvg = reduce_graph(fine, self._config.reduction, known_vertices)
@@ -137,20 +173,23 @@ class Pipeline:
             local_base,
             self.gvg,
             self._maps.near,
+            touching(self.gvg, np.concatenate([self._hazards.doubtful, self._newcomers.points])),
         )
         known, seen = self.mapper.observe(view)
         self._keep(scan, odom_base, local_base)
+        happened += seen
         if self._turning():
-            return seen
+            return happened
         if len(self.keyframes) == 1:
             self._turn(_blind_angle(scan))
-            return seen
+            return happened
         order, done = self.mission.advance(view, known)
         self._obey(order)
-        return seen + done
+        return happened + done
 
     def _worth_a_look(self, scan: Scan, odom_base: Pose) -> bool:
-        if self._last is None:
+        if self._last is None or self._look_now:
+            self._look_now = False
             return True
         moved, c = self._last.odom_base.to(odom_base), self._config.keyframe
         return (
@@ -167,9 +206,10 @@ class Pipeline:
         self.travelled += math.hypot(motion.x, motion.y)
         noise = self._config.odometry_noise.covariance(motion, scan.stamp - self._last.stamp)
         prior = self._last.local_base.compose(motion)
-        match = (
-            self._maps.find if self._odometry.has_gap_since(self._last.stamp) else self._maps.match
-        )
+        lost = self._was_lifted or self._odometry.has_gap_since(self._last.stamp)
+        match = self._maps.find if lost else self._maps.match
+        if self._was_lifted:
+            self._was_lifted, noise = False, noise + _LIFTED
         local_base, covariance = match(scan, prior, rotated_covariance(noise, -motion.theta))
         moved = self._last.local_base.to(local_base)
         step = Step(moved, rotated_covariance(covariance, motion.theta))
@@ -193,7 +233,7 @@ class Pipeline:
 
     # -- control, per odometry message -------------------------------------------------------------
 
-    def control(self, odometry: Odometry) -> Twist:
+    def control(self, odometry: Odometry, felt: Felt = _NOTHING_FELT) -> Twist:
         """The twist to drive now."""
         before = self._odometry.newest
         if before is not None:
@@ -201,19 +241,49 @@ class Pipeline:
         self._odometry.append(odometry)
         if self._last is None:
             return STANDSTILL
+        local_base = self._last.local_base.compose(self._last.odom_base.to(odometry.odom_base))
+        moment = Moment(odometry.stamp, local_base, self._wish(local_base), felt)
+        twist, incident = self._reflexes.act(moment, lambda: self._room_behind(local_base))
+        if incident is not None:
+            self._take_down(incident, local_base)
+        return twist
+
+    def _wish(self, local_base: Pose) -> Twist:
+        """The twist that carries out the present order."""
         if self._turning():
             return Twist(0.0, self._config.edge_follower.max_turn_rate_radps * 0.8)
         match self._order:
             case Drive(track=track):
-                local_base = self._last.local_base.compose(
-                    self._last.odom_base.to(odometry.odom_base)
-                )
                 self._twist = follow(
                     track, local_base, self._twist.linear, self._radius, self._config.edge_follower
                 )
                 return self._twist
             case _:
                 return STANDSTILL
+
+    def _room_behind(self, local_base: Pose) -> float:
+        """How far the robot can go straight back, by what the map knows; m."""
+        points = seen_from(local_base, self._maps.near.points())
+        margin = self._config.passage_margin_m
+        return free_distance(points, Twist(-1.0, 0.0), radius=self._radius, margin=margin)
+
+    def _take_down(self, incident: Incident, local_base: Pose) -> None:
+        """Let the next look, which is due now, take account of an incident."""
+        self._look_now = True
+        match incident:
+            case Hit(cause=cause, bearings=bearings):
+                self._incidents.append(("back off", cause))
+                blocks = self._hazards.add(
+                    local_base, bearings, self._radius, self.travelled, lasting=cause == "cliff"
+                )
+                if blocks:
+                    self.mission.obstruct(f"{cause} again and again")
+            case Held():
+                self._incidents.append(("wait", "something is in the way"))
+                self.mission.hold()
+            case PutDown():
+                self._incidents.append(("look around", "the robot was lifted"))
+                self._was_lifted = True
 
     def _obey(self, order: Order) -> None:
         if isinstance(order, LookAround):

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from gvgbot.autonomy.exploration.paths import Approach, shortest_paths
-from gvgbot.autonomy.gvg.local import Branch, LocalGvg, Place
+from gvgbot.autonomy.gvg.local import Branch, LocalGvg, LocalNode, Place
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
 from gvgbot.autonomy.views import Correspondence
 from gvgbot.geometry import Array, Pose, wrap_angle
@@ -138,6 +138,7 @@ class Situation:
     where: Whereabouts
     place: Place
     local_base: Pose
+    doubted: frozenset[int] = frozenset()  # nodes that may be there for a while only
 
     def starts(self) -> list[Approach]:
         """The first vertices that the robot can reach along the edge it is on."""
@@ -161,7 +162,8 @@ class Situation:
         driven = self.where.trail_length
         found = [Approach(driven, end)]
         edge = self.graph.edge_at(end)
-        if edge is not None:
+        half = self.graph.half_edge(end)
+        if edge is not None and half is not None and not half.blocked:
             found.append(Approach(max(0.0, edge.length - driven), edge.other(end)))
         return [a for a in found if a.arrival.vertex not in in_sight]
 
@@ -216,10 +218,18 @@ class Situation:
         while True:
             end = self.gvg.end_of(path[-1])
             node = self.gvg.nodes[end]
-            if end in self.known.vertex_of or node.degree != 2:
+            if end in self.known.vertex_of or (node.degree != 2 and end not in self.doubted):
                 return path
             arrived = Branch(path[-1].edge, not path[-1].forward)
             onwards = [b for b in node.branches if b not in node.weak and b != arrived]
-            if len(onwards) != 1 or any(b.edge == onwards[0].edge for b in path):
+            if not onwards:
                 return path
-            path = (*path, onwards[0])
+            straight = self.gvg.bearing(arrived, node.clearance) + math.pi
+            onward = min(onwards, key=lambda b: self._turn(b, node, straight))
+            if any(b.edge == onward.edge for b in path):
+                return path
+            path = (*path, onward)
+
+    def _turn(self, branch: Branch, node: LocalNode, straight: float) -> float:
+        """How much a branch turns away from straight on, rad."""
+        return abs(wrap_angle(self.gvg.bearing(branch, node.clearance) - straight))

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+from gvgbot.autonomy.control.reflexes import Felt
 from gvgbot.autonomy.estimate import smoothed
 from gvgbot.autonomy.events import Event, LoopClosed
 from gvgbot.autonomy.loop import Loop
@@ -24,8 +25,9 @@ from tests.unit.autonomy.sights import carved
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(60)]
 
-Message = Scan | Odometry
+Message = Scan | tuple[Odometry, Felt]
 Answer = list[Event] | Twist
+NOTHING_FELT = Felt()
 # A dead end that leads to a ring of corridors: a meetpoint, an endpoint, and a loop to close.
 LOLLIPOP = carved(
     [
@@ -53,9 +55,9 @@ class RecordedPipeline(Pipeline):
         self.answers.append(answer)
         return answer
 
-    def control(self, odometry: Odometry) -> Twist:
-        answer = super().control(odometry)
-        self.messages.append(odometry)
+    def control(self, odometry: Odometry, felt: Felt = NOTHING_FELT) -> Twist:
+        answer = super().control(odometry, felt)
+        self.messages.append((odometry, felt))
         self.answers.append(answer)
         return answer
 
@@ -100,7 +102,7 @@ def replayed(drive: Drive) -> RecordedPipeline:
         if isinstance(message, Scan):
             fresh.perceive(message)
         else:
-            fresh.control(message)
+            fresh.control(*message)
     return fresh
 
 
@@ -150,8 +152,8 @@ def test_a_range_that_differs_by_a_centimetre_is_another_drive(drive: Drive) -> 
     """The comparison above is fine enough to see it."""
     fresh = RecordedPipeline(drive.config)
     for message in drive.pipeline.messages:
-        if isinstance(message, Odometry):
-            fresh.control(message)
+        if isinstance(message, tuple):
+            fresh.control(*message)
         else:
             nearer = message.ranges - 0.01 * (message.stamp > 3.0)
             fresh.perceive(replace(message, ranges=nearer))

@@ -1,0 +1,217 @@
+"""What the robot does at once when it is touched, lifted or held up, whatever its plan is."""
+
+import math
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from gvgbot.geometry import STANDSTILL, Pose, Twist
+from gvgbot.hal.guard import Reason
+from gvgbot.hal.messages import Contact
+from gvgbot.ranges import Range
+
+_SIDE_RAD = math.radians(55)  # where the middle of the left bumper is
+_GRIP_S = 3.0  # backing off longer than it should take, by this, is given up
+_OFTEN_S = 20.0  # a second overload within this time means that something is in the way
+_TRIES = 3  # to get rid of a contact by backing off
+
+Cause = Literal["bumper", "cliff", "over-current", "stuck"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReflexConfig:
+    """How the robot gets away from what it has felt."""
+
+    back_off_m: Annotated[float, Range(0.02, 0.5)] = 0.12
+    back_off_speed_mps: Annotated[float, Range(0.01, 0.3)] = 0.1
+    rest_s: Annotated[float, Range(0.1, 60.0)] = 2.0  # after an overload, or being put down
+    stuck_s: Annotated[float, Range(1.0, 60.0)] = 5.0
+    stuck_m: Annotated[float, Range(0.01, 0.5)] = 0.05  # moved less than this in that time
+    stuck_speed_mps: Annotated[float, Range(0.01, 0.5)] = 0.05  # though this was asked for
+
+
+@dataclass(frozen=True, slots=True)
+class Felt:
+    """What the base feels, and what the guard made of the last wish."""
+
+    contact: Contact | None = None
+    stopped_for: Reason | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """A control cycle: where the robot is in the local frame, what it wishes and what it feels."""
+
+    stamp: float
+    local_base: Pose
+    wish: Twist
+    felt: Felt
+
+
+@dataclass(frozen=True, slots=True)
+class Hit:
+    """Something is there at these bearings (rad) that the laser does not show."""
+
+    cause: Cause
+    bearings: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Held:
+    """The guard has not let the robot go on for a while."""
+
+
+@dataclass(frozen=True, slots=True)
+class PutDown:
+    """The wheels are on the floor again, nobody knows where."""
+
+
+Incident = Hit | Held | PutDown
+
+
+@dataclass(frozen=True, slots=True)
+class _BackOff:
+    """Drive back until so far behind where it began."""
+
+    begin: Pose
+    metres: float
+    until: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Rest:
+    """Stand until a stamp; then back off if this was not the first time."""
+
+    until: float
+    incident: Incident | None
+
+
+class Reflexes:
+    """Lets a wish through, unless there is something more urgent to do."""
+
+    def __init__(self, config: ReflexConfig) -> None:
+        self._config = config
+        self._doing: _BackOff | _Rest | None = None
+        self._touching = False
+        self._tries = 0
+        self._overloaded = -math.inf  # stamp
+        self._past: deque[Moment] = deque()
+
+    @property
+    def is_lifted(self) -> bool:
+        """Whether the wheels are, or were a moment ago, off the floor."""
+        return isinstance(self._doing, _Rest) and isinstance(self._doing.incident, PutDown)
+
+    def act(self, now: Moment, room_behind: Callable[[], float]) -> tuple[Twist, Incident | None]:
+        """The twist to drive, and what has happened.
+
+        `room_behind` tells how far the robot can go backwards, m.
+        """
+        contact = now.felt.contact
+        if contact is not None and contact.wheel_drop:
+            self._doing = _Rest(now.stamp + self._config.rest_s, PutDown())
+        elif contact is not None and contact.over_current and not self.is_lifted:
+            self._rest_from_overload(now)
+        match self._doing:
+            case _Rest():
+                return self._rest(now, self._doing, room_behind)
+            case _BackOff():
+                return self._go_back(now, self._doing), None
+            case None:
+                return self._go_on(now, room_behind)
+
+    def _go_on(
+        self, now: Moment, room_behind: Callable[[], float]
+    ) -> tuple[Twist, Incident | None]:
+        incident = self._notice(now)
+        if isinstance(incident, Hit):
+            return self._back_off(now, room_behind), incident
+        return now.wish, incident
+
+    # -- what is felt ------------------------------------------------------------------------------
+
+    def _notice(self, now: Moment) -> Incident | None:
+        contact = now.felt.contact
+        touching = contact is not None and (contact.bumper or contact.cliff)
+        before, self._touching = self._touching, touching
+        if contact is None or not touching:
+            self._tries = 0
+            return self._watch(now)
+        self._past.clear()
+        if before and self._tries >= _TRIES:
+            return None
+        self._tries += 1
+        return Hit("cliff" if contact.cliff else "bumper", _bearings(contact))
+
+    def _watch(self, now: Moment) -> Incident | None:
+        """Whether the robot has not come on for a while, and why."""
+        c, past = self._config, self._past
+        if now.wish.linear < c.stuck_speed_mps or now.felt.stopped_for in _OTHER_STOPS:
+            past.clear()
+            return None
+        past.append(now)
+        if now.stamp - past[0].stamp < c.stuck_s:
+            return None
+        begin = past.popleft()
+        if begin.local_base.distance(now.local_base) > c.stuck_m:
+            return None
+        held = any(moment.felt.stopped_for is not None for moment in past)
+        past.clear()
+        return Held() if held else Hit("stuck", (0.0,))
+
+    # -- what is done ------------------------------------------------------------------------------
+
+    def _rest_from_overload(self, now: Moment) -> None:
+        if isinstance(self._doing, _Rest):
+            return
+        again = now.stamp - self._overloaded < _OFTEN_S
+        self._overloaded = now.stamp
+        incident = Hit("over-current", (0.0,)) if again else None
+        self._doing = _Rest(now.stamp + self._config.rest_s, incident)
+
+    def _rest(
+        self, now: Moment, rest: _Rest, room_behind: Callable[[], float]
+    ) -> tuple[Twist, Incident | None]:
+        if now.stamp < rest.until:
+            return STANDSTILL, None
+        self._doing = None
+        self._past.clear()
+        if isinstance(rest.incident, Hit):
+            return self._back_off(now, room_behind), rest.incident
+        return STANDSTILL, rest.incident
+
+    def _back_off(self, now: Moment, room_behind: Callable[[], float]) -> Twist:
+        c = self._config
+        metres = min(c.back_off_m, room_behind())
+        until = now.stamp + metres / c.back_off_speed_mps + _GRIP_S
+        self._doing = _BackOff(now.local_base, metres, until)
+        self._past.clear()
+        return self._go_back(now, self._doing)
+
+    def _go_back(self, now: Moment, back: _BackOff) -> Twist:
+        behind = -back.begin.to(now.local_base).x  # of where it was felt, however long it braked
+        if behind >= back.metres or now.stamp > back.until:
+            self._doing = None
+            return STANDSTILL
+        return Twist(-self._config.back_off_speed_mps, 0.0)
+
+
+_OTHER_STOPS: tuple[Reason, ...] = (
+    "bad command",
+    "wheel drop",
+    "over-current",
+    "no scan",
+    "bumper",
+    "cliff",
+)
+
+
+def _bearings(contact: Contact) -> tuple[float, ...]:
+    """Where the bumpers or cliff sensors are that feel something, rad."""
+    sides = (
+        (contact.bumper_left or contact.cliff_left, _SIDE_RAD),
+        (contact.bumper_centre or contact.cliff_centre, 0.0),
+        (contact.bumper_right or contact.cliff_right, -_SIDE_RAD),
+    )
+    return tuple(bearing for is_felt, bearing in sides if is_felt)

@@ -1,0 +1,41 @@
+"""Ways that something stood in, and when they are worth another try."""
+
+from collections.abc import Iterable
+
+from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
+
+
+class Obstructions:
+    """Closes half-edges for a while: frontiers are not chosen, edges not driven."""
+
+    def __init__(self, retries: int, retry_after: float) -> None:
+        """Each is opened again so many times, so many seconds after it was closed."""
+        self._retries, self._retry_after = retries, retry_after
+        self._times: dict[HalfEdgeId, int] = {}  # that it was closed
+        self._since: dict[HalfEdgeId, float] = {}  # stamps of those that will be opened again
+
+    @property
+    def waiting(self) -> bool:
+        """Whether something closed will be tried again."""
+        return bool(self._since)
+
+    def close(self, graph: GvgGraph, ends: Iterable[HalfEdgeId], stamp: float) -> None:
+        """Block these ends."""
+        for end in ends:
+            half = graph.half_edge(end)
+            if half is None:
+                continue
+            half.blocked = True
+            self._times[end] = self._times.get(end, 0) + 1
+            if self._times[end] <= self._retries:
+                self._since[end] = stamp
+
+    def open(self, graph: GvgGraph, stamp: float) -> bool:
+        """Unblock what was closed long enough ago; whether there was something."""
+        due = [end for end, since in self._since.items() if stamp - since >= self._retry_after]
+        for end in due:
+            del self._since[end]
+            half = graph.half_edge(end)
+            if half is not None:
+                half.blocked = False
+        return bool(due)

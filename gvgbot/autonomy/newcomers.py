@@ -1,0 +1,100 @@
+"""Things that stand where there was nothing before: people, mostly, who go again.
+
+They are kept out of the map until they have stood for a while, and nothing that depends on them is
+believed for a while longer. The guard sees them all the same.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from gvgbot.autonomy.gvg.local_map import LocalMap
+from gvgbot.geometry import Array, Pose
+from gvgbot.hal.messages import Scan
+from gvgbot.ranges import Range
+
+_CELL_M = 0.2
+_REACH_M = 6.0  # beyond, beams are too far apart to tell what was there before
+_LOST_S = 3.0  # what has not been seen for so long has gone, and begins anew if it comes back
+
+Cell = tuple[int, int]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NewcomersConfig:
+    """When something new is taken for a part of the building."""
+
+    away_from_walls_m: Annotated[float, Range(0.1, 2.0)] = 0.35
+    mapped_after_s: Annotated[float, Range(0.0, 600.0)] = 5.0
+    believed_after_s: Annotated[float, Range(0.0, 3600.0)] = 120.0
+
+
+@dataclass(slots=True, eq=False)
+class _Stay:
+    first: float  # stamps
+    last: float
+
+
+class Newcomers:
+    """Where something has come lately, by cells of the local frame."""
+
+    def __init__(self, config: NewcomersConfig) -> None:
+        self._config = config
+        self._stays: dict[Cell, _Stay] = {}
+
+    def sift(self, scan: Scan, local_base: Pose, local_map: LocalMap) -> Scan:
+        """The scan without the beams that end on something which has come a moment ago."""
+        self._forget(scan.stamp)
+        beams = np.flatnonzero(scan.ranges < _REACH_M)
+        ends = _ends(scan, beams, local_base)
+        is_new = self._is_new(ends, local_map)
+        beams, cells = beams[is_new], np.floor(ends[is_new] / _CELL_M).astype(int).tolist()
+        passing = [
+            beam
+            for beam, (i, j) in zip(beams.tolist(), cells, strict=True)
+            if self._age((i, j), scan.stamp) < self._config.mapped_after_s
+        ]
+        if not passing:
+            return scan
+        ranges = scan.ranges.copy()
+        ranges[passing] = np.nan
+        return replace(scan, ranges=ranges)
+
+    def _is_new(self, ends: Array, local_map: LocalMap) -> NDArray[np.bool_]:
+        """Which points (N, 2) lie where the map has known nothing but free space."""
+        walls = local_map.points()
+        known = local_map.known(ends)
+        if not len(walls) or not known.any():
+            return np.zeros(len(ends), bool)
+        limit = self._config.away_from_walls_m
+        distance, _ = cKDTree(walls).query(ends, distance_upper_bound=limit)
+        return np.asarray(known & ~np.isfinite(distance))
+
+    def _age(self, cell: Cell, stamp: float) -> float:
+        stay = self._stays.setdefault(cell, _Stay(stamp, stamp))
+        stay.last = stamp
+        return stamp - stay.first
+
+    def _forget(self, stamp: float) -> None:
+        c = self._config
+        self._stays = {
+            cell: stay
+            for cell, stay in self._stays.items()
+            if stamp - stay.first < c.believed_after_s
+            and (stamp - stay.last < _LOST_S or stay.last - stay.first >= c.mapped_after_s)
+        }
+
+    @property
+    def points(self) -> Array:
+        """The middles (N, 2) of the cells that have been new lately, local frame."""
+        return (np.array(list(self._stays), dtype=np.float64).reshape(-1, 2) + 0.5) * _CELL_M
+
+
+def _ends(scan: Scan, beams: NDArray[np.intp], local_base: Pose) -> Array:
+    """Where beams end (N, 2), local frame."""
+    bearings = scan.angle_min + scan.angle_increment * beams
+    directions = np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
+    return local_base.compose(scan.base_laser).transform(scan.ranges[beams, None] * directions)

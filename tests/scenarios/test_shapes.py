@@ -1,0 +1,168 @@
+"""Shapes of free space that are easily taken for something else, explored to the end."""
+
+import math
+
+import pytest
+
+from gvgbot.config import TwinConfig
+from gvgbot.drivers.hokuyo.twin_config import HokuyoTwinConfig
+from gvgbot.drivers.kobuki.twin_config import KobukiTwinConfig
+from gvgbot.geometry import Pose
+from gvgbot.worlds.canvas import Canvas
+from tests.scenarios.rig import (
+    assert_degrees,
+    assert_explored,
+    assert_found,
+    graph_shape,
+    play,
+)
+from tests.unit.autonomy.sights import Rectangle, carved
+
+pytestmark = [pytest.mark.slow, pytest.mark.twin, pytest.mark.timeout(120)]
+
+
+def test_a_hall_without_a_wall_in_sight_ends_the_run_with_a_reason() -> None:
+    """A laser that sees 5.6 m, in the middle of 13 m by 13 m."""
+    twin = TwinConfig(laser=HokuyoTwinConfig(model="URG-04LX"))
+    run = play(carved([(-6.5, -6.5, 6.5, 6.5)]), Pose(), twin=twin, limit=120.0)
+    assert run.outcome == "failed"
+    assert "no walls within range" in run.pipeline.mission.reason
+    assert run.contacts == 0
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.15], ids=["straight", "perturbed"])
+def test_a_crossing_is_one_meetpoint_of_four(offset: float) -> None:
+    """Arms that face each other, or are a little off: far less than half the robot apart."""
+    free: list[Rectangle] = [
+        (-3.5, -0.7, 3.5, 0.7),
+        (-0.7, 0.0, 0.7, 3.5),
+        (-0.7 + offset, -3.5, 0.7 + offset, 0.0),
+    ]
+    run = play(carved(free), Pose(-2.0, 0.1, 0.2))
+    assert_explored(run)
+    middle = (offset / 2, 0.0)
+    assert_found(run, "meetpoint", [middle])
+    assert_degrees(run, {middle: 4})
+    assert_found(run, "endpoint", [(-2.8, 0.0), (2.8, 0.0), (0.0, 2.8), (offset, -2.8)])
+
+
+def test_alcoves_less_deep_than_the_corridor_is_wide_are_no_vertices() -> None:
+    niches: list[Rectangle] = [(-1.0, 0.5, 0.0, 1.1), (1.0, -0.9, 1.6, 0.0)]
+    run = play(carved([(-3.5, -0.7, 3.5, 0.7), *niches]), Pose(-2.0, 0.0, 0.0))
+    assert_explored(run)
+    assert graph_shape(run) == (0, 2, 1)
+
+
+def test_a_pillar_in_a_dead_end_makes_an_edge_from_a_vertex_to_itself() -> None:
+    """The corridor comes into the room; around the pillar the robot comes back to the mouth."""
+    run = play(
+        carved([(-3.0, -0.6, 0.0, 0.6), (0.0, -1.8, 3.6, 1.8)], [(1.3, -0.5, 2.3, 0.5)]),
+        Pose(-1.5, 0.0, 0.0),
+    )
+    assert_explored(run)
+    graph = run.pipeline.mapper.graph
+    loops = [edge for edge in graph.edges.values() if edge.a.vertex == edge.b.vertex]
+    assert len(loops) == 1
+    assert graph_shape(run) == (1, 1, 2)
+
+
+@pytest.mark.xfail(strict=True, reason="nothing closes an edge that has no end")
+def test_a_ring_without_a_vertex_is_driven_round_once() -> None:
+    """A pillar alone in a room: an edge without an end."""
+    run = play(
+        carved([(-2.0, -2.0, 2.0, 2.0)], [(-0.7, -0.7, 0.7, 0.7)]),
+        Pose(-1.3, 0.0, math.pi / 2),
+        limit=60.0,
+    )
+    assert_explored(run)
+    assert len(run.vertices("meetpoint")) == 0
+
+
+def test_two_ways_round_a_block_are_two_edges_between_the_same_vertices() -> None:
+    """West and east of a block with a corridor on either side, and a dead end at each vertex."""
+    free: list[Rectangle] = [
+        (-4.5, -0.6, -1.0, 0.6),
+        (1.0, -0.6, 4.5, 0.6),
+        (-2.2, -1.9, 2.2, 1.9),
+    ]
+    run = play(carved(free, [(-1.0, -0.7, 1.0, 0.7)]), Pose(-3.5, 0.0, 0.1))
+    assert_explored(run)
+    graph = run.pipeline.mapper.graph
+    parallel = [
+        edge
+        for edge in graph.edges.values()
+        if {edge.a.vertex, edge.b.vertex} == set(run.vertices("meetpoint"))
+    ]
+    assert graph_shape(run) == (2, 2, 4)
+    assert len(parallel) == 2
+
+
+def test_a_side_corridor_that_lies_behind_the_laser_s_view_is_found() -> None:
+    """With 240 degrees of sight, past an arm that leaves backwards at 45 degrees."""
+    canvas = Canvas(10.0, 7.0)
+    canvas.carve(1.0, 4.0, 9.0, 5.2)
+    canvas.carve_turned(3.6, 3.2, 5.0, 1.2, math.radians(45))
+    run = play(
+        canvas.world("rear"),
+        Pose(2.0, 4.6, 0.0),
+        twin=TwinConfig(laser=HokuyoTwinConfig(model="URG-04LX")),
+    )
+    assert_explored(run)
+    assert graph_shape(run) == (1, 3, 3)
+
+
+@pytest.mark.parametrize("width", [0.3, 0.37, 0.4], ids=lambda w: f"{w:g} m")
+def test_a_door_that_the_robot_does_not_fit_through_is_no_edge(width: float) -> None:
+    """The robot is 0.354 m wide and wants three centimetres on either side."""
+    free: list[Rectangle] = [(-2.5, -0.7, 2.5, 0.7), (-width / 2, 0.7, width / 2, 1.0)]
+    free.append((-1.5, 0.9, 1.5, 3.0))
+    run = play(carved(free), Pose(-1.5, 0.0, 0.0))
+    assert_explored(run)
+    assert graph_shape(run) == (0, 2, 1)
+
+
+def test_a_door_that_the_robot_fits_through_is_an_edge() -> None:
+    free: list[Rectangle] = [(-2.5, -0.7, 2.5, 0.7), (-0.25, 0.7, 0.25, 1.0), (-1.0, 0.9, 1.0, 3.0)]
+    run = play(carved(free), Pose(-1.5, 0.0, 0.0))
+    assert_explored(run)
+    assert len(run.vertices("meetpoint")) >= 1
+    assert max(pose.y for pose in run.truth) > 1.2  # it has been inside
+
+
+@pytest.mark.parametrize("width", [0.8, 2.0], ids=["narrow", "wide"])
+def test_a_dead_end_is_half_its_width_before_the_wall(width: float) -> None:
+    run = play(carved([(-3.0, -width / 2, 3.0, width / 2)]), Pose(-1.0, 0.05, 0.1))
+    assert_explored(run)
+    ends = [(-3.0 + width / 2, 0.0), (3.0 - width / 2, 0.0)]
+    assert_found(run, "endpoint", ends, within=0.2)
+    assert graph_shape(run) == (0, 2, 1)
+
+
+@pytest.mark.parametrize("inner", [0.6, 1.1], ids=["equal", "wider"])
+def test_a_bend_round_a_corner_is_no_vertex(inner: float) -> None:
+    free: list[Rectangle] = [(-3.0, -0.6, 0.6, 0.6), (0.6 - 2 * inner, -0.6, 0.6, 4.0)]
+    run = play(carved(free), Pose(-2.0, 0.0, 0.0))
+    assert_explored(run)
+    assert graph_shape(run) == (0, 2, 1)
+
+
+def test_a_tree_of_corridors_is_explored_without_a_loop() -> None:
+    """A comb with two teeth: everything but the tips is passed more than once."""
+    free: list[Rectangle] = [
+        (-4.0, -0.6, 4.0, 0.6),
+        (-1.6, 0.0, -0.4, 3.5),
+        (1.4, 0.0, 2.6, 3.5),
+    ]
+    run = play(carved(free), Pose(-3.0, 0.0, 0.0))
+    assert_explored(run)
+    assert graph_shape(run) == (2, 4, 5)
+
+
+def test_equal_branches_are_not_taken_for_one_another() -> None:
+    """Four equal side corridors with worn wheels: no vertex closes a loop with its neighbour."""
+    free: list[Rectangle] = [(-1.0, -0.6, 11.0, 0.6)]
+    free += [(x - 0.6, 0.0, x + 0.6, 2.4) for x in (1.0, 4.0, 7.0, 10.0 - 0.6)]
+    twin = TwinConfig(seed=5, base=KobukiTwinConfig(odometry="worn"))
+    run = play(carved(free), Pose(0.0, 0.0, 0.0), twin=twin)
+    assert_explored(run)
+    assert graph_shape(run) == (4, 6, 9)
