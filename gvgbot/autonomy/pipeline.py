@@ -40,6 +40,7 @@ from gvgbot.ranges import Range
 
 _NOTHING_FELT = Felt()
 _LIFTED = np.diag([0.3**2, 0.3**2, 0.1**2])  # how far a robot is carried that is put down again
+_SEEN_SHARE = 0.8  # of the laser's range: walls farther off cannot be relied on
 _LONGEST_GAP_S = 2.0  # between keyframes; a longer one is an outage of a device
 _SCAN_EVERY_M, _SCAN_EVERY_RAD = 0.7, 0.5  # scans that are kept for the occupancy grid
 
@@ -162,6 +163,9 @@ class Pipeline:
             local_base.position,
             min_clearance=self._radius + self._config.passage_margin_m,
             roughness=self._config.reduction.roughness_m,
+            open_clearance=min(
+                self._config.reduction.open_clearance_m, _SEEN_SHARE * scan.range_max
+            ),
             felt=self._hazards.points,
         )
         known_vertices = self.mapper.known_around(local_base, self._config.local_map.half_width_m)

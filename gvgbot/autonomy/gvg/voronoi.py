@@ -12,6 +12,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import Delaunay, QhullError
 
+from gvgbot.autonomy.gvg.coast import Diagram, with_coast
 from gvgbot.autonomy.gvg.local_map import LocalMap
 from gvgbot.geometry import Array
 
@@ -43,14 +44,16 @@ def fine_graph(
     *,
     min_clearance: float,
     roughness: float,
+    open_clearance: float = np.inf,
     felt: Array = _NOTHING,
 ) -> FineGraph:
     """The certain Voronoi graph around the robot (2,); EMPTY where there is none.
 
     A ridge counts if the robot (of radius `min_clearance`) fits between its two generators, and if
     they cannot be two bumps of one flat wall: a disc of radius r touches two bumps of height h on a
-    wall if they are less than sqrt(8 h r) apart. `roughness` is that h, m. `felt` are obstacles
-    (N, 2) that the map does not show.
+    wall if they are less than sqrt(8 h r) apart. `roughness` is that h, m. Farther from all walls
+    than `open_clearance` m, the graph goes along the coast instead. `felt` are obstacles (N, 2)
+    that the map does not show.
     """
     generators = np.concatenate([local_map.points(), felt])
     if len(generators) < 4:
@@ -59,26 +62,37 @@ def fine_graph(
         triangles = Delaunay(generators)
     except QhullError:
         return EMPTY
-    centres, clearance = _circumcircles(generators[triangles.simplices])
-    wide = clearance >= min_clearance
-    certain = np.zeros(len(centres), bool)
-    certain[wide] = _disc_is_known(local_map, centres[wide], clearance[wide])
+    points, clearance = _circumcircles(generators[triangles.simplices])
     a, b, pair = _ridges(triangles)
     p, q = generators[pair[:, 0]], generators[pair[:, 1]]
     chord = np.hypot(*(p - q).T)
-    narrowest = _least_clearance(centres, clearance, a, b, p, q)
+    narrowest = _least_clearance(points, clearance, a, b, p, q)
     parts = chord >= np.maximum(2 * min_clearance, np.sqrt(8 * roughness * narrowest))
-    a, b, p, q = a[parts], b[parts], p[parts], q[parts]
-    joined = certain[a] & (b >= 0) & certain[b]
-    lead = np.full(len(centres), np.nan)
-    for here, there in ((a, b), (b, a)):
-        out = (here >= 0) & certain[here] & ((there < 0) | (wide[there] & ~certain[there]))
-        goal = np.where((there < 0)[:, None], (p + q) / 2, centres[there])[out]
-        towards = goal - centres[here[out]]
-        lead[here[out]] = np.arctan2(towards[:, 1], towards[:, 0])
-    return _piece_of_robot(
-        centres, clearance, np.stack([a[joined], b[joined]], axis=1), lead, robot
-    )
+    endless = parts & (b < 0)
+    links = np.stack([a, b], axis=1)[parts & ~endless]
+    if np.isfinite(open_clearance):
+        diagram = Diagram(points, clearance, a, b, pair, parts)
+        coast = with_coast(diagram, generators, open_clearance, local_map)
+        if coast is not None:
+            points, clearance, links = coast
+    wide = clearance >= min_clearance
+    near = wide & (clearance <= open_clearance)
+    certain = np.zeros(len(points), bool)
+    certain[near] = _disc_is_known(local_map, points[near], clearance[near])
+    lead = np.full(len(points), np.nan)
+    for here, there in ((links[:, 0], links[:, 1]), (links[:, 1], links[:, 0])):
+        out = certain[here] & wide[there] & ~certain[there]
+        lead[here[out]] = _direction(points[there[out]] - points[here[out]])
+    out = endless & certain[a]
+    lead[a[out]] = _direction((p[out] + q[out]) / 2 - points[a[out]])
+    joined = certain[links].all(axis=1)
+    return _piece_of_robot(points, clearance, links[joined], lead, robot)
+
+
+def _direction(vectors: Array) -> Array:
+    """Angles (N,) of vectors (N, 2), rad."""
+    angles: Array = np.arctan2(vectors[:, 1], vectors[:, 0])
+    return angles
 
 
 def _circumcircles(corners: Array) -> tuple[Array, Array]:
