@@ -21,6 +21,8 @@ from gvgbot.ranges import Range
 
 _LEAST_LOOP_M = 4.0  # an edge with both ends in sight is left to sight unless so much was driven
 _WORTH_TURNING_M = 1.0  # a new frontier must be so much nearer than the old one
+_FACING_RAD = 1.0  # looking so far past a thing, one would not see it go
+_FACING_POINTS = 6  # of a polyline tell where its end points to
 _LONGEST_VIEW_S = 2.0  # a longer gap between views is an outage, not a lack of progress
 
 Outcome = Literal["explored", "explored_with_blocked", "failed"]
@@ -269,6 +271,9 @@ class Mission:
         waited = view.stamp - self._last_progress
         if track.length < 0.3 and blind and end in view.doubted:
             self._held = True
+            away = _turn_to_face(view, path[-1])
+            if min(away, math.tau - away) > _FACING_RAD:
+                return LookAround(away)
         elif track.length < 0.3 and waited > self._config.look_around_s:
             self._last_progress = view.stamp
             self._looked_around += 1
@@ -396,6 +401,12 @@ class Mission:
     def _end(self, view: View, outcome: Outcome, reason: str) -> None:
         self.outcome, self.reason = outcome, reason
         self._events.append(Finished(view.stamp, outcome, reason))
+
+
+def _turn_to_face(view: View, branch: Branch) -> float:
+    """How far to turn left until the robot looks along the end of a branch, rad."""
+    dx, dy = np.diff(view.gvg.leaving(branch)[-_FACING_POINTS:][[0, -1]], axis=0)[0]
+    return float((math.atan2(dy, dx) - view.local_base.theta) % math.tau)
 
 
 def _later(stamp: float | None, seconds: float) -> float | None:

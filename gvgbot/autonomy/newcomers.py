@@ -27,9 +27,9 @@ Cell = tuple[int, int]
 class NewcomersConfig:
     """When something new is taken for a part of the building."""
 
-    away_from_walls_m: Annotated[float, Range(0.1, 2.0)] = 0.35
+    away_from_walls_m: Annotated[float, Range(0.1, 2.0)] = 0.2
     mapped_after_s: Annotated[float, Range(0.0, 600.0)] = 5.0
-    believed_after_s: Annotated[float, Range(0.0, 3600.0)] = 120.0
+    believed_after_s: Annotated[float, Range(0.0, 3600.0)] = 300.0
 
 
 @dataclass(slots=True, eq=False)
@@ -50,12 +50,13 @@ class Newcomers:
         self._forget(scan.stamp)
         beams = np.flatnonzero(scan.ranges < _REACH_M)
         ends = _ends(scan, beams, local_base)
+        cells = [(i, j) for i, j in np.floor(ends / _CELL_M).astype(int).tolist()]
         is_new = self._is_new(ends, local_map)
-        beams, cells = beams[is_new], np.floor(ends[is_new] / _CELL_M).astype(int).tolist()
         passing = [
             beam
-            for beam, (i, j) in zip(beams.tolist(), cells, strict=True)
-            if self._age((i, j), scan.stamp) < self._config.mapped_after_s
+            for beam, cell, new in zip(beams.tolist(), cells, is_new.tolist(), strict=True)
+            if (new or cell in self._stays)
+            and self._age(cell, scan.stamp) < self._config.mapped_after_s
         ]
         if not passing:
             return scan

@@ -1,0 +1,127 @@
+"""People stand in the way: the robot waits, goes round them or elsewhere, and comes back."""
+
+import math
+
+import pytest
+
+from gvgbot.autonomy.events import VertexAdded
+from gvgbot.geometry import Pose
+from tests.scenarios.rig import (
+    FAR_AWAY,
+    ROBOT_RADIUS,
+    Play,
+    assert_degrees,
+    assert_found,
+    play,
+)
+from tests.unit.autonomy.sights import carved
+
+pytestmark = [pytest.mark.slow, pytest.mark.twin, pytest.mark.timeout(120)]
+
+# A corridor from west to east, with a branch to the north whose end cannot be seen from its mouth.
+NARROW = 1.0  # m: no way past a person of 0.4 m or more
+WORLD = carved(
+    [
+        (-4.0, -0.5, 3.0, 0.5),
+        (-0.5, 0.0, 0.5, 3.5),
+        (-0.5, 2.5, 3.0, 3.5),
+    ]
+)
+START = Pose(-3.0, 0.0, 0.0)
+MEETPOINT = (0.0, NARROW**2 / (8 * NARROW))
+ENDS = [(-3.5, 0.0), (2.5, 0.0), (2.5, 3.0)]
+
+
+def distances_to_person(run: Play, x: float, y: float, *, since: float) -> list[float]:
+    return [math.dist((p.x, p.y), (x, y)) for p in run.truth[round(since * 50) :]]
+
+
+def test_a_person_who_steps_aside_soon_is_waited_for() -> None:
+    spot = (0.0, 1.8)
+
+    async def story(run: Play) -> None:
+        await run.until(lambda: run.here.y > 0.3)
+        run.put_person(*spot)
+        await run.sleep(8.0)
+        run.put_person(*FAR_AWAY)
+
+    run = play(WORLD, START, story=story, with_person=True)
+    assert run.outcome == "explored", run.pipeline.mission.reason
+    assert run.contacts == 0
+    assert "try another way" not in run.recoveries()
+    assert_found(run, "meetpoint", [MEETPOINT])
+    assert_degrees(run, {MEETPOINT: 3})
+    assert_found(run, "endpoint", ENDS)
+
+
+def test_a_person_who_stays_for_a_while_is_left_alone_and_the_branch_explored_later() -> None:
+    """Waited for at most fifteen seconds; nothing is believed that only the person makes so."""
+    spot = (0.0, 1.8)
+    gone: list[float] = []
+
+    async def story(run: Play) -> None:
+        await run.until(lambda: run.here.y > 0.3)
+        run.put_person(*spot)
+        await run.until(lambda: "try another way" in run.recoveries())
+        gone.append(run.clock.now())
+        await run.sleep(15.0)
+        run.put_person(*FAR_AWAY)
+
+    run = play(WORLD, START, story=story, with_person=True)
+    assert gone
+    assert run.outcome == "explored", run.pipeline.mission.reason
+    assert run.contacts == 0
+    assert "try again" in run.recoveries()
+    assert_found(run, "meetpoint", [MEETPOINT])
+    assert_found(run, "endpoint", ENDS)
+    added = [e for e in run.events if isinstance(e, VertexAdded)]
+    assert len(added) == 4
+
+
+def test_a_person_who_never_goes_leaves_a_frontier_blocked() -> None:
+    async def story(run: Play) -> None:
+        await run.until(lambda: run.here.y > 0.3)
+        run.put_person(0.0, 1.8)
+
+    run = play(WORLD, START, story=story, with_person=True)
+    assert run.outcome == "explored_with_blocked", run.pipeline.mission.reason
+    assert run.contacts == 0
+    assert run.recoveries().count("try again") <= 3
+    assert run.ended < 300.0
+
+
+def test_a_person_in_a_wide_corridor_is_passed() -> None:
+    """Between the person, 0.25 m in radius at most, and either wall there is 0.85 m."""
+    world = carved([(-4.0, -1.1, 6.0, 1.1), (3.8, -1.1, 6.0, 5.0)])
+
+    async def story(run: Play) -> None:
+        await run.until(lambda: run.here.x > -1.5)
+        run.put_person(1.5, 0.0)
+        await run.until(lambda: run.here.x > 3.0)
+        run.put_person(*FAR_AWAY)
+
+    run = play(world, START, story=story, with_person=True)
+    assert run.outcome == "explored", run.pipeline.mission.reason
+    assert run.contacts == 0
+    assert_found(run, "endpoint", [(-2.9, 0.0), (4.9, 3.9)])
+    assert len(run.vertices("meetpoint")) == 0
+
+
+def test_a_person_who_jumps_into_the_way_is_not_touched() -> None:
+    """A metre ahead of a robot at half a metre a second; it stops and does not brush past."""
+    spots: list[tuple[float, float, float]] = []
+
+    async def story(run: Play) -> None:
+        await run.until(lambda: run.here.x > -1.5)
+        spots.append((run.here.x + 1.0, run.here.y, run.clock.now()))
+        run.put_person(*spots[0][:2])
+        await run.sleep(6.0)
+        run.put_person(*FAR_AWAY)
+
+    run = play(WORLD, START, story=story, with_person=True)
+    x, y, when = spots[0]
+    near = distances_to_person(run, x, y, since=when)[:300]
+    assert min(near) > ROBOT_RADIUS + 0.2
+    assert run.contacts == 0
+    assert run.stopped_for["obstacle"] > 0
+    assert run.outcome == "explored", run.pipeline.mission.reason
