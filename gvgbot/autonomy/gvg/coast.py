@@ -131,7 +131,8 @@ def _arcs(diagram: Diagram, walls: Array, cuts: _Cuts, radius: float) -> tuple[I
     centre = walls[owner]
     halfway = _on_circle(centre, angle + turn / 2, radius)
     free = cKDTree(walls).query(halfway)[0] >= radius - _TOUCH_M if len(halfway) else turn > 0
-    links, bends = [], [np.empty((0, 2))]
+    links: list[tuple[int, int]] = []
+    bends = [np.empty((0, 2))]
     serial = len(cuts.points)
     for i in np.flatnonzero(free).tolist():
         pieces = max(1, int(np.ceil(radius * turn[i] / _ARC_M)))
