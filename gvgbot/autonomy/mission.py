@@ -8,10 +8,11 @@ import numpy as np
 
 from gvgbot.autonomy.control.edge_follower import Track
 from gvgbot.autonomy.events import Decision, Event, Finished, Recovery
+from gvgbot.autonomy.exploration.access import NEAR_M, way_to_edge
 from gvgbot.autonomy.exploration.ears import ear_next, nearest_frontier
 from gvgbot.autonomy.exploration.obstructions import Obstructions
 from gvgbot.autonomy.exploration.paths import shortest_paths
-from gvgbot.autonomy.gvg.local import Branch
+from gvgbot.autonomy.gvg.local import Branch, Place
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.autonomy.start_edge import StartEdge, is_at_start
@@ -103,8 +104,10 @@ class Mission:
         """The order for the next keyframe interval."""
         self._events = []
         place = view.gvg.place(view.local_base.position)
-        if place is None or place.distance > 1.5:
+        if place is None:
             return self._search(view), self._events
+        if place.distance > NEAR_M:
+            return self._access(view, place), self._events
         self._lost_since = None
         base = view.local_base.position
         passage = self.where.follow(view.gvg, place, known, base)
@@ -352,6 +355,15 @@ class Mission:
         half.blocked = True
         self._events.append(Recovery(view.stamp, "give up a frontier", reason))
         self.target = None
+
+    def _access(self, view: View, place: Place) -> Order:
+        """Go to the nearest edge, if the way there is free."""
+        track = way_to_edge(view, place)
+        if track is None:
+            return self._search(view)
+        self._lost_since = None
+        self._watch_progress(view)
+        return Stand() if self.outcome is not None else Drive(track, blind_end=True)
 
     def _search(self, view: View) -> Order:
         """No edge in sight: look around, and give up after a while."""
