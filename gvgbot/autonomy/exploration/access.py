@@ -19,7 +19,7 @@ def way_to_edge(view: View, place: Place) -> Track | None:
     base, edge = view.local_base.position, view.gvg.edges[place.edge]
     goal = [float(np.interp(place.station, edge.stations, edge.polyline[:, k])) for k in (0, 1)]
     line = np.linspace(base, goal, math.ceil(place.distance / _SPACING_M) + 1)
-    room = cKDTree(view.local_map.points()).query(line)[0]
+    room = np.asarray(cKDTree(view.local_map.points()).query(line)[0])
     narrow = room < min(_ROOM_M, float(room[0]))  # where it stands, it may stand close
     if narrow.any() or not view.local_map.known(line).all():
         return None
