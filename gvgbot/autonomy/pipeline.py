@@ -283,7 +283,7 @@ class Pipeline:
                 if blocks:
                     self.mission.obstruct(f"{cause} again and again")
             case Held():
-                self._incidents.append(("wait", "something is in the way"))
+                self._incidents.append(("back off", "something is in the way"))
                 self.mission.hold()
             case PutDown():
                 self._incidents.append(("look around", "the robot was lifted"))

@@ -59,7 +59,7 @@ class Hit:
 
 @dataclass(frozen=True, slots=True)
 class Held:
-    """The guard has not let the robot go on for a while."""
+    """The guard has not let the robot go on for a while: it stands too near to something."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,9 +125,9 @@ class Reflexes:
         self, now: Moment, room_behind: Callable[[], float]
     ) -> tuple[Twist, Incident | None]:
         incident = self._notice(now)
-        if isinstance(incident, Hit):
-            return self._back_off(now, room_behind), incident
-        return now.wish, incident
+        if incident is None:
+            return now.wish, None
+        return self._back_off(now, room_behind), incident
 
     # -- what is felt ------------------------------------------------------------------------------
 
