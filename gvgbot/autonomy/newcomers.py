@@ -17,6 +17,7 @@ from gvgbot.hal.messages import Scan
 from gvgbot.ranges import Range
 
 _CELL_M = 0.2
+_AROUND = 0.15 * np.stack([f(np.arange(8) * np.pi / 4) for f in (np.cos, np.sin)], axis=1)  # m
 _REACH_M = 6.0  # beyond, beams are too far apart to tell what was there before
 _LOST_S = 3.0  # what has not been seen for so long has gone, and begins anew if it comes back
 
@@ -65,9 +66,12 @@ class Newcomers:
         return replace(scan, ranges=ranges)
 
     def _is_new(self, ends: Array, local_map: LocalMap) -> NDArray[np.bool_]:
-        """Which points (N, 2) lie where the map has known nothing but free space."""
+        """Which points (N, 2) lie where the map has known nothing but free space.
+
+        All around: behind a wall that comes into sight nothing is known.
+        """
         walls = local_map.points()
-        known = local_map.known(ends)
+        known = local_map.known(ends[:, None, :] + _AROUND).all(axis=1)
         if not len(walls) or not known.any():
             return np.zeros(len(ends), bool)
         limit = self._config.away_from_walls_m
