@@ -122,12 +122,30 @@ class LocalGvg:
         return edge.b if branch.forward else edge.a
 
     def bearing(self, branch: Branch, clearance: float) -> float:
-        """Direction of a branch as it leaves its node's disc, rad in the local frame."""
+        """Direction of a branch as it leaves its node's disc, rad in the local frame.
+
+        A point at which nothing certain branches off is no end of it.
+        """
         line = self.leaving(branch)
-        away = np.hypot(*(line - line[0]).T)
-        reach = min(max(0.5, 0.9 * clearance), float(away.max()))
-        target = line[int(np.argmax(away >= reach))]
-        return float(np.arctan2(target[1] - line[0, 1], target[0] - line[0, 0]))
+        wanted = max(0.5, 0.9 * clearance)
+        origin, passed = line[0], {branch.edge}
+        while np.hypot(*(line - origin).T).max() < wanted:
+            onwards = self.onwards(branch)
+            if onwards is None or onwards.edge in passed:
+                break
+            branch = onwards
+            passed.add(branch.edge)
+            line = np.concatenate([line, self.leaving(branch)])
+        away = np.hypot(*(line - origin).T)
+        target = line[int(np.argmax(away >= min(wanted, float(away.max()))))]
+        return float(np.arctan2(target[1] - origin[1], target[0] - origin[0]))
+
+    def onwards(self, branch: Branch) -> Branch | None:
+        """The one certain way on where a branch arrives; None at a meetpoint or an end."""
+        node = self.nodes[self.end_of(branch)]
+        arrived = Branch(branch.edge, not branch.forward)
+        ways = [b for b in node.branches if b not in node.weak and b != arrived]
+        return ways[0] if node.degree == 2 and len(ways) == 1 else None
 
     def routes(self, start: Place) -> dict[int, tuple[float, tuple[Branch, ...]]]:
         """Shortest way from a place to every node: metres, and the branches that are driven.

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gvgbot.autonomy.gvg.local import Branch, LocalGvg, Place
-from tests.unit.autonomy.local_graphs import drawn
+from tests.unit.autonomy.local_graphs import Point, drawn
 
 #        4
 #        | 2 m
@@ -91,3 +91,18 @@ def test_the_line_of_a_route_is_as_long_as_the_route(edge: int, share: float) ->
         length = float(np.hypot(*np.diff(line, axis=0).T).sum())
         assert metres - 0.11 <= length <= metres + 1e-9  # begins at the next point of the edge
         assert line[-1] == pytest.approx(POINTS[node])
+
+
+def test_a_bearing_looks_past_a_point_where_nothing_branches_off() -> None:
+    """The way bends half a metre off; its direction is taken 1.8 m off all the same."""
+    lines: dict[int, tuple[int, int, list[Point]]] = {
+        1: (1, 2, []),
+        2: (2, 3, []),
+        3: (1, 4, []),
+        4: (1, 5, []),
+    }
+    points = {1: (0.0, 0.0), 2: (0.5, -0.5), 3: (4.0, -0.5), 4: (-4.0, 0.0), 5: (0.0, 4.0)}
+    gvg = drawn(points, lines)
+    beyond = math.sqrt(1.8**2 - 0.5**2)
+    expected = math.atan2(-0.5, beyond)
+    assert gvg.bearing(Branch(1, forward=True), 2.0) == pytest.approx(expected, abs=0.03)
