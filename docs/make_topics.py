@@ -8,7 +8,7 @@ Fields are explained by the comments that they have in the source.
 import inspect
 import re
 from pathlib import Path
-from typing import Literal, get_args, get_origin, get_type_hints
+from typing import Literal, TypeGuard, get_args, get_origin, get_type_hints
 
 import msgspec
 
@@ -64,11 +64,13 @@ def _overview() -> str:
 def _section(topic: Topic) -> str:
     parts = [f"## `{topic.key('ROBOT')}`: {topic.payload.__name__}\n\n{_explained(topic.payload)}"]
     hints = get_type_hints(topic.payload).values()
-    within = dict.fromkeys(
-        h for h in hints if isinstance(h, type) and issubclass(h, msgspec.Struct)
-    )
-    parts += [f"### {part.__name__}\n\n{_explained(part)}" for part in within]
+    within = dict.fromkeys(part for hint in hints for part in (hint, *get_args(hint)))
+    parts += [f"### {part.__name__}\n\n{_explained(part)}" for part in within if _is_struct(part)]
     return "\n".join(parts)
+
+
+def _is_struct(part: object) -> TypeGuard[type[msgspec.Struct]]:
+    return isinstance(part, type) and issubclass(part, msgspec.Struct)
 
 
 def _explained(payload: type[msgspec.Struct]) -> str:

@@ -1,6 +1,5 @@
 """The configuration: one frozen tree of what every part of the robot needs to know."""
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from importlib.resources import files
@@ -16,10 +15,9 @@ from gvgbot.drivers.kobuki.twin import KobukiTwinConfig
 from gvgbot.hal.guard import GuardConfig
 from gvgbot.ranges import Range
 from gvgbot.strict_yaml import load
-from gvgbot.topics import TelemetryConfig
+from gvgbot.topics import TelemetryConfig, is_robot_name
 
 DEFAULT = "sim.yaml"
-NAME = re.compile(r"[A-Za-z0-9_-]+")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,7 +30,7 @@ class RobotConfig:
 
     def __post_init__(self) -> None:
         """Raises ValueError for a name that cannot be part of a topic."""
-        if NAME.fullmatch(self.name) is None:
+        if not is_robot_name(self.name):
             raise ValueError(f"name = {self.name!r}: must be letters, digits, - and _ only")
 
 

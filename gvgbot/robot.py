@@ -2,7 +2,9 @@
 
 import asyncio
 import contextlib
+from collections import deque
 from collections.abc import Awaitable, Callable
+from functools import partial
 from typing import Protocol
 
 import structlog
@@ -16,11 +18,13 @@ from gvgbot.hal.guard import Guard
 from gvgbot.hal.messages import Odometry
 from gvgbot.journal import GuardJournal, log_event, status_line
 from gvgbot.links import Devices, Links
+from gvgbot.live_map import LiveMap
+from gvgbot.maps.run_directory import record_of
 from gvgbot.service import Notifier
 from gvgbot.session import Session
 from gvgbot.simulation import Simulation
 from gvgbot.snapshots import state
-from gvgbot.topics import STATE, State
+from gvgbot.topics import EVENTS_KEPT, MAP, STATE, Event, Events, Map, Payload, State
 
 SAVE_EVERY = 30.0  # s at least between two savings while the map grows
 STUCK_AFTER = 1.0  # s without a control cycle, though the base is there
@@ -31,8 +35,8 @@ log = structlog.get_logger()
 class Network(Protocol):
     """Where the robot is watched from."""
 
-    def publish(self, state: State) -> None:
-        """Send without waiting."""
+    def publish(self, value: Payload) -> None:
+        """Send without waiting; from any thread."""
 
     async def answer(self) -> None:
         """Answer queries until cancelled."""
@@ -54,6 +58,8 @@ class Robot:
         self._grown, self._finished = asyncio.Event(), asyncio.Event()
         self._odometry: Odometry | None = None
         self._cycles, self._sequence = 0, 0
+        self._happened, self._told = 0, 0  # events; and those of them that were published
+        self._latest_events: deque[Event] = deque(maxlen=EVENTS_KEPT)
         self._ready = False
         self._guard = GuardJournal()
         self._clock: Clock
@@ -78,6 +84,7 @@ class Robot:
         }
         if self._network is not None:
             work["network"] = self._network.answer()
+            work["map"] = self._keep_shown(self._network)
         async with asyncio.TaskGroup() as tasks:
             serving = [tasks.create_task(task, name=name) for name, task in work.items()]
             log.info("stopping", signal=await stopped)
@@ -130,6 +137,16 @@ class Robot:
         except GvgbotError as error:
             log.warning("map not saved", reason=str(error))
 
+    async def _keep_shown(self, network: Network) -> None:
+        """Publish the map as it grows."""
+        live_map, due = LiveMap(), self._clock.now()
+        while True:
+            draw = live_map.update(self._pipeline, self._clock.now())
+            if draw is not None:
+                await self._off_loop(partial(_publish_drawn, network, draw))
+            due = max(due + 1.0 / MAP.rate_hz, self._clock.now())
+            await self._clock.sleep_until(due)
+
     async def _beat(self) -> None:
         """Tell everybody how things are, a few times a second."""
         due = self._clock.now()
@@ -144,8 +161,18 @@ class Robot:
         self._session.on_events(happened)
         for event in happened:
             log_event(event)
+            self._take_down(event)
             if isinstance(event, events.VertexAdded):
                 self._grown.set()
+
+    def _take_down(self, event: events.Event) -> None:
+        """Keep an event for those who watch."""
+        record = record_of(event)
+        kind, stamp = record.pop("event"), record.pop("stamp")
+        self._latest_events.append(
+            Event(number=self._happened, stamp=stamp, kind=kind, details=record)
+        )
+        self._happened += 1
 
     def _on_cycle(self, odometry: Odometry) -> None:
         self._note(odometry)
@@ -165,6 +192,9 @@ class Robot:
         self._sequence += 1
         if self._network is not None:
             self._network.publish(now)
+            if self._told < self._happened:
+                self._network.publish(Events(events=tuple(self._latest_events)))
+                self._told = self._happened
         self._notifier.status(status_line(now))
         stuck = now.cycle_age is not None and now.cycle_age > STUCK_AFTER
         if not stuck or self._devices.base.away is not None:
@@ -186,3 +216,7 @@ class Robot:
             laser=self._devices.laser_health,
             base=self._devices.base_health,
         )
+
+
+def _publish_drawn(network: Network, draw: Callable[[], Map]) -> None:
+    network.publish(draw())

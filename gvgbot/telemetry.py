@@ -2,7 +2,6 @@
 
 import asyncio
 import contextlib
-import re
 from collections import deque
 from collections.abc import Callable
 from types import TracebackType
@@ -10,9 +9,11 @@ from typing import Self
 
 import msgspec
 import zenoh
+import zenoh.ext
 
 from gvgbot.errors import GvgbotError
-from gvgbot.topics import STATE, State, TelemetryConfig, alive_key
+from gvgbot.topics import TOPICS, Payload, TelemetryConfig, Topic, alive_key
+from gvgbot.zenoh_config import reason, session_config
 
 _WAITING_QUERIES = 32  # more than this are dropped, oldest first; who asked gets nothing
 _MAX_SESSIONS = 32
@@ -33,48 +34,64 @@ class Telemetry:
     def __init__(self, config: TelemetryConfig, robot: str) -> None:
         """Listen. Raises GvgbotError if an address cannot be had."""
         self.failures = 0  # samples that could not be sent
-        self._latest: State | None = None
-        self._key = STATE.key(robot)
+        self._latest: dict[Topic, Payload] = {}
+        self._robot = robot
         self._session = _open(config)
-        self._publisher = self._session.declare_publisher(
-            self._key,
-            encoding=zenoh.Encoding(STATE.encoding),
-            congestion_control=zenoh.CongestionControl.DROP,
-            priority=_PRIORITIES[STATE.priority],
-        )
+        self._publishers = {topic.payload: (topic, self._publisher(topic)) for topic in TOPICS}
         self._alive = self._session.liveliness().declare_token(alive_key(robot))
 
-    def publish(self, state: State) -> None:
-        """Send a state to whoever listens; without waiting, and without complaining if it fails."""
-        self._latest = state
+    def _publisher(self, topic: Topic) -> zenoh.ext.AdvancedPublisher:
+        """A publisher that drops rather than waits, and keeps what a latecomer gets."""
+        return zenoh.ext.declare_advanced_publisher(
+            self._session,
+            topic.key(self._robot),
+            encoding=zenoh.Encoding(topic.encoding),
+            congestion_control=zenoh.CongestionControl.DROP,
+            priority=_PRIORITIES[topic.priority],
+            cache=zenoh.ext.CacheConfig(topic.history),
+            publisher_detection=True,
+        )
+
+    def publish(self, value: Payload) -> None:
+        """Send to whoever listens; without waiting, and without complaining if it fails."""
+        topic, publisher = self._publishers[type(value)]
+        self._latest[topic] = value
         try:
-            self._publisher.put(msgspec.msgpack.encode(state))
+            publisher.put(msgspec.msgpack.encode(value))
         except zenoh.ZError:
             self.failures += 1
 
     async def answer(self) -> None:
-        """Answer queries for the newest state until cancelled."""
+        """Answer queries for the newest values until cancelled."""
         loop, arrived = asyncio.get_running_loop(), asyncio.Event()
-        waiting: deque[zenoh.Query] = deque(maxlen=_WAITING_QUERIES)
+        waiting: deque[tuple[Topic, zenoh.Query]] = deque(maxlen=_WAITING_QUERIES)
 
-        def take(query: zenoh.Query) -> None:
-            waiting.append(query)
-            loop.call_soon_threadsafe(arrived.set)
+        def taking(topic: Topic) -> Callable[[zenoh.Query], None]:
+            def take(query: zenoh.Query) -> None:
+                waiting.append((topic, query))
+                loop.call_soon_threadsafe(arrived.set)
 
-        with self._session.declare_queryable(self._key, take):
+            return take
+
+        with contextlib.ExitStack() as stack:
+            for topic in TOPICS:
+                if topic.queryable:
+                    key = topic.key(self._robot)
+                    stack.enter_context(self._session.declare_queryable(key, taking(topic)))
             while True:
                 await arrived.wait()
                 arrived.clear()
                 while waiting:  # a frozen asker can block a reply, so the loop stays out of it
-                    await asyncio.to_thread(self._reply, waiting.popleft())
+                    await asyncio.to_thread(self._reply, *waiting.popleft())
 
-    def _reply(self, query: zenoh.Query) -> None:
+    def _reply(self, topic: Topic, query: zenoh.Query) -> None:
         with query, contextlib.suppress(zenoh.ZError):  # who asked may have gone
-            if self._latest is None:
-                query.reply_err("there is no state yet")
+            latest = self._latest.get(topic)
+            if latest is None:
+                query.reply_err(f"there is no {topic.name} yet")
                 return
-            encode, encoding = _form(query.parameters.get("format"))
-            query.reply(self._key, encode(self._latest), encoding=encoding)
+            encode, encoding = _form(topic, query.parameters.get("format"))
+            query.reply(topic.key(self._robot), encode(latest), encoding=encoding)
 
     def close(self) -> None:
         """Leave the network."""
@@ -92,11 +109,11 @@ class Telemetry:
         self.close()
 
 
-def _form(wanted: str | None) -> tuple[Callable[[State], bytes], zenoh.Encoding]:
+def _form(topic: Topic, wanted: str | None) -> tuple[Callable[[Payload], bytes], zenoh.Encoding]:
     """How to encode an answer, and the encoding that says so."""
     if wanted == "json":
         return msgspec.json.encode, zenoh.Encoding.APPLICATION_JSON
-    return msgspec.msgpack.encode, zenoh.Encoding(STATE.encoding)
+    return msgspec.msgpack.encode, zenoh.Encoding(topic.encoding)
 
 
 def _open(config: TelemetryConfig) -> zenoh.Session:
@@ -105,31 +122,19 @@ def _open(config: TelemetryConfig) -> zenoh.Session:
     except zenoh.ZError as error:
         where = ", ".join(config.listen)
         raise GvgbotError(
-            f"cannot listen on {where}: {_reason(error)}; "
+            f"cannot listen on {where}: {reason(error)}; "
             "choose another address (telemetry.listen), or set telemetry.enabled=false"
         ) from error
 
 
 def _session_config(config: TelemetryConfig) -> zenoh.Config:
-    settings: dict[str, object] = {
-        "mode": "peer",
-        "listen/endpoints": config.listen,
-        "scouting/multicast/enabled": False,
-        "scouting/gossip/enabled": False,
-        "transport/shared_memory/enabled": False,
-        "transport/link/tx/lease": round(1000 * config.lease_s),
-        "transport/unicast/max_sessions": _MAX_SESSIONS,
-        "timestamping/enabled": True,
-    }
-    session = zenoh.Config()
-    for key, value in settings.items():
-        session.insert_json5(key, msgspec.json.encode(value).decode())
-    return session
-
-
-def _reason(error: zenoh.ZError) -> str:
-    """What the library says is wrong, without the places in its own source."""
-    if "already in use" in str(error):
-        return "the address is already in use, perhaps by another gvgbot"
-    found = re.search(r"\[([^\]]*)\]", str(error))
-    return re.sub(r" at /\S+", "", found.group(1) if found else str(error)).strip(". ")
+    return session_config(
+        {
+            "mode": "peer",
+            "listen/endpoints": config.listen,
+            "connect/endpoints": config.connect,
+            "transport/link/tx/lease": round(1000 * config.lease_s),
+            "transport/unicast/max_sessions": _MAX_SESSIONS,
+            "timestamping/enabled": True,
+        }
+    )

@@ -1,9 +1,12 @@
 """What the robot says on the network: the table of topics, and the types that travel."""
 
+import re
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
 from gvgbot.ranges import Range
 
@@ -17,19 +20,31 @@ class TelemetryConfig:
 
     enabled: bool = True
     listen: tuple[str, ...] = ("tcp/127.0.0.1:7447",)
+    connect: tuple[str, ...] = ()  # zenoh routers to join, as often as they come back
     lease_s: Annotated[float, Range(0.5, 60.0)] = (
         2.0  # silence after which the robot counts as gone
     )
 
     def __post_init__(self) -> None:
         """Raises ValueError for addresses that cannot be listened on."""
-        for endpoint in self.listen:
-            if len(endpoint.split("/")) != 2 or not all(endpoint.split("/")):
-                raise ValueError(
-                    f"listen = {endpoint!r}: must be protocol/address, such as tcp/0.0.0.0:7447"
-                )
+        for key in ("listen", "connect"):
+            for endpoint in getattr(self, key):
+                if not is_endpoint(endpoint):
+                    raise ValueError(
+                        f"{key} = {endpoint!r}: must be protocol/address, such as tcp/0.0.0.0:7447"
+                    )
         if self.enabled and not self.listen:
             raise ValueError("listen is empty: give an address, or set enabled: false")
+
+
+def is_robot_name(text: str) -> bool:
+    """Whether the text can be a robot's part of a key."""
+    return re.fullmatch(r"[A-Za-z0-9_-]+", text) is not None
+
+
+def is_endpoint(text: str) -> bool:
+    """Whether the text has the form of an address: protocol/address."""
+    return len(text.split("/")) == 2 and all(text.split("/"))
 
 
 class LinkHealth(msgspec.Struct, frozen=True, kw_only=True):
@@ -72,6 +87,80 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
     base: LinkHealth
 
 
+class MapVertex(msgspec.Struct, frozen=True, kw_only=True):
+    """A vertex of the graph, where it is believed to be now; map frame."""
+
+    id: int
+    kind: Literal["meetpoint", "endpoint"]
+    position: tuple[float, float]  # m
+    covariance: tuple[float, float, float, float]  # of the position, 2x2 row-major, m^2
+    clearance: float  # m to the nearest walls
+    frontiers: tuple[float, ...]  # rad, where edges leave that were never followed
+
+
+class MapEdge(msgspec.Struct, frozen=True, kw_only=True):
+    """An edge of the graph, from one vertex to another or to itself; map frame."""
+
+    start: int  # id of a vertex
+    end: int  # id of a vertex
+    length: float  # m
+    points: bytes  # little-endian float32 pairs x, y, m, from start to end
+
+    @property
+    def polyline(self) -> NDArray[np.float32]:
+        """The points (N, 2), m; read-only."""
+        return np.frombuffer(self.points, "<f4").reshape(-1, 2)
+
+
+class Map(msgspec.Struct, frozen=True, kw_only=True):
+    """The map so far: walls, graph and the way driven. Sent when it has grown; map frame.
+
+    The cells and the trail lie where the robot believed to be at that time; later loop closures
+    correct them only in the saved map.
+    """
+
+    stamp: float  # s, the robot's monotonic clock
+    resolution: float  # m, the side of a cell
+    origin: tuple[float, float]  # m, the outer corner of the first cell
+    columns: int  # cells along x
+    rows: int  # cells along y
+    cells: bytes  # int8, row by row from the origin: percent occupied, -1 unknown
+    vertices: tuple[MapVertex, ...]
+    edges: tuple[MapEdge, ...]
+    trail: bytes  # little-endian float32 pairs x, y, m, about one for each 0.7 m driven
+
+    @property
+    def grid(self) -> NDArray[np.int8]:
+        """The cells (rows, columns), row 0 at the bottom; read-only."""
+        return np.frombuffer(self.cells, np.int8).reshape(self.rows, self.columns)
+
+    @property
+    def driven(self) -> NDArray[np.float32]:
+        """The trail (N, 2), m; read-only."""
+        return np.frombuffer(self.trail, "<f4").reshape(-1, 2)
+
+
+class Event(msgspec.Struct, frozen=True, kw_only=True):
+    """One thing that happened."""
+
+    number: int  # from 0, since the robot's program began
+    stamp: float  # s, the robot's monotonic clock
+    kind: str  # as `event` in events.jsonl: vertex_added, decision and others
+    details: dict[str, str | int | float | bool | None]  # its other fields, as in events.jsonl
+
+
+class Events(msgspec.Struct, frozen=True, kw_only=True):
+    """The latest events, oldest first. Sent when something has happened.
+
+    Each message has up to 64 of them, so that one that is lost is made up for by the next.
+    """
+
+    events: tuple[Event, ...]
+
+
+Payload = State | Map | Events
+
+
 @dataclass(frozen=True, slots=True)
 class Topic:
     """One row of the table.
@@ -97,8 +186,11 @@ class Topic:
         return f"application/msgpack;gvgbot.{self.payload.__name__}.v{self.version}"
 
 
-STATE = Topic("state", State, 1, 5.0, "data_high", 0, queryable=True)
-TOPICS = (STATE,)
+STATE = Topic("state", State, 1, 5.0, "data_high", 1, queryable=True)
+MAP = Topic("map", Map, 1, 0.5, "data_low", 1, queryable=True)
+EVENTS = Topic("events", Events, 1, 5.0, "data", 1, queryable=True)
+TOPICS = (STATE, MAP, EVENTS)
+EVENTS_KEPT = 64  # in a message
 
 
 def alive_key(robot: str) -> str:

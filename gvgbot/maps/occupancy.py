@@ -66,6 +66,32 @@ def occupancy_grid(
     return _finished(ballot, resolution_m)
 
 
+class GrowingGrid:
+    """The same grid of scans that come one by one; lasers of a longer range see as the first."""
+
+    def __init__(self, resolution_m: float = 0.05, max_range_m: float = 12.0) -> None:
+        self._cell, self._max_range = resolution_m, max_range_m
+        self._disc: _Disc | None = None
+        self._ballot: _Ballot | None = None
+        self._first_stamp = 0.0
+
+    def add(self, map_base: Pose, scan: Scan) -> None:
+        """Let a scan vote that was taken at a pose."""
+        map_laser = map_base.compose(scan.base_laser)
+        if self._disc is None:
+            self._disc = _Disc.of_radius(min(self._max_range, scan.range_max), self._cell)
+            self._first_stamp = scan.stamp
+        around = _Ballot.around([map_laser], self._disc)
+        self._ballot = around if self._ballot is None else self._ballot.grown(around)
+        _vote(self._ballot, self._disc, map_laser, scan, age=scan.stamp - self._first_stamp)
+
+    def grid(self) -> OccupancyGrid:
+        """The grid so far; without any scan one unknown cell."""
+        if self._ballot is None:
+            return occupancy_grid([], self._cell)
+        return _finished(self._ballot, self._cell)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _Disc:
     """Distance (m) and direction (index) of cells from the middle one, (2 half + 1) square."""
@@ -100,8 +126,24 @@ class _Ballot:
         places = np.array([_cell(laser, disc.cell) for laser in lasers or [Pose()]])
         corner = places.min(axis=0) - disc.half
         rows, columns = places.max(axis=0) + disc.half + 1 - corner
-        seen_s = np.full((rows, columns), np.inf, np.float32)
-        return cls(np.zeros((rows, columns), np.int8), seen_s, corner)
+        return cls._empty(corner, (rows, columns))
+
+    @classmethod
+    def _empty(cls, corner: Indices, shape: tuple[int, int]) -> Self:
+        return cls(np.zeros(shape, np.int8), np.full(shape, np.inf, np.float32), corner)
+
+    def grown(self, other: Self) -> Self:
+        """This ballot, or a larger one with its votes that covers the other's cells as well."""
+        corner = np.minimum(self.corner, other.corner)
+        end = np.maximum(self.corner + self.votes.shape, other.corner + other.votes.shape)
+        rows, columns = end - corner
+        if (rows, columns) == self.votes.shape:
+            return self
+        larger = self._empty(corner, (rows, columns))
+        row, column = self.corner - corner
+        here = np.s_[row : row + self.votes.shape[0], column : column + self.votes.shape[1]]
+        larger.votes[here], larger.seen_s[here] = self.votes, self.seen_s
+        return larger
 
 
 def _cell(pose: Pose, cell: float) -> tuple[int, int]:

@@ -65,8 +65,7 @@ class RunDirectory:
 
         Raises TypeError if the event is no dataclass, GvgbotError if the line cannot be written.
         """
-        record = {"event": _snake_case(type(event).__name__)} | _fields(event)
-        line = json.dumps(record, ensure_ascii=False, allow_nan=False) + "\n"
+        line = json.dumps(record_of(event), ensure_ascii=False, allow_nan=False) + "\n"
         try:
             self._events.write(line.encode())
         except OSError as error:
@@ -86,6 +85,11 @@ class RunDirectory:
         trace: TracebackType | None,
     ) -> None:
         self.close()
+
+
+def record_of(event: object) -> dict[str, Any]:
+    """An event as its line has it: the fields of the dataclass after its name as `event`."""
+    return {"event": _snake_case(type(event).__name__)} | _fields(event)
 
 
 def plain(value: object) -> Any:

@@ -20,7 +20,7 @@ from gvgbot.robot import Robot
 from gvgbot.service import Notifier
 from gvgbot.session import Session
 from gvgbot.simulation import Place, Simulation
-from gvgbot.topics import State
+from gvgbot.topics import Events, Map, Payload, State
 from gvgbot.worlds.canvas import Canvas
 
 STOP = (0, 0)
@@ -97,9 +97,17 @@ class Network:
 
     def __init__(self) -> None:
         self.states: list[State] = []
+        self.maps: list[Map] = []
+        self.events: list[Events] = []
 
-    def publish(self, state: State) -> None:
-        self.states.append(state)
+    def publish(self, value: Payload) -> None:
+        match value:
+            case State():
+                self.states.append(value)
+            case Map():
+                self.maps.append(value)
+            case Events():
+                self.events.append(value)
 
     async def answer(self) -> None:
         await asyncio.Event().wait()

@@ -8,8 +8,10 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import structlog
+from scipy.spatial import cKDTree
 
 from gvgbot.clock import Clock
 from gvgbot.errors import DeviceLost
@@ -231,3 +233,44 @@ def test_a_control_loop_that_is_stuck_gives_no_sign_of_life(daemon: Daemon) -> N
     daemon.run_on(FrozenLinks, 30.0)
     assert daemon.manager.count("WATCHDOG=1") < 10
     assert daemon.network.states[-1].cycle_age == pytest.approx(30.0, abs=0.5)
+
+
+def test_those_who_watch_get_the_map_and_each_event_of_the_list(daemon: Daemon) -> None:
+    async def story(clock: Clock) -> None:
+        await clock.sleep_until(40.0)
+
+    daemon.run(story)
+    path = daemon.session.directory.path
+    lines = [json.loads(line) for line in (path / "events.jsonl").read_text().splitlines()]
+    told = {event.number: event for sent in daemon.network.events for event in sent.events}
+    assert [
+        {"event": told[n].kind, "stamp": told[n].stamp} | told[n].details for n in sorted(told)
+    ] == lines[: len(told)]
+    assert len(lines) - len(told) in (0, 1)  # one may have come too late for the last message
+    last = daemon.network.maps[-1]
+    assert [vertex.id for vertex in last.vertices] == [
+        line["vertex"] for line in lines if line["event"] == "vertex_added" if line["stamp"] < 38.0
+    ]
+    for vertex in last.vertices:
+        (line,) = [x for x in lines if x["event"] == "vertex_added" and x["vertex"] == vertex.id]
+        assert math.dist(vertex.position, (line["x"], line["y"])) < 0.3
+    assert daemon.network.states[-1].distance == pytest.approx(
+        np.hypot(*np.diff(last.driven, axis=0).T).sum(), abs=2.0
+    )
+
+
+def test_the_walls_that_are_shown_are_those_of_the_world(daemon: Daemon) -> None:
+    async def story(clock: Clock) -> None:
+        await clock.sleep_until(20.0)
+
+    daemon.run(story)
+    assert daemon.session.place is not None
+    world, start = daemon.session.place.world, daemon.session.place.start
+    last = daemon.network.maps[-1]
+    rows, columns = np.nonzero(last.grid > 65)
+    corners = np.column_stack([columns + 0.5, rows + 0.5]) * last.resolution + last.origin
+    for squares in (world.occupied, ~world.occupied):  # a wall is where both are near
+        places = (np.argwhere(squares)[:, ::-1] + 0.5) * world.resolution_m + world.origin
+        away, _ = cKDTree(places).query(start.transform(corners))
+        assert np.size(away) > 100
+        assert np.quantile(away, 0.95) < 1.5 * last.resolution

@@ -1,6 +1,7 @@
 """Grids of rooms whose walls are known exactly: ranges come from ray-box geometry."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from gvgbot.errors import UsageError
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
 from gvgbot.maps.map_server import encode_map_server, read_map_server, write_map_server
-from gvgbot.maps.occupancy import OccupancyGrid, occupancy_grid
+from gvgbot.maps.occupancy import GrowingGrid, OccupancyGrid, occupancy_grid
 
 CELL = 0.05
 # walls in the middle of cells: left, bottom, right, top
@@ -83,6 +84,25 @@ def check_room(grid: OccupancyGrid) -> None:
 
 def test_a_room_has_walls_where_geometry_says_free_inside_and_unknown_outside() -> None:
     check_room(occupancy_grid([(pose, a_scan(pose)) for pose in POSES], CELL))
+
+
+def test_scans_that_come_one_by_one_draw_the_same_grid_as_all_at_once() -> None:
+    rng = np.random.default_rng(5)
+    poses = [Pose(x, y, 0.3) for x, y in rng.uniform(-40.0, 40.0, (12, 2))]  # mostly out of reach
+    scans = [(pose, replace(open_hall(np.full(90, 3.0)), stamp=i)) for i, pose in enumerate(poses)]
+    growing = GrowingGrid(0.2, 8.0)
+    for pose, scan in scans:
+        growing.add(pose, scan)
+    grid, expected = growing.grid(), occupancy_grid(scans, 0.2, 8.0)
+    assert grid.origin == expected.origin
+    assert (grid.cells == expected.cells).all()
+    assert grid.seen_s is not None
+    assert expected.seen_s is not None
+    assert (grid.seen_s == expected.seen_s).all()
+
+
+def test_a_grid_that_has_not_begun_to_grow_is_unknown() -> None:
+    assert GrowingGrid().grid().cells.tolist() == [[-1]]
 
 
 def test_a_mounted_laser_draws_the_same_room() -> None:

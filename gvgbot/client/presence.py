@@ -1,0 +1,43 @@
+"""Whether a robot is there: what can be told from its token on the network and its silence."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+QUIET_AFTER = 2.0  # s without a state, though the robot is on the network
+
+Word = Literal["alive", "quiet", "gone", "absent", "cut off"]
+
+
+@dataclass(frozen=True, slots=True)
+class Presence:
+    """How things are with the robot, and for how long, s.
+
+    alive: it is on the network and says so; quiet: it is on the network but says nothing, so its
+    program hangs; gone: it was there, and left or died; absent: it was not there since this
+    program connected; cut off: the router in between is away, so that nobody knows.
+    """
+
+    word: Word
+    for_s: float
+
+
+@dataclass(slots=True)
+class Signs:
+    """What was noticed last; stamps in s of one clock, None for never."""
+
+    connected_at: float
+    token_at: float | None = None  # when the robot joined or left the network
+    has_token: bool = False
+    heard_at: float | None = None  # the last state
+
+    def presence(self, now: float, *, reachable: bool) -> Presence:
+        """What the signs say at a stamp; `reachable`: whether the robot's leaving would be told."""
+        if self.token_at is None:
+            return Presence("absent" if reachable else "cut off", now - self.connected_at)
+        if not self.has_token:
+            return Presence("gone" if reachable else "cut off", now - self.token_at)
+        heard_at = self.token_at if self.heard_at is None else max(self.heard_at, self.token_at)
+        silence = now - heard_at
+        if silence > QUIET_AFTER:
+            return Presence("quiet", silence)
+        return Presence("alive", now - self.token_at)

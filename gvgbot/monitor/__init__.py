@@ -1,0 +1,1 @@
+"""A live view of a robot in a terminal."""
