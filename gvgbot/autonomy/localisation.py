@@ -16,6 +16,7 @@ _LEAST_POINTS = 50  # fewer say nothing about a pose
 _LEAST_INLIERS = 0.5  # of the beams must find a wall, or the match is not believed
 _CLEARLY = 0.02  # better agreement of beams and walls than this is no chance
 _SEARCH_M, _SEARCH_STEP_M = 1.0, 0.25  # around the pose by odometry
+_SLIPPING = 25.0  # times the covariance of odometry, when the wheels slip
 _LOST = np.diag([0.5**2, 0.5**2, 0.05**2])  # of a base that nobody heard for a while
 _FLOOR = np.diag([0.004**2, 0.004**2, 0.0006**2])  # what matching cannot know of itself
 
@@ -38,36 +39,39 @@ class LocalMaps:
         self.near.insert(scan, local_laser, travelled)
         self._far.insert(scan, local_laser, travelled)
 
-    def match(self, scan: Scan, prior: Pose, Q: Array) -> tuple[Pose, Array]:
-        """The pose of the base near a prior with covariance Q (3, 3), and its covariance.
+    def match(self, scan: Scan, before: Pose, motion: Pose, Q: Array) -> tuple[Pose, Array]:
+        """The pose of the base after a motion with covariance Q (3, 3), and its covariance.
 
-        Both covariances are in the frame of the base. Without enough walls it is the prior.
+        Both covariances are in the frame of the base. Without enough walls it is where odometry
+        has it. Wheels may have turned without effect, so it may as well be where it was `before`.
         """
-        return self._best(scan, [prior], Q)
+        prior = before.compose(motion)
+        still = Pose(before.x, before.y, prior.theta)
+        return self._best(scan, [(prior, Q), (still, _SLIPPING * Q)])
 
-    def find(self, scan: Scan, prior: Pose, Q: Array) -> tuple[Pose, Array]:
+    def find(self, scan: Scan, before: Pose, motion: Pose, Q: Array) -> tuple[Pose, Array]:
         """As `match`, where nobody saw the way that the base took: it is searched for around.
 
         Wheels tell how far it went and how much it turned, but not which of it came first.
         """
-        return self._best(scan, _around(prior), Q + _LOST)
+        return self._best(scan, [(p, Q + _LOST) for p in _around(before.compose(motion))])
 
-    def _best(self, scan: Scan, priors: list[Pose], Q: Array) -> tuple[Pose, Array]:
+    def _best(self, scan: Scan, priors: list[tuple[Pose, Array]]) -> tuple[Pose, Array]:
         """The match from the first prior, unless that from another one is clearly better."""
         far = self._far.points()
         walls = np.concatenate([self.near.points(), far[~self.near.covers(far)]])
         points = _sampled(scan, self._matching.points)
         if min(len(walls), len(points)) < _LEAST_POINTS:
-            return priors[0], Q
+            return priors[0]
         tree, best, agreement = cKDTree(walls), None, 0.0
-        for prior in priors:
+        for prior, Q in priors:
             found = register(points, tree, walls, prior, Q, self._matching)
             if found is None or found.inliers < _LEAST_INLIERS:
                 continue
             now = found.inliers * (1.0 - found.rms / self._matching.max_pair_m)
             if now > agreement + _CLEARLY:
                 best, agreement = found, now
-        return (priors[0], Q) if best is None else (best.pose, best.covariance + _FLOOR)
+        return priors[0] if best is None else (best.pose, best.covariance + _FLOOR)
 
 
 def _around(prior: Pose) -> list[Pose]:

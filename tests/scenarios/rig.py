@@ -10,10 +10,12 @@ import numpy as np
 
 from gvgbot.autonomy.events import Event, Recovery
 from gvgbot.autonomy.loop import Loop
+from gvgbot.autonomy.mission import ExplorationConfig
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.graph import Vertex
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.config import Config, TwinConfig
+from gvgbot.drivers.body import RobotBody
 from gvgbot.drivers.hokuyo.driver import HokuyoLaser
 from gvgbot.drivers.kobuki.driver import KobukiBase
 from gvgbot.drivers.kobuki.mishaps import Mishap
@@ -104,6 +106,7 @@ class _Always:
 
 
 Story = Callable[[Play], Awaitable[None]]
+Grip = Callable[[Pose], float]  # share of what the wheels turn that the body goes, by its pose
 
 
 def play(
@@ -114,18 +117,30 @@ def play(
     with_person: bool = False,
     limit: float = 600.0,
     twin: TwinConfig | None = None,
+    exploration: ExplorationConfig | None = None,
+    grip: Grip | None = None,
 ) -> Play:
     """Explore a world while a story happens to the robot, for at most so many seconds."""
-    config = Config(twin=replace(twin or TwinConfig(seed=3), people=int(with_person)))
-    return run_in_virtual_time(_played(config, world, start, story, limit))  # type: ignore[no-any-return]
+    config = Config(
+        twin=replace(twin or TwinConfig(seed=3), people=int(with_person)),
+        exploration=exploration or ExplorationConfig(),
+    )
+    return run_in_virtual_time(_played(config, world, start, story, limit, grip))  # type: ignore[no-any-return]
 
 
 async def _played(
-    config: Config, world: World, start: Pose, story: Story | None, limit: float
+    config: Config,
+    world: World,
+    start: Pose,
+    story: Story | None,
+    limit: float,
+    grip: Grip | None,
 ) -> Play:
     clock = LoopClock()
     walkways = Walkways(world, start) if config.twin.people else None
     simulation = Simulation(config, Place(world, start, walkways), clock)
+    if grip is not None:
+        _lose_grip(simulation.body, grip)
     pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
     run = Play(simulation, pipeline, clock)
     if walkways is not None:
@@ -155,6 +170,17 @@ async def _played(
             task.cancel()
     run.ended = clock.now()
     return run
+
+
+def _lose_grip(body: RobotBody, grip: Grip) -> None:
+    """Let the wheels turn, but the body only roll on by the share that the grip says."""
+    roll = body._roll
+
+    def slipping(way: float, turn: float) -> None:
+        share = grip(body.pose)
+        roll(share * way, share * turn)
+
+    body._roll = slipping  # type: ignore[method-assign]
 
 
 async def _told(story: Story, run: Play) -> None:
