@@ -1,0 +1,302 @@
+"""The client against a robot's telemetry in this process, and against one in a process of its own.
+
+Nothing is found by shouting: every session is told its address.
+"""
+
+import asyncio
+import json
+import signal
+import subprocess
+import sys
+import time
+import tracemalloc
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from threading import Event as Flag
+
+import msgspec
+import numpy as np
+import pytest
+import zenoh
+
+from gvgbot import client
+from gvgbot.errors import GvgbotError, UsageError
+from gvgbot.telemetry import Telemetry
+from gvgbot.topics import Event, Events, Map, MapEdge, MapVertex, State, TelemetryConfig
+from tests.process.addresses import free_endpoint
+from tests.unit.test_telemetry import EXAMPLE
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(60)]
+
+PATIENCE = 15.0  # s, for a busy machine
+A_MAP = Map(
+    stamp=3.0,
+    resolution=0.5,
+    origin=(-1.0, 2.0),
+    columns=3,
+    rows=2,
+    cells=bytes([0, 100, 0xFF, 50, 0, 0]),
+    vertices=(
+        MapVertex(
+            id=4,
+            kind="meetpoint",
+            position=(0.5, 2.5),
+            covariance=(1.0, 0.0, 0.0, 1.0),
+            clearance=0.7,
+            frontiers=(1.5,),
+        ),
+    ),
+    edges=(MapEdge(start=4, end=4, length=2.0, points=np.array([1, 2, 3, 4], "<f4").tobytes()),),
+    trail=np.array([0.0, 0.0, 1.5, -2.0], "<f4").tobytes(),
+)
+ROBOT = """
+import sys, time
+from gvgbot.telemetry import Telemetry
+from gvgbot.topics import TelemetryConfig
+from tests.unit.test_telemetry import EXAMPLE
+with Telemetry(TelemetryConfig(listen=(sys.argv[1],)), "far") as robot:
+    while True:
+        robot.publish(EXAMPLE)
+        time.sleep(0.1)
+"""
+
+
+def until(is_so: Callable[[], bool], *, patience_s: float = PATIENCE) -> float:
+    """Wait until something is so; the seconds that took."""
+    start, pause = time.perf_counter(), Flag()
+    while not is_so():
+        assert time.perf_counter() - start < patience_s, "it did not become so"
+        pause.wait(0.02)
+    return time.perf_counter() - start
+
+
+def a_robot(endpoint: str, name: str = "near") -> Telemetry:
+    return Telemetry(TelemetryConfig(listen=(endpoint,)), name)
+
+
+def numbered(number: int) -> State:
+    return msgspec.structs.replace(EXAMPLE, sequence=number)
+
+
+def happened(number: int, kind: str = "decision") -> Event:
+    return Event(number=number, stamp=float(number), kind=kind, details={"reason": "ear"})
+
+
+@pytest.fixture
+def endpoint() -> str:
+    return free_endpoint()
+
+
+def test_who_joins_gets_the_newest_values_at_once_though_nothing_more_is_sent(
+    endpoint: str,
+) -> None:
+    with a_robot(endpoint) as robot:
+        robot.publish(numbered(6))
+        robot.publish(numbered(7))
+        robot.publish(A_MAP)
+        robot.publish(Events(events=(happened(0), happened(1))))
+        with client.connect("near", endpoint) as seen:
+            assert next(iter(seen.state())) == numbered(7)
+            assert next(iter(seen.map())) == A_MAP
+            events = iter(seen.events())
+            assert [next(events), next(events)] == [happened(0), happened(1)]
+
+
+def test_a_map_is_unpacked_into_arrays(endpoint: str) -> None:
+    with a_robot(endpoint) as robot, client.connect("near", endpoint) as seen:
+        robot.publish(A_MAP)
+        got = next(iter(seen.map()))
+    assert got.grid.tolist() == [[0, 100, -1], [50, 0, 0]]
+    assert got.edges[0].polyline.tolist() == [[1.0, 2.0], [3.0, 4.0]]
+    assert got.driven.tolist() == [[0.0, 0.0], [1.5, -2.0]]
+
+
+def test_the_loop_of_a_program_gets_state_after_state(endpoint: str) -> None:
+    async def watch() -> list[int]:
+        with a_robot(endpoint) as robot:
+            async with asyncio.timeout(PATIENCE), client.connect("near", endpoint) as seen:
+                numbers: list[int] = []
+                robot.publish(numbered(1))
+                async for state in seen.state():
+                    numbers.append(state.sequence)
+                    if len(numbers) == 5:
+                        break
+                    robot.publish(numbered(state.sequence + 1))
+                return numbers
+
+    assert asyncio.run(watch()) == [1, 2, 3, 4, 5]
+
+
+def test_events_come_once_each_whatever_is_lost_between(endpoint: str) -> None:
+    with a_robot(endpoint) as robot, client.connect("near", endpoint) as seen:
+        robot.publish(Events(events=(happened(0), happened(1))))
+        events = iter(seen.events())
+        got = [next(events), next(events)]
+        robot.publish(Events(events=(happened(0), happened(1), happened(2))))
+        until(lambda: len(seen.events().latest) == 3)
+        robot.publish(Events(events=(happened(1), happened(2), happened(3))))
+        got += [next(events), next(events)]
+        assert [event.number for event in got] == [0, 1, 2, 3]
+        robot.publish(Events(events=(happened(0, "recovery"),)))  # it began anew
+        assert next(events) == happened(0, "recovery")
+
+
+def test_a_slow_reader_skips_to_the_newest_and_costs_no_memory(endpoint: str) -> None:
+    with a_robot(endpoint) as robot, client.connect("near", endpoint) as seen:
+        states = iter(seen.state())
+        robot.publish(numbered(0))
+        assert next(states).sequence == 0
+        big = msgspec.structs.replace(numbered(1), reason="x" * 100_000)
+        tracemalloc.start()
+        for _ in range(500):  # 50 MB
+            robot.publish(big)
+            Flag().wait(0.001)
+        robot.publish(numbered(999))
+        until(lambda: (seen.state().latest or EXAMPLE).sequence == 999)
+        _, peak = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        assert peak < 10_000_000
+        assert next(states).sequence == 999
+
+
+def test_closing_ends_every_iteration_and_leaves_no_session_behind(endpoint: str) -> None:
+    async def watch() -> list[State]:
+        async with client.connect("near", endpoint) as seen:
+            got, is_first = [], asyncio.Event()
+
+            async def read() -> None:
+                async for state in seen.state():
+                    got.append(state)
+                    is_first.set()
+
+            async with asyncio.timeout(PATIENCE), asyncio.TaskGroup() as tasks:
+                reading = tasks.create_task(read())
+                await is_first.wait()
+                seen.close()
+                await reading
+            return got
+
+    with a_robot(endpoint) as robot:
+        robot.publish(EXAMPLE)
+        assert asyncio.run(watch()) == [EXAMPLE]
+        info = robot._session.info
+        until(lambda: not info.peers_zid() and not info.routers_zid())
+
+
+def test_a_state_of_another_version_is_refused_in_words(endpoint: str) -> None:
+    with a_robot(endpoint) as robot, client.connect("near", endpoint) as seen:
+        robot._session.put(
+            "gvgbot/near/state",
+            b"\x80",
+            encoding=zenoh.Encoding("application/msgpack;gvgbot.State.v9"),
+        )
+        with pytest.raises(GvgbotError, match=r"State\.v9.*State\.v1"):
+            next(iter(seen.state()))
+
+
+def test_a_damaged_state_is_refused_in_words(endpoint: str) -> None:
+    with a_robot(endpoint) as robot, client.connect("near", endpoint) as seen:
+        robot._session.put(
+            "gvgbot/near/state",
+            b"\x80",
+            encoding=zenoh.Encoding("application/msgpack;gvgbot.State.v1"),
+        )
+        with pytest.raises(GvgbotError, match="damaged sample of state"):
+            next(iter(seen.state()))
+
+
+def test_an_address_where_nobody_answers_is_one_error(endpoint: str) -> None:
+    with (
+        pytest.raises(GvgbotError, match=f"nobody answers at {endpoint}"),
+        client.connect("near", endpoint, patience_s=0.3),
+    ):
+        pass
+
+
+@pytest.mark.parametrize(("name", "address"), [("a/b", "tcp/h:1"), ("", "tcp/h:1"), ("a", "h:1")])
+def test_a_name_or_an_address_that_cannot_be_is_refused(name: str, address: str) -> None:
+    with pytest.raises(UsageError):
+        client.connect(name, address)
+
+
+def test_a_robot_of_another_name_is_told_from_none(endpoint: str) -> None:
+    with a_robot(endpoint), client.connect("stranger", endpoint) as seen:
+        assert seen.presence.word == "absent"
+        assert seen.others() == ["near"]
+
+
+def test_silence_is_told_from_absence(endpoint: str) -> None:
+    with a_robot(endpoint) as robot, client.connect("near", endpoint) as seen:
+        robot.publish(EXAMPLE)
+        until(lambda: seen.presence.word == "alive")
+        until(lambda: seen.presence.word == "quiet", patience_s=5.0)
+        assert seen.presence.for_s > 1.0
+        robot.publish(EXAMPLE)
+        until(lambda: seen.presence.word == "alive")
+        robot.close()
+        until(lambda: seen.presence.word == "gone")
+
+
+@contextmanager
+def far_robot(endpoint: str) -> Iterator["subprocess.Popen[bytes]"]:
+    """A robot in a process of its own."""
+    with subprocess.Popen([sys.executable, "-c", ROBOT, endpoint]) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+def test_a_robot_that_was_killed_is_gone_and_back_when_it_starts_again(endpoint: str) -> None:
+    with far_robot(endpoint) as process, client.connect("far", endpoint) as seen:
+        assert next(iter(seen.state())) == EXAMPLE
+        until(lambda: seen.presence.word == "alive")
+        process.send_signal(signal.SIGKILL)
+        until(lambda: seen.presence.word == "gone", patience_s=3.0)
+        with far_robot(endpoint):
+            until(lambda: seen.presence.word == "alive")
+            until(lambda: (seen.state().age or 9.0) < 1.0)
+
+
+def test_a_robot_that_is_frozen_is_noticed(endpoint: str) -> None:
+    """A stopped process is as silent as one whose cable was pulled."""
+    with far_robot(endpoint) as process, client.connect("far", endpoint) as seen:
+        until(lambda: seen.presence.word == "alive")
+        process.send_signal(signal.SIGSTOP)
+        until(lambda: seen.presence.word in ("quiet", "gone"), patience_s=3.0)
+        process.send_signal(signal.SIGCONT)
+        until(lambda: seen.presence.word == "alive")
+
+
+@contextmanager
+def router(endpoint: str) -> Iterator[zenoh.Session]:
+    config = zenoh.Config()
+    for key, value in {
+        "mode": "router",
+        "listen/endpoints": [endpoint],
+        "scouting/multicast/enabled": False,
+    }.items():
+        config.insert_json5(key, json.dumps(value))
+    with zenoh.open(config) as session:
+        yield session
+
+
+def test_a_router_in_between_may_come_and_go(endpoint: str) -> None:
+    config = TelemetryConfig(listen=(free_endpoint(),), connect=(endpoint,))
+    with router(endpoint) as first:
+        robot = Telemetry(config, "near")
+        seen = client.connect("near", endpoint)
+        with robot, seen:
+            robot.publish(numbered(1))
+            robot.publish(A_MAP)
+            until(lambda: seen.presence.word == "alive")
+            until(lambda: seen.map().latest == A_MAP)
+            first.close()  # type: ignore[no-untyped-call]
+            until(lambda: seen.presence.word == "cut off")
+            later = msgspec.structs.replace(A_MAP, stamp=9.0)
+            robot.publish(later)
+            with router(endpoint):
+                until(lambda: seen.presence.word == "alive")
+                until(lambda: seen.map().latest == later)  # though it was sent to nobody
+                robot.close()
+                until(lambda: seen.presence.word == "gone")
