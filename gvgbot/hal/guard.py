@@ -29,7 +29,7 @@ Reason = Literal[
 class GuardConfig:
     """What the robot may do at most, whatever autonomy asks for."""
 
-    max_speed_mps: Annotated[float, Range(0.05, 0.7)] = 0.5
+    max_speed_mps: Annotated[float, Range(0.05, 0.7)] = 0.7
     max_reverse_speed_mps: Annotated[float, Range(0.0, 0.3)] = 0.1  # the laser sees little behind
     max_turn_rate_radps: Annotated[float, Range(0.1, 3.14)] = 1.5  # a gyro degrades when faster
     max_acceleration_mps2: Annotated[float, Range(0.05, 3.0)] = 0.5

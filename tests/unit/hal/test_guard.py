@@ -195,8 +195,8 @@ def test_a_command_that_is_no_number_stops_the_robot(bad: float) -> None:
 
 LIMITS = {
     "within": (Twist(0.4, 0.5), Twist(0.4, 0.5)),
-    "too fast": (Twist(1.0, 0.0), Twist(0.5, 0.0)),
-    "too fast on an arc keeps the arc": (Twist(1.0, 1.0), Twist(0.5, 0.5)),
+    "too fast": (Twist(1.0, 0.0), Twist(0.7, 0.0)),
+    "too fast on an arc keeps the arc": (Twist(1.0, 1.0), Twist(0.7, 0.7)),
     "too fast backwards": (Twist(-0.4, 0.0), Twist(-0.1, 0.0)),
     "turning too fast": (Twist(0.0, -4.0), Twist(0.0, -1.5)),
     "turning too fast keeps the arc": (Twist(0.2, 3.0), Twist(0.1, 1.5)),
