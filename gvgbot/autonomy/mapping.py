@@ -45,6 +45,7 @@ class MappingConfig:
     misses: Annotated[int, Range(1, 50)] = 6  # sightings of a plain edge that refute a vertex
     conflicts: Annotated[int, Range(1, 50)] = 4  # sightings that overrule an edge
     surplus: Annotated[int, Range(1, 50)] = 3  # sightings in a row that add a departure to a vertex
+    passed_m: Annotated[float, Range(0.3, 5.0)] = 1.0  # from so near, what there is to see is seen
     update_every_m: Annotated[float, Range(0.1, 10.0)] = 1.0
     recognise_within_m: Annotated[float, Range(1.0, 20.0)] = 5.0
     min_inliers: Annotated[float, Range(0.1, 1.0)] = 0.7  # share of a vertex's walls found again
@@ -376,12 +377,21 @@ class Mapper:
         turned = {k: h.bearing + vertex.local.theta for k, h in vertex.half_edges.items()}
         limit = math.radians(self._recognition.bearing_deg)
         matched = match_bearings(bearings, turned, limit)
-        unmatched = [i for i, b in enumerate(branches) if i not in matched and b not in node.weak]
-        vertex.surplus = vertex.surplus + 1 if unmatched else 0
-        if vertex.surplus >= self._config.surplus:
-            vertex.surplus = 0
-            for i in unmatched:
-                matched[i] = vertex.add_half_edge(bearings[i] - vertex.local.theta)
+        new = [i for i in range(len(branches)) if i not in matched]
+        certain = [i for i in new if branches[i] not in node.weak]
+        vertex.surplus = vertex.surplus + 1 if certain else 0
+        base = view.local_base.position
+        at_it = np.hypot(*(vertex.local.position - base)) < self._config.passed_m
+        vertex.unclear = vertex.unclear + at_it if new else 0
+        # What stays unclear although the robot is there must be driven to: it becomes a frontier.
+        if vertex.unclear >= self._config.candidates.meetpoint_sightings:
+            certain = new
+        elif vertex.surplus < self._config.surplus:
+            certain = []
+        if certain:
+            vertex.surplus = vertex.unclear = 0
+        for i in certain:
+            matched[i] = vertex.add_half_edge(bearings[i] - vertex.local.theta)
         for i, key in matched.items():
             vertex.half_edges[key].misses = 0
             known.pair_branch(branches[i], HalfEdgeId(vertex.id, key))

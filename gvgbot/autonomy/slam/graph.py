@@ -53,6 +53,7 @@ class Vertex:
     sightings: int = 1
     misses: int = 0
     surplus: int = 0  # sightings in a row with a departure that is not known
+    unclear: int = 0  # sightings from it with a departure of which too little can be seen
     visits: int = 1
     serial: int = 0
 

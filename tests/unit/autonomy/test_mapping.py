@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -176,6 +177,23 @@ def test_a_departure_seen_only_later_is_added() -> None:
     vertex = seen.mapper.graph.vertices[seen.known.vertex_of[2]]
     assert vertex.degree == 4
     assert len(seen.mapper.graph.edges) == 1
+
+
+def test_a_departure_that_stays_unclear_from_where_it_leaves_becomes_a_frontier() -> None:
+    """A side way of which only the first decimetres can be seen, even from the vertex itself."""
+    lines = {**TEE_LINES, 13: (2, 5, [])}
+    stub = drawn({**TEE_POINTS, 5: (3.0, 0.3)}, lines, unseen={**UNSEEN, 5: math.pi / 2})
+    node = stub.nodes[2]
+    unclear = LocalGvg(
+        {**stub.nodes, 2: replace(node, weak=frozenset({Branch(13, forward=True)}))}, stub.edges
+    )
+    seen = Seen().look(unclear, 20)
+    vertex = seen.mapper.graph.vertices[seen.known.vertex_of[2]]
+    assert vertex.degree == 3
+    moved = Pose(2.6, 0.0)
+    seen.mapper.move(moved, np.zeros((3, 3)))
+    seen.look(unclear, CONFIG.candidates.meetpoint_sightings, at=moved)
+    assert vertex.degree == 4
 
 
 def test_a_departure_seen_once_between_clear_views_is_not_added() -> None:
