@@ -13,7 +13,7 @@ from gvgbot.hal.devices import Base, Laser
 from gvgbot.hal.latest import Latest
 from gvgbot.hal.messages import Battery, Contact, Odometry, Scan
 
-FIRST_RETRY, LAST_RETRY = 0.5, 1.0  # s; each wait is twice the one before
+RETRY = 0.5  # s between losing a device, or not finding it, and trying again
 
 log = structlog.get_logger()
 
@@ -38,7 +38,6 @@ class _Reopening(Generic[D]):
         """`open_device` raises DeviceLost when that is not possible."""
         self.away: str | None = "not there yet"
         self._name, self._open, self._clock = name, open_device, clock
-        self._retry = FIRST_RETRY
         self._since: float | None = None  # when it was lost; None before it was ever there
         self.reconnects = 0
         self._device: D | None = None
@@ -47,19 +46,27 @@ class _Reopening(Generic[D]):
         """Serve the device until cancelled, whatever happens to it."""
         while True:
             try:
-                await self._serve()
-            except* (DeviceLost, DeviceRefused) as failures:
-                self._lost(_text(failures))
-            await self._clock.sleep_until(self._clock.now() + self._retry)
-            self._retry = min(2 * self._retry, LAST_RETRY)
+                device, close = await self._open()
+            except (DeviceLost, DeviceRefused) as failure:
+                self._lost(str(failure))
+            else:
+                await self._serve(device, close)
+            await self._clock.sleep_until(self._clock.now() + RETRY)
 
-    async def _serve(self) -> None:
-        device, close = await self._open()
+    async def _serve(self, device: D, close: Callable[[], None]) -> None:
+        """Serve the device until it is lost.
+
+        A loss does not leave the group, in which it could hide a cancellation of the same moment.
+        """
         try:
             async with asyncio.TaskGroup() as tasks:
                 self._device = device
-                tasks.create_task(device.run(), name=self._name)
-                tasks.create_task(self._pass_on(device), name=f"{self._name} values")
+                passing = tasks.create_task(self._pass_on(device), name=f"{self._name} values")
+                try:
+                    await device.run()
+                except (DeviceLost, DeviceRefused) as failure:
+                    self._lost(str(failure))
+                    passing.cancel()
         finally:
             self._device = None  # a closed link must not be written to: its number may be reused
             close()
@@ -82,7 +89,7 @@ class _Reopening(Generic[D]):
         after = None if self._since is None else round(self._clock.now() - self._since, 1)
         log.info(f"{self._name} is there" if after is None else f"{self._name} back", after_s=after)
         self.reconnects += after is not None
-        self.away, self._retry = None, FIRST_RETRY
+        self.away = None
 
 
 class ReopeningLaser(_Reopening[Laser]):
@@ -146,8 +153,3 @@ class ReopeningBase(_Reopening[Base]):
         while True:
             self._newest.put(await device.next_odometry())
             self._heard()
-
-
-def _text(failures: BaseExceptionGroup[Exception]) -> str:
-    failure = failures.exceptions[0]
-    return _text(failure) if isinstance(failure, BaseExceptionGroup) else str(failure)
