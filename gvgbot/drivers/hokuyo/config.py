@@ -34,7 +34,7 @@ class HokuyoConfig:
     max_range_m: Annotated[float, Range(0.5, 100.0)] = 30.0
     processing_latency_s: Annotated[float, Range(0.0, 0.1)] = 0.00475  # last beam to first byte
     synchronise: bool = True  # ask the laser for its time before the scans
-    reply_timeout_s: Annotated[float, Range(0.15, 10.0)] = 1.0
+    reply_timeout_s: Annotated[float, Range(0.15, 10.0)] = 0.4  # slow ones need 0.11 s
     opening_patience_s: Annotated[float, Range(1.0, 60.0)] = 4.0  # with a laser that boots
     missed_scans: Annotated[int, Range(1, 100)] = 3  # before the stream is started again
 

@@ -263,12 +263,12 @@ class HokuyoLaser:
             raise DeviceLost("the laser answers but sends no scans: switch it off and on")
         clock = self._dialogue.clock
         while (until := self._last_scan + stream.silence) > clock.now():
-            await self._listen(stream, until - clock.now())
+            await self._listen(stream, until)
 
-    async def _listen(self, stream: _Stream, seconds: float) -> None:
+    async def _listen(self, stream: _Stream, until: float) -> None:
         """Hand on what comes; a timer for each scan would cost more than its checksums."""
         with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(seconds):
+            async with asyncio.timeout_at(until):
                 while True:
                     self._hand_on(await self._dialogue.receive(), stream)
 

@@ -213,7 +213,7 @@ class KobukiBase:
     async def _listen(self, until: float) -> None:
         """Take what the base sends; a timer for each frame would cost more than its reading."""
         with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(max(0.0, until - self._clock.now())):
+            async with asyncio.timeout_at(until):
                 while True:
                     self._take(await self._stream.read())
 
