@@ -33,20 +33,29 @@ class FaultSchedule:
         self._ends: dict[str, float] = {}
         self._planned: list[tuple[float, str]] = []  # set times still to come, earliest first
         self._injected: list[tuple[str, float]] = []
+        self._due = math.inf
 
     def inject(self, name: str, duration: float) -> None:
         """Let a fault begin at the next `advance`, for so long (s)."""
         self._injected.append((name, duration))
+        self._due = -math.inf
 
     def advance(self, now: float) -> list[str]:
         """The faults that have begun up to now (s), in order of name."""
+        if self._starts is not None and now < self._due:
+            return []
+        began = self._begin(now)
+        self._due = self._earliest()
+        return began
+
+    def _begin(self, now: float) -> list[str]:
         if self._starts is None:
             self._starts = {name: self._next_start(name, now) for name in self._rates}
             self._planned = sorted(
                 (now + late, name) for name, rate in self._rates.items() for late in rate.at
             )
         self._ends = {name: end for name, end in self._ends.items() if end > now}
-        began = {name: self._rates[name].duration for name in self._due(self._starts, now)}
+        began = {name: self._rates[name].duration for name in _due(self._starts, now)}
         for name, duration in began.items():
             self._starts[name] = self._next_start(name, now + duration)
         while self._planned and self._planned[0][0] <= now:
@@ -65,15 +74,17 @@ class FaultSchedule:
 
     def next_due(self) -> float:
         """When the next fault begins or ends, s; inf if never."""
-        if self._injected:
-            return -math.inf
+        return self._due
+
+    def _earliest(self) -> float:
         starts = () if self._starts is None else self._starts.values()
         planned = (stamp for stamp, _ in self._planned[:1])
         return min((*starts, *planned, *self._ends.values()), default=math.inf)
 
-    def _due(self, starts: Mapping[str, float], now: float) -> list[str]:
-        return [name for name, start in starts.items() if start <= now]
-
     def _next_start(self, name: str, since: float) -> float:
         per_h = self._rates[name].per_h
         return since + float(self._rng.exponential(_HOUR / per_h)) if per_h > 0.0 else math.inf
+
+
+def _due(starts: Mapping[str, float], now: float) -> list[str]:
+    return [name for name, start in starts.items() if start <= now]

@@ -183,20 +183,25 @@ class _Damage:
         rates = (config.flipped_bits_per_kb, config.lost_bytes_per_kb, config.inserted_bytes_per_kb)
         if not any(rates) or not data:
             return data
-        flipped, lost, inserted = (rate / 1000 for rate in rates)
-        wire = np.frombuffer(data, np.uint8).copy()
-        hit = self._drawn(len(wire), flipped, "flipped bit")
-        wire[hit] ^= (1 << self._rng.integers(0, 8, int(hit.sum()))).astype(np.uint8)
-        wire = wire[~self._drawn(len(wire), lost, "lost byte")]
-        places = np.flatnonzero(self._drawn(len(wire), inserted, "inserted byte"))
-        return np.insert(
-            wire, places, self._rng.integers(0, 256, len(places)).astype(np.uint8)
-        ).tobytes()
+        flipped, lost, inserted = (self._struck(rate, len(data)) for rate in rates)
+        if flipped == lost == inserted == 0:
+            return data
+        return self._struck_at(data, flipped, lost, inserted)
 
-    def _drawn(
-        self, size: int, share: float, name: str
-    ) -> "np.ndarray[tuple[int], np.dtype[np.bool_]]":
-        """Which of so many bytes a fault hits."""
-        hit = self._rng.random(size) < share
-        self.counts[name] += int(hit.sum())
-        return hit
+    def _struck(self, per_kb: float, size: int) -> int:
+        """How many of so many bytes a fault hits."""
+        return int(self._rng.binomial(size, per_kb / 1000)) if per_kb > 0.0 else 0
+
+    def _struck_at(self, data: bytes, flipped: int, lost: int, inserted: int) -> bytes:
+        """The bytes with so many of these faults, anywhere."""
+        self.counts += Counter(
+            {"flipped bit": flipped, "lost byte": lost, "inserted byte": inserted}
+        )
+        wire = np.frombuffer(data, np.uint8).copy()
+        hit = self._rng.choice(len(wire), flipped, replace=False)
+        wire[hit] ^= (1 << self._rng.integers(0, 8, flipped)).astype(np.uint8)
+        wire = np.delete(wire, self._rng.choice(len(wire), lost, replace=False))
+        places = self._rng.integers(0, len(wire) + 1, inserted)
+        return np.insert(
+            wire, places, self._rng.integers(0, 256, inserted).astype(np.uint8)
+        ).tobytes()

@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import errno
+import math
 import os
 import termios
 from collections.abc import Callable
@@ -202,25 +203,31 @@ class TwinDevice(Protocol):
 
 async def serve_twin(twin: TwinDevice, stream: ByteStream, clock: Clock) -> None:
     """Join a twin to a stream until cancelled or until the other end goes."""
+    loop = asyncio.get_running_loop()
     wake = asyncio.Event()
+    awaited = math.inf  # when `talk` will wake by itself
 
     async def listen() -> None:
         while True:
             data = await stream.read()
             stream.write(twin.receive(data, clock.now()))
-            wake.set()
+            if twin.next_due() < awaited:
+                wake.set()
 
     async def talk() -> None:
+        nonlocal awaited
         while True:
-            due = twin.next_due()
-            if due <= clock.now():
+            if twin.next_due() <= clock.now():
                 stream.write(twin.advance(clock.now()))
+            awaited = twin.next_due()
+            if awaited <= clock.now():
                 await asyncio.sleep(0)
                 continue
+            timer = None if awaited == math.inf else loop.call_at(awaited, wake.set)
+            await wake.wait()
             wake.clear()
-            with contextlib.suppress(TimeoutError):
-                async with asyncio.timeout_at(None if due == float("inf") else due):
-                    await wake.wait()
+            if timer is not None:
+                timer.cancel()
 
     try:
         async with asyncio.TaskGroup() as tasks:
