@@ -9,6 +9,7 @@ from gvgbot.drivers.cable import Cable
 from gvgbot.drivers.link_faults import FaultyLink, LinkFaultConfig
 from gvgbot.drivers.transport import ByteStream, TwinDevice, serve_twin
 
+ENDS_OF_LINK = {"silence", "unplug"}
 Work = list[Coroutine[Any, Any, None]]
 
 

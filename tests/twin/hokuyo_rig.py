@@ -16,7 +16,7 @@ from gvgbot.errors import DeviceLost
 from gvgbot.geometry import Array
 from gvgbot.hal.messages import Scan
 from gvgbot.hal.reopening import Opened, ReopeningLaser
-from tests.twin.device_rig import Wire, Work, play
+from tests.twin.device_rig import ENDS_OF_LINK, Wire, Work, play
 
 DIGITS = 4  # beams that hold the number of the scan, six bits each
 ROUNDING = 0.0005 + 1e-9  # m: half a millimetre
@@ -93,6 +93,11 @@ class LaserRig:
     @property
     def link(self) -> FaultyLink:
         return self.wire.link
+
+    def inject(self, fault: str, seconds: float) -> None:
+        """Let something befall the device or its link, for so long."""
+        inject = self.link.inject if fault in ENDS_OF_LINK else self.twin.inject
+        inject(fault, seconds)  # type: ignore[operator]
 
     def work(self) -> Work:
         return [self.wire.serve(self.clock), self.laser.run(), self.judge()]

@@ -12,7 +12,7 @@ from gvgbot.drivers.transport import TwinDevice
 from gvgbot.geometry import Twist
 from gvgbot.hal.messages import Contact, Odometry
 from gvgbot.hal.reopening import ReopeningBase
-from tests.twin.device_rig import Wire, Work
+from tests.twin.device_rig import ENDS_OF_LINK, Wire, Work
 from tests.twin.device_rig import play as play_rig
 from tests.twin.kobuki_body import IdealBody
 from tests.twin.stamp_errors import OtherClock
@@ -74,6 +74,11 @@ class Robot:
     @property
     def link(self) -> FaultyLink:
         return self.wire.link
+
+    def inject(self, fault: str, seconds: float) -> None:
+        """Let something befall the device or its link, for so long."""
+        inject = self.link.inject if fault in ENDS_OF_LINK else self.twin.inject
+        inject(fault, seconds)  # type: ignore[operator]
 
     def work(self) -> Work:
         return [self.wire.serve(self.clock), self.base.run(), self.follow(self.twist)]

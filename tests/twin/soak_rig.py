@@ -3,9 +3,10 @@
 import gc
 import math
 import sys
-from collections import Counter
-from collections.abc import Mapping
+from collections import Counter, deque
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from gvgbot.drivers.hokuyo.driver import HokuyoConfig
@@ -20,6 +21,7 @@ from tests.twin.kobuki_rig import Robot
 LOOK = 0.1  # s between two looks at the rig
 SETTLING = 60.0  # s after a start in which stamps may be a little off
 GROUP = 2  # steps that a URG-04LX must merge for 115200 bit/s
+FAULTS_APART = 4.0  # s
 DRIFT_PPM = 50.0
 TWIST = Twist(0.2, 0.3)
 
@@ -28,17 +30,15 @@ TWIST = Twist(0.2, 0.3)
 class Recovery:
     """How long a device gave nothing at worst, counted from the end of its last fault.
 
-    `lasting` tells how long the faults last that do (s). A device that boots, or refuses all until
-    it is told to, is not there yet; `longest_away` is how long that took at worst (s).
+    `lasting` tells how long the faults last that do (s). A device that goes down to boot, as long
+    as its own configuration says, is not there yet.
     """
 
     lasting: Mapping[str, float]
     worst: float = 0.0
     cause: str = "none"
-    longest_away: float = 0.0
     _excused: float = 0.0
     _looked: float = 0.0
-    _back: float = 0.0
     _last_fault: str = "none"
     _seen: int = 0
     _counts: Counter[str] | None = None
@@ -46,10 +46,7 @@ class Recovery:
     def look(self, now: float, last: float, counts: Counter[str], *, is_away: bool) -> None:
         """Judge by the last good value (s) and how often each fault has begun by now (s)."""
         if is_away:
-            self.longest_away = max(self.longest_away, now - self._back)
             self._excused = max(self._excused, now)
-        else:
-            self._back = now
         if counts.total() > self._seen:
             for name in counts - (self._counts or Counter()):
                 end = self._looked + self.lasting.get(name, 0.0)
@@ -104,14 +101,30 @@ class Soak:
         return [*self.laser.work(), *self.base.work()]
 
     async def last(self, seconds: float) -> None:
-        """Look on for so long, and measure the memory at half of it and at the end."""
+        """Look on for so long, and measure the memory at half of it and at the end.
+
+        Each fault is made to happen once in the first minutes, whatever chance brings besides.
+        """
+        faults = self._faults()
         for half in (seconds / 2, seconds):
             while (now := self.laser.clock.now()) < half:
+                if faults and now >= faults[0][0]:
+                    faults.popleft()[1]()
                 await self.laser.clock.sleep_until(now + LOOK)
                 self._look_at_laser(now + LOOK)
                 self._look_at_base(now + LOOK)
             gc.collect()
             self.memory.append((sys.getallocatedblocks(), _resident()))
+
+    def _faults(self) -> deque[tuple[float, Callable[[], None]]]:
+        """Every fault of a device or its link that can be called up, and when to do so (s)."""
+        rigs = (self.laser, self.laser_recovery), (self.base, self.base_recovery)
+        calls = [
+            partial(rig.inject, name, seconds)
+            for rig, recovery in rigs
+            for name, seconds in recovery.lasting.items()
+        ]
+        return deque((FAULTS_APART * i, call) for i, call in enumerate(calls, 1))
 
     def _look_at_laser(self, now: float) -> None:
         rig = self.laser
@@ -119,7 +132,7 @@ class Soak:
         self.scan_stamps.add(rig.errors, are_settled=self._is_settled("laser", starts, now))
         self.scans += len(rig.arrivals)
         self._last_scan = rig.arrivals[-1] if rig.arrivals else self._last_scan
-        is_away = rig.twin._is_down or rig.twin._answers.is_abnormal
+        is_away = rig.twin._is_down or rig.twin._answers.restarts_at is not None
         self.laser_recovery.look(
             now, self._last_scan, rig.link.counts + rig.twin.counts, is_away=is_away
         )

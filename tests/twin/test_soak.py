@@ -6,13 +6,13 @@ from gvgbot.drivers.hokuyo.twin import HokuyoTwinConfig, LaserMishapConfig
 from gvgbot.drivers.kobuki.mishaps import MishapConfig
 from gvgbot.drivers.kobuki.twin import KobukiTwinConfig
 from gvgbot.drivers.link_faults import LinkFaultConfig
+from tests.twin.device_rig import ENDS_OF_LINK
 from tests.twin.soak_rig import DRIFT_PPM, Soak, soak
 
 pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(120)]
 
 DAY = 86_400.0  # s
 DAMAGE = {"flipped bit", "lost byte", "inserted byte", "cut message"}
-ENDS_OF_LINK = {"silence", "unplug"}
 
 
 def laser_config(per_h: float, damage_per_kb: float) -> HokuyoTwinConfig:
@@ -85,6 +85,7 @@ def check(rig: Soak, seconds: float) -> None:
     assert set(rig.base.twin.mishaps.counts) == set(base.mishaps.rates)
     for name in ("bad_messages", "repeated_scans", "refused_scans", "restarts", "reboots"):
         assert rig.laser.total(name) > 0, name
+    assert rig.laser.total("reboots") <= 2 * rig.laser.twin.counts["abnormal"]  # one may be lost
     assert (rig.laser.wrong, rig.jumps) == (0, 0)
     assert rig.laser_recovery.worst < 2.0, rig.laser_recovery
     assert rig.base_recovery.worst < 2.0, rig.base_recovery
@@ -95,7 +96,7 @@ def check(rig: Soak, seconds: float) -> None:
 
 
 def test_minutes_of_all_faults_at_once_are_survived() -> None:
-    check(soak(laser_config(90.0, 0.005), base_config(90.0, 0.01), 150.0, seed=9), 150.0)
+    check(soak(laser_config(40.0, 0.02), base_config(40.0, 0.02), 150.0), 150.0)
 
 
 @pytest.mark.bench  # half an hour of computing: run it with -m bench
