@@ -84,29 +84,6 @@ def test_every_loss_is_counted_and_no_damaged_scan_is_handed_on() -> None:
     on_rig(scenario, link=link)
 
 
-@pytest.mark.parametrize("drift_ppm", [-50.0, 50.0])
-@pytest.mark.parametrize(
-    ("sync", "latency", "limit"),
-    [
-        pytest.param(True, 0.0, 0.0015, id="synchronised"),
-        pytest.param(False, 0.0, 0.0015, id="arrivals only"),
-        pytest.param(True, 0.004, 0.0035, id="half of a one-sided latency is found out"),
-    ],
-)
-def test_stamps_are_right_in_spite_of_jitter_and_drift(
-    drift_ppm: float, latency: float, limit: float, *, sync: bool
-) -> None:
-    async def scenario(rig: LaserRig) -> None:
-        await rig.clock.sleep_until(120.0)
-        late = np.array(rig.errors[600:])
-        assert len(late) > 500
-        assert np.sqrt(np.mean(late**2)) < limit
-
-    link = LinkFaultConfig(latency_s=latency, jitter_s=0.005)
-    config = HokuyoConfig(synchronise=sync)
-    on_rig(scenario, link=link, config=config, clock_drift_ppm=drift_ppm)
-
-
 @pytest.mark.parametrize("sync", [True, False])
 def test_a_reboot_to_the_same_time_of_its_clock_is_no_trap(*, sync: bool) -> None:
     """A clock that began again stands a little further than at the last scan before."""
