@@ -68,6 +68,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_run(commands)
     _add_twin(commands)
     _add_check(commands)
+    _add_monitor(commands)
     _add_map(commands)
     return parser
 
@@ -151,6 +152,27 @@ def _add_check(commands: "argparse._SubParsersAction[_Parser]") -> None:
     )
     _add_config(check)
     check.set_defaults(command=_check)
+
+
+def _add_monitor(commands: "argparse._SubParsersAction[_Parser]") -> None:
+    monitor = commands.add_parser(
+        "monitor",
+        help="watch a robot in the terminal",
+        description="Show the map, the state and the events of a robot as they come over the "
+        "network, until q or Ctrl-C. Nothing that the monitor does can move the robot.",
+        epilog="example: gvgbot monitor turtlebot2 --connect tcp/192.168.1.7:7447",
+    )
+    monitor.add_argument(
+        "robot", nargs="?", metavar="ROBOT", help="its robot.name (default: the only one there is)"
+    )
+    monitor.add_argument("--robot", default=argparse.SUPPRESS, metavar="NAME", help="the same")
+    monitor.add_argument(
+        "--connect",
+        default="tcp/127.0.0.1:7447",
+        metavar="ADDRESS",
+        help="of the robot or of a zenoh router (default: %(default)s)",
+    )
+    monitor.set_defaults(command=_monitor)
 
 
 def _add_map(commands: "argparse._SubParsersAction[_Parser]") -> None:
@@ -264,6 +286,17 @@ def _check(options: argparse.Namespace) -> int:
     from gvgbot.check import check
 
     return check(config, _say)
+
+
+def _monitor(options: argparse.Namespace) -> int:
+    try:
+        from gvgbot.monitor.app import monitor
+    except ModuleNotFoundError as error:
+        if error.name is None or not error.name.startswith("rich"):
+            raise
+        raise GvgbotError("the monitor needs rich: pip install 'gvgbot[tui]'") from error
+
+    return monitor(options.robot, options.connect)
 
 
 def _map_show(options: argparse.Namespace) -> int:

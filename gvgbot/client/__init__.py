@@ -8,7 +8,7 @@ The same with `async with` and `async for`.
 """
 
 from gvgbot.client.presence import Presence
-from gvgbot.client.robot import DEFAULT_ENDPOINT, Robot, connect
+from gvgbot.client.robot import DEFAULT_ENDPOINT, Robot, connect, robots
 from gvgbot.topics import Event, LinkHealth, Map, MapEdge, MapVertex, State
 
 __all__ = [
@@ -22,4 +22,5 @@ __all__ = [
     "Robot",
     "State",
     "connect",
+    "robots",
 ]

@@ -14,7 +14,7 @@ class Presence:
 
     alive: it is on the network and says so; quiet: it is on the network but says nothing, so its
     program hangs; gone: it was there, and left or died; absent: it was not there since this
-    program connected; cut off: the router in between is away, so that nobody knows.
+    program connected; cut off: nothing answers at the address any more, so that nobody knows.
     """
 
     word: Word
@@ -29,13 +29,15 @@ class Signs:
     token_at: float | None = None  # when the robot joined or left the network
     has_token: bool = False
     heard_at: float | None = None  # the last state
+    via_router: bool = False  # otherwise the other end of the connection is the robot itself
 
-    def presence(self, now: float, *, reachable: bool) -> Presence:
-        """What the signs say at a stamp; `reachable`: whether the robot's leaving would be told."""
+    def presence(self, now: float, *, linked: bool) -> Presence:
+        """What the signs say at a stamp; `linked`: whether anything is at the other end."""
         if self.token_at is None:
-            return Presence("absent" if reachable else "cut off", now - self.connected_at)
+            return Presence("absent" if linked else "cut off", now - self.connected_at)
         if not self.has_token:
-            return Presence("gone" if reachable else "cut off", now - self.token_at)
+            is_known = linked or not self.via_router
+            return Presence("gone" if is_known else "cut off", now - self.token_at)
         heard_at = self.token_at if self.heard_at is None else max(self.heard_at, self.token_at)
         silence = now - heard_at
         if silence > QUIET_AFTER:

@@ -51,6 +51,16 @@ def connect(robot: str, endpoint: str = DEFAULT_ENDPOINT, *, patience_s: float =
     return Robot(robot, endpoint, patience_s)
 
 
+def robots(endpoint: str = DEFAULT_ENDPOINT, *, patience_s: float = 10.0) -> list[str]:
+    """The names of all robots that can be reached at an address; blocks.
+
+    Raises GvgbotError if nobody answers, UsageError if it is no address.
+    """
+    _check_endpoint(endpoint)
+    with _open(endpoint, patience_s) as session:
+        return _names(session)
+
+
 class Robot:
     """One robot; made by `connect`. What it says is kept up to date whether it is read or not."""
 
@@ -62,7 +72,6 @@ class Robot:
         self._map: Newest[Map] = Newest()
         self._events: Newest[Events] = Newest()
         self._signs = Signs(0.0)
-        self._via_router = False
         self._gate = threading.Lock()  # one of opening and closing at a time
         self._is_closed = False
 
@@ -83,24 +92,18 @@ class Robot:
     @property
     def presence(self) -> Presence:
         """Whether the robot is there."""
-        return self._signs.presence(time.perf_counter(), reachable=self._is_reachable())
+        return self._signs.presence(time.perf_counter(), linked=self._is_linked())
 
     def others(self) -> list[str]:
         """The names of all robots that are on this network now."""
         assert self._session is not None, "the robot is not connected: use `with`"
-        found = self._session.liveliness().get(alive_key("*"), timeout=1.0)
-        keys = [str(reply.ok.key_expr) for reply in found if reply.ok is not None]
-        return sorted(key.split("/")[1] for key in keys)
+        return _names(self._session)
 
-    def _is_reachable(self) -> bool:
-        """A robot that was connected to directly has left if nothing is at the other end."""
+    def _is_linked(self) -> bool:
         if self._session is None:
             return False
         info = self._session.info
-        if info.routers_zid():
-            self._via_router = True
-            return True
-        return not self._via_router
+        return bool(info.routers_zid() or info.peers_zid())
 
     # -- coming and going --------------------------------------------------------------------------
 
@@ -115,8 +118,8 @@ class Robot:
             self._begin(session)
 
     def _begin(self, session: zenoh.Session) -> None:
-        self._signs = Signs(time.perf_counter())
-        self._via_router = bool(session.info.routers_zid())
+        via_router = bool(session.info.routers_zid())
+        self._signs = Signs(time.perf_counter(), via_router=via_router)
         session.liveliness().declare_subscriber(alive_key(self.name), self._on_token, history=True)
         self._subscribe(session, STATE, State, self._state)
         self._subscribe(session, MAP, Map, self._map)
@@ -222,6 +225,20 @@ class _Fresh:
         same = [event for event in events if event.number == last.number]
         has_restarted = events[-1].number < last.number or (same and same[0] != last)
         return tuple(event for event in events if has_restarted or event.number > last.number)
+
+
+def _check_endpoint(endpoint: str) -> None:
+    if not is_endpoint(endpoint):
+        raise UsageError(
+            f"{endpoint!r} is no address: give protocol/address, such as tcp/host:7447"
+        )
+
+
+def _names(session: zenoh.Session) -> list[str]:
+    """Of the robots that are on the network now."""
+    found = session.liveliness().get(alive_key("*"), timeout=1.0)
+    keys = [str(reply.ok.key_expr) for reply in found if reply.ok is not None]
+    return sorted(key.split("/")[1] for key in keys)
 
 
 def _open(endpoint: str, patience_s: float) -> zenoh.Session:

@@ -1,0 +1,118 @@
+"""The monitor as a program: watches one robot until a key or a signal ends it."""
+
+import asyncio
+import math
+from collections import deque
+from collections.abc import Callable
+
+import numpy as np
+
+from gvgbot import client
+from gvgbot.client import Robot, State
+from gvgbot.errors import GvgbotError, UsageError
+from gvgbot.monitor.facts import Fact, headline
+from gvgbot.monitor.screen import Picture, Screen
+from gvgbot.monitor.terminal import keys, open_console
+from gvgbot.monitor.view import Points
+from gvgbot.service import StopSignals
+
+_EVERY = 0.2  # s between pictures
+_PATIENCE = 1.0  # s for a connection, before the screen says that there is none
+_STEP, _STEPS = 0.1, 50  # m between points of the trail, and how many: until the map has them
+
+
+Show = Callable[[Picture], None]
+
+
+def monitor(robot: str | None, endpoint: str) -> int:
+    """Show a robot, or the only one there is, until q, Ctrl-C or another signal; 0.
+
+    Raises UsageError if there is no terminal, if an argument cannot be right, or if several robots
+    are there and none is named.
+    """
+    if robot is not None:
+        client.connect(robot, endpoint)  # complains of wrong arguments before the screen is taken
+    console = open_console()
+    with StopSignals() as signals, console.screen():
+        try:
+            asyncio.run(_until_told(signals, robot, endpoint, Screen(console).show))
+        except* UsageError as errors:
+            raise errors.exceptions[0] from None
+    return 0
+
+
+async def _until_told(signals: StopSignals, robot: str | None, endpoint: str, show: Show) -> None:
+    quitting = asyncio.Event()
+
+    def on_key(key: str) -> None:
+        if key in "qQ":
+            quitting.set()
+
+    async with asyncio.TaskGroup() as tasks:
+        watching = tasks.create_task(_keep_watching(robot, endpoint, show))
+        ends = [tasks.create_task(quitting.wait()), tasks.create_task(signals.wait())]
+        with keys(on_key):
+            await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
+        for task in (watching, *ends):
+            task.cancel()
+
+
+async def _keep_watching(robot: str | None, endpoint: str, show: Show) -> None:
+    """Watch, and say why if that is not possible just now."""
+    show(Picture(Fact("gvgbot", f"connecting to {endpoint}", "faint")))
+    while True:
+        try:
+            name = robot or await _only_robot(endpoint)
+            async with client.connect(name, endpoint, patience_s=_PATIENCE) as seen:
+                await _watch(seen, show)
+        except UsageError:
+            raise
+        except GvgbotError as error:
+            show(Picture(Fact("gvgbot", f"{error}; trying again", "bad")))
+            await asyncio.sleep(_EVERY)
+
+
+async def _only_robot(endpoint: str) -> str:
+    """The name of the robot that is there. Raises UsageError if there are several."""
+    names = await asyncio.to_thread(client.robots, endpoint, patience_s=_PATIENCE)
+    if len(names) > 1:
+        raise UsageError(f"there are several robots: {', '.join(names)}; name one of them")
+    if not names:
+        raise GvgbotError(f"no robot at {endpoint}")
+    return names[0]
+
+
+async def _watch(robot: Robot, show: Show) -> None:
+    trail = _Trail()
+    while True:
+        presence, state = robot.presence, robot.state().latest
+        others = await asyncio.to_thread(robot.others) if presence.word == "absent" else []
+        picture = Picture(
+            headline(robot.name, presence, state, others),
+            state,
+            robot.map().latest,
+            trail.after(state),
+            robot.events().latest,
+            is_fresh=presence.word == "alive",
+        )
+        show(picture)
+        await asyncio.sleep(_EVERY)
+
+
+class _Trail:
+    """The last metres driven, which the map does not have yet."""
+
+    def __init__(self) -> None:
+        self._points: deque[tuple[float, float]] = deque(maxlen=_STEPS)
+        self._sequence = -1
+
+    def after(self, state: State | None) -> Points:
+        """The way (N, 2), m, up to a state."""
+        if state is not None:
+            here = state.pose[:2]
+            if state.sequence < self._sequence:  # the robot began anew
+                self._points.clear()
+            self._sequence = state.sequence
+            if not self._points or math.dist(here, self._points[-1]) >= _STEP:
+                self._points.append(here)
+        return np.array(self._points).reshape(-1, 2)

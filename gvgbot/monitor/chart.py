@@ -1,0 +1,159 @@
+"""The map as characters: walls, edges and the trail in dots; vertices and the robot as signs."""
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvgbot.monitor.braille import Dots, lit, patterns
+from gvgbot.monitor.view import Points, View
+from gvgbot.topics import Map
+
+Layer = Literal["empty", "wall", "trail", "edge", "frontier", "vertex", "robot"]
+
+LAYERS: tuple[Layer, ...] = ("empty", "wall", "trail", "edge", "frontier", "vertex", "robot")
+_OCCUPIED = 65  # percent, as map_server has it
+_ARROWS = "→↗↑↖←↙↓↘"
+_SIGNS = {"meetpoint": "●", "endpoint": "○"}
+_FRONTIER_M = 0.8  # from its vertex, where a frontier's mark stands
+_LEAST_DOTS = 3.0  # or so far, if that is more, so that it does not stand on the vertex
+_MARGIN_M = 0.5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Chart:
+    """Characters (rows, columns) as code points, and the index in `LAYERS` of each; read-only.
+
+    `floor` (rows, columns) tells where the floor is known to be free. `scale` is m per character.
+    """
+
+    codes: NDArray[np.uint32]
+    layers: NDArray[np.uint8]
+    floor: NDArray[np.bool_]
+    scale: float
+
+    def text(self) -> list[str]:
+        """The characters, a line each; a blank where there is nothing."""
+        codes = np.where(self.layers == 0, ord(" "), self.codes)
+        return ["".join(map(chr, row)) for row in codes.tolist()]
+
+
+def chart(
+    known: Map | None,
+    pose: tuple[float, float, float] | None,
+    trail: Points,
+    width: int,
+    height: int,
+) -> Chart:
+    """The whole of a map in so many characters; `trail` (N, 2), m, is what it does not yet have."""
+    view = View.around(*_box(known, pose, trail), width, height)
+    canvas = _Canvas(view)
+    if known is not None:
+        canvas.lay("wall", _walls(known, view))
+        canvas.lay("trail", _drawn(view, [known.driven, trail]))
+        canvas.lay("edge", _drawn(view, [edge.polyline for edge in known.edges]))
+        _mark_vertices(canvas, known)
+    if pose is not None:
+        canvas.mark("robot", (pose[0], pose[1]), _arrow(pose[2]))
+    floor = np.zeros((height, width), bool) if known is None else _floor(known, view)
+    return Chart(canvas.codes, canvas.layers, floor, 2.0 * view.metres_per_dot)
+
+
+class _Canvas:
+    """Layers that are laid one over the other; what comes later hides what was there."""
+
+    def __init__(self, view: View) -> None:
+        self._view = view
+        self._dots = np.zeros(view.shape, bool)
+        self.codes = patterns(self._dots)
+        self.layers = np.zeros((view.height, view.width), np.uint8)
+
+    def lay(self, layer: Layer, dots: Dots) -> None:
+        """Add dots; a character has the colour of the last layer with a dot in it."""
+        self._dots |= dots
+        self.codes = patterns(self._dots)
+        self.layers[lit(dots)] = LAYERS.index(layer)
+
+    def mark(self, layer: Layer, point: tuple[float, float], sign: str) -> None:
+        """Put a sign in place of the character at a point, m."""
+        at = self._view.character_of(point)
+        if at is not None:
+            self.codes[at], self.layers[at] = ord(sign), LAYERS.index(layer)
+
+    @property
+    def metres_per_dot(self) -> float:
+        """The scale."""
+        return self._view.metres_per_dot
+
+
+def _box(
+    known: Map | None, pose: tuple[float, float, float] | None, trail: Points
+) -> tuple[Points, Points]:
+    """Corners (2,), m, of all there is to show."""
+    points = [np.zeros((1, 2)), trail]
+    if pose is not None:
+        points.append(np.array([pose[:2]]))
+    if known is not None:
+        points.append(_cells(known, known.grid >= 0))
+        points.append(np.array([vertex.position for vertex in known.vertices]).reshape(-1, 2))
+    every = np.concatenate(points)
+    return every.min(axis=0) - _MARGIN_M, every.max(axis=0) + _MARGIN_M
+
+
+def _cells(known: Map, chosen: Dots) -> Points:
+    """Centres (N, 2), m, of cells that are marked in (rows, columns)."""
+    rows, columns = np.nonzero(chosen)
+    centres: Points = np.column_stack([columns + 0.5, rows + 0.5]) * known.resolution + known.origin
+    return centres
+
+
+def _walls(known: Map, view: View) -> Dots:
+    """Dots within a wall's cell, and those in which a wall's cell has its centre."""
+    occupied = known.grid >= _OCCUPIED
+    dots = _sampled(known, occupied, view)
+    view.plot(dots, _cells(known, occupied))
+    return dots
+
+
+def _sampled(known: Map, marked: Dots, view: View) -> Dots:
+    """Which dots have their centre in a cell that is marked in (rows, columns)."""
+    x, y = view.centres()
+    columns = np.floor((x - known.origin[0]) / known.resolution).astype(np.int64)
+    rows = np.floor((y - known.origin[1]) / known.resolution).astype(np.int64)
+    inside = ((rows >= 0) & (rows < known.rows))[:, None] & (
+        (columns >= 0) & (columns < known.columns)
+    )
+    at = marked[rows.clip(0, known.rows - 1)[:, None], columns.clip(0, known.columns - 1)]
+    sampled: Dots = at & inside
+    return sampled
+
+
+def _floor(known: Map, view: View) -> NDArray[np.bool_]:
+    """The characters (rows, columns) with some known floor or wall in them."""
+    return lit(_sampled(known, known.grid >= 0, view))
+
+
+def _drawn(view: View, polylines: list[Points]) -> Dots:
+    dots = np.zeros(view.shape, bool)
+    for polyline in polylines:
+        view.draw(dots, polyline)
+    return dots
+
+
+def _mark_vertices(canvas: _Canvas, known: Map) -> None:
+    away = max(_FRONTIER_M, _LEAST_DOTS * canvas.metres_per_dot)
+    for vertex in known.vertices:
+        x, y = vertex.position
+        for bearing in vertex.frontiers:
+            canvas.mark(
+                "frontier", (x + away * math.cos(bearing), y + away * math.sin(bearing)), "?"
+            )
+    for vertex in known.vertices:
+        canvas.mark("vertex", vertex.position, _SIGNS[vertex.kind])
+
+
+def _arrow(theta: float) -> str:
+    """The arrow nearest to a direction, rad."""
+    return _ARROWS[round(theta / (math.pi / 4)) % 8]

@@ -1,0 +1,182 @@
+"""A robot in words: what the lines of the monitor say of a state, of events and of its presence."""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from gvgbot.client import Event, LinkHealth, Presence, State
+
+Tone = Literal["plain", "good", "warning", "bad", "faint"]
+
+_STUCK_AFTER = 1.0  # s without a control cycle
+_LOW_BATTERY = 0.2  # of a full charge
+_GAUGE = 8  # characters
+_QUIET = {"edge_joined"}  # too many of them, and they say little
+_PHASES: Mapping[str, Tone] = {
+    "starting": "warning",
+    "exploring": "good",
+    "halted": "bad",
+    "finished": "good",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Fact:
+    """A line: what it is about, what there is to say, and in which tone."""
+
+    name: str
+    text: str
+    tone: Tone = "plain"
+
+
+def facts(state: State, events: tuple[Event, ...]) -> Iterator[Fact]:
+    """What there is to know of a robot, the most telling first."""
+    yield Fact("phase", state.outcome or state.phase, _tone_of_phase(state))
+    yield from _intention(state, events)
+    x, y, theta = state.pose
+    yield Fact("pose", f"{x:.2f} {y:.2f} m  {_degrees(theta)}")
+    yield Fact("sigma", _sigma(state))
+    yield Fact("speed", f"{state.twist[0]:.2f} m/s  {math.degrees(state.twist[1]):+.0f}°/s")
+    yield Fact("driven", f"{state.distance:.1f} m")
+    yield Fact("vertices", f"{state.vertices}, {state.frontiers} frontiers left")
+    yield Fact("edges", f"{state.edges}")
+    yield Fact("guard", *((state.guard, "warning") if state.guard else ("free", "plain")))
+    yield Fact("contacts", *_contacts(state))
+    yield Fact("battery", *_battery(state))
+    yield Fact("laser", *_link(state.laser))
+    yield Fact("base", *_link(state.base))
+    yield Fact("control", *_control(state))
+
+
+def _tone_of_phase(state: State) -> Tone:
+    return "warning" if state.outcome not in (None, "explored") else _PHASES[state.phase]
+
+
+def _intention(state: State, events: tuple[Event, ...]) -> Iterator[Fact]:
+    """Where the robot goes, and why."""
+    chosen = next((event for event in reversed(events) if event.kind == "decision"), None)
+    if chosen is None or state.phase == "finished":
+        yield Fact("going to", "-", "faint")
+        yield Fact("why", state.reason or "-", "plain" if state.reason else "faint")
+        return
+    yield Fact("going to", f"vertex {chosen.details.get('vertex')}{_towards(chosen)}")
+    yield Fact("why", str(chosen.details.get("reason")))
+
+
+def _towards(decision: Event) -> str:
+    bearing = decision.details.get("bearing")
+    return f", {_degrees(bearing)}" if isinstance(bearing, float) else ""
+
+
+def _degrees(angle: float) -> str:
+    """Whole degrees of an angle, rad; never -0."""
+    return f"{round(math.degrees(angle))}°"
+
+
+def _sigma(state: State) -> str:
+    """The standard deviations of the pose: the larger one of the position, and of the heading."""
+    xx, xy, _, _, yy, _, _, _, tt = state.covariance
+    largest = (xx + yy) / 2 + math.hypot((xx - yy) / 2, xy)
+    return (
+        f"{100 * math.sqrt(max(0.0, largest)):.1f} cm  {math.degrees(math.sqrt(max(0.0, tt))):.1f}°"
+    )
+
+
+def _contacts(state: State) -> tuple[str, Tone]:
+    slips = f", {state.slips} slips" if state.slips else ""
+    return f"{state.contacts}{slips}", "warning" if state.contacts or state.slips else "plain"
+
+
+def _battery(state: State) -> tuple[str, Tone]:
+    if state.battery_fraction is None or state.battery_voltage is None:
+        return "unknown", "faint"
+    full = round(_GAUGE * min(1.0, max(0.0, state.battery_fraction)))
+    gauge = "█" * full + "░" * (_GAUGE - full)
+    tone: Tone = "bad" if state.battery_fraction < _LOW_BATTERY else "good"
+    return f"{gauge} {state.battery_fraction:.0%} {state.battery_voltage:.1f} V", tone
+
+
+def _link(link: LinkHealth) -> tuple[str, Tone]:
+    if not link.connected:
+        return "away" if link.messages else "not there", "bad"
+    troubles = {"lost": link.lost, "damaged": link.damaged, "reconnects": link.reconnects}
+    said = ", ".join(f"{count} {name}" for name, count in troubles.items() if count)
+    return (said, "plain") if said else ("fine", "good")
+
+
+def _control(state: State) -> tuple[str, Tone]:
+    """Whether the control loop turns."""
+    if state.cycle_age is None:
+        return "not begun", "faint"
+    if state.cycle_age > _STUCK_AFTER:
+        return f"no cycle for {state.cycle_age:.0f} s", "bad"
+    return "running", "good"
+
+
+def told(event: Event, now: float) -> Fact | None:
+    """An event as a line at a stamp, s; None for those that only fill the list."""
+    if event.kind in _QUIET:
+        return None
+    tone: Tone = {"recovery": "warning", "finished": "good", "loop_closed": "good"}.get(
+        event.kind, "plain"
+    )  # type: ignore[assignment]
+    return Fact(f"{duration(now - event.stamp):>8}", _words(event), tone)
+
+
+def _words(event: Event) -> str:
+    get = event.details.get
+    match event.kind:
+        case "decision":
+            return f"go to vertex {get('vertex')}{_towards(event)}: {get('reason')}"
+        case "vertex_added":
+            return f"found {get('kind')} {get('vertex')} of degree {get('degree')}"
+        case "vertex_removed":
+            return f"vertex {get('vertex')} is none: {get('reason')}"
+        case "loop_closed":
+            away = get("away_m")
+            far = f" after {away:.0f} m" if isinstance(away, float) else ""
+            return f"loop closed at vertex {get('vertex')}{far}"
+        case "recovery":
+            return f"{get('action')}: {get('reason')}"
+        case "finished":
+            return f"{get('outcome')}: {get('reason')}"
+        case _:
+            said = ", ".join(f"{name} {value}" for name, value in event.details.items())
+            return f"{event.kind.replace('_', ' ')}: {said}"
+
+
+def headline(robot: str, presence: Presence, state: State | None, others: list[str]) -> Fact:
+    """The one thing to know first."""
+    match presence.word:
+        case "absent":
+            there = f"there is {', '.join(others)}" if others else "there is none"
+            return Fact(robot, f"no robot named {robot} here; {there}", "bad")
+        case "gone":
+            return Fact(robot, f"robot gone since {duration(presence.for_s)}", "bad")
+        case "cut off":
+            return Fact(
+                robot, f"connection lost since {duration(presence.for_s)}, trying again", "bad"
+            )
+        case "quiet":
+            return Fact(robot, f"quiet since {duration(presence.for_s)}: its program hangs", "bad")
+        case "alive":
+            return _alive(robot, state)
+
+
+def _alive(robot: str, state: State | None) -> Fact:
+    if state is None:
+        return Fact(robot, "has not said anything yet", "warning")
+    if state.cycle_age is not None and state.cycle_age > _STUCK_AFTER and state.base.connected:
+        return Fact(robot, "its control loop is stuck", "bad")
+    return Fact(robot, state.reason or "alive", _tone_of_phase(state))
+
+
+def duration(seconds: float) -> str:
+    """A time span in the words of people: 12 s, 3 min 5 s, 2 h 7 min."""
+    whole = int(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60} s"
+    return f"{whole // 3600} h {whole % 3600 // 60} min"

@@ -1,0 +1,183 @@
+"""Maps drawn by hand against characters whose dots were counted by hand."""
+
+import math
+import unicodedata
+
+import numpy as np
+import pytest
+
+from gvgbot.monitor.braille import Dots, patterns
+from gvgbot.monitor.chart import LAYERS, Chart, chart
+from gvgbot.monitor.view import View
+from gvgbot.topics import Map
+from tests.unit.monitor.maps import a_map, vertex
+
+NOWHERE = np.zeros((0, 2))
+
+
+def names(dots: Dots) -> str:
+    return unicodedata.name(chr(int(patterns(dots)[0, 0])))
+
+
+@pytest.mark.parametrize(
+    ("row", "column", "number"),
+    [(0, 0, 1), (1, 0, 2), (2, 0, 3), (0, 1, 4), (1, 1, 5), (2, 1, 6), (3, 0, 7), (3, 1, 8)],
+)
+def test_each_dot_is_the_one_that_unicode_numbers_so(row: int, column: int, number: int) -> None:
+    dots = np.zeros((4, 2), bool)
+    dots[row, column] = True
+    assert names(dots) == f"BRAILLE PATTERN DOTS-{number}"
+
+
+def test_no_dot_is_the_blank_pattern_and_all_are_all() -> None:
+    assert names(np.zeros((4, 2), bool)) == "BRAILLE PATTERN BLANK"
+    assert names(np.ones((4, 2), bool)) == "BRAILLE PATTERN DOTS-12345678"
+
+
+def drawn(known: Map, width: int, height: int) -> Chart:
+    return chart(known, None, NOWHERE, width, height)
+
+
+# Cells of a metre about the points 0..15, with half a metre around their centres: 16 x 16 m.
+ROOM = """
+################
+#......#.......#
+#......#.......#
+#......#.......#
+#..............#
+#..............#
+#..............#
+#......#########
+#..............#
+#..............#
+#..#...........#
+#..............#
+#..............#
+#..............#
+#.............##
+################
+"""
+WALLS = np.array([[sign == "#" for sign in line] for line in ROOM.split()])
+HALF = (-0.5, -0.5)
+
+
+def test_where_a_dot_is_as_large_as_a_cell_the_dots_are_the_walls() -> None:
+    room = drawn(a_map(ROOM, origin=HALF), 8, 4)
+    assert room.scale == 2.0  # of a character: two dots of a metre
+    assert (dots_of(room) == WALLS).all()
+    assert room.text()[0] == "⡏⠉⠉⢹⠉⠉⠉⢹"
+    assert room.floor.all()
+
+
+def test_where_dots_are_finer_than_cells_walls_stay_closed() -> None:
+    room = drawn(a_map(ROOM, origin=HALF), 16, 8)
+    assert (dots_of(room) == np.kron(WALLS, np.ones((2, 2), bool))).all()
+
+
+def test_where_dots_are_coarser_than_cells_no_wall_is_lost() -> None:
+    room = drawn(a_map(ROOM, origin=HALF), 4, 2)
+    blocks = WALLS.reshape(8, 2, 8, 2).any(axis=(1, 3))
+    assert (dots_of(room) == blocks).all()
+
+
+def test_a_wide_terminal_shows_the_map_in_its_middle() -> None:
+    room = drawn(a_map(ROOM, origin=HALF), 12, 4)
+    assert (dots_of(room)[:, 4:20] == WALLS).all()
+    assert not dots_of(room)[:, :4].any()
+    assert not dots_of(room)[:, 20:].any()
+
+
+def test_unknown_floor_is_told_from_known() -> None:
+    half = ROOM.replace("#.", " .").strip("\n").split("\n")
+    drawing = "\n".join(line[:8] + " " * 8 for line in half)
+    far = vertex((15.0, 8.0))  # keeps the view as wide as before
+    room = drawn(a_map(drawing, origin=HALF, vertices=(far,)), 8, 4)
+    assert room.floor[:, :4].all()
+    assert not room.floor[:, 4:].any()
+
+
+EMPTY = "\n".join(["." * 16] * 16)
+
+
+def test_an_edge_is_a_line_without_gaps_and_hides_the_trail_under_it() -> None:
+    upright = [(2.0, 2.0), (2.0, 12.0)]
+    found = drawn(
+        a_map(EMPTY, origin=HALF, lines=(upright,), trail=[(2.0, 2.0), (12.0, 2.0)]), 8, 4
+    )
+    expected = np.zeros((16, 16), bool)
+    for i in range(2, 13):
+        expected[15 - i, 2] = True  # row 0 is the north
+        expected[13, i] = True
+    assert (dots_of(found) == expected).all()
+    edge, trail = LAYERS.index("edge"), LAYERS.index("trail")
+    assert found.layers[3].tolist() == [0, edge, trail, trail, trail, trail, trail, 0]
+
+
+def test_the_last_metres_are_drawn_though_the_map_does_not_have_them() -> None:
+    way = np.array([[3.0, 0.0], [3.0, 4.0]])
+    found = chart(a_map(EMPTY, origin=HALF), None, way, 8, 4)
+    expected = np.zeros((16, 16), bool)
+    expected[11:16, 3] = True
+    assert (dots_of(found) == expected).all()
+
+
+def test_vertices_frontiers_and_the_robot_are_signs_where_they_are() -> None:
+    known = a_map(
+        EMPTY,
+        origin=HALF,
+        vertices=(
+            vertex((1.0, 1.0), frontiers=(0.0, math.pi / 2)),
+            vertex((15.0, 15.0), "endpoint"),
+        ),
+    )
+    found = chart(known, (8.0, 9.0, 0.0), NOWHERE, 8, 4)
+    assert found.text() == ["       ○", "    →   ", "?       ", "● ?     "]
+
+
+@pytest.mark.parametrize(
+    ("degrees", "arrow"),
+    [
+        *[(0, "→"), (45, "↗"), (90, "↑"), (135, "↖"), (180, "←"), (-180, "←"), (-135, "↙")],
+        *[(-90, "↓"), (-45, "↘"), (20, "→"), (25, "↗"), (-20, "→"), (360, "→"), (450, "↑")],
+    ],
+)
+def test_the_arrow_points_where_the_robot_looks(degrees: float, arrow: str) -> None:
+    found = chart(None, (0.0, 0.0, math.radians(degrees)), NOWHERE, 8, 4)
+    assert arrow in "".join(found.text())
+
+
+def test_without_a_map_there_is_a_small_empty_place() -> None:
+    found = chart(None, None, NOWHERE, 10, 5)
+    assert found.text() == [" " * 10] * 5
+
+
+def test_what_lies_outside_a_view_is_left_out() -> None:
+    view = View(2, 1, 0.0, 4.0, 1.0)
+    dots = np.zeros(view.shape, bool)
+    view.draw(dots, np.array([[-5.0, 3.5], [20.0, 3.5]]))
+    assert dots.tolist() == [[True] * 4, [False] * 4, [False] * 4, [False] * 4]
+    assert view.character_of((4.5, 1.0)) is None
+    assert view.character_of((3.5, 1.0)) == (0, 1)
+
+
+def dots_of(found: Chart) -> Dots:
+    """The dots of all characters, by their names in the Unicode standard."""
+    places = {
+        1: (0, 0),
+        2: (1, 0),
+        3: (2, 0),
+        4: (0, 1),
+        5: (1, 1),
+        6: (2, 1),
+        7: (3, 0),
+        8: (3, 1),
+    }
+    rows, columns = found.codes.shape
+    dots = np.zeros((4 * rows, 2 * columns), bool)
+    for (row, column), code in np.ndenumerate(found.codes):
+        pattern, dash, numbers = unicodedata.name(chr(code)).rpartition("-")
+        assert not dash or pattern == "BRAILLE PATTERN DOTS", "a sign where dots were expected"
+        for number in numbers if dash else "":
+            y, x = places[int(number)]
+            dots[4 * row + y, 2 * column + x] = True
+    return dots

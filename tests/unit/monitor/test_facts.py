@@ -1,0 +1,128 @@
+"""The words for a robot's state, its events and its presence."""
+
+import math
+
+import msgspec
+import pytest
+
+from gvgbot.client import Event, Presence
+from gvgbot.monitor.facts import Fact, duration, facts, headline, told
+from tests.unit.test_telemetry import EXAMPLE
+
+DECISION = Event(
+    number=0,
+    stamp=1.0,
+    kind="decision",
+    details={"vertex": 7, "bearing": math.pi / 2, "reason": "nearest frontier"},
+)
+
+
+def said(**changes: object) -> dict[str, Fact]:
+    return {fact.name: fact for fact in facts(msgspec.structs.replace(EXAMPLE, **changes), ())}
+
+
+def test_the_numbers_of_a_state_are_said_in_the_units_of_people() -> None:
+    lines = said(pose=(1.0, -2.0, math.pi / 6), twist=(0.25, -math.pi / 18))
+    assert lines["pose"].text == "1.00 -2.00 m  30°"
+    assert lines["speed"].text == "0.25 m/s  -10°/s"
+    assert lines["driven"].text == "31.5 m"
+    assert lines["battery"].text == "███████░ 90% 16.1 V"
+
+
+def test_sigma_is_along_the_longest_axis_of_the_ellipse() -> None:
+    c, s = math.cos(0.4), math.sin(0.4)  # an ellipse of 3 by 1 cm, turned by 0.4 rad
+    xx, yy = 9e-4 * c * c + 1e-4 * s * s, 9e-4 * s * s + 1e-4 * c * c
+    xy = (9e-4 - 1e-4) * c * s
+    tt = math.radians(2.0) ** 2
+    lines = said(covariance=(xx, xy, 0.0, xy, yy, 0.0, 0.0, 0.0, tt))
+    assert lines["sigma"].text == "3.0 cm  2.0°"
+
+
+def test_the_next_decision_and_its_reason_are_said() -> None:
+    lines = {fact.name: fact.text for fact in facts(EXAMPLE, (DECISION,))}
+    assert lines["going to"] == "vertex 7, 90°"
+    assert lines["why"] == "nearest frontier"
+
+
+def test_who_has_finished_goes_nowhere() -> None:
+    done = msgspec.structs.replace(
+        EXAMPLE, phase="finished", outcome="explored", reason="no frontier is left"
+    )
+    lines = {fact.name: fact.text for fact in facts(done, (DECISION,))}
+    assert (lines["phase"], lines["going to"]) == ("explored", "-")
+    assert lines["why"] == "no frontier is left"
+
+
+def test_troubles_of_links_are_counted() -> None:
+    lines = said()
+    assert lines["laser"].text == "4 lost, 3 damaged"
+    assert lines["base"] == Fact("base", "away", "bad")
+
+
+@pytest.mark.parametrize(
+    ("changes", "name", "expected"),
+    [
+        ({"cycle_age": 5.2}, "control", Fact("control", "no cycle for 5 s", "bad")),
+        ({"cycle_age": None}, "control", Fact("control", "not begun", "faint")),
+        ({"guard": "obstacle near"}, "guard", Fact("guard", "obstacle near", "warning")),
+        ({"contacts": 0, "slips": 0}, "contacts", Fact("contacts", "0", "plain")),
+        ({"battery_fraction": None}, "battery", Fact("battery", "unknown", "faint")),
+        (
+            {"battery_fraction": 0.1, "battery_voltage": 13.2},
+            "battery",
+            Fact("battery", "█░░░░░░░ 10% 13.2 V", "bad"),
+        ),
+        ({"phase": "halted"}, "phase", Fact("phase", "halted", "bad")),
+        ({"pose": (0.0, 0.0, -0.001)}, "pose", Fact("pose", "0.00 0.00 m  0°", "plain")),
+    ],
+)
+def test_what_needs_a_look_is_toned(changes: dict[str, object], name: str, expected: Fact) -> None:
+    assert said(**changes)[name] == expected
+
+
+@pytest.mark.parametrize(
+    ("word", "others", "text"),
+    [
+        ("absent", ["a", "b"], "no robot named karl here; there is a, b"),
+        ("absent", [], "no robot named karl here; there is none"),
+        ("gone", [], "robot gone since 12 s"),
+        ("cut off", [], "connection lost since 12 s, trying again"),
+        ("quiet", [], "quiet since 12 s: its program hangs"),
+        ("alive", [], "alive"),
+    ],
+)
+def test_the_headline_says_how_things_are(word: str, others: list[str], text: str) -> None:
+    presence = Presence(word, 12.3)  # type: ignore[arg-type]
+    state = msgspec.structs.replace(EXAMPLE, reason="")
+    assert headline("karl", presence, state, others).text == text
+
+
+def test_a_control_loop_that_is_stuck_makes_the_headline() -> None:
+    laser = msgspec.structs.replace(EXAMPLE.base, connected=True)
+    stuck = msgspec.structs.replace(EXAMPLE, cycle_age=7.0, base=laser)
+    assert headline("karl", Presence("alive", 1.0), stuck, []).tone == "bad"
+
+
+def test_an_event_is_a_sentence_with_its_age() -> None:
+    assert told(DECISION, 13.5) == Fact("    12 s", "go to vertex 7, 90°: nearest frontier")
+
+
+def test_a_kind_of_event_that_is_not_known_yet_is_told_all_the_same() -> None:
+    strange = Event(number=1, stamp=0.0, kind="wheel_lost", details={"wheel": "left"})
+    fact = told(strange, 0.0)
+    assert fact is not None
+    assert fact.text == "wheel lost: wheel left"
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [
+        (0.9, "0 s"),
+        (59.9, "59 s"),
+        (60.0, "1 min 0 s"),
+        (3599.0, "59 min 59 s"),
+        (7620, "2 h 7 min"),
+    ],
+)
+def test_durations(seconds: float, text: str) -> None:
+    assert duration(seconds) == text
