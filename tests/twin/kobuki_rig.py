@@ -77,8 +77,10 @@ class Robot:
 
     def inject(self, fault: str, seconds: float) -> None:
         """Let something befall the device or its link, for so long."""
-        inject = self.link.inject if fault in ENDS_OF_LINK else self.twin.inject
-        inject(fault, seconds)  # type: ignore[operator]
+        inject: Callable[..., None] = (
+            self.link.inject if fault in ENDS_OF_LINK else self.twin.inject
+        )
+        inject(fault, seconds)
 
     def work(self) -> Work:
         return [self.wire.serve(self.clock), self.base.run(), self.follow(self.twist)]
