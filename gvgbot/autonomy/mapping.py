@@ -479,6 +479,19 @@ class Mapper:
         self.belief = ekf.remove_vertex(self.belief, vertex.id)
         self._events.append(VertexRemoved(view.stamp, vertex.id, reason))
 
+    def close_ring(self, view: View, line: Array, min_clearance: float) -> None:
+        """Make a vertex here on an edge without an end that has been driven round.
+
+        The polyline (N, 2), local frame, begins and ends about where the robot is.
+        """
+        here = view.local_base.position
+        line = np.concatenate([here[None], line, here[None]])
+        way_out, way_in = line[len(line) // 8] - here, line[-len(line) // 8] - here
+        bearings = (math.atan2(way_out[1], way_out[0]), math.atan2(way_in[1], way_in[0]))
+        vertex = self._add(view, Sighting(here, min_clearance, bearings, meetpoint=True))
+        ends = [HalfEdgeId(vertex.id, key) for key in vertex.half_edges]
+        self.join(view, ends[0], ends[1], line, min_clearance, driven=True)
+
     def in_local_frame(self, view: View, vertex: int) -> Pose:
         """Where a vertex, seen lately or not, stands in the local frame."""
         return view.local_base.compose(ekf.expected(self.belief, vertex)[0])

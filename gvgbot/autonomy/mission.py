@@ -160,21 +160,30 @@ class Mission:
         self._mapper.join(view, left, arrived, passage.line, passage.narrowest, driven=True)
 
     def _close_start_edge(self, view: View, clearance: float) -> None:
-        """Join the edge that the robot started on, when it comes there from the other end."""
+        """Join the edge that the robot started on, when it comes there from the other end.
+
+        If it met no vertex on the way, the edge is a ring.
+        """
         start, on_edge, graph = self._start_edge, self.where.on_edge, self._mapper.graph
+        if not graph.vertices and self._is_round(clearance):
+            line, narrowest = np.array(self.where.trail), self.where.narrowest
+            self._mapper.close_ring(view, line, narrowest)
         if start is None or on_edge is None or on_edge == start.end:
             return
         ends = (graph.half_edge(on_edge), graph.half_edge(start.end))
         if any(half is None or not half.open for half in ends):
             return
-        if self.where.trail_length < _LEAST_LOOP_M or not is_at_start(
-            self._mapper.belief, clearance
-        ):
+        if not self._is_round(clearance):
             return
         rest = self._mapper.in_local_frame(view, start.end.vertex).transform(start.line)
         line = np.concatenate([np.array(self.where.trail), rest])
         narrowest = min(self.where.narrowest, start.narrowest)
         self._mapper.join(view, on_edge, start.end, line, narrowest, driven=True)
+
+    def _is_round(self, clearance: float) -> bool:
+        """Whether the robot has come back to where it started."""
+        driven = self.where.trail_length > _LEAST_LOOP_M
+        return driven and is_at_start(self._mapper.belief, clearance)
 
     # -- where next ------------------------------------------------------------------------------
 
@@ -358,12 +367,12 @@ class Mission:
 
     def _access(self, view: View, place: Place) -> Order:
         """Go to the nearest edge, if the way there is free."""
-        track = way_to_edge(view, place)
-        if track is None:
+        way = way_to_edge(view, place)
+        if way is None:
             return self._search(view)
         self._lost_since = None
         self._watch_progress(view)
-        return Stand() if self.outcome is not None else Drive(track, blind_end=True)
+        return Stand() if self.outcome is not None else Drive(Track.of(*way), blind_end=True)
 
     def _search(self, view: View) -> Order:
         """No edge in sight: look around, and give up after a while."""

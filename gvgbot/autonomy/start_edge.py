@@ -14,6 +14,7 @@ from gvgbot.geometry import Array
 
 _GATE = 9.2  # squared Mahalanobis distance, 2 degrees of freedom
 _FAR_M = 0.8  # from the start, whatever the uncertainty
+_AT_M = 0.25  # so near, standard deviation, one is at a place and not on the way to it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,4 +33,4 @@ def is_at_start(belief: Belief, clearance: float) -> bool:
     """
     away = belief.x[:2]
     near = float(np.hypot(*away)) < min(_FAR_M, clearance)
-    return near and mahalanobis(away, belief.P[:2, :2] + np.eye(2) * 0.1**2) < _GATE
+    return near and mahalanobis(away, belief.P[:2, :2] + np.eye(2) * _AT_M**2) < _GATE

@@ -5,17 +5,20 @@ import math
 import numpy as np
 from scipy.spatial import cKDTree
 
-from gvgbot.autonomy.control.edge_follower import Track
 from gvgbot.autonomy.gvg.local import Place
 from gvgbot.autonomy.views import View
+from gvgbot.geometry import Array
 
 NEAR_M = 1.5  # from an edge, one is as good as on it
 _ROOM_M = 0.35  # from the walls, on the way
 _SPACING_M = 0.1
 
 
-def way_to_edge(view: View, place: Place) -> Track | None:
-    """The straight way to the nearest point of the local GVG; None if it is not free."""
+def way_to_edge(view: View, place: Place) -> tuple[Array, Array] | None:
+    """The straight way to the nearest point of the local GVG; None if it is not free.
+
+    Its points (N, 2), local frame, and their distances (N,) from the walls, m.
+    """
     base, edge = view.local_base.position, view.gvg.edges[place.edge]
     goal = [float(np.interp(place.station, edge.stations, edge.polyline[:, k])) for k in (0, 1)]
     line = np.linspace(base, goal, math.ceil(place.distance / _SPACING_M) + 1)
@@ -23,4 +26,4 @@ def way_to_edge(view: View, place: Place) -> Track | None:
     narrow = room < min(_ROOM_M, float(room[0]))  # where it stands, it may stand close
     if narrow.any() or not view.local_map.known(line).all():
         return None
-    return Track.of(line, room)
+    return line, room

@@ -18,7 +18,7 @@ def belief(x: float, y: float, sigma: float) -> Belief:
         (0.3, 0.2, 0.1, 1.0, True),
         (0.3, 0.2, 0.1, 0.3, False),  # a wall may stand between here and there
         (0.9, 0.0, 2.0, 3.0, False),  # a robot that is lost is not everywhere
-        (0.7, 0.0, 0.01, 3.0, False),  # 7 sigmas of 0.1 m away: surely somewhere else
+        (0.78, 0.0, 0.01, 3.0, False),  # 3 sigmas of 0.25 m away: somewhere else
     ],
 )
 def test_the_start_is_near_within_the_disc_and_within_the_uncertainty(
