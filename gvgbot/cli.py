@@ -165,7 +165,7 @@ def _add_monitor(commands: "argparse._SubParsersAction[_Parser]") -> None:
     monitor.add_argument(
         "robot", nargs="?", metavar="ROBOT", help="its robot.name (default: the only one there is)"
     )
-    monitor.add_argument("--robot", default=argparse.SUPPRESS, metavar="NAME", help="the same")
+    monitor.add_argument("--robot", dest="named", metavar="NAME", help="the same")
     monitor.add_argument(
         "--connect",
         default="tcp/127.0.0.1:7447",
@@ -296,7 +296,7 @@ def _monitor(options: argparse.Namespace) -> int:
             raise
         raise GvgbotError("the monitor needs rich: pip install 'gvgbot[tui]'") from error
 
-    return monitor(options.robot, options.connect)
+    return monitor(options.robot or options.named, options.connect)
 
 
 def _map_show(options: argparse.Namespace) -> int:

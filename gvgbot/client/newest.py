@@ -102,10 +102,15 @@ def decoded(topic: Topic, payload: type[T], encoding: str, data: bytes) -> T:
     """The value in a sample. Raises GvgbotError if it is of another version, or damaged."""
     if encoding != topic.encoding:
         raise GvgbotError(
-            f"the robot sends {topic.name} as {encoding}, this program reads {topic.encoding}: "
-            "install the same version of gvgbot on both"
+            f"the robot sends {_schema(encoding)}, this program reads {_schema(topic.encoding)}: "
+            "install the same gvgbot on both"
         )
     try:
         return msgspec.msgpack.decode(data, type=payload)
     except msgspec.MsgspecError as error:
         raise GvgbotError(f"a damaged sample of {topic.name}: {error}") from error
+
+
+def _schema(encoding: str) -> str:
+    """Type and version, as an encoding has them after the format."""
+    return encoding.rpartition(";gvgbot.")[2]

@@ -4,7 +4,6 @@ Nothing is found by shouting: every session is told its address.
 """
 
 import asyncio
-import json
 import signal
 import subprocess
 import sys
@@ -23,7 +22,7 @@ from gvgbot import client
 from gvgbot.errors import GvgbotError, UsageError
 from gvgbot.telemetry import Telemetry
 from gvgbot.topics import Event, Events, Map, MapEdge, MapVertex, State, TelemetryConfig
-from tests.process.addresses import free_endpoint
+from tests.process.addresses import free_endpoint, router
 from tests.unit.test_telemetry import EXAMPLE
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(60)]
@@ -266,19 +265,6 @@ def test_a_robot_that_is_frozen_is_noticed(endpoint: str) -> None:
         until(lambda: seen.presence.word in ("quiet", "gone"), patience_s=3.0)
         process.send_signal(signal.SIGCONT)
         until(lambda: seen.presence.word == "alive")
-
-
-@contextmanager
-def router(endpoint: str) -> Iterator[zenoh.Session]:
-    config = zenoh.Config()
-    for key, value in {
-        "mode": "router",
-        "listen/endpoints": [endpoint],
-        "scouting/multicast/enabled": False,
-    }.items():
-        config.insert_json5(key, json.dumps(value))
-    with zenoh.open(config) as session:
-        yield session
 
 
 def test_a_router_in_between_may_come_and_go(endpoint: str) -> None:
