@@ -48,7 +48,7 @@ clean:
 # The stamps: what is installed for running, and for developing. A changed pyproject.toml renews them.
 .venv/core: pyproject.toml
 	@$(call make_venv)
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[tui]'
 	@touch $@
 
 .venv/dev: pyproject.toml
