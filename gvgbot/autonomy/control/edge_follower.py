@@ -9,6 +9,9 @@ import numpy as np
 from gvgbot.geometry import STANDSTILL, Array, Pose, Twist, wrap_angle
 from gvgbot.ranges import Range
 
+_LEAST_LOOK_AHEAD_M = 0.12
+_CUT = 0.8  # of the clearance, the farthest to look ahead
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EdgeFollowerConfig:
@@ -54,6 +57,11 @@ def follow(
     here = int(np.argmin(d))
     remaining = track.length - float(track.stations[here])
     ahead = config.look_ahead_m + config.look_ahead_s * max(speed, 0.0)
+    soon = track.clearance[
+        here : int(np.searchsorted(track.stations, track.stations[here] + ahead))
+    ]
+    # Who looks far ahead cuts corners: where it is narrow, there is no room for that.
+    ahead = min(ahead, max(_LEAST_LOOK_AHEAD_M, _CUT * float(soon.min(initial=np.inf))))
     aim = int(np.searchsorted(track.stations, track.stations[here] + ahead))
     target = track.polyline[min(aim, len(track.polyline) - 1)]
     away = math.hypot(target[0] - local_base.x, target[1] - local_base.y)
