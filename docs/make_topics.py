@@ -25,7 +25,9 @@ What a robot says over zenoh. `ROBOT` is its `robot.name`; `*` in that place lis
 them. A payload is one MessagePack map from field name to value; the encoding of each sample carries
 its type and version. Units are SI, angles are in radians.
 
-A queryable topic answers a `get` with its newest sample, and in JSON to `KEY?format=json`.
+A queryable topic answers a `get` with its newest sample, and in JSON to `KEY?format=json`, where
+raw bytes are in base64. What is kept for latecomers is what an advanced subscriber gets when it
+joins. `gvgbot.client` does all of this for programs in Python.
 """
 ALIVE = """\
 ## `{key}`

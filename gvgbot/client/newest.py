@@ -1,6 +1,7 @@
 """The newest sample of a topic, between zenoh's threads and whoever reads: a loop or a thread."""
 
 import asyncio
+import contextlib
 import threading
 import time
 from collections.abc import AsyncIterator, Callable, Iterator
@@ -80,7 +81,8 @@ class Newest(Generic[T]):
         seen = 0
 
         def wake() -> None:
-            loop.call_soon_threadsafe(fresh.set)
+            with contextlib.suppress(RuntimeError):  # a loop that was closed while we waited
+                loop.call_soon_threadsafe(fresh.set)
 
         with self._changed:
             self._wakes.add(wake)

@@ -25,3 +25,17 @@ def router(endpoint: str) -> Iterator[zenoh.Session]:
         config.insert_json5(key, json.dumps(value))
     with zenoh.open(config) as session:
         yield session
+
+
+@contextmanager
+def plain_session(endpoint: str) -> Iterator[zenoh.Session]:
+    """A program on the network that knows nothing of us."""
+    config = zenoh.Config()
+    for key, value in {
+        "mode": "client",
+        "connect/endpoints": [endpoint],
+        "scouting/multicast/enabled": False,
+    }.items():
+        config.insert_json5(key, json.dumps(value))
+    with zenoh.open(config) as session:
+        yield session

@@ -4,6 +4,8 @@ Nothing is found by shouting: every session is told its address.
 """
 
 import asyncio
+import base64
+import json
 import signal
 import subprocess
 import sys
@@ -22,7 +24,7 @@ from gvgbot import client
 from gvgbot.errors import GvgbotError, UsageError
 from gvgbot.telemetry import Telemetry
 from gvgbot.topics import Event, Events, Map, MapEdge, MapVertex, State, TelemetryConfig
-from tests.process.addresses import free_endpoint, router
+from tests.process.addresses import free_endpoint, plain_session, router
 from tests.unit.test_telemetry import EXAMPLE
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(60)]
@@ -202,6 +204,37 @@ def test_a_damaged_state_is_refused_in_words(endpoint: str) -> None:
         )
         with pytest.raises(GvgbotError, match="damaged sample of state"):
             next(iter(seen.state()))
+
+
+def test_every_topic_answers_who_asks_for_its_newest_sample(endpoint: str) -> None:
+    def ask(session: zenoh.Session, selector: str) -> bytes:
+        (reply,) = list(session.get(selector, timeout=PATIENCE))
+        sample = reply.ok if reply.ok is not None else reply.err
+        assert sample is not None
+        return sample.payload.to_bytes()
+
+    async def answers() -> list[bytes]:
+        with a_robot(endpoint) as robot, plain_session(endpoint) as session:
+            robot.publish(A_MAP)
+            robot.publish(Events(events=(happened(3),)))
+            async with asyncio.timeout(PATIENCE), asyncio.TaskGroup() as tasks:
+                answering = tasks.create_task(robot.answer())
+                await asyncio.sleep(0.1)
+                selectors = ["map", "map?format=json", "events?format=json", "state"]
+                got = [
+                    await asyncio.to_thread(ask, session, f"gvgbot/near/{selector}")
+                    for selector in selectors
+                ]
+                answering.cancel()
+            return got
+
+    as_msgpack, as_json, events, state = asyncio.run(answers())
+    assert msgspec.msgpack.decode(as_msgpack, type=Map) == A_MAP
+    plain = json.loads(as_json)
+    assert base64.b64decode(plain["cells"]) == A_MAP.cells
+    assert plain["vertices"][0]["position"] == [0.5, 2.5]
+    assert json.loads(events)["events"][0]["details"] == {"reason": "ear"}
+    assert state == b"there is no state yet"
 
 
 def test_an_address_where_nobody_answers_is_one_error(endpoint: str) -> None:
