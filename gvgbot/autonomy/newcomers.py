@@ -32,7 +32,7 @@ class NewcomersConfig:
 
     away_from_walls_m: Annotated[float, Range(0.1, 2.0)] = 0.2
     mapped_after_s: Annotated[float, Range(0.0, 600.0)] = 5.0
-    believed_after_s: Annotated[float, Range(0.0, 3600.0)] = 300.0
+    believed_after_s: Annotated[float, Range(0.0, 3600.0)] = 120.0
 
 
 @dataclass(slots=True, eq=False)
