@@ -9,6 +9,7 @@ import time
 
 import numpy as np
 
+from gvgbot.autonomy.control.reflexes import Felt
 from gvgbot.autonomy.estimate import smoothed
 from gvgbot.autonomy.events import Event
 from gvgbot.autonomy.loop import Loop
@@ -42,10 +43,10 @@ class TimedPipeline(Pipeline):
         (self.keyframe_times if len(self.keyframes) > count else self.idle_times).append(spent)
         return happened
 
-    def control(self, odometry: Odometry) -> Twist:
+    def control(self, odometry: Odometry, *felt: Felt) -> Twist:
         """Time a control cycle."""
         begin = time.perf_counter()
-        twist = super().control(odometry)
+        twist = super().control(odometry, *felt)
         self.control_times.append(time.perf_counter() - begin)
         return twist
 
