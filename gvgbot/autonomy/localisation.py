@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
@@ -12,6 +13,7 @@ from gvgbot.hal.messages import Scan
 
 _RANGE_M = 24.0  # of the beams that are matched
 _LONGEST_GAP_M = 0.5  # between two beams, for their even spacing
+_SMOOTHED = 9  # beams, to tell where the next point is due
 _LEAST_POINTS = 50  # fewer say nothing about a pose
 _LEAST_INLIERS = 0.5  # of the beams must find a wall, or the match is not believed
 _CLEARLY = 0.02  # better agreement of beams and walls than this is no chance
@@ -84,7 +86,9 @@ def _around(prior: Pose) -> list[Pose]:
 def _sampled(scan: Scan, count: int) -> Array:
     """About so many end points (N, 2), evenly spaced along what the beams hit; base frame.
 
-    Evenly in space, not in angle: far walls tell most about the heading, and have few beams.
+    Evenly in space, not in angle: far walls tell most about the heading, and have few beams. The
+    way along the walls is smoothed: where beams are dense, each point's own noise would decide
+    which is taken, in the order of the sweep, and turn the walls a little.
     """
     with np.errstate(invalid="ignore"):
         hit = scan.ranges < _RANGE_M
@@ -92,7 +96,8 @@ def _sampled(scan: Scan, count: int) -> Array:
     points = np.stack([r * np.cos(b), r * np.sin(b)], axis=1)
     if len(points) == 0:
         return points
-    gaps = np.hypot(*np.diff(points, axis=0).T)
+    way = uniform_filter1d(points, _SMOOTHED, axis=0, mode="nearest")
+    gaps = np.hypot(*np.diff(way, axis=0).T)
     along = np.concatenate([[0.0], np.cumsum(np.minimum(gaps, _LONGEST_GAP_M))])
     step = max(float(along[-1]) / count, 1e-6)
     chosen = np.unique(np.floor(along / step), return_index=True)[1]

@@ -4,10 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from gvgbot.geometry import Pose
+from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
 
 _STILL_M, _STILL_RAD = 1e-3, 2e-4  # less motion than this during a sweep does not show
+_SLANT = 12.0  # of a wall between two beams, which sees it at five degrees: longer than wide
 
 
 def deskewed(scan: Scan, motion: Pose) -> Scan:
@@ -29,10 +30,25 @@ def deskewed(scan: Scan, motion: Pose) -> Scan:
     towards = np.where(seen, np.arctan2(moved_y, moved_x), bearings + turn) - mount.theta
     away = np.remainder(towards - scan.bearings + np.pi, 2 * np.pi) - np.pi
     index = np.arange(len(ranges)) + away / scan.angle_increment
+    return replace(scan, ranges=_at_beams(index, ranges, scan), time_increment=0.0)
+
+
+def _at_beams(index: Array, ranges: Array, scan: Scan) -> Array:
+    """Ranges (N,) at the scan's own directions, of ones that are known between them.
+
+    Where two neighbours lie on one wall, it is straight between them; elsewhere the nearer counts.
+    A wall that is only ever moved to the nearest beam is turned a little.
+    """
     order = np.argsort(index, kind="stable")
     index, ranges = index[order], ranges[order]
     wanted = np.arange(len(ranges))
     after = np.clip(np.searchsorted(index, wanted), 1, len(index) - 1)
-    nearest = after - (wanted - index[after - 1] < index[after] - wanted)
+    near, far = ranges[after - 1], ranges[after]
+    share = (wanted - index[after - 1]) / np.maximum(index[after] - index[after - 1], 1e-9)
+    nearest = after - (share < 0.5)
     taken = np.abs(index[nearest] - wanted) <= 1.0
-    return replace(scan, ranges=np.where(taken, ranges[nearest], np.nan), time_increment=0.0)
+    width = scan.angle_increment * np.where(np.isfinite(near), near, 0.0)
+    with np.errstate(invalid="ignore"):
+        on_wall = (np.abs(far - near) < _SLANT * width) & (share >= 0.0) & (share <= 1.0)
+        straight = near * far / ((1.0 - share) * far + share * near)
+    return np.where(taken, np.where(on_wall, straight, ranges[nearest]), np.nan)

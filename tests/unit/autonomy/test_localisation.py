@@ -1,0 +1,46 @@
+"""Localisation against walls that are known exactly."""
+
+import math
+
+import numpy as np
+
+from gvgbot.autonomy.gvg.local_map import LocalMapConfig
+from gvgbot.autonomy.localisation import LocalMaps
+from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
+from gvgbot.geometry import Array, Pose
+from gvgbot.hal.messages import Scan
+
+BEARINGS = np.radians(np.linspace(-135.0, 135.0, 1081))
+LOOSE = np.diag([0.05**2, 0.05**2, 0.02**2])
+
+
+def maps() -> LocalMaps:
+    return LocalMaps(
+        LocalMapConfig(half_width_m=10.0),
+        LocalMapConfig(half_width_m=20.0, cell_m=0.25, bridge_gap_m=0.0),
+        ScanMatchingConfig(),
+    )
+
+
+def room(rng: np.random.Generator, x: float) -> Scan:
+    """A room of 16 by 3 m, seen from x on its middle line, with a centimetre of noise."""
+    c, s = np.cos(BEARINGS), np.sin(BEARINGS)
+    with np.errstate(divide="ignore"):
+        to_end = np.where(c > 0, 8.0 - x, 8.0 + x) / np.abs(c)
+        to_side = 1.5 / np.abs(s)
+    ranges: Array = np.minimum(to_end, to_side) + rng.normal(0.0, 0.01, len(BEARINGS))
+    return Scan(0.0, ranges, float(BEARINGS[0]), math.radians(0.25), 0.1, 30.0)
+
+
+def test_noise_does_not_turn_the_scan() -> None:
+    """Whichever way the beams sweep, the heading found is right on average."""
+    rng, errors = np.random.default_rng(1), []
+    for _ in range(40):
+        local = maps()
+        for x in np.arange(-2.0, 0.0, 0.25):
+            local.insert(room(rng, x), Pose(x, 0.0, 0.0), x + 2.0)
+        found, _ = local.match(room(rng, 0.0), Pose(), LOOSE)
+        errors.append(found.theta)
+    standard_error = np.std(errors) / math.sqrt(len(errors))
+    assert standard_error < 5e-5
+    assert abs(np.mean(errors)) < 3 * standard_error
