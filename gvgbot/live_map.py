@@ -33,8 +33,10 @@ class LiveMap:
             return None
         self._taken += len(new)
         vertices = pipeline.mapper.graph.vertices
-        poses = {number: pipeline.mapper.belief.map_vertex(number) for number in vertices}
-        return partial(self._drawn, new, route_graph(pipeline, poses), stamp)
+        belief = pipeline.mapper.belief
+        poses = {number: belief.map_vertex(number) for number in vertices}
+        covariances = {number: belief.vertex_covariance(number) for number in vertices}
+        return partial(self._drawn, new, route_graph(pipeline, poses, covariances), stamp)
 
     def _drawn(self, new: Sequence[Keyframe], graph: RouteGraph, stamp: float) -> Map:
         for keyframe in new:

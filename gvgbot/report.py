@@ -48,8 +48,8 @@ class Journey:
 
 def map_files(pipeline: Pipeline, journey: Journey, title: str) -> dict[str, bytes | str]:
     """All files of a run but summary and events, by name."""
-    keyframes, vertices = smoothed(pipeline)
-    graph = route_graph(pipeline, vertices)
+    keyframes, vertices, covariances = smoothed(pipeline)
+    graph = route_graph(pipeline, vertices, covariances)
     scans = [
         (pose, keyframe.scan)
         for pose, keyframe in zip(keyframes, pipeline.keyframes, strict=True)
@@ -83,12 +83,14 @@ def _corrected(journey: Journey, pipeline: Pipeline, keyframes: list[Pose]) -> l
     ]
 
 
-def route_graph(pipeline: Pipeline, vertices: dict[int, Pose]) -> RouteGraph:
-    """The GVG graph with vertices at the given poses (map_vertex)."""
+def route_graph(
+    pipeline: Pipeline, vertices: dict[int, Pose], covariances: dict[int, Array]
+) -> RouteGraph:
+    """The GVG graph with vertices at the given poses (map_vertex), covariances (2, 2) in m^2."""
     mapper = pipeline.mapper
     return RouteGraph(
         tuple(
-            _map_vertex(vertex, vertices[vertex.id], mapper.belief.vertex_covariance(vertex.id))
+            _map_vertex(vertex, vertices[vertex.id], covariances[vertex.id])
             for vertex in mapper.graph.vertices.values()
         ),
         tuple(_map_edge(edge, vertices) for edge in mapper.graph.edges.values()),

@@ -7,7 +7,7 @@ from scipy.ndimage import uniform_filter1d
 from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
-from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig, register
+from gvgbot.autonomy.slam.scan_matching import Registration, ScanMatchingConfig, register
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
 
@@ -20,7 +20,8 @@ _CLEARLY = 0.02  # better agreement of beams and walls than this is no chance
 _SEARCH_M, _SEARCH_STEP_M = 1.0, 0.25  # around the pose by odometry
 _SLIPPING = 25.0  # times the covariance of odometry, when the wheels slip
 _LOST = np.diag([0.5**2, 0.5**2, 0.05**2])  # of a base that nobody heard for a while
-_FLOOR = np.diag([0.004**2, 0.004**2, 0.0006**2])  # what matching cannot know of itself
+_SHARED = 8.0  # scans that a wall is seen in: they err against it, and it against the building
+_FLOOR = np.diag([0.0015**2, 0.0015**2, 0.00025**2])  # what matching cannot know of itself
 
 
 class LocalMaps:
@@ -58,22 +59,43 @@ class LocalMaps:
         """
         return self._best(scan, [(p, Q + _LOST) for p in _around(before.compose(motion))])
 
+    def _walls(self) -> tuple[Array, Array]:
+        """The walls (N, 2) of the near map, and of the far one around it; hits (N,) of each."""
+        far = self._far.points()
+        around = ~self.near.covers(far)
+        return (
+            np.concatenate([self.near.points(), far[around]]),
+            np.concatenate([self.near.hits(), self._far.hits()[around]]),
+        )
+
     def _best(self, scan: Scan, priors: list[tuple[Pose, Array]]) -> tuple[Pose, Array]:
         """The match from the first prior, unless that from another one is clearly better."""
-        far = self._far.points()
-        walls = np.concatenate([self.near.points(), far[~self.near.covers(far)]])
+        walls, hits = self._walls()
         points = _sampled(scan, self._matching.points)
         if min(len(walls), len(points)) < _LEAST_POINTS:
             return priors[0]
-        tree, best, agreement = cKDTree(walls), None, 0.0
+        tree, best, agreement = cKDTree(walls), priors[0], 0.0
         for prior, Q in priors:
-            found = register(points, tree, walls, prior, Q, self._matching)
+            found = register(points, tree, walls, prior, Q, self._matching, hits)
             if found is None or found.inliers < _LEAST_INLIERS:
                 continue
             now = found.inliers * (1.0 - found.rms / self._matching.max_pair_m)
             if now > agreement + _CLEARLY:
-                best, agreement = found, now
-        return priors[0] if best is None else (best.pose, best.covariance + _FLOOR)
+                best, agreement = (found.pose, _drift(found, Q)), now
+        return best
+
+
+def _drift(found: Registration, Q: Array) -> Array:
+    """Covariance (3, 3) of a step that was matched, so that those of many steps add up.
+
+    Scans are matched with walls, not with each other, so the error of one match is not carried on
+    to the next: the walls that come into sight inherit the mean error of all scans that share
+    them. What walls say counts more than in a single match; what only odometry says does not.
+    """
+    by_odometry = np.linalg.inv(Q)
+    by_walls = np.linalg.inv(found.covariance) - by_odometry
+    drift = np.linalg.inv(by_odometry + _SHARED * by_walls) + _FLOOR
+    return np.asarray(drift, np.float64)
 
 
 def _around(prior: Pose) -> list[Pose]:

@@ -123,7 +123,7 @@ def test_a_replay_leaves_the_same_map_to_the_last_bit(drive: Drive) -> None:
     assert one.ids == other.ids
     assert one.x.tobytes() == other.x.tobytes()
     assert one.P.tobytes() == other.P.tobytes()
-    maps = [geojson.encode(route_graph(p, smoothed(p)[1])) for p in (first, again)]
+    maps = [geojson.encode(route_graph(p, *smoothed(p)[1:])) for p in (first, again)]
     assert maps[0] == maps[1]
 
 

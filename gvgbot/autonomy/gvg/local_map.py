@@ -16,6 +16,8 @@ from gvgbot.hal.messages import Scan
 from gvgbot.ranges import Range
 
 _HIT = 2  # votes that one hit gives an occupied cell
+_MOST_HITS = 100  # that a mean remembers; more would keep a wall where it no longer is
+_EMPTY = (("_free", False), ("_votes", 0), ("_mean", 0.0), ("_hits", 0.0), ("_seen_at", -np.inf))
 _MAX_VOTES = 8  # a wall needs this many contrary scans, less the hits, before it is forgotten
 
 
@@ -48,6 +50,7 @@ class LocalMap:
         self._free = np.zeros((n, n), bool)
         self._votes = np.zeros((n, n), np.int16)
         self._mean = np.zeros((n, n, 2))
+        self._hits = np.zeros((n, n), np.float32)  # that the mean is made of
         self._seen_at = np.full((n, n), -np.inf, np.float32)  # metres driven when last seen
         centres = ((np.arange(n) + 0.5) * self._cell).astype(np.float32)
         self._offsets_x = np.broadcast_to(centres[:, None], (n, n))
@@ -67,6 +70,14 @@ class LocalMap:
     def points(self) -> Array:
         """Mean hits of the occupied cells (N, 2), local frame."""
         return self._mean[self._votes > 0]
+
+    def hits(self) -> Array:
+        """How many hits (N,) each of `points` is the mean of, the oldest forgotten.
+
+        Where a wall lies on the border of two rows of cells, both means are off, and only together
+        they are right: each counts as often as it was hit.
+        """
+        return self._hits[self._votes > 0].astype(np.float64)
 
     def covers(self, points: Array) -> NDArray[np.bool_]:
         """Whether each point (N, 2) lies in the window."""
@@ -92,7 +103,7 @@ class LocalMap:
         if np.abs(shift).max() * self._cell < 1.0:
             return
         self._corner = wanted
-        for name, empty in (("_free", False), ("_votes", 0), ("_mean", 0.0), ("_seen_at", -np.inf)):
+        for name, empty in _EMPTY:
             setattr(self, name, _shifted(getattr(self, name), shift, empty))
 
     def _carve(self, scan: Scan, ranges: Array, local_laser: Pose, travelled: float) -> None:
@@ -128,8 +139,10 @@ class LocalMap:
         y = np.bincount(index, points[inside, 1]) / count
         i, j = np.divmod(cell, self._size)
         old = np.maximum(self._votes[i, j], 0)
-        share = (_HIT / (old + _HIT))[:, None]
+        before = np.where(old > 0, self._hits[i, j], 0.0)
+        share = (count / (before + count))[:, None]
         self._mean[i, j] = (1 - share) * self._mean[i, j] + share * np.stack([x, y], axis=1)
+        self._hits[i, j] = np.minimum(before + count, _MOST_HITS)
         self._votes[i, j] = np.minimum(old + _HIT, _MAX_VOTES)
         self._seen_at[i, j] = travelled
 

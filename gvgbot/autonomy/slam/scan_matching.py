@@ -44,19 +44,27 @@ class Registration:
 
 
 def register(
-    points: Array, tree: cKDTree, walls: Array, prior: Pose, Q: Array, config: ScanMatchingConfig
+    points: Array,
+    tree: cKDTree,
+    walls: Array,
+    prior: Pose,
+    Q: Array,
+    config: ScanMatchingConfig,
+    hits: Array | None = None,
 ) -> Registration | None:
     """The pose that lays points (N, 2) of its frame onto wall points (M, 2), near a prior.
 
+    `hits` (M,) is how much each wall point counts beside its neighbours, by default all the same.
     Q (3, 3) is the prior's covariance in its own frame. None when too few points find a wall.
     """
     information = np.linalg.inv(Q)
+    counts = np.ones(len(walls)) if hits is None else hits
     step = np.zeros(3)  # of the pose, in the prior's frame
     pose, A = prior, information
     inliers, rms = 0.0, 0.0
     for _ in range(_ITERATIONS):
         world = pose.transform(points)
-        pairs = _pairs(world, tree, walls, config.max_pair_m)
+        pairs = _pairs(world, tree, walls, counts, config.max_pair_m)
         if pairs is None or len(pairs[0]) < config.min_pairs:
             return None
         index, normal, residual = pairs
@@ -77,7 +85,7 @@ def register(
 
 
 def _pairs(
-    world: Array, tree: cKDTree, walls: Array, reach: float
+    world: Array, tree: cKDTree, walls: Array, hits: Array, reach: float
 ) -> tuple[Index, Array, Array] | None:
     """Indices of the points near a wall, the wall's normals (K, 2), and signed distances (K,)."""
     found = tree.query(world, k=_NEIGHBOURS, distance_upper_bound=max(reach, _REACH_M))
@@ -86,8 +94,10 @@ def _pairs(
     if len(index) == 0:
         return None
     present = np.isfinite(distance[index])
-    group = walls[np.where(present, near[index], near[index][:, :1])]
-    weight = present / present.sum(axis=1, keepdims=True)
+    near = np.where(present, near[index], near[index][:, :1])
+    group = walls[near]
+    weight = present * hits[near]
+    weight /= weight.sum(axis=1, keepdims=True)
     centre = (weight[..., None] * group).sum(axis=1)
     d = group - centre[:, None]
     xx, yy, xy = (

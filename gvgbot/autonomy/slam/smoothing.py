@@ -1,21 +1,23 @@
 """The whole trajectory and all vertices at once: a pose graph over keyframes and vertices.
 
 The EKF is the measure of uncertainty while driving; this corrects the past by what was learnt
-later. Gauss-Newton on relative SE(2) poses, solved sparsely.
+later. Gauss-Newton on relative SE(2) poses, solved sparsely. Constraints that may be mistakes count
+the less the more the others disagree with them, as if their errors had Cauchy's distribution.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.linalg import spsolve
+from scipy.sparse import csc_array
+from scipy.sparse.linalg import splu
 
 from gvgbot.geometry import Array, Pose
 
 Index = NDArray[np.intp]
 
-_ITERATIONS = 8
+_ITERATIONS = 15
+_DOUBT = 3.0  # squared Mahalanobis distance at which a doubtful constraint counts half
 _CONVERGED = 1e-5  # metres and radians
 _FIXED = 1e12  # information that holds the first pose in place
 
@@ -28,51 +30,68 @@ class Constraint:
     b: int
     a_b: Pose
     information: Array
+    doubtful: bool = False
 
 
-def smooth(poses: Array, constraints: list[Constraint]) -> Array:
-    """The poses (N, 3) that agree best with all constraints, the first one staying where it is."""
-    x = poses.copy()
-    if not constraints:
+class PoseGraph:
+    """Constraints as arrays."""
+
+    def __init__(self, constraints: list[Constraint]) -> None:
+        self._a = np.array([c.a for c in constraints], np.intp)
+        self._b = np.array([c.b for c in constraints], np.intp)
+        z = [(c.a_b.x, c.a_b.y, c.a_b.theta) for c in constraints]
+        self._z = np.array(z).reshape(-1, 3)
+        self._W = np.array([c.information for c in constraints]).reshape(-1, 3, 3)
+        self._doubtful = np.array([c.doubtful for c in constraints], np.bool_)
+
+    def solve(self, poses: Array) -> Array:
+        """The poses (N, 3) that agree best with all constraints, the first one staying in place."""
+        x = poses.copy()
+        if not len(self._a):
+            return x
+        for iteration in range(_ITERATIONS):
+            H, g = self._normal_equations(x, trusting=iteration == 0)
+            change = -splu(H).solve(g).reshape(-1, 3)
+            x += change
+            x[:, 2] = np.remainder(x[:, 2] + np.pi, 2 * np.pi) - np.pi
+            if np.abs(change).max() < _CONVERGED and iteration > 0:
+                break
         return x
-    a = np.array([c.a for c in constraints])
-    b = np.array([c.b for c in constraints])
-    z = np.array([(c.a_b.x, c.a_b.y, c.a_b.theta) for c in constraints])
-    W = np.array([c.information for c in constraints])
-    for _ in range(_ITERATIONS):
-        change = _step(x, a, b, z, W)
-        x += change
-        x[:, 2] = np.remainder(x[:, 2] + np.pi, 2 * np.pi) - np.pi
-        if np.abs(change).max() < _CONVERGED:
-            break
-    return x
 
+    def covariances(self, poses: Array, wanted: list[int]) -> Array:
+        """Covariances (K, 3, 3) of K of the solved poses (N, 3), against the first, m and rad."""
+        if not wanted:
+            return np.empty((0, 3, 3))
+        H, _ = self._normal_equations(poses, trusting=False)
+        rows = 3 * np.array(wanted)[:, None] + np.arange(3)
+        columns = np.zeros((3 * len(poses), rows.size))
+        columns[rows.ravel(), np.arange(rows.size)] = 1.0
+        P = splu(H).solve(columns).reshape(len(columns), len(wanted), 3)
+        return np.array([P[row, i] for i, row in enumerate(rows)])
 
-def _step(x: Array, a: Index, b: Index, z: Array, W: Array) -> Array:
-    """One Gauss-Newton step (N, 3)."""
-    r, A, B = _residuals(x, a, b, z)
-    blocks = [
-        (p, q, np.einsum("kji,kjl,klm->kim", P, W, Q))
-        for p, P in ((a, A), (b, B))
-        for q, Q in ((a, A), (b, B))
-    ]
-    n = 3 * len(x)
-    k = np.arange(3)
-    rows = [
-        np.broadcast_to((3 * p[:, None] + k)[:, :, None], h.shape).ravel() for p, _, h in blocks
-    ]
-    cols = [
-        np.broadcast_to((3 * q[:, None] + k)[:, None, :], h.shape).ravel() for _, q, h in blocks
-    ]
-    values = [h.ravel() for _, _, h in blocks]
-    rows.append(k)
-    cols.append(k)
-    values.append(np.full(3, _FIXED))
-    H = coo_array((np.concatenate(values), (np.concatenate(rows), np.concatenate(cols))), (n, n))
-    g = np.zeros((len(x), 3))
-    np.add.at(g, a, np.einsum("kji,kjl,kl->ki", A, W, r))
-    np.add.at(g, b, np.einsum("kji,kjl,kl->ki", B, W, r))
-    return -np.asarray(spsolve(H.tocsc(), g.ravel())).reshape(-1, 3)
+    def _normal_equations(self, x: Array, *, trusting: bool) -> tuple[csc_array, Array]:
+        """Information matrix H (3N, 3N) and gradient g (3N,); trusting, nothing is doubted."""
+        r, A, B = _residuals(x, self._a, self._b, self._z)
+        W = self._W if trusting else self._W * self._weights(r)[:, None, None]
+        ends = ((self._a, A), (self._b, B))
+        k = np.arange(3)
+        values, rows, columns = [np.full(3, _FIXED)], [k], [k]
+        g = np.zeros((len(x), 3))
+        for p, P in ends:
+            np.add.at(g, p, np.einsum("kji,kjl,kl->ki", P, W, r))
+            for q, Q in ends:
+                h = np.einsum("kji,kjl,klm->kim", P, W, Q)
+                values.append(h.ravel())
+                rows.append(np.broadcast_to((3 * p[:, None] + k)[:, :, None], h.shape).ravel())
+                columns.append(np.broadcast_to((3 * q[:, None] + k)[:, None, :], h.shape).ravel())
+        n = 3 * len(x)
+        at = (np.concatenate(rows), np.concatenate(columns))
+        return csc_array((np.concatenate(values), at), (n, n)), g.ravel()
+
+    def _weights(self, r: Array) -> Array:
+        """How much each constraint counts (K,), by its residuals (K, 3)."""
+        distance = np.einsum("ki,kij,kj->k", r, self._W, r)
+        return np.where(self._doubtful, 1.0 / (1.0 + distance / _DOUBT), 1.0)
 
 
 def _residuals(x: Array, a: Index, b: Index, z: Array) -> tuple[Array, Array, Array]:

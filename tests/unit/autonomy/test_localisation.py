@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+from scipy.stats import chi2
 
 from gvgbot.autonomy.gvg.local_map import LocalMapConfig
 from gvgbot.autonomy.localisation import LocalMaps
@@ -39,8 +40,34 @@ def test_noise_does_not_turn_the_scan() -> None:
         local = maps()
         for x in np.arange(-2.0, 0.0, 0.25):
             local.insert(room(rng, x), Pose(x, 0.0, 0.0), x + 2.0)
-        found, _ = local.match(room(rng, 0.0), Pose(), LOOSE)
+        found, _ = local.match(room(rng, 0.0), Pose(-0.25, 0.0, 0.0), Pose(0.25, 0.0, 0.0), LOOSE)
         errors.append(found.theta)
     standard_error = np.std(errors) / math.sqrt(len(errors))
     assert standard_error < 5e-5
     assert abs(np.mean(errors)) < 3 * standard_error
+
+
+def test_without_walls_the_covariance_is_the_prior_s() -> None:
+    nothing = Scan(0.0, np.full(1081, math.inf), float(BEARINGS[0]), math.radians(0.25), 0.1, 30.0)
+    pose, covariance = maps().match(nothing, Pose(1.0, 2.0, 3.0), Pose(), LOOSE)
+    assert pose == Pose(1.0, 2.0, 3.0)
+    assert np.array_equal(covariance, LOOSE)
+
+
+def test_a_drive_errs_about_as_much_as_its_steps_say_together() -> None:
+    """Twenty matched steps: what adds up is the drift of the walls, not the error of a match."""
+    rng, noise = np.random.default_rng(6), np.diag([0.01**2, 0.005**2, 0.003**2])
+    errors, summed = [], np.zeros(3)
+    for _ in range(15):
+        local, believed = maps(), Pose(-4.0, 0.0, 0.0)
+        local.insert(room(rng, -4.0), believed, 0.0)
+        for step in range(1, 21):
+            slip = Pose.from_array(rng.multivariate_normal([0.25, 0.0, 0.0], noise))
+            scan = room(rng, -4.0 + 0.25 * step)
+            believed, covariance = local.match(scan, believed, slip, noise)
+            summed += np.diag(covariance) / 15
+            local.insert(scan, believed, 0.25 * step)
+        errors.append((believed.x - 1.0, believed.y, believed.theta))
+    share = np.mean(np.square(errors), axis=0)[[0, 2]] / summed[[0, 2]]
+    assert (share < chi2.ppf(0.995, 15) / 15).all()
+    assert (share > 0.1).all()

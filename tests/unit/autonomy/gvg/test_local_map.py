@@ -201,3 +201,17 @@ def test_the_frame_that_scans_are_inserted_in_changes_nothing_but_the_frame(
     off = off_the_walls(back)
     assert np.quantile(off, 0.95) < 0.02
     assert off.max() < 0.08
+
+
+def test_a_wall_on_the_border_of_two_rows_of_cells_is_where_its_hits_are() -> None:
+    """Both rows' means are off, each to its side; by their hits they make up the wall's place."""
+    rng, local_map = np.random.default_rng(2), LocalMap(LocalMapConfig())
+    wall = 2.003  # most hits fall into the farther row
+    bearings = np.radians(np.linspace(-30.0, 30.0, 241))
+    for _ in range(5):
+        ranges = (wall + rng.normal(0.0, 0.01, len(bearings))) / np.cos(bearings)
+        step = float(bearings[1] - bearings[0])
+        local_map.insert(Scan(0.0, ranges, float(bearings[0]), step, 0.1, 30.0), Pose(), 0.0)
+    x, hits = local_map.points()[:, 0], local_map.hits()
+    assert abs(np.average(x, weights=hits) - wall) < 0.001
+    assert abs(np.mean(x) - wall) > 0.001  # so the test is one
