@@ -31,6 +31,8 @@ from gvgbot.zenoh_config import reason, session_config
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 
+_SETTLING = 1.0  # s after connecting, by when one has heard of all robots on the network
+
 T = TypeVar("T", State, Map, Events)
 
 
@@ -58,6 +60,7 @@ def robots(endpoint: str = DEFAULT_ENDPOINT, *, patience_s: float = 10.0) -> lis
     """
     _check_endpoint(endpoint)
     with _open(endpoint, patience_s) as session:
+        threading.Event().wait(_SETTLING)
         return _names(session)
 
 
@@ -74,6 +77,7 @@ class Robot:
         self._signs = Signs(0.0)
         self._gate = threading.Lock()  # one of opening and closing at a time
         self._is_closed = False
+        self._has_been_seen = threading.Event()
 
     # -- what the robot says -----------------------------------------------------------------------
 
@@ -108,7 +112,7 @@ class Robot:
     # -- coming and going --------------------------------------------------------------------------
 
     def open(self) -> None:
-        """Connect. Raises GvgbotError if nobody answers; blocks that long."""
+        """Connect, and look for the robot; blocks. Raises GvgbotError if nobody answers."""
         session = _open(self.endpoint, self._patience_s)
         with self._gate:
             self._session = session
@@ -116,6 +120,7 @@ class Robot:
                 self._session.close()  # type: ignore[no-untyped-call]
                 return
             self._begin(session)
+        self._has_been_seen.wait(_SETTLING)
 
     def _begin(self, session: zenoh.Session) -> None:
         via_router = bool(session.info.routers_zid())
@@ -147,6 +152,7 @@ class Robot:
     def _on_token(self, sample: zenoh.Sample) -> None:
         self._signs.has_token = sample.kind == zenoh.SampleKind.PUT
         self._signs.token_at = time.perf_counter()
+        self._has_been_seen.set()
 
     def close(self) -> None:
         """Leave the network, and end all iterations."""

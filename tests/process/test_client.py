@@ -252,15 +252,18 @@ def test_a_name_or_an_address_that_cannot_be_is_refused(name: str, address: str)
 
 
 def test_a_robot_of_another_name_is_told_from_none(endpoint: str) -> None:
-    with a_robot(endpoint), client.connect("stranger", endpoint) as seen:
-        assert seen.presence.word == "absent"
-        assert seen.others() == ["near"]
+    with a_robot(endpoint):
+        with client.connect("near", endpoint) as seen:
+            assert seen.presence.word == "alive"
+        with client.connect("stranger", endpoint) as seen:
+            assert seen.presence.word == "absent"
+            assert seen.others() == ["near"]
+        assert client.robots(endpoint) == ["near"]
 
 
 def test_silence_is_told_from_absence(endpoint: str) -> None:
     with a_robot(endpoint) as robot, client.connect("near", endpoint) as seen:
         robot.publish(EXAMPLE)
-        until(lambda: seen.presence.word == "alive")
         until(lambda: seen.presence.word == "quiet", patience_s=5.0)
         assert seen.presence.for_s > 1.0
         robot.publish(EXAMPLE)
