@@ -17,6 +17,7 @@ import yaml
 from PIL import Image
 from scipy.stats import chi2
 
+from benchmarks.score_run import score_run
 from gvgbot.cli import main
 from gvgbot.drivers.world import World, save_world
 from gvgbot.geometry import Array, Pose
@@ -326,3 +327,13 @@ def test_the_edge_of_the_start_is_not_driven_twice(tmp_path: Path) -> None:
     assert main(["explore", "--world", "ring", "--seed", "2", "--out", str(tmp_path)]) == 0
     summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
     assert summary["distance_m"] < math.tau * 6.0 * 1.2
+
+
+@pytest.mark.timeout(300)
+def test_a_laser_that_sees_no_farther_than_a_room_finds_all_of_a_building(tmp_path: Path) -> None:
+    """A URG-04LX, 5.6 m: where none of its beams comes back, there may be a wall all the same."""
+    laser = ["--set", "twin.laser.model=URG-04LX"]
+    arguments = ["explore", "--world", "floor_plan:113", "--seed", "1", *laser]
+    assert main([*arguments, "--out", str(tmp_path / "run")]) == 0
+    score = score_run(tmp_path / "run")
+    assert score["recall"] == score["precision"] == score["edge_recall"] == 1.0
