@@ -10,6 +10,7 @@ _COMMON: Mapping[str, object] = {
     "scouting/multicast/enabled": False,
     "scouting/gossip/enabled": False,
     "transport/shared_memory/enabled": False,
+    "transport/unicast/open_timeout": 2000,  # ms; closing waits for it if the other end is frozen
     "connect/retry": {
         "period_init_ms": 100,
         "period_max_ms": 1000,

@@ -1,6 +1,7 @@
 """A robot seen over the network: its newest state and map, its events, and whether it is there."""
 
 import asyncio
+import contextlib
 import threading
 import time
 from collections.abc import AsyncIterator, Iterator
@@ -161,7 +162,8 @@ class Robot:
         with self._gate:
             self._is_closed = True
             if self._session is not None:
-                self._session.close()  # type: ignore[no-untyped-call]
+                with contextlib.suppress(zenoh.ZError):  # the other end is frozen
+                    self._session.close()  # type: ignore[no-untyped-call]
 
     def __enter__(self) -> Self:
         self.open()

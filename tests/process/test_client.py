@@ -272,6 +272,14 @@ def test_silence_is_told_from_absence(endpoint: str) -> None:
         until(lambda: seen.presence.word == "gone")
 
 
+def test_who_leaves_a_frozen_robot_is_not_held(endpoint: str) -> None:
+    with far_robot(endpoint) as process, client.connect("far", endpoint) as seen:
+        process.send_signal(signal.SIGSTOP)
+        until(lambda: seen.presence.word == "gone")  # and the client tries to connect again
+        seen.close()
+        assert next(iter(seen.state()), None) is None
+
+
 @contextmanager
 def far_robot(endpoint: str) -> Iterator["subprocess.Popen[bytes]"]:
     """A robot in a process of its own."""
