@@ -7,6 +7,7 @@ from scipy.ndimage import uniform_filter1d
 from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
+from gvgbot.autonomy.slam.calibration import Calibration
 from gvgbot.autonomy.slam.scan_matching import Registration, ScanMatchingConfig, register
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
@@ -35,6 +36,7 @@ class LocalMaps:
     ) -> None:
         self.near, self._far = LocalMap(near), LocalMap(far)
         self._matching = matching
+        self._calibration = Calibration()
 
     def insert(self, scan: Scan, local_base: Pose, travelled: float) -> None:
         """Add a scan taken by the base at a pose in the local frame, after so many metres."""
@@ -42,22 +44,35 @@ class LocalMaps:
         self.near.insert(scan, local_laser, travelled)
         self._far.insert(scan, local_laser, travelled)
 
-    def match(self, scan: Scan, before: Pose, motion: Pose, Q: Array) -> tuple[Pose, Array]:
+    def match(
+        self, scan: Scan, before: Pose, motion: Pose, duration: float, Q: Array
+    ) -> tuple[Pose, Array]:
         """The pose of the base after a motion with covariance Q (3, 3), and its covariance.
 
         Both covariances are in the frame of the base. Without enough walls it is where odometry
         has it. Wheels may have turned without effect, so it may as well be where it was `before`.
         """
+        motion = self._calibration.corrected(motion, duration)
         prior = before.compose(motion)
         still = Pose(before.x, before.y, prior.theta)
-        return self._best(scan, [(prior, Q), (still, _SLIPPING * Q)])
+        best = self._best(scan, [(prior, Q), (still, _SLIPPING * Q)])
+        if best is None:
+            return prior, Q
+        found, used = best
+        if used is Q:
+            self._calibration.learn(motion, duration, prior.to(found.pose), Q, found.covariance)
+        return found.pose, _drift(found, used)
 
-    def find(self, scan: Scan, before: Pose, motion: Pose, Q: Array) -> tuple[Pose, Array]:
+    def find(
+        self, scan: Scan, before: Pose, motion: Pose, duration: float, Q: Array
+    ) -> tuple[Pose, Array]:
         """As `match`, where nobody saw the way that the base took: it is searched for around.
 
         Wheels tell how far it went and how much it turned, but not which of it came first.
         """
-        return self._best(scan, [(p, Q + _LOST) for p in _around(before.compose(motion))])
+        prior = before.compose(self._calibration.corrected(motion, duration))
+        best = self._best(scan, [(p, Q + _LOST) for p in _around(prior)])
+        return (prior, Q + _LOST) if best is None else (best[0].pose, _drift(*best))
 
     def _walls(self) -> tuple[Array, Array]:
         """The walls (N, 2) of the near map, and of the far one around it; hits (N,) of each."""
@@ -68,20 +83,22 @@ class LocalMaps:
             np.concatenate([self.near.hits(), self._far.hits()[around]]),
         )
 
-    def _best(self, scan: Scan, priors: list[tuple[Pose, Array]]) -> tuple[Pose, Array]:
+    def _best(
+        self, scan: Scan, priors: list[tuple[Pose, Array]]
+    ) -> tuple[Registration, Array] | None:
         """The match from the first prior, unless that from another one is clearly better."""
         walls, hits = self._walls()
         points = _sampled(scan, self._matching.points)
         if min(len(walls), len(points)) < _LEAST_POINTS:
-            return priors[0]
-        tree, best, agreement = cKDTree(walls), priors[0], 0.0
+            return None
+        tree, best, agreement = cKDTree(walls), None, 0.0
         for prior, Q in priors:
             found = register(points, tree, walls, prior, Q, self._matching, hits)
             if found is None or found.inliers < _LEAST_INLIERS:
                 continue
             now = found.inliers * (1.0 - found.rms / self._matching.max_pair_m)
             if now > agreement + _CLEARLY:
-                best, agreement = (found.pose, _drift(found, Q)), now
+                best, agreement = (found, Q), now
         return best
 
 

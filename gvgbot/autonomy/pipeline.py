@@ -208,13 +208,14 @@ class Pipeline:
             return Pose()
         motion = self._last.odom_base.to(odom_base)
         self.travelled += math.hypot(motion.x, motion.y)
-        noise = self._config.odometry_noise.covariance(motion, scan.stamp - self._last.stamp)
+        duration = scan.stamp - self._last.stamp
+        noise = self._config.odometry_noise.covariance(motion, duration)
         lost = self._was_lifted or self._odometry.has_gap_since(self._last.stamp)
         match = self._maps.find if lost else self._maps.match
         if self._was_lifted:
             self._was_lifted, noise = False, noise + _LIFTED
         local_base, covariance = match(
-            scan, self._last.local_base, motion, rotated_covariance(noise, -motion.theta)
+            scan, self._last.local_base, motion, duration, rotated_covariance(noise, -motion.theta)
         )
         moved = self._last.local_base.to(local_base)
         step = Step(moved, rotated_covariance(covariance, motion.theta))

@@ -40,7 +40,9 @@ def test_noise_does_not_turn_the_scan() -> None:
         local = maps()
         for x in np.arange(-2.0, 0.0, 0.25):
             local.insert(room(rng, x), Pose(x, 0.0, 0.0), x + 2.0)
-        found, _ = local.match(room(rng, 0.0), Pose(-0.25, 0.0, 0.0), Pose(0.25, 0.0, 0.0), LOOSE)
+        found, _ = local.match(
+            room(rng, 0.0), Pose(-0.25, 0.0, 0.0), Pose(0.25, 0.0, 0.0), 1.0, LOOSE
+        )
         errors.append(found.theta)
     standard_error = np.std(errors) / math.sqrt(len(errors))
     assert standard_error < 5e-5
@@ -49,7 +51,7 @@ def test_noise_does_not_turn_the_scan() -> None:
 
 def test_without_walls_the_covariance_is_the_prior_s() -> None:
     nothing = Scan(0.0, np.full(1081, math.inf), float(BEARINGS[0]), math.radians(0.25), 0.1, 30.0)
-    pose, covariance = maps().match(nothing, Pose(1.0, 2.0, 3.0), Pose(), LOOSE)
+    pose, covariance = maps().match(nothing, Pose(1.0, 2.0, 3.0), Pose(), 1.0, LOOSE)
     assert pose == Pose(1.0, 2.0, 3.0)
     assert np.array_equal(covariance, LOOSE)
 
@@ -64,7 +66,7 @@ def test_a_drive_errs_about_as_much_as_its_steps_say_together() -> None:
         for step in range(1, 21):
             slip = Pose.from_array(rng.multivariate_normal([0.25, 0.0, 0.0], noise))
             scan = room(rng, -4.0 + 0.25 * step)
-            believed, covariance = local.match(scan, believed, slip, noise)
+            believed, covariance = local.match(scan, believed, slip, 1.0, noise)
             summed += np.diag(covariance) / 15
             local.insert(scan, believed, 0.25 * step)
         errors.append((believed.x - 1.0, believed.y, believed.theta))

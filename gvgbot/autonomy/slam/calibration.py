@@ -1,0 +1,57 @@
+"""What is constantly wrong with odometry, learnt from how scan matching corrects it.
+
+A scale of all distances, a scale of all turns, and a turn rate that is felt while there is none.
+Walls correct each step only in part, so what is left of a constant error would add up.
+"""
+
+import numpy as np
+
+from gvgbot.geometry import Array, Pose
+
+_SIGMA = np.array([0.02, 0.01, 0.0005])  # before anything is known: 1, 1, rad/s
+_WANDER = np.array([1e-5, 1e-5, 1e-6])  # of each with every step
+_SURPRISING = 16.0  # squared Mahalanobis distance of a correction that tells of a slip
+_LEAST = 1e-10 * np.eye(3)  # variance of a correction where walls say nothing, m^2 and rad^2
+
+
+class Calibration:
+    """Belief about the three errors: mean and covariance."""
+
+    def __init__(self) -> None:
+        self.x = np.zeros(3)
+        self.P = np.diag(_SIGMA**2)
+
+    def corrected(self, motion: Pose, duration: float) -> Pose:
+        """A motion that odometry felt in some seconds, as it most probably was."""
+        distance, turn, rate = self.x
+        return Pose(
+            motion.x * (1.0 + distance),
+            motion.y * (1.0 + distance),
+            motion.theta * (1.0 + turn) + rate * duration,
+        )
+
+    def learn(self, motion: Pose, duration: float, change: Pose, Q: Array, C: Array) -> None:
+        """Account for the change that walls made to the pose after a corrected motion.
+
+        The change is in the frame of the base after it. Q and C (3, 3) are the covariances of that
+        pose before and after, in the same frame: Q - C is that of the change, and 1 - C Q^-1 the
+        share of an error that the change makes good.
+        """
+        c, s = np.cos(motion.theta), np.sin(motion.theta)
+        J = np.array(
+            [
+                [c * motion.x + s * motion.y, 0.0, 0.0],
+                [c * motion.y - s * motion.x, 0.0, 0.0],
+                [0.0, motion.theta, duration],
+            ]
+        )
+        H = J - C @ np.linalg.solve(Q, J)
+        r = np.array([change.x, change.y, change.theta])
+        P = self.P + np.diag(_WANDER**2)
+        S = H @ P @ H.T + Q - C + _LEAST
+        if r @ np.linalg.solve(S, r) > _SURPRISING:
+            return
+        K = np.linalg.solve(S, H @ P).T
+        self.x = self.x + K @ r
+        P -= K @ S @ K.T
+        self.P = (P + P.T) / 2

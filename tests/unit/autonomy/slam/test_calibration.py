@@ -1,0 +1,94 @@
+"""What odometry does wrong all the time is found, as well as the calibration says."""
+
+import numpy as np
+from scipy.stats import chi2
+
+from gvgbot.autonomy.slam.calibration import Calibration
+from gvgbot.geometry import Array, Pose, rotated_covariance
+
+ERRORS = np.array([-0.015, 0.008, 0.0004])  # scale of distances, of turns, rad/s
+Q = np.diag([0.015**2, 0.003**2, 0.003**2])
+WALLS = np.diag([1.0 / 0.01**2, 1.0 / 0.004**2, 1.0 / 0.001**2])  # information
+STEPS = ((Pose(0.25, 0.02, 0.1), 0.5), (Pose(0.25, 0.0, 0.0), 0.5), (Pose(0.2, -0.05, -0.2), 0.5))
+
+
+def matched(walls: Array) -> Array:
+    """Covariance (3, 3) after a match with walls of this information."""
+    return np.asarray(np.linalg.inv(np.linalg.inv(Q) + walls), np.float64)
+
+
+def driven(errors: Array, walls: Array, seed: int, steps: int = 120) -> Calibration:
+    """The calibration after steps whose odometry has these errors beside its noise."""
+    rng, calibration = np.random.default_rng(seed), Calibration()
+    for i in range(steps):
+        felt, duration = STEPS[i % len(STEPS)]
+        true = Pose(
+            felt.x * (1 + errors[0]),
+            felt.y * (1 + errors[0]),
+            felt.theta * (1 + errors[1]) + errors[2] * duration,
+        )
+        slip = Pose.from_array(rng.multivariate_normal(np.zeros(3), Q))
+        corrected = calibration.corrected(felt, duration)
+        off = corrected.to(true).compose(slip)  # from the prior to the truth
+        z = np.array([off.x, off.y, off.theta])
+        if walls.any():
+            scatter = np.diag(np.where(np.diag(walls) > 0, 1 / np.maximum(np.diag(walls), 1), 0))
+            z = z + rng.multivariate_normal(np.zeros(3), scatter)
+        C = matched(walls)
+        change = Pose.from_array(C @ walls @ z)
+        calibration.learn(corrected, duration, change, Q, C)
+    return calibration
+
+
+def test_constant_errors_are_found_as_well_as_it_says() -> None:
+    runs, total = 40, 0.0
+    for seed in range(runs):
+        found = driven(ERRORS, WALLS, seed)
+        error = found.x - ERRORS
+        total += float(error @ np.linalg.solve(found.P, error))
+    low, high = chi2.ppf(0.005, 3 * runs), chi2.ppf(0.995, 3 * runs)
+    assert 0.5 * low < total < high  # the prior is wider than these errors
+
+
+def test_the_scale_of_distances_is_soon_known() -> None:
+    found = driven(ERRORS, WALLS, 1)
+    assert np.sqrt(found.P[0, 0]) < 0.01
+    assert abs(found.x[0] - ERRORS[0]) < 3 * np.sqrt(found.P[0, 0])
+
+
+def test_walls_along_which_one_drives_say_nothing_about_distances() -> None:
+    """Straight steps and side walls only: what is known of the scale is what was known before."""
+    calibration, walls = Calibration(), np.diag([0.0, 1.0 / 0.004**2, 1.0 / 0.001**2])
+    C = matched(walls)
+    before = calibration.P[0, 0]
+    for _ in range(50):
+        calibration.learn(Pose(0.25, 0.0, 0.0), 0.5, Pose(0.0, 0.001, 0.0001), Q, C)
+    assert calibration.x[0] == 0.0
+    assert calibration.P[0, 0] >= before
+
+
+def test_a_slip_teaches_nothing() -> None:
+    calibration = Calibration()
+    C = matched(WALLS)
+    calibration.learn(Pose(0.25, 0.0, 0.0), 0.5, Pose(-0.25, 0.0, 0.0), Q, C)
+    assert not calibration.x.any()
+
+
+def test_a_correction_to_the_known_errors_undoes_them() -> None:
+    calibration = Calibration()
+    calibration.x = np.array([0.01, -0.02, 0.001])
+    motion = calibration.corrected(Pose(1.0, 0.5, 0.4), 2.0)
+    assert np.allclose((motion.x, motion.y, motion.theta), (1.01, 0.505, 0.392 + 0.002))
+
+
+def test_the_frame_of_the_step_does_not_matter() -> None:
+    """Q and C, handed over as seen from the end of a step that turns, tell the same."""
+    turned = Calibration()
+    straight = Calibration()
+    C = matched(WALLS)
+    straight.learn(Pose(0.25, 0.0, 0.0), 0.0, Pose(0.004, 0.0, 0.0), Q, C)
+    angle = 0.6
+    around = [rotated_covariance(m, -angle) for m in (Q, C)]
+    change = Pose(0.004 * np.cos(angle), -0.004 * np.sin(angle), 0.0)
+    turned.learn(Pose(0.25, 0.0, angle), 0.0, change, around[0], around[1])
+    assert np.isclose(turned.x[0], straight.x[0])
