@@ -5,6 +5,7 @@ believed for a while longer. The guard sees them all the same.
 """
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Annotated
 
 import numpy as np
@@ -20,6 +21,7 @@ _CELL_M = 0.2
 _AROUND = 0.15 * np.stack([f(np.arange(8) * np.pi / 4) for f in (np.cos, np.sin)], axis=1)  # m
 _STEP_M = 0.3  # in range from beam to beam, at the rim of something
 _BEAMS = 3  # fewer see nothing for sure
+_WIDE_M = 1.0  # no person is that wide
 _REACH_M = 6.0  # beyond, beams are too far apart to tell what was there before
 _LOST_S = 3.0  # what has not been seen for so long has gone, and begins anew if it comes back
 
@@ -51,7 +53,7 @@ class Newcomers:
     def sift(self, scan: Scan, local_base: Pose, local_map: LocalMap) -> Scan:
         """The scan without the beams that end on something which has come a moment ago."""
         self._forget(scan.stamp)
-        beams = np.flatnonzero(_in_front(scan.ranges) & (scan.ranges < _REACH_M))
+        beams = np.flatnonzero(_in_front(scan) & (scan.ranges < _REACH_M))
         ends = _ends(scan, beams, local_base)
         cells = [(i, j) for i, j in np.floor(ends / _CELL_M).astype(int).tolist()]
         is_new = self._is_new(ends, local_map)
@@ -100,19 +102,20 @@ class Newcomers:
         return (np.array(list(self._stays), dtype=np.float64).reshape(-1, 2) + 0.5) * _CELL_M
 
 
-def _in_front(ranges: Array) -> NDArray[np.bool_]:
-    """Which beams (N,) end on something narrow with more room on either side: no wall does."""
-    there = np.isfinite(ranges)
-    depth = np.where(there, ranges, np.inf)
-    with np.errstate(invalid="ignore"):
-        step = np.abs(np.diff(depth))
-    edges = np.flatnonzero(~(step < _STEP_M)) + 1  # also between two that see nothing
-    starts, stops = np.r_[0, edges], np.r_[edges, len(ranges)]
-    found = np.zeros(len(ranges), np.bool_)
-    for start, stop in zip(starts[1:-1].tolist(), stops[1:-1].tolist(), strict=True):
-        piece = depth[start:stop]
-        stands_out = piece[0] + _STEP_M < depth[start - 1] and piece[-1] + _STEP_M < depth[stop]
-        found[start:stop] = stands_out and stop - start >= _BEAMS
+def _in_front(scan: Scan) -> NDArray[np.bool_]:
+    """Which beams (N,) end on something narrow with more room on either side: no wall does.
+
+    A beam without an echo has the room of the whole range; one that failed tells nothing.
+    """
+    told = np.flatnonzero(~np.isnan(scan.ranges))
+    depth = np.minimum(scan.ranges[told], scan.range_max)
+    edges = np.flatnonzero(np.abs(np.diff(depth)) >= _STEP_M) + 1
+    found = np.zeros(len(scan.ranges), np.bool_)
+    for start, stop in pairwise(edges.tolist()):
+        near, far = depth[start], depth[stop - 1]
+        stands_out = near + _STEP_M < depth[start - 1] and far + _STEP_M < depth[stop]
+        width = near * scan.angle_increment * (stop - start)
+        found[told[start:stop]] = stands_out and stop - start >= _BEAMS and width < _WIDE_M
     return found
 
 

@@ -43,3 +43,13 @@ def test_a_wall_is_no_newcomer_even_where_the_map_knew_free_space() -> None:
     newcomers, dropped = after(carved([ROOM]), carved([smaller]))
     assert dropped == 0
     assert len(newcomers.points) == 0
+
+
+def test_the_stretch_of_wall_within_a_short_range_is_no_newcomer() -> None:
+    """A wall 3.4 m ahead, of which a laser that reaches 3.5 m sees the nearest part only."""
+    local_map, newcomers = LocalMap(LocalMapConfig()), Newcomers(NewcomersConfig())
+    local_map.insert(sweep(carved([ROOM]), HERE), HERE, 0.0)
+    room: Rectangle = (-4.0, -3.0, 3.4, 3.0)
+    short = sweep(carved([room]), HERE, reach=3.5)
+    assert np.isinf(short.ranges).any()
+    assert newcomers.sift(short, HERE, local_map) is short
