@@ -110,10 +110,12 @@ class Mission:
             return self._access(view, place), self._events
         self._lost_since = None
         base = view.local_base.position
+        clearance = view.gvg.edges[place.edge].clearance_at(place.station)
+        self._close_ring(view, clearance)
         passage = self.where.follow(view.gvg, place, known, base)
         if passage is not None:
             self._account_for(view, known, passage)
-        self._close_start_edge(view, view.gvg.edges[place.edge].clearance_at(place.station))
+        self._close_start_edge(view, clearance)
         graph = self._mapper.graph
         here = Situation(view.gvg, known, graph, self.where, place, view.local_base, view.doubted)
         self._watch_progress(view)
@@ -159,15 +161,14 @@ class Mission:
             return
         self._mapper.join(view, left, arrived, passage.line, passage.narrowest, driven=True)
 
-    def _close_start_edge(self, view: View, clearance: float) -> None:
-        """Join the edge that the robot started on, when it comes there from the other end.
+    def _close_ring(self, view: View, clearance: float) -> None:
+        """Give an edge without an end a vertex, when the robot has come round to its start."""
+        if not self._mapper.graph.vertices and self._is_round(clearance):
+            self._mapper.close_ring(view, np.array(self.where.trail), self.where.narrowest)
 
-        If it met no vertex on the way, the edge is a ring.
-        """
+    def _close_start_edge(self, view: View, clearance: float) -> None:
+        """Join the edge that the robot started on, when it comes there from the other end."""
         start, on_edge, graph = self._start_edge, self.where.on_edge, self._mapper.graph
-        if not graph.vertices and self._is_round(clearance):
-            line, narrowest = np.array(self.where.trail), self.where.narrowest
-            self._mapper.close_ring(view, line, narrowest)
         if start is None or on_edge is None or on_edge == start.end:
             return
         ends = (graph.half_edge(on_edge), graph.half_edge(start.end))
