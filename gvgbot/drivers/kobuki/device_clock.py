@@ -12,6 +12,7 @@ _WRAP_MS = 65536
 _DRIFT = 2e-4  # s/s that the envelope may rise: more than two cheap crystals differ
 _RESET_S = 1.0  # a counter this far ahead of the host's clock has started anew
 _GAP_S = 0.1  # a silence this much longer or shorter by the counter has seen a restart
+_NEXT_S = 0.03  # the next frame of a link that stalled is no farther by the counter
 _LATE_S = 0.1  # this much behind the envelope, a frame is late;
 _LATE_BELIEVED_S = 2.0  # and the counter has started anew when all have been for so long
 _SHORTEST_STEP_S = 1e-3  # stamps on the host's clock rise at least by this
@@ -47,7 +48,7 @@ def advance_clock(clock: DeviceClock, raw_ms: int, arrival: float) -> DeviceCloc
     late_since = _late_since(clock, arrival - elapsed, arrival)
     if (
         elapsed + clock.offset > arrival + _RESET_S
-        or (step > _GAP_S and _is_restart(raw_ms, step, silence=arrival - clock.arrival))
+        or (step > _NEXT_S and _is_restart(raw_ms, step, silence=arrival - clock.arrival))
         or (late_since is not None and arrival - late_since > _LATE_BELIEVED_S)
     ):
         started = start_clock(raw_ms, max(arrival, clock.stamp + _SHORTEST_STEP_S))
