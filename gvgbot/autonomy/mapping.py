@@ -247,11 +247,8 @@ class Mapper:
                 match.agreement,
             )
         )
-        vertex.local, vertex.seen_at, vertex.updated_at = (
-            match.local,
-            view.travelled,
-            view.travelled,
-        )
+        vertex.local = match.local
+        vertex.seen_at = vertex.updated_at = view.travelled
         vertex.visits += 1
         self._measure(view, vertex, view.local_base.to(match.local), match.covariance)
 
@@ -468,9 +465,12 @@ class Mapper:
                         self.remove(view, vertex, "its edge ends elsewhere")
 
     def forget_strays(self, view: View) -> None:
-        """Take out the vertices that hang together with nothing."""
-        for vertex in list(self.graph.vertices.values()):
-            if all(half.edge is None for half in vertex.half_edges.values()):
+        """Take out vertices that hang together with nothing, if there is anything to hang on to.
+
+        One with a departure that was tried in vain stays: somebody has been there.
+        """
+        for vertex in list(self.graph.vertices.values()) if self.graph.edges else ():
+            if all(half.open for half in vertex.half_edges.values()):
                 self.remove(view, vertex, "nothing leads there")
 
     def remove(self, view: View, vertex: Vertex, reason: str) -> None:

@@ -158,18 +158,7 @@ class Pipeline:
         scan = self._newcomers.sift(scan, local_base, self._maps.near)
         self._maps.insert(scan, local_base, self.travelled)
         self._hazards.forget(self.travelled)
-        fine = fine_graph(
-            self._maps.near,
-            local_base.position,
-            min_clearance=self._radius + self._config.passage_margin_m,
-            roughness=self._config.reduction.roughness_m,
-            open_clearance=min(
-                self._config.reduction.open_clearance_m, _SEEN_SHARE * scan.range_max
-            ),
-            felt=self._hazards.points,
-        )
-        known_vertices = self.mapper.known_around(local_base, self._config.local_map.half_width_m)
-        self.gvg = reduce_graph(fine, self._config.reduction, known_vertices)
+        self.gvg = self._local_gvg(local_base, scan.range_max)
         view = View(
             len(self.keyframes),
             scan.stamp,
@@ -190,6 +179,20 @@ class Pipeline:
         order, done = self.mission.advance(view, known)
         self._obey(order)
         return happened + done
+
+    def _local_gvg(self, local_base: Pose, range_max: float) -> LocalGvg:
+        """The GVG around the base, by what the local map shows and the map holds."""
+        reduction = self._config.reduction
+        fine = fine_graph(
+            self._maps.near,
+            local_base.position,
+            min_clearance=self._radius + self._config.passage_margin_m,
+            roughness=reduction.roughness_m,
+            open_clearance=min(reduction.open_clearance_m, _SEEN_SHARE * range_max),
+            felt=self._hazards.points,
+        )
+        known = self.mapper.known_around(local_base, self._config.local_map.half_width_m)
+        return reduce_graph(fine, reduction, known)
 
     def _worth_a_look(self, scan: Scan, odom_base: Pose) -> bool:
         if self._last is None or self._look_now:

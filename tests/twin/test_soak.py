@@ -15,6 +15,21 @@ DAY = 86_400.0  # s
 DAMAGE = {"flipped bit", "lost byte", "inserted byte", "cut message"}
 
 
+def link_config(per_h: float, damage_per_kb: float, chip_timer_s: float = 0.0) -> LinkFaultConfig:
+    """A link with all its faults, a little late and jittery."""
+    return LinkFaultConfig(
+        latency_s=0.0005,
+        jitter_s=0.005,
+        chip_timer_s=chip_timer_s,
+        flipped_bits_per_kb=damage_per_kb,
+        lost_bytes_per_kb=damage_per_kb,
+        inserted_bytes_per_kb=damage_per_kb,
+        cut_messages_per_k=100.0 * damage_per_kb,
+        silences_per_h=per_h,
+        unplugs_per_h=per_h,
+    )
+
+
 def laser_config(per_h: float, damage_per_kb: float) -> HokuyoTwinConfig:
     """A URG-04LX on a serial line too slow for all its beams, whose clock wraps after a second."""
     return HokuyoTwinConfig(
@@ -34,16 +49,7 @@ def laser_config(per_h: float, damage_per_kb: float) -> HokuyoTwinConfig:
             abnormal_per_h=per_h,
             blinds_per_h=per_h,
         ),
-        link=LinkFaultConfig(
-            latency_s=0.0005,
-            jitter_s=0.005,
-            flipped_bits_per_kb=damage_per_kb,
-            lost_bytes_per_kb=damage_per_kb,
-            inserted_bytes_per_kb=damage_per_kb,
-            cut_messages_per_k=100.0 * damage_per_kb,
-            silences_per_h=per_h,
-            unplugs_per_h=per_h,
-        ),
+        link=link_config(per_h, damage_per_kb),
     )
 
 
@@ -64,17 +70,7 @@ def base_config(per_h: float, damage_per_kb: float) -> KobukiTwinConfig:
             unknown_parts_per_h=per_h,
             no_replies_per_h=per_h,
         ),
-        link=LinkFaultConfig(
-            latency_s=0.0005,
-            jitter_s=0.005,
-            chip_timer_s=0.016,
-            flipped_bits_per_kb=damage_per_kb,
-            lost_bytes_per_kb=damage_per_kb,
-            inserted_bytes_per_kb=damage_per_kb,
-            cut_messages_per_k=100.0 * damage_per_kb,
-            silences_per_h=per_h,
-            unplugs_per_h=per_h,
-        ),
+        link=link_config(per_h, damage_per_kb, chip_timer_s=0.016),
     )
 
 

@@ -259,6 +259,27 @@ def test_a_dead_end_to_be_driven_is_joined_only_from_its_end() -> None:
     assert len(seen.mapper.graph.edges) == 1
 
 
+def test_strays_are_forgotten_only_beside_a_map_that_holds_together() -> None:
+    seen = Seen().look(TEE, CONFIG.candidates.meetpoint_sightings)  # one vertex, no edge yet
+    view = View(99, 99.0, 9.9, Pose(), TEE, NOTHING_SEEN)
+    seen.mapper.forget_strays(view)
+    assert len(seen.mapper.graph.vertices) == 1
+    seen.look(TEE, 20)
+    edges = seen.mapper.graph.edges
+    seen.mapper.close_ring(view, np.array([(9.0, 9.0), (9.0, 12.0), (12.0, 12.0)]), 1.0)
+    assert len(edges) == 2
+    ring = max(edges.values(), key=lambda edge: edge.id)
+    seen.mapper.graph.unjoin(ring)
+    stray = seen.mapper.graph.vertices[ring.a.vertex]
+    stray.half_edges[ring.a.key].blocked = True  # tried in vain: it stays
+    seen.mapper.forget_strays(view)
+    assert stray.id in seen.mapper.graph.vertices
+    stray.half_edges[ring.a.key].blocked = False
+    seen.mapper.forget_strays(view)
+    assert stray.id not in seen.mapper.graph.vertices
+    assert len(seen.mapper.graph.vertices) == 2
+
+
 def test_the_robot_s_uncertainty_is_in_the_place_of_a_vertex_seen_later() -> None:
     """A drive between the sights adds to the covariance of what is seen after it only."""
     seen = Seen().look(TEE, CONFIG.candidates.meetpoint_sightings)
