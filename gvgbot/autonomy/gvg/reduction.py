@@ -20,6 +20,7 @@ from gvgbot.ranges import Range
 _SPACING = 0.1  # metres between the points of an edge
 _MERGE_HYSTERESIS = 1.3  # by which factor an edge must differ to overrule what the map says of it
 _REACH_HYSTERESIS = 1.12
+_FALL_IN_CORNER = 0.3  # metres of clearance lost per metre, at least, towards a corner
 _ENDPOINT_M = 0.6  # a point so near to a known endpoint is that endpoint
 
 
@@ -178,22 +179,38 @@ def _walk(neighbours: list[list[int]], is_key: set[int], start: int, first: int)
 def _prune(draft: _Draft, min_reach: float, endpoints: Array) -> None:
     """Drop corner branches in rounds: a dead end keeps the vertex that both its corners hang on."""
     while True:
-        doomed = []
+        doomed: dict[int, list[tuple[int, int]]] = {}  # leaves and their chains, by base
         for node, ends in draft.ends.items():
             if len(ends) == 1 and not draft.open(node):
                 reach, base, key = draft.reach(node)
                 if draft.degree(base) >= 3 and _is_corner(
                     reach / min_reach, draft.position[node], draft.position[base], endpoints
                 ):
-                    doomed.append((node, base, key))
-        if not doomed:
+                    doomed.setdefault(base, []).append((node, key))
+        ready = [base for base in doomed if not _waits(draft, base, doomed)]
+        if not ready:
             return
-        for node, _, key in doomed:
+        for node, key in [leaf for base in ready for leaf in doomed[base]]:
             draft.remove(key)
             del draft.ends[node]
-        for base in dict.fromkeys(base for _, base, _ in doomed):
+        for base in ready:
             if base in draft.ends and len(draft.ends[base]) == 2 and not draft.open(base):
                 draft.splice(base)
+
+
+def _waits(draft: _Draft, base: int, doomed: dict[int, list[tuple[int, int]]]) -> bool:
+    """Whether a corner branch of the base still has twigs to lose, so that not all can go at once.
+
+    Towards a corner clearance falls by 1 / reach of the way; along a room it hardly does.
+    """
+    for key, _ in draft.ends[base]:
+        chain = draft.chains[key]
+        fork = chain.b if chain.a == base else chain.a
+        stump = len(draft.ends[fork]) - len(doomed.get(fork, ())) == 1 and not draft.open(fork)
+        falls = draft.clearance[base] - draft.clearance[fork]
+        if fork in doomed and stump and falls > _FALL_IN_CORNER * chain.length():
+            return True
+    return False
 
 
 def _is_corner(reach: float, tip: Array, base: Array, endpoints: Array) -> bool:

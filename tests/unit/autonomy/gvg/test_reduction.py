@@ -1,5 +1,6 @@
 """What is near a threshold stays as the map has it: hand-drawn fine graphs, lengths by design."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -99,3 +100,23 @@ def test_a_branch_near_the_least_reach_stays_what_it_was(
 ) -> None:
     gvg = reduce_graph(branching(reach), CONFIG, known)
     assert degrees(gvg) == ([3] if is_kept else [])
+
+
+def test_twigs_of_a_corner_branch_do_not_make_it_the_dead_end() -> None:
+    """A room whose walls are 2 m from the end of its middle line; in one corner stands something."""
+    middle, fork = (0.0, 0.0), (1.0, 1.0)
+    graph = fine(
+        [
+            ((0.0, -6.0), middle),
+            (middle, (-1.8, 1.8)),
+            (middle, fork),
+            (fork, (1.8, 1.8)),
+            (fork, (1.0, 1.4)),
+        ]
+    )
+    x, y = graph.points.T
+    graph = replace(graph, clearance=np.minimum(2 - np.abs(x), 2 - y))
+    gvg = reduce_graph(graph, CONFIG)
+    assert degrees(gvg) == []
+    ends = sorted(tuple(node.position.round(3)) for node in gvg.nodes.values())
+    assert ends == [(0.0, -6.0), middle]
