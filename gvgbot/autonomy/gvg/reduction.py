@@ -6,6 +6,7 @@ a branch is seen, so for a branch that ends in unseen space it is a lower bound.
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Annotated
 
@@ -187,9 +188,11 @@ def _prune(draft: _Draft, min_reach: float, endpoints: Array) -> None:
                     reach / min_reach, draft.position[node], draft.position[base], endpoints
                 ):
                     doomed.setdefault(base, []).append((node, key))
-        ready = [base for base in doomed if not _waits(draft, base, doomed)]
-        if not ready:
+        if not doomed:
             return
+        forks = [fork for base in doomed for fork in _forks(draft, base, doomed)]
+        least = min((draft.clearance[fork] for fork in forks), default=math.inf)
+        ready = [base for base in doomed if draft.clearance[base] <= least]
         for node, key in [leaf for base in ready for leaf in doomed[base]]:
             draft.remove(key)
             del draft.ends[node]
@@ -198,8 +201,8 @@ def _prune(draft: _Draft, min_reach: float, endpoints: Array) -> None:
                 draft.splice(base)
 
 
-def _waits(draft: _Draft, base: int, doomed: dict[int, list[tuple[int, int]]]) -> bool:
-    """Whether a corner branch of the base still has twigs to lose, so that not all can go at once.
+def _forks(draft: _Draft, base: int, doomed: dict[int, list[tuple[int, int]]]) -> Iterator[int]:
+    """Where corner branches of a base fork: all their twigs must go before any of its branches do.
 
     Towards a corner clearance falls by 1 / reach of the way; along a room it hardly does.
     """
@@ -209,8 +212,7 @@ def _waits(draft: _Draft, base: int, doomed: dict[int, list[tuple[int, int]]]) -
         stump = len(draft.ends[fork]) - len(doomed.get(fork, ())) == 1 and not draft.open(fork)
         falls = draft.clearance[base] - draft.clearance[fork]
         if fork in doomed and stump and falls > _FALL_IN_CORNER * chain.length():
-            return True
-    return False
+            yield fork
 
 
 def _is_corner(reach: float, tip: Array, base: Array, endpoints: Array) -> bool:

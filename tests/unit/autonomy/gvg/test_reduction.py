@@ -102,21 +102,24 @@ def test_a_branch_near_the_least_reach_stays_what_it_was(
     assert degrees(gvg) == ([3] if is_kept else [])
 
 
-def test_twigs_of_a_corner_branch_do_not_make_it_the_dead_end() -> None:
-    """A room whose walls are 2 m from the end of its middle line; in one corner stands something."""
-    middle, fork = (0.0, 0.0), (1.0, 1.0)
+def test_twigs_of_a_corner_branch_do_not_shift_the_dead_end() -> None:
+    """A room 4 m wide and 5.2 m deep, as its middle line has it; in one corner stands something."""
+    door, near, far, fork = (0.0, -6.0), (0.0, -1.2), (0.0, 0.0), (1.0, -2.2)
     graph = fine(
         [
-            ((0.0, -6.0), middle),
-            (middle, (-1.8, 1.8)),
-            (middle, fork),
-            (fork, (1.8, 1.8)),
-            (fork, (1.0, 1.4)),
+            (door, near),
+            (near, far),
+            (near, (-1.8, -3.0)),
+            (near, fork),
+            (fork, (1.8, -3.0)),
+            (fork, (1.0, -2.6)),
+            (far, (-1.8, 1.8)),
+            (far, (1.8, 1.8)),
         ]
     )
     x, y = graph.points.T
-    graph = replace(graph, clearance=np.minimum(2 - np.abs(x), 2 - y))
+    room = np.minimum(2 - np.abs(x), np.minimum(2 - y, 3.2 + y))
+    graph = replace(graph, clearance=np.where(y < -3.0, 0.5, np.maximum(room, 0.2)))
     gvg = reduce_graph(graph, CONFIG)
     assert degrees(gvg) == []
-    ends = sorted(tuple(node.position.round(3)) for node in gvg.nodes.values())
-    assert ends == [(0.0, -6.0), middle]
+    assert sorted(tuple(node.position.round(3)) for node in gvg.nodes.values()) == [door, far]
