@@ -3,7 +3,7 @@
 import asyncio
 import contextlib
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from types import TracebackType
 from typing import Self
 
@@ -12,11 +12,14 @@ import zenoh
 import zenoh.ext
 
 from gvgbot.errors import GvgbotError
+from gvgbot.requests import JSON, MESSAGEPACK, Answer, Asked, request_key
 from gvgbot.topics import TOPICS, Payload, TelemetryConfig, Topic, alive_key
 from gvgbot.zenoh_config import reason, session_config
 
 _WAITING_QUERIES = 32  # more than this are dropped, oldest first; who asked gets nothing
+_WAITING_REQUESTS = 8
 _MAX_SESSIONS = 32
+_LONGEST_NAME, _LONGEST_ARGUMENTS = 80, 1000  # bytes of who asks, and of what
 _PRIORITIES = {
     "interactive_high": zenoh.Priority.INTERACTIVE_HIGH,
     "data_high": zenoh.Priority.DATA_HIGH,
@@ -93,6 +96,40 @@ class Telemetry:
             encode, encoding = _form(topic, query.parameters.get("format"))
             query.reply(topic.key(self._robot), encode(latest), encoding=encoding)
 
+    async def hear(self, handle: Callable[[Asked], Awaitable[Answer]]) -> None:
+        """Put requests to the handler as they come, and send its answers, until cancelled.
+
+        A query for several keys at once is none: who reads all that a robot has to say must not
+        find that it has stopped.
+        """
+        loop, arrived = asyncio.get_running_loop(), asyncio.Event()
+        waiting: deque[zenoh.Query] = deque(maxlen=_WAITING_REQUESTS)
+
+        def take(query: zenoh.Query) -> None:
+            waiting.append(query)
+            loop.call_soon_threadsafe(arrived.set)
+
+        every = request_key(self._robot, "*")
+        with self._session.declare_queryable(every, take):
+            async with asyncio.TaskGroup() as tasks:
+                while True:
+                    await arrived.wait()
+                    arrived.clear()
+                    while waiting:
+                        query = waiting.popleft()
+                        key = str(query.key_expr)
+                        if "*" in key:
+                            query.drop()  # type: ignore[no-untyped-call]
+                        else:  # one that takes long must not hold up the next
+                            tasks.create_task(self._put(query, key, handle))
+
+    async def _put(
+        self, query: zenoh.Query, key: str, handle: Callable[[Asked], Awaitable[Answer]]
+    ) -> None:
+        with query:
+            answer = await handle(_asked(query, key))
+            await asyncio.to_thread(_tell, query, key, answer)
+
     def close(self) -> None:
         """Leave the network."""
         self._session.close()  # type: ignore[no-untyped-call]
@@ -107,6 +144,34 @@ class Telemetry:
         trace: TracebackType | None,
     ) -> None:
         self.close()
+
+
+def _asked(query: zenoh.Query, key: str) -> Asked:
+    data = b"" if query.payload is None else query.payload.to_bytes()
+    encoding = MESSAGEPACK if query.encoding is None else str(query.encoding)
+    if len(data) > _LONGEST_ARGUMENTS:
+        data = data[:_LONGEST_ARGUMENTS]  # which is wrong, and will be called so
+    return Asked(key.rpartition("/")[2], data, encoding, _origin(query))
+
+
+def _origin(query: zenoh.Query) -> str:
+    """Who asks: the name that it gives itself, and its session's id if the network tells it."""
+    named = b"" if query.attachment is None else query.attachment.to_bytes()[:_LONGEST_NAME]
+    name = "".join(c for c in named.decode(errors="replace") if c.isprintable()) or "somebody"
+    source = query.source_info
+    return name if source is None else f"{name}, session {source.source_id.zid}"
+
+
+def _tell(query: zenoh.Query, key: str, answer: Answer) -> None:
+    """Send the answer in the language of the question."""
+    is_json = query.encoding is not None and str(query.encoding).startswith(JSON)
+    encode = msgspec.json.encode if is_json else msgspec.msgpack.encode
+    encoding = zenoh.Encoding(JSON if is_json else MESSAGEPACK)
+    with contextlib.suppress(zenoh.ZError):  # who asked may have gone
+        if answer.done:
+            query.reply(key, encode(answer), encoding=encoding)
+        else:
+            query.reply_err(encode(answer), encoding=encoding)
 
 
 def _form(topic: Topic, wanted: str | None) -> tuple[Callable[[Payload], bytes], zenoh.Encoding]:
@@ -136,5 +201,6 @@ def _session_config(config: TelemetryConfig) -> zenoh.Config:
             "transport/link/tx/lease": round(1000 * config.lease_s),
             "transport/unicast/max_sessions": _MAX_SESSIONS,
             "timestamping/enabled": True,
-        }
+        },
+        config.zenoh_file,
     )

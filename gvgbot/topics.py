@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Literal
 
 import msgspec
@@ -9,16 +10,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvgbot.ranges import Range
+from gvgbot.requests import RequestName
 
-Phase = Literal["starting", "exploring", "halted", "finished"]
+Phase = Literal["starting", "exploring", "errand", "waiting", "paused", "halted", "finished"]
 Priority = Literal["interactive_high", "data_high", "data", "data_low"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TelemetryConfig:
-    """Where the robot can be watched; loopback only, unless the configuration opens it."""
+    """Where the robot can be watched; loopback only, unless the configuration opens it.
+
+    `requests` names what it may be asked for; to permit all, list pause, resume, stop, home, goto,
+    explore, relocalise, save and set.
+    """
 
     enabled: bool = True
+    requests: tuple[RequestName, ...] = ()
+    zenoh_file: Path | None = None  # JSON5: keys, passwords, access control; see configs/zenoh
     listen: tuple[str, ...] = ("tcp/127.0.0.1:7447",)
     connect: tuple[str, ...] = ()  # zenoh routers to join, as often as they come back
     lease_s: Annotated[float, Range(0.5, 60.0)] = (
@@ -69,8 +77,10 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
     cycles: int  # control cycles so far
     cycle_age: float | None  # s since the last one, None before the first
     phase: Phase
-    outcome: str | None  # explored, explored_with_blocked, failed; None while exploring
+    outcome: str | None  # explored, explored_with_blocked, failed, stopped; None before
     reason: str  # for the outcome, or for being halted
+    errand: str | None = None  # what it was asked to do just now, such as goto 7
+    requests: tuple[str, ...] = ()  # what it may be asked for, as its configuration says
     pose: tuple[float, float, float]  # map_base: x, y, theta
     covariance: tuple[float, ...]  # of the pose, 3x3 row-major
     twist: tuple[float, float]  # as measured: m/s ahead, rad/s anticlockwise

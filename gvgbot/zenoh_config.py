@@ -2,9 +2,12 @@
 
 import re
 from collections.abc import Mapping
+from pathlib import Path
 
 import msgspec
 import zenoh
+
+from gvgbot.errors import UsageError
 
 _COMMON: Mapping[str, object] = {
     "scouting/multicast/enabled": False,
@@ -19,12 +22,28 @@ _COMMON: Mapping[str, object] = {
 }
 
 
-def session_config(settings: Mapping[str, object]) -> zenoh.Config:
-    """A configuration: addresses are told, not found by shouting, and tried again when lost."""
-    config = zenoh.Config()
+def session_config(settings: Mapping[str, object], file: Path | None = None) -> zenoh.Config:
+    """A configuration: addresses are told, not found by shouting, and tried again when lost.
+
+    What a file (JSON5) sets stands, and the settings fill the rest. Raises UsageError for a file
+    that cannot be used.
+    """
+    plain = zenoh.Config()
+    config = zenoh.Config() if file is None else _read(file)
     for key, value in {**_COMMON, **settings}.items():
-        config.insert_json5(key, msgspec.json.encode(value).decode())
+        if config.get_json(key) == plain.get_json(key):
+            config.insert_json5(key, msgspec.json.encode(value).decode())
     return config
+
+
+def _read(file: Path) -> zenoh.Config:
+    try:
+        return zenoh.Config.from_json5(file.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        what = getattr(error, "strerror", None) or "it is no text"
+        raise UsageError(f"cannot read {file}: {what}") from error
+    except zenoh.ZError as error:
+        raise UsageError(f"{file} is no configuration of zenoh: {reason(error)}") from error
 
 
 def reason(error: zenoh.ZError) -> str:

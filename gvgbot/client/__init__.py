@@ -4,23 +4,30 @@
         for state in robot.state():
             print(state.phase, state.pose)
 
-The same with `async with` and `async for`.
+The same with `async with` and `async for`. What its configuration permits can be asked of it:
+
+    answer = await robot.goto(7)            # in a program with a loop
+    answer = robot.goto(1.5, -2.0).result()  # in one without
 """
 
+from gvgbot.client.asking import Asking, Refused
 from gvgbot.client.presence import Presence
-from gvgbot.client.robot import DEFAULT_ENDPOINT, Robot, connect, robots
+from gvgbot.client.robot import DEFAULT_ENDPOINT, Robot, connect, only_robot, robots
 from gvgbot.topics import Event, LinkHealth, Map, MapEdge, MapVertex, State
 
 __all__ = [
     "DEFAULT_ENDPOINT",
+    "Asking",
     "Event",
     "LinkHealth",
     "Map",
     "MapEdge",
     "MapVertex",
     "Presence",
+    "Refused",
     "Robot",
     "State",
     "connect",
+    "only_robot",
     "robots",
 ]

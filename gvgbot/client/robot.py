@@ -2,19 +2,24 @@
 
 import asyncio
 import contextlib
+import json
+import operator
 import threading
 import time
 from collections.abc import AsyncIterator, Iterator
 from functools import partial
+from pathlib import Path
 from types import TracebackType
-from typing import Self, TypeVar
+from typing import Self, TypeVar, overload
 
 import zenoh
 import zenoh.ext
 
+from gvgbot.client.asking import Asking, ask
 from gvgbot.client.newest import Newest, decoded
 from gvgbot.client.presence import Presence, Signs
 from gvgbot.errors import GvgbotError, UsageError
+from gvgbot.requests import Arguments, Goto, Nothing, RequestName, Set
 from gvgbot.topics import (
     EVENTS,
     MAP,
@@ -37,40 +42,61 @@ _SETTLING = 1.0  # s after connecting, by when one has heard of all robots on th
 T = TypeVar("T", State, Map, Events)
 
 
-def connect(robot: str, endpoint: str = DEFAULT_ENDPOINT, *, patience_s: float = 10.0) -> "Robot":
+def connect(
+    robot: str,
+    endpoint: str = DEFAULT_ENDPOINT,
+    *,
+    patience_s: float = 10.0,
+    zenoh_file: Path | None = None,
+) -> "Robot":
     """A robot by its name, to be entered with `with` or `async with`.
 
     `endpoint` is the address of the robot or of a zenoh router. Entering raises GvgbotError if
     nobody answers there for as long as the patience lasts; whether the robot itself is there, now
     or later, its `presence` tells. A connection that is lost later is made again by itself.
-    Raises UsageError for a name or an address that cannot be one.
+    `zenoh_file` (JSON5) has keys and passwords; an address in it replaces the default one.
+    Raises UsageError for a name or an address that cannot be one, or a file that cannot be used.
     """
     if not is_robot_name(robot):
         raise UsageError(f"no robot can be named {robot!r}: letters, digits, - and _ only")
-    if not is_endpoint(endpoint):
-        raise UsageError(
-            f"{endpoint!r} is no address: give protocol/address, such as tcp/host:7447"
-        )
-    return Robot(robot, endpoint, patience_s)
+    _check_endpoint(endpoint)
+    return Robot(robot, endpoint, patience_s, zenoh_file)
 
 
-def robots(endpoint: str = DEFAULT_ENDPOINT, *, patience_s: float = 10.0) -> list[str]:
+def robots(
+    endpoint: str = DEFAULT_ENDPOINT, *, patience_s: float = 10.0, zenoh_file: Path | None = None
+) -> list[str]:
     """The names of all robots that can be reached at an address; blocks.
 
-    Raises GvgbotError if nobody answers, UsageError if it is no address.
+    Raises GvgbotError if nobody answers, UsageError if it is no address or no file of zenoh.
     """
     _check_endpoint(endpoint)
-    with _open(endpoint, patience_s) as session:
+    with _open(endpoint, patience_s, zenoh_file) as session:
         threading.Event().wait(_SETTLING)
         return _names(session)
+
+
+def only_robot(endpoint: str, patience_s: float = 10.0, zenoh_file: Path | None = None) -> str:
+    """The name of the one robot that can be reached at an address; blocks.
+
+    Raises UsageError if there are several, GvgbotError if there is none or nobody answers.
+    """
+    names = robots(endpoint, patience_s=patience_s, zenoh_file=zenoh_file)
+    if len(names) > 1:
+        raise UsageError(f"there are several robots: {', '.join(names)}; name one of them")
+    if not names:
+        raise GvgbotError(f"no robot at {endpoint}")
+    return names[0]
 
 
 class Robot:
     """One robot; made by `connect`. What it says is kept up to date whether it is read or not."""
 
-    def __init__(self, name: str, endpoint: str, patience_s: float) -> None:
+    def __init__(
+        self, name: str, endpoint: str, patience_s: float, zenoh_file: Path | None = None
+    ) -> None:
         self.name, self.endpoint = name, endpoint
-        self._patience_s = patience_s
+        self._patience_s, self._zenoh_file = patience_s, zenoh_file
         self._session: zenoh.Session | None = None
         self._state: Newest[State] = Newest()
         self._map: Newest[Map] = Newest()
@@ -110,11 +136,62 @@ class Robot:
         info = self._session.info
         return bool(info.routers_zid() or info.peers_zid())
 
+    # -- what it can be asked for ------------------------------------------------------------------
+    #
+    # Each is sent at once; `await` what it returns, or call its `result()`, for what the robot does
+    # now. Both raise Refused with its reason, GvgbotError if there is no answer.
+
+    def pause(self) -> Asking:
+        """Stand still, until `resume`."""
+        return self._ask("pause")
+
+    def resume(self) -> Asking:
+        """Go on with what was paused."""
+        return self._ask("resume")
+
+    def stop(self) -> Asking:
+        """End the exploration, and save the map."""
+        return self._ask("stop")
+
+    def home(self) -> Asking:
+        """Drive to where it started."""
+        return self._ask("home")
+
+    @overload
+    def goto(self, place: int, /) -> Asking: ...
+    @overload
+    def goto(self, place: float, y: float, /) -> Asking: ...
+    def goto(self, place: float, y: float | None = None, /) -> Asking:
+        """Drive to a vertex by its id, or to a point x, y, m, in the map frame."""
+        if y is None:
+            return self._ask("goto", Goto(vertex=operator.index(place)))  # type: ignore[arg-type]
+        return self._ask("goto", Goto(x=place, y=y))
+
+    def explore(self) -> Asking:
+        """Go on exploring, also after the end."""
+        return self._ask("explore")
+
+    def relocalise(self) -> Asking:
+        """Look around, and find its place in the map again."""
+        return self._ask("relocalise")
+
+    def save(self) -> Asking:
+        """Save the map now."""
+        return self._ask("save")
+
+    def set(self, key: str, value: bool | float | str) -> Asking:
+        """Change one of the configuration's keys that can be changed while the robot runs."""
+        return self._ask("set", Set(key=key, value=value))
+
+    def _ask(self, name: RequestName, arguments: Arguments | None = None) -> Asking:
+        assert self._session is not None, "the robot is not connected: use `with`"
+        return ask(self._session, self.name, name, arguments or Nothing())
+
     # -- coming and going --------------------------------------------------------------------------
 
     def open(self) -> None:
         """Connect, and look for the robot; blocks. Raises GvgbotError if nobody answers."""
-        session = _open(self.endpoint, self._patience_s)
+        session = _open(self.endpoint, self._patience_s, self._zenoh_file)
         with self._gate:
             self._session = session
             if self._is_closed:  # by somebody who did not want to wait
@@ -249,15 +326,20 @@ def _names(session: zenoh.Session) -> list[str]:
     return sorted(key.split("/")[1] for key in keys)
 
 
-def _open(endpoint: str, patience_s: float) -> zenoh.Session:
+def _open(endpoint: str, patience_s: float, file: Path | None) -> zenoh.Session:
     settings = {
         "mode": "client",
         "connect/endpoints": [endpoint],
         "connect/timeout_ms": round(1000 * patience_s),
     }
+    config = session_config(settings, file)
+    if endpoint != DEFAULT_ENDPOINT:  # somebody wants this one, whatever the file says
+        config.insert_json5("connect/endpoints", json.dumps([endpoint]))
     try:
-        return zenoh.open(session_config(settings))
+        return zenoh.open(config)
     except zenoh.ZError as error:
+        where = ", ".join(json.loads(config.get_json("connect/endpoints")))
         if "Unable to connect" in str(error):
-            raise GvgbotError(f"nobody answers at {endpoint}") from error
-        raise GvgbotError(f"cannot connect to {endpoint}: {reason(error)}") from error
+            keys = "" if file is None else f", or it does not accept the keys of {file}"
+            raise GvgbotError(f"nobody answers at {where}{keys}") from error
+        raise GvgbotError(f"cannot connect to {where}: {reason(error)}") from error

@@ -4,6 +4,9 @@ import asyncio
 import math
 from collections import deque
 from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,7 +27,14 @@ _STEP, _STEPS = 0.1, 50  # m between points of the trail, and how many: until th
 Show = Callable[[Picture], None]
 
 
-def monitor(robot: str | None, endpoint: str) -> int:
+class Connection(NamedTuple):
+    """Where to connect to, and with which keys."""
+
+    endpoint: str
+    zenoh_file: Path | None
+
+
+def monitor(robot: str | None, endpoint: str, zenoh_file: Path | None = None) -> int:
     """Show a robot, or the only one there is, until q, Ctrl-C or another signal; 0.
 
     Raises UsageError if there is no terminal, if an argument cannot be right, or if several robots
@@ -35,13 +45,16 @@ def monitor(robot: str | None, endpoint: str) -> int:
     console = open_console()
     with StopSignals() as signals, console.screen():
         try:
-            asyncio.run(_until_told(signals, robot, endpoint, Screen(console).show))
+            show, connection = Screen(console).show, Connection(endpoint, zenoh_file)
+            asyncio.run(_until_told(signals, robot, connection, show))
         except* UsageError as errors:
             raise errors.exceptions[0] from None
     return 0
 
 
-async def _until_told(signals: StopSignals, robot: str | None, endpoint: str, show: Show) -> None:
+async def _until_told(
+    signals: StopSignals, robot: str | None, connection: Connection, show: Show
+) -> None:
     quitting = asyncio.Event()
 
     def on_key(key: str) -> None:
@@ -49,7 +62,7 @@ async def _until_told(signals: StopSignals, robot: str | None, endpoint: str, sh
             quitting.set()
 
     async with asyncio.TaskGroup() as tasks:
-        watching = tasks.create_task(_keep_watching(robot, endpoint, show))
+        watching = tasks.create_task(_keep_watching(robot, connection, show))
         ends = [tasks.create_task(quitting.wait()), tasks.create_task(signals.wait())]
         with keys(on_key):
             await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
@@ -57,29 +70,23 @@ async def _until_told(signals: StopSignals, robot: str | None, endpoint: str, sh
             task.cancel()
 
 
-async def _keep_watching(robot: str | None, endpoint: str, show: Show) -> None:
+async def _keep_watching(robot: str | None, connection: Connection, show: Show) -> None:
     """Watch, and say why if that is not possible just now."""
+    endpoint, file = connection
     show(Picture(Fact("gvgbot", f"connecting to {endpoint}", "faint")))
     while True:
         try:
-            name = robot or await _only_robot(endpoint)
-            async with client.connect(name, endpoint, patience_s=_PATIENCE) as seen:
+            only = partial(client.only_robot, endpoint, _PATIENCE, file)
+            name = await asyncio.to_thread(only) if robot is None else robot
+            async with client.connect(
+                name, endpoint, patience_s=_PATIENCE, zenoh_file=file
+            ) as seen:
                 await _watch(seen, show)
         except UsageError:
             raise
         except GvgbotError as error:
             show(Picture(Fact("gvgbot", f"{error}; trying again", "bad")))
             await asyncio.sleep(_EVERY)
-
-
-async def _only_robot(endpoint: str) -> str:
-    """The name of the robot that is there. Raises UsageError if there are several."""
-    names = await asyncio.to_thread(client.robots, endpoint, patience_s=_PATIENCE)
-    if len(names) > 1:
-        raise UsageError(f"there are several robots: {', '.join(names)}; name one of them")
-    if not names:
-        raise GvgbotError(f"no robot at {endpoint}")
-    return names[0]
 
 
 async def _watch(robot: Robot, show: Show) -> None:

@@ -16,6 +16,9 @@ _QUIET = {"edge_joined"}  # too many of them, and they say little
 _PHASES: Mapping[str, Tone] = {
     "starting": "warning",
     "exploring": "good",
+    "errand": "good",
+    "waiting": "good",
+    "paused": "warning",
     "halted": "bad",
     "finished": "good",
 }
@@ -55,6 +58,10 @@ def _tone_of_phase(state: State) -> Tone:
 
 def _intention(state: State, events: tuple[Event, ...]) -> Iterator[Fact]:
     """Where the robot goes, and why."""
+    if state.errand is not None:
+        yield Fact("going to", state.errand)
+        yield Fact("why", "somebody asked for it")
+        return
     chosen = next((event for event in reversed(events) if event.kind == "decision"), None)
     if chosen is None or state.phase == "finished":
         yield Fact("going to", "-", "faint")

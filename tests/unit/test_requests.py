@@ -1,0 +1,102 @@
+"""What can be asked of a robot, in JSON and in MessagePack, and what is wrong with the rest."""
+
+import contextlib
+import json
+
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gvgbot.requests import (
+    JSON,
+    MESSAGEPACK,
+    REQUESTS,
+    Goto,
+    Nothing,
+    Set,
+    in_words,
+    parse,
+    request_key,
+)
+
+ARGUMENTS = [
+    ("goto", {"vertex": 7}, Goto(vertex=7)),
+    ("goto", {"x": 1, "y": -2.5}, Goto(x=1.0, y=-2.5)),
+    ("set", {"key": "a.b", "value": True}, Set(key="a.b", value=True)),
+    ("set", {"key": "a.b", "value": 0.25}, Set(key="a.b", value=0.25)),
+    ("set", {"key": "a.b", "value": "kobuki"}, Set(key="a.b", value="kobuki")),
+    ("pause", {}, Nothing()),
+]
+
+
+def test_the_requests_are_the_promised_ones() -> None:
+    promised = {"pause", "resume", "stop", "home", "goto", "explore", "relocalise", "save", "set"}
+    assert set(REQUESTS) >= promised
+    assert request_key("sim", "goto") == "gvgbot/sim/ctl/goto"
+
+
+@pytest.mark.parametrize(("name", "plain", "typed"), ARGUMENTS)
+def test_arguments_come_in_json_or_in_messagepack(
+    name: str, plain: dict[str, object], typed: Goto | Set | Nothing
+) -> None:
+    assert parse(name, json.dumps(plain).encode(), JSON) == typed
+    assert parse(name, msgspec.msgpack.encode(plain), MESSAGEPACK) == typed
+
+
+def test_nothing_at_all_stands_for_no_arguments() -> None:
+    assert parse("pause", b"", MESSAGEPACK) == Nothing()
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "says"),
+    [
+        ("goto", "{}", "either vertex, or x and y"),
+        ("goto", '{"vertex": 1, "x": 2, "y": 3}', "either vertex, or x and y"),
+        ("goto", '{"vertex": 1, "x": 2}', "either vertex, or x and y"),
+        ("goto", '{"x": 2}', "either vertex, or x and y"),
+        ("goto", '{"vertex": "7"}', "vertex"),
+        ("goto", '{"vertex": 7.5}', "vertex"),
+        ("goto", '{"x": 1e300, "y": 0}', "100000"),
+        ("goto", '{"vertix": 7}', "vertix"),
+        ("set", '{"key": "a"}', "value"),
+        ("set", '{"key": "a", "value": null}', "value"),
+        ("pause", '{"for": 3}', "for"),
+        ("pause", "nonsense", "malformed"),
+        ("pause", "[" * 900, ""),
+    ],
+)
+def test_wrong_arguments_are_called_wrong_in_words(name: str, text: str, says: str) -> None:
+    with pytest.raises(ValueError, match=f"wrong arguments of {name}.*{says}"):
+        parse(name, text.encode(), JSON)
+
+
+@given(st.sampled_from(REQUESTS), st.binary(max_size=200), st.sampled_from([JSON, MESSAGEPACK]))
+def test_no_bytes_do_more_harm_than_that(name: str, data: bytes, encoding: str) -> None:
+    with contextlib.suppress(ValueError):  # RecursionError, KeyError and others would show
+        parse(name, data, encoding)
+
+
+@given(st.floats(allow_nan=True, allow_infinity=True))
+def test_a_point_is_a_number_within_reason(x: float) -> None:
+    data = msgspec.msgpack.encode({"x": x, "y": 0.0})
+    if abs(x) <= 1e5:
+        assert parse("goto", data, MESSAGEPACK) == Goto(x=x, y=0.0)
+    else:
+        with pytest.raises(ValueError, match="wrong arguments"):
+            parse("goto", data, MESSAGEPACK)
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "words"),
+    [
+        ("goto", Goto(vertex=7), "goto 7"),
+        ("goto", Goto(x=1.5, y=-2.0), "goto 1.5 -2"),
+        ("set", Set(key="a.b", value=True), "set a.b true"),
+        ("home", Nothing(), "home"),
+    ],
+)
+def test_a_request_can_be_read_by_people(
+    name: str, arguments: Goto | Set | Nothing, words: str
+) -> None:
+    assert in_words(name, arguments) == words
