@@ -69,6 +69,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_twin(commands)
     _add_check(commands)
     _add_monitor(commands)
+    _add_ctl(commands)
     _add_map(commands)
     return parser
 
@@ -166,13 +167,44 @@ def _add_monitor(commands: "argparse._SubParsersAction[_Parser]") -> None:
         "robot", nargs="?", metavar="ROBOT", help="its robot.name (default: the only one there is)"
     )
     monitor.add_argument("--robot", dest="named", metavar="NAME", help="the same")
-    monitor.add_argument(
+    _add_connection(monitor)
+    monitor.set_defaults(command=_monitor)
+
+
+def _add_ctl(commands: "argparse._SubParsersAction[_Parser]") -> None:
+    ctl = commands.add_parser(
+        "ctl",
+        help="ask a robot for something",
+        usage="%(prog)s [-h] [--connect ADDRESS] [--zenoh-file FILE] [ROBOT] REQUEST [WORD ...]",
+        description="Ask a robot to pause, resume, stop (which ends the exploration), drive home, "
+        "goto V (a vertex) or goto X Y (metres, map frame), explore, relocalise, save (the map), "
+        "or set KEY VALUE. Prints what it does now and exits 0, or says why it does not, and "
+        "exits 1. A robot does what telemetry.requests permits.",
+        epilog="example: gvgbot ctl turtlebot2 goto 7 --connect tcp/192.168.1.7:7447",
+    )
+    ctl.add_argument(
+        "words",
+        nargs="+",
+        metavar="WORD",
+        help="the robot's robot.name (default: the only one there is), and the request",
+    )
+    _add_connection(ctl)
+    ctl.set_defaults(command=_ctl)
+
+
+def _add_connection(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
         "--connect",
         default="tcp/127.0.0.1:7447",
         metavar="ADDRESS",
         help="of the robot or of a zenoh router (default: %(default)s)",
     )
-    monitor.set_defaults(command=_monitor)
+    parser.add_argument(
+        "--zenoh-file",
+        type=Path,
+        metavar="FILE",
+        help="keys and passwords, and perhaps an address: a configuration of zenoh in JSON5",
+    )
 
 
 def _add_map(commands: "argparse._SubParsersAction[_Parser]") -> None:
@@ -296,7 +328,13 @@ def _monitor(options: argparse.Namespace) -> int:
             raise
         raise GvgbotError("the monitor needs rich: pip install 'gvgbot[tui]'") from error
 
-    return monitor(options.robot or options.named, options.connect)
+    return monitor(options.robot or options.named, options.connect, options.zenoh_file)
+
+
+def _ctl(options: argparse.Namespace) -> int:
+    from gvgbot.ctl import ctl
+
+    return ctl(options.words, options.connect, options.zenoh_file, _say)
 
 
 def _map_show(options: argparse.Namespace) -> int:

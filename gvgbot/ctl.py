@@ -1,0 +1,79 @@
+"""One request to a robot from the command line: what it says, or why it will not."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TypeVar
+
+import msgspec
+
+from gvgbot import client
+from gvgbot.client import Asking, Robot
+from gvgbot.errors import UsageError
+from gvgbot.requests import REQUESTS
+
+Number = TypeVar("Number", int, float)
+
+
+def ctl(
+    words: Sequence[str], endpoint: str, zenoh_file: Path | None, say: Callable[[str], None]
+) -> int:
+    """Ask for what the words say, and say the answer; 0.
+
+    Raises UsageError for words that are no request, GvgbotError if the robot refuses or is away.
+    """
+    name, request, arguments = _split(words)
+    ask = _asker(request, arguments)
+    name = name or client.only_robot(endpoint, zenoh_file=zenoh_file)
+    with client.connect(name, endpoint, zenoh_file=zenoh_file) as robot:
+        say(ask(robot).result())
+    return 0
+
+
+def _split(words: Sequence[str]) -> tuple[str | None, str, Sequence[str]]:
+    """The robot's name, None if it is left out, the request and its arguments."""
+    is_named = words[0] not in REQUESTS or (len(words) > 1 and words[1] in REQUESTS)
+    name, rest = (words[0], words[1:]) if is_named else (None, words)
+    if not rest or rest[0] not in REQUESTS:
+        what = f"{rest[0]!r} is no request" if rest else f"{words[0]!r} is not asked for anything"
+        raise UsageError(f"{what}: there are {', '.join(REQUESTS)}")
+    return name, rest[0], rest[1:]
+
+
+def _asker(request: str, arguments: Sequence[str]) -> Callable[[Robot], Asking]:
+    """How to ask for it. Raises UsageError if the arguments do not fit."""
+    match request, arguments:
+        case "goto", [vertex]:
+            number = _number(int, vertex, "the id of a vertex")
+            return lambda robot: robot.goto(number)
+        case "goto", [x, y]:
+            point = _number(float, x, "a number"), _number(float, y, "a number")
+            return lambda robot: robot.goto(*point)
+        case "set", [key, value]:
+            return lambda robot: robot.set(key, _value(value))
+        case "goto", _:
+            raise UsageError("goto needs a vertex, or x and y: goto 7, goto 1.5 -2")
+        case "set", _:
+            raise UsageError("set needs a key and a value: set robot.limits.max_speed_mps 0.3")
+        case _, []:
+            return _plain(request)
+        case _:
+            raise UsageError(f"{request} takes no arguments")
+
+
+def _plain(request: str) -> Callable[[Robot], Asking]:
+    return lambda robot: getattr(robot, request)()
+
+
+def _number(kind: Callable[[str], Number], text: str, allowed: str) -> Number:
+    try:
+        return kind(text)
+    except ValueError as error:
+        raise UsageError(f"{text!r} must be {allowed}") from error
+
+
+def _value(text: str) -> bool | float | str:
+    """A number, true or false if it is one, else the text itself."""
+    try:
+        return msgspec.json.decode(text, type=bool | int | float)
+    except msgspec.MsgspecError:
+        return text
