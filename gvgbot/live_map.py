@@ -6,11 +6,10 @@ from functools import partial
 import numpy as np
 
 from gvgbot.autonomy.pipeline import Keyframe, Pipeline
-from gvgbot.geometry import Array
 from gvgbot.maps.occupancy import GrowingGrid
 from gvgbot.maps.route_graph import RouteGraph
 from gvgbot.report import route_graph
-from gvgbot.topics import Map, MapEdge, MapVertex
+from gvgbot.topics import Map, MapEdge, MapVertex, packed
 
 _RESOLUTION_M, _REACH_M = 0.15, 8.0  # coarser and shorter than the saved grid: cheap to send
 
@@ -54,7 +53,7 @@ class LiveMap:
             cells=grid.cells.tobytes(),
             vertices=_vertices(graph),
             edges=_edges(graph),
-            trail=_pairs(np.array(self._trail)),
+            trail=packed(np.array(self._trail)),
         )
 
 
@@ -74,11 +73,6 @@ def _vertices(graph: RouteGraph) -> tuple[MapVertex, ...]:
 
 def _edges(graph: RouteGraph) -> tuple[MapEdge, ...]:
     return tuple(
-        MapEdge(start=edge.start, end=edge.end, length=edge.length, points=_pairs(edge.polyline))
+        MapEdge(start=edge.start, end=edge.end, length=edge.length, points=packed(edge.polyline))
         for edge in graph.edges
     )
-
-
-def _pairs(points: Array) -> bytes:
-    """Points (N, 2) as they travel."""
-    return points.astype("<f4").tobytes()

@@ -18,6 +18,7 @@ from gvgbot.hal.guard import Guard
 from gvgbot.hal.messages import Odometry
 from gvgbot.journal import GuardJournal, log_event, status_line
 from gvgbot.links import Devices, Links
+from gvgbot.live_feed import LiveFeed
 from gvgbot.live_map import LiveMap
 from gvgbot.maps.run_directory import record_of
 from gvgbot.service import Notifier
@@ -37,6 +38,9 @@ class Network(Protocol):
 
     def publish(self, value: Payload) -> None:
         """Send without waiting; from any thread."""
+
+    def is_heard(self, payload: type[Payload]) -> bool:
+        """Whether to send values of a type; not, if nobody listens and none are kept."""
 
     async def answer(self) -> None:
         """Answer queries until cancelled."""
@@ -60,6 +64,11 @@ class Robot:
         self._cycles, self._sequence = 0, 0
         self._happened, self._told = 0, 0  # events; and those of them that were published
         self._latest_events: deque[Event] = deque(maxlen=EVENTS_KEPT)
+        self._decided = ""  # the reason of the last decision
+        self._feed: LiveFeed | None = None
+        if network is not None:
+            rate_hz = session.config.telemetry.scan_rate_hz
+            self._feed = LiveFeed(network, session.pipeline, rate_hz)
         self._ready = False
         self._guard = GuardJournal()
         self._clock: Clock
@@ -101,6 +110,8 @@ class Robot:
     def _prepare(self, links: Links) -> None:
         robot = self._session.config.robot
         self._devices = Devices(links)
+        if self._feed is not None:
+            self._devices.laser.on_scan = self._feed.on_scan
         self._loop = Loop(
             self._devices.laser,
             self._devices.base,
@@ -164,6 +175,8 @@ class Robot:
             self._take_down(event)
             if isinstance(event, events.VertexAdded):
                 self._grown.set()
+            if isinstance(event, events.Decision):
+                self._decided = event.reason
 
     def _take_down(self, event: events.Event) -> None:
         """Keep an event for those who watch."""
@@ -185,11 +198,15 @@ class Robot:
 
     def _note(self, odometry: Odometry) -> None:
         self._odometry, self._cycles = odometry, self._cycles + 1
+        if self._feed is not None:
+            self._feed.on_odometry(odometry)
 
     def _report(self) -> None:
         """Publish the state; tell the service manager, unless the control loop is stuck."""
         now = self._state()
         self._sequence += 1
+        if self._feed is not None:
+            self._feed.on_beat(now.stamp, self._decided)
         if self._network is not None:
             self._network.publish(now)
             if self._told < self._happened:

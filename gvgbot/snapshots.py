@@ -1,10 +1,17 @@
-"""The robot's state at a moment, as the network gets it."""
+"""The robot at a moment, as the network gets it: its state, scans, odometry, and plan."""
 
+import numpy as np
+
+from gvgbot import topics
+from gvgbot.autonomy.exploration.paths import Approach, shortest_paths
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.ekf import OdometryNoise, predict
-from gvgbot.geometry import STANDSTILL, Array
-from gvgbot.hal.messages import Battery, Odometry
-from gvgbot.topics import LinkHealth, Phase, State
+from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
+from gvgbot.geometry import STANDSTILL, Array, Pose, wrap_angle
+from gvgbot.hal.messages import Battery, Odometry, Scan
+from gvgbot.topics import NOTHING_IN_RANGE, NOTHING_TRUSTED, LinkHealth, Phase, State, packed
+
+_FARTHEST_MM = NOTHING_IN_RANGE - 1
 
 
 def state(
@@ -68,3 +75,83 @@ def pose_covariance(pipeline: Pipeline, odometry: Odometry | None, noise: Odomet
     motion = last.odom_base.to(odometry.odom_base)
     growth = noise.covariance(motion, max(0.0, odometry.stamp - last.stamp))
     return predict(belief, motion, growth).P[:3, :3]
+
+
+def sweep(scan: Scan, map_base: Pose | None) -> topics.Scan:
+    """A scan as it travels; `map_base` is where the robot was at the middle of it."""
+    return topics.Scan(
+        stamp=scan.stamp,
+        time_increment=scan.time_increment,
+        angle_min=scan.angle_min,
+        angle_increment=scan.angle_increment,
+        range_max=scan.range_max,
+        base_laser=_triple(scan.base_laser),
+        map_base=None if map_base is None else _triple(map_base),
+        ranges=_millimetres(scan.ranges),
+    )
+
+
+def _millimetres(ranges: Array) -> bytes:
+    """Ranges, m, as they travel; what is too far for that counts as out of range."""
+    with np.errstate(invalid="ignore"):
+        mm = np.minimum(np.rint(ranges * 1000.0), NOTHING_IN_RANGE)
+        mm[mm > _FARTHEST_MM] = NOTHING_IN_RANGE
+    mm[np.isnan(mm)] = NOTHING_TRUSTED
+    return mm.astype("<u2").tobytes()
+
+
+def movement(odometry: Odometry, map_base: Pose) -> topics.Odometry:
+    """Odometry as it travels, with where the robot is believed to be."""
+    return topics.Odometry(
+        stamp=odometry.stamp,
+        map_base=_triple(map_base),
+        odom_base=_triple(odometry.odom_base),
+        twist=(odometry.twist.linear, odometry.twist.angular),
+    )
+
+
+def _triple(pose: Pose) -> tuple[float, float, float]:
+    return pose.x, pose.y, pose.theta
+
+
+def plan(pipeline: Pipeline, reason: str, stamp: float) -> topics.Plan:
+    """Where the robot goes; `reason` is the last decision's."""
+    target, graph = pipeline.mission.target, pipeline.mapper.graph
+    half = None if target is None else graph.half_edge(target)
+    vertex = bearing = None
+    route = np.zeros((0, 2))
+    if target is not None and half is not None:
+        vertex = target.vertex
+        bearing = wrap_angle(half.bearing + pipeline.mapper.belief.map_vertex(vertex).theta)
+        route = _route(pipeline, target)
+    return topics.Plan(
+        stamp=stamp,
+        vertex=vertex,
+        bearing=bearing,
+        reason=reason,
+        track=packed(pipeline.track),
+        route=packed(route),
+    )
+
+
+def _route(pipeline: Pipeline, target: HalfEdgeId) -> Array:
+    """The known edges (N, 2), m, from the end of the robot's own edge to a frontier's vertex."""
+    graph, where = pipeline.mapper.graph, pipeline.mission.where
+    if where.on_edge is None or where.on_edge == target:
+        return np.zeros((0, 2))
+    starts = [Approach(where.trail_length, where.on_edge)]
+    edge = graph.edge_at(where.on_edge)
+    if edge is not None:
+        ahead = max(0.0, edge.length - where.trail_length)
+        starts.append(Approach(ahead, edge.other(where.on_edge)))
+    approach = shortest_paths(graph, starts).get(target.vertex)
+    departures = () if approach is None else approach.departures
+    return np.concatenate([np.zeros((0, 2)), *(_line(pipeline, graph, end) for end in departures)])
+
+
+def _line(pipeline: Pipeline, graph: GvgGraph, end: HalfEdgeId) -> Array:
+    """An edge (N, 2), m, map frame, away from one of its ends."""
+    edge = graph.edge_at(end)
+    assert edge is not None, "paths lead over edges"
+    line = pipeline.mapper.belief.map_vertex(edge.a.vertex).transform(edge.polyline)
+    return line if end == edge.a else line[::-1]

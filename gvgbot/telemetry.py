@@ -43,8 +43,15 @@ class Telemetry:
         self._publishers = {topic.payload: (topic, self._publisher(topic)) for topic in TOPICS}
         self._alive = self._session.liveliness().declare_token(alive_key(robot))
 
-    def _publisher(self, topic: Topic) -> zenoh.ext.AdvancedPublisher:
+    def _publisher(self, topic: Topic) -> zenoh.Publisher | zenoh.ext.AdvancedPublisher:
         """A publisher that drops rather than waits, and keeps what a latecomer gets."""
+        if not topic.history:
+            return self._session.declare_publisher(
+                topic.key(self._robot),
+                encoding=zenoh.Encoding(topic.encoding),
+                congestion_control=zenoh.CongestionControl.DROP,
+                priority=_PRIORITIES[topic.priority],
+            )
         return zenoh.ext.declare_advanced_publisher(
             self._session,
             topic.key(self._robot),
@@ -54,6 +61,13 @@ class Telemetry:
             cache=zenoh.ext.CacheConfig(topic.history),
             publisher_detection=True,
         )
+
+    def is_heard(self, payload: type[Payload]) -> bool:
+        """Whether to send values of a type; not, if nobody listens and none are kept."""
+        _, publisher = self._publishers[payload]
+        if isinstance(publisher, zenoh.ext.AdvancedPublisher):
+            return True
+        return publisher.matching_status.matching  # type: ignore[attr-defined, no-any-return]
 
     def publish(self, value: Payload) -> None:
         """Send to whoever listens; without waiting, and without complaining if it fails."""

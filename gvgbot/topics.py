@@ -32,6 +32,7 @@ class TelemetryConfig:
     lease_s: Annotated[float, Range(0.5, 60.0)] = (
         2.0  # silence after which the robot counts as gone
     )
+    scan_rate_hz: Annotated[float, Range(0.1, 40.0)] = 10.0  # at most; with nobody there, none
 
     def __post_init__(self) -> None:
         """Raises ValueError for addresses that cannot be listened on."""
@@ -95,6 +96,11 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
     slips: int  # times that gyro and wheels began to disagree
     laser: LinkHealth
     base: LinkHealth
+
+
+def packed(points: NDArray[np.floating]) -> bytes:
+    """Points (N, 2), m, as they travel: little-endian float32 pairs."""
+    return points.astype("<f4").tobytes()
 
 
 class MapVertex(msgspec.Struct, frozen=True, kw_only=True):
@@ -168,7 +174,72 @@ class Events(msgspec.Struct, frozen=True, kw_only=True):
     events: tuple[Event, ...]
 
 
-Payload = State | Map | Events
+class Scan(msgspec.Struct, frozen=True, kw_only=True):
+    """One sweep of the laser, as it came, and where the robot believed to be.
+
+    Sent only while somebody listens. Beam i points to `angle_min + i * angle_increment` in the
+    frame of the laser, anticlockwise.
+    """
+
+    stamp: float  # s, the robot's monotonic clock, of the first beam
+    time_increment: float  # s from one beam to the next
+    angle_min: float  # rad
+    angle_increment: float  # rad
+    range_max: float  # m
+    base_laser: tuple[float, float, float]  # the laser on the robot: x, y, theta
+    map_base: tuple[float, float, float] | None  # at the middle of the sweep; None if not known
+    ranges: bytes  # little-endian uint16, mm; 0: nothing trusted, 65535: nothing within range
+
+    @property
+    def metres(self) -> NDArray[np.float32]:
+        """The ranges (N,), m; NaN where nothing is trusted, inf where nothing is within range."""
+        metres: NDArray[np.float32] = _METRES[np.frombuffer(self.ranges, "<u2")]
+        return metres
+
+
+class Odometry(msgspec.Struct, frozen=True, kw_only=True):
+    """Where the robot is and how it moves. Sent only while somebody listens."""
+
+    stamp: float  # s, the robot's monotonic clock
+    map_base: tuple[float, float, float]  # as believed: x, y, theta
+    odom_base: tuple[float, float, float]  # by wheels and gyro alone, since the program began
+    twist: tuple[float, float]  # as measured: m/s ahead, rad/s anticlockwise
+
+
+class Plan(msgspec.Struct, frozen=True, kw_only=True):
+    """Where the robot is about to go, and why. Sent when it has changed; map frame."""
+
+    stamp: float  # s, the robot's monotonic clock
+    vertex: int | None  # id of the vertex that the edge to be explored leaves; None without one
+    bearing: float | None  # rad, how it leaves there
+    reason: str  # of the decision: ear, nearest frontier and others; empty before the first
+    track: bytes  # little-endian float32 pairs x, y, m: what is driven now, as far as it is seen
+    route: bytes  # the same: known edges from there on, to the vertex
+
+    @property
+    def ahead(self) -> NDArray[np.float32]:
+        """The track (N, 2), m; read-only."""
+        return np.frombuffer(self.track, "<f4").reshape(-1, 2)
+
+    @property
+    def further(self) -> NDArray[np.float32]:
+        """The route (N, 2), m; read-only."""
+        return np.frombuffer(self.route, "<f4").reshape(-1, 2)
+
+
+NOTHING_TRUSTED, NOTHING_IN_RANGE = 0, 65535  # instead of a range in mm
+
+
+def _in_metres() -> NDArray[np.float32]:
+    """The range, m, that each uint16 stands for."""
+    metres = np.arange(65536, dtype=np.float32) / np.float32(1000.0)
+    metres[[NOTHING_TRUSTED, NOTHING_IN_RANGE]] = np.nan, np.inf
+    return metres
+
+
+_METRES = _in_metres()
+
+Payload = State | Map | Events | Scan | Odometry | Plan
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,6 +247,7 @@ class Topic:
     """One row of the table.
 
     `history` samples are kept for those who come late; `queryable` topics answer with the newest.
+    Those without a history are only sent while somebody listens.
     """
 
     name: str
@@ -199,7 +271,10 @@ class Topic:
 STATE = Topic("state", State, 1, 5.0, "data_high", 1, queryable=True)
 MAP = Topic("map", Map, 1, 0.5, "data_low", 1, queryable=True)
 EVENTS = Topic("events", Events, 1, 5.0, "data", 1, queryable=True)
-TOPICS = (STATE, MAP, EVENTS)
+PLAN = Topic("plan", Plan, 1, 2.0, "data", 1, queryable=True)
+ODOMETRY = Topic("odometry", Odometry, 1, 20.0, "data_high", 0, queryable=False)
+SCAN = Topic("scan", Scan, 1, 40.0, "data", 0, queryable=False)
+TOPICS = (STATE, MAP, EVENTS, PLAN, ODOMETRY, SCAN)
 EVENTS_KEPT = 64  # in a message
 
 

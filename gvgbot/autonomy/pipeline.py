@@ -137,6 +137,21 @@ class Pipeline:
         moved = self._last.odom_base.to(newest.odom_base)
         return self.mapper.belief.map_base.compose(moved)
 
+    def map_base_at(self, stamp: float) -> Pose | None:
+        """The pose as believed now to have been a moment ago; None if odometry does not tell."""
+        odom_base = self._odometry.odom_base_at(stamp)
+        if self._last is None or odom_base is None:
+            return None
+        return self.mapper.belief.map_base.compose(self._last.odom_base.to(odom_base))
+
+    @property
+    def track(self) -> Array:
+        """What is being driven along (N, 2), m, map frame; no point while standing or turning."""
+        if self._last is None or not isinstance(self._order, Drive):
+            return np.zeros((0, 2))
+        map_local = self.mapper.belief.map_base.compose(self._last.local_base.inverse())
+        return map_local.transform(self._order.track.polyline)
+
     # -- perception, per scan --------------------------------------------------------------------
 
     def perceive(self, scan: Scan) -> list[Event]:

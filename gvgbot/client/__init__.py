@@ -13,7 +13,17 @@ The same with `async with` and `async for`. What its configuration permits can b
 from gvgbot.client.asking import Asking, Refused
 from gvgbot.client.presence import Presence
 from gvgbot.client.robot import DEFAULT_ENDPOINT, Robot, connect, only_robot, robots
-from gvgbot.topics import Event, LinkHealth, Map, MapEdge, MapVertex, State
+from gvgbot.topics import (
+    Event,
+    LinkHealth,
+    Map,
+    MapEdge,
+    MapVertex,
+    Odometry,
+    Plan,
+    Scan,
+    State,
+)
 
 __all__ = [
     "DEFAULT_ENDPOINT",
@@ -23,9 +33,12 @@ __all__ = [
     "Map",
     "MapEdge",
     "MapVertex",
+    "Odometry",
+    "Plan",
     "Presence",
     "Refused",
     "Robot",
+    "Scan",
     "State",
     "connect",
     "only_robot",

@@ -23,10 +23,16 @@ from gvgbot.requests import Arguments, Goto, Nothing, RequestName, Set
 from gvgbot.topics import (
     EVENTS,
     MAP,
+    ODOMETRY,
+    PLAN,
+    SCAN,
     STATE,
     Event,
     Events,
     Map,
+    Odometry,
+    Plan,
+    Scan,
     State,
     Topic,
     alive_key,
@@ -39,7 +45,7 @@ DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 
 _SETTLING = 1.0  # s after connecting, by when one has heard of all robots on the network
 
-T = TypeVar("T", State, Map, Events)
+T = TypeVar("T", State, Map, Events, Plan, Odometry, Scan)
 
 
 def connect(
@@ -101,6 +107,10 @@ class Robot:
         self._state: Newest[State] = Newest()
         self._map: Newest[Map] = Newest()
         self._events: Newest[Events] = Newest()
+        self._plan: Newest[Plan] = Newest()
+        self._odometry: Newest[Odometry] = Newest()
+        self._scan: Newest[Scan] = Newest()
+        self._heard: set[Topic] = set()  # that were subscribed to
         self._signs = Signs(0.0)
         self._gate = threading.Lock()  # one of opening and closing at a time
         self._is_closed = False
@@ -119,6 +129,20 @@ class Robot:
     def events(self) -> "EventStream":
         """What happens, one after another; those of the last minutes first."""
         return EventStream(self._events)
+
+    def plan(self) -> Newest[Plan]:
+        """Where it goes, and why, each time that this changes."""
+        return self._plan
+
+    def odometry(self) -> Newest[Odometry]:
+        """Its pose and its speed, many times a second; sent from the first call on."""
+        self._hear(ODOMETRY, Odometry, self._odometry)
+        return self._odometry
+
+    def scan(self) -> Newest[Scan]:
+        """What its laser sees; sent from the first call on."""
+        self._hear(SCAN, Scan, self._scan)
+        return self._scan
 
     @property
     def presence(self) -> Presence:
@@ -207,6 +231,16 @@ class Robot:
         self._subscribe(session, STATE, State, self._state)
         self._subscribe(session, MAP, Map, self._map)
         self._subscribe(session, EVENTS, Events, self._events)
+        self._subscribe(session, PLAN, Plan, self._plan)
+
+    def _hear(self, topic: Topic, payload: type[T], newest: Newest[T]) -> None:
+        """Subscribe to a topic that is sent to those only who listen, if that is still to do."""
+        with self._gate:
+            assert self._session is not None, "the robot is not connected: use `with`"
+            if topic not in self._heard and not self._is_closed:
+                self._heard.add(topic)
+                on_sample = partial(self._on_sample, topic, payload, newest)
+                self._session.declare_subscriber(topic.key(self.name), on_sample)
 
     def _subscribe(
         self, session: zenoh.Session, topic: Topic, payload: type[T], newest: Newest[T]
@@ -234,7 +268,8 @@ class Robot:
 
     def close(self) -> None:
         """Leave the network, and end all iterations."""
-        for newest in (self._state, self._map, self._events):
+        boxes = (self._state, self._map, self._events, self._plan, self._odometry, self._scan)
+        for newest in boxes:
             newest.close()
         with self._gate:
             self._is_closed = True

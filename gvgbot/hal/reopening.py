@@ -93,10 +93,14 @@ class _Reopening(Generic[D]):
 
 
 class ReopeningLaser(_Reopening[Laser]):
-    """A laser that is lost only for a while."""
+    """A laser that is lost only for a while.
+
+    `on_scan` is given each scan as it comes, too, and must not take long.
+    """
 
     def __init__(self, open_device: Open[Laser], clock: Clock) -> None:
         super().__init__("laser", open_device, clock)
+        self.on_scan: Callable[[Scan], None] | None = None
         self._scans: Latest[Scan | DeviceLost] = Latest()
 
     async def next_scan(self) -> Scan:
@@ -116,8 +120,11 @@ class ReopeningLaser(_Reopening[Laser]):
 
     async def _pass_on(self, device: Laser) -> None:
         while True:
-            self._scans.put(await device.next_scan())
+            scan = await device.next_scan()
+            self._scans.put(scan)
             self._heard()
+            if self.on_scan is not None:
+                self.on_scan(scan)
 
 
 class ReopeningBase(_Reopening[Base]):

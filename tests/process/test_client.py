@@ -23,7 +23,18 @@ import zenoh
 from gvgbot import client
 from gvgbot.errors import GvgbotError, UsageError
 from gvgbot.telemetry import Telemetry
-from gvgbot.topics import Event, Events, Map, MapEdge, MapVertex, State, TelemetryConfig
+from gvgbot.topics import (
+    Event,
+    Events,
+    Map,
+    MapEdge,
+    MapVertex,
+    Odometry,
+    Plan,
+    Scan,
+    State,
+    TelemetryConfig,
+)
 from tests.process.addresses import free_endpoint, plain_session, router
 from tests.unit.test_telemetry import EXAMPLE
 
@@ -49,6 +60,27 @@ A_MAP = Map(
     ),
     edges=(MapEdge(start=4, end=4, length=2.0, points=np.array([1, 2, 3, 4], "<f4").tobytes()),),
     trail=np.array([0.0, 0.0, 1.5, -2.0], "<f4").tobytes(),
+)
+A_SCAN = Scan(
+    stamp=4.0,
+    time_increment=0.0001,
+    angle_min=-1.0,
+    angle_increment=1.0,
+    range_max=30.0,
+    base_laser=(0.1, 0.0, 0.0),
+    map_base=(1.0, 2.0, 3.0),
+    ranges=np.array([1500, 0, 65535], "<u2").tobytes(),
+)
+SOME_ODOMETRY = Odometry(
+    stamp=5.0, map_base=(1.0, 2.0, 3.0), odom_base=(0.5, 0.0, 0.1), twist=(0.2, 0.0)
+)
+A_PLAN = Plan(
+    stamp=6.0,
+    vertex=4,
+    bearing=1.5,
+    reason="ear",
+    track=np.array([0, 0, 1, 0], "<f4").tobytes(),
+    route=b"",
 )
 ROBOT = """
 import sys, time
@@ -110,6 +142,33 @@ def test_a_map_is_unpacked_into_arrays(endpoint: str) -> None:
     assert got.grid.tolist() == [[0, 100, -1], [50, 0, 0]]
     assert got.edges[0].polyline.tolist() == [[1.0, 2.0], [3.0, 4.0]]
     assert got.driven.tolist() == [[0.0, 0.0], [1.5, -2.0]]
+
+
+def test_scans_and_odometry_are_sent_to_those_who_ask_for_them(endpoint: str) -> None:
+    with a_robot(endpoint) as robot, client.connect("near", endpoint) as seen:
+        until(lambda: seen.presence.word == "alive")
+        assert not robot.is_heard(Scan)
+        scans = seen.scan()
+        until(lambda: robot.is_heard(Scan))
+        assert not robot.is_heard(Odometry)
+        robot.publish(A_SCAN)
+        got = next(iter(scans))
+        assert got == A_SCAN
+        assert got.metres == pytest.approx([1.5, np.nan, np.inf], nan_ok=True)
+        odometry = seen.odometry()
+        until(lambda: robot.is_heard(Odometry))
+        robot.publish(SOME_ODOMETRY)
+        assert next(iter(odometry)) == SOME_ODOMETRY
+        assert seen.scan() is scans
+
+
+def test_who_joins_gets_the_plan_that_was_made_before(endpoint: str) -> None:
+    with a_robot(endpoint) as robot:
+        robot.publish(A_PLAN)
+        with client.connect("near", endpoint) as seen:
+            got = next(iter(seen.plan()))
+    assert got == A_PLAN
+    assert got.ahead.tolist() == [[0.0, 0.0], [1.0, 0.0]]
 
 
 def test_the_loop_of_a_program_gets_state_after_state(endpoint: str) -> None:

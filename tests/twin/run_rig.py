@@ -20,7 +20,7 @@ from gvgbot.robot import Robot
 from gvgbot.service import Notifier
 from gvgbot.session import Session
 from gvgbot.simulation import Place, Simulation
-from gvgbot.topics import Events, Map, Payload, State
+from gvgbot.topics import Events, Map, Odometry, Payload, Plan, Scan, State
 from gvgbot.worlds.canvas import Canvas
 
 STOP = (0, 0)
@@ -99,6 +99,9 @@ class Network:
         self.states: list[State] = []
         self.maps: list[Map] = []
         self.events: list[Events] = []
+        self.plans: list[Plan] = []
+        self.odometry: list[Odometry] = []
+        self.scans: list[Scan] = []
 
     def publish(self, value: Payload) -> None:
         match value:
@@ -108,6 +111,15 @@ class Network:
                 self.maps.append(value)
             case Events():
                 self.events.append(value)
+            case Plan():
+                self.plans.append(value)
+            case Odometry():
+                self.odometry.append(value)
+            case Scan():
+                self.scans.append(value)
+
+    def is_heard(self, payload: type[Payload]) -> bool:
+        return True
 
     async def answer(self) -> None:
         await asyncio.Event().wait()
