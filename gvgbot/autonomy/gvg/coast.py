@@ -68,33 +68,24 @@ def with_coast(
     return points, clearance, np.concatenate([ridges, arcs])
 
 
-def _frame(diagram: Diagram, walls: Array) -> tuple[Array, Array, Array]:
-    """Of ridges: middle between generators (M, 2), half their distance (M,), direction (M, 2)."""
-    p, q = walls[diagram.generators[:, 0]], walls[diagram.generators[:, 1]]
-    half = np.hypot(*(q - p).T) / 2
-    across = (q - p) / (2 * half)[:, None]
-    return (p + q) / 2, half, np.stack([-across[:, 1], across[:, 0]], axis=1)
-
-
-def _ends(diagram: Diagram, middle: Array, direction: Array) -> tuple[Array, Array]:
-    """Where ridges begin and end, m along their direction from the middle."""
-    start = ((diagram.points[diagram.a] - middle) * direction).sum(axis=1)
-    end = ((diagram.points[diagram.b] - middle) * direction).sum(axis=1)
-    return start, np.where(diagram.b < 0, start, end)
-
-
 def _cuts(diagram: Diagram, walls: Array, radius: float) -> _Cuts:
-    middle, half, direction = _frame(diagram, walls)
-    start, end = _ends(diagram, middle, direction)
+    a, b = diagram.a, diagram.b
+    farthest = np.maximum(diagram.clearance[a], diagram.clearance[b])  # on a ridge that ends
+    far = np.flatnonzero((b >= 0) & (farthest > radius - _TOUCH_M))
+    p, q = walls[diagram.generators[far, 0]], walls[diagram.generators[far, 1]]
+    middle, half = (p + q) / 2, np.hypot(*(q - p).T) / 2
+    across = (q - p) / (2 * half)[:, None]
+    direction = np.stack([-across[:, 1], across[:, 0]], axis=1)
+    start, end = (((diagram.points[i] - middle) * direction).sum(axis=1) for i in (a[far], b[far]))
     low, high = np.minimum(start, end), np.maximum(start, end)
     away = np.sqrt(np.maximum(radius**2 - half**2, 0.0))
-    ridge, along = [], []
+    cut, along = [], []
     for side in (-away, away):
         hit = np.flatnonzero((half < radius) & (low < side) & (side < high))
-        ridge.append(hit)
+        cut.append(hit)
         along.append(side[hit])
-    ridges, places = np.concatenate(ridge), np.concatenate(along)
-    return _Cuts(middle[ridges] + places[:, None] * direction[ridges], ridges, places)
+    cuts, places = np.concatenate(cut), np.concatenate(along)
+    return _Cuts(middle[cuts] + places[:, None] * direction[cuts], far[cuts], places)
 
 
 def _cut_ridges(diagram: Diagram, cuts: _Cuts, radius: float) -> Indices:

@@ -52,6 +52,7 @@ class LocalMap:
         self._mean = np.zeros((n, n, 2))
         self._hits = np.zeros((n, n), np.float32)  # that the mean is made of
         self._seen_at = np.full((n, n), -np.inf, np.float32)  # metres driven when last seen
+        self._renew()
         centres = ((np.arange(n) + 0.5) * self._cell).astype(np.float32)
         self._offsets_x = np.broadcast_to(centres[:, None], (n, n))
         self._offsets_y = np.broadcast_to(centres[None, :], (n, n))
@@ -66,10 +67,19 @@ class LocalMap:
         )
         self._occupy(points, travelled)
         self._forget(travelled)
+        self._renew()
+
+    def _renew(self) -> None:
+        """Draw from the cells what is asked for again and again."""
+        occupied = self._votes > 0
+        self._points, self._weights = self._mean[occupied], self._hits[occupied].astype(np.float64)
+        for drawn in (self._points, self._weights):
+            drawn.setflags(write=False)
+        self._known = np.pad(self._free | occupied, 1)  # with a rim for what is not in the window
 
     def points(self) -> Array:
         """Mean hits of the occupied cells (N, 2), local frame."""
-        return self._mean[self._votes > 0]
+        return self._points
 
     def hits(self) -> Array:
         """How many hits (N,) each of `points` is the mean of, the oldest forgotten.
@@ -77,7 +87,7 @@ class LocalMap:
         Where a wall lies on the border of two rows of cells, both means are off, and only together
         they are right: each counts as often as it was hit.
         """
-        return self._hits[self._votes > 0].astype(np.float64)
+        return self._weights
 
     def covers(self, points: Array) -> NDArray[np.bool_]:
         """Whether each point (N, 2) lies in the window."""
@@ -87,10 +97,12 @@ class LocalMap:
 
     def known(self, points: Array) -> NDArray[np.bool_]:
         """Whether the cell under each point (..., 2) is free or occupied rather than unknown."""
-        cells = np.floor(points / self._cell).astype(np.int64) - self._corner
-        inside = ((cells >= 0) & (cells < self._size)).all(axis=-1)
-        i, j = np.where(inside, cells[..., 0], 0), np.where(inside, cells[..., 1], 0)
-        known: NDArray[np.bool_] = inside & (self._free[i, j] | (self._votes[i, j] > 0))
+        low, high = self._corner - 1, self._corner + self._size
+        i, j = (
+            np.clip(np.floor(points[..., k] / self._cell), low[k], high[k]).astype(np.intp) - low[k]
+            for k in (0, 1)
+        )
+        known: NDArray[np.bool_] = self._known[i, j]
         return known
 
     @property

@@ -17,6 +17,7 @@ from gvgbot.autonomy.gvg.local_map import LocalMap
 from gvgbot.geometry import Array
 
 _RING = np.stack([f(np.arange(16) * np.pi / 8) for f in (np.cos, np.sin)], axis=1)
+_WITHIN = np.concatenate([0.5 * _RING[::2], np.zeros((1, 2))])
 _MAX_UNKNOWN = 1  # of the sampled points of a disc
 _NOTHING: Array = np.empty((0, 2))
 
@@ -62,30 +63,33 @@ def fine_graph(
         triangles = Delaunay(generators)
     except QhullError:
         return EMPTY
-    points, clearance = _circumcircles(generators[triangles.simplices])
+    points, clearance = _circumcircles(generators, triangles.simplices)
     a, b, pair = _ridges(triangles)
     p, q = generators[pair[:, 0]], generators[pair[:, 1]]
     chord = np.hypot(*(p - q).T)
-    narrowest = _least_clearance(points, clearance, a, b, p, q)
-    parts = chord >= np.maximum(2 * min_clearance, np.sqrt(8 * roughness * narrowest))
-    endless = parts & (b < 0)
-    links = np.stack([a, b], axis=1)[parts & ~endless]
+    parts = chord >= 2 * min_clearance
+    narrowest = _least_clearance(points, clearance, a[parts], b[parts], p[parts], q[parts])
+    parts[parts] = chord[parts] >= np.sqrt(8 * roughness * narrowest)
+    endless = np.flatnonzero(parts & (b < 0))
+    links = np.stack([a, b], axis=1)[parts & (b >= 0)]
     if np.isfinite(open_clearance):
         diagram = Diagram(points, clearance, a, b, pair, parts)
         coast = with_coast(diagram, generators, open_clearance, local_map)
         if coast is not None:
             points, clearance, links = coast
     wide = clearance >= min_clearance
-    near = wide & (clearance <= open_clearance)
+    asked = np.zeros(len(points), bool)
+    asked[links] = asked[a[endless]] = True
+    asked &= wide & (clearance <= open_clearance)
     certain = np.zeros(len(points), bool)
-    certain[near] = _disc_is_known(local_map, points[near], clearance[near])
+    certain[asked] = _disc_is_known(local_map, points[asked], clearance[asked])
     lead = np.full(len(points), np.nan)
     for here, there in ((links[:, 0], links[:, 1]), (links[:, 1], links[:, 0])):
         out = certain[here] & wide[there] & ~certain[there]
         lead[here[out]] = _direction(points[there[out]] - points[here[out]])
-    out = endless & certain[a]
+    out = endless[certain[a[endless]]]
     lead[a[out]] = _direction((p[out] + q[out]) / 2 - points[a[out]])
-    joined = certain[links].all(axis=1)
+    joined = certain[links[:, 0]] & certain[links[:, 1]]
     return _piece_of_robot(points, clearance, links[joined], lead, robot)
 
 
@@ -95,35 +99,44 @@ def _direction(vectors: Array) -> Array:
     return angles
 
 
-def _circumcircles(corners: Array) -> tuple[Array, Array]:
-    """Centres (N, 2) and radii (N,) of triangles (N, 3, 2); infinite for degenerate ones."""
-    a, b, c = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    cross = 2 * (b[:, 0] * c[:, 1] - b[:, 1] * c[:, 0])
+def _circumcircles(generators: Array, triangles: NDArray[np.int32]) -> tuple[Array, Array]:
+    """Centres (N, 2) and radii (N,) around triangles (N, 3); infinite for degenerate ones."""
+    x, y = (generators[:, k][triangles.T] for k in (0, 1))
+    bx, by, cx, cy = x[1] - x[0], y[1] - y[0], x[2] - x[0], y[2] - y[0]
+    cross = 2 * (bx * cy - by * cx)
+    bb, cc = bx * bx + by * by, cx * cx + cy * cy
     with np.errstate(divide="ignore", invalid="ignore"):
-        bb, cc = (b * b).sum(axis=1), (c * c).sum(axis=1)
-        x = (c[:, 1] * bb - b[:, 1] * cc) / cross
-        y = (b[:, 0] * cc - c[:, 0] * bb) / cross
-    offset = np.stack([x, y], axis=1)
-    offset[~np.isfinite(offset).all(axis=1)] = 1e6
-    return a + offset, np.hypot(offset[:, 0], offset[:, 1])
+        offset = np.stack([(cy * bb - by * cc) / cross, (bx * cc - cx * bb) / cross], axis=1)
+    offset[~(np.isfinite(offset[:, 0]) & np.isfinite(offset[:, 1]))] = 1e6
+    centres = np.stack([x[0], y[0]], axis=1) + offset
+    return centres, np.hypot(offset[:, 0], offset[:, 1])
 
 
 def _disc_is_known(local_map: LocalMap, centres: Array, radii: Array) -> NDArray[np.bool_]:
     """Whether the maximal discs, but for a rim of two cells, lie in known space."""
     outer = np.maximum(radii - 0.2, 0.5 * radii)
-    rings = np.concatenate([_RING, 0.5 * _RING[::2], np.zeros((1, 2))])
-    samples = centres[:, None, :] + outer[:, None, None] * rings
-    unknown: NDArray[np.int64] = (~local_map.known(samples)).sum(axis=1)
+    unknown = _unknown(local_map, centres, outer, _WITHIN)
+    hopeful = np.flatnonzero(unknown <= _MAX_UNKNOWN)
+    unknown[hopeful] += _unknown(local_map, centres[hopeful], outer[hopeful], _RING)
     return unknown <= _MAX_UNKNOWN
+
+
+def _unknown(local_map: LocalMap, centres: Array, radii: Array, places: Array) -> NDArray[np.int64]:
+    """How many of the places (K, 2) of a unit disc lie in unknown space, for each disc (N,)."""
+    samples = centres[:, None, :] + radii[:, None, None] * places
+    unknown: NDArray[np.int64] = (~local_map.known(samples)).sum(axis=1)
+    return unknown
 
 
 def _ridges(triangles: Delaunay) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int32]]:
     """Triangles (a, b) that share an edge, b = -1 at the hull, and the edge's two generators."""
+    other = triangles.neighbors.ravel()
     own = np.repeat(np.arange(len(triangles.simplices)), 3)
-    other = triangles.neighbors.ravel().astype(np.int64)
-    pair = triangles.simplices[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2)
-    once = (own < other) | (other < 0)
-    return own[once], other[once], pair[once]
+    once = np.flatnonzero((own < other) | (other < 0))
+    corners, side = triangles.simplices.ravel(), once % 3
+    first = once - side  # corner of the triangle; a side lies opposite to its own
+    pair = np.stack([corners[first + (side + 1) % 3], corners[first + (side + 2) % 3]], axis=1)
+    return own[once], other[once].astype(np.int64), pair
 
 
 def _least_clearance(
@@ -144,12 +157,12 @@ def _piece_of_robot(
     centres: Array, clearance: Array, ridges: NDArray[np.int64], lead: Array, robot: Array
 ) -> FineGraph:
     """The connected piece that is nearest to the robot."""
-    nodes = np.unique(ridges)
-    if len(nodes) == 0:
+    if len(ridges) == 0:
         return EMPTY
-    number = np.full(len(centres), -1)
-    number[nodes] = np.arange(len(nodes))
-    ridges = number[ridges]
+    used = np.zeros(len(centres), bool)
+    used[ridges] = True
+    nodes = np.flatnonzero(used)
+    ridges = (np.cumsum(used) - 1)[ridges]
     n = len(nodes)
     links = coo_array((np.ones(len(ridges)), (ridges[:, 0], ridges[:, 1])), (n, n))
     _, piece = connected_components(links, directed=False)
