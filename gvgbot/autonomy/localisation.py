@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
 from gvgbot.autonomy.slam.calibration import Calibration
-from gvgbot.autonomy.slam.scan_matching import Registration, ScanMatchingConfig, register
+from gvgbot.autonomy.slam.scan_matching import Registration, ScanMatchingConfig, Sides, register
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
 
@@ -74,26 +74,28 @@ class LocalMaps:
         best = self._best(scan, [(p, Q + _LOST) for p in _around(prior)])
         return (prior, Q + _LOST) if best is None else (best[0].pose, _drift(*best))
 
-    def _walls(self) -> tuple[Array, Array]:
-        """The walls (N, 2) of the near map, and of the far one around it; hits (N,) of each."""
+    def _walls(self) -> tuple[Array, Array, Array]:
+        """Walls (N, 2) of the near map and of the far one around it, their hits and sights."""
         far = self._far.points()
         around = ~self.near.covers(far)
         return (
             np.concatenate([self.near.points(), far[around]]),
             np.concatenate([self.near.hits(), self._far.hits()[around]]),
+            np.concatenate([self.near.sights(), self._far.sights()[around]]),
         )
 
     def _best(
         self, scan: Scan, priors: list[tuple[Pose, Array]]
     ) -> tuple[Registration, Array] | None:
         """The match from the first prior, unless that from another one is clearly better."""
-        walls, hits = self._walls()
+        walls, hits, sights = self._walls()
+        sides = Sides(sights, scan.base_laser.position)
         points = _sampled(scan, self._matching.points)
         if min(len(walls), len(points)) < _LEAST_POINTS:
             return None
         tree, best, agreement = cKDTree(walls), None, 0.0
         for prior, Q in priors:
-            found = register(points, tree, walls, prior, Q, self._matching, hits)
+            found = register(points, tree, walls, prior, Q, self._matching, hits, sides)
             if found is None or found.inliers < _LEAST_INLIERS:
                 continue
             now = found.inliers * (1.0 - found.rms / self._matching.max_pair_m)

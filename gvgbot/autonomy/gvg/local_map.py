@@ -17,7 +17,14 @@ from gvgbot.ranges import Range
 
 _HIT = 2  # votes that one hit gives an occupied cell
 _MOST_HITS = 100  # that a mean remembers; more would keep a wall where it no longer is
-_EMPTY = (("_free", False), ("_votes", 0), ("_mean", 0.0), ("_hits", 0.0), ("_seen_at", -np.inf))
+_EMPTY = (
+    ("_free", False),
+    ("_votes", 0),
+    ("_mean", 0.0),
+    ("_hits", 0.0),
+    ("_sight", 0.0),
+    ("_seen_at", -np.inf),
+)
 _MAX_VOTES = 8  # a wall needs this many contrary scans, less the hits, before it is forgotten
 
 
@@ -51,6 +58,7 @@ class LocalMap:
         self._votes = np.zeros((n, n), np.int16)
         self._mean = np.zeros((n, n, 2))
         self._hits = np.zeros((n, n), np.float32)  # that the mean is made of
+        self._sight = np.zeros((n, n, 2), np.float32)  # mean direction to where it was seen from
         self._seen_at = np.full((n, n), -np.inf, np.float32)  # metres driven when last seen
         self._renew()
         centres = ((np.arange(n) + 0.5) * self._cell).astype(np.float32)
@@ -65,7 +73,7 @@ class LocalMap:
         points = _bridged(
             local_laser.transform(_hits(scan, ranges, self._reach)), self._config.bridge_gap_m
         )
-        self._occupy(points, travelled)
+        self._occupy(points, local_laser.position, travelled)
         self._forget(travelled)
         self._renew()
 
@@ -88,6 +96,10 @@ class LocalMap:
         they are right: each counts as often as it was hit.
         """
         return self._weights
+
+    def sights(self) -> Array:
+        """Mean direction (N, 2) from each of `points` to where it was seen from, local frame."""
+        return self._sight[self._votes > 0].astype(np.float64)
 
     def covers(self, points: Array) -> NDArray[np.bool_]:
         """Whether each point (N, 2) lies in the window."""
@@ -142,7 +154,7 @@ class LocalMap:
         gone = np.hypot(d[:, 0], d[:, 1]) < beyond - 1.5 * self._cell
         self._votes[i[gone], j[gone]] -= 1
 
-    def _occupy(self, points: Array, travelled: float) -> None:
+    def _occupy(self, points: Array, eye: Array, travelled: float) -> None:
         cells = np.floor(points / self._cell).astype(np.int64) - self._corner
         inside = ((cells >= 0) & (cells < self._size)).all(axis=1)
         flat = cells[inside, 0] * self._size + cells[inside, 1]
@@ -153,7 +165,11 @@ class LocalMap:
         old = np.maximum(self._votes[i, j], 0)
         before = np.where(old > 0, self._hits[i, j], 0.0)
         share = (count / (before + count))[:, None]
-        self._mean[i, j] = (1 - share) * self._mean[i, j] + share * np.stack([x, y], axis=1)
+        mean = np.stack([x, y], axis=1)
+        towards = eye - mean
+        towards /= np.maximum(np.hypot(*towards.T), 1e-6)[:, None]
+        self._mean[i, j] = (1 - share) * self._mean[i, j] + share * mean
+        self._sight[i, j] = (1 - share) * self._sight[i, j] + share * towards
         self._hits[i, j] = np.minimum(before + count, _MOST_HITS)
         self._votes[i, j] = np.minimum(old + _HIT, _MAX_VOTES)
         self._seen_at[i, j] = travelled

@@ -1,11 +1,12 @@
 """Registration of points on the walls of a map: Gauss-Newton, point to line, with a prior.
 
 The prior is the odometry's own covariance, so the direction that the walls do not constrain (along
-a bare corridor) is left to odometry.
+a bare corridor) is left to odometry. A point is laid onto a wall's face that was seen from its own
+side: what a room shows of a thin wall is not what the corridor showed of it.
 """
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from gvgbot.ranges import Range
 Index = NDArray[np.intp]
 
 _NEIGHBOURS = 5
+_FEWEST = 3  # of them make a line
 _FLATNESS = 0.08  # smallest over largest spread of the neighbours of a point on a wall
 _REACH_M = 0.35  # as far away as neighbours on one wall may be
 _ITERATIONS = 6
@@ -43,6 +45,17 @@ class Registration:
     rms: float  # metres from the walls
 
 
+class Sides(NamedTuple):
+    """From which side walls are seen.
+
+    `sights` (M, 2) are directions from wall points to where they were seen from; `eye` (2,) is
+    where the points that are registered are seen from, in their own frame.
+    """
+
+    sights: Array
+    eye: Array
+
+
 def register(
     points: Array,
     tree: cKDTree,
@@ -51,10 +64,12 @@ def register(
     Q: Array,
     config: ScanMatchingConfig,
     hits: Array | None = None,
+    sides: Sides | None = None,
 ) -> Registration | None:
     """The pose that lays points (N, 2) of its frame onto wall points (M, 2), near a prior.
 
-    `hits` (M,) is how much each wall point counts beside its neighbours, by default all the same.
+    `hits` (M,) is how much each wall point counts beside its neighbours, by default all the same;
+    without `sides` a point may lie on either face of a wall.
     Q (3, 3) is the prior's covariance in its own frame. None when too few points find a wall.
     """
     information = np.linalg.inv(Q)
@@ -64,7 +79,8 @@ def register(
     inliers, rms = 0.0, 0.0
     for _ in range(_ITERATIONS):
         world = pose.transform(points)
-        pairs = _pairs(world, tree, walls, counts, config.max_pair_m)
+        seen = None if sides is None else Sides(sides.sights, pose.transform(sides.eye))
+        pairs = _pairs(world, tree, walls, counts, config.max_pair_m, seen)
         if pairs is None or len(pairs[0]) < config.min_pairs:
             return None
         index, normal, residual = pairs
@@ -85,19 +101,34 @@ def register(
 
 
 def _pairs(
-    world: Array, tree: cKDTree, walls: Array, hits: Array, reach: float
+    world: Array, tree: cKDTree, walls: Array, hits: Array, reach: float, sides: Sides | None
 ) -> tuple[Index, Array, Array] | None:
     """Indices of the points near a wall, the wall's normals (K, 2), and signed distances (K,)."""
     found = tree.query(world, k=_NEIGHBOURS, distance_upper_bound=max(reach, _REACH_M))
     distance, near = np.asarray(found[0]), np.asarray(found[1])
-    index = np.nonzero(np.isfinite(distance[:, 2]) & (distance[:, 0] < reach))[0]
+    index = np.nonzero(np.isfinite(distance[:, _FEWEST - 1]) & (distance[:, 0] < reach))[0]
     if len(index) == 0:
         return None
     present = np.isfinite(distance[index])
     near = np.where(present, near[index], near[index][:, :1])
-    group = walls[near]
-    weight = present * hits[near]
-    weight /= weight.sum(axis=1, keepdims=True)
+    group, weight = walls[near], present * hits[near]
+    centre, normal, flat = _lines(group, weight)
+    if sides is not None:
+        eyewards = ((sides.eye - world[index]) * normal).sum(axis=1)
+        seen_from = np.einsum("kij,kj->ki", sides.sights[near], normal)
+        weight *= seen_from * eyewards[:, None] > 0.0
+        enough = np.count_nonzero(weight, axis=1) >= _FEWEST
+        weight[~enough] = 1.0
+        centre, normal, flat = _lines(group, weight)
+        flat &= enough
+    residual = ((world[index] - centre) * normal).sum(axis=1)
+    keep = flat & (np.abs(residual) < reach)
+    return index[keep], normal[keep], residual[keep]
+
+
+def _lines(group: Array, weight: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Centres (K, 2) and normals (K, 2) of groups of points (K, G, 2), and which are lines (K,)."""
+    weight = weight / weight.sum(axis=1, keepdims=True)
     centre = (weight[..., None] * group).sum(axis=1)
     d = group - centre[:, None]
     xx, yy, xy = (
@@ -106,11 +137,8 @@ def _pairs(
     angle = 0.5 * np.arctan2(2 * xy, xx - yy)  # of the wall
     spread = np.hypot((xx - yy) / 2, xy)
     large, small = (xx + yy) / 2 + spread, (xx + yy) / 2 - spread
-    flat = small < _FLATNESS * large
     normal = np.stack([-np.sin(angle), np.cos(angle)], axis=1)
-    residual = ((world[index] - centre) * normal).sum(axis=1)
-    keep = flat & (np.abs(residual) < reach)
-    return index[keep], normal[keep], residual[keep]
+    return centre, normal, small < _FLATNESS * large
 
 
 def _jacobian(points: Array, normal: Array, pose: Pose, prior: Pose) -> Array:

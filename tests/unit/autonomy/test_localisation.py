@@ -1,5 +1,6 @@
 """Localisation against walls that are known exactly."""
 
+import itertools
 import math
 
 import numpy as np
@@ -10,6 +11,7 @@ from gvgbot.autonomy.localisation import LocalMaps
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
+from tests.unit.autonomy.sights import LASER_270, carved, sweep
 
 BEARINGS = np.radians(np.linspace(-135.0, 135.0, 1081))
 LOOSE = np.diag([0.05**2, 0.05**2, 0.02**2])
@@ -73,3 +75,25 @@ def test_a_drive_errs_about_as_much_as_its_steps_say_together() -> None:
     share = np.mean(np.square(errors), axis=0)[[0, 2]] / summed[[0, 2]]
     assert (share < chi2.ppf(0.995, 15) / 15).all()
     assert (share > 0.1).all()
+
+
+def test_a_thin_wall_seen_from_behind_is_not_taken_for_the_face_seen_before() -> None:
+    """Along a corridor, through a door, and back along the other side of its wall."""
+    thin = 0.1
+    world = carved(
+        [(-3.0, -1.0, 6.0, 1.0), (-3.0, 1.0 + thin, 6.0, 4.0), (4.2, 0.9, 5.2, 1.1 + thin)]
+    )
+    way = [Pose(x, 0.0, 0.0) for x in np.arange(-1.5, 4.7, 0.3)]
+    way += [Pose(4.7, 0.0, turn) for turn in np.arange(0.3, math.pi / 2, 0.3)]
+    way += [Pose(4.7, y, math.pi / 2) for y in np.arange(0.3, 2.6, 0.3)]
+    way += [Pose(4.7, 2.5, turn) for turn in np.arange(1.8, math.pi, 0.3)]
+    way += [Pose(x, 2.5, math.pi) for x in np.arange(4.5, 0.0, -0.3)]
+    rng, noise = np.random.default_rng(3), np.diag([0.015**2, 0.008**2, 0.005**2])
+    local, believed, errors = maps(), way[0], list[float]()
+    for before, here in itertools.pairwise([way[0], *way]):
+        slip = before.to(here).compose(Pose.from_array(rng.multivariate_normal(np.zeros(3), noise)))
+        scan = sweep(world, here, field_of_view=LASER_270, sigma=0.01, rng=rng, reach=5.6)
+        believed, _ = local.match(scan, believed, slip, 0.5, noise)
+        local.insert(scan, believed, 0.3 * len(errors))
+        errors.append(abs(believed.y - here.y))
+    assert max(errors) < 0.5 * thin

@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 from gvgbot.autonomy.slam.scan_matching import (
     Registration,
     ScanMatchingConfig,
+    Sides,
     register,
 )
 from gvgbot.drivers.world import World
@@ -144,3 +145,22 @@ def test_too_few_points_are_no_match() -> None:
     walls = looked(CORNER, [Pose()]).points()
     points = hits(CORNER, Pose())[: CONFIG.min_pairs - 1]
     assert register(points, cKDTree(walls), walls, Pose(), Q, CONFIG) is None
+
+
+def test_points_are_laid_onto_the_face_that_was_seen_from_their_side() -> None:
+    """Above a thin wall, of which the map has the lower face: only the end wall is the same."""
+    along, up = np.arange(-3.0, 3.0, 0.03), np.arange(-2.0, 2.0, 0.03)
+    end = np.stack([np.full_like(up, 3.0), up], axis=1)
+    walls = np.concatenate([np.stack([along, np.zeros_like(along)], axis=1), end])
+    sights = np.repeat([[0.0, -1.0], [-1.0, 0.0]], [len(along), len(up)], axis=0)
+    upper = np.stack([along[along < 2.5], np.full((along < 2.5).sum(), 0.1)], axis=1)
+    points, eye = np.concatenate([upper, end[up > 0.3]]), np.array([0.0, 1.0])
+    prior, tree = Pose(0.05, 0.0, 0.0), cKDTree(walls)
+    own = register(points, tree, walls, prior, Q, CONFIG, sides=Sides(sights, eye))
+    either = register(points, tree, walls, prior, Q, CONFIG)
+    assert own is not None
+    assert either is not None
+    assert own.pose.x == pytest.approx(0.0, abs=0.01)
+    assert own.pose.y == pytest.approx(0.0, abs=1e-3)
+    assert own.covariance[1, 1] > 0.5 * Q[1, 1]
+    assert either.pose.y == pytest.approx(-0.1, abs=0.02)
