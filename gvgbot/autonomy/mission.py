@@ -11,7 +11,7 @@ from gvgbot.autonomy.events import Decision, Event, Finished, Recovery
 from gvgbot.autonomy.exploration.access import NEAR_M, way_to_edge
 from gvgbot.autonomy.exploration.ears import ear_next, nearest_frontier
 from gvgbot.autonomy.exploration.obstructions import Obstructions
-from gvgbot.autonomy.exploration.paths import shortest_paths
+from gvgbot.autonomy.exploration.paths import Approach, shortest_paths
 from gvgbot.autonomy.gvg.local import Branch, Place
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.slam.graph import HalfEdgeId
@@ -31,8 +31,17 @@ Outcome = Literal["explored", "explored_with_blocked", "failed"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ExplorationConfig:
-    """What is worth a drive, and when to give up."""
+    """What is worth a drive, and when to give up.
 
+    `ears`: at the end of an edge the next one clockwise, and the nearest frontier when there is
+    none. `nearest`: always the nearest; at a vertex with several, the next clockwise. `balanced`:
+    as `nearest`, but the standard deviation of a frontier's place counts, too.
+    """
+
+    policy: Literal["ears", "nearest", "balanced"] = "nearest"
+    detour_m_per_m: Annotated[float, Range(0.0, 1000.0)] = (
+        50.0  # for less standard deviation, if balanced
+    )
     drive_dead_ends: bool = False  # although the end of a dead end can be seen from its mouth
     patience_m: Annotated[float, Range(5.0, 1000.0)] = (
         60.0  # driven beyond twice the way to a frontier
@@ -213,15 +222,15 @@ class Mission:
         return self._drive(view, here, path)
 
     def _choose(self, view: View, here: Situation) -> HalfEdgeId | None:
-        """The next frontier: by the ear rule at the vertex just found, else the nearest."""
+        """The next frontier, by the policy."""
         graph = self._mapper.graph
         if not graph.vertices:
             return None
         chosen, reason = self._ear(here), "ear"
         if chosen is None:
-            nearest = nearest_frontier(graph, here.starts())
+            nearest = self._nearest(here.starts())
             if nearest is None and self._reopen(view):
-                nearest = nearest_frontier(graph, here.starts())
+                nearest = self._nearest(here.starts())
             if nearest is None:
                 self._finish(view)
                 return None
@@ -238,7 +247,7 @@ class Mission:
             return target
         starts = here.starts()
         way = shortest_paths(self._mapper.graph, starts).get(target.vertex)
-        nearest = nearest_frontier(self._mapper.graph, starts)
+        nearest = self._nearest(starts)
         if nearest is None or nearest[0].vertex not in {end.vertex for end in found}:
             return target
         if way is not None and nearest[1].metres > way.metres - _WORTH_TURNING_M:
@@ -246,10 +255,25 @@ class Mission:
         self._commit(view, here, nearest[0], "nearer frontier")
         return nearest[0]
 
+    def _nearest(self, starts: list[Approach]) -> tuple[HalfEdgeId, Approach] | None:
+        graph, belief = self._mapper.graph, self._mapper.belief
+        if self._config.policy != "balanced":
+            return nearest_frontier(graph, starts)
+        weight = self._config.detour_m_per_m
+        return nearest_frontier(
+            graph,
+            starts,
+            lambda v: weight * math.sqrt(float(np.trace(belief.vertex_covariance(v)))),
+        )
+
     def _ear(self, here: Situation) -> HalfEdgeId | None:
         """The ear rule at the end of the edge just explored."""
         graph = self._mapper.graph
-        if self.target is None or graph.half_edge(self.target) is None:
+        if (
+            self._config.policy != "ears"
+            or self.target is None
+            or graph.half_edge(self.target) is None
+        ):
             return None
         edge = graph.edge_at(self.target)
         return None if edge is None else ear_next(graph, edge.other(self.target))

@@ -114,3 +114,21 @@ def test_at_the_nearest_vertex_the_ear_rule_decides_which_frontier() -> None:
     assert found is not None
     bearing = graph.vertices[middle].half_edges[found[0].key].bearing
     assert math.cos(bearing) == pytest.approx(-1.0)
+
+
+def test_a_handicap_is_worth_so_many_metres() -> None:
+    """Seen from b1: a1 is one block away, c3 three; a1 is handicapped by a little less, or more."""
+    graph, ids = streets(3, 3)
+    near, far = ids[0, 0], ids[2, 2]
+    for a, b in (((0, 0), (1, 0)), ((2, 2), (1, 2))):
+        edge = graph.edge_at(between(graph, ids[a], ids[b]))
+        assert edge is not None
+        graph.unjoin(edge)
+        other = edge.b if edge.a.vertex == ids[a] else edge.a
+        graph.remove_half_edge(other)
+    block = next(iter(graph.edges.values())).length
+    start = [Approach(0.0, HalfEdgeId(ids[0, 1], -1))]
+    for handicap, expected in ((1.9 * block, near), (2.1 * block, far)):
+        found = nearest_frontier(graph, start, lambda v, h=handicap: h if v == near else 0.0)
+        assert found is not None
+        assert found[0].vertex == expected
