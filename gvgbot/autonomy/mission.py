@@ -259,12 +259,12 @@ class Mission:
         graph, belief = self._mapper.graph, self._mapper.belief
         if self._config.policy != "balanced":
             return nearest_frontier(graph, starts)
-        weight = self._config.detour_m_per_m
-        return nearest_frontier(
-            graph,
-            starts,
-            lambda v: weight * math.sqrt(float(np.trace(belief.vertex_covariance(v)))),
-        )
+
+        def handicap(vertex: int) -> float:
+            sigma = math.sqrt(float(np.trace(belief.vertex_covariance(vertex))))
+            return self._config.detour_m_per_m * sigma
+
+        return nearest_frontier(graph, starts, handicap)
 
     def _ear(self, here: Situation) -> HalfEdgeId | None:
         """The ear rule at the end of the edge just explored."""

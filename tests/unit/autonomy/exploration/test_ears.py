@@ -128,7 +128,8 @@ def test_a_handicap_is_worth_so_many_metres() -> None:
         graph.remove_half_edge(other)
     block = next(iter(graph.edges.values())).length
     start = [Approach(0.0, HalfEdgeId(ids[0, 1], -1))]
-    for handicap, expected in ((1.9 * block, near), (2.1 * block, far)):
-        found = nearest_frontier(graph, start, lambda v, h=handicap: h if v == near else 0.0)
+    for metres, expected in ((1.9 * block, near), (2.1 * block, far)):
+        handicaps = dict.fromkeys(graph.vertices, 0.0) | {near: metres}
+        found = nearest_frontier(graph, start, handicaps.__getitem__)
         assert found is not None
         assert found[0].vertex == expected
