@@ -69,6 +69,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_twin(commands)
     _add_check(commands)
     _add_monitor(commands)
+    _add_web(commands)
     _add_ctl(commands)
     _add_map(commands)
     return parser
@@ -169,6 +170,35 @@ def _add_monitor(commands: "argparse._SubParsersAction[_Parser]") -> None:
     monitor.add_argument("--robot", dest="named", metavar="NAME", help="the same")
     _add_connection(monitor)
     monitor.set_defaults(command=_monitor)
+
+
+def _add_web(commands: "argparse._SubParsersAction[_Parser]") -> None:
+    web = commands.add_parser(
+        "web",
+        help="watch a robot in the browser",
+        description="Serve a page with the live map, the state and the events of a robot, to this "
+        "machine only unless --host says otherwise, until Ctrl-C. Who has the page open can ask "
+        "the robot for what its telemetry.requests permits.",
+        epilog="example: gvgbot web turtlebot2 --connect tcp/192.168.1.7:7447",
+    )
+    web.add_argument(
+        "robot", nargs="?", metavar="ROBOT", help="its robot.name (default: the only one there is)"
+    )
+    web.add_argument(
+        "--host",
+        default="127.0.0.1",
+        metavar="ADDRESS",
+        help="where to serve the page; 0.0.0.0 lets everybody in (default: %(default)s)",
+    )
+    web.add_argument(
+        "--port",
+        type=tcp_port,
+        default=8080,
+        metavar="N",
+        help="default: %(default)s; 0 takes any that is free",
+    )
+    _add_connection(web)
+    web.set_defaults(command=_web)
 
 
 def _add_ctl(commands: "argparse._SubParsersAction[_Parser]") -> None:
@@ -276,6 +306,14 @@ def seed(text: str) -> int:
     return value
 
 
+def tcp_port(text: str) -> int:
+    """A number of a TCP port. Raises ValueError."""
+    value = int(text)
+    if not 0 <= value <= 65535:
+        raise ValueError(text)
+    return value
+
+
 def frames(text: str) -> int:
     """A number of pictures that still makes a film. Raises ValueError."""
     value = int(text)
@@ -329,6 +367,18 @@ def _monitor(options: argparse.Namespace) -> int:
         raise GvgbotError("the monitor needs rich: pip install 'gvgbot[tui]'") from error
 
     return monitor(options.robot or options.named, options.connect, options.zenoh_file)
+
+
+def _web(options: argparse.Namespace) -> int:
+    try:
+        from gvgbot.web.app import web
+    except ModuleNotFoundError as error:
+        if error.name is None or not error.name.startswith("websockets"):
+            raise
+        raise GvgbotError("the page needs websockets: pip install 'gvgbot[web]'") from error
+
+    connection = (options.robot, options.connect, options.zenoh_file)
+    return web(*connection, host=options.host, port=options.port, say=_say)
 
 
 def _ctl(options: argparse.Namespace) -> int:

@@ -1,0 +1,174 @@
+"""From a robot to the viewers: connects, passes on what it says, asks it for things."""
+
+import asyncio
+import math
+from collections import deque
+from collections.abc import AsyncIterable
+from functools import partial
+from pathlib import Path
+from typing import TypeVar
+
+from gvgbot import client
+from gvgbot.client import Asking, Robot, State
+from gvgbot.errors import GvgbotError, UsageError
+from gvgbot.requests import Goto, Set
+from gvgbot.topics import Events, Map, Odometry, Plan, Scan
+from gvgbot.web.viewers import Audience
+from gvgbot.web.wire import History, Kind, Link, Reply, Wish
+
+_PATIENCE = 1.0  # s for a connection, before the page says that there is none
+_BEAT = 0.5  # s between words on how things are
+_PAUSE = 0.1  # s between two values of a kind: more often nobody sees
+_SAMPLE_EVERY, _SAMPLES = 2.0, 900  # s of the robot's clock, and how many: half an hour
+
+T = TypeVar("T", State, Map, Plan, Odometry, Scan)
+
+
+class Feed:
+    """Watches one robot, or the only one there is, for an audience."""
+
+    def __init__(
+        self, robot: str | None, endpoint: str, zenoh_file: Path | None, audience: Audience
+    ) -> None:
+        self._name, self._endpoint, self._file = robot, endpoint, zenoh_file
+        self._audience = audience
+        self._robot: Robot | None = None
+        self._history = _Histories()
+        self._lost_at: float | None = None  # by the loop's clock; None while connected
+
+    async def run(self) -> None:
+        """Watch until cancelled, and say why if that is not possible just now.
+
+        Raises UsageError if several robots are there and none is named.
+        """
+        while True:
+            try:
+                await self._connect()
+            except* UsageError as errors:
+                raise errors.exceptions[0] from None
+            except* GvgbotError as errors:
+                self._say_why(str(_first(errors)))
+            await asyncio.sleep(_BEAT)
+
+    async def _connect(self) -> None:
+        only = partial(client.only_robot, self._endpoint, _PATIENCE, self._file)
+        name = await asyncio.to_thread(only) if self._name is None else self._name
+        seen = client.connect(name, self._endpoint, patience_s=_PATIENCE, zenoh_file=self._file)
+        async with seen as robot:
+            self._robot, self._lost_at = robot, None
+            try:
+                await self._watch(robot)
+            finally:
+                self._robot = None
+
+    def _say_why(self, trouble: str) -> None:
+        now = asyncio.get_running_loop().time()
+        self._lost_at = now if self._lost_at is None else self._lost_at
+        said = Link(
+            robot=self._name,
+            endpoint=self._endpoint,
+            word="unreachable",
+            for_s=now - self._lost_at,
+            silence_s=None,
+            trouble=trouble,
+        )
+        self._audience.show("link", said)
+
+    async def _watch(self, robot: Robot) -> None:
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(self._pass_on("state", robot.state()))
+            tasks.create_task(self._pass_on("map", robot.map()))
+            tasks.create_task(self._pass_on("plan", robot.plan()))
+            tasks.create_task(self._pass_on("odometry", robot.odometry()))
+            tasks.create_task(self._pass_on("scan", robot.scan()))
+            tasks.create_task(self._remember(robot.state()))
+            tasks.create_task(self._keep_telling(robot))
+
+    async def _pass_on(self, kind: Kind, values: AsyncIterable[T]) -> None:
+        async for value in values:
+            self._audience.show(kind, value)
+            await asyncio.sleep(_PAUSE)
+
+    async def _remember(self, states: AsyncIterable[State]) -> None:
+        """Keep a history for those who come later."""
+        async for state in states:
+            if self._history.add(state):
+                self._audience.keep("history", self._history.columns())
+
+    async def _keep_telling(self, robot: Robot) -> None:
+        """Say how things are with the robot, and what has happened."""
+        told: Events | None = None
+        while True:
+            self._audience.show("link", await self._link(robot))
+            happened = Events(events=robot.events().latest)
+            if happened != told:
+                told = happened
+                self._audience.show("events", happened)
+            await asyncio.sleep(_BEAT)
+
+    async def _link(self, robot: Robot) -> Link:
+        """How things are with a robot to whose address there was a connection."""
+        presence = robot.presence
+        others = await asyncio.to_thread(robot.others) if presence.word == "absent" else []
+        return Link(
+            robot=robot.name,
+            endpoint=self._endpoint,
+            word=presence.word,
+            for_s=presence.for_s,
+            silence_s=robot.state().age,
+            others=tuple(others),
+        )
+
+    async def fulfil(self, wish: Wish) -> Reply:
+        """Ask the robot for what somebody wants, and wait for its answer."""
+        try:
+            text, done = await self._ask(wish), True
+        except (GvgbotError, ValueError) as error:
+            text, done = str(error), False
+        return Reply(id=wish.id, done=done, text=text)
+
+    def _ask(self, wish: Wish) -> Asking:
+        robot = self._robot
+        if robot is None:
+            raise GvgbotError("there is no connection to the robot")
+        match wish.typed:
+            case Goto(vertex=None, x=float(x), y=float(y)):
+                return robot.goto(x, y)
+            case Goto(vertex=int(vertex)):
+                return robot.goto(vertex)
+            case Set(key=key, value=value):
+                return robot.set(key, value)
+            case _:
+                return getattr(robot, wish.name)()  # type: ignore[no-any-return]
+
+
+class _Histories:
+    """The last half hour of a robot's state, thinned."""
+
+    def __init__(self) -> None:
+        self._samples: deque[tuple[float, float, float | None]] = deque(maxlen=_SAMPLES)
+
+    def add(self, state: State) -> bool:
+        """Take a state, if it is time for the next; whether it was."""
+        last = self._samples[-1][0] if self._samples else -math.inf
+        if state.stamp < last:  # the robot began anew
+            self._samples.clear()
+        elif state.stamp < last + _SAMPLE_EVERY:
+            return False
+        self._samples.append((state.stamp, sigma(state), state.battery_fraction))
+        return True
+
+    def columns(self) -> History:
+        stamps, sigmas, batteries = zip(*self._samples, strict=True)
+        return History(stamps=stamps, sigmas=sigmas, batteries=batteries)
+
+
+def sigma(state: State) -> float:
+    """The standard deviation of the position, m, in the direction in which it is largest."""
+    xx, xy, _, _, yy = state.covariance[:5]
+    return math.sqrt(max(0.0, (xx + yy) / 2 + math.hypot((xx - yy) / 2, xy)))
+
+
+def _first(failures: BaseExceptionGroup[GvgbotError]) -> GvgbotError:
+    failure = failures.exceptions[0]
+    return _first(failure) if isinstance(failure, BaseExceptionGroup) else failure

@@ -1,0 +1,218 @@
+// Joins the parts: what comes in changes what is known, and the next frame draws it.
+
+import { Link } from "./link.js";
+import { LAYERS, MapPicture } from "./map.js";
+import { Plot } from "./plots.js";
+import { Requests } from "./requests.js";
+import { View } from "./view.js";
+import * as words from "./words.js";
+
+const $ = (id) => document.getElementById(id);
+const GESTURES = "drag to move, wheel or two fingers to zoom";
+const PANEL_EVERY = 150; // ms
+const THEMES = ["system", "dark", "light"];
+
+let state = null, robotLink = null, events = [], isConnected = false, isStale = false, isFollowing = false;
+let isMapDue = true, isPanelDue = true, panelAt = 0;
+
+const redraw = () => { isMapDue = true; };
+const view = new View($("map"), () => { setFollowing(false); redraw(); }, tap);
+const picture = new MapPicture($("map"), view);
+const sigmaPlot = new Plot($("sigma-plot"), words.length);
+const batteryPlot = new Plot($("battery-plot"), words.percent, 1);
+const link = new Link(take, (isOpen) => { isConnected = isOpen; isPanelDue = true; });
+const requests = new Requests(link);
+
+// -- what comes in ---------------------------------------------------------------------------------
+
+function take(kind, value) {
+  switch (kind) {
+    case "link": robotLink = value; break;
+    case "history":
+      sigmaPlot.set(value.stamps, value.sigmas);
+      batteryPlot.set(value.stamps, value.batteries);
+      break;
+    case "state": takeState(value); break;
+    case "map":
+      picture.setMap(value);
+      $("map").setAttribute("aria-label", `map, ${value.vertices.length} vertices, ${value.edges.length} edges; ${GESTURES}`);
+      break;
+    case "plan": picture.plan = value; break;
+    case "scan": picture.setScan(value); break;
+    case "odometry": picture.setPose(value.map_base, value.stamp); break;
+    case "events": events = value.events.filter(words.isTold); break;
+  }
+  isMapDue = true;
+  isPanelDue = true;
+}
+
+function takeState(value) {
+  if (state !== null && value.sequence < state.sequence) picture.forget(); // it began anew
+  state = value;
+  picture.covariance = value.covariance;
+  picture.setPose(value.pose, value.stamp);
+  sigmaPlot.add(value.stamp, words.sigma(value));
+  batteryPlot.add(value.stamp, value.battery_fraction);
+}
+
+// -- what is shown ---------------------------------------------------------------------------------
+
+function frame(now) {
+  requestAnimationFrame(frame);
+  if (isPanelDue && now > panelAt + PANEL_EVERY) { isPanelDue = false; panelAt = now; drawPanel(); }
+  if (isMapDue) { isMapDue = false; drawMap(); }
+}
+
+function drawMap() {
+  if (isFollowing && picture.pose !== null) [view.x, view.y] = picture.pose;
+  else if (view.isAutomatic) view.fit(picture.box());
+  picture.draw();
+  const metres = [1, 2, 5, 10, 20, 50].find((length) => length * view.scale >= 60) ?? 50;
+  $("scale-bar").style.width = `${metres * view.scale}px`;
+  $("scale-text").textContent = `${metres} m`;
+}
+
+function drawPanel() {
+  const [text, tone, stale] = said();
+  isStale = stale;
+  $("robot").textContent = document.title = robotLink?.robot ?? "gvgbot";
+  $("headline").textContent = text;
+  $("headline").dataset.tone = tone;
+  $("banner").hidden = !isStale;
+  $("banner").textContent = text;
+  document.body.classList.toggle("stale", isStale);
+  if (state !== null) {
+    fill($("facts"), words.facts(state, picture.plan), factLine);
+    $("sigma-now").textContent = words.length(words.sigma(state));
+    $("battery-now").textContent = state.battery_fraction === null ? "unknown" : words.percent(state.battery_fraction);
+  }
+  fill($("events"), [...events].reverse(), eventLine);
+  requests.show(state, isConnected && !isStale);
+  drawPlace();
+  const styles = getComputedStyle(document.body);
+  sigmaPlot.draw(styles);
+  batteryPlot.draw(styles);
+}
+
+function said() {
+  if (!isConnected) return ["connection to gvgbot web lost, trying again", "bad", true];
+  return robotLink === null ? ["connecting", "faint", false] : words.headline(robotLink, state);
+}
+
+// Make the children of a list say what they should, and touch only those that change.
+function fill(list, items, line) {
+  while (list.children.length > items.length) list.lastChild.remove();
+  items.forEach((item, i) => {
+    const child = list.children[i] ?? list.appendChild(document.createElement(list.tagName === "DL" ? "div" : "li"));
+    if (child.children.length === 0) child.append(...(list.tagName === "DL" ? ["dt", "dd"] : ["time", "span"]).map((tag) => document.createElement(tag)));
+    const [left, right, tone] = line(item);
+    if (child.children[0].textContent !== left) child.children[0].textContent = left;
+    if (child.children[1].textContent !== right) child.children[1].textContent = right;
+    if (child.dataset.tone !== tone) child.dataset.tone = tone;
+  });
+}
+
+const factLine = (fact) => fact;
+
+function eventLine(event) {
+  const [text, tone] = words.told(event);
+  return [state === null ? "" : words.duration(state.stamp - event.stamp), text, tone];
+}
+
+// -- what people do --------------------------------------------------------------------------------
+
+let place = null; // { vertex } or { x, y } that was tapped on
+
+function tap(px, py) {
+  const vertex = picture.vertexAt(px, py), [x, y] = view.toMap(px, py);
+  place = vertex === null ? { x, y } : { vertex: vertex.id };
+  picture.selected = vertex?.id ?? null;
+  isPanelDue = isMapDue = true;
+}
+
+function drawPlace() {
+  $("place").hidden = place === null;
+  if (place === null) return;
+  $("place-text").textContent = placeText();
+  $("place-go").hidden = !requests.may("goto");
+}
+
+function placeText() {
+  if (place.vertex === undefined) return `${place.x.toFixed(2)}, ${place.y.toFixed(2)} m`;
+  const vertex = picture.known?.vertices.find((one) => one.id === place.vertex);
+  if (vertex === undefined) return `vertex ${place.vertex} is no more`;
+  const [x, y] = vertex.position, [xx, xy, , yy] = vertex.covariance;
+  const open = vertex.frontiers.length ? `, ${vertex.frontiers.length} frontiers` : "";
+  return `${vertex.kind} ${vertex.id} at ${x.toFixed(2)}, ${y.toFixed(2)} m; sigma ${words.length(words.axes(xx, xy, yy)[0])}, clearance ${vertex.clearance.toFixed(2)} m${open}`;
+}
+
+function closePlace() {
+  place = picture.selected = null;
+  isPanelDue = isMapDue = true;
+}
+
+function goThere() {
+  const label = place.vertex === undefined ? `drive to ${place.x.toFixed(1)}, ${place.y.toFixed(1)}` : `drive to vertex ${place.vertex}`;
+  requests.ask("goto", place, label);
+  closePlace();
+}
+
+function setFollowing(on) {
+  isFollowing = on;
+  $("follow").setAttribute("aria-pressed", on);
+}
+
+function fit() {
+  setFollowing(false);
+  view.isAutomatic = true;
+  redraw();
+}
+
+function follow() {
+  setFollowing(!isFollowing);
+  view.isAutomatic = false;
+  redraw();
+}
+
+function setTheme(name) {
+  document.documentElement.dataset.theme = name;
+  $("theme").textContent = `theme: ${name}`;
+  localStorage.setItem("theme", name);
+  readColours();
+}
+
+function readColours() {
+  picture.setColours(getComputedStyle(document.body));
+  isMapDue = isPanelDue = true;
+}
+
+function layer([name, label, colour, sign]) {
+  const line = document.createElement("label"), box = document.createElement("input"), mark = document.createElement("span");
+  Object.assign(box, { type: "checkbox", checked: true, id: `layer-${name}` });
+  Object.assign(mark, { textContent: sign, className: `sign sign-${colour}` });
+  box.addEventListener("change", () => { picture.shown[box.checked ? "add" : "delete"](name); redraw(); });
+  line.append(box, mark, label);
+  return line;
+}
+
+$("layers").append(...LAYERS.map(layer));
+$("zoom-in").addEventListener("click", () => view.zoom(1.4));
+$("zoom-out").addEventListener("click", () => view.zoom(1 / 1.4));
+$("fit").addEventListener("click", fit);
+$("follow").addEventListener("click", follow);
+$("place-go").addEventListener("click", goThere);
+$("place-close").addEventListener("click", closePlace);
+$("theme").addEventListener("click", () => {
+  const now = THEMES.indexOf(document.documentElement.dataset.theme);
+  setTheme(THEMES[(now + 1) % THEMES.length]);
+});
+document.addEventListener("keydown", (event) => {
+  if (event.target instanceof HTMLInputElement || event.ctrlKey || event.metaKey) return;
+  if (event.key === "0") fit();
+  else if (event.key === "f") follow();
+  else if (event.key === "Escape") closePlace();
+});
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", readColours);
+new ResizeObserver(redraw).observe($("map"));
+setTheme(THEMES.includes(localStorage.getItem("theme")) ? localStorage.getItem("theme") : "system");
+requestAnimationFrame(frame);

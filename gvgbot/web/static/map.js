@@ -1,0 +1,288 @@
+// Draws what is known, layer upon layer, in pixels of the screen.
+
+import { points, millimetres } from "./msgpack.js";
+import { axes } from "./words.js";
+
+const SIGMAS = 3;
+const FRONTIER = 26; // pixels from a vertex to the tip of its frontier's arrow
+
+export const LAYERS = [
+  ["grid", "walls and floor", "wall", "▇"],
+  ["trail", "way driven", "trail", "─"],
+  ["edges", "edges", "edge", "━"],
+  ["ellipses", "3 sigma", "ellipse", "◯"],
+  ["vertices", "vertices", "vertex", "●"],
+  ["frontiers", "frontiers", "frontier", "➤"],
+  ["plan", "plan", "plan", "┅"],
+  ["scan", "laser", "scan", "∴"],
+];
+
+export class MapPicture {
+  constructor(canvas, view) {
+    this.canvas = canvas;
+    this.view = view;
+    this.shown = new Set(LAYERS.map(([name]) => name));
+    this.known = this.plan = this.scan = this.pose = this.covariance = this.selected = null;
+    this.way = []; // [stamp, x, y] since the map was made
+  }
+
+  setColours(styles) {
+    this.colours = {};
+    for (const name of ["floor", "wall", "trail", "edge", "ellipse", "vertex", "frontier", "plan", "scan", "robot", "paper"]) {
+      this.colours[name] = styles.getPropertyValue(`--${name}`).trim();
+    }
+    if (this.known !== null) this.cells = this.painted(this.known);
+  }
+
+  setMap(known) {
+    this.known = known;
+    this.edges = known.edges.map((edge) => points(edge.points));
+    this.trail = points(known.trail);
+    this.at = new Map(known.vertices.map((vertex) => [vertex.id, vertex.position]));
+    this.way = this.way.filter(([stamp]) => stamp > known.stamp);
+    this.cells = this.painted(known);
+  }
+
+  setScan(scan) {
+    this.scan = scan;
+    this.dots = scan.map_base === null ? [] : ends(scan);
+  }
+
+  setPose(pose, stamp) {
+    this.pose = pose;
+    const last = this.way.at(-1);
+    if (last !== undefined && stamp < last[0]) this.way = []; // the robot began anew
+    if (last === undefined || Math.hypot(pose[0] - last[1], pose[1] - last[2]) > 0.05) {
+      this.way.push([stamp, pose[0], pose[1]]);
+      if (this.way.length > 2000) this.way.shift();
+    }
+  }
+
+  forget() {
+    this.known = this.plan = this.scan = this.selected = null;
+    this.way = [];
+  }
+
+  // Left, bottom, right, top, m, of all there is.
+  box() {
+    const [x, y] = this.pose ?? [0, 0];
+    if (this.known === null) return [x - 4, y - 4, x + 4, y + 4];
+    const { origin, columns, rows, resolution } = this.known;
+    return [origin[0], origin[1], origin[0] + columns * resolution, origin[1] + rows * resolution];
+  }
+
+  painted(known) {
+    const picture = new OffscreenCanvas(known.columns, known.rows);
+    const context = picture.getContext("2d");
+    const image = context.createImageData(known.columns, known.rows);
+    const floor = rgb(this.colours.floor), wall = rgb(this.colours.wall);
+    const cells = new Int8Array(known.cells.buffer, known.cells.byteOffset, known.cells.length);
+    for (let row = 0; row < known.rows; row++) {
+      for (let column = 0; column < known.columns; column++) {
+        const occupied = cells[row * known.columns + column];
+        if (occupied < 0) continue;
+        const share = Math.min(1, Math.max(0, (occupied - 20) / 60));
+        const to = 4 * ((known.rows - 1 - row) * known.columns + column);
+        for (let i = 0; i < 3; i++) image.data[to + i] = floor[i] + share * (wall[i] - floor[i]);
+        image.data[to + 3] = 255;
+      }
+    }
+    context.putImageData(image, 0, 0);
+    return picture;
+  }
+
+  draw() {
+    const { canvas, view } = this, ratio = devicePixelRatio || 1;
+    const width = Math.round(view.width * ratio), height = Math.round(view.height * ratio);
+    if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
+    const c = (this.c = canvas.getContext("2d"));
+    c.setTransform(ratio, 0, 0, ratio, 0, 0);
+    c.clearRect(0, 0, view.width, view.height);
+    c.lineJoin = c.lineCap = "round";
+    const layers = {
+      grid: () => this.drawGrid(), trail: () => this.drawTrail(), edges: () => this.drawEdges(),
+      ellipses: () => this.drawEllipses(), frontiers: () => this.drawFrontiers(), vertices: () => this.drawVertices(),
+      plan: () => this.drawPlan(), scan: () => this.drawScan(),
+    };
+    for (const name of ["grid", "trail", "edges", "scan", "plan", "ellipses", "frontiers", "vertices"]) {
+      if (this.shown.has(name)) layers[name]();
+    }
+    this.drawRobot();
+  }
+
+  drawGrid() {
+    if (this.known === null) return;
+    const { origin, columns, rows, resolution } = this.known;
+    const [left, top] = this.view.toScreen(origin[0], origin[1] + rows * resolution);
+    this.c.imageSmoothingEnabled = this.view.scale * resolution < 1.5;
+    this.c.drawImage(this.cells, left, top, columns * resolution * this.view.scale, rows * resolution * this.view.scale);
+  }
+
+  line(xy, colour, width) {
+    if (xy.length < 4) return;
+    const c = this.c;
+    c.beginPath();
+    for (let i = 0; i < xy.length; i += 2) c.lineTo(...this.view.toScreen(xy[i], xy[i + 1]));
+    c.strokeStyle = colour;
+    c.lineWidth = width;
+    c.stroke();
+  }
+
+  drawTrail() {
+    const way = this.way.flatMap(([, x, y]) => [x, y]);
+    if (this.known !== null) way.unshift(...this.trail);
+    this.line(way, this.colours.trail, 1.5);
+  }
+
+  drawEdges() {
+    if (this.known === null) return;
+    for (const edge of this.edges) this.line(edge, this.colours.edge, 2.5);
+  }
+
+  ellipse(x, y, xx, xy, yy) {
+    const [long, direction, short] = axes(xx, xy, yy), c = this.c, scale = SIGMAS * this.view.scale;
+    c.beginPath();
+    c.ellipse(...this.view.toScreen(x, y), long * scale, short * scale, -direction, 0, 2 * Math.PI);
+    c.strokeStyle = this.colours.ellipse;
+    c.lineWidth = 1.5;
+    c.stroke();
+  }
+
+  drawEllipses() {
+    for (const { position: [x, y], covariance: [xx, xy, , yy] } of this.known?.vertices ?? []) this.ellipse(x, y, xx, xy, yy);
+  }
+
+  drawVertices() {
+    const c = this.c;
+    for (const vertex of this.known?.vertices ?? []) {
+      const [px, py] = this.view.toScreen(...vertex.position);
+      c.beginPath();
+      c.arc(px, py, 5, 0, 2 * Math.PI);
+      c.fillStyle = vertex.kind === "endpoint" ? this.colours.paper : this.colours.vertex;
+      c.fill();
+      c.strokeStyle = vertex.kind === "endpoint" ? this.colours.vertex : this.colours.paper;
+      c.lineWidth = vertex.kind === "endpoint" ? 2.5 : 1;
+      c.stroke();
+      if (vertex.id === this.selected) {
+        c.beginPath();
+        c.arc(px, py, 11, 0, 2 * Math.PI);
+        c.strokeStyle = this.colours.robot;
+        c.lineWidth = 2;
+        c.stroke();
+      }
+      if (this.view.scale > 28) {
+        c.font = "12px system-ui, sans-serif";
+        c.lineWidth = 3;
+        c.strokeStyle = this.colours.paper;
+        const isTaken = vertex.frontiers.some((bearing) => Math.cos(bearing - 0.7) > 0.3);
+        c.textAlign = isTaken ? "right" : "left";
+        const x = px + (isTaken ? -9 : 9);
+        c.strokeText(vertex.id, x, py - 8);
+        c.fillStyle = this.colours.vertex;
+        c.fillText(vertex.id, x, py - 8);
+      }
+    }
+  }
+
+  arrow(px, py, bearing, colour, size) {
+    const c = this.c;
+    c.save();
+    c.translate(px, py);
+    c.rotate(-bearing);
+    c.beginPath();
+    c.moveTo(size, 0);
+    c.lineTo(size - 11, 6);
+    c.lineTo(size - 11, -6);
+    c.closePath();
+    c.fillStyle = colour;
+    c.fill();
+    c.strokeStyle = this.colours.paper;
+    c.lineWidth = 1;
+    c.stroke();
+    c.restore();
+  }
+
+  drawFrontiers() {
+    for (const vertex of this.known?.vertices ?? []) {
+      const [px, py] = this.view.toScreen(...vertex.position);
+      for (const bearing of vertex.frontiers) this.arrow(px, py, bearing, this.colours.frontier, FRONTIER);
+    }
+  }
+
+  drawPlan() {
+    if (this.plan === null) return;
+    this.c.setLineDash([7, 6]);
+    this.line(points(this.plan.route), this.colours.plan, 3);
+    this.line(points(this.plan.track), this.colours.plan, 3);
+    this.c.setLineDash([]);
+    const target = this.known === null ? undefined : this.at.get(this.plan.vertex);
+    if (target === undefined) return;
+    const [px, py] = this.view.toScreen(...target);
+    this.arrow(px, py, this.plan.bearing, this.colours.plan, FRONTIER + 4);
+    this.c.beginPath();
+    this.c.arc(px, py, 10, 0, 2 * Math.PI);
+    this.c.strokeStyle = this.colours.plan;
+    this.c.lineWidth = 2;
+    this.c.stroke();
+  }
+
+  drawScan() {
+    if (this.scan === null) return;
+    this.c.fillStyle = this.colours.scan;
+    for (let i = 0; i < this.dots.length; i += 2) {
+      const [px, py] = this.view.toScreen(this.dots[i], this.dots[i + 1]);
+      this.c.fillRect(px - 1, py - 1, 2.5, 2.5);
+    }
+  }
+
+  drawRobot() {
+    if (this.pose === null) return;
+    const c = this.c, size = Math.max(10, 0.2 * this.view.scale);
+    c.save();
+    c.translate(...this.view.toScreen(this.pose[0], this.pose[1]));
+    c.rotate(-this.pose[2]);
+    c.beginPath();
+    c.moveTo(1.35 * size, 0);
+    c.lineTo(-0.85 * size, 0.85 * size);
+    c.lineTo(-0.45 * size, 0);
+    c.lineTo(-0.85 * size, -0.85 * size);
+    c.closePath();
+    c.fillStyle = this.colours.robot;
+    c.fill();
+    c.strokeStyle = this.colours.paper;
+    c.lineWidth = 1.5;
+    c.stroke();
+    c.restore();
+    if (this.covariance !== null && this.shown.has("ellipses")) {
+      this.ellipse(this.pose[0], this.pose[1], this.covariance[0], this.covariance[1], this.covariance[4]);
+    }
+  }
+
+  // The vertex nearest to a place on the screen, if it is near.
+  vertexAt(px, py) {
+    let nearest = null, least = 18;
+    for (const vertex of this.known?.vertices ?? []) {
+      const [vx, vy] = this.view.toScreen(...vertex.position), away = Math.hypot(vx - px, vy - py);
+      if (away < least) [nearest, least] = [vertex, away];
+    }
+    return nearest;
+  }
+}
+
+// Where the beams ended, map frame, m: x, y, x, y and so on.
+function ends(scan) {
+  const [bx, by, heading] = scan.map_base, [lx, ly, turned] = scan.base_laser;
+  const x = bx + Math.cos(heading) * lx - Math.sin(heading) * ly, y = by + Math.sin(heading) * lx + Math.cos(heading) * ly;
+  const found = [], ranges = millimetres(scan.ranges), first = heading + turned + scan.angle_min;
+  for (let i = 0; i < ranges.length; i++) {
+    if (ranges[i] === 0 || ranges[i] === 65535) continue;
+    const bearing = first + i * scan.angle_increment, range = ranges[i] / 1000;
+    found.push(x + range * Math.cos(bearing), y + range * Math.sin(bearing));
+  }
+  return found;
+}
+
+function rgb(colour) {
+  const hex = colour.slice(1);
+  return [0, 2, 4].map((i) => parseInt(hex.slice(i, i + 2), 16));
+}

@@ -1,0 +1,119 @@
+// A robot in words: the same words as those of `gvgbot monitor`.
+
+export const LOW_BATTERY = 0.2, STALE = 3.0, STUCK = 1.0; // of a full charge; s; s
+
+export const degrees = (angle) => `${Math.round((angle * 180) / Math.PI) + 0}°`;
+export const percent = (share) => `${Math.round(100 * share)} %`;
+
+export function duration(seconds) {
+  const whole = Math.max(0, Math.floor(seconds));
+  if (whole < 60) return `${whole} s`;
+  if (whole < 3600) return `${Math.floor(whole / 60)} min ${whole % 60} s`;
+  return `${Math.floor(whole / 3600)} h ${Math.floor((whole % 3600) / 60)} min`;
+}
+
+// Standard deviations of a position: [largest, its direction, smallest].
+export function axes(xx, xy, yy) {
+  const middle = (xx + yy) / 2, away = Math.hypot((xx - yy) / 2, xy);
+  const root = (variance) => Math.sqrt(Math.max(0, variance));
+  return [root(middle + away), Math.atan2(2 * xy, xx - yy) / 2, root(middle - away)];
+}
+
+export const sigma = (state) => axes(state.covariance[0], state.covariance[1], state.covariance[4])[0];
+export const length = (metres) => (metres < 1 ? `${(100 * metres).toFixed(1)} cm` : `${metres.toFixed(2)} m`);
+
+const TONES = { exploring: "good", errand: "good", waiting: "good", finished: "good", paused: "warning", starting: "warning", halted: "bad" };
+export const toneOfPhase = (state) =>
+  state.outcome && state.outcome !== "explored" ? "warning" : TONES[state.phase] ?? "plain";
+
+// [name, text, tone] of each line, the most telling first.
+export function facts(state, plan) {
+  const [x, y, theta] = state.pose;
+  const turn = Math.sqrt(Math.max(0, state.covariance[8]));
+  return [
+    ["phase", state.phase, toneOfPhase(state)],
+    ["outcome", state.outcome?.replaceAll("_", " ") ?? "none yet", state.outcome ? toneOfPhase(state) : "faint"],
+    ...intention(state, plan),
+    ["pose", `${x.toFixed(2)}, ${y.toFixed(2)} m, ${degrees(theta)}`, "plain"],
+    ["sigma", `${length(sigma(state))}, ${((turn * 180) / Math.PI).toFixed(1)}°`, "plain"],
+    ["speed", `${state.twist[0].toFixed(2)} m/s, ${degrees(state.twist[1])}/s`, "plain"],
+    ["driven", `${state.distance.toFixed(1)} m`, "plain"],
+    ["map", `${state.vertices} vertices, ${state.edges} edges`, "plain"],
+    ["frontiers", `${state.frontiers} left`, "plain"],
+    ["battery", ...battery(state)],
+    ["laser", ...device(state.laser)],
+    ["base", ...device(state.base)],
+    ["control", ...control(state)],
+    ["guard", state.guard ?? "free", state.guard ? "warning" : "plain"],
+    ["contacts", contacts(state), state.contacts || state.slips ? "warning" : "plain"],
+  ];
+}
+
+function intention(state, plan) {
+  if (state.errand) return [["going to", state.errand, "plain"], ["why", "somebody asked for it", "plain"]];
+  if (state.phase === "finished") return [["why", state.reason, "plain"]];
+  if (plan === null || plan.vertex === null) return [["going to", "nowhere yet", "faint"]];
+  return [["going to", `the edge of vertex ${plan.vertex} at ${degrees(plan.bearing)}`, "plain"], ["why", plan.reason || "not said", "plain"]];
+}
+
+function battery(state) {
+  if (state.battery_fraction === null) return ["unknown", "faint"];
+  const voltage = state.battery_voltage === null ? "" : `, ${state.battery_voltage.toFixed(1)} V`;
+  return [percent(state.battery_fraction) + voltage, state.battery_fraction < LOW_BATTERY ? "bad" : "good"];
+}
+
+function device(link) {
+  if (!link.connected) return [link.messages ? "away" : "not there", "bad"];
+  const troubles = ["lost", "damaged", "reconnects"].filter((name) => link[name]);
+  return troubles.length ? [troubles.map((name) => `${link[name]} ${name}`).join(", "), "plain"] : ["fine", "good"];
+}
+
+function control(state) {
+  if (state.cycle_age === null) return ["not begun", "faint"];
+  return state.cycle_age > STUCK ? [`no cycle for ${duration(state.cycle_age)}`, "bad"] : ["running", "good"];
+}
+
+const contacts = (state) => `${state.contacts}${state.slips ? `, ${state.slips} slips` : ""}`;
+
+// What to say first of a robot: [text, tone]; and whether what is shown may be wrong by now.
+export function headline(link, state) {
+  const since = duration(link.for_s);
+  switch (link.word) {
+    case "unreachable": return [`${link.trouble}; trying again`, "bad", true];
+    case "absent": return [`no robot named ${link.robot} here; there is ${link.others.join(", ") || "none"}`, "bad", true];
+    case "gone": return [`robot gone since ${since}`, "bad", true];
+    case "cut off": return [`connection to the robot lost since ${since}, trying again`, "bad", true];
+  }
+  if (link.silence_s !== null && link.silence_s > STALE) {
+    return [`quiet since ${duration(link.silence_s)}: its program hangs`, "bad", true];
+  }
+  if (state === null) return ["it has not said anything yet", "warning", false];
+  if (state.cycle_age > STUCK && state.base.connected) return ["its control loop is stuck", "bad", false];
+  return [state.reason || (state.outcome ?? state.phase), toneOfPhase(state), false];
+}
+
+const QUIET = new Set(["edge_joined"]);
+export const isTold = (event) => !QUIET.has(event.kind);
+
+// An event as [text, tone].
+export function told(event) {
+  const d = event.details;
+  switch (event.kind) {
+    case "decision": {
+      const towards = typeof d.bearing === "number" ? `, ${degrees(d.bearing)}` : "";
+      return [`go to vertex ${d.vertex}${towards}: ${d.reason}`, "plain"];
+    }
+    case "vertex_added": return [`found ${d.kind} ${d.vertex} of degree ${d.degree}`, "plain"];
+    case "vertex_removed": return [`vertex ${d.vertex} is none: ${d.reason}`, "plain"];
+    case "loop_closed": {
+      const far = typeof d.away_m === "number" ? ` after ${d.away_m.toFixed(0)} m` : "";
+      return [`loop closed at vertex ${d.vertex}${far}`, "good"];
+    }
+    case "recovery": return [`${d.action}: ${d.reason}`, "warning"];
+    case "finished": return [`${d.outcome.replaceAll("_", " ")}: ${d.reason}`, "good"];
+    default: {
+      const said = Object.entries(d).map(([name, value]) => `${name.replaceAll("_", " ")} ${value}`);
+      return [`${event.kind.replaceAll("_", " ")}: ${said.join(", ")}`, "plain"];
+    }
+  }
+}

@@ -1,0 +1,74 @@
+"""What passes between the server and the page, and in which form.
+
+To the page: MessagePack, a pair of a kind and a value. State, map, plan, odometry, scan and events
+are as they travel between robot and client; the others are below. From the page: a wish, in JSON.
+"""
+
+from typing import Any, Literal
+
+import msgspec
+
+from gvgbot.requests import Arguments, RequestName, kind_of
+from gvgbot.topics import Events, Map, Odometry, Plan, Scan, State
+
+Kind = Literal["link", "history", "state", "map", "plan", "odometry", "scan", "events", "reply"]
+
+
+class Link(msgspec.Struct, frozen=True, kw_only=True):
+    """How the server stands with the robot."""
+
+    robot: str | None  # its name, as far as it is known
+    endpoint: str  # where the server looks for it
+    word: str  # as a Presence has it, or `unreachable`: no connection to the robot's address
+    for_s: float  # since when
+    silence_s: float | None  # since the last state; None before the first
+    others: tuple[str, ...] = ()  # who else is there, if the robot is absent
+    trouble: str = ""  # why it is unreachable
+
+
+class History(msgspec.Struct, frozen=True, kw_only=True):
+    """How some values went, for the plots; columns of equal length."""
+
+    stamps: tuple[float, ...]  # s, the robot's monotonic clock
+    sigmas: tuple[float, ...]  # m, of the position
+    batteries: tuple[float | None, ...]  # of a full charge, 0..1
+
+
+class Reply(msgspec.Struct, frozen=True, kw_only=True):
+    """What became of a wish."""
+
+    id: int
+    done: bool
+    text: str  # for people
+
+
+class Wish(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What somebody at the page wants of the robot."""
+
+    id: int  # for the reply
+    name: RequestName
+    arguments: dict[str, Any] = {}
+
+    @property
+    def typed(self) -> Arguments:
+        """The arguments of the request. Raises ValueError if they do not fit."""
+        try:
+            return msgspec.convert(self.arguments, kind_of(self.name))
+        except msgspec.MsgspecError as error:
+            raise ValueError(f"wrong arguments of {self.name}: {error}") from error
+
+
+Value = Link | History | State | Map | Plan | Odometry | Scan | Events | Reply
+
+
+def frame(kind: Kind, value: Value) -> bytes:
+    """A message to the page."""
+    return msgspec.msgpack.encode((kind, value))
+
+
+def wish(text: str | bytes) -> Wish:
+    """A message from the page. Raises ValueError if it is none."""
+    try:
+        return msgspec.json.decode(text, type=Wish)
+    except (msgspec.MsgspecError, RecursionError) as error:
+        raise ValueError(f"no wish: {error}") from error

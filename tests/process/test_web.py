@@ -1,0 +1,517 @@
+"""`gvgbot web`: its server, by a client that is not ours, and its page, in a real browser.
+
+With GVGBOT_PICTURES=docs/images a test leaves web.png and web-phone.png there.
+"""
+
+import asyncio
+import base64
+import io
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from contextlib import asynccontextmanager, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.error import HTTPError
+from urllib.request import Request, urlopen
+
+import msgspec
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from PIL import Image
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+
+from gvgbot.requests import Answer, Asked, Goto
+from gvgbot.telemetry import Telemetry
+from gvgbot.topics import Event, Events, TelemetryConfig
+from gvgbot.web.server import Web
+from gvgbot.web.viewers import Audience
+from gvgbot.web.wire import Reply, Wish
+from tests.process.addresses import free_endpoint
+from tests.process.browser import Page, browser, chromium
+from tests.unit.monitor.maps import a_map, vertex
+from tests.unit.test_telemetry import EXAMPLE
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(180)]
+
+PATIENCE = 30.0  # s, for a busy machine
+
+
+# -- the server ------------------------------------------------------------------------------------
+
+
+async def granted(wish: Wish) -> Reply:
+    return Reply(id=wish.id, done=True, text=f"so be it: {wish.name}")
+
+
+@asynccontextmanager
+async def serving(audience: Audience) -> AsyncIterator[int]:
+    """A server; its port."""
+    async with (
+        asyncio.timeout(PATIENCE),
+        await Web("127.0.0.1", 0, audience, granted).open() as server,
+    ):
+        yield next(iter(server.sockets)).getsockname()[1]
+
+
+def live(port: int, **more: str) -> connect:
+    return connect(f"ws://127.0.0.1:{port}/live", **more)  # type: ignore[arg-type]
+
+
+async def received(viewer: ClientConnection) -> tuple[str, dict[str, object]]:
+    kind, value = msgspec.msgpack.decode(await viewer.recv(decode=False))
+    return kind, value
+
+
+async def so_many(audience: Audience, viewers: int) -> None:
+    """Wait until there are so many."""
+    while len(audience) != viewers:  # noqa: ASYNC110
+        await asyncio.sleep(0.01)
+
+
+def run(story: Callable[[Audience, int], Awaitable[None]]) -> None:
+    async def all_of_it() -> None:
+        audience = Audience()
+        async with serving(audience) as port:
+            await story(audience, port)
+
+    asyncio.run(all_of_it())
+
+
+def test_every_viewer_gets_what_is_known_and_what_comes() -> None:
+    async def story(audience: Audience, port: int) -> None:
+        audience.show("state", EXAMPLE)
+        async with live(port) as one, live(port) as two:
+            for viewer in (one, two):
+                kind, state = await received(viewer)
+                assert (kind, state["sequence"]) == ("state", 7)
+            audience.show("events", Events(events=()))
+            assert [await received(one), await received(two)] == 2 * [("events", {"events": []})]
+        await so_many(audience, 0)
+
+    run(story)
+
+
+def test_a_wish_is_answered_to_who_had_it() -> None:
+    async def story(audience: Audience, port: int) -> None:
+        async with live(port) as one, live(port) as two:
+            await one.send('{"id": 5, "name": "pause"}')
+            assert await received(one) == (
+                "reply",
+                {"id": 5, "done": True, "text": "so be it: pause"},
+            )
+            audience.show("events", Events(events=()))
+            assert (await received(two))[0] == "events"
+
+    run(story)
+
+
+@pytest.mark.parametrize("text", ["drive!", '{"id": 1, "name": "fly"}', "x" * 5000, b"\x00"])
+def test_who_talks_nonsense_has_to_leave_and_the_others_stay(text: str | bytes) -> None:
+    async def story(audience: Audience, port: int) -> None:
+        async with live(port) as one, live(port) as two:
+            await one.send(text)
+            with pytest.raises(ConnectionClosed):
+                await one.recv()
+            audience.show("state", EXAMPLE)
+            assert (await received(two))[0] == "state"
+
+    run(story)
+
+
+def test_a_page_from_elsewhere_gets_nothing() -> None:
+    async def story(audience: Audience, port: int) -> None:
+        with pytest.raises(InvalidStatus, match="403"):
+            await live(port, origin="https://example.com")
+        async with live(port, origin=f"http://127.0.0.1:{port}"):
+            pass
+
+    run(story)
+
+
+def test_the_thirty_third_viewer_is_told_that_there_are_too_many() -> None:
+    async def story(audience: Audience, port: int) -> None:
+        viewers = [await live(port) for _ in range(32)]
+        with pytest.raises(InvalidStatus, match="503"):
+            await live(port)
+        await viewers[0].close()
+        await so_many(audience, 31)
+        async with live(port):
+            pass
+
+    run(story)
+
+
+def test_a_viewer_that_does_not_read_holds_nobody_up() -> None:
+    big = msgspec.structs.replace(EXAMPLE, reason="".join(map(chr, range(32, 50_000))))
+
+    async def story(audience: Audience, port: int) -> None:
+        async with live(port, compression=None) as quick:  # type: ignore[arg-type]
+            frozen = socket.create_connection(("127.0.0.1", port))
+            fields = {
+                "Host": f"127.0.0.1:{port}",
+                "Upgrade": "websocket",
+                "Connection": "Upgrade",
+                "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ==",
+                "Sec-WebSocket-Version": "13",
+            }
+            lines = "".join(f"{name}: {value}\r\n" for name, value in fields.items())
+            frozen.sendall(f"GET /live HTTP/1.1\r\n{lines}\r\n".encode())
+            await so_many(audience, 2)
+            for number in range(200):  # 20 MB, far more than the sockets take
+                audience.show("state", msgspec.structs.replace(big, sequence=number))
+                assert (await received(quick))[1]["sequence"] == number
+            frozen.close()
+
+    run(story)
+
+
+# -- the program -----------------------------------------------------------------------------------
+
+
+@contextmanager
+def gvgbot(*arguments: str, cwd: Path | None = None) -> Iterator["subprocess.Popen[str]"]:
+    """A gvgbot process that does not outlive the test."""
+    with subprocess.Popen(
+        [sys.executable, "-m", "gvgbot", *arguments],
+        cwd=cwd,
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+    ) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+@contextmanager
+def web(*arguments: str) -> Iterator[str]:
+    """The program on a free port; the address of its page."""
+    with gvgbot("web", "--port", "0", *arguments) as process:
+        assert process.stdout is not None
+        said = process.stdout.readline()
+        assert "http://" in said, said
+        yield next(word for word in said.split() if word.startswith("http://"))
+        process.send_signal(signal.SIGINT)
+        rest, _ = process.communicate(timeout=PATIENCE)
+        assert (process.returncode, rest) == (0, "")
+
+
+def get(address: str, **fields: str) -> tuple[int, bytes]:
+    try:
+        with urlopen(Request(address, headers=fields), timeout=PATIENCE) as answer:
+            return answer.status, answer.read()
+    except HTTPError as refused:
+        return refused.code, refused.read()
+
+
+def test_the_program_serves_its_page_and_ends_when_told() -> None:
+    with web("karl", "--connect", free_endpoint()) as address:
+        status, body = get(address)
+        assert (status, body[:15]) == (200, b"<!doctype html>")
+        assert get(f"{address}secrets.txt")[0] == 404
+        assert get(f"{address}live")[0] == 426
+        assert get(address, Host="example.com")[0] == 403
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "named"),
+    [
+        (["--port", "{taken}"], 1, "--port"),
+        (["--host", "192.0.2.1"], 1, "192.0.2.1"),
+        (["--port", "70000"], 2, "70000"),
+        (["a/b"], 2, "a/b"),
+        (["--connect", "here"], 2, "here"),
+    ],
+)
+def test_what_cannot_be_is_one_line(arguments: list[str], status: int, named: str) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = str(taken.getsockname()[1])
+        words = [word.replace("{taken}", port) for word in arguments]
+        done = subprocess.run(
+            [sys.executable, "-m", "gvgbot", "web", *words],
+            check=False,
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE,
+        )
+    assert (done.returncode, done.stdout) == (status, "")
+    (line,) = done.stderr.splitlines()
+    assert named in line
+
+
+# -- the page -----------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
+    program = chromium()
+    if program is None:
+        pytest.skip("there is no chromium here: apt install chromium")
+    with browser(program, tmp_path_factory.mktemp("browser")) as tab:
+        yield tab
+
+
+def desktop(page: Page, address: str, *, dark: bool = True) -> None:
+    page.open(address, 1280, 800, phone=False, dark=dark)
+
+
+ROOM = a_map(
+    "\n".join(["#" * 20, *["#" + "." * 18 + "#"] * 8, "#" * 20]),  # 10 by 5 m
+    vertices=(vertex((6.0, 2.0)),),
+    resolution=0.5,
+)
+HERE = msgspec.structs.replace(EXAMPLE, pose=(3.0, 2.0, 0.0), requests=("pause", "goto"))
+
+
+@dataclass
+class Play:
+    """A robot at (3, 2) that looks at the vertex, and who watches it."""
+
+    endpoint: str
+    page: Page
+    sequence: int = 0
+
+    def __post_init__(self) -> None:
+        self.robot = Telemetry(TelemetryConfig(listen=(self.endpoint,)), "karl")
+        self.robot.publish(ROOM)
+        decision: dict[str, str | int | float | bool | None]
+        decision = {"vertex": 1, "bearing": 0.0, "reason": "ear"}
+        happened = Event(number=0, stamp=3.0, kind="decision", details=decision)
+        self.robot.publish(Events(events=(happened,)))
+
+    def until(self, expression: str) -> None:
+        """Let the robot say how it is, until something is so on the page."""
+        end = time.perf_counter() + PATIENCE
+        while True:
+            self.sequence += 1
+            self.robot.publish(msgspec.structs.replace(HERE, sequence=self.sequence))
+            if self.page.look(expression):
+                return
+            assert time.perf_counter() < end, (expression, self.page.text())
+
+    def until_read(self, words: str) -> None:
+        self.until(f"document.body.innerText.includes({json.dumps(words)})")
+
+    def drawn(self) -> None:
+        """Wait until what was done is on the screen, and the map."""
+        self.until("document.querySelector('#map').ariaLabel.includes('1 vertices')")
+        for _ in range(3):
+            self.until("new Promise((done) => requestAnimationFrame(() => done(true)))")
+
+
+def colour(page: Page, name: str) -> list[int]:
+    """A colour of the page's style sheet, red, green, blue."""
+    text = page.look(f"getComputedStyle(document.body).getPropertyValue('--{name}').trim()")
+    return [int(text[at : at + 2], 16) for at in (1, 3, 5)]
+
+
+def stretch(page: Page, name: str) -> tuple[NDArray[np.float64], int]:
+    """The middle (x, y) of what has a colour on the map, in pixels of the page, and how many."""
+    left, top, width, height = page.look(
+        "(() => { const r = document.querySelector('#map').getBoundingClientRect();"
+        "return [r.x, r.y, r.width, r.height].map(Math.round) })()"
+    )
+    picture = page.pixels().astype(int)[top : top + height, left : left + width]
+    rows, columns = np.nonzero(np.abs(picture - colour(page, name)).sum(axis=2) < 12)
+    if not len(rows):
+        return np.zeros(2), 0
+    return np.array([columns.mean() + left, rows.mean() + top]), len(rows)
+
+
+def test_the_page_decodes_what_msgpack_encodes(page: Page) -> None:
+    values = [
+        *(None, True, False, 0, 1, -1, 127, 128, -32, -33, -128, -129, 255, 256, 65535, 65536),
+        *(-32768, -32769, 2**32 - 1, 2**32, -(2**31), -(2**31) - 1, 2**50, 1.5, -1e300, 0.1),
+        *("", "a" * 31, "a" * 32, "ä€😀" * 100, "x" * 70_000),
+        *([], [1] * 15, [1] * 16, [0] * 70_000, {}, {str(n): n for n in range(20)}),
+        {f"_{number}": [number] for number in range(66_000)},
+    ]
+    with web("karl", "--connect", free_endpoint()) as address:
+        desktop(page, address)
+        assert json.loads(decoded_by(page, values, "JSON.stringify(got)")) == values
+        pairs = np.array([1.5, -2.0], "<f4").tobytes()
+        assert decoded_by(page, pairs, "Array.from(m.points(got))") == [1.5, -2.0]
+
+
+def decoded_by(page: Page, value: object, then: str) -> Any:
+    """What the page makes of an encoded value, called `got`."""
+    data = base64.b64encode(msgspec.msgpack.encode(value)).decode()
+    return page.look(
+        "import('/msgpack.js').then((m) => { const got = m.decode(Uint8Array.from("
+        f"atob('{data}'), (c) => c.charCodeAt(0)).buffer); return {then} }})"
+    )
+
+
+def test_the_page_shows_a_robot_on_its_map_that_can_be_moved_and_zoomed(page: Page) -> None:
+    endpoint = free_endpoint()
+    with web("--connect", endpoint) as address:
+        play = Play(endpoint, page)
+        with play.robot:
+            desktop(page, address)
+            play.until("document.querySelector('#robot').textContent === 'karl'")
+            for words in ("vertex 1, 0°: ear", "31.5 m", "90 %, 16.1 V", "3.00, 2.00 m, 0°"):
+                play.until_read(words)
+            play.drawn()
+            (robot, _), (ahead, _) = stretch(page, "robot"), stretch(page, "vertex")
+            assert ahead[0] - robot[0] > 50  # 3 m to the east of it
+            assert ahead[1] == pytest.approx(robot[1], abs=12)
+            page.click("#zoom-in")
+            play.drawn()
+            wider = stretch(page, "vertex")[0] - stretch(page, "robot")[0]
+            assert wider[0] == pytest.approx(1.4 * (ahead - robot)[0], rel=0.06)
+            page.mouse("mouseWheel", *page.middle("#map"), deltaX=0, deltaY=-200)
+            play.drawn()
+            before = stretch(page, "robot")[0]
+            assert (stretch(page, "vertex")[0] - before)[0] > 1.2 * wider[0]
+            x, y = page.middle("#map")
+            page.mouse("mousePressed", x, y, button="left", clickCount=1)
+            page.mouse("mouseMoved", x - 40, y + 30, button="left", buttons=1)
+            page.mouse("mouseReleased", x - 40, y + 30, button="left", clickCount=1)
+            play.drawn()
+            assert stretch(page, "robot")[0] - before == pytest.approx([-40, 30], abs=4)
+            page.click("#layer-vertices")
+            play.drawn()
+            assert stretch(page, "vertex")[1] == 0
+            page.click("#fit")
+            play.drawn()
+            assert stretch(page, "robot")[0] == pytest.approx(robot, abs=4)
+
+
+def test_two_fingers_zoom_on_a_phone(page: Page) -> None:
+    endpoint = free_endpoint()
+    with web("--connect", endpoint) as address:
+        play = Play(endpoint, page)
+        with play.robot:
+            page.open(address, 390, 844, phone=True, dark=False)
+            play.until_read("vertex 1, 0°: ear")
+            assert page.look("document.documentElement.scrollWidth") == 390  # nothing sticks out
+            scale = "document.querySelector('#scale-bar').offsetWidth"
+            text = "parseFloat(document.querySelector('#scale-text').textContent)"
+            play.drawn()
+            before = page.look(f"{scale} / {text}")
+            x, y = page.middle("#map")
+            page.touch("touchStart", (x - 40, y), (x + 40, y))
+            page.touch("touchMove", (x - 60, y), (x + 60, y))
+            page.touch("touchMove", (x - 80, y), (x + 80, y))
+            page.touch("touchEnd")
+            play.drawn()
+            assert page.look(f"{scale} / {text}") == pytest.approx(2 * before, rel=0.1)
+
+
+def test_a_silent_robot_one_that_left_and_a_lost_server_are_told_apart(page: Page) -> None:
+    endpoint = free_endpoint()
+    banner = "document.querySelector('#banner').innerText"
+    with web("--connect", endpoint) as address:
+        port = address.rstrip("/").rpartition(":")[2]
+        desktop(page, address)
+        page.until("document.querySelector('#banner').innerText.includes('nobody answers')")
+        play = Play(endpoint, page)
+        with play.robot:
+            play.until("document.querySelector('#banner').hidden")
+            page.until(f"{banner}.startsWith('quiet since 3 s')")
+            assert page.look("document.querySelector('[data-request=pause]').disabled")
+            play.until("document.querySelector('#banner').hidden")
+        page.until(f"{banner}.startsWith('robot gone since')")
+        assert "31.5 m" in page.text()  # what was known last remains
+    page.until(f"{banner}.startsWith('connection to gvgbot web lost')")
+    with web("--connect", endpoint, "--port", port):
+        play = Play(endpoint, page)
+        with play.robot:
+            play.until("document.querySelector('#banner').hidden")
+
+
+def test_a_button_asks_the_robot_and_its_answer_is_shown(page: Page) -> None:
+    endpoint = free_endpoint()
+    asked: list[tuple[str, bytes]] = []
+
+    async def answer(request: Asked) -> Answer:
+        asked.append((request.name, request.data))
+        if request.name == "goto":
+            return Answer(done=False, text="no way leads there")
+        return Answer(done=True, text="it stands")
+
+    def person(play: Play, address: str) -> None:
+        desktop(page, address)
+        play.until(
+            "document.querySelector('[data-request=pause]:enabled:not([hidden])')?.id === ''"
+        )
+        assert page.look("document.querySelector('[data-request=stop]').hidden")  # not announced
+        page.click("[data-request=pause]")
+        play.until_read("pause: it stands")
+        play.drawn()
+        x, y = stretch(page, "vertex")[0]
+        for kind in ("mousePressed", "mouseReleased"):
+            page.mouse(kind, x, y, button="left", clickCount=1)
+        play.until_read("meetpoint 1 at 6.00, 2.00 m")
+        page.click("#place-go")
+        play.until_read("refused: no way leads there")
+
+    async def story(address: str) -> None:
+        play = Play(endpoint, page)
+        with play.robot:
+            async with asyncio.TaskGroup() as tasks:
+                hearing = tasks.create_task(play.robot.hear(answer))
+                await asyncio.to_thread(person, play, address)
+                hearing.cancel()
+
+    with web("--connect", endpoint) as address:
+        asyncio.run(story(address))
+    assert [name for name, _ in asked] == ["pause", "goto"]
+    assert msgspec.msgpack.decode(asked[1][1], type=Goto) == Goto(vertex=1)
+
+
+def test_a_twin_that_explores_is_seen_doing_so(page: Page, tmp_path: Path) -> None:
+    endpoint = free_endpoint()
+    settings = ["--set", f"telemetry.listen=[{endpoint}]"]
+    with gvgbot("run", *settings, cwd=tmp_path), web("--connect", endpoint) as address:
+        desktop(page, address)
+        page.until("document.body.innerText.includes('exploring')")
+        driven = "parseFloat([...document.querySelectorAll('#facts div')].find("
+        driven += "(one) => one.firstChild.textContent === 'driven').lastChild.textContent)"
+        page.until(f"{driven} > 1.0")
+        floor, _ = stretch(page, "floor")
+        robot, size = stretch(page, "robot")
+        assert size > 50
+        assert stretch(page, "floor")[1] > 5000
+        assert stretch(page, "scan")[1] > 200
+        assert stretch(page, "plan")[1] > 50
+        assert np.abs(robot - floor).max() < 600
+        page.click("#follow")
+        page.until("document.querySelector('#follow').getAttribute('aria-pressed') === 'true'")
+        page.until(f"{driven} > 2.0")
+        assert stretch(page, "robot")[0] == pytest.approx(page.middle("#map"), abs=25)
+        assert page.complaints == []
+
+
+@pytest.mark.skipif("GVGBOT_PICTURES" not in os.environ, reason="no pictures are asked for")
+@pytest.mark.timeout(1200)
+def test_pictures_for_the_guide(page: Page, tmp_path: Path) -> None:
+    """Takes some minutes: the robot has to have something to show."""
+    endpoint, folder = free_endpoint(), Path(os.environ["GVGBOT_PICTURES"])
+    settings = ["--set", f"telemetry.listen=[{endpoint}]"]
+    with gvgbot("run", *settings, cwd=tmp_path), web("--connect", endpoint) as address:
+        desktop(page, address)
+        vertices = "parseInt([...document.querySelectorAll('#facts div')].find("
+        vertices += "(one) => one.firstChild.textContent === 'map')?.lastChild.textContent)"
+        page.until(f"{vertices} >= 6", patience_s=1000.0)
+        _save(page.png(), folder / "web.png")
+        page.open(address, 390, 844, phone=True, dark=False)
+        page.until(f"{vertices} >= 6")
+        page.until("new Promise((done) => setTimeout(() => done(true), 3000))")
+        _save(page.png(), folder / "web-phone.png")
+
+
+def _save(png: bytes, path: Path) -> None:
+    """Write a picture with no more colours than it needs."""
+    picture = Image.open(io.BytesIO(png)).convert("RGB")
+    picture.quantize(128).save(path, optimize=True)
