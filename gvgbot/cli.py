@@ -113,8 +113,9 @@ def _add_run(commands: "argparse._SubParsersAction[_Parser]") -> None:
         "run",
         help="the daemon: explore with the devices of the configuration",
         description="Run the daemon in real time, on the devices of the configuration or on their "
-        "twins, until it is stopped (SIGINT or SIGTERM).",
-        epilog="example: gvgbot run turtlebot2.yaml",
+        "twins, until it is stopped (SIGINT or SIGTERM). With a state directory (service.state_dir "
+        "or $STATE_DIRECTORY) it goes on with the map that it was making when it ended.",
+        epilog="example: gvgbot run turtlebot2.yaml --set service.state_dir=/var/lib/gvgbot",
     )
     run.add_argument(
         "config", nargs="?", type=Path, metavar="CONFIG", help="default: sim.yaml, no hardware"
@@ -122,6 +123,13 @@ def _add_run(commands: "argparse._SubParsersAction[_Parser]") -> None:
     _add_overrides(run)
     run.add_argument(
         "--out", type=Path, metavar="DIR", help="run directory (default: a new one in runs/)"
+    )
+    known = run.add_mutually_exclusive_group()
+    known.add_argument(
+        "--map", type=Path, metavar="RUN_DIR", help="begin with the map of an earlier run"
+    )
+    known.add_argument(
+        "--new", action="store_true", help="begin a new map, whatever the state directory holds"
     )
     run.set_defaults(command=_run)
 
@@ -337,7 +345,7 @@ def _run(options: argparse.Namespace) -> int:
     config = load_config(options.config, options.overrides)
     from gvgbot import daemon
 
-    return daemon.run(config, out=options.out)
+    return daemon.run(config, out=options.out, known=options.map, anew=options.new)
 
 
 def _twin(options: argparse.Namespace) -> int:

@@ -19,18 +19,21 @@ class Clock(Protocol):
 
 
 class LoopClock:
-    """The running event loop's clock: real, or virtual under `VirtualTimeLoop`."""
+    """The running event loop's clock: real, or virtual under `VirtualTimeLoop`.
 
-    def __init__(self) -> None:
-        self._loop = asyncio.get_running_loop()
+    It may be `ahead` of it by some seconds, to go on from where a clock of an earlier life ended.
+    """
+
+    def __init__(self, ahead: float = 0.0) -> None:
+        self._loop, self._ahead = asyncio.get_running_loop(), ahead
 
     def now(self) -> float:
-        """Seconds of the loop's clock."""
-        return self._loop.time()
+        """Seconds of the loop's clock, and what this one is ahead."""
+        return self._loop.time() + self._ahead
 
     async def sleep_until(self, stamp: float) -> None:
         """Return at the stamp, or at once (but after other tasks had a turn) if it has passed."""
-        await asyncio.sleep(max(0.0, stamp - self._loop.time()))
+        await asyncio.sleep(max(0.0, stamp - self.now()))
 
 
 class _JumpingSelector(selectors.SelectSelector):

@@ -49,6 +49,13 @@ class TwinConfig:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ServiceConfig:
+    """Where a daemon keeps what must outlive it."""
+
+    state_dir: str | None = None  # runs are in it and go on there; None: $STATE_DIRECTORY, if set
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Config:
     """The root of every configuration file: a section for each part, named after its module."""
 
@@ -58,6 +65,7 @@ class Config:
     twin: TwinConfig = field(default_factory=TwinConfig)
     autonomy: AutonomyConfig = field(default_factory=AutonomyConfig)
     exploration: ExplorationConfig = field(default_factory=ExplorationConfig)
+    service: ServiceConfig = field(default_factory=ServiceConfig)
     telemetry: TelemetryConfig = field(default_factory=TelemetryConfig)
 
 

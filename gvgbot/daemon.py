@@ -17,6 +17,8 @@ from gvgbot.hal.guard import Guard
 from gvgbot.hal.messages import Odometry
 from gvgbot.links import Devices, Links
 from gvgbot.maps.run_directory import RunDirectory
+from gvgbot.persistence.keeper import Keeper
+from gvgbot.persistence.start import Wanted, begin, state_directory
 from gvgbot.progress import Progress
 from gvgbot.robot import Robot
 from gvgbot.service import Notifier, StopSignals, set_up_logging
@@ -98,8 +100,13 @@ def _conclude(session: Session) -> int:
     return 0 if mission.outcome == "explored" else 1
 
 
-def run(config: Config, *, out: Path | None) -> int:
+def run(
+    config: Config, *, out: Path | None, known: Path | None = None, anew: bool = False
+) -> int:
     """Be the daemon until a signal ends it; the exit status, 0 whatever was found by then.
+
+    With a state directory it goes on with the map that it was making, unless `anew` or `out` say
+    otherwise; `known` is the directory of a run whose map it begins with.
 
     Raises UsageError for a world or directory that cannot be used, GvgbotError if the network
     address is taken or the map cannot be written. Devices that are missing are waited for.
@@ -110,10 +117,12 @@ def run(config: Config, *, out: Path | None) -> int:
     with contextlib.ExitStack() as stack:
         signals = stack.enter_context(StopSignals())
         telemetry = _telemetry(config, stack)
-        directory = stack.enter_context(RunDirectory.create(out, world=name))
+        start = begin(Wanted(out, known, anew, state_directory(config, os.environ)), world=name)
+        directory = stack.enter_context(start.directory)
         session = Session(config, directory, place)
-        _announce(session)
-        robot = Robot(session, Notifier.from_environment(), telemetry)
+        keeper = Keeper(session, start.files, start.saved)
+        _announce(session, resumed=start.saved is not None)
+        robot = Robot(session, Notifier.from_environment(), telemetry, keeper=keeper)
         try:
             with asyncio.Runner() as runner:
                 runner.run(robot.serve(signals.wait()))
@@ -121,6 +130,7 @@ def run(config: Config, *, out: Path | None) -> int:
             session.failure = str(_first(failures))
             raise _first(failures) from None
         finally:
+            keeper.finish()
             session.save()
             log.info("map saved", path=str(directory.path))
     return 0
@@ -132,7 +142,7 @@ def _telemetry(config: Config, stack: contextlib.ExitStack) -> Telemetry | None:
     return stack.enter_context(Telemetry(config.telemetry, config.robot.name))
 
 
-def _announce(session: Session) -> None:
+def _announce(session: Session, *, resumed: bool) -> None:
     config = session.config
     log.info(
         "started",
@@ -143,6 +153,7 @@ def _announce(session: Session) -> None:
         base="twin" if session.place else config.base.port,
         network=", ".join(config.telemetry.listen) if config.telemetry.enabled else "off",
         out=str(session.directory.path),
+        map="known" if resumed else "new",
     )
 
 

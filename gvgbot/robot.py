@@ -21,6 +21,7 @@ from gvgbot.links import Devices, Links
 from gvgbot.live_feed import LiveFeed
 from gvgbot.live_map import LiveMap
 from gvgbot.maps.run_directory import record_of
+from gvgbot.persistence.keeper import Keeper
 from gvgbot.service import Notifier
 from gvgbot.session import Session
 from gvgbot.simulation import Simulation
@@ -55,9 +56,11 @@ class Robot:
         notifier: Notifier,
         network: Network | None,
         off_loop: Callable[[Callable[[], None]], Awaitable[None]] = asyncio.to_thread,
+        keeper: Keeper | None = None,
     ) -> None:
+        """`keeper` keeps the mission on disk; without one a restart begins anew."""
         self._session, self._notifier = session, notifier
-        self._network, self._off_loop = network, off_loop
+        self._network, self._off_loop, self._keeper = network, off_loop, keeper
         self._pipeline = session.pipeline
         self._grown, self._finished = asyncio.Event(), asyncio.Event()
         self._odometry: Odometry | None = None
@@ -78,11 +81,8 @@ class Robot:
     # -- the tasks ---------------------------------------------------------------------------------
 
     async def serve(self, stopped: Awaitable[str], links: Links | None = None) -> None:
-        """Live until `stopped` returns; the base stands still then.
-
-        Raises an ExceptionGroup of GvgbotError if the list of events cannot be written.
-        """
-        self._clock = LoopClock()
+        """Live until `stopped` returns; the base stands still then."""
+        self._clock = LoopClock() if self._keeper is None else self._keeper.clock()
         links = self._open_links() if links is None else links
         self._prepare(links)
         work = {
@@ -91,6 +91,9 @@ class Robot:
             "beat": self._beat(),
             "save": self._keep_saved(),
         }
+        if self._keeper is not None:
+            self._keeper.attach(links.feedback)
+            work["keep"] = self._keeper.keep(self._clock, self._off_loop)
         if self._network is not None:
             work["network"] = self._network.answer()
             work["map"] = self._keep_shown(self._network)
@@ -128,6 +131,7 @@ class Robot:
         self._grown.set()
         while True:
             self._note(await self._devices.base.next_odometry())
+            self._be_ready()
             self._devices.base.drive(STANDSTILL)
 
     async def _keep_saved(self) -> None:
@@ -173,6 +177,8 @@ class Robot:
         for event in happened:
             log_event(event)
             self._take_down(event)
+            if self._keeper is not None:
+                self._keeper.on_event(event)
             if isinstance(event, events.VertexAdded):
                 self._grown.set()
             if isinstance(event, events.Decision):
@@ -190,11 +196,15 @@ class Robot:
     def _on_cycle(self, odometry: Odometry) -> None:
         self._note(odometry)
         self._session.on_cycle(odometry, self._devices.base.contact)
-        if not self._ready and self._pipeline.keyframes:  # a scan and odometry made the first
-            self._ready = True
-            self._notifier.ready()
+        if self._pipeline.keyframes:  # a scan and odometry made the first
+            self._be_ready()
         if self._ready:
             self._guard.note(self._loop.stopped_for, odometry.stamp)
+
+    def _be_ready(self) -> None:
+        if not self._ready:
+            self._ready = True
+            self._notifier.ready()
 
     def _note(self, odometry: Odometry) -> None:
         self._odometry, self._cycles = odometry, self._cycles + 1

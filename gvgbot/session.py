@@ -3,17 +3,34 @@
 import copy
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
+
+import structlog
 
 from gvgbot import __version__
 from gvgbot.autonomy import events
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.config import Config
+from gvgbot.errors import GvgbotError
 from gvgbot.geometry import Pose
 from gvgbot.hal.messages import Contact, Odometry
 from gvgbot.maps.run_directory import RunDirectory
 from gvgbot.report import Journey, map_files, world_files
 from gvgbot.simulation import Place, Simulation
+
+log = structlog.get_logger()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tally:
+    """What a session has counted; stamps in s of the robot's clock."""
+
+    first_stamp: float | None
+    last_stamp: float
+    contacts: int
+    closures: int
+    recoveries: int
 
 
 class Session:
@@ -28,16 +45,29 @@ class Session:
         self._counts = {events.LoopClosed: 0, events.Recovery: 0}
         self.contacts = 0  # times that a bumper was pressed
         self._in_contact = False
+        self._untold: list[events.Event] = []  # that could not be written yet
         self._started = time.perf_counter()
         self._first_stamp: float | None = None
         self._last_stamp = 0.0
 
     def on_events(self, happened: list[events.Event]) -> None:
-        """Take down what happened."""
+        """Take down what happened; what cannot be written just now is written later."""
+        had_trouble = bool(self._untold)
+        self._untold += happened
+        try:
+            self._tell()
+        except GvgbotError as error:
+            if not had_trouble:
+                log.warning("events not written, exploring on", reason=str(error))
         for event in happened:
-            self.directory.append_event(event)
             if type(event) in self._counts:
                 self._counts[type(event)] += 1
+
+    def _tell(self) -> None:
+        """Write what is still to be told. Raises GvgbotError if that is not possible."""
+        while self._untold:
+            self.directory.append_event(self._untold[0])
+            del self._untold[0]
 
     def on_cycle(self, odometry: Odometry, contact: Contact | None) -> None:
         """Take down a control cycle."""
@@ -49,6 +79,26 @@ class Session:
         self._in_contact = touching
         self.journey.record(odometry, self.pipeline, self._truth(odometry.stamp))
 
+    @property
+    def tally(self) -> Tally:
+        """What has been counted so far."""
+        return Tally(
+            first_stamp=self._first_stamp,
+            last_stamp=self._last_stamp,
+            contacts=self.contacts,
+            closures=self._counts[events.LoopClosed],
+            recoveries=self._counts[events.Recovery],
+        )
+
+    def count_on(self, tally: Tally) -> None:
+        """Go on from what an earlier life of this session has counted."""
+        self._first_stamp, self._last_stamp = tally.first_stamp, tally.last_stamp
+        self.contacts = tally.contacts
+        self._counts = {
+            events.LoopClosed: tally.closures,
+            events.Recovery: tally.recoveries,
+        }
+
     def _truth(self, stamp: float) -> Pose | None:
         """world_base at a stamp, where it is known."""
         if self.simulation is None:
@@ -58,6 +108,7 @@ class Session:
 
     def save(self) -> None:
         """Write the map and the summary. Raises GvgbotError if they cannot be written."""
+        self._tell()
         self.saving(unfinished="stopped from outside")()
 
     def saving(self, *, unfinished: str) -> Callable[[], None]:

@@ -24,13 +24,16 @@ class HazardConfig:
 
 
 @dataclass(slots=True, eq=False)
-class _Hazard:
+class Hazard:
+    """Something that was felt once."""
+
     points: Array  # (N, 2) local frame
     travelled: float  # metres driven when it was felt
     lasting: bool
 
     @property
     def centre(self) -> Array:
+        """The middle (2,) of its points."""
         return np.asarray(self.points.mean(axis=0))
 
 
@@ -39,7 +42,7 @@ class Hazards:
 
     def __init__(self, config: HazardConfig) -> None:
         self._config = config
-        self._all: list[_Hazard] = []
+        self._all: list[Hazard] = []
 
     def add(
         self,
@@ -55,7 +58,7 @@ class Hazards:
         True if that many hits so near mean that there is no way through.
         """
         self.forget(travelled)
-        hazard = _Hazard(_rim(local_base, bearings, radius + _BEYOND_M), travelled, lasting)
+        hazard = Hazard(_rim(local_base, bearings, radius + _BEYOND_M), travelled, lasting)
         away = [float(np.hypot(*(other.centre - hazard.centre))) for other in self._all]
         for other, metres in zip(self._all, away, strict=True):
             if metres < self._config.same_m:

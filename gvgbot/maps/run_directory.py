@@ -1,5 +1,7 @@
 """The directory that a run writes: whole files at once, events line by line."""
 
+import contextlib
+import io
 import json
 import math
 import re
@@ -67,7 +69,7 @@ class RunDirectory:
         """
         line = json.dumps(record_of(event), ensure_ascii=False, allow_nan=False) + "\n"
         try:
-            self._events.write(line.encode())
+            _write_all(self._events, line.encode())
         except OSError as error:
             raise GvgbotError(f"cannot write {self.path / EVENTS}: {error.strerror}") from error
 
@@ -85,6 +87,19 @@ class RunDirectory:
         trace: TracebackType | None,
     ) -> None:
         self.close()
+
+
+def _write_all(file: io.FileIO, content: bytes) -> None:
+    """Add all of it to a file, or nothing. Raises OSError."""
+    end = file.seek(0, io.SEEK_END)
+    left = memoryview(content)
+    try:
+        while left:
+            left = left[file.write(left) :]
+    except OSError:
+        with contextlib.suppress(OSError):
+            file.truncate(end)
+        raise
 
 
 def record_of(event: object) -> dict[str, Any]:

@@ -82,6 +82,15 @@ class LinkStatistics:
     slips: int = 0
 
 
+@dataclass(frozen=True, slots=True)
+class FeedbackMemory:
+    """What a later reader must know to go on counting: wheels and gyro turn without us."""
+
+    odometry: WheelOdometry
+    elapsed: float  # s of the base's time at its reading
+    clock: DeviceClock
+
+
 class FeedbackReader:
     """What the base has reported so far: contact, battery, dock, identity, counters, odometry."""
 
@@ -104,6 +113,7 @@ class FeedbackReader:
         self._slips = 0
         self._is_slipping = False
         self.heard = -math.inf  # arrival of the last frame of use, s
+        self.is_unbroken = True  # no motion has been missed since `recall`
 
     def take(self, data: bytes, arrival: float) -> Odometry | None:
         """The newest odometry that these bytes complete, if any.
@@ -122,6 +132,23 @@ class FeedbackReader:
         """What the base has answered so far about itself."""
         known = self._extras
         return Identity(known.get(HardwareVersion), known.get(FirmwareVersion), known.get(Udid))
+
+    @property
+    def memory(self) -> FeedbackMemory | None:
+        """What a reader after this one needs; None before the base was heard."""
+        if self._odometry is None or self._clock is None:
+            return None
+        return FeedbackMemory(self._odometry, self._odometry_elapsed, self._clock)
+
+    def recall(self, memory: FeedbackMemory, *, counting: bool) -> None:
+        """Go on from where an earlier reader ended, before anything was read.
+
+        `counting`: clock and counters have gone on meanwhile. Otherwise the pose alone is taken
+        over, as of a base that has started anew.
+        """
+        self._odometry = memory.odometry
+        if counting:
+            self._clock, self._odometry_elapsed = memory.clock, memory.elapsed
 
     @property
     def slip_rate(self) -> float:
@@ -200,6 +227,7 @@ class FeedbackReader:
         state = self._odometry
         if state is None or is_new or state.implausible >= _JUMPS_BELIEVED:
             self._odometry = start_odometry(reading, None if state is None else state.odom_base)
+            self.is_unbroken = self.is_unbroken and state is None
             self._odometry_elapsed = clock.elapsed
             return None
         dt = clock.elapsed - self._odometry_elapsed

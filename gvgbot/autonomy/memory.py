@@ -1,0 +1,283 @@
+"""What a mind must remember to go on after a restart; the only place that knows all of it.
+
+The names of the fields are the names in saved missions, and so are those of the values below them:
+a field that is added needs a default, and one that is renamed cannot be read any more.
+What a moment decides (the order, reflexes, patience, people in sight) is left to the next moment.
+"""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvgbot.autonomy.candidates import Candidate
+from gvgbot.autonomy.exploration.obstructions import Obstructions
+from gvgbot.autonomy.gvg.local_map import LocalMap
+from gvgbot.autonomy.hazards import Hazard
+from gvgbot.autonomy.mission import Mission, Outcome
+from gvgbot.autonomy.odometry_log import OdometryLog
+from gvgbot.autonomy.pipeline import Keyframe, Pipeline, Step
+from gvgbot.autonomy.slam import ekf
+from gvgbot.autonomy.slam.ekf import Belief
+from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
+from gvgbot.autonomy.start_edge import StartEdge
+from gvgbot.autonomy.views import Observation
+from gvgbot.autonomy.whereabouts import Whereabouts
+from gvgbot.geometry import STANDSTILL, Array, Pose
+from gvgbot.hal.messages import Odometry
+
+_LEAST = np.diag([1e-3, 1e-3, 1e-4])  # variance of a step or sighting that had to be made up
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cells:
+    """A local map: what is free, when each cell was seen, and the walls by their cell's number."""
+
+    corner: NDArray[np.int64]  # (2,) indices of the first cell
+    free: NDArray[np.uint8]  # bits, rows after each other
+    seen_at: NDArray[np.float32]  # (N, N) metres driven when last seen
+    walls: NDArray[np.int64]  # (M,) numbers of the occupied cells
+    votes: NDArray[np.int16]  # (M,)
+    mean: Array  # (M, 2) local frame
+    hits: NDArray[np.float32]  # (M,)
+    sight: NDArray[np.float32]  # (M, 2) mean direction to where they were seen from
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Odds:
+    """What is known to be wrong with odometry: mean (3,) and covariance (3, 3)."""
+
+    x: Array
+    P: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Closed:
+    """Ways that were closed: how often each, and since when those that will be tried again."""
+
+    times: dict[HalfEdgeId, int] = field(default_factory=dict)
+    since: dict[HalfEdgeId, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Intent:
+    """Where the mission stands."""
+
+    where: Whereabouts
+    target: HalfEdgeId | None
+    outcome: Outcome | None
+    reason: str
+    budget_m: float
+    newest_m: float
+    start_edge: StartEdge | None
+    frontiers: set[HalfEdgeId]
+    closed: Closed
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Memory:
+    """A mind at a keyframe, but for what only ever grows: keyframes, steps and observations."""
+
+    keyframes: int  # that there were
+    last: Keyframe | None  # of them, without its scan
+    travelled: float
+    kept: Pose | None
+    belief: Belief
+    graph: GvgGraph
+    candidates: list[Candidate]
+    intent: Intent
+    near: Cells
+    far: Cells
+    odds: Odds
+    hazards: list[Hazard]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Growth:
+    """What one keyframe added: itself, the step to it, and the vertices seen from it."""
+
+    keyframe: Keyframe
+    step: Step | None  # None for the first
+    observations: list[Observation]
+
+
+# -- remembering -----------------------------------------------------------------------------------
+
+
+def remember(pipeline: Pipeline) -> Memory:
+    """What there is to remember; it shares its parts with the pipeline, so keep it at once."""
+    mapper, maps = pipeline.mapper, pipeline._maps
+    calibration = maps._calibration
+    return Memory(
+        keyframes=len(pipeline.keyframes),
+        last=None if pipeline._last is None else replace(pipeline._last, scan=None),
+        travelled=pipeline.travelled,
+        kept=pipeline._kept,
+        belief=mapper.belief,
+        graph=mapper.graph,
+        candidates=mapper._unbelieved._all,
+        intent=_intent(pipeline.mission),
+        near=_cells(maps.near),
+        far=_cells(maps._far),
+        odds=Odds(calibration.x, calibration.P),
+        hazards=pipeline._hazards._all,
+    )
+
+
+def _intent(mission: Mission) -> Intent:
+    closed = mission._obstructions
+    return Intent(
+        mission.where,
+        mission.target,
+        mission.outcome,
+        mission.reason,
+        mission._budget_m,
+        mission._newest_m,
+        mission._start_edge,
+        mission._frontiers,
+        Closed(closed._times, closed._since),
+    )
+
+
+def _cells(local_map: LocalMap) -> Cells:
+    walls = np.flatnonzero(local_map._votes > 0)
+    return Cells(
+        local_map._corner,
+        np.packbits(local_map._free),
+        local_map._seen_at,
+        walls,
+        local_map._votes.ravel()[walls],
+        local_map._mean.reshape(-1, 2)[walls],
+        local_map._hits.ravel()[walls],
+        local_map._sight.reshape(-1, 2)[walls],
+    )
+
+
+def growth(pipeline: Pipeline, keyframe: int, observation: int) -> list[Growth]:
+    """What keyframes added from one on, with the observations from one on; by their numbers."""
+    observations: dict[int, list[Observation]] = {}
+    for seen in pipeline.mapper.observations[observation:]:
+        observations.setdefault(seen.keyframe, []).append(seen)
+    return [
+        Growth(
+            pipeline.keyframes[i],
+            pipeline.steps[i - 1] if i > 0 else None,
+            observations.get(i, []),
+        )
+        for i in range(keyframe, len(pipeline.keyframes))
+    ]
+
+
+# -- recalling -------------------------------------------------------------------------------------
+
+
+def recall(pipeline: Pipeline, memory: Memory, past: list[Growth]) -> None:
+    """Make the mind that was remembered of this one, and take it through what came after.
+
+    Of the past some of the latest may be missing, and some may be younger than the memory. The
+    robot is lost a little: the next scan is laid onto the local map from some way around.
+    """
+    _recall_mapper(pipeline, memory)
+    _recall_mission(pipeline.mission, memory.intent)
+    if _fits(pipeline._maps.near, memory.near) and _fits(pipeline._maps._far, memory.far):
+        _recall_cells(pipeline._maps.near, memory.near)
+        _recall_cells(pipeline._maps._far, memory.far)
+    calibration = pipeline._maps._calibration
+    calibration.x, calibration.P = memory.odds.x, memory.odds.P
+    pipeline._hazards._all = list(memory.hazards)
+    pipeline.travelled, pipeline._kept = memory.travelled, memory.kept
+    _recall_past(pipeline, past[: memory.keyframes])
+    if len(past) < memory.keyframes and memory.last is not None:
+        _bridge(pipeline, memory.last)
+    for later in past[memory.keyframes :]:
+        _live_again(pipeline, later)
+    _tie_vertices(pipeline)
+    if pipeline.keyframes:
+        _awake(pipeline, pipeline.keyframes[-1])
+
+
+def _awake(pipeline: Pipeline, last: Keyframe) -> None:
+    """Be where the last keyframe was, as after a silence of the base."""
+    pipeline._last = last
+    pipeline._odometry = OdometryLog()
+    pipeline._odometry.append(Odometry(last.stamp, last.odom_base, STANDSTILL))
+    pipeline._look_now = True
+
+
+def _recall_mapper(pipeline: Pipeline, memory: Memory) -> None:
+    mapper = pipeline.mapper
+    mapper.belief, mapper.graph = memory.belief, memory.graph
+    mapper._unbelieved._all = list(memory.candidates)
+
+
+def _recall_mission(mission: Mission, intent: Intent) -> None:
+    mission.where, mission.target = intent.where, intent.target
+    mission.outcome, mission.reason = intent.outcome, intent.reason
+    mission._budget_m, mission._newest_m = intent.budget_m, intent.newest_m
+    mission._start_edge, mission._frontiers = intent.start_edge, intent.frontiers
+    closed: Obstructions = mission._obstructions
+    closed._times, closed._since = intent.closed.times, intent.closed.since
+
+
+def _fits(local_map: LocalMap, cells: Cells) -> bool:
+    """Whether cells are of a map of this size; the configuration may have changed."""
+    return cells.seen_at.shape == local_map._seen_at.shape
+
+
+def _recall_cells(local_map: LocalMap, cells: Cells) -> None:
+    shape = cells.seen_at.shape
+    local_map._corner, local_map._seen_at = cells.corner, cells.seen_at
+    bits = np.unpackbits(cells.free, count=shape[0] * shape[1])
+    local_map._free[:] = bits.astype(bool).reshape(shape)
+    local_map._votes.ravel()[cells.walls] = cells.votes
+    local_map._mean.reshape(-1, 2)[cells.walls] = cells.mean
+    local_map._hits.ravel()[cells.walls] = cells.hits
+    local_map._sight.reshape(-1, 2)[cells.walls] = cells.sight
+    local_map._renew()
+
+
+def _recall_past(pipeline: Pipeline, past: list[Growth]) -> None:
+    pipeline.keyframes[:] = [grown.keyframe for grown in past]
+    pipeline.steps[:] = [grown.step for grown in past if grown.step is not None]
+    seen = [observation for grown in past for observation in grown.observations]
+    pipeline.mapper.observations[:] = seen
+
+
+def _live_again(pipeline: Pipeline, grown: Growth) -> None:
+    """Account for a keyframe that is younger than the memory, but for what it would have found."""
+    mapper, keyframe, step = pipeline.mapper, grown.keyframe, grown.step
+    if step is not None and pipeline.keyframes:
+        mapper.move(step.motion, step.covariance)
+        pipeline.steps.append(step)
+        pipeline.travelled += pipeline.keyframes[-1].odom_base.distance(keyframe.odom_base)
+    pipeline.keyframes.append(keyframe)
+    if keyframe.scan is not None:
+        pipeline._kept = keyframe.local_base
+        pipeline._maps.insert(keyframe.scan, keyframe.local_base, pipeline.travelled)
+    for seen in grown.observations:
+        if seen.vertex in mapper.belief.ids:
+            mapper.belief = ekf.update(mapper.belief, seen.vertex, seen.base_vertex, seen.R)
+            mapper.observations.append(seen)
+
+
+def _bridge(pipeline: Pipeline, last: Keyframe) -> None:
+    """Let the last keyframe stand in for all that were lost before it."""
+    if pipeline.keyframes:
+        motion = pipeline.keyframes[-1].map_base.to(last.map_base)
+        metres = float(np.hypot(motion.x, motion.y))
+        pipeline.steps.append(Step(motion, _LEAST * (1.0 + metres)))
+    pipeline.keyframes.append(last)
+
+
+def _tie_vertices(pipeline: Pipeline) -> None:
+    """Let the last keyframe see those vertices whose observations have been lost, as believed."""
+    mapper = pipeline.mapper
+    ids = set(mapper.belief.ids)
+    mapper.observations[:] = [seen for seen in mapper.observations if seen.vertex in ids]
+    if not pipeline.keyframes:
+        return
+    for vertex in sorted(ids - {seen.vertex for seen in mapper.observations}):
+        base_vertex, H = ekf.expected(mapper.belief, vertex)
+        R = H @ mapper.belief.P @ H.T + _LEAST
+        number = len(pipeline.keyframes) - 1
+        mapper.observations.append(Observation(number, vertex, base_vertex, R))

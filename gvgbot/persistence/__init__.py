@@ -1,0 +1,1 @@
+"""What outlives the process: the mission as a journal and a snapshot, in a form of its own."""

@@ -1,0 +1,163 @@
+"""Keeps a session's mission on disk as it goes, and brings it back.
+
+The journal gets what is new about every second. The snapshot is renewed when the map has changed
+or the robot has come on, at most that often; the journal is synchronised with the disk before. A
+disk that is full, read-only or slow holds up nothing: what was not written is written later.
+"""
+
+import math
+from collections.abc import Awaitable, Callable
+from functools import partial
+
+import structlog
+
+from gvgbot.autonomy import events
+from gvgbot.autonomy.memory import growth, recall, remember
+from gvgbot.clock import Clock, LoopClock
+from gvgbot.drivers.kobuki.feedback import FeedbackReader
+from gvgbot.persistence.mission_files import MissionFiles
+from gvgbot.persistence.mission_state import Batch, Beat, Saved, Snapshot, boot_id, rows
+from gvgbot.persistence.records import packed
+from gvgbot.session import Session
+
+KEEP_EVERY = 0.5  # s between two batches
+SNAPSHOT_EVERY = 5.0  # s between two snapshots, if nothing but the robot's place has changed
+_PAUSE_S = 1.0  # that the robot's clock is said to have stood while the computer was off
+_COUNTING_S = 60.0  # away for longer, the base's counters may have come round
+_SETTLED = (events.VertexAdded, events.VertexRemoved, events.EdgeJoined, events.LoopClosed)
+
+log = structlog.get_logger()
+
+
+class Keeper:
+    """Writes what a session learns into its run directory, after bringing back what is there.
+
+    Whoever has a keeper makes the robot's clock and its links by it.
+    """
+
+    def __init__(self, session: Session, files: MissionFiles, saved: Saved | None = None) -> None:
+        """Make the session what was `saved`, if it was; in other files if it shall begin there."""
+        self._session, self._files, self._saved = session, files, saved
+        self._boot = boot_id()
+        self._ahead = 0.0  # s, the robot's clock minus the computer's
+        self._feedback: FeedbackReader | None = None
+        self._keyframes = self._observations = self._rows = 0  # that are in the journal
+        self._snapshot_at = -math.inf  # stamp of the last snapshot
+        self._snapshot_of = -1  # keyframes in it
+        self._settled = False  # the map has changed since the last snapshot
+        self._same_life = False  # the computer and its clock have gone on since
+        self.trouble: str | None = None  # why nothing can be written just now
+        if saved is not None:
+            self._revive(saved)
+
+    # -- coming back -------------------------------------------------------------------------------
+
+    def _revive(self, saved: Saved) -> None:
+        session = self._session
+        session.count_on(saved.beat.tally)
+        session.journey = saved.journey
+        recall(session.pipeline, saved.memory, saved.past)
+        if self._files.is_begun:
+            self._keyframes = len(saved.past)
+            self._observations = len(session.pipeline.mapper.observations)
+            self._rows = len(saved.journey.stamps)
+
+    def clock(self) -> LoopClock:
+        """The robot's clock, which goes on from where it ended; on the running loop."""
+        clock = LoopClock()
+        if self._saved is not None:
+            beat, now = self._saved.beat, clock.now()
+            self._same_life = beat.boot == self._boot and now + beat.ahead >= beat.stamp
+            self._ahead = beat.ahead if self._same_life else beat.stamp + _PAUSE_S - now
+            clock = LoopClock(self._ahead)
+        return clock
+
+    def attach(self, feedback: FeedbackReader) -> None:
+        """Let odometry go on from where it ended: the wheels may have turned meanwhile."""
+        self._feedback = feedback
+        beat = None if self._saved is None else self._saved.beat
+        if beat is not None and beat.odometer is not None:
+            away = LoopClock(self._ahead).now() - beat.stamp
+            feedback.recall(beat.odometer, counting=self._same_life and away < _COUNTING_S)
+
+    # -- keeping -----------------------------------------------------------------------------------
+
+    def on_event(self, event: events.Event) -> None:
+        """Note what happened: a map that has changed is kept at once."""
+        self._settled = self._settled or isinstance(event, (*_SETTLED, events.Finished))
+
+    async def keep(
+        self, clock: Clock, off_loop: Callable[[Callable[[], None]], Awaitable[None]]
+    ) -> None:
+        """Keep the mission until cancelled."""
+        while True:
+            await clock.sleep_until(clock.now() + KEEP_EVERY)
+            await off_loop(self.keeping(clock.now()))
+
+    def keeping(self, stamp: float) -> Callable[[], None]:
+        """A function that writes what is new at a stamp, in a thread or later.
+
+        Call each such function before asking for the next.
+        """
+        pipeline = self._session.pipeline
+        if not pipeline.keyframes:
+            return _nothing
+        beat = self._beat(stamp)
+        batch = Batch(
+            first=self._keyframes,
+            growth=growth(pipeline, self._keyframes, self._observations),
+            rows=rows(self._session.journey, self._rows),
+            beat=beat,
+        )
+        new_rows = self._rows + len(batch.rows.stamps)
+        counts = (len(pipeline.keyframes), len(pipeline.mapper.observations), new_rows)
+        if counts == (self._keyframes, self._observations, self._rows) and not self._settled:
+            return _nothing
+        due = self._settled or stamp - self._snapshot_at >= SNAPSHOT_EVERY
+        snapshot = None
+        if due and (self._settled or self._snapshot_of < len(pipeline.keyframes)):
+            snapshot = packed(Snapshot(memory=remember(pipeline), beat=beat))
+            self._settled = False
+        return partial(self._write, packed(batch), counts, snapshot, stamp)
+
+    def finish(self) -> None:
+        """Write all that is new; call when nothing runs any more."""
+        self._settled = True
+        self.keeping(self._session.tally.last_stamp)()
+
+    def _write(
+        self, batch: bytes, counts: tuple[int, int, int], snapshot: bytes | None, stamp: float
+    ) -> None:
+        try:
+            self._files.append(batch, sync=snapshot is not None)
+            self._keyframes, self._observations, self._rows = counts
+            if snapshot is not None:
+                self._files.save(snapshot)
+                self._snapshot_at, self._snapshot_of = stamp, counts[0]
+        except OSError as error:
+            self._settled = self._settled or snapshot is not None
+            self._complain(error.strerror or str(error))
+        else:
+            self._complain(None)
+
+    def _complain(self, trouble: str | None) -> None:
+        """Say once that nothing can be written, and once that it can again."""
+        path = str(self._session.directory.path)
+        if trouble is not None and self.trouble is None:
+            log.warning("mission not kept, exploring on", reason=trouble, path=path)
+        elif trouble is None and self.trouble is not None:
+            log.info("mission kept again", path=path)
+        self.trouble = trouble
+
+    def _beat(self, stamp: float) -> Beat:
+        return Beat(
+            stamp=stamp,
+            boot=self._boot,
+            ahead=self._ahead,
+            tally=self._session.tally,
+            odometer=None if self._feedback is None else self._feedback.memory,
+        )
+
+
+def _nothing() -> None:
+    """Nothing is new."""

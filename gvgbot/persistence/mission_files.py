@@ -1,0 +1,178 @@
+"""The files that a mission lives in: a journal that grows, and a snapshot with the one before it.
+
+What was written stays readable whatever ends the process: the journal up to its last whole record,
+the snapshot or the one before. Functions that write raise OSError, and may be called again.
+"""
+
+import contextlib
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from gvgbot.autonomy.memory import Growth
+from gvgbot.persistence.mission_state import (
+    VERSION,
+    Batch,
+    Header,
+    Rows,
+    Saved,
+    Snapshot,
+    journey_of,
+)
+from gvgbot.persistence.records import Damaged, packed, record, records, unpacked
+
+JOURNAL, SNAPSHOT, SNAPSHOT_BEFORE = "journal.gvg", "snapshot.gvg", "snapshot-before.gvg"
+
+
+class MissionFiles:
+    """The files of one mission in its directory."""
+
+    def __init__(self, directory: Path) -> None:
+        self._journal = directory / JOURNAL
+        self._snapshot = directory / SNAPSHOT
+        self._before = directory / SNAPSHOT_BEFORE
+        self._end: int | None = None  # of what is whole in the journal; None: not begun
+
+    @property
+    def is_begun(self) -> bool:
+        """Whether there is a journal that goes on."""
+        return self._end is not None
+
+    # -- reading -----------------------------------------------------------------------------------
+
+    def read(self) -> Saved | None:
+        """The mission, with as much of its past as is whole; None if there is no snapshot.
+
+        Raises Damaged if there is one that cannot be read, or is of a later version.
+        """
+        snapshot = self._newest_snapshot()
+        if snapshot is None:
+            return None
+        past: list[Growth] = []
+        parts: list[Rows] = []
+        newest = snapshot.beat
+        for batch in self._batches():
+            if batch.first != len(past):
+                break
+            past += batch.growth
+            parts.append(batch.rows)
+            newest = max(newest, batch.beat, key=lambda beat: beat.stamp)
+        return Saved(snapshot.memory, past, journey_of(parts, len(past)), newest)
+
+    def _newest_snapshot(self) -> Snapshot | None:
+        trouble: Damaged | None = None
+        for path in (self._snapshot, self._before):
+            try:
+                header, body = _two_records(path)
+                _check(header, "gvgbot snapshot")
+                return unpacked(body, Snapshot)
+            except FileNotFoundError:
+                continue
+            except Damaged as error:
+                trouble = trouble or Damaged(f"{path}: {error}")
+        if trouble is not None:
+            raise trouble
+        return None
+
+    def _batches(self) -> Iterator[Batch]:
+        """The batches of the journal, up to the first that is not whole."""
+        try:
+            data = self._journal.read_bytes()
+        except FileNotFoundError:
+            return
+        for number, (payload, end) in enumerate(records(data)):
+            try:
+                if number == 0:
+                    _check(payload, "gvgbot journal")
+                else:
+                    yield unpacked(payload, Batch)
+            except Damaged:
+                return
+            self._end = end
+
+    # -- writing -----------------------------------------------------------------------------------
+
+    def begin(self) -> None:
+        """Begin an empty journal, and forget the mission that was here. Raises OSError."""
+        for path in (self._snapshot, self._before):
+            path.unlink(missing_ok=True)
+        start = record(packed(Header("gvgbot journal", VERSION)))
+        _replace(self._journal, start)
+        self._end = len(start)
+
+    def append(self, batch: bytes, *, sync: bool) -> None:
+        """Add a batch (MessagePack) to the journal; `sync` if it must outlive a power cut.
+
+        Raises OSError; then it may be tried again, and nothing before it is lost.
+        """
+        if self._end is None:
+            self.begin()
+            assert self._end is not None
+        framed = record(batch)
+        with self._journal.open("r+b", buffering=0) as journal:
+            journal.truncate(self._end)  # what an earlier attempt may have left
+            journal.seek(self._end)
+            _write_all(journal.fileno(), framed)
+            if sync:
+                os.fsync(journal.fileno())
+        self._end += len(framed)
+
+    def save(self, snapshot: bytes) -> None:
+        """Replace the snapshot (MessagePack) at once; the old one stays beside it.
+
+        Raises OSError; then the old ones stand.
+        """
+        content = record(packed(Header("gvgbot snapshot", VERSION))) + record(snapshot)
+        _replace(self._snapshot, content, keep=self._before)
+
+
+def _two_records(path: Path) -> tuple[bytes, bytes]:
+    """Raises Damaged, FileNotFoundError."""
+    try:
+        found = [payload for payload, _ in records(path.read_bytes())]
+    except FileNotFoundError:
+        raise
+    except OSError as error:
+        raise Damaged(error.strerror or "cannot be read") from error
+    if len(found) != 2:
+        raise Damaged("it is cut short or altered")
+    return found[0], found[1]
+
+
+def _check(header: bytes, content: str) -> None:
+    """Raises Damaged if a file is another one, or of a later version."""
+    found = unpacked(header, Header)
+    if found.content != content:
+        raise Damaged(f"it is a {found.content}")
+    if found.version > VERSION:
+        raise Damaged(f"it is of version {found.version}, and this program knows {VERSION}")
+
+
+def _replace(path: Path, content: bytes, keep: Path | None = None) -> None:
+    """Put content in the place of a file, and the file in the place of `keep`. Raises OSError."""
+    aside = path.with_name(f".{path.name}.tmp")
+    try:
+        with aside.open("wb", buffering=0) as file:
+            _write_all(file.fileno(), content)
+            os.fsync(file.fileno())
+        if keep is not None and path.exists():
+            path.replace(keep)
+        aside.replace(path)
+        _sync_directory(path.parent)
+    finally:
+        with contextlib.suppress(OSError):
+            aside.unlink(missing_ok=True)
+
+
+def _write_all(file: int, content: bytes) -> None:
+    left = memoryview(content)
+    while left:
+        left = left[os.write(file, left) :]
+
+
+def _sync_directory(path: Path) -> None:
+    directory = os.open(path, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(directory)
+    finally:
+        os.close(directory)

@@ -1,0 +1,94 @@
+"""Where a run begins: in a new directory, in the one where it ended, or with the map of another."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import structlog
+
+from gvgbot.config import Config
+from gvgbot.errors import UsageError
+from gvgbot.maps.run_directory import RunDirectory
+from gvgbot.persistence.mission_files import SNAPSHOT, SNAPSHOT_BEFORE, MissionFiles
+from gvgbot.persistence.mission_state import Saved
+from gvgbot.persistence.records import Damaged
+
+log = structlog.get_logger()
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What was asked for: a directory for the run, a run whose map is known, a new map."""
+
+    out: Path | None = None
+    known: Path | None = None
+    anew: bool = False
+    state_dir: Path | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """The directory of the run, the files of its mission, and what is known already."""
+
+    directory: RunDirectory
+    files: MissionFiles
+    saved: Saved | None = None
+
+
+def state_directory(config: Config, environment: Mapping[str, str]) -> Path | None:
+    """The state directory: the configured one, or the service manager's; None: there is none."""
+    given = config.service.state_dir or environment.get("STATE_DIRECTORY", "").partition(":")[0]
+    return Path(given) if given else None
+
+
+def begin(wanted: Wanted, *, world: str) -> Start:
+    """Where to begin. Raises UsageError if a directory cannot be used or has no map to begin with.
+
+    A mission that cannot be read is left where it is, and a new one begun: nobody may be there to
+    decide.
+    """
+    if wanted.known is not None:
+        saved = _known(wanted.known)
+        directory = _new(wanted, world)
+        return Start(directory, MissionFiles(directory.path), saved)
+    path = None if wanted.anew or wanted.out is not None else _newest(wanted.state_dir)
+    if path is not None:
+        files = MissionFiles(path)
+        try:
+            saved_there = files.read()
+        except Damaged as error:
+            log.warning("mission cannot be read, a new one begins", reason=str(error))
+        else:
+            return Start(RunDirectory(path), files, saved_there)
+    directory = _new(wanted, world)
+    return Start(directory, MissionFiles(directory.path))
+
+
+def _new(wanted: Wanted, world: str) -> RunDirectory:
+    runs = Path("runs") if wanted.state_dir is None else wanted.state_dir / "runs"
+    return RunDirectory.create(wanted.out, world=world, runs=runs)
+
+
+def _known(path: Path) -> Saved:
+    """The mission of a run. Raises UsageError if there is none that can be read."""
+    try:
+        saved = MissionFiles(path).read()
+    except Damaged as error:
+        raise UsageError(f"cannot begin with {error}") from error
+    if saved is None:
+        raise UsageError(f"cannot begin with {path}: there is no {SNAPSHOT} in it")
+    return saved
+
+
+def _newest(state_dir: Path | None) -> Path | None:
+    """The run with the highest number that has left a mission."""
+    if state_dir is None:
+        return None
+    found = [
+        (int(number[1]), path.name, path)
+        for path in (state_dir / "runs").glob("*")
+        if (number := re.search(r"-(\d+)$", path.name))
+        and any((path / name).exists() for name in (SNAPSHOT, SNAPSHOT_BEFORE))
+    ]
+    return max(found)[2] if found else None
