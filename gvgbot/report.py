@@ -19,13 +19,12 @@ from gvgbot.maps.picture import draw_map
 from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
 from gvgbot.maps.trajectory import Trajectory, encode_tum, to_trajectory
 
-_PERIOD = 0.1  # s between the rows of a trajectory
-
 
 @dataclass(slots=True)
 class Journey:
-    """The way of the robot, ten rows a second."""
+    """The way of the robot, a row each `period` s, or for each odometry message if that is 0."""
 
+    period: float = 0.1
     stamps: list[float] = field(default_factory=list)
     keyframes: list[int] = field(default_factory=list)  # the last one before each row
     odom_base: list[Pose] = field(default_factory=list)
@@ -35,7 +34,7 @@ class Journey:
     def record(self, odometry: Odometry, pipeline: Pipeline, world_base: Pose | None) -> None:
         """Take down a control cycle, if a row is due."""
         if not pipeline.keyframes or (
-            self.stamps and odometry.stamp < self.stamps[-1] + _PERIOD - 1e-3
+            self.stamps and odometry.stamp < self.stamps[-1] + self.period - 1e-3
         ):
             return
         self.stamps.append(odometry.stamp)

@@ -4,7 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gvgbot.autonomy.localisation import sampled
 from gvgbot.autonomy.pipeline import Pipeline
+from gvgbot.autonomy.slam.revisits import Passage, revisits
 from gvgbot.autonomy.slam.smoothing import Constraint, PoseGraph
 from gvgbot.autonomy.views import Observation
 from gvgbot.geometry import Array, Pose
@@ -19,7 +21,11 @@ class Estimate(NamedTuple):
 
 
 def smoothed(pipeline: Pipeline) -> Estimate:
-    """The best estimate of all keyframes and vertices."""
+    """The best estimate of all keyframes and vertices.
+
+    Where somebody else drove, nobody came close to vertices to know them again for certain: then
+    walls that were passed twice close the loops, and vertices stand where the first visit saw them.
+    """
     keyframes, mapper = pipeline.keyframes, pipeline.mapper
     ids = {vertex: len(keyframes) + i for i, vertex in enumerate(mapper.belief.ids)}
     start = [k.map_base for k in keyframes] + [mapper.belief.map_vertex(v) for v in ids]
@@ -27,11 +33,18 @@ def smoothed(pipeline: Pipeline) -> Estimate:
         Constraint(i, i + 1, step.motion, _inverse(step.covariance))
         for i, step in enumerate(pipeline.steps[: len(keyframes) - 1])
     ]
-    met = set[int]()
+    if pipeline.led:
+        constraints += revisits(_passage(pipeline), pipeline.matching)
+    met, recognised = set[int](), set[int]()
     for seen in mapper.observations:
-        if seen.vertex in ids and seen.keyframe < len(keyframes):
-            constraints.append(_sight(seen, ids[seen.vertex], again=seen.vertex in met))
-            met.add(seen.vertex)
+        if seen.vertex not in ids or seen.keyframe >= len(keyframes):
+            continue
+        sight = _sight(seen, ids[seen.vertex], again=seen.vertex in met)
+        met.add(seen.vertex)
+        if sight.doubtful:
+            recognised.add(seen.vertex)
+        if not (pipeline.led and seen.vertex in recognised):
+            constraints.append(sight)
     graph = PoseGraph(constraints)
     x = graph.solve(np.array([(p.x, p.y, p.theta) for p in start]).reshape(-1, 3))
     poses = [Pose.from_array(row) for row in x]
@@ -41,6 +54,12 @@ def smoothed(pipeline: Pipeline) -> Estimate:
         {vertex: poses[i] for vertex, i in ids.items()},
         dict(zip(ids, P, strict=True)),
     )
+
+
+def _passage(pipeline: Pipeline) -> Passage:
+    scans = {i: k.scan for i, k in enumerate(pipeline.keyframes) if k.scan is not None}
+    walls = {i: sampled(scan, pipeline.matching.points) for i, scan in scans.items()}
+    return Passage([(step.motion, step.covariance) for step in pipeline.steps], walls)
 
 
 def _sight(seen: Observation, vertex: int, *, again: bool) -> Constraint:

@@ -8,7 +8,12 @@ from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
 from gvgbot.autonomy.slam.calibration import Calibration
-from gvgbot.autonomy.slam.scan_matching import Registration, ScanMatchingConfig, Sides, register
+from gvgbot.autonomy.slam.scan_matching import (
+    Registration,
+    ScanMatchingConfig,
+    Sides,
+    register_coarsely,
+)
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
 
@@ -16,9 +21,11 @@ _RANGE_M = 24.0  # of the beams that are matched
 _LONGEST_GAP_M = 0.5  # between two beams, for their even spacing
 _SMOOTHED = 9  # beams, to tell where the next point is due
 _LEAST_POINTS = 50  # fewer say nothing about a pose
-_LEAST_INLIERS = 0.5  # of the beams must find a wall, or the match is not believed
 _CLEARLY = 0.1  # better agreement of beams and walls than this is no chance
 _SEARCH_M, _SEARCH_STEP_M = 1.0, 0.25  # around the pose by odometry
+_SEARCH_STEP_RAD, _SEARCH_PAIR_M = 0.05, 0.3
+_SEARCHED = 60  # points
+_UNLIKELY_M = 0.03  # nearer to the walls must be what is turned as far as it may be
 _SLIPPING = 25.0  # times the covariance of odometry, when the wheels slip
 _LOST = np.diag([0.5**2, 0.5**2, 0.05**2])  # of a base that nobody heard for a while
 _SHARED = 8.0  # scans that a wall is seen in: they err against it, and it against the building
@@ -90,15 +97,18 @@ class LocalMaps:
         """The match from the first prior, unless that from another one is clearly better."""
         walls, hits, sights = self._walls()
         sides = Sides(sights, scan.base_laser.position)
-        points = _sampled(scan, self._matching.points)
+        config = self._matching
+        points = sampled(scan, config.points)
+        coarse = (config.coarse_pair_m,) if config.coarse_pair_m else ()
         if min(len(walls), len(points)) < _LEAST_POINTS:
             return None
         tree, best, agreement = cKDTree(walls), None, 0.0
         for prior, Q in priors:
-            found = register(points, tree, walls, prior, Q, self._matching, hits, sides)
-            if found is None or found.inliers < _LEAST_INLIERS:
+            near = _turned(points, tree, prior, config.search_rad) if config.search_rad else prior
+            found = register_coarsely(points, tree, walls, near, Q, config, coarse, hits, sides)
+            if found is None or found.inliers < config.min_inliers:
                 continue
-            now = found.inliers * (1.0 - found.rms / self._matching.max_pair_m)
+            now = found.inliers * (1.0 - found.rms / config.max_pair_m)
             if now > agreement + _CLEARLY:
                 best, agreement = (found, Q), now
         return best
@@ -117,6 +127,17 @@ def _drift(found: Registration, Q: Array) -> Array:
     return np.asarray(drift, np.float64)
 
 
+def _turned(points: Array, tree: cKDTree, prior: Pose, reach: float) -> Pose:
+    """The pose with the heading, within reach (rad), at which points lie nearest to the walls."""
+    some = points[:: max(1, len(points) // _SEARCHED)]
+    turns = np.arange(-reach, reach + 1e-9, _SEARCH_STEP_RAD)
+    poses = [prior.compose(Pose(0.0, 0.0, float(turn))) for turn in turns]
+    laid = np.concatenate([pose.transform(some) for pose in poses])
+    distance = np.asarray(tree.query(laid, distance_upper_bound=_SEARCH_PAIR_M)[0])
+    off = np.minimum(distance, _SEARCH_PAIR_M).reshape(len(turns), -1).mean(axis=1)
+    return poses[int(np.argmin(off + _UNLIKELY_M * (turns / reach) ** 2))]
+
+
 def _around(prior: Pose) -> list[Pose]:
     """The pose, and others with its heading, nearest first."""
     steps = np.arange(-_SEARCH_M, _SEARCH_M + 1e-9, _SEARCH_STEP_M)
@@ -124,7 +145,7 @@ def _around(prior: Pose) -> list[Pose]:
     return [prior.compose(Pose(x, y, 0.0)) for away, x, y in offsets if away <= _SEARCH_M]
 
 
-def _sampled(scan: Scan, count: int) -> Array:
+def sampled(scan: Scan, count: int) -> Array:
     """About so many end points (N, 2), evenly spaced along what the beams hit; base frame.
 
     Evenly in space, not in angle: far walls tell most about the heading, and have few beams. The

@@ -118,19 +118,21 @@ class Mission:
         if place.distance > NEAR_M:
             return self._access(view, place), self._events
         self._lost_since = None
-        base = view.local_base.position
-        clearance = view.gvg.edges[place.edge].clearance_at(place.station)
-        self._close_ring(view, clearance)
-        passage = self.where.follow(view.gvg, place, known, base)
-        if passage is not None:
-            self._account_for(view, known, passage)
-        self._close_start_edge(view, clearance)
+        self._learn(view, known, place)
         graph = self._mapper.graph
         here = Situation(view.gvg, known, graph, self.where, place, view.local_base, view.doubted)
         self._watch_progress(view)
         self._watch_the_way(view)
         order = Stand() if self.outcome is not None else self._decide(view, here)
         return order, self._events
+
+    def witness(self, view: View, known: Correspondence) -> list[Event]:
+        """Learn from where somebody else drives the robot."""
+        self._events = []
+        place = view.gvg.place(view.local_base.position)
+        if place is not None and place.distance <= NEAR_M:
+            self._learn(view, known, place)
+        return self._events
 
     def skip(self, seconds: float) -> None:
         """Let no patience run out by a time in which nothing was to be seen."""
@@ -150,6 +152,15 @@ class Mission:
         self._obstructed = reason
 
     # -- the edge under the wheels -------------------------------------------------------------
+
+    def _learn(self, view: View, known: Correspondence, place: Place) -> None:
+        """Account for what has been driven."""
+        clearance = view.gvg.edges[place.edge].clearance_at(place.station)
+        self._close_ring(view, clearance)
+        passage = self.where.follow(view.gvg, place, known, view.local_base.position)
+        if passage is not None:
+            self._account_for(view, known, passage)
+        self._close_start_edge(view, clearance)
 
     def _account_for(self, view: View, known: Correspondence, passage: Passage) -> None:
         """Count a traversal, or close the edge that was driven from a vertex now out of sight."""

@@ -98,9 +98,15 @@ class Pipeline:
     """The robot's mind: feed it odometry and scans, ask it for twists."""
 
     def __init__(
-        self, config: AutonomyConfig, exploration: ExplorationConfig, robot_radius: float
+        self,
+        config: AutonomyConfig,
+        exploration: ExplorationConfig,
+        robot_radius: float,
+        *,
+        led: bool = False,
     ) -> None:
-        self._config, self._radius = config, robot_radius
+        """`led` if somebody else drives: it only learns, and its twists mean nothing."""
+        self._config, self._radius, self.led = config, robot_radius, led
         self._maps = LocalMaps(config.local_map, config.far_map, config.scan_matching)
         self.mapper = Mapper(
             config.mapping,
@@ -127,6 +133,11 @@ class Pipeline:
         self.travelled = 0.0
 
     # -- state -----------------------------------------------------------------------------------
+
+    @property
+    def matching(self) -> ScanMatchingConfig:
+        """How scans are laid onto walls."""
+        return self._config.scan_matching
 
     @property
     def map_base(self) -> Pose:
@@ -186,6 +197,8 @@ class Pipeline:
         known, seen = self.mapper.observe(view)
         self._keep(scan, odom_base, local_base)
         happened += seen
+        if self.led:
+            return happened + self.mission.witness(view, known)
         if self._turning():
             return happened
         if len(self.keyframes) == 1:

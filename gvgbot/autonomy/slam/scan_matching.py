@@ -5,7 +5,7 @@ a bare corridor) is left to odometry. A point is laid onto a wall's face that wa
 side: what a room shows of a thin wall is not what the corridor showed of it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -33,6 +33,9 @@ class ScanMatchingConfig:
     independent_share: Annotated[float, Range(0.001, 1.0)] = 0.3  # neighbouring pairs err together
     points: Annotated[int, Range(50, 5000)] = 300  # of a scan that are matched
     min_pairs: Annotated[int, Range(10, 1000)] = 40
+    min_inliers: Annotated[float, Range(0.0, 1.0)] = 0.5  # share of a scan that must find a wall
+    coarse_pair_m: Annotated[float, Range(0.0, 2.0)] = 0.0  # of a first match; 0: there is none
+    search_rad: Annotated[float, Range(0.0, 1.0)] = 0.0  # for the heading first, to either side
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,6 +101,29 @@ def register(
         if np.abs(change).max() < 1e-4:
             break
     return Registration(pose, np.linalg.inv(A), inliers, rms)
+
+
+def register_coarsely(
+    points: Array,
+    tree: cKDTree,
+    walls: Array,
+    prior: Pose,
+    Q: Array,
+    config: ScanMatchingConfig,
+    reaches: tuple[float, ...],
+    hits: Array | None = None,
+    sides: Sides | None = None,
+) -> Registration | None:
+    """As `register`, from farther away: pairs first reach as far as each of `reaches`, m.
+
+    A match is where the next one starts, with the same Q around it.
+    """
+    for reach in reaches:
+        near = register(
+            points, tree, walls, prior, Q, replace(config, max_pair_m=reach), hits, sides
+        )
+        prior = prior if near is None else near.pose
+    return register(points, tree, walls, prior, Q, config, hits, sides)
 
 
 def _pairs(

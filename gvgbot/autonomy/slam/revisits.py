@@ -1,0 +1,165 @@
+"""Places that were passed twice: the walls seen on one visit, laid onto those of an earlier one.
+
+Vertices close loops where lines of the GVG meet, while the robot drives. This closes them anywhere,
+after the run. A match must lie where the uncertainty since the last one allows it, and explain most
+of what both visits saw; smoothing doubts one that then disagrees with all the others.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from gvgbot.autonomy.slam.ekf import Belief, predict
+from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig, register_coarsely
+from gvgbot.autonomy.slam.smoothing import Constraint, PoseGraph
+from gvgbot.geometry import Array, Pose, rotated_covariance
+
+_AROUND = 4  # scans before and after one, whose walls belong to its place
+_LEAST_LOOP_M = 10.0  # driven in between, or it is the same visit
+_EVERY_M = 1.0  # driven between two tries
+_NEAR_M, _FARTHEST_M = 2.0, 7.0  # between two visits of a place, without and with uncertainty
+_POINTS = 250  # of a place that are laid onto another
+_CELL_M = 0.1  # of the grid that thins the walls of a place
+_REACHES_M = (2.5, 1.2, 0.6)  # of pairs, at first
+_OVERRATED = 9.0  # what steps err alike adds up: so much more variance
+_SLACK = np.diag([0.1**2, 0.1**2, 0.03**2])  # of the earlier place
+_GATE = 16.3  # squared Mahalanobis distance, 3 degrees of freedom
+_WALL_M = 0.15  # a point so near to a wall lies on it
+_IN_VIEW_M = 1.0  # a point farther from all walls was not seen on the other visit
+_LEAST_IN_VIEW = 0.6  # share of the points
+_LEAST_AGREEMENT = 0.75  # share of the points in view that lie on walls
+_FLOOR = np.diag([0.02**2, 0.02**2, 0.004**2])  # what matching cannot know of itself
+_NO_NEWS_M = 0.05  # a match that moves the robot less need not be accounted for at once
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Passage:
+    """A whole run: the steps from keyframe to keyframe, and what walls were seen at some of them.
+
+    A step is a motion and its covariance (3, 3), both in the frame of its start; walls are points
+    (K, 2) in the frame of the base.
+    """
+
+    steps: list[tuple[Pose, Array]]
+    walls: dict[int, Array]
+
+
+def revisits(passage: Passage, matching: ScanMatchingConfig) -> list[Constraint]:
+    """How later visits of a place see earlier ones, by numbers of keyframes."""
+    chain = [
+        Constraint(i, i + 1, motion, np.asarray(np.linalg.inv(P), np.float64))
+        for i, (motion, P) in enumerate(passage.steps)
+    ]
+    x, found = _laid_out(passage), list[Constraint]()
+    for i, belief in _tries(passage):
+        j = _earlier_visit(x, passage, i, belief)
+        match = None if j is None else _match(x, passage, j, i, belief, matching)
+        if match is None:
+            continue
+        found.append(match)
+        belief.P[:] = 0.0
+        if np.abs(_residual(x, match)[:2]).max() > _NO_NEWS_M:
+            x = PoseGraph(chain + found).solve(x)
+    return found
+
+
+def _laid_out(passage: Passage) -> Array:
+    """The poses (N, 3) by the steps alone."""
+    poses = [Pose()]
+    for motion, _ in passage.steps:
+        poses.append(poses[-1].compose(motion))
+    return np.array([(p.x, p.y, p.theta) for p in poses])
+
+
+def _tries(passage: Passage) -> Iterator[tuple[int, Belief]]:
+    """The keyframes to look from, and the motion since the last place that was known again.
+
+    Whoever knows a place again sets the covariance of that motion to zero.
+    """
+    belief, last, driven, tried = Belief(), 0, _driven(passage), 0.0
+    for i in sorted(passage.walls):
+        for motion, covariance in passage.steps[last:i]:
+            belief = predict(belief, motion, _OVERRATED * covariance)
+        last = i
+        if driven[i] - tried >= _EVERY_M:
+            tried = driven[i]
+            yield i, belief
+
+
+def _driven(passage: Passage) -> Array:
+    """Metres driven until each keyframe."""
+    steps = [np.hypot(motion.x, motion.y) for motion, _ in passage.steps]
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def _earlier_visit(x: Array, passage: Passage, i: int, belief: Belief) -> int | None:
+    """The nearest keyframe of an earlier visit to the place of one."""
+    driven, seen = _driven(passage), np.array(sorted(passage.walls))
+    earlier = seen[driven[seen] < driven[i] - _LEAST_LOOP_M]
+    if len(earlier) == 0:
+        return None
+    distance = np.hypot(*(x[earlier, :2] - x[i, :2]).T)
+    sigma = float(np.sqrt(np.linalg.eigvalsh(belief.P[:2, :2])[-1]))
+    near = distance.min() < min(_NEAR_M + 2 * sigma, _FARTHEST_M)
+    return int(earlier[distance.argmin()]) if near else None
+
+
+def _match(
+    x: Array, passage: Passage, j: int, i: int, belief: Belief, matching: ScanMatchingConfig
+) -> Constraint | None:
+    """Keyframe i seen from keyframe j, if the walls around both agree."""
+    walls, points = _place(x, passage, j), _place(x, passage, i)
+    tree = cKDTree(walls)
+    prior = _pose(x, j).to(_pose(x, i))
+    Q = rotated_covariance(belief.P, -float(belief.x[2])) + _SLACK
+    some = points[:: max(1, len(points) // _POINTS)]
+    found = register_coarsely(some, tree, walls, prior, Q, matching, _REACHES_M)
+    if found is None:
+        return None
+    off = _array(prior.to(found.pose))
+    if off @ np.linalg.solve(Q, off) > _GATE:
+        return None
+    laid = found.pose.transform(points)
+    distance = np.asarray(tree.query(laid, distance_upper_bound=_IN_VIEW_M)[0])
+    in_view = np.isfinite(distance)
+    if in_view.mean() < _LEAST_IN_VIEW or (distance[in_view] < _WALL_M).mean() < _LEAST_AGREEMENT:
+        return None
+    covariance = rotated_covariance(found.covariance + _FLOOR, found.pose.theta)
+    return Constraint(
+        j, i, found.pose, np.asarray(np.linalg.inv(covariance), np.float64), doubtful=True
+    )
+
+
+def _place(x: Array, passage: Passage, i: int) -> Array:
+    """The walls (K, 2) around a keyframe in its frame, as seen there, just before and just after.
+
+    One point for each cell of a grid.
+    """
+    seen = sorted(passage.walls)
+    at, here = seen.index(i), _pose(x, i)
+    points = np.concatenate(
+        [
+            here.to(_pose(x, k)).transform(passage.walls[k])
+            for k in seen[max(0, at - _AROUND) : at + _AROUND + 1]
+        ]
+    )
+    cells = np.floor(points / _CELL_M).astype(np.int64)
+    return points[np.unique(cells, axis=0, return_index=True)[1]]
+
+
+def _residual(x: Array, match: Constraint) -> Array:
+    """Expected minus measured, in the frame of the first pose."""
+    expected = _array(_pose(x, match.a).to(_pose(x, match.b)))
+    r = expected - _array(match.a_b)
+    r[2] = np.remainder(r[2] + np.pi, 2 * np.pi) - np.pi
+    return r
+
+
+def _pose(x: Array, i: int) -> Pose:
+    return Pose.from_array(x[i])
+
+
+def _array(pose: Pose) -> Array:
+    return np.array([pose.x, pose.y, pose.theta])
