@@ -14,7 +14,8 @@ from gvgbot.drivers.kobuki.driver import KobukiConfig
 from gvgbot.drivers.kobuki.twin import KobukiTwinConfig
 from gvgbot.hal.guard import GuardConfig
 from gvgbot.ranges import Range
-from gvgbot.strict_yaml import load
+from gvgbot.recording.config import RecordingConfig
+from gvgbot.strict_yaml import load, load_text
 from gvgbot.topics import TelemetryConfig, is_robot_name
 
 DEFAULT = "sim.yaml"
@@ -67,6 +68,7 @@ class Config:
     exploration: ExplorationConfig = field(default_factory=ExplorationConfig)
     service: ServiceConfig = field(default_factory=ServiceConfig)
     telemetry: TelemetryConfig = field(default_factory=TelemetryConfig)
+    recording: RecordingConfig = field(default_factory=RecordingConfig)
 
 
 def load_config(path: Path | None = None, overrides: Sequence[str] = ()) -> Config:
@@ -75,6 +77,14 @@ def load_config(path: Path | None = None, overrides: Sequence[str] = ()) -> Conf
     Raises ConfigError that lists every mistake of the file and of the overrides (`a.b=c`).
     """
     return load(Config, packaged(DEFAULT if path is None else path), overrides)
+
+
+def config_in(text: str, source: str, overrides: Sequence[str] = ()) -> Config:
+    """The configuration in a text (YAML), with overrides put on top.
+
+    Raises ConfigError; `source` is what mistakes in the text are blamed on.
+    """
+    return load_text(Config, text, source, overrides)
 
 
 def packaged(path: Path | str) -> Path:

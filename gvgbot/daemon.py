@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import os
 import sys
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import structlog
@@ -20,10 +21,12 @@ from gvgbot.maps.run_directory import RunDirectory
 from gvgbot.persistence.keeper import Keeper
 from gvgbot.persistence.start import Wanted, begin, state_directory
 from gvgbot.progress import Progress
+from gvgbot.recording import extra_needed
 from gvgbot.robot import Robot
 from gvgbot.service import Notifier, StopSignals, set_up_logging
 from gvgbot.session import Session
 from gvgbot.simulation import Simulation, open_place
+from gvgbot.strict_yaml import dump
 from gvgbot.telemetry import Telemetry
 
 log = structlog.get_logger()
@@ -40,7 +43,10 @@ def explore(config: Config, *, out: Path | None, real_time: bool) -> int:
         session, progress = Session(config, directory, place), Progress()
         factory = None if real_time else VirtualTimeLoop
         try:
-            with asyncio.Runner(loop_factory=factory) as runner:
+            with (
+                recorded(session, patient=not real_time),
+                asyncio.Runner(loop_factory=factory) as runner,
+            ):
                 runner.run(explore_once(session, progress))
         except Exception as error:
             session.failure = str(error) or type(error).__name__
@@ -59,7 +65,7 @@ async def explore_once(session: Session, progress: Progress) -> None:
     assert session.place is not None
     clock = LoopClock()
     session.simulation = Simulation(session.config, session.place, clock)
-    devices = Devices(Links(session.config, clock, session.simulation))
+    devices = Devices(Links(session.config, clock, session.simulation, session.tap))
 
     def on_cycle(odometry: Odometry) -> None:
         session.on_cycle(odometry, devices.base.contact)
@@ -74,6 +80,7 @@ async def explore_once(session: Session, progress: Progress) -> None:
         guard,
         on_events=session.on_events,
         on_cycle=on_cycle,
+        log=session.recorder,
     )
     limit = session.config.twin.time_limit_s
     async with asyncio.TaskGroup() as tasks:
@@ -124,7 +131,7 @@ def run(
         _announce(session, resumed=start.saved is not None)
         robot = Robot(session, Notifier.from_environment(), telemetry, keeper=keeper)
         try:
-            with asyncio.Runner() as runner:
+            with recorded(session, patient=False), asyncio.Runner() as runner:
                 runner.run(robot.serve(signals.wait()))
         except* GvgbotError as failures:
             session.failure = str(_first(failures))
@@ -134,6 +141,21 @@ def run(
             session.save()
             log.info("map saved", path=str(directory.path))
     return 0
+
+
+def recorded(session: Session, *, patient: bool) -> AbstractContextManager[object]:
+    """What records a session, if that is wanted, until it is left.
+
+    Raises UsageError if nothing can be written there, GvgbotError without the packages for it.
+    """
+    if session.config.recording.path is None:
+        return contextlib.nullcontext()
+    with extra_needed():
+        from gvgbot.recording.recorder import Recorder
+    about = {"title": session.title, "version": __version__, "config": dump(session.config)}
+    session.recorder = Recorder(session.config.recording, about, patient=patient)
+    session.recorder.map_base = lambda: session.pipeline.map_base
+    return session.recorder
 
 
 def _telemetry(config: Config, stack: contextlib.ExitStack) -> Telemetry | None:

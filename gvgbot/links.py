@@ -3,12 +3,14 @@
 import asyncio
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 from gvgbot.clock import Clock
 from gvgbot.config import Config
 from gvgbot.drivers.hokuyo.driver import HokuyoLaser, LinkStatistics
 from gvgbot.drivers.kobuki.driver import KobukiBase
 from gvgbot.drivers.kobuki.feedback import FeedbackReader
+from gvgbot.drivers.tapped import Tap, TappedStream
 from gvgbot.drivers.tcp import SCHEME, TcpStream
 from gvgbot.drivers.transport import ByteStream, open_serial
 from gvgbot.errors import DeviceLost
@@ -26,10 +28,17 @@ class Links:
     The odometry of a base that is opened again goes on from where it ended.
     """
 
-    def __init__(self, config: Config, clock: Clock, simulation: Simulation | None) -> None:
+    def __init__(
+        self,
+        config: Config,
+        clock: Clock,
+        simulation: Simulation | None,
+        tap: Tap | None = None,
+    ) -> None:
         if simulation is not None and config.twin.base.odometry == "wheels":
             config = replace(config, base=replace(config.base, heading="wheels"))
         self.config, self.clock, self.simulation = config, clock, simulation
+        self._tap = tap
         self._laser_link = LinkStatistics()
         self._laser: HokuyoLaser | None = None
         self.feedback = FeedbackReader(
@@ -43,6 +52,7 @@ class Links:
             stream, close = await _open_port("laser", config.port, config.baud)
         else:
             stream, close = self.simulation.laser, _leave_open
+        stream = self._tapped("laser", stream)
         self._laser = HokuyoLaser(stream, config, self.clock, self._laser_link)
         return self._laser, close
 
@@ -53,7 +63,14 @@ class Links:
             stream, close = await _open_port("base", config.port, config.baud)
         else:
             stream, close = self.simulation.base, _leave_open
+        stream = self._tapped("base", stream)
         return KobukiBase(stream, config, self.clock, self.feedback), close
+
+    def _tapped(self, link: str, stream: ByteStream) -> ByteStream:
+        if self._tap is None:
+            return stream
+        heard, said = (partial(self._tap, link, said=said) for said in (False, True))
+        return TappedStream(stream, heard, said)
 
     def laser_health(self, *, connected: bool, reconnects: int) -> LinkHealth:
         """What has come from the laser."""

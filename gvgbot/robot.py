@@ -108,7 +108,7 @@ class Robot:
         session = self._session
         if session.place is not None:
             session.simulation = Simulation(session.config, session.place, self._clock)
-        return Links(session.config, self._clock, session.simulation)
+        return Links(session.config, self._clock, session.simulation, session.tap)
 
     def _prepare(self, links: Links) -> None:
         robot = self._session.config.robot
@@ -122,6 +122,7 @@ class Robot:
             Guard(robot.limits, robot.radius_m),
             on_events=self._on_events,
             on_cycle=self._on_cycle,
+            log=self._session.recorder,
         )
 
     async def _explore(self) -> None:

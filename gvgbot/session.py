@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from typing import TYPE_CHECKING
 
 import structlog
 
@@ -12,12 +13,16 @@ from gvgbot import __version__
 from gvgbot.autonomy import events
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.config import Config
+from gvgbot.drivers.tapped import Tap
 from gvgbot.errors import GvgbotError
 from gvgbot.geometry import Pose
 from gvgbot.hal.messages import Contact, Odometry
-from gvgbot.maps.run_directory import RunDirectory
+from gvgbot.maps.run_directory import RunDirectory, record_of
 from gvgbot.report import Journey, map_files, world_files
 from gvgbot.simulation import Place, Simulation
+
+if TYPE_CHECKING:  # it needs packages that only those have who record
+    from gvgbot.recording.recorder import Recorder
 
 log = structlog.get_logger()
 
@@ -34,13 +39,22 @@ class Tally:
 
 
 class Session:
-    """What an exploration knows and has counted. `place` is None where the robot is real."""
+    """What an exploration knows and has counted. `place` is None where the robot is real.
 
-    def __init__(self, config: Config, directory: RunDirectory, place: Place | None) -> None:
+    `led` if somebody else drives, so that there is nothing to decide.
+    """
+
+    def __init__(
+        self, config: Config, directory: RunDirectory, place: Place | None, *, led: bool = False
+    ) -> None:
         self.config, self.directory, self.place = config, directory, place
-        self.pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
-        self.journey = Journey()
+        self.pipeline = Pipeline(
+            config.autonomy, config.exploration, config.robot.radius_m, led=led
+        )
+        self.journey = Journey(period=0.0) if led else Journey()
+        self.title = config.robot.name if place is None else place.world.name  # of the picture
         self.simulation: Simulation | None = None
+        self.recorder: Recorder | None = None
         self.failure: str | None = None  # what ended the run, if it was neither mission nor person
         self._counts = {events.LoopClosed: 0, events.Recovery: 0}
         self.contacts = 0  # times that a bumper was pressed
@@ -49,6 +63,13 @@ class Session:
         self._started = time.perf_counter()
         self._first_stamp: float | None = None
         self._last_stamp = 0.0
+
+    @property
+    def tap(self) -> Tap | None:
+        """What listens to the links, if that is recorded."""
+        if self.recorder is None or not self.config.recording.raw_bytes:
+            return None
+        return self.recorder.on_bytes
 
     def on_events(self, happened: list[events.Event]) -> None:
         """Take down what happened; what cannot be written just now is written later."""
@@ -60,6 +81,8 @@ class Session:
             if not had_trouble:
                 log.warning("events not written, exploring on", reason=str(error))
         for event in happened:
+            if self.recorder is not None:
+                self.recorder.on_event(record_of(event))
             if type(event) in self._counts:
                 self._counts[type(event)] += 1
 
@@ -120,8 +143,7 @@ class Session:
         return partial(self._write, still(self.pipeline), still_journey(self.journey), summary)
 
     def _write(self, pipeline: Pipeline, journey: Journey, summary: dict[str, object]) -> None:
-        name = self.config.robot.name if self.place is None else self.place.world.name
-        files = map_files(pipeline, journey, name)
+        files = map_files(pipeline, journey, self.title)
         if self.place is not None:
             files |= world_files(self.place.world)
         self.directory.write(files)
@@ -162,6 +184,7 @@ def still(pipeline: Pipeline) -> Pipeline:
 def still_journey(journey: Journey) -> Journey:
     """A copy that does not grow."""
     return Journey(
+        journey.period,
         journey.stamps.copy(),
         journey.keyframes.copy(),
         journey.odom_base.copy(),

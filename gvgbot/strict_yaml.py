@@ -55,6 +55,22 @@ def load(cls: type[T], path: Path | None, overrides: Sequence[str] = ()) -> T:
     Raises ConfigError with a line for every mistake: source, key path, value, what is allowed.
     """
     content, lines = ({}, []) if path is None else _read(path)
+    return _loaded(cls, content, lines, str(path), overrides)
+
+
+def load_text(cls: type[T], text: str, source: str, overrides: Sequence[str] = ()) -> T:
+    """As `load`, of YAML that is at hand; `source` is what mistakes in it are blamed on."""
+    content, lines = _parse(text, source)
+    return _loaded(cls, content, lines, source, overrides)
+
+
+def _loaded(
+    cls: type[T],
+    content: dict[Any, Any],
+    lines: list[str],
+    source: str,
+    overrides: Sequence[str],
+) -> T:
     assigned: list[_Override] = []
     for text in overrides:
         parsed = _parse_override(text)
@@ -66,7 +82,7 @@ def load(cls: type[T], path: Path | None, overrides: Sequence[str] = ()) -> T:
     in_all: list[Problem] = []
     convert(cls, content, (), in_file)
     result = convert(cls, _merged(content, assigned), (), in_all)
-    lines += [f"{path}: {one}" for one in in_file if not one.missing or one in in_all]
+    lines += [f"{source}: {one}" for one in in_file if not one.missing or one in in_all]
     lines += [_blame(one, assigned) for one in in_all if one not in in_file]
     if lines:
         raise ConfigError("\n".join(lines))
@@ -83,17 +99,24 @@ def _blame(problem: Problem, assigned: Sequence[_Override]) -> str:
 def _read(path: Path) -> tuple[dict[Any, Any], list[str]]:
     """The mapping of a YAML file, and the lines that say why it could not be read."""
     try:
-        content = yaml.load(path.read_text(encoding="utf-8"), _Loader)
+        text = path.read_text(encoding="utf-8")
     except OSError as error:
         return {}, [f"{path}: cannot read the file: {error.strerror}"]
     except UnicodeDecodeError:
         return {}, [f"{path}: not a text file"]
+    return _parse(text, str(path))
+
+
+def _parse(text: str, source: str) -> tuple[dict[Any, Any], list[str]]:
+    """The mapping in a YAML text, and the lines that say what is wrong with it."""
+    try:
+        content = yaml.load(text, _Loader)
     except (yaml.YAMLError, ValueError, RecursionError) as error:
-        return {}, [f"{path}: not valid YAML: {_syntax(error)}"]
+        return {}, [f"{source}: not valid YAML: {_syntax(error)}"]
     if content is None:
         return {}, []
     if not isinstance(content, dict):
-        return {}, [f"{path}: {shorten(content)}: must be a mapping (key: value)"]
+        return {}, [f"{source}: {shorten(content)}: must be a mapping (key: value)"]
     return content, []
 
 

@@ -2,15 +2,37 @@
 
 import asyncio
 from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
 
 from gvgbot.autonomy.control.reflexes import Felt
 from gvgbot.autonomy.events import Event
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.errors import DeviceLost
-from gvgbot.geometry import STANDSTILL
+from gvgbot.geometry import STANDSTILL, Twist
 from gvgbot.hal.devices import Base, Laser
 from gvgbot.hal.guard import Guard, GuardState, Reason
-from gvgbot.hal.messages import Odometry, Scan
+from gvgbot.hal.messages import Battery, Odometry, Scan
+
+
+@dataclass(frozen=True, slots=True)
+class Cycle:
+    """What a control cycle was given, what autonomy wished, and what the guard made of that."""
+
+    odometry: Odometry
+    felt: Felt
+    wish: Twist
+    permitted: Twist
+
+
+class Log(Protocol):
+    """Takes down what the pipeline is given, in that order."""
+
+    def on_scan(self, scan: Scan) -> None:
+        """A scan that is about to be looked at."""
+
+    def on_cycle(self, cycle: Cycle, battery: Battery | None) -> None:
+        """A control cycle, and the newest state of the battery."""
 
 
 class Loop:
@@ -28,9 +50,10 @@ class Loop:
         *,
         on_events: Callable[[list[Event]], None],
         on_cycle: Callable[[Odometry], None],
+        log: Log | None = None,
     ) -> None:
         self._laser, self._base, self._pipeline, self._guard = laser, base, pipeline, guard
-        self._on_events, self._on_cycle = on_events, on_cycle
+        self._on_events, self._on_cycle, self._log = on_events, on_cycle, log
         self._scan: Scan | None = None
         self._guard_state = GuardState()
         self.stopped_for: Reason | None = None
@@ -51,6 +74,8 @@ class Loop:
             except DeviceLost:
                 self._scan = None  # the guard stops now, not when the last scan is too old
                 continue
+            if self._log is not None:
+                self._log.on_scan(scan)
             events = self._pipeline.perceive(scan)
             self._scan = scan
             if events:
@@ -60,7 +85,8 @@ class Loop:
         while self._pipeline.mission.outcome is None:
             odometry = await self._base.next_odometry()
             contact = self._base.contact
-            wish = self._pipeline.control(odometry, Felt(contact, self.stopped_for))
+            felt = Felt(contact, self.stopped_for)
+            wish = self._pipeline.control(odometry, felt)
             self._guard_state, twist, self.stopped_for = self._guard.permit(
                 self._guard_state,
                 wish,
@@ -70,5 +96,7 @@ class Loop:
                 contact=contact,
             )
             self._base.drive(twist)
+            if self._log is not None:
+                self._log.on_cycle(Cycle(odometry, felt, wish, twist), self._base.battery)
             self._on_cycle(odometry)
         perceiving.cancel()

@@ -1,0 +1,119 @@
+"""MCAP files that follow each other: run.mcap, run.1.mcap, ... each whole in itself.
+
+Chunks are small and go out at once, so that whatever ends the program costs the last second only.
+"""
+
+import os
+from collections import deque
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import BinaryIO, NamedTuple
+
+import msgspec
+from mcap.writer import CompressionType, Writer
+
+from gvgbot.recording.messages import CHANNELS, Channel
+from gvgbot.recording.schemas import DESCRIPTORS
+
+CHUNK_BYTES = 65_536
+METADATA = "gvgbot"  # the name of the record that says what a file belongs to
+SYNC_EVERY_BYTES = 1_000_000  # that a power failure may cost
+_EVENT_SCHEMA = {
+    "type": "object",
+    "properties": {"event": {"type": "string"}, "stamp": {"type": "number"}},
+}
+
+
+class Entry(NamedTuple):
+    """One message: when it was taken down and when it was true, in ns, and its bytes."""
+
+    channel: Channel
+    logged: int
+    stamp: int
+    data: bytes
+
+
+def part_path(first: Path, number: int) -> Path:
+    """The file that follows after so many others."""
+    return first if number == 0 else first.with_suffix(f".{number}{first.suffix}")
+
+
+def free_path(wanted: Path) -> Path:
+    """The path, or the next like it (run-2.mcap) at which there is nothing of a recording yet."""
+    path, number = wanted, 1
+    while path.exists() or any(path.parent.glob(f"{path.stem}.*{path.suffix}")):
+        number += 1
+        path = wanted.with_stem(f"{wanted.stem}-{number}")
+    return path
+
+
+class McapFiles:
+    """Files of limited size, of which the oldest go when there are too many bytes in all."""
+
+    def __init__(
+        self, first: Path, about: Mapping[str, str], *, file_bytes: float, total_bytes: float
+    ) -> None:
+        """`about` goes into each file. Raises OSError if the first cannot be made."""
+        self._first, self._about = first, dict(about)
+        self._file_bytes, self._total_bytes = file_bytes, total_bytes
+        self._part = 0
+        self._done: deque[tuple[Path, int]] = deque()  # files that are finished, and their bytes
+        self._open()
+
+    def _open(self) -> None:
+        self.path = part_path(self._first, self._part)
+        self._start(self.path.open("xb"))
+
+    def _start(self, file: BinaryIO) -> None:
+        self._file, self._synced = file, 0
+        self._writer = Writer(self._file, CHUNK_BYTES, CompressionType.ZSTD)
+        self._writer.start(library="gvgbot")
+        self._writer.add_metadata(METADATA, self._about | {"part": str(self._part)})
+        schemas = {"": 0}
+        for channel in CHANNELS:
+            if channel.schema not in schemas:
+                schemas[channel.schema] = _register_schema(self._writer, channel)
+        self._channels = {
+            channel: self._writer.register_channel(
+                channel.topic, channel.encoding, schemas[channel.schema]
+            )
+            for channel in CHANNELS
+        }
+        self._file.flush()
+
+    def write(self, entries: Sequence[Entry]) -> None:
+        """Add messages. Raises OSError; the files are of no more use then."""
+        for entry in entries:
+            number = self._channels[entry.channel]
+            self._writer.add_message(number, entry.logged, entry.data, entry.stamp)
+        self._file.flush()
+        size = self._file.tell()
+        if size - self._synced > SYNC_EVERY_BYTES:
+            os.fsync(self._file.fileno())
+            self._synced = size
+        if size > self._file_bytes:
+            self.finish()
+            self._part += 1
+            self._open()
+
+    def finish(self) -> None:
+        """End the file with its index, and make room. Raises OSError."""
+        with self._file:
+            self._writer.finish()  # type: ignore[no-untyped-call]
+        self._done.append((self.path, self.path.stat().st_size))
+        while sum(size for _, size in self._done) + self._file_bytes > self._total_bytes:
+            self._done.popleft()[0].unlink(missing_ok=True)
+
+    def abandon(self) -> None:
+        """Let go of the file as it is."""
+        try:
+            self._file.close()
+        except OSError:
+            return  # what could not be written still cannot be
+
+
+def _register_schema(writer: Writer, channel: Channel) -> int:
+    if channel.encoding == "json":
+        data = msgspec.json.encode(_EVENT_SCHEMA)
+        return int(writer.register_schema(channel.schema, "jsonschema", data))
+    return int(writer.register_schema(channel.schema, channel.encoding, DESCRIPTORS))

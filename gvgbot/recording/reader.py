@@ -1,0 +1,137 @@
+"""What a recording holds, in the order in which it happened, as far as the files go."""
+
+import os
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import BinaryIO
+
+import msgspec
+import zstandard
+from google.protobuf.message import DecodeError
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.records import Channel, Chunk, Message, Metadata
+from mcap.stream_reader import CRCValidationError, breakup_chunk
+from mcap.writer import MCAP0_MAGIC
+
+from gvgbot.errors import UsageError
+from gvgbot.recording import Lived
+from gvgbot.recording.files import METADATA, part_path
+from gvgbot.recording.messages import (
+    BATTERY,
+    CYCLE,
+    EVENT,
+    SCAN,
+    decode_battery,
+    decode_cycle,
+    decode_scan,
+)
+
+_HEAD = struct.Struct("<BQ")  # of a record: what it is, and the bytes that follow
+_DAMAGE = (
+    McapError,
+    CRCValidationError,
+    DecodeError,
+    zstandard.ZstdError,
+    struct.error,
+    UnicodeDecodeError,
+    msgspec.MsgspecError,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class About:
+    """What a recording says of itself."""
+
+    title: str  # of the world, or of the robot
+    config: str  # JSON
+    part: int  # files of the same recording that came before
+
+
+class Recording:
+    """A file and those that follow it, read once from the first message to the last."""
+
+    def __init__(self, path: Path) -> None:
+        """Raises UsageError if the file cannot be read, or is no recording."""
+        self._path = path
+        self.about = _about(path)
+        self.is_cut = False  # whether the last file that was read ends in the middle
+        self.left_out = 0  # messages that the disk was too slow for
+
+    def messages(self) -> Iterator[tuple[float, Lived]]:
+        """What the robot was given, each with the time (s) when it was taken down."""
+        for path in _parts(self._path, self.about.part):
+            with path.open("rb") as file:
+                yield from self._messages(file)
+
+    def _messages(self, file: BinaryIO) -> Iterator[tuple[float, Lived]]:
+        topics: dict[int, str] = {}
+        self.is_cut = True
+        try:
+            for opcode, content in _records(file):
+                if opcode == Opcode.CHUNK:
+                    yield from self._of_chunk(content, topics)
+                elif opcode == Opcode.FOOTER:
+                    self.is_cut = False
+        except _DAMAGE:
+            return
+
+    def _of_chunk(self, content: bytes, topics: dict[int, str]) -> Iterator[tuple[float, Lived]]:
+        """The messages of a chunk, none if a part of it is missing or wrong."""
+        chunk = Chunk.read(ReadDataStream(BytesIO(content)))
+        for record in breakup_chunk(chunk, validate_crc=True):
+            if isinstance(record, Channel):
+                topics[record.id] = record.topic
+            elif isinstance(record, Message):
+                topic, at = topics[record.channel_id], record.log_time / 1e9
+                if topic == SCAN.topic:
+                    yield at, decode_scan(record.data)
+                elif topic == CYCLE.topic:
+                    yield at, decode_cycle(record.data)
+                elif topic == BATTERY.topic:
+                    yield at, decode_battery(record.data)
+                elif topic == EVENT.topic:
+                    event = msgspec.json.decode(record.data)
+                    self.left_out += event["messages"] if event["event"] == "left_out" else 0
+
+
+def _about(path: Path) -> About:
+    try:
+        with path.open("rb") as file:
+            for opcode, content in _records(file):
+                if opcode != Opcode.METADATA:
+                    continue
+                found = Metadata.read(ReadDataStream(BytesIO(content)))
+                if found.name == METADATA:
+                    m = found.metadata
+                    return About(m["title"], m["config"], int(m["part"]))
+    except OSError as error:
+        raise UsageError(f"cannot read {path}: {error.strerror}") from error
+    except _DAMAGE:
+        pass
+    raise UsageError(f"{path} holds nothing of a gvgbot recording: it is cut short, or another's")
+
+
+def _records(file: BinaryIO) -> Iterator[tuple[int, bytes]]:
+    """The records of a file that are whole."""
+    if file.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
+        return
+    size = os.fstat(file.fileno()).st_size
+    while len(head := file.read(_HEAD.size)) == _HEAD.size:
+        opcode, length = _HEAD.unpack(head)
+        if length > size - file.tell():
+            return
+        yield opcode, file.read(length)
+
+
+def _parts(path: Path, number: int) -> Iterator[Path]:
+    """A file, and those of the same recording that follow it."""
+    ending = f".{number}{path.suffix}" if number else path.suffix
+    first = path.with_name(path.name.removesuffix(ending) + path.suffix)
+    yield path
+    while (path := part_path(first, number := number + 1)).exists():
+        yield path

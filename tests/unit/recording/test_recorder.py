@@ -1,0 +1,258 @@
+"""Recordings on disk: whole, cut, rotated, and on disks that are full or slow."""
+
+import errno
+import threading
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from structlog.testing import capture_logs
+
+from gvgbot.autonomy.control.reflexes import Felt
+from gvgbot.autonomy.loop import Cycle
+from gvgbot.errors import UsageError
+from gvgbot.geometry import Pose, Twist
+from gvgbot.hal.messages import Battery, Odometry, Scan
+from gvgbot.recording import Lived, recorder
+from gvgbot.recording.config import RecordingConfig
+from gvgbot.recording.files import Entry, McapFiles, free_path
+from gvgbot.recording.reader import Recording
+from gvgbot.recording.recorder import Recorder
+
+ABOUT = {"title": "ring", "config": "{}"}
+STILL = Twist(0.0, 0.0)
+
+
+def scan(stamp: float, seed: int = 0) -> Scan:
+    ranges = np.random.default_rng(seed).uniform(0.1, 5.0, 400)
+    return Scan(stamp, ranges, -1.0, 0.005, 0.1, 5.6)
+
+
+def cycle(stamp: float) -> Cycle:
+    return Cycle(Odometry(stamp, Pose(stamp, 0.0, 0.1), STILL), Felt(), STILL, STILL)
+
+
+def record(to: Recorder, cycles: int) -> list[Lived]:
+    """Fifty cycles a second, a scan after each fifth; what was recorded."""
+    lived: list[Lived] = []
+    for k in range(cycles):
+        lived.append(cycle(0.02 * k))
+        to.on_cycle(lived[-1], None)
+        if k % 5 == 4:
+            lived.append(scan(0.02 * k - 0.01, k))
+            to.on_scan(lived[-1])
+    return lived
+
+
+def config(path: Path, **settings: Any) -> RecordingConfig:
+    return RecordingConfig(path=path, **settings)
+
+
+def same(one: Lived, other: Lived) -> bool:
+    if isinstance(one, Scan) and isinstance(other, Scan):
+        return one.stamp == other.stamp and one.ranges.tobytes() == other.ranges.tobytes()
+    return one == other
+
+
+def read(path: Path) -> list[Lived]:
+    return [message for _, message in Recording(path).messages()]
+
+
+def assert_begins_as(found: Sequence[Lived], lived: Sequence[Lived]) -> None:
+    assert all(same(a, b) for a, b in zip(found, lived, strict=False))
+    assert len(found) <= len(lived)
+
+
+def test_what_is_recorded_is_read_in_the_same_order(tmp_path: Path) -> None:
+    with Recorder(config(tmp_path / "run.mcap"), ABOUT) as to:
+        lived = record(to, 100)
+        battery = Battery(1.0, 15.5, 0.8, charging=False)
+        last = cycle(9.0)
+        to.on_cycle(last, battery)
+        to.on_cycle(last, battery)
+    found = read(tmp_path / "run.mcap")
+    assert len(found) == len(lived) + 3
+    assert_begins_as(found, [*lived, last, battery, last])
+    recording = Recording(tmp_path / "run.mcap")
+    assert recording.about.title == "ring"
+    times = [at for at, _ in recording.messages()]
+    assert times == sorted(times)
+    assert not recording.is_cut
+
+
+def test_another_reader_finds_all_topics_with_their_schemas(tmp_path: Path) -> None:
+    with Recorder(config(tmp_path / "run.mcap"), ABOUT) as to:
+        record(to, 10)
+        to.on_event({"event": "decision", "stamp": 0.2, "reason": "ear"})
+        to.on_bytes("base", b"\xaa\x55", said=True)
+    with (tmp_path / "run.mcap").open("rb") as file:
+        found = [
+            (channel.topic, "" if schema is None else schema.name)
+            for schema, channel, _ in make_reader(file).iter_messages()
+        ]
+    assert found.count(("/scan", "foxglove.LaserScan")) == 2
+    assert found.count(("/cycle", "gvgbot.Cycle")) == 10
+    assert found.count(("/tf", "foxglove.FrameTransform")) == 10
+    assert found.count(("/events", "gvgbot.Event")) == 1
+    assert found.count(("/raw/base/said", "")) == 1
+
+
+def test_a_file_cut_at_any_byte_is_read_to_the_cut(tmp_path: Path) -> None:
+    with Recorder(config(tmp_path / "run.mcap"), ABOUT) as to:
+        lived = record(to, 250)
+    whole = (tmp_path / "run.mcap").read_bytes()
+    cut, lengths = tmp_path / "cut.mcap", []
+    rng = np.random.default_rng(7)
+    for size in [0, 1, 8, 9, 40, *sorted(rng.integers(0, len(whole), 40).tolist())]:
+        cut.write_bytes(whole[:size])
+        try:
+            recording = Recording(cut)
+        except UsageError:
+            assert size < 1000
+            continue
+        found = [message for _, message in recording.messages()]
+        assert recording.is_cut
+        assert_begins_as(found, lived)
+        lengths.append(len(found))
+    assert lengths == sorted(lengths)
+    assert len(set(lengths)) > 3
+    cut.write_bytes(whole[: len(whole) // 2])
+    assert len(read(cut)) > 0.2 * len(lived)
+
+
+def test_damage_ends_a_file_and_nothing_worse(tmp_path: Path) -> None:
+    with Recorder(config(tmp_path / "run.mcap"), ABOUT) as to:
+        lived = record(to, 400)
+    whole = np.frombuffer((tmp_path / "run.mcap").read_bytes(), np.uint8)
+    rng = np.random.default_rng(3)
+    for at in rng.integers(0, len(whole), 40).tolist():
+        damaged = whole.copy()
+        damaged[at] ^= 1 << int(rng.integers(8))
+        (tmp_path / "bad.mcap").write_bytes(damaged.tobytes())
+        try:
+            found = read(tmp_path / "bad.mcap")
+        except UsageError:
+            continue
+        assert_begins_as(found, lived)
+
+
+def test_files_follow_each_other_and_are_read_as_one(tmp_path: Path) -> None:
+    with Recorder(config(tmp_path / "run.mcap", file_mb=0.3), ABOUT, patient=True) as to:
+        lived = record(to, 2000)
+    names = {path.name for path in tmp_path.iterdir()}
+    assert {"run.mcap", "run.1.mcap", "run.2.mcap"} <= names
+    found = read(tmp_path / "run.mcap")
+    assert len(found) == len(lived)
+    assert_begins_as(found, lived)
+    later = read(tmp_path / "run.1.mcap")
+    assert 0 < len(later) < len(lived)
+    assert_begins_as(later[::-1], lived[::-1])
+
+
+def test_the_oldest_files_go_when_there_are_too_many_bytes(tmp_path: Path) -> None:
+    limited = config(tmp_path / "run.mcap", file_mb=0.1, total_mb=0.5)
+    with Recorder(limited, ABOUT, patient=True) as to:
+        lived = record(to, 3000)
+    assert not (tmp_path / "run.mcap").exists()
+    assert sum(path.stat().st_size for path in tmp_path.iterdir()) < 0.7e6
+    assert len(list(tmp_path.iterdir())) >= 2
+    oldest = min(tmp_path.iterdir(), key=lambda path: int(path.name.split(".")[1]))
+    assert_begins_as(read(oldest)[::-1], lived[::-1])
+
+
+def test_an_earlier_recording_stays(tmp_path: Path) -> None:
+    for _ in range(2):
+        with Recorder(config(tmp_path / "run.mcap"), ABOUT) as to:
+            record(to, 5)
+    assert {path.name for path in tmp_path.iterdir()} == {"run.mcap", "run-2.mcap"}
+    (tmp_path / "run-2.1.mcap").touch()
+    (tmp_path / "run-2.mcap").unlink()
+    assert free_path(tmp_path / "run.mcap").name == "run-3.mcap"
+
+
+class FullDisk(McapFiles):
+    """Has room for one batch only."""
+
+    left = 1
+
+    def write(self, entries: Sequence[Entry]) -> None:
+        if self.left == 0:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        self.left -= 1
+        super().write(entries)
+
+
+def test_a_full_disk_ends_the_recording_and_nothing_else(tmp_path: Path) -> None:
+    with (
+        capture_logs() as logged,
+        Recorder(config(tmp_path / "run.mcap"), ABOUT, files=FullDisk) as to,
+    ):
+        record(to, 200)
+    said = [line for line in logged if line["event"] == "recording ended"]
+    assert len(said) == 1
+    assert said[0]["reason"] == "No space left on device"
+
+
+def test_the_kernels_own_full_disk_is_survived() -> None:
+    with (
+        capture_logs() as logged,
+        Recorder(config(Path("run.mcap")), ABOUT, files=OnDevFull) as to,
+    ):
+        record(to, 500)
+    assert [line["event"] for line in logged] == ["recording ended"]
+
+
+class OnDevFull(McapFiles):
+    """Writes where nothing ever fits."""
+
+    def __init__(self, first: Path, about: dict[str, str], **limits: float) -> None:
+        super().__init__(Path("/dev/full"), about, **limits)
+
+    def _open(self) -> None:
+        self.path = self._first
+        self._start(self.path.open("r+b", buffering=0))
+
+
+class SlowDisk(McapFiles):
+    """Waits until it is told to go on."""
+
+    may_write = threading.Event()
+
+    def write(self, entries: Sequence[Entry]) -> None:
+        self.may_write.wait()
+        super().write(entries)
+
+
+def test_a_slow_disk_delays_nobody_and_the_gap_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recorder, "MOST_WAITING", 100_000)
+    with capture_logs() as logged:
+        with Recorder(config(tmp_path / "run.mcap"), ABOUT, files=SlowDisk) as to:
+            record(to, 500)  # would never return if it waited
+            SlowDisk.may_write.set()
+            while to.is_behind:
+                pass
+            record(to, 100)
+        assert [line["event"] for line in logged] == [
+            "recording cannot keep up: messages are left out",
+            "recording goes on",
+        ]
+    recording = Recording(tmp_path / "run.mcap")
+    kept = len(list(recording.messages()))
+    assert recording.left_out == logged[1]["left_out"] > 0
+    assert kept < 720
+
+
+@pytest.mark.parametrize("name", ["", "missing/run.mcap"])
+def test_where_nothing_can_be_written_nothing_begins(name: str, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"recording\.path"):
+        Recorder(config(tmp_path / name), ABOUT)
+
+
+def test_there_must_be_room_for_two_files(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="total_mb"):
+        config(tmp_path, file_mb=10.0, total_mb=15.0)
