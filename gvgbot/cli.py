@@ -13,6 +13,7 @@ from gvgbot.errors import GvgbotError, UsageError
 
 FAILURE, BAD_USAGE, INTERRUPTED = 1, 2, 130
 MOST_FRAMES = 200
+NO_ECHO_M = 80.0  # of the lasers that CARMEN logs were made with
 NEGATIVE_NUMBER = re.compile(r"-\.?\d")
 
 
@@ -72,6 +73,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_web(commands)
     _add_ctl(commands)
     _add_map(commands)
+    _add_replay(commands)
     return parser
 
 
@@ -280,6 +282,50 @@ def _add_map(commands: "argparse._SubParsersAction[_Parser]") -> None:
     info.set_defaults(command=_map_info)
 
 
+def _add_replay(commands: "argparse._SubParsersAction[_Parser]") -> None:
+    replay = commands.add_parser(
+        "replay",
+        help="map a recorded run once more",
+        description="Let the robot's mind live through a recording (MCAP) again, or through a "
+        "CARMEN log (ODOM and FLASER lines, plain or gzipped), and write a run directory. A "
+        "recording leaves the map of its run, to the last byte, unless --config or --set change "
+        "what the mind does.",
+        epilog="example: gvgbot replay run.mcap --out runs/again",
+    )
+    replay.add_argument("log", type=Path, metavar="FILE", help="the recording or log")
+    replay.add_argument(
+        "--config",
+        type=Path,
+        metavar="C.yaml",
+        help="default: that of the recorded run; carmen.yaml for a CARMEN log",
+    )
+    _add_overrides(replay)
+    replay.add_argument(
+        "--out", type=Path, metavar="DIR", help="run directory (default: a new one in runs/)"
+    )
+    replay.add_argument(
+        "--no-echo",
+        type=number,
+        default=NO_ECHO_M,
+        metavar="M",
+        help="ranges of a CARMEN log from here on mean that nothing was hit (default: %(default)s)",
+    )
+    replay.add_argument(
+        "--serve",
+        action="store_true",
+        help="play it on the network at the pace of life, for gvgbot monitor and web, until "
+        "stopped (SIGINT or SIGTERM)",
+    )
+    replay.add_argument(
+        "--speed",
+        type=speed,
+        default=1.0,
+        metavar="N",
+        help="with --serve: so many times faster than life",
+    )
+    replay.set_defaults(command=_replay)
+
+
 def _add_config(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "config", nargs="?", type=Path, metavar="CONFIG", help="default: sim.yaml, no hardware"
@@ -318,6 +364,14 @@ def tcp_port(text: str) -> int:
     """A number of a TCP port. Raises ValueError."""
     value = int(text)
     if not 0 <= value <= 65535:
+        raise ValueError(text)
+    return value
+
+
+def speed(text: str) -> float:
+    """A finite number above 0. Raises ValueError."""
+    value = number(text)
+    if value <= 0.0:
         raise ValueError(text)
     return value
 
@@ -410,6 +464,22 @@ def _map_info(options: argparse.Namespace) -> int:
     for line in facts(SavedRun.read(options.run)):
         _say(line)
     return 0
+
+
+def _replay(options: argparse.Namespace) -> int:
+    from gvgbot.replay import Wanted, replay
+
+    wanted = Wanted(
+        path=options.log,
+        config=options.config,
+        overrides=options.overrides,
+        no_echo_m=options.no_echo,
+    )
+    if not options.serve:
+        return replay(wanted, _say, out=options.out)
+    from gvgbot.playback import serve
+
+    return serve(wanted, out=options.out, speed=options.speed)
 
 
 def _say(text: str) -> None:

@@ -39,11 +39,13 @@ def record(to: Recorder, cycles: int) -> list[Lived]:
     """Fifty cycles a second, a scan after each fifth; what was recorded."""
     lived: list[Lived] = []
     for k in range(cycles):
-        lived.append(cycle(0.02 * k))
-        to.on_cycle(lived[-1], None)
+        now = cycle(0.02 * k)
+        to.on_cycle(now, None)
+        lived.append(now)
         if k % 5 == 4:
-            lived.append(scan(0.02 * k - 0.01, k))
-            to.on_scan(lived[-1])
+            seen = scan(0.02 * k - 0.01, k)
+            to.on_scan(seen)
+            lived.append(seen)
     return lived
 
 

@@ -1,0 +1,120 @@
+"""Error and time of a CARMEN log against hand-made relations, beside yag-slam if that is installed.
+
+    python -m benchmarks.bench_intel intel.log.gz intel.relations
+
+A relation is a line `t1 t2 dx dy dz roll pitch yaw`: where the robot was at t2, seen from t1. The
+relations of the usual logs, and the metric, are those of Kuemmerle et al. (2009).
+`pip install yag-slam` adds the second row; nothing else needs it.
+"""
+
+import argparse
+import importlib
+import importlib.util
+import math
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from gvgbot.carmen import CarmenLog, read_carmen
+from gvgbot.cli import NO_ECHO_M
+from gvgbot.geometry import Array, Pose
+from gvgbot.maps.trajectory import decode_tum
+from gvgbot.replay import Wanted, replay
+
+REACH_M = 30.0  # of the beams that yag-slam uses
+
+
+def relation_errors(relations: Array, stamps: Array, poses: Array) -> tuple[Array, Array]:
+    """Errors in m and rad of the relations that a trajectory covers, poses taken in between."""
+    poses = np.column_stack([poses[:, :2], np.unwrap(poses[:, 2])])
+    covered = ((relations[:, :2] >= stamps[0]) & (relations[:, :2] <= stamps[-1])).all(axis=1)
+    metres, turns = [], []
+    for t1, t2, dx, dy, *_, yaw in relations[covered].tolist():
+        a, b = (
+            Pose(*(float(np.interp(t, stamps, column)) for column in poses.T)) for t in (t1, t2)
+        )
+        off = a.to(b)
+        metres.append(math.hypot(off.x - dx, off.y - dy))
+        turns.append(abs(math.remainder(off.theta - yaw, math.tau)))
+    return np.array(metres), np.array(turns)
+
+
+def by_gvgbot(log: Path) -> tuple[Array, Array]:
+    with tempfile.TemporaryDirectory() as directory:
+        wanted = Wanted(path=log, config=None, overrides=[], no_echo_m=NO_ECHO_M)
+        replay(wanted, lambda _: None, out=Path(directory))
+        estimate = decode_tum((Path(directory) / "estimate.tum").read_text(encoding="utf-8"))
+    return estimate.stamps, estimate.poses
+
+
+def by_odometry(log: Path) -> tuple[Array, Array]:
+    recorded = _read(log)
+    return _rows([(o.stamp, o.odom_base) for o in recorded.odometry])
+
+
+def by_yag_slam(log: Path) -> tuple[Array, Array]:
+    """Its poses at the scans, with the odometry from there until the next."""
+    graph_slam = importlib.import_module("yag_slam.graph_slam")
+    models = importlib.import_module("yag_slam.models")
+    recorded = _read(log)
+    heard = {o.stamp: o.odom_base for o in recorded.odometry}
+    slam, scans = graph_slam.GraphSlam.default(), []
+    for scan in recorded.scans:
+        ranges = np.where(np.isfinite(scan.ranges), scan.ranges, NO_ECHO_M)
+        first, step = scan.angle_min, scan.angle_increment
+        last, at = first + step * (len(ranges) - 1), heard[scan.stamp]
+        known = models.LocalizedRangeScan(
+            ranges, first, last, step, 0.0, NO_ECHO_M, REACH_M, at.x, at.y, at.theta
+        )
+        slam.process_scan(known)
+        scans.append(known)
+    slam.run_opt()
+    corrected = [Pose(s.corrected_pose.x, s.corrected_pose.y, s.corrected_pose.t) for s in scans]
+    stamps = np.array([scan.stamp for scan in recorded.scans])
+    rows = []
+    for o in recorded.odometry:
+        k = max(0, int(np.searchsorted(stamps, o.stamp, side="right")) - 1)
+        rows.append((o.stamp, corrected[k].compose(heard[float(stamps[k])].to(o.odom_base))))
+    return _rows(rows)
+
+
+def _read(log: Path) -> CarmenLog:
+    return read_carmen(log, no_echo_m=NO_ECHO_M, base_laser=Pose())
+
+
+def _rows(poses: list[tuple[float, Pose]]) -> tuple[Array, Array]:
+    return np.array([t for t, _ in poses]), np.array([(p.x, p.y, p.theta) for _, p in poses])
+
+
+def measure(
+    name: str, mapper: Callable[[Path], tuple[Array, Array]], log: Path, relations: Array
+) -> None:
+    start = time.process_time()
+    stamps, poses = mapper(log)
+    seconds = time.process_time() - start
+    metres, turns = relation_errors(relations, stamps, poses)
+    print(
+        f"{name:10} {len(metres):5d} {metres.mean():8.4f} {np.median(metres):8.4f} "
+        f"{metres.max():8.3f} {math.degrees(turns.mean()):8.3f} {seconds:8.1f}"
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("log", type=Path)
+    parser.add_argument("relations", type=Path)
+    options = parser.parse_args()
+    relations = np.loadtxt(options.relations, ndmin=2)
+    mappers = {"odometry": by_odometry, "gvgbot": by_gvgbot}
+    if importlib.util.find_spec("yag_slam"):
+        mappers["yag-slam"] = by_yag_slam
+    print("mapper     pairs   mean m median m    max m mean deg    CPU s")
+    for name, mapper in mappers.items():
+        measure(name, mapper, options.log, relations)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,139 @@
+"""Logs in the text form of CARMEN: dead reckoning (`ODOM`) and laser sweeps (`FLASER`).
+
+    ODOM x y theta tv rv accel stamp host logger_stamp
+    FLASER n r1 .. rn  laser_x laser_y laser_theta  x y theta  stamp host logger_stamp
+
+Metres, radians and seconds. Other lines are passed over.
+"""
+
+import gzip
+import math
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from operator import attrgetter
+from pathlib import Path
+
+import numpy as np
+
+from gvgbot.autonomy.control.reflexes import Felt
+from gvgbot.autonomy.loop import Cycle
+from gvgbot.errors import UsageError
+from gvgbot.geometry import STANDSTILL, Pose
+from gvgbot.hal.messages import Odometry, Scan
+from gvgbot.recording import Lived
+
+_GZIP = b"\x1f\x8b"
+_TAIL = 9  # words of a FLASER line after the ranges
+_ODOM_WORDS = 10
+_LONGEST_GAP_S = 0.2  # between messages; logs leave some out
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CarmenLog:
+    """What a log holds, each by its stamp; `damaged` lines could not be read."""
+
+    odometry: list[Odometry]
+    scans: list[Scan]
+    damaged: int
+
+
+def read_carmen(path: Path, *, no_echo_m: float, base_laser: Pose) -> CarmenLog:
+    """The odometry and the scans of a log, plain or gzipped.
+
+    A sweep covers the half-circle ahead. Ranges from `no_echo_m` on mean that nothing was hit. The
+    base's pose at each scan counts as odometry too. Raises UsageError for a file that cannot be
+    read, is no text, or has no sweep in it.
+    """
+    odometry, scans, damaged = list[Odometry](), list[Scan](), 0
+    for line in _lines(path):
+        try:
+            match line.split():
+                case ["ODOM", *words]:
+                    odometry.append(_odometry(words))
+                case ["FLASER", *words]:
+                    scan, at = _sweep(words, no_echo_m, base_laser)
+                    scans.append(scan)
+                    odometry.append(at)
+        except ValueError:
+            damaged += 1
+    if not scans:
+        raise UsageError(f"{path} has no FLASER line that can be read: is it a CARMEN log?")
+    by_stamp = attrgetter("stamp")
+    return CarmenLog(sorted(odometry, key=by_stamp), sorted(scans, key=by_stamp), damaged)
+
+
+def _lines(path: Path) -> Iterator[str]:
+    """The lines, as far as the file goes: an archive that was cut ends with a piece of one."""
+    try:
+        with path.open("rb") as file:
+            packed = file.read(len(_GZIP)) == _GZIP
+        with gzip.open(path) if packed else path.open("rb") as file:
+            yield from (_text(path, line) for line in file)
+    except EOFError:
+        yield "ODOM"
+    except (OSError, zlib.error) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise UsageError(f"cannot read {path}: {reason}") from error
+
+
+def _text(path: Path, line: bytes) -> str:
+    if b"\0" in line:
+        raise UsageError(f"{path} is not text: a CARMEN log is needed")
+    return line.decode(errors="replace")
+
+
+def _odometry(words: list[str]) -> Odometry:
+    """Raises ValueError."""
+    if len(words) != _ODOM_WORDS - 1:
+        raise ValueError(words)
+    x, y, theta, stamp = _numbers([*words[:3], words[6]])
+    return Odometry(stamp, Pose(x, y, theta), STANDSTILL)
+
+
+def _sweep(words: list[str], no_echo_m: float, base_laser: Pose) -> tuple[Scan, Odometry]:
+    """A scan, and where the base was. Raises ValueError."""
+    beams = int(words[0]) if words else 0
+    if beams < 2 or len(words) != 1 + beams + _TAIL:
+        raise ValueError(words)
+    ranges = np.array(_numbers(words[1 : 1 + beams]))
+    x, y, theta, stamp = _numbers([*words[beams + 4 : beams + 7], words[beams + 7]])
+    ranges[ranges >= no_echo_m] = np.inf
+    ranges[ranges <= 0.0] = np.nan
+    step = math.pi / (beams - beams % 2)  # 180 or 181 beams are a degree apart
+    scan = Scan(stamp, ranges, -math.pi / 2, step, 0.0, no_echo_m, base_laser=base_laser)
+    return scan, Odometry(stamp, Pose(x, y, theta), STANDSTILL)
+
+
+def _numbers(words: list[str]) -> list[float]:
+    """Finite numbers. Raises ValueError."""
+    numbers = [float(word) for word in words]
+    if not all(map(math.isfinite, numbers)):
+        raise ValueError(words)
+    return numbers
+
+
+def messages(log: CarmenLog) -> Iterator[tuple[float, Lived]]:
+    """A log as a robot would have lived through it, by the stamps."""
+    scans = iter(log.scans)
+    scan = next(scans, None)
+    for odometry in _without_gaps(log.odometry):
+        yield odometry.stamp, Cycle(odometry, Felt(), STANDSTILL, STANDSTILL)
+        while scan is not None and scan.stamp <= odometry.stamp:
+            yield odometry.stamp, scan
+            scan = next(scans, None)
+
+
+def _without_gaps(odometry: list[Odometry]) -> Iterator[Odometry]:
+    """The messages, and evenly spread ones in between where they are far apart in time."""
+    yield from odometry[:1]
+    for earlier, later in pairwise(odometry):
+        motion = earlier.odom_base.to(later.odom_base)
+        parts = max(1, math.ceil((later.stamp - earlier.stamp) / _LONGEST_GAP_S))
+        for part in range(1, parts):
+            share = part / parts
+            moved = Pose(share * motion.x, share * motion.y, share * motion.theta)
+            stamp = earlier.stamp + share * (later.stamp - earlier.stamp)
+            yield Odometry(stamp, earlier.odom_base.compose(moved), later.twist)
+        yield later

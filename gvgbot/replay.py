@@ -1,0 +1,125 @@
+"""A recorded run, or a log of somebody else's robot, through the robot's mind once more."""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from gvgbot.autonomy.loop import Cycle
+from gvgbot.carmen import messages, read_carmen
+from gvgbot.config import Config, config_in, load_config
+from gvgbot.errors import UsageError
+from gvgbot.geometry import Pose
+from gvgbot.hal.messages import Scan
+from gvgbot.maps.run_directory import RunDirectory
+from gvgbot.recording import Lived, extra_needed
+from gvgbot.session import Session
+
+MCAP = b"\x89MCAP"
+CARMEN_CONFIG = Path("carmen.yaml")
+
+
+@dataclass(slots=True)
+class Log:
+    """What is to be replayed: a title, a configuration, and messages by the time they came, s.
+
+    `led` if somebody else drove. `flaws` says, after the last message, what was wrong with it.
+    """
+
+    title: str
+    config: Config
+    messages: Iterator[tuple[float, Lived]]
+    led: bool
+    flaws: Callable[[], list[str]] = field(default=list)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wanted:
+    """A file to replay, and how: `config` None is the recorded one, or that for CARMEN logs."""
+
+    path: Path
+    config: Path | None
+    overrides: list[str]
+    no_echo_m: float
+
+
+def replay(wanted: Wanted, say: Callable[[str], None], *, out: Path | None) -> int:
+    """Map a log again, say where the map is, and return the exit status.
+
+    Raises UsageError for a log or directory that cannot be used, ConfigError.
+    """
+    log = open_log(wanted)
+    with RunDirectory.create(out, world=log.title) as directory:
+        session = Session(log.config, directory, place=None, led=log.led)
+        session.title, session.failure = log.title, "interrupted"
+        try:
+            for _, message in log.messages:
+                take(session, message)
+            session.failure = None
+        finally:
+            session.save()
+    for line in conclusion(session, log):
+        say(line)
+    return 0
+
+
+def take(session: Session, message: Lived) -> None:
+    """Let a session see a scan, or live through a control cycle."""
+    match message:
+        case Scan():
+            session.on_events(session.pipeline.perceive(message))
+        case Cycle():
+            session.pipeline.control(message.odometry, message.felt)
+            session.on_cycle(message.odometry, message.felt.contact)
+
+
+def conclusion(session: Session, log: Log) -> list[str]:
+    """What came of it, for people."""
+    pipeline, path = session.pipeline, session.directory.path
+    graph, mission = pipeline.mapper.graph, pipeline.mission
+    outcome = f"{mission.outcome}: {mission.reason}; " if mission.outcome else ""
+    return [
+        f"replayed: {outcome}{len(graph.vertices)} vertices, {len(graph.edges)} edges, "
+        f"{pipeline.travelled:.0f} m",
+        *log.flaws(),
+        f"map:     {path / 'map.geojson'}",
+        f"picture: {path / 'map.png'}",
+    ]
+
+
+def open_log(wanted: Wanted) -> Log:
+    """The log in a file of either kind. Raises UsageError, ConfigError."""
+    try:
+        with wanted.path.open("rb") as file:
+            start = file.read(len(MCAP))
+    except OSError as error:
+        raise UsageError(f"cannot read {wanted.path}: {error.strerror}") from error
+    return _recording(wanted) if start == MCAP else _carmen(wanted)
+
+
+def _recording(wanted: Wanted) -> Log:
+    with extra_needed():
+        from gvgbot.recording.reader import Recording
+    recording = Recording(wanted.path)
+    if wanted.config is None:
+        source = f"the configuration in {wanted.path}"
+        config = config_in(recording.about.config, source, wanted.overrides)
+    else:
+        config = load_config(wanted.config, wanted.overrides)
+
+    def flaws() -> list[str]:
+        left_out = f"{recording.left_out} messages were left out when it was recorded"
+        cut = "the recording ends in the middle, as when a program is killed"
+        return [left_out] * bool(recording.left_out) + [cut] * recording.is_cut
+
+    return Log(recording.about.title, config, recording.messages(), False, flaws)
+
+
+def _carmen(wanted: Wanted) -> Log:
+    config = load_config(wanted.config or CARMEN_CONFIG, wanted.overrides)
+    mount = config.laser
+    base_laser = Pose(mount.x_m, mount.y_m, math.radians(mount.yaw_deg))
+    log = read_carmen(wanted.path, no_echo_m=wanted.no_echo_m, base_laser=base_laser)
+    flaws = [f"{log.damaged} damaged lines were passed over"] if log.damaged else []
+    title = wanted.path.name.split(".")[0] or "log"
+    return Log(title, config, messages(log), True, lambda: flaws)

@@ -1,0 +1,150 @@
+"""A whole exploration is recorded; what is replayed from the file is the same run again."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gvgbot.cli import main
+from gvgbot.clock import LoopClock, run_in_virtual_time
+from gvgbot.drivers.world import save_world
+from gvgbot.links import Links
+from gvgbot.maps.run_directory import RunDirectory
+from gvgbot.maps.trajectory import decode_tum
+from gvgbot.playback import PlayedRobot
+from gvgbot.replay import Wanted, open_log
+from gvgbot.session import Session
+from tests.replay.test_pipeline import LOLLIPOP, START
+from tests.twin.run_rig import Network, at_once
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(120)]
+
+SAME = ["map.geojson", "map.pgm", "map.yaml", "map.png", "seen.png", "events.jsonl"]
+SAME += ["estimate.tum", "online.tum", "odometry.tum"]
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """A run directory, and the recording of the run."""
+
+    run: Path
+    recording: Path
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
+    """An exploration that bumps into nothing, but closes a loop; with what was on the wires."""
+    directory = tmp_path_factory.mktemp("recorded")
+    save_world(LOLLIPOP, directory)
+    run, recording = directory / "run", directory / "run.mcap"
+    arguments = ["explore", "--world", str(directory / f"{LOLLIPOP.name}.yaml"), "--out", str(run)]
+    arguments += ["--start", str(START.x), str(START.y), str(START.theta)]
+    arguments += ["--set", f"recording.path={recording}", "--set", "recording.raw_bytes=true"]
+    assert main(arguments) == 0
+    return Recorded(run, recording)
+
+
+def test_a_recording_is_replayed_to_the_same_map_byte_for_byte(
+    recorded: Recorded, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["replay", str(recorded.recording), "--out", str(tmp_path)]) == 0
+    assert capsys.readouterr().out.startswith("replayed: explored")
+    for name in SAME:
+        assert (tmp_path / name).read_bytes() == (recorded.run / name).read_bytes(), name
+    was, now = (json.loads((d / "summary.json").read_text()) for d in (recorded.run, tmp_path))
+    for key in ("outcome", "reason", "distance_m", "duration_s", "contacts", "vertices", "config"):
+        assert now[key] == was[key]
+
+
+@pytest.fixture
+def cut(recorded: Recorded, tmp_path: Path) -> Path:
+    """The first part of the recording, as a killed program leaves it."""
+    whole = recorded.recording.read_bytes()
+    path = tmp_path / "cut.mcap"
+    path.write_bytes(whole[: int(0.4 * len(whole))])
+    return path
+
+
+def test_a_recording_that_was_cut_is_replayed_to_the_cut(
+    recorded: Recorded, cut: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["replay", str(cut), "--out", str(tmp_path / "run")]) == 0
+    assert "ends in the middle" in capsys.readouterr().out
+    for name in ("odometry.tum", "online.tum"):
+        original = (recorded.run / name).read_text()
+        again = (tmp_path / "run" / name).read_text()
+        assert 0.2 * len(original) < len(again) < 0.6 * len(original)
+        assert original.startswith(again)
+
+
+def test_a_replay_with_another_mind_is_another_run(
+    recorded: Recorded, cut: Path, tmp_path: Path
+) -> None:
+    other = ["--set", "autonomy.keyframe.distance_m=0.5"]
+    assert main(["replay", str(cut), "--out", str(tmp_path / "run"), *other]) == 0
+    again = (tmp_path / "run" / "online.tum").read_text()
+    assert not (recorded.run / "online.tum").read_text().startswith(again)
+    config = json.loads((tmp_path / "run" / "summary.json").read_text())["config"]
+    assert config["autonomy"]["keyframe"]["distance_m"] == 0.5
+    assert config["twin"]["world"].endswith(".yaml")
+
+
+@pytest.mark.parametrize("size", [3, 8, 30])
+def test_a_recording_without_a_beginning_is_one_clear_line(
+    size: int, recorded: Recorded, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(recorded.recording.read_bytes()[:size])
+    assert main(["replay", str(cut), "--out", str(tmp_path / "run")]) == 2
+    assert len(capsys.readouterr().err.splitlines()) == 1
+    assert not (tmp_path / "run").exists()
+
+
+def played(path: Path, out: Path, speed: float, seconds: float) -> Network:
+    """What the network gets while a recording is played for so long."""
+    log = open_log(Wanted(path=path, config=None, overrides=[], no_echo_m=80.0))
+    network = Network()
+    with RunDirectory.create(out, world=log.title) as directory:
+        session = Session(log.config, directory, place=None)
+        robot = PlayedRobot(session, network, log, speed, at_once)
+
+        async def live() -> None:
+            clock = LoopClock()
+
+            async def told() -> str:
+                await clock.sleep_until(clock.now() + seconds)
+                return "SIGINT"
+
+            await robot.serve(told(), Links(log.config, clock, None))
+
+        run_in_virtual_time(live())
+    return network
+
+
+def test_a_recording_is_played_at_the_pace_of_life_or_faster(
+    recorded: Recorded, cut: Path, tmp_path: Path
+) -> None:
+    online = decode_tum((recorded.run / "online.tum").read_text(encoding="utf-8"))
+    states = played(cut, tmp_path / "run", speed=2.0, seconds=5.0).states
+    assert states[-1].stamp - states[0].stamp == pytest.approx(10.0, abs=0.3)
+    for state in states:
+        assert state.cycle_age is None or 0.0 <= state.cycle_age < 0.2
+        if state.phase != "exploring":
+            continue
+        k = int(np.abs(online.stamps - state.stamp).argmin())
+        assert np.hypot(*(online.positions[k] - state.pose[:2])) < 0.15
+    assert sum(state.phase == "exploring" for state in states) > 0.8 * len(states)
+
+
+def test_when_a_recording_is_over_the_robot_stands_and_is_still_there(
+    cut: Path, tmp_path: Path
+) -> None:
+    network = played(cut, tmp_path / "run", speed=10.0, seconds=20.0)
+    last = network.states[-1]
+    assert last.cycle_age is not None
+    assert last.cycle_age < 0.2
+    assert last.pose == network.states[-20].pose
+    assert network.maps[-1].vertices
+    assert (tmp_path / "run" / "map.geojson").exists()

@@ -1,0 +1,100 @@
+"""CARMEN logs: every field where the format has it, damage counted, no file that surprises."""
+
+import gzip
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gvgbot.carmen import CarmenLog, read_carmen
+from gvgbot.errors import UsageError
+from gvgbot.geometry import Pose
+
+ODOM = "ODOM 1.0 2.0 0.5 0.1 0.2 0.0 7.25 host 3.0"
+FLASER = "FLASER 4 1.5 81.83 0.0 2.5 9.0 9.0 9.0 1.1 2.1 0.6 7.5 host 3.25"
+
+
+def read(path: Path) -> CarmenLog:
+    return read_carmen(path, no_echo_m=80.0, base_laser=Pose(0.1, 0.0, 0.0))
+
+
+def written(path: Path, *lines: str) -> Path:
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def test_odometry_and_scans_are_read_by_the_fields_of_the_format(tmp_path: Path) -> None:
+    log = read(written(tmp_path / "a.log", "# a comment", "PARAM x y", ODOM, FLASER))
+    assert [(o.stamp, o.odom_base) for o in log.odometry] == [
+        (7.25, Pose(1.0, 2.0, 0.5)),
+        (7.5, Pose(1.1, 2.1, 0.6)),
+    ]
+    (scan,) = log.scans
+    assert (scan.stamp, scan.base_laser, log.damaged) == (7.5, Pose(0.1, 0.0, 0.0), 0)
+    np.testing.assert_array_equal(scan.ranges, [1.5, math.inf, math.nan, 2.5])
+
+
+@pytest.mark.parametrize(("beams", "step_deg"), [(180, 1.0), (181, 1.0), (360, 0.5), (361, 0.5)])
+def test_a_sweep_covers_half_a_circle_from_the_right(
+    beams: int, step_deg: float, tmp_path: Path
+) -> None:
+    line = f"FLASER {beams} {' '.join(['1'] * beams)} 0 0 0 0 0 0 1 h 1"
+    (scan,) = read(written(tmp_path / "a.log", line)).scans
+    assert math.degrees(scan.angle_increment) == pytest.approx(step_deg)
+    assert math.degrees(scan.angle_min) == pytest.approx(-90.0)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "ODOM 1 2",
+        "ODOM 1 2 x 0 0 0 7 host 3",
+        "ODOM 1 2 nan 0 0 0 7 host 3",
+        "FLASER",
+        FLASER.replace("FLASER 4", "FLASER 5"),
+        FLASER.replace("1.5", "1.5.5"),
+        FLASER[:30],
+    ],
+)
+def test_a_damaged_line_is_counted_and_passed_over(line: str, tmp_path: Path) -> None:
+    log = read(written(tmp_path / "a.log", line, FLASER))
+    assert (len(log.scans), len(log.odometry), log.damaged) == (1, 1, 1)
+
+
+def test_lines_that_come_late_are_put_in_order(tmp_path: Path) -> None:
+    late = ODOM.replace("7.25", "7.9")
+    log = read(written(tmp_path / "a.log", late, FLASER, ODOM))
+    assert [o.stamp for o in log.odometry] == [7.25, 7.5, 7.9]
+
+
+def test_a_packed_log_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
+    whole = gzip.compress("\n".join([FLASER] * 2000).encode(), mtime=0)
+    path = tmp_path / "a.log.gz"
+    path.write_bytes(whole)
+    assert (len(read(path).scans), read(path).damaged) == (2000, 0)
+    path.write_bytes(whole[: len(whole) // 2])
+    assert 0 < len(read(path).scans) < 2000
+    assert read(path).damaged >= 1
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"", "no FLASER"),
+        (ODOM.encode(), "no FLASER"),
+        (b"\x7fELF\0\0\1\n", "not text"),
+        (b"\x1f\x8bnot gzip at all", "cannot read"),
+    ],
+)
+def test_a_file_that_is_no_log_is_refused(content: bytes, said: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.log"
+    path.write_bytes(content)
+    with pytest.raises(UsageError, match=said):
+        read(path)
+
+
+def test_a_missing_file_and_a_directory_are_refused(tmp_path: Path) -> None:
+    for path in (tmp_path / "none.log", tmp_path):
+        with pytest.raises(UsageError, match="cannot read"):
+            read(path)
