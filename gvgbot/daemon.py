@@ -107,9 +107,7 @@ def _conclude(session: Session) -> int:
     return 0 if mission.outcome == "explored" else 1
 
 
-def run(
-    config: Config, *, out: Path | None, known: Path | None = None, anew: bool = False
-) -> int:
+def run(config: Config, *, out: Path | None, known: Path | None = None, anew: bool = False) -> int:
     """Be the daemon until a signal ends it; the exit status, 0 whatever was found by then.
 
     With a state directory it goes on with the map that it was making, unless `anew` or `out` say

@@ -29,6 +29,18 @@ def log_event(event: events.Event) -> None:
             log.info("recovery", action=event.action, reason=event.reason)
         case events.Finished():
             log.info("finished", outcome=event.outcome, reason=event.reason)
+        case events.Requested():
+            log.info(
+                "requested",
+                request=event.request,
+                origin=event.origin,
+                done=event.done,
+                answer=event.answer,
+            )
+        case events.ErrandEnded():
+            log.info(
+                "errand ended", errand=event.errand, outcome=event.outcome, reason=event.reason
+            )
         case _:
             pass
 
@@ -63,5 +75,5 @@ def status_line(state: State) -> str:
     if state.phase == "starting":
         return f"starting: {state.reason}" if state.reason else "starting"
     graph = f"{state.vertices} vertices, {state.frontiers} frontiers"
-    what = state.outcome or state.phase
+    what = state.outcome if state.phase == "finished" else state.errand or state.phase
     return f"{what}: {state.reason}; {graph}" if state.reason else f"{what}: {graph}"

@@ -91,8 +91,10 @@ def kind_of(name: str) -> type[Arguments]:
 def parse(name: str, data: bytes, encoding: str) -> Arguments:
     """The arguments in a payload, JSON if its encoding says so; nothing stands for none.
 
-    Raises ValueError that says what is wrong with them.
+    Raises ValueError that says what is wrong with them, or with the name.
     """
+    if name not in REQUESTS:
+        raise ValueError(f"there is no such request; there are {', '.join(REQUESTS)}")
     if not data:
         data, encoding = b"{}", JSON
     decode = msgspec.json.decode if encoding.startswith(JSON) else msgspec.msgpack.decode

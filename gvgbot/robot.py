@@ -12,20 +12,22 @@ import structlog
 from gvgbot.autonomy import events
 from gvgbot.autonomy.loop import Loop
 from gvgbot.clock import Clock, LoopClock
+from gvgbot.config import Config
 from gvgbot.errors import GvgbotError
-from gvgbot.geometry import STANDSTILL
-from gvgbot.hal.guard import Guard
-from gvgbot.hal.messages import Odometry
+from gvgbot.hal.guard import Guard, Reason
+from gvgbot.hal.messages import Contact, Odometry
 from gvgbot.journal import GuardJournal, log_event, status_line
 from gvgbot.links import Devices, Links
 from gvgbot.live_feed import LiveFeed
 from gvgbot.live_map import LiveMap
 from gvgbot.maps.run_directory import record_of
 from gvgbot.persistence.keeper import Keeper
+from gvgbot.requests import Answer, Asked
 from gvgbot.service import Notifier
 from gvgbot.session import Session
 from gvgbot.simulation import Simulation
 from gvgbot.snapshots import state
+from gvgbot.steering import Steering
 from gvgbot.topics import EVENTS_KEPT, MAP, STATE, Event, Events, Map, Payload, State
 
 SAVE_EVERY = 30.0  # s at least between two savings while the map grows
@@ -46,6 +48,9 @@ class Network(Protocol):
     async def answer(self) -> None:
         """Answer queries until cancelled."""
 
+    async def hear(self, handle: Callable[[Asked], Awaitable[Answer]]) -> None:
+        """Put requests to the handler until cancelled."""
+
 
 class Robot:
     """One exploration as a daemon. `off_loop` runs a function that takes long, and waits for it."""
@@ -63,6 +68,7 @@ class Robot:
         self._network, self._off_loop, self._keeper = network, off_loop, keeper
         self._pipeline = session.pipeline
         self._grown, self._finished = asyncio.Event(), asyncio.Event()
+        self._saving = asyncio.Lock()  # one at a time
         self._odometry: Odometry | None = None
         self._cycles, self._sequence = 0, 0
         self._happened, self._told = 0, 0  # events; and those of them that were published
@@ -87,7 +93,7 @@ class Robot:
         self._prepare(links)
         work = {
             "devices": self._devices.run(),
-            "explore": self._explore(),
+            "explore": self._loop.run(),
             "beat": self._beat(),
             "save": self._keep_saved(),
         }
@@ -97,6 +103,7 @@ class Robot:
         if self._network is not None:
             work["network"] = self._network.answer()
             work["map"] = self._keep_shown(self._network)
+            work["requests"] = self._network.hear(self._steering().handle)
         async with asyncio.TaskGroup() as tasks:
             serving = [tasks.create_task(task, name=name) for name, task in work.items()]
             log.info("stopping", signal=await stopped)
@@ -123,35 +130,69 @@ class Robot:
             on_events=self._on_events,
             on_cycle=self._on_cycle,
             log=self._session.recorder,
+            stays=True,
         )
+        if self._pipeline.mission.outcome is not None:  # before a restart
+            self._grown.set()
 
-    async def _explore(self) -> None:
-        """Explore to the end, and then stand there."""
-        await self._loop.run()
-        self._finished.set()
-        self._grown.set()
-        while True:
-            self._note(await self._devices.base.next_odometry())
-            self._be_ready()
-            self._devices.base.drive(STANDSTILL)
+    def _steering(self) -> Steering:
+        return Steering(
+            self._session.config,
+            self._pipeline.errands,
+            self,
+            now=self._clock.now,
+            save=self._save_as_asked,
+            use=self._use,
+            tell=self._on_events,
+        )
 
     async def _keep_saved(self) -> None:
         """Save now and then while the map grows, and when it is finished."""
-        while not self._finished.is_set():
+        while True:
             await self._grown.wait()
             self._grown.clear()
             await self._save()
+            if self._pipeline.mission.outcome is not None:
+                log.info("standing still until stopped", map=str(self._session.directory.path))
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(SAVE_EVERY):
                     await self._finished.wait()
-        await self._save()
-        log.info("standing still until stopped", map=str(self._session.directory.path))
+            self._finished.clear()
 
     async def _save(self) -> None:
         try:
-            await self._off_loop(self._session.saving(unfinished="still exploring"))
+            await self._save_as_asked()
         except GvgbotError as error:
             log.warning("map not saved", reason=str(error))
+
+    async def _save_as_asked(self) -> str:
+        """Save, and return where. Raises GvgbotError if that cannot be."""
+        async with self._saving:
+            await self._off_loop(self._session.saving(unfinished="still exploring"))
+        return str(self._session.directory.path)
+
+    def _use(self, config: Config) -> None:
+        """Put a configuration into effect, as far as that can be changed."""
+        self._session.config = config
+        self._pipeline.errands.configure(config.exploration)
+        self._loop.guard_by(Guard(config.robot.limits, config.robot.radius_m))
+
+    # -- what the robot feels ----------------------------------------------------------------------
+
+    @property
+    def away(self) -> str | None:
+        """Which devices are missing, and why."""
+        return self._devices.away
+
+    @property
+    def contact(self) -> Contact | None:
+        """What the base feels."""
+        return self._devices.base.contact
+
+    @property
+    def stopped_for(self) -> Reason | None:
+        """Why the guard holds the robot."""
+        return self._loop.stopped_for
 
     async def _keep_shown(self, network: Network) -> None:
         """Publish the map as it grows."""
@@ -180,8 +221,10 @@ class Robot:
             self._take_down(event)
             if self._keeper is not None:
                 self._keeper.on_event(event)
-            if isinstance(event, events.VertexAdded):
+            if isinstance(event, events.VertexAdded | events.Finished):
                 self._grown.set()
+            if isinstance(event, events.Finished):
+                self._finished.set()
             if isinstance(event, events.Decision):
                 self._decided = event.reason
 
@@ -196,9 +239,10 @@ class Robot:
 
     def _on_cycle(self, odometry: Odometry) -> None:
         self._note(odometry)
-        self._session.on_cycle(odometry, self._devices.base.contact)
-        if self._pipeline.keyframes:  # a scan and odometry made the first
-            self._be_ready()
+        if not self._pipeline.errands.is_resting:
+            self._session.on_cycle(odometry, self._devices.base.contact)
+        if self._pipeline.keyframes or self._pipeline.mission.outcome is not None:
+            self._be_ready()  # a scan and odometry made the first
         if self._ready:
             self._guard.note(self._loop.stopped_for, odometry.stamp)
 
@@ -243,6 +287,7 @@ class Robot:
             slips=self._devices.slips,
             laser=self._devices.laser_health,
             base=self._devices.base_health,
+            requests=self._session.config.telemetry.requests,
         )
 
 

@@ -29,8 +29,10 @@ def state(
     slips: int,
     laser: LinkHealth,
     base: LinkHealth,
+    requests: tuple[str, ...] = (),
 ) -> State:
     """The state at `stamp`; `odometry` is the last control cycle's, `away` says what is missing."""
+    errand = pipeline.errands.errand
     mission, graph, map_base = pipeline.mission, pipeline.mapper.graph, pipeline.map_base
     twist = STANDSTILL if odometry is None else odometry.twist
     return State(
@@ -41,6 +43,8 @@ def state(
         phase=_phase(pipeline, away),
         outcome=mission.outcome,
         reason=mission.reason or away or "",
+        errand=None if errand is None else str(errand),
+        requests=requests,
         pose=(map_base.x, map_base.y, map_base.theta),
         covariance=tuple(pose_covariance(pipeline, odometry, noise).ravel().tolist()),
         twist=(twist.linear, twist.angular),
@@ -59,11 +63,18 @@ def state(
 
 
 def _phase(pipeline: Pipeline, away: str | None) -> Phase:
-    if pipeline.mission.outcome is not None:
+    errands = pipeline.errands
+    if errands.is_paused:
+        return "paused"
+    if errands.errand is None and pipeline.mission.outcome is not None:
         return "finished"
     if not pipeline.keyframes:
         return "starting"
-    return "exploring" if away is None else "halted"
+    if away is not None:
+        return "halted"
+    if errands.errand is not None:
+        return "errand"
+    return "waiting" if errands.is_waiting else "exploring"
 
 
 def pose_covariance(pipeline: Pipeline, odometry: Odometry | None, noise: OdometryNoise) -> Array:

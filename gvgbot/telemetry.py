@@ -165,15 +165,20 @@ def _asked(query: zenoh.Query, key: str) -> Asked:
     encoding = MESSAGEPACK if query.encoding is None else str(query.encoding)
     if len(data) > _LONGEST_ARGUMENTS:
         data = data[:_LONGEST_ARGUMENTS]  # which is wrong, and will be called so
-    return Asked(key.rpartition("/")[2], data, encoding, _origin(query))
+    return Asked(_printable(key.rpartition("/")[2]), data, encoding, _origin(query))
 
 
 def _origin(query: zenoh.Query) -> str:
     """Who asks: the name that it gives itself, and its session's id if the network tells it."""
     named = b"" if query.attachment is None else query.attachment.to_bytes()[:_LONGEST_NAME]
-    name = "".join(c for c in named.decode(errors="replace") if c.isprintable()) or "somebody"
+    name = _printable(named.decode(errors="replace")) or "somebody"
     source = query.source_info
     return name if source is None else f"{name}, session {source.source_id.zid}"
+
+
+def _printable(text: str) -> str:
+    """The text without what could play tricks on a terminal."""
+    return "".join(c for c in text if c.isprintable())
 
 
 def _tell(query: zenoh.Query, key: str, answer: Answer) -> None:

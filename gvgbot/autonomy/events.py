@@ -76,4 +76,35 @@ class Finished:
     reason: str
 
 
-Event = VertexAdded | VertexRemoved | EdgeJoined | LoopClosed | Decision | Recovery | Finished
+@dataclass(frozen=True, slots=True)
+class Requested:
+    """Somebody asked for something; what was answered."""
+
+    stamp: float
+    request: str
+    origin: str
+    done: bool  # false: refused
+    answer: str
+
+
+@dataclass(frozen=True, slots=True)
+class ErrandEnded:
+    """The robot is done with what it was asked for: arrived, given up, replaced or stopped."""
+
+    stamp: float
+    errand: str
+    outcome: str
+    reason: str
+
+
+Event = (
+    VertexAdded
+    | VertexRemoved
+    | EdgeJoined
+    | LoopClosed
+    | Decision
+    | Recovery
+    | Finished
+    | Requested
+    | ErrandEnded
+)

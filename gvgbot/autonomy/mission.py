@@ -26,7 +26,7 @@ _FACING_RAD = 1.0  # looking so far past a thing, one would not see it go
 _FACING_POINTS = 6  # of a polyline tell where its end points to
 _LONGEST_VIEW_S = 2.0  # a longer gap between views is an outage, not a lack of progress
 
-Outcome = Literal["explored", "explored_with_blocked", "failed"]
+Outcome = Literal["explored", "explored_with_blocked", "failed", "stopped"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -133,6 +133,33 @@ class Mission:
         if place is not None and place.distance <= NEAR_M:
             self._learn(view, known, place)
         return self._events
+
+    def stop(self, stamp: float, reason: str) -> Event:
+        """End the exploration, because somebody wants that."""
+        self.outcome, self.reason = "stopped", reason
+        return Finished(stamp, "stopped", reason)
+
+    def reopen(self) -> None:
+        """Go on after the end: also to what was given up."""
+        self.outcome, self.reason = None, ""
+        for end in self._mapper.graph.blocked():
+            half = self._mapper.graph.half_edge(end)
+            assert half is not None
+            half.blocked = False
+        self._obstructions = Obstructions(self._config.retries, self._config.retry_after_s)
+        self.set_aside()
+
+    def set_aside(self) -> None:
+        """Let the robot do something else; choose anew when it comes back."""
+        self.target = None
+        self._looked_around = 0
+        self._held = False
+        self._held_since = self._lost_since = None
+        self._stranded_since = self._examining_since = None
+
+    def configure(self, config: ExplorationConfig) -> None:
+        """Use another configuration from now on."""
+        self._config = config
 
     def skip(self, seconds: float) -> None:
         """Let no patience run out by a time in which nothing was to be seen."""

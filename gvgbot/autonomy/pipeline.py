@@ -17,6 +17,7 @@ from gvgbot.autonomy.control.reflexes import (
     ReflexConfig,
     Reflexes,
 )
+from gvgbot.autonomy.errands import Errands
 from gvgbot.autonomy.events import Event, Recovery
 from gvgbot.autonomy.gvg.local import LocalGvg
 from gvgbot.autonomy.gvg.local_map import LocalMapConfig
@@ -41,6 +42,7 @@ from gvgbot.ranges import Range
 _NOTHING_FELT = Felt()
 _LIFTED = np.diag([0.3**2, 0.3**2, 0.1**2])  # how far a robot is carried that is put down again
 _SEEN_SHARE = 0.8  # of the laser's range: walls farther off cannot be relied on
+_ROOM_BESIDE_EDGES_M = 0.08  # on each side, where no edge leads
 _LONGEST_GAP_S = 2.0  # between keyframes; a longer one is an outage of a device
 _SCAN_EVERY_M, _SCAN_EVERY_RAD = 0.7, 0.5  # scans that are kept for the occupancy grid
 
@@ -115,6 +117,9 @@ class Pipeline:
             drive_dead_ends=exploration.drive_dead_ends,
         )
         self.mission = Mission(exploration, self.mapper)
+        self.errands = Errands(
+            self.mission, self.mapper, exploration, robot_radius + _ROOM_BESIDE_EDGES_M
+        )
         self._odometry = OdometryLog()
         self._reflexes = Reflexes(config.reflexes)
         self._hazards = Hazards(config.hazards)
@@ -172,13 +177,15 @@ class Pipeline:
         odom_base = self._odometry.odom_base_at(scan.stamp)
         if (
             odom_base is None
-            or self.mission.outcome is not None
+            or (self.errands.is_resting and self._last is not None)
             or self._reflexes.is_lifted
             or not self._worth_a_look(scan, odom_base)
         ):
             return happened
         if self._last is not None:
             self.mission.skip(max(0.0, scan.stamp - self._last.stamp - _LONGEST_GAP_S))
+        if self.errands.is_lost:
+            self.errands.is_lost, self._was_lifted = False, True
         scan = deskewed(scan, self._odometry.motion_during(scan))
         local_base = self._localise(scan, odom_base)
         scan = self._newcomers.sift(scan, local_base, self._maps.near)
@@ -204,7 +211,7 @@ class Pipeline:
         if len(self.keyframes) == 1:
             self._turn(_blind_angle(scan))
             return happened
-        order, done = self.mission.advance(view, known)
+        order, done = self.errands.advance(view, known)
         self._obey(order)
         return happened + done
 
@@ -281,12 +288,17 @@ class Pipeline:
         local_base = self._last.local_base.compose(self._last.odom_base.to(odometry.odom_base))
         moment = Moment(odometry.stamp, local_base, self._wish(local_base), felt)
         twist, incident = self._reflexes.act(moment, lambda: self._room_behind(local_base))
+        if self.errands.is_resting:  # whoever touches it then is no obstacle
+            incident, twist = incident if isinstance(incident, PutDown) else None, STANDSTILL
         if incident is not None:
             self._take_down(incident, local_base)
         return twist
 
     def _wish(self, local_base: Pose) -> Twist:
         """The twist that carries out the present order."""
+        if self.errands.is_resting:
+            self._order = Stand()
+            return STANDSTILL
         if self._turning():
             return Twist(0.0, self._config.edge_follower.max_turn_rate_radps * 0.8)
         match self._order:
@@ -314,10 +326,10 @@ class Pipeline:
                     local_base, bearings, self._radius, self.travelled, lasting=cause == "cliff"
                 )
                 if blocks:
-                    self.mission.obstruct(f"{cause} again and again")
+                    self.errands.obstruct(f"{cause} again and again")
             case Held():
                 self._incidents.append(("back off", "something is in the way"))
-                self.mission.hold()
+                self.errands.hold()
             case PutDown():
                 self._incidents.append(("look around", "the robot was lifted"))
                 self._was_lifted = True

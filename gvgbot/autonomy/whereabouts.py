@@ -175,7 +175,12 @@ class Situation:
         if approach is None:
             return None
         departures = (*approach.departures, target)
-        first = departures[0].vertex
+        return self.path_over(departures[0].vertex, departures)
+
+    def path_over(
+        self, first: int, departures: tuple[HalfEdgeId, ...]
+    ) -> tuple[Branch, ...] | None:
+        """Branches to drive, as far as they are in sight, to a vertex and on over departures."""
         path = self._to_vertex(first)
         if path is None:
             return None
@@ -187,6 +192,12 @@ class Situation:
             if self.gvg.end_of(branch) not in self.known.vertex_of:
                 return self._extended(path)
         return path
+
+    def along_own_edge(self, *, ahead: bool) -> tuple[Branch, ...]:
+        """Along the present edge, away from the vertex that it leaves from, or back to it."""
+        end = self.where.on_edge
+        assert end is not None, "no edge to drive along"
+        return self._extended((self._away_from(end) if ahead else self._back(),))
 
     def _back(self) -> Branch:
         return self.where.backwards(self.gvg, self.place, self.known, self.local_base)

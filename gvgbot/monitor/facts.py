@@ -35,7 +35,8 @@ class Fact:
 
 def facts(state: State, events: tuple[Event, ...]) -> Iterator[Fact]:
     """What there is to know of a robot, the most telling first."""
-    yield Fact("phase", state.outcome or state.phase, _tone_of_phase(state))
+    phase = state.outcome if state.phase == "finished" else None
+    yield Fact("phase", phase or state.phase, _tone_of_phase(state))
     yield from _intention(state, events)
     x, y, theta = state.pose
     yield Fact("pose", f"{x:.2f} {y:.2f} m  {_degrees(theta)}")

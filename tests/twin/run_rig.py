@@ -2,10 +2,12 @@
 
 import asyncio
 import struct
-from collections.abc import Callable, Coroutine
+from collections.abc import Awaitable, Callable, Coroutine
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+
+import msgspec
 
 from gvgbot.clock import Clock, LoopClock, run_in_virtual_time
 from gvgbot.config import Config, RobotConfig, TwinConfig
@@ -16,11 +18,12 @@ from gvgbot.geometry import Pose
 from gvgbot.hal.devices import Base
 from gvgbot.links import Close, Links
 from gvgbot.maps.run_directory import RunDirectory
+from gvgbot.requests import MESSAGEPACK, REQUESTS, Answer, Asked, RequestName
 from gvgbot.robot import Robot
 from gvgbot.service import Notifier
 from gvgbot.session import Session
 from gvgbot.simulation import Place, Simulation
-from gvgbot.topics import Events, Map, Odometry, Payload, Plan, Scan, State
+from gvgbot.topics import Events, Map, Odometry, Payload, Plan, Scan, State, TelemetryConfig
 from gvgbot.worlds.canvas import Canvas
 
 STOP = (0, 0)
@@ -124,6 +127,15 @@ class Network:
     async def answer(self) -> None:
         await asyncio.Event().wait()
 
+    async def hear(self, handle: Callable[[Asked], Awaitable[Answer]]) -> None:
+        self._handle = handle
+        await asyncio.Event().wait()
+
+    async def ask(self, name: str, **arguments: object) -> Answer:
+        """Ask the robot for something, as a client would."""
+        data = msgspec.msgpack.encode(arguments)
+        return await self._handle(Asked(name, data, MESSAGEPACK, "a test"))
+
 
 async def at_once(function: Callable[[], None]) -> None:
     function()
@@ -132,13 +144,19 @@ async def at_once(function: Callable[[], None]) -> None:
 class Daemon:
     """A daemon in a corridor around three corners, and all that can be seen of it from outside."""
 
-    def __init__(self, out: Path) -> None:
+    def __init__(
+        self,
+        out: Path,
+        place: Place | None = None,
+        requests: tuple[RequestName, ...] = REQUESTS,
+    ) -> None:
         canvas = Canvas(14.0, 14.0)
         canvas.carve_path([(2.0, 2.0), (12.0, 2.0), (12.0, 12.0), (2.0, 12.0), (2.0, 5.0)], 1.4)
-        place = Place(canvas.world("corridor"), Pose(5.0, 2.1, 0.3))
+        place = place or Place(canvas.world("corridor"), Pose(5.0, 2.1, 0.3))
         self.config = Config(
             robot=RobotConfig(name="tester"),
             twin=TwinConfig(base=KobukiTwinConfig(odometry="perfect")),
+            telemetry=TelemetryConfig(requests=requests),
         )
         self.manager, self.network = Manager(), Network()
         self.session = Session(self.config, RunDirectory(out), place)

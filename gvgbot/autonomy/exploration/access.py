@@ -15,15 +15,22 @@ _SPACING_M = 0.1
 
 
 def way_to_edge(view: View, place: Place) -> tuple[Array, Array] | None:
-    """The straight way to the nearest point of the local GVG; None if it is not free.
+    """The straight way to the nearest point of the local GVG, as `straight_way` has it."""
+    edge = view.gvg.edges[place.edge]
+    goal = [float(np.interp(place.station, edge.stations, edge.polyline[:, k])) for k in (0, 1)]
+    return straight_way(view, np.array(goal), _ROOM_M)
+
+
+def straight_way(view: View, goal: Array, least_room: float) -> tuple[Array, Array] | None:
+    """The straight way to a point (2,), local frame; None if it is not known to be free.
 
     Its points (N, 2), local frame, and their distances (N,) from the walls, m.
     """
-    base, edge = view.local_base.position, view.gvg.edges[place.edge]
-    goal = [float(np.interp(place.station, edge.stations, edge.polyline[:, k])) for k in (0, 1)]
-    line = np.linspace(base, goal, math.ceil(place.distance / _SPACING_M) + 1)
+    base = view.local_base.position
+    distance = float(np.hypot(*(goal - base)))
+    line = np.linspace(base, goal, math.ceil(distance / _SPACING_M) + 1)
     room = np.asarray(cKDTree(view.local_map.points()).query(line)[0])
-    narrow = room < min(_ROOM_M, float(room[0]))  # where it stands, it may stand close
+    narrow = room < min(least_room, float(room[0]))  # where it stands, it may stand close
     if narrow.any() or not view.local_map.known(line).all():
         return None
     return line, room

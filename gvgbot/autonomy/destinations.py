@@ -1,0 +1,85 @@
+"""Ways over the known graph to a vertex, or to the point of an edge that is nearest to a place."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gvgbot.autonomy.exploration.paths import Approach, shortest_paths
+from gvgbot.autonomy.gvg.local import Branch
+from gvgbot.autonomy.mapping import Mapper
+from gvgbot.autonomy.slam.graph import Edge, GvgGraph, HalfEdgeId
+from gvgbot.autonomy.views import View
+from gvgbot.autonomy.whereabouts import Situation
+from gvgbot.geometry import Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Foot:
+    """The point of the graph that is nearest to a place: metres `station` from the edge's end a."""
+
+    edge: Edge
+    index: int  # of the edge's polyline
+    station: float
+    away: float  # m from the place
+
+    def in_local_frame(self, mapper: Mapper, view: View) -> Array:
+        """Where it is, (2,)."""
+        start = mapper.in_local_frame(view, self.edge.a.vertex)
+        point: Array = start.transform(self.edge.polyline[self.index])
+        return point
+
+
+@dataclass(frozen=True, slots=True)
+class Route:
+    """A way: to a vertex over these departures and on into the last one, or along one's own edge.
+
+    `ahead` tells which way along the own edge; None if the way leads over vertices.
+    """
+
+    metres: float
+    vertex: int
+    departures: tuple[HalfEdgeId, ...]
+    ahead: bool | None = None
+
+    @property
+    def first(self) -> int:
+        """The first vertex on the way."""
+        return self.departures[0].vertex if self.departures else self.vertex
+
+    def branches(self, here: Situation) -> tuple[Branch, ...] | None:
+        """What to drive of it, as far as it is in sight."""
+        if self.ahead is not None:
+            return here.along_own_edge(ahead=self.ahead)
+        return here.path_over(self.first, self.departures)
+
+
+def foot_of(mapper: Mapper, point: Array) -> Foot | None:
+    """The foot of a point (2,), map frame; None if no edge is known."""
+    feet = []
+    for edge in mapper.graph.edges.values():
+        line = mapper.belief.map_vertex(edge.a.vertex).transform(edge.polyline)
+        away = np.hypot(*(line - point).T)
+        i = int(np.argmin(away))
+        station = float(np.hypot(*np.diff(line[: i + 1], axis=0).T).sum())
+        feet.append(Foot(edge, i, station, float(away[i])))
+    return min(feet, key=lambda foot: foot.away, default=None)
+
+
+def route_to_vertex(graph: GvgGraph, starts: list[Approach], vertex: int) -> Route | None:
+    """The shortest way to a vertex; None if no known way leads there."""
+    approach = shortest_paths(graph, starts).get(vertex)
+    return None if approach is None else Route(approach.metres, vertex, approach.departures)
+
+
+def route_to_foot(here: Situation, starts: list[Approach], foot: Foot) -> Route | None:
+    """The shortest way to a point of an edge; None if no known way leads there."""
+    edge, reached = foot.edge, shortest_paths(here.graph, starts)
+    routes = []
+    for end, rest in ((edge.a, foot.station), (edge.b, edge.length - foot.station)):
+        approach, half = reached.get(end.vertex), here.graph.half_edge(end)
+        if approach is not None and half is not None and not half.blocked:
+            routes.append(Route(approach.metres + rest, end.vertex, (*approach.departures, end)))
+        if end == here.where.on_edge:
+            onwards = rest - here.where.trail_length
+            routes.append(Route(abs(onwards), end.vertex, (), ahead=onwards > 0.0))
+    return min(routes, key=lambda route: route.metres, default=None)

@@ -1,0 +1,165 @@
+"""What becomes of a request: permitted or not, safe or not, done, answered and written down."""
+
+import dataclasses
+from collections.abc import Awaitable, Callable
+from typing import Any, Protocol, get_type_hints
+
+from gvgbot.autonomy.errands import Declined, Errands
+from gvgbot.autonomy.events import Event, Requested
+from gvgbot.config import Config
+from gvgbot.conversion import Problem, convert
+from gvgbot.errors import GvgbotError
+from gvgbot.hal.guard import Reason
+from gvgbot.hal.messages import Contact
+from gvgbot.requests import Answer, Arguments, Asked, Goto, Set, in_words, parse
+
+SETTABLE = (
+    "robot.limits.max_speed_mps",
+    "robot.limits.max_turn_rate_radps",
+    "exploration.policy",
+    "exploration.patience_m",
+    "exploration.patience_s",
+    "exploration.look_around_s",
+    "exploration.in_the_way_s",
+    "exploration.nothing_in_sight_s",
+)
+_MOVING = ("resume", "home", "goto", "explore", "relocalise")
+_HARMLESS: tuple[Reason, ...] = ("obstacle", "obstacle near")  # the robot may turn away from it
+_LONGEST_WORDS = 200  # characters of a request in the list of events
+
+
+class Body(Protocol):
+    """What the robot feels, and what its guard says."""
+
+    @property
+    def away(self) -> str | None:
+        """Which devices are missing."""
+
+    @property
+    def contact(self) -> Contact | None:
+        """What the base feels."""
+
+    @property
+    def stopped_for(self) -> Reason | None:
+        """Why the guard holds the robot."""
+
+
+class Steering:
+    """Answers requests.
+
+    `save` writes the map and returns where; `use` puts a changed configuration into effect;
+    `tell` is given what happens because of a request.
+    """
+
+    def __init__(
+        self,
+        config: Config,
+        errands: Errands,
+        body: Body,
+        *,
+        now: Callable[[], float],
+        save: Callable[[], Awaitable[str]],
+        use: Callable[[Config], None],
+        tell: Callable[[list[Event]], None],
+    ) -> None:
+        self._config, self._limits = config, config.robot.limits
+        self._errands, self._body = errands, body
+        self._now, self._save, self._use, self._tell = now, save, use, tell
+
+    async def handle(self, asked: Asked) -> Answer:
+        """Do what is asked for, or say why not; either is written down with who asked."""
+        words = asked.name
+        try:
+            arguments = parse(asked.name, asked.data, asked.encoding)
+            words = in_words(asked.name, arguments)
+            self._check(asked.name)
+            answer = Answer(done=True, text=await self._do(asked.name, arguments))
+        except (Declined, ValueError, GvgbotError) as error:
+            answer = Answer(done=False, text=str(error))
+        words = words[:_LONGEST_WORDS]
+        happened = Requested(self._now(), words, asked.origin, answer.done, answer.text)
+        self._tell([happened, *self._errands.take_events()])
+        return answer
+
+    def _check(self, name: str) -> None:
+        """Raises Declined if that is not permitted, or not safe just now."""
+        permitted = self._config.telemetry.requests
+        if name not in permitted:
+            raise Declined(
+                f"{name} is not permitted here: telemetry.requests in the robot's configuration "
+                f"lists {', '.join(permitted) or 'nothing'}"
+            )
+        danger = self._danger() if name in _MOVING else None
+        if danger is not None:
+            raise Declined(f"it cannot move now: {danger}")
+
+    def _danger(self) -> str | None:
+        contact, stopped_for = self._body.contact, self._body.stopped_for
+        if self._body.away is not None:
+            return self._body.away
+        if contact is not None and contact.wheel_drop:
+            return "it is lifted"
+        if contact is not None and contact.bumper:
+            return "a bumper is pressed"
+        if contact is not None and contact.cliff:
+            return "it stands at a cliff"
+        if contact is not None and contact.over_current:
+            return "a motor is overloaded"
+        return None if stopped_for in _HARMLESS else stopped_for
+
+    async def _do(self, name: str, arguments: Arguments) -> str:
+        errands, stamp = self._errands, self._now()
+        match name, arguments:
+            case "pause", _:
+                return errands.pause()
+            case "resume", _:
+                return errands.resume()
+            case "stop", _:
+                return f"{errands.stop(stamp)}; map saved in {await self._save()}"
+            case "home", _:
+                return errands.home(stamp)
+            case "explore", _:
+                return errands.explore(stamp)
+            case "relocalise", _:
+                return errands.relocalise(stamp)
+            case _, Goto(vertex=None, x=float(x), y=float(y)):
+                return errands.goto_point(x, y, stamp)
+            case _, Goto(vertex=int(vertex)):
+                return errands.goto_vertex(vertex, stamp)
+            case _, Set(key=key, value=value):
+                return self._set(key, value)
+            case _:
+                return f"map saved in {await self._save()}"
+
+    def _set(self, key: str, value: bool | float | str) -> str:
+        if key not in SETTABLE:
+            raise Declined(
+                f"{key} cannot be changed while the robot runs; {', '.join(SETTABLE)} can"
+            )
+        changed = _replaced(self._config, key, value)
+        limits = changed.robot.limits
+        if (
+            limits.max_speed_mps > self._limits.max_speed_mps
+            or limits.max_turn_rate_radps > self._limits.max_turn_rate_radps
+        ):
+            raise Declined(f"{key} cannot be raised above what the robot's configuration has")
+        self._config = changed
+        self._use(changed)
+        return f"{key} is {value} now"
+
+
+def _replaced(config: Config, key: str, value: bool | float | str) -> Config:
+    """The configuration with another value. Raises Declined if that does not fit."""
+    *sections, name = key.split(".")
+    nodes: list[Any] = [config]
+    for section in sections:
+        nodes.append(getattr(nodes[-1], section))
+    problems: list[Problem] = []
+    kind = get_type_hints(type(nodes[-1]), include_extras=True)[name]
+    changed = convert(kind, value, (*sections, name), problems)
+    if problems:
+        raise Declined(str(problems[0]))
+    for node, part in zip(reversed(nodes), reversed([*sections, name]), strict=True):
+        changed = dataclasses.replace(node, **{part: changed})
+    result: Config = changed
+    return result

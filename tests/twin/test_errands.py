@@ -1,0 +1,291 @@
+"""A robot that is asked for things, in virtual time, in a world shaped like the letter theta.
+
+Two meetpoints, 5 m apart over the bar in the middle and 12 m around either side.
+"""
+
+import json
+import math
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gvgbot.clock import Clock
+from gvgbot.geometry import Pose
+from gvgbot.requests import REQUESTS, Answer
+from gvgbot.simulation import Place
+from gvgbot.worlds.canvas import Canvas
+from tests.twin.run_rig import STOP, Daemon, base_commands
+
+pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(300)]
+
+MEETPOINTS = ((5.5, 2.0), (5.5, 7.0))
+START = Pose(3.5, 2.1, 0.2)
+BESIDE = (8.8, 4.5)  # 0.2 m beside the middle of the eastern corridor
+NEAR = 0.3  # m
+
+
+def theta() -> Place:
+    canvas = Canvas(11.0, 9.0)
+    ring = [(2.0, 2.0), (9.0, 2.0), (9.0, 7.0), (2.0, 7.0), (2.0, 2.0)]
+    canvas.carve_path(ring, 1.4)
+    canvas.carve_path(list(MEETPOINTS), 1.4)
+    return Place(canvas.world("theta"), START)
+
+
+@dataclass
+class Trip:
+    """One errand: what was answered, how it ended, where the robot is in the world."""
+
+    answer: Answer
+    outcome: str = ""
+    reason: str = ""
+    world: tuple[float, float] = (math.nan, math.nan)
+    driven: float = math.nan
+    fastest: float = math.nan
+
+    def off(self, x: float, y: float) -> float:
+        return math.hypot(self.world[0] - x, self.world[1] - y)
+
+
+@dataclass
+class Tour:
+    """All that happened on the way."""
+
+    daemon: Daemon
+    paused: list[tuple[float, float]] = field(default_factory=list)
+    answers: dict[str, Answer] = field(default_factory=dict)
+    trips: dict[str, Trip] = field(default_factory=dict)
+    phases: dict[str, str] = field(default_factory=dict)
+    vertices: dict[int, tuple[float, float]] = field(default_factory=dict)  # world
+
+    def lines(self, kind: str) -> list[dict[str, Any]]:
+        text = (self.daemon.session.directory.path / "events.jsonl").read_text()
+        lines = [json.loads(line) for line in text.splitlines()]
+        return [line for line in lines if line["event"] == kind]
+
+
+async def until(clock: Clock, is_so: Callable[[], bool], patience: float = 300.0) -> None:
+    end = clock.now() + patience
+    while not is_so():
+        assert clock.now() < end, "it did not become so"
+        await clock.sleep_until(clock.now() + 0.2)
+
+
+async def a_while(clock: Clock, seconds: float) -> None:
+    await clock.sleep_until(clock.now() + seconds)
+
+
+def story(tour: Tour) -> Callable[[Clock], Awaitable[None]]:
+    daemon, ask = tour.daemon, tour.daemon.network.ask
+    pipeline, states = daemon.session.pipeline, daemon.network.states
+
+    async def trip(clock: Clock, title: str, name: str, **arguments: object) -> None:
+        begin, first = pipeline.travelled, len(states)
+        made = tour.trips[title] = Trip(await ask(name, **arguments))
+        await until(clock, lambda: pipeline.errands.errand is None)
+        await a_while(clock, 1.0)
+        (*_, end) = [e for e in daemon.network.events[-1].events if e.kind == "errand_ended"]
+        made.outcome, made.reason = str(end.details["outcome"]), str(end.details["reason"])
+        made.world = (daemon.place.x, daemon.place.y)
+        made.driven = pipeline.travelled - begin
+        made.fastest = max(abs(state.twist[0]) for state in states[first:])
+
+    async def pausing(clock: Clock) -> None:
+        tour.answers["pause"] = await ask("pause")
+        tour.answers["pause again"] = await ask("pause")
+        await a_while(clock, 1.5)  # to brake
+        for _ in range(2):
+            tour.paused.append((daemon.place.x, daemon.place.y))
+            await a_while(clock, 20.0)
+        tour.phases["paused"] = states[-1].phase
+        tour.answers["goto while paused"] = await ask("goto", x=0.0, y=0.0)
+        tour.answers["resume"] = await ask("resume")
+        tour.answers["resume again"] = await ask("resume")
+        await a_while(clock, 5.0)
+        tour.paused.append((daemon.place.x, daemon.place.y))
+        tour.phases["resumed"] = states[-1].phase
+
+    async def tell(clock: Clock) -> None:
+        await a_while(clock, 1.5)
+        tour.answers["too early"] = await ask("home")
+        await a_while(clock, 8.0)
+        await pausing(clock)
+        await until(clock, lambda: states[-1].phase == "finished")
+        graph, belief = pipeline.mapper.graph, pipeline.mapper.belief
+        for vertex in graph.vertices:
+            x, y = START.transform(belief.map_vertex(vertex).position)
+            tour.vertices[vertex] = (float(x), float(y))
+        for vertex in (*graph.vertices, *graph.vertices):
+            await trip(clock, f"goto {vertex}", "goto", vertex=vertex)
+        tour.phases["after a trip"] = states[-1].phase
+        tour.answers["there already"] = await ask("goto", vertex=max(graph.vertices))
+        await until(clock, lambda: pipeline.errands.errand is None)
+        x, y = START.inverse().transform(np.array(BESIDE))
+        await trip(clock, "beside", "goto", x=float(x), y=float(y))
+        tour.answers["limit"] = await ask("set", key="robot.limits.max_speed_mps", value=0.2)
+        await trip(clock, "home", "home")
+        tour.answers["no limit"] = await ask("set", key="robot.limits.max_speed_mps", value=0.7)
+        tour.answers["unknown"] = await ask("goto", vertex=999)
+        tour.answers["outside"] = await ask("goto", x=50.0, y=50.0)
+        tour.answers["save"] = await ask("save")
+        await trip(clock, "relocalise", "relocalise")
+        tour.answers["explore"] = await ask("explore")
+        tour.phases["explore"] = "" if pipeline.errands.is_resting else "exploring"
+        await until(clock, lambda: pipeline.mission.outcome is not None)
+        tour.answers["stop"] = await ask("stop")
+
+    return tell
+
+
+@pytest.fixture(scope="module")
+def tour(tmp_path_factory: pytest.TempPathFactory) -> Tour:
+    made = Tour(Daemon(tmp_path_factory.mktemp("theta"), theta()))
+    with made.daemon.session.directory:
+        made.daemon.run(story(made))  # type: ignore[arg-type]
+    return made
+
+
+def test_a_paused_robot_stands_and_goes_on_when_it_is_told_to(tour: Tour) -> None:
+    stood, still, gone_on = tour.paused
+    assert math.dist(stood, still) < 1e-3
+    assert math.dist(still, gone_on) > 0.5
+    assert (tour.phases["paused"], tour.phases["resumed"]) == ("paused", "exploring")
+    assert all(tour.answers[name].done for name in ("pause", "resume"))
+
+
+def test_asking_twice_does_no_harm(tour: Tour) -> None:
+    assert tour.answers["pause again"].done
+    assert "already" in tour.answers["pause again"].text
+    assert tour.answers["resume again"].done
+    assert tour.answers["there already"].done
+
+
+def test_a_paused_robot_is_driven_by_nobody_else(tour: Tour) -> None:
+    assert not tour.answers["goto while paused"].done
+    assert "paused" in tour.answers["goto while paused"].text
+
+
+def test_every_vertex_can_be_driven_to_by_the_shortest_way(tour: Tour) -> None:
+    meetpoints = [
+        vertex
+        for vertex, place in tour.vertices.items()
+        if min(math.dist(place, true) for true in MEETPOINTS) < NEAR
+    ]
+    assert len(meetpoints) == 2
+    for vertex, place in tour.vertices.items():
+        trip = tour.trips[f"goto {vertex}"]
+        assert (trip.outcome, trip.answer.done) == ("arrived", True)
+        assert trip.off(*place) < NEAR
+    assert tour.trips[f"goto {meetpoints[1]}"].driven < 5.0 + 2 * NEAR  # over the bar
+    assert tour.phases["after a trip"] == "finished"
+
+
+def test_a_point_beside_an_edge_is_driven_to(tour: Tour) -> None:
+    trip = tour.trips["beside"]
+    assert trip.outcome == "arrived"
+    assert trip.off(*BESIDE) < NEAR
+
+
+def test_the_robot_comes_home(tour: Tour) -> None:
+    assert tour.trips["home"].outcome == "arrived"
+    assert tour.trips["home"].off(START.x, START.y) < NEAR
+
+
+def test_a_speed_limit_holds_and_can_only_be_lowered_below_the_configured_one(tour: Tour) -> None:
+    assert tour.answers["limit"].done
+    assert tour.trips["home"].fastest < 0.21 < tour.trips["beside"].fastest
+    assert tour.answers["no limit"].done
+
+
+@pytest.mark.parametrize(
+    ("title", "says"),
+    [
+        ("too early", "not seen enough"),
+        ("unknown", "no vertex 999; there are"),
+        ("outside", "the nearest known way ends"),
+    ],
+)
+def test_what_cannot_be_is_refused_with_a_reason(tour: Tour, title: str, says: str) -> None:
+    assert not tour.answers[title].done
+    assert says in tour.answers[title].text
+
+
+def test_exploring_goes_on_after_the_end(tour: Tour) -> None:
+    assert tour.answers["explore"].done
+    assert tour.phases["explore"] == "exploring"
+    assert len(tour.lines("finished")) == 2
+    assert tour.daemon.session.pipeline.mission.outcome == "explored"
+
+
+def test_a_robot_that_looks_around_stays_where_it_is(tour: Tour) -> None:
+    assert tour.trips["relocalise"].outcome == "arrived"
+    assert tour.trips["relocalise"].off(*tour.trips["home"].world) < 0.1
+
+
+def test_nothing_was_touched_on_the_way(tour: Tour) -> None:
+    assert tour.daemon.session.simulation is not None
+    assert tour.daemon.session.simulation.body.contacts == 0
+
+
+def test_every_request_is_in_the_list_of_events_with_who_asked(tour: Tour) -> None:
+    lines = tour.lines("requested")
+    assert len(lines) == len(tour.answers) + len(tour.trips) + len(tour.vertices)
+    assert all(line["origin"] == "a test" for line in lines)
+    refused = [line["request"] for line in lines if not line["done"]]
+    assert refused == ["home", "goto 0 0", "goto 999", "goto 50 50"]
+    assert {line["request"] for line in lines} >= {"pause", "resume", "save", "stop", "explore"}
+
+
+def test_a_stopped_exploration_is_over_until_somebody_wants_more(tmp_path: Path) -> None:
+    daemon, places, phases = Daemon(tmp_path / "run"), list[Pose](), list[str]()
+
+    async def tell(clock: Clock) -> None:
+        await a_while(clock, 8.0)
+        answer = await daemon.network.ask("stop")
+        assert answer.done
+        assert str(daemon.session.directory.path) in answer.text
+        summary = json.loads((daemon.session.directory.path / "summary.json").read_text())
+        assert summary["outcome"] == "stopped"
+        await a_while(clock, 2.0)
+        for _ in range(2):
+            places.append(daemon.place)
+            phases.append(daemon.network.states[-1].phase)
+            await a_while(clock, 10.0)
+        assert (await daemon.network.ask("explore")).done
+        await a_while(clock, 5.0)
+        places.append(daemon.place)
+        phases.append(daemon.network.states[-1].phase)
+
+    with daemon.session.directory:
+        daemon.run(tell)
+    assert places[0] == places[1]
+    assert places[1].distance(places[2]) > 0.5
+    assert phases == ["finished", "finished", "exploring"]
+
+
+def test_without_permission_nothing_is_done(tmp_path: Path) -> None:
+    """As it comes: who can reach the robot can watch it, and that is all."""
+    daemon = Daemon(tmp_path / "run", requests=())
+    answers: list[Answer] = []
+    fitting: dict[str, dict[str, object]] = {
+        "goto": {"vertex": 1},
+        "set": {"key": "robot.limits.max_speed_mps", "value": 0.1},
+    }
+
+    async def tell(clock: Clock) -> None:
+        await a_while(clock, 3.0)
+        answers.extend(
+            [await daemon.network.ask(name, **fitting.get(name, {})) for name in REQUESTS]
+        )
+        await a_while(clock, 3.0)
+
+    with daemon.session.directory:
+        daemon.run(tell)
+    assert not any(answer.done for answer in answers)
+    assert all("not permitted" in answer.text for answer in answers)
+    assert daemon.network.states[-1].phase == "exploring"
+    assert set(base_commands(bytes(daemon.cable.written))[-100:-10]) != {STOP}
