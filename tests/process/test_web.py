@@ -5,7 +5,6 @@ With GVGBOT_PICTURES=docs/images a test leaves web.png and web-phone.png there.
 
 import asyncio
 import base64
-import io
 import json
 import os
 import signal
@@ -25,7 +24,6 @@ import msgspec
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from PIL import Image
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
@@ -504,14 +502,8 @@ def test_pictures_for_the_guide(page: Page, tmp_path: Path) -> None:
         vertices = "parseInt([...document.querySelectorAll('#facts div')].find("
         vertices += "(one) => one.firstChild.textContent === 'map')?.lastChild.textContent)"
         page.until(f"{vertices} >= 6", patience_s=1000.0)
-        _save(page.png(), folder / "web.png")
+        (folder / "web.png").write_bytes(page.png())
         page.open(address, 390, 844, phone=True, dark=False)
         page.until(f"{vertices} >= 6")
         page.until("new Promise((done) => setTimeout(() => done(true), 3000))")
-        _save(page.png(), folder / "web-phone.png")
-
-
-def _save(png: bytes, path: Path) -> None:
-    """Write a picture with no more colours than it needs."""
-    picture = Image.open(io.BytesIO(png)).convert("RGB")
-    picture.quantize(128).save(path, optimize=True)
+        (folder / "web-phone.png").write_bytes(page.png())

@@ -104,7 +104,7 @@ export class MapPicture {
       ellipses: () => this.drawEllipses(), frontiers: () => this.drawFrontiers(), vertices: () => this.drawVertices(),
       plan: () => this.drawPlan(), scan: () => this.drawScan(),
     };
-    for (const name of ["grid", "trail", "edges", "scan", "plan", "ellipses", "frontiers", "vertices"]) {
+    for (const name of ["grid", "trail", "edges", "scan", "ellipses", "frontiers", "vertices", "plan"]) {
       if (this.shown.has(name)) layers[name]();
     }
     this.drawRobot();
@@ -237,6 +237,9 @@ export class MapPicture {
 
   drawRobot() {
     if (this.pose === null) return;
+    if (this.covariance !== null && this.shown.has("ellipses")) {
+      this.ellipse(this.pose[0], this.pose[1], this.covariance[0], this.covariance[1], this.covariance[4]);
+    }
     const c = this.c, size = Math.max(10, 0.2 * this.view.scale);
     c.save();
     c.translate(...this.view.toScreen(this.pose[0], this.pose[1]));
@@ -253,9 +256,6 @@ export class MapPicture {
     c.lineWidth = 1.5;
     c.stroke();
     c.restore();
-    if (this.covariance !== null && this.shown.has("ellipses")) {
-      this.ellipse(this.pose[0], this.pose[1], this.covariance[0], this.covariance[1], this.covariance[4]);
-    }
   }
 
   // The vertex nearest to a place on the screen, if it is near.

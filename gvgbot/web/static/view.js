@@ -1,6 +1,7 @@
 // Which part of the map is shown, and the gestures that change it.
 
 const LEAST = 4, MOST = 400; // pixels per metre
+const MARGIN = 16, BUTTONS = 66; // pixels around the map, and below it
 const TAP = 6; // pixels that a finger may move and still have tapped
 
 export class View {
@@ -29,12 +30,11 @@ export class View {
 
   fit(box) {
     const [left, bottom, right, top] = box;
-    const margin = Math.min(60, 0.08 * Math.min(this.width, this.height));
-    this.x = (left + right) / 2;
-    this.y = (bottom + top) / 2;
-    const wide = (this.width - 2 * margin) / Math.max(right - left, 4);
-    const high = (this.height - 2 * margin) / Math.max(top - bottom, 4);
+    const wide = (this.width - 2 * MARGIN) / Math.max(right - left, 4);
+    const high = (this.height - MARGIN - BUTTONS) / Math.max(top - bottom, 4);
     this.scale = clamp(Math.min(wide, high));
+    this.x = (left + right) / 2;
+    this.y = (bottom + top) / 2 - (BUTTONS - MARGIN) / 2 / this.scale;
   }
 
   zoom(factor, px = this.width / 2, py = this.height / 2) {
