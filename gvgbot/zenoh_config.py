@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Mapping
+from importlib.resources import files
 from pathlib import Path
 
 import msgspec
@@ -25,8 +26,9 @@ _COMMON: Mapping[str, object] = {
 def session_config(settings: Mapping[str, object], file: Path | None = None) -> zenoh.Config:
     """A configuration: addresses are told, not found by shouting, and tried again when lost.
 
-    What a file (JSON5) sets stands, and the settings fill the rest. Raises UsageError for a file
-    that cannot be used.
+    What a file (JSON5) sets stands, and the settings fill the rest; a name without a folder means
+    the file in the working directory, or else the packaged one. Raises UsageError for a file that
+    cannot be used.
     """
     plain = zenoh.Config()
     config = zenoh.Config() if file is None else _read(file)
@@ -37,6 +39,9 @@ def session_config(settings: Mapping[str, object], file: Path | None = None) -> 
 
 
 def _read(file: Path) -> zenoh.Config:
+    inside = Path(str(files("gvgbot") / "configs" / "zenoh")) / file.name
+    if file.name == str(file) and not file.exists() and inside.exists():
+        file = inside
     try:
         return zenoh.Config.from_json5(file.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
