@@ -62,10 +62,9 @@ class ExplorationConfig:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drive:
-    """Follow a track; `blind_end` if it stops only because sight does."""
+    """Follow a track."""
 
     track: Track
-    blind_end: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -342,9 +341,8 @@ class Mission:
     def _drive(self, view: View, here: Situation, path: tuple[Branch, ...]) -> Order:
         track = Track.of(*view.gvg.line_from(here.place, path))
         end = view.gvg.end_of(path[-1])
-        blind = end not in here.known.vertex_of
         waited = view.stamp - self._last_progress
-        if track.length < 0.3 and blind and end in view.doubted:
+        if track.length < 0.3 and end not in here.known.vertex_of and end in view.doubted:
             self._held = True
             away = _turn_to_face(view, path[-1])
             if min(away, math.tau - away) > _FACING_RAD:
@@ -357,7 +355,7 @@ class Mission:
                 return Stand()
             self._events.append(Recovery(view.stamp, "look around", "standing at the end of sight"))
             return LookAround(math.tau)
-        return Drive(track, blind)
+        return Drive(track)
 
     # -- something in the way ----------------------------------------------------------------------
 
@@ -435,7 +433,7 @@ class Mission:
             return self._search(view)
         self._lost_since = None
         self._watch_progress(view)
-        return Stand() if self.outcome is not None else Drive(Track.of(*way), blind_end=True)
+        return Stand() if self.outcome is not None else Drive(Track.of(*way))
 
     def _search(self, view: View) -> Order:
         """No edge in sight: look around, and give up after a while."""

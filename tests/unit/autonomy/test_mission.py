@@ -82,8 +82,6 @@ def end_of(order: Order) -> Point:
 def test_before_the_first_vertex_the_robot_drives_on_along_its_edge() -> None:
     order = Robot().look(PLAIN)
     assert end_of(order) == pytest.approx((8.0, 0.0))
-    assert isinstance(order, Drive)
-    assert order.blind_end
 
 
 def test_as_soon_as_a_vertex_is_known_the_robot_goes_for_a_frontier_of_it() -> None:
