@@ -5,7 +5,7 @@ import numpy as np
 from gvgbot import topics
 from gvgbot.autonomy.exploration.paths import Approach, shortest_paths
 from gvgbot.autonomy.pipeline import Pipeline
-from gvgbot.autonomy.slam.ekf import OdometryNoise, predict
+from gvgbot.autonomy.slam.ekf import Belief, OdometryNoise, predict
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
 from gvgbot.geometry import STANDSTILL, Array, Pose, wrap_angle
 from gvgbot.hal.messages import Battery, Odometry, Scan
@@ -85,7 +85,8 @@ def pose_covariance(pipeline: Pipeline, odometry: Odometry | None, noise: Odomet
     last = pipeline.keyframes[-1]
     motion = last.odom_base.to(odometry.odom_base)
     growth = noise.covariance(motion, max(0.0, odometry.stamp - last.stamp))
-    return predict(belief, motion, growth).P[:3, :3]
+    robot = Belief(belief.x[:3], belief.P[:3, :3])  # without the vertices, which do not move
+    return predict(robot, motion, growth).P
 
 
 def sweep(scan: Scan, map_base: Pose | None) -> topics.Scan:
@@ -126,8 +127,9 @@ def _triple(pose: Pose) -> tuple[float, float, float]:
 
 
 def plan(pipeline: Pipeline, reason: str, stamp: float) -> topics.Plan:
-    """Where the robot goes; `reason` is the last decision's."""
-    target, graph = pipeline.mission.target, pipeline.mapper.graph
+    """Where the robot goes; `reason` is the last decision's. An errand has a track only."""
+    is_exploring, graph = pipeline.errands.errand is None, pipeline.mapper.graph
+    target = pipeline.mission.target if is_exploring else None
     half = None if target is None else graph.half_edge(target)
     vertex = bearing = None
     route = np.zeros((0, 2))
@@ -139,7 +141,7 @@ def plan(pipeline: Pipeline, reason: str, stamp: float) -> topics.Plan:
         stamp=stamp,
         vertex=vertex,
         bearing=bearing,
-        reason=reason,
+        reason=reason if is_exploring else "",
         track=packed(pipeline.track),
         route=packed(route),
     )

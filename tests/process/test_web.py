@@ -470,8 +470,9 @@ def test_a_button_asks_the_robot_and_its_answer_is_shown(page: Page) -> None:
 
 def test_a_twin_that_explores_is_seen_doing_so(page: Page, tmp_path: Path) -> None:
     endpoint = free_endpoint()
-    settings = ["--set", f"telemetry.listen=[{endpoint}]"]
-    with gvgbot("run", *settings, cwd=tmp_path), web("--connect", endpoint) as address:
+    listen, requests = f"telemetry.listen=[{endpoint}]", "telemetry.requests=[pause, resume]"
+    run_it = gvgbot("run", "--set", listen, "--set", requests, cwd=tmp_path)
+    with run_it, web("--connect", endpoint) as address:
         desktop(page, address)
         page.until("document.body.innerText.includes('exploring')")
         driven = "parseFloat([...document.querySelectorAll('#facts div')].find("
@@ -488,6 +489,13 @@ def test_a_twin_that_explores_is_seen_doing_so(page: Page, tmp_path: Path) -> No
         page.until("document.querySelector('#follow').getAttribute('aria-pressed') === 'true'")
         page.until(f"{driven} > 2.0")
         assert stretch(page, "robot")[0] == pytest.approx(page.middle("#map"), abs=25)
+        page.click("[data-request=pause]")
+        page.until("document.querySelector('#headline').innerText.includes('paused')")
+        page.until("document.querySelector('#answer').dataset.tone === 'good'")
+        page.until("document.body.innerText.includes('0.00 m/s')")
+        page.until("!document.querySelector('[data-request=resume]').disabled")
+        page.click("[data-request=resume]")
+        page.until("document.querySelector('#headline').innerText === 'exploring'")
         assert page.complaints == []
 
 

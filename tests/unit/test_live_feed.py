@@ -56,6 +56,7 @@ def crossing() -> Any:
         mapper=SimpleNamespace(
             graph=graph, belief=SimpleNamespace(map_vertex=lambda number: poses[number])
         ),
+        errands=SimpleNamespace(errand=None),
         track=np.array([[1.0, 0.0], [4.0, 0.0]]),
         map_base=Pose(1.0, 0.0, 0.0),
         map_base_at=lambda stamp: Pose(stamp, 0.0, 0.0),
@@ -111,6 +112,14 @@ def test_a_plan_without_a_target_has_only_its_track() -> None:
     standing.mission.target = None
     sent = plan(standing, "", 9.0)
     assert (sent.vertex, sent.bearing, sent.route) == (None, None, b"")
+
+
+def test_on_an_errand_the_frontier_is_not_where_the_robot_goes() -> None:
+    sent_away = crossing()
+    sent_away.errands.errand = "goto 7"
+    sent = plan(sent_away, "ear", 9.0)
+    assert (sent.vertex, sent.reason, sent.route) == (None, "", b"")
+    assert len(sent.ahead) == 2
 
 
 def test_a_plan_is_sent_when_it_has_changed() -> None:
