@@ -2,9 +2,14 @@
 
 import asyncio
 import json
-from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import asynccontextmanager
+import signal
+import subprocess
+import sys
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from contextlib import asynccontextmanager, contextmanager
+from pathlib import Path
 
+import msgspec
 import pytest
 import zenoh
 
@@ -13,7 +18,8 @@ from gvgbot.errors import GvgbotError
 from gvgbot.requests import Answer, Asked, Goto, Set, parse
 from gvgbot.telemetry import Telemetry
 from gvgbot.topics import TelemetryConfig
-from tests.process.addresses import free_endpoint, plain_session
+from tests.process.addresses import free_endpoint, plain_session, router
+from tests.unit.test_telemetry import EXAMPLE
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(60)]
 
@@ -26,9 +32,14 @@ async def obliging(asked: Asked) -> Answer:
 
 @asynccontextmanager
 async def a_robot(
-    endpoint: str, handle: Callable[[Asked], Awaitable[Answer]] = obliging
+    endpoint: str,
+    handle: Callable[[Asked], Awaitable[Answer]] = obliging,
+    *,
+    connect: str | None = None,
+    name: str = "near",
 ) -> AsyncIterator[None]:
-    with Telemetry(TelemetryConfig(listen=(endpoint,)), "near") as robot:
+    routers = () if connect is None else (connect,)
+    with Telemetry(TelemetryConfig(listen=(endpoint,), connect=routers), name) as robot:
         hearing = asyncio.ensure_future(robot.hear(handle))  # noqa: TID251
         await asyncio.sleep(0)
         yield
@@ -178,3 +189,165 @@ def test_who_asks_can_name_itself_but_not_flood_the_log(endpoint: str) -> None:
     assert origins[0] == "ana"
     assert all(len(origin) <= 80 and origin.isprintable() for origin in origins)
     assert origins[3] == "somebody"
+
+
+WATCHER = """
+import sys, zenoh
+from gvgbot import client
+with client.connect("near", sys.argv[1]) as robot:
+    robot.scan()
+    next(iter(robot.state()))
+    print("there", flush=True)
+    for state in robot.state():
+        pass
+"""
+SLEEPER = """
+import asyncio, sys
+from gvgbot.telemetry import Telemetry
+from gvgbot.topics import TelemetryConfig
+async def handle(asked):
+    print("asked", flush=True)
+    await asyncio.Event().wait()
+with Telemetry(TelemetryConfig(listen=(sys.argv[1],)), "near") as robot:
+    print("there", flush=True)
+    asyncio.run(robot.hear(handle))
+"""
+
+
+@contextmanager
+def program(source: str, endpoint: str) -> Iterator["subprocess.Popen[str]"]:
+    """A program in a process of its own, as soon as it says that it is there."""
+    command = [sys.executable, "-c", source, endpoint]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout is not None
+            assert process.stdout.readline() == "there\n"
+            yield process
+        finally:
+            process.kill()
+
+
+async def answered(ask: Callable[[], client.Asking]) -> str:
+    """The answer, as soon as there is anybody to give one."""
+    while True:
+        try:
+            return await ask()
+        except GvgbotError:
+            await asyncio.sleep(0.1)
+
+
+def test_a_router_in_between_may_come_and_go(endpoint: str) -> None:
+    async def story() -> list[str]:
+        with router(endpoint) as first:
+            async with (
+                a_robot(free_endpoint(), connect=endpoint),
+                client.connect("near", endpoint) as robot,
+            ):
+                answers = [await answered(robot.pause)]
+                await asyncio.to_thread(first.close)
+                with pytest.raises(GvgbotError):
+                    await robot.pause()
+                with router(endpoint):
+                    answers.append(await answered(robot.resume))
+                return answers
+
+    assert asyncio.run(story()) == ["does pause", "does resume"]
+
+
+def test_of_two_robots_only_the_one_that_is_asked_does_something(endpoint: str) -> None:
+    asked: list[tuple[str, str]] = []
+
+    def noting(name: str) -> Callable[[Asked], Awaitable[Answer]]:
+        async def note(one: Asked) -> Answer:
+            asked.append((name, one.name))
+            return await obliging(one)
+
+        return note
+
+    async def story() -> None:
+        with router(endpoint):
+            async with (
+                a_robot(free_endpoint(), noting("near"), connect=endpoint),
+                a_robot(free_endpoint(), noting("other"), connect=endpoint, name="other"),
+                client.connect("near", endpoint) as near,
+                client.connect("other", endpoint) as other,
+            ):
+                await answered(near.pause)
+                await answered(other.home)
+                await answered(near.resume)
+
+    asyncio.run(story())
+    assert asked == [("near", "pause"), ("other", "home"), ("near", "resume")]
+
+
+def test_a_watcher_that_hangs_holds_up_no_request(endpoint: str) -> None:
+    async def story() -> None:
+        with Telemetry(TelemetryConfig(listen=(endpoint,)), "near") as robot:
+            robot.publish(EXAMPLE)
+            async with asyncio.TaskGroup() as tasks:
+                hearing = tasks.create_task(robot.hear(obliging))
+                await asyncio.to_thread(watched, robot)
+                hearing.cancel()
+
+    def watched(robot: Telemetry) -> None:
+        with program(WATCHER, endpoint) as watcher:
+            watcher.send_signal(signal.SIGSTOP)
+            big = msgspec.structs.replace(EXAMPLE, reason="x" * 100_000)
+            with client.connect("near", endpoint) as seen:
+                for _ in range(20):
+                    for _ in range(10):
+                        robot.publish(big)  # fills the buffers of the watcher's link
+                    assert seen.pause().result() == "does pause"
+
+    asyncio.run(story())
+
+
+def test_a_robot_that_dies_over_a_request_is_noticed(endpoint: str) -> None:
+    with program(SLEEPER, endpoint) as process, client.connect("near", endpoint) as robot:
+        asking = robot.pause()
+        assert process.stdout is not None
+        assert process.stdout.readline() == "asked\n"
+        process.send_signal(signal.SIGKILL)
+        with pytest.raises(GvgbotError, match="near does not answer"):
+            asking.result(timeout=3.0)
+
+
+def test_a_person_asks_a_running_robot_from_the_command_line(endpoint: str, tmp_path: Path) -> None:
+    def ctl(*words: str) -> tuple[int, str, str]:
+        command = [sys.executable, "-m", "gvgbot", "ctl", *words, "--connect", endpoint]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
+        return done.returncode, done.stdout, done.stderr
+
+    arguments = ["--out", str(tmp_path / "run"), "--set", f"telemetry.listen=[{endpoint}]"]
+    with subprocess.Popen(
+        [sys.executable, "-m", "gvgbot", "run", *arguments], cwd=tmp_path, stderr=subprocess.PIPE
+    ) as process:
+        try:
+            with client.connect("sim", endpoint, patience_s=30.0) as robot:
+                for state in robot.state():
+                    if state.distance > 0.0:
+                        break
+            paused = ctl("pause")  # the only robot need not be named
+            moving = ctl("sim", "goto", "999")
+            resumed = ctl("sim", "resume")
+            unknown = ctl("sim", "goto", "999")
+            saved = ctl("sim", "save")
+        finally:
+            process.terminate()
+            process.communicate(timeout=30)
+    assert paused == (0, "it stands still until it is asked to resume\n", "")
+    assert moving == (1, "", "gvgbot: it is paused: ask it to resume first\n")
+    assert resumed == (0, "it goes on exploring\n", "")
+    assert unknown[0] == 1
+    assert "there is no vertex 999" in unknown[2]
+    assert saved == (0, f"map saved in {tmp_path / 'run'}\n", "")
+    events = (tmp_path / "run" / "events.jsonl").read_text().splitlines()
+    requested = [line for line in map(json.loads, events) if line["event"] == "requested"]
+    assert [line["request"] for line in requested] == [
+        "pause",
+        "goto 999",
+        "resume",
+        "goto 999",
+        "save",
+    ]
+    assert all("@" in line["origin"] for line in requested)

@@ -1,0 +1,206 @@
+"""What the robot will not do, whoever asks: what is not permitted, not safe, or makes no sense."""
+
+import asyncio
+from dataclasses import dataclass, field, replace
+from typing import cast
+
+import msgspec
+import pytest
+
+from gvgbot.autonomy.errands import Declined, Errands
+from gvgbot.autonomy.events import Event, Requested
+from gvgbot.config import Config, RobotConfig
+from gvgbot.errors import GvgbotError
+from gvgbot.hal.guard import GuardConfig, Reason
+from gvgbot.hal.messages import Contact
+from gvgbot.requests import MESSAGEPACK, REQUESTS, Answer, Asked, RequestName
+from gvgbot.steering import SETTABLE, Steering
+from gvgbot.topics import TelemetryConfig
+
+FREE = Contact(stamp=0.0)
+CONFIG = Config(robot=RobotConfig(limits=GuardConfig(max_speed_mps=0.5)))
+
+
+@dataclass
+class Body:
+    """What the robot feels."""
+
+    away: str | None = None
+    contact: Contact | None = FREE
+    stopped_for: Reason | None = None
+
+
+class Willing:
+    """Errands that agree to everything, and remember what."""
+
+    def __init__(self) -> None:
+        self.did: list[str] = []
+        self.refuses = False
+
+    def __getattr__(self, name: str) -> object:
+        def do(*_: object) -> str:
+            if self.refuses:
+                raise Declined("it does not want to")
+            self.did.append(name)
+            return f"did {name}"
+
+        return do
+
+    def take_events(self) -> list[Event]:
+        return []
+
+
+@dataclass
+class Rig:
+    """A steering with all that it touches."""
+
+    permitted: tuple[RequestName, ...] = REQUESTS
+    body: Body = field(default_factory=Body)
+    errands: Willing = field(default_factory=Willing)
+    told: list[Event] = field(default_factory=list)
+    used: list[Config] = field(default_factory=list)
+    disk_is_full: bool = False
+
+    async def save(self) -> str:
+        if self.disk_is_full:
+            raise GvgbotError("no space left")
+        return "/somewhere"
+
+    def __post_init__(self) -> None:
+        self.steering = Steering(
+            replace(CONFIG, telemetry=TelemetryConfig(requests=self.permitted)),
+            cast(Errands, self.errands),
+            self.body,
+            now=lambda: 12.5,
+            save=self.save,
+            use=self.used.append,
+            tell=self.told.extend,
+        )
+
+    def ask(self, name: str, **arguments: object) -> Answer:
+        data = msgspec.msgpack.encode(arguments)
+        return asyncio.run(self.steering.handle(Asked(name, data, MESSAGEPACK, "ana")))
+
+
+FITTING: dict[str, dict[str, object]] = {
+    "goto": {"vertex": 3},
+    "set": {"key": "exploration.patience_s", "value": 30},
+}
+MOVING = ("resume", "home", "goto", "explore", "relocalise")
+
+
+def touched(**felt: bool) -> Body:
+    return Body(contact=replace(FREE, **felt))
+
+
+@pytest.mark.parametrize("name", MOVING)
+@pytest.mark.parametrize(
+    ("body", "says"),
+    [
+        (Body(away="no laser: unplugged"), "no laser: unplugged"),
+        (touched(bumper_left=True), "a bumper is pressed"),
+        (touched(cliff_centre=True), "at a cliff"),
+        (touched(wheel_drop_left=True), "lifted"),
+        (touched(over_current=True), "overloaded"),
+        (Body(stopped_for="no scan"), "no scan"),
+        (Body(stopped_for="bad command"), "bad command"),
+    ],
+)
+def test_nothing_sets_the_robot_in_motion_while_that_is_not_safe(
+    name: str, body: Body, says: str
+) -> None:
+    rig = Rig(body=body)
+    answer = rig.ask(name, **FITTING.get(name, {}))
+    assert not answer.done
+    assert says in answer.text
+    assert rig.errands.did == []
+
+
+@pytest.mark.parametrize("name", ["pause", "stop", "save", "set"])
+def test_what_does_not_move_the_robot_is_done_whatever_it_feels(name: str) -> None:
+    rig = Rig(body=touched(bumper_left=True))
+    assert rig.ask(name, **FITTING.get(name, {})).done
+
+
+@pytest.mark.parametrize("name", MOVING)
+def test_an_obstacle_ahead_is_no_reason_not_to_turn_away_from_it(name: str) -> None:
+    assert Rig(body=Body(stopped_for="obstacle")).ask(name, **FITTING.get(name, {})).done
+
+
+@pytest.mark.parametrize("name", REQUESTS)
+def test_what_is_not_listed_is_refused_and_the_key_is_named(name: RequestName) -> None:
+    others = tuple(other for other in REQUESTS if other != name)
+    answer = Rig(permitted=others).ask(name, **FITTING.get(name, {}))
+    assert not answer.done
+    assert "telemetry.requests" in answer.text
+    assert Rig(permitted=(name,)).ask(name, **FITTING.get(name, {})).done
+
+
+def test_every_request_is_told_of_with_its_origin_whatever_became_of_it() -> None:
+    rig = Rig(permitted=("pause",))
+    rig.ask("pause")
+    rig.ask("goto", vertex=3)
+    rig.ask("goto", vertix=3)
+    rig.ask("dance" * 100)
+    assert all(isinstance(event, Requested) for event in rig.told)
+    lines = [event for event in rig.told if isinstance(event, Requested)]
+    assert [(line.request[:8], line.done) for line in lines] == [
+        ("pause", True),
+        ("goto 3", False),
+        ("goto", False),
+        ("dancedan", False),
+    ]
+    assert {(line.origin, line.stamp) for line in lines} == {("ana", 12.5)}
+    assert max(len(line.request) for line in lines) <= 200
+
+
+def test_what_the_errands_decline_is_refused_with_their_reason() -> None:
+    rig = Rig()
+    rig.errands.refuses = True
+    assert rig.ask("home") == Answer(done=False, text="it does not want to")
+
+
+def test_a_map_that_cannot_be_saved_is_said_to_be_so() -> None:
+    assert Rig().ask("save") == Answer(done=True, text="map saved in /somewhere")
+    assert Rig(disk_is_full=True).ask("save") == Answer(done=False, text="no space left")
+
+
+def test_a_value_takes_effect_and_the_next_one_counts_from_there() -> None:
+    rig = Rig()
+    assert rig.ask("set", key="robot.limits.max_speed_mps", value=0.2).done
+    assert rig.ask("set", key="exploration.patience_s", value=30).done
+    last = rig.used[-1]
+    assert (last.robot.limits.max_speed_mps, last.exploration.patience_s) == (0.2, 30.0)
+    assert last.robot.limits.margin_m == CONFIG.robot.limits.margin_m
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "says"),
+    [
+        ("robot.limits.max_speed_mps", 0.6, "cannot be raised"),
+        ("robot.limits.max_turn_rate_radps", 3.0, "cannot be raised"),
+        ("robot.limits.max_speed_mps", -1, "from 0.05 to 0.7"),
+        ("robot.limits.max_speed_mps", "fast", "a number"),
+        ("robot.limits.max_speed_mps", True, "a number"),
+        ("exploration.policy", "random", "one of"),
+        ("robot.limits.margin_m", 0.0, "cannot be changed while the robot runs"),
+        ("telemetry.requests", "stop", "cannot be changed while the robot runs"),
+        ("__class__", 1, "cannot be changed while the robot runs"),
+    ],
+)
+def test_a_value_that_does_not_fit_changes_nothing(key: str, value: object, says: str) -> None:
+    rig = Rig()
+    answer = rig.ask("set", key=key, value=value)
+    assert not answer.done
+    assert says in answer.text
+    assert rig.used == []
+
+
+@pytest.mark.parametrize("key", SETTABLE)
+def test_every_key_that_is_offered_exists(key: str) -> None:
+    node: object = CONFIG
+    for part in key.split("."):
+        node = getattr(node, part)
+    rig = Rig()
+    assert rig.ask("set", key=key, value=node).done
+    assert rig.used == [replace(CONFIG, telemetry=TelemetryConfig(requests=REQUESTS))]
