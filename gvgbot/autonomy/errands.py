@@ -7,8 +7,9 @@ import numpy as np
 
 from gvgbot.autonomy.control.edge_follower import Track
 from gvgbot.autonomy.destinations import Route, foot_of, route_to_foot, route_to_vertex
-from gvgbot.autonomy.events import ErrandEnded, Event, Recovery
+from gvgbot.autonomy.events import Decision, ErrandEnded, Event, Recovery
 from gvgbot.autonomy.exploration.access import NEAR_M, straight_way, way_to_edge
+from gvgbot.autonomy.exploration.certainty import Revisiting, robot_sigma
 from gvgbot.autonomy.exploration.paths import Approach
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.mission import Drive, ExplorationConfig, LookAround, Mission, Order, Stand
@@ -92,6 +93,8 @@ class Errands:
         self.is_lost = False  # somebody doubts the pose; whoever takes that into account resets it
         self.happened: list[Event] = []  # because of requests; whoever tells of it takes it out
         self._seen: tuple[View, Correspondence] | None = None
+        self._revisiting = Revisiting(config.certainty)
+        self._is_own = False  # the errand: nobody asked for it, and exploring goes on after it
         self._begin(None)
 
     @property
@@ -103,6 +106,7 @@ class Errands:
     def configure(self, config: ExplorationConfig) -> None:
         """Use another configuration from now on."""
         self._config = config
+        self._revisiting = Revisiting(config.certainty)
         self._mission.configure(config)
 
     # -- what can be asked for ---------------------------------------------------------------------
@@ -232,7 +236,8 @@ class Errands:
                 half.blocked = False
         if self.errand is not None:
             self.happened.append(ErrandEnded(stamp, str(self.errand), how, reason))
-            self.is_waiting = True
+            self.is_waiting = not self._is_own
+        self._is_own = False
         self._begin(None)
 
     # -- what is done about it ---------------------------------------------------------------------
@@ -240,11 +245,30 @@ class Errands:
     def advance(self, view: View, known: Correspondence) -> tuple[Order, list[Event]]:
         """The order for the next keyframe interval, and what has happened."""
         self._seen = view, known
-        if self.errand is None:
+        if self.errand is None and not self._revisit(view):
+            self._revisiting.note_target(self._mission.target)
             return self._mission.advance(view, known)
         happened = self._mission.witness(view, known)
         order = self._pursue(view, known)
         return order, happened + self.take_events()
+
+    def _revisit(self, view: View) -> bool:
+        """Go back to a vertex, if that is to be done before exploring goes on; whether it is."""
+        here = self._here()
+        if here is None or not self._mission.is_choosing:
+            return False
+        belief = self._mapper.belief
+        wanted = self._revisiting.next(self._mapper.graph, belief, here.starts())
+        if wanted is None:
+            doubtful = self._revisiting.too_uncertain(belief)
+            self._mission.remark = (
+                f"; {len(doubtful)} vertices stay less certain than wanted" if doubtful else ""
+            )
+            return False
+        self._take(ToVertex(wanted.vertex), view.stamp)
+        self._is_own = True
+        self.happened.append(Decision(view.stamp, wanted.vertex, None, wanted.reason))
+        return True
 
     def take_events(self) -> list[Event]:
         """What has happened and was not told of yet."""
@@ -312,7 +336,7 @@ class Errands:
 
     def _look_once(self, view: View) -> Order:
         if self._looks:
-            sigma = math.sqrt(max(np.trace(self._mapper.belief.P[:2, :2]), 0.0))
+            sigma = robot_sigma(self._mapper.belief)
             self._end(view.stamp, "arrived", f"it knows its place to {sigma:.2f} m")
             return Stand()
         return self._look_around(view)

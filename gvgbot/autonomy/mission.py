@@ -1,7 +1,7 @@
 """What the robot is about: explore every frontier, give up what is out of reach, say why."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 import numpy as np
@@ -9,6 +9,7 @@ import numpy as np
 from gvgbot.autonomy.control.edge_follower import Track
 from gvgbot.autonomy.events import Decision, Event, Finished, Recovery
 from gvgbot.autonomy.exploration.access import NEAR_M, way_to_edge
+from gvgbot.autonomy.exploration.certainty import CertaintyConfig, vertex_sigma
 from gvgbot.autonomy.exploration.ears import ear_next, nearest_frontier
 from gvgbot.autonomy.exploration.obstructions import Obstructions
 from gvgbot.autonomy.exploration.paths import Approach, shortest_paths
@@ -42,6 +43,7 @@ class ExplorationConfig:
     detour_m_per_m: Annotated[float, Range(0.0, 1000.0)] = (
         50.0  # for less standard deviation, if balanced
     )
+    certainty: CertaintyConfig = field(default_factory=CertaintyConfig)
     drive_dead_ends: bool = False  # although the end of a dead end can be seen from its mouth
     patience_m: Annotated[float, Range(5.0, 1000.0)] = (
         60.0  # driven beyond twice the way to a frontier
@@ -91,6 +93,7 @@ class Mission:
         self.target: HalfEdgeId | None = None
         self.outcome: Outcome | None = None
         self.reason = ""
+        self.remark = ""  # on how certain the map is, for the end
         self._budget_m = math.inf  # of `travelled`, for the present target
         self._newest_m = 0.0  # of the target edge that has been driven
         self._last_progress = 0.0  # stamp
@@ -124,6 +127,13 @@ class Mission:
         self._watch_the_way(view)
         order = Stand() if self.outcome is not None else self._decide(view, here)
         return order, self._events
+
+    @property
+    def is_choosing(self) -> bool:
+        """Whether a task is done, and the next one has to be chosen on the graph."""
+        graph = self._mapper.graph
+        half = None if self.target is None else graph.half_edge(self.target)
+        return self.outcome is None and bool(graph.vertices) and (half is None or not half.open)
 
     def witness(self, view: View, known: Correspondence) -> list[Event]:
         """Learn from where somebody else drives the robot."""
@@ -298,8 +308,7 @@ class Mission:
             return nearest_frontier(graph, starts)
 
         def handicap(vertex: int) -> float:
-            sigma = math.sqrt(float(np.trace(belief.vertex_covariance(vertex))))
-            return self._config.detour_m_per_m * sigma
+            return self._config.detour_m_per_m * vertex_sigma(belief, vertex)
 
         return nearest_frontier(graph, starts, handicap)
 
@@ -462,7 +471,7 @@ class Mission:
         if blocked:
             self._end(view, "explored_with_blocked", f"{blocked} frontiers were given up")
         else:
-            self._end(view, "explored", "no frontier is left")
+            self._end(view, "explored", f"no frontier is left{self.remark}")
         return Stand()
 
     def _given_up(self) -> int:

@@ -1,0 +1,28 @@
+"""Going back to what is known: the robot does it, goes on exploring, and ends."""
+
+import pytest
+
+from gvgbot.autonomy.events import Decision, ErrandEnded
+from gvgbot.autonomy.exploration.certainty import CertaintyConfig
+from gvgbot.autonomy.mission import ExplorationConfig
+from gvgbot.geometry import Pose
+from tests.scenarios.rig import assert_explored, play
+from tests.unit.autonomy.sights import carved
+
+pytestmark = [pytest.mark.slow, pytest.mark.twin, pytest.mark.timeout(120)]
+
+BLOCKS = [(x, y, x + 2.4, y + 2.4) for x in (-3.6, 1.2) for y in (-3.6, 1.2)]
+TOWN = carved([(-4.8, -4.8, 4.8, 4.8)], BLOCKS)  # two blocks by two
+
+
+def test_the_robot_visits_places_between_and_says_that_its_goal_is_out_of_reach() -> None:
+    certainty = CertaintyConfig(p_explore=0.1, vertex_sigma_m=0.001)
+    run = play(TOWN, Pose(0.0, -4.0, 0.1), exploration=ExplorationConfig(certainty=certainty))
+    assert_explored(run)
+    decisions = [e for e in run.events if isinstance(e, Decision)]
+    visits = [e for e in decisions if "place is uncertain" in e.reason]
+    ended = [e for e in run.events if isinstance(e, ErrandEnded)]
+    assert visits
+    assert [e.outcome for e in ended] == ["arrived"] * len(visits)
+    assert "less certain than wanted" in run.pipeline.mission.reason
+    assert run.contacts == 0
