@@ -5,7 +5,7 @@ which never jumps: corrections of the global estimate do not move it.
 """
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ _EMPTY = (
     ("_sight", 0.0),
     ("_seen_at", -np.inf),
 )
+_ONE_WALL = 0.4  # of a cell: means of neighbouring cells nearer than this are of one wall
 _MAX_VOTES = 8  # a wall needs this many contrary scans, less the hits, before it is forgotten
 
 
@@ -40,6 +41,14 @@ class LocalMapConfig:
     bridge_gap_m: Annotated[float, Range(0.0, 1.0)] = (
         0.3  # neighbouring hits closer than this are one wall
     )
+
+
+class Walls(NamedTuple):
+    """Mean hits (N, 2), how many there were (N,), and directions (N, 2) to where they were seen."""
+
+    points: Array
+    hits: Array
+    sights: Array
 
 
 class LocalMap:
@@ -80,26 +89,31 @@ class LocalMap:
     def _renew(self) -> None:
         """Draw from the cells what is asked for again and again."""
         occupied = self._votes > 0
-        self._points, self._weights = self._mean[occupied], self._hits[occupied].astype(np.float64)
-        for drawn in (self._points, self._weights):
+        self._walls = _merged(
+            np.flatnonzero(occupied),
+            self._size,
+            Walls(
+                self._mean[occupied],
+                self._hits[occupied].astype(np.float64),
+                self._sight[occupied].astype(np.float64),
+            ),
+            _ONE_WALL * self._cell,
+        )
+        for drawn in self._walls:
             drawn.setflags(write=False)
         self._known = np.pad(self._free | occupied, 1)  # with a rim for what is not in the window
 
     def points(self) -> Array:
-        """Mean hits of the occupied cells (N, 2), local frame."""
-        return self._points
+        """Points of the walls (N, 2), local frame: about one for each cell that a wall crosses."""
+        return self._walls.points
 
     def hits(self) -> Array:
-        """How many hits (N,) each of `points` is the mean of, the oldest forgotten.
-
-        Where a wall lies on the border of two rows of cells, both means are off, and only together
-        they are right: each counts as often as it was hit.
-        """
-        return self._weights
+        """How many hits (N,) each of `points` is the mean of, the oldest forgotten."""
+        return self._walls.hits
 
     def sights(self) -> Array:
         """Mean direction (N, 2) from each of `points` to where it was seen from, local frame."""
-        return self._sight[self._votes > 0].astype(np.float64)
+        return self._walls.sights
 
     def covers(self, points: Array) -> NDArray[np.bool_]:
         """Whether each point (N, 2) lies in the window."""
@@ -192,6 +206,29 @@ def _shifted(
     target = tuple(slice(max(-s, 0), n + min(-s, 0)) for s in shift)
     out[target] = array[source]
     return out
+
+
+def _merged(cells: NDArray[np.intp], columns: int, walls: Walls, reach: float) -> Walls:
+    """The walls of ascending cells (N,), with one mean for two neighbours on the same face.
+
+    Where a wall lies on the border of two rows of cells, both means are off, and only together
+    they are right. With a reach of less than half a cell no mean has two others on one axis.
+    """
+    for step in (1, columns):
+        points, hits, sights = walls
+        beside = np.minimum(np.searchsorted(cells, cells + step), len(cells) - 1)
+        near = np.hypot(*(points[beside] - points).T) < reach
+        one_side = (sights[beside] * sights).sum(axis=1) > 0.0
+        low = np.flatnonzero((cells[beside] == cells + step) & near & one_side)
+        high = beside[low]
+        share = (hits[high] / (hits[low] + hits[high]))[:, None]
+        points[low] += share * (points[high] - points[low])
+        sights[low] += share * (sights[high] - sights[low])
+        hits[low] += hits[high]
+        kept = np.ones(len(cells), bool)
+        kept[high] = False
+        cells, walls = cells[kept], Walls(points[kept], hits[kept], sights[kept])
+    return walls
 
 
 def _without_single_dropouts(ranges: Array) -> Array:
