@@ -102,8 +102,10 @@ class LocalMaps:
         coarse = (config.coarse_pair_m,) if config.coarse_pair_m else ()
         if min(len(walls), len(points)) < _LEAST_POINTS:
             return None
-        tree, best, agreement = cKDTree(walls), None, 0.0
+        tree, best, agreement = cKDTree(walls, balanced_tree=False), None, 0.0
         for prior, Q in priors:
+            if agreement + _CLEARLY >= 1.0:
+                break  # nothing can be clearly better
             near = _turned(points, tree, prior, config.search_rad) if config.search_rad else prior
             found = register_coarsely(points, tree, walls, near, Q, config, coarse, hits, sides)
             if found is None or found.inliers < config.min_inliers:

@@ -5,6 +5,7 @@ a bare corridor) is left to odometry. A point is laid onto a wall's face that wa
 side: what a room shows of a thin wall is not what the corridor showed of it.
 """
 
+import math
 from dataclasses import dataclass, replace
 from typing import Annotated, NamedTuple
 
@@ -22,6 +23,7 @@ _FEWEST = 3  # of them make a line
 _FLATNESS = 0.08  # smallest over largest spread of the neighbours of a point on a wall
 _REACH_M = 0.35  # as far away as neighbours on one wall may be
 _ITERATIONS = 6
+_SAME_PAIRS_M, _SAME_PAIRS_RAD = 0.02, 0.005  # moved less, points are near to the same walls
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,6 +61,15 @@ class Sides(NamedTuple):
     eye: Array
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Pairs:
+    """Points by their index (K,), and the walls they are near to: centre and normal (K, 2)."""
+
+    index: Index
+    centre: Array
+    normal: Array
+
+
 def register(
     points: Array,
     tree: cKDTree,
@@ -80,13 +91,19 @@ def register(
     step = np.zeros(3)  # of the pose, in the prior's frame
     pose, A = prior, information
     inliers, rms = 0.0, 0.0
+
+    def paired(pose: Pose) -> _Pairs:
+        seen = None if sides is None else Sides(sides.sights, pose.transform(sides.eye))
+        return _pairs(pose.transform(points), tree, walls, counts, config.max_pair_m, seen)
+
+    paired_at, pairs = pose, paired(pose)
     for _ in range(_ITERATIONS):
         world = pose.transform(points)
-        seen = None if sides is None else Sides(sides.sights, pose.transform(sides.eye))
-        pairs = _pairs(world, tree, walls, counts, config.max_pair_m, seen)
-        if pairs is None or len(pairs[0]) < config.min_pairs:
+        if _is_elsewhere(paired_at.to(pose)):
+            paired_at, pairs = pose, paired(pose)
+        index, normal, residual = _near(world, pairs, config.max_pair_m)
+        if len(index) < config.min_pairs:
             return None
-        index, normal, residual = pairs
         weight = (
             config.independent_share
             / config.pair_sigma_m**2
@@ -126,15 +143,18 @@ def register_coarsely(
     return register(points, tree, walls, prior, Q, config, hits, sides)
 
 
+def _is_elsewhere(motion: Pose) -> bool:
+    """Whether points have moved so far that they may be near to another part of the walls."""
+    return math.hypot(motion.x, motion.y) > _SAME_PAIRS_M or abs(motion.theta) > _SAME_PAIRS_RAD
+
+
 def _pairs(
     world: Array, tree: cKDTree, walls: Array, hits: Array, reach: float, sides: Sides | None
-) -> tuple[Index, Array, Array] | None:
-    """Indices of the points near a wall, the wall's normals (K, 2), and signed distances (K,)."""
+) -> _Pairs:
+    """The points that are near to a wall, and its line there."""
     found = tree.query(world, k=_NEIGHBOURS, distance_upper_bound=max(reach, _REACH_M))
     distance, near = np.asarray(found[0]), np.asarray(found[1])
     index = np.nonzero(np.isfinite(distance[:, _FEWEST - 1]) & (distance[:, 0] < reach))[0]
-    if len(index) == 0:
-        return None
     present = np.isfinite(distance[index])
     near = np.where(present, near[index], near[index][:, :1])
     group, weight = walls[near], present * hits[near]
@@ -142,24 +162,29 @@ def _pairs(
     if sides is not None:
         eyewards = ((sides.eye - world[index]) * normal).sum(axis=1)
         seen_from = np.einsum("kij,kj->ki", sides.sights[near], normal)
-        weight *= seen_from * eyewards[:, None] > 0.0
+        facing = seen_from * eyewards[:, None] > 0.0
+        weight *= facing
         enough = np.count_nonzero(weight, axis=1) >= _FEWEST
-        weight[~enough] = 1.0
-        centre, normal, flat = _lines(group, weight)
+        mixed = np.flatnonzero(enough & (present & ~facing).any(axis=1))
+        centre[mixed], normal[mixed], flat[mixed] = _lines(group[mixed], weight[mixed])
         flat &= enough
-    residual = ((world[index] - centre) * normal).sum(axis=1)
-    keep = flat & (np.abs(residual) < reach)
-    return index[keep], normal[keep], residual[keep]
+    return _Pairs(index[flat], centre[flat], normal[flat])
+
+
+def _near(world: Array, pairs: _Pairs, reach: float) -> tuple[Index, Array, Array]:
+    """Indices of the points near a wall, the wall's normals (K, 2), and signed distances (K,)."""
+    residual = ((world[pairs.index] - pairs.centre) * pairs.normal).sum(axis=1)
+    near = np.abs(residual) < reach
+    return pairs.index[near], pairs.normal[near], residual[near]
 
 
 def _lines(group: Array, weight: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Centres (K, 2) and normals (K, 2) of groups of points (K, G, 2), and which are lines (K,)."""
     weight = weight / weight.sum(axis=1, keepdims=True)
-    centre = (weight[..., None] * group).sum(axis=1)
-    d = group - centre[:, None]
-    xx, yy, xy = (
-        (weight * p).sum(axis=1) for p in (d[..., 0] ** 2, d[..., 1] ** 2, d[..., 0] * d[..., 1])
-    )
+    x, y = group[..., 0], group[..., 1]
+    centre = np.stack([(weight * x).sum(axis=1), (weight * y).sum(axis=1)], axis=1)
+    dx, dy = x - centre[:, :1], y - centre[:, 1:]
+    xx, yy, xy = ((weight * p).sum(axis=1) for p in (dx * dx, dy * dy, dx * dy))
     angle = 0.5 * np.arctan2(2 * xy, xx - yy)  # of the wall
     spread = np.hypot((xx - yy) / 2, xy)
     large, small = (xx + yy) / 2 + spread, (xx + yy) / 2 - spread
