@@ -18,7 +18,7 @@ from gvgbot.autonomy.slam.recognition import (
     RecognitionConfig,
     Sighting,
     detection_covariance,
-    gate_distance,
+    gate_distances,
     looks_alike,
     match_bearings,
 )
@@ -195,12 +195,11 @@ class Mapper:
     def _candidates(self, view: View, sighting: Sighting) -> list[tuple[float, Vertex, float]]:
         """Known vertices, long out of sight, inside the gate of a sighting; most likely first."""
         found = []
+        far = gate_distances(self.belief, sighting, view.local_base, self._recognition)
         for vertex in self.graph.vertices.values():
             if view.travelled - vertex.seen_at < self._recognition.tracked_m:
                 continue
-            d2, metres = gate_distance(
-                self.belief, vertex, sighting, view.local_base, self._recognition
-            )
+            d2, metres = far[vertex.id]
             if d2 < self._recognition.gate or metres < self._recognition.same_place_m:
                 found.append((d2, vertex.id, vertex, metres))
         return [

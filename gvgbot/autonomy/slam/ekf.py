@@ -163,6 +163,26 @@ def innovation(
     return r, H @ belief.P @ H.T + R, H
 
 
+def distances(belief: Belief, base_point: Array, R: Array) -> tuple[Array, Array]:
+    """How far a point (2,) in the base frame, with covariance R (2, 2), is from each vertex.
+
+    Squared Mahalanobis distances and metres, both (N,), in the order of the belief's ids.
+    """
+    c, s = math.cos(belief.x[2]), math.sin(belief.x[2])
+    base_map = np.array([[c, s], [-s, c]])  # rotation
+    foreseen = (belief.x[3:].reshape(-1, 3)[:, :2] - belief.x[:2]) @ base_map.T
+    r = base_point - foreseen
+    n = len(r)
+    H = np.empty((n, 2, 5))  # by the pose of the robot and the vertex's position
+    H[:, :, :2], H[:, :, 3:] = -base_map, base_map
+    H[:, 0, 2], H[:, 1, 2] = foreseen[:, 1], -foreseen[:, 0]
+    at = np.tile(np.arange(5), (n, 1))
+    at[:, 3:] += 3 * np.arange(n)[:, None]
+    S = H @ belief.P[at[:, :, None], at[:, None, :]] @ H.swapaxes(1, 2) + R
+    d2 = (r * np.linalg.solve(S, r[:, :, None])[:, :, 0]).sum(axis=1)
+    return d2, np.hypot(r[:, 0], r[:, 1])
+
+
 def update(belief: Belief, vertex: int, base_vertex: Pose, R: Array) -> Belief:
     """The belief after seeing a vertex again; Joseph form, positive whatever the gain."""
     r, S, H = innovation(belief, vertex, base_vertex, R)

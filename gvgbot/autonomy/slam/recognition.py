@@ -11,7 +11,7 @@ from typing import Annotated
 
 import numpy as np
 
-from gvgbot.autonomy.slam.ekf import Belief, innovation, mahalanobis
+from gvgbot.autonomy.slam.ekf import Belief, distances
 from gvgbot.autonomy.slam.graph import Vertex
 from gvgbot.geometry import Array, Pose, wrap_angle
 from gvgbot.ranges import Range
@@ -64,14 +64,14 @@ def match_bearings(
     return matched
 
 
-def gate_distance(
-    belief: Belief, vertex: Vertex, sighting: Sighting, local_base: Pose, config: RecognitionConfig
-) -> tuple[float, float]:
-    """Squared Mahalanobis distance and metres between a sighting and a known vertex."""
+def gate_distances(
+    belief: Belief, sighting: Sighting, local_base: Pose, config: RecognitionConfig
+) -> dict[int, tuple[float, float]]:
+    """Squared Mahalanobis distance and metres between a sighting and each known vertex, by id."""
     seen = local_base.inverse().transform(sighting.position)
     R = detection_covariance(float(np.hypot(*seen)), config)
-    r, S, _ = innovation(belief, vertex.id, Pose(float(seen[0]), float(seen[1])), R)
-    return mahalanobis(r, S), float(np.hypot(*r))
+    d2, metres = distances(belief, seen, R)
+    return dict(zip(belief.ids, zip(d2.tolist(), metres.tolist(), strict=True), strict=True))
 
 
 def looks_alike(

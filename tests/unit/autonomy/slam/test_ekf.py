@@ -13,6 +13,7 @@ from gvgbot.autonomy.slam.ekf import (
     Belief,
     OdometryNoise,
     add_vertex,
+    distances,
     expected,
     innovation,
     mahalanobis,
@@ -314,3 +315,16 @@ def test_a_loop_closure_shrinks_what_odometry_alone_lets_grow() -> None:
         for step in [Pose(0.5, 0.0, 0.0)] * int(SIDE / 0.5) + [Pose(0.0, 0.0, math.pi / 2)]:
             blind = predict(blind, step, noise.covariance(step, 1.0))
     assert np.trace(belief.P[:2, :2]) < 0.5 * np.trace(blind.P[:2, :2])
+
+
+@given(seeds, st.integers(0, 5))
+def test_distances_of_all_vertices_are_those_of_each_innovation(seed: int, vertices: int) -> None:
+    rng = np.random.default_rng(seed)
+    belief, point = random_belief(rng, vertices), rng.uniform(-9.0, 9.0, 2)
+    R = random_covariance(rng, 2)
+    d2, metres = distances(belief, point, R)
+    assert d2.shape == metres.shape == (vertices,)
+    for i, vertex in enumerate(belief.ids):
+        r, S, _ = innovation(belief, vertex, Pose(*point.tolist()), R)
+        assert d2[i] == pytest.approx(mahalanobis(r, S))
+        assert metres[i] == pytest.approx(math.hypot(*r))

@@ -14,7 +14,7 @@ from gvgbot.autonomy.slam.recognition import (
     RecognitionConfig,
     Sighting,
     detection_covariance,
-    gate_distance,
+    gate_distances,
     looks_alike,
     match_bearings,
 )
@@ -101,7 +101,7 @@ def test_the_gate_is_mahalanobis_distance_with_the_joint_covariance() -> None:
     local_base = Pose(7.0, -3.0, 2.0)
     base_vertex = here.to(seen_first).position + np.array([0.1, -0.2])
     target = Sighting(local_base.transform(base_vertex), 1.0, (), meetpoint=True)
-    d2, metres = gate_distance(belief, vertex(), target, local_base, CONFIG)
+    ((_, (d2, metres)),) = gate_distances(belief, target, local_base, CONFIG).items()
     assert metres == pytest.approx(math.hypot(0.1, 0.2))
     c, s = math.cos(1.0), math.sin(1.0)
     into_base = np.array([[c, s], [-s, c]])
