@@ -133,7 +133,6 @@ def _without_gaps(odometry: list[Odometry]) -> Iterator[Odometry]:
         parts = max(1, math.ceil((later.stamp - earlier.stamp) / _LONGEST_GAP_S))
         for part in range(1, parts):
             share = part / parts
-            moved = Pose(share * motion.x, share * motion.y, share * motion.theta)
             stamp = earlier.stamp + share * (later.stamp - earlier.stamp)
-            yield Odometry(stamp, earlier.odom_base.compose(moved), later.twist)
+            yield Odometry(stamp, earlier.odom_base.compose(motion.part(share)), later.twist)
         yield later

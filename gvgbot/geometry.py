@@ -45,6 +45,10 @@ class Pose:
         """The motion from this pose to the other: a_b.to(a_c) = b_c."""
         return self.inverse().compose(other)
 
+    def part(self, share: float) -> "Pose":
+        """A share of a motion that is small, or goes on as it began."""
+        return Pose(share * self.x, share * self.y, share * self.theta)
+
     def distance(self, other: "Pose") -> float:
         """Metres between the two origins."""
         return math.hypot(other.x - self.x, other.y - self.y)

@@ -75,11 +75,22 @@ def _trajectory(journey: Journey, poses: list[Pose]) -> Trajectory:
 
 
 def _corrected(journey: Journey, pipeline: Pipeline, keyframes: list[Pose]) -> list[Pose]:
-    """The journey hung on the smoothed keyframes: map_base of each row."""
-    return [
-        keyframes[k].compose(pipeline.keyframes[k].odom_base.to(odom_base))
-        for k, odom_base in zip(journey.keyframes, journey.odom_base, strict=True)
-    ]
+    """The journey hung on the smoothed keyframes: map_base of each row.
+
+    What odometry is wrong by from one keyframe to the next is spread over the time between.
+    """
+    corrected = list[Pose]()
+    for k, stamp, odom_base in zip(
+        journey.keyframes, journey.stamps, journey.odom_base, strict=True
+    ):
+        before, *after = pipeline.keyframes[k : k + 2]
+        pose = keyframes[k].compose(before.odom_base.to(odom_base))
+        for keyframe in after:
+            share = (stamp - before.stamp) / max(keyframe.stamp - before.stamp, 1e-9)
+            by_next = keyframes[k + 1].compose(keyframe.odom_base.to(odom_base))
+            pose = pose.compose(pose.to(by_next).part(min(max(share, 0.0), 1.0)))
+        corrected.append(pose)
+    return corrected
 
 
 def route_graph(

@@ -62,7 +62,8 @@ class LocalMaps:
         motion = self._calibration.corrected(motion, duration)
         prior = before.compose(motion)
         still = Pose(before.x, before.y, prior.theta)
-        best = self._best(scan, [(prior, Q), (still, _SLIPPING * Q)])
+        slipping = [] if self._matching.search_rad else [(still, _SLIPPING * Q)]
+        best = self._best(scan, [(prior, Q), *slipping])
         if best is None:
             return prior, Q
         found, used = best

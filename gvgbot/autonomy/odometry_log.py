@@ -59,14 +59,9 @@ class OdometryLog:
         before, after = self.odom_base_at(end - span), self.odom_base_at(end)
         if before is None or after is None:
             return Pose()
-        return _part(before.to(after), duration / span)
+        return before.to(after).part(duration / span)
 
 
 def _between(earlier: Odometry, later: Odometry, stamp: float) -> Pose:
     share = (stamp - earlier.stamp) / (later.stamp - earlier.stamp)
-    return earlier.odom_base.compose(_part(earlier.odom_base.to(later.odom_base), share))
-
-
-def _part(motion: Pose, share: float) -> Pose:
-    """A share of a short motion."""
-    return Pose(share * motion.x, share * motion.y, share * motion.theta)
+    return earlier.odom_base.compose(earlier.odom_base.to(later.odom_base).part(share))
