@@ -19,6 +19,7 @@ from gvgbot.hal.messages import Odometry
 from gvgbot.links import Devices, Links
 from gvgbot.maps.run_directory import RunDirectory
 from gvgbot.persistence.keeper import Keeper
+from gvgbot.persistence.mission_files import MissionFiles
 from gvgbot.persistence.start import Wanted, begin, state_directory
 from gvgbot.progress import Progress
 from gvgbot.recording import extra_needed
@@ -53,6 +54,7 @@ def explore(config: Config, *, out: Path | None, real_time: bool) -> int:
             raise
         finally:
             progress.clear()
+            Keeper(session, MissionFiles(directory.path)).finish()
             session.save()
     return _conclude(session)
 

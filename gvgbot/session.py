@@ -100,7 +100,8 @@ class Session:
         touching = contact is not None and contact.bumper
         self.contacts += touching and not self._in_contact
         self._in_contact = touching
-        self.journey.record(odometry, self.pipeline, self._truth(odometry.stamp))
+        if not self.pipeline.is_lost:
+            self.journey.record(odometry, self.pipeline, self._truth(odometry.stamp))
 
     @property
     def tally(self) -> Tally:

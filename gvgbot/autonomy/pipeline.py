@@ -145,6 +145,11 @@ class Pipeline:
         return self._config.scan_matching
 
     @property
+    def is_lost(self) -> bool:
+        """Whether it does not know where on its map it is."""
+        return False
+
+    @property
     def map_base(self) -> Pose:
         """The pose as believed now."""
         newest = self._odometry.newest

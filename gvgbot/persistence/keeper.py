@@ -12,7 +12,8 @@ from functools import partial
 import structlog
 
 from gvgbot.autonomy import events
-from gvgbot.autonomy.memory import growth, recall, remember
+from gvgbot.autonomy.memory import growth, remember
+from gvgbot.autonomy.returning import ReturningPipeline
 from gvgbot.clock import Clock, LoopClock
 from gvgbot.drivers.kobuki.feedback import FeedbackReader
 from gvgbot.persistence.mission_files import MissionFiles
@@ -45,6 +46,7 @@ class Keeper:
         self._snapshot_at = -math.inf  # stamp of the last snapshot
         self._snapshot_of = -1  # keyframes in it
         self._settled = False  # the map has changed since the last snapshot
+        self._goes_on = files.is_begun  # in the files in which it ended
         self._same_life = False  # the computer and its clock have gone on since
         self.trouble: str | None = None  # why nothing can be written just now
         if saved is not None:
@@ -56,11 +58,25 @@ class Keeper:
         session = self._session
         session.count_on(saved.beat.tally)
         session.journey = saved.journey
-        recall(session.pipeline, saved.memory, saved.past)
-        if self._files.is_begun:
+        config = session.config
+        session.pipeline = ReturningPipeline(
+            config.autonomy,
+            config.exploration,
+            config.robot.radius_m,
+            saved.memory,
+            saved.past,
+            self._is_vouched,
+        )
+        if not self._goes_on:
+            session.pipeline.mission.outcome, session.pipeline.mission.reason = None, ""
+        else:
             self._keyframes = len(saved.past)
             self._observations = len(session.pipeline.mapper.observations)
             self._rows = len(saved.journey.stamps)
+
+    def _is_vouched(self) -> bool:
+        """Whether the base has counted all the time since, so that it cannot have driven."""
+        return self._goes_on and self._feedback is not None and self._feedback.is_unbroken
 
     def clock(self) -> LoopClock:
         """The robot's clock, which goes on from where it ended; on the running loop."""
@@ -100,7 +116,7 @@ class Keeper:
         Call each such function before asking for the next.
         """
         pipeline = self._session.pipeline
-        if not pipeline.keyframes:
+        if not pipeline.keyframes or pipeline.is_lost:
             return _nothing
         beat = self._beat(stamp)
         batch = Batch(

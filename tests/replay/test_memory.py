@@ -84,7 +84,7 @@ def test_what_the_journal_says_after_the_snapshot_is_lived_again(
     one, other = restarted.mapper.belief, lived.mapper.belief
     assert one.ids == other.ids
     assert one.x == pytest.approx(other.x, abs=1e-9)
-    assert one.P == pytest.approx(other.P, abs=1e-12)
+    assert pytest.approx(other.P, abs=1e-12) == one.P
     assert restarted.map_base.distance(lived.mapper.belief.map_base) < 1e-9
 
 

@@ -75,7 +75,8 @@ class Lives:
         """Live until the mission has an outcome, or until killed: no last word gets out."""
         files = MissionFiles(self.out)
         saved = MissionFiles(self.known).read() if self.known is not None else files.read()
-        session = Session(self.config, RunDirectory(self.out), self.place)
+        directory = RunDirectory(self.out)
+        session = Session(self.config, directory, self.place)
         session.simulation = self.world
         keeper = Keeper(session, files, saved)
         self.sessions.append(session)
@@ -94,7 +95,8 @@ class Lives:
             return "SIGKILL"
 
         robot = Robot(session, Notifier(None), None, off_loop=at_once, keeper=keeper)
-        await robot.serve(ended(), links)
+        with directory:
+            await robot.serve(ended(), links)
 
 
 def at(stamp: float) -> Callable[[Session, float], bool]:

@@ -165,7 +165,7 @@ def full_disk(room: int) -> Iterator[None]:
 def test_a_disk_without_room_for_a_batch_takes_it_later(tmp_path: Path, room: int) -> None:
     files = written(tmp_path)
     size = (tmp_path / JOURNAL).stat().st_size
-    with full_disk(size + room), pytest.raises(OSError):
+    with full_disk(size + room), pytest.raises(OSError, match="too large"):
         files.append(batch(5, 40), sync=True)
     assert places(tmp_path) == [float(i) for i in range(5)]
     files.append(batch(5, 40), sync=True)
@@ -175,7 +175,7 @@ def test_a_disk_without_room_for_a_batch_takes_it_later(tmp_path: Path, room: in
 def test_a_disk_without_room_for_a_snapshot_keeps_the_old_ones(tmp_path: Path) -> None:
     files = written(tmp_path)
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
-    with full_disk(200), pytest.raises(OSError):
+    with full_disk(200), pytest.raises(OSError, match="too large"):
         files.save(snapshot(9.0))
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 
@@ -199,5 +199,5 @@ def test_what_cannot_be_written_is_an_error_and_no_loss(
     path.mkdir()
     files = written(path)
     mishap(path)
-    with pytest.raises(OSError):
+    with pytest.raises(OSError, match="journal"):
         files.append(batch(5), sync=True)

@@ -1,0 +1,308 @@
+"""Where on a known map is the robot? Hypotheses all over it, and looks that tell them apart.
+
+The robot draws a local map from nothing and drives about; each look lays that map onto the walls
+of the known one. What fits nowhere better than chance is dropped, what fits in several places is
+kept until the robot has driven to where they differ.
+"""
+
+import math
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation, distance_transform_edt
+from scipy.spatial import cKDTree
+
+from gvgbot.autonomy.gvg.local_map import LocalMap
+from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig, register
+from gvgbot.geometry import Array, Pose, wrap_angle
+from gvgbot.hal.messages import Scan
+
+_CELL_M, _WALL_CELL_M = 0.25, 0.1
+_REACH_M = 8.0  # around the robot, what is compared
+_NEAR_M = 0.2  # walls so near to each other are one
+_PLACES_M = 0.5  # between places that are tried,
+_HEADINGS = 120  # each with so many headings
+_TRIED = 100  # places in one go
+_ROUGH_M = 0.4  # walls so far off do not speak for a rough guess
+_ROUGH_POINTS, _POINTS = 80, 300
+_GUESSES = 40  # that are looked at closely
+_APART_M, _APART_RAD = 0.8, 0.35  # guesses nearer to each other are the same
+_ONE_M, _ONE_RAD = 0.4, 0.2  # hypotheses nearer to each other are the same
+_LOOK_EVERY_M = 1.0  # driven between two looks
+_TYPICAL = 0.05  # share of the walls that disagree at the right place
+_CHANCE = (
+    0.15  # where it looks alike by chance, and of what the map has not seen: that says nothing
+)
+_LOOKS = 5  # before anything is said
+_SURE = 0.995
+_HOPELESS = 0.01
+_GUESSED = np.diag([0.3**2, 0.3**2, 0.1**2])
+_FOLLOWED = np.diag([0.1**2, 0.1**2, 0.03**2])
+
+Bools = NDArray[np.bool_]
+
+
+class KnownWalls:
+    """The walls of a known map, what of it has been seen, and where a robot has been."""
+
+    def __init__(self, scans: Sequence[tuple[Pose, Scan]], places: Array) -> None:
+        """Scans taken at map_base poses, and places (N, 2) on the known edges, map frame."""
+        ends = [base.compose(scan.base_laser).transform(_ends(scan)) for base, scan in scans]
+        points = np.concatenate([np.empty((0, 2)), *ends])
+        self.points = _thinned(points, _WALL_CELL_M)
+        self.tree = cKDTree(self.points)
+        self.places = _thinned(places, _PLACES_M)
+        everything = np.concatenate([self.points, self.places])
+        low = everything.min(axis=0) if len(everything) else np.zeros(2)
+        high = everything.max(axis=0) if len(everything) else np.zeros(2)
+        self._corner = low - 2 * _REACH_M
+        shape = np.ceil((high - low + 4 * _REACH_M) / _WALL_CELL_M).astype(int)
+        walls = np.zeros(shape, bool)
+        walls[self._cells(self.points, _WALL_CELL_M)] = True
+        self._score = np.clip(
+            1.0 - distance_transform_edt(~walls) * _WALL_CELL_M / _ROUGH_M, 0.0, 1.0
+        ).astype(np.float32)
+        seen = np.zeros(np.ceil(shape * _WALL_CELL_M / _CELL_M).astype(int), bool)
+        for base, scan in scans:
+            seen[self._cells(base.compose(scan.base_laser).transform(_passed(scan)), _CELL_M)] = 1
+        self._seen: Bools = binary_dilation(seen, iterations=2)
+
+    def _cells(self, points: Array, cell: float) -> tuple[NDArray[np.int64], ...]:
+        return tuple(((points - self._corner) / cell).astype(np.int64).T)
+
+    def scores(self, points: Array) -> Array:
+        """How well points (..., 2) lie on walls, 0..1 (...)."""
+        i, j = np.moveaxis(((points - self._corner) / _WALL_CELL_M).astype(np.int64), -1, 0)
+        rows, columns = self._score.shape
+        inside = (i >= 0) & (j >= 0) & (i < rows) & (j < columns)
+        return np.where(inside, self._score[np.where(inside, i, 0), np.where(inside, j, 0)], 0.0)
+
+    def is_seen(self, points: Array) -> Bools:
+        """Whether the map has seen anything where points (N, 2) are."""
+        i, j = ((points - self._corner) / _CELL_M).astype(np.int64).T
+        rows, columns = self._seen.shape
+        inside = (i >= 0) & (j >= 0) & (i < rows) & (j < columns)
+        found: Bools = inside & self._seen[np.where(inside, i, 0), np.where(inside, j, 0)]
+        return found
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """What the robot has around it: the walls (N, 2) near it, in the local frame."""
+
+    local_base: Pose
+    local_map: LocalMap
+    walls: Array
+
+    @classmethod
+    def around(cls, local_base: Pose, local_map: LocalMap) -> "Look":
+        """What a local map shows now; it is the map itself, which goes on to change."""
+        points = local_map.points()
+        near = np.hypot(*(points - local_base.position).T) < _REACH_M
+        return cls(local_base, local_map, points[near])
+
+
+@dataclass(slots=True, eq=False)
+class Hypothesis:
+    """Where the local frame may be on the map, and the log of how much speaks for it."""
+
+    map_local: Pose
+    weight: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Opinion:
+    """The best hypothesis, how sure it is (0..1), and how many places are possible."""
+
+    map_local: Pose | None
+    confidence: float
+    possible: int
+    looks: int
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether to act on it."""
+        return self.looks >= _LOOKS and self.confidence >= _SURE
+
+
+class Relocaliser:
+    """Forms an opinion, a little work at a time."""
+
+    def __init__(self, known: KnownWalls, matching: ScanMatchingConfig) -> None:
+        self._known, self._matching = known, matching
+        self._look: Look
+        self._hypotheses: list[Hypothesis] = []
+        self._none = 0.0  # log weight of being nowhere on the map
+        self._looks = 0
+        self._opinion = Opinion(None, 0.0, 0, 0)
+        self._work = self._working()
+
+    def step(self, look: Look) -> Opinion:
+        """Do a bit of work on a look; the opinion so far."""
+        self._look = look
+        next(self._work)
+        return self._opinion
+
+    def _formed(self) -> Opinion:
+        """What the looks so far say; weights are compared with that of no place at all."""
+        if not self._hypotheses:
+            return Opinion(None, 0.0, 0, self._looks)
+        weights = np.exp(np.array([h.weight for h in self._hypotheses] + [self._none]))
+        shares = weights / weights.sum()
+        best = int(np.argmax(shares[:-1]))
+        possible = int((shares[:-1] > _HOPELESS).sum())
+        best_place = self._hypotheses[best].map_local
+        return Opinion(best_place, float(shares[best]), possible, self._looks)
+
+    def _working(self) -> Generator[None, None, None]:
+        while True:
+            look = self._look
+            guesses = yield from self._guesses(look)
+            yield from self._begin(look, guesses)
+            while self._hypotheses:
+                start = self._look.local_base
+                while self._look.local_base.distance(start) < _LOOK_EVERY_M:
+                    yield
+                yield from self._compare(self._look)
+            while self._look.local_base.distance(look.local_base) < _LOOK_EVERY_M:
+                yield
+
+    def _guesses(self, look: Look) -> Generator[None, None, list[Pose]]:
+        """map_base where the walls around fit roughly, the best first."""
+        base_walls = look.local_base.inverse().transform(_some(look.walls, _ROUGH_POINTS))
+        headings = np.arange(_HEADINGS) * math.tau / _HEADINGS
+        c, s = np.cos(headings), np.sin(headings)
+        turned = np.stack(
+            [
+                np.outer(c, base_walls[:, 0]) - np.outer(s, base_walls[:, 1]),
+                np.outer(s, base_walls[:, 0]) + np.outer(c, base_walls[:, 1]),
+            ],
+            axis=-1,
+        )
+        scores = []
+        places = self._known.places
+        for first in range(0, len(places), _TRIED):
+            some = places[first : first + _TRIED]
+            laid = [self._known.scores(place + turned).mean(axis=1) for place in some]
+            scores.append(np.array(laid))
+            yield
+        return _peaks(places, headings, np.concatenate([np.empty((0, _HEADINGS)), *scores]))
+
+    def _begin(self, look: Look, guesses: list[Pose]) -> Generator[None, None, None]:
+        """Make hypotheses of what fits closely, too."""
+        self._hypotheses, self._none, self._looks = [], 0.0, 0
+        found = []
+        for guess in guesses:
+            yield
+            hypothesis = Hypothesis(guess.compose(look.local_base.inverse()))
+            if self._fit(look, hypothesis, _GUESSED):
+                found.append(hypothesis)
+        self._hypotheses = found
+        self._conclude()
+
+    def _compare(self, look: Look) -> Generator[None, None, None]:
+        """Weigh every hypothesis by a look."""
+        for hypothesis in self._hypotheses:
+            yield
+            if not self._fit(look, hypothesis, _FOLLOWED):
+                hypothesis.weight = -math.inf
+        self._conclude()
+
+    def _conclude(self) -> None:
+        self._looks += 1
+        self._none -= _CHANCE / _TYPICAL
+        distinct: list[Hypothesis] = []
+        for h in sorted(self._hypotheses, key=lambda h: -h.weight):
+            hopeless = h.weight < self._none + math.log(_HOPELESS)
+            if not hopeless and not any(self._same(h, other) for other in distinct):
+                distinct.append(h)
+        top = max((h.weight for h in distinct), default=0.0)
+        for h in distinct:  # only differences count
+            h.weight -= top
+        self._none -= top
+        self._hypotheses = distinct
+        self._opinion = self._formed()
+
+    def _same(self, one: Hypothesis, other: Hypothesis) -> bool:
+        here = self._look.local_base
+        a, b = one.map_local.compose(here), other.map_local.compose(here)
+        return a.distance(b) < _ONE_M and abs(wrap_angle(a.theta - b.theta)) < _ONE_RAD
+
+    def _fit(self, look: Look, hypothesis: Hypothesis, Q: Array) -> bool:
+        """Lay a look onto the map near a hypothesis and weigh it; whether that is possible."""
+        points = look.local_base.inverse().transform(_some(look.walls, _POINTS))
+        prior = hypothesis.map_local.compose(look.local_base)
+        known = self._known
+        found = register(points, known.tree, known.points, prior, Q, self._matching)
+        if found is None:
+            return False
+        hypothesis.map_local = found.pose.compose(look.local_base.inverse())
+        hypothesis.weight -= self._disagreement(look, found.pose, points) / _TYPICAL
+        return True
+
+    def _disagreement(self, look: Look, map_base: Pose, base_walls: Array) -> float:
+        """Share of the walls, of either map, that the other one should have and has not."""
+        laid = map_base.transform(base_walls)
+        seen = self._known.is_seen(laid)
+        distance = np.asarray(self._known.tree.query(laid)[0])
+        unknown_to_map = float(np.where(seen, distance > _NEAR_M, _CHANCE).mean())
+        around = self._known.tree.query_ball_point(map_base.position, _REACH_M)
+        there = look.local_base.compose(map_base.inverse()).transform(self._known.points[around])
+        there = there[look.local_map.known(there)]
+        if len(there) == 0:
+            return 1.0
+        distance = np.asarray(cKDTree(look.local_map.points()).query(there)[0])
+        return max(unknown_to_map, float((distance > _NEAR_M).mean()))
+
+
+def _peaks(places: Array, headings: Array, scores: Array) -> list[Pose]:
+    """The best poses by scores (places, headings), none near a better one."""
+    peaks: list[Pose] = []
+    for flat in np.argsort(-scores, axis=None, kind="stable").tolist():
+        i, k = divmod(flat, len(headings))
+        pose = Pose(float(places[i, 0]), float(places[i, 1]), wrap_angle(float(headings[k])))
+        if all(
+            pose.distance(p) > _APART_M or abs(wrap_angle(pose.theta - p.theta)) > _APART_RAD
+            for p in peaks
+        ):
+            peaks.append(pose)
+            if len(peaks) == _GUESSES:
+                break
+    return peaks
+
+
+def _some(points: Array, count: int) -> Array:
+    """About so many of the points, evenly taken."""
+    return points[:: max(1, len(points) // count)]
+
+
+def _thinned(points: Array, cell: float) -> Array:
+    """One point (M, 2) for each cell that points (N, 2) are in: the mean of these."""
+    if not len(points):
+        return points
+    _, index, count = np.unique(
+        np.floor(points / cell).astype(np.int64), axis=0, return_inverse=True, return_counts=True
+    )
+    index = index.ravel()
+    means = [np.bincount(index, points[:, k]) / count for k in (0, 1)]
+    return np.stack(means, axis=1)
+
+
+def _ends(scan: Scan) -> Array:
+    """Where beams hit (N, 2), laser frame."""
+    hit = np.isfinite(scan.ranges)
+    bearings = scan.bearings[hit]
+    ends: Array = scan.ranges[hit, None] * np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
+    return ends
+
+
+def _passed(scan: Scan) -> Array:
+    """Points (N, 2) along the beams, as far as is compared, laser frame."""
+    ends = _ends(scan)[::4]
+    away = np.hypot(*ends.T)
+    shares = np.arange(0.0, 2 * _REACH_M, _CELL_M)[None] / np.maximum(away, 1e-6)[:, None]
+    i, k = np.nonzero(shares < 1.0)
+    passed: Array = ends[i] * shares[i, k][:, None]
+    return passed

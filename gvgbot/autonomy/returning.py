@@ -1,0 +1,200 @@
+"""A mind that comes back to a map it knows: where it was, or lost until it knows better.
+
+If the base vouches that it cannot have moved unnoticed, and the scan agrees with the local map as
+it was kept, life goes on there. Otherwise a second mind that knows nothing drives about, and its
+local map is laid onto the known one until a single place is left.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from gvgbot.autonomy.control.reflexes import Felt
+from gvgbot.autonomy.estimate import Estimate, smoothed
+from gvgbot.autonomy.events import Event, Finished, Recovery
+from gvgbot.autonomy.memory import Growth, Memory, recall
+from gvgbot.autonomy.mission import ExplorationConfig
+from gvgbot.autonomy.pipeline import AutonomyConfig, Pipeline, Step
+from gvgbot.autonomy.relocalisation import KnownWalls, Look, Opinion, Relocaliser
+from gvgbot.autonomy.slam.ekf import Belief
+from gvgbot.autonomy.whereabouts import Whereabouts
+from gvgbot.geometry import STANDSTILL, Pose, Twist
+from gvgbot.hal.messages import Odometry, Scan
+
+_AGREES_M, _AGREEMENT = 0.15, 0.8  # so near to the walls must be that share of a scan's ends
+_MOVED_M, _MOVED_RAD = 0.5, 0.3  # farther from where odometry has it, something is wrong
+_FOUND = np.diag([0.1**2, 0.1**2, 0.03**2])  # covariance of a place found on the map
+_CARRIED = np.diag([1.0, 1.0, 0.3**2])  # and of the way there, of which nothing is known
+_NOTHING_FELT = Felt()
+
+
+class ReturningPipeline(Pipeline):
+    """A pipeline with a past. Until `is_lost` is false its pose means nothing."""
+
+    def __init__(
+        self,
+        config: AutonomyConfig,
+        exploration: ExplorationConfig,
+        robot_radius: float,
+        memory: Memory,
+        past: list[Growth],
+        is_vouched: Callable[[], bool],
+    ) -> None:
+        """`is_vouched` tells, once the base is heard, whether it counted on all the time."""
+        super().__init__(config, exploration, robot_radius)
+        recall(self, memory, past)
+        self._new_mind = partial(Pipeline, config, exploration, robot_radius)
+        self._is_vouched = is_vouched
+        self._matching = config.scan_matching
+        self._is_back = not self.keyframes
+        self._seeker: Pipeline | None = None
+        self._relocaliser: Relocaliser
+        self._estimate: Estimate
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether it does not know where on its map it is."""
+        return not self._is_back
+
+    def perceive(self, scan: Scan) -> list[Event]:
+        """Learn from a scan; while it is lost, where on the map it was taken."""
+        if self._is_back:
+            return super().perceive(scan)
+        if self._seeker is not None:
+            return self._seek(self._seeker, scan)
+        odom_base = self._odometry.odom_base_at(scan.stamp)
+        if odom_base is None:
+            return []
+        if self._is_vouched() and self._agrees(scan, odom_base):
+            self._is_back = True
+            return super().perceive(scan)
+        return self._begin_to_seek(scan)
+
+    def control(self, odometry: Odometry, felt: Felt = _NOTHING_FELT) -> Twist:
+        """The twist to drive now."""
+        if self._seeker is not None:
+            return self._seeker.control(odometry, felt)
+        twist = super().control(odometry, felt)
+        return twist if self._is_back else STANDSTILL
+
+    def _agrees(self, scan: Scan, odom_base: Pose) -> bool:
+        """Whether a scan shows the walls that are known where the robot should be."""
+        assert self._last is not None
+        before, motion = self._last.local_base, self._last.odom_base.to(odom_base)
+        duration = scan.stamp - self._last.stamp
+        noise = self._config.odometry_noise.covariance(motion, duration)
+        local_base, _ = self._maps.find(scan, before, motion, duration, noise)
+        offset = before.compose(motion).to(local_base)
+        if np.hypot(offset.x, offset.y) > _MOVED_M or abs(offset.theta) > _MOVED_RAD:
+            return False
+        walls, hit = self._maps.near.points(), np.isfinite(scan.ranges)
+        bearings = scan.bearings[hit]
+        ends = scan.ranges[hit, None] * np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
+        ends = local_base.compose(scan.base_laser).transform(ends)
+        ends = ends[self._maps.near.known(ends)]
+        if not len(walls) or len(ends) < self._matching.min_pairs:
+            return False
+        distance = np.asarray(cKDTree(walls).query(ends)[0])
+        return float((distance < _AGREES_M).mean()) >= _AGREEMENT
+
+    # -- lost ------------------------------------------------------------------------------------
+
+    def _begin_to_seek(self, scan: Scan) -> list[Event]:
+        self._estimate = smoothed(self)
+        scans = [
+            (pose, keyframe.scan)
+            for pose, keyframe in zip(self._estimate.keyframes, self.keyframes, strict=True)
+            if keyframe.scan is not None
+        ]
+        places = np.array([(p.x, p.y) for p in self._estimate.keyframes]).reshape(-1, 2)
+        self._relocaliser = Relocaliser(KnownWalls(scans, places), self._matching)
+        self._seeker = self._new_mind()
+        self._seeker._odometry = self._odometry
+        self.mission.reason = "not sure where it is"
+        return [Recovery(scan.stamp, "look for its place on the map", "it may have been moved")]
+
+    def _seek(self, seeker: Pipeline, scan: Scan) -> list[Event]:
+        """Let the second mind drive on; what it finds is of no interest but for the place."""
+        seeker.perceive(scan)
+        last = seeker._last
+        if last is None or seeker._turning():
+            return []
+        opinion = self._relocaliser.step(Look.around(last.local_base, seeker._maps.near))
+        if opinion.map_local is not None and opinion.is_sure:
+            self._arrive(seeker, opinion.map_local)
+            reason = f"{opinion.confidence:.3f} sure after {opinion.looks} looks"
+            return [Recovery(scan.stamp, "go on from its place on the map", reason)]
+        self.mission.reason = _doubt(opinion)
+        if seeker.mission.outcome is None:
+            return []
+        self.mission.outcome = "failed"
+        return [Finished(scan.stamp, "failed", self.mission.reason)]
+
+    def _arrive(self, seeker: Pipeline, map_local: Pose) -> None:
+        """Be at a place, in the second mind's local frame and with its local maps."""
+        assert seeker._last is not None
+        map_base = self._as_believed(map_local.compose(seeker._last.local_base))
+        map_local = map_base.compose(seeker._last.local_base.inverse())
+        self._move_hazards(seeker, map_local)
+        older = self.travelled - seeker.travelled
+        for local_map in (seeker._maps.near, seeker._maps._far):
+            local_map._seen_at += np.float32(older)
+        self._maps, self._odometry, self.gvg = seeker._maps, seeker._odometry, seeker.gvg
+        self._reflexes, self._newcomers = seeker._reflexes, seeker._newcomers
+        self._place(map_base)
+        motion = self.keyframes[-1].map_base.to(map_base)
+        self._last = replace(seeker._last, map_base=map_base)
+        self.keyframes.append(self._last)
+        self.steps.append(Step(motion, _CARRIED))
+        self._kept = None
+        self._look_now = True
+        self._seeker, self._is_back = None, True
+
+    def _as_believed(self, map_base: Pose) -> Pose:
+        """A pose on the smoothed map, seen from the nearest vertex as the belief has that."""
+        vertices = self._estimate.vertices
+        if not vertices:
+            return map_base
+        nearest = min(vertices, key=lambda vertex: vertices[vertex].distance(map_base))
+        belief = self.mapper.belief.map_vertex(nearest)
+        return belief.compose(vertices[nearest].to(map_base))
+
+    def _place(self, map_base: Pose) -> None:
+        """Believe to be at a pose, independently of the way there; know all vertices from afar."""
+        mapper, belief = self.mapper, self.mapper.belief
+        x, P = belief.x.copy(), belief.P.copy()
+        x[:3] = map_base.x, map_base.y, map_base.theta
+        P[:3], P[:, :3] = 0.0, 0.0
+        P[:3, :3] = _FOUND
+        mapper.belief = Belief(x, P, belief.ids)
+        for vertex in mapper.graph.vertices.values():
+            vertex.seen_at = min(
+                vertex.seen_at, self.travelled - self._config.recognition.tracked_m
+            )
+        mapper._unbelieved._all.clear()
+        self.mission.where, self.mission.target = Whereabouts(), None
+        self.mission.reason = ""
+
+    def _move_hazards(self, seeker: Pipeline, map_local: Pose) -> None:
+        """Take what was felt into the new local frame, beside what was felt since."""
+        assert self._last is not None
+        map_before = self.mapper.belief.map_base.compose(self._last.local_base.inverse())
+        turn = map_local.to(map_before)
+        for hazard in self._hazards._all:
+            hazard.points = turn.transform(hazard.points)
+        for hazard in seeker._hazards._all:
+            hazard.travelled += self.travelled - seeker.travelled
+        self._hazards._all += seeker._hazards._all
+
+
+def _doubt(opinion: Opinion) -> str:
+    """How unsure it is, in words."""
+    if not opinion.possible:
+        return "not sure where it is: no place on the map fits yet"
+    places = "place fits" if opinion.possible == 1 else "places fit"
+    return (
+        f"not sure where it is: {opinion.possible} {places}, {opinion.confidence:.2f} for the best"
+    )

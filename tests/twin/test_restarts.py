@@ -1,0 +1,123 @@
+"""A robot that is killed at any moment goes on with its map, and finds its place on it."""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gvgbot.autonomy.returning import ReturningPipeline
+from gvgbot.config import Config, load_config
+from gvgbot.geometry import Pose
+from gvgbot.persistence.mission_files import JOURNAL, SNAPSHOT
+from gvgbot.session import Session
+from gvgbot.simulation import Place
+from tests.replay.test_pipeline import LOLLIPOP, START
+from tests.twin.lives_rig import GoingWorld, Lives, at
+from tests.unit.autonomy.sights import carved
+
+pytestmark = [pytest.mark.slow, pytest.mark.twin, pytest.mark.timeout(180)]
+
+Points = dict[str, list[tuple[float, float]]]
+
+
+def vertices(out: Path) -> Points:
+    found: Points = {"meetpoint": [], "endpoint": []}
+    for feature in json.loads((out / "map.geojson").read_text())["features"]:
+        if feature["geometry"]["type"] == "Point":
+            x, y = feature["geometry"]["coordinates"]
+            found[feature["properties"]["metadata"]["kind"]].append((x, y))
+    return found
+
+
+def summary(out: Path) -> dict[str, object]:
+    read: dict[str, object] = json.loads((out / "summary.json").read_text())
+    return read
+
+
+@pytest.fixture(scope="module")
+def config() -> Config:
+    return load_config(None, ["twin.seed=1"])
+
+
+@pytest.fixture(scope="module")
+def whole(config: Config, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run that nothing interrupted."""
+    out = tmp_path_factory.mktemp("whole")
+    Lives(config, Place(LOLLIPOP, START), out).run([])
+    return out
+
+
+def torn(world: GoingWorld, out: Path) -> None:
+    """What a power cut does to the end of a journal."""
+    data = bytearray((out / JOURNAL).read_bytes())
+    data[-30] ^= 16
+    (out / JOURNAL).write_bytes(data[:-7])
+
+
+def test_the_map_of_several_lives_is_that_of_one(
+    config: Config, whole: Path, tmp_path: Path
+) -> None:
+    moments = sorted(np.random.default_rng(4).uniform(5.0, 60.0, 3).tolist())
+    lives = Lives(config, Place(LOLLIPOP, START), tmp_path, between=torn)
+    last = lives.run([at(moment) for moment in moments])
+    assert summary(tmp_path)["outcome"] == summary(whole)["outcome"] == "explored"
+    assert summary(tmp_path)["contacts"] == 0
+    for session in lives.sessions[1:]:
+        assert isinstance(session.pipeline, ReturningPipeline)
+        assert session.pipeline._seeker is None
+    found, wanted = vertices(tmp_path), vertices(whole)
+    for kind in wanted:
+        assert len(found[kind]) == len(wanted[kind])
+        for one, other in zip(found[kind], wanted[kind], strict=True):
+            assert math.dist(one, other) < 0.05
+    rows = {name: np.loadtxt(tmp_path / f"{name}.tum") for name in ("estimate", "truth")}
+    stamps = rows["estimate"][:, 0]
+    assert (np.diff(stamps) > 0).all()
+    assert (stamps == rows["truth"][:, 0]).all()
+    away = START.transform(rows["estimate"][:, 1:3]) - rows["truth"][:, 1:3]
+    assert np.hypot(*away.T).max() < 0.15
+    events = [json.loads(line) for line in (tmp_path / "events.jsonl").read_text().splitlines()]
+    added = [event for event in events if event["event"] == "vertex_added"]
+    assert len(added) == len(last.pipeline.mapper.graph.vertices)
+
+
+def pose_error(lives: Lives, session: Session) -> float:
+    truth = START.inverse().compose(lives.world.body.pose)
+    return truth.distance(session.pipeline.map_base)
+
+
+def test_on_a_known_map_it_finds_its_place_and_says_nothing_before(
+    config: Config, whole: Path, tmp_path: Path
+) -> None:
+    """The corridors of the ring are all alike: only where it branches can it be told."""
+    before = vertices(whole)
+    lives = Lives(config, Place(LOLLIPOP, Pose(8.0, 4.0, -1.2)), tmp_path, known=whole)
+    last = lives.run([])
+    assert summary(tmp_path)["outcome"] == "explored"
+    assert summary(tmp_path)["contacts"] == 0
+    assert not last.pipeline.is_lost
+    assert pose_error(lives, last) < 0.1
+    events = [json.loads(line) for line in (tmp_path / "events.jsonl").read_text().splitlines()]
+    actions = [event["action"] for event in events if event["event"] == "recovery"]
+    assert actions[:2] == ["look for its place on the map", "go on from its place on the map"]
+    assert vertices(tmp_path).keys() == before.keys()
+    for kind, points in vertices(tmp_path).items():
+        assert len(points) == len(before[kind])
+        for one, other in zip(points, before[kind], strict=True):
+            assert math.dist(one, other) < 0.05
+    assert vertices(whole) == before
+
+
+def test_in_another_building_it_claims_no_place_and_spoils_no_map(
+    config: Config, whole: Path, tmp_path: Path
+) -> None:
+    elsewhere = carved([(-5.0, -0.7, 6.0, 0.7), (0.0, -0.7, 1.8, 5.0), (3.0, -4.0, 4.2, 0.0)])
+    lives = Lives(config, Place(elsewhere, Pose(-4.0, 0.0, 0.0)), tmp_path, known=whole)
+    last = lives.run([])
+    assert last.pipeline.is_lost
+    assert summary(tmp_path)["outcome"] == "failed"
+    assert "not sure where it is" in str(summary(tmp_path)["reason"])
+    assert vertices(tmp_path) == vertices(whole)
+    assert not (tmp_path / SNAPSHOT).exists()
