@@ -374,7 +374,7 @@ class Errands:
         way = straight_way(view, goal, self._room_m) if away < _DIRECT_M else None
         if way is not None and waited < self._config.look_around_s:
             self._heading = None
-            return Drive(Track.of(*way), blind_end=False)
+            return Drive(Track.of(*way))
         foot = foot_of(self._mapper, np.array([errand.x, errand.y]))
         if foot is None:
             return self._give_up(view, "no edge is known that it could drive on")
@@ -416,7 +416,7 @@ class Errands:
             if self._looks >= _LOOKS:
                 return self._give_up(view, "the way there is not to be seen any more")
             return self._look_around(view)
-        return Drive(track, blind_end=False)
+        return Drive(track)
 
     def _find_edge(self, view: View, waited: float) -> Order:
         """Off the graph: go to the nearest edge, or look around for one."""
@@ -424,7 +424,7 @@ class Errands:
         place = view.gvg.place(view.local_base.position)
         way = None if place is None else way_to_edge(view, place)
         if way is not None and waited < self._config.look_around_s:
-            return Drive(Track.of(*way), blind_end=True)
+            return Drive(Track.of(*way))
         if self._looks >= _LOOKS:
             return self._give_up(view, "no edge is in sight")
         return self._look_around(view)
