@@ -17,6 +17,7 @@ from gvgbot.web.pages import Pages, is_foreign, said
 from gvgbot.web.viewers import Audience, Viewer
 from gvgbot.web.wire import Reply, Wish, frame, wish
 
+_FOREIGN = "open the page by this machine's address, or by the name given with --host"
 LIVE = "/live"  # where the page asks for its WebSocket
 _MOST_VIEWERS = 32
 _LONGEST_WISH = 2000  # bytes
@@ -57,7 +58,7 @@ class Web:
     def _receive(self, connection: ServerConnection, request: Request) -> Response | None:
         """The answer to a request; None lets it become a WebSocket."""
         if is_foreign(request, self._host):
-            return said(HTTPStatus.FORBIDDEN, "this page is for its own viewers only")
+            return said(HTTPStatus.FORBIDDEN, _FOREIGN)
         if request.path != LIVE:
             return self._pages.answer(request.path)
         if "Upgrade" not in request.headers:

@@ -23,17 +23,19 @@ from urllib.request import Request, urlopen
 import msgspec
 import numpy as np
 import pytest
+import zenoh
 from numpy.typing import NDArray
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
+from gvgbot import client
 from gvgbot.requests import Answer, Asked, Goto
 from gvgbot.telemetry import Telemetry
 from gvgbot.topics import Event, Events, TelemetryConfig
 from gvgbot.web.server import Web
 from gvgbot.web.viewers import Audience
 from gvgbot.web.wire import Reply, Wish
-from tests.process.addresses import free_endpoint
+from tests.process.addresses import free_endpoint, plain_session, router
 from tests.process.browser import Page, browser, chromium
 from tests.unit.monitor.maps import a_map, vertex
 from tests.unit.test_telemetry import EXAMPLE
@@ -245,6 +247,43 @@ def test_what_cannot_be_is_one_line(arguments: list[str], status: int, named: st
     assert (done.returncode, done.stdout) == (status, "")
     (line,) = done.stderr.splitlines()
     assert named in line
+
+
+def test_of_several_robots_one_has_to_be_named() -> None:
+    endpoint = free_endpoint()
+
+    def joining(name: str) -> Telemetry:
+        return Telemetry(TelemetryConfig(listen=(free_endpoint(),), connect=(endpoint,)), name)
+
+    with router(endpoint), joining("karl"), joining("otto"):
+        with client.connect("otto", endpoint) as seen:
+            while seen.others() != ["karl", "otto"]:
+                pass
+        with gvgbot("web", "--port", "0", "--connect", endpoint) as process:
+            said, _ = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 2
+    assert "there are several robots: karl, otto" in said.splitlines()[-1]
+
+
+def test_a_robot_of_another_version_is_said_to_be_one() -> None:
+    endpoint = free_endpoint()
+
+    async def story(address: str) -> None:
+        async with asyncio.timeout(PATIENCE), live(int(address.rpartition(":")[2][:-1])) as viewer:
+            while True:
+                kind, value = await received(viewer)
+                if kind == "link" and value["word"] == "unreachable":
+                    assert "install the same gvgbot on both" in str(value["trouble"])
+                    return
+
+    with Telemetry(TelemetryConfig(listen=(endpoint,)), "karl"), plain_session(endpoint) as other:
+        encoding = zenoh.Encoding("application/msgpack;gvgbot.State.v9")
+        with web("karl", "--connect", endpoint) as address:
+            publisher = other.declare_publisher("gvgbot/karl/state", encoding=encoding)
+            while not publisher.matching_status.matching:  # type: ignore[attr-defined]
+                pass
+            publisher.put(b"\x80")
+            asyncio.run(story(address))
 
 
 # -- the page -----------------------------------------------------------------------------------
