@@ -174,7 +174,7 @@ class Errands:
         graph, here = self._mapper.graph, self._here()
         if vertex not in graph.vertices:
             raise Declined(f"there is no vertex {vertex}; {_listed(list(graph.vertices))}")
-        if self.errand == ToVertex(vertex):
+        if self.errand == ToVertex(vertex) and not self._is_own:
             return f"it is on its way to vertex {vertex} already"
         route = None if here is None else route_to_vertex(graph, here.starts(), vertex)
         if here is not None and route is None:
