@@ -5,12 +5,12 @@ from dataclasses import dataclass, field
 from typing import Annotated
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.candidates import Candidates, CandidatesConfig
 from gvgbot.autonomy.events import EdgeJoined, Event, LoopClosed, VertexAdded, VertexRemoved
 from gvgbot.autonomy.gvg.local import Branch, LocalEdge, LocalGvg, LocalNode
 from gvgbot.autonomy.gvg.reduction import KnownVertices
+from gvgbot.autonomy.recogniser import CLOSE_M, Match, Recogniser
 from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.slam.graph import Edge, GvgGraph, HalfEdgeId, Kind, Vertex
@@ -18,22 +18,15 @@ from gvgbot.autonomy.slam.recognition import (
     RecognitionConfig,
     Sighting,
     detection_covariance,
-    gate_distances,
-    looks_alike,
     match_bearings,
 )
-from gvgbot.autonomy.slam.scan_matching import Registration, ScanMatchingConfig, register
+from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
 from gvgbot.autonomy.topology import split_edge_at, take_out
 from gvgbot.autonomy.views import Correspondence, Observation, View
-from gvgbot.geometry import Array, Pose, rotated_covariance
+from gvgbot.geometry import Array, Pose
 from gvgbot.ranges import Range
 
-_WALL_M = 0.15  # a point so near to a wall lies on it
-_CLOSE_M = 1.5  # as near as one needs to be to tell vertices apart
 _AT_END_M = 0.5  # so near to the end of a dead end, it has been driven
-_BESIDE_M = 0.4  # walls that agree only so far off are another vertex's
-_KNOWN_SHARE = 0.4  # of a vertex's walls must lie where something has been seen
-_REGISTRATION_FLOOR = np.diag([4e-4, 4e-4, 9e-6])  # what registration cannot know of itself
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,22 +49,6 @@ class MappingConfig:
     snapshot_m: Annotated[float, Range(1.0, 20.0)] = 6.0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Match:
-    """A known vertex laid onto a sighting: its frame there, and how well it fits.
-
-    `covariance` (2, 2) or (3, 3) is of the measurement in the base frame, `distance` the squared
-    Mahalanobis distance, `metres` the offset.
-    """
-
-    vertex: Vertex
-    local: Pose
-    covariance: Array
-    agreement: float
-    distance: float
-    metres: float
-
-
 class Mapper:
     """Keeps the belief and the graph; both are corrected by every view."""
 
@@ -83,7 +60,14 @@ class Mapper:
         *,
         drive_dead_ends: bool = False,
     ) -> None:
-        self._config, self._recognition, self._matching = config, recognition, matching
+        self._config, self._recognition = config, recognition
+        self._recogniser = Recogniser(
+            recognition,
+            matching,
+            min_inliers=config.min_inliers,
+            min_inliers_far=config.min_inliers_far,
+            margin=config.margin,
+        )
         self._drive_dead_ends = drive_dead_ends
         self.belief = Belief()
         self.graph = GvgGraph()
@@ -159,81 +143,16 @@ class Mapper:
         """
         for node, sighting in sightings.items():
             away = float(np.hypot(*(sighting.position - view.local_base.position)))
-            unclear = view.gvg.nodes[node].is_suspect and away > _CLOSE_M
+            unclear = view.gvg.nodes[node].is_suspect and away > CLOSE_M
             if node in known.vertex_of or unclear or away > self._config.recognise_within_m:
                 continue
-            matches = [
-                match
-                for distance, vertex, metres in self._candidates(view, sighting)
-                if vertex.id not in known.node_of
-                and (match := self._compare(view, sighting, vertex, distance, metres)) is not None
-            ]
-            best = self._beyond_doubt(matches, sighting)
+            vertices = [v for key, v in self.graph.vertices.items() if key not in known.node_of]
+            best = self._recogniser.find(self.belief, vertices, view, sighting)
             if best is not None:
                 self._close_loop(view, best)
                 known.pair(node, best.vertex.id)
 
-    def _beyond_doubt(self, matches: list[_Match], sighting: Sighting) -> _Match | None:
-        """The match that lies far deeper in its gate than any other elsewhere in the building.
-
-        Of two close together, the one whose walls lie nearer to what is seen.
-        """
-        if not matches:
-            return None
-        first = matches[0]
-        here = self.belief.map_vertex(first.vertex.id)
-        neighbours = []
-        for match in matches:
-            if here.distance(self.belief.map_vertex(match.vertex.id)) < _CLOSE_M:
-                neighbours.append(match)
-            elif match.distance < first.distance + self._config.margin:
-                return None
-        return min(
-            neighbours, key=lambda m: float(np.hypot(*(m.local.position - sighting.position)))
-        )
-
-    def _candidates(self, view: View, sighting: Sighting) -> list[tuple[float, Vertex, float]]:
-        """Known vertices, long out of sight, inside the gate of a sighting; most likely first."""
-        found = []
-        far = gate_distances(self.belief, sighting, view.local_base, self._recognition)
-        for vertex in self.graph.vertices.values():
-            if view.travelled - vertex.seen_at < self._recognition.tracked_m:
-                continue
-            d2, metres = far[vertex.id]
-            if d2 < self._recognition.gate or metres < self._recognition.same_place_m:
-                found.append((d2, vertex.id, vertex, metres))
-        return [
-            (d2, vertex, metres) for d2, _, vertex, metres in sorted(found, key=lambda f: f[:2])
-        ]
-
-    def _compare(
-        self, view: View, sighting: Sighting, vertex: Vertex, distance: float, metres: float
-    ) -> _Match | None:
-        """The vertex found where a sighting is, if its shape and the walls agree.
-
-        Walls that have changed cannot hide a vertex that stands where it should and looks alike.
-        """
-        foreseen = view.local_base.compose(ekf.expected(self.belief, vertex.id)[0])
-        if not looks_alike(vertex, sighting, foreseen, self._recognition):
-            return None
-        prior = Pose(float(sighting.position[0]), float(sighting.position[1]), foreseen.theta)
-        found, agreement = self._register(view, vertex, prior)
-        surprising = metres > self._recognition.same_place_m
-        least = self._config.min_inliers_far if surprising else self._config.min_inliers
-        if found is not None and agreement >= least:
-            if np.hypot(*(found.pose.position - sighting.position)) > _BESIDE_M:
-                return None  # it stands beside what is seen
-            covariance = rotated_covariance(
-                found.covariance + _REGISTRATION_FLOOR, view.local_base.to(found.pose).theta
-            )
-            return _Match(vertex, found.pose, covariance, agreement, distance, metres)
-        away = float(np.hypot(*(sighting.position - view.local_base.position)))
-        if away > _CLOSE_M or metres > 0.5 * self._recognition.same_place_m:
-            return None
-        covariance = detection_covariance(away, self._recognition)
-        return _Match(vertex, prior, covariance, agreement, distance, metres)
-
-    def _close_loop(self, view: View, match: _Match) -> None:
+    def _close_loop(self, view: View, match: Match) -> None:
         """Correct the belief by a vertex that has been recognised."""
         vertex = match.vertex
         self._events.append(
@@ -251,24 +170,6 @@ class Mapper:
         vertex.visits += 1
         self._measure(view, vertex, view.local_base.to(match.local), match.covariance)
 
-    def _register(
-        self, view: View, vertex: Vertex, prior: Pose
-    ) -> tuple[Registration | None, float]:
-        """A vertex's frame laid onto the local map, and the share of its walls found where seen."""
-        walls = view.local_map.points()
-        turn_sigma = math.sqrt(float(self.belief.P[2, 2])) + 0.02
-        Q = np.diag([0.15**2, 0.15**2, turn_sigma**2])
-        tree = cKDTree(walls)
-        found = register(vertex.snapshot, tree, walls, prior, Q, self._matching)
-        if found is None:
-            return None, 0.0
-        laid = found.pose.transform(vertex.snapshot)
-        laid = laid[view.local_map.known(laid)]
-        if len(laid) < max(self._matching.min_pairs, _KNOWN_SHARE * len(vertex.snapshot)):
-            return None, 0.0
-        distance, _ = tree.query(laid, distance_upper_bound=_WALL_M)
-        return found, float(np.isfinite(distance).mean())
-
     # -- what is new -------------------------------------------------------------------------
 
     def _consider(self, view: View, sightings: dict[int, Sighting], known: Correspondence) -> None:
@@ -280,11 +181,17 @@ class Mapper:
             candidate = self._unbelieved.note(sighting, away, view.travelled)
             if not self._unbelieved.is_believable(candidate, view.gvg.nodes[node], away):
                 continue
-            examined = away < _CLOSE_M and self._unbelieved.is_examined(candidate)
-            if self._crowded(view, sighting) or (self._candidates(view, sighting) and not examined):
+            examined = away < CLOSE_M and self._unbelieved.is_examined(candidate)
+            if self._crowded(view, sighting) or (
+                not examined and self._may_be_known(view, sighting)
+            ):
                 continue  # it may be a known one: look at it from closer
             self._unbelieved.drop(candidate)
             known.pair(node, self._add(view, sighting).id)
+
+    def _may_be_known(self, view: View, sighting: Sighting) -> bool:
+        vertices = self.graph.vertices.values()
+        return bool(self._recogniser.candidates(self.belief, vertices, view, sighting))
 
     def _crowded(self, view: View, sighting: Sighting) -> bool:
         """Whether a vertex of this kind that is in sight stands here already."""

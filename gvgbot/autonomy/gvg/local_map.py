@@ -10,6 +10,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter1d
+from scipy.spatial import cKDTree
 
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
@@ -101,11 +102,18 @@ class LocalMap:
         )
         for drawn in self._walls:
             drawn.setflags(write=False)
+        self._tree: cKDTree | None = None
         self._known = np.pad(self._free | occupied, 1)  # with a rim for what is not in the window
 
     def points(self) -> Array:
         """Points of the walls (N, 2), local frame: about one for each cell that a wall crosses."""
         return self._walls.points
+
+    def tree(self) -> cKDTree:
+        """To find the nearest of `points`."""
+        if self._tree is None:
+            self._tree = cKDTree(self._walls.points, balanced_tree=False)
+        return self._tree
 
     def hits(self) -> Array:
         """How many hits (N,) each of `points` is the mean of, the oldest forgotten."""
