@@ -171,7 +171,7 @@ class Errands:
     def goto_vertex(self, vertex: int, stamp: float) -> str:
         """Drive to a vertex."""
         self._check_going()
-        graph, here = self._mapper.graph, self._here()
+        graph, here = self._mapper.graph, self.whereabouts()
         if vertex not in graph.vertices:
             raise Declined(f"there is no vertex {vertex}; {_listed(list(graph.vertices))}")
         if self.errand == ToVertex(vertex) and not self._is_own:
@@ -186,7 +186,7 @@ class Errands:
         self._check_going()
         if self.errand == errand:
             return "it is on its way there already"
-        foot, here = foot_of(self._mapper, np.array([errand.x, errand.y])), self._here()
+        foot, here = foot_of(self._mapper, np.array([errand.x, errand.y])), self.whereabouts()
         base = self._mapper.belief.map_base
         away = math.hypot(errand.x - base.x, errand.y - base.y)
         if away > _DIRECT_M:
@@ -206,7 +206,7 @@ class Errands:
         if self._seen is None:
             raise Declined("it has not seen enough yet to know where it is")
 
-    def _here(self) -> Situation | None:
+    def whereabouts(self) -> Situation | None:
         """Where the robot was on the graph when it last looked; None if that was off it."""
         return None if self._seen is None else self._situation(*self._seen)
 
@@ -254,7 +254,7 @@ class Errands:
 
     def _revisit(self, view: View) -> bool:
         """Go back to a vertex, if that is to be done before exploring goes on; whether it is."""
-        here = self._here()
+        here = self.whereabouts()
         if here is None or not self._mission.is_choosing:
             return False
         belief = self._mapper.belief

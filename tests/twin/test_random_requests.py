@@ -1,0 +1,91 @@
+"""Whatever is asked for, in whatever order: nothing fails, and the guard has the last word."""
+
+import json
+import math
+import tempfile
+from pathlib import Path
+
+import msgspec
+import pytest
+from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import strategies as st
+
+from gvgbot.clock import Clock
+from gvgbot.geometry import Pose
+from gvgbot.requests import JSON, MESSAGEPACK, REQUESTS, Answer, Asked
+from gvgbot.steering import SETTABLE
+from tests.twin.run_rig import STOP, Daemon, base_commands
+
+pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(300)]
+
+RUNS, REQUESTS_A_RUN = 5, 200
+BRAKING_S = 2.0
+STILL_M = 0.005
+
+numbers = st.one_of(st.integers(-3, 12), st.floats(-20.0, 20.0), st.just(math.inf))
+fitting = st.one_of(
+    st.tuples(st.sampled_from([r for r in REQUESTS if r not in ("goto", "set")]), st.just({})),
+    st.tuples(st.just("goto"), st.fixed_dictionaries({"vertex": st.integers(-1, 8)})),
+    st.tuples(st.just("goto"), st.fixed_dictionaries({"x": numbers, "y": numbers})),
+    st.tuples(
+        st.just("set"),
+        st.fixed_dictionaries(
+            {
+                "key": st.sampled_from([*SETTABLE, "robot.radius_m", "twin", ""]),
+                "value": st.one_of(numbers, st.booleans(), st.sampled_from(["ears", "fast"])),
+            }
+        ),
+    ),
+).map(lambda pair: Asked(pair[0], msgspec.msgpack.encode(pair[1]), MESSAGEPACK, "fitting"))
+wrong = st.builds(
+    Asked,
+    st.one_of(st.sampled_from(REQUESTS), st.text(max_size=10)),
+    st.binary(max_size=40),
+    st.sampled_from([MESSAGEPACK, JSON, ""]),
+    st.just("wrong"),
+)
+requests = st.lists(
+    st.one_of(fitting, fitting, fitting, wrong), min_size=REQUESTS_A_RUN, max_size=REQUESTS_A_RUN
+)
+
+
+@given(requests=requests)
+@settings(
+    max_examples=RUNS,
+    deadline=None,
+    phases=[Phase.explicit, Phase.generate],  # a failure is rare, and shrinking would take hours
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
+)
+def test_a_thousand_random_requests_do_no_harm(requests: list[Asked]) -> None:
+    with tempfile.TemporaryDirectory() as out:
+        daemon, answers = Daemon(Path(out)), list[Answer]()
+        limit_mm = 1000 * daemon.config.robot.limits.max_speed_mps
+
+        async def story(clock: Clock) -> None:
+            errands = daemon.session.pipeline.errands
+            paused_at: float | None = None
+            stood: Pose | None = None
+            await clock.sleep_until(3.0)
+            for asked in requests:
+                answers.append(await daemon.network._handle(asked))
+                if not errands.is_paused:
+                    paused_at = stood = None
+                elif paused_at is None:
+                    paused_at = clock.now()
+                elif clock.now() > paused_at + BRAKING_S:
+                    stood = stood or daemon.place
+                    assert stood.distance(daemon.place) < STILL_M
+                await clock.sleep_until(clock.now() + 0.1)
+
+        with daemon.session.directory:
+            daemon.run(story)
+        assert len(answers) == REQUESTS_A_RUN
+        assert all(answer.text for answer in answers)
+        lines = (Path(out) / "events.jsonl").read_text().split("\n")
+        told = [json.loads(line) for line in lines if '"requested"' in line]
+        assert [line["done"] for line in told] == [answer.done for answer in answers]
+        assert daemon.session.simulation is not None
+        assert daemon.session.simulation.body.contacts == 0
+        commands = base_commands(bytes(daemon.cable.written))
+        assert max(abs(speed) for speed, _ in commands) <= limit_mm
+        assert commands[-1] == STOP
