@@ -1,0 +1,57 @@
+"""What the daemon on twins says of scans, odometry and its plan, held against the truth."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gvgbot.clock import Clock
+from gvgbot.geometry import Pose
+from tests.twin.run_rig import Daemon
+
+pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(120)]
+
+
+def test_scans_and_odometry_come_at_their_rates_from_where_the_robot_is(tmp_path: Path) -> None:
+    daemon = Daemon(tmp_path / "run")
+    places: list[Pose] = []
+
+    async def story(clock: Clock) -> None:
+        await clock.sleep_until(11.0)
+        places.append(daemon.place)
+
+    with daemon.session.directory:
+        daemon.run(story)
+    start = daemon.session.place
+    assert start is not None
+    truth = start.start.to(places[0])
+    scans = [scan for scan in daemon.network.scans if 1.0 < scan.stamp < 11.0]
+    odometry = [said for said in daemon.network.odometry if 1.0 < said.stamp < 11.0]
+    assert len(scans) == pytest.approx(100, abs=3)
+    assert len(odometry) == pytest.approx(200, abs=5)
+    for believed in (scans[-1].map_base, odometry[-1].map_base):
+        assert believed == pytest.approx((truth.x, truth.y, truth.theta), abs=0.15)
+    far = np.nan_to_num(scans[-1].metres, nan=0.0, posinf=0.0).max()
+    assert 1.0 < far < scans[-1].range_max
+
+
+def test_the_plan_begins_at_the_robot_and_is_told_when_it_changes(tmp_path: Path) -> None:
+    daemon = Daemon(tmp_path / "run")
+
+    async def story(clock: Clock) -> None:
+        await clock.sleep_until(25.0)
+
+    with daemon.session.directory:
+        daemon.run(story)
+    plans, states = daemon.network.plans, daemon.network.states
+    assert 3 < len(plans) <= 51  # twice a second at most
+    driving = [plan for plan in plans if len(plan.ahead)]
+    assert driving
+    for plan in driving:
+        here = min(states, key=lambda state: abs(state.stamp - plan.stamp)).pose[:2]
+        assert np.hypot(*(plan.ahead - here).T).min() < 0.3
+    decisions = [e for e in daemon.network.events[-1].events if e.kind == "decision"]
+    assert (plans[-1].vertex, plans[-1].reason) == (
+        decisions[-1].details["vertex"],
+        decisions[-1].details["reason"],
+    )
