@@ -127,6 +127,7 @@ function tap(px, py) {
   const vertex = picture.vertexAt(px, py), [x, y] = view.toMap(px, py);
   place = vertex === null ? { x, y } : { vertex: vertex.id };
   picture.selected = vertex?.id ?? null;
+  picture.tapped = vertex === null ? [x, y] : null;
   isPanelDue = isMapDue = true;
 }
 
@@ -147,7 +148,7 @@ function placeText() {
 }
 
 function closePlace() {
-  place = picture.selected = null;
+  place = picture.selected = picture.tapped = null;
   isPanelDue = isMapDue = true;
 }
 

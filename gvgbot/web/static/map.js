@@ -22,7 +22,7 @@ export class MapPicture {
     this.canvas = canvas;
     this.view = view;
     this.shown = new Set(LAYERS.map(([name]) => name));
-    this.known = this.plan = this.scan = this.pose = this.covariance = this.selected = null;
+    this.known = this.plan = this.scan = this.pose = this.covariance = this.selected = this.tapped = null;
     this.way = []; // [stamp, x, y] since the map was made
   }
 
@@ -107,7 +107,23 @@ export class MapPicture {
     for (const name of ["grid", "trail", "edges", "scan", "ellipses", "frontiers", "vertices", "plan"]) {
       if (this.shown.has(name)) layers[name]();
     }
+    this.drawTapped();
     this.drawRobot();
+  }
+
+  drawTapped() {
+    if (this.tapped === null) return;
+    const [px, py] = this.view.toScreen(...this.tapped), c = this.c;
+    for (const [colour, width] of [[this.colours.paper, 5], [this.colours.robot, 2.5]]) {
+      c.beginPath();
+      for (const [dx, dy] of [[-7, -7], [-7, 7]]) {
+        c.moveTo(px + dx, py + dy);
+        c.lineTo(px - dx, py - dy);
+      }
+      c.strokeStyle = colour;
+      c.lineWidth = width;
+      c.stroke();
+    }
   }
 
   drawGrid() {
