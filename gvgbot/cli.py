@@ -69,6 +69,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_run(commands)
     _add_twin(commands)
     _add_check(commands)
+    _add_install_service(commands)
     _add_monitor(commands)
     _add_web(commands)
     _add_ctl(commands)
@@ -164,6 +165,25 @@ def _add_check(commands: "argparse._SubParsersAction[_Parser]") -> None:
     )
     _add_config(check)
     check.set_defaults(command=_check)
+
+
+def _add_install_service(commands: "argparse._SubParsersAction[_Parser]") -> None:
+    install = commands.add_parser(
+        "install-service",
+        help="make the robot a service of this machine",
+        description="Write the systemd service, the names of the ports, the user and the "
+        "configuration to where they belong, and say what each is for and what to run then. A "
+        "configuration that is there already is kept.",
+        epilog="example: sudo /opt/gvgbot/bin/gvgbot install-service turtlebot2.yaml",
+    )
+    install.add_argument(
+        "config", nargs="?", type=Path, metavar="CONFIG", help="default: turtlebot2.yaml"
+    )
+    install.add_argument(
+        "--user", action="store_true", help="a service of your own session, without root"
+    )
+    install.add_argument("--dry-run", action="store_true", help="only say what would be written")
+    install.set_defaults(command=_install_service)
 
 
 def _add_monitor(commands: "argparse._SubParsersAction[_Parser]") -> None:
@@ -418,6 +438,12 @@ def _check(options: argparse.Namespace) -> int:
     from gvgbot.check import check
 
     return check(config, _say)
+
+
+def _install_service(options: argparse.Namespace) -> int:
+    from gvgbot.installation import install_service
+
+    return install_service(options.config, user=options.user, dry_run=options.dry_run, say=_say)
 
 
 def _monitor(options: argparse.Namespace) -> int:

@@ -1,0 +1,166 @@
+"""Puts the service and what belongs to it in its place, and says what each file is for."""
+
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+
+from gvgbot.config import load_config, packaged
+from gvgbot.errors import GvgbotError
+
+_BACK_OFF_SINCE = 254  # the version of systemd from which on restarts can be spaced out
+_BACK_OFF = "RestartSteps=6\nRestartMaxDelaySec=60\n"
+_HIDDEN = ("/home", "/root", "/run/user")  # from services, by ProtectHome
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """A file, its content, and why it is there. `kept`: one that exists already stays."""
+
+    path: Path
+    content: str
+    purpose: str
+    kept: bool = False
+
+
+def install_service(
+    config: Path | None, *, user: bool, dry_run: bool, say: Callable[[str], None]
+) -> int:
+    """Write the files of the service, or only say what would be written; the exit status.
+
+    Raises ConfigError for a configuration with mistakes, GvgbotError if a file cannot be written
+    or the service could not run from where this program is.
+    """
+    source = packaged("turtlebot2.yaml" if config is None else config)
+    load_config(source)
+    home, programs = Path.home(), Path(sys.executable).parent
+    if not user and not dry_run:
+        _check_place(Path(sys.executable))
+    version = _systemd_version()
+    wanted = (
+        user_files(source, home, programs, version)
+        if user
+        else system_files(source, Path("/"), programs, version)
+    )
+    for file in wanted:
+        say(f"{'would write' if dry_run else _write(file)} {file.path}: {file.purpose}")
+    say("then run:")
+    for command in USER_COMMANDS if user else SYSTEM_COMMANDS:
+        say(f"  {command}")
+    return 0
+
+
+SYSTEM_COMMANDS = (
+    "systemd-sysusers                                       # makes the user gvgbot",
+    "systemd-tmpfiles --create                              # makes /etc/gvgbot as it should be",
+    "udevadm control --reload && udevadm trigger            # names the ports",
+    "systemctl daemon-reload && systemctl enable --now gvgbot",
+    "systemctl status gvgbot; journalctl -fu gvgbot         # see what it does",
+)
+USER_COMMANDS = (
+    "systemctl --user daemon-reload && systemctl --user enable --now gvgbot",
+    "loginctl enable-linger                                 # to run while you are logged out",
+    "systemctl --user status gvgbot; journalctl --user -fu gvgbot",
+)
+
+
+def system_files(source: Path, root: Path, programs: Path, version: int | None) -> list[Written]:
+    """The files of a machine's own service below `root`, its programs in a folder.
+
+    `version` is systemd's; None where it is not known.
+    """
+    etc = root / "etc"
+    config = Path("/etc/gvgbot/gvgbot.yaml")
+    return [
+        Written(
+            root / config.relative_to("/"), _text(source), "the configuration, yours to edit", True
+        ),
+        Written(
+            etc / "systemd/system/gvgbot.service",
+            _unit("gvgbot.service", programs, config, version),
+            "the service",
+        ),
+        Written(
+            etc / "udev/rules.d/60-gvgbot.rules",
+            _packaged_text("60-gvgbot.rules"),
+            "stable names for the ports, and no modem manager on them",
+        ),
+        Written(
+            etc / "sysusers.d/gvgbot.conf",
+            _packaged_text("sysusers.conf"),
+            "the user that the service runs as",
+        ),
+        Written(
+            etc / "tmpfiles.d/gvgbot.conf",
+            _packaged_text("tmpfiles.conf"),
+            "the folder of the configuration",
+        ),
+    ]
+
+
+def user_files(source: Path, home: Path, programs: Path, version: int | None) -> list[Written]:
+    """The files of a person's own service, below their home."""
+    config = home / ".config/gvgbot/gvgbot.yaml"
+    unit = _unit("gvgbot-user.service", programs, config, version)
+    return [
+        Written(config, _text(source), "the configuration, yours to edit", True),
+        Written(home / ".config/systemd/user/gvgbot.service", unit, "the service"),
+    ]
+
+
+def _unit(name: str, programs: Path, config: Path, version: int | None) -> str:
+    """A unit with the paths of this installation, and what this systemd knows beyond the common."""
+    text = _packaged_text(name)
+    text = text.replace("/etc/gvgbot/gvgbot.yaml", str(config))
+    text = text.replace("/opt/gvgbot/bin", str(programs))
+    if version is not None and version >= _BACK_OFF_SINCE:
+        text = text.replace("RestartSec=1\n", "RestartSec=1\n" + _BACK_OFF)
+    return text
+
+
+def _packaged_text(name: str) -> str:
+    return (files("gvgbot") / "systemd" / name).read_text("utf-8")
+
+
+def _text(path: Path) -> str:
+    return path.read_text("utf-8")
+
+
+def _write(file: Written) -> str:
+    """Write a file; what was done, in a word. Raises GvgbotError."""
+    if file.kept and file.path.exists():
+        return "kept"
+    try:
+        file.path.parent.mkdir(parents=True, exist_ok=True)
+        file.path.write_text(file.content, "utf-8")
+    except OSError as error:
+        hint = ": try sudo, or --user" if isinstance(error, PermissionError) else ""
+        raise GvgbotError(f"cannot write {file.path}: {error.strerror}{hint}") from error
+    return "wrote"
+
+
+def _check_place(executable: Path) -> None:
+    """Raises GvgbotError if the service, which sees no home, would not find its program."""
+    for path in (executable, executable.resolve()):
+        hidden = next((home for home in _HIDDEN if path.is_relative_to(home)), None)
+        if hidden is not None:
+            raise GvgbotError(
+                f"the service cannot see {path}, for it sees nothing of {hidden}: "
+                "install gvgbot elsewhere, for instance with python3 -m venv /opt/gvgbot"
+            )
+
+
+def _systemd_version() -> int | None:
+    """The version of the systemd that is installed here."""
+    systemctl = shutil.which("systemctl")
+    if systemctl is None:
+        return None
+    done = subprocess.run(
+        [systemctl, "--version"], check=False, capture_output=True, text=True, timeout=10
+    )
+    found = re.match(r"systemd (\d+)", done.stdout)
+    return int(found[1]) if found else None

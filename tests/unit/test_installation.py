@@ -1,0 +1,93 @@
+"""What `install-service` writes, where, and what it says of it."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from gvgbot.cli import main
+from gvgbot.config import load_config, packaged
+from gvgbot.installation import system_files, user_files
+
+PROGRAMS = Path("/srv/robot/bin")
+SOURCE = packaged("turtlebot2.yaml")
+
+
+def contents(version: int | None) -> dict[str, str]:
+    files = system_files(SOURCE, Path("/"), PROGRAMS, version)
+    return {str(file.path): file.content for file in files}
+
+
+def test_everything_goes_where_systemd_and_udev_look_for_it() -> None:
+    assert list(contents(252)) == [
+        "/etc/gvgbot/gvgbot.yaml",
+        "/etc/systemd/system/gvgbot.service",
+        "/etc/udev/rules.d/60-gvgbot.rules",
+        "/etc/sysusers.d/gvgbot.conf",
+        "/etc/tmpfiles.d/gvgbot.conf",
+    ]
+    assert contents(252)["/etc/gvgbot/gvgbot.yaml"] == SOURCE.read_text()
+
+
+def test_the_unit_starts_the_programs_of_this_installation() -> None:
+    unit = contents(252)["/etc/systemd/system/gvgbot.service"].splitlines()
+    assert "ExecStart=/srv/robot/bin/gvgbot run /etc/gvgbot/gvgbot.yaml" in unit
+    stop = "ExecStopPost=-/srv/robot/bin/python -m gvgbot.stop_base /etc/gvgbot/gvgbot.yaml"
+    assert stop in unit
+
+
+@pytest.mark.parametrize(("version", "spaced"), [(None, False), (253, False), (254, True)])
+def test_restarts_are_spaced_out_where_systemd_can(version: int | None, spaced: bool) -> None:
+    unit = contents(version)["/etc/systemd/system/gvgbot.service"].splitlines()
+    assert ("RestartMaxDelaySec=60" in unit) == spaced
+
+
+def test_a_person_s_service_stays_below_their_home(tmp_path: Path) -> None:
+    files = user_files(SOURCE, tmp_path, PROGRAMS, None)
+    assert all(file.path.is_relative_to(tmp_path) for file in files)
+    assert f"run {tmp_path}/.config/gvgbot/gvgbot.yaml" in files[1].content
+
+
+def test_a_dry_run_says_all_and_writes_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert main(["install-service", "--user", "--dry-run"]) == 0
+    said = capsys.readouterr().out
+    assert f"would write {tmp_path}/.config/systemd/user/gvgbot.service" in said
+    assert "systemctl --user" in said
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_is_written_can_be_used_and_a_configuration_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert main(["install-service", "--user", "sim.yaml"]) == 0
+    config = tmp_path / ".config/gvgbot/gvgbot.yaml"
+    assert load_config(config) == load_config()
+    config.write_text("{robot: {name: mine}}")
+    assert main(["install-service", "--user"]) == 0
+    assert load_config(config).robot.name == "mine"
+    assert f"kept {config}" in capsys.readouterr().out
+
+
+def test_a_configuration_with_mistakes_is_not_installed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    bad = tmp_path / "bad.yaml"
+    bad.write_text("{robot: {nam: mine}}")
+    assert main(["install-service", "--user", str(bad)]) != 0
+    assert "nam" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == [bad]
+
+
+def test_a_service_that_could_not_see_its_program_is_not_installed(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "executable", "/home/me/gvgbot/bin/python")
+    assert main(["install-service"]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "/home/me/gvgbot/bin/python" in line
+    assert "/opt/gvgbot" in line
