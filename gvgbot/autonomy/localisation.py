@@ -97,9 +97,9 @@ class LocalMaps:
     ) -> tuple[Registration, Array] | None:
         """The match from the first prior, unless that from another one is clearly better."""
         walls, hits, sights = self._walls()
-        sides = Sides(sights, scan.base_laser.position)
         config = self._matching
         points = sampled(scan, config.points)
+        sides = Sides(sights, scan.base_laser.position - points)
         coarse = (config.coarse_pair_m,) if config.coarse_pair_m else ()
         if min(len(walls), len(points)) < _LEAST_POINTS:
             return None

@@ -241,6 +241,7 @@ class Mapper:
         walls = view.local_map.points()
         near = np.hypot(*(walls - vertex.local.position).T) < self._config.snapshot_m
         vertex.snapshot = vertex.local.inverse().transform(walls[near])
+        vertex.sights = Pose(theta=-vertex.local.theta).transform(view.local_map.sights()[near])
 
     # -- what is known better ----------------------------------------------------------------
 

@@ -17,7 +17,7 @@ from gvgbot.autonomy.slam.recognition import (
     gate_distances,
     looks_alike,
 )
-from gvgbot.autonomy.slam.scan_matching import Registration, ScanMatchingConfig, register
+from gvgbot.autonomy.slam.scan_matching import Registration, ScanMatchingConfig, Sides, register
 from gvgbot.autonomy.views import View
 from gvgbot.geometry import Array, Pose, rotated_covariance
 
@@ -131,7 +131,8 @@ class Recogniser:
         turn_sigma = math.sqrt(float(belief.P[2, 2])) + 0.02
         Q = np.diag([0.15**2, 0.15**2, turn_sigma**2])
         walls, tree = view.local_map.points(), view.local_map.tree()
-        found = register(vertex.snapshot, tree, walls, prior, Q, self._matching)
+        sides = Sides(view.local_map.sights(), vertex.sights)
+        found = register(vertex.snapshot, tree, walls, prior, Q, self._matching, sides=sides)
         if found is None:
             return None, 0.0
         laid = found.pose.transform(vertex.snapshot)

@@ -50,6 +50,7 @@ class Vertex:
     snapshot: Array = field(
         default_factory=lambda: np.empty((0, 2))
     )  # walls around it, vertex frame
+    sights: Array = field(default_factory=lambda: np.empty((0, 2)))  # of its walls, vertex frame
     sightings: int = 1
     misses: int = 0
     surplus: int = 0  # sightings in a row with a departure that is not known

@@ -51,14 +51,18 @@ class Registration:
 
 
 class Sides(NamedTuple):
-    """From which side walls are seen.
+    """From which side walls are seen: directions to there, of any length; 0 is either side.
 
-    `sights` (M, 2) are directions from wall points to where they were seen from; `eye` (2,) is
-    where the points that are registered are seen from, in their own frame.
+    `of_walls` (M, 2) are those from the wall points, `of_points` (N, 2) those from the points that
+    are registered, in their frame.
     """
 
-    sights: Array
-    eye: Array
+    of_walls: Array
+    of_points: Array
+
+    def turned(self, angle: float) -> "Sides":
+        """With the points turned by an angle."""
+        return Sides(self.of_walls, Pose(theta=angle).transform(self.of_points))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,8 +97,8 @@ def register(
     inliers, rms = 0.0, 0.0
 
     def paired(pose: Pose) -> _Pairs:
-        seen = None if sides is None else Sides(sides.sights, pose.transform(sides.eye))
-        return _pairs(pose.transform(points), tree, walls, counts, config.max_pair_m, seen)
+        turned = None if sides is None else sides.turned(pose.theta)
+        return _pairs(pose.transform(points), tree, walls, counts, config.max_pair_m, turned)
 
     paired_at, pairs = pose, paired(pose)
     for _ in range(_ITERATIONS):
@@ -160,9 +164,9 @@ def _pairs(
     group, weight = walls[near], present * hits[near]
     centre, normal, flat = _lines(group, weight)
     if sides is not None:
-        eyewards = ((sides.eye - world[index]) * normal).sum(axis=1)
-        seen_from = np.einsum("kij,kj->ki", sides.sights[near], normal)
-        facing = seen_from * eyewards[:, None] > 0.0
+        before = np.einsum("kij,kj->ki", sides.of_walls[near], normal)
+        now = (sides.of_points[index] * normal).sum(axis=1)
+        facing = before * now[:, None] >= 0.0
         weight *= facing
         enough = np.count_nonzero(weight, axis=1) >= _FEWEST
         mixed = np.flatnonzero(enough & (present & ~facing).any(axis=1))

@@ -154,9 +154,10 @@ def test_points_are_laid_onto_the_face_that_was_seen_from_their_side() -> None:
     walls = np.concatenate([np.stack([along, np.zeros_like(along)], axis=1), end])
     sights = np.repeat([[0.0, -1.0], [-1.0, 0.0]], [len(along), len(up)], axis=0)
     upper = np.stack([along[along < 2.5], np.full((along < 2.5).sum(), 0.1)], axis=1)
-    points, eye = np.concatenate([upper, end[up > 0.3]]), np.array([0.0, 1.0])
+    points = np.concatenate([upper, end[up > 0.3]])
+    sides = Sides(sights, np.array([0.0, 1.0]) - points)
     prior, tree = Pose(0.05, 0.0, 0.0), cKDTree(walls)
-    own = register(points, tree, walls, prior, Q, CONFIG, sides=Sides(sights, eye))
+    own = register(points, tree, walls, prior, Q, CONFIG, sides=sides)
     either = register(points, tree, walls, prior, Q, CONFIG)
     assert own is not None
     assert either is not None
