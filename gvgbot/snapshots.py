@@ -80,12 +80,12 @@ def _phase(pipeline: Pipeline, away: str | None) -> Phase:
 def pose_covariance(pipeline: Pipeline, odometry: Odometry | None, noise: OdometryNoise) -> Array:
     """Covariance (3, 3) of map_base: the belief's, grown by the motion since the last keyframe."""
     belief = pipeline.mapper.belief
+    robot = Belief(belief.x[:3], belief.P[:3, :3] + pipeline.blur)
     if odometry is None or not pipeline.keyframes:
-        return belief.P[:3, :3]
+        return robot.P
     last = pipeline.keyframes[-1]
     motion = last.odom_base.to(odometry.odom_base)
     growth = noise.covariance(motion, max(0.0, odometry.stamp - last.stamp))
-    robot = Belief(belief.x[:3], belief.P[:3, :3])  # without the vertices, which do not move
     return predict(robot, motion, growth).P
 
 

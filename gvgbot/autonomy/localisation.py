@@ -28,8 +28,8 @@ _SEARCHED = 60  # points
 _UNLIKELY_M = 0.03  # nearer to the walls must be what is turned as far as it may be
 _SLIPPING = 25.0  # times the covariance of odometry, when the wheels slip
 _LOST = np.diag([0.5**2, 0.5**2, 0.05**2])  # of a base that nobody heard for a while
-_SHARED = 8.0  # scans that a wall is seen in: they err against it, and it against the building
-_FLOOR = np.diag([0.0015**2, 0.0015**2, 0.00025**2])  # what matching cannot know of itself
+_MOST_SHARED = 100.0  # scans that a wall can be the mean of
+_PER_M = np.diag([0.003**2, 0.003**2, 0.0001**2])  # per metre: what cells do to walls
 
 
 class LocalMaps:
@@ -44,6 +44,8 @@ class LocalMaps:
         self.near, self._far = LocalMap(near), LocalMap(far)
         self._matching = matching
         self._calibration = Calibration()
+        self._shared = 1.0  # scans that the walls in sight are the mean of
+        self.blur = np.zeros((3, 3))  # covariance of the last match, in the frame of the base
 
     def insert(self, scan: Scan, local_base: Pose, travelled: float) -> None:
         """Add a scan taken by the base at a pose in the local frame, after so many metres."""
@@ -65,11 +67,16 @@ class LocalMaps:
         slipping = [] if self._matching.search_rad else [(still, _SLIPPING * Q)]
         best = self._best(scan, [(prior, Q), *slipping])
         if best is None:
+            self.blur = np.zeros((3, 3))
             return prior, Q
         found, used = best
         if used is Q:
             self._calibration.learn(motion, duration, prior.to(found.pose), Q, found.covariance)
-        return found.pose, _drift(found, used)
+        self.blur = found.covariance
+        self._shared = min((1.0 - _renewed(scan, motion)) * self._shared + 1.0, _MOST_SHARED)
+        noise = found.rms / self._matching.pair_sigma_m
+        moved = math.hypot(motion.x, motion.y)
+        return found.pose, _drift(found, used, self._shared, noise) + moved * _PER_M
 
     def find(
         self, scan: Scan, before: Pose, motion: Pose, duration: float, Q: Array
@@ -80,7 +87,7 @@ class LocalMaps:
         """
         prior = before.compose(self._calibration.corrected(motion, duration))
         best = self._best(scan, [(p, Q + _LOST) for p in _around(prior)])
-        return (prior, Q + _LOST) if best is None else (best[0].pose, _drift(*best))
+        return (prior, Q + _LOST) if best is None else (best[0].pose, best[0].covariance)
 
     def _walls(self) -> tuple[Array, Array, Array]:
         """Walls (N, 2) of the near map and of the far one around it, their hits and sights."""
@@ -117,17 +124,35 @@ class LocalMaps:
         return best
 
 
-def _drift(found: Registration, Q: Array) -> Array:
+def _renewed(scan: Scan, motion: Pose) -> float:
+    """The share of the walls in sight that come into sight with a step of this motion.
+
+    A wall stays in sight for about twice the mean range, or a turn through the field of view. The
+    mean is over walls, of which a beam shows the more the farther it goes.
+    """
+    with np.errstate(invalid="ignore"):
+        ranges = scan.ranges[scan.ranges < _RANGE_M]
+    reach = float((ranges**2).sum() / ranges.sum())
+    field_of_view = scan.angle_increment * len(scan.ranges)
+    moved = math.hypot(motion.x, motion.y)
+    return min(1.0, moved / (2 * reach) + abs(motion.theta) / field_of_view)
+
+
+def _drift(found: Registration, Q: Array, shared: float, noise: float) -> Array:
     """Covariance (3, 3) of a step that was matched, so that those of many steps add up.
 
-    Scans are matched with walls, not with each other, so the error of one match is not carried on
-    to the next: the walls that come into sight inherit the mean error of all scans that share
-    them. What walls say counts more than in a single match; what only odometry says does not.
+    Scans are laid onto walls, and walls drawn by `shared` scans on average, n. A pose errs by
+    e = (1 - g) (e' + q) + g (m + v): the gain g weighs odometry with its noise q, from the pose
+    before, and walls with the mean error m of those scans and the noise v of a match, which is
+    `noise` times what the matcher expects. Of the new in it, the share 1 / (1 + g (n - 1) / 2)
+    stays for good.
     """
-    by_odometry = np.linalg.inv(Q)
-    by_walls = np.linalg.inv(found.covariance) - by_odometry
-    drift = np.linalg.inv(by_odometry + _SHARED * by_walls) + _FLOOR
-    return np.asarray(drift, np.float64)
+    g = np.eye(3) - found.covariance @ np.linalg.inv(Q)
+    by_walls = g @ found.covariance * min(noise, 1.0) ** 2  # g V g', as V is P g^-1
+    new = (np.eye(3) - g) @ Q @ (np.eye(3) - g).T + by_walls
+    stays = np.linalg.inv(np.eye(3) + g * (shared - 1.0) / 2)
+    drift = stays @ new @ stays.T
+    return np.asarray((drift + drift.T) / 2, np.float64)
 
 
 def _turned(points: Array, tree: cKDTree, prior: Pose, reach: float) -> Pose:

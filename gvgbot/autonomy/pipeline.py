@@ -173,6 +173,11 @@ class Pipeline:
         map_local = self.mapper.belief.map_base.compose(self._last.local_base.inverse())
         return map_local.transform(self._order.track.polyline)
 
+    @property
+    def blur(self) -> Array:
+        """What the newest match errs beside the drift that the belief knows of (3, 3), map frame."""
+        return rotated_covariance(self._maps.blur, self.mapper.belief.map_base.theta)
+
     # -- perception, per scan --------------------------------------------------------------------
 
     def perceive(self, scan: Scan) -> list[Event]:

@@ -59,7 +59,7 @@ def test_without_walls_the_covariance_is_the_prior_s() -> None:
 
 
 def test_a_drive_errs_about_as_much_as_its_steps_say_together() -> None:
-    """Twenty matched steps: what adds up is the drift of the walls, not the error of a match."""
+    """Twenty matched steps: the drift of the walls adds up, the error of a match counts once."""
     rng, noise = np.random.default_rng(6), np.diag([0.01**2, 0.005**2, 0.003**2])
     errors, summed = [], np.zeros(3)
     for _ in range(15):
@@ -72,6 +72,7 @@ def test_a_drive_errs_about_as_much_as_its_steps_say_together() -> None:
             summed += np.diag(covariance) / 15
             local.insert(scan, believed, 0.25 * step)
         errors.append((believed.x - 1.0, believed.y, believed.theta))
+        summed += np.diag(local.blur) / 15
     share = np.mean(np.square(errors), axis=0)[[0, 2]] / summed[[0, 2]]
     assert (share < chi2.ppf(0.995, 15) / 15).all()
     assert (share > 0.1).all()
