@@ -175,7 +175,7 @@ class Pipeline:
 
     @property
     def blur(self) -> Array:
-        """What the newest match errs beside the drift that the belief knows of (3, 3), map frame."""
+        """What the newest match errs beside the belief's drift: covariance (3, 3), map frame."""
         return rotated_covariance(self._maps.blur, self.mapper.belief.map_base.theta)
 
     # -- perception, per scan --------------------------------------------------------------------

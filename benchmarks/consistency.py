@@ -1,0 +1,327 @@
+"""Explore worlds and compare what the robot believes with the truth: is it as wrong as it says?
+
+    python -m benchmarks.consistency [--worlds floor_plan:1 ring ...] [--seeds 1 2]
+        [--plans FROM TO] [--odometry kobuki worn] [--laser UTM-30LX] [--set key=value ...]
+        [--out FILE] [--plot DIRECTORY]
+
+All runs are in this process, one after the other, in virtual time. For each a line is printed:
+NEES of the pose at keyframes (3 degrees of freedom), of the vertices of the map and of the filter
+(2), and of closures against where the vertex truly is from (3); how many closures were wrong, and
+how many vertices were entered twice; end error and vertex RMSE. FILE keeps the numbers as lines of
+JSON; runs that are in there are not run again. Then the means, each with the band in which 95 % of
+such means lie if the errors are as the covariances say. Errors of one run hang together, so a run
+counts as one. --plot needs matplotlib (the extra `plot`).
+"""
+
+import argparse
+import asyncio
+import json
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+from scipy.stats import chi2
+
+from benchmarks.reference_gvg import reference_gvg
+from gvgbot.autonomy.estimate import smoothed
+from gvgbot.autonomy.events import Event, LoopClosed
+from gvgbot.autonomy.loop import Loop
+from gvgbot.autonomy.pipeline import Pipeline
+from gvgbot.clock import LoopClock, run_in_virtual_time
+from gvgbot.config import Config, load_config
+from gvgbot.drivers.hokuyo.driver import HokuyoLaser
+from gvgbot.drivers.kobuki.driver import KobukiBase
+from gvgbot.errors import GvgbotError
+from gvgbot.geometry import Array, Pose, rotated_covariance, wrap_angle
+from gvgbot.hal.guard import Guard
+from gvgbot.hal.messages import Odometry, Scan
+from gvgbot.simulation import Simulation, open_place
+
+MATCH = 1.5  # m: a vertex farther from the true one is another
+WRONG_M = 1.0  # a closure that lays a vertex this far from where it is is wrong
+TIMES = 50  # of the error and the sigma along a run, that are kept for the plot
+
+Row = dict[str, Any]
+
+
+class Watched(Pipeline):
+    """Takes down what it believed of its pose at each keyframe."""
+
+    def __init__(self, config: Config) -> None:
+        super().__init__(config.autonomy, config.exploration, config.robot.radius_m)
+        self.believed: list[tuple[Pose, Array]] = []
+        self.closures: list[tuple[int, LoopClosed]] = []  # with their keyframes
+
+    def perceive(self, scan: Scan) -> list[Event]:
+        count = len(self.keyframes)
+        happened = super().perceive(scan)
+        if len(self.keyframes) > count:
+            belief = self.mapper.belief
+            self.believed.append((belief.map_base, belief.P[:3, :3] + self.blur))
+        self.closures += [(count, e) for e in happened if isinstance(e, LoopClosed)]
+        return happened
+
+
+async def explore(config: Config, pipeline: Pipeline, truth: list[tuple[float, ...]]) -> None:
+    """Drive through the twins until there is an outcome; rows of stamp and world_base."""
+    clock = LoopClock()
+    simulation = Simulation(config, open_place(config), clock)
+    laser = HokuyoLaser(simulation.laser, config.laser, clock)
+    base = KobukiBase(simulation.base, config.base, clock)
+
+    def note(odometry: Odometry) -> None:
+        simulation.body.advance(odometry.stamp)
+        pose = simulation.body.pose
+        truth.append((odometry.stamp, pose.x, pose.y, pose.theta))
+
+    guard = Guard(config.robot.limits, config.robot.radius_m)
+    loop = Loop(laser, base, pipeline, guard, on_events=lambda _: None, on_cycle=note)
+    async with asyncio.TaskGroup() as tasks:
+        serving = [tasks.create_task(part.run()) for part in (laser, base, simulation)]
+        await loop.run()
+        for task in serving:
+            task.cancel()
+
+
+def run(overrides: Sequence[str]) -> Row:
+    """Explore once and compare."""
+    config = load_config(None, overrides)
+    pipeline, track, begin = Watched(config), list[tuple[float, ...]](), time.process_time()
+    run_in_virtual_time(explore(config, pipeline, track))
+    place = open_place(config)
+    map_base = _truth(pipeline, np.array(track), place.start)
+    graph = reference_gvg(place.world, (place.start.x, place.start.y), config.robot.radius_m).graph
+    places = np.array([graph.nodes[node]["position"] for node in graph]).reshape(-1, 2)
+    places = place.start.inverse().transform(places)
+    return {
+        "outcome": pipeline.mission.outcome,
+        "driven_m": pipeline.travelled,
+        "cpu_s": time.process_time() - begin,
+        **_poses(pipeline, map_base),
+        **_vertices(pipeline, places),
+        **_closures(pipeline, map_base),
+    }
+
+
+def _truth(pipeline: Pipeline, track: Array, start: Pose) -> list[Pose]:
+    """Where the base truly was at each keyframe, in the map frame."""
+    stamps = [keyframe.stamp for keyframe in pipeline.keyframes]
+    columns = [track[:, 1], track[:, 2], np.unwrap(track[:, 3])]
+    world_base = np.stack([np.interp(stamps, track[:, 0], c) for c in columns], axis=1)
+    return [start.to(Pose.from_array(row)) for row in world_base]
+
+
+def _poses(pipeline: Watched, truth: list[Pose]) -> Row:
+    errors, nees, sigmas = [], [], []
+    for (believed, covariance), true in zip(pipeline.believed[1:], truth[1:], strict=True):
+        off = _difference(believed, true)
+        errors.append(off)
+        nees.append(float(off @ np.linalg.solve(covariance, off)))
+        sigmas.append(np.sqrt(np.diag(covariance)))
+    e, s = np.array(errors), np.array(sigmas)
+    at = np.linspace(0, len(e) - 1, TIMES).astype(int)
+    return {
+        "pose_nees": float(np.mean(nees)),
+        "pose_rms_m": float(np.sqrt((e[:, :2] ** 2).sum(axis=1).mean())),
+        "pose_sigma_m": float(np.sqrt((s[:, :2] ** 2).sum(axis=1).mean())),
+        "heading_rms": float(np.sqrt((e[:, 2] ** 2).mean())),
+        "heading_sigma": float(np.sqrt((s[:, 2] ** 2).mean())),
+        "end_error_m": float(np.hypot(*e[-1, :2])),
+        "along": np.hypot(*e[at, :2].T).round(4).tolist(),
+        "along_sigma": np.hypot(*s[at, :2].T).round(4).tolist(),
+    }
+
+
+def _vertices(pipeline: Pipeline, places: Array) -> Row:
+    """The vertices of the map and of the filter against those of the building (N, 2)."""
+    estimate, belief = smoothed(pipeline), pipeline.mapper.belief
+    ids = list(estimate.vertices)
+    found = np.array([estimate.vertices[v].position for v in ids]).reshape(-1, 2)
+    gaps = np.hypot(*(found[:, None] - places).transpose(2, 0, 1))
+    pairs = [
+        (ids[i], places[j])
+        for i, j in zip(*linear_sum_assignment(np.where(gaps < MATCH, gaps, 1e3)), strict=True)
+        if gaps[i, j] < MATCH
+    ]
+    free = set(ids) - {v for v, _ in pairs}
+    mapped = [(estimate.vertices[v].position - p, estimate.covariances[v]) for v, p in pairs]
+    held = [(belief.map_vertex(v).position - p, belief.vertex_covariance(v)) for v, p in pairs]
+    near = [v for v in free if len(places) and gaps[ids.index(v)].min() < WRONG_M]
+    return {
+        "vertices": len(ids),
+        "twice": len(near),
+        "vertex_nees": _mean_nees(mapped),
+        "filter_vertex_nees": _mean_nees(held),
+        "vertex_rmse_m": float(np.sqrt(np.mean([d @ d for d, _ in mapped]))) if mapped else None,
+        "vertex_distances": [round(float(d @ np.linalg.solve(C, d)), 3) for d, C in mapped],
+    }
+
+
+def _closures(pipeline: Watched, truth: list[Pose]) -> Row:
+    """Each closure against the place where the vertex was before it, both by the true poses."""
+    closed = {(keyframe, event.vertex) for keyframe, event in pipeline.closures}
+    last, errors, offs = dict[int, Pose](), list[tuple[Array, Array]](), list[float]()
+    for seen in pipeline.mapper.observations:
+        here = truth[seen.keyframe].compose(seen.base_vertex)
+        if (seen.keyframe, seen.vertex) in closed and seen.vertex in last:
+            off = _difference(here, last[seen.vertex])
+            offs.append(float(np.hypot(*off[:2])))
+            if len(seen.R) == 3:
+                errors.append((off, rotated_covariance(seen.R, truth[seen.keyframe].theta)))
+        last[seen.vertex] = here
+    return {
+        "closures": len(offs),
+        "wrong": sum(off > WRONG_M for off in offs),
+        "closure_nees": _mean_nees(errors),
+        "nis": [round(event.mahalanobis, 3) for _, event in pipeline.closures],
+    }
+
+
+def _difference(a: Pose, b: Pose) -> Array:
+    return np.array([a.x - b.x, a.y - b.y, wrap_angle(a.theta - b.theta)])
+
+
+def _mean_nees(errors: list[tuple[Array, Array]]) -> float | None:
+    return float(np.mean([e @ np.linalg.solve(C, e) for e, C in errors])) if errors else None
+
+
+COLUMNS = (  # key, degrees of freedom
+    ("pose_nees", 3),
+    ("vertex_nees", 2),
+    ("filter_vertex_nees", 2),
+    ("closure_nees", 3),
+)
+
+
+def line(row: Row) -> str:
+    """A run in a line."""
+    nees = " ".join("    -" if row[k] is None else f"{row[k]:5.2f}" for k, _ in COLUMNS)
+    rmse = row["vertex_rmse_m"]
+    return (
+        f"{row['name']:32} {row['outcome'] or '-':10.10} {nees}  end {row['end_error_m']:.3f}  "
+        f"rmse {'-' if rmse is None else f'{rmse:.3f}'}  closed {row['closures']}, "
+        f"wrong {row['wrong']}, twice {row['twice']}  {row['cpu_s']:.0f} s"
+    )
+
+
+def summary(rows: list[Row]) -> list[str]:
+    """Means over the runs of each profile and all, with the bands of 95 %."""
+    lines = []
+    for odometry in [*dict.fromkeys(row["odometry"] for row in rows), "all"]:
+        some = [row for row in rows if odometry in ("all", row["odometry"])]
+        lines.append(f"{odometry}: {len(some)} runs")
+        for key, freedom in COLUMNS:
+            values = [row[key] for row in some if row[key] is not None]
+            if values:
+                band = [chi2.ppf(p, freedom * len(values)) / len(values) for p in (0.025, 0.975)]
+                lines.append(
+                    f"  {key:20} {np.mean(values):5.2f}   band {band[0]:.2f} to {band[1]:.2f}"
+                )
+        closures = sum(row["closures"] for row in some)
+        worst = max(some, key=lambda row: row["vertex_rmse_m"] or 0.0)
+        lines += [
+            f"  closures {closures}, wrong {sum(row['wrong'] for row in some)}, "
+            f"vertices twice {sum(row['twice'] for row in some)}",
+            f"  vertex RMSE: mean {np.mean([r['vertex_rmse_m'] or 0.0 for r in some]):.3f}, "
+            f"worst {worst['vertex_rmse_m']:.3f} m ({worst['name']}); "
+            f"largest end error {max(row['end_error_m'] for row in some):.3f} m",
+        ]
+    return lines
+
+
+def plot(rows: list[Row], directory: Path) -> None:
+    """Three pictures: NEES per run, error and sigma along the runs, vertices against chi-square."""
+    import matplotlib as mpl  # noqa: PLC0415
+
+    mpl.use("Agg")
+    from matplotlib import pyplot as plt  # noqa: PLC0415
+
+    figure, axes = plt.subplots(1, 3, figsize=(13, 3.8), layout="constrained")
+    nees = sorted(row["pose_nees"] for row in rows)
+    axes[0].plot(nees, np.arange(1, len(nees) + 1) / len(nees), label="pose, 3 degrees of freedom")
+    of_vertices = sorted(row["vertex_nees"] for row in rows if row["vertex_nees"] is not None)
+    shares = np.arange(1, len(of_vertices) + 1) / len(of_vertices)
+    axes[0].plot(of_vertices, shares, label="vertices, 2")
+    axes[0].set(xlabel="mean NEES of a run", ylabel="share of runs", xscale="log")
+    axes[0].legend()
+    share = np.linspace(0, 1, TIMES)
+    rms = np.sqrt(np.mean([np.square(row["along"]) for row in rows], axis=0))
+    sigma = np.sqrt(np.mean([np.square(row["along_sigma"]) for row in rows], axis=0))
+    axes[1].plot(share, rms, label="error, rms over runs")
+    axes[1].plot(share, sigma, label="sigma that the filter gives")
+    axes[1].set(xlabel="share of the run", ylabel="position of the robot, m")
+    axes[1].legend()
+    distances = np.concatenate([row["vertex_distances"] for row in rows])
+    x = np.linspace(0, 8, 33)
+    axes[2].hist(distances, x, density=True, label="vertices")
+    axes[2].plot(x, chi2.pdf(x, 2), label="chi-square, 2")
+    axes[2].set(xlabel="squared Mahalanobis distance", ylabel="density")
+    axes[2].legend()
+    figure.savefig(directory / "consistency.png", dpi=110)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run, print a line for each and the summary."""
+    options = _options(arguments)
+    worlds = [(world, seed) for world in options.worlds for seed in options.seeds]
+    low, high = options.plans or (1, 0)
+    worlds += [(f"floor_plan:{number}", number) for number in range(low, high + 1)]
+    known = _known(options.out)
+    rows = []
+    for world, seed in worlds:
+        for odometry in options.odometry:
+            name = f"{world} {seed} {odometry} {options.laser}"
+            row = known.get(name) or _row(name, world, seed, odometry, options)
+            rows.append(row)
+            print(line(row), flush=True)
+            if options.out is not None and name not in known:
+                with options.out.open("a", encoding="utf-8") as file:
+                    file.write(json.dumps(row) + "\n")
+    print("\n".join(summary(rows)))
+    if options.plot is not None:
+        plot(rows, options.plot)
+    return 0
+
+
+def _row(name: str, world: str, seed: int, odometry: str, options: argparse.Namespace) -> Row:
+    settings = [
+        f"twin.world={world}",
+        f"twin.seed={seed}",
+        f"twin.base.odometry={odometry}",
+        f"twin.laser.model={options.laser}",
+        *options.overrides,
+    ]
+    return {"name": name, "odometry": odometry, **run(settings)}
+
+
+def _known(out: Path | None) -> dict[str, Row]:
+    if out is None or not out.exists():
+        return {}
+    rows = [json.loads(text) for text in out.read_text(encoding="utf-8").splitlines()]
+    return {row["name"]: row for row in rows}
+
+
+def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
+    parser.add_argument("--worlds", nargs="*", default=[])
+    parser.add_argument("--seeds", nargs="+", type=int, default=[1])
+    parser.add_argument("--plans", nargs=2, type=int, metavar=("FROM", "TO"))
+    parser.add_argument("--odometry", nargs="+", default=["kobuki", "worn"])
+    parser.add_argument("--laser", default="UTM-30LX")
+    parser.add_argument("--set", dest="overrides", nargs="+", default=[])
+    parser.add_argument("--out", type=Path)
+    parser.add_argument("--plot", type=Path)
+    return parser.parse_args(arguments)
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main())
+    except GvgbotError as error:
+        sys.exit(str(error))
