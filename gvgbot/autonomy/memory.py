@@ -45,10 +45,14 @@ class Cells:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Odds:
-    """What is known to be wrong with odometry: mean (3,) and covariance (3, 3)."""
+    """What is known to be wrong with odometry: mean (3,) and covariance (3, 3).
+
+    `shared` is how many scans the walls in sight are the mean of.
+    """
 
     x: Array
     P: Array
+    shared: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,7 +123,7 @@ def remember(pipeline: Pipeline) -> Memory:
         intent=_intent(pipeline.mission),
         near=_cells(maps.near),
         far=_cells(maps._far),
-        odds=Odds(calibration.x, calibration.P),
+        odds=Odds(calibration.x, calibration.P, maps._shared),
         hazards=pipeline._hazards._all,
     )
 
@@ -184,6 +188,7 @@ def recall(pipeline: Pipeline, memory: Memory, past: list[Growth]) -> None:
         _recall_cells(pipeline._maps._far, memory.far)
     calibration = pipeline._maps._calibration
     calibration.x, calibration.P = memory.odds.x, memory.odds.P
+    pipeline._maps._shared = memory.odds.shared
     pipeline._hazards._all = list(memory.hazards)
     pipeline.travelled, pipeline._kept = memory.travelled, memory.kept
     _recall_past(pipeline, past[: memory.keyframes])
