@@ -29,7 +29,7 @@ _UNLIKELY_M = 0.03  # nearer to the walls must be what is turned as far as it ma
 _SLIPPING = 25.0  # times the covariance of odometry, when the wheels slip
 _LOST = np.diag([0.5**2, 0.5**2, 0.05**2])  # of a base that nobody heard for a while
 _MOST_SHARED = 100.0  # scans that a wall can be the mean of
-_PER_M = np.diag([0.003**2, 0.003**2, 0.0001**2])  # per metre: what cells do to walls
+_PER_M = np.diag([0.004**2, 0.004**2, 0.0001**2])  # per metre: what cells do to walls
 
 
 class LocalMaps:
