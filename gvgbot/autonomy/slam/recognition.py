@@ -16,6 +16,8 @@ from gvgbot.autonomy.slam.graph import Vertex
 from gvgbot.geometry import Array, Pose, wrap_angle
 from gvgbot.ranges import Range
 
+_BESIDE_M = 0.4  # where a vertex is known to be, and where it is: as far apart as that may be
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecognitionConfig:
@@ -80,14 +82,15 @@ def looks_alike(
     """Whether kind, degree, clearance and bearings agree, the vertex's frame at `local_vertex`.
 
     A degree that differs by one passes: of a pair of close meetpoints either may be seen as one.
+    Clearance changes at most as much as the place: a vertex found from afar may have lain beside.
     """
     if (vertex.kind == "meetpoint") != sighting.meetpoint:
         return False
     if abs(vertex.degree - len(sighting.bearings)) > 1:
         return False
-    if abs(vertex.clearance - sighting.clearance) > max(
-        config.clearance_m, 0.15 * vertex.clearance
-    ):
+    beside = min(float(np.hypot(*(sighting.position - local_vertex.position))), _BESIDE_M)
+    tolerance = max(config.clearance_m, 0.15 * vertex.clearance) + beside
+    if abs(vertex.clearance - sighting.clearance) > tolerance:
         return False
     known = {key: half.bearing + local_vertex.theta for key, half in vertex.half_edges.items()}
     matched = match_bearings(sighting.bearings, known, math.radians(config.bearing_deg))

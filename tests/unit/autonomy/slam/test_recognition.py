@@ -93,6 +93,13 @@ def test_a_crossing_may_be_seen_as_one_of_a_close_pair_of_tees() -> None:
     assert looks_alike(vertex(*TEE), sighting(*CROSSING), Pose(), CONFIG)
 
 
+@pytest.mark.parametrize(("beside", "alike"), [(0.0, False), (0.3, True), (2.0, False)])
+def test_a_vertex_that_lies_beside_may_be_nearer_to_the_walls(beside: float, alike: bool) -> None:
+    """Clearance is 1-Lipschitz; what is farther off than vertices err is not excused."""
+    wider = sighting(*TEE, clearance=1.2 + (0.9 if beside > 1.0 else 0.45))
+    assert looks_alike(vertex(*TEE), wider, Pose(0.0, beside, 0.0), CONFIG) is alike
+
+
 def test_the_gate_is_mahalanobis_distance_with_the_joint_covariance() -> None:
     """The filter's numbers put together by hand, and the distance by scipy."""
     seen_first, here = Pose(2.0, 0.0, 0.0), Pose(3.0, 1.0, 1.0)
