@@ -38,10 +38,10 @@ def serve(wanted: Wanted, *, out: Path | None, speed: float) -> int:
     """
     set_up_logging(sys.stderr, os.environ)
     played = open_log(wanted)
-    config = played.config
+    telemetry = replace(played.config.telemetry, enabled=True, requests=())
+    config = replace(played.config, telemetry=telemetry)
     with contextlib.ExitStack() as stack:
         signals = stack.enter_context(StopSignals())
-        telemetry = replace(config.telemetry, enabled=True)
         network = stack.enter_context(Telemetry(telemetry, config.robot.name))
         directory = stack.enter_context(RunDirectory.create(out, world=played.title))
         session = Session(config, directory, place=None, led=played.led)

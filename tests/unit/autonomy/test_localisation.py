@@ -17,11 +17,11 @@ BEARINGS = np.radians(np.linspace(-135.0, 135.0, 1081))
 LOOSE = np.diag([0.05**2, 0.05**2, 0.02**2])
 
 
-def maps() -> LocalMaps:
+def maps(matching: ScanMatchingConfig | None = None) -> LocalMaps:
     return LocalMaps(
         LocalMapConfig(half_width_m=10.0),
         LocalMapConfig(half_width_m=20.0, cell_m=0.25, bridge_gap_m=0.0),
-        ScanMatchingConfig(),
+        matching or ScanMatchingConfig(),
     )
 
 
@@ -56,6 +56,22 @@ def test_without_walls_the_covariance_is_the_prior_s() -> None:
     pose, covariance = maps().match(nothing, Pose(1.0, 2.0, 3.0), Pose(), 1.0, LOOSE)
     assert pose == Pose(1.0, 2.0, 3.0)
     assert np.array_equal(covariance, LOOSE)
+
+
+def test_wheels_that_slipped_in_a_turn_are_found_out_by_a_search() -> None:
+    """They say half a radian to the left, and the walls nothing at all."""
+    rng, found = np.random.default_rng(2), []
+    for search_rad in (0.0, 0.6):
+        local = maps(ScanMatchingConfig(coarse_pair_m=0.5, search_rad=search_rad))
+        local.insert(room(rng, -2.0), Pose(-2.0, 0.0, 0.0), 0.0)
+        pose, _ = local.match(
+            room(rng, -2.0), Pose(-2.0, 0.0, 0.0), Pose(0.0, 0.0, 0.5), 1.0, LOOSE
+        )
+        found.append(pose)
+    without, searched = found
+    assert abs(without.theta) > 0.1
+    assert abs(searched.theta) < 0.01
+    assert searched.distance(Pose(-2.0, 0.0, 0.0)) < 0.02
 
 
 def test_a_drive_errs_about_as_much_as_its_steps_say_together() -> None:
