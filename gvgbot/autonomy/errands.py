@@ -24,6 +24,7 @@ _OFF_GRAPH_M = 3.0  # a point farther from every edge is out of reach
 _DIRECT_M = 4.0  # the longest straight way to a point
 _SHORT_M = 0.3  # a track so short leads nowhere
 _PROGRESS_M = 0.3
+_SURE_M = 0.4  # of a place that was found again
 _LOOKS = 2  # around, before giving up
 _LONGEST_VIEW_S = 2.0  # a longer gap between views is an outage, not a lack of progress
 
@@ -337,7 +338,8 @@ class Errands:
     def _look_once(self, view: View) -> Order:
         if self._looks:
             sigma = robot_sigma(self._mapper.belief)
-            self._end(view.stamp, "arrived", f"it knows its place to {sigma:.2f} m")
+            how = "arrived" if sigma < _SURE_M else "given up"
+            self._end(view.stamp, how, f"it knows its place to {sigma:.2f} m")
             return Stand()
         return self._look_around(view)
 

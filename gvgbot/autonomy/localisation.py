@@ -21,6 +21,8 @@ _RANGE_M = 24.0  # of the beams that are matched
 _LONGEST_GAP_M = 0.5  # between two beams, for their even spacing
 _SMOOTHED = 9  # beams, to tell where the next point is due
 _LEAST_POINTS = 50  # fewer say nothing about a pose
+_TURNED_RAD = 0.4  # that a robot may have been turned unnoticed
+_AT_ALL = 0.01  # better agreement, where no place is likelier than another
 _CLEARLY = 0.1  # better agreement of beams and walls than this is no chance
 _SEARCH_M, _SEARCH_STEP_M = 1.0, 0.25  # around the pose by odometry
 _SEARCH_STEP_RAD, _SEARCH_PAIR_M = 0.05, 0.3
@@ -79,14 +81,23 @@ class LocalMaps:
         return found.pose, _drift(found, used, self._shared, noise) + moved * _PER_M
 
     def find(
-        self, scan: Scan, before: Pose, motion: Pose, duration: float, Q: Array
+        self,
+        scan: Scan,
+        before: Pose,
+        motion: Pose,
+        duration: float,
+        Q: Array,
+        *,
+        is_doubted: bool = False,
     ) -> tuple[Pose, Array]:
         """As `match`, where nobody saw the way that the base took: it is searched for around.
 
-        Wheels tell how far it went and how much it turned, but not which of it came first.
+        Wheels tell how far it went and how much it turned, but not which of it came first. Where
+        even they are doubted, the place that agrees best is taken.
         """
         prior = before.compose(self._calibration.corrected(motion, duration))
-        best = self._best(scan, [(p, Q + _LOST) for p in _around(prior)])
+        clearly, turned = (_AT_ALL, _TURNED_RAD) if is_doubted else (_CLEARLY, 0.0)
+        best = self._best(scan, [(p, Q + _LOST) for p in _around(prior)], clearly, turned)
         return (prior, Q + _LOST) if best is None else (best[0].pose, best[0].covariance)
 
     def _walls(self) -> tuple[Array, Array, Array]:
@@ -100,7 +111,11 @@ class LocalMaps:
         )
 
     def _best(
-        self, scan: Scan, priors: list[tuple[Pose, Array]]
+        self,
+        scan: Scan,
+        priors: list[tuple[Pose, Array]],
+        clearly: float = _CLEARLY,
+        turned: float = 0.0,
     ) -> tuple[Registration, Array] | None:
         """The match from the first prior, unless that from another one is clearly better."""
         walls, hits, sights = self._walls()
@@ -112,14 +127,15 @@ class LocalMaps:
             return None
         tree, best, agreement = cKDTree(walls, balanced_tree=False), None, 0.0
         for prior, Q in priors:
-            if agreement + _CLEARLY >= 1.0:
+            if agreement + clearly >= 1.0:
                 break  # nothing can be clearly better
-            near = _turned(points, tree, prior, config.search_rad) if config.search_rad else prior
+            reach = max(config.search_rad, turned)
+            near = _turned(points, tree, prior, reach) if reach else prior
             found = register_coarsely(points, tree, walls, near, Q, config, coarse, hits, sides)
             if found is None or found.inliers < config.min_inliers:
                 continue
             now = found.inliers * (1.0 - found.rms / config.max_pair_m)
-            if now > agreement + _CLEARLY:
+            if now > agreement + clearly:
                 best, agreement = (found, Q), now
         return best
 

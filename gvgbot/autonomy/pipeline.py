@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Annotated
 
 import numpy as np
@@ -194,8 +195,6 @@ class Pipeline:
             return happened
         if self._last is not None:
             self.mission.skip(max(0.0, scan.stamp - self._last.stamp - _LONGEST_GAP_S))
-        if self.errands.is_lost:
-            self.errands.is_lost, self._was_lifted = False, True
         scan = deskewed(scan, self._odometry.motion_during(scan))
         local_base = self._localise(scan, odom_base)
         scan = self._newcomers.sift(scan, local_base, self._maps.near)
@@ -258,9 +257,12 @@ class Pipeline:
         self.travelled += math.hypot(motion.x, motion.y)
         duration = scan.stamp - self._last.stamp
         noise = self._config.odometry_noise.covariance(motion, duration)
+        is_doubted, self.errands.is_lost = self.errands.is_lost, False
         lost = self._was_lifted or self._odometry.has_gap_since(self._last.stamp)
         match = self._maps.find if lost else self._maps.match
-        if self._was_lifted:
+        if is_doubted:
+            match = partial(self._maps.find, is_doubted=True)
+        if self._was_lifted or is_doubted:
             self._was_lifted, noise = False, noise + _LIFTED
         local_base, covariance = match(
             scan, self._last.local_base, motion, duration, rotated_covariance(noise, -motion.theta)

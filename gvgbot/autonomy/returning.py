@@ -64,7 +64,7 @@ class ReturningPipeline(Pipeline):
         if self._is_back:
             return super().perceive(scan)
         if self._seeker is not None:
-            return self._seek(self._seeker, scan)
+            return [] if self.errands.is_resting else self._seek(self._seeker, scan)
         odom_base = self._odometry.odom_base_at(scan.stamp)
         if odom_base is None:
             return []
@@ -76,7 +76,8 @@ class ReturningPipeline(Pipeline):
     def control(self, odometry: Odometry, felt: Felt = _NOTHING_FELT) -> Twist:
         """The twist to drive now."""
         if self._seeker is not None:
-            return self._seeker.control(odometry, felt)
+            twist = self._seeker.control(odometry, felt)
+            return STANDSTILL if self.errands.is_resting else twist
         twist = super().control(odometry, felt)
         return twist if self._is_back else STANDSTILL
 

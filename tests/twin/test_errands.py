@@ -61,6 +61,7 @@ class Tour:
     trips: dict[str, Trip] = field(default_factory=dict)
     phases: dict[str, str] = field(default_factory=dict)
     vertices: dict[int, tuple[float, float]] = field(default_factory=dict)  # world
+    errors: list[tuple[float, float]] = field(default_factory=list)  # of the pose: m, rad
 
     def lines(self, kind: str) -> list[dict[str, Any]]:
         text = (self.daemon.session.directory.path / "events.jsonl").read_text()
@@ -93,6 +94,16 @@ def story(tour: Tour) -> Callable[[Clock], Awaitable[None]]:
         made.world = (daemon.place.x, daemon.place.y)
         made.driven = pipeline.travelled - begin
         made.fastest = max(abs(state.twist[0]) for state in states[first:])
+
+    def carry() -> None:
+        """Put the robot elsewhere, along the corridor and turned, so that it feels nothing."""
+        assert daemon.session.simulation is not None
+        here = daemon.place
+        daemon.session.simulation.body.pose = Pose(here.x + 0.7, here.y, here.theta + 0.2)
+
+    def note_error() -> None:
+        error = START.compose(pipeline.map_base).to(daemon.place)
+        tour.errors.append((math.hypot(error.x, error.y), abs(error.theta)))
 
     async def pausing(clock: Clock) -> None:
         tour.answers["pause"] = await ask("pause")
@@ -132,7 +143,10 @@ def story(tour: Tour) -> Callable[[Clock], Awaitable[None]]:
         tour.answers["unknown"] = await ask("goto", vertex=999)
         tour.answers["outside"] = await ask("goto", x=50.0, y=50.0)
         tour.answers["save"] = await ask("save")
+        carry()
+        note_error()
         await trip(clock, "relocalise", "relocalise")
+        note_error()
         tour.answers["explore"] = await ask("explore")
         tour.phases["explore"] = "" if pipeline.errands.is_resting else "exploring"
         await until(clock, lambda: pipeline.mission.outcome is not None)
@@ -221,9 +235,12 @@ def test_exploring_goes_on_after_the_end(tour: Tour) -> None:
     assert tour.daemon.session.pipeline.mission.outcome == "explored"
 
 
-def test_a_robot_that_looks_around_stays_where_it_is(tour: Tour) -> None:
+def test_a_robot_that_was_carried_finds_its_place_when_it_is_told_to(tour: Tour) -> None:
+    (carried_m, carried_rad), (found_m, found_rad) = tour.errors
+    assert (carried_m, carried_rad) == pytest.approx((0.7, 0.2), abs=0.05)
     assert tour.trips["relocalise"].outcome == "arrived"
-    assert tour.trips["relocalise"].off(*tour.trips["home"].world) < 0.1
+    assert found_m < 0.05
+    assert found_rad < 0.02
 
 
 def test_nothing_was_touched_on_the_way(tour: Tour) -> None:
