@@ -152,7 +152,12 @@ def recorded(session: Session, *, patient: bool) -> AbstractContextManager[objec
         return contextlib.nullcontext()
     with extra_needed():
         from gvgbot.recording.recorder import Recorder
-    about = {"title": session.title, "version": __version__, "config": dump(session.config)}
+    about = {
+        "title": session.title,
+        "version": __version__,
+        "config": dump(session.config),
+        "resumed": "yes" if session.pipeline.keyframes else "no",
+    }
     session.recorder = Recorder(session.config.recording, about, patient=patient)
     session.recorder.map_base = lambda: session.pipeline.map_base
     return session.recorder

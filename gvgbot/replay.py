@@ -108,9 +108,13 @@ def _recording(wanted: Wanted) -> Log:
         config = load_config(wanted.config, wanted.overrides)
 
     def flaws() -> list[str]:
-        left_out = f"{recording.left_out} messages were left out when it was recorded"
-        cut = "the recording ends in the middle, as when a program is killed"
-        return [left_out] * bool(recording.left_out) + [cut] * recording.is_cut
+        found = {
+            "the run went on with an earlier map, which is not here": recording.about.resumed,
+            f"{recording.requests} requests steered the run, and are left out": recording.requests,
+            f"{recording.left_out} messages are missing: the disk was slow": recording.left_out,
+            "the recording ends in the middle, as when a program is killed": recording.is_cut,
+        }
+        return [f"but:     {flaw}" for flaw, is_there in found.items() if is_there]
 
     return Log(recording.about.title, config, recording.messages(), False, flaws)
 
@@ -120,6 +124,6 @@ def _carmen(wanted: Wanted) -> Log:
     mount = config.laser
     base_laser = Pose(mount.x_m, mount.y_m, math.radians(mount.yaw_deg))
     log = read_carmen(wanted.path, no_echo_m=wanted.no_echo_m, base_laser=base_laser)
-    flaws = [f"{log.damaged} damaged lines were passed over"] if log.damaged else []
+    flaws = [f"but:     {log.damaged} damaged lines were passed over"] if log.damaged else []
     title = wanted.path.name.split(".")[0] or "log"
     return Log(title, config, messages(log), True, lambda: flaws)

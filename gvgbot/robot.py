@@ -93,7 +93,7 @@ class Robot:
         self._prepare(links)
         work = {
             "devices": self._devices.run(),
-            "explore": self._loop.run(),
+            "explore": self._explore(),
             "beat": self._beat(),
             "save": self._keep_saved(),
         }
@@ -110,6 +110,10 @@ class Robot:
             self._notifier.stopping()
             for task in serving:
                 task.cancel()
+
+    async def _explore(self) -> None:
+        """Drive, or stand, until cancelled."""
+        await self._loop.run()
 
     def _open_links(self) -> Links:
         session = self._session

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import msgspec
 import zstandard
@@ -50,6 +50,7 @@ class About:
     title: str  # of the world, or of the robot
     config: str  # JSON
     part: int  # files of the same recording that came before
+    resumed: bool  # whether the run went on with a map that was there before
 
 
 class Recording:
@@ -61,6 +62,7 @@ class Recording:
         self.about = _about(path)
         self.is_cut = False  # whether the last file that was read ends in the middle
         self.left_out = 0  # messages that the disk was too slow for
+        self.requests = 0  # that were granted
 
     def messages(self) -> Iterator[tuple[float, Lived]]:
         """What the robot was given, each with the time (s) when it was taken down."""
@@ -95,8 +97,14 @@ class Recording:
                 elif topic == BATTERY.topic:
                     yield at, decode_battery(record.data)
                 elif topic == EVENT.topic:
-                    event = msgspec.json.decode(record.data)
-                    self.left_out += event["messages"] if event["event"] == "left_out" else 0
+                    self._count(msgspec.json.decode(record.data))
+
+    def _count(self, event: dict[str, Any]) -> None:
+        match event:
+            case {"event": "left_out", "messages": int(messages)}:
+                self.left_out += messages
+            case {"event": "requested", "done": True}:
+                self.requests += 1
 
 
 def _about(path: Path) -> About:
@@ -108,7 +116,7 @@ def _about(path: Path) -> About:
                 found = Metadata.read(ReadDataStream(BytesIO(content)))
                 if found.name == METADATA:
                     m = found.metadata
-                    return About(m["title"], m["config"], int(m["part"]))
+                    return About(m["title"], m["config"], int(m["part"]), m.get("resumed") == "yes")
     except OSError as error:
         raise UsageError(f"cannot read {path}: {error.strerror}") from error
     except _DAMAGE:

@@ -85,6 +85,15 @@ def test_what_is_recorded_is_read_in_the_same_order(tmp_path: Path) -> None:
     assert not recording.is_cut
 
 
+def test_requests_that_were_granted_are_counted(tmp_path: Path) -> None:
+    with Recorder(config(tmp_path / "run.mcap"), ABOUT | {"resumed": "yes"}) as to:
+        for done in (True, False, True):
+            to.on_event({"event": "requested", "stamp": 1.0, "done": done})
+    recording = Recording(tmp_path / "run.mcap")
+    assert list(recording.messages()) == []
+    assert (recording.requests, recording.about.resumed) == (2, True)
+
+
 def test_another_reader_finds_all_topics_with_their_schemas(tmp_path: Path) -> None:
     with Recorder(config(tmp_path / "run.mcap"), ABOUT) as to:
         record(to, 10)
