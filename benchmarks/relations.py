@@ -1,6 +1,6 @@
 """Error and time of a CARMEN log against hand-made relations, beside yag-slam if that is installed.
 
-    python -m benchmarks.bench_intel intel.log.gz intel.relations
+    python -m benchmarks.relations intel.log.gz intel.relations
 
 A relation is a line `t1 t2 dx dy dz roll pitch yaw`: where the robot was at t2, seen from t1. The
 relations of the usual logs, and the metric, are those of Kuemmerle et al. (2009).
@@ -56,12 +56,13 @@ def by_odometry(log: Path) -> tuple[Array, Array]:
 
 
 def by_yag_slam(log: Path) -> tuple[Array, Array]:
-    """Its poses at the scans, with the odometry from there until the next."""
+    """Its poses at the scans; what odometry is wrong by in between is spread over the time."""
     graph_slam = importlib.import_module("yag_slam.graph_slam")
+    matcher = importlib.import_module("yag_slam.scan_matching").Scan2DMatcherCpp
     models = importlib.import_module("yag_slam.models")
     recorded = _read(log)
     heard = {o.stamp: o.odom_base for o in recorded.odometry}
-    slam, scans = graph_slam.GraphSlam.default(), []
+    slam, scans = graph_slam.GraphSlam(matcher({}), matcher({}, loop=True)), []
     for scan in recorded.scans:
         ranges = np.where(np.isfinite(scan.ranges), scan.ranges, NO_ECHO_M)
         first, step = scan.angle_min, scan.angle_increment
@@ -72,12 +73,18 @@ def by_yag_slam(log: Path) -> tuple[Array, Array]:
         slam.process_scan(known)
         scans.append(known)
     slam.run_opt()
-    corrected = [Pose(s.corrected_pose.x, s.corrected_pose.y, s.corrected_pose.t) for s in scans]
+    found = [scan.corrected_pose for scan in scans]
+    corrected = [Pose(p.x, p.y, p.euler[2]) for p in found]
     stamps = np.array([scan.stamp for scan in recorded.scans])
     rows = []
     for o in recorded.odometry:
         k = max(0, int(np.searchsorted(stamps, o.stamp, side="right")) - 1)
-        rows.append((o.stamp, corrected[k].compose(heard[float(stamps[k])].to(o.odom_base))))
+        by_scans = [
+            corrected[i].compose(heard[float(stamps[i])].to(o.odom_base))
+            for i in (k, min(k + 1, len(stamps) - 1))
+        ]
+        share = float(np.interp(o.stamp, stamps[k : k + 2], [0.0, 1.0][: len(stamps) - k]))
+        rows.append((o.stamp, by_scans[0].compose(by_scans[0].to(by_scans[1]).part(share))))
     return _rows(rows)
 
 
