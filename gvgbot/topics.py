@@ -24,10 +24,10 @@ class TelemetryConfig:
     explore, relocalise, save and set.
     """
 
-    enabled: bool = True
-    requests: tuple[RequestName, ...] = ()
+    enabled: bool = True  # false: nothing goes over the network
+    requests: tuple[RequestName, ...] = ()  # what the robot may be asked for
     zenoh_file: Path | None = None  # JSON5: keys, passwords, access control; see configs/zenoh
-    listen: tuple[str, ...] = ("tcp/127.0.0.1:7447",)
+    listen: tuple[str, ...] = ("tcp/127.0.0.1:7447",)  # addresses that others can reach it at
     connect: tuple[str, ...] = ()  # zenoh routers to join, as often as they come back
     lease_s: Annotated[float, Range(0.5, 60.0)] = (
         2.0  # silence after which the robot counts as gone

@@ -21,8 +21,8 @@ _MEMORY_M = 12.0  # driven, after which a candidate is forgotten
 class CandidatesConfig:
     """How often something must be seen before it is believed."""
 
-    meetpoint_sightings: Annotated[int, Range(1, 50)] = 4
-    endpoint_sightings: Annotated[int, Range(1, 50)] = 6
+    meetpoint_sightings: Annotated[int, Range(1, 50)] = 4  # before a meetpoint enters the map
+    endpoint_sightings: Annotated[int, Range(1, 50)] = 6  # before an endpoint enters the map
 
 
 @dataclass(slots=True, eq=False)

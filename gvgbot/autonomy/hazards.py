@@ -19,7 +19,7 @@ class HazardConfig:
 
     memory_m: Annotated[float, Range(1.0, 1000.0)] = 15.0  # driven; a second hit makes it lasting
     same_m: Annotated[float, Range(0.05, 2.0)] = 0.35  # hits nearer than this are of one thing
-    blocking_hits: Annotated[int, Range(1, 20)] = 3
+    blocking_hits: Annotated[int, Range(1, 20)] = 3  # see blocking_m
     blocking_m: Annotated[float, Range(0.1, 5.0)] = 1.0  # so many hits so near block the way
 
 

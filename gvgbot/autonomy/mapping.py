@@ -39,13 +39,16 @@ class MappingConfig:
     conflicts: Annotated[int, Range(1, 50)] = 4  # sightings that overrule an edge
     surplus: Annotated[int, Range(1, 50)] = 3  # sightings in a row that add a departure to a vertex
     passed_m: Annotated[float, Range(0.3, 5.0)] = 1.0  # from so near, what there is to see is seen
+    # driven between two corrections by the same vertex
     update_every_m: Annotated[float, Range(0.1, 10.0)] = 1.0
+    # vertices farther away are not looked up
     recognise_within_m: Annotated[float, Range(1.0, 20.0)] = 5.0
     min_inliers: Annotated[float, Range(0.1, 1.0)] = 0.7  # share of a vertex's walls found again
     min_inliers_far: Annotated[float, Range(0.1, 1.0)] = (
         0.9  # of one that is not where it should be
     )
     margin: Annotated[float, Range(0.0, 50.0)] = 9.0  # in squared Mahalanobis distance, to the next
+    # around a vertex, walls are kept to know it again
     snapshot_m: Annotated[float, Range(1.0, 20.0)] = 6.0
 
 

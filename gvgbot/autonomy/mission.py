@@ -39,6 +39,7 @@ class ExplorationConfig:
     as `nearest`, but the standard deviation of a frontier's place counts, too.
     """
 
+    # which frontier comes next, see above
     policy: Literal["ears", "nearest", "balanced"] = "nearest"
     detour_m_per_m: Annotated[float, Range(0.0, 1000.0)] = (
         50.0  # for less standard deviation, if balanced

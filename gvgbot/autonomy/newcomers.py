@@ -32,8 +32,10 @@ Cell = tuple[int, int]
 class NewcomersConfig:
     """When something new is taken for a part of the building."""
 
-    away_from_walls_m: Annotated[float, Range(0.1, 2.0)] = 0.2
+    away_from_walls_m: Annotated[float, Range(0.1, 2.0)] = 0.2  # nearer to a wall, it is the wall
+    # standing for so long, it enters the local map
     mapped_after_s: Annotated[float, Range(0.0, 600.0)] = 5.0
+    # standing for so long, vertices may depend on it
     believed_after_s: Annotated[float, Range(0.0, 3600.0)] = 120.0
 
 

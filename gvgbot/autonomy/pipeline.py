@@ -52,9 +52,9 @@ _SCAN_EVERY_M, _SCAN_EVERY_RAD = 0.7, 0.5  # scans that are kept for the occupan
 class KeyframeConfig:
     """How much motion makes a new look worth its cost."""
 
-    distance_m: Annotated[float, Range(0.02, 2.0)] = 0.25
-    turn_rad: Annotated[float, Range(0.02, 2.0)] = 0.25
-    interval_s: Annotated[float, Range(0.1, 10.0)] = 1.0
+    distance_m: Annotated[float, Range(0.02, 2.0)] = 0.25  # driven since the last one
+    turn_rad: Annotated[float, Range(0.02, 2.0)] = 0.25  # turned since the last one
+    interval_s: Annotated[float, Range(0.1, 10.0)] = 1.0  # since the last one
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

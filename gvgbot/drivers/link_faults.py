@@ -32,15 +32,15 @@ class LinkFaultConfig:
     chip_timer_s: Annotated[float, Range(0.0, 0.255)] = (
         0.0  # an FTDI's latency timer; usually 16 ms
     )
-    flipped_bits_per_kb: PerThousand = 0.0
-    lost_bytes_per_kb: PerThousand = 0.0
-    inserted_bytes_per_kb: PerThousand = 0.0
-    cut_messages_per_k: PerThousand = 0.0
-    silences_per_h: PerHour = 0.0
-    silence_s: Annotated[float, Range(0.0, 3600.0)] = 2.0
-    unplugs_per_h: PerHour = 0.0
+    flipped_bits_per_kb: PerThousand = 0.0  # damaged bytes
+    lost_bytes_per_kb: PerThousand = 0.0  # bytes that never arrive
+    inserted_bytes_per_kb: PerThousand = 0.0  # bytes that nobody sent
+    cut_messages_per_k: PerThousand = 0.0  # messages whose end is missing
+    silences_per_h: PerHour = 0.0  # nothing comes for a while
+    silence_s: Annotated[float, Range(0.0, 3600.0)] = 2.0  # so long
+    unplugs_per_h: PerHour = 0.0  # the cable is pulled
     unplugs_at_s: tuple[Moment, ...] = ()  # since the twin was first served
-    unplugged_s: Annotated[float, Range(0.0, 86_400.0)] = 3.0
+    unplugged_s: Annotated[float, Range(0.0, 86_400.0)] = 3.0  # until it is plugged in again
 
 
 class FaultyLink:

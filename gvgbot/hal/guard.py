@@ -29,14 +29,17 @@ Reason = Literal[
 class GuardConfig:
     """What the robot may do at most, whatever autonomy asks for."""
 
-    max_speed_mps: Annotated[float, Range(0.05, 0.7)] = 0.7
+    max_speed_mps: Annotated[float, Range(0.05, 0.7)] = 0.7  # forwards
     max_reverse_speed_mps: Annotated[float, Range(0.0, 0.3)] = 0.1  # the laser sees little behind
     max_turn_rate_radps: Annotated[float, Range(0.1, 3.14)] = 1.5  # a gyro degrades when faster
-    max_acceleration_mps2: Annotated[float, Range(0.05, 3.0)] = 0.5
+    max_acceleration_mps2: Annotated[float, Range(0.05, 3.0)] = 0.5  # speeding up
+    # slowing down, also to stop for something ahead
     max_braking_mps2: Annotated[float, Range(0.05, 3.0)] = 1.0
+    # of turning faster or slower
     max_angular_acceleration_radps2: Annotated[float, Range(0.1, 20.0)] = 3.5
-    max_scan_age_s: Annotated[float, Range(0.05, 2.0)] = 0.5
-    margin_m: Annotated[float, Range(0.0, 0.5)] = 0.015
+    max_scan_age_s: Annotated[float, Range(0.05, 2.0)] = 0.5  # older than this, the robot stops
+    margin_m: Annotated[float, Range(0.0, 0.5)] = 0.015  # kept free around the footprint
+    # from a command to the first effect on the motors
     response_time_s: Annotated[float, Range(0.0, 1.0)] = 0.1
 
 

@@ -17,11 +17,15 @@ _CUT = 0.8  # of the clearance, the farthest to look ahead
 class EdgeFollowerConfig:
     """Speeds and look-ahead."""
 
-    max_speed_mps: Annotated[float, Range(0.05, 2.0)] = 0.6
-    max_turn_rate_radps: Annotated[float, Range(0.1, 4.0)] = 1.2
+    max_speed_mps: Annotated[float, Range(0.05, 2.0)] = 0.6  # where it is wide and straight
+    max_turn_rate_radps: Annotated[float, Range(0.1, 4.0)] = 1.2  # on the spot and on the way
+    # before the end of a track and before bends
     braking_mps2: Annotated[float, Range(0.05, 5.0)] = 0.4
+    # to the point that it steers for, standing
     look_ahead_m: Annotated[float, Range(0.1, 2.0)] = 0.25
+    # and farther off by what it drives in this time
     look_ahead_s: Annotated[float, Range(0.0, 3.0)] = 0.5
+    # farther off course than this, it turns before it drives
     turn_on_the_spot_rad: Annotated[float, Range(0.2, 3.0)] = 0.9
     slow_clearance_m: Annotated[float, Range(0.1, 2.0)] = (
         0.6  # narrower than this, the robot slows down

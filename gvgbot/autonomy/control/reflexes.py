@@ -23,10 +23,10 @@ Cause = Literal["bumper", "cliff", "over-current", "stuck"]
 class ReflexConfig:
     """How the robot gets away from what it has felt."""
 
-    back_off_m: Annotated[float, Range(0.02, 0.5)] = 0.12
-    back_off_speed_mps: Annotated[float, Range(0.01, 0.3)] = 0.1
+    back_off_m: Annotated[float, Range(0.02, 0.5)] = 0.12  # after a bump or at a cliff
+    back_off_speed_mps: Annotated[float, Range(0.01, 0.3)] = 0.1  # backwards
     rest_s: Annotated[float, Range(0.1, 60.0)] = 2.0  # after an overload, or being put down
-    stuck_s: Annotated[float, Range(1.0, 60.0)] = 5.0
+    stuck_s: Annotated[float, Range(1.0, 60.0)] = 5.0  # without coming on: stuck
     stuck_m: Annotated[float, Range(0.01, 0.5)] = 0.05  # moved less than this in that time
     stuck_speed_mps: Annotated[float, Range(0.01, 0.5)] = 0.05  # though this was asked for
 

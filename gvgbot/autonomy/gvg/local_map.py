@@ -34,8 +34,8 @@ _MAX_VOTES = 8  # a wall needs this many contrary scans, less the hits, before i
 class LocalMapConfig:
     """Size and memory of the local map."""
 
-    half_width_m: Annotated[float, Range(3.0, 30.0)] = 8.0
-    cell_m: Annotated[float, Range(0.05, 0.5)] = 0.1
+    half_width_m: Annotated[float, Range(3.0, 30.0)] = 8.0  # from the robot to the edge of the map
+    cell_m: Annotated[float, Range(0.05, 0.5)] = 0.1  # side of a cell
     memory_m: Annotated[float, Range(5.0, 200.0)] = (
         30.0  # metres driven after which a cell is forgotten
     )

@@ -20,11 +20,11 @@ from gvgbot.ranges import Range
 class OdometryNoise:
     """How the variance of dead reckoning grows with distance, turning and time."""
 
-    along_m_per_sqrt_m: Annotated[float, Range(0.0, 1.0)] = 0.03
-    along_m_per_sqrt_rad: Annotated[float, Range(0.0, 1.0)] = 0.01
-    turn_rad_per_sqrt_rad: Annotated[float, Range(0.0, 1.0)] = 0.02
-    turn_rad_per_sqrt_m: Annotated[float, Range(0.0, 1.0)] = 0.01
-    turn_rad_per_sqrt_s: Annotated[float, Range(0.0, 1.0)] = 0.003
+    along_m_per_sqrt_m: Annotated[float, Range(0.0, 1.0)] = 0.03  # along the way, by driving
+    along_m_per_sqrt_rad: Annotated[float, Range(0.0, 1.0)] = 0.01  # along the way, by turning
+    turn_rad_per_sqrt_rad: Annotated[float, Range(0.0, 1.0)] = 0.02  # heading, by turning
+    turn_rad_per_sqrt_m: Annotated[float, Range(0.0, 1.0)] = 0.01  # heading, by driving
+    turn_rad_per_sqrt_s: Annotated[float, Range(0.0, 1.0)] = 0.003  # heading, by time alone
 
     def covariance(self, motion: Pose, duration: float) -> Array:
         """Covariance (3, 3) of a short motion, in the frame of its start.

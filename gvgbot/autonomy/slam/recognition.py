@@ -26,12 +26,14 @@ class RecognitionConfig:
     tracked_m: Annotated[float, Range(1.0, 100.0)] = (
         12.0  # driven since last seen: told by place alone
     )
-    same_place_m: Annotated[float, Range(0.2, 2.0)] = 0.8
+    same_place_m: Annotated[float, Range(0.2, 2.0)] = 0.8  # vertices closer than this may be one
     gate: Annotated[float, Range(1.0, 50.0)] = (
         13.8  # squared Mahalanobis distance, 2 degrees of freedom
     )
+    # by which two sightings of one vertex may differ
     clearance_m: Annotated[float, Range(0.05, 2.0)] = 0.3
-    bearing_deg: Annotated[float, Range(5.0, 90.0)] = 40.0
+    bearing_deg: Annotated[float, Range(5.0, 90.0)] = 40.0  # by which departing edges may differ
+    # of a vertex's place as seen from near
     detection_sigma_m: Annotated[float, Range(0.01, 1.0)] = 0.08
 
 

@@ -30,11 +30,12 @@ _SAME_PAIRS_M, _SAME_PAIRS_RAD = 0.02, 0.005  # moved less, points are near to t
 class ScanMatchingConfig:
     """How far points are paired, and how much one pair is worth."""
 
+    # a point farther from every wall has no pair
     max_pair_m: Annotated[float, Range(0.05, 1.0)] = 0.25
-    pair_sigma_m: Annotated[float, Range(0.005, 0.5)] = 0.03
+    pair_sigma_m: Annotated[float, Range(0.005, 0.5)] = 0.03  # of a point's distance from its wall
     independent_share: Annotated[float, Range(0.001, 1.0)] = 0.3  # neighbouring pairs err together
     points: Annotated[int, Range(50, 5000)] = 300  # of a scan that are matched
-    min_pairs: Annotated[int, Range(10, 1000)] = 40
+    min_pairs: Annotated[int, Range(10, 1000)] = 40  # with fewer there is no match
     min_inliers: Annotated[float, Range(0.0, 1.0)] = 0.5  # share of a scan that must find a wall
     coarse_pair_m: Annotated[float, Range(0.0, 2.0)] = 0.0  # of a first match; 0: there is none
     search_rad: Annotated[float, Range(0.0, 1.0)] = 0.0  # for the heading first, to either side

@@ -16,22 +16,23 @@ class HokuyoConfig:
 
     port: str = "/dev/ttyACM0"  # or tcp://host:10940
     baud: Annotated[int, Range(19200, 750000)] = 115200  # means nothing on USB and Ethernet
+    # what carries the bytes, and so how many; auto: told by the port
     link: Literal["auto", "usb", "serial", "tcp"] = "auto"
     rate_hz: Annotated[float, Range(0.5, 50.0)] = 10.0  # scans a second, as near as the motor does
     skip: Annotated[int, Range(0, 9)] | None = None  # scans left out between two; beats rate_hz
     cluster: Annotated[int, Range(1, 99)] = 1  # steps per beam
     adapt: bool = True  # to a link that is too slow: coarser, shorter or fewer scans
     echo: Echo = "single"  # which of several returns along a beam; needs a multi-echo laser
-    intensities: bool = False
+    intensities: bool = False  # ask for them beside the ranges
     user_string: str = ""  # marks the scans asked for; up to 16 letters and digits
     x_m: float = 0.0  # of the laser on the base
-    y_m: float = 0.0
-    yaw_deg: Annotated[float, Range(-180.0, 180.0)] = 0.0
-    upside_down: bool = False
+    y_m: float = 0.0  # likewise, to the left
+    yaw_deg: Annotated[float, Range(-180.0, 180.0)] = 0.0  # likewise, anticlockwise
+    upside_down: bool = False  # mounted with its top down: angles are mirrored
     first_angle_deg: Annotated[float, Range(-180.0, 180.0)] = -180.0  # of the laser as mounted:
     last_angle_deg: Annotated[float, Range(-180.0, 180.0)] = 180.0  # beams outside are left out
     min_range_m: Annotated[float, Range(0.0, 10.0)] = 0.0  # the laser's own limit holds too
-    max_range_m: Annotated[float, Range(0.5, 100.0)] = 30.0
+    max_range_m: Annotated[float, Range(0.5, 100.0)] = 30.0  # what is beyond counts as nothing hit
     processing_latency_s: Annotated[float, Range(0.0, 0.1)] = 0.00475  # last beam to first byte
     synchronise: bool = True  # ask the laser for its time before the scans
     reply_timeout_s: Annotated[float, Range(0.15, 10.0)] = 0.4  # slow ones need 0.11 s

@@ -18,14 +18,14 @@ PerHour = Annotated[float, Range(0.0, 36_000.0)]
 class LaserMishapConfig:
     """How often a simulated laser has each mishap, and how long one lasts."""
 
-    reboots_per_h: PerHour = 0.0
+    reboots_per_h: PerHour = 0.0  # it comes back as after power-up
     reboots_at_s: tuple[Moment, ...] = ()  # since the twin was first served
     freezes_per_h: PerHour = 0.0  # the last scan comes over and over
     stalls_per_h: PerHour = 0.0  # answers, but sends no scans
     unstable_per_h: PerHour = 0.0  # says that it cannot measure just now
     abnormal_per_h: PerHour = 0.0  # refuses everything until it is rebooted
     blinds_per_h: PerHour = 0.0  # error codes instead of ranges
-    duration_s: Annotated[float, Range(0.0, 60.0)] = 1.0
+    duration_s: Annotated[float, Range(0.0, 60.0)] = 1.0  # of each that passes by itself
 
     @property
     def rates(self) -> dict[str, Rate]:
@@ -48,23 +48,24 @@ class LaserMishapConfig:
 class HokuyoTwinConfig:
     """Which laser is simulated, and its imperfections."""
 
-    model: ModelName = "UTM-30LX"
-    range_sigma_m: Fraction = 0.01
-    dropout_fraction: Fraction = 0.005
+    model: ModelName = "UTM-30LX"  # which laser it is
+    range_sigma_m: Fraction = 0.01  # noise of a range
+    dropout_fraction: Fraction = 0.005  # of the beams: nothing measured
     mixed_pixel_fraction: Fraction = 0.0  # of the beams at an edge: between near and far
     double_echo_fraction: Fraction = 0.02  # beams that something thin reflects on their way
     bad_checksum_fraction: Fraction = 0.0  # of the scans
     lost_stop_fraction: Fraction = 0.0  # of the QT that come while scans are sent
     processing_latency_s: Annotated[float, Range(0.0, 0.1)] = 0.00475  # last beam to first byte
     answers_once_per_turn: bool = False  # while it measures, as real lasers do
-    clock_drift_ppm: Annotated[float, Range(-1000.0, 1000.0)] = 50.0
-    clock_start_ms: Annotated[int, Range(0, WRAP_MS - 1)] = 0
+    clock_drift_ppm: Annotated[float, Range(-1000.0, 1000.0)] = 50.0  # its clock against the host's
+    clock_start_ms: Annotated[int, Range(0, WRAP_MS - 1)] = 0  # its clock at power-up
+    # its motor turns more slowly by this
     motor_error_ppm: Annotated[float, Range(-50_000.0, 50_000.0)] = 0.0
     serial_baud: Annotated[int, Range(0, 750_000)] = 0  # 0: USB or Ethernet
     boot_s: Annotated[float, Range(0.0, 60.0)] = 0.0  # of silence after power-up
     reboot_s: Annotated[float, Range(0.0, 60.0)] = 1.5  # likewise after a reboot
-    starts_in_scip_1: bool = False
-    starts_abnormal: bool = False
-    serial_number: str = "H0000001"
+    starts_in_scip_1: bool = False  # old firmware: SCIP 2 has to be asked for
+    starts_abnormal: bool = False  # refuses everything until it is rebooted
+    serial_number: str = "H0000001"  # what it answers when asked
     mishaps: LaserMishapConfig = field(default_factory=LaserMishapConfig)
     link: LinkFaultConfig = field(default_factory=LinkFaultConfig)

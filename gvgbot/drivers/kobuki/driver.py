@@ -40,21 +40,23 @@ _STOP = BaseControl(0, 0)
 class KobukiConfig:
     """The link to the base, its limits, and when silence is dangerous."""
 
-    port: str = "/dev/gvgbot-base"
-    baud: Annotated[int, Range(9600, 1_000_000)] = 115_200
-    heading: Heading = "gyro"
-    wheel_base_m: Annotated[float, Range(0.05, 2.0)] = WHEEL_BASE
-    wheel_radius_m: Annotated[float, Range(0.01, 0.5)] = 0.035
+    port: str = "/dev/gvgbot-base"  # as the udev rules name it
+    baud: Annotated[int, Range(9600, 1_000_000)] = 115_200  # a Kobuki knows no other
+    heading: Heading = "gyro"  # what tells how far the base has turned
+    wheel_base_m: Annotated[float, Range(0.05, 2.0)] = WHEEL_BASE  # from wheel to wheel
+    wheel_radius_m: Annotated[float, Range(0.01, 0.5)] = 0.035  # turns ticks into metres
     max_speed_mps: Annotated[float, Range(0.01, 2.0)] = 0.7  # of the faster wheel
+    # a faster turn is slowed down on its arc
     max_turn_rate_radps: Annotated[float, Range(0.01, math.pi)] = math.pi
     max_acceleration_mps2: Annotated[float, Range(0.05, 100.0)] | None = None  # None: no ramp
     max_braking_mps2: Annotated[float, Range(0.05, 100.0)] | None = None  # a stop is never put off
+    # None: no ramp
     max_angular_acceleration_radps2: Annotated[float, Range(0.1, 1000.0)] | None = None
     deadman_s: Annotated[float, Range(0.05, 2.0)] = 0.5  # without drive(): stop
     silence_stop_s: Annotated[float, Range(0.05, 2.0)] = 0.5  # without feedback: stop
     silence_lost_s: Annotated[float, Range(0.1, 10.0)] = 1.0  # without feedback: give up
     link_delay_s: Annotated[float, Range(0.0, 0.1)] = 0.0  # from measuring to arrival, at best
-    identity_attempts: Annotated[int, Range(0, 100)] = 10
+    identity_attempts: Annotated[int, Range(0, 100)] = 10  # to learn version and serial number
 
     @property
     def geometry(self) -> DriveGeometry:

@@ -36,17 +36,17 @@ _SIDES = (4, 2, 1)  # bits of bumper and cliff: left, centre, right
 class MishapConfig:
     """How often a simulated base has each mishap, and how long one lasts."""
 
-    bumps_per_h: PerHour = 0.0
-    cliffs_per_h: PerHour = 0.0
-    wheel_drops_per_h: PerHour = 0.0
-    over_currents_per_h: PerHour = 0.0
-    low_batteries_per_h: PerHour = 0.0
-    slips_per_h: PerHour = 0.0
-    reboots_per_h: PerHour = 0.0
-    short_parts_per_h: PerHour = 0.0
-    unknown_parts_per_h: PerHour = 0.0
+    bumps_per_h: PerHour = 0.0  # a bumper is pressed, though nothing is there
+    cliffs_per_h: PerHour = 0.0  # a cliff sensor sees no floor
+    wheel_drops_per_h: PerHour = 0.0  # a wheel hangs in the air
+    over_currents_per_h: PerHour = 0.0  # a motor is overloaded
+    low_batteries_per_h: PerHour = 0.0  # the voltage reads low
+    slips_per_h: PerHour = 0.0  # a wheel slips some centimetres
+    reboots_per_h: PerHour = 0.0  # it restarts, and its stamps with it
+    short_parts_per_h: PerHour = 0.0  # a part of a frame is cut short
+    unknown_parts_per_h: PerHour = 0.0  # a frame has a part that nobody knows
     no_replies_per_h: PerHour = 0.0  # to what it is asked
-    duration_s: Annotated[float, Range(0.0, 60.0)] = 0.5
+    duration_s: Annotated[float, Range(0.0, 60.0)] = 0.5  # of each that lasts
     boot_s: Annotated[float, Range(0.0, 60.0)] = 1.0  # from a reboot to the first frame
 
     @property
