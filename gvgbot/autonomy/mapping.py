@@ -80,7 +80,7 @@ class Mapper:
 
     def move(self, motion: Pose, covariance: Array) -> None:
         """Account for a motion of the base, with its covariance (3, 3)."""
-        self.belief = ekf.predict(self.belief, motion, covariance)
+        self.belief = ekf.advance(self.belief, motion, covariance)
 
     def known_around(self, local_base: Pose, within_m: float) -> KnownVertices:
         """The vertices around the base, seen lately or not, in the local frame."""

@@ -15,6 +15,9 @@ import numpy as np
 from gvgbot.geometry import Array, Pose, wrap_angle
 from gvgbot.ranges import Range
 
+_LARGE_M = 0.3  # an innovation from which on Jacobians are taken again
+_ITERATIONS = 5
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OdometryNoise:
@@ -82,6 +85,14 @@ class Belief:
 
 def predict(belief: Belief, motion: Pose, Q: Array) -> Belief:
     """The belief after a motion (base seen from where it was) with covariance Q (3, 3)."""
+    return advance(Belief(belief.x, belief.P.copy(), belief.ids), motion, Q)
+
+
+def advance(belief: Belief, motion: Pose, Q: Array) -> Belief:
+    """As `predict`, but in the covariance of the old belief, which is valid no more.
+
+    What vertices know of each other stays where it is, however many there are.
+    """
     c, s = math.cos(belief.x[2]), math.sin(belief.x[2])
     moved = belief.map_base.compose(motion)
     F = np.array(
@@ -92,7 +103,7 @@ def predict(belief: Belief, motion: Pose, Q: Array) -> Belief:
         ]
     )
     G = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    x, P = belief.x.copy(), belief.P.copy()
+    x, P = belief.x.copy(), belief.P
     x[:3] = moved.x, moved.y, moved.theta
     P[:3, 3:] = F @ P[:3, 3:]
     P[3:, :3] = P[:3, 3:].T
@@ -150,17 +161,19 @@ def innovation(
 
     R of shape (2, 2) uses the position alone, (3, 3) the heading as well.
     """
-    k = len(R)
-    foreseen, H = expected(belief, vertex)
-    r = np.array(
-        [
-            base_vertex.x - foreseen.x,
-            base_vertex.y - foreseen.y,
-            wrap_angle(base_vertex.theta - foreseen.theta),
-        ]
-    )[:k]
-    H = H[:k]
+    r, H = _residual(belief, vertex, base_vertex, len(R))
     return r, H @ belief.P @ H.T + R, H
+
+
+def _residual(belief: Belief, vertex: int, base_vertex: Pose, k: int) -> tuple[Array, Array]:
+    """The first k components of measured minus expected pose of a vertex, and their Jacobian."""
+    foreseen, H = expected(belief, vertex)
+    r = [
+        base_vertex.x - foreseen.x,
+        base_vertex.y - foreseen.y,
+        wrap_angle(base_vertex.theta - foreseen.theta),
+    ]
+    return np.array(r[:k]), H[:k]
 
 
 def distances(belief: Belief, base_point: Array, R: Array) -> tuple[Array, Array]:
@@ -184,14 +197,38 @@ def distances(belief: Belief, base_point: Array, R: Array) -> tuple[Array, Array
 
 
 def update(belief: Belief, vertex: int, base_vertex: Pose, R: Array) -> Belief:
-    """The belief after seeing a vertex again; Joseph form, positive whatever the gain."""
-    r, S, H = innovation(belief, vertex, base_vertex, R)
-    K = np.linalg.solve(S, H @ belief.P).T
-    x = belief.x + K @ r
-    x[2::3] = np.array([wrap_angle(a) for a in x[2::3]])
-    I_KH = np.eye(len(x)) - K @ H
-    P = I_KH @ belief.P @ I_KH.T + K @ R @ K.T
+    """The belief after seeing a vertex again; Joseph form, positive whatever the gain.
+
+    After a large innovation the Jacobian of where the robot thought to be is not that of where it
+    is: it is taken again from there, as Gauss and Newton would (the iterated Kalman filter).
+    """
+    i = 3 + 3 * belief.ids.index(vertex)
+    used = np.r_[0:3, i : i + 3]  # of the state: H is 0 elsewhere
+
+    def corrected(x: Array) -> tuple[Array, Array, Array]:
+        """The mean, K and the used part of H, with the Jacobian at x."""
+        r, H = _residual(Belief(x, belief.P, belief.ids), vertex, base_vertex, len(R))
+        H = H[:, used]
+        PH = belief.P[:, used] @ H.T
+        K = np.asarray(np.linalg.solve(H @ PH[used] + R, PH.T).T, np.float64)
+        back = _wrapped(belief.x - x)[used]
+        return _wrapped(belief.x + K @ (r - H @ back)), K, H
+
+    x, K, H = corrected(belief.x)
+    if belief.map_base.to(belief.map_vertex(vertex)).distance(base_vertex) > _LARGE_M:
+        for _ in range(_ITERATIONS):
+            x, K, H = corrected(x)
+    P = belief.P - K @ (H @ belief.P[used])
+    P -= (P[:, used] @ H.T) @ K.T
+    P += K @ R @ K.T
     return Belief(x, (P + P.T) / 2, belief.ids)
+
+
+def _wrapped(x: Array) -> Array:
+    """A state, or a difference of two, with its headings in (-pi, pi]."""
+    x = x.copy()
+    x[2::3] = [wrap_angle(a) for a in x[2::3]]
+    return x
 
 
 def mahalanobis(r: Array, S: Array) -> float:

@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.optimize import least_squares
 from scipy.stats import chi2
 
 from gvgbot.autonomy.slam.ekf import (
     Belief,
     OdometryNoise,
     add_vertex,
+    advance,
     distances,
     expected,
     innovation,
@@ -79,6 +81,17 @@ def test_prediction_has_the_jacobians_of_the_motion(seed: int) -> None:
     assert np.allclose(after.P[:3, :3], F @ belief.P[:3, :3] @ F.T + G @ Q @ G.T, atol=1e-6)
     assert np.allclose(after.P[:3, 3:], F @ belief.P[:3, 3:], atol=1e-6)
     assert np.array_equal(after.P[3:, 3:], belief.P[3:, 3:])
+
+
+@given(seeds)
+def test_to_advance_is_to_predict_in_place(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    belief, motion, Q = random_belief(rng, 2), random_pose(rng), random_covariance(rng, 3)
+    wanted, here = predict(belief, motion, Q), belief.P
+    after = advance(belief, motion, Q)
+    assert after.P is here
+    assert np.array_equal(after.P, wanted.P)
+    assert np.array_equal(after.x, wanted.x)
 
 
 @given(seeds)
@@ -169,13 +182,32 @@ def test_an_update_adds_the_information_of_the_measurement(seed: int, size: int)
     belief = random_belief(rng, 2)
     R = random_covariance(rng, size)
     foreseen, H = expected(belief, 11)
-    seen = Pose.from_array(as_array(foreseen) + rng.normal(0.0, 0.1, 3))
+    seen = Pose.from_array(as_array(foreseen) + rng.normal(0.0, 0.03, 3))
     r = (as_array(seen) - as_array(foreseen))[:size]
     information = np.linalg.inv(belief.P) + H[:size].T @ np.linalg.inv(R) @ H[:size]
     x = belief.x + np.linalg.solve(information, H[:size].T @ np.linalg.solve(R, r))
     after = update(belief, 11, seen, R)
     assert np.allclose(after.P, np.linalg.inv(information), atol=1e-7)
     assert np.allclose(np.exp(1j * after.x), np.exp(1j * x), atol=1e-7)
+
+
+@given(seeds)
+def test_a_large_innovation_leads_to_the_most_probable_state(seed: int) -> None:
+    """As least squares finds it from the belief and the measurement, turned wherever that is."""
+    rng = np.random.default_rng(seed)
+    x = np.array([0.0, 0.0, 0.4, 6.0, 2.0, 0.1, -3.0, 4.0, 0.0])
+    belief = Belief(x, np.diag([0.2, 0.2, 0.15, 0.05, 0.05, 0.02, 0.1, 0.1, 0.1]) ** 2, (1, 2))
+    foreseen, R = expected(belief, 1)[0], np.diag([0.05, 0.05, 0.05]) ** 2
+    aside = rng.uniform(0.4, 1.0) * np.exp(1j * rng.uniform(-math.pi, math.pi))
+    seen = Pose(foreseen.x + aside.real, foreseen.y + aside.imag, foreseen.theta + 0.1)
+    whiten = np.linalg.inv(np.linalg.cholesky(belief.P))
+
+    def misfit(x: Array) -> Array:
+        off = as_array(seen) - as_array(expected(Belief(x, belief.P, belief.ids), 1)[0])
+        return np.concatenate([whiten @ (x - belief.x), off / 0.05])
+
+    best = least_squares(misfit, belief.x).x
+    assert np.allclose(update(belief, 1, seen, R).x, best, atol=2e-3)
 
 
 @given(seeds)
