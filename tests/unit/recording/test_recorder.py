@@ -13,10 +13,10 @@ from structlog.testing import capture_logs
 
 from gvgbot.autonomy.control.reflexes import Felt
 from gvgbot.autonomy.loop import Cycle
-from gvgbot.errors import UsageError
+from gvgbot.errors import GvgbotError, UsageError
 from gvgbot.geometry import Pose, Twist
 from gvgbot.hal.messages import Battery, Odometry, Scan
-from gvgbot.recording import Lived, recorder
+from gvgbot.recording import Lived, extra_needed, recorder
 from gvgbot.recording.config import RecordingConfig
 from gvgbot.recording.files import Entry, McapFiles, free_path
 from gvgbot.recording.reader import Recording
@@ -267,3 +267,14 @@ def test_where_nothing_can_be_written_nothing_begins(name: str, tmp_path: Path) 
 def test_there_must_be_room_for_two_files(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="total_mb"):
         config(tmp_path, file_mb=10.0, total_mb=15.0)
+
+
+@pytest.mark.parametrize("name", ["mcap", "mcap.writer", "google", "zstandard"])
+def test_a_missing_package_is_one_clear_line(name: str) -> None:
+    with pytest.raises(GvgbotError, match=r"gvgbot\[record\]"), extra_needed():
+        raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+
+def test_another_missing_module_is_a_mistake_of_the_program() -> None:
+    with pytest.raises(ModuleNotFoundError), extra_needed():
+        raise ModuleNotFoundError("No module named 'gvgbot.other'", name="gvgbot.other")

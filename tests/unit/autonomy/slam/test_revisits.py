@@ -58,7 +58,7 @@ def run(true: list[Pose], world: Array, turn: float) -> Passage:
 def poses(passage: Passage, found: list[Constraint]) -> Array:
     """The poses (N, 3) by the steps, and by what was found."""
     chain = [
-        Constraint(i, i + 1, motion, np.linalg.inv(P))
+        Constraint(i, i + 1, motion, np.asarray(np.linalg.inv(P), np.float64))
         for i, (motion, P) in enumerate(passage.steps)
     ]
     way = [Pose()]
