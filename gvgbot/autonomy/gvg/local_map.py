@@ -24,9 +24,13 @@ _EMPTY = (
     ("_mean", 0.0),
     ("_hits", 0.0),
     ("_sight", 0.0),
+    ("_echoes", 0.0),
     ("_seen_at", -np.inf),
 )
 _ONE_WALL = 0.4  # of a cell: means of neighbouring cells nearer than this are of one wall
+_LONE_M = 0.3  # an echo nearer than both its neighbours by this is one of dust on glass
+_GLASS_ECHOES = 3.0  # so many about a cell make it glass, which beams pass and robots do not
+_DECAY, _DECAYS_M = 0.05, 3.0  # echoes that a look from so near outweighs which meets nothing
 _MAX_VOTES = 8  # a wall needs this many contrary scans, less the hits, before it is forgotten
 
 
@@ -69,6 +73,7 @@ class LocalMap:
         self._mean = np.zeros((n, n, 2))
         self._hits = np.zeros((n, n), np.float32)  # that the mean is made of
         self._sight = np.zeros((n, n, 2), np.float32)  # mean direction to where it was seen from
+        self._echoes = np.zeros((n, n), np.float32)  # lone ones, of which old ones count less
         self._seen_at = np.full((n, n), -np.inf, np.float32)  # metres driven when last seen
         self._renew()
         centres = ((np.arange(n) + 0.5) * self._cell).astype(np.float32)
@@ -84,6 +89,8 @@ class LocalMap:
             local_laser.transform(_hits(scan, ranges, self._reach)), self._config.bridge_gap_m
         )
         self._occupy(points, local_laser.position, travelled)
+        echoes = _hits(scan, _lone(scan.ranges), self._reach)
+        self._note_echoes(local_laser.transform(echoes))
         self._forget(travelled)
         self._renew()
 
@@ -122,6 +129,11 @@ class LocalMap:
     def sights(self) -> Array:
         """Mean direction (N, 2) from each of `points` to where it was seen from, local frame."""
         return self._walls.sights
+
+    def suspects(self) -> Array:
+        """Middles (N, 2) of free cells of which some beams have come back: glass, perhaps."""
+        cells = np.argwhere((self._echoes > 0) & (self._votes <= 0))
+        return np.asarray((cells + self._corner + 0.5) * self._cell)
 
     def covers(self, points: Array) -> NDArray[np.bool_]:
         """Whether each point (N, 2) lies in the window."""
@@ -164,6 +176,7 @@ class LocalMap:
         passed = distance < seen_to - np.float32(0.8 * self._cell)
         self._free |= passed
         self._seen_at[passed] = travelled
+        self._doubt_echoes(passed & (distance < _DECAYS_M))
         i, j = np.nonzero(passed & (self._votes > 0))
         if len(i):
             self._vote_against(i, j, scan, see, local_laser)
@@ -174,7 +187,30 @@ class LocalMap:
         d = self._mean[i, j] - local_laser.position
         beyond = _range_towards(scan, see, d[:, 0], d[:, 1], local_laser.theta)
         gone = np.hypot(d[:, 0], d[:, 1]) < beyond - 1.5 * self._cell
+        gone[gone] = ~self._is_glass(i[gone], j[gone])
         self._votes[i[gone], j[gone]] -= 1
+
+    def _doubt_echoes(self, near: NDArray[np.bool_]) -> None:
+        """Let what is not yet glass count less where beams have passed close by."""
+        i, j = np.nonzero(near & (self._echoes > 0))
+        few = ~self._is_glass(i, j)
+        i, j = i[few], j[few]
+        self._echoes[i, j] = np.maximum(self._echoes[i, j] - _DECAY, 0.0)
+
+    def _note_echoes(self, points: Array) -> None:
+        """Count lone echoes (N, 2), once for each cell."""
+        cells = np.floor(points / self._cell).astype(np.int64) - self._corner
+        i, j = cells[((cells >= 0) & (cells < self._size)).all(axis=1)].T
+        self._echoes[i, j] += 1
+
+    def _is_glass(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Which cells (N,) have had lone echoes again and again, with their neighbours."""
+        echoes = np.zeros(len(i))
+        for di in (-1, 0, 1):
+            for dj in (-1, 0, 1):
+                row, column = (np.clip(k, 0, self._size - 1) for k in (i + di, j + dj))
+                echoes += self._echoes[row, column]
+        return echoes >= _GLASS_ECHOES
 
     def _occupy(self, points: Array, eye: Array, travelled: float) -> None:
         cells = np.floor(points / self._cell).astype(np.int64) - self._corner
@@ -200,6 +236,7 @@ class LocalMap:
         stale = self._seen_at < travelled - self._config.memory_m
         self._free[stale] = False
         self._votes[stale] = 0
+        self._echoes[stale] = 0.0
 
 
 def _shifted(
@@ -246,6 +283,16 @@ def _without_single_dropouts(ranges: Array) -> Array:
     lone = np.isnan(inner) & ~np.isnan(left) & ~np.isnan(right)
     filled[1:-1][lone] = np.minimum(left[lone], right[lone])
     return filled
+
+
+def _lone(ranges: Array) -> Array:
+    """The ranges of echoes much nearer than those on either side, NaN for all others."""
+    deep = np.where(np.isnan(ranges), -np.inf, ranges)  # what failed tells nothing
+    inner = deep[1:-1] + _LONE_M
+    lone = np.full(len(ranges), np.nan)
+    found = (inner < deep[:-2]) & (inner < deep[2:])
+    lone[1:-1][found] = ranges[1:-1][found]
+    return lone
 
 
 def _hits(scan: Scan, ranges: Array, reach: float) -> Array:

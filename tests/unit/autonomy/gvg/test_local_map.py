@@ -1,6 +1,7 @@
 """The local map against the walls that the scans were cast at."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -215,3 +216,50 @@ def test_a_wall_on_the_border_of_two_rows_of_cells_is_where_its_hits_are() -> No
     x, hits = local_map.points()[:, 0], local_map.hits()
     assert abs(np.average(x, weights=hits) - wall) < 0.001
     assert np.abs(x - wall).max() < 0.006
+
+
+# -- glass ----------------------------------------------------------------------------------------
+
+PANE = (1.5, -1.0, 1.0)  # m: its x, and between which y
+
+
+def through_glass(pose: Pose, rng: np.random.Generator) -> Scan:
+    """A scan of the room in which one beam in thirty comes back from the pane."""
+    scan = sweep(ROOM, pose)
+    x, y = np.cos(scan.bearings), np.sin(scan.bearings)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        to_pane = (PANE[0] - pose.x) / x
+    at = pose.y + to_pane * y
+    meets = (to_pane > 0.0) & (at > PANE[1]) & (at < PANE[2])
+    echo = meets & (rng.random(len(x)) < 1 / 30)
+    return replace(scan, ranges=np.where(echo, to_pane, scan.ranges))
+
+
+def test_a_pane_stays_although_most_beams_pass_it() -> None:
+    """The robot drives along it a metre away, and then looks on from farther off."""
+    rng, local_map = np.random.default_rng(0), LocalMap(LocalMapConfig())
+    poses = [Pose(0.5, y) for y in np.linspace(-1.5, 1.5, 13)] + [Pose(-1.0, 1.5)] * 10
+    for travelled, pose in enumerate(poses):
+        local_map.insert(through_glass(pose, rng), pose, 0.2 * travelled)
+    for y in np.arange(PANE[1] + 0.15, PANE[2], 0.1):
+        assert wall_points_near(local_map, PANE[0], y, reach=0.2) > 0
+    assert len(local_map.suspects()) < 5
+
+
+def test_a_pane_is_suspected_at_the_first_echoes() -> None:
+    local_map = LocalMap(LocalMapConfig())
+    local_map.insert(through_glass(ORIGIN, np.random.default_rng(1)), ORIGIN, 0.0)
+    for _ in range(2):
+        local_map.insert(sweep(ROOM, ORIGIN), ORIGIN, 0.0)
+    suspects = local_map.suspects()
+    assert len(suspects) > 0
+    assert np.abs(suspects[:, 0] - PANE[0]).max() < 0.1
+
+
+def test_a_few_false_echoes_are_forgiven_from_close_by() -> None:
+    local_map = LocalMap(LocalMapConfig())
+    local_map.insert(through_glass(ORIGIN, np.random.default_rng(1)), ORIGIN, 0.0)
+    for _ in range(60):
+        local_map.insert(sweep(ROOM, ORIGIN), ORIGIN, 0.0)
+    assert len(local_map.suspects()) == 0
+    assert wall_points_near(local_map, PANE[0], 0.0, reach=1.0) == 0
