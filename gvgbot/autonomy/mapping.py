@@ -26,6 +26,10 @@ from gvgbot.autonomy.views import Correspondence, Observation, View
 from gvgbot.geometry import Array, Pose
 from gvgbot.ranges import Range
 
+_HIDES_M = 1.0  # what stands so near to a vertex's disc may close a branch
+_FRESH_M = 6.0  # driven since a vertex was seen: the local frame still tells its place
+_IN_FULL_VIEW_M = 4.0  # from so near, it would be seen that a vertex is none
+_WELL_KNOWN_M = 0.2  # the uncertainty of its place with which that can be told
 _AT_END_M = 0.5  # so near to the end of a dead end, it has been driven
 
 
@@ -100,10 +104,12 @@ class Mapper:
         self._track(view, sightings, known)
         self._recognise(view, sightings, known)
         self._consider(view, sightings, known)
-        for node, vertex in list(known.vertex_of.items()):
-            self._refresh(
-                view, sightings[node], view.gvg.nodes[node], self.graph.vertices[vertex], known
-            )
+        for node, key in list(known.vertex_of.items()):
+            vertex = self.graph.vertices[key]
+            if node in view.doubted:
+                self._find_half_edges(view, view.gvg.nodes[node], vertex, known)
+            else:
+                self._refresh(view, sightings[node], view.gvg.nodes[node], vertex, known)
         self._refute(view, known)
         self._join(view, known)
         return known, self._events
@@ -275,15 +281,24 @@ class Mapper:
         self.belief = ekf.update(self.belief, vertex.id, base_vertex, R)
         self.observations.append(Observation(view.keyframe, vertex.id, base_vertex, R))
 
-    def _match_half_edges(
+    def _find_half_edges(
         self, view: View, node: LocalNode, vertex: Vertex, known: Correspondence
-    ) -> None:
-        """Pair a node's branches with the half-edges of its vertex; add certain new ones."""
+    ) -> tuple[list[Branch], tuple[float, ...], dict[int, int]]:
+        """A node's branches, their bearings, and which are the known half-edges of its vertex."""
         branches = sorted(node.branches, key=lambda branch: branch in node.weak)
         bearings = tuple(view.gvg.bearing(b, node.clearance) for b in branches)
         turned = {k: h.bearing + vertex.local.theta for k, h in vertex.half_edges.items()}
         limit = math.radians(self._recognition.bearing_deg)
         matched = match_bearings(bearings, turned, limit)
+        for i, key in matched.items():
+            known.pair_branch(branches[i], HalfEdgeId(vertex.id, key))
+        return branches, bearings, matched
+
+    def _match_half_edges(
+        self, view: View, node: LocalNode, vertex: Vertex, known: Correspondence
+    ) -> None:
+        """Pair a node's branches with the half-edges of its vertex; add certain new ones."""
+        branches, bearings, matched = self._find_half_edges(view, node, vertex, known)
         new = [i for i in range(len(branches)) if i not in matched]
         certain = [i for i in new if branches[i] not in node.weak]
         vertex.surplus = vertex.surplus + 1 if certain else 0
@@ -299,9 +314,9 @@ class Mapper:
             vertex.surplus = vertex.unclear = 0
         for i in certain:
             matched[i] = vertex.add_half_edge(bearings[i] - vertex.local.theta)
-        for i, key in matched.items():
+            known.pair_branch(branches[i], HalfEdgeId(vertex.id, matched[i]))
+        for key in matched.values():
             vertex.half_edges[key].misses = 0
-            known.pair_branch(branches[i], HalfEdgeId(vertex.id, key))
         if node.lead is None and len(matched) == len(branches):
             self._doubt_half_edges(vertex, set(matched.values()), len(branches))
 
@@ -318,18 +333,26 @@ class Mapper:
     def _refute(self, view: View, known: Correspondence) -> None:
         """Remove vertices where a plain edge is seen to pass through."""
         for vertex in list(self.graph.vertices.values()):
-            if vertex.id in known.node_of or view.travelled - vertex.seen_at > 6.0:
+            place = None if vertex.id in known.node_of else self._place_of(view, vertex)
+            if place is None or view.is_doubtful(place, vertex.clearance + _HIDES_M):
                 continue
-            if self._passes_through(view, vertex, known):
+            if self._passes_through(view, place, known):
                 vertex.misses += 1
                 if vertex.misses > self._config.misses:
                     self.remove(view, vertex, "an edge passes here")
 
-    def _passes_through(self, view: View, vertex: Vertex, known: Correspondence) -> bool:
+    def _place_of(self, view: View, vertex: Vertex) -> Array | None:
+        """Where a vertex near by should be seen (2,), local frame; None if that is not certain."""
+        is_fresh = view.travelled - vertex.seen_at < _FRESH_M
+        place = (vertex.local if is_fresh else self.in_local_frame(view, vertex.id)).position
+        if np.hypot(*(place - view.local_base.position)) > _IN_FULL_VIEW_M:
+            return None
+        _, S, _ = ekf.innovation(self.belief, vertex.id, Pose(), np.zeros((2, 2)))
+        return place if is_fresh or np.trace(S) < _WELL_KNOWN_M**2 else None
+
+    def _passes_through(self, view: View, point: Array, known: Correspondence) -> bool:
         """Whether an edge is seen where a vertex should be, or another vertex at its end there."""
-        if np.hypot(*(vertex.local.position - view.local_base.position)) > 4.0:
-            return False
-        place = view.gvg.place(vertex.local.position)
+        place = view.gvg.place(point)
         if place is None or place.distance > 0.3:
             return False
         edge = view.gvg.edges[place.edge]

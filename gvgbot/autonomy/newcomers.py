@@ -1,7 +1,7 @@
-"""Things that stand where there was nothing before: people, mostly, who go again.
+"""Things that may be people: they stand free, are as wide as people, and go again.
 
-They are kept out of the map until they have stood for a while, and nothing that depends on them is
-believed for a while longer. The guard sees them all the same.
+They are kept out of the map, and the planner leads round them, until they have stood for so long
+that they must be a part of the building. What depends on them is not believed meanwhile.
 """
 
 from dataclasses import dataclass, replace
@@ -17,112 +17,164 @@ from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
 from gvgbot.ranges import Range
 
-_CELL_M = 0.2
-_AROUND = 0.15 * np.stack([f(np.arange(8) * np.pi / 4) for f in (np.cos, np.sin)], axis=1)  # m
-_STEP_M = 0.3  # in range from beam to beam, at the rim of something
+_STEP_M = 0.3  # in range from beam to beam, at the rim of something that stands free
+_SMOOTH_M = 0.15  # in range from beam to beam, on it: two legs of a chair are farther apart
 _BEAMS = 3  # fewer see nothing for sure
-_WIDE_M = 1.0  # no person is that wide
-_REACH_M = 6.0  # beyond, beams are too far apart to tell what was there before
-_LOST_S = 3.0  # what has not been seen for so long has gone, and begins anew if it comes back
-
-Cell = tuple[int, int]
+_SLIM_M, _WIDE_M = 0.1, 0.8  # people are between these; what is slimmer is furniture
+_GLIMPSE_S = 3.0  # what is half hidden behind something nearer is only kept waiting so long
+_MOVED_M = 0.3  # what stands is found again within this
+_LOST_S = 3.0  # and what is out of sight for so long, beyond the time it stood, has gone
+_RIM = np.stack([f(np.arange(12) * np.pi / 6) for f in (np.cos, np.sin)], axis=1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NewcomersConfig:
-    """When something new is taken for a part of the building."""
+    """When something that may be a person is taken for a part of the building."""
 
     away_from_walls_m: Annotated[float, Range(0.1, 2.0)] = 0.2  # nearer to a wall, it is the wall
-    # standing for so long, it enters the local map
-    mapped_after_s: Annotated[float, Range(0.0, 600.0)] = 5.0
-    # standing for so long, vertices may depend on it
-    believed_after_s: Annotated[float, Range(0.0, 3600.0)] = 120.0
+    # standing for so long where nobody had looked, it is a part of the building
+    found_after_s: Annotated[float, Range(0.0, 600.0)] = 20.0
+    # standing for so long where there was nothing before, it is one as well
+    came_after_s: Annotated[float, Range(0.0, 3600.0)] = 120.0
 
 
 @dataclass(slots=True, eq=False)
-class _Stay:
-    first: float  # stamps
+class _Newcomer:
+    """A disc in the local frame, since when it has been there, and when it was last seen, s."""
+
+    centre: Array
+    radius: float
+    first: float
     last: float
+    came: bool
+    is_whole: bool  # both sides of it have been seen
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Island:
+    """Beams that end on something narrow with more room on one side or both; local frame."""
+
+    beams: slice
+    ends: Array  # (N, 2)
+    centre: Array
+    radius: float
+    is_whole: bool
 
 
 class Newcomers:
-    """Where something has come lately, by cells of the local frame."""
+    """What has come lately, or been found lately and may go."""
 
     def __init__(self, config: NewcomersConfig) -> None:
         self._config = config
-        self._stays: dict[Cell, _Stay] = {}
+        self._all: list[_Newcomer] = []
 
     def sift(self, scan: Scan, local_base: Pose, local_map: LocalMap) -> Scan:
-        """The scan without the beams that end on something which has come a moment ago."""
-        self._forget(scan.stamp)
-        beams = np.flatnonzero(_in_front(scan) & (scan.ranges < _REACH_M))
-        ends = _ends(scan, beams, local_base)
-        cells = [(i, j) for i, j in np.floor(ends / _CELL_M).astype(int).tolist()]
-        is_new = self._is_new(ends, local_map)
-        passing = [
-            beam
-            for beam, cell, new in zip(beams.tolist(), cells, is_new.tolist(), strict=True)
-            if (new or cell in self._stays)
-            and self._age(cell, scan.stamp) < self._config.mapped_after_s
-        ]
+        """The scan without the beams that end on what may be a person."""
+        self._forget(scan, local_base)
+        walls = local_map.points()
+        tree = cKDTree(walls) if len(walls) else None
+        passing = []
+        for island in _islands(scan, local_base):
+            if tree is not None and self._is_built(island, tree):
+                self._all = [one for one in self._all if not _is_at(one, island.centre)]
+            elif self._is_passing(island, scan.stamp, local_map):
+                passing.append(island.beams)
         if not passing:
             return scan
         ranges = scan.ranges.copy()
-        ranges[passing] = np.nan
+        for beams in passing:
+            ranges[beams] = np.nan
         return replace(scan, ranges=ranges)
 
-    def _is_new(self, ends: Array, local_map: LocalMap) -> NDArray[np.bool_]:
-        """Which points (N, 2) lie where the map has known nothing but free space.
-
-        All around: behind a wall that comes into sight nothing is known.
-        """
-        walls = local_map.points()
-        known = local_map.known(ends[:, None, :] + _AROUND).all(axis=1)
-        if not len(walls) or not known.any():
-            return np.zeros(len(ends), bool)
+    def _is_built(self, island: _Island, walls: cKDTree) -> bool:
+        """Whether it is mostly walls of the map that are seen: a person may brush along one."""
         limit = self._config.away_from_walls_m
-        distance, _ = cKDTree(walls).query(ends, distance_upper_bound=limit)
-        return np.asarray(known & ~np.isfinite(distance))
+        distance, _ = walls.query(island.ends, distance_upper_bound=limit)
+        return bool(np.isfinite(distance).mean() > 0.5)
 
-    def _age(self, cell: Cell, stamp: float) -> float:
-        stay = self._stays.setdefault(cell, _Stay(stamp, stamp))
-        stay.last = stamp
-        return stamp - stay.first
+    def _is_passing(self, island: _Island, stamp: float, local_map: LocalMap) -> bool:
+        """Whether what is seen has not stood there for long; it is taken down."""
+        one = next((one for one in self._all if _is_at(one, island.centre)), None)
+        if one is None:
+            came = bool(local_map.known(island.centre + island.radius * _RIM).all())
+            one = _Newcomer(island.centre, island.radius, stamp, stamp, came, island.is_whole)
+            self._all.append(one)
+        one.last = stamp
+        one.radius = max(one.radius, island.radius)
+        one.is_whole |= island.is_whole
+        stands = stamp - one.first >= self._patience(one)
+        if stands:
+            self._all.remove(one)
+        return not stands
 
-    def _forget(self, stamp: float) -> None:
-        c = self._config
-        self._stays = {
-            cell: stay
-            for cell, stay in self._stays.items()
-            if stamp - stay.first < c.believed_after_s
-            and (stamp - stay.last < _LOST_S or stay.last - stay.first >= c.mapped_after_s)
-        }
+    def _patience(self, one: _Newcomer) -> float:
+        if not one.is_whole:
+            return min(_GLIMPSE_S, self._config.found_after_s)
+        return self._config.came_after_s if one.came else self._config.found_after_s
+
+    def _forget(self, scan: Scan, local_base: Pose) -> None:
+        """Let those go that have gone: beams pass where they were, or nobody has seen them long."""
+        self._all = [
+            one
+            for one in self._all
+            if scan.stamp - one.last < _LOST_S + one.last - one.first
+            and not _is_seen_through(scan, local_base, one)
+        ]
 
     @property
     def points(self) -> Array:
-        """The middles (N, 2) of the cells that have been new lately, local frame."""
-        return (np.array(list(self._stays), dtype=np.float64).reshape(-1, 2) + 0.5) * _CELL_M
+        """The rims (N, 2), local frame, of those that have been seen whole."""
+        whole = (one.centre + one.radius * _RIM for one in self._all if one.is_whole)
+        return np.concatenate([np.empty((0, 2)), *whole])
 
 
-def _in_front(scan: Scan) -> NDArray[np.bool_]:
-    """Which beams (N,) end on something narrow with more room on either side: no wall does.
+def _is_at(one: _Newcomer, centre: Array) -> bool:
+    return bool(np.hypot(*(one.centre - centre)) < _MOVED_M)
+
+
+def _islands(scan: Scan, local_base: Pose) -> list[_Island]:
+    """What people may be, by a scan.
 
     A beam without an echo has the room of the whole range; one that failed tells nothing.
     """
     told = np.flatnonzero(~np.isnan(scan.ranges))
     depth = np.minimum(scan.ranges[told], scan.range_max)
     edges = np.flatnonzero(np.abs(np.diff(depth)) >= _STEP_M) + 1
-    found = np.zeros(len(scan.ranges), np.bool_)
+    local_laser = local_base.compose(scan.base_laser)
+    found = []
     for start, stop in pairwise(edges.tolist()):
-        near, far = depth[start], depth[stop - 1]
-        stands_out = near + _STEP_M < depth[start - 1] and far + _STEP_M < depth[stop]
-        width = near * scan.angle_increment * (stop - start)
-        found[told[start:stop]] = stands_out and stop - start >= _BEAMS and width < _WIDE_M
+        rims = depth[start] < depth[start - 1], depth[stop - 1] < depth[stop]
+        is_one = np.abs(np.diff(depth[start:stop])).max(initial=0.0) < _SMOOTH_M
+        if not any(rims) or not is_one or stop - start < _BEAMS:
+            continue
+        ends = _ends(scan, told[start:stop], depth[start:stop], local_laser)
+        width = float(np.hypot(*(ends[-1] - ends[0])))
+        if _SLIM_M <= width < _WIDE_M:
+            away = ends.mean(axis=0) - local_laser.position
+            centre = ends.mean(axis=0) + 0.3 * width * away / np.hypot(*away)
+            beams = slice(int(told[start]), int(told[stop - 1]) + 1)
+            found.append(_Island(beams, ends, centre, width / 2, all(rims)))
     return found
 
 
-def _ends(scan: Scan, beams: NDArray[np.intp], local_base: Pose) -> Array:
+def _ends(scan: Scan, beams: NDArray[np.intp], depth: Array, local_laser: Pose) -> Array:
     """Where beams end (N, 2), local frame."""
     bearings = scan.angle_min + scan.angle_increment * beams
     directions = np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
-    return local_base.compose(scan.base_laser).transform(scan.ranges[beams, None] * directions)
+    return local_laser.transform(depth[:, None] * directions)
+
+
+def _is_seen_through(scan: Scan, local_base: Pose, one: _Newcomer) -> bool:
+    """Whether most beams towards it pass it by."""
+    x, y = local_base.compose(scan.base_laser).inverse().transform(one.centre)
+    away, half = float(np.hypot(x, y)), 0.5 * one.radius
+    if away < one.radius:
+        return False
+    middle = (np.arctan2(y, x) - scan.angle_min) % (2 * np.pi) / scan.angle_increment
+    spread = half / away / scan.angle_increment
+    first, last = round(middle - spread), round(middle + spread) + 1
+    if first < 0 or last > len(scan.ranges):
+        return False
+    told = scan.ranges[first:last]
+    told = told[~np.isnan(told)]
+    return bool(len(told) and np.mean(told > away + one.radius + 0.1) > 0.5)

@@ -201,6 +201,9 @@ class Pipeline:
         self._maps.insert(scan, local_base, self.travelled)
         self._hazards.forget(self.travelled)
         self.gvg = self._local_gvg(local_base, scan.range_max)
+        doubtful = np.concatenate(
+            [self._hazards.doubtful, self._newcomers.points, self._maps.near.suspects()]
+        )
         view = View(
             len(self.keyframes),
             scan.stamp,
@@ -208,7 +211,8 @@ class Pipeline:
             local_base,
             self.gvg,
             self._maps.near,
-            touching(self.gvg, np.concatenate([self._hazards.doubtful, self._newcomers.points])),
+            doubtful,
+            touching(self.gvg, doubtful),
         )
         known, seen = self.mapper.observe(view)
         self._keep(scan, odom_base, local_base)
@@ -233,7 +237,7 @@ class Pipeline:
             min_clearance=self._radius + self._config.passage_margin_m,
             roughness=reduction.roughness_m,
             open_clearance=min(reduction.open_clearance_m, _SEEN_SHARE * range_max),
-            felt=self._hazards.points,
+            felt=np.concatenate([self._hazards.points, self._newcomers.points]),
         )
         known = self.mapper.known_around(local_base, self._config.local_map.half_width_m)
         return reduce_graph(fine, reduction, known)

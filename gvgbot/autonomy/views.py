@@ -22,7 +22,12 @@ class View:
     local_base: Pose
     gvg: LocalGvg
     local_map: LocalMap
+    doubtful: Array = field(default_factory=lambda: np.empty((0, 2)))  # obstacles that may go
     doubted: frozenset[int] = frozenset()  # nodes that may be there for a while only
+
+    def is_doubtful(self, place: Array, within_m: float) -> bool:
+        """Whether something that may go stands so near to a place (2,)."""
+        return bool((np.hypot(*(self.doubtful - place).T) < within_m).any())
 
 
 def touching(gvg: LocalGvg, points: Array) -> frozenset[int]:

@@ -16,8 +16,8 @@ from gvgbot.autonomy.mapping import Mapper, MappingConfig
 from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.autonomy.slam.recognition import RecognitionConfig
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
-from gvgbot.autonomy.views import Correspondence, View
-from gvgbot.geometry import Pose
+from gvgbot.autonomy.views import Correspondence, View, touching
+from gvgbot.geometry import Array, Pose
 from tests.unit.autonomy.local_graphs import Point, drawn
 
 CONFIG = MappingConfig()
@@ -47,15 +47,28 @@ class Seen:
         self.known = Correspondence()
         self._count = 0
 
-    def look(self, gvg: LocalGvg, times: int = 1, at: Pose | None = None) -> "Seen":
+    def look(
+        self,
+        gvg: LocalGvg,
+        times: int = 1,
+        at: Pose | None = None,
+        *,
+        doubtful: Array | None = None,
+    ) -> "Seen":
         for _ in range(times):
             view = View(
                 self._count, float(self._count), 0.1 * self._count, at or Pose(), gvg, NOTHING_SEEN
             )
+            if doubtful is not None:
+                view = replace(view, doubtful=doubtful, doubted=touching(gvg, doubtful))
             self.known, events = self.mapper.observe(view)
             self.events += events
             self._count += 1
         return self
+
+    def drive_elsewhere(self, metres: float) -> None:
+        """Let so much be driven without a look."""
+        self._count += round(10 * metres)
 
     def places(self, kind: str) -> list[Point]:
         belief = self.mapper.belief
@@ -278,6 +291,43 @@ def test_strays_are_forgotten_only_beside_a_map_that_holds_together() -> None:
     seen.mapper.forget_strays(view)
     assert stray.id not in seen.mapper.graph.vertices
     assert len(seen.mapper.graph.vertices) == 2
+
+
+PERSON = np.array([[3.0, 1.1], [3.2, 1.2], [2.8, 1.2]])  # beside the crossing of TEE
+
+
+def test_what_somebody_stands_beside_is_not_believed() -> None:
+    seen = Seen().look(TEE, 30, doubtful=PERSON)
+    assert seen.places("meetpoint") == []
+
+
+def test_a_known_vertex_learns_nothing_while_somebody_stands_beside_it() -> None:
+    """The departure that seems to lead to the north is none, the one to the east is hidden."""
+    seen = Seen().look(TEE, CONFIG.candidates.meetpoint_sightings)
+    (vertex,) = seen.mapper.graph.vertices.values()
+    before = {key: half.bearing for key, half in vertex.half_edges.items()}
+    misled = drawn(
+        {1: (-3.0, 0.0), 2: (3.0, 0.2), 4: (3.0, -4.0), 5: (3.0, 4.0)},
+        {10: (1, 2, []), 12: (2, 4, []), 13: (2, 5, [])},
+        unseen={1: math.pi, 4: -math.pi / 2, 5: math.pi / 2},
+    )
+    seen.look(misled, 30, doubtful=PERSON)
+    assert {key: half.bearing for key, half in vertex.half_edges.items()} == before
+    assert seen.places("meetpoint") == [pytest.approx((3.0, 0.0), abs=1e-3)]
+    assert seen.known.vertex_of == {2: vertex.id}
+
+
+def test_what_proves_to_be_a_plain_edge_on_coming_back_is_no_vertex() -> None:
+    seen = Seen().look(TEE, CONFIG.candidates.meetpoint_sightings)
+    seen.drive_elsewhere(20.0)
+    seen.look(PLAIN, CONFIG.misses + 1)
+    assert seen.places("meetpoint") == []
+
+
+def test_a_vertex_is_not_refuted_while_somebody_may_hide_its_branch() -> None:
+    seen = Seen().look(TEE, 10)
+    seen.look(PLAIN, 30, doubtful=np.array([[3.0, -1.5]]))
+    assert len(seen.places("meetpoint")) == 1
 
 
 def test_the_robot_s_uncertainty_is_in_the_place_of_a_vertex_seen_later() -> None:

@@ -1,48 +1,133 @@
-"""People are narrow and stand free; walls that come into sight are neither."""
+"""People stand free, are as wide as people and go; walls and furniture are or do none of this."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
 from gvgbot.autonomy.newcomers import Newcomers, NewcomersConfig
 from gvgbot.drivers.world import World
-from gvgbot.geometry import Pose
+from gvgbot.geometry import Array, Pose
 from tests.unit.autonomy.sights import Rectangle, carved, sweep
 
 ROOM: Rectangle = (-4.0, -3.0, 4.0, 3.0)
-PERSON: Rectangle = (1.9, -0.2, 2.3, 0.2)
+EMPTY = carved([ROOM])
 HERE = Pose()
+RADIUS = 0.22  # m, of a person
+CONFIG = NewcomersConfig(found_after_s=20.0, came_after_s=120.0)
+
+Point = tuple[float, float]
 
 
-def after(first: World, then: World, pose: Pose = HERE) -> tuple[Newcomers, int]:
-    """What is new in the second world for who knows the first, and how many beams were dropped."""
-    local_map, newcomers = LocalMap(LocalMapConfig()), Newcomers(NewcomersConfig())
-    for _ in range(3):
-        local_map.insert(sweep(first, HERE), HERE, 0.0)
-    scan = sweep(then, pose)
-    sifted = newcomers.sift(scan, pose, local_map)
-    return newcomers, int(np.isnan(sifted.ranges).sum() - np.isnan(scan.ranges).sum())
+class Watch:
+    """Somebody who looks from one place, and what of each sweep is kept out of the map."""
+
+    def __init__(self, known: World | None = None) -> None:
+        self.map, self.newcomers = LocalMap(LocalMapConfig()), Newcomers(CONFIG)
+        if known is not None:
+            self.map.insert(sweep(known, HERE), HERE, 0.0)
+
+    def dropped(self, world: World, stamp: float = 0.0, *, person: Point | None = None) -> int:
+        """How many beams are kept out."""
+        scan = replace(sweep(world, HERE), stamp=stamp)
+        if person is not None:
+            scan = replace(scan, ranges=np.minimum(scan.ranges, to_disc(scan.bearings, person)))
+        sifted = self.newcomers.sift(scan, HERE, self.map)
+        self.map.insert(sifted, HERE, 0.0)
+        return int(np.isnan(sifted.ranges).sum() - np.isnan(scan.ranges).sum())
+
+    def inside(self) -> int:
+        """How many points of the map are not the room's walls."""
+        return int((np.abs(self.map.points()) < [3.9, 2.9]).all(axis=1).sum())
+
+
+def to_disc(bearings: Array, centre: Point) -> Array:
+    """Ranges (N,) from the origin to a person; inf beside."""
+    along = np.cos(bearings) * centre[0] + np.sin(bearings) * centre[1]
+    beside = centre[0] ** 2 + centre[1] ** 2 - along**2
+    hit = (beside < RADIUS**2) & (along > 0.0)
+    return np.where(hit, along - np.sqrt(np.maximum(RADIUS**2 - beside, 0.0)), np.inf)
 
 
 def test_who_comes_into_an_empty_room_is_kept_out_of_the_map() -> None:
-    newcomers, dropped = after(carved([ROOM]), carved([ROOM], [PERSON]))
-    seen_of_it = 2 * math.atan2(0.2, 1.9) / (math.tau / 1080)  # beams, by its angle
-    assert abs(dropped - seen_of_it) <= 2
-    assert np.abs(newcomers.points - [1.95, 0.0]).max() < 0.35
+    watch = Watch(EMPTY)
+    beams = 2 * math.asin(RADIUS / 2.0) / (math.tau / 1080)  # by the angle of the disc
+    assert abs(watch.dropped(EMPTY, person=(2.0, 0.0)) - beams) <= 2
+    assert watch.inside() == 0
+    assert np.abs(np.hypot(*(watch.newcomers.points - [2.0, 0.0]).T) - RADIUS).max() < 0.1
 
 
 def test_nothing_is_new_in_a_room_that_stays_as_it_was() -> None:
-    newcomers, dropped = after(carved([ROOM], [PERSON]), carved([ROOM], [PERSON]))
-    assert dropped == 0
-    assert len(newcomers.points) == 0
+    pillar: Rectangle = (1.9, -0.2, 2.3, 0.2)
+    watch = Watch(carved([ROOM], [pillar]))
+    assert watch.dropped(carved([ROOM], [pillar])) == 0
+    assert len(watch.newcomers.points) == 0
 
 
 def test_a_wall_is_no_newcomer_even_where_the_map_knew_free_space() -> None:
-    smaller: Rectangle = (-4.0, -3.0, 3.4, 3.0)
-    newcomers, dropped = after(carved([ROOM]), carved([smaller]))
-    assert dropped == 0
-    assert len(newcomers.points) == 0
+    watch = Watch(EMPTY)
+    assert watch.dropped(carved([(-4.0, -3.0, 3.4, 3.0)])) == 0
+    assert len(watch.newcomers.points) == 0
+
+
+@pytest.mark.parametrize(
+    ("known", "patience"), [(None, CONFIG.found_after_s), (EMPTY, CONFIG.came_after_s)]
+)
+def test_what_stands_long_enough_is_a_part_of_the_building(
+    known: World | None, patience: float
+) -> None:
+    """A pillar is found at the first look, and a person comes: that takes longer to believe."""
+    watch = Watch(known)
+    for second in range(math.ceil(patience)):
+        assert watch.dropped(EMPTY, second, person=(2.0, 0.0)) > 0
+        assert len(watch.newcomers.points) > 0
+    for later in (0.0, 1.0):
+        assert watch.dropped(EMPTY, patience + later, person=(2.0, 0.0)) == 0
+        assert len(watch.newcomers.points) == 0
+    assert watch.inside() > 0
+
+
+def test_who_walks_is_never_believed_and_leaves_nothing_behind() -> None:
+    """To and fro at 0.5 m/s, two metres away, for five minutes."""
+    watch = Watch()
+    for second in range(300):
+        person = (2.0, 1.5 * math.sin(second / 3.0))
+        assert watch.dropped(EMPTY, second, person=person) > 0
+        near = np.hypot(*(watch.newcomers.points - person).T) < 2 * RADIUS
+        assert near.any()
+    assert watch.inside() == 0
+
+
+def test_who_walks_along_a_wall_is_kept_out_too() -> None:
+    """With 0.35 m between shoulder and wall, which is in the map already."""
+    watch = Watch(EMPTY)
+    for second in range(10):
+        watch.dropped(EMPTY, second, person=(0.5 * second - 2.5, 3.0 - RADIUS - 0.35))
+    assert watch.inside() == 0
+
+
+def test_who_goes_is_forgotten_as_soon_as_that_is_seen() -> None:
+    watch = Watch(EMPTY)
+    watch.dropped(EMPTY, 0.0, person=(2.0, 0.0))
+    watch.dropped(EMPTY, 1.0)
+    assert len(watch.newcomers.points) == 0
+
+
+def test_the_leg_of_a_table_is_no_person() -> None:
+    leg: Rectangle = (1.9, -0.02, 1.96, 0.04)
+    assert Watch().dropped(carved([ROOM], [leg])) == 0
+
+
+def test_who_is_half_hidden_is_kept_out_for_a_glimpse_and_not_led_round() -> None:
+    """Behind a corner, so that one side of the person is never seen."""
+    world, spot = carved([ROOM], [(1.0, 0.0, 1.1, 3.0)]), (2.5, -0.1)
+    watch = Watch()
+    assert watch.dropped(world, 0.0, person=spot) > 0
+    assert len(watch.newcomers.points) == 0
+    assert watch.dropped(world, 2.0, person=spot) > 0
+    assert watch.dropped(world, 4.0, person=spot) == 0
 
 
 def test_the_stretch_of_wall_within_a_short_range_is_no_newcomer() -> None:
