@@ -423,8 +423,7 @@ class Errands:
     def _find_edge(self, view: View, waited: float) -> Order:
         """Off the graph: go to the nearest edge, or look around for one."""
         self._heading = None
-        place = view.gvg.place(view.local_base.position)
-        way = None if place is None else way_to_edge(view, place)
+        way = way_to_edge(view)
         if way is not None and waited < self._config.look_around_s:
             return Drive(Track.of(*way))
         if self._looks >= _LOOKS:

@@ -19,8 +19,11 @@ from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.autonomy.start_edge import StartEdge, is_at_start
 from gvgbot.autonomy.views import Correspondence, View
 from gvgbot.autonomy.whereabouts import Passage, Situation, Whereabouts
+from gvgbot.geometry import Array
 from gvgbot.ranges import Range
 
+_ARRIVED_M = 0.3  # at the end of a track, when no more of it is left
+_BESIDE_M = 0.15  # farther from its edge than this, the robot goes there first
 _LEAST_LOOP_M = 4.0  # an edge with both ends in sight is left to sight unless so much was driven
 _WORTH_TURNING_M = 1.0  # a new frontier must be so much nearer than the old one
 _FACING_RAD = 1.0  # looking so far past a thing, one would not see it go
@@ -99,7 +102,7 @@ class Mission:
         self._newest_m = 0.0  # of the target edge that has been driven
         self._last_progress = 0.0  # stamp
         self._last_view = math.inf  # stamp
-        self._travelled_then = -math.inf
+        self._progress_at: Array | None = None  # local frame; to and fro on the spot is none
         self._start_edge: StartEdge | None = None
         self._frontiers: set[HalfEdgeId] = set()  # that were known at the last view
         self._looked_around = 0
@@ -109,6 +112,7 @@ class Mission:
         self._held_since: float | None = None
         self._lost_since: float | None = None
         self._stranded_since: float | None = None
+        self._turned_back = False  # looking for a way, after the end of sight
         self._examining_since: float | None = None
         self._events: list[Event] = []
 
@@ -119,7 +123,7 @@ class Mission:
         if place is None:
             return self._search(view), self._events
         if place.distance > NEAR_M:
-            return self._access(view, place), self._events
+            return self._access(view), self._events
         self._lost_since = None
         self._learn(view, known, place)
         graph = self._mapper.graph
@@ -341,26 +345,33 @@ class Mission:
     def _wait_for_a_way(self, view: View, here: Situation) -> Order:
         """Drive on until a known vertex comes into sight, before a frontier is given up."""
         if self._stranded_since is None:
-            self._stranded_since = view.stamp
+            self._stranded_since, self._turned_back = view.stamp, False
             self._events.append(Recovery(view.stamp, "drive on", "no way leads to the frontier"))
         if view.stamp - self._stranded_since > self._config.patience_s:
             self._stranded_since = None
             self._give_up(view, "no way leads there")
-        return self._drive(view, here, here.ahead())
+        path = here.astern() if self._turned_back else here.ahead()
+        if Track.of(*view.gvg.line_from(here.place, path)).length < _ARRIVED_M:
+            self._turned_back = not self._turned_back
+        return self._drive(view, here, path)
 
     def _drive(self, view: View, here: Situation, path: tuple[Branch, ...]) -> Order:
-        track = Track.of(*view.gvg.line_from(here.place, path))
+        line, room = view.gvg.line_from(here.place, path)
+        if here.place.distance > _BESIDE_M:  # straight to the edge first, or it may scrape along
+            base = view.local_base.position
+            line, room = np.vstack([base, line]), np.concatenate([room[:1], room])
+        track = Track.of(line, room)
         end = view.gvg.end_of(path[-1])
         waited = view.stamp - self._last_progress
-        if track.length < 0.3 and end not in here.known.vertex_of and end in view.doubted:
+        if track.length < _ARRIVED_M and end not in here.known.vertex_of and end in view.doubted:
             self._held = True
             away = _turn_to_face(view, path[-1])
             if min(away, math.tau - away) > _FACING_RAD:
                 return LookAround(away)
-        elif track.length < 0.3 and waited > self._config.look_around_s:
+        elif track.length < _ARRIVED_M and waited > self._config.look_around_s:
             self._last_progress = view.stamp
             self._looked_around += 1
-            if self._looked_around > 2:
+            if self._looked_around > 2 and self._stranded_since is None:
                 self._give_up(view, "nothing more is to be seen there")
                 return Stand()
             self._events.append(Recovery(view.stamp, "look around", "standing at the end of sight"))
@@ -405,8 +416,9 @@ class Mission:
     # -- giving up ---------------------------------------------------------------------------------
 
     def _watch_progress(self, view: View) -> None:
-        if view.travelled > self._travelled_then + 0.3:
-            self._travelled_then, self._last_progress = view.travelled, view.stamp
+        base, then = view.local_base.position, self._progress_at
+        if then is None or np.hypot(*(base - then)) > 0.3:
+            self._progress_at, self._last_progress = base, view.stamp
         self._last_progress += max(0.0, view.stamp - self._last_view - _LONGEST_VIEW_S)
         self._last_view = view.stamp
         if self.where.on_edge == self.target and self.where.trail_length > self._newest_m + 0.5:
@@ -436,9 +448,9 @@ class Mission:
         self._events.append(Recovery(view.stamp, "give up a frontier", reason))
         self.target = None
 
-    def _access(self, view: View, place: Place) -> Order:
+    def _access(self, view: View) -> Order:
         """Go to the nearest edge, if the way there is free."""
-        way = way_to_edge(view, place)
+        way = way_to_edge(view)
         if way is None:
             return self._search(view)
         self._lost_since = None

@@ -75,7 +75,7 @@ class AutonomyConfig:
     recognition: RecognitionConfig = field(default_factory=RecognitionConfig)
     scan_matching: ScanMatchingConfig = field(default_factory=ScanMatchingConfig)
     odometry_noise: OdometryNoise = field(default_factory=OdometryNoise)
-    passage_margin_m: Annotated[float, Range(0.0, 0.5)] = 0.03  # beyond the radius, on each side
+    passage_margin_m: Annotated[float, Range(0.0, 0.5)] = 0.05  # beyond the radius, on each side
 
 
 @dataclass(frozen=True, slots=True, eq=False)

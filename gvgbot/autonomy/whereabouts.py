@@ -207,6 +207,10 @@ class Situation:
         back = self._back()
         return self._extended((Branch(back.edge, not back.forward),))
 
+    def astern(self) -> tuple[Branch, ...]:
+        """Back along the present edge, as far as it is in sight."""
+        return self._extended((self._back(),))
+
     def _away_from(self, end: HalfEdgeId) -> Branch:
         branch = self.known.branch_of.get(end)
         if branch is not None and branch.edge == self.place.edge:

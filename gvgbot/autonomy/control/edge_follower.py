@@ -10,6 +10,7 @@ from gvgbot.geometry import STANDSTILL, Array, Pose, Twist, wrap_angle
 from gvgbot.ranges import Range
 
 _LEAST_LOOK_AHEAD_M = 0.12
+_TIGHT_M, _TIGHT_TURN_RAD = 0.1, 0.35  # room beside the robot in which an arc would scrape
 _CUT = 0.8  # of the clearance, the farthest to look ahead
 
 
@@ -74,7 +75,8 @@ def follow(
     angle = wrap_angle(
         math.atan2(target[1] - local_base.y, target[0] - local_base.x) - local_base.theta
     )
-    if abs(angle) > config.turn_on_the_spot_rad and away > 0.05:
+    is_tight = float(soon.min(initial=np.inf)) < robot_radius + _TIGHT_M
+    if abs(angle) > (_TIGHT_TURN_RAD if is_tight else config.turn_on_the_spot_rad) and away > 0.05:
         return Twist(0.0, math.copysign(min(config.max_turn_rate_radps, 1.5 * abs(angle)), angle))
     window = slice(here, max(here + 1, aim + 5))
     limit = _speed_limit(float(track.clearance[window].min()), robot_radius, config)

@@ -5,7 +5,6 @@ import math
 import numpy as np
 from scipy.spatial import cKDTree
 
-from gvgbot.autonomy.gvg.local import Place
 from gvgbot.autonomy.views import View
 from gvgbot.geometry import Array
 
@@ -14,11 +13,17 @@ _ROOM_M = 0.35  # from the walls, on the way
 _SPACING_M = 0.1
 
 
-def way_to_edge(view: View, place: Place) -> tuple[Array, Array] | None:
-    """The straight way to the nearest point of the local GVG, as `straight_way` has it."""
-    edge = view.gvg.edges[place.edge]
-    goal = [float(np.interp(place.station, edge.stations, edge.polyline[:, k])) for k in (0, 1)]
-    return straight_way(view, np.array(goal), _ROOM_M)
+def way_to_edge(view: View) -> tuple[Array, Array] | None:
+    """The straight way to the nearest edge of the local GVG to which there is one.
+
+    The very nearest edge may be behind a wall. As `straight_way` has it.
+    """
+    base = view.local_base.position
+    lines = (edge.polyline for edge in view.gvg.edges.values())
+    nearest = [line[int(np.argmin(np.hypot(*(line - base).T)))] for line in lines]
+    nearest.sort(key=lambda point: float(np.hypot(*(point - base))))
+    ways = (straight_way(view, goal, _ROOM_M) for goal in nearest)
+    return next((way for way in ways if way is not None), None)
 
 
 def straight_way(view: View, goal: Array, least_room: float) -> tuple[Array, Array] | None:

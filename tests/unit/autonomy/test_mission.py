@@ -186,6 +186,29 @@ def test_a_robot_that_cannot_move_gives_up_its_target_after_its_patience() -> No
     assert half.blocked
 
 
+def test_to_and_fro_on_the_spot_is_no_progress() -> None:
+    robot = Robot()
+    robot.stand(TEE, 8)
+    first = robot.mission.target
+    assert first is not None
+    while robot.stamp < CONFIG.patience_s + 10.0:
+        for x in (0.1, 0.0):
+            robot.pose, robot.travelled = Pose(x), robot.travelled + 0.1
+            robot.look(TEE)
+    half = robot.mapper.graph.half_edge(first)
+    assert half is not None
+    assert half.blocked
+
+
+def test_beside_its_edge_the_robot_goes_straight_there_first() -> None:
+    robot = Robot()
+    robot.pose = Pose(0.0, 0.4, 0.0)
+    order = robot.stand(TEE, 8)
+    assert isinstance(order, Drive)
+    assert order.track.polyline[0] == pytest.approx((0.0, 0.4))
+    assert order.track.polyline[1] == pytest.approx((0.0, 0.0), abs=0.06)
+
+
 def test_with_everything_given_up_the_outcome_says_so() -> None:
     robot = Robot()
     while robot.mission.outcome is None and robot.stamp < 10 * CONFIG.patience_s:

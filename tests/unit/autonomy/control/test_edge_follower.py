@@ -117,6 +117,16 @@ def test_the_robot_slows_down_where_it_is_narrow() -> None:
     assert speeds[3] == speeds[4] == pytest.approx(CONFIG.max_speed_mps)
 
 
+@pytest.mark.parametrize("heading", [0.6, -0.6])
+def test_where_it_is_tight_the_robot_turns_before_it_drives(heading: float) -> None:
+    """On an arc its side would come nearer to a wall that is 5 cm away."""
+    pose = Pose(1.0, 0.0, heading)
+    tight = follow(straight(3.0, RADIUS + 0.05), pose, 0.0, RADIUS, CONFIG)
+    assert tight.linear == 0.0
+    assert tight.angular * heading < 0.0
+    assert follow(straight(3.0), pose, 0.0, RADIUS, CONFIG).linear > 0.0
+
+
 def test_a_narrow_place_ahead_slows_the_robot_before_it_is_there() -> None:
     track = straight(8.0)
     track.clearance[(track.stations > 1.3) & (track.stations < 1.6)] = 0.25

@@ -1,0 +1,39 @@
+"""What a laser hardly sees, panes of glass and legs of chairs, neither misleads nor is touched."""
+
+import pytest
+
+from gvgbot.autonomy.events import VertexAdded
+from gvgbot.geometry import Pose
+from gvgbot.worlds.canvas import Canvas
+from tests.scenarios.rig import assert_explored, assert_found, play
+
+pytestmark = [pytest.mark.slow, pytest.mark.twin, pytest.mark.timeout(120)]
+
+
+def test_a_room_behind_glass_is_entered_by_its_door() -> None:
+    """A corridor of 1.5 m, and beside it a room of 3.5 m that is seen through a pane of 2.4 m."""
+    canvas = Canvas(9.0, 7.0)
+    canvas.carve(0.5, 0.5, 8.5, 2.0)
+    canvas.carve(3.0, 2.2, 8.0, 5.7)
+    canvas.carve(3.2, 2.0, 4.2, 2.2)
+    canvas.glaze(5.0, 2.0, 7.4, 2.2)
+    run = play(canvas.world("glass"), Pose(1.5, 1.25, 0.0))
+    assert_explored(run)
+    assert len(run.vertices("meetpoint")) >= 1
+    assert_found(run, "meetpoint", [(3.7, 1.3)], within=0.4)
+    added = sum(isinstance(event, VertexAdded) for event in run.events)
+    assert added <= len(run.pipeline.mapper.graph.vertices) + 2  # hardly any that had to go again
+
+
+def test_the_legs_of_a_chair_are_led_round_without_hesitation() -> None:
+    """Four legs of 4 cm: between them the robot would just fit, but for the room it needs."""
+    canvas = Canvas(9.0, 8.0, resolution=0.02)
+    canvas.carve(1.0, 1.0, 8.0, 3.4)
+    canvas.carve(6.0, 1.0, 8.0, 7.0)
+    for x in (3.5, 3.94):
+        for y in (1.98, 2.42):
+            canvas.build(x - 0.02, y - 0.02, x + 0.02, y + 0.02)
+    run = play(canvas.world("chair"), Pose(2.0, 2.2, 0.0))
+    assert_explored(run)
+    assert "back off" not in run.recoveries()
+    assert max(pose.x for pose in run.truth) > 4.2  # beyond the chair
