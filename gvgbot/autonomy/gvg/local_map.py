@@ -30,7 +30,7 @@ _EMPTY = (
 _ONE_WALL = 0.4  # of a cell: means of neighbouring cells nearer than this are of one wall
 _LONE_M = 0.3  # an echo nearer than both its neighbours by this is one of dust on glass
 _GLASS_ECHOES = 3.0  # so many about a cell make it glass, which beams pass and robots do not
-_DECAY, _DECAYS_M = 0.05, 3.0  # echoes that a look from so near outweighs which meets nothing
+_DECAY = 0.05  # echoes that one look outweighs which meets nothing
 _MAX_VOTES = 8  # a wall needs this many contrary scans, less the hits, before it is forgotten
 
 
@@ -132,7 +132,8 @@ class LocalMap:
 
     def suspects(self) -> Array:
         """Middles (N, 2) of free cells of which some beams have come back: glass, perhaps."""
-        cells = np.argwhere((self._echoes > 0) & (self._votes <= 0))
+        i, j = np.nonzero((self._echoes > 0) & (self._votes <= 0))
+        cells = np.stack([i, j], axis=1)[~self._is_glass(i, j)]
         return np.asarray((cells + self._corner + 0.5) * self._cell)
 
     def covers(self, points: Array) -> NDArray[np.bool_]:
@@ -176,7 +177,7 @@ class LocalMap:
         passed = distance < seen_to - np.float32(0.8 * self._cell)
         self._free |= passed
         self._seen_at[passed] = travelled
-        self._doubt_echoes(passed & (distance < _DECAYS_M))
+        self._doubt_echoes(passed)
         i, j = np.nonzero(passed & (self._votes > 0))
         if len(i):
             self._vote_against(i, j, scan, see, local_laser)
@@ -190,9 +191,9 @@ class LocalMap:
         gone[gone] = ~self._is_glass(i[gone], j[gone])
         self._votes[i[gone], j[gone]] -= 1
 
-    def _doubt_echoes(self, near: NDArray[np.bool_]) -> None:
-        """Let what is not yet glass count less where beams have passed close by."""
-        i, j = np.nonzero(near & (self._echoes > 0))
+    def _doubt_echoes(self, passed: NDArray[np.bool_]) -> None:
+        """Let what is not yet glass count less where beams have passed."""
+        i, j = np.nonzero(passed & (self._echoes > 0))
         few = ~self._is_glass(i, j)
         i, j = i[few], j[few]
         self._echoes[i, j] = np.maximum(self._echoes[i, j] - _DECAY, 0.0)
