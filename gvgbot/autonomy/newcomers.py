@@ -22,6 +22,7 @@ _SMOOTH_M = 0.15  # in range from beam to beam, on it: two legs of a chair are f
 _BEAMS = 3  # fewer see nothing for sure
 _SLIM_M, _WIDE_M = 0.1, 0.8  # people are between these; what is slimmer is furniture
 _GLIMPSE_S = 3.0  # what is half hidden behind something nearer is only kept waiting so long
+_BLUR_M = 0.1  # beyond its rim, beams may still end on something
 _MOVED_M = 0.3  # what stands is found again within this
 _LOST_S = 3.0  # and what is out of sight for so long, beyond the time it stood, has gone
 _RIM = np.stack([f(np.arange(12) * np.pi / 6) for f in (np.cos, np.sin)], axis=1)
@@ -54,7 +55,6 @@ class _Newcomer:
 class _Island:
     """Beams that end on something narrow with more room on one side or both; local frame."""
 
-    beams: slice
     ends: Array  # (N, 2)
     centre: Array
     radius: float
@@ -73,18 +73,14 @@ class Newcomers:
         self._forget(scan, local_base)
         walls = local_map.points()
         tree = cKDTree(walls) if len(walls) else None
-        passing = []
+        seen = []
         for island in _islands(scan, local_base):
             if tree is not None and self._is_built(island, tree):
                 self._all = [one for one in self._all if not _is_at(one, island.centre)]
             elif self._is_passing(island, scan.stamp, local_map):
-                passing.append(island.beams)
-        if not passing:
-            return scan
-        ranges = scan.ranges.copy()
-        for beams in passing:
-            ranges[beams] = np.nan
-        return replace(scan, ranges=ranges)
+                seen.append((island.centre, island.radius))
+        # At times one is seen in parts only, or has moved a little: both discs count.
+        return _without(scan, local_base, [*seen, *((one.centre, one.radius) for one in self._all)])
 
     def _is_built(self, island: _Island, walls: cKDTree) -> bool:
         """Whether it is mostly walls of the map that are seen: a person may brush along one."""
@@ -152,9 +148,22 @@ def _islands(scan: Scan, local_base: Pose) -> list[_Island]:
         if _SLIM_M <= width < _WIDE_M:
             away = ends.mean(axis=0) - local_laser.position
             centre = ends.mean(axis=0) + 0.3 * width * away / np.hypot(*away)
-            beams = slice(int(told[start]), int(told[stop - 1]) + 1)
-            found.append(_Island(beams, ends, centre, width / 2, all(rims)))
+            found.append(_Island(ends, centre, width / 2, all(rims)))
     return found
+
+
+def _without(scan: Scan, local_base: Pose, discs: list[tuple[Array, float]]) -> Scan:
+    """The scan without the beams that end in discs, by centre (2,), local frame, and radius."""
+    beams = np.flatnonzero(np.isfinite(scan.ranges))
+    ends = _ends(scan, beams, scan.ranges[beams], local_base.compose(scan.base_laser))
+    inside = np.zeros(len(beams), np.bool_)
+    for centre, radius in discs:
+        inside |= np.hypot(*(ends - centre).T) < radius + _BLUR_M
+    if not inside.any():
+        return scan
+    ranges = scan.ranges.copy()
+    ranges[beams[inside]] = np.nan
+    return replace(scan, ranges=ranges)
 
 
 def _ends(scan: Scan, beams: NDArray[np.intp], depth: Array, local_laser: Pose) -> Array:
