@@ -1,11 +1,12 @@
 """What a laser hardly sees, panes of glass and legs of chairs, neither misleads nor is touched."""
 
+import math
+
 import pytest
 
-from gvgbot.autonomy.events import VertexAdded
 from gvgbot.geometry import Pose
 from gvgbot.worlds.canvas import Canvas
-from tests.scenarios.rig import assert_explored, assert_found, play
+from tests.scenarios.rig import assert_explored, play
 
 pytestmark = [pytest.mark.slow, pytest.mark.twin, pytest.mark.timeout(120)]
 
@@ -19,10 +20,9 @@ def test_a_room_behind_glass_is_entered_by_its_door() -> None:
     canvas.glaze(5.0, 2.0, 7.4, 2.2)
     run = play(canvas.world("glass"), Pose(1.5, 1.25, 0.0))
     assert_explored(run)
-    assert len(run.vertices("meetpoint")) >= 1
-    assert_found(run, "meetpoint", [(3.7, 1.3)], within=0.4)
-    added = sum(isinstance(event, VertexAdded) for event in run.events)
-    assert added <= len(run.pipeline.mapper.graph.vertices) + 2  # hardly any that had to go again
+    meetpoints = [run.world(vertex) for vertex in run.vertices("meetpoint")]
+    assert min(math.dist(point, (3.7, 1.3)) for point in meetpoints) < 0.4
+    assert len(meetpoints) <= 2  # a corner of the pane may not have been seen well enough
 
 
 def test_the_legs_of_a_chair_are_led_round_without_hesitation() -> None:

@@ -30,6 +30,7 @@ _EMPTY = (
 _ONE_WALL = 0.4  # of a cell: means of neighbouring cells nearer than this are of one wall
 _LONE_M = 0.3  # an echo nearer than both its neighbours by this is one of dust on glass
 _GLASS_ECHOES = 3.0  # so many about a cell make it glass, which beams pass and robots do not
+_BESIDE_WALLS_M = 0.22  # half a gap that robots go through: nearer, they make no difference
 _DECAY = 0.05  # echoes that one look outweighs which meets nothing
 _MAX_VOTES = 8  # a wall needs this many contrary scans, less the hits, before it is forgotten
 
@@ -131,10 +132,13 @@ class LocalMap:
         return self._walls.sights
 
     def suspects(self) -> Array:
-        """Middles (N, 2) of free cells of which some beams have come back: glass, perhaps."""
-        i, j = np.nonzero((self._echoes > 0) & (self._votes <= 0))
-        cells = np.stack([i, j], axis=1)[~self._is_glass(i, j)]
-        return np.asarray((cells + self._corner + 0.5) * self._cell)
+        """Middles (N, 2) of free cells away from walls that send echoes: glass, perhaps."""
+        cells = np.argwhere((self._echoes > 0) & (self._votes <= 0))
+        middles = (cells + self._corner + 0.5) * self._cell
+        walls = self.points()
+        if not len(middles) or not len(walls):
+            return np.asarray(middles)
+        return np.asarray(middles[cKDTree(walls).query(middles)[0] > _BESIDE_WALLS_M])
 
     def covers(self, points: Array) -> NDArray[np.bool_]:
         """Whether each point (N, 2) lies in the window."""
