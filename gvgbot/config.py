@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from gvgbot.autonomy.mission import ExplorationConfig
 from gvgbot.autonomy.pipeline import AutonomyConfig
@@ -25,7 +25,8 @@ DEFAULT = "sim.yaml"
 class RobotConfig:
     """The robot as a body: its name on the network, its footprint and its limits."""
 
-    name: str = "gvgbot"
+    name: str = "gvgbot"  # on the network: letters, digits, - and _
+    # circle around the turning point that holds the whole robot
     radius_m: Annotated[float, Range(0.05, 2.0)] = 0.177
     limits: GuardConfig = field(default_factory=GuardConfig)
 
@@ -43,6 +44,7 @@ class TwinConfig:
     world: str = "office"  # a built-in world, or the path of a map_server YAML
     start: tuple[float, float, float] | None = None  # x (m), y (m), theta (rad); None: the world's
     people: Annotated[int | None, Range(0, 100)] = None  # who walk about; None: the world's own
+    # draws all errors of the twins, and the ways of people
     seed: Annotated[int, Range(0, 2**32 - 1)] = 1
     time_limit_s: Annotated[float, Range(1.0, 1e6)] = 14_400.0  # simulated; then `explore` ends
     laser: HokuyoTwinConfig = field(default_factory=HokuyoTwinConfig)
@@ -54,6 +56,7 @@ class ServiceConfig:
     """Where a daemon keeps what must outlive it."""
 
     state_dir: str | None = None  # runs are in it and go on there; None: $STATE_DIRECTORY, if set
+    resume: Literal["running", "paused"] = "running"  # what an interrupted run does when it goes on
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

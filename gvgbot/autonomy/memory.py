@@ -76,6 +76,8 @@ class Intent:
     start_edge: StartEdge | None
     frontiers: set[HalfEdgeId]
     closed: Closed
+    is_paused: bool = False  # somebody asked for that,
+    is_waiting: bool = False  # or for something that has been done
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -120,7 +122,7 @@ def remember(pipeline: Pipeline) -> Memory:
         belief=mapper.belief,
         graph=mapper.graph,
         candidates=mapper._unbelieved._all,
-        intent=_intent(pipeline.mission),
+        intent=_intent(pipeline),
         near=_cells(maps.near),
         far=_cells(maps._far),
         odds=Odds(calibration.x, calibration.P, maps._shared),
@@ -128,7 +130,8 @@ def remember(pipeline: Pipeline) -> Memory:
     )
 
 
-def _intent(mission: Mission) -> Intent:
+def _intent(pipeline: Pipeline) -> Intent:
+    mission, errands = pipeline.mission, pipeline.errands
     closed = mission._obstructions
     return Intent(
         mission.where,
@@ -140,6 +143,8 @@ def _intent(mission: Mission) -> Intent:
         mission._start_edge,
         mission._frontiers,
         Closed(closed._times, closed._since),
+        errands.is_paused,
+        errands.is_waiting or (errands.errand is not None and not errands._is_own),
     )
 
 
@@ -183,6 +188,8 @@ def recall(pipeline: Pipeline, memory: Memory, past: list[Growth]) -> None:
     """
     _recall_mapper(pipeline, memory)
     _recall_mission(pipeline.mission, memory.intent)
+    pipeline.errands.is_paused = memory.intent.is_paused
+    pipeline.errands.is_waiting = memory.intent.is_waiting
     if _fits(pipeline._maps.near, memory.near) and _fits(pipeline._maps._far, memory.far):
         _recall_cells(pipeline._maps.near, memory.near)
         _recall_cells(pipeline._maps._far, memory.far)

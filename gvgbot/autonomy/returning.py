@@ -63,8 +63,10 @@ class ReturningPipeline(Pipeline):
         """Learn from a scan; while it is lost, where on the map it was taken."""
         if self._is_back:
             return super().perceive(scan)
+        if self.errands.is_resting:  # nobody wants it to drive about
+            return []
         if self._seeker is not None:
-            return [] if self.errands.is_resting else self._seek(self._seeker, scan)
+            return self._seek(self._seeker, scan)
         odom_base = self._odometry.odom_base_at(scan.stamp)
         if odom_base is None:
             return []
@@ -119,6 +121,8 @@ class ReturningPipeline(Pipeline):
 
     def _seek(self, seeker: Pipeline, scan: Scan) -> list[Event]:
         """Let the second mind drive on; what it finds is of no interest but for the place."""
+        if _has_ended(seeker):  # it has failed once, and somebody wants it to go on
+            return self._begin_to_seek(scan)
         seeker.perceive(scan)
         last = seeker._last
         if last is None or seeker._turning():
@@ -129,7 +133,7 @@ class ReturningPipeline(Pipeline):
             reason = f"{opinion.confidence:.3f} sure after {opinion.looks} looks"
             return [Recovery(scan.stamp, "go on from its place on the map", reason)]
         self.mission.reason = _doubt(opinion)
-        if seeker.mission.outcome is None:
+        if not _has_ended(seeker):
             return []
         self.mission.outcome = "failed"
         return [Finished(scan.stamp, "failed", self.mission.reason)]
@@ -189,6 +193,10 @@ class ReturningPipeline(Pipeline):
         for hazard in seeker._hazards._all:
             hazard.travelled += self.travelled - seeker.travelled
         self._hazards._all += seeker._hazards._all
+
+
+def _has_ended(mind: Pipeline) -> bool:
+    return mind.mission.outcome is not None
 
 
 def _doubt(opinion: Opinion) -> str:

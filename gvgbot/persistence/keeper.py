@@ -67,6 +67,8 @@ class Keeper:
             saved.past,
             self._is_vouched,
         )
+        if session.config.service.resume == "paused":
+            session.pipeline.errands.is_paused = True
         if not self._goes_on:
             session.pipeline.mission.outcome, session.pipeline.mission.reason = None, ""
         else:

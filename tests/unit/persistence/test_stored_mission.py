@@ -1,0 +1,61 @@
+"""A mission that was stored in version 1 can be read for ever.
+
+`tests/data/mission_v1` was left by a robot that had driven from a dead end to the ring of
+`tests.replay.test_pipeline.LOLLIPOP`, some 5 m, and was killed after 14 s.
+"""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gvgbot.autonomy.estimate import smoothed
+from gvgbot.autonomy.memory import recall
+from gvgbot.autonomy.pipeline import Pipeline
+from gvgbot.config import load_config
+from gvgbot.geometry import Pose
+from gvgbot.persistence.mission_files import MissionFiles
+from gvgbot.persistence.mission_state import Saved
+
+MISSION = Path(__file__).parents[2] / "data" / "mission_v1"
+START = Pose(-3.5, -0.1, 0.2)  # world_map
+ENDPOINT = (-5.0, 0.0)  # as far from the end of a corridor 2 m wide as from its sides
+MEETPOINT = (0.0, 0.25)  # as far from the corners (-1, 1) and (1, 1) as from the wall at y = -1
+
+
+@pytest.fixture(scope="module")
+def saved() -> Saved:
+    found = MissionFiles(MISSION).read()
+    assert found is not None
+    return found
+
+
+def test_it_is_whole(saved: Saved) -> None:
+    assert len(saved.past) > 20
+    assert saved.past[0].step is None
+    assert all(grown.step is not None for grown in saved.past[1:])
+    assert 13.0 < saved.beat.stamp < 14.5
+    assert saved.beat.odometer is not None
+    assert len(saved.journey.stamps) == pytest.approx(10 * saved.beat.stamp, rel=0.1)
+    scans = [grown.keyframe.scan for grown in saved.past if grown.keyframe.scan is not None]
+    assert all(len(scan.ranges) == 1081 for scan in scans)
+
+
+def test_a_mind_that_recalls_it_has_the_map_of_that_place(saved: Saved) -> None:
+    config = load_config()
+    pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
+    recall(pipeline, saved.memory, saved.past)
+    vertices = pipeline.mapper.graph.vertices.values()
+    assert {vertex.kind for vertex in vertices} == {"meetpoint", "endpoint"}
+    assert len(pipeline.mapper.graph.edges) == 1
+    assert len(pipeline.mapper.graph.frontiers()) == 2
+    estimate = smoothed(pipeline)
+    for vertex in vertices:
+        place = START.compose(estimate.vertices[vertex.id])
+        wanted = MEETPOINT if vertex.kind == "meetpoint" else ENDPOINT
+        assert math.dist((place.x, place.y), wanted) < 0.1
+    walls = START.transform(pipeline._maps.near.points())
+    stem = walls[(walls[:, 0] > -5.5) & (walls[:, 0] < -1.5)]
+    assert len(stem) > 50
+    assert np.abs(np.abs(stem[:, 1]) - 1.0).max() < 0.1
