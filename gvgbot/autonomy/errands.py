@@ -19,6 +19,7 @@ from gvgbot.autonomy.whereabouts import Situation
 from gvgbot.geometry import Array
 
 _THERE_M = 0.15  # from a destination, one has arrived
+_AT_VERTEX_M = 1.0  # from a vertex, what stands in the way stands on the edge beyond it
 _ALMOST_M = 0.6  # as well, where one cannot come nearer
 _OFF_GRAPH_M = 3.0  # a point farther from every edge is out of reach
 _DIRECT_M = 4.0  # the longest straight way to a point
@@ -222,6 +223,8 @@ class Errands:
         self._closed: list[HalfEdgeId] = []  # ways that something stands in
         self._avoid: tuple[frozenset[HalfEdgeId], int] | None = None  # not that way on that edge
         self._heading: int | None = None  # the first vertex on the way
+        self._route: Route | None = None  # that is being driven
+        self._nearest_m = math.inf  # that has been left of it
         self._looks = 0
         self._is_looking = self._is_obstructed = False
         self._progress: float | None = None  # stamp
@@ -311,7 +314,9 @@ class Errands:
             self._give_up(view, "driven too far without reaching it")
         if self._last_view is not None:  # let no patience run out by an outage
             since += max(0.0, view.stamp - self._last_view - _LONGEST_VIEW_S)
-        if view.travelled > self._travelled_then + _PROGRESS_M or self._is_looking:
+        is_off = self._route is None  # the graph; on it, coming nearer is what counts
+        has_moved = is_off and view.travelled > self._travelled_then + _PROGRESS_M
+        if has_moved or self._is_looking:
             self._travelled_then, since = view.travelled, view.stamp
         self._progress, self._last_view, self._is_looking = since, view.stamp, False
         if self._is_obstructed or view.stamp - since > self._config.in_the_way_s:
@@ -322,6 +327,9 @@ class Errands:
         """Something stands in the way: try another one, if there is one."""
         self._is_obstructed, self._progress = False, view.stamp
         graph, on_edge = self._mapper.graph, self._mission.where.on_edge
+        if self._route is not None and self._is_at(view, self._route.first):
+            on_edge = next(iter(self._route.departures), on_edge)
+        self._nearest_m = math.inf
         edge = None if on_edge is None else graph.edge_at(on_edge)
         ends = [edge.a, edge.b] if edge is not None else [on_edge] if on_edge is not None else []
         halves = [(end, half) for end in ends if (half := graph.half_edge(end)) is not None]
@@ -334,6 +342,13 @@ class Errands:
                 half.blocked = True
                 self._closed.append(end)
         self.happened.append(Recovery(view.stamp, "try another way", "something stands in the way"))
+
+    def _is_at(self, view: View, vertex: int) -> bool:
+        """Whether the robot is about at a vertex."""
+        if vertex not in self._mapper.graph.vertices:
+            return False
+        there = self._mapper.in_local_frame(view, vertex).position
+        return float(np.hypot(*(there - view.local_base.position))) < _AT_VERTEX_M
 
     def _look_once(self, view: View) -> Order:
         if self._looks:
@@ -375,7 +390,7 @@ class Errands:
             return self._arrive(view, "")
         way = straight_way(view, goal, self._room_m) if away < _DIRECT_M else None
         if way is not None and waited < self._config.look_around_s:
-            self._heading = None
+            self._heading = self._route = None
             return Drive(Track.of(*way))
         foot = foot_of(self._mapper, np.array([errand.x, errand.y]))
         if foot is None:
@@ -405,7 +420,9 @@ class Errands:
         """Along a route, to its end or to a point of it (2,), local frame."""
         if route is None:
             return self._give_up(view, "no known way leads there")
-        self._heading = route.first
+        self._heading, self._route = route.first, route
+        if route.metres < self._nearest_m - _PROGRESS_M:
+            self._nearest_m, self._progress = route.metres, view.stamp
         path = route.branches(here) or here.ahead()
         line, clearance = view.gvg.line_from(here.place, path)
         if end is not None:
@@ -422,7 +439,7 @@ class Errands:
 
     def _find_edge(self, view: View, waited: float) -> Order:
         """Off the graph: go to the nearest edge, or look around for one."""
-        self._heading = None
+        self._heading = self._route = None
         way = way_to_edge(view)
         if way is not None and waited < self._config.look_around_s:
             return Drive(Track.of(*way))

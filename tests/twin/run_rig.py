@@ -149,13 +149,14 @@ class Daemon:
         out: Path,
         place: Place | None = None,
         requests: tuple[RequestName, ...] = REQUESTS,
+        twin: TwinConfig | None = None,
     ) -> None:
         canvas = Canvas(14.0, 14.0)
         canvas.carve_path([(2.0, 2.0), (12.0, 2.0), (12.0, 12.0), (2.0, 12.0), (2.0, 5.0)], 1.4)
         place = place or Place(canvas.world("corridor"), Pose(5.0, 2.1, 0.3))
         self.config = Config(
             robot=RobotConfig(name="tester"),
-            twin=TwinConfig(base=KobukiTwinConfig(odometry="perfect")),
+            twin=twin or TwinConfig(base=KobukiTwinConfig(odometry="perfect")),
             telemetry=TelemetryConfig(requests=requests),
         )
         self.manager, self.network = Manager(), Network()

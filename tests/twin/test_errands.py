@@ -14,6 +14,9 @@ import numpy as np
 import pytest
 
 from gvgbot.clock import Clock
+from gvgbot.config import TwinConfig
+from gvgbot.drivers.kobuki.twin import KobukiTwinConfig
+from gvgbot.drivers.people import Walkways
 from gvgbot.geometry import Pose
 from gvgbot.requests import REQUESTS, Answer
 from gvgbot.simulation import Place
@@ -28,12 +31,13 @@ BESIDE = (8.8, 4.5)  # 0.2 m beside the middle of the eastern corridor
 NEAR = 0.3  # m
 
 
-def theta() -> Place:
+def theta(width: float = 1.4, *, with_person: bool = False) -> Place:
     canvas = Canvas(11.0, 9.0)
     ring = [(2.0, 2.0), (9.0, 2.0), (9.0, 7.0), (2.0, 7.0), (2.0, 2.0)]
-    canvas.carve_path(ring, 1.4)
-    canvas.carve_path(list(MEETPOINTS), 1.4)
-    return Place(canvas.world("theta"), START)
+    canvas.carve_path(ring, width)
+    canvas.carve_path(list(MEETPOINTS), width)
+    world = canvas.world("theta")
+    return Place(world, START, Walkways(world, START) if with_person else None)
 
 
 @dataclass
@@ -306,3 +310,48 @@ def test_without_permission_nothing_is_done(tmp_path: Path) -> None:
     assert all("not permitted" in answer.text for answer in answers)
     assert daemon.network.states[-1].phase == "exploring"
     assert set(base_commands(bytes(daemon.cable.written))[-100:-10]) != {STOP}
+
+
+def test_who_stands_in_the_way_of_an_errand_is_left_alone_and_another_way_taken(
+    tmp_path: Path,
+) -> None:
+    """In the bar, which is too narrow to pass: 5 m become 12 m around the ring."""
+    twin = TwinConfig(people=1, base=KobukiTwinConfig(odometry="perfect"))
+    daemon = Daemon(tmp_path / "run", theta(1.0, with_person=True), twin=twin)
+    pipeline = daemon.session.pipeline
+    driven: list[float] = []
+
+    def put_person(x: float, y: float) -> None:
+        assert daemon.session.simulation is not None
+        people = daemon.session.simulation.body._people
+        assert people is not None
+        people._people[0].stands_until = math.inf
+        people.centres[0] = (x, y)
+
+    def vertex_at(x: float, y: float) -> int:
+        map_point = START.inverse().transform(np.array((x, y)))
+        belief = pipeline.mapper.belief
+        return min(
+            pipeline.mapper.graph.vertices,
+            key=lambda vertex: float(np.hypot(*(belief.map_vertex(vertex).position - map_point))),
+        )
+
+    async def tell(clock: Clock) -> None:
+        await a_while(clock, 0.5)
+        put_person(1000.0, 1000.0)
+        await until(clock, lambda: pipeline.mission.outcome is not None)
+        for number, place in enumerate(MEETPOINTS):
+            begin = pipeline.travelled
+            assert (await daemon.network.ask("goto", vertex=vertex_at(*place))).done
+            if number:
+                put_person(5.5, 4.8)
+            await until(clock, lambda: pipeline.errands.errand is None)
+            await a_while(clock, 1.0)
+            assert math.dist((daemon.place.x, daemon.place.y), place) < NEAR
+            driven.append(pipeline.travelled - begin)
+
+    with daemon.session.directory:
+        daemon.run(tell)
+    assert daemon.session.simulation is not None
+    assert daemon.session.simulation.body.contacts == 0
+    assert 12.0 - 2 * NEAR < driven[1] < 12.0 + 5.0  # and as far into the bar as it could see
