@@ -1,0 +1,69 @@
+"""The keeper beside a disk that refuses for a while."""
+
+from pathlib import Path
+
+import pytest
+import structlog
+
+from gvgbot.autonomy.memory import recall, remember
+from gvgbot.config import load_config
+from gvgbot.maps.run_directory import RunDirectory
+from gvgbot.persistence.keeper import Keeper
+from gvgbot.persistence.mission_files import MissionFiles
+from gvgbot.persistence.records import packed
+from gvgbot.session import Session
+from tests.unit.persistence.test_mission_files import full_disk
+
+MISSION = Path(__file__).parents[2] / "data" / "mission_v1"
+
+
+@pytest.fixture
+def session(tmp_path: Path) -> Session:
+    """One that has driven five metres."""
+    saved = MissionFiles(MISSION).read()
+    assert saved is not None
+    with RunDirectory(tmp_path) as directory:
+        session = Session(load_config(), directory, None)
+    session.journey = saved.journey
+    recall(session.pipeline, saved.memory, saved.past)
+    return session
+
+
+def test_a_full_disk_is_said_once_and_all_is_kept_when_there_is_room_again(
+    session: Session, tmp_path: Path
+) -> None:
+    keeper = Keeper(session, MissionFiles(tmp_path))
+    with structlog.testing.capture_logs() as logs:
+        for room in (0, 10, 50_000):
+            with full_disk(room):
+                keeper.keeping(20.0)()
+                assert keeper.trouble is not None
+        keeper.keeping(21.0)()
+        keeper.keeping(22.0)()
+    assert keeper.trouble is None
+    assert [(log["event"], log["log_level"]) for log in logs] == [
+        ("mission not kept, exploring on", "warning"),
+        ("mission kept again", "info"),
+    ]
+    saved = MissionFiles(tmp_path).read()
+    assert saved is not None
+    assert len(saved.past) == len(session.pipeline.keyframes)
+    assert saved.journey.stamps == session.journey.stamps
+    assert packed(saved.memory) == packed(remember(session.pipeline))
+
+
+def test_what_did_not_change_is_not_written_again(session: Session, tmp_path: Path) -> None:
+    keeper = Keeper(session, MissionFiles(tmp_path))
+    keeper.keeping(20.0)()
+    before = {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
+    for stamp in (20.5, 21.0, 60.0):
+        keeper.keeping(stamp)()
+    assert {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()} == before
+
+
+def test_a_robot_that_saw_nothing_leaves_no_mission(tmp_path: Path) -> None:
+    with RunDirectory(tmp_path) as directory:
+        keeper = Keeper(Session(load_config(), directory, None), MissionFiles(tmp_path))
+    keeper.keeping(1.0)()
+    keeper.finish()
+    assert MissionFiles(tmp_path).read() is None

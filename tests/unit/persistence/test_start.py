@@ -1,0 +1,107 @@
+"""Where a run begins, by what was asked for and what is there."""
+
+from pathlib import Path
+
+import pytest
+import structlog
+
+from gvgbot.cli import main
+from gvgbot.config import Config, ServiceConfig
+from gvgbot.errors import UsageError
+from gvgbot.persistence.mission_files import SNAPSHOT, SNAPSHOT_BEFORE
+from gvgbot.persistence.start import Start, Wanted, begin, state_directory
+from tests.unit.persistence.test_mission_files import written
+
+ELSEWHERE = {"STATE_DIRECTORY": "/var/lib/gvgbot:/var/lib/other"}
+
+
+@pytest.mark.parametrize(
+    ("configured", "environment", "expected"),
+    [
+        (None, {}, None),
+        (None, {"STATE_DIRECTORY": ""}, None),
+        (None, ELSEWHERE, Path("/var/lib/gvgbot")),
+        ("/data", ELSEWHERE, Path("/data")),
+    ],
+)
+def test_the_state_directory_is_the_configured_one_or_the_service_s(
+    configured: str | None, environment: dict[str, str], expected: Path | None
+) -> None:
+    config = Config(service=ServiceConfig(state_dir=configured))
+    assert state_directory(config, environment) == expected
+
+
+def begun(wanted: Wanted) -> Start:
+    start = begin(wanted, world="office")
+    start.directory.close()
+    return start
+
+
+def mission(path: Path) -> Path:
+    path.mkdir(parents=True)
+    written(path)
+    return path
+
+
+def test_the_first_run_of_a_state_directory_is_a_new_one(tmp_path: Path) -> None:
+    start = begun(Wanted(state_dir=tmp_path))
+    assert start.directory.path == tmp_path / "runs" / "office-1"
+    assert start.saved is None
+
+
+def test_the_run_with_the_highest_number_that_left_a_mission_goes_on(tmp_path: Path) -> None:
+    for number in (2, 9, 10):
+        mission(tmp_path / "runs" / f"office-{number}")
+    (tmp_path / "runs" / "office-11").mkdir()  # ended before it had seen anything
+    (tmp_path / "runs" / "office-10" / "events.jsonl").write_text("{}\n")
+    start = begun(Wanted(state_dir=tmp_path))
+    assert start.directory.path.name == "office-10"
+    assert start.saved is not None
+    assert len(start.saved.past) == 5
+    assert (start.directory.path / "events.jsonl").read_text() == "{}\n"
+
+
+@pytest.mark.parametrize("given", ["anew", "out"])
+def test_a_new_map_can_be_asked_for(tmp_path: Path, given: str) -> None:
+    old = mission(tmp_path / "runs" / "office-1")
+    out = tmp_path / "elsewhere" if given == "out" else None
+    start = begun(Wanted(out=out, anew=given == "anew", state_dir=tmp_path))
+    assert start.saved is None
+    assert start.directory.path == (out or tmp_path / "runs" / "office-2")
+    assert (old / SNAPSHOT).exists()
+
+
+def test_a_known_map_begins_a_run_of_its_own(tmp_path: Path) -> None:
+    known = mission(tmp_path / "known")
+    before = {path.name: path.read_bytes() for path in known.iterdir()}
+    start = begun(Wanted(known=known, state_dir=tmp_path))
+    assert start.saved is not None
+    assert start.directory.path == tmp_path / "runs" / "office-1"
+    assert not start.files.is_begun
+    assert {path.name: path.read_bytes() for path in known.iterdir()} == before
+
+
+def test_a_mission_that_cannot_be_read_stays_where_it_is(tmp_path: Path) -> None:
+    old = mission(tmp_path / "runs" / "office-1")
+    for name in (SNAPSHOT, SNAPSHOT_BEFORE):
+        (old / name).write_bytes(b"?")
+    with structlog.testing.capture_logs() as logs:
+        start = begun(Wanted(state_dir=tmp_path))
+    assert start.directory.path.name == "office-2"
+    assert (old / SNAPSHOT).read_bytes() == b"?"
+    assert [log["event"] for log in logs] == ["mission cannot be read, a new one begins"]
+
+
+@pytest.mark.parametrize("damage", [None, b"?"])
+def test_a_known_map_that_cannot_be_read_is_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], damage: bytes | None
+) -> None:
+    if damage is not None:
+        (tmp_path / SNAPSHOT).write_bytes(damage)
+    with pytest.raises(UsageError):
+        begin(Wanted(known=tmp_path), world="office")
+    arguments = ["--set", "telemetry.enabled=false", "--out", str(tmp_path / "out")]
+    assert main(["run", "--map", str(tmp_path), *arguments]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert str(tmp_path) in line
+    assert not (tmp_path / "out").exists()
