@@ -1,21 +1,20 @@
 """Writes topics.md, the reference of what travels on the network, from gvgbot/topics.py.
 
-    python docs/make_topics.py
+    python -m docs.make_topics
 
 Fields are explained by the comments that they have in the source.
 """
 
 import inspect
-import re
 from pathlib import Path
 from typing import Literal, TypeGuard, get_args, get_origin, get_type_hints
 
 import msgspec
 
+from docs.source import fields_of, table
 from gvgbot.topics import TOPICS, Topic, alive_key
 
 PAGE = Path(__file__).with_name("topics.md")
-FIELD = re.compile(r"^    (?P<name>\w+): (?P<type>[^#\n]*?)(?:  # (?P<comment>.*))?$", re.MULTILINE)
 HEAD = """\
 # Topics
 
@@ -76,22 +75,19 @@ def _is_struct(part: object) -> TypeGuard[type[msgspec.Struct]]:
 
 
 def _explained(payload: type[msgspec.Struct]) -> str:
-    rows = ["| field | type | meaning |", "|---|---|---|"]
-    rows += [f"| {' | '.join(cells)} |" for cells in _fields(payload)]
-    table = "\n".join(rows)
-    return f"{inspect.getdoc(payload) or ''}\n\n{table}\n"
+    rows = table(("field", "type", "meaning"), _fields(payload))
+    return f"{inspect.getdoc(payload) or ''}\n\n{rows}"
 
 
 def _fields(payload: type[msgspec.Struct]) -> list[tuple[str, str, str]]:
     """Name, type and comment of each field, as the source has them."""
-    found = {m["name"]: m for m in FIELD.finditer(inspect.getsource(payload))}
-    hints = get_type_hints(payload)
+    found, hints = fields_of(payload), get_type_hints(payload)
     rows = []
     for name in payload.__struct_fields__:
-        kind, comment = (found[name]["type"], found[name]["comment"]) if name in found else ("", "")
+        kind, comment = found[name].annotation, found[name].comment
         if get_origin(hints[name]) is Literal:
             kind, comment = "str", comment or ", ".join(get_args(hints[name]))
-        rows.append((f"`{name}`", f"`{kind}`".replace("|", "\\|"), comment or ""))
+        rows.append((f"`{name}`", f"`{kind}`", comment))
     return rows
 
 

@@ -16,7 +16,7 @@ def section(topic: Topic) -> str:
 
 
 def test_the_page_is_current() -> None:
-    assert PAGE.read_text(encoding="utf-8") == page(), "run python docs/make_topics.py"
+    assert PAGE.read_text(encoding="utf-8") == page(), "run make pages"
 
 
 @by_name
