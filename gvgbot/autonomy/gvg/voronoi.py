@@ -4,13 +4,15 @@ A Voronoi vertex whose maximal disc lies wholly in known space is a point of the
 the unseen rest of the building looks like; nothing else is used.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import Delaunay, QhullError
+from scipy.spatial import Delaunay, QhullError, cKDTree
 
 from gvgbot.autonomy.gvg.coast import Diagram, with_coast
 from gvgbot.autonomy.gvg.local_map import LocalMap
@@ -20,6 +22,7 @@ _RING = np.stack([f(np.arange(16) * np.pi / 8) for f in (np.cos, np.sin)], axis=
 _WITHIN = np.concatenate([0.5 * _RING[::2], np.zeros((1, 2))])
 _MAX_UNKNOWN = 1  # of the sampled points of a disc
 _NOTHING: Array = np.empty((0, 2))
+_LONG_RIDGE_M, _STEP_M, _FARTHEST_M = 1.0, 0.2, 8.0  # of ridges that end in the unknown
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,14 +86,81 @@ def fine_graph(
     asked &= wide & (clearance <= open_clearance)
     certain = np.zeros(len(points), bool)
     certain[asked] = _disc_is_known(local_map, points[asked], clearance[asked])
-    lead = np.full(len(points), np.nan)
-    for here, there in ((links[:, 0], links[:, 1]), (links[:, 1], links[:, 0])):
-        out = certain[here] & wide[there] & ~certain[there]
-        lead[here[out]] = _direction(points[there[out]] - points[here[out]])
-    out = endless[certain[a[endless]]]
-    lead[a[out]] = _direction((p[out] + q[out]) / 2 - points[a[out]])
-    joined = certain[links[:, 0]] & certain[links[:, 1]]
-    return _piece_of_robot(points, clearance, links[joined], lead, robot)
+    either = np.concatenate([links, links[:, ::-1]])
+    cut = either[certain[either[:, 0]] & wide[either[:, 1]] & ~certain[either[:, 1]]]
+    endless = endless[certain[a[endless]]]
+    start = np.concatenate([cut[:, 0], a[endless]])
+    rest = np.concatenate(
+        [
+            points[cut[:, 1]] - points[cut[:, 0]],
+            _FARTHEST_M * _outwards(triangles, endless, a, pair),
+        ]
+    )
+    joined = links[certain[links].all(axis=1)]
+    rays = _Rays(start, rest)
+    tree = cKDTree(generators)
+
+    def in_sight(places: Array) -> tuple[Array, NDArray[np.bool_]]:
+        room = np.asarray(tree.query(places)[0])
+        fits = (room >= min_clearance) & (room <= open_clearance)
+        fits[fits] = _disc_is_known(local_map, places[fits], room[fits])
+        return room, fits
+
+    return _piece_of_robot(*_prolonged(points, clearance, joined, rays, in_sight), robot)
+
+
+class _Rays(NamedTuple):
+    """Ridges of which one end is certain: that end (N,), and the way (N, 2) to the other one."""
+
+    start: NDArray[np.int64]
+    way: Array
+
+
+def _outwards(
+    triangles: Delaunay, endless: NDArray[np.intp], a: NDArray[np.int64], pair: NDArray[np.int32]
+) -> Array:
+    """Directions (N, 2) of ridges without end: square to the hull, away from the triangle."""
+    p, q = (triangles.points[pair[endless, k]] for k in (0, 1))
+    along = q - p
+    normal = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    normal /= np.hypot(*normal.T)[:, None]
+    inner = triangles.points[triangles.simplices[a[endless]]].mean(axis=1)
+    normal[((inner - p) * normal).sum(axis=1) > 0] *= -1
+    return normal
+
+
+def _prolonged(
+    points: Array,
+    clearance: Array,
+    links: NDArray[np.int64],
+    rays: _Rays,
+    in_sight: Callable[[Array], tuple[Array, NDArray[np.bool_]]],
+) -> tuple[Array, Array, NDArray[np.int64], Array]:
+    """Points, clearance, links and leads, with what is certain of ridges that end in the unknown.
+
+    Between two corners with nothing behind them a ridge is long, and has no points of its own.
+    """
+    length = np.hypot(*rays.way.T)
+    unit = rays.way / np.maximum(length, 1e-9)[:, None]
+    long = np.flatnonzero(length > _LONG_RIDGE_M)
+    steps = np.arange(_STEP_M, _FARTHEST_M, _STEP_M)
+    places = points[rays.start[long], None] + steps[:, None] * unit[long, None]
+    room, seen = (found.reshape(len(long), len(steps)) for found in in_sight(places.reshape(-1, 2)))
+    seen = np.logical_and.accumulate(seen & (steps < length[long, None]), axis=1)
+    number = np.full(seen.shape, -1)
+    number[seen] = len(points) + np.arange(np.count_nonzero(seen))
+    chain = np.concatenate([rays.start[long, None], number], axis=1)
+    onwards = chain[:, 1:] >= 0
+    lead = np.full(len(points) + np.count_nonzero(seen), np.nan)
+    end = rays.start.copy()
+    end[long] = chain[np.arange(len(long)), onwards.sum(axis=1)]
+    lead[end] = _direction(rays.way)
+    return (
+        np.concatenate([points, places[seen]]),
+        np.concatenate([clearance, room[seen]]),
+        np.concatenate([links, np.stack([chain[:, :-1][onwards], chain[:, 1:][onwards]], axis=1)]),
+        lead,
+    )
 
 
 def _direction(vectors: Array) -> Array:
