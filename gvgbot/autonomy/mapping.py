@@ -66,6 +66,7 @@ class Mapper:
         matching: ScanMatchingConfig,
         *,
         drive_dead_ends: bool = False,
+        by_position: bool = False,
     ) -> None:
         self._config, self._recognition = config, recognition
         self._recogniser = Recogniser(
@@ -76,6 +77,7 @@ class Mapper:
             margin=config.margin,
         )
         self._drive_dead_ends = drive_dead_ends
+        self._by_position = by_position
         self.belief = Belief()
         self.graph = GvgGraph()
         self.observations: list[Observation] = []
@@ -174,10 +176,11 @@ class Mapper:
                 match.agreement,
             )
         )
+        R = match.covariance[:2, :2] if self._by_position else match.covariance
         vertex.local = match.local
         vertex.seen_at = vertex.updated_at = view.travelled
         vertex.visits += 1
-        self._measure(view, vertex, view.local_base.to(match.local), match.covariance)
+        self._measure(view, vertex, view.local_base.to(match.local), R)
 
     # -- what is new -------------------------------------------------------------------------
 

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 
@@ -76,6 +76,9 @@ class AutonomyConfig:
     scan_matching: ScanMatchingConfig = field(default_factory=ScanMatchingConfig)
     odometry_noise: OdometryNoise = field(default_factory=OdometryNoise)
     passage_margin_m: Annotated[float, Range(0.0, 0.5)] = 0.05  # beyond the radius, on each side
+    # full: scans are matched, and vertices are poses. paper: odometry alone between vertices, and
+    # a vertex seen again corrects by its position only, as the method was published
+    localisation: Literal["full", "paper"] = "full"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,6 +119,7 @@ class Pipeline:
             config.recognition,
             config.scan_matching,
             drive_dead_ends=exploration.drive_dead_ends,
+            by_position=config.localisation == "paper",
         )
         self.mission = Mission(exploration, self.mapper)
         self.errands = Errands(
@@ -263,7 +267,9 @@ class Pipeline:
         noise = self._config.odometry_noise.covariance(motion, duration)
         is_doubted, self.errands.is_lost = self.errands.is_lost, False
         lost = self._was_lifted or self._odometry.has_gap_since(self._last.stamp)
-        match = self._maps.find if lost else self._maps.match
+        by_odometry = self._config.localisation == "paper"
+        follow = self._maps.trust if by_odometry else self._maps.match
+        match = self._maps.find if lost else follow
         if is_doubted:
             match = partial(self._maps.find, is_doubted=True)
         if self._was_lifted or is_doubted:

@@ -1,0 +1,38 @@
+"""Localisation as published, beside the full one."""
+
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+import pytest
+
+from gvgbot.autonomy.pipeline import Pipeline
+from gvgbot.config import load_config
+from gvgbot.geometry import STANDSTILL, Pose
+from gvgbot.hal.messages import Odometry
+from tests.unit.autonomy.sights import LASER_270, carved, sweep
+
+ROOMS = carved([(-4.0, -1.0, 4.0, 1.0), (0.0, -1.0, 2.0, 4.0)])
+
+
+def driven(localisation: Literal["full", "paper"]) -> Pipeline:
+    """Two metres straight on, of which odometry feels three per cent less."""
+    config = load_config()
+    autonomy = replace(config.autonomy, localisation=localisation)
+    pipeline = Pipeline(autonomy, config.exploration, config.robot.radius_m)
+    for step, x in enumerate(np.arange(0.0, 2.01, 0.25)):
+        stamp = 0.1 * step  # no gap in odometry
+        pipeline.control(Odometry(stamp, Pose(0.97 * float(x), 0.0, 0.0), STANDSTILL))
+        scan = sweep(ROOMS, Pose(float(x) - 1.5, 0.0, 0.0), field_of_view=LASER_270)
+        pipeline.perceive(replace(scan, stamp=stamp, time_increment=0.0))
+    return pipeline
+
+
+def test_as_published_odometry_alone_tells_the_way_between_vertices() -> None:
+    pipeline = driven("paper")
+    assert pipeline.keyframes[-1].local_base.x == pytest.approx(0.97 * 2.0)
+    assert pipeline.keyframes[-1].local_base.y == 0.0
+
+
+def test_walls_tell_it_better() -> None:
+    assert driven("full").keyframes[-1].local_base.x == pytest.approx(2.0, abs=0.03)
