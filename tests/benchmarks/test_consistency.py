@@ -1,0 +1,47 @@
+"""The measure of consistency against errors that are drawn from their covariances."""
+
+import numpy as np
+import pytest
+
+from benchmarks.consistency import Row, _mean_nees, summary
+
+
+def drawn(scale: float, size: int) -> float:
+    """The mean NEES of errors that are `scale` times as large as their covariance says."""
+    rng = np.random.default_rng(size)
+    root = rng.normal(size=(size, size))
+    covariance = root @ root.T + 0.1 * np.eye(size)
+    errors = scale * rng.multivariate_normal(np.zeros(size), covariance, 20_000)
+    found = _mean_nees([(error, covariance) for error in errors])
+    assert found is not None
+    return found
+
+
+@pytest.mark.parametrize("size", [2, 3])
+def test_honest_errors_have_as_much_nees_as_degrees_of_freedom(size: int) -> None:
+    assert drawn(1.0, size) == pytest.approx(size, rel=0.03)
+    assert drawn(3.0, size) == pytest.approx(9 * size, rel=0.03)
+
+
+def test_nothing_seen_has_no_nees() -> None:
+    assert _mean_nees([]) is None
+
+
+def test_the_summary_counts_what_all_runs_did_wrong_and_gives_the_band() -> None:
+    """100 runs of 2 degrees of freedom: chi-square with 200, 162.7 to 241.1 in 95 %."""
+    row: Row = {
+        "name": "a",
+        "odometry": "worn",
+        "closures": 3,
+        "wrong": 1,
+        "twice": 2,
+        "vertex_rmse_m": 0.1,
+        "end_error_m": 0.2,
+        "pose_nees": 3.0,
+        "vertex_nees": 2.0,
+        "filter_vertex_nees": None,
+        "closure_nees": None,
+    }
+    said = "\n".join(summary([row] * 100))
+    assert "band 1.63 to 2.41" in said
+    assert "closures 300, wrong 100, vertices twice 200" in said
