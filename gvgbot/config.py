@@ -6,6 +6,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Literal
 
+from gvgbot.autonomy.localisation import Localisation
 from gvgbot.autonomy.mission import ExplorationConfig
 from gvgbot.autonomy.pipeline import AutonomyConfig
 from gvgbot.drivers.hokuyo.driver import HokuyoConfig
@@ -69,6 +70,7 @@ class Config:
     twin: TwinConfig = field(default_factory=TwinConfig)
     autonomy: AutonomyConfig = field(default_factory=AutonomyConfig)
     exploration: ExplorationConfig = field(default_factory=ExplorationConfig)
+    localisation: Localisation = "full"  # paper: odometry between vertices, as it was published
     service: ServiceConfig = field(default_factory=ServiceConfig)
     telemetry: TelemetryConfig = field(default_factory=TelemetryConfig)
     recording: RecordingConfig = field(default_factory=RecordingConfig)

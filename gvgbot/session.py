@@ -49,7 +49,11 @@ class Session:
     ) -> None:
         self.config, self.directory, self.place = config, directory, place
         self.pipeline = Pipeline(
-            config.autonomy, config.exploration, config.robot.radius_m, led=led
+            config.autonomy,
+            config.exploration,
+            config.robot.radius_m,
+            led=led,
+            localisation=config.localisation,
         )
         self.journey = Journey(period=0.0) if led else Journey()
         self.title = config.robot.name if place is None else place.world.name  # of the picture

@@ -1,6 +1,7 @@
 """The base in the local frame: odometry, corrected by laying each scan onto the local map."""
 
 import math
+from typing import Literal
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
@@ -32,6 +33,10 @@ _SLIPPING = 25.0  # times the covariance of odometry, when the wheels slip
 _LOST = np.diag([0.5**2, 0.5**2, 0.05**2])  # of a base that nobody heard for a while
 _MOST_SHARED = 100.0  # scans that a wall can be the mean of
 _PER_M = np.diag([0.004**2, 0.004**2, 0.0001**2])  # per metre: what cells do to walls
+
+# full: scans are matched, and vertices are poses. paper: odometry alone between vertices, and a
+# vertex seen again corrects by its position only, as the method was published
+Localisation = Literal["full", "paper"]
 
 
 class LocalMaps:

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from gvgbot.autonomy.gvg.local_map import LocalMapConfig
 from gvgbot.autonomy.gvg.reduction import ReductionConfig, reduce_graph
 from gvgbot.autonomy.gvg.voronoi import fine_graph
 from gvgbot.autonomy.hazards import HazardConfig, Hazards
-from gvgbot.autonomy.localisation import LocalMaps
+from gvgbot.autonomy.localisation import Localisation, LocalMaps
 from gvgbot.autonomy.mapping import Mapper, MappingConfig
 from gvgbot.autonomy.mission import Drive, ExplorationConfig, LookAround, Mission, Order, Stand
 from gvgbot.autonomy.newcomers import Newcomers, NewcomersConfig
@@ -76,9 +76,6 @@ class AutonomyConfig:
     scan_matching: ScanMatchingConfig = field(default_factory=ScanMatchingConfig)
     odometry_noise: OdometryNoise = field(default_factory=OdometryNoise)
     passage_margin_m: Annotated[float, Range(0.0, 0.5)] = 0.05  # beyond the radius, on each side
-    # full: scans are matched, and vertices are poses. paper: odometry alone between vertices, and
-    # a vertex seen again corrects by its position only, as the method was published
-    localisation: Literal["full", "paper"] = "full"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,6 +107,7 @@ class Pipeline:
         robot_radius: float,
         *,
         led: bool = False,
+        localisation: Localisation = "full",
     ) -> None:
         """`led` if somebody else drives: it only learns, and its twists mean nothing."""
         self._config, self._radius, self.led = config, robot_radius, led
@@ -119,8 +117,9 @@ class Pipeline:
             config.recognition,
             config.scan_matching,
             drive_dead_ends=exploration.drive_dead_ends,
-            by_position=config.localisation == "paper",
+            by_position=localisation == "paper",
         )
+        self._follow = self._maps.trust if localisation == "paper" else self._maps.match
         self.mission = Mission(exploration, self.mapper)
         self.errands = Errands(
             self.mission, self.mapper, exploration, robot_radius + _ROOM_BESIDE_EDGES_M
@@ -267,9 +266,7 @@ class Pipeline:
         noise = self._config.odometry_noise.covariance(motion, duration)
         is_doubted, self.errands.is_lost = self.errands.is_lost, False
         lost = self._was_lifted or self._odometry.has_gap_since(self._last.stamp)
-        by_odometry = self._config.localisation == "paper"
-        follow = self._maps.trust if by_odometry else self._maps.match
-        match = self._maps.find if lost else follow
+        match = self._maps.find if lost else self._follow
         if is_doubted:
             match = partial(self._maps.find, is_doubted=True)
         if self._was_lifted or is_doubted:

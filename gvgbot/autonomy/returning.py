@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 from gvgbot.autonomy.control.reflexes import Felt
 from gvgbot.autonomy.estimate import Estimate, smoothed
 from gvgbot.autonomy.events import Event, Finished, Recovery
+from gvgbot.autonomy.localisation import Localisation
 from gvgbot.autonomy.memory import Growth, Memory, recall
 from gvgbot.autonomy.mission import ExplorationConfig
 from gvgbot.autonomy.pipeline import AutonomyConfig, Pipeline, Step
@@ -42,11 +43,15 @@ class ReturningPipeline(Pipeline):
         memory: Memory,
         past: list[Growth],
         is_vouched: Callable[[], bool],
+        *,
+        localisation: Localisation = "full",
     ) -> None:
         """`is_vouched` tells, once the base is heard, whether it counted on all the time."""
-        super().__init__(config, exploration, robot_radius)
+        super().__init__(config, exploration, robot_radius, localisation=localisation)
         recall(self, memory, past)
-        self._new_mind = partial(Pipeline, config, exploration, robot_radius)
+        self._new_mind = partial(
+            Pipeline, config, exploration, robot_radius, localisation=localisation
+        )
         self._is_vouched = is_vouched
         self._matching = config.scan_matching
         self._is_back = not self.keyframes

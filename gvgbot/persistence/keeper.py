@@ -66,6 +66,7 @@ class Keeper:
             saved.memory,
             saved.past,
             self._is_vouched,
+            localisation=config.localisation,
         )
         if session.config.service.resume == "paused":
             session.pipeline.errands.is_paused = True

@@ -1,11 +1,11 @@
 """Localisation as published, beside the full one."""
 
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 import pytest
 
+from gvgbot.autonomy.localisation import Localisation
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.config import load_config
 from gvgbot.geometry import STANDSTILL, Pose
@@ -15,11 +15,12 @@ from tests.unit.autonomy.sights import LASER_270, carved, sweep
 ROOMS = carved([(-4.0, -1.0, 4.0, 1.0), (0.0, -1.0, 2.0, 4.0)])
 
 
-def driven(localisation: Literal["full", "paper"]) -> Pipeline:
+def driven(localisation: Localisation) -> Pipeline:
     """Two metres straight on, of which odometry feels three per cent less."""
     config = load_config()
-    autonomy = replace(config.autonomy, localisation=localisation)
-    pipeline = Pipeline(autonomy, config.exploration, config.robot.radius_m)
+    pipeline = Pipeline(
+        config.autonomy, config.exploration, config.robot.radius_m, localisation=localisation
+    )
     for step, x in enumerate(np.arange(0.0, 2.01, 0.25)):
         stamp = 0.1 * step  # no gap in odometry
         pipeline.control(Odometry(stamp, Pose(0.97 * float(x), 0.0, 0.0), STANDSTILL))
