@@ -4,6 +4,7 @@ python -m docs.make_cli
 """
 
 import argparse
+import textwrap
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from docs.source import table
 from gvgbot.cli import _parser
 
 PAGE = Path(__file__).parent / "reference" / "cli.md"
+GLUE = "\0"  # stands for a blank at which a line must not be broken
 HEAD = """\
 # Command line
 
@@ -62,11 +64,16 @@ def _arguments(parser: argparse.ArgumentParser) -> list[argparse.Action]:
 
 def _usage(parser: argparse.ArgumentParser) -> str:
     if parser.usage is not None:
-        return (parser.usage % {"prog": parser.prog}).replace("[-h] ", "")
+        return (
+            (parser.usage % {"prog": parser.prog}).replace("[-h] ", "").replace("] ", "]\n    ", 1)
+        )
     parts = [_form(action).strip("`") for action in _arguments(parser)]
     is_free = [action.required for action in _arguments(parser)]
     words = (part if must else f"[{part}]" for part, must in zip(parts, is_free, strict=True))
-    return " ".join([parser.prog, *words])
+    joined = " ".join(
+        [parser.prog.replace(" ", GLUE), *(word.replace(" ", GLUE) for word in words)]
+    )
+    return textwrap.fill(joined, 76, subsequent_indent="    ").replace(GLUE, " ")
 
 
 def _form(action: argparse.Action) -> str:

@@ -45,6 +45,7 @@ UNITS = {
     "rad_per_sqrt_m": "rad/√m",
     "rad_per_sqrt_s": "rad/√s",
 }
+TOP = "Top level"  # heading of the keys that are in no section
 HEAD = """\
 # Configuration
 
@@ -126,9 +127,9 @@ def _text(section: Section) -> str:
         for key in section.keys
     ]
     about = re.sub(r"\s*\n\s*", " ", inspect.getdoc(section.cls) or "")
-    return (
-        f"## `{section.name}`\n\n{about}\n\n{table(('key', 'default', 'allowed', 'meaning'), rows)}"
-    )
+    heading = f"`{section.name}`" if section.name else TOP
+    keys = table(("key", "default", "allowed", "meaning"), rows)
+    return f"## {heading}\n\n{about}\n\n{keys}"
 
 
 def _shown(value: Any) -> str:

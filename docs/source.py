@@ -1,8 +1,10 @@
 """What the reference pages take from the source: the fields of classes with their comments."""
 
 import ast
+import html
 import inspect
 import io
+import re
 import textwrap
 import tokenize
 from collections.abc import Iterable
@@ -45,9 +47,13 @@ def _comment(part: ast.AnnAssign, comments: dict[int, str], alone: set[int]) -> 
 
 
 def table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
-    """A table in Markdown; a bar within a cell is escaped."""
-    head = tuple(head)
-    lines = [head, ["---"] * len(head), *rows]
-    lines[2:] = [[cell.replace("|", "\\|") for cell in row] for row in lines[2:]]
-    bars = [f"|{'|'.join(row)}|" if row is lines[1] else f"| {' | '.join(row)} |" for row in lines]
-    return "\n".join(bars) + "\n"
+    """A table in Markdown."""
+    names = tuple(head)
+    first, *others = (f"| {' | '.join(map(_cell, row))} |\n" for row in (names, *rows))
+    return "".join([first, f"|{'---|' * len(names)}\n", *others])
+
+
+def _cell(text: str) -> str:
+    """A text whose bars do not end the cell, in code neither."""
+    text = re.sub(r"`([^`]*\|[^`]*)`", lambda m: f"<code>{html.escape(m[1])}</code>", text)
+    return text.replace("|", "&#124;")

@@ -24,10 +24,10 @@ def rows_of(module: ModuleType) -> dict[str, list[list[str]]]:
     """The rows of the table below each heading of a page, without the head."""
     text = module.PAGE.read_text(encoding="utf-8")
     found = {}
-    for section in text.split("\n## `")[1:]:
+    for section in text.split("\n## ")[1:]:
         lines = [line for line in section.splitlines() if line.startswith("| ")]
-        cells = [re.split(r" (?<!\\)\| ", line[2:-2].strip()) for line in lines[1:]]
-        found[section.partition("`")[0]] = cells
+        cells = [line[2:-2].split(" | ") for line in lines[1:]]
+        found[section.splitlines()[0].strip("`")] = cells
     return found
 
 
@@ -39,7 +39,7 @@ def keys_of(tree: object, prefix: str = "") -> list[str]:
 
 
 KEYS = {
-    f"{section}.{row[0].strip('`')}": row[1:]
+    f"{section}.{row[0].strip('`')}".removeprefix("Top level."): row[1:]
     for section, rows in rows_of(make_configuration).items()
     for row in rows
 }
@@ -95,7 +95,9 @@ def test_the_options_of_a_command_are_those_of_its_help(
     with pytest.raises(SystemExit):
         main([*command.split()[1:], "--help"])
     told = set(re.findall(r"^  (--[\w-]+)", capsys.readouterr().out, re.MULTILINE))
-    listed = {row[0].strip("`").split()[0] for row in rows_of(make_cli)[command]}
+    listed = {
+        re.split(r"[`<> ]+", row[0])[1 + ("<" in row[0])] for row in rows_of(make_cli)[command]
+    }
     assert {option for option in listed if option.startswith("-")} == told
 
 
