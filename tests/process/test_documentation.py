@@ -1,0 +1,106 @@
+"""What the documentation tells people to type works.
+
+Every `gvgbot` command in a shell block must be one that the program understands. The blocks below a
+line `<!-- run -->` are carried out, page by page, in an empty directory.
+"""
+
+import json
+import os
+import re
+import shlex
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from gvgbot.cli import _parser
+from gvgbot.config import load_config, packaged
+
+ROOT = Path(__file__).parents[2]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+BLOCK = re.compile(
+    r"(?P<run><!-- run -->\n)?^```(?P<language>\w+)\n(?P<text>.*?)^```$", re.M | re.S
+)
+EARLIER = ("sudo", "nice", ".venv/bin/")
+
+
+def blocks(page: Path) -> list[re.Match[str]]:
+    return list(BLOCK.finditer(page.read_text(encoding="utf-8")))
+
+
+def commands(text: str) -> Iterator[list[str]]:
+    """The words behind `gvgbot` of each such command in a shell block."""
+    for line in text.replace("\\\n", " ").splitlines():
+        words = shlex.split(line, comments=True)
+        while words and words[0] in EARLIER:
+            words = words[1:]
+        if words and Path(words[0]).name == "gvgbot":
+            yield words[1:]
+
+
+COMMANDS = [
+    pytest.param(words, id=f"{page.stem}: gvgbot {' '.join(words)}")
+    for page in PAGES
+    for block in blocks(page)
+    if block["language"] == "sh"
+    for words in commands(block["text"])
+]
+WITH_SAMPLES = [page for page in PAGES if any(block["run"] for block in blocks(page))]
+
+
+@pytest.mark.parametrize("words", COMMANDS)
+def test_the_program_understands_a_command(words: list[str]) -> None:
+    if words == ["--version"]:
+        return
+    options = _parser().parse_args(words)
+    config = getattr(options, "config", None)
+    known = config if config is not None and packaged(config).exists() else None
+    load_config(known, getattr(options, "overrides", []))
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_python_samples_compile(page: Path) -> None:
+    for block in blocks(page):
+        text = block["text"]
+        if block["language"] == "python" and not re.match(r"\w+\(.*-> ", text):  # no signature
+            compile(text, str(page), "exec")
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(120)
+@pytest.mark.parametrize("page", WITH_SAMPLES, ids=lambda page: page.stem)
+def test_marked_samples_run(page: Path, tmp_path: Path) -> None:
+    for block in blocks(page):
+        if block["run"]:
+            program = {"sh": ["sh", "-e"], "python": [sys.executable, "-"]}[block["language"]]
+            done = carry_out(program, tmp_path, block["text"])
+            assert done.returncode == 0, f"{block['text']}\n{done.stderr}"
+
+
+@pytest.mark.slow
+def test_every_file_of_a_run_is_described(tmp_path: Path) -> None:
+    page = (ROOT / "docs" / "reference" / "run-directory.md").read_text(encoding="utf-8")
+    told = set(re.findall(r"^\| (.*?) \|", page, re.M))
+    names = {name for cell in told for name in re.findall(r"`([\w.-]+)`", cell)}
+    program = "gvgbot explore --world ring --set twin.time_limit_s=3 --out run"
+    assert carry_out(["sh"], tmp_path, program).returncode == 1  # there was no time to finish
+    files = {path.name for path in (tmp_path / "run").iterdir()}
+    assert "map.geojson" in files
+    assert files - names == set()
+    assert set(json.loads((tmp_path / "run" / "summary.json").read_text())) - names == set()
+
+
+def carry_out(program: list[str], where: Path, text: str) -> "subprocess.CompletedProcess[str]":
+    """What came of a text that a program reads, with `gvgbot` among the commands."""
+    path = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
+    return subprocess.run(
+        program,
+        input=text,
+        capture_output=True,
+        check=False,
+        cwd=where,
+        env={**os.environ, "PATH": path, "PYTHONPATH": str(ROOT)},
+        text=True,
+    )
