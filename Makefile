@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 SHELL := /bin/sh
 
-.PHONY: help explore test check static quick bench bench-explore fuzz clean
+.PHONY: help explore test check static quick bench bench-explore fuzz docs pages clean
 
 help:
 	@echo "make explore   a simulated robot maps the built-in office; prints where the map is"
@@ -11,6 +11,7 @@ help:
 	@echo "make check     format, lint, types, import rules, tests"
 	@echo "make quick     the tests that take under a second each"
 	@echo "make bench     time the inner loops and the drivers, targets beside"
+	@echo "make docs      this documentation as a site in site/; make pages renews its generated pages"
 	@echo "make fuzz      throw mutated bytes at the parsers for a minute each"
 
 explore: .venv/core
@@ -42,8 +43,16 @@ fuzz: .venv/fuzz
 	@for file in tests/fuzz/fuzz_*.py; do \
 		$(BIN)/python -m "tests.fuzz.$$(basename "$$file" .py)" -max_total_time=$(FUZZ_SECONDS) -rss_limit_mb=1024 -timeout=10 || exit 1; done
 
+docs: .venv/docs
+	@$(BIN)/pytest -q tests/unit/test_reference_pages.py
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	@echo "site: site/index.html"
+
+pages: .venv/dev
+	@for page in docs/make_*.py; do $(BIN)/python -m "docs.$$(basename "$$page" .py)" || exit 1; done
+
 clean:
-	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf .venv site .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 
 # The stamps: what is installed for running, and for developing. A changed pyproject.toml renews them.
 .venv/core: pyproject.toml
@@ -58,6 +67,10 @@ clean:
 
 .venv/fuzz: .venv/dev
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[fuzz]'
+	@touch $@
+
+.venv/docs: .venv/dev
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
 	@touch $@
 
 define make_venv
