@@ -271,7 +271,7 @@ def _add_map(commands: "argparse._SubParsersAction[_Parser]") -> None:
     maps = commands.add_parser(
         "map",
         help="pictures and facts of a saved map",
-        description="Look at the map that a run left in its directory.",
+        description="Look at the maps that runs left in their directories.",
         epilog="example: gvgbot map show runs/office-1 --animate",
     )
     actions = maps.add_subparsers(title="commands", metavar="COMMAND", required=True)
@@ -300,6 +300,16 @@ def _add_map(commands: "argparse._SubParsersAction[_Parser]") -> None:
     )
     info.add_argument("run", type=Path, metavar="RUN_DIR", help="the directory of a run")
     info.set_defaults(command=_map_info)
+    export = actions.add_parser(
+        "export",
+        help="the map in another format",
+        description="Write the map of a run in the format that the file's name ends with: .svg and "
+        ".pdf to print, .png, .graphml for graph programs, .geojson for the Nav2 route server.",
+        epilog="example: gvgbot map export runs/office-1 office.pdf",
+    )
+    export.add_argument("run", type=Path, metavar="RUN_DIR", help="the directory of a run")
+    export.add_argument("file", type=Path, metavar="FILE", help="what to write")
+    export.set_defaults(command=_map_export)
 
 
 def _add_replay(commands: "argparse._SubParsersAction[_Parser]") -> None:
@@ -489,6 +499,14 @@ def _map_info(options: argparse.Namespace) -> int:
 
     for line in facts(SavedRun.read(options.run)):
         _say(line)
+    return 0
+
+
+def _map_export(options: argparse.Namespace) -> int:
+    from gvgbot.maps.export import export
+
+    export(options.run, options.file)
+    _say(f"written: {options.file}")
     return 0
 
 

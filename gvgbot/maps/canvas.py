@@ -40,7 +40,8 @@ class Ink(IntEnum):
     ORANGE = auto()
 
 
-_COLOURS: dict[Ink, Colour] = {
+# red, green, blue
+COLOURS: dict[Ink, Colour] = {
     Ink.UNKNOWN: (238, 238, 238),
     Ink.WHITE: (255, 255, 255),
     Ink.BLACK: (20, 20, 20),
@@ -59,7 +60,7 @@ class Canvas:
 
     def __init__(self, width: int, height: int) -> None:
         self._large = Image.new("P", (width * OVERSAMPLING, height * OVERSAMPLING), Ink.WHITE)
-        self._large.putpalette(_palette())
+        self._large.putpalette(palette())
         self._pen = ImageDraw.Draw(self._large)
         self._texts: list[tuple[Point, str, int, Ink, str]] = []
 
@@ -132,11 +133,11 @@ class Canvas:
             pen.text(
                 at,
                 words,
-                _COLOURS[ink],
+                COLOURS[ink],
                 _font(size),
                 anchor,
                 stroke_width=2,
-                stroke_fill=_COLOURS[Ink.WHITE],
+                stroke_fill=COLOURS[Ink.WHITE],
             )
         return image
 
@@ -181,7 +182,7 @@ def _code(colours: NDArray[np.integer]) -> NDArray[np.int64]:
 def _blended_palette() -> list[Colour]:
     """At most 256 colours, as red, green, blue."""
     greys = [(level, level, level) for level in range(0, 256, 5)]
-    inks = [_COLOURS[ink] for ink in Ink]
+    inks = [COLOURS[ink] for ink in Ink]
     blends = [_blend(*two, share) for two in combinations(inks, 2) for share in (0.25, 0.5, 0.75)]
     return [*inks, *greys, *blends]
 
@@ -202,9 +203,10 @@ def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
     return ImageFont.load_default(size)
 
 
-def _palette() -> list[int]:
+def palette() -> list[int]:
+    """Red, green, blue of every shade and ink, one after the other."""
     shades = [(255 - round(2.2 * percent),) * 3 for percent in range(Ink.UNKNOWN)]
-    return [level for colour in [*shades, *(_COLOURS[ink] for ink in Ink)] for level in colour]
+    return [level for colour in [*shades, *(COLOURS[ink] for ink in Ink)] for level in colour]
 
 
 def _corners(corner: Point, size: Point) -> list[float]:

@@ -8,7 +8,8 @@ import numpy as np
 
 from gvgbot.geometry import Array
 from gvgbot.maps import symbols
-from gvgbot.maps.canvas import Canvas, Ink, Point, text_width
+from gvgbot.maps.canvas import Ink, Point, text_width
+from gvgbot.maps.surface import Surface
 
 TEXT_SIZE = 20
 _ROW = 36.0
@@ -23,7 +24,7 @@ class Entry:
     """A sign, drawn about a point, and what it means."""
 
     label: str
-    draw: Callable[[Canvas, Point], None]
+    draw: Callable[[Surface, Point], None]
 
     @property
     def width(self) -> float:
@@ -31,8 +32,8 @@ class Entry:
         return _SIGN + text_width(self.label, TEXT_SIZE) + _GAP
 
 
-def _stroke(draw: Callable[[Canvas, Array], None]) -> Callable[[Canvas, Point], None]:
-    def sign(canvas: Canvas, at: Point) -> None:
+def _stroke(draw: Callable[[Surface, Array], None]) -> Callable[[Surface, Point], None]:
+    def sign(canvas: Surface, at: Point) -> None:
         draw(canvas, np.array([[at[0] - 17.0, at[1]], [at[0] + 17.0, at[1]]]))
 
     return sign
@@ -71,7 +72,7 @@ class Legend:
         """Pixels."""
         return _ROW * (len(self.rows) + 1)
 
-    def draw(self, canvas: Canvas, corner: Point, width: float) -> None:
+    def draw(self, canvas: Surface, corner: Point, width: float) -> None:
         """Draw it with its upper left at the corner, the scale bar to the right of the caption."""
         left, top = corner
         canvas.text((left, top + _ROW / 2), self.caption, TEXT_SIZE)
@@ -79,14 +80,14 @@ class Legend:
         for number, row in enumerate(self.rows, start=1):
             self._draw_row(canvas, row, (left, top + _ROW * (number + 0.5)))
 
-    def _draw_row(self, canvas: Canvas, row: Sequence[Entry], at: Point) -> None:
+    def _draw_row(self, canvas: Surface, row: Sequence[Entry], at: Point) -> None:
         x, y = at
         for entry in row:
             entry.draw(canvas, (x + _SIGN / 2 - 6.0, y))
             canvas.text((x + _SIGN, y), entry.label, TEXT_SIZE)
             x += entry.width
 
-    def _draw_bar(self, canvas: Canvas, end: Point) -> None:
+    def _draw_bar(self, canvas: Surface, end: Point) -> None:
         """Four alternating fields that end at a point, and their length before them."""
         right, y = end
         left, field = right - self.bar_width, self.bar_width / 4

@@ -1,7 +1,8 @@
 """The map as a picture that could stand in a paper: grid, graph, uncertainty and trajectories."""
 
 import math
-from collections.abc import Iterator, Sized
+from collections.abc import Callable, Iterator, Sized
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from gvgbot.maps import legend, symbols
 from gvgbot.maps.canvas import Canvas, Ink, Point
 from gvgbot.maps.occupancy import UNKNOWN, OccupancyGrid
 from gvgbot.maps.route_graph import MapVertex, RouteGraph
+from gvgbot.maps.surface import Surface
 from gvgbot.maps.trajectory import Trajectory
 from gvgbot.maps.view import Box, View, box_around, pair
 
@@ -19,6 +21,8 @@ _MARGIN = 28  # pixels around everything
 _ID_SIZE = 16  # pixels
 _SIGMAS = 3.0  # of the ellipses
 _ASTRAY = 0.15  # of the map's size: how far odometry and ellipses may leave it uncut
+
+S = TypeVar("S", bound=Surface)
 
 _NO_POINTS = np.empty((0, 2))
 
@@ -32,6 +36,21 @@ def draw_map(
     title: str = "",
 ) -> bytes:
     """A PNG of all that is given, in the map frame with x to the right, cut to what is known."""
+    return draw_map_on(
+        Canvas, graph, grid=grid, estimate=estimate, odometry=odometry, title=title
+    ).png()
+
+
+def draw_map_on(
+    sheet: Callable[[int, int], S],
+    graph: RouteGraph,
+    *,
+    grid: OccupancyGrid | None,
+    estimate: Trajectory | None,
+    odometry: Trajectory | None,
+    title: str,
+) -> S:
+    """The same, on a new sheet of the kind that is given."""
     path = _NO_POINTS if estimate is None else estimate.positions
     raw = _NO_POINTS if odometry is None else odometry.positions
     box = _content(graph, grid, path, raw)
@@ -41,7 +60,7 @@ def draw_map(
         _entries(graph, path, raw), _caption(graph, title), width=width, scale=view.scale
     )
     bottom = view.corner[1] + view.size[1]
-    canvas = Canvas(round(width) + 2 * _MARGIN, round(bottom + signs.height) + _MARGIN)
+    canvas = sheet(round(width) + 2 * _MARGIN, round(bottom + signs.height) + _MARGIN)
     draw_ground(canvas, view, grid)
     symbols.draw_odometry(canvas, view.pixels(raw))
     _draw_graph(canvas, view, graph, path)
@@ -49,7 +68,7 @@ def draw_map(
         symbols.draw_start(canvas, view.pixel(path[0]), float(estimate.poses[0, 2]))
     canvas.frame(pair(view.corner), pair(view.size))
     signs.draw(canvas, (_MARGIN, bottom + _MARGIN / 2), width)
-    return canvas.png()
+    return canvas
 
 
 def _content(graph: RouteGraph, grid: OccupancyGrid | None, path: Array, raw: Array) -> Box:
@@ -77,7 +96,7 @@ def known_corners(grid: OccupancyGrid) -> Array:
     return np.asarray(grid.origin) + cells * grid.resolution_m
 
 
-def draw_ground(canvas: Canvas, view: View, grid: OccupancyGrid | None) -> None:
+def draw_ground(canvas: Surface, view: View, grid: OccupancyGrid | None) -> None:
     """Unknown everywhere, and over it the occupancy grid."""
     canvas.box(pair(view.corner), pair(view.size), fill=Ink.UNKNOWN)
     if grid is None:
@@ -94,7 +113,7 @@ def _shades(grid: OccupancyGrid) -> NDArray[np.uint8]:
     return np.where(grid.cells[::-1] == UNKNOWN, Ink.UNKNOWN, percent).astype(np.uint8)
 
 
-def _draw_graph(canvas: Canvas, view: View, graph: RouteGraph, path: Array) -> None:
+def _draw_graph(canvas: Surface, view: View, graph: RouteGraph, path: Array) -> None:
     """Edges, then the path over them, then the vertices with their ids on top."""
     for edge in graph.edges:
         symbols.draw_edge(canvas, view.pixels(edge.polyline))
@@ -108,7 +127,7 @@ def _draw_graph(canvas: Canvas, view: View, graph: RouteGraph, path: Array) -> N
         _draw_vertex(canvas, vertex, view.pixel(vertex.position))
 
 
-def _draw_vertex(canvas: Canvas, vertex: MapVertex, at: Point) -> None:
+def _draw_vertex(canvas: Surface, vertex: MapVertex, at: Point) -> None:
     """The vertex, and its id where no edge leaves it."""
     draw = symbols.draw_meetpoint if vertex.kind == "meetpoint" else symbols.draw_endpoint
     draw(canvas, at)

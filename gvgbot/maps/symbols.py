@@ -5,7 +5,8 @@ import math
 import numpy as np
 
 from gvgbot.geometry import Array
-from gvgbot.maps.canvas import Canvas, Ink, Point
+from gvgbot.maps.canvas import Ink, Point
+from gvgbot.maps.surface import Surface
 
 VERTEX_RADIUS = 6.0
 _EDGE_WIDTH = 5.5
@@ -14,40 +15,40 @@ _CIRCLE = np.linspace(0.0, math.tau, 60, endpoint=False)
 _UNIT_CIRCLE = np.column_stack([np.cos(_CIRCLE), np.sin(_CIRCLE)])
 
 
-def draw_edge(canvas: Canvas, points: Array) -> None:
+def draw_edge(canvas: Surface, points: Array) -> None:
     """A GVG edge."""
     canvas.line(points, Ink.SKY, _EDGE_WIDTH)
 
 
-def draw_estimate(canvas: Canvas, points: Array) -> None:
+def draw_estimate(canvas: Surface, points: Array) -> None:
     """The trajectory as estimated."""
     canvas.line(_thinned(points), Ink.GREEN, 2.0)
 
 
-def draw_odometry(canvas: Canvas, points: Array) -> None:
+def draw_odometry(canvas: Surface, points: Array) -> None:
     """The trajectory by odometry alone."""
     canvas.line(_thinned(points), Ink.RED, 1.4)
 
 
-def draw_meetpoint(canvas: Canvas, at: Point) -> None:
+def draw_meetpoint(canvas: Surface, at: Point) -> None:
     """A filled disc."""
     canvas.disc(at, VERTEX_RADIUS + 1.0, fill=Ink.WHITE)
     canvas.disc(at, VERTEX_RADIUS, fill=Ink.BLUE)
 
 
-def draw_endpoint(canvas: Canvas, at: Point) -> None:
+def draw_endpoint(canvas: Surface, at: Point) -> None:
     """A hollow disc."""
     canvas.disc(at, VERTEX_RADIUS, fill=Ink.BLUE)
     canvas.disc(at, VERTEX_RADIUS - 2.0, fill=Ink.WHITE)
 
 
-def draw_ellipse(canvas: Canvas, at: Point, axes: Array) -> None:
+def draw_ellipse(canvas: Surface, at: Point, axes: Array) -> None:
     """An ellipse whose two half axes are the columns of `axes` (2, 2)."""
     points = np.asarray(at) + _UNIT_CIRCLE @ axes.T
     canvas.polygon(points, fill=None, outline=Ink.PURPLE, width=1.7)
 
 
-def draw_frontier(canvas: Canvas, at: Point, bearing: float) -> None:
+def draw_frontier(canvas: Surface, at: Point, bearing: float) -> None:
     """An arrow from a vertex; the bearing is as on the map, anticlockwise from the right."""
     ahead = np.array([math.cos(bearing), -math.sin(bearing)])
     aside = np.array([-ahead[1], ahead[0]])
@@ -58,7 +59,7 @@ def draw_frontier(canvas: Canvas, at: Point, bearing: float) -> None:
     canvas.polygon(head, fill=Ink.ORANGE, outline=Ink.ORANGE, width=1.0)
 
 
-def draw_start(canvas: Canvas, at: Point, heading: float) -> None:
+def draw_start(canvas: Surface, at: Point, heading: float) -> None:
     """A kite that points where the robot looked; the heading is anticlockwise from the right."""
     turns = heading + np.array([0.0, 2.5, math.pi, -2.5])
     radii = np.array([[15.0], [12.0], [5.0], [12.0]])
@@ -66,7 +67,7 @@ def draw_start(canvas: Canvas, at: Point, heading: float) -> None:
     canvas.polygon(points, fill=Ink.BLACK, outline=Ink.WHITE, width=1.3)
 
 
-def draw_robot(canvas: Canvas, at: Point, heading: float) -> None:
+def draw_robot(canvas: Surface, at: Point, heading: float) -> None:
     """A round robot with its nose ahead; the heading is anticlockwise from the right."""
     canvas.disc(at, 11.0, fill=Ink.WHITE)
     canvas.disc(at, 9.5, fill=Ink.BLACK)

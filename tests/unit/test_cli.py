@@ -120,7 +120,9 @@ def test_the_exit_status_of_a_command_is_passed_on(status: int) -> None:
     assert status_of(lambda: status) == status
 
 
-@pytest.mark.parametrize("command", ["explore", "run", "map show", "map info", "replay"])
+@pytest.mark.parametrize(
+    "command", ["explore", "run", "map show", "map info", "map export", "replay"]
+)
 def test_every_command_explains_itself_with_an_example(command: str, capsys: Captured) -> None:
     with pytest.raises(SystemExit) as caught:
         main([*command.split(), "--help"])
