@@ -45,7 +45,7 @@ fuzz: .venv/fuzz
 
 docs: .venv/docs
 	@$(BIN)/pytest -q tests/unit/test_reference_pages.py
-	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 	@echo "site: site/index.html"
 
 pages: .venv/dev

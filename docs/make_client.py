@@ -33,6 +33,7 @@ Everything here works with `with` and `for` in a plain program, and with `async 
 and `await` in one that has an event loop. Values that a robot sends (`State`, `Map` and others)
 are listed with their fields under [Topics](../topics.md).
 """
+WIDEST = 100  # of a signature in one line
 INTERNAL = {"put"}  # public for this package only
 CLASSES = (client.Robot, client.Asking, client.Refused, client.Presence, Newest, EventStream)
 
@@ -75,13 +76,18 @@ def _described(thing: Any) -> str:
     if isinstance(thing, property):
         returns = inspect.signature(thing.fget).return_annotation  # type: ignore[arg-type]
         return f"A property: `{_short(inspect.formatannotation(returns))}`. {text}\n"
-    return f"```python\n{_short(_signature(thing))}\n```\n\n{text}\n"
+    return f"```py\n{_short(_signature(thing))}\n```\n\n{text}\n"
 
 
 def _signature(function: Callable[..., Any]) -> str:
     signature = inspect.signature(function)
     unbound = [p for name, p in signature.parameters.items() if name != "self"]
-    return f"{function.__name__}{signature.replace(parameters=unbound)}"
+    whole = f"{function.__name__}{signature.replace(parameters=unbound)}"
+    return (
+        whole
+        if len(whole) < WIDEST
+        else whole.replace("(", "(\n    ", 1).replace(", *, ", ",\n    *, ")
+    )
 
 
 def _short(text: str) -> str:

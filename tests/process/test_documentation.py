@@ -19,7 +19,7 @@ from gvgbot.cli import _parser
 from gvgbot.config import load_config, packaged
 
 ROOT = Path(__file__).parents[2]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").rglob("*.md"))]
 BLOCK = re.compile(
     r"(?P<run><!-- run -->\n)?^```(?P<language>\w+)\n(?P<text>.*?)^```$", re.M | re.S
 )
@@ -64,8 +64,14 @@ def test_the_program_understands_a_command(words: list[str]) -> None:
 def test_python_samples_compile(page: Path) -> None:
     for block in blocks(page):
         text = block["text"]
-        if block["language"] == "python" and not re.match(r"\w+\(.*-> ", text):  # no signature
+        if block["language"] == "python":
             compile(text, str(page), "exec")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_links_lead_to_files(page: Path) -> None:
+    targets = re.findall(r"\]\(([^)#:\s]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8"))
+    assert [target for target in targets if not (page.parent / target).exists()] == []
 
 
 @pytest.mark.slow
