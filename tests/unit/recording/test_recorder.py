@@ -247,7 +247,7 @@ def test_a_slow_disk_delays_nobody_and_the_gap_is_told(
             SlowDisk.may_write.set()
             while to.is_behind:
                 pass
-            record(to, 100)
+            record(to, 30)  # too little to be behind again
         assert [line["event"] for line in logged] == [
             "recording cannot keep up: messages are left out",
             "recording goes on",
@@ -255,7 +255,7 @@ def test_a_slow_disk_delays_nobody_and_the_gap_is_told(
     recording = Recording(tmp_path / "run.mcap")
     kept = len(list(recording.messages()))
     assert recording.left_out == logged[1]["left_out"] > 0
-    assert kept < 720
+    assert kept < 636
 
 
 @pytest.mark.parametrize("name", ["", "missing/run.mcap"])
