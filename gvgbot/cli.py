@@ -310,6 +310,28 @@ def _add_map(commands: "argparse._SubParsersAction[_Parser]") -> None:
     export.add_argument("run", type=Path, metavar="RUN_DIR", help="the directory of a run")
     export.add_argument("file", type=Path, metavar="FILE", help="what to write")
     export.set_defaults(command=_map_export)
+    _add_map_diff(actions)
+
+
+def _add_map_diff(actions: "argparse._SubParsersAction[_Parser]") -> None:
+    diff = actions.add_parser(
+        "diff",
+        help="how two maps of one place differ",
+        description="Lay the second map on the first, and say which vertices and edges only one of "
+        "them has, and how far apart the others are. Exits 0 if both maps have the same, 1 if not.",
+        epilog="example: gvgbot map diff runs/office-1 runs/office-2 --out both.png",
+    )
+    diff.add_argument("a", type=Path, metavar="RUN_A", help="the directory of a run")
+    diff.add_argument("b", type=Path, metavar="RUN_B", help="that of another")
+    diff.add_argument("--out", type=Path, metavar="FILE", help="a PNG of both, side by side")
+    diff.add_argument(
+        "--tolerance",
+        type=positive,
+        default=0.5,
+        metavar="M",
+        help="metres that the same vertex or edge may be apart (default: %(default)s)",
+    )
+    diff.set_defaults(command=_map_diff)
 
 
 def _add_replay(commands: "argparse._SubParsersAction[_Parser]") -> None:
@@ -348,7 +370,7 @@ def _add_replay(commands: "argparse._SubParsersAction[_Parser]") -> None:
     )
     replay.add_argument(
         "--speed",
-        type=speed,
+        type=positive,
         default=1.0,
         metavar="N",
         help="with --serve: so many times faster than life",
@@ -398,7 +420,7 @@ def tcp_port(text: str) -> int:
     return value
 
 
-def speed(text: str) -> float:
+def positive(text: str) -> float:
     """A finite number above 0. Raises ValueError."""
     value = number(text)
     if value <= 0.0:
@@ -508,6 +530,15 @@ def _map_export(options: argparse.Namespace) -> int:
     export(options.run, options.file)
     _say(f"written: {options.file}")
     return 0
+
+
+def _map_diff(options: argparse.Namespace) -> int:
+    from gvgbot.maps.diff import diff
+
+    is_equal, lines = diff(options.a, options.b, options.out, tolerance=options.tolerance)
+    for line in lines:
+        _say(line)
+    return 0 if is_equal else FAILURE
 
 
 def _replay(options: argparse.Namespace) -> int:

@@ -52,6 +52,8 @@ FRONTIER = Entry(
     "frontier left",
     lambda canvas, at: symbols.draw_frontier(canvas, (at[0] - 16.0, at[1]), 0.0),
 )
+LONE_EDGE = Entry("edge in this map only", _stroke(symbols.draw_lone_edge))
+LONE_VERTEX = Entry("vertex in this map only", symbols.draw_lone_vertex)
 WAY = replace(ESTIMATE, label="path")
 FRONTIER_NOW = replace(FRONTIER, label="frontier")
 ROBOT = Entry("robot", lambda canvas, at: symbols.draw_robot(canvas, at, 0.0))

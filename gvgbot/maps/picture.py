@@ -124,10 +124,10 @@ def _draw_graph(canvas: Surface, view: View, graph: RouteGraph, path: Array) -> 
         for bearing in vertex.frontiers:
             symbols.draw_frontier(canvas, at, bearing)
     for vertex in graph.vertices:
-        _draw_vertex(canvas, vertex, view.pixel(vertex.position))
+        draw_vertex(canvas, vertex, view.pixel(vertex.position))
 
 
-def _draw_vertex(canvas: Surface, vertex: MapVertex, at: Point) -> None:
+def draw_vertex(canvas: Surface, vertex: MapVertex, at: Point) -> None:
     """The vertex, and its id where no edge leaves it."""
     draw = symbols.draw_meetpoint if vertex.kind == "meetpoint" else symbols.draw_endpoint
     draw(canvas, at)

@@ -20,6 +20,17 @@ def draw_edge(canvas: Surface, points: Array) -> None:
     canvas.line(points, Ink.SKY, _EDGE_WIDTH)
 
 
+def draw_lone_edge(canvas: Surface, points: Array) -> None:
+    """A GVG edge that another map has not."""
+    canvas.line(points, Ink.RED, _EDGE_WIDTH + 3.0)
+
+
+def draw_lone_vertex(canvas: Surface, at: Point) -> None:
+    """A ring around a vertex that another map has not."""
+    points = np.asarray(at) + (VERTEX_RADIUS + 8.0) * _UNIT_CIRCLE
+    canvas.polygon(points, fill=None, outline=Ink.RED, width=3.5)
+
+
 def draw_estimate(canvas: Surface, points: Array) -> None:
     """The trajectory as estimated."""
     canvas.line(_thinned(points), Ink.GREEN, 2.0)

@@ -121,7 +121,7 @@ def test_the_exit_status_of_a_command_is_passed_on(status: int) -> None:
 
 
 @pytest.mark.parametrize(
-    "command", ["explore", "run", "map show", "map info", "map export", "replay"]
+    "command", ["explore", "run", "map show", "map info", "map export", "map diff", "replay"]
 )
 def test_every_command_explains_itself_with_an_example(command: str, capsys: Captured) -> None:
     with pytest.raises(SystemExit) as caught:
