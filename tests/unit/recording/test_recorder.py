@@ -117,7 +117,7 @@ def test_a_file_cut_at_any_byte_is_read_to_the_cut(tmp_path: Path) -> None:
     whole = (tmp_path / "run.mcap").read_bytes()
     cut, lengths = tmp_path / "cut.mcap", []
     rng = np.random.default_rng(7)
-    for size in [0, 1, 8, 9, 40, *sorted(rng.integers(0, len(whole), 40).tolist())]:
+    for size in [0, 1, 8, 9, 40, *sorted(rng.integers(0, len(whole), 200).tolist())]:
         cut.write_bytes(whole[:size])
         try:
             recording = Recording(cut)
@@ -132,6 +132,21 @@ def test_a_file_cut_at_any_byte_is_read_to_the_cut(tmp_path: Path) -> None:
     assert len(set(lengths)) > 3
     cut.write_bytes(whole[: len(whole) // 2])
     assert len(read(cut)) > 0.2 * len(lived)
+
+
+def test_of_several_files_the_last_may_be_cut_at_any_byte(tmp_path: Path) -> None:
+    with Recorder(config(tmp_path / "run.mcap", file_mb=0.3), ABOUT, patient=True) as to:
+        lived = record(to, 1500)
+    last = max(tmp_path.iterdir(), key=lambda path: path.stem)
+    whole = last.read_bytes()
+    last.unlink()
+    before = len(read(tmp_path / "run.mcap"))
+    rng = np.random.default_rng(11)
+    for size in rng.integers(0, len(whole), 10).tolist():
+        last.write_bytes(whole[:size])
+        found = read(tmp_path / "run.mcap")
+        assert_begins_as(found, lived)
+        assert len(found) >= before
 
 
 def test_damage_ends_a_file_and_nothing_worse(tmp_path: Path) -> None:
