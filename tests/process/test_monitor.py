@@ -1,4 +1,7 @@
-"""`gvgbot monitor` on a pseudo-terminal, read by a terminal emulator that is not ours."""
+"""`gvgbot monitor` on a pseudo-terminal, read by a terminal emulator that is not ours.
+
+With GVGBOT_PICTURES=docs/images a test leaves monitor.png there.
+"""
 
 import fcntl
 import os
@@ -12,16 +15,21 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from io import StringIO
+from pathlib import Path
 from select import select
 
 import msgspec
 import pyte
 import pytest
+from rich.console import Console
+from rich.text import Text
 
 from gvgbot import client
 from gvgbot.telemetry import Telemetry
 from gvgbot.topics import Event, Events, TelemetryConfig
 from tests.process.addresses import free_endpoint, router
+from tests.process.browser import browser, chromium
 from tests.unit.monitor.maps import a_map, vertex
 from tests.unit.test_telemetry import EXAMPLE
 
@@ -232,3 +240,51 @@ def test_a_name_or_an_address_that_cannot_be_is_one_line(arguments: tuple[str, .
     assert done.returncode == 2
     (line,) = done.stderr.splitlines()
     assert arguments[-1] in line
+
+
+# -- a picture -------------------------------------------------------------------------------------
+
+
+def styled(screen: pyte.Screen) -> Text:
+    """What is on the screen, with its colours."""
+
+    def colour(name: str) -> str:
+        return name if name.isalpha() else f"#{name}"
+
+    text = Text()
+    for row in range(screen.lines):
+        for column in range(screen.columns):
+            sign = screen.buffer[row][column]
+            words = ["bold"] * sign.bold + ["reverse"] * sign.reverse
+            text.append(sign.data, " ".join([*words, f"{colour(sign.fg)} on {colour(sign.bg)}"]))
+        text.append("\n")
+    return text
+
+
+def drawn(screen: pyte.Screen) -> str:
+    """An SVG of the screen."""
+    console = Console(record=True, width=screen.columns, file=StringIO(), color_system="truecolor")
+    console.print(styled(screen), end="")
+    return console.export_svg(title="gvgbot monitor")
+
+
+@pytest.mark.skipif("GVGBOT_PICTURES" not in os.environ, reason="no pictures are asked for")
+@pytest.mark.timeout(1200)
+def test_a_picture_for_the_guide(endpoint: str, tmp_path: Path) -> None:
+    """Takes some minutes: the robot has to have something to show."""
+    program, folder = chromium(), Path(os.environ["GVGBOT_PICTURES"])
+    assert program is not None
+    settings = ["--set", f"telemetry.listen=[{endpoint}]", "--out", str(tmp_path / "run")]
+    with (
+        subprocess.Popen([sys.executable, "-m", "gvgbot", "run", *settings]) as robot,
+        monitor("--connect", endpoint) as seat,
+    ):
+        seat.resize(100, 30)
+        while "vertices  6" not in "\n".join(seat.screen.display):
+            seat.read(1.0)
+        picture = tmp_path / "monitor.svg"
+        picture.write_text(drawn(seat.screen), encoding="utf-8")
+        robot.terminate()
+    with browser(program, tmp_path / "browser") as page:
+        page.open(picture.as_uri(), 1000, 640, phone=False, dark=True)
+        (folder / "monitor.png").write_bytes(page.png())
