@@ -84,7 +84,7 @@ def test_ten_watchers_and_a_page_cost_the_robot_no_cycle(tmp_path: Path) -> None
             for _ in range(WATCHERS)
         ]
         web, live = watching.enter_context(page(endpoint))
-        viewer = watching.enter_context(connect(live, max_size=None))
+        viewer = watching.enter_context(connect(live, max_size=None, ping_interval=None))
         topics = [newest for watcher in watchers for newest in all_topics(watcher)]
         until(lambda: all(newest() is not None for newest in topics), patience_s=PATIENCE)
         kinds = {msgspec.msgpack.decode(viewer.recv(PATIENCE, decode=False))[0] for _ in range(50)}
