@@ -325,7 +325,7 @@ def test_a_person_asks_a_running_robot_from_the_command_line(endpoint: str, tmp_
         try:
             with client.connect("sim", endpoint, patience_s=30.0) as robot:
                 for state in robot.state():
-                    if state.distance > 0.0:
+                    if state.distance > 0.3:  # it has looked around, and drives
                         break
             paused = ctl("pause")  # the only robot need not be named
             moving = ctl("sim", "goto", "999")
