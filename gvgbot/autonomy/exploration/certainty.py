@@ -55,13 +55,15 @@ class Revisiting:
 
     def next(self, graph: GvgGraph, belief: Belief, starts: list[Approach]) -> Revisit | None:
         """The vertex to visit now; None to go on exploring, or to end if all is explored."""
+        is_over = not graph.frontiers()
+        if not self._has_explored and not is_over:
+            return None  # nothing has changed since this was asked last
         ways = shortest_paths(graph, starts)
+        back = None
         if self._has_explored:
             self._has_explored = False
             back = self._reassurance(belief, ways) or self._turn(graph, belief, ways)
-            if back is not None:
-                return back
-        return None if graph.frontiers() else self._towards_goal(belief, ways)
+        return back or (self._towards_goal(belief, ways) if is_over else None)
 
     def _reassurance(self, belief: Belief, ways: dict[int, Approach]) -> Revisit | None:
         """The nearest well-known vertex, if the robot hardly knows where it is."""

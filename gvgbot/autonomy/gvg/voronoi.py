@@ -66,17 +66,11 @@ def fine_graph(
         triangles = Delaunay(generators)
     except QhullError:
         return EMPTY
-    points, clearance = _circumcircles(generators, triangles.simplices)
-    a, b, pair = _ridges(triangles)
-    p, q = generators[pair[:, 0]], generators[pair[:, 1]]
-    chord = np.hypot(*(p - q).T)
-    parts = chord >= 2 * min_clearance
-    narrowest = _least_clearance(points, clearance, a[parts], b[parts], p[parts], q[parts])
-    parts[parts] = chord[parts] >= np.sqrt(8 * roughness * narrowest)
-    endless = np.flatnonzero(parts & (b < 0))
-    links = np.stack([a, b], axis=1)[parts & (b >= 0)]
+    diagram = _diagram(triangles, min_clearance, roughness)
+    points, clearance, a, b = diagram.points, diagram.clearance, diagram.a, diagram.b
+    endless = np.flatnonzero(diagram.parts & (b < 0))
+    links = np.stack([a, b], axis=1)[diagram.parts & (b >= 0)]
     if np.isfinite(open_clearance):
-        diagram = Diagram(points, clearance, a, b, pair, parts)
         coast = with_coast(diagram, generators, open_clearance, local_map)
         if coast is not None:
             points, clearance, links = coast
@@ -89,19 +83,15 @@ def fine_graph(
     either = np.concatenate([links, links[:, ::-1]])
     cut = either[certain[either[:, 0]] & wide[either[:, 1]] & ~certain[either[:, 1]]]
     endless = endless[certain[a[endless]]]
-    start = np.concatenate([cut[:, 0], a[endless]])
-    rest = np.concatenate(
-        [
-            points[cut[:, 1]] - points[cut[:, 0]],
-            _FARTHEST_M * _outwards(triangles, endless, a, pair),
-        ]
+    away = _FARTHEST_M * _outwards(triangles, a[endless], diagram.generators[endless])
+    rays = _Rays(
+        np.concatenate([cut[:, 0], a[endless]]),
+        np.concatenate([points[cut[:, 1]] - points[cut[:, 0]], away]),
     )
     joined = links[certain[links].all(axis=1)]
-    rays = _Rays(start, rest)
-    tree = cKDTree(generators)
 
     def in_sight(places: Array) -> tuple[Array, NDArray[np.bool_]]:
-        room = np.asarray(tree.query(places)[0])
+        room = np.asarray(cKDTree(generators).query(places)[0])
         fits = (room >= min_clearance) & (room <= open_clearance)
         fits[fits] = _disc_is_known(local_map, places[fits], room[fits])
         return room, fits
@@ -116,15 +106,26 @@ class _Rays(NamedTuple):
     way: Array
 
 
-def _outwards(
-    triangles: Delaunay, endless: NDArray[np.intp], a: NDArray[np.int64], pair: NDArray[np.int32]
-) -> Array:
-    """Directions (N, 2) of ridges without end: square to the hull, away from the triangle."""
-    p, q = (triangles.points[pair[endless, k]] for k in (0, 1))
+def _diagram(triangles: Delaunay, min_clearance: float, roughness: float) -> Diagram:
+    """The whole Voronoi diagram, and which ridges count, by the two rules of `fine_graph`."""
+    generators = triangles.points
+    points, clearance = _circumcircles(generators, triangles.simplices)
+    a, b, pair = _ridges(triangles)
+    p, q = generators[pair[:, 0]], generators[pair[:, 1]]
+    chord = np.hypot(*(p - q).T)
+    parts = chord >= 2 * min_clearance
+    narrowest = _least_clearance(points, clearance, a[parts], b[parts], p[parts], q[parts])
+    parts[parts] = chord[parts] >= np.sqrt(8 * roughness * narrowest)
+    return Diagram(points, clearance, a, b, pair, parts)
+
+
+def _outwards(triangles: Delaunay, a: NDArray[np.int64], pair: NDArray[np.int32]) -> Array:
+    """Directions (N, 2) of ridges without end, square to the hull: away from triangles a (N,)."""
+    p, q = (triangles.points[pair[:, k]] for k in (0, 1))
     along = q - p
     normal = np.stack([-along[:, 1], along[:, 0]], axis=1)
     normal /= np.hypot(*normal.T)[:, None]
-    inner = triangles.points[triangles.simplices[a[endless]]].mean(axis=1)
+    inner = triangles.points[triangles.simplices[a]].mean(axis=1)
     normal[((inner - p) * normal).sum(axis=1) > 0] *= -1
     return normal
 
@@ -143,10 +144,16 @@ def _prolonged(
     length = np.hypot(*rays.way.T)
     unit = rays.way / np.maximum(length, 1e-9)[:, None]
     long = np.flatnonzero(length > _LONG_RIDGE_M)
+    if not len(long):
+        lead = np.full(len(points), np.nan)
+        lead[rays.start] = _direction(rays.way)
+        return points, clearance, links, lead
     steps = np.arange(_STEP_M, _FARTHEST_M, _STEP_M)
     places = points[rays.start[long], None] + steps[:, None] * unit[long, None]
-    room, seen = (found.reshape(len(long), len(steps)) for found in in_sight(places.reshape(-1, 2)))
-    seen = np.logical_and.accumulate(seen & (steps < length[long, None]), axis=1)
+    seen = steps < length[long, None]
+    room = np.zeros(seen.shape)
+    room[seen], seen[seen] = in_sight(places[seen])
+    seen = np.logical_and.accumulate(seen, axis=1)
     number = np.full(seen.shape, -1)
     number[seen] = len(points) + np.arange(np.count_nonzero(seen))
     chain = np.concatenate([rays.start[long, None], number], axis=1)
