@@ -253,6 +253,7 @@ class Robot:
     def _be_ready(self) -> None:
         if not self._ready:
             self._ready = True
+            self._notifier.status(status_line(self._state()))  # of a robot that is ready
             self._notifier.ready()
 
     def _note(self, odometry: Odometry) -> None:
