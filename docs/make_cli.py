@@ -1,4 +1,4 @@
-"""Writes reference/cli.md, all commands with their options, from the parser in gvgbot/cli.py.
+"""Writes reference/cli.md, all commands with their options, from the parser in gvgbot/cli/.
 
 python -m docs.make_cli
 """
@@ -9,14 +9,14 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from docs.source import table
-from gvgbot.cli import _parser
+from gvgbot.cli import parser
 
 PAGE = Path(__file__).parent / "reference" / "cli.md"
 GLUE = "\0"  # stands for a blank at which a line must not be broken
 HEAD = """\
 # Command line
 
-<!-- Written by docs/make_cli.py from gvgbot/cli.py: change the parser there, not here. -->
+<!-- Written by docs/make_cli.py from gvgbot/cli/: change the parser there, not here. -->
 
 Every command has `--help`. The exit status is 0 when a command did what it was asked for, 1 when
 it failed, 2 when it was asked wrongly, and 130 after Ctrl-C; for 1 and 2 a line on stderr says
@@ -27,7 +27,7 @@ why. `CONFIG` is a file, or the name of a packaged one: `sim.yaml`, `turtlebot2.
 
 def page() -> str:
     """The whole page, Markdown."""
-    leaves = list(_leaves(_parser()))
+    leaves = list(_leaves(parser()))
     rows = [
         (f"[`{parser.prog}`](#{parser.prog.replace(' ', '-')})", text) for parser, text in leaves
     ]

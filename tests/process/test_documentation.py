@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from gvgbot.cli import _parser
+from gvgbot.cli import parser
 from gvgbot.config import load_config, packaged
 
 ROOT = Path(__file__).parents[2]
@@ -54,7 +54,7 @@ WITH_SAMPLES = [page for page in PAGES if any(block["run"] for block in blocks(p
 def test_the_program_understands_a_command(words: list[str]) -> None:
     if words == ["--version"]:
         return
-    options = _parser().parse_args(words)
+    options = parser().parse_args(words)
     config = getattr(options, "config", None)
     known = config if config is not None and packaged(config).exists() else None
     load_config(known, getattr(options, "overrides", []))

@@ -1,0 +1,107 @@
+"""What commands have in common: kinds of arguments, shared options, and printing a line."""
+
+import argparse
+import re
+from math import isfinite
+from pathlib import Path
+from typing import Any, NoReturn, TypeAlias
+
+BAD_USAGE = 2
+MOST_FRAMES = 200
+NEGATIVE_NUMBER = re.compile(r"-\.?\d")
+
+
+class Parser(argparse.ArgumentParser):
+    """Says what is wrong in one line, and takes -1e-3 for a number, not for an option."""
+
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(**settings)
+        self._negative_number_matcher = NEGATIVE_NUMBER
+
+    def error(self, message: str) -> NoReturn:
+        """End with the message and the status of wrong usage."""
+        self.exit(BAD_USAGE, f"{self.prog}: {message} (see {self.prog} --help)\n")
+
+
+Commands: TypeAlias = "argparse._SubParsersAction[Parser]"  # noqa: SLF001 the only name it has
+
+
+def add_config(parser: argparse.ArgumentParser) -> None:
+    """Let the command take a configuration, and overrides of its keys."""
+    parser.add_argument(
+        "config", nargs="?", type=Path, metavar="CONFIG", help="default: sim.yaml, no hardware"
+    )
+    add_overrides(parser)
+
+
+def add_overrides(parser: argparse.ArgumentParser) -> None:
+    """Let the command take overrides of configuration keys."""
+    parser.add_argument(
+        "--set",
+        dest="overrides",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="override a configuration key, such as twin.base.odometry=worn; repeatable",
+    )
+
+
+def add_connection(parser: argparse.ArgumentParser) -> None:
+    """Let the command say how to reach robots on the network."""
+    parser.add_argument(
+        "--connect",
+        default="tcp/127.0.0.1:7447",
+        metavar="ADDRESS",
+        help="of the robot or of a zenoh router (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--zenoh-file",
+        type=Path,
+        metavar="FILE",
+        help="keys and passwords, and perhaps an address: a configuration of zenoh in JSON5",
+    )
+
+
+def say(text: str) -> None:
+    """Print a line to a person, at once, even into a pipe."""
+    print(text, flush=True)
+
+
+def number(text: str) -> float:
+    """A finite number. Raises ValueError."""
+    value = float(text)
+    if not isfinite(value):
+        raise ValueError(text)
+    return value
+
+
+def positive(text: str) -> float:
+    """A finite number above 0. Raises ValueError."""
+    value = number(text)
+    if value <= 0.0:
+        raise ValueError(text)
+    return value
+
+
+def seed(text: str) -> int:
+    """A whole number, not negative. Raises ValueError."""
+    value = int(text)
+    if value < 0:
+        raise ValueError(text)
+    return value
+
+
+def tcp_port(text: str) -> int:
+    """A number of a TCP port. Raises ValueError."""
+    value = int(text)
+    if not 0 <= value <= 65535:
+        raise ValueError(text)
+    return value
+
+
+def frames(text: str) -> int:
+    """A number of pictures that still makes a film. Raises ValueError."""
+    value = int(text)
+    if not 2 <= value <= MOST_FRAMES:
+        raise ValueError(text)
+    return value

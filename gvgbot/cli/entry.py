@@ -1,0 +1,67 @@
+"""The command line: arguments in, exit status out, one clear line for every failure."""
+
+import sys
+from collections.abc import Callable, Sequence
+
+from gvgbot import __version__
+from gvgbot.cli.arguments import BAD_USAGE, Parser
+from gvgbot.cli.devices import add_check, add_twin
+from gvgbot.cli.explore import add_explore
+from gvgbot.cli.maps import add_map
+from gvgbot.cli.remote import add_ctl, add_monitor, add_web
+from gvgbot.cli.replay import add_replay
+from gvgbot.cli.run import add_install_service, add_run
+from gvgbot.errors import GvgbotError, UsageError
+
+FAILURE, INTERRUPTED = 1, 130
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit status; wrong arguments raise SystemExit(2)."""
+    options = parser().parse_args(arguments)
+    return status_of(lambda: options.command(options))
+
+
+def status_of(command: Callable[[], int]) -> int:
+    """The command's own exit status, or 1 if it failed, 2 if it was asked wrongly, 130 if stopped.
+
+    The reason goes to stderr; only a mistake of the program leaves a traceback.
+    """
+    try:
+        return command()
+    except KeyboardInterrupt:
+        return _fail("interrupted", INTERRUPTED)
+    except UsageError as error:
+        return _fail(str(error), BAD_USAGE)
+    except GvgbotError as error:
+        return _fail(str(error), FAILURE)
+    except BrokenPipeError:  # whoever read our output has gone, as `head` does
+        return FAILURE
+
+
+def _fail(message: str, status: int) -> int:
+    """Say why on stderr, a line each; the status."""
+    for line in message.splitlines():
+        print(f"gvgbot: {line}", file=sys.stderr)
+    return status
+
+
+def parser() -> Parser:
+    """Of all commands and their options."""
+    root = Parser(
+        prog="gvgbot",
+        description="A robot that maps a building by itself, along its generalized Voronoi graph.",
+    )
+    root.add_argument("--version", action="version", version=f"gvgbot {__version__}")
+    commands = root.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    add_explore(commands)
+    add_run(commands)
+    add_twin(commands)
+    add_check(commands)
+    add_install_service(commands)
+    add_monitor(commands)
+    add_web(commands)
+    add_ctl(commands)
+    add_map(commands)
+    add_replay(commands)
+    return root

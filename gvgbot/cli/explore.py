@@ -1,0 +1,67 @@
+"""`gvgbot explore`."""
+
+import argparse
+from pathlib import Path
+
+from gvgbot.cli.arguments import Commands, add_overrides, number, seed
+
+
+def add_explore(commands: Commands) -> None:
+    """Add `gvgbot explore`."""
+    explore = commands.add_parser(
+        "explore",
+        help="explore a simulated world and leave a map",
+        description="Explore a simulated world through the twins of the devices, as fast as this "
+        "machine can, and write a run directory with the map. Exits 0 only if all was explored.",
+        epilog="example: gvgbot explore --world office --seed 3 --out runs/office-3",
+    )
+    explore.add_argument(
+        "--world",
+        metavar="NAME|YAML",
+        help="a built-in world (office, cave, floor_plan:7 and others), or a map_server YAML",
+    )
+    explore.add_argument(
+        "--start",
+        nargs=3,
+        type=number,
+        metavar=("X", "Y", "THETA"),
+        help="where to start in the world: metres, metres, radians (default: a built-in world's "
+        "own start, else 0 0 0)",
+    )
+    explore.add_argument("--seed", type=seed, metavar="N", help="draws all errors of the devices")
+    explore.add_argument("--config", type=Path, metavar="C.yaml", help="default: sim.yaml")
+    add_overrides(explore)
+    explore.add_argument(
+        "--out", type=Path, metavar="DIR", help="run directory (default: a new one in runs/)"
+    )
+    explore.add_argument(
+        "--real-time", action="store_true", help="at the pace of a real robot, not faster"
+    )
+    explore.set_defaults(command=_explore)
+
+
+def _explore(options: argparse.Namespace) -> int:
+    from gvgbot.config import load_config
+
+    config = load_config(options.config, _overrides(options))
+    from gvgbot import daemon
+
+    return daemon.explore(config, out=options.out, real_time=options.real_time)
+
+
+def _overrides(options: argparse.Namespace) -> list[str]:
+    """The --set options, then what the short options say about the twins."""
+    overrides = list(options.overrides)
+    if options.world is not None:
+        overrides.append(f"twin.world={_quoted(options.world)}")
+    if options.start is not None:
+        overrides.append(f"twin.start={options.start}")
+    if options.seed is not None:
+        overrides.append(f"twin.seed={options.seed}")
+    return overrides
+
+
+def _quoted(text: str) -> str:
+    """The text as a YAML string, so that a world named 7 stays a name."""
+    escaped = text.replace("'", "''")
+    return f"'{escaped}'"

@@ -1,0 +1,108 @@
+"""`gvgbot map`: pictures, facts and other formats of saved maps."""
+
+import argparse
+from pathlib import Path
+
+from gvgbot.cli.arguments import Commands, frames, positive, say
+
+
+def add_map(commands: Commands) -> None:
+    """Add `gvgbot map`."""
+    maps = commands.add_parser(
+        "map",
+        help="pictures and facts of a saved map",
+        description="Look at the maps that runs left in their directories.",
+        epilog="example: gvgbot map show runs/office-1 --animate",
+    )
+    actions = maps.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    show = actions.add_parser(
+        "show",
+        help="draw the map, or how it grew",
+        description="Draw the map of a run as a PNG; with --frames N moments of the exploration "
+        "side by side; with --animate as a GIF in which everything appears as it was found.",
+        epilog="example: gvgbot map show runs/office-1 --animate --out film.gif",
+    )
+    show.add_argument("run", type=Path, metavar="RUN_DIR", help="the directory of a run")
+    show.add_argument(
+        "--out",
+        type=Path,
+        metavar="FILE",
+        help="default: picture.png, strip.png or film.gif in the run directory",
+    )
+    show.add_argument("--animate", action="store_true", help="a GIF of the exploration")
+    show.add_argument("--frames", type=frames, metavar="N", help="moments to draw, 2 to 200")
+    show.set_defaults(command=_show)
+    info = actions.add_parser(
+        "info",
+        help="counts, lengths, extent and accuracy",
+        description="Say in a few lines what a map holds and how well it is known.",
+        epilog="example: gvgbot map info runs/office-1",
+    )
+    info.add_argument("run", type=Path, metavar="RUN_DIR", help="the directory of a run")
+    info.set_defaults(command=_info)
+    export = actions.add_parser(
+        "export",
+        help="the map in another format",
+        description="Write the map of a run in the format that the file's name ends with: .svg and "
+        ".pdf to print, .png, .graphml for graph programs, .geojson for the Nav2 route server.",
+        epilog="example: gvgbot map export runs/office-1 office.pdf",
+    )
+    export.add_argument("run", type=Path, metavar="RUN_DIR", help="the directory of a run")
+    export.add_argument("file", type=Path, metavar="FILE", help="what to write")
+    export.set_defaults(command=_export)
+    _add_diff(actions)
+
+
+def _add_diff(actions: Commands) -> None:
+    diff = actions.add_parser(
+        "diff",
+        help="how two maps of one place differ",
+        description="Lay the second map on the first, and say which vertices and edges only one of "
+        "them has, and how far apart the others are. Exits 0 if both maps have the same, 1 if not.",
+        epilog="example: gvgbot map diff runs/office-1 runs/office-2 --out both.png",
+    )
+    diff.add_argument("a", type=Path, metavar="RUN_A", help="the directory of a run")
+    diff.add_argument("b", type=Path, metavar="RUN_B", help="that of another")
+    diff.add_argument("--out", type=Path, metavar="FILE", help="a PNG of both, side by side")
+    diff.add_argument(
+        "--tolerance",
+        type=positive,
+        default=0.5,
+        metavar="M",
+        help="metres that the same vertex or edge may be apart (default: %(default)s)",
+    )
+    diff.set_defaults(command=_diff)
+
+
+def _show(options: argparse.Namespace) -> int:
+    from gvgbot.maps.show import show
+
+    path = show(options.run, options.out, animate=options.animate, frames=options.frames)
+    say(f"picture: {path}")
+    return 0
+
+
+def _info(options: argparse.Namespace) -> int:
+    from gvgbot.maps.saved_run import SavedRun
+    from gvgbot.maps.show import facts
+
+    for line in facts(SavedRun.read(options.run)):
+        say(line)
+    return 0
+
+
+def _export(options: argparse.Namespace) -> int:
+    from gvgbot.maps.export import export
+
+    export(options.run, options.file)
+    say(f"written: {options.file}")
+    return 0
+
+
+def _diff(options: argparse.Namespace) -> int:
+    from gvgbot.maps.diff import diff
+
+    is_equal, lines = diff(options.a, options.b, options.out, tolerance=options.tolerance)
+    for line in lines:
+        say(line)
+    return 0 if is_equal else 1

@@ -1,0 +1,104 @@
+"""`gvgbot monitor`, `web` and `ctl`: a robot seen and asked from elsewhere."""
+
+import argparse
+
+from gvgbot.cli.arguments import Commands, add_connection, say, tcp_port
+from gvgbot.errors import GvgbotError
+
+
+def add_monitor(commands: Commands) -> None:
+    """Add `gvgbot monitor`."""
+    monitor = commands.add_parser(
+        "monitor",
+        help="watch a robot in the terminal",
+        description="Show the map, the state and the events of a robot as they come over the "
+        "network, until q or Ctrl-C. Nothing that the monitor does can move the robot.",
+        epilog="example: gvgbot monitor turtlebot2 --connect tcp/192.168.1.7:7447",
+    )
+    monitor.add_argument(
+        "robot", nargs="?", metavar="ROBOT", help="its robot.name (default: the only one there is)"
+    )
+    monitor.add_argument("--robot", dest="named", metavar="NAME", help="the same")
+    add_connection(monitor)
+    monitor.set_defaults(command=_monitor)
+
+
+def _monitor(options: argparse.Namespace) -> int:
+    try:
+        from gvgbot.monitor.app import monitor
+    except ModuleNotFoundError as error:
+        if error.name is None or not error.name.startswith("rich"):
+            raise
+        raise GvgbotError("the monitor needs rich: pip install 'gvgbot[tui]'") from error
+
+    return monitor(options.robot or options.named, options.connect, options.zenoh_file)
+
+
+def add_web(commands: Commands) -> None:
+    """Add `gvgbot web`."""
+    web = commands.add_parser(
+        "web",
+        help="watch a robot in the browser",
+        description="Serve a page with the live map, the state and the events of a robot, to this "
+        "machine only unless --host says otherwise, until Ctrl-C. Who has the page open can ask "
+        "the robot for what its telemetry.requests permits.",
+        epilog="example: gvgbot web turtlebot2 --connect tcp/192.168.1.7:7447",
+    )
+    web.add_argument(
+        "robot", nargs="?", metavar="ROBOT", help="its robot.name (default: the only one there is)"
+    )
+    web.add_argument(
+        "--host",
+        default="127.0.0.1",
+        metavar="ADDRESS",
+        help="where to serve the page; 0.0.0.0 lets everybody in (default: %(default)s)",
+    )
+    web.add_argument(
+        "--port",
+        type=tcp_port,
+        default=8080,
+        metavar="N",
+        help="default: %(default)s; 0 takes any that is free",
+    )
+    add_connection(web)
+    web.set_defaults(command=_web)
+
+
+def _web(options: argparse.Namespace) -> int:
+    try:
+        from gvgbot.web.app import web
+    except ModuleNotFoundError as error:
+        if error.name is None or not error.name.startswith("websockets"):
+            raise
+        raise GvgbotError("the page needs websockets: pip install 'gvgbot[web]'") from error
+
+    connection = (options.robot, options.connect, options.zenoh_file)
+    return web(*connection, host=options.host, port=options.port, say=say)
+
+
+def add_ctl(commands: Commands) -> None:
+    """Add `gvgbot ctl`."""
+    ctl = commands.add_parser(
+        "ctl",
+        help="ask a robot for something",
+        usage="%(prog)s [-h] [--connect ADDRESS] [--zenoh-file FILE] [ROBOT] REQUEST [WORD ...]",
+        description="Ask a robot to pause, resume, stop (which ends the exploration), drive home, "
+        "goto V (a vertex) or goto X Y (metres, map frame), explore, relocalise, save (the map), "
+        "or set KEY VALUE. Prints what it does now and exits 0, or says why it does not, and "
+        "exits 1. A robot does what telemetry.requests permits.",
+        epilog="example: gvgbot ctl turtlebot2 goto 7 --connect tcp/192.168.1.7:7447",
+    )
+    ctl.add_argument(
+        "words",
+        nargs="+",
+        metavar="WORD",
+        help="the robot's robot.name (default: the only one there is), and the request",
+    )
+    add_connection(ctl)
+    ctl.set_defaults(command=_ctl)
+
+
+def _ctl(options: argparse.Namespace) -> int:
+    from gvgbot.ctl import ctl
+
+    return ctl(options.words, options.connect, options.zenoh_file, say)

@@ -1,0 +1,69 @@
+"""`gvgbot replay`."""
+
+import argparse
+from pathlib import Path
+
+from gvgbot.cli.arguments import Commands, add_overrides, number, positive, say
+
+NO_ECHO_M = 80.0  # of the lasers that CARMEN logs were made with
+
+
+def add_replay(commands: Commands) -> None:
+    """Add `gvgbot replay`."""
+    replay = commands.add_parser(
+        "replay",
+        help="map a recorded run once more",
+        description="Let the robot's mind live through a recording (MCAP) again, or through a "
+        "CARMEN log (ODOM and FLASER lines, plain or gzipped), and write a run directory. A "
+        "recording leaves the map of its run, to the last byte, unless --config or --set change "
+        "what the mind does.",
+        epilog="example: gvgbot replay run.mcap --out runs/again",
+    )
+    replay.add_argument("log", type=Path, metavar="FILE", help="the recording or log")
+    replay.add_argument(
+        "--config",
+        type=Path,
+        metavar="C.yaml",
+        help="default: that of the recorded run; carmen.yaml for a CARMEN log",
+    )
+    add_overrides(replay)
+    replay.add_argument(
+        "--out", type=Path, metavar="DIR", help="run directory (default: a new one in runs/)"
+    )
+    replay.add_argument(
+        "--no-echo",
+        type=number,
+        default=NO_ECHO_M,
+        metavar="M",
+        help="ranges of a CARMEN log from here on mean that nothing was hit (default: %(default)s)",
+    )
+    replay.add_argument(
+        "--serve",
+        action="store_true",
+        help="play it on the network at the pace of life, for gvgbot monitor and web, until "
+        "stopped (SIGINT or SIGTERM)",
+    )
+    replay.add_argument(
+        "--speed",
+        type=positive,
+        default=1.0,
+        metavar="N",
+        help="with --serve: so many times faster than life",
+    )
+    replay.set_defaults(command=_replay)
+
+
+def _replay(options: argparse.Namespace) -> int:
+    from gvgbot.replay import Wanted, replay
+
+    wanted = Wanted(
+        path=options.log,
+        config=options.config,
+        overrides=options.overrides,
+        no_echo_m=options.no_echo,
+    )
+    if not options.serve:
+        return replay(wanted, say, out=options.out)
+    from gvgbot.playback import serve
+
+    return serve(wanted, out=options.out, speed=options.speed)

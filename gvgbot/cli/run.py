@@ -1,0 +1,68 @@
+"""`gvgbot run`, the daemon, and `gvgbot install-service`, which makes it one of a machine."""
+
+import argparse
+from pathlib import Path
+
+from gvgbot.cli.arguments import Commands, add_overrides, say
+
+
+def add_run(commands: Commands) -> None:
+    """Add `gvgbot run`."""
+    run = commands.add_parser(
+        "run",
+        help="the daemon: explore with the devices of the configuration",
+        description="Run the daemon in real time, on the devices of the configuration or on their "
+        "twins, until it is stopped (SIGINT or SIGTERM). With a state directory (service.state_dir "
+        "or $STATE_DIRECTORY) it goes on with the map that it was making when it ended.",
+        epilog="example: gvgbot run turtlebot2.yaml --set service.state_dir=/var/lib/gvgbot",
+    )
+    run.add_argument(
+        "config", nargs="?", type=Path, metavar="CONFIG", help="default: sim.yaml, no hardware"
+    )
+    add_overrides(run)
+    run.add_argument(
+        "--out", type=Path, metavar="DIR", help="run directory (default: a new one in runs/)"
+    )
+    known = run.add_mutually_exclusive_group()
+    known.add_argument(
+        "--map", type=Path, metavar="RUN_DIR", help="begin with the map of an earlier run"
+    )
+    known.add_argument(
+        "--new", action="store_true", help="begin a new map, whatever the state directory holds"
+    )
+    run.set_defaults(command=_run)
+
+
+def _run(options: argparse.Namespace) -> int:
+    from gvgbot.config import load_config
+
+    config = load_config(options.config, options.overrides)
+    from gvgbot import daemon
+
+    return daemon.run(config, out=options.out, known=options.map, anew=options.new)
+
+
+def add_install_service(commands: Commands) -> None:
+    """Add `gvgbot install-service`."""
+    install = commands.add_parser(
+        "install-service",
+        help="make the robot a service of this machine",
+        description="Write the systemd service, the names of the ports, the user and the "
+        "configuration to where they belong, and say what each is for and what to run then. A "
+        "configuration that is there already is kept.",
+        epilog="example: sudo /opt/gvgbot/bin/gvgbot install-service turtlebot2.yaml",
+    )
+    install.add_argument(
+        "config", nargs="?", type=Path, metavar="CONFIG", help="default: turtlebot2.yaml"
+    )
+    install.add_argument(
+        "--user", action="store_true", help="a service of your own session, without root"
+    )
+    install.add_argument("--dry-run", action="store_true", help="only say what would be written")
+    install.set_defaults(command=_install_service)
+
+
+def _install_service(options: argparse.Namespace) -> int:
+    from gvgbot.installation import install_service
+
+    return install_service(options.config, user=options.user, dry_run=options.dry_run, say=say)
