@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 SHELL := /bin/sh
 
-.PHONY: help explore test check static quick bench bench-explore fuzz docs pages clean
+.PHONY: help explore test check static quick bench bench-explore keep fuzz docs pages clean
 
 help:
 	@echo "make explore   a simulated robot maps the built-in office; prints where the map is"
@@ -11,6 +11,7 @@ help:
 	@echo "make check     format, lint, types, import rules, tests"
 	@echo "make quick     the tests that take under a second each"
 	@echo "make bench     time the inner loops and the drivers, targets beside"
+	@echo "make keep RESULTS=FILE   quote a table of explorations in README and docs"
 	@echo "make docs      this documentation as a site in site/; make pages renews its generated pages"
 	@echo "make fuzz      throw mutated bytes at the parsers for a minute each"
 
@@ -38,13 +39,17 @@ PLANS ?= 100
 bench-explore: .venv/dev
 	@nice -n 10 $(BIN)/python -m benchmarks.explore_table --plans $(PLANS) --lasers UTM-30LX URG-04LX $(ARGS)
 
+keep: .venv/dev
+	@$(BIN)/python -m benchmarks.keep_results $(RESULTS)
+	@$(BIN)/python -m docs.make_tables
+
 FUZZ_SECONDS ?= 60
 fuzz: .venv/fuzz
 	@for file in tests/fuzz/fuzz_*.py; do \
 		$(BIN)/python -m "tests.fuzz.$$(basename "$$file" .py)" -max_total_time=$(FUZZ_SECONDS) -rss_limit_mb=1024 -timeout=10 || exit 1; done
 
 docs: .venv/docs
-	@$(BIN)/pytest -q tests/unit/test_reference_pages.py
+	@$(BIN)/pytest -q tests/unit/test_reference_pages.py tests/unit/test_quotes.py
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 	@echo "site: site/index.html"
 

@@ -54,6 +54,7 @@ COLUMNS = (
     ("speed_factor", "x real", "{:.0f}"),
     ("memory_mb", "MB", "{:.0f}"),
 )
+HEAD = "world            laser    seed outcome  " + " ".join(f"{t:>6}" for _, t, _ in COLUMNS)
 
 Row = dict[str, Any]
 Command = tuple[str, ...]  # arguments of `gvgbot`, but for the run directory
@@ -64,7 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _options(arguments)
     out = _out(options.out)
     print(f"results: {out / RESULTS}")
-    print("world            laser    seed outcome  " + " ".join(f"{t:>6}" for _, t, _ in COLUMNS))
+    print(HEAD)
     rows = []
     try:
         for row in _rows(commands(options), out, options.jobs):

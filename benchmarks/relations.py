@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from gvgbot.carmen import CarmenLog, read_carmen
-from gvgbot.cli import NO_ECHO_M
+from gvgbot.cli.replay import NO_ECHO_M
 from gvgbot.geometry import Array, Pose
 from gvgbot.maps.trajectory import decode_tum
 from gvgbot.replay import Wanted, replay

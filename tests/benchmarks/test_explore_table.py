@@ -8,7 +8,8 @@ from typing import Any
 import pytest
 
 from benchmarks.explore_table import RESULTS, Row, _options, commands, main, summary
-from gvgbot.cli import _overrides, _parser
+from gvgbot.cli import parser
+from gvgbot.cli.explore import _overrides
 from gvgbot.config import load_config
 from gvgbot.drivers.world import save_world
 from gvgbot.worlds.canvas import Canvas
@@ -42,7 +43,7 @@ def test_each_command_is_one_that_the_program_takes() -> None:
     )
     configs = []
     for command in commands(options):
-        taken = _parser().parse_args(command)
+        taken = parser().parse_args(command)
         configs.append(load_config(taken.config, _overrides(taken)))
     assert [(c.twin.world, c.twin.start, c.twin.seed, c.twin.laser.model) for c in configs] == [
         (world, start, seed, laser)

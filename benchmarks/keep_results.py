@@ -1,0 +1,79 @@
+"""Keep the rows of a table of explorations, for README and docs to quote.
+
+    python -m benchmarks.keep_results RESULTS.jsonl
+
+The runs in named worlds go to benchmarks/results/worlds.jsonl, those in floor plans to
+floor_plans.jsonl beside it, each in the place of what was there; a file for which there is no run
+stays. Only plain runs count: a world, a seed, a laser, and the default for all the rest.
+"""
+
+import json
+import shlex
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from benchmarks.explore_table import Row
+from gvgbot.worlds import NAMES
+
+RESULTS = Path(__file__).parent / "results"
+PLANS = "floor_plan"
+LONG = "UTM-30LX"  # the laser that comes first
+DIGITS = 5  # that are kept of a number
+PLAIN = ["gvgbot", "explore", "--world", "", "--seed", "", "--set", ""]  # as many words
+
+
+def keep(rows: list[Row], to: Path = RESULTS) -> dict[str, int]:
+    """Write the plain runs to their files, worlds in order; how many went to each."""
+    plain = sorted(filter(is_plain, rows), key=_order)
+    kept = {
+        "worlds.jsonl": [row for row in plain if _family(row) != PLANS],
+        "floor_plans.jsonl": [row for row in plain if _family(row) == PLANS],
+    }
+    for name, some in kept.items():
+        if some:
+            lines = (json.dumps({key: _short(value) for key, value in row.items()}) for row in some)
+            (to / name).write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return {name: len(some) for name, some in kept.items()}
+
+
+def is_plain(row: Row) -> bool:
+    """Whether nothing but world, seed and laser was chosen."""
+    return len(shlex.split(row["command"])) == len(PLAIN) and _family(row) in NAMES
+
+
+def _family(row: Row) -> str:
+    return str(row["world"]).partition(":")[0]
+
+
+def _order(row: Row) -> tuple[int, int, int, bool]:
+    """The order of the built-in worlds, of what they are drawn from, of seeds and lasers."""
+    number = row["world"].partition(":")[2]
+    is_short = row["laser"] != LONG
+    return NAMES.index(_family(row)), int(number or 0), row["seed"], is_short
+
+
+def _short(value: object) -> object:
+    return float(f"{value:.{DIGITS}g}") if isinstance(value, float) else value
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Keep what is in the file of the command line."""
+    if len(arguments) != 1:
+        print("give one file: python -m benchmarks.keep_results RESULTS.jsonl", file=sys.stderr)
+        return 2
+    try:
+        lines = Path(arguments[0]).read_text(encoding="utf-8").splitlines()
+    except OSError as error:
+        print(f"{arguments[0]}: {error.strerror}", file=sys.stderr)
+        return 1
+    rows = [json.loads(line) for line in lines]
+    kept = keep(rows)
+    for name, count in kept.items():
+        print(f"{RESULTS / name}: {f'{count} runs' if count else 'as it was'}")
+    print(f"left out: {len(rows) - sum(kept.values())}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

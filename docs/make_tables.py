@@ -1,0 +1,82 @@
+"""Fills what README and docs quote from benchmarks/results: python -m docs.make_tables.
+
+What stands between these two lines is written from the file, by the view that is named in brackets
+with its arguments:
+
+    <!-- from: benchmarks/results/worlds.jsonl (runs) -->
+    <!-- end -->
+"""
+
+import json
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from benchmarks import explore_table
+from benchmarks.explore_table import Row
+
+ROOT = Path(__file__).parents[1]
+QUOTE = re.compile(
+    r"^(?P<head><!-- from: (?P<file>\S+) \((?P<view>[^()]+)\) -->\n).*?^(?P<tail><!-- end -->)$",
+    re.M | re.S,
+)
+
+
+def pages() -> Iterator[Path]:
+    """README and what is in docs."""
+    yield ROOT / "README.md"
+    yield from sorted((ROOT / "docs").rglob("*.md"))
+
+
+def filled(text: str) -> str:
+    """The text with all that it quotes as it is in the files now."""
+    return QUOTE.sub(lambda m: f"{m['head']}\n{_quote(m['file'], m['view'])}\n\n{m['tail']}", text)
+
+
+def _quote(file: str, view: str) -> str:
+    lines = (ROOT / file).read_text(encoding="utf-8").splitlines()
+    name, *arguments = view.split()
+    return VIEWS[name]([json.loads(line) for line in lines], *arguments)
+
+
+def runs(rows: list[Row]) -> str:
+    """A line for each run."""
+    return _block([explore_table.HEAD, *map(explore_table.line, rows)])
+
+
+def summary(rows: list[Row]) -> str:
+    """What the runs with each laser have in common."""
+    last = rows[-1]["world"].partition(":")[2]
+    told = "\n".join(explore_table.summary(rows)).strip().splitlines()
+    return f"Of {len(rows)} runs, in the buildings 1 to {last}:\n\n{_block(told)}"
+
+
+def last_words(rows: list[Row], world: str, directory: str) -> str:
+    """What the first run in a world prints at its end, if it writes to the directory."""
+    row = next(row for row in rows if row["world"] == world)
+    return _block(
+        [
+            f"{row['outcome']}: {row['reason']}; {row['vertices']} vertices, {row['edges']} edges, "
+            f"{row['distance_m']:.0f} m driven",
+            f"map:     {directory}/map.geojson",
+            f"picture: {directory}/map.png",
+        ]
+    )
+
+
+def _block(lines: list[str]) -> str:
+    return "\n".join(["```", *lines, "```"])
+
+
+VIEWS: dict[str, Callable[..., str]] = {
+    "runs": runs,
+    "summary": summary,
+    "last_words": last_words,
+}
+
+
+if __name__ == "__main__":
+    for page in pages():
+        text = page.read_text(encoding="utf-8")
+        if (new := filled(text)) != text:
+            page.write_text(new, encoding="utf-8")
