@@ -223,7 +223,9 @@ async def serve_twin(twin: TwinDevice, stream: ByteStream, clock: Clock) -> None
             if awaited <= clock.now():
                 await asyncio.sleep(0)
                 continue
-            timer = None if awaited == math.inf else loop.call_at(awaited, wake.set)
+            at = awaited - (clock.now() - loop.time())  # the clock may be ahead of the loop's
+            at = max(at, math.nextafter(loop.time(), math.inf))  # or virtual time would stand still
+            timer = None if awaited == math.inf else loop.call_at(at, wake.set)
             await wake.wait()
             wake.clear()
             if timer is not None:

@@ -15,8 +15,8 @@ from gvgbot.errors import DeviceLost
 class Metronome:
     """A device that sends a byte every 0.1 s and echoes what it hears."""
 
-    def __init__(self) -> None:
-        self.beats = 0
+    def __init__(self, start: float = 0.0) -> None:
+        self.beats, self._start = 0, start
         self.heard: list[tuple[float, bytes]] = []
 
     def receive(self, data: bytes, now: float) -> bytes:
@@ -28,7 +28,7 @@ class Metronome:
         return b"."
 
     def next_due(self) -> float:
-        return 0.1 * (self.beats + 1)
+        return self._start + 0.1 * (self.beats + 1)
 
 
 class Silent(Metronome):
@@ -129,12 +129,12 @@ def test_a_reader_that_waits_learns_at_once_that_the_link_was_closed() -> None:
     assert run_in_virtual_time(run()) == pytest.approx(3.0)
 
 
-async def with_twin(twin: Metronome, until: float) -> list[tuple[float, bytes]]:
+async def with_twin(twin: Metronome, until: float, ahead: float = 0.0) -> list[tuple[float, bytes]]:
     here, there = pipe()
     loop = asyncio.get_running_loop()
     loop.call_later(0.25, here.write, b"hi")
     async with asyncio.TaskGroup() as tasks:
-        server = tasks.create_task(serve_twin(twin, there, LoopClock()))
+        server = tasks.create_task(serve_twin(twin, there, LoopClock(ahead)))
         log = await read_until(here, until)
         server.cancel()
     return log
@@ -142,6 +142,12 @@ async def with_twin(twin: Metronome, until: float) -> list[tuple[float, bytes]]:
 
 def test_a_served_twin_sends_when_it_is_due_and_answers_at_once() -> None:
     log = run_in_virtual_time(with_twin(Metronome(), 0.45))
+    assert log == [(0.1, b"."), (0.2, b"."), (0.25, b"<hi>"), (0.3, b"."), (0.4, b".")]
+
+
+@pytest.mark.parametrize("ahead", [-0.35, 98.33])
+def test_a_served_twin_keeps_its_own_time_on_a_clock_that_is_ahead(ahead: float) -> None:
+    log = run_in_virtual_time(with_twin(Metronome(ahead), 0.45, ahead))
     assert log == [(0.1, b"."), (0.2, b"."), (0.25, b"<hi>"), (0.3, b"."), (0.4, b".")]
 
 
