@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 
 from benchmarks.report import report
-from gvgbot.autonomy.slam.ekf import Belief, OdometryNoise, advance, distances, update
+from gvgbot.autonomy.slam.ekf import Belief, OdometryNoise, advance, correct, distances
 from gvgbot.geometry import Pose
 
 SIZES = (100, 500, 2000)
@@ -46,7 +46,7 @@ def bench(vertices: int) -> None:
     seen = belief.map_base.to(belief.map_vertex(1))
     steps: dict[str, Callable[[], object]] = {
         "motion": lambda: advance(belief, MOTION, growth),
-        "vertex seen again": lambda: update(belief, 1, seen, R),
+        "vertex seen again": lambda: correct(belief, 1, seen, R),
         "gates of all vertices": lambda: distances(belief, np.zeros(2), R[:2, :2]),
     }
     for name, do in steps.items():

@@ -281,7 +281,7 @@ class Mapper:
 
     def _measure(self, view: View, vertex: Vertex, base_vertex: Pose, R: Array) -> None:
         """Correct the belief by a vertex seen again."""
-        self.belief = ekf.update(self.belief, vertex.id, base_vertex, R)
+        self.belief = ekf.correct(self.belief, vertex.id, base_vertex, R)
         self.observations.append(Observation(view.keyframe, vertex.id, base_vertex, R))
 
     def _find_half_edges(

@@ -268,7 +268,7 @@ def _live_again(pipeline: Pipeline, grown: Growth) -> None:
         pipeline._maps.insert(keyframe.scan, keyframe.local_base, pipeline.travelled)
     for seen in grown.observations:
         if seen.vertex in mapper.belief.ids:
-            mapper.belief = ekf.update(mapper.belief, seen.vertex, seen.base_vertex, seen.R)
+            mapper.belief = ekf.correct(mapper.belief, seen.vertex, seen.base_vertex, seen.R)
             mapper.observations.append(seen)
 
 
@@ -289,7 +289,7 @@ def _tie_vertices(pipeline: Pipeline) -> None:
     if not pipeline.keyframes:
         return
     for vertex in sorted(ids - {seen.vertex for seen in mapper.observations}):
-        base_vertex, H = ekf.expected(mapper.belief, vertex)
-        R = H @ mapper.belief.P @ H.T + _LEAST
+        base_vertex, _ = ekf.expected(mapper.belief, vertex)
+        _, R, _ = ekf.innovation(mapper.belief, vertex, base_vertex, _LEAST)
         number = len(pipeline.keyframes) - 1
         mapper.observations.append(Observation(number, vertex, base_vertex, R))

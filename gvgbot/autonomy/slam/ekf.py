@@ -11,12 +11,16 @@ from dataclasses import dataclass, field
 from typing import Annotated
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gvgbot.geometry import Array, Pose, wrap_angle
 from gvgbot.ranges import Range
 
+Index = NDArray[np.intp]
+
 _LARGE_M = 0.3  # an innovation from which on Jacobians are taken again
 _ITERATIONS = 5
+_ROWS = 128  # of P that are corrected at a time: they fit into a cache
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,7 +84,7 @@ class Belief:
     def vertex_covariance(self, vertex: int) -> Array:
         """Position covariance (2, 2) of a vertex, m^2."""
         i = self._at(vertex)
-        return self.P[i : i + 2, i : i + 2]
+        return self.P[i : i + 2, i : i + 2].copy()  # an old belief's P may be that of a later one
 
 
 def predict(belief: Belief, motion: Pose, Q: Array) -> Belief:
@@ -162,7 +166,15 @@ def innovation(
     R of shape (2, 2) uses the position alone, (3, 3) the heading as well.
     """
     r, H = _residual(belief, vertex, base_vertex, len(R))
-    return r, H @ belief.P @ H.T + R, H
+    used = _used(belief, vertex)
+    H_used = H[:, used]
+    return r, H_used @ belief.P[np.ix_(used, used)] @ H_used.T + R, H
+
+
+def _used(belief: Belief, vertex: int) -> Index:
+    """The part (6,) of the state that a sight of a vertex depends on: H is 0 elsewhere."""
+    i = 3 + 3 * belief.ids.index(vertex)
+    return np.r_[0:3, i : i + 3]
 
 
 def _residual(belief: Belief, vertex: int, base_vertex: Pose, k: int) -> tuple[Array, Array]:
@@ -202,32 +214,51 @@ def update(belief: Belief, vertex: int, base_vertex: Pose, R: Array) -> Belief:
     After a large innovation the Jacobian of where the robot thought to be is not that of where it
     is: it is taken again from there, as Gauss and Newton would (the iterated Kalman filter).
     """
-    i = 3 + 3 * belief.ids.index(vertex)
-    used = np.r_[0:3, i : i + 3]  # of the state: H is 0 elsewhere
+    return correct(Belief(belief.x, belief.P.copy(), belief.ids), vertex, base_vertex, R)
 
-    def corrected(x: Array) -> tuple[Array, Array, Array]:
-        """The mean, K and the used part of H, with the Jacobian at x."""
+
+def correct(belief: Belief, vertex: int, base_vertex: Pose, R: Array) -> Belief:
+    """As `update`, but in the covariance of the old belief, which is valid no more.
+
+    Every element of P changes; what it costs is to read and to write them once.
+    """
+    used = _used(belief, vertex)
+    P_used = belief.P[used]  # HP = H P_used
+
+    def corrected(x: Array) -> tuple[Array, Array, Array, Array]:
+        """The mean, K, HP and the used part of H, with the Jacobian at x."""
         r, H = _residual(Belief(x, belief.P, belief.ids), vertex, base_vertex, len(R))
         H = H[:, used]
-        PH = belief.P[:, used] @ H.T
-        K = np.asarray(np.linalg.solve(H @ PH[used] + R, PH.T).T, np.float64)
+        HP = H @ P_used
+        K = np.asarray(np.linalg.solve(HP[:, used] @ H.T + R, HP).T, np.float64)
         back = _wrapped(belief.x - x)[used]
-        return _wrapped(belief.x + K @ (r - H @ back)), K, H
+        return _wrapped(belief.x + K @ (r - H @ back)), K, HP, H
 
-    x, K, H = corrected(belief.x)
+    x, K, HP, H = corrected(belief.x)
     if belief.map_base.to(belief.map_vertex(vertex)).distance(base_vertex) > _LARGE_M:
         for _ in range(_ITERATIONS):
-            x, K, H = corrected(x)
-    P = belief.P - K @ (H @ belief.P[used])
-    P -= (P[:, used] @ H.T) @ K.T
-    P += K @ R @ K.T
-    return Belief(x, (P + P.T) / 2, belief.ids)
+            x, K, HP, H = corrected(x)
+    # (I - K H) P (I - K H)' + K R K' = P - K L' - L K'
+    L = HP.T - K @ (HP[:, used] @ H.T + R) / 2
+    _subtract(belief.P, np.hstack([K, L]), np.hstack([L, K]).T)
+    return Belief(x, belief.P, belief.ids)
+
+
+def _subtract(P: Array, left: Array, right: Array) -> None:
+    """Take a symmetric product (N, K) (K, N) from P, which stays symmetric to the last bit."""
+    right = np.ascontiguousarray(right)
+    for i in range(0, len(P), _ROWS):
+        j = i + _ROWS
+        block = P[i:j, i:]
+        block -= left[i:j] @ right[:, i:]
+        block[:, :_ROWS] = (block[:, :_ROWS] + block[:, :_ROWS].T) / 2
+        P[j:, i:j] = block[:, _ROWS:].T
 
 
 def _wrapped(x: Array) -> Array:
-    """A state, or a difference of two, with its headings in (-pi, pi]."""
+    """A state, or a difference of two, with its headings in [-pi, pi]."""
     x = x.copy()
-    x[2::3] = [wrap_angle(a) for a in x[2::3]]
+    x[2::3] -= math.tau * np.rint(x[2::3] / math.tau)
     return x
 
 
