@@ -48,6 +48,9 @@ def _asker(request: str, arguments: Sequence[str]) -> Callable[[Robot], Asking]:
         case "goto", [x, y]:
             point = _number(float, x, "a number"), _number(float, y, "a number")
             return lambda robot: robot.goto(*point)
+        case "patrol", words:
+            vertices = [_number(int, word, "the id of a vertex") for word in words]
+            return lambda robot: robot.patrol(*vertices)
         case "set", [key, value]:
             return lambda robot: robot.set(key, _value(value))
         case "goto", _:

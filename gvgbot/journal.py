@@ -41,6 +41,8 @@ def log_event(event: events.Event) -> None:
             log.info(
                 "errand ended", errand=event.errand, outcome=event.outcome, reason=event.reason
             )
+        case events.RoundEnded():
+            log.info("round ended", round=event.round, reached=event.reached, missed=event.missed)
         case _:
             pass
 

@@ -6,13 +6,24 @@ from typing import Annotated, Literal, get_args
 import msgspec
 
 RequestName = Literal[
-    "pause", "resume", "stop", "home", "goto", "explore", "relocalise", "save", "set"
+    "pause",
+    "resume",
+    "stop",
+    "home",
+    "goto",
+    "patrol",
+    "coverage",
+    "explore",
+    "relocalise",
+    "save",
+    "set",
 ]
 REQUESTS: tuple[RequestName, ...] = get_args(RequestName)
 MESSAGEPACK, JSON = "application/msgpack", "application/json"
 
 _LONGEST_KEY = 100  # characters
 _FARTHEST_M = 1e5
+_MOST_VERTICES = 1000
 
 Metres = Annotated[float, msgspec.Meta(ge=-_FARTHEST_M, le=_FARTHEST_M)]
 
@@ -38,6 +49,14 @@ class Goto(
             raise ValueError("give either vertex, or x and y")
 
 
+class Patrol(
+    msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True
+):
+    """Which vertices to visit, over and over."""
+
+    vertices: Annotated[tuple[int, ...], msgspec.Meta(max_length=_MOST_VERTICES)] = ()  # none: all
+
+
 class Set(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A key of the configuration, and what it shall be from now on."""
 
@@ -45,7 +64,8 @@ class Set(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     value: bool | int | float | Annotated[str, msgspec.Meta(max_length=_LONGEST_KEY)]
 
 
-Arguments = Nothing | Goto | Set
+Arguments = Nothing | Goto | Patrol | Set
+_KINDS: dict[str, type[Arguments]] = {"goto": Goto, "patrol": Patrol, "set": Set}
 
 
 class Answer(msgspec.Struct, frozen=True):
@@ -77,6 +97,8 @@ def in_words(name: str, arguments: Arguments) -> str:
             return f"{name} {x:g} {y:g}"
         case Goto(vertex=vertex):
             return f"{name} {vertex}"
+        case Patrol(vertices=vertices):
+            return " ".join([name, *map(str, vertices)])
         case Set(key=key, value=value):
             return f"{name} {key} {msgspec.json.encode(value).decode()}"
         case _:
@@ -85,7 +107,7 @@ def in_words(name: str, arguments: Arguments) -> str:
 
 def kind_of(name: str) -> type[Arguments]:
     """The type of a request's arguments."""
-    return Goto if name == "goto" else Set if name == "set" else Nothing
+    return _KINDS.get(name, Nothing)
 
 
 def parse(name: str, data: bytes, encoding: str) -> Arguments:

@@ -32,7 +32,6 @@ def state(
     requests: tuple[str, ...] = (),
 ) -> State:
     """The state at `stamp`; `odometry` is the last control cycle's, `away` says what is missing."""
-    errand = pipeline.errands.errand
     mission, graph, map_base = pipeline.mission, pipeline.mapper.graph, pipeline.map_base
     twist = STANDSTILL if odometry is None else odometry.twist
     return State(
@@ -43,7 +42,7 @@ def state(
         phase=_phase(pipeline, away),
         outcome=mission.outcome,
         reason=mission.reason or away or "",
-        errand=None if errand is None else str(errand),
+        errand=pipeline.errands.progress,
         requests=requests,
         pose=(map_base.x, map_base.y, map_base.theta),
         covariance=tuple(pose_covariance(pipeline, odometry, noise).ravel().tolist()),

@@ -11,7 +11,7 @@ from gvgbot.conversion import Problem, convert
 from gvgbot.errors import GvgbotError
 from gvgbot.hal.guard import Reason
 from gvgbot.hal.messages import Contact
-from gvgbot.requests import Answer, Arguments, Asked, Goto, Set, in_words, parse
+from gvgbot.requests import Answer, Arguments, Asked, Goto, Patrol, Set, in_words, parse
 
 SETTABLE = (
     "robot.limits.max_speed_mps",
@@ -23,7 +23,7 @@ SETTABLE = (
     "exploration.in_the_way_s",
     "exploration.nothing_in_sight_s",
 )
-_MOVING = ("resume", "home", "goto", "explore", "relocalise")
+_MOVING = ("resume", "home", "goto", "patrol", "coverage", "explore", "relocalise")
 _HARMLESS: tuple[Reason, ...] = ("obstacle", "obstacle near")  # the robot may turn away from it
 _LONGEST_WORDS = 200  # characters of a request in the list of events
 
@@ -122,6 +122,10 @@ class Steering:
                 return errands.explore(stamp)
             case "relocalise", _:
                 return errands.relocalise(stamp)
+            case "coverage", _:
+                return errands.coverage(stamp)
+            case _, Patrol(vertices=vertices):
+                return errands.patrol(vertices, stamp)
             case _, Goto(vertex=None, x=float(x), y=float(y)):
                 return errands.goto_point(x, y, stamp)
             case _, Goto(vertex=int(vertex)):

@@ -21,7 +21,7 @@ class TelemetryConfig:
     """Where the robot can be watched; loopback only, unless the configuration opens it.
 
     `requests` names what it may be asked for; to permit all, list pause, resume, stop, home, goto,
-    explore, relocalise, save and set.
+    patrol, coverage, explore, relocalise, save and set.
     """
 
     enabled: bool = True  # false: nothing goes over the network

@@ -65,6 +65,16 @@ def foot_of(mapper: Mapper, point: Array) -> Foot | None:
     return min(feet, key=lambda foot: foot.away, default=None)
 
 
+def foot_at(graph: GvgGraph, end: HalfEdgeId, station: float) -> Foot | None:
+    """The point of an edge so many metres from one of its ends; None if there is no edge."""
+    edge = graph.edge_at(end)
+    if edge is None:
+        return None
+    from_a = station if end == edge.a else edge.length - station
+    along = np.concatenate([[0.0], np.hypot(*np.diff(edge.polyline, axis=0).T).cumsum()])
+    return Foot(edge, int(np.argmin(np.abs(along - from_a))), from_a, 0.0)
+
+
 def route_to_vertex(graph: GvgGraph, starts: list[Approach], vertex: int) -> Route | None:
     """The shortest way to a vertex; None if no known way leads there."""
     approach = shortest_paths(graph, starts).get(vertex)

@@ -97,6 +97,16 @@ class ErrandEnded:
     reason: str
 
 
+@dataclass(frozen=True, slots=True)
+class RoundEnded:
+    """The robot has been round on patrol; how many vertices it reached, and how many not."""
+
+    stamp: float
+    round: int
+    reached: int
+    missed: int
+
+
 Event = (
     VertexAdded
     | VertexRemoved
@@ -107,4 +117,5 @@ Event = (
     | Finished
     | Requested
     | ErrandEnded
+    | RoundEnded
 )

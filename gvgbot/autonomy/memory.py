@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvgbot.autonomy.candidates import Candidate
+from gvgbot.autonomy.errands.plans import Kept
 from gvgbot.autonomy.exploration.obstructions import Obstructions
 from gvgbot.autonomy.gvg.local_map import LocalMap
 from gvgbot.autonomy.hazards import Hazard
@@ -77,7 +78,9 @@ class Intent:
     frontiers: set[HalfEdgeId]
     closed: Closed
     is_paused: bool = False  # somebody asked for that,
-    is_waiting: bool = False  # or for something that has been done
+    is_waiting: bool = False  # or for something that has been done,
+    errand: Kept | None = None  # or is to be done
+    blocked_until: dict[HalfEdgeId, float] = field(default_factory=dict)  # stamps
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -144,7 +147,9 @@ def _intent(pipeline: Pipeline) -> Intent:
         mission._frontiers,
         Closed(closed._times, closed._since),
         errands.is_paused,
-        errands.is_waiting or (errands.errand is not None and not errands._is_own),
+        errands.is_waiting,
+        errands.kept(),
+        errands.closures.until,
     )
 
 
@@ -190,6 +195,8 @@ def recall(pipeline: Pipeline, memory: Memory, past: list[Growth]) -> None:
     _recall_mission(pipeline.mission, memory.intent)
     pipeline.errands.is_paused = memory.intent.is_paused
     pipeline.errands.is_waiting = memory.intent.is_waiting
+    pipeline.errands.recall(memory.intent.errand)
+    pipeline.errands.closures.until = memory.intent.blocked_until
     if _fits(pipeline._maps.near, memory.near) and _fits(pipeline._maps._far, memory.far):
         _recall_cells(pipeline._maps.near, memory.near)
         _recall_cells(pipeline._maps._far, memory.far)

@@ -61,6 +61,8 @@ class ExplorationConfig:
     )
     retry_after_s: Annotated[float, Range(0.0, 3600.0)] = 20.0  # and at the end, that way again,
     retries: Annotated[int, Range(0, 20)] = 3  # so many times
+    # a way that something stood in is not driven by errands for so long
+    remember_blocked_s: Annotated[float, Range(0.0, 86400.0)] = 300.0
     nothing_in_sight_s: Annotated[float, Range(2.0, 600.0)] = (
         20.0  # without any edge before giving up
     )

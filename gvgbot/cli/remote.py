@@ -83,9 +83,10 @@ def add_ctl(commands: Commands) -> None:
         help="ask a robot for something",
         usage="%(prog)s [-h] [--connect ADDRESS] [--zenoh-file FILE] [ROBOT] REQUEST [WORD ...]",
         description="Ask a robot to pause, resume, stop (which ends the exploration), drive home, "
-        "goto V (a vertex) or goto X Y (metres, map frame), explore, relocalise, save (the map), "
-        "or set KEY VALUE. Prints what it does now and exits 0, or says why it does not, and "
-        "exits 1. A robot does what telemetry.requests permits.",
+        "goto V (a vertex) or goto X Y (metres, map frame), patrol (vertices V V ..., or all, over "
+        "and over), coverage (drive all edges), explore, relocalise, save (the map), or set KEY "
+        "VALUE. Prints what it does now and exits 0, or says why it does not, and exits 1. A robot "
+        "does what telemetry.requests permits.",
         epilog="example: gvgbot ctl turtlebot2 goto 7 --connect tcp/192.168.1.7:7447",
     )
     ctl.add_argument(

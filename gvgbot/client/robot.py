@@ -19,7 +19,7 @@ from gvgbot.client.asking import Asking, ask
 from gvgbot.client.newest import Newest, decoded
 from gvgbot.client.presence import Presence, Signs
 from gvgbot.errors import GvgbotError, UsageError
-from gvgbot.requests import Arguments, Goto, Nothing, RequestName, Set
+from gvgbot.requests import Arguments, Goto, Nothing, Patrol, RequestName, Set
 from gvgbot.topics import (
     EVENTS,
     MAP,
@@ -190,6 +190,14 @@ class Robot:
         if y is None:
             return self._ask("goto", Goto(vertex=operator.index(place)))  # type: ignore[arg-type]
         return self._ask("goto", Goto(x=place, y=y))
+
+    def patrol(self, *vertices: int) -> Asking:
+        """Drive from vertex to vertex by their ids, over and over; to all if none is named."""
+        return self._ask("patrol", Patrol(vertices=vertices))
+
+    def coverage(self) -> Asking:
+        """Drive over every edge once."""
+        return self._ask("coverage")
 
     def explore(self) -> Asking:
         """Go on exploring, also after the end."""

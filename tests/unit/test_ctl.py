@@ -43,6 +43,8 @@ def test_a_value_is_a_number_or_a_truth_or_text(text: str, value: object) -> Non
         (["goto", "seven"], "'seven' must be the id of a vertex"),
         (["goto", "1", "east"], "'east' must be a number"),
         (["goto", "1", "2", "3"], "goto needs"),
+        (["patrol", "1", "east"], "'east' must be the id of a vertex"),
+        (["coverage", "1"], "coverage takes no arguments"),
         (["set", "robot.limits.max_speed_mps"], "set needs a key and a value"),
         (["sim", "pause", "now"], "pause takes no arguments"),
         (["no robot", "pause"], "no robot can be named"),

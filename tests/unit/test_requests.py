@@ -12,8 +12,10 @@ from gvgbot.requests import (
     JSON,
     MESSAGEPACK,
     REQUESTS,
+    Arguments,
     Goto,
     Nothing,
+    Patrol,
     Set,
     in_words,
     parse,
@@ -27,6 +29,9 @@ ARGUMENTS = [
     ("set", {"key": "a.b", "value": 0.25}, Set(key="a.b", value=0.25)),
     ("set", {"key": "a.b", "value": "kobuki"}, Set(key="a.b", value="kobuki")),
     ("pause", {}, Nothing()),
+    ("patrol", {"vertices": [3, 1, 3]}, Patrol(vertices=(3, 1, 3))),
+    ("patrol", {}, Patrol()),
+    ("coverage", {}, Nothing()),
 ]
 
 
@@ -38,7 +43,7 @@ def test_the_requests_are_the_promised_ones() -> None:
 
 @pytest.mark.parametrize(("name", "plain", "typed"), ARGUMENTS)
 def test_arguments_come_in_json_or_in_messagepack(
-    name: str, plain: dict[str, object], typed: Goto | Set | Nothing
+    name: str, plain: dict[str, object], typed: Arguments
 ) -> None:
     assert parse(name, json.dumps(plain).encode(), JSON) == typed
     assert parse(name, msgspec.msgpack.encode(plain), MESSAGEPACK) == typed
@@ -59,6 +64,10 @@ def test_nothing_at_all_stands_for_no_arguments() -> None:
         ("goto", '{"vertex": 7.5}', "vertex"),
         ("goto", '{"x": 1e300, "y": 0}', "100000"),
         ("goto", '{"vertix": 7}', "vertix"),
+        ("patrol", '{"vertices": 7}', "vertices"),
+        ("patrol", '{"vertices": [1, "east"]}', "vertices"),
+        ("patrol", json.dumps({"vertices": [1] * 1001}), "1000"),
+        ("coverage", '{"vertices": [1]}', "vertices"),
         ("set", '{"key": "a"}', "value"),
         ("set", '{"key": "a", "value": null}', "value"),
         ("pause", '{"for": 3}', "for"),
@@ -94,9 +103,9 @@ def test_a_point_is_a_number_within_reason(x: float) -> None:
         ("goto", Goto(x=1.5, y=-2.0), "goto 1.5 -2"),
         ("set", Set(key="a.b", value=True), "set a.b true"),
         ("home", Nothing(), "home"),
+        ("patrol", Patrol(vertices=(3, 7)), "patrol 3 7"),
+        ("patrol", Patrol(), "patrol"),
     ],
 )
-def test_a_request_can_be_read_by_people(
-    name: str, arguments: Goto | Set | Nothing, words: str
-) -> None:
+def test_a_request_can_be_read_by_people(name: str, arguments: Arguments, words: str) -> None:
     assert in_words(name, arguments) == words

@@ -86,7 +86,7 @@ FITTING: dict[str, dict[str, object]] = {
     "goto": {"vertex": 3},
     "set": {"key": "exploration.patience_s", "value": 30},
 }
-MOVING = ("resume", "home", "goto", "explore", "relocalise")
+MOVING = ("resume", "home", "goto", "patrol", "coverage", "explore", "relocalise")
 
 
 def touched(**felt: bool) -> Body:

@@ -49,6 +49,10 @@ class Revisiting:
         self._tries: dict[int, int] = {}
         self._best: dict[int, float] = {}  # standard deviation before the last visit
 
+    def configure(self, config: CertaintyConfig) -> None:
+        """Use another configuration from now on."""
+        self._config = config
+
     def note_target(self, target: HalfEdgeId | None) -> None:
         """Learn that the robot is exploring a frontier, if it is."""
         self._has_explored = self._has_explored or target is not None

@@ -1,8 +1,8 @@
 // The buttons: those that the robot permits, and its answers.
 
 const NAMES = {
-  pause: "pause", resume: "resume", stop: "end exploration", home: "drive home", explore: "explore",
-  relocalise: "find its place", save: "save map",
+  pause: "pause", resume: "resume", stop: "end exploration", home: "drive home", patrol: "patrol", coverage: "drive all edges",
+  explore: "explore", relocalise: "find its place", save: "save map",
 };
 
 export class Requests {

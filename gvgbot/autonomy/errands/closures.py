@@ -1,0 +1,38 @@
+"""Ways that something was found to stand in: not to be driven for a while."""
+
+from collections.abc import Iterable
+
+from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
+
+
+class Closures:
+    """Blocks half-edges, and unblocks them when their time is over."""
+
+    def __init__(self) -> None:
+        self.until: dict[HalfEdgeId, float] = {}  # stamps
+
+    def close(self, graph: GvgGraph, ends: Iterable[HalfEdgeId], until: float) -> None:
+        """Block those of the ends that are not blocked yet, up to a stamp."""
+        for end in ends:
+            half = graph.half_edge(end)
+            if half is not None and not half.blocked:
+                half.blocked = True
+                self.until[end] = until
+
+    def open_due(self, graph: GvgGraph, stamp: float) -> None:
+        """Unblock what was closed long enough ago."""
+        for end in [end for end, until in self.until.items() if until <= stamp]:
+            self._open(graph, end)
+
+    def open_all(self, graph: GvgGraph) -> bool:
+        """Unblock everything; whether there was something."""
+        were_some = bool(self.until)
+        for end in list(self.until):
+            self._open(graph, end)
+        return were_some
+
+    def _open(self, graph: GvgGraph, end: HalfEdgeId) -> None:
+        del self.until[end]
+        half = graph.half_edge(end)
+        if half is not None:
+            half.blocked = False

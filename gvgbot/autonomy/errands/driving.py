@@ -1,0 +1,293 @@
+"""Driving to one stop: along known ways, round what stands in them, and when it is over."""
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from gvgbot.autonomy.control.edge_follower import Track
+from gvgbot.autonomy.destinations import (
+    Foot,
+    Route,
+    foot_at,
+    foot_of,
+    route_to_foot,
+    route_to_vertex,
+)
+from gvgbot.autonomy.errands.closures import Closures
+from gvgbot.autonomy.errands.kinds import Home, Look, Past, Rest, Stop, ToPoint, ToVertex
+from gvgbot.autonomy.events import Event, Recovery
+from gvgbot.autonomy.exploration.access import NEAR_M, straight_way, way_to_edge
+from gvgbot.autonomy.exploration.certainty import robot_sigma
+from gvgbot.autonomy.exploration.paths import Approach
+from gvgbot.autonomy.mapping import Mapper
+from gvgbot.autonomy.mission import Drive, ExplorationConfig, LookAround, Mission, Order, Stand
+from gvgbot.autonomy.slam.graph import HalfEdgeId
+from gvgbot.autonomy.views import Correspondence, View
+from gvgbot.autonomy.whereabouts import Situation
+from gvgbot.geometry import Array
+
+DIRECT_M = 4.0  # the longest straight way to a point
+_THERE_M = 0.15  # from a destination, one has arrived
+_PAST_M = 0.5  # from a stop at which one does not stop
+_AT_VERTEX_M = 1.0  # from a vertex, what stands in the way stands on the edge beyond it
+_ALMOST_M = 0.6  # as well, where one cannot come nearer
+_SHORT_M = 0.3  # a track so short leads nowhere
+_PROGRESS_M = 0.3
+_SURE_M = 0.4  # of a place that was found again
+_LOOKS = 2  # around, before giving up
+_LONGEST_VIEW_S = 2.0  # a longer gap between views is an outage, not a lack of progress
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """How driving to a stop ended, and what there is to say about it."""
+
+    outcome: Literal["arrived", "given up"]
+    reason: str
+
+
+class Ground:
+    """What is known of the ground: where the robot is on it, and which ways are closed.
+
+    `room_m` is how far from the walls the robot drives where there is no edge.
+    """
+
+    def __init__(self, mission: Mission, mapper: Mapper, room_m: float) -> None:
+        self.mission, self.mapper, self.room_m = mission, mapper, room_m
+        self.closures = Closures()
+
+    def situation(self, view: View, known: Correspondence) -> Situation | None:
+        """Where the robot is on the graph; None if it is off it."""
+        place = view.gvg.place(view.local_base.position)
+        if place is None or place.distance > NEAR_M:
+            return None
+        graph, where = self.mapper.graph, self.mission.where
+        return Situation(view.gvg, known, graph, where, place, view.local_base, view.doubted)
+
+    def is_at(self, view: View, vertex: int) -> bool:
+        """Whether the robot is about at a vertex."""
+        if vertex not in self.mapper.graph.vertices:
+            return False
+        there = self.mapper.in_local_frame(view, vertex).position
+        return float(np.hypot(*(there - view.local_base.position))) < _AT_VERTEX_M
+
+
+class Driving:
+    """The way to one stop."""
+
+    def __init__(self, stop: Stop, ground: Ground, config: ExplorationConfig) -> None:
+        self.stop, self._ground, self.config = stop, ground, config
+        self._mapper = ground.mapper
+        self.happened: list[Event] = []  # whoever tells of it takes it out
+        self._began: float | None = None  # stamp
+        self._avoid: tuple[frozenset[HalfEdgeId], int] | None = None  # not that way on that edge
+        self._heading: int | None = None  # the first vertex on the way
+        self._route: Route | None = None  # that is being driven
+        self._nearest_m = math.inf  # that has been left of it
+        self._looks = 0
+        self._is_looking = self._is_obstructed = False
+        self._progress = -math.inf  # stamp
+        self._last_view = -math.inf  # stamp
+        self._travelled_then = -math.inf
+        self._budget_m = math.inf  # of `travelled`
+
+    def obstruct(self) -> None:
+        """Note that there is no way on."""
+        self._is_obstructed = True
+
+    def advance(self, view: View, known: Correspondence) -> Order | Ended:
+        """The order for the next keyframe interval, or how it ended."""
+        if self._began is None:
+            self._begin(view)
+        if view.travelled > self._budget_m:
+            return Ended("given up", "driven too far without reaching it")
+        waited = self._waited(view)
+        if self._is_obstructed or waited > self.config.in_the_way_s:
+            waited = 0.0
+            ended = self._close_way(view)
+            if ended is not None:
+                return ended
+        here = self._ground.situation(view, known)
+        match self.stop:
+            case Look():
+                return self._look_once(view)
+            case Rest(seconds=seconds):
+                return self._rest(view, seconds)
+            case ToVertex(vertex=vertex):
+                return self._to_vertex(view, here, vertex, waited)
+            case Past(end=end, station=station):
+                return self._past(view, here, foot_at(self._mapper.graph, end, station), waited)
+            case ToPoint() | Home():
+                return self._to_point(view, here, self.stop, waited)
+
+    def _begin(self, view: View) -> None:
+        known = sum(edge.length for edge in self._mapper.graph.edges.values())
+        self._budget_m = view.travelled + 2 * known + self.config.patience_m
+        self._began = self._progress = self._last_view = view.stamp
+
+    def _waited(self, view: View) -> float:
+        """Seconds without progress."""
+        outage = view.stamp - self._last_view - _LONGEST_VIEW_S
+        since = self._progress + max(0.0, outage)  # lets no patience run out
+        is_off = self._route is None  # the graph; on it, coming nearer is what counts
+        has_moved = is_off and view.travelled > self._travelled_then + _PROGRESS_M
+        if has_moved or self._is_looking:
+            self._travelled_then, since = view.travelled, view.stamp
+        self._progress, self._last_view, self._is_looking = since, view.stamp, False
+        return view.stamp - since
+
+    # -- something in the way ----------------------------------------------------------------------
+
+    def _close_way(self, view: View) -> Ended | None:
+        """Something stands in the way: try another one, if there is one."""
+        self._is_obstructed, self._progress = False, view.stamp
+        graph, on_edge = self._mapper.graph, self._ground.mission.where.on_edge
+        heading = self._heading
+        if self._route is not None and self._ground.is_at(view, self._route.first):
+            on_edge = next(iter(self._route.departures), on_edge)
+        self._nearest_m = math.inf
+        edge = None if on_edge is None else graph.edge_at(on_edge)
+        ends = [edge.a, edge.b] if edge is not None else [on_edge] if on_edge is not None else []
+        halves = [half for end in ends if (half := graph.half_edge(end)) is not None]
+        if heading is None or all(half.blocked for half in halves):
+            return Ended("given up", "something stands in the way")
+        self._avoid = frozenset(ends), heading
+        until = view.stamp + self.config.remember_blocked_s
+        self._ground.closures.close(graph, ends, until)
+        self.happened.append(Recovery(view.stamp, "try another way", "something stands in the way"))
+        return None
+
+    def _starts(self, here: Situation) -> list[Approach]:
+        """Where ways begin, without the one that something stands in."""
+        starts = here.starts()
+        if self._avoid is None or here.where.on_edge not in self._avoid[0]:
+            return starts
+        return [start for start in starts if start.arrival.vertex != self._avoid[1]]
+
+    # -- the kinds of stops ------------------------------------------------------------------------
+
+    def _look_once(self, view: View) -> Order | Ended:
+        if not self._looks:
+            return self._look_around(view)
+        sigma = robot_sigma(self._mapper.belief)
+        reason = f"it knows its place to {sigma:.2f} m"
+        return Ended("arrived" if sigma < _SURE_M else "given up", reason)
+
+    def _rest(self, view: View, seconds: float) -> Order | Ended:
+        assert self._began is not None
+        self._progress = view.stamp
+        return Stand() if view.stamp < self._began + seconds else Ended("arrived", "")
+
+    def _to_vertex(
+        self, view: View, here: Situation | None, vertex: int, waited: float
+    ) -> Order | Ended:
+        graph = self._mapper.graph
+        if vertex not in graph.vertices:
+            return Ended("given up", f"vertex {vertex} is not in the map any more")
+        node = None if here is None else here.known.node_of.get(vertex)
+        there = (
+            self._mapper.in_local_frame(view, vertex).position
+            if node is None
+            else view.gvg.nodes[node].position
+        )
+        if self._is_there(view, there, waited):
+            return Ended("arrived", f"vertex {vertex}")
+        if here is None:
+            return self._find_edge(view, waited)
+        return self._drive(view, here, route_to_vertex(graph, self._starts(here), vertex), waited)
+
+    def _past(
+        self, view: View, here: Situation | None, foot: Foot | None, waited: float
+    ) -> Order | Ended:
+        if foot is None:
+            return Ended("given up", "the edge is not in the map any more")
+        away = foot.in_local_frame(self._mapper, view) - view.local_base.position
+        if float(np.hypot(*away)) < _PAST_M:
+            return Ended("arrived", "")
+        if here is None:
+            return self._find_edge(view, waited)
+        route = route_to_foot(here, self._starts(here), foot)
+        if route is not None and route.metres < _PAST_M:
+            return Ended("arrived", "")
+        return self._drive(view, here, route, waited)
+
+    def _to_point(
+        self, view: View, here: Situation | None, stop: ToPoint | Home, waited: float
+    ) -> Order | Ended:
+        goal = np.array([stop.x, stop.y])
+        local_map = view.local_base.compose(self._mapper.belief.map_base.inverse())
+        local_goal = local_map.transform(goal)
+        away = float(np.hypot(*(local_goal - view.local_base.position)))
+        if away < _THERE_M:
+            return Ended("arrived", "")
+        way = straight_way(view, local_goal, self._ground.room_m) if away < DIRECT_M else None
+        if way is not None and waited < self.config.look_around_s:
+            self._heading = self._route = None
+            return Drive(Track.of(*way))
+        foot = foot_of(self._mapper, goal)
+        if foot is None:
+            return Ended("given up", "no edge is known that it could drive on")
+        at_foot = foot.in_local_frame(self._mapper, view)
+        if self._is_there(view, at_foot, waited):
+            short = f"{away:.1f} m from there, where the known ways end"
+            if isinstance(stop, Home):
+                return Ended("arrived", short)
+            return Ended("given up", f"the way is not free; it stands {short}")
+        if here is None:
+            return self._find_edge(view, waited)
+        route = route_to_foot(here, self._starts(here), foot)
+        return self._drive(view, here, route, waited, at_foot)
+
+    # -- on the way --------------------------------------------------------------------------------
+
+    def _drive(
+        self,
+        view: View,
+        here: Situation,
+        route: Route | None,
+        waited: float,
+        end: Array | None = None,
+    ) -> Order | Ended:
+        """Along a route, to its end or to a point of it (2,), local frame."""
+        if route is None:
+            return Ended("given up", "no known way leads there")
+        self._heading, self._route = route.first, route
+        if route.metres < self._nearest_m - _PROGRESS_M:
+            self._nearest_m, self._progress = route.metres, view.stamp
+        path = route.branches(here) or here.ahead()
+        line, clearance = view.gvg.line_from(here.place, path)
+        if end is not None:
+            d = np.hypot(*(line - end).T)
+            if d.min() < _ALMOST_M:
+                i = max(1, int(np.argmin(d)))
+                line, clearance = line[: i + 1], clearance[: i + 1]
+        track = Track.of(line, clearance)
+        if track.length < _SHORT_M and waited > self.config.look_around_s:
+            if self._looks >= _LOOKS:
+                return Ended("given up", "the way there is not to be seen any more")
+            return self._look_around(view)
+        return Drive(track)
+
+    def _find_edge(self, view: View, waited: float) -> Order | Ended:
+        """Off the graph: go to the nearest edge, or look around for one."""
+        self._heading = self._route = None
+        way = way_to_edge(view)
+        if way is not None and waited < self.config.look_around_s:
+            return Drive(Track.of(*way))
+        if self._looks >= _LOOKS:
+            return Ended("given up", "no edge is in sight")
+        return self._look_around(view)
+
+    def _look_around(self, view: View) -> Order:
+        self._looks += 1
+        self._is_looking = True
+        self.happened.append(Recovery(view.stamp, "look around", f"on the way: {self.stop}"))
+        return LookAround(math.tau)
+
+    def _is_there(self, view: View, there: Array, waited: float) -> bool:
+        """Whether the robot is at a place (2,), local frame, or as near as it comes."""
+        away = float(np.hypot(*(there - view.local_base.position)))
+        has_waited = waited > self.config.look_around_s
+        return away < _THERE_M or (has_waited and away < _ALMOST_M)

@@ -1,0 +1,347 @@
+"""What can be asked of the robot, and what it does first because of that."""
+
+import math
+
+import numpy as np
+
+from gvgbot.autonomy.destinations import Route, foot_of, route_to_foot, route_to_vertex
+from gvgbot.autonomy.errands.driving import DIRECT_M, Driving, Ended, Ground
+from gvgbot.autonomy.errands.kinds import (
+    Coverage,
+    Errand,
+    Home,
+    Look,
+    Patrol,
+    ToPoint,
+    ToVertex,
+)
+from gvgbot.autonomy.errands.plans import Here, Kept, Plan, plan_for, recalled
+from gvgbot.autonomy.events import Decision, ErrandEnded, Event
+from gvgbot.autonomy.exploration.certainty import Revisiting
+from gvgbot.autonomy.mapping import Mapper
+from gvgbot.autonomy.mission import ExplorationConfig, Mission, Order, Stand
+from gvgbot.autonomy.views import Correspondence, View
+from gvgbot.autonomy.whereabouts import Situation
+
+_OFF_GRAPH_M = 3.0  # a point farther from every edge is out of reach
+_MOST_STOPS = 10  # that are passed at once
+
+
+class Declined(Exception):
+    """The robot will not do that, and says why; nothing has changed."""
+
+
+class Errands:
+    """Stands between the pipeline and the mission, which goes on where it was when there is none.
+
+    What is asked for is answered with what happens now; Declined says why nothing does. `room_m`
+    is how far from the walls the robot drives where there is no edge.
+    """
+
+    def __init__(
+        self, mission: Mission, mapper: Mapper, config: ExplorationConfig, room_m: float
+    ) -> None:
+        self._mission, self._mapper, self._config = mission, mapper, config
+        self._ground = Ground(mission, mapper, room_m)
+        self.closures = self._ground.closures
+        self.is_paused = False
+        self.is_waiting = False  # after an errand, for what comes next
+        self.is_lost = False  # somebody doubts the pose; whoever takes that into account resets it
+        self.happened: list[Event] = []  # because of requests; whoever tells of it takes it out
+        self._seen: tuple[View, Correspondence] | None = None
+        self._revisiting = Revisiting(config.certainty)
+        self._is_own = False  # the errand: nobody asked for it, and exploring goes on after it
+        self._plan: Plan | None = None
+        self._driving: Driving | None = None
+
+    @property
+    def errand(self) -> Errand | None:
+        """What the robot is about, other than exploring."""
+        return None if self._plan is None else self._plan.errand
+
+    @property
+    def progress(self) -> str | None:
+        """The errand, and how far that is, in words."""
+        return None if self._plan is None else str(self._plan)
+
+    @property
+    def is_resting(self) -> bool:
+        """Whether there is nothing to do but to stand."""
+        is_over = self._plan is None and (self.is_waiting or self._mission.outcome is not None)
+        return self.is_paused or is_over
+
+    def configure(self, config: ExplorationConfig) -> None:
+        """Use another configuration from now on."""
+        self._config = config
+        self._revisiting.configure(config.certainty)
+        self._mission.configure(config)
+        if self._driving is not None:
+            self._driving.config = config
+
+    # -- what can be asked for ---------------------------------------------------------------------
+
+    def pause(self) -> str:
+        """Stand until `resume`."""
+        if self.is_paused:
+            return "it is paused already"
+        self.is_paused = True
+        return "it stands still until it is asked to resume"
+
+    def resume(self) -> str:
+        """Go on with what was paused."""
+        if not self.is_paused:
+            return "it was not paused"
+        self.is_paused = False
+        if self._plan is not None:
+            return f"it goes on with: {self._plan}"
+        if self.is_resting:
+            return "it is not paused any more, and has nothing to do"
+        return "it goes on exploring"
+
+    def stop(self, stamp: float) -> str:
+        """End the errand and the exploration."""
+        self.is_paused = False
+        had_errand = self._plan is not None
+        self._end(stamp, "stopped", "by a request")
+        if self._mission.outcome is not None:
+            if had_errand:
+                return f"it stands; the exploration had ended before: {self._mission.outcome}"
+            return f"it had ended before: {self._mission.outcome}"
+        self.happened.append(self._mission.stop(stamp, "stopped by a request"))
+        return "the exploration has ended"
+
+    def explore(self, stamp: float) -> str:
+        """Go on exploring, even if that had ended."""
+        self._check_going(stamp)
+        if self._plan is None and not self.is_resting:
+            return "it is exploring already"
+        self._end(stamp, "replaced", "by explore")
+        self.is_waiting = False
+        self.closures.open_all(self._mapper.graph)
+        if self._mission.outcome is not None:
+            self._mission.reopen()
+        return f"it explores; {len(self._mapper.graph.frontiers())} frontiers are known"
+
+    def relocalise(self, stamp: float) -> str:
+        """Find the place in the map again, by the walls around."""
+        self._check_going(stamp)
+        if not isinstance(self.errand, Look):
+            self._take(Look(), stamp)
+            self.is_lost = True
+        return "it looks around; it finds its place if that is within about a metre of the believed"
+
+    def home(self, stamp: float) -> str:
+        """Drive to where the robot started, or as near to it as known ways lead."""
+        return self._drive_to_point(Home(), stamp)
+
+    def goto_point(self, x: float, y: float, stamp: float) -> str:
+        """Drive to a point, m, map frame."""
+        return self._drive_to_point(ToPoint(x, y), stamp)
+
+    def goto_vertex(self, vertex: int, stamp: float) -> str:
+        """Drive to a vertex."""
+        self._check_going(stamp)
+        self._check_known(vertex)
+        if self.errand == ToVertex(vertex) and not self._is_own:
+            return f"it is on its way to vertex {vertex} already"
+        route = self._way_to_vertex(vertex)
+        if route is None and self.closures.open_all(self._mapper.graph):
+            route = self._way_to_vertex(vertex)  # what was in the way may have gone
+        if route is None and self.whereabouts() is not None:
+            raise Declined(f"no known way leads to vertex {vertex}")
+        self._take(ToVertex(vertex), stamp)
+        return f"it drives{_far(route)} to vertex {vertex}"
+
+    def patrol(self, vertices: tuple[int, ...], stamp: float) -> str:
+        """Drive from vertex to vertex over and over, in this order; to all if none is named."""
+        self._check_going(stamp)
+        for vertex in vertices:
+            self._check_known(vertex)
+        places = set(vertices or self._mapper.graph.vertices)
+        if len(places) < 2:
+            raise Declined(f"a patrol takes two vertices or more; {self._known_vertices()}")
+        if self.errand == Patrol(vertices):
+            return f"it does that already: {self._plan}"
+        self._take(Patrol(vertices), stamp)
+        return f"it patrols {len(places)} vertices until it is asked for something else"
+
+    def coverage(self, stamp: float) -> str:
+        """Drive over every edge once."""
+        self._check_going(stamp)
+        edges = self._mapper.graph.edges.values()
+        if not edges:
+            raise Declined("no edge is known yet that it could drive on")
+        if isinstance(self.errand, Coverage):
+            return f"it does that already: {self._plan}"
+        self.closures.open_all(self._mapper.graph)
+        self._take(Coverage(), stamp)
+        metres = sum(edge.length for edge in edges)
+        return (
+            f"it drives over all {len(edges)} edges, {metres:.0f} m and what must be driven twice"
+        )
+
+    def _drive_to_point(self, errand: ToPoint | Home, stamp: float) -> str:
+        self._check_going(stamp)
+        if self.errand == errand:
+            return "it is on its way there already"
+        base = self._mapper.belief.map_base
+        away = math.hypot(errand.x - base.x, errand.y - base.y)
+        if away > DIRECT_M:
+            trouble = self._trouble_on_the_way(errand)
+            if trouble is not None and self.closures.open_all(self._mapper.graph):
+                trouble = self._trouble_on_the_way(errand)
+            if trouble is not None:
+                raise Declined(trouble)
+        self._take(errand, stamp)
+        where = "to where it started" if isinstance(errand, Home) else "there"
+        return f"it drives {where}, {away:.1f} m away in a straight line"
+
+    def _trouble_on_the_way(self, errand: ToPoint | Home) -> str | None:
+        """Why no known way leads to a point."""
+        foot, here = foot_of(self._mapper, np.array([errand.x, errand.y])), self.whereabouts()
+        if foot is None:
+            return "no edge is known yet that it could drive on"
+        if foot.away > _OFF_GRAPH_M and isinstance(errand, ToPoint):
+            return f"the nearest known way ends {foot.away:.1f} m from there"
+        if here is not None and route_to_foot(here, here.starts(), foot) is None:
+            return "no known way leads there"
+        return None
+
+    def _way_to_vertex(self, vertex: int) -> Route | None:
+        here = self.whereabouts()
+        if here is None:
+            return None
+        return route_to_vertex(self._mapper.graph, here.starts(), vertex)
+
+    def _check_going(self, stamp: float) -> None:
+        if self.is_paused:
+            raise Declined("it is paused: ask it to resume first")
+        if self._seen is None:
+            raise Declined("it has not seen enough yet to know where it is")
+        self.closures.open_due(self._mapper.graph, stamp)
+
+    def _check_known(self, vertex: int) -> None:
+        if vertex not in self._mapper.graph.vertices:
+            raise Declined(f"there is no vertex {vertex}; {self._known_vertices()}")
+
+    def _known_vertices(self) -> str:
+        """Which vertices there are, in a few words."""
+        ids = self._mapper.graph.vertices
+        if not ids:
+            return "none is known yet"
+        return f"there are {len(ids)}, with ids from {min(ids)} to {max(ids)}"
+
+    def whereabouts(self) -> Situation | None:
+        """Where the robot was on the graph when it last looked; None if that was off it."""
+        return None if self._seen is None else self._ground.situation(*self._seen)
+
+    def _take(self, errand: Errand, stamp: float) -> None:
+        self._end(stamp, "replaced", f"by {errand}")
+        self._mission.set_aside()
+        self.is_waiting = False
+        self._plan = plan_for(errand)
+
+    def _end(self, stamp: float, how: str, reason: str) -> None:
+        """Be done with the errand, if there is one, and wait for what comes next."""
+        if self._plan is not None:
+            self.happened.append(ErrandEnded(stamp, str(self._plan.errand), how, reason))
+            self.is_waiting = not self._is_own
+        if self._is_own:
+            self.closures.open_all(self._mapper.graph)
+        self._is_own = False
+        self._plan = self._driving = None
+
+    # -- after a restart ---------------------------------------------------------------------------
+
+    def kept(self) -> Kept | None:
+        """What there is to remember of the errand that somebody asked for."""
+        return None if self._plan is None or self._is_own else self._plan.kept()
+
+    def recall(self, kept: Kept | None) -> None:
+        """Go on with an errand that was remembered."""
+        self._plan = None if kept is None else recalled(kept)
+
+    # -- what is done about it ---------------------------------------------------------------------
+
+    def advance(self, view: View, known: Correspondence) -> tuple[Order, list[Event]]:
+        """The order for the next keyframe interval, and what has happened."""
+        self._seen = view, known
+        self.closures.open_due(self._mapper.graph, view.stamp)
+        if self._plan is None and not self._revisit(view):
+            self._revisiting.note_target(self._mission.target)
+            return self._mission.advance(view, known)
+        happened = self._mission.witness(view, known)
+        order = self._pursue(view, known)
+        return order, happened + self.take_events()
+
+    def _revisit(self, view: View) -> bool:
+        """Go back to a vertex, if that is to be done before exploring goes on; whether it is."""
+        here = self.whereabouts()
+        if here is None or not self._mission.is_choosing:
+            return False
+        belief = self._mapper.belief
+        wanted = self._revisiting.next(self._mapper.graph, belief, here.starts())
+        if wanted is None:
+            doubtful = self._revisiting.too_uncertain(belief)
+            self._mission.remark = (
+                f"; {len(doubtful)} vertices stay less certain than wanted" if doubtful else ""
+            )
+            return False
+        self._take(ToVertex(wanted.vertex), view.stamp)
+        self._is_own = True
+        self.happened.append(Decision(view.stamp, wanted.vertex, None, wanted.reason))
+        return True
+
+    def take_events(self) -> list[Event]:
+        """What has happened and was not told of yet."""
+        happened, self.happened = self.happened, []
+        return happened
+
+    def hold(self) -> None:
+        """Note that the robot cannot go on just now: somebody may be in its way."""
+        if self._plan is None:
+            self._mission.hold()
+
+    def obstruct(self, reason: str) -> None:
+        """Note that there is no way on."""
+        if self._plan is None:
+            self._mission.obstruct(reason)
+        elif self._driving is not None:
+            self._driving.obstruct()
+
+    def _pursue(self, view: View, known: Correspondence) -> Order:
+        """Drive to the stop, or on to the next one; a stop to pass is no reason to stand."""
+        for _ in range(_MOST_STOPS):
+            plan = self._plan
+            assert plan is not None, "there is an errand"
+            driving = self._driving or self._next(plan, view)
+            if driving is None:
+                break
+            order = driving.advance(view, known)
+            self.happened += driving.happened
+            driving.happened.clear()
+            if not isinstance(order, Ended):
+                return order
+            plan.note(self._here(view), order)
+            self._driving = None
+        return Stand()
+
+    def _next(self, plan: Plan, view: View) -> Driving | None:
+        """Begin to drive to the next stop; without one that is the end of the errand."""
+        stop = plan.next(self._here(view))
+        self.happened += plan.happened
+        plan.happened.clear()
+        if isinstance(stop, Ended):
+            self._end(view.stamp, stop.outcome, stop.reason)
+            return None
+        self._driving = Driving(stop, self._ground, self._config)
+        return self._driving
+
+    def _here(self, view: View) -> Here:
+        here = self.whereabouts()
+        starts = [] if here is None else here.starts()
+        return Here(view.stamp, self._mapper.graph, starts, view.travelled)
+
+
+def _far(route: Route | None) -> str:
+    return "" if route is None else f" {route.metres:.1f} m"
