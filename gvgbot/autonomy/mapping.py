@@ -99,7 +99,10 @@ class Mapper:
         return KnownVertices(positions[near], degrees)
 
     def observe(self, view: View) -> tuple[Correspondence, list[Event]]:
-        """Match a view with the map and learn from it."""
+        """Match a view with the map and learn from it.
+
+        The list of what happened grows with what is joined or removed before the next view.
+        """
         self._events = []
         known = Correspondence()
         sightings = self._sightings(view)

@@ -33,7 +33,7 @@ from gvgbot.autonomy.odometry_log import OdometryLog
 from gvgbot.autonomy.slam.ekf import OdometryNoise
 from gvgbot.autonomy.slam.recognition import RecognitionConfig
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
-from gvgbot.autonomy.views import View, touching
+from gvgbot.autonomy.views import Correspondence, View, touching
 from gvgbot.geometry import STANDSTILL, Array, Pose, Twist, rotated_covariance, wrap_angle
 from gvgbot.hal.deskew import deskewed
 from gvgbot.hal.messages import Odometry, Scan
@@ -217,19 +217,23 @@ class Pipeline:
             doubtful,
             touching(self.gvg, doubtful),
         )
-        known, seen = self.mapper.observe(view)
+        known, learnt = self.mapper.observe(view)
         self._keep(scan, odom_base, local_base)
-        happened += seen
+        done = self._act(view, known, scan)
+        return happened + learnt + done  # what was done may have taught the mapper more
+
+    def _act(self, view: View, known: Correspondence, scan: Scan) -> list[Event]:
+        """Decide what to do next; what happened by that."""
         if self.led:
-            return happened + self.mission.witness(view, known)
+            return self.mission.witness(view, known)
         if self._turning():
-            return happened
+            return []
         if len(self.keyframes) == 1:
             self._turn(_blind_angle(scan))
-            return happened
+            return []
         order, done = self.errands.advance(view, known)
         self._obey(order)
-        return happened + done
+        return done
 
     def _local_gvg(self, local_base: Pose, range_max: float) -> LocalGvg:
         """The GVG around the base, by what the local map shows and the map holds."""

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from gvgbot.autonomy.events import EdgeJoined
 from gvgbot.config import TwinConfig
 from gvgbot.drivers.hokuyo.twin_config import HokuyoTwinConfig
 from gvgbot.drivers.kobuki.twin_config import KobukiTwinConfig
@@ -85,6 +86,8 @@ def test_a_ring_without_a_vertex_is_driven_round_once() -> None:
     (vertex,) = run.vertices("meetpoint")
     assert np.hypot(*run.pipeline.mapper.belief.map_vertex(vertex).position) < 0.9
     assert run.pipeline.travelled < 1.2 * edge.length
+    (joined,) = (event for event in run.events if isinstance(event, EdgeJoined))
+    assert (joined.start, joined.end, joined.driven) == (vertex, vertex, True)
 
 
 def test_two_ways_round_a_block_are_two_edges_between_the_same_vertices() -> None:
