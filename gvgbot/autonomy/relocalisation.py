@@ -3,6 +3,9 @@
 The robot draws a local map from nothing and drives about; each look lays that map onto the walls
 of the known one. What fits nowhere better than chance is dropped, what fits in several places is
 kept until the robot has driven to where they differ.
+
+Two looks from near each other show the same walls and are no two witnesses: a look counts in full
+only as long as it is the newest, and then with the share of its walls that has been left behind.
 """
 
 import math
@@ -22,16 +25,18 @@ from gvgbot.hal.messages import Scan
 _CELL_M, _WALL_CELL_M = 0.25, 0.1
 _REACH_M = 8.0  # around the robot, what is compared
 _NEAR_M = 0.2  # walls so near to each other are one
-_PLACES_M = 0.5  # between places that are tried,
-_HEADINGS = 120  # each with so many headings
+_ROOM_M = 0.2  # from the walls, a robot may stand
+_HEADINGS = 120  # that are tried at each place
 _TRIED = 100  # places in one go
 _ROUGH_M = 0.4  # walls so far off do not speak for a rough guess
 _ROUGH_POINTS, _POINTS = 80, 300
-_GUESSES = 40  # that are looked at closely
-_APART_M, _APART_RAD = 0.8, 0.35  # guesses nearer to each other are the same
+_GUESSES = 150  # that are looked at closely: a place that is left out can never be found
+_FITS_A_STEP = 4
+_APART_M, _APART_RAD = 0.6, 0.3  # guesses nearer to each other are the same
+_COMPARED = 5000  # guesses in that
 _ONE_M, _ONE_RAD = 0.4, 0.2  # hypotheses nearer to each other are the same
 _LOOK_EVERY_M = 1.0  # driven between two looks
-_TYPICAL = 0.05  # share of the walls that disagree at the right place
+_TELLING = 0.01  # share of the walls: who disagrees with so much more is e times less likely
 _CHANCE = (
     0.15  # where it looks alike by chance, and of what the map has not seen: that says nothing
 )
@@ -45,18 +50,16 @@ Bools = NDArray[np.bool_]
 
 
 class KnownWalls:
-    """The walls of a known map, what of it has been seen, and where a robot has been."""
+    """The walls of a known map, what of it has been seen, and where a robot may be."""
 
-    def __init__(self, scans: Sequence[tuple[Pose, Scan]], places: Array) -> None:
-        """Scans taken at map_base poses, and places (N, 2) on the known edges, map frame."""
+    def __init__(self, scans: Sequence[tuple[Pose, Scan]]) -> None:
+        """Scans taken at map_base poses."""
         ends = [base.compose(scan.base_laser).transform(_ends(scan)) for base, scan in scans]
         points = np.concatenate([np.empty((0, 2)), *ends])
         self.points = _thinned(points, _WALL_CELL_M)
         self.tree = cKDTree(self.points)
-        self.places = _thinned(places, _PLACES_M)
-        everything = np.concatenate([self.points, self.places])
-        low = everything.min(axis=0) if len(everything) else np.zeros(2)
-        high = everything.max(axis=0) if len(everything) else np.zeros(2)
+        low = self.points.min(axis=0) if len(self.points) else np.zeros(2)
+        high = self.points.max(axis=0) if len(self.points) else np.zeros(2)
         self._corner = low - 2 * _REACH_M
         shape = np.ceil((high - low + 4 * _REACH_M) / _WALL_CELL_M).astype(int)
         walls = np.zeros(shape, bool)
@@ -68,6 +71,8 @@ class KnownWalls:
         for base, scan in scans:
             seen[self._cells(base.compose(scan.base_laser).transform(_passed(scan)), _CELL_M)] = 1
         self._seen: Bools = binary_dilation(seen, iterations=2)
+        free = self._corner + (np.argwhere(seen) + 0.5) * _CELL_M
+        self.places = free[self.tree.query(free)[0] > _ROOM_M]
 
     def _cells(self, points: Array, cell: float) -> tuple[NDArray[np.int64], ...]:
         return tuple(((points - self._corner) / cell).astype(np.int64).T)
@@ -109,7 +114,14 @@ class Hypothesis:
     """Where the local frame may be on the map, and the log of how much speaks for it."""
 
     map_local: Pose
-    weight: float = 0.0
+    behind: float = 0.0  # log weight, by the walls that have been left behind
+    newest: float = 0.0  # and by those of the newest look
+    is_possible: bool = True
+
+    @property
+    def weight(self) -> float:
+        """By all walls that have been seen."""
+        return self.behind + self.newest if self.is_possible else -math.inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +146,7 @@ class Relocaliser:
         self._known, self._matching = known, matching
         self._look: Look
         self._hypotheses: list[Hypothesis] = []
-        self._none = 0.0  # log weight of being nowhere on the map
+        self._nowhere = _nowhere()
         self._looks = 0
         self._opinion = Opinion(None, 0.0, 0, 0)
         self._work = self._working()
@@ -149,7 +161,8 @@ class Relocaliser:
         """What the looks so far say; weights are compared with that of no place at all."""
         if not self._hypotheses:
             return Opinion(None, 0.0, 0, self._looks)
-        weights = np.exp(np.array([h.weight for h in self._hypotheses] + [self._none]))
+        weights = np.array([h.weight for h in [*self._hypotheses, self._nowhere]])
+        weights = np.exp(weights - weights.max())
         shares = weights / weights.sum()
         best = int(np.argmax(shares[:-1]))
         possible = int((shares[:-1] > _HOPELESS).sum())
@@ -162,10 +175,10 @@ class Relocaliser:
             guesses = yield from self._guesses(look)
             yield from self._begin(look, guesses)
             while self._hypotheses:
-                start = self._look.local_base
-                while self._look.local_base.distance(start) < _LOOK_EVERY_M:
+                before = self._look.local_base
+                while (driven := self._look.local_base.distance(before)) < _LOOK_EVERY_M:
                     yield
-                yield from self._compare(self._look)
+                yield from self._compare(self._look, driven)
             while self._look.local_base.distance(look.local_base) < _LOOK_EVERY_M:
                 yield
 
@@ -181,47 +194,43 @@ class Relocaliser:
             ],
             axis=-1,
         )
-        scores = []
+        found = []
         places = self._known.places
         for first in range(0, len(places), _TRIED):
             some = places[first : first + _TRIED]
             laid = [self._known.scores(place + turned).mean(axis=1) for place in some]
-            scores.append(np.array(laid))
+            found.append(_best_turned(some, np.array(laid)))
             yield
-        return _peaks(places, headings, np.concatenate([np.empty((0, _HEADINGS)), *scores]))
+        return _peaks(np.concatenate([np.empty((0, 4)), *found]))
 
     def _begin(self, look: Look, guesses: list[Pose]) -> Generator[None, None, None]:
         """Make hypotheses of what fits closely, too."""
-        self._hypotheses, self._none, self._looks = [], 0.0, 0
-        found = []
-        for guess in guesses:
-            yield
-            hypothesis = Hypothesis(guess.compose(look.local_base.inverse()))
-            if self._fit(look, hypothesis, _GUESSED):
-                found.append(hypothesis)
-        self._hypotheses = found
-        self._conclude()
+        inverse = look.local_base.inverse()
+        self._hypotheses = [Hypothesis(guess.compose(inverse)) for guess in guesses]
+        self._nowhere, self._looks = _nowhere(), 0
+        yield from self._weigh(look, _GUESSED)
 
-    def _compare(self, look: Look) -> Generator[None, None, None]:
-        """Weigh every hypothesis by a look."""
-        for hypothesis in self._hypotheses:
-            yield
-            if not self._fit(look, hypothesis, _FOLLOWED):
-                hypothesis.weight = -math.inf
+    def _compare(self, look: Look, driven: float) -> Generator[None, None, None]:
+        """Weigh every hypothesis by a look, so many metres after the one before."""
+        share = min(1.0, driven / (2 * _REACH_M))
+        for hypothesis in [*self._hypotheses, self._nowhere]:
+            hypothesis.behind += share * hypothesis.newest
+        yield from self._weigh(look, _FOLLOWED)
+
+    def _weigh(self, look: Look, Q: Array) -> Generator[None, None, None]:
+        for number, hypothesis in enumerate(self._hypotheses):
+            if number % _FITS_A_STEP == 0:
+                yield
+            hypothesis.is_possible = self._fit(look, hypothesis, Q)
         self._conclude()
 
     def _conclude(self) -> None:
         self._looks += 1
-        self._none -= _CHANCE / _TYPICAL
+        least = self._nowhere.weight + math.log(_HOPELESS)
         distinct: list[Hypothesis] = []
         for h in sorted(self._hypotheses, key=lambda h: -h.weight):
-            hopeless = h.weight < self._none + math.log(_HOPELESS)
-            if not hopeless and not any(self._same(h, other) for other in distinct):
+            if h.weight > least and not any(self._same(h, other) for other in distinct):
                 distinct.append(h)
-        top = max((h.weight for h in distinct), default=0.0)
-        for h in distinct:  # only differences count
-            h.weight -= top
-        self._none -= top
         self._hypotheses = distinct
         self._opinion = self._formed()
 
@@ -239,7 +248,7 @@ class Relocaliser:
         if found is None:
             return False
         hypothesis.map_local = found.pose.compose(look.local_base.inverse())
-        hypothesis.weight -= self._disagreement(look, found.pose, points) / _TYPICAL
+        hypothesis.newest = -self._disagreement(look, found.pose, points) / _TELLING
         return True
 
     def _disagreement(self, look: Look, map_base: Pose, base_walls: Array) -> float:
@@ -253,23 +262,31 @@ class Relocaliser:
         there = there[look.local_map.known(there)]
         if len(there) == 0:
             return 1.0
-        distance = np.asarray(cKDTree(look.local_map.points()).query(there)[0])
+        distance = np.asarray(look.local_map.tree().query(there)[0])
         return max(unknown_to_map, float((distance > _NEAR_M).mean()))
 
 
-def _peaks(places: Array, headings: Array, scores: Array) -> list[Pose]:
-    """The best poses by scores (places, headings), none near a better one."""
+def _nowhere() -> Hypothesis:
+    """Being nowhere on the map, where everything fits as it does by chance."""
+    return Hypothesis(Pose(), newest=-_CHANCE / _TELLING)
+
+
+def _best_turned(places: Array, scores: Array) -> Array:
+    """Guesses (N, 4) of x, y, heading and score: what fits better than if turned a little."""
+    best = (scores >= np.roll(scores, 1, axis=1)) & (scores > np.roll(scores, -1, axis=1))
+    i, k = np.nonzero(best)
+    return np.column_stack([places[i], k * (math.tau / _HEADINGS), scores[i, k]])
+
+
+def _peaks(guesses: Array) -> list[Pose]:
+    """The best poses of guesses (N, 4), none near a better one."""
+    left = guesses[np.argsort(-guesses[:, 3], kind="stable")[:_COMPARED]]
     peaks: list[Pose] = []
-    for flat in np.argsort(-scores, axis=None, kind="stable").tolist():
-        i, k = divmod(flat, len(headings))
-        pose = Pose(float(places[i, 0]), float(places[i, 1]), wrap_angle(float(headings[k])))
-        if all(
-            pose.distance(p) > _APART_M or abs(wrap_angle(pose.theta - p.theta)) > _APART_RAD
-            for p in peaks
-        ):
-            peaks.append(pose)
-            if len(peaks) == _GUESSES:
-                break
+    while len(peaks) < _GUESSES and len(left):
+        x, y, heading = left[0, :3].tolist()
+        peaks.append(Pose(x, y, wrap_angle(heading)))
+        turn = np.abs((left[:, 2] - heading + math.pi) % math.tau - math.pi)
+        left = left[(np.hypot(left[:, 0] - x, left[:, 1] - y) > _APART_M) | (turn > _APART_RAD)]
     return peaks
 
 

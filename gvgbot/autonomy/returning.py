@@ -5,6 +5,7 @@ it was kept, life goes on there. Otherwise a second mind that knows nothing driv
 local map is laid onto the known one until a single place is left.
 """
 
+import contextlib
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -13,6 +14,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.control.reflexes import Felt
+from gvgbot.autonomy.errands import Declined
 from gvgbot.autonomy.estimate import Estimate, smoothed
 from gvgbot.autonomy.events import Event, Finished, Recovery
 from gvgbot.autonomy.localisation import Localisation
@@ -56,6 +58,7 @@ class ReturningPipeline(Pipeline):
         self._matching = config.scan_matching
         self._is_back = not self.keyframes
         self._seeker: Pipeline | None = None
+        self._tour: list[int] | None = None  # vertices of its own that it still drives to
         self._relocaliser: Relocaliser
         self._estimate: Estimate
 
@@ -117,17 +120,14 @@ class ReturningPipeline(Pipeline):
             for pose, keyframe in zip(self._estimate.keyframes, self.keyframes, strict=True)
             if keyframe.scan is not None
         ]
-        places = np.array([(p.x, p.y) for p in self._estimate.keyframes]).reshape(-1, 2)
-        self._relocaliser = Relocaliser(KnownWalls(scans, places), self._matching)
-        self._seeker = self._new_mind()
+        self._relocaliser = Relocaliser(KnownWalls(scans), self._matching)
+        self._seeker, self._tour = self._new_mind(), None
         self._seeker._odometry = self._odometry
         self.mission.reason = "not sure where it is"
         return [Recovery(scan.stamp, "look for its place on the map", "it may have been moved")]
 
     def _seek(self, seeker: Pipeline, scan: Scan) -> list[Event]:
         """Let the second mind drive on; what it finds is of no interest but for the place."""
-        if _has_ended(seeker):  # it has failed once, and somebody wants it to go on
-            return self._begin_to_seek(scan)
         seeker.perceive(scan)
         last = seeker._last
         if last is None or seeker._turning():
@@ -138,10 +138,23 @@ class ReturningPipeline(Pipeline):
             reason = f"{opinion.confidence:.3f} sure after {opinion.looks} looks"
             return [Recovery(scan.stamp, "go on from its place on the map", reason)]
         self.mission.reason = _doubt(opinion)
-        if not _has_ended(seeker):
+        if self._goes_on(seeker, scan.stamp):
             return []
-        self.mission.outcome = "failed"
+        self.mission.outcome, self._seeker = "failed", None
         return [Finished(scan.stamp, "failed", self.mission.reason)]
+
+    def _goes_on(self, seeker: Pipeline, stamp: float) -> bool:
+        """Whether there is more to see: when all is explored, once more what was seen long ago."""
+        if not seeker.errands.is_resting:
+            return True
+        vertices = seeker.mapper.graph.vertices
+        if self._tour is None:
+            self._tour = sorted(vertices, key=lambda v: vertices[v].seen_at, reverse=True)
+        while self._tour:
+            with contextlib.suppress(Declined):
+                seeker.errands.goto_vertex(self._tour.pop(), stamp)
+                return True
+        return False
 
     def _arrive(self, seeker: Pipeline, map_local: Pose) -> None:
         """Be at a place, in the second mind's local frame and with its local maps."""
@@ -198,10 +211,6 @@ class ReturningPipeline(Pipeline):
         for hazard in seeker._hazards._all:
             hazard.travelled += self.travelled - seeker.travelled
         self._hazards._all += seeker._hazards._all
-
-
-def _has_ended(mind: Pipeline) -> bool:
-    return mind.mission.outcome is not None
 
 
 def _doubt(opinion: Opinion) -> str:

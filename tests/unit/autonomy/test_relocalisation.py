@@ -1,0 +1,78 @@
+"""Where on a known map a robot is: told by walls that differ, and never by walls that do not."""
+
+import math
+from collections.abc import Iterable
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
+from gvgbot.autonomy.relocalisation import KnownWalls, Look, Opinion, Relocaliser
+from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
+from gvgbot.drivers.world import World
+from gvgbot.geometry import Pose, wrap_angle
+from tests.unit.autonomy.sights import LASER_270, Rectangle, carved, sweep
+
+pytestmark = pytest.mark.slow
+
+SQUARE: list[Rectangle] = [
+    *((-1.0, -1.0, 11.0, 1.0), (-1.0, 9.0, 11.0, 11.0)),
+    *((-1.0, -1.0, 1.0, 11.0), (9.0, -1.0, 11.0, 11.0)),
+]
+CORNERS = [(0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0)]
+ALIKE = carved(SQUARE)  # turned by a quarter about its middle, it is the same
+WITH_BRANCH = carved([*SQUARE, (2.0, 9.0, 4.0, 15.0)])
+STEP_M = 0.5
+WORK = 200  # steps of the relocaliser between two looks; more than it needs
+
+
+def along(corners: Iterable[tuple[float, float]]) -> list[Pose]:
+    """Poses along straight lines, looking ahead."""
+    poses = []
+    for (xa, ya), (xb, yb) in pairwise(corners):
+        for share in np.arange(0.0, 1.0, STEP_M / math.hypot(xb - xa, yb - ya)):
+            x, y = xa + share * (xb - xa), ya + share * (yb - ya)
+            poses.append(Pose(float(x), float(y), math.atan2(yb - ya, xb - xa)))
+    return poses
+
+
+def opinions(world: World, path: list[Pose]) -> list[Opinion]:
+    """What is thought after each pose of a path (world frame, which is that of the map).
+
+    The map is of scans taken on the way round the corridors.
+    """
+    rng = np.random.default_rng(3)
+    known = [(pose, sweep(world, pose)) for pose in along([*CORNERS, CORNERS[0]])[::2]]
+    relocaliser = Relocaliser(KnownWalls(known), ScanMatchingConfig())
+    local_map, formed = LocalMap(LocalMapConfig(half_width_m=10.0)), []
+    for number, pose in enumerate(path):
+        view = LASER_270 if number else math.tau  # it turns before it drives
+        scan = sweep(world, pose, field_of_view=view, sigma=0.01, rng=rng)
+        local_base = path[0].to(pose)
+        local_map.insert(scan, local_base, number * STEP_M)
+        look = Look.around(local_base, local_map)
+        formed.append([relocaliser.step(look) for _ in range(WORK)][-1])
+    return formed
+
+
+def test_walls_that_are_all_alike_leave_every_place_possible_however_long_it_drives() -> None:
+    path = along([(5.0, 0.3), *CORNERS[1:], *CORNERS[:2]])
+    formed = opinions(ALIKE, path)
+    assert formed[-1].looks > 20
+    assert not any(opinion.is_sure for opinion in formed)
+    assert {opinion.possible for opinion in formed[-40:]} == {4}
+
+
+def test_it_is_sure_when_it_has_seen_the_branch_and_not_before() -> None:
+    path = along([(1.2, 0.5), *CORNERS[1:], (1.0, 10.0)])
+    formed = opinions(WITH_BRANCH, path)
+    for pose, opinion in zip(path, formed, strict=True):
+        if pose.y < 2.0 and pose.x < 8.0:  # out of sight of the branch and of its mouth
+            assert not opinion.is_sure
+        if opinion.is_sure:
+            assert opinion.map_local is not None
+            found = opinion.map_local.compose(path[0].to(pose))
+            assert found.distance(pose) < 0.1
+            assert abs(wrap_angle(found.theta - pose.theta)) < 0.03
+    assert formed[-1].is_sure
