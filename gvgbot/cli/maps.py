@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from gvgbot.cli.arguments import Commands, frames, positive, say
+from gvgbot.errors import GvgbotError, UsageError
 
 
 def add_map(commands: Commands) -> None:
@@ -43,12 +44,22 @@ def add_map(commands: Commands) -> None:
     export = actions.add_parser(
         "export",
         help="the map in another format",
-        description="Write the map of a run in the format that the file's name ends with: .svg and "
-        ".pdf to print, .png, .graphml for graph programs, .geojson for the Nav2 route server.",
+        description="Write the map of a run in the format that the file's name ends with: "
+        ".svg and .pdf to print, .png, .graphml for graph programs, .geojson for the Nav2 route "
+        "server. With --ros-bag write a recording (MCAP) as a bag of ROS 2: scans, odometry, "
+        "transforms, and the map as it grew.",
         epilog="example: gvgbot map export runs/office-1 office.pdf",
     )
-    export.add_argument("run", type=Path, metavar="RUN_DIR", help="the directory of a run")
+    export.add_argument(
+        "run", type=Path, metavar="RUN_DIR", help="the directory of a run, or a recording"
+    )
     export.add_argument("file", type=Path, metavar="FILE", help="what to write")
+    export.add_argument("--ros-bag", action="store_true", help="FILE is the new directory of a bag")
+    export.add_argument(
+        "--sensors-only",
+        action="store_true",
+        help="leave the map and the robot's place in it out of the bag, for programs that map",
+    )
     export.set_defaults(command=_export)
     _add_diff(actions)
 
@@ -94,7 +105,25 @@ def _info(options: argparse.Namespace) -> int:
 def _export(options: argparse.Namespace) -> int:
     from gvgbot.maps.export import export
 
+    if options.ros_bag:
+        return _export_bag(options)
+    if options.sensors_only:
+        raise UsageError("--sensors-only is about bags: give --ros-bag, too")
     export(options.run, options.file)
+    say(f"written: {options.file}")
+    return 0
+
+
+def _export_bag(options: argparse.Namespace) -> int:
+    try:
+        from gvgbot.ros_bag import export_bag
+    except ModuleNotFoundError as error:
+        if error.name is None or not error.name.startswith("rosbags"):
+            raise
+        raise GvgbotError("bags need rosbags: pip install 'gvgbot[ros2]'") from error
+
+    for line in export_bag(options.run, options.file, sensors_only=options.sensors_only):
+        say(line)
     say(f"written: {options.file}")
     return 0
 

@@ -10,6 +10,7 @@ from functools import cache, partial
 from typing import Annotated, Any, ClassVar, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gvgbot.geometry import Array
 
@@ -57,8 +58,8 @@ Int32 = Annotated[int, INT32]
 UInt32 = Annotated[int, UINT32]
 Float32 = Annotated[float, FLOAT32]
 Float64 = Annotated[float, FLOAT64]
-Bytes = Annotated[Array, Numbers(UINT8)]
-Int8s = Annotated[Array, Numbers(INT8)]
+Bytes = Annotated[NDArray[Any], Numbers(UINT8)]
+Int8s = Annotated[NDArray[Any], Numbers(INT8)]
 Float32s = Annotated[Array, Numbers(FLOAT32)]
 Matrix6 = Annotated[Array, Numbers(FLOAT64, 36)]
 
@@ -123,6 +124,29 @@ def _write_items(write: Write, out: bytearray, value: tuple[Message, ...]) -> No
     _put(out, 4, struct.pack("<I", len(value)))
     for item in value:
         write(out, item)
+
+
+def decode_twist(data: bytes, *, stamped: bool) -> tuple[float, float]:
+    """Velocity ahead (m/s) and turn rate (rad/s) of a Twist, or of a TwistStamped.
+
+    What else a twist can say no wheels could follow. Raises ValueError for data that are no such
+    message.
+    """
+    if data[:2] not in (b"\0\0", b"\0\1"):
+        raise ValueError("not plain CDR")
+    order, body = "<" if data[1] else ">", data[len(LITTLE_ENDIAN) :]
+    try:
+        begin = 0
+        if stamped:
+            (length,) = struct.unpack_from(order + "I", body, _FRAME_AT)
+            begin = -(-(_FRAME_AT + 4 + length) // 8) * 8
+        linear, *_, angular = struct.unpack_from(order + "6d", body, begin)
+    except struct.error as error:
+        raise ValueError("cut short") from error
+    return linear, angular
+
+
+_FRAME_AT = 8  # bytes; where the length of a header's frame_id is
 
 
 def definition(kind: type[Message]) -> str:

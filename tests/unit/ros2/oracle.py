@@ -51,9 +51,10 @@ def _numbers(code: str, count: int, rng: np.random.Generator) -> Any:
     return rng.integers(limits.min, limits.max, count, dtype=code, endpoint=True)
 
 
-def by_rosbags(message: Message) -> bytes:
+def by_rosbags(message: Message, *, little_endian: bool = True) -> bytes:
     """The same message, as `rosbags` encodes it."""
-    return bytes(STORE.serialize_cdr(_theirs(message), message.ros_name))
+    theirs = _theirs(message)
+    return bytes(STORE.serialize_cdr(theirs, message.ros_name, little_endian=little_endian))
 
 
 def _theirs(message: Any) -> Any:

@@ -1,12 +1,16 @@
 """Every message as an independent implementation encodes and defines it."""
 
+import contextlib
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from gvgbot.ros2 import messages
-from gvgbot.ros2.cdr import Message, definition, encode
+from gvgbot.ros2.cdr import Message, decode_twist, definition, encode
 from tests.unit.ros2.oracle import STORE, STORES, by_rosbags, random_message
 
 CONTENTS = 1000
@@ -65,3 +69,29 @@ def _plain(fields: object) -> object:
     if isinstance(fields, list | tuple):
         return [_plain(field) for field in fields]
     return fields
+
+
+@pytest.mark.parametrize("kind", [messages.Twist, messages.TwistStamped], ids=lambda k: k.__name__)
+@pytest.mark.parametrize("little", [True, False], ids=["little endian", "big endian"])
+def test_a_twist_of_the_oracle_is_read(kind: type[Message], little: bool) -> None:
+    rng = np.random.default_rng(11)
+    for _ in range(200):
+        message = random_message(kind, rng)
+        twist = message.twist if isinstance(message, messages.TwistStamped) else message
+        data = by_rosbags(message, little_endian=little)
+        read = decode_twist(data, stamped=kind is messages.TwistStamped)
+        np.testing.assert_array_equal(read, (twist.linear.x, twist.angular.z))
+
+
+@given(st.binary(max_size=120), st.booleans())
+def test_what_is_no_twist_is_refused_and_nothing_worse(data: bytes, stamped: bool) -> None:
+    with contextlib.suppress(ValueError):
+        decode_twist(data, stamped=stamped)
+
+
+@given(st.booleans(), st.data())
+def test_a_twist_that_is_cut_short_is_refused(stamped: bool, draw: st.DataObject) -> None:
+    whole = encode(messages.TwistStamped() if stamped else messages.Twist())
+    cut = draw.draw(st.integers(0, len(whole) - 1))
+    with pytest.raises(ValueError, match=r"cut short|CDR"):
+        decode_twist(whole[:cut], stamped=stamped)

@@ -1,0 +1,174 @@
+"""A node among those of ROS 2 that use rmw_zenoh: sends messages, hears who wants to drive."""
+
+import asyncio
+from collections import deque
+from collections.abc import Callable
+from types import TracebackType
+from typing import Self
+
+import structlog
+import zenoh
+import zenoh.ext
+
+from gvgbot.errors import GvgbotError
+from gvgbot.geometry import Twist
+from gvgbot.ros2 import messages
+from gvgbot.ros2.cdr import decode_twist
+from gvgbot.ros2.config import Ros2Config
+from gvgbot.ros2.topics import TOPICS, Node, Topic, attachment, gid
+from gvgbot.zenoh_config import reason, session_config
+
+_HEARTBEAT_S = 0.5  # by which receivers of latched topics find out that they have missed one
+_TWISTS = {"Twist": messages.Twist, "TwistStamped": messages.TwistStamped}
+_LONGEST_COMMAND = 1000  # bytes
+
+log = structlog.get_logger()
+
+
+class Ros2Node:
+    """The robot as a node; a context manager that leaves the network.
+
+    Nothing waits: what cannot be sent is dropped.
+    """
+
+    def __init__(self, config: Ros2Config, robot: str) -> None:
+        """Raises GvgbotError if the addresses cannot be used."""
+        self._config, self._warned = config, False
+        self._session = _open(config)
+        self._node = Node(
+            config.domain,
+            str(self._session.info.zid()),
+            config.namespace,
+            f"gvgbot_{robot.replace('-', '_')}",
+        )
+        self._tokens: list[zenoh.LivelinessToken] = []  # gone with the session
+        self._declare_token(self._node.token())
+        self._publishers = {
+            topic: self._publisher(number, topic) for number, topic in enumerate(TOPICS, start=1)
+        }
+
+    def _declare_token(self, token: str) -> None:
+        self._tokens.append(self._session.liveliness().declare_token(token))
+
+    def _publisher(self, number: int, topic: Topic) -> "_Publisher":
+        token = self._node.endpoint_token(number, topic)
+        self._declare_token(token)
+        return _Publisher(self._session, self._node.key(topic), gid(token), latched=topic.latched)
+
+    def wants(self, topic: Topic) -> bool:
+        """Whether to send messages of a topic: somebody listens, or latecomers get them."""
+        return self._publishers[topic].is_heard
+
+    def send(self, topic: Topic, data: bytes, unix_ns: int) -> None:
+        """Send a message, in CDR; one topic from one thread."""
+        self._publishers[topic].put(data, unix_ns)
+
+    async def hear(self, drive: Callable[[Twist], None]) -> None:
+        """Hand on the newest twist each time until cancelled, if the configuration permits that."""
+        kind = self._config.cmd_vel
+        if kind is None:
+            return
+        loop, arrived = asyncio.get_running_loop(), asyncio.Event()
+        newest: deque[zenoh.Sample] = deque(maxlen=1)
+
+        def take(sample: zenoh.Sample) -> None:
+            newest.append(sample)
+            loop.call_soon_threadsafe(arrived.set)
+
+        topic = Topic("/cmd_vel", _TWISTS[kind])
+        with self._session.declare_subscriber(self._node.key(topic), take):
+            self._declare_token(self._node.endpoint_token(len(TOPICS) + 1, topic, hears=True))
+            while True:
+                await arrived.wait()
+                arrived.clear()
+                if newest:  # one that came while another was read has been read in its place
+                    self._hand_on(newest.popleft(), drive)
+
+    def _hand_on(self, sample: zenoh.Sample, drive: Callable[[Twist], None]) -> None:
+        data = sample.payload.to_bytes()[:_LONGEST_COMMAND]
+        try:
+            linear, angular = decode_twist(data, stamped=self._config.cmd_vel == "TwistStamped")
+        except ValueError as error:
+            if not self._warned:
+                self._warned = True
+                log.warning("damaged /cmd_vel are passed over", reason=str(error))
+        else:
+            drive(Twist(linear, angular))
+
+    def close(self) -> None:
+        """Leave the network."""
+        self._session.close()  # type: ignore[no-untyped-call]
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+class _Publisher:
+    """One topic: counts its messages, and says with each who sent it and when."""
+
+    def __init__(self, session: zenoh.Session, key: str, own: bytes, *, latched: bool) -> None:
+        self._gid, self._sequence = own, 0
+        self._plain: zenoh.Publisher | None = None
+        self._advanced: zenoh.ext.AdvancedPublisher | None = None
+        if latched:
+            self._advanced = zenoh.ext.declare_advanced_publisher(
+                session,
+                key,
+                congestion_control=zenoh.CongestionControl.DROP,
+                cache=zenoh.ext.CacheConfig(1),
+                sample_miss_detection=zenoh.ext.MissDetectionConfig(
+                    heartbeat=None, sporadic_heartbeat=_HEARTBEAT_S
+                ),
+                publisher_detection=True,
+            )
+        else:
+            self._plain = session.declare_publisher(
+                key, congestion_control=zenoh.CongestionControl.DROP
+            )
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether there is a point in sending."""
+        return self._plain is None or self._plain.matching_status.matching  # type: ignore[attr-defined]
+
+    def put(self, data: bytes, unix_ns: int) -> None:
+        """Send a message."""
+        self._sequence += 1  # as rmw_zenoh counts: from 1
+        attached = attachment(self._sequence, unix_ns, self._gid)
+        try:
+            if self._advanced is not None:
+                self._advanced.put(data, attachment=attached)
+            elif self._plain is not None:
+                self._plain.put(data, attachment=attached)
+        except zenoh.ZError as error:
+            log.debug("not sent to ROS 2", reason=reason(error))
+
+
+def _open(config: Ros2Config) -> zenoh.Session:
+    """A session like those of ROS nodes: found and linked to by way of a router."""
+    try:
+        return zenoh.open(
+            session_config(
+                {
+                    "mode": "peer",
+                    "listen/endpoints": config.listen,
+                    "connect/endpoints": config.connect,
+                    "scouting/gossip/enabled": True,
+                    "timestamping/enabled": True,
+                },
+                config.zenoh_file,
+            )
+        )
+    except zenoh.ZError as error:
+        raise GvgbotError(
+            f"cannot meet ROS 2 from {', '.join(config.listen)}: {reason(error)}; "
+            "choose another address (ros2.listen), or set ros2.enabled=false"
+        ) from error

@@ -1,0 +1,131 @@
+"""A recording as a bag that ROS 2 programs play: what ROS would have heard of that run."""
+
+from pathlib import Path
+from types import TracebackType
+from typing import Final, Self
+
+from rosbags.interfaces import (
+    Connection,
+    Qos,
+    QosDurability,
+    QosHistory,
+    QosLiveliness,
+    QosReliability,
+    QosTime,
+)
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+
+from gvgbot.autonomy.loop import Cycle
+from gvgbot.autonomy.pipeline import Pipeline
+from gvgbot.errors import GvgbotError, UsageError
+from gvgbot.hal.messages import Scan
+from gvgbot.live_ros import LiveRos
+from gvgbot.replay import Log, Wanted, open_log
+from gvgbot.ros2.cdr import definition
+from gvgbot.ros2.topics import Topic
+
+_VERSION: Final = 9  # of the format, as Iron and later write it
+_MAP_EVERY_S = 5.0  # maps are large
+_FOR_EVER = QosTime(9_223_372_036, 854_775_807)
+
+
+def export_bag(recording: Path, out: Path, *, sensors_only: bool) -> list[str]:
+    """Write a bag directory, and say what is missing in it.
+
+    The robot's mind lives through the recording once more for its map, unless only what the sensors
+    said is wanted. Stamps are those of the robot's clock. Raises UsageError for a recording that
+    cannot be read, or a directory that exists; GvgbotError if it cannot be written.
+    """
+    if out.exists():
+        raise UsageError(f"{out} exists already; name a new directory")
+    log = open_log(Wanted(path=recording, config=None, overrides=[], no_echo_m=80.0))
+    try:
+        with _Bag(out) as bag:
+            _play(log, bag, sensors_only=sensors_only)
+    except OSError as error:
+        raise GvgbotError(f"cannot write {out}: {error.strerror}") from error
+    return log.flaws()
+
+
+def _play(log: Log, bag: "_Bag", *, sensors_only: bool) -> None:
+    config = log.config
+    pipeline = Pipeline(
+        config.autonomy,
+        config.exploration,
+        config.robot.radius_m,
+        led=log.led,
+        localisation=config.localisation,
+    )
+    live = LiveRos([bag], pipeline, config.autonomy.odometry_noise, unix=lambda stamp: stamp)
+    at = due = 0.0
+    for at, message in log.messages:
+        match message:
+            case Scan():
+                live.on_scan(message)
+                if not sensors_only:
+                    pipeline.perceive(message)
+            case Cycle():
+                if not sensors_only:
+                    pipeline.control(message.odometry, message.felt)
+                live.on_odometry(message.odometry)
+        if at >= due:
+            _draw(live, at)
+            due = at + _MAP_EVERY_S
+    _draw(live, at)
+
+
+def _draw(live: LiveRos, at: float) -> None:
+    draw = live.draw(at)
+    if draw is not None:
+        draw()
+
+
+class _Bag:
+    """Takes down every message; a context manager that finishes the bag."""
+
+    def __init__(self, path: Path) -> None:
+        self._writer = Writer(path, version=_VERSION, storage_plugin=StoragePlugin.MCAP)
+        self._writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
+        self._connections: dict[Topic, Connection] = {}
+
+    def wants(self, topic: Topic) -> bool:
+        """Every topic is wanted."""
+        return True
+
+    def send(self, topic: Topic, data: bytes, unix_ns: int) -> None:
+        """Take down a message."""
+        if topic not in self._connections:
+            self._connections[topic] = self._writer.add_connection(
+                topic.name,
+                topic.message.ros_name,
+                msgdef=definition(topic.message),
+                rihs01=f"RIHS01_{topic.message.type_hash}",
+                offered_qos_profiles=[_qos(topic)],
+            )
+        self._writer.write(self._connections[topic], unix_ns, data)
+
+    def __enter__(self) -> Self:
+        self._writer.open()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._writer.close()
+
+
+def _qos(topic: Topic) -> Qos:
+    return Qos(
+        QosHistory.KEEP_LAST,
+        1 if topic.latched else 10,
+        QosReliability.RELIABLE,
+        QosDurability.TRANSIENT_LOCAL if topic.latched else QosDurability.VOLATILE,
+        _FOR_EVER,
+        _FOR_EVER,
+        QosLiveliness.AUTOMATIC,
+        _FOR_EVER,
+        avoid_ros_namespace_conventions=False,
+    )
