@@ -3,7 +3,8 @@
 Run: python -m benchmarks.bench_telemetry [SECONDS]
 
 Scans of 1081 beams at 40 Hz, odometry at its rate, the state at 10 Hz, and each second a map of
-60 by 60 m with 200 vertices are made as the daemon makes them, and sent to a listener on loopback.
+200 vertices, what has changed in a grid of 60 by 60 m, a trajectory of 2,000 poses, and the health
+are made as the daemon makes them, and sent to a listener on loopback.
 On a machine that is busy otherwise, `chrt -f 10` before it tells the delays of its own.
 """
 
@@ -17,7 +18,6 @@ import subprocess
 import sys
 import time
 from collections.abc import AsyncIterable, Callable
-from types import SimpleNamespace
 from typing import Any, cast
 
 import msgspec
@@ -25,7 +25,8 @@ import numpy as np
 
 from benchmarks.report import report
 from gvgbot import client
-from gvgbot.autonomy.pipeline import Keyframe, Pipeline
+from gvgbot.autonomy.mission import ExplorationConfig
+from gvgbot.autonomy.pipeline import AutonomyConfig, Keyframe, Pipeline
 from gvgbot.autonomy.slam.ekf import Belief, OdometryNoise
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex
 from gvgbot.geometry import Pose, Twist
@@ -34,7 +35,8 @@ from gvgbot.live_feed import LiveFeed
 from gvgbot.live_map import LiveMap
 from gvgbot.snapshots import state
 from gvgbot.telemetry import Telemetry
-from gvgbot.topics import LinkHealth, TelemetryConfig
+from gvgbot.topics import HEALTH, LinkHealth, Map, TelemetryConfig
+from gvgbot.vitals import Vitals
 
 VERTICES, BEAMS, SIDE = 200, 1081, 60.0
 STATE_HZ, MAP_HZ, SCAN_HZ, ODOMETRY_HZ = 10.0, 1.0, 40.0, 50.0
@@ -64,24 +66,11 @@ class Robot:
 
     def __init__(self, network: Telemetry) -> None:
         known, belief = graph()
-        self.pipeline = cast(Pipeline, self._mind(known, belief))
-        self.network, self.live_map = network, LiveMap()
+        self.pipeline = _mind(known, belief)
+        self.network, self.live_map = network, LiveMap(0.0)
+        self.vitals = Vitals(time.perf_counter())
         self.feed = LiveFeed(network, self.pipeline, SCAN_HZ)
         self.rng, self.sequence = np.random.default_rng(1), 0
-
-    def _mind(self, known: GvgGraph, belief: Belief) -> Any:
-        target = HalfEdgeId(VERTICES - 1, 1)
-        where = SimpleNamespace(on_edge=HalfEdgeId(0, 0), trail_length=1.0)
-        return SimpleNamespace(
-            mapper=SimpleNamespace(graph=known, belief=belief),
-            mission=SimpleNamespace(target=target, where=where, outcome=None, reason=""),
-            keyframes=[],
-            travelled=100.0,
-            track=np.zeros((100, 2)),
-            map_base=Pose(),
-            map_base_at=lambda stamp: Pose(),
-            errands=SimpleNamespace(errand=None, is_paused=False, is_waiting=False),
-        )
 
     def scan(self, stamp: float) -> Scan:
         ranges = self.rng.uniform(2.0, 12.0, BEAMS)
@@ -108,6 +97,7 @@ class Robot:
                 stamp=stamp,
                 sequence=self.sequence,
                 cycles=self.sequence,
+                uptime=self.vitals.uptime(stamp),
                 noise=OdometryNoise(),
                 away=None,
                 guard=None,
@@ -124,9 +114,16 @@ class Robot:
         stamp = time.perf_counter()
         here = Pose(x, y)
         self.pipeline.keyframes.append(Keyframe(stamp, here, here, here, self.scan(stamp)))
-        draw = self.live_map.update(self.pipeline, time.perf_counter())
+        draw = self.live_map.update(self.pipeline, stamp)
         assert draw is not None
-        self.network.publish(msgspec.structs.replace(draw(), stamp=time.perf_counter()))
+        for value, latest in draw():  # stamped when ready, so that only the way is measured
+            value = msgspec.structs.replace(cast(Map, value), stamp=time.perf_counter())
+            self.network.publish(value, latest)
+
+    def on_health(self) -> None:
+        stamp = time.perf_counter()
+        self.vitals.note_cycle(0.01)
+        self.network.publish(self.vitals.health(stamp, unsent=0, laser=FINE, base=FINE))
 
     def fill(self) -> None:
         """Have seen the whole map before, so that it is as large as it gets."""
@@ -134,6 +131,18 @@ class Robot:
             for y in np.arange(4.0, SIDE, 8.0).tolist():
                 here = Pose(x, y)
                 self.pipeline.keyframes.append(Keyframe(0.0, here, here, here, self.scan(0.0)))
+        for at in np.linspace(0.0, 50.0, 2000).tolist():
+            there = Pose(at, at)
+            self.pipeline.keyframes.append(Keyframe(0.0, there, there, there, None))
+
+
+def _mind(known: GvgGraph, belief: Belief) -> Pipeline:
+    """A mind with a map, at its first vertex, that goes to the last."""
+    pipeline = Pipeline(AutonomyConfig(), ExplorationConfig(), 0.177)
+    pipeline.mapper.graph, pipeline.mapper.belief = known, belief
+    pipeline.mission.target = HalfEdgeId(VERTICES - 1, 1)
+    pipeline.mission.where.on_edge = HalfEdgeId(0, 0)
+    return pipeline
 
 
 async def every(action: Callable[[], None], rate_hz: float, *, in_thread: bool = False) -> None:
@@ -158,12 +167,14 @@ async def speak(robot: Robot, seconds: float) -> tuple[float, float]:
         longest = max(longest, time.perf_counter() - begin)
 
     robot.fill()
-    robot.on_map()
+    for _ in range(8):  # as many messages as the grid takes
+        robot.on_map()
     work = [
         every(on_scan, SCAN_HZ),
         every(robot.on_odometry, ODOMETRY_HZ),
         every(robot.on_beat, STATE_HZ),
         every(robot.on_map, MAP_HZ, in_thread=True),
+        every(robot.on_health, HEALTH.rate_hz),
     ]
     used, begin = cpu(), time.perf_counter()
     with contextlib.suppress(TimeoutError):
@@ -180,7 +191,7 @@ async def idle(seconds: float) -> float:
     with contextlib.suppress(TimeoutError):
         async with asyncio.timeout(seconds), asyncio.TaskGroup() as tasks:
             tasks.create_task(every(lambda: _draw(rng), SCAN_HZ))
-            for rate_hz in (ODOMETRY_HZ, STATE_HZ, MAP_HZ):
+            for rate_hz in (ODOMETRY_HZ, STATE_HZ, MAP_HZ, HEALTH.rate_hz):
                 tasks.create_task(every(lambda: None, rate_hz))
     return (cpu() - used) / (time.perf_counter() - begin)
 
@@ -197,11 +208,13 @@ def cpu() -> float:
 
 async def listen(endpoint: str, seconds: float) -> None:
     """Print how late each kind of value is in this process, s, as JSON."""
-    late: dict[str, list[float]] = {"scan": [], "state": [], "odometry": [], "map": []}
+    late: dict[str, list[float]] = {}
 
     async def note(kind: str, values: AsyncIterable[Any]) -> None:
         async for value in values:
-            late[kind].append(time.perf_counter() - value.stamp)  # one clock for all processes
+            late.setdefault(kind, []).append(
+                time.perf_counter() - value.stamp
+            )  # one clock for all processes
 
     async with client.connect("bench", endpoint) as seen:
         sources: dict[str, AsyncIterable[Any]] = {
@@ -209,6 +222,9 @@ async def listen(endpoint: str, seconds: float) -> None:
             "state": seen.state(),
             "odometry": seen.odometry(),
             "map": seen.map(),
+            "grid": seen.grid(),
+            "trajectory": seen.trajectory(),
+            "health": seen.health(),
         }
         print("ready", flush=True)
         with contextlib.suppress(TimeoutError):

@@ -35,7 +35,10 @@ are listed with their fields under [Topics](../topics.md).
 """
 WIDEST = 100  # of a signature in one line
 INTERNAL = {"put"}  # public for this package only
-CLASSES = (client.Robot, client.Asking, client.Refused, client.Presence, Newest, EventStream)
+CLASSES = (
+    *(client.Robot, client.Asking, client.Refused, client.Presence),
+    *(Newest, EventStream, client.Raster),
+)
 
 
 def page() -> str:

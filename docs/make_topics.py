@@ -12,6 +12,7 @@ from typing import Literal, TypeGuard, get_args, get_origin, get_type_hints
 import msgspec
 
 from docs.source import fields_of, table
+from gvgbot.requests import REQUESTS, request_key
 from gvgbot.topics import TOPICS, Topic, alive_key
 
 PAGE = Path(__file__).with_name("topics.md")
@@ -24,6 +25,9 @@ What a robot says over zenoh. `ROBOT` is its `robot.name`; `*` in that place lis
 them. A payload is one MessagePack map from field name to value; the encoding of each sample carries
 its type and version. Units are SI, angles are in radians.
 
+Only the robot writes its topics; the files in `configs/zenoh` see to that. What is sent on change
+is sent again to a subscriber that has lost it (`heartbeat` of an advanced subscriber).
+
 A queryable topic answers a `get` with its newest sample, and in JSON to `KEY?format=json`, where
 raw bytes are in base64. What is kept for latecomers is what an advanced subscriber gets when it
 joins. `gvgbot.client` does all of this for programs in Python.
@@ -34,31 +38,53 @@ ALIVE = """\
 A liveliness token, without payload: there as long as the robot is on the network. A robot that
 hangs can keep it, so look at `cycles` and `cycle_age` of its state, too.
 """
+REQUEST = """\
+## `{key}`: requests
+
+A query to exactly one of these keys asks the robot for something: {names}. What each does, its
+arguments, and the answer are under [Command a robot from elsewhere](how-to/remote.md).
+"""
 
 
 def page() -> str:
     """The whole page, Markdown."""
-    return "\n".join(
-        [HEAD, _overview(), *map(_section, TOPICS), ALIVE.format(key=alive_key("ROBOT"))]
-    )
+    return "\n".join([HEAD, _overview(), *map(_section, TOPICS), _alive(), _requests()])
+
+
+def _alive() -> str:
+    return ALIVE.format(key=alive_key("ROBOT"))
+
+
+def _requests() -> str:
+    names = ", ".join(f"`{name}`" for name in REQUESTS)
+    return REQUEST.format(key=request_key("ROBOT", "REQUEST"), names=names)
 
 
 def _overview() -> str:
     rows = [
-        "| key | payload | Hz | priority | kept for latecomers | queryable |",
-        "|---|---|---|---|---|---|",
+        "| key | payload | sent | priority | kept for latecomers | queryable | who may write |",
+        "|---|---|---|---|---|---|---|",
     ]
     for topic in TOPICS:
         cells = (
             f"`{topic.key('ROBOT')}`",
             f"`{topic.encoding}`",
-            f"{topic.rate_hz:g}",
+            f"on change, at most {topic.rate_hz:g} Hz"
+            if topic.on_change
+            else f"{topic.rate_hz:g} Hz",
             topic.priority,
             str(topic.history or "none"),
             "yes" if topic.queryable else "no",
+            "the robot",
         )
         rows.append(f"| {' | '.join(cells)} |")
-    rows.append(f"| `{alive_key('ROBOT')}` | liveliness token | | | | |")
+    rows.append(
+        f"| `{alive_key('ROBOT')}` | liveliness token | while it is there | | | | the robot |"
+    )
+    rows.append(
+        f"| `{request_key('ROBOT', 'REQUEST')}` | query, see below | when asked | | | | "
+        "whom the access control lets; `telemetry.requests` permits |"
+    )
     return "\n".join(rows) + "\n"
 
 

@@ -18,8 +18,8 @@ from gvgbot.hal.guard import Guard, Reason
 from gvgbot.hal.messages import Contact, Odometry
 from gvgbot.journal import GuardJournal, log_event, status_line
 from gvgbot.links import Devices, Links
-from gvgbot.live_feed import LiveFeed
-from gvgbot.live_map import LiveMap
+from gvgbot.live_feed import LiveFeed, Pace
+from gvgbot.live_map import LiveMap, News
 from gvgbot.maps.run_directory import record_of
 from gvgbot.persistence.keeper import Keeper
 from gvgbot.requests import Answer, Asked
@@ -28,7 +28,8 @@ from gvgbot.session import Session
 from gvgbot.simulation import Simulation
 from gvgbot.snapshots import state
 from gvgbot.steering import Steering
-from gvgbot.topics import EVENTS_KEPT, MAP, STATE, Event, Events, Map, Payload, State
+from gvgbot.topics import EVENTS_KEPT, HEALTH, MAP, STATE, Event, Events, Health, Payload, State
+from gvgbot.vitals import Vitals
 
 SAVE_EVERY = 30.0  # s at least between two savings while the map grows
 STUCK_AFTER = 1.0  # s without a control cycle, though the base is there
@@ -39,8 +40,10 @@ log = structlog.get_logger()
 class Network(Protocol):
     """Where the robot is watched from."""
 
-    def publish(self, value: Payload) -> None:
-        """Send without waiting; from any thread."""
+    failures: int  # samples that could not be sent
+
+    def publish(self, value: Payload, latest: Payload | None = None) -> None:
+        """Send without waiting; from any thread. `latest`: what to answer who asks, if not that."""
 
     def is_heard(self, payload: type[Payload]) -> bool:
         """Whether to send values of a type; not, if nobody listens and none are kept."""
@@ -70,7 +73,7 @@ class Robot:
         self._grown, self._finished = asyncio.Event(), asyncio.Event()
         self._saving = asyncio.Lock()  # one at a time
         self._odometry: Odometry | None = None
-        self._cycles, self._sequence = 0, 0
+        self._sequence = 0
         self._happened, self._told = 0, 0  # events; and those of them that were published
         self._latest_events: deque[Event] = deque(maxlen=EVENTS_KEPT)
         self._decided = ""  # the reason of the last decision
@@ -80,7 +83,9 @@ class Robot:
             self._feed = LiveFeed(network, session.pipeline, rate_hz)
         self._ready = False
         self._guard = GuardJournal()
+        self._healths = Pace(HEALTH.rate_hz)
         self._clock: Clock
+        self._vitals: Vitals
         self._devices: Devices
         self._loop: Loop
 
@@ -91,6 +96,7 @@ class Robot:
         self._clock = LoopClock() if self._keeper is None else self._keeper.clock()
         links = self._open_links() if links is None else links
         self._prepare(links)
+        self._vitals = Vitals(self._clock.now())
         work = {
             "devices": self._devices.run(),
             "explore": self._explore(),
@@ -200,7 +206,8 @@ class Robot:
 
     async def _keep_shown(self, network: Network) -> None:
         """Publish the map as it grows."""
-        live_map, due = LiveMap(), self._clock.now()
+        due = self._clock.now()
+        live_map = LiveMap(began=due)
         while True:
             draw = live_map.update(self._pipeline, self._clock.now())
             if draw is not None:
@@ -257,7 +264,8 @@ class Robot:
             self._notifier.ready()
 
     def _note(self, odometry: Odometry) -> None:
-        self._odometry, self._cycles = odometry, self._cycles + 1
+        self._odometry = odometry
+        self._vitals.note_cycle(self._clock.now() - odometry.stamp)
         if self._feed is not None:
             self._feed.on_odometry(odometry)
 
@@ -269,6 +277,8 @@ class Robot:
             self._feed.on_beat(now.stamp, self._decided)
         if self._network is not None:
             self._network.publish(now)
+            if self._healths.allows(now.stamp):
+                self._network.publish(self._health(self._network, now))
             if self._told < self._happened:
                 self._network.publish(Events(events=tuple(self._latest_events)))
                 self._told = self._happened
@@ -277,14 +287,21 @@ class Robot:
         if not stuck or self._devices.base.away is not None:
             self._notifier.alive()
 
+    def _health(self, network: Network, now: State) -> Health:
+        return self._vitals.health(
+            now.stamp, unsent=network.failures, laser=now.laser, base=now.base
+        )
+
     def _state(self) -> State:
+        now = self._clock.now()
         return state(
             self._pipeline,
             self._odometry,
             self._devices.base.battery,
-            stamp=self._clock.now(),
+            stamp=now,
             sequence=self._sequence,
-            cycles=self._cycles,
+            cycles=self._vitals.cycles,
+            uptime=self._vitals.uptime(now),
             noise=self._session.config.autonomy.odometry_noise,
             away=self._devices.away,
             guard=self._loop.stopped_for,
@@ -296,5 +313,6 @@ class Robot:
         )
 
 
-def _publish_drawn(network: Network, draw: Callable[[], Map]) -> None:
-    network.publish(draw())
+def _publish_drawn(network: Network, draw: Callable[[], list[News]]) -> None:
+    for value, latest in draw():
+        network.publish(value, latest)

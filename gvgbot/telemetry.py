@@ -13,13 +13,14 @@ import zenoh.ext
 
 from gvgbot.errors import GvgbotError
 from gvgbot.requests import JSON, MESSAGEPACK, Answer, Asked, request_key
-from gvgbot.topics import TOPICS, Payload, TelemetryConfig, Topic, alive_key
+from gvgbot.topics import HEARTBEAT, TOPICS, Payload, TelemetryConfig, Topic, alive_key
 from gvgbot.zenoh_config import reason, session_config
 
 _WAITING_QUERIES = 32  # more than this are dropped, oldest first; who asked gets nothing
 _WAITING_REQUESTS = 8
 _MAX_SESSIONS = 32
 _LONGEST_NAME, _LONGEST_ARGUMENTS = 80, 1000  # bytes of who asks, and of what
+_MISSES = zenoh.ext.MissDetectionConfig(heartbeat=HEARTBEAT, sporadic_heartbeat=None)
 _PRIORITIES = {
     "interactive_high": zenoh.Priority.INTERACTIVE_HIGH,
     "data_high": zenoh.Priority.DATA_HIGH,
@@ -59,6 +60,7 @@ class Telemetry:
             congestion_control=zenoh.CongestionControl.DROP,
             priority=_PRIORITIES[topic.priority],
             cache=zenoh.ext.CacheConfig(topic.history),
+            sample_miss_detection=_MISSES if topic.on_change else None,
             publisher_detection=True,
         )
 
@@ -69,10 +71,13 @@ class Telemetry:
             return True
         return publisher.matching_status.matching  # type: ignore[attr-defined, no-any-return]
 
-    def publish(self, value: Payload) -> None:
-        """Send to whoever listens; without waiting, and without complaining if it fails."""
+    def publish(self, value: Payload, latest: Payload | None = None) -> None:
+        """Send to whoever listens; without waiting, and without complaining if it fails.
+
+        `latest` is what those get who ask for the newest, if not the value itself.
+        """
         topic, publisher = self._publishers[type(value)]
-        self._latest[topic] = value
+        self._latest[topic] = value if latest is None else latest
         try:
             publisher.put(msgspec.msgpack.encode(value))
         except zenoh.ZError:

@@ -1,6 +1,7 @@
 """What the robot says on the network: the table of topics, and the types that travel."""
 
 import re
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -82,6 +83,7 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
     reason: str  # for the outcome, or for being halted
     errand: str | None = None  # what it was asked to do just now, such as goto 7
     requests: tuple[str, ...] = ()  # what it may be asked for, as its configuration says
+    uptime: float = 0.0  # s since the robot's program began
     pose: tuple[float, float, float]  # map_base: x, y, theta
     covariance: tuple[float, ...]  # of the pose, 3x3 row-major
     twist: tuple[float, float]  # as measured: m/s ahead, rad/s anticlockwise
@@ -129,31 +131,104 @@ class MapEdge(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Map(msgspec.Struct, frozen=True, kw_only=True):
-    """The map so far: walls, graph and the way driven. Sent when it has grown; map frame.
+    """The graph so far, corrected by every loop closure. Sent when it has grown; map frame."""
 
-    The cells and the trail lie where the robot believed to be at that time; later loop closures
-    correct them only in the saved map.
+    stamp: float  # s, the robot's monotonic clock
+    vertices: tuple[MapVertex, ...]
+    edges: tuple[MapEdge, ...]
+
+
+class Tile(msgspec.Struct, frozen=True, kw_only=True):
+    """A square part of the grid. That at column 0, row 0 has a corner at the map's origin."""
+
+    column: int  # of tiles, along x
+    row: int  # of tiles, along y
+    cells: bytes  # zlib of int8, row by row from the lower left: percent occupied, -1 unknown
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Raster:
+    """Cells (rows, columns), percent occupied, -1 where unknown, row 0 at the bottom; read-only.
+
+    `origin` (m, map frame) is the outer corner of cell [0, 0], `resolution` (m) a cell's side.
+    """
+
+    cells: NDArray[np.int8]
+    resolution: float
+    origin: tuple[float, float]
+
+
+class Grid(msgspec.Struct, frozen=True, kw_only=True):
+    """Walls and floor, in tiles. Sent with those that changed since the message before.
+
+    The answer to a query has all tiles, and the number of the last message that is in them. Who
+    finds a number missing, or another `began`, asks for all again. The cells lie where the robot
+    believed to be at that time; later loop closures correct them only in the saved map.
     """
 
     stamp: float  # s, the robot's monotonic clock
+    began: float  # s, when this grid was begun; those of another one are void
+    number: int  # of the message, from 1
     resolution: float  # m, the side of a cell
-    origin: tuple[float, float]  # m, the outer corner of the first cell
-    columns: int  # cells along x
-    rows: int  # cells along y
-    cells: bytes  # int8, row by row from the origin: percent occupied, -1 unknown
-    vertices: tuple[MapVertex, ...]
-    edges: tuple[MapEdge, ...]
-    trail: bytes  # little-endian float32 pairs x, y, m, about one for each 0.7 m driven
+    side: int  # cells along the side of a tile
+    tiles: tuple[Tile, ...]
+
+    def raster(self) -> Raster:
+        """The tiles laid side by side; unknown between them. Raises ValueError for damaged ones."""
+        if not self.tiles:
+            return Raster(np.full((1, 1), -1, np.int8), self.resolution, (0.0, 0.0))
+        places = np.array([(tile.row, tile.column) for tile in self.tiles])
+        corner = places.min(axis=0)
+        rows, columns = (places.max(axis=0) + 1 - corner) * self.side
+        cells = np.full((rows, columns), -1, np.int8)
+        for (row, column), tile in zip((places - corner) * self.side, self.tiles, strict=True):
+            cells[row : row + self.side, column : column + self.side] = self._unpacked(tile)
+        cells.setflags(write=False)
+        width = self.side * self.resolution
+        return Raster(cells, self.resolution, (int(corner[1]) * width, int(corner[0]) * width))
+
+    def _unpacked(self, tile: Tile) -> NDArray[np.int8]:
+        try:
+            return np.frombuffer(zlib.decompress(tile.cells), np.int8).reshape(self.side, self.side)
+        except zlib.error as error:
+            raise ValueError(f"a damaged tile at {tile.column}, {tile.row}: {error}") from error
+
+
+class Trajectory(msgspec.Struct, frozen=True, kw_only=True):
+    """The way driven so far, thinned to at most 2,000 poses. Sent when it has grown; map frame.
+
+    The poses are those that the robot believed in at the time; later loop closures correct them
+    only in the saved map.
+    """
+
+    stamp: float  # s, the robot's monotonic clock
+    stamps: bytes  # little-endian float64, s: when it was there
+    poses: bytes  # little-endian float32 triples x, y, theta, m and rad: map_base at these times
 
     @property
-    def grid(self) -> NDArray[np.int8]:
-        """The cells (rows, columns), row 0 at the bottom; read-only."""
-        return np.frombuffer(self.cells, np.int8).reshape(self.rows, self.columns)
+    def times(self) -> NDArray[np.float64]:
+        """The stamps (N,), s; read-only."""
+        return np.frombuffer(self.stamps, "<f8")
 
     @property
-    def driven(self) -> NDArray[np.float32]:
-        """The trail (N, 2), m; read-only."""
-        return np.frombuffer(self.trail, "<f4").reshape(-1, 2)
+    def map_base(self) -> NDArray[np.float32]:
+        """The poses (N, 3): x, y, theta; read-only."""
+        return np.frombuffer(self.poses, "<f4").reshape(-1, 3)
+
+
+class Health(msgspec.Struct, frozen=True, kw_only=True):
+    """How the robot's program and its links are doing."""
+
+    stamp: float  # s, the robot's monotonic clock
+    uptime: float  # s since the robot's program began
+    cycles: int  # control cycles so far
+    late_cycles: int  # those of them that acted on odometry older than 0.1 s
+    slowest_cycle: float  # s, the oldest odometry acted on since the message before
+    cpu: float  # cores that the program has kept busy since the message before
+    memory: int  # bytes of it that are in the machine's memory
+    unsent: int  # samples that the network would not take
+    laser: LinkHealth
+    base: LinkHealth
 
 
 class Event(msgspec.Struct, frozen=True, kw_only=True):
@@ -239,7 +314,7 @@ def _in_metres() -> NDArray[np.float32]:
 
 _METRES = _in_metres()
 
-Payload = State | Map | Events | Scan | Odometry | Plan
+Payload = State | Map | Grid | Trajectory | Events | Scan | Odometry | Plan | Health
 
 
 @dataclass(frozen=True, slots=True)
@@ -247,7 +322,8 @@ class Topic:
     """One row of the table.
 
     `history` samples are kept for those who come late; `queryable` topics answer with the newest.
-    Those without a history are only sent while somebody listens.
+    Those without a history are only sent while somebody listens. Those that are sent `on_change`
+    send a lost sample again, since the next one may be long in coming.
     """
 
     name: str
@@ -257,6 +333,7 @@ class Topic:
     priority: Priority
     history: int
     queryable: bool
+    on_change: bool = False
 
     def key(self, robot: str) -> str:
         """The key expression of a robot's topic."""
@@ -268,14 +345,20 @@ class Topic:
         return f"application/msgpack;gvgbot.{self.payload.__name__}.v{self.version}"
 
 
-STATE = Topic("state", State, 1, 5.0, "data_high", 1, queryable=True)
-MAP = Topic("map", Map, 1, 0.5, "data_low", 1, queryable=True)
-EVENTS = Topic("events", Events, 1, 5.0, "data", 1, queryable=True)
-PLAN = Topic("plan", Plan, 1, 2.0, "data", 1, queryable=True)
+STATE = Topic("state", State, 1, 10.0, "data_high", 1, queryable=True)
+MAP = Topic("map", Map, 2, 1.0, "data_low", 1, queryable=True, on_change=True)
+GRID = Topic("grid", Grid, 1, 1.0, "data_low", 1, queryable=True, on_change=True)
+TRAJECTORY = Topic("trajectory", Trajectory, 1, 1.0, "data_low", 1, queryable=True, on_change=True)
+EVENTS = Topic("events", Events, 1, 10.0, "data", 1, queryable=True, on_change=True)
+PLAN = Topic("plan", Plan, 1, 2.0, "data", 1, queryable=True, on_change=True)
+HEALTH = Topic("health", Health, 1, 1.0, "data", 1, queryable=True)
 ODOMETRY = Topic("odometry", Odometry, 1, 20.0, "data_high", 0, queryable=False)
 SCAN = Topic("scan", Scan, 1, 40.0, "data", 0, queryable=False)
-TOPICS = (STATE, MAP, EVENTS, PLAN, ODOMETRY, SCAN)
+TOPICS = (STATE, MAP, GRID, TRAJECTORY, EVENTS, PLAN, HEALTH, ODOMETRY, SCAN)
+HEARTBEAT = 2.0  # s, how often a topic that is sent on change says which sample was its last
 EVENTS_KEPT = 64  # in a message
+TRAJECTORY_POSES = 2000  # in a message, at most
+LATE_AFTER = 0.1  # s, the age of odometry from which a control cycle counts as late
 
 
 def alive_key(robot: str) -> str:

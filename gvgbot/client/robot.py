@@ -6,35 +6,43 @@ import json
 import operator
 import threading
 import time
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from functools import partial
 from pathlib import Path
 from types import TracebackType
-from typing import Self, TypeVar, overload
+from typing import NoReturn, Self, TypeVar, overload
 
 import zenoh
 import zenoh.ext
 
-from gvgbot.client.asking import Asking, ask
+from gvgbot.client.asking import PATIENCE_S, Asking, ask
 from gvgbot.client.newest import Newest, decoded
 from gvgbot.client.presence import Presence, Signs
+from gvgbot.client.tiles import Tiles
 from gvgbot.errors import GvgbotError, UsageError
 from gvgbot.requests import Arguments, Goto, Nothing, Patrol, RequestName, Set
 from gvgbot.topics import (
     EVENTS,
+    GRID,
+    HEALTH,
     MAP,
     ODOMETRY,
     PLAN,
     SCAN,
     STATE,
+    TRAJECTORY,
     Event,
     Events,
+    Grid,
+    Health,
     Map,
     Odometry,
+    Payload,
     Plan,
     Scan,
     State,
     Topic,
+    Trajectory,
     alive_key,
     is_endpoint,
     is_robot_name,
@@ -45,7 +53,7 @@ DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 
 _SETTLING = 1.0  # s after connecting, by when one has heard of all robots on the network
 
-T = TypeVar("T", State, Map, Events, Plan, Odometry, Scan)
+T = TypeVar("T", bound=Payload)
 
 
 def connect(
@@ -110,9 +118,13 @@ class Robot:
         self._plan: Newest[Plan] = Newest()
         self._odometry: Newest[Odometry] = Newest()
         self._scan: Newest[Scan] = Newest()
+        self._trajectory: Newest[Trajectory] = Newest()
+        self._health: Newest[Health] = Newest()
+        self._grid: Newest[Grid] = Newest()
+        self._tiles = Tiles(self._grid, self._ask_for_tiles)
         self._heard: set[Topic] = set()  # that were subscribed to
         self._signs = Signs(0.0)
-        self._gate = threading.Lock()  # one of opening and closing at a time
+        self._gate = threading.RLock()  # one of opening and closing at a time
         self._is_closed = False
         self._has_been_seen = threading.Event()
 
@@ -123,8 +135,29 @@ class Robot:
         return self._state
 
     def map(self) -> Newest[Map]:
-        """Its map, each time it has grown."""
+        """Its graph, each time it has grown."""
         return self._map
+
+    def grid(self) -> Newest[Grid]:
+        """Walls and floor, each time they have grown: tiles, which `raster()` joins to an array.
+
+        Sent from the first call on; missing tiles are asked for.
+        """
+        self._subscribe(GRID, self._on_tiles)
+        return self._grid
+
+    def trajectory(self) -> Newest[Trajectory]:
+        """The way driven, each time it has grown: `map_base` and `times` are arrays.
+
+        Sent from the first call on.
+        """
+        self._hear(TRAJECTORY, Trajectory, self._trajectory)
+        return self._trajectory
+
+    def health(self) -> Newest[Health]:
+        """How its program and its links are doing, once a second; sent from the first call on."""
+        self._hear(HEALTH, Health, self._health)
+        return self._health
 
     def events(self) -> "EventStream":
         """What happens, one after another; those of the last minutes first."""
@@ -236,30 +269,22 @@ class Robot:
         via_router = bool(session.info.routers_zid())
         self._signs = Signs(time.perf_counter(), via_router=via_router)
         session.liveliness().declare_subscriber(alive_key(self.name), self._on_token, history=True)
-        self._subscribe(session, STATE, State, self._state)
-        self._subscribe(session, MAP, Map, self._map)
-        self._subscribe(session, EVENTS, Events, self._events)
-        self._subscribe(session, PLAN, Plan, self._plan)
+        self._hear(STATE, State, self._state)
+        self._hear(MAP, Map, self._map)
+        self._hear(EVENTS, Events, self._events)
+        self._hear(PLAN, Plan, self._plan)
 
     def _hear(self, topic: Topic, payload: type[T], newest: Newest[T]) -> None:
-        """Subscribe to a topic that is sent to those only who listen, if that is still to do."""
+        """Put each sample of a topic into a box from now on, if that is still to do."""
+        self._subscribe(topic, partial(self._on_sample, topic, payload, newest))
+
+    def _subscribe(self, topic: Topic, on_sample: Callable[[zenoh.Sample], None]) -> None:
+        """Hear a topic from now on, if that is still to do, and the last sample before."""
         with self._gate:
             assert self._session is not None, "the robot is not connected: use `with`"
             if topic not in self._heard and not self._is_closed:
                 self._heard.add(topic)
-                on_sample = partial(self._on_sample, topic, payload, newest)
-                self._session.declare_subscriber(topic.key(self.name), on_sample)
-
-    def _subscribe(
-        self, session: zenoh.Session, topic: Topic, payload: type[T], newest: Newest[T]
-    ) -> None:
-        """Put each sample of a topic, and the last one before it was subscribed to, into a box."""
-        zenoh.ext.declare_advanced_subscriber(
-            session,
-            topic.key(self.name),
-            partial(self._on_sample, topic, payload, newest),
-            history=zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=1),
-        )
+                _declare(self._session, topic, topic.key(self.name), on_sample)
 
     def _on_sample(
         self, topic: Topic, payload: type[T], newest: Newest[T], sample: zenoh.Sample
@@ -269,6 +294,32 @@ class Robot:
         if topic is STATE:
             self._signs.heard_at = time.perf_counter()
 
+    def _on_tiles(self, sample: zenoh.Sample) -> None:
+        try:
+            self._tiles.take(_grid_in(sample))
+        except GvgbotError as error:
+            self._grid.put(partial(_fail, error))
+
+    def _ask_for_tiles(self) -> None:
+        """Ask the robot for its whole grid, without waiting."""
+        replies = list[zenoh.Reply]()
+
+        def answered() -> None:
+            sample = replies[0].ok if replies else None
+            try:
+                self._tiles.take_all(None if sample is None else _grid_in(sample))
+            except GvgbotError as error:
+                self._tiles.take_all(None)
+                self._grid.put(partial(_fail, error))
+
+        assert self._session is not None
+        with contextlib.suppress(zenoh.ZError):  # closed meanwhile
+            self._session.get(
+                GRID.key(self.name),
+                zenoh.handlers.Callback(replies.append, answered),
+                timeout=PATIENCE_S,
+            )
+
     def _on_token(self, sample: zenoh.Sample) -> None:
         self._signs.has_token = sample.kind == zenoh.SampleKind.PUT
         self._signs.token_at = time.perf_counter()
@@ -276,8 +327,10 @@ class Robot:
 
     def close(self) -> None:
         """Leave the network, and end all iterations."""
-        boxes = (self._state, self._map, self._events, self._plan, self._odometry, self._scan)
-        for newest in boxes:
+        for newest in (
+            *(self._state, self._map, self._grid, self._trajectory, self._events, self._plan),
+            *(self._health, self._odometry, self._scan),
+        ):
             newest.close()
         with self._gate:
             self._is_closed = True
@@ -360,6 +413,32 @@ def _check_endpoint(endpoint: str) -> None:
         raise UsageError(
             f"{endpoint!r} is no address: give protocol/address, such as tcp/host:7447"
         )
+
+
+def _grid_in(sample: zenoh.Sample) -> Grid:
+    """Raises GvgbotError if it is of another version, or damaged."""
+    return decoded(GRID, Grid, str(sample.encoding), sample.payload.to_bytes())
+
+
+def _fail(error: GvgbotError) -> NoReturn:
+    raise error
+
+
+def _declare(
+    session: zenoh.Session, topic: Topic, key: str, on_sample: Callable[[zenoh.Sample], None]
+) -> None:
+    """Subscribe; what is kept for latecomers is sent first, and what is lost is sent again."""
+    if not topic.history:
+        session.declare_subscriber(key, on_sample)
+        return
+    recovery = zenoh.ext.RecoveryConfig(heartbeat=True, periodic_queries=None)
+    zenoh.ext.declare_advanced_subscriber(
+        session,
+        key,
+        on_sample,
+        history=zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=1),
+        recovery=recovery if topic.on_change else None,
+    )
 
 
 def _names(session: zenoh.Session) -> list[str]:

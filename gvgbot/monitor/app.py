@@ -1,8 +1,6 @@
 """The monitor as a program: watches one robot until a key or a signal ends it."""
 
 import asyncio
-import math
-from collections import deque
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -11,8 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from gvgbot import client
-from gvgbot.client import Robot, State
+from gvgbot.client import Grid, Raster, Robot, State, Trajectory
 from gvgbot.errors import GvgbotError, UsageError
+from gvgbot.monitor.chart import Scene
 from gvgbot.monitor.facts import Fact, headline
 from gvgbot.monitor.screen import Picture, Screen
 from gvgbot.monitor.terminal import keys, open_console
@@ -21,7 +20,6 @@ from gvgbot.service import StopSignals
 
 _EVERY = 0.2  # s between pictures
 _PATIENCE = 1.0  # s for a connection, before the screen says that there is none
-_STEP, _STEPS = 0.1, 50  # m between points of the trail, and how many: until the map has them
 
 
 Show = Callable[[Picture], None]
@@ -90,36 +88,46 @@ async def _keep_watching(robot: str | None, connection: Connection, show: Show) 
 
 
 async def _watch(robot: Robot, show: Show) -> None:
-    trail = _Trail()
+    grid, trajectory, health = robot.grid(), robot.trajectory(), robot.health()
+    floor = _Floor()
     while True:
         presence, state = robot.presence, robot.state().latest
         others = await asyncio.to_thread(robot.others) if presence.word == "absent" else []
+        scene = Scene(
+            robot.map().latest,
+            floor.of(grid.latest),
+            _way(trajectory.latest, state),
+            robot.plan().latest,
+            None if state is None else state.pose,
+        )
         picture = Picture(
             headline(robot.name, presence, state, others),
             state,
-            robot.map().latest,
-            trail.after(state),
+            scene,
             robot.events().latest,
+            health.latest,
             is_fresh=presence.word == "alive",
         )
         show(picture)
         await asyncio.sleep(_EVERY)
 
 
-class _Trail:
-    """The last metres driven, which the map does not have yet."""
+def _way(driven: Trajectory | None, state: State | None) -> Points:
+    """The way driven (N, 2), m, up to a state."""
+    points = np.zeros((0, 2)) if driven is None else driven.map_base[:, :2]
+    return points if state is None else np.concatenate([points, [state.pose[:2]]])
+
+
+class _Floor:
+    """The newest grid, unpacked once."""
 
     def __init__(self) -> None:
-        self._points: deque[tuple[float, float]] = deque(maxlen=_STEPS)
-        self._sequence = -1
+        self._grid: Grid | None = None
+        self._raster: Raster | None = None
 
-    def after(self, state: State | None) -> Points:
-        """The way (N, 2), m, up to a state."""
-        if state is not None:
-            here = state.pose[:2]
-            if state.sequence < self._sequence:  # the robot began anew
-                self._points.clear()
-            self._sequence = state.sequence
-            if not self._points or math.dist(here, self._points[-1]) >= _STEP:
-                self._points.append(here)
-        return np.array(self._points).reshape(-1, 2)
+    def of(self, grid: Grid | None) -> Raster | None:
+        """The cells of a grid."""
+        if grid is not self._grid:
+            self._grid = grid
+            self._raster = None if grid is None else grid.raster()
+        return self._raster

@@ -1,7 +1,7 @@
-"""The map as characters: walls, edges and the trail in dots; vertices and the robot as signs."""
+"""The map as characters: walls, edges, way and plan in dots; vertices and the robot as signs."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -9,17 +9,30 @@ from numpy.typing import NDArray
 
 from gvgbot.monitor.braille import Dots, lit, patterns
 from gvgbot.monitor.view import Points, View
-from gvgbot.topics import Map
+from gvgbot.topics import Map, Plan, Raster
 
-Layer = Literal["empty", "wall", "trail", "edge", "frontier", "vertex", "robot"]
+Layer = Literal["empty", "wall", "trail", "edge", "plan", "frontier", "vertex", "robot"]
 
-LAYERS: tuple[Layer, ...] = ("empty", "wall", "trail", "edge", "frontier", "vertex", "robot")
+LAYERS: tuple[Layer, ...] = (
+    *("empty", "wall", "trail", "edge", "plan", "frontier", "vertex", "robot"),
+)
 _OCCUPIED = 65  # percent, as map_server has it
 _ARROWS = "→↗↑↖←↙↓↘"
 _SIGNS = {"meetpoint": "●", "endpoint": "○"}
 _FRONTIER_M = 0.8  # from its vertex, where a frontier's mark stands
 _LEAST_DOTS = 3.0  # or so far, if that is more, so that it does not stand on the vertex
 _MARGIN_M = 0.5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """What is to be drawn, as far as it is known; `trail` (N, 2), m, is the way driven."""
+
+    graph: Map | None = None
+    floor: Raster | None = None
+    trail: Points = field(default_factory=lambda: np.zeros((0, 2)))
+    plan: Plan | None = None
+    pose: tuple[float, float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,24 +53,22 @@ class Chart:
         return ["".join(map(chr, row)) for row in codes.tolist()]
 
 
-def chart(
-    known: Map | None,
-    pose: tuple[float, float, float] | None,
-    trail: Points,
-    width: int,
-    height: int,
-) -> Chart:
-    """The whole of a map in so many characters; `trail` (N, 2), m, is what it does not yet have."""
-    view = View.around(*_box(known, pose, trail), width, height)
-    canvas = _Canvas(view)
-    if known is not None:
-        canvas.lay("wall", _walls(known, view))
-        canvas.lay("trail", _drawn(view, [known.driven, trail]))
-        canvas.lay("edge", _drawn(view, [edge.polyline for edge in known.edges]))
-        _mark_vertices(canvas, known)
-    if pose is not None:
-        canvas.mark("robot", (pose[0], pose[1]), _arrow(pose[2]))
-    floor = np.zeros((height, width), bool) if known is None else _floor(known, view)
+def chart(scene: Scene, width: int, height: int) -> Chart:
+    """The whole of a scene in so many characters."""
+    view = View.around(*_box(scene), width, height)
+    canvas, floor = _Canvas(view), np.zeros((height, width), bool)
+    if scene.floor is not None:
+        canvas.lay("wall", _walls(scene.floor, view))
+        floor = _floor(scene.floor, view)
+    canvas.lay("trail", _drawn(view, [scene.trail]))
+    if scene.graph is not None:
+        canvas.lay("edge", _drawn(view, [edge.polyline for edge in scene.graph.edges]))
+    if scene.plan is not None:
+        canvas.lay("plan", _drawn(view, [scene.plan.ahead, scene.plan.further]))
+    if scene.graph is not None:
+        _mark_vertices(canvas, scene.graph)
+    if scene.pose is not None:
+        canvas.mark("robot", scene.pose[:2], _arrow(scene.pose[2]))
     return Chart(canvas.codes, canvas.layers, floor, 2.0 * view.metres_per_dot)
 
 
@@ -88,51 +99,48 @@ class _Canvas:
         return self._view.metres_per_dot
 
 
-def _box(
-    known: Map | None, pose: tuple[float, float, float] | None, trail: Points
-) -> tuple[Points, Points]:
+def _box(scene: Scene) -> tuple[Points, Points]:
     """Corners (2,), m, of all there is to show."""
-    points = [np.zeros((1, 2)), trail]
-    if pose is not None:
-        points.append(np.array([pose[:2]]))
-    if known is not None:
-        points.append(_cells(known, known.grid >= 0))
-        points.append(np.array([vertex.position for vertex in known.vertices]).reshape(-1, 2))
+    points = [np.zeros((1, 2)), scene.trail]
+    if scene.pose is not None:
+        points.append(np.array([scene.pose[:2]]))
+    if scene.floor is not None:
+        points.append(_cells(scene.floor, scene.floor.cells >= 0))
+    if scene.graph is not None:
+        points.append(np.array([one.position for one in scene.graph.vertices]).reshape(-1, 2))
     every = np.concatenate(points)
     return every.min(axis=0) - _MARGIN_M, every.max(axis=0) + _MARGIN_M
 
 
-def _cells(known: Map, chosen: Dots) -> Points:
+def _cells(floor: Raster, chosen: Dots) -> Points:
     """Centres (N, 2), m, of cells that are marked in (rows, columns)."""
     rows, columns = np.nonzero(chosen)
-    centres: Points = np.column_stack([columns + 0.5, rows + 0.5]) * known.resolution + known.origin
+    centres: Points = np.column_stack([columns + 0.5, rows + 0.5]) * floor.resolution + floor.origin
     return centres
 
 
-def _walls(known: Map, view: View) -> Dots:
+def _walls(floor: Raster, view: View) -> Dots:
     """Dots within a wall's cell, and those in which a wall's cell has its centre."""
-    occupied = known.grid >= _OCCUPIED
-    dots = _sampled(known, occupied, view)
-    view.plot(dots, _cells(known, occupied))
+    occupied = floor.cells >= _OCCUPIED
+    dots = _sampled(floor, occupied, view)
+    view.plot(dots, _cells(floor, occupied))
     return dots
 
 
-def _sampled(known: Map, marked: Dots, view: View) -> Dots:
+def _sampled(floor: Raster, marked: Dots, view: View) -> Dots:
     """Which dots have their centre in a cell that is marked in (rows, columns)."""
     x, y = view.centres()
-    columns = np.floor((x - known.origin[0]) / known.resolution).astype(np.int64)
-    rows = np.floor((y - known.origin[1]) / known.resolution).astype(np.int64)
-    inside = ((rows >= 0) & (rows < known.rows))[:, None] & (
-        (columns >= 0) & (columns < known.columns)
-    )
-    at = marked[rows.clip(0, known.rows - 1)[:, None], columns.clip(0, known.columns - 1)]
-    sampled: Dots = at & inside
+    high, wide = marked.shape
+    columns = np.floor((x - floor.origin[0]) / floor.resolution).astype(np.int64)
+    rows = np.floor((y - floor.origin[1]) / floor.resolution).astype(np.int64)
+    inside = ((rows >= 0) & (rows < high))[:, None] & ((columns >= 0) & (columns < wide))
+    sampled: Dots = marked[rows.clip(0, high - 1)[:, None], columns.clip(0, wide - 1)] & inside
     return sampled
 
 
-def _floor(known: Map, view: View) -> NDArray[np.bool_]:
+def _floor(floor: Raster, view: View) -> NDArray[np.bool_]:
     """The characters (rows, columns) with some known floor or wall in them."""
-    return lit(_sampled(known, known.grid >= 0, view))
+    return lit(_sampled(floor, floor.cells >= 0, view))
 
 
 def _drawn(view: View, polylines: list[Points]) -> Dots:

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from gvgbot.client import Event, LinkHealth, Presence, State
+from gvgbot.client import Event, Health, LinkHealth, Plan, Presence, State
 
 Tone = Literal["plain", "good", "warning", "bad", "faint"]
 
@@ -33,11 +33,11 @@ class Fact:
     tone: Tone = "plain"
 
 
-def facts(state: State, events: tuple[Event, ...]) -> Iterator[Fact]:
+def facts(state: State, plan: Plan | None, health: Health | None) -> Iterator[Fact]:
     """What there is to know of a robot, the most telling first."""
     phase = state.outcome if state.phase == "finished" else None
     yield Fact("phase", phase or state.phase, _tone_of_phase(state))
-    yield from _intention(state, events)
+    yield from _intention(state, plan)
     x, y, theta = state.pose
     yield Fact("pose", f"{x:.2f} {y:.2f} m  {_degrees(theta)}")
     yield Fact("sigma", _sigma(state))
@@ -50,26 +50,26 @@ def facts(state: State, events: tuple[Event, ...]) -> Iterator[Fact]:
     yield Fact("battery", *_battery(state))
     yield Fact("laser", *_link(state.laser))
     yield Fact("base", *_link(state.base))
-    yield Fact("control", *_control(state))
+    yield Fact("control", *_control(state, health))
+    yield Fact("program", *_program(health))
 
 
 def _tone_of_phase(state: State) -> Tone:
     return "warning" if state.outcome not in (None, "explored") else _PHASES[state.phase]
 
 
-def _intention(state: State, events: tuple[Event, ...]) -> Iterator[Fact]:
+def _intention(state: State, plan: Plan | None) -> Iterator[Fact]:
     """Where the robot goes, and why."""
     if state.errand is not None:
         yield Fact("going to", state.errand)
         yield Fact("why", "somebody asked for it")
         return
-    chosen = next((event for event in reversed(events) if event.kind == "decision"), None)
-    if chosen is None or state.phase == "finished":
+    if plan is None or plan.vertex is None or plan.bearing is None or state.phase == "finished":
         yield Fact("going to", "-", "faint")
         yield Fact("why", state.reason or "-", "plain" if state.reason else "faint")
         return
-    yield Fact("going to", f"vertex {chosen.details.get('vertex')}{_towards(chosen)}")
-    yield Fact("why", str(chosen.details.get("reason")))
+    yield Fact("going to", f"vertex {plan.vertex}, {_degrees(plan.bearing)}")
+    yield Fact("why", plan.reason or "-")
 
 
 def _towards(decision: Event) -> str:
@@ -113,13 +113,23 @@ def _link(link: LinkHealth) -> tuple[str, Tone]:
     return (said, "plain") if said else ("fine", "good")
 
 
-def _control(state: State) -> tuple[str, Tone]:
-    """Whether the control loop turns."""
+def _control(state: State, health: Health | None) -> tuple[str, Tone]:
+    """Whether the control loop turns, and how often it was late."""
     if state.cycle_age is None:
         return "not begun", "faint"
     if state.cycle_age > _STUCK_AFTER:
         return f"no cycle for {state.cycle_age:.0f} s", "bad"
+    if health is not None and health.late_cycles:
+        return f"running, {health.late_cycles} late", "plain"
     return "running", "good"
+
+
+def _program(health: Health | None) -> tuple[str, Tone]:
+    """What the robot's program costs."""
+    if health is None:
+        return "-", "faint"
+    unsent = f"  {health.unsent} unsent" if health.unsent else ""
+    return f"{health.cpu:.0%} cpu  {health.memory / 1e6:.0f} MB{unsent}", "plain"
 
 
 def told(event: Event, now: float) -> Fact | None:

@@ -2,15 +2,13 @@
 
 from dataclasses import dataclass, field
 
-import numpy as np
 from rich.console import Console
 from rich.style import Style
 from rich.text import Text
 
-from gvgbot.client import Event, Map, State
-from gvgbot.monitor.chart import LAYERS, Chart, Layer, chart
+from gvgbot.client import Event, Health, State
+from gvgbot.monitor.chart import LAYERS, Chart, Layer, Scene, chart
 from gvgbot.monitor.facts import Fact, Tone, facts, told
-from gvgbot.monitor.view import Points
 
 _FACTS_WIDTH, _NAME_WIDTH = 31, 10
 _LEAST_MAP_WIDTH = 20
@@ -19,6 +17,7 @@ _COLOURS: dict[Layer, str] = {
     "wall": "white",
     "trail": "yellow",
     "edge": "cyan",
+    "plan": "magenta",
     "frontier": "bold magenta",
     "vertex": "bold green",
     "robot": "bold red",
@@ -38,6 +37,7 @@ _LEGEND: tuple[tuple[Layer, str, str], ...] = (
     ("frontier", "?", "frontier"),
     ("edge", "⠒", "edge"),
     ("trail", "⠒", "way"),
+    ("plan", "⠒", "plan"),
 )
 
 
@@ -50,9 +50,9 @@ class Picture:
 
     headline: Fact
     state: State | None = None
-    known: Map | None = None
-    trail: Points = field(default_factory=lambda: np.zeros((0, 2)))
+    scene: Scene = field(default_factory=Scene)
     events: tuple[Event, ...] = ()
+    health: Health | None = None
     is_fresh: bool = True
 
     def lines(self, width: int, height: int) -> list[Text]:
@@ -63,7 +63,7 @@ class Picture:
         if map_width < _LEAST_MAP_WIDTH:  # too narrow for both
             body, scale = self._facts(middle), None
         else:
-            drawn = self._chart(map_width, max(1, middle))
+            drawn = chart(self.scene, map_width, max(1, middle))
             beside = self._facts(middle)
             body = [_joined(a, b) for a, b in zip(self._map(drawn), beside, strict=False)]
             scale = drawn.scale
@@ -77,10 +77,6 @@ class Picture:
         text = Text(f" {self.headline.name} ", "reverse bold")
         return text.append(f" {self.headline.text}", _TONES[self.headline.tone])
 
-    def _chart(self, width: int, height: int) -> Chart:
-        pose = None if self.state is None else self.state.pose
-        return chart(self.known, pose, self.trail, width, height)
-
     def _map(self, drawn: Chart) -> list[Text]:
         lines = [
             _coloured(text, layers.tolist(), floor.tolist())
@@ -89,7 +85,9 @@ class Picture:
         return lines if self.is_fresh else [Text(line.plain, "bright_black") for line in lines]
 
     def _facts(self, height: int) -> list[Text]:
-        known = [] if self.state is None else list(facts(self.state, self.events))
+        known: list[Fact] = []
+        if self.state is not None:
+            known = list(facts(self.state, self.scene.plan, self.health))
         lines = [_line(fact, faint=not self.is_fresh) for fact in known[:height]]
         return lines + [Text()] * (height - len(lines))
 

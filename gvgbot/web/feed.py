@@ -12,16 +12,16 @@ from gvgbot import client
 from gvgbot.client import Asking, Robot, State
 from gvgbot.errors import GvgbotError, UsageError
 from gvgbot.requests import Goto, Set
-from gvgbot.topics import Events, Map, Odometry, Plan, Scan
+from gvgbot.topics import Events, Grid, Health, Map, Odometry, Plan, Scan, Tile, Trajectory
 from gvgbot.web.viewers import Audience
-from gvgbot.web.wire import History, Kind, Link, Reply, Wish
+from gvgbot.web.wire import Floor, History, Kind, Link, Reply, Wish
 
 _PATIENCE = 1.0  # s for a connection, before the page says that there is none
 _BEAT = 0.5  # s between words on how things are
 _PAUSE = 0.1  # s between two values of a kind: more often nobody sees
 _SAMPLE_EVERY, _SAMPLES = 2.0, 900  # s of the robot's clock, and how many: half an hour
 
-T = TypeVar("T", State, Map, Plan, Odometry, Scan)
+T = TypeVar("T", State, Map, Trajectory, Plan, Odometry, Scan, Health)
 
 
 class Feed:
@@ -78,7 +78,10 @@ class Feed:
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(self._pass_on("state", robot.state()))
             tasks.create_task(self._pass_on("map", robot.map()))
+            tasks.create_task(self._pass_on_tiles(robot.grid()))
+            tasks.create_task(self._pass_on("trajectory", robot.trajectory()))
             tasks.create_task(self._pass_on("plan", robot.plan()))
+            tasks.create_task(self._pass_on("health", robot.health()))
             tasks.create_task(self._pass_on("odometry", robot.odometry()))
             tasks.create_task(self._pass_on("scan", robot.scan()))
             tasks.create_task(self._remember(robot.state()))
@@ -87,6 +90,22 @@ class Feed:
     async def _pass_on(self, kind: Kind, values: AsyncIterable[T]) -> None:
         async for value in values:
             self._audience.show(kind, value)
+            await asyncio.sleep(_PAUSE)
+
+    async def _pass_on_tiles(self, grids: AsyncIterable[Grid]) -> None:
+        """Send of each grid what is new in it."""
+        began: float | None = None
+        shown: dict[tuple[int, int], Tile] = {}
+        async for grid in grids:
+            if grid.began != began:
+                began, shown = grid.began, {}
+                self._audience.forget("tile")
+                self._audience.show("floor", Floor(resolution=grid.resolution, side=grid.side))
+            for tile in grid.tiles:
+                place = tile.row, tile.column
+                if shown.get(place) != tile:
+                    shown[place] = tile
+                    self._audience.show("tile", tile, place)
             await asyncio.sleep(_PAUSE)
 
     async def _remember(self, states: AsyncIterable[State]) -> None:

@@ -1,7 +1,8 @@
 """What passes between the server and the page, and in which form.
 
-To the page: MessagePack, a pair of a kind and a value. State, map, plan, odometry, scan and events
-are as they travel between robot and client; the others are below. From the page: a wish, in JSON.
+To the page: MessagePack, a pair of a kind and a value. State, map, trajectory, plan, odometry,
+scan, events and health are as they travel between robot and client, and so is each tile of the
+grid; the others are below. From the page: a wish, in JSON.
 """
 
 from typing import Any, Literal
@@ -9,9 +10,12 @@ from typing import Any, Literal
 import msgspec
 
 from gvgbot.requests import Arguments, RequestName, kind_of
-from gvgbot.topics import Events, Map, Odometry, Plan, Scan, State
+from gvgbot.topics import Events, Health, Map, Odometry, Plan, Scan, State, Tile, Trajectory
 
-Kind = Literal["link", "history", "state", "map", "plan", "odometry", "scan", "events", "reply"]
+Known = Literal[
+    "state", "map", "floor", "tile", "trajectory", "plan", "odometry", "scan", "events", "health"
+]
+Kind = Known | Literal["link", "history", "reply"]
 
 
 class Link(msgspec.Struct, frozen=True, kw_only=True):
@@ -32,6 +36,13 @@ class History(msgspec.Struct, frozen=True, kw_only=True):
     stamps: tuple[float, ...]  # s, the robot's monotonic clock
     sigmas: tuple[float, ...]  # m, of the position
     batteries: tuple[float | None, ...]  # of a full charge, 0..1
+
+
+class Floor(msgspec.Struct, frozen=True, kw_only=True):
+    """Begins a grid; the tiles that were sent before belong to it no more."""
+
+    resolution: float  # m, the side of a cell
+    side: int  # cells along the side of a tile
 
 
 class Reply(msgspec.Struct, frozen=True, kw_only=True):
@@ -58,7 +69,8 @@ class Wish(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
             raise ValueError(f"wrong arguments of {self.name}: {error}") from error
 
 
-Value = Link | History | State | Map | Plan | Odometry | Scan | Events | Reply
+Told = State | Map | Floor | Tile | Trajectory | Plan | Odometry | Scan | Events | Health
+Value = Told | Link | History | Reply
 
 
 def frame(kind: Kind, value: Value) -> bytes:

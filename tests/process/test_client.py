@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 import tracemalloc
+import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from threading import Event as Flag
@@ -21,11 +22,14 @@ import pytest
 import zenoh
 
 from gvgbot import client
+from gvgbot.client.newest import Newest
 from gvgbot.errors import GvgbotError, UsageError
 from gvgbot.telemetry import Telemetry
 from gvgbot.topics import (
     Event,
     Events,
+    Grid,
+    Health,
     Map,
     MapEdge,
     MapVertex,
@@ -34,8 +38,11 @@ from gvgbot.topics import (
     Scan,
     State,
     TelemetryConfig,
+    Tile,
+    Trajectory,
 )
 from tests.process.addresses import free_endpoint, plain_session, router
+from tests.unit.monitor.maps import SIDE, a_grid
 from tests.unit.test_telemetry import EXAMPLE
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(60)]
@@ -43,11 +50,6 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(60)]
 PATIENCE = 15.0  # s, for a busy machine
 A_MAP = Map(
     stamp=3.0,
-    resolution=0.5,
-    origin=(-1.0, 2.0),
-    columns=3,
-    rows=2,
-    cells=bytes([0, 100, 0xFF, 50, 0, 0]),
     vertices=(
         MapVertex(
             id=4,
@@ -59,7 +61,23 @@ A_MAP = Map(
         ),
     ),
     edges=(MapEdge(start=4, end=4, length=2.0, points=np.array([1, 2, 3, 4], "<f4").tobytes()),),
-    trail=np.array([0.0, 0.0, 1.5, -2.0], "<f4").tobytes(),
+)
+A_WAY = Trajectory(
+    stamp=3.0,
+    stamps=np.array([1.0, 2.5], "<f8").tobytes(),
+    poses=np.array([0.0, 0.0, 0.5, 1.5, -2.0, 3.0], "<f4").tobytes(),
+)
+A_HEALTH = Health(
+    stamp=3.0,
+    uptime=3.0,
+    cycles=150,
+    late_cycles=1,
+    slowest_cycle=0.15,
+    cpu=0.1,
+    memory=80_000_000,
+    unsent=0,
+    laser=EXAMPLE.laser,
+    base=EXAMPLE.base,
 )
 A_SCAN = Scan(
     stamp=4.0,
@@ -86,6 +104,7 @@ ROBOT = """
 import sys, time
 from gvgbot.telemetry import Telemetry
 from gvgbot.topics import TelemetryConfig
+from tests.unit.monitor.maps import SIDE, a_grid
 from tests.unit.test_telemetry import EXAMPLE
 with Telemetry(TelemetryConfig(listen=(sys.argv[1],)), "far") as robot:
     while True:
@@ -135,13 +154,56 @@ def test_who_joins_gets_the_newest_values_at_once_though_nothing_more_is_sent(
             assert [next(events), next(events)] == [happened(0), happened(1)]
 
 
-def test_a_map_is_unpacked_into_arrays(endpoint: str) -> None:
+def test_what_is_packed_is_unpacked_into_arrays(endpoint: str) -> None:
     with a_robot(endpoint) as robot, client.connect("near", endpoint) as seen:
-        robot.publish(A_MAP)
-        got = next(iter(seen.map()))
-    assert got.grid.tolist() == [[0, 100, -1], [50, 0, 0]]
-    assert got.edges[0].polyline.tolist() == [[1.0, 2.0], [3.0, 4.0]]
-    assert got.driven.tolist() == [[0.0, 0.0], [1.5, -2.0]]
+        for value in (A_MAP, A_WAY, A_HEALTH, a_grid(".#\n# ", resolution=0.5)):
+            robot.publish(value)
+        assert next(iter(seen.map())).edges[0].polyline.tolist() == [[1.0, 2.0], [3.0, 4.0]]
+        way = next(iter(seen.trajectory()))
+        assert next(iter(seen.health())) == A_HEALTH
+        floor = next(iter(seen.grid())).raster()
+    assert way.times.tolist() == [1.0, 2.5]
+    assert way.map_base.tolist() == [[0.0, 0.0, 0.5], [1.5, -2.0, 3.0]]
+    assert floor.cells[:2, :2].tolist() == [[100, -1], [0, 100]]
+    assert (floor.cells[2:] == -1).all()
+    assert (floor.origin, floor.resolution) == ((0.0, 0.0), 0.5)
+
+
+def spread(number: int, *columns: int) -> Grid:
+    """A message with tiles beside each other, each of which has the number in its cells."""
+    cells = zlib.compress(bytes([number]) * SIDE * SIDE)
+    tiles = tuple(Tile(column=column, row=0, cells=cells) for column in columns)
+    return msgspec.structs.replace(a_grid(" ", number=number), tiles=tiles)
+
+
+def seen_in(grid: Newest[Grid]) -> list[int]:
+    """The number in each tile."""
+    latest = grid.latest
+    return [] if latest is None else latest.raster().cells[0, ::SIDE].tolist()
+
+
+def test_who_comes_late_or_misses_tiles_sees_the_whole_grid_all_the_same(endpoint: str) -> None:
+    def watch(robot: Telemetry) -> None:
+        with client.connect("near", endpoint) as seen:
+            grid = seen.grid()
+            until(lambda: seen_in(grid) == [1, 1, 2])
+            robot.publish(spread(4, 0), spread(4, 0, 1, 2))  # the third was lost
+            until(lambda: seen_in(grid) == [4, 4, 4])
+            robot.publish(spread(5, 1), spread(5, 1))  # which nobody has to ask for
+            until(lambda: seen_in(grid) == [4, 5, 4])
+
+    async def story() -> None:
+        with a_robot(endpoint) as robot:
+            robot.publish(spread(1, 0, 1, 2))
+            two = spread(2, 2)
+            whole = msgspec.structs.replace(two, tiles=(*spread(1, 0, 1).tiles, *two.tiles))
+            robot.publish(two, whole)
+            async with asyncio.TaskGroup() as tasks:
+                answering = tasks.create_task(robot.answer())
+                await asyncio.to_thread(watch, robot)
+                answering.cancel()
+
+    asyncio.run(story())
 
 
 def test_scans_and_odometry_are_sent_to_those_who_ask_for_them(endpoint: str) -> None:
@@ -275,11 +337,12 @@ def test_every_topic_answers_who_asks_for_its_newest_sample(endpoint: str) -> No
     async def answers() -> list[bytes]:
         with a_robot(endpoint) as robot, plain_session(endpoint) as session:
             robot.publish(A_MAP)
+            robot.publish(a_grid(" ", number=2), a_grid("#", number=2))
             robot.publish(Events(events=(happened(3),)))
             async with asyncio.timeout(PATIENCE), asyncio.TaskGroup() as tasks:
                 answering = tasks.create_task(robot.answer())
                 await asyncio.sleep(0.1)
-                selectors = ["map", "map?format=json", "events?format=json", "state"]
+                selectors = ["map", "grid?format=json", "events?format=json", "state"]
                 got = [
                     await asyncio.to_thread(ask, session, f"gvgbot/near/{selector}")
                     for selector in selectors
@@ -290,8 +353,7 @@ def test_every_topic_answers_who_asks_for_its_newest_sample(endpoint: str) -> No
     as_msgpack, as_json, events, state = asyncio.run(answers())
     assert msgspec.msgpack.decode(as_msgpack, type=Map) == A_MAP
     plain = json.loads(as_json)
-    assert base64.b64decode(plain["cells"]) == A_MAP.cells
-    assert plain["vertices"][0]["position"] == [0.5, 2.5]
+    assert zlib.decompress(base64.b64decode(plain["tiles"][0]["cells"]))[0] == 100  # of the whole
     assert json.loads(events)["events"][0]["details"] == {"reason": "ear"}
     assert state == b"there is no state yet"
 

@@ -27,10 +27,10 @@ from rich.text import Text
 
 from gvgbot import client
 from gvgbot.telemetry import Telemetry
-from gvgbot.topics import Event, Events, TelemetryConfig
+from gvgbot.topics import Event, Events, Plan, TelemetryConfig
 from tests.process.addresses import free_endpoint, router
 from tests.process.browser import browser, chromium
-from tests.unit.monitor.maps import a_map, vertex
+from tests.unit.monitor.maps import a_grid, a_map, vertex
 from tests.unit.test_telemetry import EXAMPLE
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(90)]
@@ -132,7 +132,10 @@ def a_robot(endpoint: str, name: str = "karl") -> Telemetry:
     robot = Telemetry(TelemetryConfig(listen=(endpoint,)), name)
     robot.publish(msgspec.structs.replace(EXAMPLE, reason="", pose=(3.0, 2.0, 0.0)))
     drawing = "\n".join(["#" * 20, *["#" + "." * 18 + "#"] * 8, "#" * 20])
-    robot.publish(a_map(drawing, vertices=(vertex((6.0, 2.0)),), resolution=0.5))
+    robot.publish(a_grid(drawing, resolution=0.5))
+    robot.publish(a_map((vertex((6.0, 2.0)),)))
+    plan = Plan(stamp=3.0, vertex=1, bearing=0.0, reason="ear", track=b"", route=b"")
+    robot.publish(plan)
     decision = Event(
         number=0,
         stamp=3.0,

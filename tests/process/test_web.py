@@ -31,13 +31,13 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from gvgbot import client
 from gvgbot.requests import Answer, Asked, Goto
 from gvgbot.telemetry import Telemetry
-from gvgbot.topics import Event, Events, TelemetryConfig
+from gvgbot.topics import Event, Events, TelemetryConfig, Trajectory
 from gvgbot.web.server import Web
 from gvgbot.web.viewers import Audience
 from gvgbot.web.wire import Reply, Wish
 from tests.process.addresses import free_endpoint, plain_session, router
 from tests.process.browser import Page, browser, chromium
-from tests.unit.monitor.maps import a_map, vertex
+from tests.unit.monitor.maps import a_grid, a_map, vertex
 from tests.unit.test_telemetry import EXAMPLE
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(180)]
@@ -302,10 +302,13 @@ def desktop(page: Page, address: str, *, dark: bool = True) -> None:
     page.open(address, 1280, 800, phone=False, dark=dark)
 
 
-ROOM = a_map(
-    "\n".join(["#" * 20, *["#" + "." * 18 + "#"] * 8, "#" * 20]),  # 10 by 5 m
-    vertices=(vertex((6.0, 2.0)),),
-    resolution=0.5,
+WALLS = "\n".join(["#" * 20, *["#" + "." * 18 + "#"] * 8, "#" * 20])
+ROOM = a_grid(WALLS, resolution=0.5)  # 10 by 5 m
+GRAPH = a_map((vertex((6.0, 2.0)),))
+WAY = Trajectory(
+    stamp=3.0,
+    stamps=np.array([1.0, 2.0], "<f8").tobytes(),
+    poses=np.array([[1.0, 4.0, 0.0], [8.0, 4.0, 0.0]], "<f4").tobytes(),
 )
 HERE = msgspec.structs.replace(EXAMPLE, pose=(3.0, 2.0, 0.0), requests=("pause", "goto"))
 
@@ -321,6 +324,7 @@ class Play:
     def __post_init__(self) -> None:
         self.robot = Telemetry(TelemetryConfig(listen=(self.endpoint,)), "karl")
         self.robot.publish(ROOM)
+        self.robot.publish(GRAPH)
         decision: dict[str, str | int | float | bool | None]
         decision = {"vertex": 1, "bearing": 0.0, "reason": "ear"}
         happened = Event(number=0, stamp=3.0, kind="decision", details=decision)

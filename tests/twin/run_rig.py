@@ -23,7 +23,19 @@ from gvgbot.robot import Robot
 from gvgbot.service import Notifier
 from gvgbot.session import Session
 from gvgbot.simulation import Place, Simulation
-from gvgbot.topics import Events, Map, Odometry, Payload, Plan, Scan, State, TelemetryConfig
+from gvgbot.topics import (
+    Events,
+    Grid,
+    Health,
+    Map,
+    Odometry,
+    Payload,
+    Plan,
+    Scan,
+    State,
+    TelemetryConfig,
+    Trajectory,
+)
 from gvgbot.worlds.canvas import Canvas
 
 STOP = (0, 0)
@@ -105,8 +117,13 @@ class Network:
         self.plans: list[Plan] = []
         self.odometry: list[Odometry] = []
         self.scans: list[Scan] = []
+        self.grids: list[Grid] = []
+        self.whole_grid: Payload | None = None
+        self.trajectories: list[Trajectory] = []
+        self.healths: list[Health] = []
+        self.failures = 0
 
-    def publish(self, value: Payload) -> None:
+    def publish(self, value: Payload, latest: Payload | None = None) -> None:
         match value:
             case State():
                 self.states.append(value)
@@ -120,6 +137,13 @@ class Network:
                 self.odometry.append(value)
             case Scan():
                 self.scans.append(value)
+            case Grid():
+                self.grids.append(value)
+                self.whole_grid = latest
+            case Trajectory():
+                self.trajectories.append(value)
+            case Health():
+                self.healths.append(value)
 
     def is_heard(self, payload: type[Payload]) -> bool:
         return True

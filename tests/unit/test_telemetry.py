@@ -31,6 +31,7 @@ EXAMPLE = State(
     reason="",
     errand=None,
     requests=("pause", "goto"),
+    uptime=12.0,
     pose=(1.0, -2.0, 0.5),
     covariance=(1.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 3.0),
     twist=(0.25, -0.1),
@@ -60,6 +61,7 @@ PLAIN = {
     "reason": "",
     "errand": None,
     "requests": ["pause", "goto"],
+    "uptime": 12.0,
     "pose": [1.0, -2.0, 0.5],
     "covariance": [1.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 3.0],
     "twist": [0.25, -0.1],
@@ -125,7 +127,7 @@ def test_the_state_topic_is_the_promised_one() -> None:
     assert STATE.key("r") == "gvgbot/r/state"
     assert alive_key("r") == "gvgbot/r/alive"
     assert STATE.encoding == "application/msgpack;gvgbot.State.v1"
-    assert STATE.rate_hz == 5.0
+    assert STATE.rate_hz == 10.0
     assert STATE.queryable
 
 

@@ -12,7 +12,7 @@ const GESTURES = "drag to move, wheel or two fingers to zoom";
 const PANEL_EVERY = 150; // ms
 const THEMES = ["system", "dark", "light"];
 
-let state = null, robotLink = null, events = [], isConnected = false, isStale = false, isFollowing = false;
+let state = null, robotLink = null, events = [], healths = [], isConnected = false, isStale = false, isFollowing = false;
 let isMapDue = true, isPanelDue = true, panelAt = 0;
 
 const redraw = () => { isMapDue = true; };
@@ -37,6 +37,10 @@ function take(kind, value) {
       picture.setMap(value);
       $("map").setAttribute("aria-label", `map, ${value.vertices.length} vertices, ${value.edges.length} edges; ${GESTURES}`);
       break;
+    case "floor": picture.setFloor(value); break;
+    case "tile": picture.floor?.take(value).then(redraw); break;
+    case "trajectory": picture.setTrajectory(value); break;
+    case "health": healths = [...healths, value].slice(-2); break;
     case "plan": picture.plan = value; break;
     case "scan": picture.setScan(value); break;
     case "odometry": picture.setPose(value.map_base, value.stamp); break;
@@ -83,6 +87,7 @@ function drawPanel() {
   document.body.classList.toggle("stale", isStale);
   if (state !== null) {
     fill($("facts"), words.facts(state, picture.plan), factLine);
+    fill($("health"), words.health(healths.at(-1), healths.at(-2)), factLine);
     $("sigma-now").textContent = words.length(words.sigma(state));
     $("battery-now").textContent = state.battery_fraction === null ? "unknown" : words.percent(state.battery_fraction);
   }

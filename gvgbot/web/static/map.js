@@ -1,6 +1,7 @@
 // Draws what is known, layer upon layer, in pixels of the screen.
 
-import { points, millimetres } from "./msgpack.js";
+import { Floor } from "./floor.js";
+import { millimetres, points, poses } from "./msgpack.js";
 import { axes } from "./words.js";
 
 const SIGMAS = 3;
@@ -23,7 +24,9 @@ export class MapPicture {
     this.view = view;
     this.shown = new Set(LAYERS.map(([name]) => name));
     this.known = this.plan = this.scan = this.pose = this.covariance = this.selected = this.tapped = null;
-    this.way = []; // [stamp, x, y] since the map was made
+    this.floor = null;
+    this.trail = []; // x, y and so on
+    this.way = []; // [stamp, x, y] since the trail was made
   }
 
   setColours(styles) {
@@ -31,16 +34,22 @@ export class MapPicture {
     for (const name of ["floor", "wall", "trail", "edge", "ellipse", "vertex", "frontier", "plan", "scan", "robot", "paper"]) {
       this.colours[name] = styles.getPropertyValue(`--${name}`).trim();
     }
-    if (this.known !== null) this.cells = this.painted(this.known);
+    this.floor?.setColours(this.colours);
   }
 
   setMap(known) {
     this.known = known;
     this.edges = known.edges.map((edge) => points(edge.points));
-    this.trail = points(known.trail);
     this.at = new Map(known.vertices.map((vertex) => [vertex.id, vertex.position]));
-    this.way = this.way.filter(([stamp]) => stamp > known.stamp);
-    this.cells = this.painted(known);
+  }
+
+  setFloor({ resolution, side }) {
+    this.floor = new Floor(resolution, side, this.colours);
+  }
+
+  setTrajectory(driven) {
+    this.trail = Array.from(poses(driven.poses)).filter((_, i) => i % 3 < 2);
+    this.way = this.way.filter(([stamp]) => stamp > driven.stamp);
   }
 
   setScan(scan) {
@@ -60,35 +69,14 @@ export class MapPicture {
 
   forget() {
     this.known = this.plan = this.scan = this.selected = null;
+    this.trail = [];
     this.way = [];
   }
 
   // Left, bottom, right, top, m, of all there is.
   box() {
     const [x, y] = this.pose ?? [0, 0];
-    if (this.known === null) return [x - 4, y - 4, x + 4, y + 4];
-    const { origin, columns, rows, resolution } = this.known;
-    return [origin[0], origin[1], origin[0] + columns * resolution, origin[1] + rows * resolution];
-  }
-
-  painted(known) {
-    const picture = new OffscreenCanvas(known.columns, known.rows);
-    const context = picture.getContext("2d");
-    const image = context.createImageData(known.columns, known.rows);
-    const floor = rgb(this.colours.floor), wall = rgb(this.colours.wall);
-    const cells = new Int8Array(known.cells.buffer, known.cells.byteOffset, known.cells.length);
-    for (let row = 0; row < known.rows; row++) {
-      for (let column = 0; column < known.columns; column++) {
-        const occupied = cells[row * known.columns + column];
-        if (occupied < 0) continue;
-        const share = Math.min(1, Math.max(0, (occupied - 20) / 60));
-        const to = 4 * ((known.rows - 1 - row) * known.columns + column);
-        for (let i = 0; i < 3; i++) image.data[to + i] = floor[i] + share * (wall[i] - floor[i]);
-        image.data[to + 3] = 255;
-      }
-    }
-    context.putImageData(image, 0, 0);
-    return picture;
+    return this.floor?.box ?? [x - 4, y - 4, x + 4, y + 4];
   }
 
   draw() {
@@ -127,11 +115,11 @@ export class MapPicture {
   }
 
   drawGrid() {
-    if (this.known === null) return;
-    const { origin, columns, rows, resolution } = this.known;
-    const [left, top] = this.view.toScreen(origin[0], origin[1] + rows * resolution);
-    this.c.imageSmoothingEnabled = this.view.scale * resolution < 1.5;
-    this.c.drawImage(this.cells, left, top, columns * resolution * this.view.scale, rows * resolution * this.view.scale);
+    if (!this.floor?.picture) return;
+    const { picture, left, top, resolution } = this.floor;
+    this.c.imageSmoothingEnabled = this.view.scale * resolution < 3;
+    this.c.imageSmoothingQuality = "high";
+    this.c.drawImage(picture, ...this.view.toScreen(left, top), picture.width * resolution * this.view.scale, picture.height * resolution * this.view.scale);
   }
 
   line(xy, colour, width) {
@@ -145,9 +133,7 @@ export class MapPicture {
   }
 
   drawTrail() {
-    const way = this.way.flatMap(([, x, y]) => [x, y]);
-    if (this.known !== null) way.unshift(...this.trail);
-    this.line(way, this.colours.trail, 1.5);
+    this.line([...this.trail, ...this.way.flatMap(([, x, y]) => [x, y])], this.colours.trail, 1.5);
   }
 
   drawEdges() {
@@ -296,9 +282,4 @@ function ends(scan) {
     found.push(x + range * Math.cos(bearing), y + range * Math.sin(bearing));
   }
   return found;
-}
-
-function rgb(colour) {
-  const hex = colour.slice(1);
-  return [0, 2, 4].map((i) => parseInt(hex.slice(i, i + 2), 16));
 }

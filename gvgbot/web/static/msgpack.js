@@ -60,4 +60,5 @@ export function decode(buffer) {
 
 // Points as they travel, little-endian float32 pairs; every machine with a browser is little-endian.
 export const points = (binary) => new Float32Array(binary.buffer, binary.byteOffset, binary.length >> 2);
+export const poses = points; // x, y, theta, x and so on
 export const millimetres = (binary) => new Uint16Array(binary.buffer, binary.byteOffset, binary.length >> 1);

@@ -1,6 +1,6 @@
 // A robot in words: the same words as those of `gvgbot monitor`.
 
-export const LOW_BATTERY = 0.2, STALE = 3.0, STUCK = 1.0; // of a full charge; s; s
+export const LOW_BATTERY = 0.2, STALE = 3.0, STUCK = 1.0, LATE = 0.1; // of a full charge; s; s; s
 
 export const degrees = (angle) => `${Math.round((angle * 180) / Math.PI) + 0}°`;
 export const percent = (share) => `${Math.round(100 * share)} %`;
@@ -71,6 +71,26 @@ function device(link) {
 function control(state) {
   if (state.cycle_age === null) return ["not begun", "faint"];
   return state.cycle_age > STUCK ? [`no cycle for ${duration(state.cycle_age)}`, "bad"] : ["running", "good"];
+}
+
+// The same of its program and its links; `before` is the health a moment earlier, to tell rates.
+export function health(now, before) {
+  if (now === undefined) return [["program", "nothing said yet", "faint"]];
+  const rate = before === undefined || now.stamp <= before.stamp ? "" : `, ${((now.cycles - before.cycles) / (now.stamp - before.stamp)).toFixed(0)} per s`;
+  return [
+    ["program", `${percent(now.cpu)} of a core, ${(now.memory / 1e6).toFixed(0)} MB`, "plain"],
+    ["up", duration(now.uptime), "plain"],
+    ["cycles", `${now.cycles}${rate}`, "plain"],
+    ["late", `${now.late_cycles}, slowest ${(1000 * now.slowest_cycle).toFixed(0)} ms`, now.slowest_cycle > LATE ? "warning" : "good"],
+    ["laser", ...counters(now.laser, "scans")],
+    ["base", ...counters(now.base, "frames")],
+    ["network", now.unsent ? `${now.unsent} unsent` : "all sent", now.unsent ? "warning" : "good"],
+  ];
+}
+
+function counters(link, unit) {
+  const [text, tone] = device(link);
+  return [`${link.messages} ${unit}, ${text}`, tone];
 }
 
 const contacts = (state) => `${state.contacts}${state.slips ? `, ${state.slips} slips` : ""}`;

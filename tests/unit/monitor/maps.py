@@ -1,36 +1,53 @@
 """Maps drawn by hand: `#` is a wall, `.` free floor, a blank is unknown; north is up."""
 
-import numpy as np
+import zlib
 
-from gvgbot.topics import Map, MapEdge, MapVertex
+import numpy as np
+from numpy.typing import NDArray
+
+from gvgbot.topics import Grid, Map, MapEdge, MapVertex, Raster, Tile
 
 CELLS = {"#": 100, ".": 0, " ": -1}
+SIDE = 64  # cells of a tile
 
 
 def a_map(
-    drawing: str,
-    *,
-    resolution: float = 1.0,
-    origin: tuple[float, float] = (0.0, 0.0),
-    vertices: tuple[MapVertex, ...] = (),
-    lines: tuple[list[tuple[float, float]], ...] = (),
-    trail: list[tuple[float, float]] | None = None,
+    vertices: tuple[MapVertex, ...] = (), lines: tuple[list[tuple[float, float]], ...] = ()
 ) -> Map:
-    rows = [[CELLS[sign] for sign in line] for line in reversed(drawing.strip("\n").split("\n"))]
     return Map(
         stamp=0.0,
-        resolution=resolution,
-        origin=origin,
-        columns=len(rows[0]),
-        rows=len(rows),
-        cells=np.array(rows, np.int8).tobytes(),
         vertices=vertices,
         edges=tuple(
             MapEdge(start=1, end=1, length=1.0, points=np.array(line, "<f4").tobytes())
             for line in lines
         ),
-        trail=np.array(trail or [], "<f4").tobytes(),
     )
+
+
+def a_floor(
+    drawing: str, *, resolution: float = 1.0, origin: tuple[float, float] = (0.0, 0.0)
+) -> Raster:
+    return Raster(_cells(drawing), resolution, origin)
+
+
+def a_grid(drawing: str, *, resolution: float = 1.0, number: int = 1) -> Grid:
+    """A drawing of at most 64 by 64 cells, whose lower left corner is the map's origin."""
+    drawn = _cells(drawing)
+    cells = np.full((SIDE, SIDE), -1, np.int8)
+    cells[: drawn.shape[0], : drawn.shape[1]] = drawn
+    return Grid(
+        stamp=0.0,
+        began=0.0,
+        number=number,
+        resolution=resolution,
+        side=SIDE,
+        tiles=(Tile(column=0, row=0, cells=zlib.compress(cells.tobytes())),),
+    )
+
+
+def _cells(drawing: str) -> NDArray[np.int8]:
+    rows = [[CELLS[sign] for sign in line] for line in reversed(drawing.strip("\n").split("\n"))]
+    return np.array(rows, np.int8)
 
 
 def vertex(

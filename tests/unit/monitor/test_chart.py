@@ -7,12 +7,10 @@ import numpy as np
 import pytest
 
 from gvgbot.monitor.braille import Dots, patterns
-from gvgbot.monitor.chart import LAYERS, Chart, chart
+from gvgbot.monitor.chart import LAYERS, Chart, Scene, chart
 from gvgbot.monitor.view import View
-from gvgbot.topics import Map
-from tests.unit.monitor.maps import a_map, vertex
-
-NOWHERE = np.zeros((0, 2))
+from gvgbot.topics import Map, Plan
+from tests.unit.monitor.maps import a_floor, a_map, vertex
 
 
 def names(dots: Dots) -> str:
@@ -34,8 +32,8 @@ def test_no_dot_is_the_blank_pattern_and_all_are_all() -> None:
     assert names(np.ones((4, 2), bool)) == "BRAILLE PATTERN DOTS-12345678"
 
 
-def drawn(known: Map, width: int, height: int) -> Chart:
-    return chart(known, None, NOWHERE, width, height)
+def drawn(drawing: str, width: int, height: int, graph: Map | None = None) -> Chart:
+    return chart(Scene(graph, a_floor(drawing, origin=HALF)), width, height)
 
 
 # Cells of a metre about the points 0..15, with half a metre around their centres: 16 x 16 m.
@@ -62,7 +60,7 @@ HALF = (-0.5, -0.5)
 
 
 def test_where_a_dot_is_as_large_as_a_cell_the_dots_are_the_walls() -> None:
-    room = drawn(a_map(ROOM, origin=HALF), 8, 4)
+    room = drawn(ROOM, 8, 4)
     assert room.scale == 2.0  # of a character: two dots of a metre
     assert (dots_of(room) == WALLS).all()
     assert room.text()[0] == "⡏⠉⠉⢹⠉⠉⠉⢹"
@@ -70,18 +68,18 @@ def test_where_a_dot_is_as_large_as_a_cell_the_dots_are_the_walls() -> None:
 
 
 def test_where_dots_are_finer_than_cells_walls_stay_closed() -> None:
-    room = drawn(a_map(ROOM, origin=HALF), 16, 8)
+    room = drawn(ROOM, 16, 8)
     assert (dots_of(room) == np.kron(WALLS, np.ones((2, 2), bool))).all()
 
 
 def test_where_dots_are_coarser_than_cells_no_wall_is_lost() -> None:
-    room = drawn(a_map(ROOM, origin=HALF), 4, 2)
+    room = drawn(ROOM, 4, 2)
     blocks = WALLS.reshape(8, 2, 8, 2).any(axis=(1, 3))
     assert (dots_of(room) == blocks).all()
 
 
 def test_a_wide_terminal_shows_the_map_in_its_middle() -> None:
-    room = drawn(a_map(ROOM, origin=HALF), 12, 4)
+    room = drawn(ROOM, 12, 4)
     assert (dots_of(room)[:, 4:20] == WALLS).all()
     assert not dots_of(room)[:, :4].any()
     assert not dots_of(room)[:, 20:].any()
@@ -91,7 +89,7 @@ def test_unknown_floor_is_told_from_known() -> None:
     half = ROOM.replace("#.", " .").strip("\n").split("\n")
     drawing = "\n".join(line[:8] + " " * 8 for line in half)
     far = vertex((15.0, 8.0))  # keeps the view as wide as before
-    room = drawn(a_map(drawing, origin=HALF, vertices=(far,)), 8, 4)
+    room = drawn(drawing, 8, 4, a_map((far,)))
     assert room.floor[:, :4].all()
     assert not room.floor[:, 4:].any()
 
@@ -101,9 +99,8 @@ EMPTY = "\n".join(["." * 16] * 16)
 
 def test_an_edge_is_a_line_without_gaps_and_hides_the_trail_under_it() -> None:
     upright = [(2.0, 2.0), (2.0, 12.0)]
-    found = drawn(
-        a_map(EMPTY, origin=HALF, lines=(upright,), trail=[(2.0, 2.0), (12.0, 2.0)]), 8, 4
-    )
+    way = np.array([[2.0, 2.0], [12.0, 2.0]])
+    found = chart(Scene(a_map(lines=(upright,)), a_floor(EMPTY, origin=HALF), way), 8, 4)
     expected = np.zeros((16, 16), bool)
     for i in range(2, 13):
         expected[15 - i, 2] = True  # row 0 is the north
@@ -113,24 +110,28 @@ def test_an_edge_is_a_line_without_gaps_and_hides_the_trail_under_it() -> None:
     assert found.layers[3].tolist() == [0, edge, trail, trail, trail, trail, trail, 0]
 
 
-def test_the_last_metres_are_drawn_though_the_map_does_not_have_them() -> None:
-    way = np.array([[3.0, 0.0], [3.0, 4.0]])
-    found = chart(a_map(EMPTY, origin=HALF), None, way, 8, 4)
+def test_the_plan_is_drawn_from_the_robot_to_where_it_goes() -> None:
+    plan = Plan(
+        stamp=0.0,
+        vertex=1,
+        bearing=0.0,
+        reason="ear",
+        track=np.array([[3.0, 0.0], [3.0, 4.0]], "<f4").tobytes(),
+        route=np.array([[3.0, 4.0], [9.0, 4.0]], "<f4").tobytes(),
+    )
+    found = chart(Scene(floor=a_floor(EMPTY, origin=HALF), plan=plan), 8, 4)
     expected = np.zeros((16, 16), bool)
-    expected[11:16, 3] = True
+    expected[11:16, 3] = expected[11, 3:10] = True  # row 0 is the north
     assert (dots_of(found) == expected).all()
+    assert set(found.layers[found.layers > 0].tolist()) == {LAYERS.index("plan")}
 
 
 def test_vertices_frontiers_and_the_robot_are_signs_where_they_are() -> None:
     known = a_map(
-        EMPTY,
-        origin=HALF,
-        vertices=(
-            vertex((1.0, 1.0), frontiers=(0.0, math.pi / 2)),
-            vertex((15.0, 15.0), "endpoint"),
-        ),
+        (vertex((1.0, 1.0), frontiers=(0.0, math.pi / 2)), vertex((15.0, 15.0), "endpoint"))
     )
-    found = chart(known, (8.0, 9.0, 0.0), NOWHERE, 8, 4)
+    scene = Scene(known, a_floor(EMPTY, origin=HALF), pose=(8.0, 9.0, 0.0))
+    found = chart(scene, 8, 4)
     assert found.text() == ["       ○", "    →   ", "?       ", "● ?     "]
 
 
@@ -142,12 +143,12 @@ def test_vertices_frontiers_and_the_robot_are_signs_where_they_are() -> None:
     ],
 )
 def test_the_arrow_points_where_the_robot_looks(degrees: float, arrow: str) -> None:
-    found = chart(None, (0.0, 0.0, math.radians(degrees)), NOWHERE, 8, 4)
+    found = chart(Scene(pose=(0.0, 0.0, math.radians(degrees))), 8, 4)
     assert arrow in "".join(found.text())
 
 
 def test_without_a_map_there_is_a_small_empty_place() -> None:
-    found = chart(None, None, NOWHERE, 10, 5)
+    found = chart(Scene(), 10, 5)
     assert found.text() == [" " * 10] * 5
 
 

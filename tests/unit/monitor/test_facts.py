@@ -5,7 +5,7 @@ import math
 import msgspec
 import pytest
 
-from gvgbot.client import Event, Presence
+from gvgbot.client import Event, Health, Plan, Presence
 from gvgbot.monitor.facts import Fact, duration, facts, headline, told
 from tests.unit.test_telemetry import EXAMPLE
 
@@ -17,8 +17,27 @@ DECISION = Event(
 )
 
 
+PLAN = Plan(
+    stamp=1.0, vertex=7, bearing=math.pi / 2, reason="nearest frontier", track=b"", route=b""
+)
+HEALTH = Health(
+    stamp=1.0,
+    uptime=60.0,
+    cycles=3000,
+    late_cycles=0,
+    slowest_cycle=0.01,
+    cpu=0.143,
+    memory=82_400_000,
+    unsent=0,
+    laser=EXAMPLE.laser,
+    base=EXAMPLE.base,
+)
+
+
 def said(**changes: object) -> dict[str, Fact]:
-    return {fact.name: fact for fact in facts(msgspec.structs.replace(EXAMPLE, **changes), ())}
+    return {
+        fact.name: fact for fact in facts(msgspec.structs.replace(EXAMPLE, **changes), None, None)
+    }
 
 
 def test_the_numbers_of_a_state_are_said_in_the_units_of_people() -> None:
@@ -38,8 +57,8 @@ def test_sigma_is_along_the_longest_axis_of_the_ellipse() -> None:
     assert lines["sigma"].text == "3.0 cm  2.0°"
 
 
-def test_the_next_decision_and_its_reason_are_said() -> None:
-    lines = {fact.name: fact.text for fact in facts(EXAMPLE, (DECISION,))}
+def test_what_is_next_and_why_is_said() -> None:
+    lines = {fact.name: fact.text for fact in facts(EXAMPLE, PLAN, None)}
     assert lines["going to"] == "vertex 7, 90°"
     assert lines["why"] == "nearest frontier"
 
@@ -48,9 +67,20 @@ def test_who_has_finished_goes_nowhere() -> None:
     done = msgspec.structs.replace(
         EXAMPLE, phase="finished", outcome="explored", reason="no frontier is left"
     )
-    lines = {fact.name: fact.text for fact in facts(done, (DECISION,))}
+    lines = {fact.name: fact.text for fact in facts(done, PLAN, None)}
     assert (lines["phase"], lines["going to"]) == ("explored", "-")
     assert lines["why"] == "no frontier is left"
+
+
+def test_the_health_of_the_program_is_said() -> None:
+    state = msgspec.structs.replace(EXAMPLE, cycle_age=0.02)
+    lines = {fact.name: fact for fact in facts(state, None, HEALTH)}
+    assert lines["program"].text == "14% cpu  82 MB"
+    assert lines["control"] == Fact("control", "running", "good")
+    ill = msgspec.structs.replace(HEALTH, late_cycles=5, unsent=2)
+    lines = {fact.name: fact for fact in facts(state, None, ill)}
+    assert lines["program"].text == "14% cpu  82 MB  2 unsent"
+    assert lines["control"].text == "running, 5 late"
 
 
 def test_troubles_of_links_are_counted() -> None:

@@ -10,20 +10,24 @@ import pytest
 from rich.console import Console
 
 from gvgbot.client import Event
+from gvgbot.monitor.chart import Scene
 from gvgbot.monitor.facts import Fact
 from gvgbot.monitor.screen import Picture, Screen
-from tests.unit.monitor.maps import a_map, vertex
+from tests.unit.monitor.maps import a_floor, a_map, vertex
 from tests.unit.test_telemetry import EXAMPLE
 
 ALIVE = Fact("karl", "alive", "good")
-CORRIDOR = a_map(
-    "\n".join(["#" * 40, *["." * 40] * 8, "#" * 40]), vertices=(vertex((5.0, 5.0)),), resolution=0.5
+CORRIDOR = Scene(
+    a_map((vertex((5.0, 5.0)),)),
+    a_floor("\n".join(["#" * 40, *["." * 40] * 8, "#" * 40]), resolution=0.5),
+    np.array([[1.0, -2.0]]),
+    pose=EXAMPLE.pose,
 )
 EVENTS = tuple(
     Event(number=n, stamp=float(n), kind="recovery", details={"action": f"try {n}", "reason": "?"})
     for n in range(12)
 )
-PICTURE = Picture(ALIVE, EXAMPLE, CORRIDOR, np.array([[1.0, -2.0]]), EVENTS)
+PICTURE = Picture(ALIVE, EXAMPLE, CORRIDOR, EVENTS)
 
 
 class Terminal:
@@ -87,6 +91,7 @@ def test_the_usual_terminal_shows_everything() -> None:
         "laser",
         "base",
         "control",
+        "program",
     ):
         assert any(line[49:].startswith(fact) for line in shown), fact
     assert "try 11: ?" in text

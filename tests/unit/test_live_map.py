@@ -1,0 +1,115 @@
+"""Grid and trajectory as they grow on the network, held against the maps that they are parts of."""
+
+import math
+from collections.abc import Iterator
+
+import msgspec
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from gvgbot.autonomy.pipeline import Keyframe
+from gvgbot.geometry import Pose
+from gvgbot.hal.messages import Scan
+from gvgbot.live_grid import LiveGrid
+from gvgbot.live_map import Trail
+from gvgbot.maps.occupancy import occupancy_grid
+from gvgbot.topics import TRAJECTORY_POSES, Grid, Raster
+
+
+def keyframe(x: float, y: float, reach: float = 3.0) -> Keyframe:
+    """A look around in a round room."""
+    angles = np.linspace(-math.pi, math.pi, 721)[:-1]
+    here = Pose(x, y, 0.3)
+    scan = Scan(x, np.full(angles.shape, reach), angles[0], angles[1] - angles[0], 0.1, 30.0)
+    return Keyframe(x, here, here, here, scan)
+
+
+DRIVE = [keyframe(0.5 * i, -0.3 * i) for i in range(20)]
+
+
+def sent(drive: list[Keyframe]) -> Iterator[tuple[Grid, Grid]]:
+    """What changes with each keyframe, and the whole."""
+    live = LiveGrid(began=7.0)
+    for one in drive:
+        live.add([one])
+        while (changed := live.changes(one.stamp)) is not None:
+            yield changed, live.whole(one.stamp)
+
+
+def merged(grids: list[Grid]) -> Grid:
+    tiles = {(tile.row, tile.column): tile for grid in grids for tile in grid.tiles}
+    return msgspec.structs.replace(grids[-1], tiles=tuple(tiles.values()))
+
+
+def percent_at(raster: Raster, points: NDArray[np.float64]) -> list[int]:
+    at = np.floor((points - raster.origin) / raster.resolution).astype(int)
+    found: list[int] = raster.cells[at[:, 1], at[:, 0]].tolist()
+    return found
+
+
+def test_what_has_changed_adds_up_to_the_grid_of_all_scans() -> None:
+    changes, wholes = zip(*sent(DRIVE), strict=True)
+    scans = [(one.map_base, one.scan) for one in DRIVE if one.scan is not None]
+    made = occupancy_grid(scans, 0.05, 8.0)
+    rows, columns = np.nonzero(made.cells >= 0)
+    points = np.column_stack([columns + 0.5, rows + 0.5]) * 0.05 + made.origin
+    expected = made.cells[rows, columns].tolist()
+    assert percent_at(merged(list(changes)).raster(), points) == expected
+    assert percent_at(wholes[-1].raster(), points) == expected
+    assert np.count_nonzero(wholes[-1].raster().cells >= 0) == len(rows)
+    assert [grid.number for grid in changes] == list(range(1, len(changes) + 1))
+    assert {grid.began for grid in changes} == {7.0}
+
+
+def test_only_what_has_changed_is_sent() -> None:
+    live = LiveGrid(began=0.0)
+    live.add(DRIVE)
+    everything = live.changes(1.0)
+    assert live.changes(2.0) is None
+    live.add([keyframe(9.5, -5.7, reach=0.4)])  # sees no farther than the tiles around it
+    changed = live.changes(3.0)
+    assert everything is not None
+    assert changed is not None
+    assert 1 <= len(changed.tiles) <= 4
+    assert len(everything.tiles) > 8
+
+
+def test_a_large_map_is_sent_in_messages_of_bounded_size() -> None:
+    far = [keyframe(40.0 * i, 40.0 * j) for i in range(5) for j in range(5)]
+    live = LiveGrid(began=0.0)
+    live.add(far)
+    first = live.changes(1.0)
+    assert first is not None
+    assert len(first.tiles) == 128
+    assert live.has_more
+    rest = list(iter(lambda: live.changes(1.0), None))
+    assert live.changes(1.0) is None
+    assert len(merged([first, *rest]).tiles) == len(live.whole(1.0).tiles) > 128
+
+
+def test_a_trajectory_keeps_its_ends_and_its_shape_however_long_it_gets() -> None:
+    trail, here = Trail(), Pose()
+    for i in range(30_000):  # 7.5 km around a circle of 50 m
+        angle = i * 0.25 / 50.0
+        here = Pose(50.0 * math.cos(angle), 50.0 * math.sin(angle), angle)
+        trail.add([Keyframe(float(i), here, here, here, None)])
+    told = trail.told(30_000.0)
+    assert len(told.times) == len(told.map_base) <= TRAJECTORY_POSES
+    assert len(told.times) > TRAJECTORY_POSES / 3
+    assert told.times[0] == 0.0
+    assert (np.diff(told.times) > 0.0).all()
+    x, y, theta = told.map_base.T.astype(float)
+    assert np.hypot(x, y) == pytest.approx(50.0, abs=1e-3)
+    assert theta == pytest.approx(told.times * 0.25 / 50.0, abs=1e-3)
+    steps = np.hypot(np.diff(x), np.diff(y))
+    assert steps.max() < 2.2 * steps.min()
+    assert math.dist((x[-1], y[-1]), (here.x, here.y)) < 2 * steps.max()
+
+
+def test_standing_makes_a_trajectory_no_longer() -> None:
+    trail, here = Trail(), Pose(1.0, 2.0, 0.5)
+    still = Keyframe(1.0, here, here, here, None)
+    assert trail.add([still])
+    assert not trail.add([still])
+    assert trail.told(2.0).map_base.tolist() == [[1.0, 2.0, 0.5]]
