@@ -16,6 +16,9 @@ from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
 from gvgbot.ranges import Range
 
+Index = NDArray[np.intp]
+Window = tuple[slice, slice]  # rows and columns
+
 _HIT = 2  # votes that one hit gives an occupied cell
 _MOST_HITS = 100  # that a mean remembers; more would keep a wall where it no longer is
 _EMPTY = (
@@ -76,6 +79,7 @@ class LocalMap:
         self._sight = np.zeros((n, n, 2), np.float32)  # mean direction to where it was seen from
         self._echoes = np.zeros((n, n), np.float32)  # lone ones, of which old ones count less
         self._seen_at = np.full((n, n), -np.inf, np.float32)  # metres driven when last seen
+        self._known = np.zeros((n + 2, n + 2), bool)  # with a rim for what is not in the window
         self._renew()
         centres = ((np.arange(n) + 0.5) * self._cell).astype(np.float32)
         self._offsets_x = np.broadcast_to(centres[:, None], (n, n))
@@ -84,13 +88,15 @@ class LocalMap:
     def insert(self, scan: Scan, local_laser: Pose, travelled: float) -> None:
         """Add a scan taken at the laser pose after so many metres driven."""
         self._recentre(local_laser)
-        ranges = _without_single_dropouts(scan.ranges)
-        self._carve(scan, ranges, local_laser, travelled)
+        ranges, bearings = _without_single_dropouts(scan.ranges), scan.bearings
+        directions = np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
+        self._carve(scan, ranges, directions, local_laser, travelled)
         points = _bridged(
-            local_laser.transform(_hits(scan, ranges, self._reach)), self._config.bridge_gap_m
+            local_laser.transform(_hits(ranges, directions, self._reach)),
+            self._config.bridge_gap_m,
         )
         self._occupy(points, local_laser.position, travelled)
-        echoes = _hits(scan, _lone(scan.ranges), self._reach)
+        echoes = _hits(_lone(scan.ranges), directions, self._reach)
         self._note_echoes(local_laser.transform(echoes))
         self._forget(travelled)
         self._renew()
@@ -111,7 +117,7 @@ class LocalMap:
         for drawn in self._walls:
             drawn.setflags(write=False)
         self._tree: cKDTree | None = None
-        self._known = np.pad(self._free | occupied, 1)  # with a rim for what is not in the window
+        np.logical_or(self._free, occupied, out=self._known[1:-1, 1:-1])
 
     def points(self) -> Array:
         """Points of the walls (N, 2), local frame: about one for each cell that a wall crosses."""
@@ -169,25 +175,47 @@ class LocalMap:
         for name, empty in _EMPTY:
             setattr(self, name, _shifted(getattr(self, name), shift, empty))
 
-    def _carve(self, scan: Scan, ranges: Array, local_laser: Pose, travelled: float) -> None:
+    def _carve(
+        self, scan: Scan, ranges: Array, directions: Array, local_laser: Pose, travelled: float
+    ) -> None:
         """Mark what the beams passed through as free, and vote against walls they passed."""
         reach = min(self._reach, scan.range_max)  # as far as a beam without an echo is free
         see = minimum_filter1d(np.where(np.isnan(ranges), 0.0, np.minimum(ranges, reach)), 3)
+        ends = local_laser.transform(see[:, None] * directions)
+        window = self._window(ends, local_laser.position, reach * scan.angle_increment)
         corner = self._corner * self._cell
-        dx = self._offsets_x + np.float32(corner[0] - local_laser.x)
-        dy = self._offsets_y + np.float32(corner[1] - local_laser.y)
+        dx = self._offsets_x[window] + np.float32(corner[0] - local_laser.x)
+        dy = self._offsets_y[window] + np.float32(corner[1] - local_laser.y)
         seen_to = _range_towards(scan, see.astype(np.float32), dx, dy, local_laser.theta)
         distance = np.sqrt(dx * dx + dy * dy)
         passed = distance < seen_to - np.float32(0.8 * self._cell)
-        self._free |= passed
-        self._seen_at[passed] = travelled
-        self._doubt_echoes(passed)
-        i, j = np.nonzero(passed & (self._votes > 0))
+        self._free[window] |= passed
+        self._seen_at[window][passed] = travelled
+        self._doubt_echoes(*self._cells(window, passed & (self._echoes[window] > 0)))
+        i, j = self._cells(window, passed & (self._votes[window] > 0))
         if len(i):
             self._vote_against(i, j, scan, see, local_laser)
 
+    def _window(self, ends: Array, eye: Array, beside: float) -> Window:
+        """The cells that beams from the eye to their ends (N, 2) pass, or pass `beside` m away."""
+        margin = beside + self._cell
+        low = np.minimum(ends.min(axis=0), eye) - margin
+        high = np.maximum(ends.max(axis=0), eye) + margin
+        first = np.floor(low / self._cell).astype(int) - self._corner
+        last = np.ceil(high / self._cell).astype(int) - self._corner
+        rows, columns = (
+            slice(max(a, 0), max(b, 0)) for a, b in zip(first.tolist(), last.tolist(), strict=True)
+        )
+        return rows, columns
+
+    @staticmethod
+    def _cells(window: Window, chosen: NDArray[np.bool_]) -> tuple[Index, Index]:
+        """Rows and columns of the cells that are chosen in a window."""
+        i, j = np.nonzero(chosen)
+        return i + window[0].start, j + window[1].start
+
     def _vote_against(
-        self, i: NDArray[np.int64], j: NDArray[np.int64], scan: Scan, see: Array, local_laser: Pose
+        self, i: Index, j: Index, scan: Scan, see: Array, local_laser: Pose
     ) -> None:
         d = self._mean[i, j] - local_laser.position
         beyond = _range_towards(scan, see, d[:, 0], d[:, 1], local_laser.theta)
@@ -195,9 +223,8 @@ class LocalMap:
         gone[gone] = ~self._is_glass(i[gone], j[gone])
         self._votes[i[gone], j[gone]] -= 1
 
-    def _doubt_echoes(self, passed: NDArray[np.bool_]) -> None:
+    def _doubt_echoes(self, i: Index, j: Index) -> None:
         """Let what is not yet glass count less where beams have passed."""
-        i, j = np.nonzero(passed & (self._echoes > 0))
         few = ~self._is_glass(i, j)
         i, j = i[few], j[few]
         self._echoes[i, j] = np.maximum(self._echoes[i, j] - _DECAY, 0.0)
@@ -208,22 +235,28 @@ class LocalMap:
         i, j = cells[((cells >= 0) & (cells < self._size)).all(axis=1)].T
         self._echoes[i, j] += 1
 
-    def _is_glass(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.bool_]:
+    def _is_glass(self, i: Index, j: Index) -> NDArray[np.bool_]:
         """Which cells (N,) have had lone echoes again and again, with their neighbours."""
-        echoes = np.zeros(len(i))
-        for di in (-1, 0, 1):
-            for dj in (-1, 0, 1):
-                row, column = (np.clip(k, 0, self._size - 1) for k in (i + di, j + dj))
-                echoes += self._echoes[row, column]
-        return echoes >= _GLASS_ECHOES
+        if not len(i):
+            return np.zeros(0, np.bool_)
+        rows, columns = self._beside(i)[:, :, None], self._beside(j)[:, None, :]
+        echoes = self._echoes[rows, columns].sum(axis=(1, 2), dtype=np.float64)
+        glass: NDArray[np.bool_] = echoes >= _GLASS_ECHOES
+        return glass
+
+    def _beside(self, k: Index) -> Index:
+        """Each row or column (N,) with the one before and the one after it (N, 3)."""
+        beside: Index = np.minimum(np.maximum(k[:, None] + (-1, 0, 1), 0), self._size - 1)
+        return beside
 
     def _occupy(self, points: Array, eye: Array, travelled: float) -> None:
         cells = np.floor(points / self._cell).astype(np.int64) - self._corner
         inside = ((cells >= 0) & (cells < self._size)).all(axis=1)
         flat = cells[inside, 0] * self._size + cells[inside, 1]
-        cell, index, count = np.unique(flat, return_inverse=True, return_counts=True)
-        x = np.bincount(index, points[inside, 0]) / count
-        y = np.bincount(index, points[inside, 1]) / count
+        counts = np.bincount(flat)
+        cell = np.flatnonzero(counts)
+        count = counts[cell]
+        x, y = (np.bincount(flat, points[inside, k])[cell] / count for k in (0, 1))
         i, j = np.divmod(cell, self._size)
         old = np.maximum(self._votes[i, j], 0)
         before = np.where(old > 0, self._hits[i, j], 0.0)
@@ -238,10 +271,10 @@ class LocalMap:
         self._seen_at[i, j] = travelled
 
     def _forget(self, travelled: float) -> None:
-        stale = self._seen_at < travelled - self._config.memory_m
-        self._free[stale] = False
-        self._votes[stale] = 0
-        self._echoes[stale] = 0.0
+        fresh = self._seen_at >= travelled - self._config.memory_m
+        self._free &= fresh
+        self._votes *= fresh
+        self._echoes *= fresh
 
 
 def _shifted(
@@ -267,10 +300,11 @@ def _merged(cells: NDArray[np.intp], columns: int, walls: Walls, reach: float) -
     for step in (1, columns):
         points, hits, sights = walls
         beside = np.minimum(np.searchsorted(cells, cells + step), len(cells) - 1)
-        near = np.hypot(*(points[beside] - points).T) < reach
-        one_side = (sights[beside] * sights).sum(axis=1) > 0.0
-        low = np.flatnonzero((cells[beside] == cells + step) & near & one_side)
+        low = np.flatnonzero(cells[beside] == cells + step)
         high = beside[low]
+        near = np.hypot(*(points[high] - points[low]).T) < reach
+        one = near & ((sights[high] * sights[low]).sum(axis=1) > 0.0)
+        low, high = low[one], high[one]
         share = (hits[high] / (hits[low] + hits[high]))[:, None]
         points[low] += share * (points[high] - points[low])
         sights[low] += share * (sights[high] - sights[low])
@@ -300,13 +334,12 @@ def _lone(ranges: Array) -> Array:
     return lone
 
 
-def _hits(scan: Scan, ranges: Array, reach: float) -> Array:
+def _hits(ranges: Array, directions: Array, reach: float) -> Array:
     """End points (N, 2) of the beams that hit something within reach, laser frame."""
     with np.errstate(invalid="ignore"):
         hit = ranges < reach
-    bearings = scan.bearings[hit]
-    directions: Array = np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
-    return ranges[hit, None] * directions
+    ends: Array = ranges[hit, None] * directions[hit]
+    return ends
 
 
 def _bridged(points: Array, gap: float) -> Array:
@@ -327,9 +360,11 @@ def _range_towards(
 ) -> NDArray[np.floating]:
     """How far the scan sees in the direction of each offset; 0 outside its field of view."""
     turn = np.float32(2 * np.pi)
-    bearing = np.arctan2(dy, dx) - np.float32(theta + scan.angle_min)
+    bearing = np.arctan2(dy, dx)
+    bearing -= np.float32(theta + scan.angle_min)
     bearing -= turn * np.floor(bearing / turn)
-    index = (bearing * np.float32(1 / scan.angle_increment) + np.float32(0.5)).astype(np.int32)
-    inside = index < len(see)
-    index[~inside] = 0
-    return np.where(inside, see[index], see.dtype.type(0))
+    bearing *= np.float32(1 / scan.angle_increment)
+    bearing += np.float32(0.5)
+    beam = np.minimum(bearing.astype(np.int32), len(see))
+    towards: NDArray[np.floating] = np.append(see, see.dtype.type(0))[beam]
+    return towards
