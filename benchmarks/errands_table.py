@@ -1,31 +1,71 @@
-"""Explores a world, drives to each of its vertices and home: what is reached, and by which ways.
+"""Explores worlds, then asks for random vertices and points: what is reached, and by which ways.
 
-    python -m benchmarks.errands_table --world office --seed 1
+    python -m benchmarks.errands_table --worlds office ring rooms cave --requests 100
 
-In virtual time, on the twins. A vertex counts as reached if the robot truly stands where the map
-has the vertex, and `ratio` is metres driven by metres of the shortest way over the graph.
+In virtual time, on the twins. `reached` counts what the robot said to have reached and where it
+truly stands then; `refused` and `given up` are what it declined, and left, with a reason; `wrong`
+is all else, and is told of line by line. `ratio` is metres driven by metres of the shortest way
+over the graph, of all that was reached together; `worst` that of a single way of more than 5 m.
+With --out every world leaves a line of JSON when it is done, and is not run again.
 """
 
 import argparse
 import asyncio
-from dataclasses import dataclass, field
+import json
+import math
+from collections import Counter
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
 
 import numpy as np
 
-from gvgbot.autonomy.destinations import route_to_vertex
+from gvgbot.autonomy.destinations import foot_of, route_to_foot, route_to_vertex
 from gvgbot.autonomy.errands import Declined
 from gvgbot.autonomy.events import ErrandEnded, Event
 from gvgbot.autonomy.loop import Loop
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.config import Config, load_config
-from gvgbot.geometry import Pose
+from gvgbot.geometry import Array, Pose
 from gvgbot.hal.guard import Guard
 from gvgbot.links import Devices, Links
 from gvgbot.simulation import Place, Simulation, open_place
 
 REACHED_M = 0.3
 LONGEST_S = 1200.0  # of an errand
+LONG_M = 5.0  # a way for which its ratio says something
+ROOM_M = 0.3  # that a point which is asked for has beside the robot's radius
+HEAD = (
+    "world            seed explored reached refused given-up wrong hits  ratio  worst  driven   s"
+)
+
+
+@dataclass
+class Score:
+    """What became of the requests in one world."""
+
+    world: str
+    seed: int
+    explored: str = ""
+    reached: int = 0
+    refused: int = 0
+    given_up: int = 0
+    wrong: int = 0
+    contacts: int = 0
+    driven: float = 0.0
+    shortest: float = 0.0
+    worst: float = 0.0
+    duration: float = 0.0
+    reasons: dict[str, int] = field(default_factory=dict)
+
+    @property
+    def row(self) -> str:
+        ratio = self.driven / self.shortest if self.shortest else math.nan
+        return (
+            f"{self.world:16} {self.seed:4} {self.explored:8} {self.reached:7} {self.refused:7} "
+            f"{self.given_up:8} {self.wrong:5} {self.contacts:4} {ratio:6.3f} {self.worst:6.2f} "
+            f"{self.driven:7.0f} {self.duration:6.0f}"
+        )
 
 
 @dataclass
@@ -37,10 +77,9 @@ class Tour:
     pipeline: Pipeline
     clock: LoopClock
     simulation: Simulation
+    score: Score
+    verbose: bool = False
     events: list[Event] = field(default_factory=list)
-    missed: int = 0
-    driven: float = 0.0
-    shortest: float = 0.0
 
     @property
     def here(self) -> Pose:
@@ -53,71 +92,106 @@ class Tour:
         while not self.pipeline.errands.is_resting and self.clock.now() < end:
             await self.clock.sleep_until(self.clock.now() + 0.5)
 
-    async def visit(self, vertex: int | None) -> None:
-        """Drive to a vertex, or home, and print how that went."""
-        errands, graph = self.pipeline.errands, self.pipeline.mapper.graph
-        begin, start = self.pipeline.travelled, self.clock.now()
-        here, shortest = errands.whereabouts(), float("nan")
-        if here is not None and vertex is not None:
-            route = route_to_vertex(graph, here.starts(), vertex)
-            shortest = shortest if route is None else route.metres
+    def shortest(self, goal: int | Array) -> float:
+        """Metres of the shortest way over the graph, NaN if none is known."""
+        here, mapper = self.pipeline.errands.whereabouts(), self.pipeline.mapper
+        if here is None:
+            return math.nan
+        if isinstance(goal, int):
+            route = route_to_vertex(mapper.graph, here.starts(), goal)
+            return math.nan if route is None else route.metres
+        foot = foot_of(mapper, goal)
+        route = None if foot is None else route_to_foot(here, here.starts(), foot)
+        return math.nan if route is None or foot is None else route.metres + foot.away
+
+    async def visit(self, goal: int | Array) -> None:
+        """Drive to a vertex or to a point of the map (2,), and count how that went."""
+        errands, begin, start = self.pipeline.errands, self.pipeline.travelled, self.clock.now()
+        shortest, count = self.shortest(goal), len(self.events)
         try:
-            if vertex is None:
-                errands.home(start)
+            if isinstance(goal, int):
+                errands.goto_vertex(goal, start)
             else:
-                errands.goto_vertex(vertex, start)
+                errands.goto_point(float(goal[0]), float(goal[1]), start)
         except Declined as reason:
-            self.missed += 1
-            print(f"{vertex}: refused: {reason}")
+            self.score.refused += 1
+            self.note(goal, f"refused: {reason}")
             return
         await self.resting(LONGEST_S)
         await self.clock.sleep_until(self.clock.now() + 1.0)
-        self.conclude(vertex, begin, start, shortest)
-
-    def conclude(self, vertex: int | None, begin: float, start: float, shortest: float) -> None:
-        ended = [event for event in self.events if isinstance(event, ErrandEnded)]
-        goal = np.zeros(2)
-        if vertex is not None and vertex in self.pipeline.mapper.graph.vertices:
-            goal = self.pipeline.mapper.belief.map_vertex(vertex).position
-        off = float(np.hypot(*(self.place.start.transform(goal) - self.here.position)))
+        ended = [event for event in self.events[count:] if isinstance(event, ErrandEnded)]
         driven = self.pipeline.travelled - begin
-        is_reached = bool(ended) and ended[-1].stamp > start and off < REACHED_M
-        self.missed += not is_reached
-        if shortest == shortest:  # not for the way home, which ends beside the graph
-            self.driven, self.shortest = self.driven + driven, self.shortest + shortest
-        print(
-            f"{'home' if vertex is None else vertex:>5} "
-            f"{'reached' if is_reached else 'MISSED':8} off {off:5.2f} m, driven {driven:6.1f} m, "
-            f"shortest {shortest:6.1f} m, {self.clock.now() - start:5.0f} s  "
-            f"{ended[-1].reason if ended else ''}"
-        )
+        way = f"{driven:.1f} m for {shortest:.1f} m in {self.clock.now() - start:.0f} s"
+        if not ended:
+            self.score.wrong += 1
+            self.note(goal, f"WRONG: did not end; {way}")
+        elif ended[-1].outcome != "arrived":
+            self.score.given_up += 1
+            self.note(goal, f"{ended[-1].outcome}: {ended[-1].reason}; {way}")
+        else:
+            self.arrived(goal, driven, shortest, way)
 
-    async def run(self) -> None:
+    def arrived(self, goal: int | Array, driven: float, shortest: float, way: str) -> None:
+        mapper = self.pipeline.mapper
+        place = mapper.belief.map_vertex(goal).position if isinstance(goal, int) else goal
+        off = float(np.hypot(*(self.place.start.transform(place) - self.here.position)))
+        if off > REACHED_M:
+            self.score.wrong += 1
+            self.note(goal, f"WRONG: {off:.2f} m off; {way}")
+            return
+        self.score.reached += 1
+        if shortest == shortest:
+            self.score.driven += driven
+            self.score.shortest += shortest
+            if shortest > LONG_M:
+                self.score.worst = max(self.score.worst, driven / shortest)
+                if driven > 1.3 * shortest:
+                    self.note(goal, f"detour; {way}")
+
+    def note(self, goal: int | Array, what: str) -> None:
+        reasons = Counter(self.score.reasons)
+        reasons[what.split(";", maxsplit=1)[0]] += 1
+        self.score.reasons = dict(reasons)
+        if self.verbose:
+            name = goal if isinstance(goal, int) else np.round(goal, 2)
+            print(f"  {self.clock.now():7.0f} s  {name}: {what}", flush=True)
+
+    def goals(self, count: int) -> list[int | Array]:
+        """Vertices and points in turn, at random; points have room, and lie near the known."""
+        rng = np.random.default_rng(self.config.twin.seed)
+        world, start = self.place.world, self.place.start
+        goals: list[int | Array] = []
+        vertices = list(self.pipeline.mapper.graph.vertices)
+        walls = np.argwhere(world.occupied)[:, ::-1]
+        walls = (walls + 0.5) * world.resolution_m + np.array(world.origin)
+        seen = np.array([k.map_base.position for k in self.pipeline.keyframes])
+        while len(goals) < count:
+            if len(goals) % 2 == 0:
+                goals.append(int(rng.choice(vertices)))
+                continue
+            point = seen[rng.integers(len(seen))] + rng.uniform(-0.7, 0.7, 2)
+            room = np.hypot(*(walls - start.transform(point)).T).min()
+            if room > self.config.robot.radius_m + ROOM_M:
+                goals.append(point)
+        return goals
+
+    async def run(self, count: int) -> None:
         await self.clock.sleep_until(3.0)
         await self.resting(self.config.twin.time_limit_s)
-        mission, graph = self.pipeline.mission, self.pipeline.mapper.graph
-        print(
-            f"{mission.outcome}: {mission.reason}; {len(graph.vertices)} vertices, "
-            f"{self.clock.now():.0f} s, {self.pipeline.travelled:.0f} m"
-        )
-        vertices = list(graph.vertices)
-        np.random.default_rng(self.config.twin.seed).shuffle(vertices)
-        for vertex in [*vertices, None]:
-            await self.visit(vertex)
-        ratio = self.driven / self.shortest if self.shortest else float("nan")
-        print(
-            f"missed {self.missed} of {len(vertices) + 1}, "
-            f"contacts {self.simulation.body.contacts}, driven {self.driven:.1f} m, "
-            f"shortest {self.shortest:.1f} m, ratio {ratio:.3f}"
-        )
+        self.score.explored = "yes" if self.pipeline.mission.outcome == "explored" else "no"
+        for goal in self.goals(count):
+            if not isinstance(goal, int) or goal in self.pipeline.mapper.graph.vertices:
+                await self.visit(goal)
+        self.score.contacts = self.simulation.body.contacts
+        self.score.duration = self.clock.now()
 
 
-async def explore_and_visit(config: Config) -> None:
+async def explore_and_visit(config: Config, score: Score, count: int, *, verbose: bool) -> None:
     clock, place = LoopClock(), open_place(config)
     simulation = Simulation(config, place, clock)
     devices = Devices(Links(config, clock, simulation))
     pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
-    tour = Tour(config, place, pipeline, clock, simulation)
+    tour = Tour(config, place, pipeline, clock, simulation, score, verbose)
     loop = Loop(
         devices.laser,
         devices.base,
@@ -129,19 +203,44 @@ async def explore_and_visit(config: Config) -> None:
     )
     async with asyncio.TaskGroup() as tasks:
         work = [tasks.create_task(devices.run()), tasks.create_task(loop.run())]
-        await tour.run()
+        await tour.run(count)
         for task in work:
             task.cancel()
 
 
+def done_before(out: Path | None) -> dict[tuple[str, int], Score]:
+    """The worlds of an earlier start."""
+    if out is None or not out.exists():
+        return {}
+    scores = [Score(**json.loads(line)) for line in out.read_text().splitlines()]
+    return {(score.world, score.seed): score for score in scores}
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
-    parser.add_argument("--world", default="office")
+    parser.add_argument("--worlds", nargs="+", default=["office", "ring", "rooms", "cave"])
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--requests", type=int, default=100, help="in each world")
+    parser.add_argument("--out", type=Path, help="lines of JSON; worlds in it are not run again")
+    parser.add_argument("--verbose", action="store_true", help="tell of all that was not reached")
     parser.add_argument("--set", dest="overrides", action="append", default=[])
     options = parser.parse_args()
-    overrides = [f"twin.world={options.world}", f"twin.seed={options.seed}", *options.overrides]
-    run_in_virtual_time(explore_and_visit(load_config(None, overrides)))
+    done = done_before(options.out)
+    print(HEAD)
+    for world in options.worlds:
+        score = done.get((world, options.seed))
+        if score is None:
+            score = Score(world, options.seed)
+            chosen = [f"twin.world={world}", f"twin.seed={options.seed}", *options.overrides]
+            config = load_config(None, chosen)
+            work = explore_and_visit(config, score, options.requests, verbose=options.verbose)
+            run_in_virtual_time(work)
+            if options.out is not None:
+                with options.out.open("a") as file:
+                    file.write(json.dumps(asdict(score)) + "\n")
+        print(score.row, flush=True)
+        for reason, times in sorted(score.reasons.items(), key=lambda item: -item[1]):
+            print(f"    {times:3} {reason}")
 
 
 if __name__ == "__main__":

@@ -25,7 +25,15 @@ KEEP_EVERY = 0.5  # s between two batches
 SNAPSHOT_EVERY = 5.0  # s between two snapshots, if nothing but the robot's place has changed
 _PAUSE_S = 1.0  # that the robot's clock is said to have stood while the computer was off
 _COUNTING_S = 60.0  # away for longer, the base's counters may have come round
-_SETTLED = (events.VertexAdded, events.VertexRemoved, events.EdgeJoined, events.LoopClosed)
+_SETTLED = (
+    events.VertexAdded,
+    events.VertexRemoved,
+    events.EdgeJoined,
+    events.LoopClosed,
+    events.Requested,
+    events.ErrandEnded,
+    events.Finished,
+)
 
 log = structlog.get_logger()
 
@@ -102,8 +110,8 @@ class Keeper:
     # -- keeping -----------------------------------------------------------------------------------
 
     def on_event(self, event: events.Event) -> None:
-        """Note what happened: a map that has changed is kept at once."""
-        self._settled = self._settled or isinstance(event, (*_SETTLED, events.Finished))
+        """Note what happened: a map that has changed is kept at once, and so is a wish."""
+        self._settled = self._settled or isinstance(event, _SETTLED)
 
     async def keep(
         self, clock: Clock, off_loop: Callable[[Callable[[], None]], Awaitable[None]]

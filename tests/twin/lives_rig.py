@@ -30,13 +30,18 @@ class GoingWorld(Simulation):
         await super().run()
 
 
+def explored(session: Session) -> bool:
+    """Whether there is an outcome."""
+    return session.pipeline.mission.outcome is not None
+
+
 def nothing(world: GoingWorld, out: Path) -> None:
     """What happens between two lives."""
 
 
 @dataclass
 class Lives:
-    """Several lives of one robot; each ends with a kill when it is told, the last by its outcome.
+    """Several lives of one robot; each ends with a kill when it is told, or when it is `over`.
 
     `between` is done to the world and to the run directory while the robot is dead for `dead_s`.
     """
@@ -47,6 +52,7 @@ class Lives:
     known: Path | None = None
     dead_s: float = 3.0
     between: Callable[[GoingWorld, Path], None] = nothing
+    over: Callable[[Session], bool] = explored
     sessions: list[Session] = field(default_factory=list)
     keepers: list[Keeper] = field(default_factory=list)
     world: GoingWorld = field(init=False)
@@ -72,7 +78,7 @@ class Lives:
             going.cancel()
 
     async def _live(self, clock: Clock, kill: Callable[[Session, float], bool]) -> None:
-        """Live until the mission has an outcome, or until killed: no last word gets out."""
+        """Live until that is over, or until killed: no last word gets out."""
         files = MissionFiles(self.out)
         saved = MissionFiles(self.known).read() if self.known is not None else files.read()
         directory = RunDirectory(self.out)
@@ -86,8 +92,8 @@ class Lives:
 
         async def ended() -> str:
             begun = clock.now()
-            while session.pipeline.mission.outcome is None:
-                assert clock.now() - begun < PATIENCE, "the exploration does not end"
+            while not self.over(session):
+                assert clock.now() - begun < PATIENCE, "that does not end"
                 await clock.sleep_until(clock.now() + LOOK)
                 if kill(session, clock.now()):
                     links.cable.is_cut = True

@@ -3,10 +3,12 @@
 Two meetpoints, 5 m apart over the bar in the middle and 12 m around either side.
 """
 
+import asyncio
 import json
 import math
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -27,14 +29,14 @@ pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(300)]
 
 MEETPOINTS = ((5.5, 2.0), (5.5, 7.0))
 START = Pose(3.5, 2.1, 0.2)
+RING = ((2.0, 2.0), (9.0, 2.0), (9.0, 7.0), (2.0, 7.0), (2.0, 2.0))
 BESIDE = (8.8, 4.5)  # 0.2 m beside the middle of the eastern corridor
 NEAR = 0.3  # m
 
 
 def theta(width: float = 1.4, *, with_person: bool = False) -> Place:
     canvas = Canvas(11.0, 9.0)
-    ring = [(2.0, 2.0), (9.0, 2.0), (9.0, 7.0), (2.0, 7.0), (2.0, 2.0)]
-    canvas.carve_path(ring, width)
+    canvas.carve_path(list(RING), width)
     canvas.carve_path(list(MEETPOINTS), width)
     world = canvas.world("theta")
     return Place(world, START, Walkways(world, START) if with_person else None)
@@ -66,6 +68,8 @@ class Tour:
     phases: dict[str, str] = field(default_factory=dict)
     vertices: dict[int, tuple[float, float]] = field(default_factory=dict)  # world
     errors: list[tuple[float, float]] = field(default_factory=list)  # of the pose: m, rad
+    covered: list[tuple[float, float]] = field(default_factory=list)  # world
+    doing: set[str | None] = field(default_factory=set)  # on patrol, as it was published
 
     def lines(self, kind: str) -> list[dict[str, Any]]:
         text = (self.daemon.session.directory.path / "events.jsonl").read_text()
@@ -109,6 +113,21 @@ def story(tour: Tour) -> Callable[[Clock], Awaitable[None]]:
         error = START.compose(pipeline.map_base).to(daemon.place)
         tour.errors.append((math.hypot(error.x, error.y), abs(error.theta)))
 
+    async def cover() -> None:
+        """Take down where the robot is, for as long as nobody stops that."""
+        while True:
+            tour.covered.append((daemon.place.x, daemon.place.y))
+            await asyncio.sleep(0.3)
+
+    async def patrol(clock: Clock) -> None:
+        tour.answers["patrol"] = await ask("patrol", vertices=list(meetpoints(tour)))
+        await until(clock, lambda: len(tour.lines("round_ended")) == 2)
+        tour.answers["patrol again"] = await ask("patrol", vertices=list(meetpoints(tour)))
+        await a_while(clock, 1.0)
+        tour.doing = {state.errand for state in states[-5:]}
+        tour.answers["patrol of one"] = await ask("patrol", vertices=[min(tour.vertices)])
+        tour.answers["patrol of none"] = await ask("patrol", vertices=[min(tour.vertices), 999])
+
     async def pausing(clock: Clock) -> None:
         tour.answers["pause"] = await ask("pause")
         tour.answers["pause again"] = await ask("pause")
@@ -142,6 +161,10 @@ def story(tour: Tour) -> Callable[[Clock], Awaitable[None]]:
         x, y = START.inverse().transform(np.array(BESIDE))
         await trip(clock, "beside", "goto", x=float(x), y=float(y))
         tour.answers["limit"] = await ask("set", key="robot.limits.max_speed_mps", value=0.2)
+        watching = asyncio.ensure_future(cover())  # noqa: TID251
+        await trip(clock, "coverage", "coverage")
+        watching.cancel()
+        await patrol(clock)
         await trip(clock, "home", "home")
         tour.answers["no limit"] = await ask("set", key="robot.limits.max_speed_mps", value=0.7)
         tour.answers["unknown"] = await ask("goto", vertex=999)
@@ -157,6 +180,15 @@ def story(tour: Tour) -> Callable[[Clock], Awaitable[None]]:
         tour.answers["stop"] = await ask("stop")
 
     return tell
+
+
+def meetpoints(tour: Tour) -> tuple[int, ...]:
+    """The vertices at both ends of the bar."""
+    return tuple(
+        vertex
+        for vertex, place in tour.vertices.items()
+        if min(math.dist(place, true) for true in MEETPOINTS) < NEAR
+    )
 
 
 @pytest.fixture(scope="module")
@@ -188,17 +220,12 @@ def test_a_paused_robot_is_driven_by_nobody_else(tour: Tour) -> None:
 
 
 def test_every_vertex_can_be_driven_to_by_the_shortest_way(tour: Tour) -> None:
-    meetpoints = [
-        vertex
-        for vertex, place in tour.vertices.items()
-        if min(math.dist(place, true) for true in MEETPOINTS) < NEAR
-    ]
-    assert len(meetpoints) == 2
+    assert len(meetpoints(tour)) == 2
     for vertex, place in tour.vertices.items():
         trip = tour.trips[f"goto {vertex}"]
         assert (trip.outcome, trip.answer.done) == ("arrived", True)
         assert trip.off(*place) < NEAR
-    assert tour.trips[f"goto {meetpoints[1]}"].driven < 5.0 + 2 * NEAR  # over the bar
+    assert tour.trips[f"goto {meetpoints(tour)[1]}"].driven < 5.0 + 2 * NEAR  # over the bar
     assert tour.phases["after a trip"] == "finished"
 
 
@@ -206,6 +233,36 @@ def test_a_point_beside_an_edge_is_driven_to(tour: Tour) -> None:
     trip = tour.trips["beside"]
     assert trip.outcome == "arrived"
     assert trip.off(*BESIDE) < NEAR
+
+
+def test_a_coverage_drives_over_every_edge_and_hardly_any_twice(tour: Tour) -> None:
+    """The ring of 24 m and the bar of 5 m, in one go from one meetpoint to the other."""
+    trip, driven = tour.trips["coverage"], np.array(tour.covered)
+    assert (trip.outcome, trip.reason) == ("arrived", "3 of 3 edges driven")
+    for start, end in (*pairwise(RING), MEETPOINTS):
+        for share in np.linspace(0.1, 0.9, 20):
+            place = (1 - share) * np.array(start) + share * np.array(end)
+            assert np.hypot(*(driven - place).T).min() < 0.5
+    to_start = min(trip_to.off(*BESIDE) for trip_to in tour.trips.values())
+    assert to_start < NEAR  # where it began: halfway between the meetpoints
+    assert trip.driven < 1.1 * (24.0 + 5.0) + 6.0 + 2 * NEAR  # and 6 m to the first meetpoint
+
+
+def test_a_patrol_goes_to_and_fro_until_something_else_is_asked_for(tour: Tour) -> None:
+    first, second, *_ = tour.lines("round_ended")
+    assert [(line["round"], line["reached"], line["missed"]) for line in (first, second)] == [
+        (1, 2, 0),
+        (2, 2, 0),
+    ]
+    a, b = meetpoints(tour)
+    assert tour.answers["patrol"].done
+    assert "already" in tour.answers["patrol again"].text
+    assert tour.doing == {f"patrol {a} {b}, round 3"}
+    assert not tour.answers["patrol of one"].done
+    assert "two vertices or more" in tour.answers["patrol of one"].text
+    assert "no vertex 999" in tour.answers["patrol of none"].text
+    ended = [line for line in tour.lines("errand_ended") if line["errand"] == f"patrol {a} {b}"]
+    assert [line["outcome"] for line in ended] == ["replaced"]
 
 
 def test_the_robot_comes_home(tour: Tour) -> None:
@@ -257,7 +314,15 @@ def test_every_request_is_in_the_list_of_events_with_who_asked(tour: Tour) -> No
     assert len(lines) == len(tour.answers) + len(tour.trips) + len(tour.vertices)
     assert all(line["origin"] == "a test" for line in lines)
     refused = [line["request"] for line in lines if not line["done"]]
-    assert refused == ["home", "goto 0 0", "goto 999", "goto 50 50"]
+    low = min(tour.vertices)
+    assert refused == [
+        "home",
+        "goto 0 0",
+        f"patrol {low}",
+        f"patrol {low} 999",
+        "goto 999",
+        "goto 50 50",
+    ]
     assert {line["request"] for line in lines} >= {"pause", "resume", "save", "stop", "explore"}
 
 

@@ -161,11 +161,12 @@ class Rounds:
     def _end_round(self, here: Here) -> bool:
         """Tell of a round that is over; whether it led nowhere."""
         began, self._travelled_then = self._travelled_then, here.travelled
-        if began is None or not (self._reached or self._missed):
+        if not (self._reached or self._missed):
             return False
         self._rounds += 1
         self.happened.append(RoundEnded(here.stamp, self._rounds, self._reached, self._missed))
-        led_nowhere = not self._reached or here.travelled < began + _MOVED_M
+        has_moved = began is None or here.travelled > began + _MOVED_M
+        led_nowhere = not (self._reached and has_moved)
         self._reached = self._missed = 0
         return led_nowhere
 
