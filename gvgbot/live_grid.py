@@ -1,13 +1,13 @@
 """The grid so far as tiles: which have changed since they were sent last, and all of them."""
 
-import math
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
+from itertools import product
 
 import numpy as np
 
 from gvgbot.autonomy.pipeline import Keyframe
-from gvgbot.maps.occupancy import GrowingGrid, OccupancyGrid
+from gvgbot.maps.occupancy import GrowingGrid
 from gvgbot.topics import Grid, Tile
 
 _RESOLUTION_M, _REACH_M = 0.05, 8.0  # a shorter reach than the saved grid's: cheap to send
@@ -24,27 +24,36 @@ class LiveGrid:
     def __init__(self, began: float) -> None:
         self._grid = GrowingGrid(_RESOLUTION_M, _REACH_M)
         self._began, self._number = began, 0
+        self._touched: dict[Place, None] = {}  # since they were sent, the longest ago first
         self._sent: dict[Place, bytes] = {}
         self._tiles: dict[Place, Tile] = {}
-        self.has_more = False  # tiles that could not all be sent at once
+
+    @property
+    def has_more(self) -> bool:
+        """Whether some tiles still have to be sent."""
+        return bool(self._touched)
 
     def add(self, keyframes: Iterable[Keyframe]) -> None:
         """Let scans vote."""
         for keyframe in keyframes:
             if keyframe.scan is not None:
                 self._grid.add(keyframe.map_base, keyframe.scan)
+                low, high = self._grid.around(keyframe.map_base, keyframe.scan)
+                rows, columns = zip(low // _SIDE, (high - 1) // _SIDE + 1, strict=True)
+                self._touched |= dict.fromkeys(product(range(*rows), range(*columns)))
 
     def changes(self, stamp: float) -> Grid | None:
         """The tiles that have changed since the last call, or as many as are sent at once."""
         changed: list[Tile] = []
-        self.has_more = False
-        for place, cells in _tiled(self._grid.grid()):
+        while self._touched and len(changed) < _MOST_TILES:
+            place = next(iter(self._touched))
+            del self._touched[place]
+            row, column = place
+            cells = self._grid.square(row * _SIDE, column * _SIDE, _SIDE).tobytes()
             if cells != self._sent.get(place, _BLANK):
-                if len(changed) == _MOST_TILES:
-                    self.has_more = True
-                    break
                 self._sent[place] = cells
-                self._tiles[place] = _tile(place, cells)
+                packed = zlib.compress(cells, _EFFORT)
+                self._tiles[place] = Tile(column=column, row=row, cells=packed)
                 changed.append(self._tiles[place])
         if not changed:
             return None
@@ -67,23 +76,3 @@ class LiveGrid:
 
 
 _BLANK = bytes(np.full(_SIDE * _SIDE, -1, np.int8))
-
-
-def _tile(place: Place, cells: bytes) -> Tile:
-    row, column = place
-    return Tile(column=column, row=row, cells=zlib.compress(cells, _EFFORT))
-
-
-def _tiled(grid: OccupancyGrid) -> Iterator[tuple[Place, bytes]]:
-    """The cells of each tile that a grid lies on."""
-    left, bottom = (round(x / grid.resolution_m) for x in grid.origin)
-    row, column = bottom // _SIDE, left // _SIDE
-    inside = np.s_[bottom - row * _SIDE :, left - column * _SIDE :]
-    filled = np.add(grid.cells.shape, [bottom - row * _SIDE, left - column * _SIDE])
-    rows, columns = (math.ceil(cells / _SIDE) for cells in filled)
-    cells = np.full((rows * _SIDE, columns * _SIDE), -1, np.int8)
-    cells[inside][: grid.cells.shape[0], : grid.cells.shape[1]] = grid.cells
-    tiles = cells.reshape(rows, _SIDE, columns, _SIDE).swapaxes(1, 2)
-    for up in range(rows):
-        for along in range(columns):
-            yield (row + up, column + along), tiles[up, along].tobytes()

@@ -127,7 +127,8 @@ def _map_edge(edge: Edge, vertices: dict[int, Pose]) -> MapEdge:
     """An edge whose polyline is bent so that it ends on its vertices."""
     line = vertices[edge.a.vertex].transform(edge.polyline)
     start, end = vertices[edge.a.vertex].position, vertices[edge.b.vertex].position
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+    steps, along = line[1:] - line[:-1], np.zeros(len(line))
+    np.cumsum(np.hypot(steps[:, 0], steps[:, 1]), out=along[1:])
     share = (along / max(along[-1], 1e-9))[:, None]
     line = line + (1 - share) * (start - line[0]) + share * (end - line[-1])
     return MapEdge(

@@ -85,6 +85,27 @@ class GrowingGrid:
         self._ballot = around if self._ballot is None else self._ballot.grown(around)
         _vote(self._ballot, self._disc, map_laser, scan, age=scan.stamp - self._first_stamp)
 
+    def around(self, map_base: Pose, scan: Scan) -> tuple[Indices, Indices]:
+        """The first (row, column) that a scan from a pose can change, and that after the last.
+
+        Cell (0, 0) has its lower left corner at the map's origin.
+        """
+        here = np.array(_cell(map_base.compose(scan.base_laser), self._cell))
+        half = math.ceil(min(self._max_range, scan.range_max) / self._cell) + 2
+        return here - half, here + half + 1
+
+    def square(self, row: int, column: int, side: int) -> Cells:
+        """Occupancy in percent of a square of cells (side, side) from a (row, column) on."""
+        votes = np.zeros((side, side), np.int8)
+        if self._ballot is not None:
+            first, corner = np.array([row, column]), self._ballot.corner
+            low = np.maximum(first, corner)
+            high = np.maximum(low, np.minimum(first + side, corner + self._ballot.votes.shape))
+            votes[_box(low - first, high - first)] = self._ballot.votes[
+                _box(low - corner, high - corner)
+            ]
+        return _PERCENT[votes]
+
     def grid(self) -> OccupancyGrid:
         """The grid so far; without any scan one unknown cell."""
         if self._ballot is None:
@@ -144,6 +165,11 @@ class _Ballot:
         here = np.s_[row : row + self.votes.shape[0], column : column + self.votes.shape[1]]
         larger.votes[here], larger.seen_s[here] = self.votes, self.seen_s
         return larger
+
+
+def _box(low: Indices, high: Indices) -> tuple[slice, slice]:
+    """Where an array has rows and columns from one corner up to another."""
+    return slice(low[0], high[0]), slice(low[1], high[1])
 
 
 def _cell(pose: Pose, cell: float) -> tuple[int, int]:

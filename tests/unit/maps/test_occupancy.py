@@ -101,8 +101,30 @@ def test_scans_that_come_one_by_one_draw_the_same_grid_as_all_at_once() -> None:
     assert (grid.seen_s == expected.seen_s).all()
 
 
+def test_squares_of_a_growing_grid_are_cut_out_of_it_and_all_changes_lie_around_the_scan() -> None:
+    growing, pose = GrowingGrid(CELL, 8.0), Pose(3.0, -2.0, 0.3)
+    growing.add(pose, a_scan(pose))
+    low, high = growing.around(pose, a_scan(pose))
+    grid = growing.grid()
+    left, bottom = (round(x / CELL) for x in grid.origin)
+    rows, columns = np.nonzero(grid.cells >= 0)
+    known = {
+        (row + bottom, column + left): grid.cells[row, column]
+        for row, column in zip(rows.tolist(), columns.tolist(), strict=True)
+    }
+    found, side = {}, 37
+    for row in range(bottom - 50, bottom + grid.cells.shape[0] + 50, side):
+        for column in range(left - 50, left + grid.cells.shape[1] + 50, side):
+            square = growing.square(row, column, side)
+            for y, x in np.argwhere(square >= 0).tolist():
+                found[row + y, column + x] = square[y, x]
+    assert found == known
+    assert all(low[0] <= row < high[0] and low[1] <= column < high[1] for row, column in known)
+
+
 def test_a_grid_that_has_not_begun_to_grow_is_unknown() -> None:
     assert GrowingGrid().grid().cells.tolist() == [[-1]]
+    assert (GrowingGrid().square(3, -5, 4) == -1).all()
 
 
 def test_a_mounted_laser_draws_the_same_room() -> None:
