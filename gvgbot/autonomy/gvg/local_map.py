@@ -104,16 +104,13 @@ class LocalMap:
     def _renew(self) -> None:
         """Draw from the cells what is asked for again and again."""
         occupied = self._votes > 0
-        self._walls = _merged(
-            np.flatnonzero(occupied),
-            self._size,
-            Walls(
-                self._mean[occupied],
-                self._hits[occupied].astype(np.float64),
-                self._sight[occupied].astype(np.float64),
-            ),
-            _ONE_WALL * self._cell,
+        cells = np.flatnonzero(occupied)
+        walls = Walls(
+            self._mean.reshape(-1, 2)[cells],
+            self._hits.ravel()[cells].astype(np.float64),
+            self._sight.reshape(-1, 2)[cells].astype(np.float64),
         )
+        self._walls = _merged(cells, self._size, walls, _ONE_WALL * self._cell)
         for drawn in self._walls:
             drawn.setflags(write=False)
         self._tree: cKDTree | None = None
@@ -156,7 +153,10 @@ class LocalMap:
         """Whether the cell under each point (..., 2) is free or occupied rather than unknown."""
         low, high = self._corner - 1, self._corner + self._size
         i, j = (
-            np.clip(np.floor(points[..., k] / self._cell), low[k], high[k]).astype(np.intp) - low[k]
+            np.minimum(np.maximum(np.floor(points[..., k] / self._cell), low[k]), high[k]).astype(
+                np.intp
+            )
+            - low[k]
             for k in (0, 1)
         )
         known: NDArray[np.bool_] = self._known[i, j]
@@ -214,9 +214,7 @@ class LocalMap:
         i, j = np.nonzero(chosen)
         return i + window[0].start, j + window[1].start
 
-    def _vote_against(
-        self, i: Index, j: Index, scan: Scan, see: Array, local_laser: Pose
-    ) -> None:
+    def _vote_against(self, i: Index, j: Index, scan: Scan, see: Array, local_laser: Pose) -> None:
         d = self._mean[i, j] - local_laser.position
         beyond = _range_towards(scan, see, d[:, 0], d[:, 1], local_laser.theta)
         gone = np.hypot(d[:, 0], d[:, 1]) < beyond - 1.5 * self._cell
@@ -309,8 +307,9 @@ def _merged(cells: NDArray[np.intp], columns: int, walls: Walls, reach: float) -
         points[low] += share * (points[high] - points[low])
         sights[low] += share * (sights[high] - sights[low])
         hits[low] += hits[high]
-        kept = np.ones(len(cells), bool)
-        kept[high] = False
+        is_kept = np.ones(len(cells), bool)
+        is_kept[high] = False
+        kept = np.flatnonzero(is_kept)
         cells, walls = cells[kept], Walls(points[kept], hits[kept], sights[kept])
     return walls
 

@@ -8,7 +8,7 @@ a branch is seen, so for a branch that ends in unseen space it is a lower bound.
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -141,39 +141,60 @@ def reduce_graph(
     return _finish(draft, config.min_reach)
 
 
+class _Neighbours(NamedTuple):
+    """Of point i those from `first[i]` to `first[i + 1]` in `all`, in the order of the ridges.
+
+    Two flat lists: thousands of small ones keep the garbage collector busy.
+    """
+
+    first: list[int]
+    all: list[int]
+
+    @classmethod
+    def of(cls, fine: FineGraph) -> "_Neighbours":
+        """The neighbours of every point of a fine graph."""
+        own, other = fine.ridges.ravel(), fine.ridges[:, ::-1].ravel()
+        count = np.bincount(own, minlength=len(fine.points))
+        first = np.concatenate([[0], np.cumsum(count)])
+        return cls(first.tolist(), other[np.argsort(own, kind="stable")].tolist())
+
+
 def _contract(fine: FineGraph) -> _Draft:
     """Chains of points with two neighbours become one edge each."""
-    neighbours: list[list[int]] = [[] for _ in range(len(fine.points))]
-    for a, b in fine.ridges.tolist():
-        neighbours[a].append(b)
-        neighbours[b].append(a)
-    lead = [None if math.isnan(angle) else angle for angle in fine.lead.tolist()]
-    keys = [i for i, n in enumerate(neighbours) if len(n) != 2 or lead[i] is not None]
-    if not keys and neighbours:
-        keys = [0]  # a ring without a vertex
+    neighbours = _Neighbours.of(fine)
+    first, everyone = neighbours
+    is_key = (np.diff(first) != 2) | ~np.isnan(fine.lead)
+    if len(is_key) and not is_key.any():
+        is_key[0] = True  # a ring without a vertex
+    keys = np.flatnonzero(is_key).tolist()
     draft = _Draft(
         {i: fine.points[i] for i in keys},
         {i: float(fine.clearance[i]) for i in keys},
-        {i: lead[i] for i in keys},
+        {i: None if math.isnan(angle := float(fine.lead[i])) else angle for i in keys},
         ends={i: [] for i in keys},
     )
-    is_key = set(keys)
+    stops = is_key.tolist()
     walked: set[tuple[int, int]] = set()
     for key in keys:
-        for first in neighbours[key]:
-            if (key, first) not in walked:
-                path = _walk(neighbours, is_key, key, first)
+        for second in everyone[first[key] : first[key + 1]]:
+            if (key, second) not in walked:
+                path = _walk(neighbours, stops, key, second)
                 walked.add((path[-1], path[-2]))
-                walked.add((key, first))
+                walked.add((key, second))
                 draft.add(_Chain(key, path[-1], fine.points[path], fine.clearance[path]))
     return draft
 
 
-def _walk(neighbours: list[list[int]], is_key: set[int], start: int, first: int) -> list[int]:
-    path = [start, first]
-    while path[-1] not in is_key:
-        one, two = neighbours[path[-1]]
-        path.append(two if one == path[-2] else one)
+def _walk(neighbours: _Neighbours, stops: list[bool], start: int, second: int) -> list[int]:
+    first, everyone = neighbours
+    before, here, path = start, second, [start, second]
+    while not stops[here]:
+        at = first[here]
+        onwards = everyone[at]
+        if onwards == before:
+            onwards = everyone[at + 1]
+        before, here = here, onwards
+        path.append(here)
     return path
 
 

@@ -69,7 +69,8 @@ def fine_graph(
     diagram = _diagram(triangles, min_clearance, roughness)
     points, clearance, a, b = diagram.points, diagram.clearance, diagram.a, diagram.b
     endless = np.flatnonzero(diagram.parts & (b < 0))
-    links = np.stack([a, b], axis=1)[diagram.parts & (b >= 0)]
+    whole = np.flatnonzero(diagram.parts & (b >= 0))
+    links = np.stack([a[whole], b[whole]], axis=1)
     if np.isfinite(open_clearance):
         coast = with_coast(diagram, generators, open_clearance, local_map)
         if coast is not None:
@@ -78,17 +79,19 @@ def fine_graph(
     asked = np.zeros(len(points), bool)
     asked[links] = asked[a[endless]] = True
     asked &= wide & (clearance <= open_clearance)
-    certain = np.zeros(len(points), bool)
-    certain[asked] = _disc_is_known(local_map, points[asked], clearance[asked])
-    either = np.concatenate([links, links[:, ::-1]])
-    cut = either[certain[either[:, 0]] & wide[either[:, 1]] & ~certain[either[:, 1]]]
+    certain, discs = np.zeros(len(points), bool), np.flatnonzero(asked)
+    certain[discs] = _disc_is_known(local_map, points[discs], clearance[discs])
+    here, there = certain[links.T]
+    inner = np.flatnonzero(here & there)
+    rim = np.concatenate([links[here & ~there], links[there & ~here, ::-1]])
+    cut = rim[wide[rim[:, 1]]]
     endless = endless[certain[a[endless]]]
     away = _FARTHEST_M * _outwards(triangles, a[endless], diagram.generators[endless])
     rays = _Rays(
         np.concatenate([cut[:, 0], a[endless]]),
         np.concatenate([points[cut[:, 1]] - points[cut[:, 0]], away]),
     )
-    joined = links[certain[links].all(axis=1)]
+    joined = links[inner]
 
     def in_sight(places: Array) -> tuple[Array, NDArray[np.bool_]]:
         room = np.asarray(cKDTree(generators).query(places)[0])
