@@ -3,14 +3,15 @@ PYTHON ?= python3
 BIN := .venv/bin
 SHELL := /bin/sh
 
-.PHONY: help explore test check static quick bench bench-explore keep fuzz docs pages clean
+.PHONY: help explore test check static quick bench bench-explore figures keep fuzz docs pages clean
 
 help:
 	@echo "make explore   a simulated robot maps the built-in office; prints where the map is"
 	@echo "make test      the whole test suite"
 	@echo "make check     format, lint, types, import rules, tests"
 	@echo "make quick     the tests that take under a second each"
-	@echo "make bench     time the inner loops and the drivers, targets beside"
+	@echo "make bench     time the inner loops and the drivers, targets beside: docs/benchmarks.md"
+	@echo "make figures   repeat the paper's experiments: docs/figures.md"
 	@echo "make keep RESULTS=FILE   quote a table of explorations in README and docs"
 	@echo "make docs      this documentation as a site in site/; make pages renews its generated pages"
 	@echo "make fuzz      throw mutated bytes at the parsers for a minute each"
@@ -33,7 +34,12 @@ static: .venv/dev
 check: static test
 
 bench: .venv/dev
-	@for file in benchmarks/bench_*.py; do $(BIN)/python -m "benchmarks.$$(basename "$$file" .py)" || exit 1; done
+	@OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.run_benches $(ARGS)
+	@$(BIN)/python -m docs.make_benchmarks
+
+figures: .venv/docs
+	@OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.figures $(ARGS)
+	@$(BIN)/python -m docs.make_figures
 
 PLANS ?= 100
 bench-explore: .venv/dev
@@ -42,6 +48,7 @@ bench-explore: .venv/dev
 keep: .venv/dev
 	@$(BIN)/python -m benchmarks.keep_results $(RESULTS)
 	@$(BIN)/python -m docs.make_tables
+	@$(BIN)/python -m docs.make_benchmarks
 
 FUZZ_SECONDS ?= 60
 fuzz: .venv/fuzz

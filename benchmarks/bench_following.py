@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.report import report, report_fact
 from gvgbot.geometry import Array
 from gvgbot.worlds.buildings import OFFICE_CORRIDORS
 
@@ -32,13 +33,14 @@ def main() -> int:
     stamps, path = rows[:, 0], rows[:, 1:3]
     heading = np.unwrap(2 * np.arctan2(rows[:, 6], rows[:, 7]))
     beside = np.concatenate([_offsets(path, *line) for line in _centre_lines()])
-    print(f"lateral deviation: rms {np.sqrt(np.mean(beside**2)) * 1000:.1f} mm", end=", ")
-    print(f"worst {np.abs(beside).max() * 1000:.1f} mm, {len(beside)} poses (target 30 mm rms)")
+    report("off the centre line, rms", 1e3 * float(np.sqrt(np.mean(beside**2))), "mm", at_most=30)
+    report_fact("off the centre line, worst", 1e3 * float(np.abs(beside).max()), "mm")
     dt = np.diff(stamps)
     speed, turn = np.hypot(*np.diff(path, axis=0).T) / dt, np.diff(heading) / dt
     for name, rate, unit in (("acceleration", speed, "m/s^2"), ("turning", turn, "rad/s^2")):
         change = np.abs(np.diff(rate) / dt[1:])
-        print(f"{name}: 99 % below {np.percentile(change, 99):.2f} {unit}, most {change.max():.2f}")
+        report_fact(f"{name}, p99", float(np.percentile(change, 99)), unit)
+        report_fact(f"{name}, most", float(change.max()), unit)
     return status
 
 
@@ -62,4 +64,5 @@ def _offsets(path: Array, start: Array, end: Array) -> Array:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    if status := main():
+        sys.exit(status)

@@ -3,10 +3,11 @@
 import math
 import resource
 from collections.abc import Callable
-from timeit import default_timer
+from time import process_time
 
 import numpy as np
 
+from benchmarks.report import report_fact
 from gvgbot.geometry import Pose
 from gvgbot.hal.messages import Scan
 from gvgbot.maps import geojson
@@ -70,11 +71,11 @@ def trajectory() -> Trajectory:
     return Trajectory(turns * 10.0, poses)
 
 
-def report(name: str, action: Callable[[], object]) -> None:
-    before, start = peak_mb(), default_timer()
+def timed(name: str, action: Callable[[], object]) -> None:
+    before, start = peak_mb(), process_time()
     action()
-    taken = default_timer() - start
-    print(f"{name:24} {taken:6.2f} s   peak memory +{peak_mb() - before:.0f} MB")
+    report_fact(name, process_time() - start, "s of CPU")
+    report_fact(f"{name}: peak memory, more than before", peak_mb() - before, "MB")
 
 
 def peak_mb() -> float:
@@ -84,12 +85,12 @@ def peak_mb() -> float:
 def main() -> None:
     taken, routes, path = scans(), graph(), trajectory()
     grids: list[OccupancyGrid] = []
-    report(f"grid of {SCANS} scans", lambda: grids.append(occupancy_grid(taken)))
-    report("map.pgm and map.yaml", lambda: encode_map_server(grids[0]))
-    report("map.geojson", lambda: geojson.encode(routes))
-    report(f"a .tum of {len(path.stamps)} poses", lambda: encode_tum(path))
-    report("map.png", lambda: draw_map(routes, grid=grids[0], estimate=path, odometry=path))
-    print(f"peak memory of the process {peak_mb():.0f} MB")
+    timed(f"grid of {SCANS} scans", lambda: grids.append(occupancy_grid(taken)))
+    timed("map.pgm and map.yaml", lambda: encode_map_server(grids[0]))
+    timed("map.geojson", lambda: geojson.encode(routes))
+    timed(f"a .tum of {len(path.stamps)} poses", lambda: encode_tum(path))
+    timed("map.png", lambda: draw_map(routes, grid=grids[0], estimate=path, odometry=path))
+    report_fact("peak memory of the process", peak_mb(), "MB")
 
 
 if __name__ == "__main__":

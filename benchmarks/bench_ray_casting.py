@@ -10,14 +10,16 @@ from functools import partial
 
 import numpy as np
 
+from benchmarks.report import report_fact
 from gvgbot.drivers.body import RobotBody
 from gvgbot.drivers.world import World
 from gvgbot.geometry import Pose
-from gvgbot.worlds import NAMES, open_world
+from gvgbot.worlds import open_world
 
 BEARINGS = np.deg2rad(np.linspace(-135.0, 135.0, 1081))
 RADIUS = 0.18  # m
 SWEEPS = 500
+WORLDS = ("office", "cave", "floor_plan")
 
 
 def free_poses(world: World, rng: np.random.Generator) -> list[Pose]:
@@ -31,15 +33,15 @@ def free_poses(world: World, rng: np.random.Generator) -> list[Pose]:
     return poses
 
 
-def percentiles(action: Callable[[Pose], object], poses: list[Pose]) -> str:
-    """Median and 95th percentile of the time that the action takes, in ms."""
+def report_times(what: str, action: Callable[[Pose], object], poses: list[Pose]) -> None:
+    """Median and 95th percentile of the CPU time that the action takes, in ms."""
     times = []
     for pose in poses:
-        begin = time.perf_counter()
+        begin = time.thread_time()
         action(pose)
-        times.append(time.perf_counter() - begin)
-    p50, p95 = np.percentile(times, [50, 95]) * 1e3
-    return f"p50 {p50:.3f} ms, p95 {p95:.3f} ms"
+        times.append(time.thread_time() - begin)
+    for share in (50, 95):
+        report_fact(f"{what}, p{share}", 1e3 * float(np.percentile(times, share)), "ms")
 
 
 def drive(world: World, pose: Pose) -> None:
@@ -51,16 +53,16 @@ def drive(world: World, pose: Pose) -> None:
 
 
 def main() -> None:
-    """Print one line per world."""
+    """Time each world."""
     rng = np.random.default_rng(1)
-    for name in sys.argv[1:] or NAMES:
+    for name in sys.argv[1:] or WORLDS:
         world, _ = open_world(name)
         poses = free_poses(world, rng)
         for reach in (5.6, 30.0):
             world.cast(poses[0], BEARINGS, reach)
             sweep = partial(world.cast, bearings=BEARINGS, max_range=reach)
-            print(f"{name}: 1081 beams to {reach} m: {percentiles(sweep, poses)}")
-        print(f"{name}: 50 steps of the body: {percentiles(partial(drive, world), poses)}")
+            report_times(f"{name}: 1081 beams to {reach} m", sweep, poses)
+        report_times(f"{name}: 50 steps of the body", partial(drive, world), poses)
 
 
 if __name__ == "__main__":

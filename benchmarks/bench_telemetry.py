@@ -117,8 +117,8 @@ class Robot:
         draw = self.live_map.update(self.pipeline, stamp)
         assert draw is not None
         for value, latest in draw():  # stamped when ready, so that only the way is measured
-            value = msgspec.structs.replace(cast(Map, value), stamp=time.perf_counter())
-            self.network.publish(value, latest)
+            now = msgspec.structs.replace(cast(Map, value), stamp=time.perf_counter())
+            self.network.publish(now, latest)
 
     def on_health(self) -> None:
         stamp = time.perf_counter()

@@ -1,6 +1,6 @@
 """Error and time of a CARMEN log against hand-made relations, beside yag-slam if that is installed.
 
-    python -m benchmarks.relations intel.log.gz intel.relations
+    python -m benchmarks.relations intel.log.gz intel.relations [--keep]
 
 A relation is a line `t1 t2 dx dy dz roll pitch yaw`: where the robot was at t2, seen from t1. The
 relations of the usual logs, and the metric, are those of Kuemmerle et al. (2009).
@@ -10,6 +10,7 @@ relations of the usual logs, and the metric, are those of Kuemmerle et al. (2009
 import argparse
 import importlib
 import importlib.util
+import json
 import math
 import tempfile
 import time
@@ -24,6 +25,7 @@ from gvgbot.geometry import Array, Pose
 from gvgbot.maps.trajectory import decode_tum
 from gvgbot.replay import Wanted, replay
 
+RESULTS = Path(__file__).parent / "results" / "relations.json"
 REACH_M = 30.0  # of the beams that yag-slam uses
 
 
@@ -98,29 +100,43 @@ def _rows(poses: list[tuple[float, Pose]]) -> tuple[Array, Array]:
 
 def measure(
     name: str, mapper: Callable[[Path], tuple[Array, Array]], log: Path, relations: Array
-) -> None:
+) -> dict[str, str | float]:
+    """Print how well a mapper does, and return it."""
     start = time.process_time()
     stamps, poses = mapper(log)
     seconds = time.process_time() - start
     metres, turns = relation_errors(relations, stamps, poses)
     print(
         f"{name:10} {len(metres):5d} {metres.mean():8.4f} {np.median(metres):8.4f} "
-        f"{metres.max():8.3f} {math.degrees(turns.mean()):8.3f} {seconds:8.1f}"
+        f"{metres.max():8.3f} {math.degrees(turns.mean()):8.3f} {seconds:8.1f}",
+        flush=True,
     )
+    return {
+        "mapper": name,
+        "pairs": len(metres),
+        "mean_m": float(metres.mean()),
+        "median_m": float(np.median(metres)),
+        "most_m": float(metres.max()),
+        "mean_deg": math.degrees(turns.mean()),
+        "cpu_s": seconds,
+    }
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("log", type=Path)
     parser.add_argument("relations", type=Path)
+    parser.add_argument("--keep", action="store_true", help="for docs/benchmarks.md to quote")
     options = parser.parse_args()
     relations = np.loadtxt(options.relations, ndmin=2)
     mappers = {"odometry": by_odometry, "gvgbot": by_gvgbot}
     if importlib.util.find_spec("yag_slam"):
         mappers["yag-slam"] = by_yag_slam
     print("mapper     pairs   mean m median m    max m mean deg    CPU s")
-    for name, mapper in mappers.items():
-        measure(name, mapper, options.log, relations)
+    rows = [measure(name, mapper, options.log, relations) for name, mapper in mappers.items()]
+    if options.keep:
+        text = json.dumps({"log": options.log.name, "rows": rows}, indent=1)
+        RESULTS.write_text(text + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":
