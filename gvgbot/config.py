@@ -13,9 +13,11 @@ from gvgbot.drivers.hokuyo.driver import HokuyoConfig
 from gvgbot.drivers.hokuyo.twin import HokuyoTwinConfig
 from gvgbot.drivers.kobuki.driver import KobukiConfig
 from gvgbot.drivers.kobuki.twin import KobukiTwinConfig
+from gvgbot.foxglove.config import FoxgloveConfig
 from gvgbot.hal.guard import GuardConfig
 from gvgbot.ranges import Range
 from gvgbot.recording.config import RecordingConfig
+from gvgbot.ros2.config import Ros2Config
 from gvgbot.strict_yaml import load, load_text
 from gvgbot.topics import TelemetryConfig, is_robot_name
 
@@ -74,6 +76,17 @@ class Config:
     service: ServiceConfig = field(default_factory=ServiceConfig)
     telemetry: TelemetryConfig = field(default_factory=TelemetryConfig)
     recording: RecordingConfig = field(default_factory=RecordingConfig)
+    ros2: Ros2Config = field(default_factory=Ros2Config)
+    foxglove: FoxgloveConfig = field(default_factory=FoxgloveConfig)
+
+    def __post_init__(self) -> None:
+        """Raises ValueError if the robot would take the address of the router of ROS."""
+        taken = set(self.telemetry.listen) & set(self.ros2.connect)
+        if self.ros2.enabled and self.telemetry.enabled and taken:
+            raise ValueError(
+                f"telemetry.listen and ros2.connect both have {min(taken)}, where rmw_zenohd is: "
+                "set telemetry.listen=[tcp/127.0.0.1:7448], for example"
+            )
 
 
 def load_config(path: Path | None = None, overrides: Sequence[str] = ()) -> Config:

@@ -6,6 +6,7 @@ import os
 import sys
 from contextlib import AbstractContextManager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import structlog
 
@@ -24,11 +25,15 @@ from gvgbot.persistence.start import Wanted, begin, state_directory
 from gvgbot.progress import Progress
 from gvgbot.recording import extra_needed
 from gvgbot.robot import Robot
+from gvgbot.ros2.node import Ros2Node
 from gvgbot.service import Notifier, StopSignals, set_up_logging
 from gvgbot.session import Session
 from gvgbot.simulation import Simulation, open_place
 from gvgbot.strict_yaml import dump
 from gvgbot.telemetry import Telemetry
+
+if TYPE_CHECKING:  # it needs packages that only those have who want the live view
+    from gvgbot.foxglove.server import FoxgloveServer
 
 log = structlog.get_logger()
 
@@ -129,7 +134,15 @@ def run(config: Config, *, out: Path | None, known: Path | None = None, anew: bo
         session = Session(config, directory, place)
         keeper = Keeper(session, start.files, start.saved)
         _announce(session, resumed=start.saved is not None)
-        robot = Robot(session, Notifier.from_environment(), telemetry, keeper=keeper)
+        ros2, foxglove = _ros2(config, stack), _foxglove(config, stack)
+        robot = Robot(
+            session,
+            Notifier.from_environment(),
+            telemetry,
+            keeper=keeper,
+            neighbours=[near for near in (ros2, foxglove) if near is not None],
+            driver=ros2,
+        )
         try:
             with recorded(session, patient=False), asyncio.Runner() as runner:
                 runner.run(robot.serve(signals.wait()))
@@ -167,6 +180,26 @@ def _telemetry(config: Config, stack: contextlib.ExitStack) -> Telemetry | None:
     if not config.telemetry.enabled:
         return None
     return stack.enter_context(Telemetry(config.telemetry, config.robot.name))
+
+
+def _ros2(config: Config, stack: contextlib.ExitStack) -> Ros2Node | None:
+    if not config.ros2.enabled:
+        return None
+    return stack.enter_context(Ros2Node(config.ros2, config.robot.name))
+
+
+def _foxglove(config: Config, stack: contextlib.ExitStack) -> "FoxgloveServer | None":
+    if not config.foxglove.enabled:
+        return None
+    try:
+        from gvgbot.foxglove.server import FoxgloveServer
+    except ModuleNotFoundError as error:
+        if error.name is None or not error.name.startswith("foxglove"):
+            raise
+        raise GvgbotError(
+            "the live view needs foxglove-sdk: pip install 'gvgbot[foxglove]'"
+        ) from error
+    return stack.enter_context(FoxgloveServer(config.foxglove, config.robot.name))
 
 
 def _announce(session: Session, *, resumed: bool) -> None:

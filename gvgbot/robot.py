@@ -3,23 +3,26 @@
 import asyncio
 import contextlib
 from collections import deque
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from functools import partial
 from typing import Protocol
 
 import structlog
 
 from gvgbot.autonomy import events
+from gvgbot.autonomy.errands import Declined
 from gvgbot.autonomy.loop import Loop
 from gvgbot.clock import Clock, LoopClock
 from gvgbot.config import Config
 from gvgbot.errors import GvgbotError
+from gvgbot.geometry import Twist
 from gvgbot.hal.guard import Guard, Reason
-from gvgbot.hal.messages import Contact, Odometry
+from gvgbot.hal.messages import Contact, Odometry, Scan
 from gvgbot.journal import GuardJournal, log_event, status_line
 from gvgbot.links import Devices, Links
 from gvgbot.live_feed import LiveFeed, Pace
 from gvgbot.live_map import LiveMap, News
+from gvgbot.live_ros import LiveRos, Neighbour, UnixTime
 from gvgbot.maps.run_directory import record_of
 from gvgbot.persistence.keeper import Keeper
 from gvgbot.requests import Answer, Asked
@@ -55,6 +58,13 @@ class Network(Protocol):
         """Put requests to the handler until cancelled."""
 
 
+class Driver(Protocol):
+    """Somebody who may want to drive."""
+
+    async def hear(self, drive: Callable[[Twist], None]) -> None:
+        """Hand on twists as they come, until cancelled."""
+
+
 class Robot:
     """One exploration as a daemon. `off_loop` runs a function that takes long, and waits for it."""
 
@@ -65,8 +75,15 @@ class Robot:
         network: Network | None,
         off_loop: Callable[[Callable[[], None]], Awaitable[None]] = asyncio.to_thread,
         keeper: Keeper | None = None,
+        *,
+        neighbours: Sequence[Neighbour] = (),
+        driver: Driver | None = None,
     ) -> None:
-        """`keeper` keeps the mission on disk; without one a restart begins anew."""
+        """`keeper` keeps the mission on disk; without one a restart begins anew.
+
+        `neighbours` are told what is to be seen, and a `driver` may drive.
+        """
+        self._neighbours, self._driver = neighbours, driver
         self._session, self._notifier = session, notifier
         self._network, self._off_loop, self._keeper = network, off_loop, keeper
         self._pipeline = session.pipeline
@@ -84,6 +101,7 @@ class Robot:
         self._ready = False
         self._guard = GuardJournal()
         self._healths = Pace(HEALTH.rate_hz)
+        self._ros: LiveRos | None = None
         self._clock: Clock
         self._vitals: Vitals
         self._devices: Devices
@@ -110,6 +128,10 @@ class Robot:
             work["network"] = self._network.answer()
             work["map"] = self._keep_shown(self._network)
             work["requests"] = self._network.hear(self._steering().handle)
+        if self._ros is not None:
+            work["neighbours"] = self._ros.keep_shown(self._clock, self._off_loop)
+        if self._driver is not None:
+            work["driver"] = self._driver.hear(self._let_drive)
         async with asyncio.TaskGroup() as tasks:
             serving = [tasks.create_task(task, name=name) for name, task in work.items()]
             log.info("stopping", signal=await stopped)
@@ -130,8 +152,14 @@ class Robot:
     def _prepare(self, links: Links) -> None:
         robot = self._session.config.robot
         self._devices = Devices(links)
-        if self._feed is not None:
-            self._devices.laser.on_scan = self._feed.on_scan
+        self._devices.laser.on_scan = self._show_scan
+        if self._neighbours:
+            self._ros = LiveRos(
+                self._neighbours,
+                self._pipeline,
+                self._session.config.autonomy.odometry_noise,
+                UnixTime(self._clock.now),
+            )
         self._loop = Loop(
             self._devices.laser,
             self._devices.base,
@@ -155,6 +183,20 @@ class Robot:
             use=self._use,
             tell=self._on_events,
         )
+
+    def _show_scan(self, scan: Scan) -> None:
+        for shown in (self._feed, self._ros):
+            if shown is not None:
+                shown.on_scan(scan)
+
+    def _let_drive(self, twist: Twist) -> None:
+        """Let somebody drive, unless the robot is paused or does not know its surroundings yet."""
+        stamp, errands = self._clock.now(), self._pipeline.errands
+        with contextlib.suppress(Declined):
+            if errands.drive(twist, stamp):
+                text = "it is driven until it is asked for something else"
+                asked = events.Requested(stamp, "cmd_vel", "ROS 2", True, text)
+                self._on_events([asked, *errands.take_events()])
 
     async def _keep_saved(self) -> None:
         """Save now and then while the map grows, and when it is finished."""
@@ -266,8 +308,9 @@ class Robot:
     def _note(self, odometry: Odometry) -> None:
         self._odometry = odometry
         self._vitals.note_cycle(self._clock.now() - odometry.stamp)
-        if self._feed is not None:
-            self._feed.on_odometry(odometry)
+        for shown in (self._feed, self._ros):
+            if shown is not None:
+                shown.on_odometry(odometry)
 
     def _report(self) -> None:
         """Publish the state; tell the service manager, unless the control loop is stuck."""

@@ -67,13 +67,13 @@ def _phase(pipeline: Pipeline, away: str | None) -> Phase:
     errands = pipeline.errands
     if errands.is_paused:
         return "paused"
-    if errands.errand is None and pipeline.mission.outcome is not None:
+    if errands.progress is None and pipeline.mission.outcome is not None:
         return "finished"
     if not pipeline.keyframes:
         return "starting"
     if away is not None:
         return "halted"
-    if errands.errand is not None:
+    if errands.progress is not None:
         return "errand"
     return "waiting" if errands.is_waiting else "exploring"
 

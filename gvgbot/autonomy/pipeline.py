@@ -311,6 +311,9 @@ class Pipeline:
         local_base = self._last.local_base.compose(self._last.odom_base.to(odometry.odom_base))
         moment = Moment(odometry.stamp, local_base, self._wish(local_base), felt)
         twist, incident = self._reflexes.act(moment, lambda: self._room_behind(local_base))
+        command = self.errands.command(odometry.stamp)
+        if command is not None and not self._reflexes.is_lifted:
+            self._turning_to, self._order, twist = None, Stand(), command
         if self.errands.is_resting:  # whoever touches it then is no obstacle
             incident, twist = incident if isinstance(incident, PutDown) else None, STANDSTILL
         if incident is not None:

@@ -22,9 +22,11 @@ from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.mission import ExplorationConfig, Mission, Order, Stand
 from gvgbot.autonomy.views import Correspondence, View
 from gvgbot.autonomy.whereabouts import Situation
+from gvgbot.geometry import STANDSTILL, Twist
 
 _OFF_GRAPH_M = 3.0  # a point farther from every edge is out of reach
 _MOST_STOPS = 10  # that are passed at once
+_HOLD_S = 0.5  # that a twist of somebody who drives holds; without another one the robot stands
 
 
 class Declined(Exception):
@@ -53,6 +55,7 @@ class Errands:
         self._is_own = False  # the errand: nobody asked for it, and exploring goes on after it
         self._plan: Plan | None = None
         self._driving: Driving | None = None
+        self._command: tuple[Twist, float] | None = None  # of whoever drives, and when it came, s
 
     @property
     def errand(self) -> Errand | None:
@@ -62,12 +65,15 @@ class Errands:
     @property
     def progress(self) -> str | None:
         """The errand, and how far that is, in words."""
+        if self._command is not None:
+            return "driven by somebody"
         return None if self._plan is None else str(self._plan)
 
     @property
     def is_resting(self) -> bool:
         """Whether there is nothing to do but to stand."""
-        is_over = self._plan is None and (self.is_waiting or self._mission.outcome is not None)
+        is_free = self._plan is None and self._command is None
+        is_over = is_free and (self.is_waiting or self._mission.outcome is not None)
         return self.is_paused or is_over
 
     def configure(self, config: ExplorationConfig) -> None:
@@ -84,7 +90,7 @@ class Errands:
         """Stand until `resume`."""
         if self.is_paused:
             return "it is paused already"
-        self.is_paused = True
+        self.is_paused, self._command = True, None
         return "it stands still until it is asked to resume"
 
     def resume(self) -> str:
@@ -113,7 +119,7 @@ class Errands:
     def explore(self, stamp: float) -> str:
         """Go on exploring, even if that had ended."""
         self._check_going(stamp)
-        if self._plan is None and not self.is_resting:
+        if self._plan is None and self._command is None and not self.is_resting:
             return "it is exploring already"
         self._end(stamp, "replaced", "by explore")
         self.is_waiting = False
@@ -179,6 +185,27 @@ class Errands:
         return (
             f"it drives over all {len(edges)} edges, {metres:.0f} m and what must be driven twice"
         )
+
+    def drive(self, twist: Twist, stamp: float) -> bool:
+        """Let somebody else drive until something is asked for; whether that is new.
+
+        A twist holds until the next one comes, but not for long. Meanwhile the robot learns.
+        """
+        self._check_going(stamp)
+        is_new = self._command is None
+        if is_new:
+            self._end(stamp, "replaced", "by somebody who drives")
+            self._mission.set_aside()
+            self.is_waiting = True
+        self._command = twist, stamp
+        return is_new
+
+    def command(self, stamp: float) -> Twist | None:
+        """What somebody who drives wants now; None if nobody does."""
+        if self._command is None:
+            return None
+        twist, since = self._command
+        return twist if stamp - since < _HOLD_S else STANDSTILL
 
     def _drive_to_point(self, errand: ToPoint | Home, stamp: float) -> str:
         self._check_going(stamp)
@@ -249,7 +276,7 @@ class Errands:
         if self._is_own:
             self.closures.open_all(self._mapper.graph)
         self._is_own = False
-        self._plan = self._driving = None
+        self._plan = self._driving = self._command = None
 
     # -- after a restart ---------------------------------------------------------------------------
 
@@ -267,6 +294,8 @@ class Errands:
         """The order for the next keyframe interval, and what has happened."""
         self._seen = view, known
         self.closures.open_due(self._mapper.graph, view.stamp)
+        if self._command is not None:
+            return Stand(), self._mission.witness(view, known) + self.take_events()
         if self._plan is None and not self._revisit(view):
             self._revisiting.note_target(self._mission.target)
             return self._mission.advance(view, known)
@@ -299,12 +328,12 @@ class Errands:
 
     def hold(self) -> None:
         """Note that the robot cannot go on just now: somebody may be in its way."""
-        if self._plan is None:
+        if self._plan is None and self._command is None:
             self._mission.hold()
 
     def obstruct(self, reason: str) -> None:
         """Note that there is no way on."""
-        if self._plan is None:
+        if self._plan is None and self._command is None:
             self._mission.obstruct(reason)
         elif self._driving is not None:
             self._driving.obstruct()
