@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from gvgbot.cli.arguments import Commands, frames, positive, say
+from gvgbot.cli.arguments import Commands, add_overrides, frames, positive, say
 from gvgbot.errors import GvgbotError, UsageError
 
 
@@ -62,6 +62,38 @@ def add_map(commands: Commands) -> None:
     )
     export.set_defaults(command=_export)
     _add_diff(actions)
+    _add_import(actions)
+
+
+def _add_import(actions: Commands) -> None:
+    importing = actions.add_parser(
+        "import",
+        help="a run made of a ROS map, to drive in",
+        description="Make a run of a map that somebody else has made (map_server YAML and image): "
+        "the GVG of its largest free space, with the walls to find the robot's place by. The map "
+        "frame is that of the file; unknown pixels stay unknown.",
+        epilog="example: gvgbot map import floor.yaml --out runs/floor",
+    )
+    importing.add_argument("map", type=Path, metavar="MAP.yaml", help="the map")
+    importing.add_argument(
+        "--out", type=Path, metavar="RUN_DIR", required=True, help="the directory of the new run"
+    )
+    importing.add_argument(
+        "--config", type=Path, metavar="C.yaml", help="of the robot; default: sim.yaml"
+    )
+    add_overrides(importing)
+    importing.set_defaults(command=_import)
+
+
+def _import(options: argparse.Namespace) -> int:
+    from gvgbot.config import load_config
+    from gvgbot.map_import import import_map
+
+    config = load_config(options.config, options.overrides)
+    vertices, edges = import_map(options.map, options.out, config)
+    say(f"imported: {vertices} vertices, {edges} edges")
+    say(f"to drive in it: gvgbot run --map {options.out}")
+    return 0
 
 
 def _add_diff(actions: Commands) -> None:

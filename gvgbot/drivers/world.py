@@ -131,6 +131,11 @@ def load_world(path: Path) -> World:
     A pixel is a wall where its occupancy exceeds `occupied_thresh`; unknown pixels are free.
     Raises WorldError, in one line, for whatever is wrong with the file or its image.
     """
+    return load_map(path)[0]
+
+
+def load_map(path: Path) -> tuple[World, Mask]:
+    """The same world, and which of its squares are known: walls, or below `free_thresh`."""
     entries = _Entries(path, _read_yaml(path))
     resolution = entries.number("resolution")
     if resolution <= 0.0:
@@ -138,12 +143,13 @@ def load_world(path: Path) -> World:
     origin = entries.origin()
     negate = entries.negate()
     threshold = entries.fraction("occupied_thresh", OCCUPIED_THRESHOLD)
-    entries.fraction("free_thresh", FREE_THRESHOLD)
+    free_threshold = entries.fraction("free_thresh", FREE_THRESHOLD)
     entries.require_trinary()
     grey = _read_grey(path, entries.image())
     occupancy = (grey if negate else 255.0 - grey) / 255.0
     occupied = np.ascontiguousarray(np.flipud(occupancy > threshold))
-    return World(occupied, resolution, origin, path.stem)
+    known = occupied | np.flipud(occupancy < free_threshold)
+    return World(occupied, resolution, origin, path.stem), known
 
 
 def save_world(world: World, directory: Path) -> Path:

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from gvgbot.errors import UsageError
-from gvgbot.maps.atomic_files import write_files
 from gvgbot.maps.occupancy import UNKNOWN, OccupancyGrid, Seconds
 
 IMAGE = "map.pgm"
@@ -37,13 +36,8 @@ def encode_map_server(grid: OccupancyGrid) -> dict[str, bytes | str]:
     return files if grid.seen_s is None else files | {SEEN: _seconds_png(grid.seen_s)}
 
 
-def write_map_server(grid: OccupancyGrid, directory: Path) -> None:
-    """Replace the files in a directory. Raises GvgbotError if one cannot be written."""
-    write_files(directory, encode_map_server(grid))
-
-
 def read_map_server(directory: Path) -> OccupancyGrid:
-    """The grid that `write_map_server` left there, with cells of 0, 100 and -1 percent.
+    """The grid that `encode_map_server` made the files of, with cells of 0, 100 and -1 percent.
 
     Raises UsageError, in one line, if a file is missing (but for SEEN) or damaged.
     """

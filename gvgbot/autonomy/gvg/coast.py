@@ -10,18 +10,28 @@ place detection using the extended Voronoi graph, ICRA 2005.)
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from gvgbot.autonomy.gvg.local_map import LocalMap
 from gvgbot.geometry import Array
 
 _ARC_M = 0.3  # a longer arc is made of pieces
 _TOUCH_M = 1e-6  # what numbers cannot tell from lying on the coast
 
 Indices = NDArray[np.int64]
+
+
+class Space(Protocol):
+    """What is known of a place, such as a local map."""
+
+    def points(self) -> Array:
+        """Points of the walls (N, 2)."""
+
+    def known(self, points: Array) -> NDArray[np.bool_]:
+        """Whether something is known where each point (..., 2) is."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,7 +60,7 @@ class _Cuts:
 
 
 def with_coast(
-    diagram: Diagram, walls: Array, radius: float, local_map: LocalMap
+    diagram: Diagram, walls: Array, radius: float, space: Space
 ) -> tuple[Array, Array, Indices] | None:
     """The coast at `radius` m from the walls (G, 2), and the diagram as far as it is within.
 
@@ -58,7 +68,7 @@ def with_coast(
     no such open space is in sight.
     """
     cuts = _cuts(diagram, walls, radius)
-    if not local_map.known(cuts.points).any():
+    if not space.known(cuts.points).any():
         return None
     ridges = _cut_ridges(diagram, cuts, radius)
     arcs, bends = _arcs(diagram, walls, cuts, radius)

@@ -14,8 +14,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import Delaunay, QhullError, cKDTree
 
-from gvgbot.autonomy.gvg.coast import Diagram, with_coast
-from gvgbot.autonomy.gvg.local_map import LocalMap
+from gvgbot.autonomy.gvg.coast import Diagram, Space, with_coast
 from gvgbot.geometry import Array
 
 _RING = np.stack([f(np.arange(16) * np.pi / 8) for f in (np.cos, np.sin)], axis=1)
@@ -43,7 +42,7 @@ EMPTY = FineGraph(np.empty((0, 2)), np.empty(0), np.empty((0, 2), np.int64), np.
 
 
 def fine_graph(
-    local_map: LocalMap,
+    local_map: Space,
     robot: Array,
     *,
     min_clearance: float,
@@ -192,7 +191,7 @@ def _circumcircles(generators: Array, triangles: NDArray[np.int32]) -> tuple[Arr
     return centres, np.hypot(offset[:, 0], offset[:, 1])
 
 
-def _disc_is_known(local_map: LocalMap, centres: Array, radii: Array) -> NDArray[np.bool_]:
+def _disc_is_known(local_map: Space, centres: Array, radii: Array) -> NDArray[np.bool_]:
     """Whether the maximal discs, but for a rim of two cells, lie in known space."""
     outer = np.maximum(radii - 0.2, 0.5 * radii)
     unknown = _unknown(local_map, centres, outer, _WITHIN)
@@ -201,7 +200,7 @@ def _disc_is_known(local_map: LocalMap, centres: Array, radii: Array) -> NDArray
     return unknown <= _MAX_UNKNOWN
 
 
-def _unknown(local_map: LocalMap, centres: Array, radii: Array, places: Array) -> NDArray[np.int64]:
+def _unknown(local_map: Space, centres: Array, radii: Array, places: Array) -> NDArray[np.int64]:
     """How many of the places (K, 2) of a unit disc lie in unknown space, for each disc (N,)."""
     samples = centres[:, None, :] + radii[:, None, None] * places
     unknown: NDArray[np.int64] = (~local_map.known(samples)).sum(axis=1)

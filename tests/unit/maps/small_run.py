@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from gvgbot.maps import geojson
-from gvgbot.maps.map_server import write_map_server
+from gvgbot.maps.atomic_files import write_files
+from gvgbot.maps.map_server import encode_map_server
 from gvgbot.maps.occupancy import OccupancyGrid
 from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph, VertexKind
 from gvgbot.maps.trajectory import Trajectory, encode_tum
@@ -95,7 +96,7 @@ def write_run(directory: Path) -> Path:
     """The run, in a new directory."""
     directory.mkdir()
     (directory / "map.geojson").write_text(geojson.encode(GRAPH))
-    write_map_server(corridor(), directory)
+    write_files(directory, encode_map_server(corridor()))
     for name in ("estimate.tum", "odometry.tum"):
         (directory / name).write_text(encode_tum(path()))
     lines = "".join(json.dumps(event) + "\n" for event in EVENTS)

@@ -13,7 +13,8 @@ from PIL import Image
 from gvgbot.errors import UsageError
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
-from gvgbot.maps.map_server import encode_map_server, read_map_server, write_map_server
+from gvgbot.maps.atomic_files import write_files
+from gvgbot.maps.map_server import encode_map_server, read_map_server
 from gvgbot.maps.occupancy import GrowingGrid, OccupancyGrid, occupancy_grid
 
 CELL = 0.05
@@ -250,7 +251,7 @@ def trinary(directory: Path) -> tuple[NDArray[np.int_], tuple[float, ...], float
 
 def test_map_server_loads_what_was_written(tmp_path: Path) -> None:
     percent = np.array([[-1, 0, 19], [50, 66, 100]], np.int8)
-    write_map_server(OccupancyGrid(percent, 0.05, (-1.25, 2.5)), tmp_path)
+    write_files(tmp_path, encode_map_server(OccupancyGrid(percent, 0.05, (-1.25, 2.5))))
     cells, origin, resolution = trinary(tmp_path)
     assert cells.tolist() == [[-1, 0, 0], [-1, 100, 100]]
     assert origin == (-1.25, 2.5, 0.0)
@@ -288,7 +289,7 @@ def test_every_cell_knows_which_scan_saw_it_first() -> None:
 def test_a_grid_that_was_written_can_be_read(tmp_path: Path) -> None:
     percent = np.array([[0, 50, 100], [-1, 0, 100]], np.int8)
     seen_s = np.array([[0.0, 3.7, 90000.0], [np.inf, 65534.0, 12.2]], np.float32)
-    write_map_server(OccupancyGrid(percent, 0.05, (-1.25, 2.5), seen_s), tmp_path)
+    write_files(tmp_path, encode_map_server(OccupancyGrid(percent, 0.05, (-1.25, 2.5), seen_s)))
     grid = read_map_server(tmp_path)
     assert grid.cells.tolist() == [[0, -1, 100], [-1, 0, 100]]
     assert (grid.resolution_m, grid.origin) == (0.05, (-1.25, 2.5))
@@ -297,7 +298,9 @@ def test_a_grid_that_was_written_can_be_read(tmp_path: Path) -> None:
 
 
 def test_a_grid_without_a_record_of_what_was_seen_can_be_read(tmp_path: Path) -> None:
-    write_map_server(OccupancyGrid(np.zeros((2, 3), np.int8), 0.05, (0.0, 0.0)), tmp_path)
+    write_files(
+        tmp_path, encode_map_server(OccupancyGrid(np.zeros((2, 3), np.int8), 0.05, (0.0, 0.0)))
+    )
     assert read_map_server(tmp_path).seen_s is None
 
 
@@ -318,7 +321,10 @@ def test_a_damaged_grid_is_a_usage_error_in_one_line(
     tmp_path: Path, name: str, content: bytes
 ) -> None:
     seen_s = np.zeros((2, 3), np.float32)
-    write_map_server(OccupancyGrid(np.zeros((2, 3), np.int8), 0.05, (0.0, 0.0), seen_s), tmp_path)
+    write_files(
+        tmp_path,
+        encode_map_server(OccupancyGrid(np.zeros((2, 3), np.int8), 0.05, (0.0, 0.0), seen_s)),
+    )
     (tmp_path / name).write_bytes(content)
     with pytest.raises(UsageError, match=name) as caught:
         read_map_server(tmp_path)

@@ -1,0 +1,126 @@
+"""The command `gvgbot map import`: a run made of a map_server map, to be localised on."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from gvgbot.autonomy.gvg.local import LocalGvg
+from gvgbot.autonomy.gvg.reduction import reduce_graph
+from gvgbot.autonomy.gvg.voronoi import fine_graph
+from gvgbot.autonomy.known_grid import KnownGrid, learn
+from gvgbot.autonomy.pipeline import Pipeline
+from gvgbot.config import Config
+from gvgbot.drivers.hokuyo.models import MODELS
+from gvgbot.drivers.ray_casting import Mask
+from gvgbot.drivers.world import World, load_map
+from gvgbot.errors import GvgbotError, UsageError
+from gvgbot.geometry import Array, Pose
+from gvgbot.hal.messages import Scan
+from gvgbot.maps.run_directory import RunDirectory
+from gvgbot.persistence.keeper import Keeper
+from gvgbot.persistence.mission_files import SNAPSHOT, MissionFiles
+from gvgbot.session import Session
+
+_BEAMS = 720  # of a scan, all around
+_MERGE_M = 0.1  # points of walls in one square of this size are one
+_SEEN_SHARE = 0.8  # of the laser's range: walls farther off cannot be relied on
+_MOST_CELLS = 60_000_000  # of a map
+
+
+def import_map(path: Path, out: Path, config: Config) -> tuple[int, int]:
+    """Write a run that knows a map_server map; how many vertices and edges it has.
+
+    Raises UsageError for a map or a directory that cannot be used, GvgbotError if nothing can be
+    written.
+    """
+    if (out / SNAPSHOT).exists():
+        raise UsageError(f"{out} holds a mission already: choose another directory")
+    world, known = load_map(path)
+    if known.size > _MOST_CELLS:
+        raise UsageError(f"{path}: {known.size} pixels are too many; at most {_MOST_CELLS} will do")
+    with RunDirectory.create(out, world=world.name) as directory:
+        session = Session(config, directory, None)
+        session.title = world.name
+        _teach(session.pipeline, path, world, known, config)
+        graph = session.pipeline.mapper.graph
+        if not graph.vertices:
+            raise UsageError(f"{path}: no way in it is wide enough for the robot")
+        keeper = Keeper(session, MissionFiles(directory.path))
+        keeper.finish()
+        if keeper.trouble is not None:
+            raise GvgbotError(f"cannot write the mission to {out}: {keeper.trouble}")
+        session.pipeline.mission.reason = f"imported from {path.name}"
+        session.save()
+        return len(graph.vertices), len(graph.edges)
+
+
+def _teach(pipeline: Pipeline, path: Path, world: World, known: Mask, config: Config) -> None:
+    reach = MODELS[config.twin.laser.model].usable_mm / 1000
+    gvg = _gvg(path, world, known, config, reach)
+    if gvg.edges:
+        learn(pipeline, gvg, _looker(world, known, reach))
+
+
+def _gvg(path: Path, world: World, known: Mask, config: Config, reach: float) -> LocalGvg:
+    """The GVG of the largest part of the map that the robot can drive in."""
+    reduction = config.autonomy.reduction
+    room = config.robot.radius_m + config.autonomy.passage_margin_m
+    grid = KnownGrid(_walls(world, known), known, world.resolution_m, np.array(world.origin))
+    fine = fine_graph(
+        grid,
+        _somewhere(path, world, known, room),
+        min_clearance=room,
+        roughness=reduction.roughness_m,
+        open_clearance=min(reduction.open_clearance_m, _SEEN_SHARE * reach),
+    )
+    return reduce_graph(fine, reduction)
+
+
+def _somewhere(path: Path, world: World, known: Mask, room: float) -> Array:
+    """The middle (2,), m, of the largest connected space with room for the robot."""
+    free = known & ~world.occupied
+    distance = np.asarray(ndimage.distance_transform_edt(np.pad(free, 1)))[1:-1, 1:-1]
+    distance = distance * world.resolution_m
+    labels, count = ndimage.label(distance > room)
+    if not count:
+        raise UsageError(f"{path}: nothing in it is free and wide enough for the robot")
+    largest = 1 + int(np.argmax(np.bincount(labels.ravel())[1:]))
+    row, column = np.unravel_index(
+        int(np.argmax(np.where(labels == largest, distance, 0.0))), free.shape
+    )
+    middle: Array = _centres(world, np.array([row]), np.array([column]))[0]
+    return middle
+
+
+def _walls(world: World, known: Mask) -> Array:
+    """Points (N, 2), m, on the faces of walls that look onto free space, not too many of them."""
+    free = known & ~world.occupied
+    beside = ndimage.binary_dilation(free, np.ones((3, 3), np.bool_))
+    points = _centres(world, *np.nonzero(world.occupied & beside))
+    cells = np.floor(points / max(_MERGE_M, world.resolution_m)).astype(np.int64)
+    _, index, count = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
+    index = index.ravel()
+    return np.stack([np.bincount(index, points[:, k]) / count for k in (0, 1)], axis=1)
+
+
+def _centres(world: World, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Array:
+    """Of squares (N,), (N, 2) m."""
+    squares = np.stack([columns, rows], axis=1) + 0.5
+    return np.asarray(squares * world.resolution_m + np.array(world.origin))
+
+
+def _looker(world: World, known: Mask, reach: float) -> Callable[[Pose], Scan]:
+    """What a laser sees that looks all around; beams into the unknown tell nothing."""
+    bearings: Array = -math.pi + np.arange(_BEAMS, dtype=np.float64) * (math.tau / _BEAMS)
+    beyond = World(world.occupied | ~known, world.resolution_m, world.origin)
+
+    def look(pose: Pose) -> Scan:
+        ranges = world.cast(pose, bearings, reach)
+        ranges[beyond.cast(pose, bearings, reach) < ranges - world.resolution_m / 2] = np.nan
+        return Scan(0.0, ranges, -math.pi, math.tau / _BEAMS, 0.0, reach)
+
+    return look

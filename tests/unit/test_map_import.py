@@ -1,0 +1,154 @@
+"""A map that somebody else has made becomes a run, or one line that says why not."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from benchmarks.reference_gvg import reference_gvg
+from gvgbot.cli import main
+from gvgbot.config import Config
+from gvgbot.drivers.world import World, load_map, save_world
+from gvgbot.map_import import import_map
+from gvgbot.maps.saved_run import SavedRun
+from gvgbot.persistence.mission_files import MissionFiles
+from gvgbot.worlds import open_world
+from gvgbot.worlds.canvas import Canvas
+
+GREY = {"wall": 0, "free": 254, "unknown": 205}  # of map_saver
+
+
+def vertices(run: Path) -> np.ndarray:
+    return np.array([vertex.position for vertex in SavedRun.read(run).graph.vertices])
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(120)
+@pytest.mark.parametrize("name", ["office", "ring", "rooms"])
+def test_the_graph_of_an_imported_world_is_that_of_the_world(name: str, tmp_path: Path) -> None:
+    """By the exact Voronoi diagram of the bitmap, which shares no code with the robot's."""
+    world, start = open_world(name)
+    assert start is not None
+    run = tmp_path / "run"
+    count, edges = import_map(save_world(world, tmp_path), run, Config())
+    reference = reference_gvg(world, (start.x, start.y), Config().robot.radius_m)
+    nodes = dict(reference.graph.nodes(data=True))
+    required = np.array([node["position"] for node in nodes.values() if node["is_required"]])
+    all_ = np.array([node["position"] for node in nodes.values()])
+    found = vertices(run)
+    assert len(found) == count
+    apart = np.hypot(*(required[:, None] - found[None]).transpose(2, 0, 1))
+    assert apart.min(axis=1).max() < 0.4
+    assert np.hypot(*(found[:, None] - all_[None]).transpose(2, 0, 1)).min(axis=1).max() < 0.4
+    assert abs(edges - reference.graph.number_of_edges()) <= count - len(required)
+
+
+def cross() -> World:
+    canvas = Canvas(15.0, 9.0)
+    canvas.carve_path([(1.5, 4.5), (13.5, 4.5)], 1.4)
+    canvas.carve_path([(4.5, 1.5), (4.5, 7.5)], 1.4)
+    return canvas.world("cross")
+
+
+def painted(directory: Path, hidden: tuple[slice, slice] | None = None) -> Path:
+    """The cross in map_server form, with a part of it unknown; rows from the bottom."""
+    path = save_world(cross(), directory)
+    picture = directory / "cross.png"
+    grey = np.asarray(Image.open(picture)).copy()
+    grey[grey == 254] = GREY["free"]
+    if hidden is not None:
+        grey[::-1][hidden] = GREY["unknown"]
+    Image.fromarray(grey).save(picture)
+    return path
+
+
+def test_what_is_unknown_becomes_a_frontier_and_no_wall(tmp_path: Path) -> None:
+    rows, columns = cross().occupied.shape
+    eastern = np.s_[0:rows, columns * 10 // 15 : columns]
+    path = painted(tmp_path, eastern)
+    assert not load_map(path)[1][eastern].any()
+    import_map(path, tmp_path / "run", Config())
+    run = SavedRun.read(tmp_path / "run")
+    frontiers = [(vertex.position, vertex.frontiers) for vertex in run.graph.vertices]
+    ((place, (bearing,)),) = [found for found in frontiers if found[1]]
+    assert place == pytest.approx((4.5, 4.5), abs=0.1)
+    assert bearing == pytest.approx(0.0, abs=0.1)
+    assert sum(vertex.kind == "endpoint" for vertex in run.graph.vertices) == 3
+
+
+def test_the_run_holds_a_mission_on_which_a_daemon_can_begin(tmp_path: Path) -> None:
+    assert main(["map", "import", str(painted(tmp_path)), "--out", str(tmp_path / "run")]) == 0
+    saved = MissionFiles(tmp_path / "run").read()
+    assert saved is not None
+    assert len(saved.memory.graph.vertices) == 5
+    assert len(saved.past) == saved.memory.keyframes
+    assert saved.memory.intent.outcome is None
+    assert main(["map", "show", str(tmp_path / "run")]) == 0
+
+
+def test_a_run_that_is_there_is_not_overwritten(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["map", "import", str(painted(tmp_path)), "--out", str(tmp_path / "run")]
+    assert main(words) == 0
+    capsys.readouterr()
+    assert main(words) == 2
+    assert "holds a mission already" in capsys.readouterr().err
+
+
+def broken(directory: Path, what: str) -> Path:
+    """A map with a mistake."""
+    path = painted(directory)
+    text, picture = path.read_text(), directory / "cross.png"
+    match what:
+        case "no file":
+            return directory / "nowhere.yaml"
+        case "no image":
+            picture.unlink()
+        case "cut image":
+            picture.write_bytes(picture.read_bytes()[:200])
+        case "no yaml":
+            path.write_bytes(b"\x00\xff\x13" * 50)
+        case "other yaml":
+            path.write_text("[1, 2")
+        case "no key":
+            path.write_text(text.replace("resolution", "revolution"))
+        case "turned":
+            path.write_text(text.replace(", 0.0]", ", 0.5]").replace("- 0.0\n", "- 0.5\n"))
+        case "all wall":
+            Image.new("L", (50, 50), GREY["wall"]).save(picture)
+        case "all unknown":
+            Image.new("L", (50, 50), GREY["unknown"]).save(picture)
+        case "all free":
+            Image.new("L", (50, 50), GREY["free"]).save(picture)
+        case "one pixel":
+            Image.new("L", (1, 1), GREY["free"]).save(picture)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("what", "says"),
+    [
+        ("no file", "no such file"),
+        ("no image", "no such file"),
+        ("cut image", "cannot read"),
+        ("no yaml", "cannot be read as text"),
+        ("other yaml", "not valid YAML"),
+        ("no key", "key resolution: missing"),
+        ("turned", "yaw must be 0"),
+        ("all wall", "nothing in it is free"),
+        ("all unknown", "nothing in it is free"),
+        ("all free", "no way in it"),
+        ("one pixel", "nothing in it is free"),
+    ],
+)
+def test_what_is_no_map_gets_one_line_and_leaves_nothing(
+    what: str, says: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "run"
+    assert main(["map", "import", str(broken(tmp_path, what)), "--out", str(out)]) == 2
+    shown = capsys.readouterr()
+    assert says in shown.err
+    assert shown.err.count("\n") == 1
+    assert not (out / "snapshot.gvg").exists()
