@@ -4,12 +4,16 @@ from types import TracebackType
 from typing import Self
 
 import foxglove
+import structlog
 from foxglove.websocket import ChannelView, Client, ServerListener
 
 from gvgbot.errors import GvgbotError
+from gvgbot.foxglove import LAYOUT
 from gvgbot.foxglove.config import FoxgloveConfig
 from gvgbot.ros2.cdr import definition
 from gvgbot.ros2.topics import TOPICS, Topic
+
+log = structlog.get_logger()
 
 
 class FoxgloveServer:
@@ -34,6 +38,8 @@ class FoxgloveServer:
                 f"cannot serve Foxglove at {config.host}:{config.port}: {error}; "
                 "choose another address (foxglove.host, foxglove.port)"
             ) from error
+        where = f"ws://{config.host}:{self.port}"
+        log.info("Foxglove can watch", address=where, layout=str(LAYOUT))
 
     @property
     def port(self) -> int:
