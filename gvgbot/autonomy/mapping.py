@@ -90,13 +90,17 @@ class Mapper:
 
     def known_around(self, local_base: Pose, within_m: float) -> KnownVertices:
         """The vertices around the base, seen lately or not, in the local frame."""
-        local_map = local_base.compose(self.belief.map_base.inverse())
-        positions = local_map.transform(self.belief.x[3:].reshape(-1, 3)[:, :2])
+        positions = self._vertices_from(local_base)
         near = np.hypot(*(positions - local_base.position).T) < within_m
         degrees = np.array(
             [self.graph.vertices[self.belief.ids[i]].degree for i in np.flatnonzero(near)], int
         )
         return KnownVertices(positions[near], degrees)
+
+    def _vertices_from(self, local_base: Pose) -> Array:
+        """Where the vertices are (N, 2), local frame, in the order of the belief's ids."""
+        local_map = local_base.compose(self.belief.map_base.inverse())
+        return local_map.transform(self.belief.x[3:].reshape(-1, 3)[:, :2])
 
     def observe(self, view: View) -> tuple[Correspondence, list[Event]]:
         """Match a view with the map and learn from it.
@@ -338,23 +342,33 @@ class Mapper:
 
     def _refute(self, view: View, known: Correspondence) -> None:
         """Remove vertices where a plain edge is seen to pass through."""
-        for vertex in list(self.graph.vertices.values()):
-            place = None if vertex.id in known.node_of else self._place_of(view, vertex)
-            if place is None or view.is_doubtful(place, vertex.clearance + _HIDES_M):
+        for vertex, place in self._in_full_view(view):
+            near_by = vertex.clearance + _HIDES_M
+            if vertex.id in known.node_of or view.is_doubtful(place, near_by):
                 continue
             if self._passes_through(view, place, known):
                 vertex.misses += 1
                 if vertex.misses > self._config.misses:
                     self.remove(view, vertex, "an edge passes here")
 
-    def _place_of(self, view: View, vertex: Vertex) -> Array | None:
-        """Where a vertex near by should be seen (2,), local frame; None if that is not certain."""
-        is_fresh = view.travelled - vertex.seen_at < _FRESH_M
-        place = (vertex.local if is_fresh else self.in_local_frame(view, vertex.id)).position
-        if np.hypot(*(place - view.local_base.position)) > _IN_FULL_VIEW_M:
-            return None
+    def _in_full_view(self, view: View) -> list[tuple[Vertex, Array]]:
+        """The vertices that should be seen near by, and where (2,), local frame, for certain."""
+        found = []
+        for vertex_id, believed in zip(
+            self.belief.ids, self._vertices_from(view.local_base), strict=True
+        ):
+            vertex = self.graph.vertices[vertex_id]
+            is_fresh = view.travelled - vertex.seen_at < _FRESH_M
+            place = vertex.local.position if is_fresh else believed
+            away = math.hypot(place[0] - view.local_base.x, place[1] - view.local_base.y)
+            if away <= _IN_FULL_VIEW_M and (is_fresh or self._is_well_known(vertex)):
+                found.append((vertex, place))
+        return found
+
+    def _is_well_known(self, vertex: Vertex) -> bool:
+        """Whether it is certain where a vertex stands as seen from the robot."""
         _, S, _ = ekf.innovation(self.belief, vertex.id, Pose(), np.zeros((2, 2)))
-        return place if is_fresh or np.trace(S) < _WELL_KNOWN_M**2 else None
+        return bool(np.trace(S) < _WELL_KNOWN_M**2)
 
     def _passes_through(self, view: View, point: Array, known: Correspondence) -> bool:
         """Whether an edge is seen where a vertex should be, or another vertex at its end there."""

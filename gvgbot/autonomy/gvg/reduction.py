@@ -67,9 +67,12 @@ class _Chain:
     b: int
     points: Array
     clearance: Array
+    known_length: float | None = None  # of these points, if it has been asked for
 
     def length(self) -> float:
-        return float(np.hypot(*np.diff(self.points, axis=0).T).sum())
+        if self.known_length is None:
+            self.known_length = float(_steps(self.points).sum())
+        return self.known_length
 
 
 @dataclass(slots=True, eq=False)
@@ -308,7 +311,7 @@ def _known_length(draft: _Draft, chain: _Chain, merge_m: float, known: KnownVert
 def _attach(chain: _Chain, point: Array, *, at_start: bool) -> None:
     """Let a chain begin (or end) at a node that has moved."""
     index = 0 if at_start else len(chain.points)
-    chain.points = np.insert(chain.points, index, point, axis=0)
+    chain.points, chain.known_length = np.insert(chain.points, index, point, axis=0), None
     edge = chain.clearance[0] if at_start else chain.clearance[-1]
     chain.clearance = np.insert(chain.clearance, index, edge)
 
@@ -336,11 +339,25 @@ def _is_weak(draft: _Draft, branch: Branch, node: int, min_reach: float) -> bool
 
 def _edge(chain: _Chain) -> LocalEdge:
     """Resample at even spacing and smooth the zigzag of the Voronoi vertices; ends stay."""
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(chain.points, axis=0).T))])
+    along = _stations(chain.points)
     count = max(2, round(along[-1] / _SPACING) + 1)
-    at = np.linspace(0.0, along[-1], count)
+    at = np.arange(count) * (along[-1] / (count - 1))
+    at[-1] = along[-1]
     line = np.stack([np.interp(at, along, chain.points[:, k]) for k in (0, 1)], axis=1)
     for _ in range(2):
         line[1:-1] = 0.25 * line[:-2] + 0.5 * line[1:-1] + 0.25 * line[2:]
-    stations = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
-    return LocalEdge(chain.a, chain.b, line, np.interp(at, along, chain.clearance), stations)
+    clearance = np.interp(at, along, chain.clearance)
+    return LocalEdge(chain.a, chain.b, line, clearance, _stations(line))
+
+
+def _stations(line: Array) -> Array:
+    """Metres (N,) along a polyline (N, 2)."""
+    along = np.zeros(len(line))
+    np.cumsum(_steps(line), out=along[1:])
+    return along
+
+
+def _steps(line: Array) -> Array:
+    """Metres (N - 1,) from point to point of a polyline (N, 2)."""
+    way = line[1:] - line[:-1]
+    return np.hypot(way[:, 0], way[:, 1])

@@ -174,7 +174,8 @@ def innovation(
 def _used(belief: Belief, vertex: int) -> Index:
     """The part (6,) of the state that a sight of a vertex depends on: H is 0 elsewhere."""
     i = 3 + 3 * belief.ids.index(vertex)
-    return np.r_[0:3, i : i + 3]
+    used: Index = np.r_[0:3, i : i + 3]
+    return used
 
 
 def _residual(belief: Belief, vertex: int, base_vertex: Pose, k: int) -> tuple[Array, Array]:

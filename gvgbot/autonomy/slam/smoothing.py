@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array
-from scipy.sparse.linalg import splu
+from scipy.sparse.linalg import SuperLU, splu
 
 from gvgbot.geometry import Array, Pose
 
@@ -51,7 +51,7 @@ class PoseGraph:
             return x
         for iteration in range(_ITERATIONS):
             H, g = self._normal_equations(x, trusting=iteration == 0)
-            change = -splu(H).solve(g).reshape(-1, 3)
+            change = -_factors(H).solve(g).reshape(-1, 3)
             x += change
             x[:, 2] = np.remainder(x[:, 2] + np.pi, 2 * np.pi) - np.pi
             if np.abs(change).max() < _CONVERGED and iteration > 0:
@@ -66,7 +66,7 @@ class PoseGraph:
         rows = 3 * np.array(wanted)[:, None] + np.arange(3)
         columns = np.zeros((3 * len(poses), rows.size))
         columns[rows.ravel(), np.arange(rows.size)] = 1.0
-        P = splu(H).solve(columns).reshape(len(columns), len(wanted), 3)
+        P = _factors(H).solve(columns).reshape(len(columns), len(wanted), 3)
         return np.array([P[row, i] for i, row in enumerate(rows)])
 
     def _normal_equations(self, x: Array, *, trusting: bool) -> tuple[csc_array, Array]:
@@ -78,9 +78,10 @@ class PoseGraph:
         values, rows, columns = [np.full(3, _FIXED)], [k], [k]
         g = np.zeros((len(x), 3))
         for p, P in ends:
-            np.add.at(g, p, np.einsum("kji,kjl,kl->ki", P, W, r))
+            PW = P.swapaxes(1, 2) @ W
+            np.add.at(g, p, (PW @ r[:, :, None])[:, :, 0])
             for q, Q in ends:
-                h = np.einsum("kji,kjl,klm->kim", P, W, Q)
+                h = PW @ Q
                 values.append(h.ravel())
                 rows.append(np.broadcast_to((3 * p[:, None] + k)[:, :, None], h.shape).ravel())
                 columns.append(np.broadcast_to((3 * q[:, None] + k)[:, None, :], h.shape).ravel())
@@ -92,6 +93,13 @@ class PoseGraph:
         """How much each constraint counts (K,), by its residuals (K, 3)."""
         distance = np.einsum("ki,kij,kj->k", r, self._W, r)
         return np.where(self._doubtful, 1.0 / (1.0 + distance / _DOUBT), 1.0)
+
+
+def _factors(H: csc_array) -> SuperLU:
+    """H, which is symmetric and positive, made ready to be solved by."""
+    return splu(
+        H, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+    )
 
 
 def _residuals(x: Array, a: Index, b: Index, z: Array) -> tuple[Array, Array, Array]:

@@ -210,6 +210,24 @@ def test_a_large_innovation_leads_to_the_most_probable_state(seed: int) -> None:
     assert np.allclose(update(belief, 1, seen, R).x, best, atol=2e-3)
 
 
+def test_a_map_of_many_blocks_is_corrected_as_the_textbook_says() -> None:
+    """Joseph's form with dense matrices; and not one bit of symmetry is lost."""
+    rng = np.random.default_rng(1)
+    belief, R = random_belief(rng, 90), random_covariance(rng, 3)
+    P = belief.P
+    foreseen, H = expected(belief, 50)
+    S = H @ P @ H.T + R
+    K = P @ H.T @ np.linalg.inv(S)
+    rest = np.eye(len(P)) - K @ H
+    joseph = rest @ P @ rest.T + K @ R @ K.T
+    before = P.copy()
+    after = update(belief, 50, Pose(foreseen.x + 0.01, foreseen.y, foreseen.theta), R)
+    assert np.array_equal(belief.P, before)
+    assert np.allclose(after.P, joseph, rtol=0.0, atol=1e-13)
+    assert np.array_equal(after.P, after.P.T)
+    assert np.allclose(innovation(belief, 50, foreseen, R)[1], S, rtol=0.0, atol=1e-15)
+
+
 @given(seeds)
 def test_many_updates_keep_the_covariance_symmetric_and_positive(seed: int) -> None:
     rng = np.random.default_rng(seed)
