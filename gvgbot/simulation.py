@@ -1,7 +1,7 @@
 """The simulated robot: one world, one body, and the twins of both devices on in-memory streams."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -65,7 +65,7 @@ class Simulation:
             count = _people_count(config, place.world)
             people = People(place.walkways, count, people_seed, clock.now())
         self.body = RobotBody(place.world, place.start, shape, clock.now(), people)
-        sight = Sight(place.world, people, glass_seed)
+        sight = Sight(place.world, people, glass_seed, self.body.others)
         self._clock = clock
         mount = config.laser.base_laser
         model = MODELS[config.twin.laser.model]
@@ -103,6 +103,10 @@ class Simulation:
         )
         self.laser, self._laser_end = laser_cable.host, laser_cable.device
         self.base, self._base_end = cable.host, cable.device
+
+    def meet(self, others: Iterable["Simulation"]) -> None:
+        """Share the world with other robots: they see each other, and bump into each other."""
+        self.body.others += [other.body for other in others]
 
     def _look(self, bearing: float) -> float:
         """Distance (m) from the body to the next wall in a direction (rad) of its own."""

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import numpy as np
 
+from gvgbot.drivers.discs import disc_offsets
 from gvgbot.drivers.people import People
 from gvgbot.drivers.world import World
 from gvgbot.geometry import Array, Pose, wrap_angle
@@ -37,7 +38,8 @@ class RobotBody:
 
     `pose` is world_base. `left_travel` and `right_travel` are what the wheels have rolled, m, slip
     against a wall included; `distance_m` is the way that the robot itself has come. `contacts`
-    counts separate collisions, with walls and with people, who walk on as the body advances.
+    counts separate collisions, with walls, with people, who walk on as the body advances, and with
+    `others`: bodies in the same world, where they stood when they were advanced last.
     """
 
     def __init__(
@@ -53,6 +55,7 @@ class RobotBody:
         self.left_travel = self.right_travel = 0.0
         self.distance_m = 0.0
         self.contacts = 0
+        self.others: list[RobotBody] = []
         self._world = world
         self._people = people
         self._now = stamp
@@ -169,9 +172,17 @@ class RobotBody:
         """From a place to the nearest point of each wall square and person in reach: (N, 2), m."""
         far = self._world.clear_of_walls(x, y) > reach
         walls = NOTHING if far else self._world.wall_offsets(x, y, reach)
-        if self._people is None:
+        if self._people is not None:
+            walls = np.concatenate((walls, self._people.offsets(x, y, reach)))
+        if not self.others:
             return walls
-        return np.concatenate((walls, self._people.offsets(x, y, reach)))
+        return np.concatenate((walls, disc_offsets(*discs_of(self.others), x, y, reach)))
+
+
+def discs_of(bodies: list[RobotBody]) -> tuple[Array, Array]:
+    """Where bodies are in the world: centres (N, 2) and radii (N,), m."""
+    centres = np.array([body.pose.position for body in bodies]).reshape(-1, 2)
+    return centres, np.array([body.config.radius_m for body in bodies])
 
 
 def _ramp(speed: float, target: float, limit: float, duration: float) -> tuple[float, float]:

@@ -11,6 +11,7 @@ from scipy import ndimage, sparse
 from scipy.sparse import csgraph
 from scipy.spatial import KDTree
 
+from gvgbot.drivers.discs import cast_on_discs, disc_offsets
 from gvgbot.drivers.world import World
 from gvgbot.errors import WorldError
 from gvgbot.geometry import Array, Pose
@@ -131,23 +132,11 @@ class People:
 
     def offsets(self, x: float, y: float, reach: float) -> Array:
         """From (x, y) to the nearest point of each person within `reach`: (M, 2), m."""
-        to_centre = self.centres - (x, y)
-        distance = np.hypot(to_centre[:, 0], to_centre[:, 1])
-        gap = np.maximum(distance - self.radii, 0.0)
-        near = gap <= reach
-        shares: Array = gap[near] / np.maximum(distance[near], 1e-9)
-        return np.asarray(to_centre[near] * shares[:, None])
+        return disc_offsets(self.centres, self.radii, x, y, reach)
 
     def cast(self, pose: Pose, bearings: Array) -> Array:
         """Ranges (N,) in m to the nearest person along bearings (N,) of a sensor; inf: nobody."""
-        directions = np.stack((np.cos(bearings + pose.theta), np.sin(bearings + pose.theta)))
-        to_centre = self.centres - (pose.x, pose.y)
-        ahead = to_centre @ directions
-        beside = (to_centre**2).sum(axis=1)[:, None] - ahead**2
-        half_chord = np.sqrt(np.maximum(self.radii[:, None] ** 2 - beside, 0.0))
-        hit = (beside < self.radii[:, None] ** 2) & (ahead + half_chord > 0.0)
-        ranges = np.where(hit, np.maximum(ahead - half_chord, 0.0), np.inf)
-        return np.asarray(ranges.min(axis=0, initial=np.inf))
+        return cast_on_discs(self.centres, self.radii, pose, bearings)
 
     def _born(self, place: Array, stamp: float) -> _Person:
         radius, speed = (float(self._rng.uniform(*limits)) for limits in (RADII, SPEEDS))

@@ -1,7 +1,9 @@
-"""What a laser sees in the simulated world: walls, people, and glass or what is behind it."""
+"""What a laser sees in the simulated world: walls, glass or what is behind it, people, robots."""
 
 import numpy as np
 
+from gvgbot.drivers.body import RobotBody, discs_of
+from gvgbot.drivers.discs import cast_on_discs
 from gvgbot.drivers.people import People
 from gvgbot.drivers.world import World
 from gvgbot.geometry import Array, Pose
@@ -14,10 +16,14 @@ AT_CORNER = 1e-6  # of a square: nearer than this, a beam may have met either si
 
 
 class Sight:
-    """Sees the world and the people in it; `seed` draws which beams glass lets pass."""
+    """Sees the world, the people and `others` in it; `seed` draws which beams glass lets pass."""
 
-    def __init__(self, world: World, people: People | None, seed: int) -> None:
+    def __init__(
+        self, world: World, people: People | None, seed: int, others: list[RobotBody] | None = None
+    ) -> None:
+        """`others` may grow later."""
         self._world, self._people = world, people
+        self._others = [] if others is None else others
         self._rng = np.random.default_rng(seed)
 
     def look(self, pose: Pose, bearings: Array, max_range: float) -> Array:
@@ -25,10 +31,11 @@ class Sight:
         ranges = self._world.cast(pose, bearings, max_range)
         if self._world.glass is not None:
             ranges = self._through_glass(pose, bearings, max_range, ranges)
-        if self._people is None:
-            return ranges
-        nearest = np.minimum(ranges, self._people.cast(pose, bearings))
-        return np.where(nearest <= max_range, nearest, np.inf)
+        if self._people is not None:
+            ranges = np.minimum(ranges, self._people.cast(pose, bearings))
+        if self._others:
+            ranges = np.minimum(ranges, cast_on_discs(*discs_of(self._others), pose, bearings))
+        return np.where(ranges <= max_range, ranges, np.inf)
 
     def _through_glass(
         self, pose: Pose, bearings: Array, max_range: float, surface: Array
