@@ -18,15 +18,17 @@ from gvgbot import client
 from gvgbot.errors import GvgbotError, UsageError
 from gvgbot.requests import Answer, Asked
 from gvgbot.telemetry import Telemetry
-from gvgbot.topics import Event, Events, TelemetryConfig
+from gvgbot.topics import Event, Events, TelemetryConfig, Trajectory
 from gvgbot.zenoh_config import session_config
 from tests.process.addresses import free_endpoint
+from tests.unit.monitor.maps import a_grid
 from tests.unit.test_telemetry import EXAMPLE
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(60)]
 
 PACKAGED = Path(str(files("gvgbot") / "configs" / "zenoh"))
 INSTALLED = "/etc/gvgbot/zenoh"
+WAY = Trajectory(stamp=1.0, stamps=bytes(8), poses=bytes(12))
 
 
 @dataclass(frozen=True)
@@ -125,6 +127,8 @@ def visit(network: Network, guest: Callable[[], object]) -> list[str]:
             robot.publish(EXAMPLE)
             event = Event(number=0, stamp=1.0, kind="decision", details={})
             robot.publish(Events(events=(event,)))
+            robot.publish(WAY)
+            robot.publish(a_grid(".", number=2), a_grid("#", number=2))  # the first was long ago
             async with asyncio.TaskGroup() as tasks:
                 serving = [tasks.create_task(robot.hear(handle)), tasks.create_task(robot.answer())]
                 await asyncio.to_thread(guest)
@@ -163,6 +167,8 @@ def test_a_monitor_reads_and_its_commands_come_to_nothing(network: Network) -> N
         with enter(network, "monitor") as robot:
             assert next(iter(robot.state())) == EXAMPLE
             assert next(iter(robot.events())).kind == "decision"
+            assert next(iter(robot.trajectory())) == WAY
+            assert next(iter(robot.grid())).raster().cells[0, 0] == 100  # which it had to ask for
             assert robot.presence.word == "alive"
             for asking in (robot.pause(), robot.stop(), robot.goto(3), robot.set("a.b", 1)):
                 with pytest.raises(GvgbotError, match=r"does not answer|has not answered"):
@@ -196,6 +202,7 @@ def test_who_is_known_but_has_no_rights_gets_nothing(network: Network) -> None:
         with enter(network, "somebody") as robot:
             assert robot.presence.word == "absent"
             assert robot.state().latest is None
+            assert robot.grid().latest is robot.trajectory().latest is robot.health().latest is None
             with pytest.raises(GvgbotError):
                 robot.stop().result()
 

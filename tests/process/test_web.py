@@ -6,6 +6,7 @@ With GVGBOT_PICTURES=docs/images a test leaves web.png and web-phone.png there.
 import asyncio
 import base64
 import json
+import math
 import os
 import signal
 import socket
@@ -31,7 +32,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from gvgbot import client
 from gvgbot.requests import Answer, Asked, Goto
 from gvgbot.telemetry import Telemetry
-from gvgbot.topics import Event, Events, TelemetryConfig, Trajectory
+from gvgbot.topics import Event, Events, Health, TelemetryConfig, Trajectory
 from gvgbot.web.server import Web
 from gvgbot.web.viewers import Audience
 from gvgbot.web.wire import Reply, Wish
@@ -228,7 +229,7 @@ def test_the_program_serves_its_page_and_ends_when_told() -> None:
     [
         (["--port", "{taken}"], 1, "--port"),
         (["--host", "192.0.2.1"], 1, "192.0.2.1"),
-        (["--port", "70000"], 2, "70000"),
+        (["--port", "99999"], 2, "'99999' is no port: there are 0 to 65535"),
         (["a/b"], 2, "a/b"),
         (["--connect", "here"], 2, "here"),
     ],
@@ -343,6 +344,18 @@ class Play:
     def until_read(self, words: str) -> None:
         self.until(f"document.body.innerText.includes({json.dumps(words)})")
 
+    def until_drawn(
+        self, is_so: Callable[[dict[str, tuple[NDArray[np.float64], int]]], bool], *names: str
+    ) -> dict[str, tuple[NDArray[np.float64], int]]:
+        """Wait until the stretches of colours are as wanted, and return them."""
+        end = time.perf_counter() + PATIENCE
+        while True:
+            self.drawn()
+            found = stretches(self.page, *names)
+            if is_so(found):
+                return found
+            assert time.perf_counter() < end, found
+
     def drawn(self) -> None:
         """Wait until what was done is on the screen, and the map."""
         self.until("document.querySelector('#map').ariaLabel.includes('1 vertices')")
@@ -358,15 +371,22 @@ def colour(page: Page, name: str) -> list[int]:
 
 def stretch(page: Page, name: str) -> tuple[NDArray[np.float64], int]:
     """The middle (x, y) of what has a colour on the map, in pixels of the page, and how many."""
+    return stretches(page, name)[name]
+
+
+def stretches(page: Page, *names: str) -> dict[str, tuple[NDArray[np.float64], int]]:
+    """The same of several colours at one moment."""
     left, top, width, height = page.look(
         "(() => { const r = document.querySelector('#map').getBoundingClientRect();"
         "return [r.x, r.y, r.width, r.height].map(Math.round) })()"
     )
     picture = page.pixels().astype(int)[top : top + height, left : left + width]
-    rows, columns = np.nonzero(np.abs(picture - colour(page, name)).sum(axis=2) < 12)
-    if not len(rows):
-        return np.zeros(2), 0
-    return np.array([columns.mean() + left, rows.mean() + top]), len(rows)
+    found = {}
+    for name in names:
+        rows, columns = np.nonzero(np.abs(picture - colour(page, name)).sum(axis=2) < 12)
+        middle = np.array([columns.mean() + left, rows.mean() + top]) if len(rows) else np.zeros(2)
+        found[name] = middle, len(rows)
+    return found
 
 
 def test_the_page_decodes_what_msgpack_encodes(page: Page) -> None:
@@ -426,6 +446,52 @@ def test_the_page_shows_a_robot_on_its_map_that_can_be_moved_and_zoomed(page: Pa
             page.click("#fit")
             play.drawn()
             assert stretch(page, "robot")[0] == pytest.approx(robot, abs=4)
+
+
+def test_walls_the_way_driven_and_the_health_are_shown_as_they_change(page: Page) -> None:
+    endpoint = free_endpoint()
+    health = Health(
+        stamp=3.0,
+        uptime=125.0,
+        cycles=6000,
+        late_cycles=2,
+        slowest_cycle=0.015,
+        cpu=0.143,
+        memory=82_400_000,
+        unsent=0,
+        laser=EXAMPLE.laser,
+        base=EXAMPLE.base,
+    )
+    with web("--connect", endpoint) as address:
+        play = Play(endpoint, page)
+        with play.robot:
+            play.robot.publish(WAY)
+            play.robot.publish(health)
+            desktop(page, address)
+            for words in ("14 % of a core, 82 MB", "2 min 5 s", "2, slowest 15 ms", "all sent"):
+                play.until_read(words)
+            names = ("robot", "vertex", "trail", "wall")
+            seen = play.until_drawn(
+                lambda seen: seen["wall"][1] > 1000 and min(seen[n][1] for n in names) > 20, *names
+            )
+            robot, ahead, way, walls = (seen[name][0] for name in names)
+            scale = (ahead - robot)[0] / 3.0
+            last = math.hypot(5.0, 2.0)  # from (1, 4) to (8, 4), and then to the robot at (3, 2)
+            middle = (np.array([4.5, 4.0]) * 7.0 + np.array([5.5, 3.0]) * last) / (7.0 + last)
+            assert (way - robot) / scale == pytest.approx((middle - [3, 2]) * [1, -1], abs=0.4)
+            assert (walls - robot) / scale == pytest.approx(
+                [2.0, -0.5], abs=0.1
+            )  # the room's middle
+            squares = seen["wall"][1] / (0.5 * scale) ** 2
+            assert squares == pytest.approx(WALLS.count("#"), rel=0.15)
+            play.robot.publish(a_grid(WALLS.replace("#", "."), resolution=0.5, number=2))
+            play.until_drawn(
+                lambda seen: seen["wall"][1] < 1000 < seen["floor"][1], "wall", "floor"
+            )  # of walls remains what is written on the buttons in the same colour
+            page.click("#layer-grid")
+            play.until_drawn(
+                lambda seen: seen["floor"][1] < 1000 and seen["robot"][1] > 20, "floor", "robot"
+            )
 
 
 def test_two_fingers_zoom_on_a_phone(page: Page) -> None:
