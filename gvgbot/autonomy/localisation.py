@@ -31,6 +31,7 @@ _SEARCHED = 60  # points
 _UNLIKELY_M = 0.07  # nearer to the walls must be what is turned as far as it may be
 _SLIPPING = 25.0  # times the covariance of odometry, when the wheels slip
 _LOST = np.diag([0.5**2, 0.5**2, 0.05**2])  # of a base that nobody heard for a while
+_SEEN_SHARE = 0.3  # of the walls must be known to a robot that comes round a corner unseen
 _MOST_SHARED = 100.0  # scans that a wall can be the mean of
 _PER_M = np.diag([0.004**2, 0.004**2, 0.0001**2])  # per metre: what cells do to walls
 
@@ -104,11 +105,13 @@ class LocalMaps:
         """As `match`, where nobody saw the way that the base took: it is searched for around.
 
         Wheels tell how far it went and how much it turned, but not which of it came first. Where
-        even they are doubted, the place that agrees best is taken.
+        even they are doubted, the place that agrees best is taken. Walls where nothing is known yet
+        do not speak against a place.
         """
         prior = before.compose(self._calibration.corrected(motion, duration))
         clearly, turned = (_AT_ALL, _TURNED_RAD) if is_doubted else (_CLEARLY, 0.0)
-        best = self._best(scan, [(p, Q + _LOST) for p in _around(prior)], clearly, turned)
+        priors = [(p, Q + _LOST) for p in _around(prior)]
+        best = self._best(scan, priors, clearly, turned, least_known=_SEEN_SHARE)
         return (prior, Q + _LOST) if best is None else (best[0].pose, best[0].covariance)
 
     def _walls(self) -> tuple[Array, Array, Array]:
@@ -127,8 +130,12 @@ class LocalMaps:
         priors: list[tuple[Pose, Array]],
         clearly: float = _CLEARLY,
         turned: float = 0.0,
+        least_known: float = 1.0,
     ) -> tuple[Registration, Array] | None:
-        """The match from the first prior, unless that from another one is clearly better."""
+        """The match from the first prior, unless that from another one is clearly better.
+
+        Of the points, the share that hits what is known counts, which is taken for `least_known`.
+        """
         walls, hits, sights = self._walls()
         config = self._matching
         points = sampled(scan, config.points)
@@ -143,9 +150,15 @@ class LocalMaps:
             reach = max(config.search_rad, turned)
             near = _turned(points, tree, prior, reach) if reach else prior
             found = register_coarsely(points, tree, walls, near, Q, config, coarse, hits, sides)
-            if found is None or found.inliers < config.min_inliers:
+            if found is None:
                 continue
-            now = found.inliers * (1.0 - found.rms / config.max_pair_m)
+            inliers = found.inliers
+            if least_known < 1.0:
+                known = float(self.near.known(found.pose.transform(points)).mean())
+                inliers /= max(known, inliers, least_known)
+            if inliers < config.min_inliers:
+                continue
+            now = inliers * (1.0 - found.rms / config.max_pair_m)
             if now > agreement + clearly:
                 best, agreement = (found, Q), now
         return best

@@ -27,7 +27,8 @@ from gvgbot.autonomy.whereabouts import Whereabouts
 from gvgbot.geometry import STANDSTILL, Array, Pose
 from gvgbot.hal.messages import Odometry
 
-_LEAST = np.diag([1e-3, 1e-3, 1e-4])  # variance of a step or sighting that had to be made up
+_LEAST = np.diag([1e-5, 1e-5, 1e-6])  # variance of a step or sighting that had to be made up
+_JUMP_M = 0.5  # as no closure of a loop moves the robot
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -282,7 +283,11 @@ def _live_again(pipeline: Pipeline, grown: Growth) -> None:
 def _bridge(pipeline: Pipeline, last: Keyframe) -> None:
     """Let the last keyframe stand in for all that were lost before it."""
     if pipeline.keyframes:
-        motion = pipeline.keyframes[-1].map_base.to(last.map_base)
+        before = pipeline.keyframes[-1]
+        motion = before.local_base.to(last.local_base)  # which no closure of a loop moves
+        as_believed = before.map_base.to(last.map_base)
+        if motion.distance(as_believed) > _JUMP_M:  # another local frame, after it was lost
+            motion = as_believed
         metres = float(np.hypot(motion.x, motion.y))
         pipeline.steps.append(Step(motion, _LEAST * (1.0 + metres)))
     pipeline.keyframes.append(last)

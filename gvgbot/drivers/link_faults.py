@@ -69,6 +69,11 @@ class FaultyLink:
         self._is_plugged = True
 
     @property
+    def device(self) -> TwinDevice:
+        """The device at the other end of the link."""
+        return self._device
+
+    @property
     def counts(self) -> Counter[str]:
         """How often each kind of fault has happened."""
         return self._schedule.counts + self._damage.counts + self._lost

@@ -74,6 +74,22 @@ def test_wheels_that_slipped_in_a_turn_are_found_out_by_a_search() -> None:
     assert searched.distance(Pose(-2.0, 0.0, 0.0)) < 0.02
 
 
+def test_a_robot_that_comes_round_a_corner_unseen_is_found_by_the_walls_it_knew() -> None:
+    """Most of what it sees is new, and the wheels are wrong by some centimetres."""
+    world = carved([(-4.0, -1.0, 1.0, 1.0), (-1.0, -1.0, 1.0, 9.0)])
+    rng, local = np.random.default_rng(7), maps()
+    before, here = Pose(-1.8, 0.0, 0.0), Pose(0.0, 1.5, math.pi / 2)
+    for x in (-2.4, -2.1, -1.8):
+        seen = sweep(world, Pose(x, 0.0, 0.0), field_of_view=LASER_270, sigma=0.01, rng=rng)
+        local.insert(seen, Pose(x, 0.0, 0.0), x)
+    scan = sweep(world, here, field_of_view=LASER_270, sigma=0.01, rng=rng)
+    wheels = before.to(here).compose(Pose(0.08, -0.05, 0.01))
+    found, covariance = local.find(scan, before, wheels, 4.0, LOOSE)
+    assert found.distance(here) < 0.02
+    assert abs(found.theta - here.theta) < 0.01
+    assert covariance[0, 0] < 0.05**2
+
+
 def test_a_drive_errs_about_as_much_as_its_steps_say_together() -> None:
     """Twenty matched steps: the drift of the walls adds up, the error of a match counts once."""
     rng, noise = np.random.default_rng(6), np.diag([0.01**2, 0.005**2, 0.003**2])
