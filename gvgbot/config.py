@@ -19,6 +19,7 @@ from gvgbot.ranges import Range
 from gvgbot.recording.config import RecordingConfig
 from gvgbot.ros2.config import Ros2Config
 from gvgbot.strict_yaml import load, load_text
+from gvgbot.team.member import TeamConfig
 from gvgbot.topics import TelemetryConfig, is_robot_name
 
 DEFAULT = "sim.yaml"
@@ -75,6 +76,7 @@ class Config:
     localisation: Localisation = "full"  # paper: odometry between vertices, as it was published
     service: ServiceConfig = field(default_factory=ServiceConfig)
     telemetry: TelemetryConfig = field(default_factory=TelemetryConfig)
+    team: TeamConfig = field(default_factory=TeamConfig)
     recording: RecordingConfig = field(default_factory=RecordingConfig)
     ros2: Ros2Config = field(default_factory=Ros2Config)
     foxglove: FoxgloveConfig = field(default_factory=FoxgloveConfig)

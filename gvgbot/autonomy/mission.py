@@ -13,6 +13,7 @@ from gvgbot.autonomy.exploration.certainty import CertaintyConfig, vertex_sigma
 from gvgbot.autonomy.exploration.ears import ear_next, nearest_frontier
 from gvgbot.autonomy.exploration.obstructions import Obstructions
 from gvgbot.autonomy.exploration.paths import Approach, shortest_paths
+from gvgbot.autonomy.exploration.sharing import Sharing
 from gvgbot.autonomy.gvg.local import Branch, Place
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.slam.graph import HalfEdgeId
@@ -96,6 +97,7 @@ class Mission:
     def __init__(self, config: ExplorationConfig, mapper: Mapper) -> None:
         self._config, self._mapper = config, mapper
         self.where = Whereabouts()
+        self.sharing: Sharing | None = None  # of frontiers with other robots, if there are any
         self.target: HalfEdgeId | None = None
         self.outcome: Outcome | None = None
         self.reason = ""
@@ -216,6 +218,7 @@ class Mission:
         edge = graph.edge_at(left)
         if edge is not None:
             edge.traversals += 1
+            edge.doubted_since = None
             return
         far, near = graph.half_edge(arrived), graph.half_edge(left)
         if far is None or near is None or not (far.open and near.open):
@@ -265,6 +268,9 @@ class Mission:
         if self.target is None and self._obstructions.waiting:
             self._last_progress = view.stamp
             return Stand()
+        if self.target is None and self._waits_for_others():
+            self._last_progress = view.stamp
+            return Stand()
         if self.target is None and graph.frontiers():
             return self._wait_for_a_way(view, here)
         if self.target is None and graph.vertices:
@@ -286,20 +292,29 @@ class Mission:
             if nearest is None and self._reopen(view):
                 nearest = self._nearest(here.starts())
             if nearest is None:
-                self._finish(view)
+                if self._is_left_to_others():
+                    self._end(view, "explored", "no frontier of the team is left")
+                elif not self._waits_for_others():
+                    self._finish(view)
                 return None
             self._stranded_since = None
             chosen, reason = nearest[0], "nearest frontier"
         self._commit(view, here, chosen, reason)
         return chosen
 
-    def _reconsidered(self, view: View, here: Situation, target: HalfEdgeId) -> HalfEdgeId:
+    def _reconsidered(self, view: View, here: Situation, target: HalfEdgeId) -> HalfEdgeId | None:
         """The target, or a frontier found just now that is nearer than what is left of the way."""
         frontiers = set(self._mapper.graph.frontiers())
         found, self._frontiers = frontiers - self._frontiers, frontiers
-        if not found or self.where.on_edge == target:
+        if self.where.on_edge == target:
+            if self.sharing is not None:
+                self.sharing.enter()
             return target
         starts = here.starts()
+        if self.sharing is not None and not self.sharing.keeps(target, self._mapper.graph, starts):
+            return self._choose(view, here)
+        if not found:
+            return target
         way = shortest_paths(self._mapper.graph, starts).get(target.vertex)
         nearest = self._nearest(starts)
         if nearest is None or nearest[0].vertex not in {end.vertex for end in found}:
@@ -311,6 +326,8 @@ class Mission:
 
     def _nearest(self, starts: list[Approach]) -> tuple[HalfEdgeId, Approach] | None:
         graph, belief = self._mapper.graph, self._mapper.belief
+        if self.sharing is not None:
+            return self.sharing.choose(graph, starts)
         if self._config.policy != "balanced":
             return nearest_frontier(graph, starts)
 
@@ -319,11 +336,25 @@ class Mission:
 
         return nearest_frontier(graph, starts, handicap)
 
+    def _waits_for_others(self) -> bool:
+        """Whether other robots are on their way to every frontier that is left."""
+        return self.sharing is not None and self.sharing.is_waiting
+
+    def _is_left_to_others(self) -> bool:
+        """Whether there are frontiers, but others have followed all of them."""
+        return (
+            self.sharing is not None
+            and self.sharing.is_done
+            and not self._obstructions.waiting
+            and bool(self._mapper.graph.frontiers())
+        )
+
     def _ear(self, here: Situation) -> HalfEdgeId | None:
         """The ear rule at the end of the edge just explored."""
         graph = self._mapper.graph
         if (
             self._config.policy != "ears"
+            or self.sharing is not None
             or self.target is None
             or graph.half_edge(self.target) is None
         ):

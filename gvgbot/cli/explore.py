@@ -5,6 +5,8 @@ from pathlib import Path
 
 from gvgbot.cli.arguments import Commands, add_overrides, number, seed
 
+MOST_ROBOTS = 8
+
 
 def add_explore(commands: Commands) -> None:
     """Add `gvgbot explore`."""
@@ -29,6 +31,13 @@ def add_explore(commands: Commands) -> None:
         "own start, else 0 0 0)",
     )
     explore.add_argument("--seed", type=seed, metavar="N", help="draws all errors of the devices")
+    explore.add_argument(
+        "--robots",
+        type=robots,
+        default=1,
+        metavar="N",
+        help="so many robots explore together, 1 to 8; the others start anywhere, by the seed",
+    )
     explore.add_argument("--config", type=Path, metavar="C.yaml", help="default: sim.yaml")
     add_overrides(explore)
     explore.add_argument(
@@ -40,10 +49,24 @@ def add_explore(commands: Commands) -> None:
     explore.set_defaults(command=_explore)
 
 
+def robots(text: str) -> int:
+    """A number of robots that can explore together. Raises ValueError."""
+    value = int(text)
+    if not 1 <= value <= MOST_ROBOTS:
+        raise ValueError(text)
+    return value
+
+
 def _explore(options: argparse.Namespace) -> int:
     from gvgbot.config import load_config
 
     config = load_config(options.config, _overrides(options))
+    if options.robots > 1:
+        from gvgbot.expedition import explore_together
+
+        return explore_together(
+            config, options.robots, out=options.out, real_time=options.real_time
+        )
     from gvgbot import daemon
 
     return daemon.explore(config, out=options.out, real_time=options.real_time)

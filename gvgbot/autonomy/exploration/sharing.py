@@ -1,0 +1,27 @@
+"""What a mission asks of somebody who knows what other robots do."""
+
+from typing import Protocol
+
+from gvgbot.autonomy.exploration.paths import Approach
+from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
+
+
+class Sharing(Protocol):
+    """Shares the frontiers with other robots."""
+
+    def choose(self, graph: GvgGraph, starts: list[Approach]) -> tuple[HalfEdgeId, Approach] | None:
+        """The frontier that is worth most to this robot, and the way there; None: not one."""
+
+    def keeps(self, target: HalfEdgeId, graph: GvgGraph, starts: list[Approach]) -> bool:
+        """Whether a frontier is still worth a drive of this robot."""
+
+    def enter(self) -> None:
+        """Note that the robot has come to the frontier, and follows it."""
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether others are on their way to all that is left: it may come back to this robot."""
+
+    @property
+    def is_done(self) -> bool:
+        """Whether every frontier that this robot can reach has been followed by somebody."""

@@ -1,0 +1,255 @@
+"""Several simulated robots explore one world together; each has its own mind, devices and files."""
+
+import asyncio
+import contextlib
+import os
+import sys
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import structlog
+
+from gvgbot import __version__
+from gvgbot.autonomy.loop import Loop
+from gvgbot.clock import LoopClock, VirtualTimeLoop
+from gvgbot.config import Config
+from gvgbot.drivers.people import Walkways
+from gvgbot.errors import UsageError, WorldError
+from gvgbot.geometry import Pose
+from gvgbot.hal.guard import Guard
+from gvgbot.hal.messages import Odometry
+from gvgbot.links import Devices, Links
+from gvgbot.maps import geojson
+from gvgbot.maps.merging import merged
+from gvgbot.maps.picture import draw_map
+from gvgbot.maps.route_graph import RouteGraph
+from gvgbot.maps.run_directory import RunDirectory
+from gvgbot.report import world_files
+from gvgbot.service import set_up_logging
+from gvgbot.session import Session
+from gvgbot.simulation import Place, Simulation, open_place
+from gvgbot.team.chart import chart_of
+from gvgbot.team.member import Member
+from gvgbot.team.news import decode, encode
+
+log = structlog.get_logger()
+
+
+_APART_M = 2.0  # between two starts, at least
+_TRIES = 1000  # to draw a start
+
+
+def explore_together(config: Config, count: int, *, out: Path | None, real_time: bool) -> int:
+    """Explore a simulated world with several robots, print where the map is; the exit status.
+
+    Raises UsageError for a world or directory that cannot be used.
+    """
+    set_up_logging(sys.stderr, os.environ, "warning")
+    place = open_place(config)
+    if place.walkways is not None:
+        raise UsageError("several robots do not go among people yet: --set twin.people=0")
+    places = [replace(place, start=start) for start in _starts(config, place, count)]
+    with contextlib.ExitStack() as stack:
+        directory = stack.enter_context(RunDirectory.create(out, world=place.world.name))
+        robots = [
+            _Robot.made(stack, config, number, one, directory.path)
+            for number, one in enumerate(places)
+        ]
+        try:
+            factory = None if real_time else VirtualTimeLoop
+            with asyncio.Runner(loop_factory=factory) as runner:
+                runner.run(_explore(robots))
+        finally:
+            for robot in robots:
+                robot.session.save()
+            joined = _save(directory, robots)
+    return _conclude(directory, robots, joined)
+
+
+def _starts(config: Config, place: Place, count: int) -> list[Pose]:
+    """Where the robots start: the first one where it would alone, the others by the seed.
+
+    Raises WorldError if there is no room.
+    """
+    rng = np.random.default_rng(np.random.SeedSequence([config.twin.seed, count]))
+    free, starts = Walkways(place.world, place.start).points, [place.start]
+    for _ in range(_TRIES):
+        if len(starts) == count:
+            return starts
+        x, y = free[rng.integers(len(free))].tolist()
+        start = Pose(x, y, float(rng.uniform(-np.pi, np.pi)))
+        if all(start.distance(other) >= _APART_M for other in starts):
+            starts.append(start)
+    raise WorldError(f"world {place.world.name}: no room for {count} robots; take fewer")
+
+
+@dataclass(slots=True, eq=False)
+class _Robot:
+    session: Session
+    member: Member
+    told: float = float("-inf")  # stamp
+
+    @classmethod
+    def made(
+        cls, stack: contextlib.ExitStack, config: Config, number: int, place: Place, out: Path
+    ) -> "_Robot":
+        """A robot with a name, errors and a run directory of its own."""
+        name = f"robot-{number + 1}"
+        seeds = np.random.SeedSequence(config.twin.seed).generate_state(number + 1)
+        seed = config.twin.seed if number == 0 else int(seeds[number])
+        config = replace(
+            config,
+            robot=replace(config.robot, name=name),
+            twin=replace(
+                config.twin, seed=seed, start=(place.start.x, place.start.y, place.start.theta)
+            ),
+        )
+        directory = stack.enter_context(RunDirectory.create(out / name, world=name))
+        session = Session(config, directory, place)
+        mapper = session.pipeline.mapper
+        member = Member(name, config.team, lambda: chart_of(mapper.graph, mapper.belief))
+        session.pipeline.mission.sharing = member
+        return cls(session, member)
+
+
+async def _explore(robots: list[_Robot]) -> None:
+    """Let all of them explore until each has an outcome, or there is no more time."""
+    clock = LoopClock()
+    simulations = [Simulation(r.session.config, _place(r.session), clock) for r in robots]
+    for robot, simulation in zip(robots, simulations, strict=True):
+        robot.session.simulation = simulation
+        simulation.meet(other for other in simulations if other is not simulation)
+    async with asyncio.TaskGroup() as tasks:
+        for robot in robots:
+            tasks.create_task(_live(robot, robots, clock), name=robot.member.name)
+
+
+def _place(session: Session) -> Place:
+    assert session.place is not None
+    return session.place
+
+
+async def _live(robot: _Robot, robots: list[_Robot], clock: LoopClock) -> None:
+    """One robot's exploration; it stands in the world, and tells the others, until all are done."""
+    session = robot.session
+    devices = Devices(Links(session.config, clock, session.simulation, session.tap))
+    config = session.config.robot
+    loop = Loop(
+        devices.laser,
+        devices.base,
+        session.pipeline,
+        Guard(config.limits, config.radius_m),
+        on_events=session.on_events,
+        on_cycle=partial(_on_cycle, robot, robots, devices),
+        log=None,
+    )
+    limit = session.config.twin.time_limit_s
+    async with asyncio.TaskGroup() as tasks:
+        serving = tasks.create_task(devices.run(), name="devices")
+        try:
+            async with asyncio.timeout(limit):
+                await loop.run()
+        except TimeoutError:
+            session.failure = devices.away or f"not explored after {limit:g} s"
+        _tell(robot, robots, clock.now())
+        serving.cancel()
+
+
+def _on_cycle(robot: _Robot, robots: list[_Robot], devices: Devices, odometry: Odometry) -> None:
+    robot.session.on_cycle(odometry, devices.base.contact)
+    if odometry.stamp >= robot.told + robot.session.config.team.tell_every_s:
+        _tell(robot, robots, odometry.stamp)
+        robot.member.look(odometry.stamp)
+        for met in robot.member.met:
+            log.info("maps joined", robot=robot.member.name, other=met.robot)
+
+
+def _tell(robot: _Robot, robots: list[_Robot], stamp: float) -> None:
+    """Let the others hear the news, as bytes."""
+    robot.told = stamp
+    pipeline = robot.session.pipeline
+    is_over = pipeline.mission.outcome is not None or robot.session.failure is not None
+    data = encode(robot.member.news(stamp, pipeline.map_base, 0.0, finished=is_over))
+    for other in robots:
+        if other is not robot:
+            other.member.hear(decode(data), stamp)
+
+
+def _save(directory: RunDirectory, robots: list[_Robot]) -> list[_Robot]:
+    """Write the map of all whose maps could be joined to the first one's; which these are."""
+    first = robots[0]
+    graph = _graph(first)
+    joined, frames = [first], first.member.frames
+    poses = {first.member.name: Pose()}
+    for robot in robots[1:]:
+        pose = frames.get(robot.member.name)
+        if pose is not None:
+            graph, poses[robot.member.name] = merged(graph, _graph(robot), pose)
+            joined.append(robot)
+    world = _place(first.session).world
+    files = world_files(world)
+    files["map.geojson"] = geojson.encode(graph)
+    files["map.png"] = draw_map(graph, title=world.name)
+    directory.write(files)
+    directory.write_summary(_summary(robots, joined, poses, graph))
+    return joined
+
+
+def _graph(robot: _Robot) -> RouteGraph:
+    path = robot.session.directory.path / "map.geojson"
+    return geojson.decode(path.read_text(encoding="utf-8"))
+
+
+def _summary(
+    robots: list[_Robot], joined: list[_Robot], poses: dict[str, Pose], graph: RouteGraph
+) -> dict[str, object]:
+    missions = [robot.session.pipeline.mission for robot in robots]
+    outcomes = [mission.outcome or "failed" for mission in missions]
+    everything = all(outcome == "explored" for outcome in outcomes)
+    durations = [_duration(robot) for robot in robots]
+    return {
+        "outcome": "explored" if everything else next(o for o in outcomes if o != "explored"),
+        "reason": "; ".join(
+            f"{r.member.name}: {m.reason or r.session.failure or 'stopped from outside'}"
+            for r, m in zip(robots, missions, strict=True)
+        ),
+        "robots": [robot.member.name for robot in robots],
+        "joined": [robot.member.name for robot in joined],
+        "frames": {name: (pose.x, pose.y, pose.theta) for name, pose in poses.items()},
+        "distance_m": sum(robot.session.pipeline.travelled for robot in robots),
+        "duration_s": max(durations),
+        "durations_s": durations,
+        "vertices": len(graph.vertices),
+        "edges": len(graph.edges),
+        "contacts": sum(robot.session.contacts for robot in robots),
+        "seed": robots[0].session.config.twin.seed,
+        "version": __version__,
+    }
+
+
+def _duration(robot: _Robot) -> float:
+    tally = robot.session.tally
+    return tally.last_stamp - (tally.first_stamp or 0.0)
+
+
+def _conclude(directory: RunDirectory, robots: list[_Robot], joined: list[_Robot]) -> int:
+    """Print the outcome and where the map is; the exit status."""
+    is_explored = True
+    for robot in robots:
+        mission = robot.session.pipeline.mission
+        is_explored &= mission.outcome == "explored"
+        _say(
+            f"{robot.member.name}: {mission.outcome or 'failed'}: "
+            f"{mission.reason or robot.session.failure}; "
+            f"{robot.session.pipeline.travelled:.0f} m driven in {_duration(robot):.0f} s"
+        )
+    _say(f"maps joined: {len(joined)} of {len(robots)}")
+    _say(f"map:     {directory.path / 'map.geojson'}")
+    _say(f"picture: {directory.path / 'map.png'}")
+    return 0 if is_explored else 1
+
+
+def _say(text: str) -> None:
+    sys.stdout.write(text + "\n")

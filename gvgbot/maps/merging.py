@@ -1,0 +1,207 @@
+"""Maps of one building by several robots, laid on each other as one route graph.
+
+Each map holds what one robot has measured, and only that, so they are independent but for the
+frame that they are laid into. Where two know the same vertex its place is their covariance
+intersection: never surer than it may be, whatever the two have in common.
+"""
+
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+from scipy.spatial.distance import cdist
+
+from gvgbot.geometry import Array, Pose, wrap_angle
+from gvgbot.maps.moved import moved_graph
+from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
+
+_SAME_M = 0.6  # vertices nearer to each other are one
+_SAME_RAD = 0.7  # departures nearer to each other are one
+_ON_EDGE_M = 0.4  # from an edge, a vertex that the edge's own map does not know splits it
+_FROM_ENDS_M = 0.8  # but not so near to its ends
+_BESIDE_M = 1.0  # edges between the same vertices that stay nearer to each other are one
+_AHEAD_M = 0.8  # along an edge, its direction is taken
+_FITS = 5  # rounds of pairing and fitting
+_SHARES = np.linspace(0.02, 0.98, 25)  # of the first covariance in an intersection
+
+
+def merged(ours: RouteGraph, theirs: RouteGraph, pose: Pose) -> tuple[RouteGraph, Pose]:
+    """Both maps as one, in the frame of the first, and where the other's frame lies in it.
+
+    `pose` says where that is about, to less than half a metre all over the map.
+    """
+    pose = _fitted(ours, theirs, pose)
+    theirs = moved_graph(theirs, pose)
+    pairs = _pairs(ours, theirs)
+    free_id = max((vertex.id for vertex in ours.vertices), default=-1) + 1
+    names = {theirs.vertices[j].id: ours.vertices[i].id for i, j in pairs}
+    lone = [vertex for vertex in theirs.vertices if vertex.id not in names]
+    names |= {vertex.id: free_id + k for k, vertex in enumerate(lone)}
+    new = [replace(vertex, id=names[vertex.id]) for vertex in lone]
+    known = {ours.vertices[i].id for i, _ in pairs}
+    edges = list(_split(ours.edges, new))
+    others = [replace(e, start=names[e.start], end=names[e.end]) for e in theirs.edges]
+    for edge in _split(others, [v for v in ours.vertices if v.id not in known]):
+        if not any(_is_same(edge, other) for other in edges):
+            edges.append(edge)
+    partner = {ours.vertices[i].id: theirs.vertices[j] for i, j in pairs}
+    vertices = [
+        _fused(vertex, partner[vertex.id]) if vertex.id in partner else vertex
+        for vertex in ours.vertices
+    ]
+    leaving = _directions(edges)
+    return RouteGraph(
+        tuple(_settled(vertex, leaving.get(vertex.id, [])) for vertex in (*vertices, *new)),
+        tuple(_anchored(edge, vertices + new) for edge in edges),
+    ), pose
+
+
+def _fitted(ours: RouteGraph, theirs: RouteGraph, pose: Pose) -> Pose:
+    """The pose that lays the vertices that both have on each other best."""
+    for _ in range(_FITS):
+        pairs = _pairs(ours, moved_graph(theirs, pose))
+        if len(pairs) < 2:
+            break
+        a = np.array([complex(*ours.vertices[i].position) for i, _ in pairs])
+        b = np.array([complex(*theirs.vertices[j].position) for _, j in pairs])
+        turn = np.vdot(b - b.mean(), a - a.mean())
+        shift = a.mean() - b.mean() * turn / (abs(turn) or 1.0)
+        pose = Pose(float(shift.real), float(shift.imag), float(np.angle(turn)))
+    return pose
+
+
+def _pairs(ours: RouteGraph, theirs: RouteGraph) -> list[tuple[int, int]]:
+    """Indices of the vertices that both have."""
+    a, b = (np.array([v.position for v in g.vertices]).reshape(-1, 2) for g in (ours, theirs))
+    away = np.minimum(cdist(a, b), _SAME_M)
+    rows, columns = linear_sum_assignment(away)
+    pairs = zip(rows.tolist(), columns.tolist(), strict=True)
+    return [(i, j) for i, j in pairs if away[i, j] < _SAME_M]
+
+
+def _fused(ours: MapVertex, theirs: MapVertex) -> MapVertex:
+    """One vertex of two, with the departures of both."""
+    position, covariance = covariance_intersection(
+        np.array(ours.position), _matrix(ours), np.array(theirs.position), _matrix(theirs)
+    )
+    bearings = list(ours.bearings)
+    bearings += [b for b in theirs.bearings if not _is_among(b, ours.bearings)]
+    frontiers = [
+        *(f for f in ours.frontiers if not _is_followed(f, theirs)),
+        *(f for f in theirs.frontiers if not _is_among(f, ours.bearings)),
+    ]
+    x, y = position.tolist()
+    xx, xy, yx, yy = covariance.ravel().tolist()
+    return replace(
+        ours,
+        kind="meetpoint" if len(bearings) > 1 else "endpoint",
+        position=(x, y),
+        covariance=(xx, xy, yx, yy),
+        degree=len(bearings),
+        bearings=tuple(bearings),
+        frontiers=tuple(frontiers),
+        visits=ours.visits + theirs.visits,
+    )
+
+
+def covariance_intersection(a: Array, of_a: Array, b: Array, of_b: Array) -> tuple[Array, Array]:
+    """Means (2,) and covariances (2, 2) as one that is consistent, whatever they have in common.
+
+    Of all mixtures of both informations the one with the least determinant.
+    """
+    inverse_a, inverse_b = np.linalg.inv(_regular(of_a)), np.linalg.inv(_regular(of_b))
+    mixtures = (np.linalg.inv(w * inverse_a + (1 - w) * inverse_b) for w in _SHARES)
+    best, w = min(zip(mixtures, _SHARES, strict=True), key=lambda m: float(np.linalg.det(m[0])))
+    mean: Array = best @ (w * inverse_a @ a + (1 - w) * inverse_b @ b)
+    return mean, np.asarray(best)
+
+
+def _regular(covariance: Array) -> Array:
+    """The start of a map is where it is by definition, and certain only in its own frame."""
+    return np.asarray(covariance + 1e-6 * np.eye(2))
+
+
+def _matrix(vertex: MapVertex) -> Array:
+    return np.array(vertex.covariance).reshape(2, 2)
+
+
+def _is_among(bearing: float, bearings: Iterable[float]) -> bool:
+    return any(abs(wrap_angle(bearing - other)) < _SAME_RAD for other in bearings)
+
+
+def _is_followed(bearing: float, vertex: MapVertex) -> bool:
+    """Whether a vertex has an edge in a direction."""
+    return _is_among(bearing, [b for b in vertex.bearings if b not in vertex.frontiers])
+
+
+def _split(edges: Iterable[MapEdge], vertices: list[MapVertex]) -> Iterable[MapEdge]:
+    """The edges, cut where vertices lie on them that their map does not know."""
+    for edge in edges:
+        line = edge.polyline
+        along = np.concatenate([[0.0], np.hypot(*np.diff(line, axis=0).T).cumsum()])
+        cuts = []
+        for vertex in vertices:
+            away = np.hypot(*(line - vertex.position).T)
+            i = int(np.argmin(away))
+            inside = _FROM_ENDS_M < along[i] < along[-1] - _FROM_ENDS_M
+            if away[i] < _ON_EDGE_M and inside:
+                cuts.append((i, vertex.id))
+        start, first = edge.start, 0
+        for i, middle in sorted(cuts):
+            if i > first:
+                yield _piece(edge, start, middle, first, i, along)
+                start, first = middle, i
+        yield _piece(edge, start, edge.end, first, len(line) - 1, along)
+
+
+def _piece(edge: MapEdge, start: int, end: int, first: int, last: int, along: Array) -> MapEdge:
+    if (first, last) == (0, len(along) - 1):
+        return edge
+    share = float((along[last] - along[first]) / max(along[-1], 1e-9))
+    line = edge.polyline[first : last + 1].copy()
+    return replace(edge, start=start, end=end, polyline=line, length=share * edge.length)
+
+
+def _is_same(edge: MapEdge, other: MapEdge) -> bool:
+    """Whether two edges join the same vertices by the same way."""
+    if {edge.start, edge.end} != {other.start, other.end}:
+        return False
+    away = cdist(edge.polyline, other.polyline)
+    return float(max(away.min(axis=0).max(), away.min(axis=1).max())) < _BESIDE_M
+
+
+def _directions(edges: list[MapEdge]) -> dict[int, list[float]]:
+    """The bearings by which edges leave each vertex."""
+    found: dict[int, list[float]] = {}
+    for edge in edges:
+        for vertex, line in ((edge.start, edge.polyline), (edge.end, edge.polyline[::-1])):
+            along = np.concatenate([[0.0], np.hypot(*np.diff(line, axis=0).T).cumsum()])
+            i = min(int(np.searchsorted(along, _AHEAD_M)), len(line) - 1)
+            dx, dy = line[max(i, 1)] - line[0]
+            found.setdefault(vertex, []).append(math.atan2(dy, dx))
+    return found
+
+
+def _settled(vertex: MapVertex, leaving: list[float]) -> MapVertex:
+    """A vertex whose frontiers are those that no edge of either map follows."""
+    frontiers = tuple(f for f in vertex.frontiers if not _is_among(f, leaving))
+    bearings = vertex.bearings + tuple(d for d in leaving if not _is_among(d, vertex.bearings))
+    return replace(
+        vertex,
+        frontiers=frontiers,
+        bearings=bearings,
+        degree=len(bearings),
+        kind="meetpoint" if len(bearings) > 1 else "endpoint",
+    )
+
+
+def _anchored(edge: MapEdge, vertices: list[MapVertex]) -> MapEdge:
+    """The edge, bent so that it ends on its vertices."""
+    places = {vertex.id: np.array(vertex.position) for vertex in vertices}
+    line = edge.polyline
+    along = np.concatenate([[0.0], np.hypot(*np.diff(line, axis=0).T).cumsum()])
+    share = (along / max(along[-1], 1e-9))[:, None]
+    off = (1 - share) * (places[edge.start] - line[0]) + share * (places[edge.end] - line[-1])
+    return replace(edge, polyline=line + off)

@@ -1,0 +1,267 @@
+"""One robot of a team: what it has heard of the others, and which frontier is its own.
+
+Every robot decides for itself by what it knows; there is nobody who assigns work. Its filter and
+its graph hold only what it has measured itself. What the others have found tells it where not to
+go, and which of its own frontiers leads to where nobody has been.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated
+
+from gvgbot.autonomy.exploration.paths import Approach, shortest_paths
+from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
+from gvgbot.geometry import Pose
+from gvgbot.ranges import Range
+from gvgbot.team.alignment import Alignment, align, refined
+from gvgbot.team.chart import Chart, moved
+from gvgbot.team.news import Claim, Frame, News, told_edges, told_vertices
+from gvgbot.team.site import Frontier, Site
+
+_TAKES_OVER_M = 2.0  # nearer to a frontier than who claims it, one takes it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TeamConfig:
+    """Exploring together with other robots."""
+
+    enabled: bool = False  # true: tell the others, and listen to them
+    tell_every_s: Annotated[float, Range(0.2, 60.0)] = 2.0  # of one's own map
+    align_every_s: Annotated[float, Range(1.0, 600.0)] = (
+        15.0  # laying the maps of two on each other
+    )
+    # silence after which a robot counts as lost; what it was about to do is free for others
+    lost_after_s: Annotated[float, Range(1.0, 600.0)] = 10.0
+
+
+@dataclass(slots=True, eq=False)
+class _Mate:
+    """Another robot, as it was last heard."""
+
+    news: News
+    chart: Chart
+    heard: float  # stamp of the own clock
+    alignment: Alignment | None = None
+    tried: float = float("-inf")  # stamp of the last attempt to align
+    sizes: tuple[int, ...] = ()  # of both charts then
+
+
+@dataclass(frozen=True, slots=True)
+class Met:
+    """Another robot's map was laid onto the own one."""
+
+    robot: str
+    alignment: Alignment
+
+
+class Member:
+    """Takes part in a team; the `Sharing` of a mission."""
+
+    def __init__(
+        self, name: str, config: TeamConfig, tell: Callable[[], Chart], life: int = 0
+    ) -> None:
+        """`tell` makes the own chart."""
+        self.name, self._config, self._life = name, config, life
+        self._own_chart = tell
+        self._chart = Chart()
+        self._mates: dict[str, _Mate] = {}
+        self._site: Site | None = None
+        self._claim: Claim | None = None
+        self._claimed_end: HalfEdgeId | None = None
+        self._stamp = 0.0
+        self._sequence = 0
+        self._others_claim_all = self._nothing_left = False
+        self.met: list[Met] = []  # lately; whoever tells of it takes it out
+
+    # -- what is told and heard --------------------------------------------------------------------
+
+    def news(self, stamp: float, map_base: Pose, speed: float, *, finished: bool) -> News:
+        """What to tell the others now."""
+        self._stamp = stamp
+        self._chart = self._own_chart()
+        self._site = None
+        self._sequence += 1
+        if finished:
+            self._claim = None
+        frames = tuple(
+            Frame(name, (pose.x, pose.y, pose.theta))
+            for name, pose in sorted(self._direct().items())
+        )
+        return News(
+            robot=self.name,
+            life=self._life,
+            sequence=self._sequence,
+            stamp=stamp,
+            pose=(map_base.x, map_base.y, map_base.theta),
+            speed=speed,
+            claim=self._claim,
+            finished=finished,
+            frames=frames,
+            vertices=told_vertices(self._chart),
+            edges=told_edges(self._chart),
+        )
+
+    def hear(self, news: News, stamp: float) -> None:
+        """Take in what another one tells."""
+        self._stamp = max(self._stamp, stamp)
+        if news.robot == self.name:
+            return
+        mate = self._mates.get(news.robot)
+        if mate is None or mate.news.life != news.life:
+            self._mates[news.robot] = _Mate(news, news.chart, stamp)
+        elif news.sequence > mate.news.sequence:
+            mate.news, mate.chart, mate.heard = news, news.chart, stamp
+        self._site = None
+
+    def look(self, stamp: float) -> None:
+        """Try to lay the maps of others onto the own one, where that is due."""
+        self._stamp = max(self._stamp, stamp)
+        for name, mate in sorted(self._mates.items()):
+            sizes = tuple(
+                len(part)
+                for chart in (self._chart, mate.chart)
+                for part in (chart.vertices, chart.edges)
+            )
+            if stamp - mate.tried < self._config.align_every_s or sizes == mate.sizes:
+                continue
+            mate.tried, mate.sizes = stamp, sizes
+            before = mate.alignment
+            if before is None:
+                mate.alignment = align(self._chart, mate.chart)
+                if mate.alignment is not None:
+                    self.met.append(Met(name, mate.alignment))
+            else:
+                mate.alignment = refined(self._chart, mate.chart, before)
+            self._site = None
+
+    def _direct(self) -> dict[str, Pose]:
+        """Poses of the frames that were found, in the own one."""
+        return {
+            name: mate.alignment.pose
+            for name, mate in self._mates.items()
+            if mate.alignment is not None
+        }
+
+    @property
+    def frames(self) -> dict[str, Pose]:
+        """Poses of all known frames in the own one: found, or told by one whose frame is known."""
+        known = {self.name: Pose()} | self._direct()
+        waiting = sorted(self._direct())
+        while waiting:
+            name = waiting.pop(0)
+            for frame in self._mates[name].news.frames if name in self._mates else ():
+                if frame.robot not in known:
+                    known[frame.robot] = known[name].compose(Pose(*frame.pose))
+                    waiting.append(frame.robot)
+        del known[self.name]
+        return {name: pose for name, pose in known.items() if name in self._mates}
+
+    def is_lost(self, name: str) -> bool:
+        """Whether nothing has been heard of a robot for long."""
+        return self._stamp - self._mates[name].heard > self._config.lost_after_s
+
+    def others(self) -> dict[str, Pose]:
+        """Where the others are, own map frame: those that are heard and whose frame is known."""
+        return {
+            name: pose.compose(Pose(*self._mates[name].news.pose))
+            for name, pose in self.frames.items()
+            if not self.is_lost(name)
+        }
+
+    # -- which frontier is whose -------------------------------------------------------------------
+
+    def choose(self, graph: GvgGraph, starts: list[Approach]) -> tuple[HalfEdgeId, Approach] | None:
+        """The frontier that nobody else is nearer to, by the shortest way; see `Sharing`."""
+        reached = shortest_paths(graph, starts)
+        site = self._current_site()
+        metres = {vertex: way.metres for vertex, way in reached.items()}
+        costs = {
+            frontier: (cost, end)
+            for frontier, (cost, end) in site.costs(metres).items()
+            if (half := graph.half_edge(end)) is not None and half.open
+        }
+        claims = self._claims()
+        mine = [
+            (cost, end, frontier)
+            for frontier, (cost, end) in costs.items()
+            if not self._is_taken(frontier, cost, claims)
+        ]
+        others_drive = any(not self._mates[name].news.finished for name in self.others())
+        may_come = others_drive and any(site.open.values())
+        self._nothing_left = bool(reached) and not costs and not may_come
+        self._others_claim_all = bool(reached) and not mine and (bool(costs) or may_come)
+        if not mine:
+            self._claim = self._claimed_end = None
+            return None
+        cost, end, frontier = min(mine, key=lambda one: (one[0], one[1]))
+        self._claim = Claim(frontier.x, frontier.y, frontier.bearing, cost)
+        self._claimed_end = end
+        return end, reached[end.vertex]
+
+    def _is_taken(self, frontier: Frontier, cost: float, claims: list[tuple[str, Claim]]) -> bool:
+        """Whether another robot is on its way to a frontier, and not much farther from it."""
+        for name, claim in claims:
+            if frontier.is_at(claim.x, claim.y, claim.bearing):
+                lead = 0.0 if self._claim is not None and self._is_claimed(frontier) else 1.0
+                mine, theirs = cost + lead * _TAKES_OVER_M, claim.metres
+                if (theirs, name) < (mine, self.name):
+                    return True
+        return False
+
+    def _is_claimed(self, frontier: Frontier) -> bool:
+        claim = self._claim
+        return claim is not None and frontier.is_at(claim.x, claim.y, claim.bearing)
+
+    def _claims(self) -> list[tuple[str, Claim]]:
+        """What others are on their way to, own map frame."""
+        found = []
+        for name, pose in sorted(self.frames.items()):
+            claim = self._mates[name].news.claim
+            if claim is None or self.is_lost(name):
+                continue
+            there = pose.compose(Pose(claim.x, claim.y, claim.bearing))
+            found.append((name, _claim_at(claim, there)))
+        return found
+
+    def keeps(self, target: HalfEdgeId, graph: GvgGraph, starts: list[Approach]) -> bool:
+        """Whether the target is still what it was chosen for; see `Sharing`."""
+        claim = self._claim
+        if target != self._claimed_end or claim is None:
+            return True
+        site = self._current_site()
+        frontier = next(
+            (f for many in site.open.values() for f in many if self._is_claimed(f)), None
+        )
+        if frontier is None:
+            return False
+        metres = {vertex: way.metres for vertex, way in shortest_paths(graph, starts).items()}
+        cost, _ = site.costs(metres).get(frontier, (claim.metres, target))
+        self._claim = Claim(claim.x, claim.y, claim.bearing, cost)
+        return not self._is_taken(frontier, cost, self._claims())
+
+    def enter(self) -> None:
+        """Note that the robot is on the edge that it claims: nobody is nearer."""
+        if self._claim is not None:
+            self._claim = Claim(self._claim.x, self._claim.y, self._claim.bearing, 0.0)
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether others are on their way to all that is left; see `Sharing`."""
+        return self._others_claim_all
+
+    @property
+    def is_done(self) -> bool:
+        """Whether nothing is left that this robot could go to; see `Sharing`."""
+        return self._nothing_left
+
+    def _current_site(self) -> Site:
+        if self._site is None:
+            charts = [self._own_chart()]
+            charts += [moved(self._mates[n].chart, pose) for n, pose in self.frames.items()]
+            self._site = Site(charts)
+        return self._site
+
+
+def _claim_at(claim: Claim, there: Pose) -> Claim:
+    """The claim at another place."""
+    return Claim(there.x, there.y, there.theta, claim.metres)

@@ -1,0 +1,149 @@
+"""What robots of a team tell each other: all of it each time, so that any message may be lost."""
+
+import msgspec
+import numpy as np
+
+from gvgbot.autonomy.slam.graph import HalfEdgeId
+from gvgbot.errors import GvgbotError
+from gvgbot.geometry import Array
+from gvgbot.team.chart import Chart, ChartEdge, ChartVertex, Departure
+
+_WALL_M = 0.01  # unit of the walls around a vertex, as they travel
+
+
+class TeamVertex(msgspec.Struct, frozen=True, array_like=True):
+    """A vertex of a chart."""
+
+    id: int
+    position: tuple[float, float]  # m, the robot's map frame
+    covariance: tuple[float, float, float, float]  # of the position, 2x2 row-major, m^2
+    clearance: float  # m
+    departures: tuple[tuple[int, float, int | None, bool], ...]  # key, bearing, edge, blocked
+    walls: bytes  # little-endian int16 pairs x, y, cm, from the vertex
+
+
+class TeamEdge(msgspec.Struct, frozen=True, array_like=True):
+    """An edge of a chart."""
+
+    id: int
+    a: tuple[int, int]  # vertex, key
+    b: tuple[int, int]
+    length: float  # m
+    min_clearance: float  # m
+    points: bytes  # little-endian float32 pairs x, y, m, map frame
+
+
+class Claim(msgspec.Struct, frozen=True, array_like=True):
+    """A frontier that a robot is on its way to, and the metres that are left of the way."""
+
+    x: float  # m, the robot's map frame
+    y: float
+    bearing: float  # rad
+    metres: float
+
+
+class Frame(msgspec.Struct, frozen=True, array_like=True):
+    """Where the map frame of another robot lies in one's own, m and rad."""
+
+    robot: str
+    pose: tuple[float, float, float]
+
+
+class News(msgspec.Struct, frozen=True, kw_only=True):
+    """All that a robot tells its team."""
+
+    robot: str
+    life: int  # another one after a restart: the map frame is a new one
+    sequence: int
+    stamp: float  # s, the robot's own clock
+    pose: tuple[float, float, float]  # map_base
+    speed: float  # m/s
+    claim: Claim | None
+    finished: bool  # it does not drive any more
+    frames: tuple[Frame, ...]
+    vertices: tuple[TeamVertex, ...]
+    edges: tuple[TeamEdge, ...]
+
+    @property
+    def chart(self) -> Chart:
+        """Its graph, in its map frame."""
+        return Chart(
+            {vertex.id: _vertex(vertex) for vertex in self.vertices},
+            {edge.id: _edge(edge) for edge in self.edges},
+        )
+
+
+def encode(news: News) -> bytes:
+    """The news in MessagePack."""
+    return msgspec.msgpack.encode(news)
+
+
+def decode(data: bytes) -> News:
+    """What `encode` wrote. Raises GvgbotError if it is damaged, or does not hang together."""
+    try:
+        news = msgspec.msgpack.decode(data, type=News)
+        chart = news.chart
+    except (msgspec.MsgspecError, ValueError) as error:
+        raise GvgbotError(f"damaged news of a team: {error}") from error
+    for edge in chart.edges.values():
+        for end in (edge.a, edge.b):
+            vertex = chart.vertices.get(end.vertex)
+            if vertex is None or all(d.key != end.key for d in vertex.departures):
+                raise GvgbotError(f"damaged news of a team: edge {edge.id} ends nowhere")
+    if any(
+        departure.edge is not None and departure.edge not in chart.edges
+        for vertex in chart.vertices.values()
+        for departure in vertex.departures
+    ):
+        raise GvgbotError("damaged news of a team: a departure has an edge that is not told")
+    return news
+
+
+def told_vertices(chart: Chart) -> tuple[TeamVertex, ...]:
+    """The vertices of a chart as they travel."""
+    return tuple(_told_vertex(vertex) for vertex in chart.vertices.values())
+
+
+def told_edges(chart: Chart) -> tuple[TeamEdge, ...]:
+    """The edges of a chart as they travel."""
+    return tuple(
+        TeamEdge(
+            edge.id,
+            (edge.a.vertex, edge.a.key),
+            (edge.b.vertex, edge.b.key),
+            edge.length,
+            edge.min_clearance,
+            edge.polyline.astype("<f4").tobytes(),
+        )
+        for edge in chart.edges.values()
+    )
+
+
+def _told_vertex(vertex: ChartVertex) -> TeamVertex:
+    x, y = vertex.position.tolist()
+    xx, xy, yx, yy = vertex.covariance.ravel().tolist()
+    walls = np.rint((vertex.walls - vertex.position) / _WALL_M).astype("<i2").tobytes()
+    departures = tuple((d.key, d.bearing, d.edge, d.blocked) for d in vertex.departures)
+    return TeamVertex(vertex.id, (x, y), (xx, xy, yx, yy), vertex.clearance, departures, walls)
+
+
+def _vertex(told: TeamVertex) -> ChartVertex:
+    position = np.array(told.position)
+    walls = position + _WALL_M * np.frombuffer(told.walls, "<i2").reshape(-1, 2)
+    return ChartVertex(
+        told.id,
+        position,
+        np.array(told.covariance).reshape(2, 2),
+        told.clearance,
+        tuple(Departure(*departure) for departure in told.departures),
+        walls,
+    )
+
+
+def _edge(told: TeamEdge) -> ChartEdge:
+    line: Array = np.frombuffer(told.points, "<f4").reshape(-1, 2).astype(np.float64)
+    if len(line) < 2 or not np.isfinite(line).all():
+        raise ValueError(f"edge {told.id} has no line")
+    return ChartEdge(
+        told.id, HalfEdgeId(*told.a), HalfEdgeId(*told.b), told.length, told.min_clearance, line
+    )

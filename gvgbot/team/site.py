@@ -1,0 +1,187 @@
+"""The building as a team knows it: charts laid on each other, what is still open, and ways there.
+
+Vertices of different charts that stand at one place are one. A departure is open only as long as
+nobody has followed it, or seen where it leads.
+"""
+
+import heapq
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+from scipy.spatial.distance import cdist
+
+from gvgbot.autonomy.slam.graph import HalfEdgeId
+from gvgbot.geometry import Array, wrap_angle
+from gvgbot.team.chart import Chart, Departure
+
+_SAME_M = 0.6  # vertices nearer to each other are one
+_SAME_RAD = 0.7  # departures nearer to each other are one
+_ON_EDGE_M = 0.45  # from an edge, a vertex of another chart lies on it
+_AHEAD_M = 0.8  # along an edge, its direction is taken
+
+End = tuple[int, HalfEdgeId]  # a chart's index and a half-edge of it
+
+
+@dataclass(frozen=True, slots=True)
+class Frontier:
+    """A departure that nobody has followed: the place it leaves from, m, and its bearing, rad."""
+
+    x: float
+    y: float
+    bearing: float
+
+    def is_at(self, x: float, y: float, bearing: float) -> bool:
+        """Whether another frontier is this one."""
+        away = math.hypot(self.x - x, self.y - y)
+        return away < 2 * _SAME_M and abs(wrap_angle(self.bearing - bearing)) < _SAME_RAD
+
+
+@dataclass(frozen=True, slots=True)
+class Onward:
+    """What another robot has found behind a departure: the vertex there, and how far it is."""
+
+    place: int
+    metres: float
+
+
+class Site:
+    """Charts in one frame, the own one first."""
+
+    def __init__(self, charts: list[Chart]) -> None:
+        self._charts = charts
+        self._place: dict[tuple[int, int], int] = {}  # chart and vertex -> place
+        self._members: list[dict[int, int]] = []  # by place: chart -> vertex
+        self._points: list[Array] = []
+        for number, chart in enumerate(charts):
+            self._lay(number, chart)
+        self._links: dict[int, list[tuple[int, float]]] = {}
+        for number, chart in enumerate(charts):
+            for edge in chart.edges.values():
+                a, b = (self._place[number, end.vertex] for end in (edge.a, edge.b))
+                self._links.setdefault(a, []).append((b, edge.length))
+                self._links.setdefault(b, []).append((a, edge.length))
+        self.open: dict[int, list[Frontier]] = {}  # by place
+        self.onward: dict[HalfEdgeId, Onward] = {}  # behind own departures, by what others know
+        self.own: dict[HalfEdgeId, Frontier] = {}  # own departures that nobody has followed
+        for number, chart in enumerate(charts):
+            for vertex in chart.vertices.values():
+                for departure in vertex.departures:
+                    if departure.edge is None:
+                        self._judge(number, HalfEdgeId(vertex.id, departure.key), departure)
+
+    def _lay(self, number: int, chart: Chart) -> None:
+        """Let vertices of one more chart be at known places, or at new ones."""
+        ids = list(chart.vertices)
+        points = np.array([chart.vertices[i].position for i in ids]).reshape(-1, 2)
+        if ids and self._points:
+            away = np.minimum(cdist(points, np.array(self._points)), _SAME_M)
+            rows, places = linear_sum_assignment(away)
+            for row, place in zip(rows.tolist(), places.tolist(), strict=True):
+                if away[row, place] < _SAME_M:
+                    self._place[number, ids[row]] = place
+                    self._members[place][number] = ids[row]
+        for i, point in zip(ids, points, strict=True):
+            if (number, i) not in self._place:
+                self._place[number, i] = len(self._points)
+                self._points.append(point)
+                self._members.append({number: i})
+
+    def _judge(self, number: int, end: HalfEdgeId, departure: Departure) -> None:
+        """Find out whether a departure without an edge has one in another chart."""
+        place = self._place[number, end.vertex]
+        known = self._followed(number, end.vertex, departure.bearing)
+        if number == 0 and known is not None:
+            self.onward[end] = known
+        if known is not None or (departure.blocked and number > 0):
+            return
+        x, y = self._points[place]
+        frontier = Frontier(float(x), float(y), departure.bearing)
+        same = [f for f in self.open.get(place, []) if f.is_at(x, y, departure.bearing)]
+        if not same:
+            self.open.setdefault(place, []).append(frontier)
+        if number == 0:
+            self.own[end] = same[0] if same else frontier
+
+    def _followed(self, number: int, vertex: int, bearing: float) -> Onward | None:
+        """What another chart has behind a departure."""
+        place = self._place[number, vertex]
+        for other, chart in enumerate(self._charts):
+            if other == number:
+                continue
+            known = self._members[place].get(other)
+            if known is not None:
+                found = self._behind(other, known, bearing)
+            else:
+                found = self._along(other, chart, self._points[place], bearing)
+            if found is not None:
+                return found
+        return None
+
+    def _behind(self, number: int, vertex: int, bearing: float) -> Onward | None:
+        """Behind the departure of a chart's vertex that leaves in a direction."""
+        chart = self._charts[number]
+        departures = chart.vertices[vertex].departures
+        nearest = min(departures, key=lambda d: abs(wrap_angle(d.bearing - bearing)), default=None)
+        if nearest is None or nearest.edge is None:
+            return None
+        if abs(wrap_angle(nearest.bearing - bearing)) > _SAME_RAD:
+            return None
+        edge = chart.edges[nearest.edge]
+        far = edge.b if edge.a == (vertex, nearest.key) else edge.a
+        return Onward(self._place[number, far.vertex], edge.length)
+
+    def _along(self, number: int, chart: Chart, point: Array, bearing: float) -> Onward | None:
+        """Along the edge of a chart that passes a point in a direction."""
+        for edge in chart.edges.values():
+            away = np.hypot(*(edge.polyline - point).T)
+            i = int(np.argmin(away))
+            if away[i] > _ON_EDGE_M:
+                continue
+            for end, line in ((edge.b, edge.polyline[i:]), (edge.a, edge.polyline[i::-1])):
+                along = np.concatenate([[0.0], np.hypot(*np.diff(line, axis=0).T).cumsum()])
+                if along[-1] < _AHEAD_M:
+                    continue
+                dx, dy = line[int(np.searchsorted(along, _AHEAD_M))] - line[0]
+                if abs(wrap_angle(math.atan2(dy, dx) - bearing)) < _SAME_RAD:
+                    return Onward(self._place[number, end.vertex], float(along[-1]))
+        return None
+
+    def costs(self, reached: dict[int, float]) -> dict[Frontier, tuple[float, HalfEdgeId]]:
+        """The way to every open frontier, m, and the own departure to take for it.
+
+        `reached` has the ways to own vertices. From a departure that others have followed it goes
+        on over the edges of all.
+        """
+        best: dict[Frontier, tuple[float, HalfEdgeId]] = {}
+        queue: list[tuple[float, int, HalfEdgeId]] = []
+        for end, frontier in self.own.items():
+            if end.vertex in reached:
+                _improve(best, frontier, reached[end.vertex], end)
+        for end, onward in self.onward.items():
+            if end.vertex in reached:
+                queue.append((reached[end.vertex] + onward.metres, onward.place, end))
+        heapq.heapify(queue)
+        done: set[int] = set()
+        while queue:
+            metres, place, end = heapq.heappop(queue)
+            if place in done:
+                continue
+            done.add(place)
+            for frontier in self.open.get(place, []):
+                _improve(best, frontier, metres, end)
+            for other, length in self._links.get(place, []):
+                if other not in done:
+                    heapq.heappush(queue, (metres + length, other, end))
+        return best
+
+
+def _improve(
+    best: dict[Frontier, tuple[float, HalfEdgeId]],
+    frontier: Frontier,
+    metres: float,
+    end: HalfEdgeId,
+) -> None:
+    if frontier not in best or (metres, end) < best[frontier]:
+        best[frontier] = metres, end

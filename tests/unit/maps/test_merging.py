@@ -1,0 +1,133 @@
+"""Halves of a known map make the whole; fused places are never surer than they may be."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gvgbot.geometry import Pose
+from gvgbot.maps.merging import covariance_intersection, merged
+from gvgbot.maps.moved import moved_graph
+from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
+
+PLACES = {
+    0: (0.0, 0.0),
+    1: (6.0, 0.0),
+    2: (13.0, 0.0),
+    3: (0.0, 5.0),
+    4: (6.0, 5.0),
+    5: (13.0, 5.0),
+}
+CORRIDORS = ((0, 1), (1, 2), (3, 4), (4, 5), (0, 3), (1, 4), (2, 5))
+FRAME = Pose(4.0, -3.0, 2.0)
+
+
+def seen(vertices: set[int], shift: int = 0) -> RouteGraph:
+    """What a robot knows that has been at some places; ids moved by `shift`."""
+    edges = [(a, b) for a, b in CORRIDORS if a in vertices and b in vertices]
+    return RouteGraph(
+        tuple(vertex(v, vertices, shift) for v in sorted(vertices)),
+        tuple(
+            MapEdge(
+                start=a + shift,
+                end=b + shift,
+                polyline=np.linspace(PLACES[a], PLACES[b], 30),
+                length=math.dist(PLACES[a], PLACES[b]),
+                min_clearance=0.8,
+            )
+            for a, b in edges
+        ),
+    )
+
+
+def vertex(v: int, vertices: set[int], shift: int) -> MapVertex:
+    far = [b if a == v else a for a, b in CORRIDORS if v in (a, b)]
+    bearing = {f: math.atan2(PLACES[f][1] - PLACES[v][1], PLACES[f][0] - PLACES[v][0]) for f in far}
+    return MapVertex(
+        id=v + shift,
+        kind="meetpoint",
+        position=PLACES[v],
+        degree=len(far),
+        bearings=tuple(bearing.values()),
+        clearance=0.8,
+        covariance=(0.01, 0.0, 0.0, 0.01),
+        frontiers=tuple(b for f, b in bearing.items() if f not in vertices),
+    )
+
+
+@pytest.mark.parametrize("off", [Pose(), Pose(0.2, -0.1, 0.02)])
+def test_two_halves_that_overlap_make_the_whole(off: Pose) -> None:
+    left, right = seen({0, 1, 3, 4}), seen({1, 2, 4, 5}, shift=40)
+    told = moved_graph(right, FRAME.inverse())
+    whole, pose = merged(left, told, off.compose(FRAME))
+    assert pose.distance(FRAME) < 1e-6
+    assert len(whole.vertices) == 6
+    assert len(whole.edges) == len(CORRIDORS)
+    assert not any(v.frontiers for v in whole.vertices)
+    assert sorted(v.degree for v in whole.vertices) == [2, 2, 2, 2, 3, 3]
+    places = np.array([v.position for v in whole.vertices])
+    for true in PLACES.values():
+        assert np.hypot(*(places - true).T).min() < 1e-6
+
+
+def test_what_nobody_followed_stays_a_frontier() -> None:
+    whole, _ = merged(seen({0, 1, 3}), seen({1, 3, 4}, shift=10), Pose())
+    at = {v.position: v for v in whole.vertices}
+    assert len(at[6.0, 0.0].frontiers) == 1  # to place 2
+    assert len(at[6.0, 5.0].frontiers) == 1  # to place 5
+    assert not at[0.0, 0.0].frontiers
+    assert len(whole.edges) == 4
+
+
+def test_a_vertex_that_one_map_lacks_splits_its_edge() -> None:
+    without = RouteGraph(
+        tuple(v for v in seen(set(PLACES)).vertices if v.id in (0, 2)),
+        (
+            MapEdge(
+                start=0,
+                end=2,
+                polyline=np.linspace(PLACES[0], PLACES[2], 60),
+                length=13.0,
+                min_clearance=0.8,
+            ),
+        ),
+    )
+    whole, _ = merged(without, seen({0, 1, 4, 2}, shift=10), Pose())
+    ends = {frozenset((e.start, e.end)) for e in whole.edges}
+    place = {v.id: (round(v.position[0], 6), round(v.position[1], 6)) for v in whole.vertices}
+    assert {frozenset(place[i] for i in pair) for pair in ends} == {
+        frozenset({PLACES[0], PLACES[1]}),
+        frozenset({PLACES[1], PLACES[2]}),
+        frozenset({PLACES[1], PLACES[4]}),
+    }
+    assert sum(e.length for e in whole.edges) == pytest.approx(13.0 + 5.0, abs=0.3)
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+def test_an_intersection_is_consistent_whatever_both_have_in_common(seed: int) -> None:
+    """For two estimates with any cross covariance, the fused error is no larger than it says."""
+    rng = np.random.default_rng(seed)
+    joint = rng.normal(size=(4, 4))
+    joint = joint @ joint.T + 0.01 * np.eye(4)
+    of_a, of_b, cross = joint[:2, :2], joint[2:, 2:], joint[:2, 2:]
+    a, b = rng.normal(size=2), rng.normal(size=2)
+    mean, covariance = covariance_intersection(a, of_a, b, of_b)
+    zero, _ = covariance_intersection(np.zeros(2), of_a, np.zeros(2), of_b)
+    np.testing.assert_allclose(zero, 0.0, atol=1e-9)
+    gain_a = np.stack(
+        [covariance_intersection(e, of_a, np.zeros(2), of_b)[0] for e in np.eye(2)], axis=1
+    )
+    gain_b = np.stack(
+        [covariance_intersection(np.zeros(2), of_a, e, of_b)[0] for e in np.eye(2)], axis=1
+    )
+    np.testing.assert_allclose(gain_a @ a + gain_b @ b, mean, atol=1e-6)
+    np.testing.assert_allclose(gain_a + gain_b, np.eye(2), atol=1e-6)  # unbiased
+    true = (
+        gain_a @ of_a @ gain_a.T
+        + gain_b @ of_b @ gain_b.T
+        + gain_a @ cross @ gain_b.T
+        + gain_b @ cross.T @ gain_a.T
+    )
+    assert np.linalg.eigvalsh(covariance - true).min() > -1e-4

@@ -1,0 +1,73 @@
+import math
+
+import numpy as np
+import pytest
+
+from gvgbot.geometry import Pose, wrap_angle
+from gvgbot.team.alignment import align, refined
+from tests.unit.team.building import irregular, lattice
+
+STARTS = Pose(3.0, -2.0, 0.7), Pose(11.0, 6.0, -2.4)
+LEFT, RIGHT = {0, 1, 2, 3, 5, 6, 7, 8, 10, 11, 12, 13}, {1, 2, 3, 4, 6, 7, 8, 9, 11, 12, 13, 14}
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_two_charts_that_share_enough_of_a_building_are_laid_on_each_other(seed: int) -> None:
+    building, rng = irregular(seed), np.random.default_rng(seed)
+    ours, theirs = (
+        building.chart(seen, start, rng) for seen, start in zip((LEFT, RIGHT), STARTS, strict=True)
+    )
+    found = align(ours, theirs)
+    assert found is not None
+    true = STARTS[0].to(STARTS[1])
+    middle = np.array([6.0, 2.0])
+    assert np.hypot(*(found.pose.transform(middle) - true.transform(middle))) < 0.1
+    assert abs(wrap_angle(found.pose.theta - true.theta)) < 0.01
+    assert all(ours_id == theirs_id for ours_id, theirs_id in found.pairs)
+    assert found.confidence >= 0.995
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_charts_of_different_buildings_are_not_joined(seed: int) -> None:
+    everything = set(range(20))
+    ours = irregular(seed).chart(everything, STARTS[0])
+    theirs = irregular(seed + 10).chart(everything, STARTS[1])
+    assert align(ours, theirs) is None
+
+
+@pytest.mark.parametrize("shift", [0, 1, 5])
+def test_a_building_that_repeats_itself_is_never_joined(shift: int) -> None:
+    """However much both have seen, each block of a grid may be any other."""
+    grid = lattice(6.0 * np.arange(5), 6.0 * np.arange(4))
+    seen = {0, 1, 2, 3, 5, 6, 7, 8, 10, 11, 12, 13}
+    theirs = {v + shift for v in seen}
+    assert align(grid.chart(seen, STARTS[0]), grid.chart(theirs, STARTS[1])) is None
+
+
+def test_charts_that_share_nothing_are_not_joined() -> None:
+    building = irregular(4)
+    ours = building.chart({0, 1, 5, 6, 10, 11, 15, 16}, STARTS[0])
+    theirs = building.chart({3, 4, 8, 9, 13, 14, 18, 19}, STARTS[1])
+    assert align(ours, theirs) is None
+
+
+def test_an_alignment_that_the_charts_no_longer_bear_out_is_taken_back() -> None:
+    building = irregular(1)
+    ours, theirs = building.chart(LEFT, STARTS[0]), building.chart(RIGHT, STARTS[1])
+    found = align(ours, theirs)
+    assert found is not None
+    assert refined(ours, theirs, found) is not None
+    elsewhere = irregular(12).chart(RIGHT, STARTS[1])
+    assert refined(ours, elsewhere, found) is None
+
+
+def test_the_covariance_of_a_frame_grows_with_how_far_apart_the_charts_stay() -> None:
+    building = irregular(2)
+    exact = align(building.chart(LEFT, Pose()), building.chart(RIGHT, Pose()))
+    blurred = align(
+        building.chart(LEFT, Pose(), np.random.default_rng(1)),
+        building.chart(RIGHT, Pose(), np.random.default_rng(2)),
+    )
+    assert exact is not None
+    assert blurred is not None
+    assert math.sqrt(np.trace(blurred.covariance)) > math.sqrt(np.trace(exact.covariance))

@@ -1,0 +1,68 @@
+import msgspec
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gvgbot.errors import GvgbotError
+from gvgbot.geometry import Pose
+from gvgbot.team.chart import Chart
+from gvgbot.team.news import Claim, Frame, News, decode, encode, told_edges, told_vertices
+from tests.unit.team.building import irregular
+
+CHART = irregular(1).chart({0, 1, 2, 5, 6, 7}, Pose(3.0, -2.0, 0.7))
+
+
+def news(chart: Chart) -> News:
+    return News(
+        robot="one",
+        life=3,
+        sequence=7,
+        stamp=12.5,
+        pose=(1.0, 2.0, 0.5),
+        speed=0.3,
+        claim=Claim(1.0, 2.0, 0.1, 12.0),
+        finished=False,
+        frames=(Frame("two", (4.0, 5.0, 0.6)),),
+        vertices=told_vertices(chart),
+        edges=told_edges(chart),
+    )
+
+
+def test_a_chart_arrives_as_it_was_to_the_centimetre() -> None:
+    heard = decode(encode(news(CHART)))
+    assert heard.claim == Claim(1.0, 2.0, 0.1, 12.0)
+    assert heard.frames == (Frame("two", (4.0, 5.0, 0.6)),)
+    chart = heard.chart
+    assert chart.vertices.keys() == CHART.vertices.keys()
+    for key, vertex in CHART.vertices.items():
+        other = chart.vertices[key]
+        assert other.departures == vertex.departures
+        np.testing.assert_array_equal(other.position, vertex.position)
+        np.testing.assert_array_equal(other.covariance, vertex.covariance)
+        np.testing.assert_allclose(other.walls, vertex.walls, atol=0.0051)
+    for key, edge in CHART.edges.items():
+        assert (chart.edges[key].a, chart.edges[key].b) == (edge.a, edge.b)
+        np.testing.assert_allclose(chart.edges[key].polyline, edge.polyline, atol=1e-5)
+
+
+@given(data=st.data())
+def test_damaged_news_are_refused_or_whole(data: st.DataObject) -> None:
+    told = bytearray(encode(news(CHART)))
+    at = data.draw(st.integers(0, len(told) - 1))
+    told[at] = data.draw(st.integers(0, 255))
+    try:
+        heard = decode(bytes(told))
+    except GvgbotError:
+        return
+    ends = {end.vertex for e in heard.chart.edges.values() for end in (e.a, e.b)}
+    assert ends <= heard.chart.vertices.keys()
+
+
+def test_an_edge_that_ends_nowhere_is_refused() -> None:
+    told = news(CHART)
+    lost = told.edges[0].a[0]
+    others = tuple(vertex for vertex in told.vertices if vertex.id != lost)
+    damaged = msgspec.structs.replace(told, vertices=others)
+    with pytest.raises(GvgbotError, match="ends nowhere"):
+        decode(encode(damaged))

@@ -1,0 +1,66 @@
+import math
+
+import networkx as nx  # type: ignore[import-untyped]
+import numpy as np
+import pytest
+
+from gvgbot.geometry import Pose
+from gvgbot.team.site import Site
+from tests.unit.team.building import Building, irregular, lattice
+
+HERE = Pose()
+
+
+def test_what_another_robot_has_followed_is_no_frontier() -> None:
+    row = lattice(np.array([0.0, 5.0, 11.0, 18.0]), np.array([0.0, 6.0]))
+    ours, theirs = {0, 1, 4, 5}, {1, 2, 5, 6}
+    site = Site([row.chart(ours, HERE), row.chart(theirs, HERE)])
+    places = {(round(f.x), round(f.y)) for many in site.open.values() for f in many}
+    assert places == {(11, 0), (11, 6)}  # only beyond what either has seen
+    assert {end.vertex for end in site.onward} == {1, 5}
+    assert not site.own
+
+
+def test_alone_every_departure_without_an_edge_is_open() -> None:
+    building = irregular(3)
+    chart = building.chart({0, 1, 5, 6}, HERE)
+    expected = {
+        (v.id, d.key) for v in chart.vertices.values() for d in v.departures if d.edge is None
+    }
+    assert {tuple(end) for end in Site([chart]).own} == expected
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_ways_to_frontiers_are_shortest_over_what_all_know(seed: int) -> None:
+    building = irregular(seed)
+    left, right = {0, 1, 2, 5, 6, 7, 10, 11, 12}, {2, 3, 7, 8, 12, 13}
+    site = Site([building.chart(left, HERE), building.chart(right, HERE)])
+    graph = nx.Graph()
+    for a, b in building.corridors:
+        if {a, b} <= left or {a, b} <= right:
+            graph.add_edge(a, b, weight=math.dist(building.places[a], building.places[b]))
+    start = 6
+    known_alone = graph.edge_subgraph([e for e in graph.edges if set(e) <= left])
+    reached = nx.single_source_dijkstra_path_length(known_alone, start)
+    everywhere = nx.single_source_dijkstra_path_length(graph, start)
+    costs = site.costs(reached)
+    for many in site.open.values():
+        for frontier in many:
+            place = int(np.argmin(np.hypot(*(building.places - (frontier.x, frontier.y)).T)))
+            if place in everywhere:
+                assert costs[frontier][0] == pytest.approx(everywhere[place], abs=1e-6)
+            else:
+                assert frontier not in costs
+
+
+def test_a_vertex_that_only_one_robot_knows_lies_on_the_edge_of_the_other() -> None:
+    """One has seen a side way in the middle of what the other knows as one corridor."""
+    places = np.array([(0.0, 0.0), (6.0, 0.0), (12.0, 0.0), (6.0, 5.0)])
+    with_side = Building(places, ((0, 1), (1, 2), (1, 3)))
+    straight = Building(places, ((0, 2),))
+    site = Site([with_side.chart({1}, HERE), straight.chart({0, 2}, HERE)])
+    (frontier,) = (f for many in site.open.values() for f in many)
+    assert frontier.bearing == pytest.approx(math.pi / 2)
+    assert sorted(onward.metres for onward in site.onward.values()) == pytest.approx(
+        [6.0, 6.0], abs=0.2
+    )
