@@ -112,6 +112,24 @@ with Telemetry(TelemetryConfig(listen=(sys.argv[1],)), "far") as robot:
         time.sleep(0.1)
 """
 
+STUCK = """
+import select, sys
+from gvgbot.telemetry import Telemetry
+from gvgbot.topics import TelemetryConfig
+from tests.unit.test_telemetry import EXAMPLE
+with Telemetry(TelemetryConfig(listen=(sys.argv[1],)), "far") as robot:
+    while not select.select([sys.stdin], [], [], 0.1)[0]:
+        robot.publish(EXAMPLE)
+    sum(range(10**12))  # one call, during which no other Python runs
+"""
+WATCHER = """
+import sys
+from gvgbot import client
+with client.connect("near", sys.argv[1]) as robot:
+    for known in robot.map():
+        print(known.stamp, flush=True)
+"""
+
 
 def until(is_so: Callable[[], bool], *, patience_s: float = PATIENCE) -> float:
     """Wait until something is so; the seconds that took."""
@@ -430,6 +448,46 @@ def test_a_robot_that_is_frozen_is_noticed(endpoint: str) -> None:
         until(lambda: seen.presence.word in ("quiet", "gone"), patience_s=3.0)
         process.send_signal(signal.SIGCONT)
         until(lambda: seen.presence.word == "alive")
+
+
+def test_a_program_that_hangs_is_quiet_and_not_gone_until_it_is(endpoint: str) -> None:
+    """The network's own threads live on in it, and hold its token."""
+    command = [sys.executable, "-c", STUCK, endpoint]
+    with subprocess.Popen(command, stdin=subprocess.PIPE) as process:
+        try:
+            with client.connect("far", endpoint, patience_s=40.0) as seen:
+                until(lambda: seen.presence.word == "alive")
+                assert process.stdin is not None
+                process.stdin.write(b"\n")
+                process.stdin.flush()
+                until(lambda: seen.presence.word == "quiet")
+                lease = TelemetryConfig().lease_s
+                until(lambda: seen.presence.for_s > 2.5 * lease)  # longer than the dead are there
+                assert seen.presence.word == "quiet"
+                process.kill()
+                until(lambda: seen.presence.word == "gone", patience_s=3.0)
+        finally:
+            process.kill()
+
+
+def test_the_last_map_arrives_though_a_stalled_link_has_dropped_it(endpoint: str) -> None:
+    command = [sys.executable, "-c", WATCHER, endpoint]
+    line = np.random.default_rng(1).uniform(0.0, 9.0, 30_000).astype("<f4").tobytes()
+    big = msgspec.structs.replace(A_MAP, edges=(MapEdge(start=4, end=4, length=2.0, points=line),))
+    with a_robot(endpoint) as robot, subprocess.Popen(command, stdout=subprocess.PIPE) as watcher:
+        try:
+            robot.publish(A_MAP)
+            assert watcher.stdout is not None
+            assert watcher.stdout.readline() == b"3.0\n"
+            watcher.send_signal(signal.SIGSTOP)
+            for _ in range(300):  # 36 MB, more than a link holds
+                robot.publish(big)
+            robot.publish(msgspec.structs.replace(A_MAP, stamp=9.0))
+            watcher.send_signal(signal.SIGCONT)
+            while watcher.stdout.readline() != b"9.0\n":
+                pass
+        finally:
+            watcher.kill()
 
 
 def test_a_router_in_between_may_come_and_go(endpoint: str) -> None:
