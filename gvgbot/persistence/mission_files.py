@@ -32,6 +32,7 @@ class MissionFiles:
         self._snapshot = directory / SNAPSHOT
         self._before = directory / SNAPSHOT_BEFORE
         self._end: int | None = None  # of what is whole in the journal; None: not begun
+        self._is_whole = True  # the newest snapshot, as far as that is known
 
     @property
     def is_begun(self) -> bool:
@@ -70,6 +71,7 @@ class MissionFiles:
                 continue
             except Damaged as error:
                 trouble = trouble or Damaged(f"{path}: {error}")
+                self._is_whole = self._is_whole and path != self._snapshot
         if trouble is not None:
             raise trouble
         return None
@@ -120,10 +122,12 @@ class MissionFiles:
     def save(self, snapshot: bytes) -> None:
         """Replace the snapshot (MessagePack) at once; the old one stays beside it.
 
-        Raises OSError; then the old ones stand.
+        One that was found damaged does not take the place of the whole one before it. Raises
+        OSError; then the old ones stand.
         """
         content = record(packed(Header("gvgbot snapshot", VERSION))) + record(snapshot)
-        _replace(self._snapshot, content, keep=self._before)
+        _replace(self._snapshot, content, keep=self._before if self._is_whole else None)
+        self._is_whole = True
 
 
 def _two_records(path: Path) -> tuple[bytes, bytes]:

@@ -201,3 +201,18 @@ def test_what_cannot_be_written_is_an_error_and_no_loss(
     mishap(path)
     with pytest.raises(OSError, match="journal"):
         files.append(batch(5), sync=True)
+
+
+def test_a_damaged_snapshot_does_not_push_out_the_whole_one_before_it(tmp_path: Path) -> None:
+    written(tmp_path)
+    newest = tmp_path / SNAPSHOT
+    newest.write_bytes(newest.read_bytes()[:-5])
+    again = MissionFiles(tmp_path)
+    saved = again.read()
+    assert saved is not None
+    assert saved.memory.travelled == 3.0
+    again.save(snapshot(5.0))
+    newest.write_bytes(newest.read_bytes()[:-5])
+    saved = MissionFiles(tmp_path).read()
+    assert saved is not None
+    assert saved.memory.travelled == 3.0
