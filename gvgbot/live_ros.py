@@ -1,7 +1,7 @@
 """What neighbours that speak the messages of ROS 2 are told while the robot moves."""
 
 import time
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from functools import partial
 from typing import Protocol
 
@@ -21,10 +21,10 @@ from gvgbot.ros2.topics import Topic
 from gvgbot.ros2.translation import BASE, LASER, MAP, ODOM
 from gvgbot.ros_markers import markers
 
-MAP_EVERY = 2.0  # s at least between two maps
+MAP_EVERY = 5.0  # s at least between two maps, which travel whole
 _CLOCK_SET_S = 0.005  # a larger change of the computer's clock is followed
 
-Drawn = Callable[[float], tuple[Message, Message]]  # map and markers, given a stamp
+Drawn = Callable[[float], Mapping[Topic, Message]]  # map and markers, given a stamp
 OffLoop = Callable[[Callable[[], None]], Awaitable[None]]
 
 
@@ -93,7 +93,7 @@ class LiveRos:
             self._send(topics.ODOM, translation.odometry(odometry, stamp, pose, twist), stamp)
         if self._is_wanted(topics.TF):
             frames = {(ODOM, BASE): odometry.odom_base}
-            if self._pipeline.keyframes:
+            if self._pipeline.keyframes and not self._pipeline.is_lost:
                 map_odom = self._pipeline.map_base.compose(odometry.odom_base.inverse())
                 frames[MAP, ODOM] = map_odom
             self._send(topics.TF, translation.transforms(stamp, frames), stamp)
@@ -107,7 +107,7 @@ class LiveRos:
         return None if work is None else partial(self._send_map, work, self._unix(stamp))
 
     def _send_map(self, work: Drawn, stamp: float) -> None:
-        for topic, message in zip((topics.MAP, topics.MARKERS), work(stamp), strict=True):
+        for topic, message in work(stamp).items():
             self._send(topic, message, stamp)
 
     async def keep_shown(self, clock: Clock, off_loop: OffLoop) -> None:
@@ -148,13 +148,17 @@ class _Drawing:
 
     def _drawn(
         self, new: Sequence[Keyframe], graph: RouteGraph, stamp: float
-    ) -> tuple[Message, Message]:
-        for keyframe in new:
-            if keyframe.scan is not None:
-                self._grid.add(keyframe.map_base, keyframe.scan)
-        grid = self._grid.grid()
-        drawn = translation.occupancy_grid(grid.cells, grid.resolution_m, grid.origin, stamp)
-        return drawn, markers(graph, stamp)
+    ) -> Mapping[Topic, Message]:
+        drawn: dict[Topic, Message] = {topics.MARKERS: markers(graph, stamp)}
+        scans = [(keyframe.map_base, keyframe.scan) for keyframe in new if keyframe.scan]
+        for map_base, scan in scans:
+            self._grid.add(map_base, scan)
+        if scans:
+            grid = self._grid.grid()
+            drawn[topics.MAP] = translation.occupancy_grid(
+                grid.cells, grid.resolution_m, grid.origin, stamp
+            )
+        return drawn
 
 
 class _Drift:

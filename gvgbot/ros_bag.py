@@ -19,13 +19,12 @@ from gvgbot.autonomy.loop import Cycle
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.errors import GvgbotError, UsageError
 from gvgbot.hal.messages import Scan
-from gvgbot.live_ros import LiveRos
+from gvgbot.live_ros import MAP_EVERY, LiveRos
 from gvgbot.replay import Log, Wanted, open_log
 from gvgbot.ros2.cdr import definition
 from gvgbot.ros2.topics import Topic
 
 _VERSION: Final = 9  # of the format, as Iron and later write it
-_MAP_EVERY_S = 5.0  # maps are large
 _FOR_EVER = QosTime(9_223_372_036, 854_775_807)
 
 
@@ -70,7 +69,7 @@ def _play(log: Log, bag: "_Bag", *, sensors_only: bool) -> None:
                 live.on_odometry(message.odometry)
         if at >= due:
             _draw(live, at)
-            due = at + _MAP_EVERY_S
+            due = at + MAP_EVERY
     _draw(live, at)
 
 

@@ -39,8 +39,9 @@ class Heard:
         self.got[topic].append(STORE.deserialize_cdr(data, topic.message.ros_name))
 
 
-def live(heard: Heard, map_base: Pose | None = None) -> LiveRos:
-    mind = SimpleNamespace(keyframes=[] if map_base is None else [object()], map_base=map_base)
+def live(heard: Heard, map_base: Pose | None = None, *, is_lost: bool = False) -> LiveRos:
+    keyframes = [] if map_base is None else [object()]
+    mind = SimpleNamespace(keyframes=keyframes, map_base=map_base, is_lost=is_lost)
     return LiveRos([heard], cast(Pipeline, mind), NOISE, lambda stamp: stamp + LATER)
 
 
@@ -85,6 +86,13 @@ def test_transforms_lead_from_the_map_to_the_base() -> None:
 def test_before_it_knows_anything_the_robot_is_nowhere_in_the_map() -> None:
     heard = Heard(topics.TF)
     live(heard).on_odometry(Odometry(1.0, Pose(), Twist()))
+    (message,) = heard.got[topics.TF]
+    assert [t.child_frame_id for t in message.transforms] == ["base_link"]
+
+
+def test_a_robot_that_is_lost_claims_no_place_in_the_map() -> None:
+    heard = Heard(topics.TF)
+    live(heard, Pose(3.0, 4.0, 0.0), is_lost=True).on_odometry(Odometry(1.0, Pose(), Twist()))
     (message,) = heard.got[topics.TF]
     assert [t.child_frame_id for t in message.transforms] == ["base_link"]
 
@@ -151,7 +159,7 @@ def test_the_covariance_is_that_of_many_robots_that_err_as_the_noise_says() -> N
 
 def test_a_grid_lies_where_its_corner_is() -> None:
     cells = np.array([[0, 100, -1], [50, 0, -1]], np.int8)
-    told = STORE.deserialize_cdr(
+    told: Any = STORE.deserialize_cdr(
         encode(occupancy_grid(cells, 0.05, (-1.0, 2.0), 7.5)), "nav_msgs/msg/OccupancyGrid"
     )
     assert told.data.tolist() == [0, 100, -1, 50, 0, -1]  # row-major from the origin
@@ -179,7 +187,7 @@ def test_markers_show_vertices_edges_and_frontiers() -> None:
     line = np.array([[0.0, 1.0], [2.0, 1.5], [4.0, 1.0]])
     edge = MapEdge(start=1, end=2, polyline=line, length=4.1, min_clearance=0.5)
     ends = (vertex(1, 0.0, "meetpoint", (math.pi / 2,)), vertex(2, 4.0, "meetpoint"))
-    told = STORE.deserialize_cdr(
+    told: Any = STORE.deserialize_cdr(
         encode(markers(RouteGraph(ends, (edge,)), 7.5)), "visualization_msgs/msg/MarkerArray"
     )
     drawn = {marker.ns: marker for marker in told.markers}
