@@ -2,18 +2,23 @@
 
     python -m benchmarks.explore_table [--worlds office floor_plan:7 PATH.yaml:X:Y:THETA ...]
         [--seeds 1 2 3] [--plans N] [--lasers UTM-30LX URG-04LX] [--rough] [--people N]
-        [--set key=value ...] [--jobs N] [--out DIR]
+        [--set key=value ...] [--jobs N | --scheduler tcp://HOST:8786] [--out DIR]
 
 Each world is explored with each seed and each laser, then each of the floor plans 1 to N, with its
 own number as seed. Runs are scored against the true GVG of their worlds (benchmarks.score_run). DIR
 keeps the run directories and a line for each in results.jsonl. A run that is in there already is
 shown, but not run again unless it crashed: take another DIR when the program has changed.
 
+With --scheduler the runs are shared out on a Dask cluster (`pip install 'gvgbot[cluster]'`), whose
+workers are started in this directory of their machines: `dask worker tcp://HOST:8786 --nthreads 1`.
+Rows come back here; run directories stay where they were made, unless DIR is on a common disk.
+
 A run fails if it did not explore all, touched something or could not be scored. The exit status is
 0 only if no run failed.
 """
 
 import argparse
+import importlib
 import json
 import os
 import re
@@ -22,7 +27,8 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from concurrent.futures import Executor, ThreadPoolExecutor, as_completed
+from contextlib import contextmanager
 from pathlib import Path
 from statistics import fmean, median
 from typing import Any
@@ -68,9 +74,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     print(HEAD)
     rows = []
     try:
-        for row in _rows(commands(options), out, options.jobs):
-            rows.append(row)
-            print(line(row), flush=True)
+        with executor(options.jobs, options.scheduler) as pool:
+            for row in _rows(commands(options), out, pool):
+                rows.append(row)
+                print(line(row), flush=True)
     except KeyboardInterrupt:
         print(f"interrupted; --out {out} goes on from here", file=sys.stderr)
         return INTERRUPTED
@@ -92,6 +99,7 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     )
     parser.add_argument("--set", dest="overrides", nargs="+", default=[])
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--scheduler", help="of a Dask cluster, as tcp://HOST:PORT")
     parser.add_argument("--out", type=Path, help="default: a new directory in runs/")
     return parser.parse_args(arguments)
 
@@ -129,14 +137,33 @@ def _command(world: str, seed: int, settings: list[str]) -> Command:
     return "explore", *place, *(word for item in settings for word in ("--set", item))
 
 
-def _rows(wanted: list[Command], out: Path, jobs: int) -> Iterator[Row]:
+@contextmanager
+def executor(jobs: int, scheduler: str | None) -> Iterator[Executor]:
+    """What runs work: threads here, as many as `jobs`, or the workers of a Dask cluster."""
+    if scheduler is None:
+        with ThreadPoolExecutor(jobs) as pool:
+            yield pool
+        return
+    try:
+        distributed = importlib.import_module("distributed")
+    except ImportError:
+        raise SystemExit("--scheduler needs pip install 'gvgbot[cluster]'") from None
+    try:
+        client = distributed.Client(scheduler)
+    except (OSError, ValueError) as error:
+        raise SystemExit(f"no scheduler at {scheduler}: {error}") from None
+    with client, client.get_executor(pure=False) as workers:
+        yield workers
+
+
+def _rows(wanted: list[Command], out: Path, pool: Executor) -> Iterator[Row]:
     """The results that are in `out`, then the others as they come; each is kept at once."""
     results = out / RESULTS
     results.touch()
     known = [json.loads(text) for text in results.read_text(encoding="utf-8").splitlines()]
     kept = {row["command"]: row for row in known if row["outcome"] != CRASHED}
     yield from (kept[text] for text in map(_text, wanted) if text in kept)
-    with ThreadPoolExecutor(jobs) as pool, results.open("a", encoding="utf-8") as file:
+    with results.open("a", encoding="utf-8") as file:
         runs = [pool.submit(run, c, out / _slug(c)) for c in wanted if _text(c) not in kept]
         try:
             for done in as_completed(runs):

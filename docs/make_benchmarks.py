@@ -22,6 +22,10 @@ HEAD = """\
 the figure by its target. A figure that misses its target says so. Times are of the processor
 unless a name says otherwise, but other programs on the machine lengthen those as well.
 
+Tables of explorations take hours on one machine. With `--scheduler tcp://HOST:8786` the runs of
+`python -m benchmarks.explore_table` are shared out on a Dask cluster instead (`gvgbot[cluster]`),
+and `make keep RESULTS=FILE` quotes what comes back here and in the README.
+
 """
 TITLES = {  # in the order of the page
     "bench_step": "A scan, stage by stage",

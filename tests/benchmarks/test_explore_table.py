@@ -1,13 +1,25 @@
 """The table of explorations: what it runs, what it keeps, and what it says of it."""
 
 import json
+import os
 import shutil
 from pathlib import Path
 from typing import Any
 
+import distributed
 import pytest
 
-from benchmarks.explore_table import RESULTS, Row, _options, commands, main, summary
+from benchmarks.explore_table import (
+    CRASHED,
+    RESULTS,
+    Row,
+    _options,
+    commands,
+    executor,
+    main,
+    run,
+    summary,
+)
 from gvgbot.cli import parser
 from gvgbot.cli.explore import _overrides
 from gvgbot.config import load_config
@@ -100,6 +112,30 @@ def test_a_failure_is_listed_with_the_command_that_repeats_it(changes: Row) -> N
     *_, failed, listed = summary([run_of(), run_of(command=command, **changes)])
     assert failed == "  failed: 1"
     assert listed.splitlines()[0].strip() == command
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(120)
+def test_the_workers_of_a_cluster_run_what_threads_would(tmp_path: Path) -> None:
+    """Two workers, each a process of its own; a world that does not exist takes them no time."""
+    wanted = commands(_options(["--worlds", "nowhere", "--seeds", "1", "2"]))
+    with (
+        distributed.LocalCluster(  # type: ignore[no-untyped-call]
+            n_workers=2, threads_per_worker=1, dashboard_address=None
+        ) as two,
+        executor(1, two.scheduler_address) as pool,
+    ):
+        rows = [pool.submit(run, c, tmp_path / str(n)).result() for n, c in enumerate(wanted)]
+        assert pool.submit(os.getpid).result() != os.getpid()
+    assert [(row["seed"], row["status"], row["outcome"]) for row in rows] == [
+        (1, 2, CRASHED), (2, 2, CRASHED),
+    ]  # fmt: skip
+    assert all("unknown world 'nowhere'" in row["reason"] for row in rows)
+
+
+def test_a_scheduler_that_is_not_there_is_said_in_a_line() -> None:
+    with pytest.raises(SystemExit, match="no scheduler at nonsense"):
+        executor(1, "nonsense").__enter__()
 
 
 @pytest.mark.slow
