@@ -47,19 +47,20 @@ class Whereabouts:
         """Account for the robot's present place; the change of edge, if there was one."""
         edge = gvg.edges[place.edge]
         ends = [
-            (metres, known.half_edge_of[branch], node)
-            for branch, metres, node in (
-                (Branch(place.edge, forward=True), place.station, edge.a),
-                (Branch(place.edge, forward=False), edge.length - place.station, edge.b),
+            (metres, known.half_edge_of[branch], branch)
+            for branch, metres in (
+                (Branch(place.edge, forward=True), place.station),
+                (Branch(place.edge, forward=False), edge.length - place.station),
             )
             if branch in known.half_edge_of
         ]
         passage = None
         if ends and all(end != self.on_edge for _, end, _ in ends):
-            _, end, node = min(ends)
-            passage = self._passage(gvg, place, known, node)
-            self.on_edge, self.trail = end, [gvg.nodes[node].position]
-            self.narrowest = math.inf
+            _, end, out = min(ends)
+            passage = self._passage(gvg, place, known, edge.a if out.forward else edge.b)
+            line, rooms = gvg.line_from(place, (Branch(place.edge, not out.forward),))
+            self.on_edge, self.trail = end, list(line[::-1])
+            self.narrowest = float(rooms.min())
         here = int(np.searchsorted(edge.stations, place.station))
         self.narrowest = min(self.narrowest, float(edge.clearance[here]))
         self._extend(base)

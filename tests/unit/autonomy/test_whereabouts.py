@@ -220,3 +220,20 @@ def test_with_a_trail_ahead_is_away_from_where_the_robot_came_from(heading: floa
     here = Situation(CORRIDOR, ALL_KNOWN, corridor_graph(), walk.where, place, pose)
     line, _ = CORRIDOR.line_from(place, here.ahead())
     assert line[-1] == pytest.approx([6.0, 0.0])
+
+
+def test_an_edge_that_is_recognised_late_has_been_driven_round_its_bend() -> None:
+    """Vertex 1 is 10 m back, 6 of them before a right angle; then it is out of sight."""
+    bend = drawn(
+        {1: (0.0, 0.0), 2: (6.0, 8.0)}, {10: (1, 2, [(6.0, 0.0)])}, unseen={2: math.pi / 2}
+    )
+    known = known_as({Branch(10, forward=True): HalfEdgeId(1, EAST)}, {1: 1})
+    walk = Walk().along(bend, known, (6.0, 4.0))
+    assert walk.where.trail_length == pytest.approx(10.0, abs=0.2)
+    later = drawn({5: (6.0, 2.0), 6: (6.0, 8.0)}, {20: (5, 6, [])})
+    here = Pose(6.0, 4.3, math.pi / 2)
+    walk.along(later, Correspondence(), (here.x, here.y))
+    place = later.place(here.position)
+    assert place is not None
+    back = walk.where.backwards(later, place, Correspondence(), Pose(here.x, here.y, -math.pi / 2))
+    assert back == Branch(20, forward=False)  # towards the south
