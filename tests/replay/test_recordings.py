@@ -1,6 +1,7 @@
 """A whole exploration is recorded; what is replayed from the file is the same run again."""
 
 import json
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from gvgbot.maps.trajectory import decode_tum
 from gvgbot.playback import PlayedRobot
 from gvgbot.replay import Wanted, open_log
 from gvgbot.session import Session
+from gvgbot.topics import Grid
 from tests.replay.test_pipeline import LOLLIPOP, START
 from tests.twin.run_rig import Network, at_once
 
@@ -147,4 +149,10 @@ def test_when_a_recording_is_over_the_robot_stands_and_is_still_there(
     assert last.cycle_age < 0.2
     assert last.pose == network.states[-20].pose
     assert network.maps[-1].vertices
+    assert isinstance(network.whole_grid, Grid)
+    assert np.count_nonzero(network.whole_grid.raster().cells > 65) > 100  # walls
+    way = network.trajectories[-1]
+    assert math.dist(way.map_base[-1, :2], last.pose[:2]) < 0.5
+    cycles = {state.stamp: state.cycles for state in network.states}
+    assert [health.cycles == cycles[health.stamp] for health in network.healths[-5:]] == [True] * 5
     assert (tmp_path / "run" / "map.geojson").exists()
