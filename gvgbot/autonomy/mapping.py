@@ -102,6 +102,16 @@ class Mapper:
         local_map = local_base.compose(self.belief.map_base.inverse())
         return local_map.transform(self.belief.x[3:].reshape(-1, 3)[:, :2])
 
+    def is_way(self, local_base: Pose, place: Array) -> bool:
+        """Whether a known edge passes a place (2,), local frame, nearer than any wall of its."""
+        x, y = self.belief.map_base.transform(local_base.inverse().transform(place))
+        for edge in self.graph.edges.values():
+            map_vertex = self.belief.map_vertex(edge.a.vertex)
+            gaps = np.hypot(*(map_vertex.transform(edge.polyline) - [x, y]).T)
+            if gaps.min() < edge.min_clearance:
+                return True
+        return False
+
     def observe(self, view: View) -> tuple[Correspondence, list[Event]]:
         """Match a view with the map and learn from it.
 

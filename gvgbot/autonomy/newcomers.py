@@ -1,10 +1,13 @@
 """Things that may be people: they stand free, are as wide as people, and go again.
 
 They are kept out of the map, and the planner leads round them, until they have stood for so long
-that they must be a part of the building. What depends on them is not believed meanwhile.
+that they must be a part of the building. What depends on them is not believed meanwhile. Even then
+they may go, and the map forgets them as soon as that is seen.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import Annotated
 
@@ -49,6 +52,7 @@ class _Newcomer:
     last: float
     came: bool
     is_whole: bool  # both sides of it have been seen
+    is_let_in: bool = False  # it has stood for long enough to be in the map
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,60 +72,97 @@ class Newcomers:
         self._config = config
         self._all: list[_Newcomer] = []
 
-    def sift(self, scan: Scan, local_base: Pose, local_map: LocalMap) -> Scan:
-        """The scan without the beams that end on what may be a person."""
-        self._forget(scan, local_base)
-        walls = local_map.points()
-        tree = cKDTree(walls) if len(walls) else None
-        seen = []
-        for island in _islands(scan, local_base):
-            if tree is not None and self._is_built(island, tree):
-                self._all = [one for one in self._all if not _is_at(one, island.centre)]
-            elif self._is_passing(island, scan.stamp, local_map):
-                seen.append((island.centre, island.radius))
+    def sift(
+        self,
+        scan: Scan,
+        local_base: Pose,
+        local_map: LocalMap,
+        is_way: Callable[[Array], bool] = lambda place: False,
+    ) -> Scan:
+        """The scan without the beams that end on what may be a person.
+
+        `is_way` tells of a place (2,), local frame, whether a way is known to lead over it.
+        """
+        self._forget(scan, local_base, local_map)
+        walls = _Walls(local_map, self._config.away_from_walls_m, is_way)
+        seen = [
+            (island.centre, island.radius)
+            for island in _islands(scan, local_base)
+            if self._is_passing(island, scan.stamp, walls)
+        ]
+        waiting = [(one.centre, one.radius) for one in self._all if not one.is_let_in]
         # At times one is seen in parts only, or has moved a little: both discs count.
-        return _without(scan, local_base, [*seen, *((one.centre, one.radius) for one in self._all)])
+        return _without(scan, local_base, [*seen, *waiting])
 
-    def _is_built(self, island: _Island, walls: cKDTree) -> bool:
-        """Whether it is mostly walls of the map that are seen: a person may brush along one."""
-        limit = self._config.away_from_walls_m
-        distance, _ = walls.query(island.ends, distance_upper_bound=limit)
-        return bool(np.isfinite(distance).mean() > 0.5)
-
-    def _is_passing(self, island: _Island, stamp: float, local_map: LocalMap) -> bool:
+    def _is_passing(self, island: _Island, stamp: float, walls: "_Walls") -> bool:
         """Whether what is seen has not stood there for long; it is taken down."""
         one = next((one for one in self._all if _is_at(one, island.centre)), None)
+        if one is None and walls.are_seen(island.ends):
+            return False
         if one is None:
-            came = bool(local_map.known(island.centre + island.radius * _RIM).all())
+            came = walls.are_away(island)
             one = _Newcomer(island.centre, island.radius, stamp, stamp, came, island.is_whole)
             self._all.append(one)
         one.last = stamp
         one.radius = max(one.radius, island.radius)
         one.is_whole |= island.is_whole
-        stands = stamp - one.first >= self._patience(one)
-        if stands:
-            self._all.remove(one)
-        return not stands
+        one.is_let_in = stamp - one.first >= self._patience(one)
+        return not one.is_let_in
 
     def _patience(self, one: _Newcomer) -> float:
         if not one.is_whole:
             return min(_GLIMPSE_S, self._config.found_after_s)
         return self._config.came_after_s if one.came else self._config.found_after_s
 
-    def _forget(self, scan: Scan, local_base: Pose) -> None:
+    def _forget(self, scan: Scan, local_base: Pose, local_map: LocalMap) -> None:
         """Let those go that have gone: beams pass where they were, or nobody has seen them long."""
+        gone = [one for one in self._all if _is_seen_through(scan, local_base, one)]
+        for one in gone:
+            local_map.doubt(one.centre, one.radius + _BLUR_M)
         self._all = [
             one
             for one in self._all
-            if scan.stamp - one.last < _LOST_S + one.last - one.first
-            and not _is_seen_through(scan, local_base, one)
+            if one not in gone
+            and (
+                local_map.covers(one.centre)
+                if one.is_let_in
+                else scan.stamp - one.last < _LOST_S + one.last - one.first
+            )
         ]
 
     @property
     def points(self) -> Array:
-        """The rims (N, 2), local frame, of those that have been seen whole."""
-        whole = (one.centre + one.radius * _RIM for one in self._all if one.is_whole)
+        """The rims (N, 2), local frame, of those seen whole that the map does not show."""
+        whole = (
+            one.centre + one.radius * _RIM
+            for one in self._all
+            if one.is_whole and not one.is_let_in
+        )
         return np.concatenate([np.empty((0, 2)), *whole])
+
+
+class _Walls:
+    """The walls of a map as a scan finds them."""
+
+    def __init__(self, local_map: LocalMap, reach: float, is_way: Callable[[Array], bool]) -> None:
+        self._map, self._reach, self._is_way = local_map, reach, is_way
+
+    @cached_property
+    def _tree(self) -> cKDTree:
+        return cKDTree(self._map.firm_points())
+
+    def are_seen(self, ends: Array) -> bool:
+        """Whether most ends (N, 2) lie on what was seen before: a person may brush along one.
+
+        Once or twice is not enough, for that may have been a person of whom too little was seen.
+        """
+        distance, _ = self._tree.query(ends, distance_upper_bound=self._reach)
+        return bool(np.isfinite(distance).mean() > 0.5)
+
+    def are_away(self, island: _Island) -> bool:
+        """Whether there was certainly nothing where an island is now."""
+        is_bare = self._map.is_bare(island.centre, island.radius)
+        return is_bare or self._is_way(island.centre)
 
 
 def _is_at(one: _Newcomer, centre: Array) -> bool:
@@ -137,9 +178,10 @@ def _islands(scan: Scan, local_base: Pose) -> list[_Island]:
     depth = np.minimum(scan.ranges[told], scan.range_max)
     edges = np.flatnonzero(np.abs(np.diff(depth)) >= _STEP_M) + 1
     local_laser = local_base.compose(scan.base_laser)
+    beside = np.concatenate([[-np.inf], depth, [-np.inf]])  # who is cut off there is half hidden
     found = []
-    for start, stop in pairwise(edges.tolist()):
-        rims = depth[start] < depth[start - 1], depth[stop - 1] < depth[stop]
+    for start, stop in pairwise([0, *edges.tolist(), len(depth)]):
+        rims = depth[start] < beside[start], depth[stop - 1] < beside[stop + 1]
         is_one = np.abs(np.diff(depth[start:stop])).max(initial=0.0) < _SMOOTH_M
         if not any(rims) or not is_one or stop - start < _BEAMS:
             continue

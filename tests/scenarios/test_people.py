@@ -125,6 +125,22 @@ def test_a_person_who_stands_there_at_the_first_look_is_no_pillar() -> None:
     assert added == ["endpoint", "endpoint"]
 
 
+def test_a_person_half_hidden_at_first_is_no_pillar() -> None:
+    """Round the corner of a bend, less of a person is seen than can be told from furniture."""
+    world = carved([(-4.0, -1.1, 6.0, 1.1), (3.8, -1.1, 6.0, 5.0)])
+
+    async def story(run: Play) -> None:
+        run.put_person(4.9, 1.3)
+        await run.until(lambda: run.here.x > 2.0)
+        run.put_person(*FAR_AWAY)
+
+    run = play(world, START, story=story, with_person=True)
+    assert run.outcome == "explored", run.pipeline.mission.reason
+    assert run.contacts == 0
+    added = [event.kind for event in run.events if isinstance(event, VertexAdded)]
+    assert added == ["endpoint", "endpoint"]
+
+
 def test_a_person_who_jumps_into_the_way_is_not_touched() -> None:
     """A metre ahead of a robot at half a metre a second; it stops and does not brush past."""
     spots: list[tuple[float, float, float]] = []

@@ -4,6 +4,7 @@ It fills the laser's blind rear. It lives in the local frame (odometry corrected
 which never jumps: corrections of the global estimate do not move it.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Annotated, NamedTuple
 
@@ -35,6 +36,7 @@ _LONE_M = 0.3  # an echo nearer than both its neighbours by this is one of dust 
 _GLASS_ECHOES = 3.0  # so many about a cell make it glass, which beams pass and robots do not
 _BESIDE_WALLS_M = 0.22  # half a gap that robots go through: nearer, they make no difference
 _DECAY = 0.05  # echoes that one look outweighs which meets nothing
+_FIRM = 5  # votes: at least three looks
 _MAX_VOTES = 8  # a wall needs this many contrary scans, less the hits, before it is forgotten
 
 
@@ -120,6 +122,10 @@ class LocalMap:
         """Points of the walls (N, 2), local frame: about one for each cell that a wall crosses."""
         return self._walls.points
 
+    def firm_points(self) -> Array:
+        """Points (N, 2) of the walls, local frame, that have been seen again and again."""
+        return np.asarray(self._mean[self._votes >= _FIRM])
+
     def tree(self) -> cKDTree:
         """To find the nearest of `points`."""
         if self._tree is None:
@@ -161,6 +167,27 @@ class LocalMap:
         )
         known: NDArray[np.bool_] = self._known[i, j]
         return known
+
+    def is_bare(self, centre: Array, radius: float) -> bool:
+        """Whether a disc, local frame, is free for certain."""
+        i, j = self._disc(centre, radius)
+        return bool(len(i)) and bool((self._free[i, j] & (self._votes[i, j] <= 0)).all())
+
+    def doubt(self, centre: Array, radius: float) -> None:
+        """Let the next beams that pass through a disc, local frame, forget what stands there."""
+        i, j = self._disc(centre, radius)
+        self._votes[i, j] = np.minimum(self._votes[i, j], 1)
+        self._echoes[i, j] = 0.0
+
+    def _disc(self, centre: Array, radius: float) -> tuple[Index, Index]:
+        """Rows and columns of the cells whose middles lie in a disc, local frame."""
+        reach = math.ceil(radius / self._cell)
+        around = np.mgrid[-reach : reach + 1, -reach : reach + 1].reshape(2, -1).T
+        cells = np.floor(centre / self._cell).astype(np.int64) + around
+        cells = cells[np.hypot(*((cells + 0.5) * self._cell - centre).T) < radius]
+        cells -= self._corner
+        i, j = cells[((cells >= 0) & (cells < self._size)).all(axis=1)].T
+        return i, j
 
     @property
     def _reach(self) -> float:

@@ -127,6 +127,15 @@ def test_an_edge_in_sight_from_end_to_end_is_joined_once() -> None:
     assert len(seen.mapper.graph.frontiers()) == 2
 
 
+def test_what_lies_on_an_edge_nearer_than_its_walls_lies_on_a_way() -> None:
+    """The edge goes from (3, 0) to (3, -4), a metre away from its walls."""
+    mapper = Seen().look(TEE, 30).mapper
+    turned = Pose(10.0, 20.0, math.pi / 2)  # of the base, which is at the origin, in another frame
+    for place, is_way in (((3.0, -2.0), True), ((3.9, -2.0), True), ((4.1, -2.0), False)):
+        assert mapper.is_way(Pose(), np.array(place)) == is_way
+        assert mapper.is_way(turned, turned.transform(np.array(place))) == is_way
+
+
 def test_two_dead_ends_in_sight_are_a_whole_map() -> None:
     seen = Seen().look(TWO_ENDS, 30)
     assert sorted(seen.places("endpoint")) == [

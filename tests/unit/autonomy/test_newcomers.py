@@ -27,14 +27,22 @@ class Watch:
     def __init__(self, known: World | None = None) -> None:
         self.map, self.newcomers = LocalMap(LocalMapConfig()), Newcomers(CONFIG)
         if known is not None:
-            self.map.insert(sweep(known, HERE), HERE, 0.0)
+            for _ in range(3):
+                self.map.insert(sweep(known, HERE), HERE, 0.0)
 
-    def dropped(self, world: World, stamp: float = 0.0, *, person: Point | None = None) -> int:
-        """How many beams are kept out."""
+    def dropped(
+        self,
+        world: World,
+        stamp: float = 0.0,
+        *,
+        person: Point | None = None,
+        way: Point = (math.inf, math.inf),
+    ) -> int:
+        """How many beams are kept out, if a way is known to lead past half a metre from `way`."""
         scan = replace(sweep(world, HERE), stamp=stamp)
         if person is not None:
             scan = replace(scan, ranges=np.minimum(scan.ranges, to_disc(scan.bearings, person)))
-        sifted = self.newcomers.sift(scan, HERE, self.map)
+        sifted = self.newcomers.sift(scan, HERE, self.map, lambda xy: math.dist(xy, way) < 0.5)
         self.map.insert(sifted, HERE, 0.0)
         return int(np.isnan(sifted.ranges).sum() - np.isnan(scan.ranges).sum())
 
@@ -89,6 +97,13 @@ def test_what_stands_long_enough_is_a_part_of_the_building(
     assert watch.inside() > 0
 
 
+def test_who_stands_in_a_way_that_is_known_came_there() -> None:
+    watch = Watch()
+    for second in range(math.ceil(CONFIG.came_after_s)):
+        watch.dropped(EMPTY, second, person=(2.0, 0.0), way=(2.0, 0.3))
+        assert watch.inside() == 0
+
+
 def test_who_walks_is_never_believed_and_leaves_nothing_behind() -> None:
     """To and fro at 0.5 m/s, two metres away, for five minutes."""
     watch = Watch()
@@ -105,6 +120,30 @@ def test_who_walks_along_a_wall_is_kept_out_too() -> None:
     watch = Watch(EMPTY)
     for second in range(10):
         watch.dropped(EMPTY, second, person=(0.5 * second - 2.5, 3.0 - RADIUS - 0.35))
+    assert watch.inside() == 0
+
+
+def test_of_whom_too_little_was_seen_at_first_is_no_wall_afterwards() -> None:
+    """Two looks of three beams each, which may be anything, have got into the map."""
+    watch = Watch(EMPTY)
+    bearings = sweep(EMPTY, HERE).bearings
+    person = to_disc(bearings, (2.0, 0.0))
+    person[np.argsort(np.abs(bearings))[3:]] = np.inf
+    for second in range(2):
+        scan = sweep(EMPTY, HERE)
+        scan = replace(scan, ranges=np.minimum(scan.ranges, person), stamp=float(second))
+        watch.map.insert(scan, HERE, 0.0)
+    assert watch.inside() > 0
+    assert watch.dropped(EMPTY, 2.0, person=(2.0, 0.0)) > 0
+    assert len(watch.newcomers.points) > 0
+
+
+def test_who_stood_for_long_and_goes_is_forgotten_at_the_next_look() -> None:
+    watch = Watch()
+    for second in range(60):
+        watch.dropped(EMPTY, second, person=(2.0, 0.0))
+    assert watch.inside() > 0
+    watch.dropped(EMPTY, 60.0)
     assert watch.inside() == 0
 
 
@@ -128,6 +167,22 @@ def test_who_is_half_hidden_is_kept_out_for_a_glimpse_and_not_led_round() -> Non
     assert len(watch.newcomers.points) == 0
     assert watch.dropped(world, 2.0, person=spot) > 0
     assert watch.dropped(world, 4.0, person=spot) == 0
+
+
+def test_who_was_half_hidden_for_long_and_steps_forward_is_kept_out_again() -> None:
+    world, spot = carved([ROOM], [(1.0, 0.0, 1.1, 3.0)]), (2.5, -0.1)
+    watch = Watch()
+    for second in range(8):
+        watch.dropped(world, second, person=spot)
+    assert watch.dropped(world, 8.0, person=(2.5, -0.35)) > 0
+    assert len(watch.newcomers.points) > 0
+
+
+def test_who_is_cut_off_where_the_sweep_ends_is_kept_out_for_a_glimpse() -> None:
+    """Half of a person straight behind the laser, the other half beyond its last beam."""
+    watch = Watch(EMPTY)
+    assert watch.dropped(EMPTY, person=(-2.0, 0.0)) > 0
+    assert len(watch.newcomers.points) == 0
 
 
 def test_the_stretch_of_wall_within_a_short_range_is_no_newcomer() -> None:
