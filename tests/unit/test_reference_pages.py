@@ -9,7 +9,14 @@ from typing import get_args
 import pytest
 import yaml
 
-from docs import make_benchmarks, make_cli, make_client, make_configuration, make_events
+from docs import (
+    make_benchmarks,
+    make_cli,
+    make_client,
+    make_configuration,
+    make_events,
+    make_figures,
+)
 from docs.make_configuration import unit_of
 from gvgbot import client
 from gvgbot.autonomy import events
@@ -17,7 +24,7 @@ from gvgbot.cli import main
 from gvgbot.config import Config, load_config
 from gvgbot.maps.run_directory import plain
 
-PAGES = [make_benchmarks, make_cli, make_client, make_configuration, make_events]
+PAGES = [make_benchmarks, make_cli, make_client, make_configuration, make_events, make_figures]
 
 
 def rows_of(module: ModuleType) -> dict[str, list[list[str]]]:

@@ -1,0 +1,111 @@
+"""E6: three loops and a branch of forty metres: what is uncertain, and whether that is honest."""
+
+import math
+
+import numpy as np
+
+from benchmarks.figures import drawing
+from benchmarks.figures.findings import Finding
+from benchmarks.figures.runs import Run, explored
+from gvgbot.geometry import Array
+
+WORLD = "office"
+SHOWN_M = 1e-3  # at least
+GATE = 9.0  # squared Mahalanobis distance: three sigma
+
+
+def find() -> Finding:
+    runs = {"paper": explored(WORLD, "localisation=paper"), "full": explored(WORLD)}
+    figure, (left, right) = drawing.stage(1, 2, (11.0, 4.4))
+    paper = runs["paper"]
+    drawing.walls(left, paper.world, color=drawing.PALE)
+    for name, color, label in (
+        ("odometry", drawing.ODOMETRY, "wheels and gyro alone"),
+        ("online", drawing.EDGE, "as believed at the time"),
+        ("truth", drawing.WALL, "truth"),
+    ):
+        points = paper.trajectory(name).poses[:, :2]
+        placed = points if name == "truth" else paper.start.transform(points)
+        left.plot(*placed.T, color=color, lw=1.0, label=label)
+    left.legend(fontsize=7, loc="lower right")
+    drawing.labelled(left, "odometry between vertices (`paper`)")
+    rows = []
+    for (name, run), color in zip(runs.items(), (drawing.ODOMETRY, drawing.EDGE), strict=True):
+        metres, u_robot, _ = run.series()
+        errors = _errors(run)
+        right.semilogy(metres, 3 * np.sqrt(u_robot), color=color, label=f"{name}: three sigma")
+        right.semilogy(metres, errors, color=color, lw=0.7, ls=":", label=f"{name}: error")
+        inside = float(np.mean(_gaps(run) < GATE))
+        rows.append(
+            (
+                f"`{name}`",
+                f"{math.sqrt(float(u_robot.max())):.2f}",
+                f"{errors.max():.2f}",
+                f"{inside:.1%}",
+                "yes" if _is_inside_at_first_closure(run) else "no",
+            )
+        )
+    right.set_ylim(bottom=SHOWN_M)
+    right.legend(fontsize=7)
+    drawing.labelled(right, "position of the robot", "m driven", "m")
+    return Finding(
+        title="Three loops and a long branch",
+        claim="Before the first closure the true place lies inside the ellipse; along a branch "
+        "without a loop the uncertainty grows, and only the way back lowers it.",
+        verdict=f"The truth is inside three sigma on {rows[0][3]} of the way with odometry between "
+        f"vertices, where the largest error is {rows[0][2]} m, and on {rows[1][3]} with scan "
+        f"matching, where it is {rows[1][2]} m.",
+        holds=all(row[-1] == "yes" for row in rows),
+        figure=drawing.save(figure, "e6"),
+        explained="The built-in `office`, the same seed for both.",
+        table=(
+            (
+                "localisation",
+                "largest sigma, m",
+                "largest error, m",
+                "inside three sigma",
+                "also before the first closure",
+            ),
+            *rows,
+        ),
+    )
+
+
+def _truth(run: Run, stamps: Array) -> Array:
+    """Where the robot was at stamps, (N, 2), map frame."""
+    truth = run.trajectory("truth")
+    at = np.column_stack([np.interp(stamps, truth.stamps, axis) for axis in truth.poses[:, :2].T])
+    return run.start.inverse().transform(at)
+
+
+def _offsets(run: Run) -> Array:
+    rows = run.trace["rows"]
+    believed = np.array([row["robot"][:2] for row in rows])
+    return believed - _truth(run, np.array([row["stamp"] for row in rows]))
+
+
+def _errors(run: Run) -> Array:
+    found: Array = np.hypot(*_offsets(run).T)
+    return found
+
+
+def _gaps(run: Run) -> Array:
+    """Squared Mahalanobis distances of the truth at the keyframes but the first, which is exact."""
+    gaps = [
+        _gap(offset, row["robot"])
+        for offset, row in zip(_offsets(run)[1:], run.trace["rows"][1:], strict=True)
+    ]
+    return np.array(gaps)
+
+
+def _gap(offset: Array, place: list[float]) -> float:
+    _, _, xx, xy, yy = place
+    return float(offset @ np.linalg.solve(np.array([[xx, xy], [xy, yy]]), offset))
+
+
+def _is_inside_at_first_closure(run: Run) -> bool:
+    first = run.trace["closures"][0]
+    believed = first["before"]["robot"]
+    stamp = max(row["stamp"] for row in run.trace["rows"] if row["stamp"] < first["stamp"])
+    (truth,) = _truth(run, np.array([stamp]))
+    return _gap(np.array(believed[:2]) - truth, believed) < GATE
