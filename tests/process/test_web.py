@@ -615,12 +615,12 @@ def test_pictures_for_the_guide(page: Page, tmp_path: Path) -> None:
     endpoint, folder = free_endpoint(), Path(os.environ["GVGBOT_PICTURES"])
     settings = ["--set", f"telemetry.listen=[{endpoint}]"]
     with gvgbot("run", *settings, cwd=tmp_path), web("--connect", endpoint) as address:
-        desktop(page, address)
+        page.open(address, 1440, 1040, phone=False, dark=True)
         vertices = "parseInt([...document.querySelectorAll('#facts div')].find("
         vertices += "(one) => one.firstChild.textContent === 'map')?.lastChild.textContent)"
-        page.until(f"{vertices} >= 6", patience_s=1000.0)
+        page.until(f"{vertices} >= 9", patience_s=1000.0)
         (folder / "web.png").write_bytes(page.png())
         page.open(address, 390, 844, phone=True, dark=False)
-        page.until(f"{vertices} >= 6")
+        page.until(f"{vertices} >= 9")
         page.until("new Promise((done) => setTimeout(() => done(true), 3000))")
         (folder / "web-phone.png").write_bytes(page.png())
