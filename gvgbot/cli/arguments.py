@@ -8,6 +8,7 @@ from typing import Any, NoReturn, TypeAlias
 
 BAD_USAGE = 2
 MOST_FRAMES = 200
+LAST_PORT = 65535
 NEGATIVE_NUMBER = re.compile(r"-\.?\d")
 
 
@@ -92,11 +93,12 @@ def seed(text: str) -> int:
 
 
 def tcp_port(text: str) -> int:
-    """A number of a TCP port. Raises ValueError."""
-    value = int(text)
-    if not 0 <= value <= 65535:
-        raise ValueError(text)
-    return value
+    """A number of a TCP port. Raises ArgumentTypeError that says what there is."""
+    if not text.isdecimal() or int(text) > LAST_PORT:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is no port: there are 0 to {LAST_PORT}, and 0 takes any that is free"
+        )
+    return int(text)
 
 
 def frames(text: str) -> int:
