@@ -14,7 +14,7 @@ from gvgbot import __version__
 from gvgbot.autonomy.loop import Loop
 from gvgbot.clock import LoopClock, VirtualTimeLoop
 from gvgbot.config import Config
-from gvgbot.errors import GvgbotError
+from gvgbot.errors import GvgbotError, UsageError
 from gvgbot.hal.guard import Guard
 from gvgbot.hal.messages import Odometry
 from gvgbot.links import Devices, Links
@@ -142,6 +142,7 @@ def run(config: Config, *, out: Path | None, known: Path | None = None, anew: bo
             keeper=keeper,
             neighbours=[near for near in (ros2, foxglove) if near is not None],
             driver=ros2,
+            team=telemetry if config.team.enabled else None,
         )
         try:
             with recorded(session, patient=False), asyncio.Runner() as runner:
@@ -178,6 +179,8 @@ def recorded(session: Session, *, patient: bool) -> AbstractContextManager[objec
 
 def _telemetry(config: Config, stack: contextlib.ExitStack) -> Telemetry | None:
     if not config.telemetry.enabled:
+        if config.team.enabled:
+            raise UsageError("team.enabled needs the network: set telemetry.enabled=true as well")
         return None
     return stack.enter_context(Telemetry(config.telemetry, config.robot.name))
 

@@ -159,6 +159,10 @@ async def _live(robot: _Robot, robots: list[_Robot], clock: LoopClock) -> None:
 
 def _on_cycle(robot: _Robot, robots: list[_Robot], devices: Devices, odometry: Odometry) -> None:
     robot.session.on_cycle(odometry, devices.base.contact)
+    robot.session.pipeline.company = list(robot.member.others().values())
+    for other in robots:
+        if other is not robot:
+            other.member.hear_pose(robot.member.name, robot.session.pipeline.map_base)
     if odometry.stamp >= robot.told + robot.session.config.team.tell_every_s:
         _tell(robot, robots, odometry.stamp)
         robot.member.look(odometry.stamp)

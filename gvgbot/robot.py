@@ -23,6 +23,7 @@ from gvgbot.links import Devices, Links
 from gvgbot.live_feed import LiveFeed, Pace
 from gvgbot.live_map import LiveMap, News
 from gvgbot.live_ros import LiveRos, Neighbour, UnixTime
+from gvgbot.live_team import LiveTeam, TeamNetwork
 from gvgbot.maps.run_directory import record_of
 from gvgbot.persistence.keeper import Keeper
 from gvgbot.requests import Answer, Asked
@@ -78,11 +79,17 @@ class Robot:
         *,
         neighbours: Sequence[Neighbour] = (),
         driver: Driver | None = None,
+        team: TeamNetwork | None = None,
     ) -> None:
         """`keeper` keeps the mission on disk; without one a restart begins anew.
 
-        `neighbours` are told what is to be seen, and a `driver` may drive.
+        `neighbours` are told what is to be seen, a `driver` may drive, and robots of a `team` share
+        the frontiers.
         """
+        self._team: LiveTeam | None = None
+        if team is not None:
+            name, config = session.config.robot.name, session.config.team
+            self._team = LiveTeam(name, config, session.pipeline, team)
         self._neighbours, self._driver = neighbours, driver
         self._session, self._notifier = session, notifier
         self._network, self._off_loop, self._keeper = network, off_loop, keeper
@@ -130,6 +137,8 @@ class Robot:
             work["requests"] = self._network.hear(self._steering().handle)
         if self._ros is not None:
             work["neighbours"] = self._ros.keep_shown(self._clock, self._off_loop)
+        if self._team is not None:
+            work["team"] = self._team.take_part(self._clock, self._off_loop)
         if self._driver is not None:
             work["driver"] = self._driver.hear(self._let_drive)
         async with asyncio.TaskGroup() as tasks:

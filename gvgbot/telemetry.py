@@ -13,7 +13,7 @@ import zenoh.ext
 
 from gvgbot.errors import GvgbotError
 from gvgbot.requests import JSON, MESSAGEPACK, Answer, Asked, request_key
-from gvgbot.topics import HEARTBEAT, TOPICS, Payload, TelemetryConfig, Topic, alive_key
+from gvgbot.topics import HEARTBEAT, TOPICS, Payload, TelemetryConfig, Topic, alive_key, team_key
 from gvgbot.zenoh_config import reason, session_config
 
 _WAITING_QUERIES = 32  # more than this are dropped, oldest first; who asked gets nothing
@@ -82,6 +82,33 @@ class Telemetry:
             publisher.put(msgspec.msgpack.encode(value))
         except zenoh.ZError:
             self.failures += 1
+
+    def tell_team(self, news: bytes) -> None:
+        """Send news to the other robots, without waiting, and without complaining if it fails."""
+        try:
+            self._session.put(
+                team_key(self._robot), news, congestion_control=zenoh.CongestionControl.DROP
+            )
+        except zenoh.ZError:
+            self.failures += 1
+
+    async def hear_team(self, handle: Callable[[bytes], None]) -> None:
+        """Hand on what other robots tell, the newest of each, until cancelled."""
+        loop, arrived = asyncio.get_running_loop(), asyncio.Event()
+        newest: dict[str, bytes] = {}
+
+        def take(sample: zenoh.Sample) -> None:
+            key = str(sample.key_expr)
+            if len(newest) < _MAX_SESSIONS or key in newest:
+                newest[key] = sample.payload.to_bytes()
+                loop.call_soon_threadsafe(arrived.set)
+
+        with self._session.declare_subscriber(team_key("*"), take):
+            while True:
+                await arrived.wait()
+                arrived.clear()
+                for key in list(newest):
+                    handle(newest.pop(key))
 
     async def answer(self) -> None:
         """Answer queries for the newest values until cancelled."""

@@ -364,3 +364,8 @@ LATE_AFTER = 0.1  # s, the age of odometry from which a control cycle counts as 
 def alive_key(robot: str) -> str:
     """The key expression of the liveliness token that a robot holds while it is there."""
     return f"gvgbot/{robot}/alive"
+
+
+def team_key(robot: str) -> str:
+    """The key expression of what a robot tells the other robots of its team."""
+    return f"gvgbot/{robot}/team"

@@ -71,6 +71,7 @@ class Newcomers:
     def __init__(self, config: NewcomersConfig) -> None:
         self._config = config
         self._all: list[_Newcomer] = []
+        self.company: list[tuple[Array, float]] = []  # other robots: where they say they are
 
     def sift(
         self,
@@ -88,11 +89,15 @@ class Newcomers:
         seen = [
             (island.centre, island.radius)
             for island in _islands(scan, local_base)
-            if self._is_passing(island, scan.stamp, walls)
+            if not self._is_company(island) and self._is_passing(island, scan.stamp, walls)
         ]
         waiting = [(one.centre, one.radius) for one in self._all if not one.is_let_in]
         # At times one is seen in parts only, or has moved a little: both discs count.
-        return _without(scan, local_base, [*seen, *waiting])
+        return _without(scan, local_base, [*seen, *waiting, *self.company])
+
+    def _is_company(self, island: _Island) -> bool:
+        """Whether it is another robot that says where it is."""
+        return any(np.hypot(*(island.centre - c)) < r + _MOVED_M for c, r in self.company)
 
     def _is_passing(self, island: _Island, stamp: float, walls: "_Walls") -> bool:
         """Whether what is seen has not stood there for long; it is taken down."""
@@ -132,13 +137,14 @@ class Newcomers:
 
     @property
     def points(self) -> Array:
-        """The rims (N, 2), local frame, of those seen whole that the map does not show."""
+        """The rims (N, 2), local frame, of company, and of those seen whole not in the map."""
         whole = (
             one.centre + one.radius * _RIM
             for one in self._all
             if one.is_whole and not one.is_let_in
         )
-        return np.concatenate([np.empty((0, 2)), *whole])
+        others = (centre + radius * _RIM for centre, radius in self.company)
+        return np.concatenate([np.empty((0, 2)), *whole, *others])
 
 
 class _Walls:

@@ -44,6 +44,9 @@ _NOTHING_FELT = Felt()
 _LIFTED = np.diag([0.3**2, 0.3**2, 0.1**2])  # how far a robot is carried that is put down again
 _SEEN_SHARE = 0.8  # of the laser's range: walls farther off cannot be relied on
 _ROOM_BESIDE_EDGES_M = 0.08  # on each side, where no edge leads
+_COMPANY_M = 0.1  # by which another robot may be elsewhere than it says
+_ROOM_FOR_BOTH_M = 0.3  # between two robots, before either has to be slow
+_BOTH_BRAKE_MPS2 = 0.5  # of each, so that two that come towards each other stop
 _LONGEST_GAP_S = 2.0  # between keyframes; a longer one is an outage of a device
 _SCAN_EVERY_M, _SCAN_EVERY_RAD = 0.7, 0.5  # scans that are kept for the occupancy grid
 
@@ -128,6 +131,8 @@ class Pipeline:
         self._reflexes = Reflexes(config.reflexes)
         self._hazards = Hazards(config.hazards)
         self._newcomers = Newcomers(config.newcomers)
+        # where other robots say that they are, map frame; None if there are surely none
+        self.company: list[Pose] | None = None
         self._incidents: list[tuple[str, str]] = []  # action and reason, since the last scan
         self._was_lifted = self._look_now = False
         self._last: Keyframe | None = None
@@ -200,6 +205,7 @@ class Pipeline:
             self.mission.skip(max(0.0, scan.stamp - self._last.stamp - _LONGEST_GAP_S))
         scan = deskewed(scan, self._odometry.motion_during(scan))
         local_base = self._localise(scan, odom_base)
+        self._newcomers.company = self._company(local_base)
         is_way = partial(self.mapper.is_way, local_base)
         scan = self._newcomers.sift(scan, local_base, self._maps.near, is_way)
         self._maps.insert(scan, local_base, self.travelled)
@@ -235,6 +241,14 @@ class Pipeline:
         order, done = self.errands.advance(view, known)
         self._obey(order)
         return done
+
+    def _company(self, local_base: Pose) -> list[tuple[Array, float]]:
+        """Other robots as discs in the local frame: about as large as this one."""
+        local_map = local_base.compose(self.mapper.belief.map_base.inverse())
+        return [
+            (local_map.compose(pose).position, self._radius + _COMPANY_M)
+            for pose in self.company or ()
+        ]
 
     def _local_gvg(self, local_base: Pose, range_max: float) -> LocalGvg:
         """The GVG around the base, by what the local map shows and the map holds."""
@@ -333,9 +347,23 @@ class Pipeline:
                 self._twist = follow(
                     track, local_base, self._twist.linear, self._radius, self._config.edge_follower
                 )
+                self._twist = self._careful(self._twist, local_base)
                 return self._twist
             case _:
                 return STANDSTILL
+
+    def _careful(self, twist: Twist, local_base: Pose) -> Twist:
+        """The twist, slow enough to stop with room for somebody ahead who comes as fast."""
+        if self.company is None:
+            return twist
+        points = local_base.inverse().transform(self._newcomers.points)
+        ahead = points[points[:, 0] > 0.0]
+        gap = float(np.hypot(*ahead.T).min(initial=np.inf)) - self._radius - _ROOM_FOR_BOTH_M
+        limit = math.sqrt(max(0.0, _BOTH_BRAKE_MPS2 * gap))
+        limit = max(limit, self._config.edge_follower.min_speed_mps)
+        if twist.linear <= limit:
+            return twist
+        return Twist(limit, twist.angular * limit / twist.linear)
 
     def _room_behind(self, local_base: Pose) -> float:
         """How far the robot can go straight back, by what the map knows; m."""

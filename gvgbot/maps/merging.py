@@ -35,6 +35,10 @@ def merged(ours: RouteGraph, theirs: RouteGraph, pose: Pose) -> tuple[RouteGraph
     pose = _fitted(ours, theirs, pose)
     theirs = moved_graph(theirs, pose)
     pairs = _pairs(ours, theirs)
+    wrong_here = _refuted(ours, {ours.vertices[i].id for i, _ in pairs}, theirs)
+    wrong_there = _refuted(theirs, {theirs.vertices[j].id for _, j in pairs}, ours)
+    ours, theirs = _without(ours, wrong_here), _without(theirs, wrong_there)
+    pairs = _pairs(ours, theirs)
     free_id = max((vertex.id for vertex in ours.vertices), default=-1) + 1
     names = {theirs.vertices[j].id: ours.vertices[i].id for i, j in pairs}
     lone = [vertex for vertex in theirs.vertices if vertex.id not in names]
@@ -79,6 +83,45 @@ def _pairs(ours: RouteGraph, theirs: RouteGraph) -> list[tuple[int, int]]:
     rows, columns = linear_sum_assignment(away)
     pairs = zip(rows.tolist(), columns.tolist(), strict=True)
     return [(i, j) for i, j in pairs if away[i, j] < _SAME_M]
+
+
+def _refuted(graph: RouteGraph, paired: set[int], other: RouteGraph) -> set[int]:
+    """Vertices where the other robot drove along a plain edge and saw none.
+
+    Somebody may have stood there. Nothing else may hang on them than what both know.
+    """
+    wrong = {
+        vertex.id
+        for vertex in graph.vertices
+        if vertex.id not in paired and any(_is_inside(vertex, edge) for edge in other.edges)
+    }
+    while True:
+        holding = {
+            mine
+            for edge in graph.edges
+            for mine, far in ((edge.start, edge.end), (edge.end, edge.start))
+            if mine in wrong and far not in wrong and far not in paired
+        }
+        if not holding:
+            return wrong
+        wrong -= holding
+
+
+def _is_inside(vertex: MapVertex, edge: MapEdge) -> bool:
+    """Whether a vertex lies on an edge that was driven, away from its ends."""
+    line = edge.polyline
+    away = np.hypot(*(line - vertex.position).T)
+    along = np.concatenate([[0.0], np.hypot(*np.diff(line, axis=0).T).cumsum()])
+    i = int(np.argmin(away))
+    from_ends = min(float(along[i]), float(along[-1] - along[i]))
+    return edge.traversals > 0 and away[i] < _BESIDE_M and from_ends > _FROM_ENDS_M
+
+
+def _without(graph: RouteGraph, wrong: set[int]) -> RouteGraph:
+    return RouteGraph(
+        tuple(vertex for vertex in graph.vertices if vertex.id not in wrong),
+        tuple(edge for edge in graph.edges if not {edge.start, edge.end} & wrong),
+    )
 
 
 def _fused(ours: MapVertex, theirs: MapVertex) -> MapVertex:

@@ -18,6 +18,7 @@ from gvgbot.team.chart import Chart, moved
 from gvgbot.team.news import Claim, Frame, News, told_edges, told_vertices
 from gvgbot.team.site import Frontier, Site
 
+_STANDING_M = 0.1  # moved less from news to news, a robot stands
 _TAKES_OVER_M = 2.0  # nearer to a frontier than who claims it, one takes it
 
 
@@ -41,12 +42,31 @@ class _Mate:
     news: News
     chart: Chart
     heard: float  # stamp of the own clock
+    map_base: Pose  # in its own map
+    is_standing: bool = False  # since the news before
     alignment: Alignment | None = None
     tried: float = float("-inf")  # stamp of the last attempt to align
     sizes: tuple[int, ...] = ()  # of both charts then
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
+class Comparison:
+    """Two charts that are to be laid on each other, and how they lay before."""
+
+    robot: str
+    life: int
+    ours: Chart
+    theirs: Chart
+    before: Alignment | None
+
+    def made(self) -> Alignment | None:
+        """How they lie; None if that is not certain, or not any more."""
+        if self.before is None:
+            return align(self.ours, self.theirs)
+        return refined(self.ours, self.theirs, self.before)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Met:
     """Another robot's map was laid onto the own one."""
 
@@ -108,31 +128,48 @@ class Member:
             return
         mate = self._mates.get(news.robot)
         if mate is None or mate.news.life != news.life:
-            self._mates[news.robot] = _Mate(news, news.chart, stamp)
+            self._mates[news.robot] = _Mate(news, news.chart, stamp, Pose(*news.pose))
         elif news.sequence > mate.news.sequence:
             mate.news, mate.chart, mate.heard = news, news.chart, stamp
+            before, mate.map_base = mate.map_base, Pose(*news.pose)
+            mate.is_standing = before.distance(mate.map_base) < _STANDING_M
         self._site = None
+
+    def hear_pose(self, robot: str, map_base: Pose) -> None:
+        """Take in where another robot is in its own map, which it tells more often than all."""
+        if robot in self._mates:
+            self._mates[robot].map_base = map_base
 
     def look(self, stamp: float) -> None:
         """Try to lay the maps of others onto the own one, where that is due."""
+        for comparison in self.due(stamp):
+            self.settle(comparison, comparison.made())
+
+    def due(self, stamp: float) -> list["Comparison"]:
+        """Which maps are to be laid on the own one now: long work that may be done elsewhere."""
         self._stamp = max(self._stamp, stamp)
+        found = []
         for name, mate in sorted(self._mates.items()):
             sizes = tuple(
                 len(part)
                 for chart in (self._chart, mate.chart)
                 for part in (chart.vertices, chart.edges)
             )
-            if stamp - mate.tried < self._config.align_every_s or sizes == mate.sizes:
-                continue
-            mate.tried, mate.sizes = stamp, sizes
-            before = mate.alignment
-            if before is None:
-                mate.alignment = align(self._chart, mate.chart)
-                if mate.alignment is not None:
-                    self.met.append(Met(name, mate.alignment))
-            else:
-                mate.alignment = refined(self._chart, mate.chart, before)
-            self._site = None
+            if stamp - mate.tried >= self._config.align_every_s and sizes != mate.sizes:
+                mate.tried, mate.sizes = stamp, sizes
+                life = mate.news.life
+                found.append(Comparison(name, life, self._chart, mate.chart, mate.alignment))
+        return found
+
+    def settle(self, comparison: "Comparison", alignment: Alignment | None) -> None:
+        """Take in what a comparison has shown, unless the other has begun anew meanwhile."""
+        mate = self._mates.get(comparison.robot)
+        if mate is None or mate.news.life != comparison.life:
+            return
+        if alignment is not None and mate.alignment is None:
+            self.met.append(Met(comparison.robot, alignment))
+        mate.alignment = alignment
+        self._site = None
 
     def _direct(self) -> dict[str, Pose]:
         """Poses of the frames that were found, in the own one."""
@@ -163,10 +200,14 @@ class Member:
     def others(self) -> dict[str, Pose]:
         """Where the others are, own map frame: those that are heard and whose frame is known."""
         return {
-            name: pose.compose(Pose(*self._mates[name].news.pose))
+            name: pose.compose(self._mates[name].map_base)
             for name, pose in self.frames.items()
             if not self.is_lost(name)
         }
+
+    def standing(self) -> dict[str, Pose]:
+        """Those of the others that have not moved lately."""
+        return {n: pose for n, pose in self.others().items() if self._mates[n].is_standing}
 
     # -- which frontier is whose -------------------------------------------------------------------
 

@@ -1,0 +1,89 @@
+"""A daemon's part in a team: tells the other robots, listens to them, compares maps on the side."""
+
+import asyncio
+import secrets
+from collections.abc import Awaitable, Callable
+from typing import Protocol
+
+import structlog
+
+from gvgbot.autonomy.pipeline import Pipeline
+from gvgbot.clock import Clock
+from gvgbot.errors import GvgbotError
+from gvgbot.team.alignment import Alignment
+from gvgbot.team.chart import chart_of
+from gvgbot.team.member import Comparison, Member, TeamConfig
+from gvgbot.team.news import decode, encode
+
+log = structlog.get_logger()
+
+
+class TeamNetwork(Protocol):
+    """How robots of a team hear each other."""
+
+    def tell_team(self, news: bytes) -> None:
+        """Send to all that listen, without waiting."""
+
+    async def hear_team(self, handle: Callable[[bytes], None]) -> None:
+        """Hand on what others tell, until cancelled."""
+
+
+class LiveTeam:
+    """Makes a mission share its frontiers with other robots on a network."""
+
+    def __init__(
+        self, name: str, config: TeamConfig, pipeline: Pipeline, network: TeamNetwork
+    ) -> None:
+        self._config, self._pipeline, self._network = config, pipeline, network
+        self._clock: Clock
+        mapper = pipeline.mapper
+        life = secrets.randbits(31)
+        self.member = Member(name, config, lambda: chart_of(mapper.graph, mapper.belief), life)
+        pipeline.mission.sharing = self.member
+        pipeline.company = []
+
+    async def take_part(
+        self, clock: Clock, off_loop: Callable[[Callable[[], None]], Awaitable[None]]
+    ) -> None:
+        """Tell and hear until cancelled; `off_loop` runs what takes long."""
+        self._clock = clock
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(self._network.hear_team(self._hear), name="hear team")
+            tasks.create_task(self._compare(off_loop), name="compare maps")
+            tasks.create_task(self._tell(), name="tell team")
+
+    def _hear(self, data: bytes) -> None:
+        try:
+            self.member.hear(decode(data), self._clock.now())
+        except GvgbotError as error:
+            log.warning("news of a team dropped", reason=str(error))
+
+    async def _tell(self) -> None:
+        pipeline = self._pipeline
+        while True:
+            if not pipeline.is_lost:
+                finished = pipeline.errands.is_resting
+                now = self._clock.now()
+                news = self.member.news(now, pipeline.map_base, 0.0, finished=finished)
+                self._network.tell_team(encode(news))
+                pipeline.company = list(self.member.standing().values())
+            await self._clock.sleep_until(self._clock.now() + self._config.tell_every_s)
+
+    async def _compare(self, off_loop: Callable[[Callable[[], None]], Awaitable[None]]) -> None:
+        while True:
+            for comparison in self.member.due(self._clock.now()):
+                self.member.settle(comparison, await _made(comparison, off_loop))
+            for met in self.member.met:
+                confidence = round(met.alignment.confidence, 4)
+                log.info("maps joined", other=met.robot, confidence=confidence)
+            self.member.met.clear()
+            await self._clock.sleep_until(self._clock.now() + self._config.tell_every_s)
+
+
+async def _made(
+    comparison: Comparison, off_loop: Callable[[Callable[[], None]], Awaitable[None]]
+) -> Alignment | None:
+    """What a comparison shows."""
+    results: list[Alignment | None] = []
+    await off_loop(lambda: results.append(comparison.made()))
+    return results[0]

@@ -1,0 +1,81 @@
+"""Two daemons' parts in a team, joined by a network in memory that can be cut; virtual time."""
+
+import asyncio
+from collections.abc import Awaitable, Callable
+
+import pytest
+
+from gvgbot.autonomy.mission import ExplorationConfig
+from gvgbot.autonomy.pipeline import AutonomyConfig, Pipeline
+from gvgbot.clock import LoopClock, run_in_virtual_time
+from gvgbot.live_team import LiveTeam
+from gvgbot.team.member import TeamConfig
+
+CONFIG = TeamConfig(enabled=True)
+
+
+class Air:
+    """Carries what is told to all who listen, unless it is cut."""
+
+    def __init__(self) -> None:
+        self.ears: list[asyncio.Queue[bytes]] = []
+        self.is_cut = False
+
+    def tell_team(self, news: bytes) -> None:
+        for ear in self.ears if not self.is_cut else ():
+            ear.put_nowait(news)
+
+    async def hear_team(self, handle: Callable[[bytes], None]) -> None:
+        ear = asyncio.Queue[bytes]()
+        self.ears.append(ear)
+        while True:
+            handle(await ear.get())
+
+
+async def at_once(work: Callable[[], None]) -> None:
+    work()
+
+
+def together(scene: Callable[[Air, list[LiveTeam]], Awaitable[None]]) -> None:
+    """Let two robots that have seen nothing take part while a scene goes on."""
+
+    async def play() -> None:
+        air, clock = Air(), LoopClock()
+        minds = (Pipeline(AutonomyConfig(), ExplorationConfig(), 0.177) for _ in range(2))
+        parts = [LiveTeam(n, CONFIG, p, air) for n, p in zip(("one", "two"), minds, strict=True)]
+        async with asyncio.TaskGroup() as tasks:
+            running = [tasks.create_task(part.take_part(clock, at_once)) for part in parts]
+            await scene(air, parts)
+            for task in running:
+                task.cancel()
+
+    run_in_virtual_time(play())
+
+
+def test_robots_hear_of_each_other_and_lose_each_other() -> None:
+    async def scene(air: Air, parts: list[LiveTeam]) -> None:
+        one, two = (part.member for part in parts)
+        await asyncio.sleep(5.0)
+        assert not one.is_lost("two")
+        assert not two.is_lost("one")
+        air.is_cut = True
+        await asyncio.sleep(CONFIG.lost_after_s + 5.0)
+        one.due(5.0 + CONFIG.lost_after_s + 5.0)
+        assert one.is_lost("two")
+        air.is_cut = False
+        await asyncio.sleep(5.0)
+        assert not one.is_lost("two")
+
+    together(scene)
+
+
+@pytest.mark.parametrize("noise", [b"", b"\xff" * 40, b"\x80"])
+def test_noise_from_the_network_changes_nothing(noise: bytes) -> None:
+    async def scene(air: Air, parts: list[LiveTeam]) -> None:
+        air.tell_team(noise)
+        await asyncio.sleep(5.0)
+        air.tell_team(noise)
+        await asyncio.sleep(5.0)
+        assert not parts[0].member.is_lost("two")
+
+    together(scene)
