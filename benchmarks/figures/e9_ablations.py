@@ -14,14 +14,11 @@ CERTAINTY = "exploration.certainty"
 IN_OFFICE = {
     "office: as shipped": (),
     "office: ears": ("exploration.policy=ears",),
-    "office: balanced": ("exploration.policy=balanced",),
     "office: odometry between vertices, and their positions": (PAPER,),
 }
 ON_BRANCHES = {
     "branches: odometry between vertices, and their positions": (PAPER,),
-    "branches: the same, p_explore 0.7": (PAPER, f"{CERTAINTY}.p_explore=0.7"),
     "branches: the same, p_explore 0.5": (PAPER, f"{CERTAINTY}.p_explore=0.5"),
-    "branches: the same, 240 degrees and 5.6 m of sight": (PAPER, "twin.laser.model=URG-04LX"),
 }
 SEEDS = range(20)
 NOISE = 0.5
