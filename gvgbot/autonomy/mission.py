@@ -14,6 +14,7 @@ from gvgbot.autonomy.exploration.ears import ear_next, nearest_frontier
 from gvgbot.autonomy.exploration.obstructions import Obstructions
 from gvgbot.autonomy.exploration.paths import Approach, shortest_paths
 from gvgbot.autonomy.exploration.sharing import Sharing
+from gvgbot.autonomy.exploration.stay import Stay
 from gvgbot.autonomy.gvg.local import Branch, Place
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.slam.graph import HalfEdgeId
@@ -106,6 +107,7 @@ class Mission:
         self._newest_m = 0.0  # of the target edge that has been driven
         self._last_progress = 0.0  # stamp
         self._last_view = math.inf  # stamp
+        self._stay = Stay()
         self._progress_at: Array | None = None  # local frame; to and fro on the spot is none
         self._start_edge: StartEdge | None = None
         self._frontiers: set[HalfEdgeId] = set()  # that were known at the last view
@@ -170,6 +172,7 @@ class Mission:
     def set_aside(self) -> None:
         """Let the robot do something else; choose anew when it comes back."""
         self.target = None
+        self._stay.end()
         self._looked_around = 0
         self._held = False
         self._held_since = self._lost_since = None
@@ -182,6 +185,7 @@ class Mission:
     def skip(self, seconds: float) -> None:
         """Let no patience run out by a time in which nothing was to be seen."""
         self._last_progress += seconds
+        self._stay.skip(seconds)
         self._last_view += seconds
         self._held_since = _later(self._held_since, seconds)
         self._lost_since = _later(self._lost_since, seconds)
@@ -266,9 +270,11 @@ class Mission:
             return Stand()
         if self.target is None and self._obstructions.waiting:
             self._last_progress = view.stamp
+            self._stay.end()
             return Stand()
         if self.target is None and self._waits_for_others():
             self._last_progress = view.stamp
+            self._stay.end()
             return Stand()
         if self.target is None and graph.frontiers():
             return self._wait_for_a_way(view, here)
@@ -451,15 +457,19 @@ class Mission:
         base, then = view.local_base.position, self._progress_at
         if then is None or np.hypot(*(base - then)) > 0.3:
             self._progress_at, self._last_progress = base, view.stamp
-        self._last_progress += max(0.0, view.stamp - self._last_view - _LONGEST_VIEW_S)
+        unseen = max(0.0, view.stamp - self._last_view - _LONGEST_VIEW_S)
+        self._last_progress += unseen
+        self._stay.skip(unseen)
         self._last_view = view.stamp
+        stayed = self._stay.note(base, view.stamp)
         if self.where.on_edge == self.target and self.where.trail_length > self._newest_m + 0.5:
             self._newest_m = self.where.trail_length  # new ground: as long as there is more, go on
             self._budget_m = max(self._budget_m, view.travelled + self._config.patience_m)
         if self.target is not None and view.travelled > self._budget_m:
             self._give_up(view, "driven too far without reaching it")
-        elif view.stamp - self._last_progress > self._config.patience_s:
+        elif max(stayed, view.stamp - self._last_progress) > self._config.patience_s:
             self._last_progress = view.stamp
+            self._stay.end()
             self._give_up(view, "no progress")
 
     def _give_up(self, view: View, reason: str) -> None:

@@ -175,6 +175,18 @@ def test_the_end_of_sight_is_looked_around_at_twice_before_a_frontier_is_given_u
     assert robot.mission.target.key != east
 
 
+def test_a_robot_that_drives_to_and_fro_gives_up_its_target_after_its_patience() -> None:
+    """Between two places a metre apart, which it may do when two ways look equally good."""
+    robot = Robot()
+    robot.stand(TEE, 8)
+    begin, target = robot.stamp, robot.mission.target
+    while robot.mission.target == target and robot.stamp < begin + 10 * CONFIG.patience_s:
+        robot.drive(TEE, (0.0, 0.0), (1.0, 0.0), (0.0, 0.0))
+    assert abs(robot.stamp - begin - CONFIG.patience_s) < 10.0
+    given_up = [e for e in robot.said(Recovery) if isinstance(e, Recovery)]
+    assert [e.reason for e in given_up] == ["no progress"]
+
+
 def test_a_robot_that_cannot_move_gives_up_its_target_after_its_patience() -> None:
     robot = Robot()
     robot.stand(TEE, 8)
