@@ -198,16 +198,20 @@ class Member:
         return self._stamp - self._mates[name].heard > self._config.lost_after_s
 
     def others(self) -> dict[str, Pose]:
-        """Where the others are, own map frame: those that are heard and whose frame is known."""
+        """Where the others are, own map frame, if that is known: who has finished stays there."""
         return {
             name: pose.compose(self._mates[name].map_base)
             for name, pose in self.frames.items()
-            if not self.is_lost(name)
+            if not self.is_lost(name) or self._mates[name].news.finished
         }
 
     def standing(self) -> dict[str, Pose]:
         """Those of the others that have not moved lately."""
-        return {n: pose for n, pose in self.others().items() if self._mates[n].is_standing}
+        return {
+            name: pose
+            for name, pose in self.others().items()
+            if self._mates[name].is_standing or self._mates[name].news.finished
+        }
 
     # -- which frontier is whose -------------------------------------------------------------------
 
