@@ -5,6 +5,7 @@ each; a line on stdin, such as `0.0 0.5 20`, makes it send so many twists, ten a
 """
 
 import json
+import select
 import sys
 import threading
 from collections import Counter
@@ -42,12 +43,18 @@ def main(port: int, most: int, domain: int) -> None:
         return tell
 
     where = {"router_ip": "127.0.0.1", "router_port": port, "domain_id": domain}
-    for topic, (kind, qos) in TOPICS.items():
-        ROS2Subscriber(topic, kind, telling(topic), **known(kind), qos=qos, **where)
+    subscribers = {
+        topic: ROS2Subscriber(topic, kind, telling(topic), **known(kind), qos=qos, **where)
+        for topic, (kind, qos) in TOPICS.items()
+    }
     publisher = ROS2Publisher("/cmd_vel", TWIST, **known(TWIST), **where)
     say("ready", {})
-    for line in sys.stdin:
-        linear, angular, times = map(float, line.split())
+    while True:
+        while not select.select([sys.stdin], [], [], 0.2)[0]:
+            for topic, subscriber in subscribers.items():
+                if TOPICS[topic][1] is LATCHED and not said[topic]:
+                    subscriber._query_historical_data()  # it asks once, which may be too early
+        linear, angular, times = map(float, sys.stdin.readline().split())
         vector = STORE.types["geometry_msgs/msg/Vector3"]
         for _ in range(int(times)):
             publisher.publish(linear=vector(linear, 0.0, 0.0), angular=vector(0.0, 0.0, angular))
