@@ -12,7 +12,7 @@ from gvgbot.autonomy.pipeline import Keyframe
 from gvgbot.geometry import Pose
 from gvgbot.hal.messages import Scan
 from gvgbot.live_grid import LiveGrid
-from gvgbot.live_map import Trail
+from gvgbot.live_map import Stretch, Trail, bent
 from gvgbot.maps.occupancy import occupancy_grid
 from gvgbot.topics import TRAJECTORY_POSES, Grid, Raster
 
@@ -113,3 +113,20 @@ def test_standing_makes_a_trajectory_no_longer() -> None:
     assert trail.add([still])
     assert not trail.add([still])
     assert trail.told(2.0).map_base.tolist() == [[1.0, 2.0, 0.5]]
+
+
+def test_edges_are_turned_with_their_vertex_and_bent_to_end_on_the_other() -> None:
+    poses = {1: Pose(1.0, 2.0, math.pi / 2), 2: Pose(1.0, 6.0, 0.3), 3: Pose(1.0, 2.5, 0.0)}
+    line = np.array([[0.0, 0.0], [1.0, 0.5], [2.0, 0.0], [4.0, 0.0]])
+    fits = Stretch(1, 2, 4.2, line)  # four metres ahead of 1, which looks north: there is 2
+    short = Stretch(3, 2, 2.0, np.array([[0.0, 1.0], [0.0, 2.0], [0.0, 3.0]]))  # from 3.5 to 5.5
+    edges = bent([fits, short], poses)
+    assert [(edge.start, edge.end, edge.length) for edge in edges] == [(1, 2, 4.2), (3, 2, 2.0)]
+    expected = [[1.0, 2.0], [0.5, 3.0], [1.0, 4.0], [1.0, 6.0]]
+    assert edges[0].polyline == pytest.approx(np.array(expected), abs=1e-6)
+    moved = [[1.0, 2.5], [1.0, 4.25], [1.0, 6.0]]  # by -1 at the start, +0.5 at the end
+    assert edges[1].polyline == pytest.approx(np.array(moved), abs=1e-6)
+
+
+def test_a_map_without_edges_has_none() -> None:
+    assert bent([], {}) == ()
