@@ -202,7 +202,8 @@ def test_who_is_known_but_has_no_rights_gets_nothing(network: Network) -> None:
         with enter(network, "somebody") as robot:
             assert robot.presence.word == "absent"
             assert robot.state().latest is None
-            assert robot.grid().latest is robot.trajectory().latest is robot.health().latest is None
+            for unknown in (robot.grid().latest, robot.trajectory().latest, robot.health().latest):
+                assert unknown is None
             with pytest.raises(GvgbotError):
                 robot.stop().result()
 
