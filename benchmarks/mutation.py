@@ -14,8 +14,8 @@ import importlib
 import io
 import json
 import os
+import resource
 import shutil
-import signal
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -28,7 +28,7 @@ import numpy as np
 ROOT = Path(__file__).parents[1]
 RESULTS = Path(__file__).parent / "results" / "mutation.json"
 COPIED = ("gvgbot", "tests", "benchmarks", "docs", "pyproject.toml")
-TIMEOUT_S = 120  # of the tests of one mutant; one that never ends is found by that
+MOST_CPU_S = 40  # of the tests of one mutant; one that never ends is found by that
 KILLED, SURVIVED = 1, 0
 PRELOADED = ("msgspec", "numpy", "pytest", "scipy.spatial", "scipy.ndimage", "serial")
 
@@ -120,7 +120,7 @@ def is_killed(mutant: Mutant, tests: Sequence[str], copy: Path) -> bool:
 def _tried(tests: Sequence[str], copy: Path) -> int:
     import pytest  # noqa: PLC0415  # needs nothing of this module's users
 
-    signal.alarm(TIMEOUT_S)
+    resource.setrlimit(resource.RLIMIT_CPU, (MOST_CPU_S, MOST_CPU_S))
     os.chdir(copy)
     sys.path.insert(0, str(copy))
     sys.dont_write_bytecode = True
@@ -170,6 +170,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             for name in options.parts
         ]
     if options.keep:
+        earlier = json.loads(RESULTS.read_text(encoding="utf-8")) if RESULTS.exists() else []
+        rows = [row for row in earlier if row["part"] not in options.parts] + rows
         RESULTS.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
     return 0
 

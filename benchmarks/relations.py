@@ -16,6 +16,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -25,7 +26,9 @@ from gvgbot.geometry import Array, Pose
 from gvgbot.maps.trajectory import decode_tum
 from gvgbot.replay import Wanted, replay
 
+Row = dict[str, Any]
 RESULTS = Path(__file__).parent / "results" / "relations.json"
+HEAD = "mapper     pairs   mean m median m    max m mean deg    CPU s"
 REACH_M = 30.0  # of the beams that yag-slam uses
 
 
@@ -100,18 +103,13 @@ def _rows(poses: list[tuple[float, Pose]]) -> tuple[Array, Array]:
 
 def measure(
     name: str, mapper: Callable[[Path], tuple[Array, Array]], log: Path, relations: Array
-) -> dict[str, str | float]:
+) -> Row:
     """Print how well a mapper does, and return it."""
     start = time.process_time()
     stamps, poses = mapper(log)
     seconds = time.process_time() - start
     metres, turns = relation_errors(relations, stamps, poses)
-    print(
-        f"{name:10} {len(metres):5d} {metres.mean():8.4f} {np.median(metres):8.4f} "
-        f"{metres.max():8.3f} {math.degrees(turns.mean()):8.3f} {seconds:8.1f}",
-        flush=True,
-    )
-    return {
+    row: Row = {
         "mapper": name,
         "pairs": len(metres),
         "mean_m": float(metres.mean()),
@@ -120,6 +118,16 @@ def measure(
         "mean_deg": math.degrees(turns.mean()),
         "cpu_s": seconds,
     }
+    print(line(row), flush=True)
+    return row
+
+
+def line(row: Row) -> str:
+    """A mapper in a line."""
+    return (
+        f"{row['mapper']:10} {row['pairs']:5d} {row['mean_m']:8.4f} {row['median_m']:8.4f} "
+        f"{row['most_m']:8.3f} {row['mean_deg']:8.3f} {row['cpu_s']:8.1f}"
+    )
 
 
 def main() -> None:
@@ -132,7 +140,7 @@ def main() -> None:
     mappers = {"odometry": by_odometry, "gvgbot": by_gvgbot}
     if importlib.util.find_spec("yag_slam"):
         mappers["yag-slam"] = by_yag_slam
-    print("mapper     pairs   mean m median m    max m mean deg    CPU s")
+    print(HEAD)
     rows = [measure(name, mapper, options.log, relations) for name, mapper in mappers.items()]
     if options.keep:
         text = json.dumps({"log": options.log.name, "rows": rows}, indent=1)

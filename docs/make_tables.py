@@ -12,7 +12,7 @@ import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from benchmarks import explore_table
+from benchmarks import explore_table, relations
 from benchmarks.explore_table import Row
 
 ROOT = Path(__file__).parents[1]
@@ -34,9 +34,17 @@ def filled(text: str) -> str:
 
 
 def _quote(file: str, view: str) -> str:
-    lines = (ROOT / file).read_text(encoding="utf-8").splitlines()
     name, *arguments = view.split()
-    return VIEWS[name]([json.loads(line) for line in lines], *arguments)
+    return VIEWS[name](_rows(ROOT / file), *arguments)
+
+
+def _rows(path: Path) -> list[Row]:
+    """Of a file with a row a line, or of one object with all of them as `rows`."""
+    text = path.read_text(encoding="utf-8")
+    if path.suffix == ".jsonl":
+        return [json.loads(line) for line in text.splitlines()]
+    found: list[Row] = json.loads(text)["rows"]
+    return found
 
 
 def runs(rows: list[Row]) -> str:
@@ -64,6 +72,11 @@ def last_words(rows: list[Row], world: str, directory: str) -> str:
     )
 
 
+def mappers(rows: list[Row]) -> str:
+    """Errors and time of each mapper of a log."""
+    return _block([relations.HEAD, *map(relations.line, rows)])
+
+
 def _block(lines: list[str]) -> str:
     return "\n".join(["```", *lines, "```"])
 
@@ -72,6 +85,7 @@ VIEWS: dict[str, Callable[..., str]] = {
     "runs": runs,
     "summary": summary,
     "last_words": last_words,
+    "mappers": mappers,
 }
 
 
