@@ -54,8 +54,8 @@ def find() -> Finding:
         "what else was changed.",
         holds=apart > 2 * whole,
         figure=drawing.save(figure, "e9"),
-        explained="Left: one run each, the same seed. Right: the filter by itself. Where two rows are "
-        "the same, so were the runs.",
+        explained="Left: one run each, the same seed. Right: the filter by itself. Where two "
+        "rows are the same, so were the runs.",
         table=(
             ("run", "way, m", "closures", "largest sigma, m", "vertex RMSE, m", "recall"),
             *(_row(name, run) for name, run in runs.items()),
