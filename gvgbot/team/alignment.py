@@ -36,6 +36,7 @@ _SHIFT_M, _TURN_RAD = 0.35, 0.1  # by which charts may be bent against each othe
 _LAID_OUT = 3  # rounds of laying walls on walls
 _ALIKE_SHARE = 0.85  # of the walls around a vertex, on either side, speaks for it,
 _UNLIKE_SHARE = 0.6  # and less than this against it; one robot may not have seen all
+_HOPELESS_SHARE = 0.5  # if fewer of them lie twice as near, they need not be laid out further
 _FITS = 5  # rounds of pairing and fitting
 _EXAMINED, _MISFITS = 12, 6  # transforms that are looked at closely, of a chart onto itself
 _APART_M, _APART_RAD = 1.0, 0.25  # transforms nearer to each other are the same
@@ -367,7 +368,7 @@ def _agreement(a: Side, b: Side, ours: ChartVertex, theirs: ChartVertex, pose: P
         laid = local.transform(near_b)
         away, index = a.walls.query(laid, distance_upper_bound=2 * _WALL_M)
         found = np.isfinite(np.asarray(away))
-        if np.count_nonzero(found) < _LEAST_PAIRS:
+        if np.count_nonzero(found) < max(_LEAST_PAIRS, _HOPELESS_SHARE * len(found)):
             return 0.0
         local, _ = _least_squares(a.walls.data[np.asarray(index)[found]], near_b[found])
     shift = local.transform(theirs.position) - pose.transform(theirs.position)
