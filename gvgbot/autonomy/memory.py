@@ -2,7 +2,7 @@
 
 The names of the fields are the names in saved missions, and so are those of the values below them:
 a field that is added needs a default, and one that is renamed cannot be read any more.
-What a moment decides (the order, reflexes, patience, people in sight) is left to the next moment.
+What a moment decides (the order, reflexes, patience) is left to the next moment.
 """
 
 from dataclasses import dataclass, field, replace
@@ -16,6 +16,7 @@ from gvgbot.autonomy.exploration.obstructions import Obstructions
 from gvgbot.autonomy.gvg.local_map import LocalMap
 from gvgbot.autonomy.hazards import Hazard
 from gvgbot.autonomy.mission import Mission, Outcome
+from gvgbot.autonomy.newcomers import Newcomer
 from gvgbot.autonomy.odometry_log import OdometryLog
 from gvgbot.autonomy.pipeline import Keyframe, Pipeline, Step
 from gvgbot.autonomy.slam import ekf
@@ -43,6 +44,9 @@ class Cells:
     mean: Array  # (M, 2) local frame
     hits: NDArray[np.float32]  # (M,)
     sight: NDArray[np.float32]  # (M, 2) mean direction to where they were seen from
+    # (K,) numbers of the cells that sent lone echoes, glass perhaps, and how many
+    glass: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
+    echoes: NDArray[np.float32] = field(default_factory=lambda: np.empty(0, np.float32))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,6 +104,7 @@ class Memory:
     far: Cells
     odds: Odds
     hazards: list[Hazard]
+    newcomers: list[Newcomer] = field(default_factory=list)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -131,6 +136,7 @@ def remember(pipeline: Pipeline) -> Memory:
         far=_cells(maps._far),
         odds=Odds(calibration.x, calibration.P, maps._shared),
         hazards=pipeline._hazards._all,
+        newcomers=pipeline._newcomers._all,
     )
 
 
@@ -156,6 +162,7 @@ def _intent(pipeline: Pipeline) -> Intent:
 
 def _cells(local_map: LocalMap) -> Cells:
     walls = np.flatnonzero(local_map._votes > 0)
+    glass = np.flatnonzero(local_map._echoes > 0)
     return Cells(
         local_map._corner,
         np.packbits(local_map._free),
@@ -165,6 +172,8 @@ def _cells(local_map: LocalMap) -> Cells:
         local_map._mean.reshape(-1, 2)[walls],
         local_map._hits.ravel()[walls],
         local_map._sight.reshape(-1, 2)[walls],
+        glass,
+        local_map._echoes.ravel()[glass],
     )
 
 
@@ -205,6 +214,7 @@ def recall(pipeline: Pipeline, memory: Memory, past: list[Growth]) -> None:
     calibration.x, calibration.P = memory.odds.x, memory.odds.P
     pipeline._maps._shared = memory.odds.shared
     pipeline._hazards._all = list(memory.hazards)
+    pipeline._newcomers._all = list(memory.newcomers)
     pipeline.travelled, pipeline._kept = memory.travelled, memory.kept
     _recall_past(pipeline, past[: memory.keyframes])
     if len(past) < memory.keyframes and memory.last is not None:
@@ -253,6 +263,7 @@ def _recall_cells(local_map: LocalMap, cells: Cells) -> None:
     local_map._mean.reshape(-1, 2)[cells.walls] = cells.mean
     local_map._hits.ravel()[cells.walls] = cells.hits
     local_map._sight.reshape(-1, 2)[cells.walls] = cells.sight
+    local_map._echoes.ravel()[cells.glass] = cells.echoes
     local_map._renew()
 
 

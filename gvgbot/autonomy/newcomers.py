@@ -27,6 +27,7 @@ _SLIM_M, _WIDE_M = 0.1, 0.8  # people are between these; what is slimmer is furn
 _GLIMPSE_S = 3.0  # what is half hidden behind something nearer is only kept waiting so long
 _BLUR_M = 0.1  # beyond its rim, beams may still end on something
 _MOVED_M = 0.3  # what stands is found again within this
+_STRAY = 0.1  # of the beams towards a place: so many may end there though nothing is there
 _LOST_S = 3.0  # and what is out of sight for so long, beyond the time it stood, has gone
 _RIM = np.stack([f(np.arange(12) * np.pi / 6) for f in (np.cos, np.sin)], axis=1)
 
@@ -43,7 +44,7 @@ class NewcomersConfig:
 
 
 @dataclass(slots=True, eq=False)
-class _Newcomer:
+class Newcomer:
     """A disc in the local frame, since when it has been there, and when it was last seen, s."""
 
     centre: Array
@@ -70,7 +71,8 @@ class Newcomers:
 
     def __init__(self, config: NewcomersConfig) -> None:
         self._config = config
-        self._all: list[_Newcomer] = []
+        self._all: list[Newcomer] = []
+        self._stamp = 0.0  # of the last scan
         self.company: list[tuple[Array, float]] = []  # other robots: where they say they are
 
     def sift(
@@ -91,7 +93,7 @@ class Newcomers:
             for island in _islands(scan, local_base)
             if not self._is_company(island) and self._is_passing(island, scan.stamp, walls)
         ]
-        waiting = [(one.centre, one.radius) for one in self._all if not one.is_let_in]
+        waiting = [(one.centre, one.radius) for one in self._waiting]
         # At times one is seen in parts only, or has moved a little: both discs count.
         return _without(scan, local_base, [*seen, *waiting, *self.company])
 
@@ -106,7 +108,7 @@ class Newcomers:
             return False
         if one is None:
             came = walls.are_away(island)
-            one = _Newcomer(island.centre, island.radius, stamp, stamp, came, island.is_whole)
+            one = Newcomer(island.centre, island.radius, stamp, stamp, came, island.is_whole)
             self._all.append(one)
         one.last = stamp
         one.radius = max(one.radius, island.radius)
@@ -114,35 +116,35 @@ class Newcomers:
         one.is_let_in = stamp - one.first >= self._patience(one)
         return not one.is_let_in
 
-    def _patience(self, one: _Newcomer) -> float:
+    def _patience(self, one: Newcomer) -> float:
         if not one.is_whole:
             return min(_GLIMPSE_S, self._config.found_after_s)
         return self._config.came_after_s if one.came else self._config.found_after_s
 
     def _forget(self, scan: Scan, local_base: Pose, local_map: LocalMap) -> None:
-        """Let those go that have gone: beams pass where they were, or nobody has seen them long."""
+        """Let those go of whom it is seen that they have gone, and those far away."""
+        for one in self._all:
+            if one.last > scan.stamp:  # kept from a time before the clock began anew
+                one.first, one.last = one.first + scan.stamp - one.last, scan.stamp
         gone = [one for one in self._all if _is_seen_through(scan, local_base, one)]
         for one in gone:
             local_map.doubt(one.centre, one.radius + _BLUR_M)
-        self._all = [
+        self._all = [one for one in self._all if one not in gone and local_map.covers(one.centre)]
+        self._stamp = scan.stamp
+
+    @property
+    def _waiting(self) -> list[Newcomer]:
+        """Those not in the map, but for whom nobody has seen for long: they may have gone."""
+        return [
             one
             for one in self._all
-            if one not in gone
-            and (
-                local_map.covers(one.centre)
-                if one.is_let_in
-                else scan.stamp - one.last < _LOST_S + one.last - one.first
-            )
+            if not one.is_let_in and self._stamp - one.last < _LOST_S + one.last - one.first
         ]
 
     @property
     def points(self) -> Array:
         """The rims (N, 2), local frame, of company, and of those seen whole not in the map."""
-        whole = (
-            one.centre + one.radius * _RIM
-            for one in self._all
-            if one.is_whole and not one.is_let_in
-        )
+        whole = (one.centre + one.radius * _RIM for one in self._waiting if one.is_whole)
         others = (centre + radius * _RIM for centre, radius in self.company)
         return np.concatenate([np.empty((0, 2)), *whole, *others])
 
@@ -171,7 +173,7 @@ class _Walls:
         return is_bare or self._is_way(island.centre)
 
 
-def _is_at(one: _Newcomer, centre: Array) -> bool:
+def _is_at(one: Newcomer, centre: Array) -> bool:
     return bool(np.hypot(*(one.centre - centre)) < _MOVED_M)
 
 
@@ -221,17 +223,22 @@ def _ends(scan: Scan, beams: NDArray[np.intp], depth: Array, local_laser: Pose) 
     return local_laser.transform(depth[:, None] * directions)
 
 
-def _is_seen_through(scan: Scan, local_base: Pose, one: _Newcomer) -> bool:
-    """Whether most beams towards it pass it by."""
+def _is_seen_through(scan: Scan, local_base: Pose, one: Newcomer) -> bool:
+    """Whether most beams towards it pass it by, and hardly any ends on it.
+
+    Beside a post between two panes of glass most beams pass as well.
+    """
     x, y = local_base.compose(scan.base_laser).inverse().transform(one.centre)
-    away, half = float(np.hypot(x, y)), 0.5 * one.radius
+    away = float(np.hypot(x, y))
     if away < one.radius:
         return False
     middle = (np.arctan2(y, x) - scan.angle_min) % (2 * np.pi) / scan.angle_increment
-    spread = half / away / scan.angle_increment
-    first, last = round(middle - spread), round(middle + spread) + 1
+    half = one.radius / away / scan.angle_increment
+    first, last = round(middle - half), round(middle + half) + 1
     if first < 0 or last > len(scan.ranges):
         return False
     told = scan.ranges[first:last]
     told = told[~np.isnan(told)]
-    return bool(len(told) and np.mean(told > away + one.radius + 0.1) > 0.5)
+    beyond = told > away + one.radius + _BLUR_M
+    ends = ~beyond & (told > away - one.radius - _BLUR_M)
+    return bool(len(told) and np.mean(beyond) > 0.5 and np.mean(ends) < _STRAY)
