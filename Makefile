@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 SHELL := /bin/sh
 
-.PHONY: help explore test check static quick bench bench-explore figures keep fuzz docs pages clean
+.PHONY: help explore test check static quick bench bench-explore reliability figures keep fuzz docs pages clean
 
 help:
 	@echo "make explore   a simulated robot maps the built-in office; prints where the map is"
@@ -13,6 +13,7 @@ help:
 	@echo "make bench     time the inner loops and the drivers, targets beside: docs/benchmarks.md"
 	@echo "make figures   repeat the paper's experiments: docs/figures.md"
 	@echo "make keep RESULTS=FILE   quote a table of explorations in README and docs"
+	@echo "make reliability   a thousand robots with faults from every layer, and what must not happen to them"
 	@echo "make docs      this documentation as a site in site/; make pages renews its generated pages"
 	@echo "make fuzz      throw mutated bytes at the parsers for a minute each"
 
@@ -40,6 +41,10 @@ bench: .venv/dev
 figures: .venv/docs
 	@OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.figures $(ARGS)
 	@$(BIN)/python -m docs.make_figures
+
+SEEDS ?= 1000
+reliability: .venv/dev
+	@nice -n 10 $(BIN)/python -m benchmarks.reliability --seeds $(SEEDS) $(ARGS)
 
 PLANS ?= 100
 bench-explore: .venv/dev

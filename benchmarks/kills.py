@@ -172,7 +172,7 @@ def vertices(out: Path) -> Points:
 
 def has_failed(row: Row) -> bool:
     """Whether a run did not end with the map of the uninterrupted one."""
-    return (
+    return bool(
         row["outcome"] != "explored"
         or row["lost"] + row["extra"] + row["contacts"] > 0
         or row["off_m"] > WANTED_M
@@ -194,7 +194,7 @@ def line(row: Row) -> str:
 def summary(rows: list[Row]) -> str:
     """All runs together."""
     whole = [row for row in rows if row["outcome"] != "crashed"]
-    damage = sum((Counter(row["damage"]) for row in rows), Counter())
+    damage = sum((Counter[str](row["damage"]) for row in rows), Counter[str]())
     return (
         f"{len(rows)} runs, {sum(row['kills'] for row in rows)} kills ("
         + ", ".join(f"{kind} {count}" for kind, count in damage.items())

@@ -1,5 +1,7 @@
 """Worlds so small that a whole exploration of one takes a few seconds of computing."""
 
+from itertools import pairwise
+
 from gvgbot.geometry import Pose
 from gvgbot.simulation import Place
 from gvgbot.worlds.canvas import Canvas
@@ -15,8 +17,11 @@ def two_rings() -> Place:
 
 
 def one_ring() -> Place:
-    """A ring of corridors and a short branch: two vertices and some twenty metres."""
+    """A ring of four corridors, no two alike, and a branch: two vertices and some twenty metres."""
     canvas = Canvas(9.5, 8.0)
-    canvas.carve_path([(1.5, 1.5), (6.0, 1.5), (6.0, 6.5), (1.5, 6.5), (1.5, 1.5)], 1.2)
-    canvas.carve_path([(6.0, 4.0), (8.2, 4.0)], 1.0)
+    corners = [(1.5, 1.5), (6.0, 1.5), (6.0, 6.5), (1.5, 6.5), (1.5, 1.5)]
+    for corridor, width in zip(pairwise(corners), (1.2, 1.55, 1.0, 1.35), strict=True):
+        canvas.carve_path(list(corridor), width)
+        canvas.carve_path([corridor[1], corridor[1]], width)
+    canvas.carve_path([(6.0, 4.0), (8.4, 4.0)], 1.0)
     return Place(canvas.world("one ring"), Pose(1.5, 3.0, 1.2))
