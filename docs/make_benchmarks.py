@@ -47,7 +47,7 @@ def page() -> str:
     names = [name for name in TITLES if (RESULTS / f"{name}.json").exists()]
     kept = {name: json.loads((RESULTS / f"{name}.json").read_text("utf-8")) for name in names}
     parts = [_machine(kept), *(_section(name, part) for name, part in kept.items())]
-    parts += [_explorations(), *_logs()]
+    parts += [_explorations(), *_logs(), *_mutants()]
     return HEAD + "\n".join(parts)
 
 
@@ -137,6 +137,21 @@ def _logs() -> Iterator[str]:
         f"## A recorded log\n\n`python -m benchmarks.relations`, with {kept['log']}: errors of the "
         "relations that people made for it. The target is a mean of 0.06 m in 10 s; published are "
         "0.070 m for a particle filter and 0.031 m for graph mapping.\n\n" + table(head, rows)
+    )
+
+
+def _mutants() -> Iterator[str]:
+    path = RESULTS / "mutation.json"
+    if not path.exists():
+        return
+    found = json.loads(path.read_text(encoding="utf-8"))
+    rows = [(f"`{row['part']}`", str(row["mutants"]), str(row["killed"])) for row in found]
+    killed, tried = (sum(row[key] for row in found) for key in ("killed", "mutants"))
+    yield (
+        f"## Do the tests notice?\n\n{killed} of {tried} mutants were killed: small changes of the "
+        "source, drawn by `python -m benchmarks.mutation` from all that cosmic-ray can make, and "
+        "tried with the fast unit tests of their part alone.\n\n"
+        + table(("part", "mutants", "killed"), rows)
     )
 
 
