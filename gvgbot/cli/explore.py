@@ -50,11 +50,10 @@ def add_explore(commands: Commands) -> None:
 
 
 def robots(text: str) -> int:
-    """A number of robots that can explore together. Raises ValueError."""
-    value = int(text)
-    if not 1 <= value <= MOST_ROBOTS:
-        raise ValueError(text)
-    return value
+    """A number of robots that can explore together. Raises ArgumentTypeError."""
+    if not text.isdecimal() or not 1 <= int(text) <= MOST_ROBOTS:
+        raise argparse.ArgumentTypeError(f"{text!r}: it can be 1 to {MOST_ROBOTS} robots")
+    return int(text)
 
 
 def _explore(options: argparse.Namespace) -> int:

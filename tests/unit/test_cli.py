@@ -26,6 +26,8 @@ BAD_ARGUMENTS = {
     "a start that is not finite": (["explore", "--start", "1", "nan", "0"], "nan"),
     "a seed that is no number": (["explore", "--seed", "x"], "--seed"),
     "a negative seed": (["explore", "--seed", "-1"], "--seed"),
+    "no robot": (["explore", "--robots", "0"], "1 to 8"),
+    "too many robots": (["explore", "--robots", "9"], "1 to 8"),
     "no action on a map": (["map"], "COMMAND"),
     "one frame": (["map", "show", ".", "--frames", "1"], "--frames"),
     "too many frames": (["map", "show", ".", "--frames", "100000"], "--frames"),
