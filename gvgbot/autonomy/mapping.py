@@ -30,6 +30,7 @@ _HIDES_M = 1.0  # what stands so near to a vertex's disc may close a branch
 _FRESH_M = 6.0  # driven since a vertex was seen: the local frame still tells its place
 _IN_FULL_VIEW_M = 4.0  # from so near, it would be seen that a vertex is none
 _WELL_KNOWN_M = 0.2  # the uncertainty of its place with which that can be told
+_DOOR_M = 0.5  # from an edge, a dead end is what stands on it
 _AT_END_M = 0.5  # so near to the end of a dead end, it has been driven
 
 
@@ -39,6 +40,8 @@ class MappingConfig:
 
     candidates: CandidatesConfig = field(default_factory=CandidatesConfig)
     trust_m: Annotated[float, Range(1.0, 30.0)] = 7.0  # vertices farther away are not yet believed
+    # for so long must sight speak against a part of a finished map: doors close, and open again
+    changed_after_s: Annotated[float, Range(0.0, 1e7)] = 86_400.0
     misses: Annotated[int, Range(1, 50)] = 6  # sightings of a plain edge that refute a vertex
     conflicts: Annotated[int, Range(1, 50)] = 4  # sightings that overrule an edge
     surplus: Annotated[int, Range(1, 50)] = 3  # sightings in a row that add a departure to a vertex
@@ -204,7 +207,7 @@ class Mapper:
     def _consider(self, view: View, sightings: dict[int, Sighting], known: Correspondence) -> None:
         """Count sightings of what is not known yet, and believe what has been seen often enough."""
         for node, sighting in sightings.items():
-            if node in known.vertex_of or node in view.doubted:
+            if node in known.vertex_of or node in view.doubted or self._is_door(view, sighting):
                 continue
             away = float(np.hypot(*(sighting.position - view.local_base.position)))
             candidate = self._unbelieved.note(sighting, away, view.travelled)
@@ -216,7 +219,8 @@ class Mapper:
             ):
                 continue  # it may be a known one: look at it from closer
             self._unbelieved.drop(candidate)
-            known.pair(node, self._add(view, sighting).id)
+            old = self._back_again(view, sighting, known)
+            known.pair(node, self._add(view, sighting).id if old is None else old.id)
 
     def _may_be_known(self, view: View, sighting: Sighting) -> bool:
         vertices = self.graph.vertices.values()
@@ -282,7 +286,7 @@ class Mapper:
         position = (1 - share) * vertex.local.position + share * sighting.position
         vertex.local = Pose(float(position[0]), float(position[1]), vertex.local.theta)
         vertex.sightings += 1
-        vertex.misses = 0
+        vertex.misses, vertex.doubted_since = 0, None
         vertex.seen_at = view.travelled
         near = np.hypot(*(position - view.local_base.position)) < 1.0
         if node.settled:
@@ -338,16 +342,18 @@ class Mapper:
         for key in matched.values():
             vertex.half_edges[key].misses = 0
         if node.lead is None and len(matched) == len(branches):
-            self._doubt_half_edges(vertex, set(matched.values()), len(branches))
+            self._doubt_half_edges(view, vertex, set(matched.values()), len(branches))
 
-    def _doubt_half_edges(self, vertex: Vertex, seen: set[int], degree: int) -> None:
+    def _doubt_half_edges(self, view: View, vertex: Vertex, seen: set[int], degree: int) -> None:
         """Drop departures that a clear view keeps not showing."""
         for key, half in list(vertex.half_edges.items()):
             if key in seen or vertex.degree <= degree:
                 continue
             half.misses += 1
             edge = self.graph.edge_at(HalfEdgeId(vertex.id, key))
-            if half.misses > self._config.misses and (edge is None or not edge.driven):
+            if half.misses <= self._config.misses or (edge is not None and edge.driven):
+                continue
+            if edge is None or self._has_changed(edge, view.stamp):
                 self.graph.remove_half_edge(HalfEdgeId(vertex.id, key))
 
     def _refute(self, view: View, known: Correspondence) -> None:
@@ -358,7 +364,8 @@ class Mapper:
                 continue
             if self._passes_through(view, place, known):
                 vertex.misses += 1
-                if vertex.misses > self._config.misses:
+                refuted = vertex.misses > self._config.misses
+                if refuted and self._has_changed(vertex, view.stamp):
                     self.remove(view, vertex, "an edge passes here")
 
     def _in_full_view(self, view: View) -> list[tuple[Vertex, Array]]:
@@ -391,6 +398,52 @@ class Mapper:
         end = edge.a if place.station < edge.length / 2 else edge.b
         return from_end > reach or end in known.vertex_of
 
+    # -- what was finished once --------------------------------------------------------------
+
+    def settle(self) -> None:
+        """Take the map for the building: what speaks against it must do so for long, from now on.
+
+        Otherwise every door that is shut for an hour would take vertices along.
+        """
+        for vertex in self.graph.vertices.values():
+            vertex.established = True
+        for edge in self.graph.edges.values():
+            edge.established = True
+
+    def _has_changed(self, part: Vertex | Edge, stamp: float) -> bool:
+        """Whether a part of the map may go that sight speaks against."""
+        if not part.established:
+            return True
+        if part.doubted_since is None:
+            part.doubted_since = stamp
+        return stamp - part.doubted_since >= self._config.changed_after_s
+
+    def _back_again(self, view: View, sighting: Sighting, known: Correspondence) -> Vertex | None:
+        """The vertex of the finished map that a sighting stands beside: a door was shut there."""
+        for vertex in self.graph.vertices.values():
+            is_away = vertex.id not in known.node_of and vertex.doubted_since is not None
+            if not is_away or sighting.meetpoint != (vertex.kind == "meetpoint"):
+                continue
+            place = self.in_local_frame(view, vertex.id)
+            off = float(np.hypot(*(place.position - sighting.position)))
+            if off < self._recognition.same_place_m and self._is_well_known(vertex):
+                x, y = sighting.position
+                vertex.local = Pose(float(x), float(y), place.theta)
+                vertex.seen_at = vertex.updated_at = view.travelled
+                return vertex
+        return None
+
+    def _is_door(self, view: View, sighting: Sighting) -> bool:
+        """Whether a dead end is seen in the middle of an edge of the finished map."""
+        if sighting.meetpoint:
+            return False
+        for edge in self.graph.edges.values():
+            if edge.established:
+                line = self.in_local_frame(view, edge.a.vertex).transform(edge.polyline)
+                if np.hypot(*(line - sighting.position).T).min() < _DOOR_M:
+                    return True
+        return False
+
     # -- what hangs together -----------------------------------------------------------------
 
     def _join(self, view: View, known: Correspondence) -> None:
@@ -407,6 +460,8 @@ class Mapper:
                 self.join(view, a, b, edge.polyline, float(edge.clearance.min()), driven=False)
             elif here is not there:
                 self._dispute(view, known, here, there)
+            elif here is not None:
+                here.doubted_since = None
 
     def _is_far_end(self, view: View, edge: LocalEdge) -> bool:
         """Whether an edge ends in a dead end where the robot is not."""
@@ -420,7 +475,7 @@ class Mapper:
             if edge is None:
                 continue
             edge.conflicts += 1
-            if edge.conflicts > self._config.conflicts:
+            if edge.conflicts > self._config.conflicts and self._has_changed(edge, view.stamp):
                 self.graph.unjoin(edge)
                 for end in (edge.a, edge.b):
                     vertex = self.graph.vertices[end.vertex]

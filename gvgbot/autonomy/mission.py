@@ -222,6 +222,7 @@ class Mission:
         edge = graph.edge_at(left)
         if edge is not None:
             edge.traversals += 1
+            edge.doubted_since = None
             return
         far, near = graph.half_edge(arrived), graph.half_edge(left)
         if far is None or near is None or not (far.open and near.open):

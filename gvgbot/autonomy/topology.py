@@ -34,7 +34,8 @@ def split_edge_at(
         for i, far in enumerate((edge.a, edge.b)):
             part = np.concatenate([np.zeros((1, 2)), parts[i]])
             near = HalfEdgeId(vertex.id, matched[i])
-            graph.join(near, far, part, edge.min_clearance, driven=edge.driven)
+            part_edge = graph.join(near, far, part, edge.min_clearance, driven=edge.driven)
+            part_edge.established = edge.established
         return
 
 
@@ -71,7 +72,8 @@ def take_out(graph: GvgGraph, belief: Belief, vertex: Vertex) -> None:
     line = np.concatenate([inwards, outwards[1:]])
     line = belief.map_vertex(start.vertex).inverse().transform(line)
     clearance = min(one.min_clearance, other.min_clearance)
-    graph.join(start, end, line, clearance, driven=one.driven and other.driven)
+    edge = graph.join(start, end, line, clearance, driven=one.driven and other.driven)
+    edge.established = one.established and other.established
 
 
 def _outwards(belief: Belief, edge: Edge, end: HalfEdgeId) -> Array:

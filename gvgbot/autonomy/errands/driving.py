@@ -26,7 +26,7 @@ from gvgbot.autonomy.mission import Drive, ExplorationConfig, LookAround, Missio
 from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.autonomy.views import Correspondence, View
 from gvgbot.autonomy.whereabouts import Situation
-from gvgbot.geometry import Array
+from gvgbot.geometry import Array, wrap_angle
 
 DIRECT_M = 4.0  # the longest straight way to a point
 _THERE_M = 0.15  # from a destination, one has arrived
@@ -37,6 +37,8 @@ _SHORT_M = 0.3  # a track so short leads nowhere
 _PROGRESS_M = 0.3
 _SURE_M = 0.4  # of a place that was found again
 _LOOKS = 2  # around, before giving up
+_UNSEEN_LOOKS = 3, 15  # at where an edge should leave: before it waits, and gives that up
+_THROUGH_RAD = 0.8  # an edge that leaves so near to where one is seen is that one
 _LONGEST_VIEW_S = 2.0  # a longer gap between views is an outage, not a lack of progress
 
 
@@ -87,6 +89,7 @@ class Driving:
         self._route: Route | None = None  # that is being driven
         self._nearest_m = math.inf  # that has been left of it
         self._looks = 0
+        self._unseen = 0  # looks at where the route goes on, without seeing that
         self._is_looking = self._is_obstructed = False
         self._progress = -math.inf  # stamp
         self._last_view = -math.inf  # stamp
@@ -142,14 +145,20 @@ class Driving:
 
     def _close_way(self, view: View) -> Ended | None:
         """Something stands in the way: try another one, if there is one."""
-        self._is_obstructed, self._progress = False, view.stamp
-        graph, on_edge = self._mapper.graph, self._ground.mission.where.on_edge
-        heading = self._heading
-        if self._route is not None and self._ground.is_at(view, self._route.first):
-            on_edge = next(iter(self._route.departures), on_edge)
+        route, on_edge = self._route, self._ground.mission.where.on_edge
+        if route is not None and route.departures and self._ground.is_at(view, route.first):
+            end = route.departures[0]
+            edge = self._mapper.graph.edge_at(end)
+            return self._close(view, end, None if edge is None else edge.other(end).vertex)
+        return self._close(view, on_edge, self._heading)
+
+    def _close(self, view: View, end: HalfEdgeId | None, heading: int | None) -> Ended | None:
+        """Drive an edge no more, and not to that vertex if the robot is on it."""
+        self._is_obstructed, self._progress, self._unseen = False, view.stamp, 0
         self._nearest_m = math.inf
-        edge = None if on_edge is None else graph.edge_at(on_edge)
-        ends = [edge.a, edge.b] if edge is not None else [on_edge] if on_edge is not None else []
+        graph = self._mapper.graph
+        edge = None if end is None else graph.edge_at(end)
+        ends = [edge.a, edge.b] if edge is not None else [end] if end is not None else []
         halves = [half for end in ends if (half := graph.half_edge(end)) is not None]
         if heading is None or all(half.blocked for half in halves):
             return Ended("given up", "something stands in the way")
@@ -158,6 +167,28 @@ class Driving:
         self._ground.closures.close(graph, ends, until)
         self.happened.append(Recovery(view.stamp, "try another way", "something stands in the way"))
         return None
+
+    def _is_missing(self, view: View, here: Situation, departure: HalfEdgeId) -> bool:
+        """Whether nothing is to be seen of an edge where it should leave, which is in sight."""
+        half = self._mapper.graph.half_edge(departure)
+        if departure in here.known.branch_of or half is None:
+            return False
+        node = here.known.node_of.get(departure.vertex)
+        if node is not None:
+            return view.gvg.nodes[node].settled and node not in view.doubted
+        local_vertex = self._mapper.in_local_frame(view, departure.vertex)
+        place = view.gvg.place(local_vertex.position)
+        if place is None or place.distance > _PAST_M:
+            return False
+        passing = view.gvg.edges[place.edge]
+        ways = [
+            passing.polyline[int(np.argmin(np.abs(passing.stations - place.station - way)))]
+            - local_vertex.position
+            for way in (-_AT_VERTEX_M, _AT_VERTEX_M)
+        ]
+        bearing = half.bearing + local_vertex.theta
+        turns = [abs(wrap_angle(math.atan2(dy, dx) - bearing)) for dx, dy in ways]
+        return min(turns) > _THROUGH_RAD
 
     def _starts(self, here: Situation) -> list[Approach]:
         """Where ways begin, without the one that something stands in."""
@@ -196,7 +227,8 @@ class Driving:
             return Ended("arrived", f"vertex {vertex}")
         if here is None:
             return self._find_edge(view, waited)
-        return self._drive(view, here, route_to_vertex(graph, self._starts(here), vertex), waited)
+        route = route_to_vertex(graph, self._starts(here), vertex)
+        return self._drive(view, here, route, waited, there if node is None else None)
 
     def _past(
         self, view: View, here: Situation | None, foot: Foot | None, waited: float
@@ -254,6 +286,18 @@ class Driving:
         if route is None:
             return Ended("given up", "no known way leads there")
         self._heading, self._route = route.first, route
+        next_one = next(iter(route.departures), None)
+        is_missing = (
+            next_one is not None
+            and self._ground.is_at(view, route.first)
+            and self._is_missing(view, here, next_one)
+        )
+        self._unseen = self._unseen + 1 if is_missing else 0
+        if self._unseen >= _UNSEEN_LOOKS[1]:
+            return self._close_way(view) or Stand()
+        if self._unseen >= _UNSEEN_LOOKS[0]:  # a door that has opened just now is still a wall
+            self._progress = view.stamp
+            return Stand()
         if route.metres < self._nearest_m - _PROGRESS_M:
             self._nearest_m, self._progress = route.metres, view.stamp
         path = route.branches(here) or here.ahead()
@@ -265,9 +309,10 @@ class Driving:
                 line, clearance = line[: i + 1], clearance[: i + 1]
         track = Track.of(line, clearance)
         if track.length < _SHORT_M and waited > self.config.look_around_s:
-            if self._looks >= _LOOKS:
-                return Ended("given up", "the way there is not to be seen any more")
-            return self._look_around(view)
+            if self._looks < _LOOKS:
+                return self._look_around(view)
+            self._looks = 0
+            return self._close_way(view) or Stand()
         return Drive(track)
 
     def _find_edge(self, view: View, waited: float) -> Order | Ended:

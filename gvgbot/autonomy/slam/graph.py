@@ -57,6 +57,8 @@ class Vertex:
     unclear: int = 0  # sightings from it with a departure of which too little can be seen
     visits: int = 1
     serial: int = 0
+    established: bool = False  # part of a map that was finished
+    doubted_since: float | None = None  # stamp; since when sight speaks against it
 
     def add_half_edge(self, bearing: float) -> int:
         """The key of a new half-edge."""
@@ -98,6 +100,8 @@ class Edge:
     driven: bool = False
     traversals: int = 0
     conflicts: int = 0
+    established: bool = False  # part of a map that was finished
+    doubted_since: float | None = None  # stamp; since when sight speaks against it
 
     def other(self, end: HalfEdgeId) -> HalfEdgeId:
         """The half-edge at the far end."""

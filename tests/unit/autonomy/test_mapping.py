@@ -385,3 +385,28 @@ def test_a_driven_edge_keeps_its_line_in_the_frame_of_its_first_vertex() -> None
     assert back == pytest.approx(line)
     assert edge.driven
     assert graph.edge_at(HalfEdgeId(*edge.b)) is edge
+
+
+def test_a_door_that_is_shut_for_a_while_takes_no_vertex_out_of_a_finished_map() -> None:
+    """The branch of the tee is out of sight, and what is left is a plain corridor."""
+    seen = Seen().look(TEE, 20)
+    vertices = set(seen.mapper.graph.vertices)
+    seen.mapper.settle()
+    seen.look(PLAIN, 100)
+    assert set(seen.mapper.graph.vertices) == vertices
+    assert of_type(seen.events, VertexRemoved) == []
+
+
+def test_what_stays_away_for_longer_than_a_day_was_walled_up() -> None:
+    seen = Seen().look(TEE, 20)
+    seen.mapper.settle()
+    seen.look(PLAIN, 20)
+    seen.drive_elsewhere(CONFIG.changed_after_s / 10.0)  # a second for each 0.1 m
+    seen.look(PLAIN, 20)
+    assert len(of_type(seen.events, VertexRemoved)) >= 1
+    assert seen.places("meetpoint") == []
+
+
+def test_before_it_is_finished_a_map_learns_as_fast_as_ever() -> None:
+    seen = Seen().look(TEE, 20).look(PLAIN, 20)
+    assert len(of_type(seen.events, VertexRemoved)) >= 1
