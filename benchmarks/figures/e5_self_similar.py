@@ -50,8 +50,8 @@ def find() -> Finding:
         verdict=f"With scan matching (`full`) the map is {'' if complete[0] else 'not '}complete "
         f"and right, by odometry between vertices (`paper`) {'as well' if complete[1] else 'not'}. "
         f"Without walls, one arrival in a hundred has another crossing of the same degree in its "
-        f"gate as soon as noise is more than {begins:g} times that of a Kobuki (sigma up to "
-        f"{sigma[begins] if begins else 0.0:.1f} m, at {BLOCK_M:g} m from crossing to crossing).",
+        f"gate as soon as noise is more than {begins:g} times the default of `odometry_noise` "
+        f"(sigma up to {sigma[begins] if begins else 0.0:.1f} m, at {BLOCK_M:g} m from crossing to crossing).",
         holds=all(complete),
         figure=drawing.save(figure, "e5"),
         explained="Left: the exploration by odometry between vertices, which gets 1200 s. "
