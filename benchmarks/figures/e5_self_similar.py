@@ -51,7 +51,8 @@ def find() -> Finding:
         f"and right, by odometry between vertices (`paper`) {'as well' if complete[1] else 'not'}. "
         f"Without walls, one arrival in a hundred has another crossing of the same degree in its "
         f"gate as soon as noise is more than {begins:g} times the default of `odometry_noise` "
-        f"(sigma up to {sigma[begins] if begins else 0.0:.1f} m, at {BLOCK_M:g} m from crossing to crossing).",
+        f"(sigma up to {sigma[begins] if begins else 0.0:.1f} m, at {BLOCK_M:g} m from crossing "
+        "to crossing).",
         holds=all(complete),
         figure=drawing.save(figure, "e5"),
         explained="Left: the exploration by odometry between vertices, which gets 1200 s. "
