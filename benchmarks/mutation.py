@@ -56,7 +56,7 @@ PARTS = {
     ),
     "guard": Part(("hal/guard.py",), ("hal/test_guard.py", "hal/test_sweep.py")),
     "graph": Part((f"{SLAM}/graph.py",), (f"{SLAM}/test_graph.py", "autonomy/test_mapping.py")),
-    "ekf": Part((f"{SLAM}/ekf.py",), (f"{SLAM}/test_ekf.py",)),
+    "ekf": Part((f"{SLAM}/ekf.py",), (f"{SLAM}/test_ekf.py", "test_config.py")),
 }
 
 
@@ -165,15 +165,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for name in COPIED:
             source, target = ROOT / name, Path(folder) / name
             _ = shutil.copytree(source, target) if source.is_dir() else shutil.copy(source, target)
-        rows = [
-            score(name, PARTS[name], options.sample, options.seed, Path(folder))
-            for name in options.parts
-        ]
-    if options.keep:
-        earlier = json.loads(RESULTS.read_text(encoding="utf-8")) if RESULTS.exists() else []
-        rows = [row for row in earlier if row["part"] not in options.parts] + rows
-        RESULTS.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+        for name in options.parts:
+            row = score(name, PARTS[name], options.sample, options.seed, Path(folder))
+            if options.keep:
+                keep(row)
     return 0
+
+
+def keep(row: dict[str, Any]) -> None:
+    """Put a part's score in the place of an earlier one."""
+    earlier = json.loads(RESULTS.read_text(encoding="utf-8")) if RESULTS.exists() else []
+    rows = [other for other in earlier if other["part"] != row["part"]] + [row]
+    RESULTS.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ from gvgbot.drivers.kobuki.commands import (
     Command,
     GetGain,
     GpOutput,
+    Melody,
     RequestExtra,
     SetGain,
     Sound,
@@ -109,3 +110,10 @@ def test_speeds_beyond_the_field_saturate() -> None:
 
 def test_a_note_is_its_period() -> None:
     assert Sound.of_frequency(440.0, 0.2) == Sound(826, 200)
+
+
+def test_the_tunes_have_the_numbers_of_the_protocol() -> None:
+    assert [tune.name for tune in sorted(Melody)] == [
+        "ON", "OFF", "RECHARGE", "BUTTON", "ERROR", "CLEANING_START", "CLEANING_END",
+    ]  # fmt: skip
+    assert [int(tune) for tune in sorted(Melody)] == list(range(7))
