@@ -54,6 +54,7 @@ class Newcomer:
     came: bool
     is_whole: bool  # both sides of it have been seen
     is_let_in: bool = False  # it has stood for long enough to be in the map
+    was_let_in: bool = False  # or it had, for what was seen of it at first
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,7 +73,6 @@ class Newcomers:
     def __init__(self, config: NewcomersConfig) -> None:
         self._config = config
         self._all: list[Newcomer] = []
-        self._stamp = 0.0  # of the last scan
         self.company: list[tuple[Array, float]] = []  # other robots: where they say they are
 
     def sift(
@@ -93,7 +93,7 @@ class Newcomers:
             for island in _islands(scan, local_base)
             if not self._is_company(island) and self._is_passing(island, scan.stamp, walls)
         ]
-        waiting = [(one.centre, one.radius) for one in self._waiting]
+        waiting = [(one.centre, one.radius) for one in self._all if not one.is_let_in]
         # At times one is seen in parts only, or has moved a little: both discs count.
         return _without(scan, local_base, [*seen, *waiting, *self.company])
 
@@ -114,6 +114,7 @@ class Newcomers:
         one.radius = max(one.radius, island.radius)
         one.is_whole |= island.is_whole
         one.is_let_in = stamp - one.first >= self._patience(one)
+        one.was_let_in |= one.is_let_in
         return not one.is_let_in
 
     def _patience(self, one: Newcomer) -> float:
@@ -122,29 +123,33 @@ class Newcomers:
         return self._config.came_after_s if one.came else self._config.found_after_s
 
     def _forget(self, scan: Scan, local_base: Pose, local_map: LocalMap) -> None:
-        """Let those go of whom it is seen that they have gone, and those far away."""
+        """Let those go that have gone, or whom nobody has seen long, or who are far away."""
         for one in self._all:
             if one.last > scan.stamp:  # kept from a time before the clock began anew
                 one.first, one.last = one.first + scan.stamp - one.last, scan.stamp
         gone = [one for one in self._all if _is_seen_through(scan, local_base, one)]
         for one in gone:
-            local_map.doubt(one.centre, one.radius + _BLUR_M)
-        self._all = [one for one in self._all if one not in gone and local_map.covers(one.centre)]
-        self._stamp = scan.stamp
-
-    @property
-    def _waiting(self) -> list[Newcomer]:
-        """Those not in the map, but for whom nobody has seen for long: they may have gone."""
-        return [
+            if one.was_let_in:
+                local_map.doubt(one.centre, one.radius + _BLUR_M)
+        self._all = [
             one
             for one in self._all
-            if not one.is_let_in and self._stamp - one.last < _LOST_S + one.last - one.first
+            if one not in gone
+            and (
+                local_map.covers(one.centre)
+                if one.is_let_in
+                else scan.stamp - one.last < _LOST_S + one.last - one.first
+            )
         ]
 
     @property
     def points(self) -> Array:
         """The rims (N, 2), local frame, of company, and of those seen whole not in the map."""
-        whole = (one.centre + one.radius * _RIM for one in self._waiting if one.is_whole)
+        whole = (
+            one.centre + one.radius * _RIM
+            for one in self._all
+            if one.is_whole and not one.is_let_in
+        )
         others = (centre + radius * _RIM for centre, radius in self.company)
         return np.concatenate([np.empty((0, 2)), *whole, *others])
 

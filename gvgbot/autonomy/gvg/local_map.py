@@ -123,8 +123,10 @@ class LocalMap:
         return self._walls.points
 
     def firm_points(self) -> Array:
-        """Points (N, 2) of the walls, local frame, that have been seen again and again."""
-        return np.asarray(self._mean[self._votes >= _FIRM])
+        """Points (N, 2), local frame, of glass and of walls that have been seen again and again."""
+        i, j = np.nonzero(self._votes > 0)
+        firm = (self._votes[i, j] >= _FIRM) | self._is_glass(i, j)
+        return np.asarray(self._mean[i[firm], j[firm]])
 
     def tree(self) -> cKDTree:
         """To find the nearest of `points`."""
@@ -174,10 +176,9 @@ class LocalMap:
         return bool(len(i)) and bool((self._free[i, j] & (self._votes[i, j] <= 0)).all())
 
     def doubt(self, centre: Array, radius: float) -> None:
-        """Let the next beams that pass through a disc, local frame, forget what stands there."""
+        """Let the next beams that pass through a disc, local frame, forget what is no glass."""
         i, j = self._disc(centre, radius)
         self._votes[i, j] = np.minimum(self._votes[i, j], 1)
-        self._echoes[i, j] = 0.0
 
     def _disc(self, centre: Array, radius: float) -> tuple[Index, Index]:
         """Rows and columns of the cells whose middles lie in a disc, local frame."""

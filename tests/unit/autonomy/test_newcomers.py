@@ -154,18 +154,6 @@ def test_who_goes_is_forgotten_as_soon_as_that_is_seen() -> None:
     assert len(watch.newcomers.points) == 0
 
 
-def test_what_stands_at_one_place_at_every_look_has_stood_there_all_the_time() -> None:
-    """Two looks in a second, again and again, and ten seconds behind a curtain in between."""
-    watch, curtain = Watch(), carved([ROOM], [(0.9, -1.0, 1.0, 1.0)])
-    stood = 0.0
-    while stood < CONFIG.found_after_s:
-        assert watch.dropped(EMPTY, stood, person=(2.0, 0.0)) > 0
-        assert watch.dropped(EMPTY, stood + 1.0, person=(2.0, 0.0)) > 0
-        watch.dropped(curtain, stood + 6.0)
-        stood += 11.0
-    assert watch.dropped(EMPTY, stood, person=(2.0, 0.0)) == 0
-
-
 def test_a_post_between_panes_of_glass_stays_where_it_is() -> None:
     """Most beams towards the disc around it go through the panes."""
     watch, post = Watch(), carved([ROOM], [(2.0, -0.07, 2.1, 0.07)])
