@@ -188,6 +188,8 @@ def _islands(scan: Scan, local_base: Pose) -> list[_Island]:
     A beam without an echo has the room of the whole range; one that failed tells nothing.
     """
     told = np.flatnonzero(~np.isnan(scan.ranges))
+    if not len(told):  # it is blind
+        return []
     depth = np.minimum(scan.ranges[told], scan.range_max)
     edges = np.flatnonzero(np.abs(np.diff(depth)) >= _STEP_M) + 1
     local_laser = local_base.compose(scan.base_laser)

@@ -201,3 +201,10 @@ def test_the_stretch_of_wall_within_a_short_range_is_no_newcomer() -> None:
     short = sweep(carved([room]), HERE, reach=3.5)
     assert np.isinf(short.ranges).any()
     assert newcomers.sift(short, HERE, local_map) is short
+
+
+def test_a_laser_that_tells_nothing_shows_nobody() -> None:
+    scan = sweep(EMPTY, HERE)
+    blind = replace(scan, ranges=np.full_like(scan.ranges, np.nan))
+    watch = Watch(EMPTY)
+    assert np.isnan(watch.newcomers.sift(blind, HERE, watch.map).ranges).all()
