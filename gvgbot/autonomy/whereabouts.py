@@ -13,6 +13,7 @@ from gvgbot.geometry import Array, Pose, wrap_angle
 
 _LOOP_M = 0.4  # a trail that comes this near to itself has been driven back
 _AWAY_M = 0.7  # nearer to a vertex than this, the trail does not tell its edges apart
+_BESIDE_M = 0.2, 1.5  # from the edge, the trail goes on beside the robot, on the edge
 _BACK_M = 0.8  # how far back along the trail one looks to tell ahead from behind
 
 
@@ -63,7 +64,9 @@ class Whereabouts:
             self.narrowest = float(rooms.min())
         here = int(np.searchsorted(edge.stations, place.station))
         self.narrowest = min(self.narrowest, float(edge.clearance[here]))
-        self._extend(base)
+        foot = edge.polyline[min(here, len(edge.polyline) - 1)]
+        is_beside = _BESIDE_M[0] < place.distance < _BESIDE_M[1]
+        self._extend(foot if is_beside else base)
         return passage
 
     def _passage(self, gvg: LocalGvg, place: Place, known: Correspondence, node: int) -> Passage:
@@ -98,14 +101,14 @@ class Whereabouts:
             return None
         return known.half_edge_of.get(Branch(path[-1].edge, not path[-1].forward))
 
-    def _extend(self, base: Array) -> None:
+    def _extend(self, point: Array) -> None:
         if len(self.trail) > 3:
-            d = np.hypot(*(np.array(self.trail) - base).T)
+            d = np.hypot(*(np.array(self.trail) - point).T)
             back = int(np.argmax(d < _LOOP_M))
             if d[back] < _LOOP_M and back < len(self.trail) - 3:
                 del self.trail[back + 1 :]
-        if not self.trail or np.hypot(*(self.trail[-1] - base)) > 0.1:
-            self.trail.append(base)
+        if not self.trail or np.hypot(*(self.trail[-1] - point)) > 0.1:
+            self.trail.append(point)
 
     def backwards(
         self, gvg: LocalGvg, place: Place, known: Correspondence, local_base: Pose

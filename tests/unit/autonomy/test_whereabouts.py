@@ -89,6 +89,12 @@ def test_a_way_back_is_taken_off_the_trail() -> None:
     assert walk.where.trail_length < 1.7
 
 
+def test_a_way_back_beside_the_edge_is_taken_off_the_trail_too() -> None:
+    walk = Walk().along(CORRIDOR, ALL_KNOWN, (0.0, 0.0), (5.0, 0.0))
+    walk.along(CORRIDOR, ALL_KNOWN, (5.0, 0.0), (5.0, 0.6), (2.0, 0.6))
+    assert walk.where.trail_length == pytest.approx(2.0, abs=0.5)  # _LOOP_M, and a step
+
+
 def test_a_meetpoint_seen_only_after_it_was_passed_is_still_passed_by_the_edge_before() -> None:
     """The vertex enters the map when the robot is already a metre beyond it."""
     unknown = known_as({Branch(10, forward=True): HalfEdgeId(1, EAST)}, {1: 1})
