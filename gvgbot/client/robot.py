@@ -51,6 +51,7 @@ from gvgbot.zenoh_config import reason, session_config
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 
+_ASK_AGAIN_S = 1.0
 _SETTLING = 1.0  # s after connecting, by when one has heard of all robots on the network
 
 T = TypeVar("T", bound=Payload)
@@ -306,10 +307,15 @@ class Robot:
 
         def answered() -> None:
             sample = replies[0].ok if replies else None
+            if sample is None:  # it may have been asked before it could answer
+                timer = threading.Timer(_ASK_AGAIN_S, self._ask_for_tiles)
+                timer.daemon = True
+                timer.start()
+                return
             try:
-                self._tiles.take_all(None if sample is None else _grid_in(sample))
+                self._tiles.take_all(_grid_in(sample))
             except GvgbotError as error:
-                self._tiles.take_all(None)
+                self._tiles.give_up()
                 self._grid.put(partial(_fail, error))
 
         assert self._session is not None

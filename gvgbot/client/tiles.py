@@ -35,11 +35,16 @@ class Tiles:
         if must_ask:
             self._ask()
 
-    def take_all(self, whole: Grid | None) -> None:
-        """The answer to what was asked; None if there was none."""
+    def give_up(self) -> None:
+        """Ask no more until something is heard again: the answer could not be read."""
         with self._gate:
             self._is_asking = False
-            if whole is None or (whole.began == self._began and whole.number <= self._number):
+
+    def take_all(self, whole: Grid) -> None:
+        """The answer to what was asked."""
+        with self._gate:
+            self._is_asking = False
+            if whole.began == self._began and whole.number <= self._number:
                 return
             if whole.began != self._began:
                 self._forget(whole.began)

@@ -224,6 +224,21 @@ def test_who_comes_late_or_misses_tiles_sees_the_whole_grid_all_the_same(endpoin
     asyncio.run(story())
 
 
+def test_the_grid_comes_though_the_robot_could_not_answer_at_first(endpoint: str) -> None:
+    async def story() -> None:
+        with a_robot(endpoint) as robot:
+            robot.publish(spread(2, 0), spread(2, 0, 1))  # the first was long ago, and no more come
+            with client.connect("near", endpoint) as seen:
+                grid = seen.grid()
+                await asyncio.to_thread(until, lambda: seen._tiles._heard == 2)
+                async with asyncio.TaskGroup() as tasks:
+                    answering = tasks.create_task(robot.answer())
+                    await asyncio.to_thread(until, lambda: seen_in(grid) == [2, 2])
+                    answering.cancel()
+
+    asyncio.run(story())
+
+
 def test_scans_and_odometry_are_sent_to_those_who_ask_for_them(endpoint: str) -> None:
     with a_robot(endpoint) as robot, client.connect("near", endpoint) as seen:
         until(lambda: seen.presence.word == "alive")

@@ -101,11 +101,11 @@ def test_a_robot_that_begins_anew_has_a_new_grid() -> None:
     assert listener.asked == 0
 
 
-def test_an_answer_that_never_comes_is_asked_for_again() -> None:
+def test_after_an_answer_that_could_not_be_read_it_asks_again_when_more_comes() -> None:
     robot, listener = Robot(), Listener()
     robot.changes(0)
     listener.tiles.take(robot.changes(1))
-    listener.tiles.take_all(None)
+    listener.tiles.give_up()
     listener.tiles.take(robot.changes(2))
     assert listener.asked == 2
 
