@@ -49,7 +49,8 @@ def with_client(use: Callable[[HokuyoLX], None], model: ModelName = "UST-10LX") 
         port = TcpPort("tcp://127.0.0.1:0")
         assert port.path is not None
         async with asyncio.TaskGroup() as tasks:
-            served = tasks.create_task(serve_twin(twin, port, LoopClock()))
+            clock = LoopClock(ahead=-asyncio.get_running_loop().time())  # begins at 0
+            served = tasks.create_task(serve_twin(twin, port, clock))
             try:
                 await asyncio.to_thread(work, parse_address(port.path))
             finally:
