@@ -24,6 +24,7 @@ _STEP_M = 0.3  # in range from beam to beam, at the rim of something that stands
 _SMOOTH_M = 0.15  # in range from beam to beam, on it: two legs of a chair are farther apart
 _BEAMS = 3  # fewer see nothing for sure
 _SLIM_M, _WIDE_M = 0.1, 0.8  # people are between these; what is slimmer is furniture
+_FLAT = 0.06  # of its width: what bulges less towards the laser is a piece of wall, or of glass
 _GLIMPSE_S = 3.0  # what is half hidden behind something nearer is only kept waiting so long
 _BLUR_M = 0.1  # beyond its rim, beams may still end on something
 _MOVED_M = 0.3  # what stands is found again within this
@@ -202,11 +203,23 @@ def _islands(scan: Scan, local_base: Pose) -> list[_Island]:
             continue
         ends = _ends(scan, told[start:stop], depth[start:stop], local_laser)
         width = float(np.hypot(*(ends[-1] - ends[0])))
-        if _SLIM_M <= width < _WIDE_M:
+        if _SLIM_M <= width < _WIDE_M and not (all(rims) and _is_flat(ends, width)):
             away = ends.mean(axis=0) - local_laser.position
             centre = ends.mean(axis=0) + 0.3 * width * away / np.hypot(*away)
             found.append(_Island(ends, centre, width / 2, all(rims)))
     return found
+
+
+def _is_flat(ends: Array, width: float) -> bool:
+    """Whether ends (N, 2) seen from side to side, m, are on a line, as on no leg and no body.
+
+    Glass shows a flat patch where it is seen head-on, which wanders along it with the robot.
+    """
+    along = (ends[-1] - ends[0]) / width
+    bulge = np.abs((ends - ends[0]) @ np.array([-along[1], along[0]]))
+    third = len(ends) // 3
+    rims = (bulge[:third].mean() + bulge[-third:].mean()) / 2
+    return bool(bulge[third:-third].mean() - rims < _FLAT * width)
 
 
 def _without(scan: Scan, local_base: Pose, discs: list[tuple[Array, float]]) -> Scan:

@@ -80,6 +80,14 @@ def test_a_wall_is_no_newcomer_even_where_the_map_knew_free_space() -> None:
     assert len(watch.newcomers.points) == 0
 
 
+def test_what_is_flat_is_taken_for_a_wall_at_once_as_no_body_is() -> None:
+    """A patch of glass that shows only where it is seen head-on, 0.4 m wide."""
+    patch: Rectangle = (2.0, -0.2, 2.1, 0.2)
+    watch = Watch(EMPTY)
+    assert watch.dropped(carved([ROOM], [patch])) == 0
+    assert watch.inside() > 0
+
+
 @pytest.mark.parametrize(
     ("known", "patience"), [(None, CONFIG.found_after_s), (EMPTY, CONFIG.came_after_s)]
 )
