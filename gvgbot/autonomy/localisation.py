@@ -15,7 +15,6 @@ from gvgbot.autonomy.slam.scan_matching import (
     Sides,
     register_coarsely,
 )
-from gvgbot.autonomy.slam.spread import Spread
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
 
@@ -34,7 +33,7 @@ _SLIPPING = 25.0  # times the covariance of odometry, when the wheels slip
 _LOST = np.diag([0.5**2, 0.5**2, 0.05**2])  # of a base that nobody heard for a while
 _SEEN_SHARE = 0.3  # of the walls must be known to a robot that comes round a corner unseen
 _MOST_SHARED = 100.0  # scans that a wall can be the mean of
-_PER_M = np.diag([0.002**2, 0.002**2, 0.0001**2])  # per metre: what cells do to walls
+_PER_M = np.diag([0.004**2, 0.004**2, 0.0001**2])  # per metre: what cells do to walls
 
 # full: scans are matched, and vertices are poses. paper: odometry alone between vertices, and a
 # vertex seen again corrects by its position only, as the method was published
@@ -52,7 +51,7 @@ class LocalMaps:
     ) -> None:
         self.near, self._far = LocalMap(near), LocalMap(far)
         self._matching = matching
-        self._calibration, self._spread = Calibration(), Spread()
+        self._calibration = Calibration()
         self._shared = 1.0  # scans that the walls in sight are the mean of
         self.blur = np.zeros((3, 3))  # covariance of the last match, in the frame of the base
 
@@ -77,19 +76,15 @@ class LocalMaps:
         best = self._best(scan, [(prior, Q), *slipping])
         if best is None:
             self.blur = np.zeros((3, 3))
-            return prior, self._spread.honest(Q)
+            return prior, Q
         found, used = best
-        gain, by_walls = _correction(found, used, self._matching.pair_sigma_m)
         if used is Q:
-            change = prior.to(found.pose)
-            self._calibration.learn(motion, duration, change, used, found.covariance)
-            self._spread.learn(change, Q, gain, by_walls)
-            used = self._spread.honest(Q)
-        left = np.eye(3) - gain
-        self.blur = _symmetric(left @ used @ left.T + by_walls)
+            self._calibration.learn(motion, duration, prior.to(found.pose), Q, found.covariance)
+        self.blur = found.covariance
         self._shared = min((1.0 - _renewed(scan, motion)) * self._shared + 1.0, _MOST_SHARED)
+        noise = found.rms / self._matching.pair_sigma_m
         moved = math.hypot(motion.x, motion.y)
-        return found.pose, _drift(self.blur, gain, self._shared) + moved * _PER_M
+        return found.pose, _drift(found, used, self._shared, noise) + moved * _PER_M
 
     def trust(
         self, scan: Scan, before: Pose, motion: Pose, duration: float, Q: Array
@@ -183,30 +178,21 @@ def _renewed(scan: Scan, motion: Pose) -> float:
     return min(1.0, moved / (2 * reach) + abs(motion.theta) / field_of_view)
 
 
-def _correction(found: Registration, Q: Array, pair_sigma_m: float) -> tuple[Array, Array]:
-    """The gain (3, 3) of a match from a prior with covariance Q, and what walls let it err by.
-
-    Points that lie better on walls than the matcher expects have so much less noise.
-    """
-    gain = np.eye(3) - found.covariance @ np.linalg.inv(Q)
-    noise = min(found.rms / pair_sigma_m, 1.0)
-    return gain, _symmetric(gain @ found.covariance * noise**2)  # g V g', as V is P g^-1
-
-
-def _drift(new: Array, gain: Array, shared: float) -> Array:
+def _drift(found: Registration, Q: Array, shared: float, noise: float) -> Array:
     """Covariance (3, 3) of a step that was matched, so that those of many steps add up.
 
     Scans are laid onto walls, and walls drawn by `shared` scans on average, n. A pose errs by
     e = (1 - g) (e' + q) + g (m + v): the gain g weighs odometry with its noise q, from the pose
-    before, and walls with the mean error m of those scans and the noise v of a match. Of what is
-    `new` in it, from q and v, the share 1 / (1 + g (n - 1) / 2) stays for good.
+    before, and walls with the mean error m of those scans and the noise v of a match, which is
+    `noise` times what the matcher expects. Of the new in it, the share 1 / (1 + g (n - 1) / 2)
+    stays for good.
     """
-    stays = np.linalg.inv(np.eye(3) + gain * (shared - 1.0) / 2)
-    return _symmetric(stays @ new @ stays.T)
-
-
-def _symmetric(P: Array) -> Array:
-    return np.asarray((P + P.T) / 2, np.float64)
+    g = np.eye(3) - found.covariance @ np.linalg.inv(Q)
+    by_walls = g @ found.covariance * min(noise, 1.0) ** 2  # g V g', as V is P g^-1
+    new = (np.eye(3) - g) @ Q @ (np.eye(3) - g).T + by_walls
+    stays = np.linalg.inv(np.eye(3) + g * (shared - 1.0) / 2)
+    drift = stays @ new @ stays.T
+    return np.asarray((drift + drift.T) / 2, np.float64)
 
 
 def _turned(points: Array, tree: cKDTree, prior: Pose, reach: float) -> Pose:

@@ -67,7 +67,7 @@ class AutonomyConfig:
     keyframe: KeyframeConfig = field(default_factory=KeyframeConfig)
     local_map: LocalMapConfig = field(default_factory=lambda: LocalMapConfig(half_width_m=10.0))
     far_map: LocalMapConfig = field(
-        default_factory=lambda: LocalMapConfig(half_width_m=20.0, cell_m=0.2, bridge_gap_m=0.0)
+        default_factory=lambda: LocalMapConfig(half_width_m=20.0, cell_m=0.25, bridge_gap_m=0.0)
     )  # only matched with: the end of a long corridor is what tells how far one has come
     reduction: ReductionConfig = field(default_factory=ReductionConfig)
     edge_follower: EdgeFollowerConfig = field(default_factory=EdgeFollowerConfig)
