@@ -7,13 +7,11 @@ they may go, and the map forgets them as soon as that is seen.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
 from itertools import pairwise
 from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.gvg.local_map import LocalMap
 from gvgbot.geometry import Array, Pose
@@ -161,16 +159,9 @@ class _Walls:
     def __init__(self, local_map: LocalMap, reach: float, is_way: Callable[[Array], bool]) -> None:
         self._map, self._reach, self._is_way = local_map, reach, is_way
 
-    @cached_property
-    def _tree(self) -> cKDTree:
-        return cKDTree(self._map.firm_points())
-
     def are_seen(self, ends: Array) -> bool:
-        """Whether most ends (N, 2) lie on what was seen before: a person may brush along one.
-
-        Once or twice is not enough, for that may have been a person of whom too little was seen.
-        """
-        distance, _ = self._tree.query(ends, distance_upper_bound=self._reach)
+        """Whether most ends (N, 2) lie on what was seen before: a person may brush along one."""
+        distance, _ = self._map.tree().query(ends, distance_upper_bound=self._reach)
         return bool(np.isfinite(distance).mean() > 0.5)
 
     def are_away(self, island: _Island) -> bool:

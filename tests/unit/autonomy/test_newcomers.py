@@ -131,21 +131,6 @@ def test_who_walks_along_a_wall_is_kept_out_too() -> None:
     assert watch.inside() == 0
 
 
-def test_of_whom_too_little_was_seen_at_first_is_no_wall_afterwards() -> None:
-    """Two looks of three beams each, which may be anything, have got into the map."""
-    watch = Watch(EMPTY)
-    bearings = sweep(EMPTY, HERE).bearings
-    person = to_disc(bearings, (2.0, 0.0))
-    person[np.argsort(np.abs(bearings))[3:]] = np.inf
-    for second in range(2):
-        scan = sweep(EMPTY, HERE)
-        scan = replace(scan, ranges=np.minimum(scan.ranges, person), stamp=float(second))
-        watch.map.insert(scan, HERE, 0.0)
-    assert watch.inside() > 0
-    assert watch.dropped(EMPTY, 2.0, person=(2.0, 0.0)) > 0
-    assert len(watch.newcomers.points) > 0
-
-
 def test_who_stood_for_long_and_goes_is_forgotten_at_the_next_look() -> None:
     watch = Watch()
     for second in range(60):
