@@ -16,6 +16,11 @@ def add_map(commands: Commands) -> None:
         epilog="example: gvgbot map show runs/office-1 --animate",
     )
     actions = maps.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    for add in (_add_show, _add_info, _add_export, _add_diff, _add_import):
+        add(actions)
+
+
+def _add_show(actions: Commands) -> None:
     show = actions.add_parser(
         "show",
         help="draw the map, or how it grew",
@@ -33,6 +38,9 @@ def add_map(commands: Commands) -> None:
     show.add_argument("--animate", action="store_true", help="a GIF of the exploration")
     show.add_argument("--frames", type=frames, metavar="N", help="moments to draw, 2 to 200")
     show.set_defaults(command=_show)
+
+
+def _add_info(actions: Commands) -> None:
     info = actions.add_parser(
         "info",
         help="counts, lengths, extent and accuracy",
@@ -41,6 +49,9 @@ def add_map(commands: Commands) -> None:
     )
     info.add_argument("run", type=Path, metavar="RUN_DIR", help="the directory of a run")
     info.set_defaults(command=_info)
+
+
+def _add_export(actions: Commands) -> None:
     export = actions.add_parser(
         "export",
         help="the map in another format",
@@ -61,8 +72,6 @@ def add_map(commands: Commands) -> None:
         help="leave the map and the robot's place in it out of the bag, for programs that map",
     )
     export.set_defaults(command=_export)
-    _add_diff(actions)
-    _add_import(actions)
 
 
 def _add_import(actions: Commands) -> None:

@@ -16,7 +16,6 @@ from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
@@ -334,6 +333,8 @@ def _examine(a: Side, b: Side, pose: Pose) -> _Evidence:
 
 def _partners(a: Side, b: Side, pose: Pose) -> list[tuple[int, int]]:
     """Indices of vertices of one kind that lie where the other's do."""
+    from scipy.optimize import linear_sum_assignment
+
     laid = pose.transform(b.points)
     away = np.minimum(cdist(a.points, laid), _SAME_M)
     away[a.is_meetpoint[:, None] != b.is_meetpoint] = _SAME_M

@@ -9,7 +9,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 
 from gvgbot.autonomy.slam.graph import HalfEdgeId
@@ -73,6 +72,8 @@ class Site:
 
     def _lay(self, number: int, chart: Chart) -> None:
         """Let vertices of one more chart be at known places, or at new ones."""
+        from scipy.optimize import linear_sum_assignment
+
         ids = list(chart.vertices)
         points = np.array([chart.vertices[i].position for i in ids]).reshape(-1, 2)
         if ids and self._points:

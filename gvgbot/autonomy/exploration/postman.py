@@ -8,7 +8,6 @@ from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
-from scipy.optimize import Bounds, LinearConstraint, milp
 from scipy.sparse import coo_array
 
 from gvgbot.autonomy.exploration.paths import Approach, shortest_paths
@@ -83,6 +82,8 @@ def _likely(metres: dict[Pair, float]) -> dict[Pair, float]:
 
 def _matched(metres: dict[Pair, float]) -> list[Pair]:
     """Pairs in which everybody is once, the shortest together; none if that cannot be."""
+    from scipy.optimize import Bounds, LinearConstraint, milp
+
     pairs = list(metres)
     number = {vertex: i for i, vertex in enumerate(sorted({v for pair in pairs for v in pair}))}
     rows = [number[vertex] for pair in pairs for vertex in pair]
