@@ -35,7 +35,8 @@ def keys(on_key: Callable[[str], None]) -> Iterator[None]:
     """Give each key that is pressed to a function of the running loop; without a keyboard, none.
 
     Keys are not echoed, and need no Enter. Ctrl-Z does nothing, since it would leave the shell with
-    a picture; Ctrl-C remains a signal.
+    a picture; Ctrl-C remains a signal, and takes away no key: a read that waits for a key which was
+    there a moment ago would hold up the loop.
     """
     if not sys.stdin.isatty():
         yield
@@ -52,6 +53,7 @@ def keys(on_key: Callable[[str], None]) -> Iterator[None]:
 
     tty.setcbreak(keyboard)
     mode = termios.tcgetattr(keyboard)
+    mode[3] |= termios.NOFLSH
     mode[6][termios.VSUSP] = b"\0"
     termios.tcsetattr(keyboard, termios.TCSADRAIN, mode)
     loop.add_reader(keyboard, read)
