@@ -19,7 +19,6 @@ from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
 
 _SCAN_EVERY_M = 1.0  # on the edges
-_SCAN_EVERY_S = 1.0  # as if the robot had driven so slowly
 _SIGMA = np.diag([0.03**2, 0.03**2, 0.01**2])  # covariance of a vertex on a map that is right
 _STEP = np.diag([1e-8, 1e-8, 1e-8])  # and of the way from one scan to the next
 _UNSEEN = -1e6  # metres driven when the robot last saw a vertex
@@ -118,16 +117,13 @@ def _onwards(gvg: LocalGvg, start: Branch, ends: dict[Branch, HalfEdgeId]) -> It
 
 
 def _drive_mentally(pipeline: Pipeline, gvg: LocalGvg, look: Look) -> None:
-    """Take scans all along the edges, as if the robot had been there."""
+    """Take scans all along the edges, as if the robot had been there, without driving a metre."""
     for edge in gvg.edges.values():
         for pose in _poses(edge):
-            stamp = _SCAN_EVERY_S * len(pipeline.keyframes)
             if pipeline.keyframes:
                 motion = pipeline.keyframes[-1].map_base.to(pose)
-                pipeline.travelled += float(np.hypot(motion.x, motion.y))
                 pipeline.steps.append(Step(motion, _STEP))
-            scan = look(pose)
-            pipeline.keyframes.append(Keyframe(stamp, pose, pose, pose, scan))
+            pipeline.keyframes.append(Keyframe(0.0, pose, pose, pose, look(pose)))
 
 
 def _poses(edge: LocalEdge) -> Iterator[Pose]:

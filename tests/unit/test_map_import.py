@@ -87,6 +87,14 @@ def test_the_run_holds_a_mission_on_which_a_daemon_can_begin(tmp_path: Path) -> 
     assert main(["map", "show", str(tmp_path / "run")]) == 0
 
 
+def test_a_map_of_somebody_else_has_not_been_driven(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    import_map(painted(tmp_path), tmp_path / "run", Config())
+    assert main(["map", "info", str(tmp_path / "run")]) == 0
+    assert "driven     0.0 m in 0:00" in capsys.readouterr().out
+
+
 def test_a_run_that_is_there_is_not_overwritten(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
