@@ -1,0 +1,69 @@
+"""The keyframes to draw: the new ones, or all again from better places after loops were closed."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from gvgbot.autonomy.estimate import smoothed_keyframes, still_past
+from gvgbot.autonomy.pipeline import Keyframe, Pipeline
+from gvgbot.geometry import Pose, wrap_angle
+
+TOLERANCE_M = 0.05  # by which what is drawn may be wrong: a cell of the grid
+_WALLS_M = 4.0  # about so far off they are: a turn moves them by so much times its angle
+_REST_S = 0.02  # for each keyframe, between drawing all again and the next time
+
+
+class Portion(NamedTuple):
+    """Keyframes to draw, as they are known now; instead of all before, or after those."""
+
+    keyframes: Sequence[Keyframe]
+    is_all: bool
+
+
+class LivePast:
+    """What somebody has drawn of the robot's past, and whether it still is the truth."""
+
+    def __init__(self) -> None:
+        self._drawn: list[Pose] = []  # map_base of each keyframe
+        self._taken = 0  # keyframes
+        self._is_doubtful = True  # what an earlier life has left may have been corrected since
+        self._rests_until = -float("inf")  # stamp
+
+    def doubt(self) -> None:
+        """Note that the past may be known better by now."""
+        self._is_doubtful = True
+
+    def update(self, pipeline: Pipeline, stamp: float) -> Callable[[], Portion] | None:
+        """A function that finds what is to be drawn, in a thread or later; None: nothing.
+
+        Call each such function before asking for the next. Where somebody else drives, only what is
+        new is found: the best estimate takes too long there.
+        """
+        new, past = pipeline.keyframes[self._taken :], None
+        self._taken += len(new)
+        if self._is_doubtful and stamp >= self._rests_until and not pipeline.led:
+            self._is_doubtful, past = False, still_past(pipeline)
+        if not new and past is None:
+            return None
+        return partial(self._portion, new, past, stamp)
+
+    def _portion(self, new: Sequence[Keyframe], past: Pipeline | None, stamp: float) -> Portion:
+        self._drawn += [keyframe.map_base for keyframe in new]
+        if past is None or not past.keyframes:
+            return Portion(new, is_all=False)
+        best = smoothed_keyframes(past)
+        if _farthest(self._drawn, best) < TOLERANCE_M:
+            return Portion(new, is_all=False)
+        self._drawn, self._rests_until = best, stamp + _REST_S * len(best)
+        moved = zip(past.keyframes, best, strict=True)
+        return Portion([replace(old, map_base=pose) for old, pose in moved], is_all=True)
+
+
+def _farthest(drawn: Sequence[Pose], best: Sequence[Pose]) -> float:
+    """How far (m) walls seen from poses move, at most, when these are corrected."""
+    a, b = (np.array([(p.x, p.y, p.theta) for p in poses]) for poses in (drawn, best))
+    turns = np.array([wrap_angle(turn) for turn in (b - a)[:, 2].tolist()])
+    return float((np.hypot(*(b - a)[:, :2].T) + _WALLS_M * np.abs(turns)).max())

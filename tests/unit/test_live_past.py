@@ -1,0 +1,147 @@
+"""What is drawn of the past, after a drive around a circle that odometry turned into a spiral."""
+
+import math
+from itertools import pairwise
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gvgbot.autonomy.pipeline import Keyframe, Step
+from gvgbot.autonomy.slam.ekf import Belief
+from gvgbot.autonomy.slam.graph import GvgGraph
+from gvgbot.autonomy.views import Observation
+from gvgbot.geometry import Array, Pose
+from gvgbot.live_map import LiveMap
+from gvgbot.live_past import TOLERANCE_M, LivePast
+from gvgbot.topics import Trajectory
+
+COUNT, RADIUS_M = 101, 8.0
+WRONG_TURN = 0.004  # rad at each step
+TURN = math.tau / (COUNT - 1)
+TRUE = [
+    Pose(RADIUS_M * math.sin(a), RADIUS_M * (1.0 - math.cos(a)), a)
+    for a in (TURN * np.arange(COUNT)).tolist()
+]
+VERTEX = Pose(1.0, 0.0)
+
+
+def drive(*, closes: bool = True, led: bool = False) -> Any:
+    """A pipeline after one turn; it saw a vertex at the start, and again at the end if it closes.
+
+    What it believes is odometry alone.
+    """
+    wrong = Pose(theta=WRONG_TURN)
+    motions = [a.to(b).compose(wrong) for a, b in pairwise(TRUE)]
+    poses = [Pose()]
+    for motion in motions:
+        poses.append(poses[-1].compose(motion))
+    seen = [Observation(0, 1, VERTEX, 1e-4 * np.eye(3))]
+    if closes:
+        at = COUNT - 1
+        seen.append(Observation(at, 1, TRUE[at].to(VERTEX), 1e-4 * np.eye(3)))
+    belief = Belief(np.array([0.0, 0.0, 0.0, VERTEX.x, VERTEX.y, 0.0]), np.eye(6), (1,))
+    noise = np.diag([1e-6, 1e-6, (10 * WRONG_TURN) ** 2])
+    return SimpleNamespace(
+        keyframes=[Keyframe(float(i), p, p, p, None) for i, p in enumerate(poses)],
+        steps=[Step(motion, noise) for motion in motions],
+        mapper=SimpleNamespace(graph=GvgGraph(), belief=belief, observations=seen),
+        led=led,
+    )
+
+
+def error(poses: list[Pose]) -> float:
+    """How far (m) the worst pose is from the truth."""
+    return max(a.distance(b) for a, b in zip(poses, TRUE, strict=True))
+
+
+def taken(past: LivePast, pipeline: Any, stamp: float) -> tuple[list[Pose], bool] | None:
+    find = past.update(pipeline, stamp)
+    if find is None:
+        return None
+    keyframes, is_all = find()
+    return [keyframe.map_base for keyframe in keyframes], is_all
+
+
+def after_the_drive(pipeline: Any) -> LivePast:
+    """All has been drawn as it was believed."""
+    past, keyframes = LivePast(), pipeline.keyframes
+    pipeline.keyframes = keyframes[:1]
+    assert taken(past, pipeline, 0.0) == ([Pose()], False)
+    pipeline.keyframes = keyframes
+    believed = [keyframe.map_base for keyframe in keyframes]
+    assert taken(past, pipeline, 1.0) == (believed[1:], False)
+    assert error(believed) > 2.0
+    return past
+
+
+def test_each_keyframe_is_drawn_once_as_long_as_nothing_speaks_against_it() -> None:
+    pipeline = drive(closes=False)
+    past = after_the_drive(pipeline)
+    assert taken(past, pipeline, 2.0) is None
+    past.doubt()
+    assert taken(past, pipeline, 3.0) == ([], False)
+    assert taken(past, pipeline, 4.0) is None
+
+
+def test_all_are_drawn_again_where_they_were_when_a_loop_has_closed() -> None:
+    pipeline = drive()
+    past = after_the_drive(pipeline)
+    past.doubt()
+    drawn = taken(past, pipeline, 2.0)
+    assert drawn is not None
+    poses, is_all = drawn
+    assert is_all
+    assert error(poses) < 0.1
+    past.doubt()
+    assert taken(past, pipeline, 1000.0) == ([], False)
+
+
+def test_what_an_earlier_life_has_left_is_drawn_where_it_was() -> None:
+    drawn = taken(LivePast(), drive(), 0.0)
+    assert drawn is not None
+    assert error(drawn[0]) < 0.1
+
+
+def test_there_is_a_rest_after_drawing_all() -> None:
+    pipeline = drive()
+    past = after_the_drive(pipeline)
+    past.doubt()
+    taken(past, pipeline, 2.0)
+    pipeline.mapper.observations[-1] = Observation(COUNT - 1, 1, Pose(2.0, 0.0), 1e-4 * np.eye(3))
+    past.doubt()
+    assert taken(past, pipeline, 2.1) is None
+    later = taken(past, pipeline, 60.0)
+    assert later is not None
+    assert later[1]
+
+
+def test_where_somebody_else_drives_only_what_is_new_is_drawn() -> None:
+    pipeline = drive(led=True)
+    assert taken(LivePast(), pipeline, 0.0) == ([k.map_base for k in pipeline.keyframes], False)
+
+
+def shown(live: LiveMap, pipeline: Any, stamp: float) -> Array:
+    """The positions (N, 2) of the trajectory that is sent."""
+    draw = live.update(pipeline, stamp)
+    assert draw is not None
+    (way,) = [one.value for one in draw() if isinstance(one.value, Trajectory)]
+    return np.asarray(way.map_base[:, :2], np.float64)
+
+
+def from_centre(way: Array) -> Array:
+    return np.hypot(way[:, 0], way[:, 1] - RADIUS_M)
+
+
+def test_the_trajectory_that_is_shown_closes_with_the_loop() -> None:
+    pipeline, live = drive(), LiveMap(began=0.0)
+    keyframes = pipeline.keyframes
+    pipeline.keyframes = keyframes[:1]
+    shown(live, pipeline, 0.0)
+    pipeline.keyframes = keyframes
+    assert np.abs(from_centre(shown(live, pipeline, 1.0)) - RADIUS_M).max() > 0.8
+    live.doubt()
+    way = from_centre(shown(live, pipeline, 2.0))
+    assert len(way) > 90
+    assert way == pytest.approx(RADIUS_M, abs=2 * TOLERANCE_M)
