@@ -19,7 +19,7 @@ Place = tuple[int, int]  # row and column of a tile
 
 
 class LiveGrid:
-    """Grows with each keyframe that shows something new."""
+    """Grows with each keyframe that shows something new, and can be drawn anew."""
 
     def __init__(self, began: float) -> None:
         self._grid = GrowingGrid(_RESOLUTION_M, _REACH_M)
@@ -41,6 +41,12 @@ class LiveGrid:
                 low, high = self._grid.around(keyframe.map_base, keyframe.scan)
                 rows, columns = zip(low // _SIDE, (high - 1) // _SIDE + 1, strict=True)
                 self._touched |= dict.fromkeys(product(range(*rows), range(*columns)))
+
+    def redraw(self, keyframes: Iterable[Keyframe]) -> None:
+        """Begin anew with these; every tile that was sent is looked at again."""
+        self._grid = GrowingGrid(_RESOLUTION_M, _REACH_M)
+        self._touched = dict.fromkeys(self._sent)
+        self.add(keyframes)
 
     def changes(self, stamp: float) -> Grid | None:
         """The tiles that have changed since the last call, or as many as are sent at once."""

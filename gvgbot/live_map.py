@@ -11,6 +11,7 @@ from gvgbot.autonomy.pipeline import Keyframe, Pipeline
 from gvgbot.autonomy.slam.graph import Vertex
 from gvgbot.geometry import Array, Pose
 from gvgbot.live_grid import LiveGrid
+from gvgbot.live_past import LivePast, Portion
 from gvgbot.topics import (
     TRAJECTORY_POSES,
     Map,
@@ -42,22 +43,27 @@ class Stretch(NamedTuple):
 
 
 class LiveMap:
-    """Grid and trajectory grow with each keyframe; the graph is told anew each time."""
+    """Grid and trajectory grow with each keyframe, and follow when a loop closes.
+
+    The graph is told anew each time.
+    """
 
     def __init__(self, began: float) -> None:
         """`began`: the robot's clock now."""
-        self._grid, self._trail = LiveGrid(began), Trail()
-        self._taken = 0  # keyframes
+        self._grid, self._trail, self._past = LiveGrid(began), Trail(), LivePast()
+
+    def doubt(self) -> None:
+        """Note that grid and trajectory may be known better by now."""
+        self._past.doubt()
 
     def update(self, pipeline: Pipeline, stamp: float) -> Callable[[], list[News]] | None:
         """A function that draws all of this moment, in a thread or later; None: no news.
 
         Call each such function before asking for the next.
         """
-        new = pipeline.keyframes[self._taken :]
-        if not new and not self._grid.has_more:
+        portion = self._past.update(pipeline, stamp)
+        if portion is None and not self._grid.has_more:
             return None
-        self._taken += len(new)
         graph, belief = pipeline.mapper.graph, pipeline.mapper.belief
         poses = {number: belief.map_vertex(number) for number in graph.vertices}
         vertices = tuple(
@@ -68,24 +74,33 @@ class LiveMap:
             Stretch(edge.a.vertex, edge.b.vertex, edge.length, edge.polyline)
             for edge in graph.edges.values()
         ]
-        return partial(self._drawn, new, vertices, edges, poses, stamp)
+        return partial(self._drawn, portion or _nothing, vertices, edges, poses, stamp)
 
     def _drawn(
         self,
-        new: Sequence[Keyframe],
+        find: Callable[[], Portion],
         vertices: tuple[MapVertex, ...],
         edges: Sequence[Stretch],
         poses: Mapping[int, Pose],
         stamp: float,
     ) -> list[News]:
         news = [News(Map(stamp=stamp, vertices=vertices, edges=bent(edges, poses)))]
-        self._grid.add(new)
+        new, is_all = find()
+        if is_all:
+            self._grid.redraw(new)
+            self._trail = Trail()
+        else:
+            self._grid.add(new)
         changed = self._grid.changes(stamp)
         if changed is not None:
             news.append(News(changed, self._grid.whole(stamp)))
         if self._trail.add(new):
             news.append(News(self._trail.told(stamp)))
         return news
+
+
+def _nothing() -> Portion:
+    return Portion((), is_all=False)
 
 
 class Trail:

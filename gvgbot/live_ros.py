@@ -7,11 +7,12 @@ from typing import Protocol
 
 import numpy as np
 
-from gvgbot.autonomy.pipeline import Keyframe, Pipeline
+from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.ekf import OdometryNoise
 from gvgbot.clock import Clock
 from gvgbot.geometry import Array, rotated_covariance
 from gvgbot.hal.messages import Odometry, Scan
+from gvgbot.live_past import LivePast, Portion
 from gvgbot.maps.occupancy import GrowingGrid
 from gvgbot.maps.route_graph import RouteGraph
 from gvgbot.report import route_graph
@@ -103,12 +104,16 @@ class LiveRos:
 
         Call each such function before asking for the next.
         """
-        work = self._drawing.update(self._pipeline)
+        work = self._drawing.update(self._pipeline, stamp)
         return None if work is None else partial(self._send_map, work, self._unix(stamp))
 
     def _send_map(self, work: Drawn, stamp: float) -> None:
         for topic, message in work(stamp).items():
             self._send(topic, message, stamp)
+
+    def doubt(self) -> None:
+        """Note that the grid may be known better by now."""
+        self._drawing.past.doubt()
 
     async def keep_shown(self, clock: Clock, off_loop: OffLoop) -> None:
         """Send the map as it grows, until cancelled."""
@@ -129,27 +134,28 @@ class LiveRos:
 
 
 class _Drawing:
-    """The grid grows with each keyframe; the graph is told anew each time."""
+    """The grid grows with each keyframe, and follows when a loop closes; the graph is told anew."""
 
     def __init__(self) -> None:
-        self._grid = GrowingGrid()
-        self._taken = 0  # keyframes
+        self._grid, self.past = GrowingGrid(), LivePast()
 
-    def update(self, pipeline: Pipeline) -> Drawn | None:
+    def update(self, pipeline: Pipeline, stamp: float) -> Drawn | None:
         """A function that draws the grid and the graph of this moment, given a stamp."""
-        new = pipeline.keyframes[self._taken :]
-        if not new:
+        portion = self.past.update(pipeline, stamp)
+        if portion is None:
             return None
-        self._taken += len(new)
         graph, belief = pipeline.mapper.graph, pipeline.mapper.belief
         poses = {number: belief.map_vertex(number) for number in graph.vertices}
         covariances = {number: belief.vertex_covariance(number) for number in graph.vertices}
-        return partial(self._drawn, new, route_graph(pipeline, poses, covariances))
+        return partial(self._drawn, portion, route_graph(pipeline, poses, covariances))
 
     def _drawn(
-        self, new: Sequence[Keyframe], graph: RouteGraph, stamp: float
+        self, find: Callable[[], Portion], graph: RouteGraph, stamp: float
     ) -> Mapping[Topic, Message]:
         drawn: dict[Topic, Message] = {topics.MARKERS: markers(graph, stamp)}
+        new, is_all = find()
+        if is_all:
+            self._grid = GrowingGrid()
         scans = [(keyframe.map_base, keyframe.scan) for keyframe in new if keyframe.scan]
         for map_base, scan in scans:
             self._grid.add(map_base, scan)

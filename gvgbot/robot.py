@@ -102,6 +102,7 @@ class Robot:
         self._latest_events: deque[Event] = deque(maxlen=EVENTS_KEPT)
         self._decided = ""  # the reason of the last decision
         self._feed: LiveFeed | None = None
+        self._live_map: LiveMap | None = None
         if network is not None:
             rate_hz = session.config.telemetry.scan_rate_hz
             self._feed = LiveFeed(network, session.pipeline, rate_hz)
@@ -258,9 +259,9 @@ class Robot:
     async def _keep_shown(self, network: Network) -> None:
         """Publish the map as it grows."""
         due = self._clock.now()
-        live_map = LiveMap(began=due)
+        self._live_map = LiveMap(began=due)
         while True:
-            draw = live_map.update(self._pipeline, self._clock.now())
+            draw = self._live_map.update(self._pipeline, self._clock.now())
             if draw is not None:
                 await self._off_loop(partial(_publish_drawn, network, draw))
             due = max(due + 1.0 / MAP.rate_hz, self._clock.now())
@@ -289,6 +290,14 @@ class Robot:
                 self._finished.set()
             if isinstance(event, events.Decision):
                 self._decided = event.reason
+            if isinstance(event, events.LoopClosed | events.Finished):
+                self._doubt_the_past()
+
+    def _doubt_the_past(self) -> None:
+        """Let what is shown of it be drawn anew."""
+        for shown in (self._live_map, self._ros):
+            if shown is not None:
+                shown.doubt()
 
     def _take_down(self, event: events.Event) -> None:
         """Keep an event for those who watch."""

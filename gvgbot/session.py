@@ -11,6 +11,7 @@ import structlog
 
 from gvgbot import __version__
 from gvgbot.autonomy import events
+from gvgbot.autonomy.estimate import still_past
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.config import Config
 from gvgbot.drivers.tapped import Tap
@@ -89,6 +90,8 @@ class Session:
                 self.recorder.on_event(record_of(event))
             if type(event) in self._counts:
                 self._counts[type(event)] += 1
+            if isinstance(event, events.WayForgotten):
+                self.journey.forget(event.kept)
 
     def _tell(self) -> None:
         """Write what is still to be told. Raises GvgbotError if that is not possible."""
@@ -178,10 +181,7 @@ def still(pipeline: Pipeline) -> Pipeline:
 
     What is only ever appended to is copied as a list, what is changed in place is copied deeply.
     """
-    copied = copy.copy(pipeline)
-    copied.keyframes, copied.steps = pipeline.keyframes.copy(), pipeline.steps.copy()
-    copied.mapper = copy.copy(pipeline.mapper)
-    copied.mapper.observations = pipeline.mapper.observations.copy()
+    copied = still_past(pipeline)
     copied.mapper.graph = copy.deepcopy(pipeline.mapper.graph)
     return copied
 

@@ -162,8 +162,8 @@ class Grid(msgspec.Struct, frozen=True, kw_only=True):
     """Walls and floor, in tiles. Sent with those that changed since the message before.
 
     The answer to a query has all tiles, and the number of the last message that is in them. Who
-    finds a number missing, or another `began`, asks for all again. The cells lie where the robot
-    believed to be at that time; later loop closures correct them only in the saved map.
+    finds a number missing, or another `began`, asks for all again. When a loop closes, cells that
+    lie elsewhere by then are sent again where they belong.
     """
 
     stamp: float  # s, the robot's monotonic clock
@@ -197,8 +197,8 @@ class Grid(msgspec.Struct, frozen=True, kw_only=True):
 class Trajectory(msgspec.Struct, frozen=True, kw_only=True):
     """The way driven so far, thinned to at most 2,000 poses. Sent when it has grown; map frame.
 
-    The poses are those that the robot believed in at the time; later loop closures correct them
-    only in the saved map.
+    The poses are those that the robot believed in at the time, until a loop closes: then all are
+    corrected.
     """
 
     stamp: float  # s, the robot's monotonic clock

@@ -1,5 +1,6 @@
 """The best estimate of the whole run: all keyframes and vertices, corrected by later closures."""
 
+import copy
 from typing import NamedTuple
 
 import numpy as np
@@ -26,9 +27,41 @@ def smoothed(pipeline: Pipeline) -> Estimate:
     Where somebody else drove, nobody came close to vertices to know them again for certain: then
     walls that were passed twice close the loops, and vertices stand where the first visit saw them.
     """
+    keyframes, graph, x = _solved(pipeline)
+    vertices = range(len(keyframes), len(x))
+    P = graph.covariances(x, list(vertices))[:, :2, :2]
+    ids = pipeline.mapper.belief.ids
+    places = [Pose.from_array(row) for row in x[len(keyframes) :]]
+    return Estimate(keyframes, dict(zip(ids, places, strict=True)), dict(zip(ids, P, strict=True)))
+
+
+def smoothed_keyframes(pipeline: Pipeline) -> list[Pose]:
+    """The keyframes (map_base) of the best estimate, in a fraction of the time that all takes."""
+    return _solved(pipeline)[0]
+
+
+def still_past(pipeline: Pipeline) -> Pipeline:
+    """A copy, for these estimates, whose past does not grow as the pipeline goes on."""
+    copied = copy.copy(pipeline)
+    copied.keyframes, copied.steps = pipeline.keyframes.copy(), pipeline.steps.copy()
+    copied.mapper = copy.copy(pipeline.mapper)
+    copied.mapper.observations = pipeline.mapper.observations.copy()
+    return copied
+
+
+def _solved(pipeline: Pipeline) -> tuple[list[Pose], PoseGraph, Array]:
+    """The best keyframes; what they were found from, and all poses (N, 3), vertices last."""
+    keyframes, belief = pipeline.keyframes, pipeline.mapper.belief
+    start = [k.map_base for k in keyframes] + [belief.map_vertex(v) for v in belief.ids]
+    graph = PoseGraph(_constraints(pipeline))
+    x = graph.solve(np.array([(p.x, p.y, p.theta) for p in start]).reshape(-1, 3))
+    return [Pose.from_array(row) for row in x[: len(keyframes)]], graph, x
+
+
+def _constraints(pipeline: Pipeline) -> list[Constraint]:
+    """Between keyframes, by their number, and vertices, which follow in the belief's order."""
     keyframes, mapper = pipeline.keyframes, pipeline.mapper
     ids = {vertex: len(keyframes) + i for i, vertex in enumerate(mapper.belief.ids)}
-    start = [k.map_base for k in keyframes] + [mapper.belief.map_vertex(v) for v in ids]
     constraints = [
         Constraint(i, i + 1, step.motion, _inverse(step.covariance))
         for i, step in enumerate(pipeline.steps[: len(keyframes) - 1])
@@ -45,15 +78,7 @@ def smoothed(pipeline: Pipeline) -> Estimate:
             recognised.add(seen.vertex)
         if not (pipeline.led and seen.vertex in recognised):
             constraints.append(sight)
-    graph = PoseGraph(constraints)
-    x = graph.solve(np.array([(p.x, p.y, p.theta) for p in start]).reshape(-1, 3))
-    poses = [Pose.from_array(row) for row in x]
-    P = graph.covariances(x, list(ids.values()))[:, :2, :2]
-    return Estimate(
-        poses[: len(keyframes)],
-        {vertex: poses[i] for vertex, i in ids.items()},
-        dict(zip(ids, P, strict=True)),
-    )
+    return constraints
 
 
 def _passage(pipeline: Pipeline) -> Passage:

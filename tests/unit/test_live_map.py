@@ -1,6 +1,7 @@
 """Grid and trajectory as they grow on the network, held against the maps that they are parts of."""
 
 import math
+import zlib
 from collections.abc import Iterator
 
 import msgspec
@@ -86,6 +87,26 @@ def test_a_large_map_is_sent_in_messages_of_bounded_size() -> None:
     rest = list(iter(lambda: live.changes(1.0), None))
     assert live.changes(1.0) is None
     assert len(merged([first, *rest]).tiles) == len(live.whole(1.0).tiles) > 128
+
+
+def test_after_a_correction_the_tiles_add_up_to_the_grid_of_the_corrected_scans() -> None:
+    astray = [keyframe(-3.0 - 0.5 * i, 2.0) for i in range(20)]
+    live = LiveGrid(began=0.0)
+    live.add(astray)
+    first = live.changes(1.0)
+    live.redraw(DRIVE)
+    rest = list(iter(lambda: live.changes(2.0), None))
+    assert first is not None
+    right = LiveGrid(began=0.0)
+    right.add(DRIVE)
+    expected = right.changes(1.0)
+    assert expected is not None
+    for shown in (merged([first, *rest]), live.whole(2.0)):
+        known = {(t.row, t.column): t.cells for t in shown.tiles}
+        for tile in expected.tiles:
+            assert known.pop((tile.row, tile.column)) == tile.cells
+        assert all(set(zlib.decompress(cells)) == {255} for cells in known.values())  # unknown
+        assert len(known) > 5
 
 
 def test_a_trajectory_keeps_its_ends_and_its_shape_however_long_it_gets() -> None:
