@@ -7,11 +7,13 @@ they may go, and the map forgets them as soon as that is seen.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.gvg.local_map import LocalMap
 from gvgbot.geometry import Array, Pose
@@ -23,6 +25,7 @@ _SMOOTH_M = 0.15  # in range from beam to beam, on it: two legs of a chair are f
 _BEAMS = 3  # fewer see nothing for sure
 _SLIM_M, _WIDE_M = 0.1, 0.8  # people are between these; what is slimmer is furniture
 _FLAT = 0.06  # of its width: what bulges less towards the laser is a piece of wall, or of glass
+_ROUND = 0.06  # of its radius: what strays less from a circle, r.m.s., may be a leg or a body
 _GLIMPSE_S = 3.0  # what is half hidden behind something nearer is only kept waiting so long
 _BLUR_M = 0.1  # beyond its rim, beams may still end on something
 _MOVED_M = 0.3  # what stands is found again within this
@@ -103,7 +106,7 @@ class Newcomers:
     def _is_passing(self, island: _Island, stamp: float, walls: "_Walls") -> bool:
         """Whether what is seen has not stood there for long; it is taken down."""
         one = next((one for one in self._all if _is_at(one, island.centre)), None)
-        if one is None and walls.are_seen(island.ends):
+        if one is None and walls.are_seen(island):
             return False
         if one is None:
             came = walls.are_away(island)
@@ -159,9 +162,17 @@ class _Walls:
     def __init__(self, local_map: LocalMap, reach: float, is_way: Callable[[Array], bool]) -> None:
         self._map, self._reach, self._is_way = local_map, reach, is_way
 
-    def are_seen(self, ends: Array) -> bool:
-        """Whether most ends (N, 2) lie on what was seen before: a person may brush along one."""
-        distance, _ = self._map.tree().query(ends, distance_upper_bound=self._reach)
+    @cached_property
+    def _tree(self) -> cKDTree:
+        return cKDTree(self._map.firm_points())
+
+    def are_seen(self, island: _Island) -> bool:
+        """Whether most of it lies on what was seen before: a person may brush along a wall.
+
+        For what is round, once or twice is not enough: that may have been a part of a person.
+        """
+        tree = self._tree if _is_round(island) else self._map.tree()
+        distance, _ = tree.query(island.ends, distance_upper_bound=self._reach)
         return bool(np.isfinite(distance).mean() > 0.5)
 
     def are_away(self, island: _Island) -> bool:
@@ -211,6 +222,21 @@ def _is_flat(ends: Array, width: float) -> bool:
     third = len(ends) // 3
     rims = (bulge[:third].mean() + bulge[-third:].mean()) / 2
     return bool(bulge[third:-third].mean() - rims < _FLAT * width)
+
+
+def _is_round(island: _Island) -> bool:
+    """Whether what was seen from side to side lies on a circle, as a leg or a body does.
+
+    The circle is the algebraic least-squares fit of Kåsa: |p|² = 2 c·p + r² - |c|².
+    """
+    if not island.is_whole:
+        return False
+    ends = island.ends - island.centre
+    equations = np.column_stack([2 * ends, np.ones(len(ends))])
+    (x, y, rest), *_ = np.linalg.lstsq(equations, (ends**2).sum(axis=1))
+    radius = np.sqrt(rest + x**2 + y**2)
+    misfit = np.hypot(*(ends - (x, y)).T) - radius
+    return bool(np.std(misfit) < _ROUND * island.radius and radius < 2.0 * island.radius)
 
 
 def _without(scan: Scan, local_base: Pose, discs: list[tuple[Array, float]]) -> Scan:

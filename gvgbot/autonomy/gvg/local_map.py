@@ -36,6 +36,7 @@ _LONE_M = 0.3  # an echo nearer than both its neighbours by this is one of dust 
 _GLASS_ECHOES = 3.0  # so many about a cell make it glass, which beams pass and robots do not
 _BESIDE_WALLS_M = 0.22  # half a gap that robots go through: nearer, they make no difference
 _DECAY = 0.05  # echoes that one look outweighs which meets nothing
+_FIRM = 5  # votes: at least three looks
 _MAX_VOTES = 8  # a wall needs this many contrary scans, less the hits, before it is forgotten
 
 
@@ -120,6 +121,12 @@ class LocalMap:
     def points(self) -> Array:
         """Points of the walls (N, 2), local frame: about one for each cell that a wall crosses."""
         return self._walls.points
+
+    def firm_points(self) -> Array:
+        """Points (N, 2), local frame, of glass and of walls that have been seen again and again."""
+        i, j = np.nonzero(self._votes > 0)
+        firm = (self._votes[i, j] >= _FIRM) | self._is_glass(i, j)
+        return np.asarray(self._mean[i[firm], j[firm]])
 
     def tree(self) -> cKDTree:
         """To find the nearest of `points`."""

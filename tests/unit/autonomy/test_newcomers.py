@@ -46,6 +46,17 @@ class Watch:
         self.map.insert(sifted, HERE, 0.0)
         return int(np.isnan(sifted.ranges).sum() - np.isnan(scan.ranges).sum())
 
+    def glimpse(self, ranges: Array, offsets: Array) -> None:
+        """Two looks of three beams each, those with the least offset (N,), at what is new here."""
+        for second in range(2):
+            few = np.where(
+                np.isin(np.arange(len(ranges)), np.argsort(abs(offsets))[:3]), ranges, np.inf
+            )
+            scan = sweep(EMPTY, HERE)
+            scan = replace(scan, ranges=np.minimum(scan.ranges, few), stamp=float(second))
+            self.map.insert(scan, HERE, 0.0)
+        assert self.inside() > 0
+
     def inside(self) -> int:
         """How many points of the map are not the room's walls."""
         return int((np.abs(self.map.points()) < [3.9, 2.9]).all(axis=1).sum())
@@ -129,6 +140,23 @@ def test_who_walks_along_a_wall_is_kept_out_too() -> None:
     for second in range(10):
         watch.dropped(EMPTY, second, person=(0.5 * second - 2.5, 3.0 - RADIUS - 0.35))
     assert watch.inside() == 0
+
+
+def test_of_whom_too_little_was_seen_at_first_is_no_wall_afterwards() -> None:
+    watch = Watch(EMPTY)
+    bearings = sweep(EMPTY, HERE).bearings
+    watch.glimpse(to_disc(bearings, (2.0, 0.0)), bearings)
+    assert watch.dropped(EMPTY, 2.0, person=(2.0, 0.0)) > 0
+    assert len(watch.newcomers.points) > 0
+
+
+def test_the_corner_of_a_wall_is_one_however_little_was_seen_of_it_at_first() -> None:
+    with_corner = carved([ROOM], [(1.6, -1.0, 2.0, -0.6)])
+    watch = Watch(EMPTY)
+    scan = sweep(with_corner, HERE)
+    corner = np.where(scan.ranges < sweep(EMPTY, HERE).ranges - 0.5, scan.ranges, np.inf)
+    watch.glimpse(corner, scan.bearings - math.atan2(-0.8, 1.8))
+    assert watch.dropped(with_corner, 2.0) == 0
 
 
 def test_who_stood_for_long_and_goes_is_forgotten_at_the_next_look() -> None:
