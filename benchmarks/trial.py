@@ -123,9 +123,9 @@ class FullFiles(MissionFiles):
         super().__init__(directory)
         self._disk = disk
 
-    def append(self, batch: bytes, *, sync: bool) -> None:
+    def append(self, batch: bytes, *, sync: bool, after: int | None = None) -> None:
         self._disk.check()
-        super().append(batch, sync=sync)
+        super().append(batch, sync=sync, after=after)
 
     def save(self, snapshot: bytes) -> None:
         self._disk.check()

@@ -42,6 +42,9 @@ class LivePast:
         Call each such function before asking for the next. Where somebody else drives, only what is
         new is found: the best estimate takes too long there.
         """
+        if self._taken > len(pipeline.keyframes):  # the latest of a long way was all that stayed
+            self._taken = len(pipeline.keyframes)
+            self._drawn[self._taken - 1 :] = [pipeline.keyframes[-1].map_base]
         new, past = pipeline.keyframes[self._taken :], None
         self._taken += len(new)
         if self._is_doubtful and stamp >= self._rests_until and not pipeline.led:

@@ -1,6 +1,7 @@
 """What a run leaves: the map, its picture, the trajectories and the summary, as files by name."""
 
 import tempfile
+from bisect import bisect_left
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -43,6 +44,13 @@ class Journey:
         self.map_base.append(pipeline.map_base)
         if world_base is not None:
             self.world_base.append(world_base)
+
+    def forget(self, keyframe: int) -> None:
+        """Leave out the rows from a keyframe on."""
+        first = bisect_left(self.keyframes, keyframe)
+        rows = (self.stamps, self.keyframes, self.odom_base, self.map_base, self.world_base)
+        for column in rows:
+            del column[first:]
 
 
 def map_files(pipeline: Pipeline, journey: Journey, title: str) -> dict[str, bytes | str]:

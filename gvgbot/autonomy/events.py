@@ -107,6 +107,18 @@ class RoundEnded:
     missed: int
 
 
+@dataclass(frozen=True, slots=True)
+class WayForgotten:
+    """On errands that showed nothing new, the robot keeps only the latest part of its way.
+
+    The first `kept` keyframes, by which it knows the map, stay; so many after them are left out.
+    """
+
+    stamp: float
+    kept: int
+    left_out: int
+
+
 Event = (
     VertexAdded
     | VertexRemoved
@@ -118,4 +130,5 @@ Event = (
     | Requested
     | ErrandEnded
     | RoundEnded
+    | WayForgotten
 )

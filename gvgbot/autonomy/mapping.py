@@ -1,7 +1,7 @@
 """From what is seen of the GVG to what is known of it: vertices matched, added and joined."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Annotated
 
 import numpy as np
@@ -509,6 +509,14 @@ class Mapper:
         vertex = self._add(view, Sighting(here, min_clearance, bearings, meetpoint=True))
         ends = [HalfEdgeId(vertex.id, key) for key in vertex.half_edges]
         self.join(view, ends[0], ends[1], line, min_clearance, driven=True)
+
+    def forget_between(self, first: int, last: int) -> None:
+        """Drop what was observed at keyframes from one on; the last one takes its number."""
+        before = [seen for seen in self.observations if seen.keyframe < first]
+        there = [
+            replace(seen, keyframe=first) for seen in self.observations if seen.keyframe == last
+        ]
+        self.observations[:] = before + there
 
     def in_local_frame(self, view: View, vertex: int) -> Pose:
         """Where a vertex, seen lately or not, stands in the local frame."""

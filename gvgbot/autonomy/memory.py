@@ -5,6 +5,7 @@ a field that is added needs a default, and one that is renamed cannot be read an
 What a moment decides (the order, reflexes, patience) is left to the next moment.
 """
 
+from bisect import bisect_left
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -105,6 +106,7 @@ class Memory:
     odds: Odds
     hazards: list[Hazard]
     newcomers: list[Newcomer] = field(default_factory=list)
+    lasting: int | None = None  # keyframes that are kept for good; None: all
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -137,6 +139,7 @@ def remember(pipeline: Pipeline) -> Memory:
         odds=Odds(calibration.x, calibration.P, maps._shared),
         hazards=pipeline._hazards._all,
         newcomers=pipeline._newcomers._all,
+        lasting=pipeline.lasting,
     )
 
 
@@ -177,10 +180,11 @@ def _cells(local_map: LocalMap) -> Cells:
     )
 
 
-def growth(pipeline: Pipeline, keyframe: int, observation: int) -> list[Growth]:
-    """What keyframes added from one on, with the observations from one on; by their numbers."""
+def growth(pipeline: Pipeline, keyframe: int = 0) -> list[Growth]:
+    """What keyframes added from one on, by its number."""
     observations: dict[int, list[Observation]] = {}
-    for seen in pipeline.mapper.observations[observation:]:
+    seen_later = bisect_left(pipeline.mapper.observations, keyframe, key=lambda o: o.keyframe)
+    for seen in pipeline.mapper.observations[seen_later:]:
         observations.setdefault(seen.keyframe, []).append(seen)
     return [
         Growth(
@@ -221,6 +225,9 @@ def recall(pipeline: Pipeline, memory: Memory, past: list[Growth]) -> None:
         _bridge(pipeline, memory.last)
     for later in past[memory.keyframes :]:
         _live_again(pipeline, later)
+    pipeline.lasting = len(pipeline.keyframes)
+    if memory.lasting is not None and memory.lasting < memory.keyframes:
+        pipeline.lasting = min(memory.lasting, pipeline.lasting)
     _tie_vertices(pipeline)
     if pipeline.keyframes:
         _awake(pipeline, pipeline.keyframes[-1])

@@ -19,7 +19,7 @@ from gvgbot.autonomy.control.reflexes import (
     Reflexes,
 )
 from gvgbot.autonomy.errands import Errands
-from gvgbot.autonomy.events import Event, Recovery
+from gvgbot.autonomy.events import EdgeJoined, Event, Recovery, VertexAdded, WayForgotten
 from gvgbot.autonomy.gvg.local import LocalGvg
 from gvgbot.autonomy.gvg.local_map import LocalMapConfig
 from gvgbot.autonomy.gvg.reduction import ReductionConfig, reduce_graph
@@ -48,6 +48,7 @@ _COMPANY_M = 0.1  # by which another robot may be elsewhere than it says
 _ROOM_FOR_BOTH_M = 0.3  # between two robots, before either has to be slow
 _BOTH_BRAKE_MPS2 = 0.5  # of each, so that two that come towards each other stop
 _LONGEST_GAP_S = 2.0  # between keyframes; a longer one is an outage of a device
+_FORGOTTEN = np.diag([1.0, 1.0, 0.3**2])  # covariance of a way that is not kept
 _SCAN_EVERY_M, _SCAN_EVERY_RAD = 0.7, 0.5  # scans that are kept for the occupancy grid
 
 
@@ -58,6 +59,7 @@ class KeyframeConfig:
     distance_m: Annotated[float, Range(0.02, 2.0)] = 0.25  # driven since the last one
     turn_rad: Annotated[float, Range(0.02, 2.0)] = 0.25  # turned since the last one
     interval_s: Annotated[float, Range(0.1, 10.0)] = 1.0  # since the last one
+    latest: Annotated[int, Range(1, 1_000_000)] = 1000  # kept of errands that showed nothing new
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -144,6 +146,7 @@ class Pipeline:
         self.gvg = LocalGvg()
         self.keyframes: list[Keyframe] = []
         self.steps: list[Step] = []
+        self.lasting = 0  # keyframes that are kept for good: the map hangs on them
         self.travelled = 0.0
 
     # -- state -----------------------------------------------------------------------------------
@@ -227,7 +230,8 @@ class Pipeline:
         known, learnt = self.mapper.observe(view)
         self._keep(scan, odom_base, local_base)
         done = self._act(view, known, scan)
-        return happened + learnt + done  # what was done may have taught the mapper more
+        happened += learnt + done  # what was done may have taught the mapper more
+        return happened + self._forget(scan.stamp, happened)
 
     def _act(self, view: View, known: Correspondence, scan: Scan) -> list[Event]:
         """Decide what to do next; what happened by that."""
@@ -312,6 +316,20 @@ class Pipeline:
         else:
             self._last = Keyframe(scan.stamp, odom_base, local_base, map_base, None)
         self.keyframes.append(self._last)
+
+    def _forget(self, stamp: float, happened: list[Event]) -> list[Event]:
+        """Leave out the way but its end, if it has become long and there was nothing to learn."""
+        is_new = any(isinstance(event, VertexAdded | EdgeJoined) for event in happened)
+        if is_new or self.errands.is_exploring:
+            self.lasting = len(self.keyframes)
+        newest = len(self.keyframes) - 1
+        if newest < self.lasting + self._config.keyframe.latest:
+            return []
+        before, last = self.keyframes[self.lasting - 1], self.keyframes[newest]
+        self.keyframes[self.lasting :] = [last]
+        self.steps[self.lasting - 1 :] = [Step(before.map_base.to(last.map_base), _FORGOTTEN)]
+        self.mapper.forget_between(self.lasting, newest)
+        return [WayForgotten(stamp, self.lasting, newest - self.lasting)]
 
     # -- control, per odometry message -------------------------------------------------------------
 

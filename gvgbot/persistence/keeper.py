@@ -6,6 +6,7 @@ disk that is full, read-only or slow holds up nothing: what was not written is w
 """
 
 import math
+from bisect import bisect_right
 from collections.abc import Awaitable, Callable
 from functools import partial
 
@@ -17,7 +18,15 @@ from gvgbot.autonomy.returning import ReturningPipeline
 from gvgbot.clock import Clock, LoopClock
 from gvgbot.drivers.kobuki.feedback import FeedbackReader
 from gvgbot.persistence.mission_files import MissionFiles
-from gvgbot.persistence.mission_state import Batch, Beat, Saved, Snapshot, boot_id, rows
+from gvgbot.persistence.mission_state import (
+    Batch,
+    Beat,
+    Count,
+    Saved,
+    Snapshot,
+    boot_id,
+    rows,
+)
 from gvgbot.persistence.records import packed
 from gvgbot.session import Session
 
@@ -33,6 +42,7 @@ _SETTLED = (
     events.Requested,
     events.ErrandEnded,
     events.Finished,
+    events.WayForgotten,
 )
 
 log = structlog.get_logger()
@@ -50,7 +60,8 @@ class Keeper:
         self._boot = boot_id()
         self._ahead = 0.0  # s, the robot's clock minus the computer's
         self._feedback: FeedbackReader | None = None
-        self._keyframes = self._observations = self._rows = 0  # that are in the journal
+        self._counts: list[Count] = []  # of what is in the journal after each batch
+        self._is_cut = False  # some of what is in the journal has been forgotten
         self._snapshot_at = -math.inf  # stamp of the last snapshot
         self._snapshot_of = -1  # keyframes in it
         self._settled = False  # the map has changed since the last snapshot
@@ -81,9 +92,7 @@ class Keeper:
         if not self._goes_on:
             session.pipeline.mission.outcome, session.pipeline.mission.reason = None, ""
         else:
-            self._keyframes = len(saved.past)
-            self._observations = len(session.pipeline.mapper.observations)
-            self._rows = len(saved.journey.stamps)
+            self._counts = list(saved.counts)
 
     def _is_vouched(self) -> bool:
         """Whether the base has counted all the time since, so that it cannot have driven."""
@@ -112,6 +121,7 @@ class Keeper:
     def on_event(self, event: events.Event) -> None:
         """Note what happened: a map that has changed is kept at once, and so is a wish."""
         self._settled = self._settled or isinstance(event, _SETTLED)
+        self._is_cut = self._is_cut or isinstance(event, events.WayForgotten)
 
     async def keep(
         self, clock: Clock, off_loop: Callable[[Callable[[], None]], Awaitable[None]]
@@ -129,23 +139,29 @@ class Keeper:
         pipeline = self._session.pipeline
         if not pipeline.keyframes or pipeline.is_lost:
             return _nothing
+        after = self._stays(pipeline.lasting) if self._is_cut else len(self._counts)
+        before = self._counts[after - 1] if after else Count(0, 0)
+        count = Count(len(pipeline.keyframes), len(self._session.journey.stamps))
+        if count == before and not self._settled:
+            return _nothing
         beat = self._beat(stamp)
         batch = Batch(
-            first=self._keyframes,
-            growth=growth(pipeline, self._keyframes, self._observations),
-            rows=rows(self._session.journey, self._rows),
+            first=before.keyframes,
+            growth=growth(pipeline, before.keyframes),
+            rows=rows(self._session.journey, before.rows),
             beat=beat,
         )
-        new_rows = self._rows + len(batch.rows.stamps)
-        counts = (len(pipeline.keyframes), len(pipeline.mapper.observations), new_rows)
-        if counts == (self._keyframes, self._observations, self._rows) and not self._settled:
-            return _nothing
         due = self._settled or stamp - self._snapshot_at >= SNAPSHOT_EVERY
         snapshot = None
         if due and (self._settled or self._snapshot_of < len(pipeline.keyframes)):
             snapshot = packed(Snapshot(memory=remember(pipeline), beat=beat))
             self._settled = False
-        return partial(self._write, packed(batch), counts, snapshot, stamp)
+        self._is_cut = False
+        return partial(self._write, packed(batch), [*self._counts[:after], count], snapshot, stamp)
+
+    def _stays(self, lasting: int) -> int:
+        """How many batches hold nothing but the first keyframes, of which none was forgotten."""
+        return bisect_right(self._counts, lasting, key=lambda count: count.keyframes)
 
     def finish(self) -> None:
         """Write all that is new; call when nothing runs any more."""
@@ -153,16 +169,17 @@ class Keeper:
         self.keeping(self._session.tally.last_stamp)()
 
     def _write(
-        self, batch: bytes, counts: tuple[int, int, int], snapshot: bytes | None, stamp: float
+        self, batch: bytes, counts: list[Count], snapshot: bytes | None, stamp: float
     ) -> None:
         try:
-            self._files.append(batch, sync=snapshot is not None)
-            self._keyframes, self._observations, self._rows = counts
+            self._files.append(batch, sync=snapshot is not None, after=len(counts) - 1)
+            self._counts = counts
             if snapshot is not None:
                 self._files.save(snapshot)
-                self._snapshot_at, self._snapshot_of = stamp, counts[0]
+                self._snapshot_at, self._snapshot_of = stamp, counts[-1].keyframes
         except OSError as error:
             self._settled = self._settled or snapshot is not None
+            self._is_cut = self._is_cut or len(counts) <= len(self._counts)
             self._complain(error.strerror or str(error))
         else:
             self._complain(None)

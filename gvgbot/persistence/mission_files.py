@@ -13,6 +13,7 @@ from gvgbot.autonomy.memory import Growth
 from gvgbot.persistence.mission_state import (
     VERSION,
     Batch,
+    Count,
     Header,
     Rows,
     Saved,
@@ -31,13 +32,13 @@ class MissionFiles:
         self._journal = directory / JOURNAL
         self._snapshot = directory / SNAPSHOT
         self._before = directory / SNAPSHOT_BEFORE
-        self._end: int | None = None  # of what is whole in the journal; None: not begun
+        self._ends: list[int] = []  # of the whole records of the journal: its head, the batches
         self._is_whole = True  # the newest snapshot, as far as that is known
 
     @property
     def is_begun(self) -> bool:
         """Whether there is a journal that goes on."""
-        return self._end is not None
+        return bool(self._ends)
 
     # -- reading -----------------------------------------------------------------------------------
 
@@ -51,14 +52,17 @@ class MissionFiles:
             return None
         past: list[Growth] = []
         parts: list[Rows] = []
+        counts: list[Count] = []
         newest = snapshot.beat
         for batch in self._batches():
             if batch.first != len(past):
                 break
             past += batch.growth
             parts.append(batch.rows)
+            rows = counts[-1].rows if counts else 0
+            counts.append(Count(len(past), rows + len(batch.rows.stamps)))
             newest = max(newest, batch.beat, key=lambda beat: beat.stamp)
-        return Saved(snapshot.memory, past, journey_of(parts, len(past)), newest)
+        return Saved(snapshot.memory, past, journey_of(parts, len(past)), newest, counts)
 
     def _newest_snapshot(self) -> Snapshot | None:
         trouble: Damaged | None = None
@@ -90,7 +94,7 @@ class MissionFiles:
                     yield unpacked(payload, Batch)
             except Damaged:
                 return
-            self._end = end
+            self._ends.append(end)
 
     # -- writing -----------------------------------------------------------------------------------
 
@@ -100,24 +104,26 @@ class MissionFiles:
             path.unlink(missing_ok=True)
         start = record(packed(Header("gvgbot journal", VERSION)))
         _replace(self._journal, start)
-        self._end = len(start)
+        self._ends = [len(start)]
 
-    def append(self, batch: bytes, *, sync: bool) -> None:
+    def append(self, batch: bytes, *, sync: bool, after: int | None = None) -> None:
         """Add a batch (MessagePack) to the journal; `sync` if it must outlive a power cut.
 
-        Raises OSError; then it may be tried again, and nothing before it is lost.
+        It takes the place of all but the first `after` batches, if that is given. Raises OSError;
+        then it may be tried again, and nothing before it is lost.
         """
-        if self._end is None:
+        if not self.is_begun:
             self.begin()
-            assert self._end is not None
-        framed = record(batch)
+        if after is not None:
+            del self._ends[after + 1 :]
+        framed, end = record(batch), self._ends[-1]
         with self._journal.open("r+b", buffering=0) as journal:
-            journal.truncate(self._end)  # what an earlier attempt may have left
-            journal.seek(self._end)
+            journal.truncate(end)  # what an earlier attempt may have left
+            journal.seek(end)
             _write_all(journal.fileno(), framed)
             if sync:
                 os.fsync(journal.fileno())
-        self._end += len(framed)
+        self._ends.append(end + len(framed))
 
     def save(self, snapshot: bytes) -> None:
         """Replace the snapshot (MessagePack) at once; the old one stays beside it.

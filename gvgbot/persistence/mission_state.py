@@ -6,7 +6,7 @@ The journal is a record `Header`, then one `Batch` about every second. The snaps
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import msgspec
 import numpy as np
@@ -64,14 +64,22 @@ class Snapshot(msgspec.Struct, frozen=True, kw_only=True):
     beat: Beat
 
 
+class Count(NamedTuple):
+    """How much a journal holds up to the end of a batch."""
+
+    keyframes: int
+    rows: int
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Saved:
-    """A mission as it was found: `past` and `rows` as far as the journal can be read."""
+    """A mission as it was found: `past` and `journey` as far as the journal can be read."""
 
     memory: Memory
     past: list[Growth]
     journey: Journey
     beat: Beat  # the newest
+    counts: list[Count]  # after each batch
 
 
 def boot_id() -> str:

@@ -42,13 +42,13 @@ def fresh(config: Config) -> Pipeline:
 
 
 def everything(pipeline: Pipeline) -> bytes:
-    return packed((remember(pipeline), growth(pipeline, 0, 0)))
+    return packed((remember(pipeline), growth(pipeline)))
 
 
 def kept(pipeline: Pipeline) -> tuple[Memory, list[Growth]]:
     return (
         unpacked(packed(remember(pipeline)), Memory),
-        unpacked(packed(growth(pipeline, 0, 0)), list[Growth]),
+        unpacked(packed(growth(pipeline)), list[Growth]),
     )
 
 

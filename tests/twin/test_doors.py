@@ -1,9 +1,4 @@
-"""A patrol in a finished map whose doors close and open again: ways change, the map does not.
-
-The world is shaped like the letter theta: two meetpoints, 5 m apart over the bar in the middle and
-12 m around either side. One door is in the middle of the bar, another one shuts it off flush with
-the wall of the ring, so that the meetpoint there is none any more.
-"""
+"""A patrol in a finished map whose doors close and open again: ways change, the map does not."""
 
 import json
 import math
@@ -15,39 +10,13 @@ import pytest
 from gvgbot.clock import Clock
 from gvgbot.config import TwinConfig
 from gvgbot.drivers.kobuki.twin import KobukiTwinConfig
-from gvgbot.drivers.world import World
-from gvgbot.geometry import Pose
 from gvgbot.simulation import Place
-from gvgbot.worlds.canvas import Canvas
+from tests.twin.doors_rig import FLUSH, MIDDLE, NORTH, SOUTH, START, swing, theta
 from tests.twin.run_rig import Daemon
 
 pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(300)]
 
-SOUTH, NORTH = (5.5, 2.0), (5.5, 7.0)
-START = Pose(3.5, 2.1, 0.2)
-WIDTH = 1.4
-MIDDLE = (4.7, 6.3, 4.4, 4.6)  # x, x, y, y of a door in the middle of the bar
-FLUSH = (4.7, 6.3, 2.0 + WIDTH / 2, 2.2 + WIDTH / 2)  # and of one where it leaves the ring
 REMEMBERED = 60.0  # s
-
-
-def theta() -> World:
-    canvas = Canvas(11.0, 9.0)
-    ring = [(2.0, 2.0), (9.0, 2.0), (9.0, 7.0), (2.0, 7.0), (2.0, 2.0)]
-    canvas.carve_path(ring, WIDTH)
-    canvas.carve_path([SOUTH, NORTH], WIDTH)
-    return canvas.world("theta")
-
-
-def swing(world: World, door: tuple[float, float, float, float], *, shut: bool) -> None:
-    """Shut or open a door in the world that everybody looks at."""
-    x0, x1, y0, y1 = (round(at / world.resolution_m) for at in door)
-    before = theta().occupied[y0:y1, x0:x1]
-    world.occupied.setflags(write=True)
-    world.occupied[y0:y1, x0:x1] = True if shut else before
-    world.occupied.setflags(write=False)
-    for cached in ("_caster", "clearance", "without_glass"):
-        world.__dict__.pop(cached, None)
 
 
 @dataclass

@@ -1,16 +1,24 @@
 """A robot that is killed while it does what somebody asked for, and goes on with it."""
 
 import json
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
+from benchmarks.kills import vertices
 from gvgbot.autonomy.errands.kinds import Patrol
+from gvgbot.autonomy.memory import growth, remember
+from gvgbot.autonomy.pipeline import AutonomyConfig, KeyframeConfig
 from gvgbot.config import Config, TwinConfig
 from gvgbot.drivers.kobuki.twin import KobukiTwinConfig
 from gvgbot.geometry import Pose
 from gvgbot.persistence.keeper import SNAPSHOT_EVERY
+from gvgbot.persistence.mission_files import MissionFiles
+from gvgbot.persistence.records import packed
 from gvgbot.session import Session
 from gvgbot.simulation import Place
 from gvgbot.worlds.canvas import Canvas
@@ -19,6 +27,10 @@ from tests.twin.lives_rig import Lives, explored
 pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(300)]
 
 TWIN = TwinConfig(base=KobukiTwinConfig(odometry="perfect"))
+START = Pose(2.5, 1.5, 0.1)
+CROSSING = (4.5, 1.675)  # as far from the corners (3.8, 2.2) and (5.2, 2.2) as from the wall at 0.8
+LATEST = 30  # keyframes
+AUTONOMY = AutonomyConfig(keyframe=KeyframeConfig(latest=LATEST))
 
 
 def tee() -> Place:
@@ -26,7 +38,7 @@ def tee() -> Place:
     canvas = Canvas(9.0, 6.0)
     canvas.carve_path([(1.5, 1.5), (7.5, 1.5)], 1.4)
     canvas.carve_path([(4.5, 1.5), (4.5, 4.5)], 1.4)
-    return Place(canvas.world("tee"), Pose(2.5, 1.5, 0.1))
+    return Place(canvas.world("tee"), START)
 
 
 @dataclass
@@ -54,15 +66,38 @@ class Owner:
         return now > self.since + SNAPSHOT_EVERY + 1.0  # so that it has been kept
 
 
-def rounds(out: Path) -> list[tuple[int, int, int]]:
+def told(out: Path, event: str) -> list[dict[str, Any]]:
     lines = [json.loads(line) for line in (out / "events.jsonl").read_text().splitlines()]
-    found = [line for line in lines if line["event"] == "round_ended"]
+    return [line for line in lines if line["event"] == event]
+
+
+def rounds(out: Path) -> list[tuple[int, int, int]]:
+    found = told(out, "round_ended")
     return [(line["round"], line["reached"], line["missed"]) for line in found]
 
 
+def check_forgotten(lives: Lives, last: Session) -> None:
+    """Of the rounds only the latest part is kept, on disk, too; the map stands where it stood."""
+    pipeline, explored_by = (
+        last.pipeline,
+        {line["kept"] for line in told(lives.out, "way_forgotten")},
+    )
+    (lasting,) = explored_by
+    assert len(told(lives.out, "way_forgotten")) > 2
+    assert pipeline.lasting == lasting < len(pipeline.keyframes) <= lasting + LATEST
+    assert len(pipeline.steps) == len(pipeline.keyframes) - 1
+    saved = MissionFiles(lives.out).read()
+    assert saved is not None
+    assert packed(saved.past) == packed(growth(pipeline))
+    assert packed(saved.memory) == packed(remember(pipeline))
+    assert saved.journey.stamps == last.journey.stamps
+    ((x, y),) = vertices(lives.out)["meetpoint"]
+    assert math.dist(START.transform(np.array([x, y])), CROSSING) < 0.15
+
+
 def test_a_patrol_goes_on_with_what_was_left_of_its_round(tmp_path: Path) -> None:
-    owner = Owner()
-    lives = Lives(Config(twin=TWIN), tee(), tmp_path, over=lambda _: len(rounds(tmp_path)) == 3)
+    owner, config = Owner(), Config(twin=TWIN, autonomy=AUTONOMY)
+    lives = Lives(config, tee(), tmp_path, over=lambda _: len(rounds(tmp_path)) == 3)
     last = lives.run([owner.sends_it])
     assert len(owner.ends) == 3
     assert last.pipeline.errands.errand == Patrol(tuple(owner.ends))
@@ -70,3 +105,4 @@ def test_a_patrol_goes_on_with_what_was_left_of_its_round(tmp_path: Path) -> Non
     # Of the second round one vertex was visited before, and two after the restart.
     assert rounds(tmp_path) == [(1, 3, 0), (2, 2, 0), (3, 3, 0)]
     assert lives.world.body.contacts == 0
+    check_forgotten(lives, last)

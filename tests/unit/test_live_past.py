@@ -1,6 +1,7 @@
 """What is drawn of the past, after a drive around a circle that odometry turned into a spiral."""
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
@@ -115,6 +116,18 @@ def test_there_is_a_rest_after_drawing_all() -> None:
     later = taken(past, pipeline, 60.0)
     assert later is not None
     assert later[1]
+
+
+def test_of_a_way_that_is_not_kept_only_what_is_new_is_drawn() -> None:
+    pipeline = drive(closes=False)
+    past, last = after_the_drive(pipeline), pipeline.keyframes[-1]
+    pipeline.keyframes[50:] = [last]
+    pipeline.steps[49:] = [Step(pipeline.keyframes[49].map_base.to(last.map_base), np.eye(3))]
+    assert taken(past, pipeline, 2.0) is None
+    pipeline.keyframes.append(replace(last, map_base=last.map_base.compose(Pose(0.3))))
+    pipeline.steps.append(Step(Pose(0.3), np.eye(3)))
+    past.doubt()
+    assert taken(past, pipeline, 3.0) == ([pipeline.keyframes[-1].map_base], False)
 
 
 def test_where_somebody_else_drives_only_what_is_new_is_drawn() -> None:

@@ -76,6 +76,12 @@ class Errands:
         is_over = is_free and (self.is_waiting or self._mission.outcome is not None)
         return self.is_paused or is_over
 
+    @property
+    def is_exploring(self) -> bool:
+        """Whether it is the robot that decides where to drive."""
+        is_own = self._is_own or (self._plan is None and self._command is None)
+        return is_own and not self.is_resting
+
     def configure(self, config: ExplorationConfig) -> None:
         """Use another configuration from now on."""
         self._config = config

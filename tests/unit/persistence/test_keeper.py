@@ -1,15 +1,17 @@
 """The keeper beside a disk that refuses for a while."""
 
+import copy
 from pathlib import Path
 
 import pytest
 import structlog
 
-from gvgbot.autonomy.memory import recall, remember
+from gvgbot.autonomy.events import WayForgotten
+from gvgbot.autonomy.memory import growth, recall, remember
 from gvgbot.config import load_config
 from gvgbot.maps.run_directory import RunDirectory
 from gvgbot.persistence.keeper import Keeper
-from gvgbot.persistence.mission_files import MissionFiles
+from gvgbot.persistence.mission_files import JOURNAL, MissionFiles
 from gvgbot.persistence.records import packed
 from gvgbot.session import Session
 from tests.unit.persistence.test_mission_files import full_disk
@@ -59,6 +61,37 @@ def test_what_did_not_change_is_not_written_again(session: Session, tmp_path: Pa
     for stamp in (20.5, 21.0, 60.0):
         keeper.keeping(stamp)()
     assert {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()} == before
+
+
+def test_a_way_that_is_forgotten_leaves_the_journal_whole_and_short(
+    session: Session, tmp_path: Path
+) -> None:
+    """As on a patrol: of twenty keyframes and more only the newest is kept."""
+    pipeline, whole = session.pipeline, copy.deepcopy(session.journey)
+    keyframes = pipeline.keyframes.copy()
+    kept, newest = len(keyframes) - 20, len(keyframes) - 1
+    explored = sum(keyframe < kept for keyframe in whole.keyframes)
+    keeper, sizes = Keeper(session, MissionFiles(tmp_path)), []
+    session.journey.forget(kept)
+    for journey, count in ((session.journey, kept), (whole, len(keyframes))):
+        session.journey, pipeline.keyframes[:] = journey, keyframes[:count]
+        keeper.keeping(20.0 + count)()
+        sizes.append((tmp_path / JOURNAL).stat().st_size)
+    pipeline.lasting, pipeline.keyframes[kept:] = kept, keyframes[-1:]
+    del pipeline.steps[kept:]
+    pipeline.mapper.forget_between(kept, newest)
+    whole.forget(kept)
+    keeper.on_event(WayForgotten(99.0, kept, newest - kept))
+    with structlog.testing.capture_logs(), full_disk(10):
+        keeper.keeping(99.0)()
+    assert keeper.trouble is not None
+    keeper.keeping(99.5)()
+    assert sizes[0] < (tmp_path / JOURNAL).stat().st_size < sizes[1]
+    saved = MissionFiles(tmp_path).read()
+    assert saved is not None
+    assert packed(saved.past) == packed(growth(pipeline))
+    assert packed(saved.memory) == packed(remember(pipeline))
+    assert len(saved.journey.stamps) == explored > 0
 
 
 def test_a_robot_that_saw_nothing_leaves_no_mission(tmp_path: Path) -> None:
