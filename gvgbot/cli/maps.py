@@ -24,8 +24,8 @@ def _add_show(actions: Commands) -> None:
     show = actions.add_parser(
         "show",
         help="draw the map, or how it grew",
-        description="Draw the map of a run as a PNG; with --frames N moments of the exploration "
-        "side by side; with --animate as a GIF in which everything appears as it was found.",
+        description="Draw the map of a run; with --frames N moments of the exploration side by "
+        "side; with --animate a film in which everything appears as it was found.",
         epilog="example: gvgbot map show runs/office-1 --animate --out film.gif",
     )
     show.add_argument("run", type=Path, metavar="RUN_DIR", help="the directory of a run")
@@ -33,7 +33,8 @@ def _add_show(actions: Commands) -> None:
         "--out",
         type=Path,
         metavar="FILE",
-        help="default: picture.png, strip.png or film.gif in the run directory",
+        help="what to write: .png, .svg or .pdf, .gif with --animate (default: picture.png, "
+        "strip.png or film.gif in the run directory)",
     )
     show.add_argument("--animate", action="store_true", help="a GIF of the exploration")
     show.add_argument("--frames", type=frames, metavar="N", help="moments to draw, 2 to 200")
@@ -115,7 +116,9 @@ def _add_diff(actions: Commands) -> None:
     )
     diff.add_argument("a", type=Path, metavar="RUN_A", help="the directory of a run")
     diff.add_argument("b", type=Path, metavar="RUN_B", help="that of another")
-    diff.add_argument("--out", type=Path, metavar="FILE", help="a PNG of both, side by side")
+    diff.add_argument(
+        "--out", type=Path, metavar="FILE", help="both, side by side: .png, .svg or .pdf"
+    )
     diff.add_argument(
         "--tolerance",
         type=positive,

@@ -7,6 +7,7 @@ import io
 from collections.abc import Sequence
 from enum import IntEnum, auto, unique
 from itertools import combinations
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,10 +60,12 @@ class Canvas:
     """A white image of `width` by `height` pixels; y grows downwards, and sizes are in pixels."""
 
     def __init__(self, width: int, height: int) -> None:
+        self.width, self.height = width, height
         self._large = Image.new("P", (width * OVERSAMPLING, height * OVERSAMPLING), Ink.WHITE)
         self._large.putpalette(palette())
         self._pen = ImageDraw.Draw(self._large)
         self._texts: list[tuple[Point, str, int, Ink, str]] = []
+        self._pasted: list[tuple[Image.Image, tuple[int, int]]] = []
 
     def raster(self, shades: NDArray[np.uint8], corner: Point, size: Point) -> None:
         """Palette indices (rows, columns), first row at the top, stretched over a rectangle."""
@@ -121,6 +124,10 @@ class Canvas:
         """Words with a white halo; the anchor is Pillow's (horizontal l m r, vertical t m b)."""
         self._texts.append((at, words, size, ink, anchor))
 
+    def paste(self, other: Self, corner: Point, *, shrunk: int = 1) -> None:
+        """Put another picture on this one, so many times smaller, over all that is drawn."""
+        self._pasted.append((other.image().reduce(shrunk), (round(corner[0]), round(corner[1]))))
+
     def png(self) -> bytes:
         """The finished picture as a PNG file."""
         return png(self.image())
@@ -128,6 +135,8 @@ class Canvas:
     def image(self) -> Image.Image:
         """The finished picture in RGB."""
         image = self._reduced()
+        for picture, corner in self._pasted:
+            image.paste(picture, corner)
         pen = ImageDraw.Draw(image)
         for at, words, size, ink, anchor in self._texts:
             pen.text(
@@ -194,12 +203,12 @@ def _blend(one: Colour, other: Colour, share: float) -> Colour:
     return red, green, blue
 
 
-def text_width(words: str, size: int) -> float:
+def text_width(words: str, size: float) -> float:
     """How wide (pixels) the words are."""
     return float(_font(size).getlength(words))
 
 
-def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
+def _font(size: float) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
     return ImageFont.load_default(size)
 
 

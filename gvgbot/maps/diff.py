@@ -1,7 +1,7 @@
 """What `gvgbot map diff` says and draws of two maps."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -9,18 +9,20 @@ import numpy as np
 from gvgbot.errors import UsageError
 from gvgbot.maps.alignment import Comparison, Pair, compare
 from gvgbot.maps.atomic_files import write_files
-from gvgbot.maps.diff_picture import draw_diff
+from gvgbot.maps.diff_picture import Grids, Titles, draw_diff
+from gvgbot.maps.picture_files import PICTURES, Paint
 from gvgbot.maps.saved_run import SavedRun
+from gvgbot.maps.surface import S
 
 
 def diff(a: Path, b: Path, out: Path | None, *, tolerance: float) -> tuple[bool, list[str]]:
     """Whether two runs left the same map, within the tolerance (m), and how they differ, in lines.
 
     With `out` a picture of both goes there. Raises UsageError if a run cannot be read or `out` is
-    no PNG, GvgbotError if it cannot be written.
+    no picture's name, GvgbotError if it cannot be written.
     """
-    if out is not None and out.suffix.lower() != ".png":
-        raise UsageError(f"{out}: this picture is a PNG, let its name end so")
+    if out is not None and out.suffix.lower() not in PICTURES:
+        raise UsageError(f"{out}: let its name end in {' or '.join(PICTURES)}")
     if out is not None and not out.parent.is_dir():
         raise UsageError(f"cannot write {out}: there is no directory {out.parent}")
     runs = (SavedRun.read(a), SavedRun.read(b))
@@ -28,9 +30,16 @@ def diff(a: Path, b: Path, out: Path | None, *, tolerance: float) -> tuple[bool,
     verdict = f"{'equal' if found.is_equal else 'different'} within {tolerance:g} m"
     names = (str(a), str(b))
     if out is not None:
-        picture = draw_diff(found, (runs[0].grid, runs[1].grid), names, verdict)
-        write_files(out.parent, {out.name: picture})
+        paint = _picture_of(found, (runs[0].grid, runs[1].grid), names, verdict)
+        write_files(out.parent, {out.name: PICTURES[out.suffix.lower()](paint)})
     return found.is_equal, [*_lines(found, names), verdict]
+
+
+def _picture_of(found: Comparison, grids: Grids, names: Titles, verdict: str) -> Paint:
+    def paint(sheet: Callable[[int, int], S], /) -> S:
+        return draw_diff(sheet, found, grids, names, verdict)
+
+    return paint
 
 
 def _lines(found: Comparison, names: tuple[str, str]) -> Iterator[str]:

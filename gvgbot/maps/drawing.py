@@ -1,6 +1,7 @@
 """A drawing surface that keeps shapes, for formats that can be enlarged without end."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +37,7 @@ class Words:
 
     at: Point
     words: str
-    size: int
+    size: float
     ink: Ink
     anchor: Anchor
 
@@ -95,6 +96,41 @@ class Drawing:
     ) -> None:
         """Words with a white halo, over all that is drawn."""
         self.words.append(Words(at, words, size, ink, anchor))
+
+    def paste(self, other: Self, corner: Point, *, shrunk: int = 1) -> None:
+        """Put another drawing on this one, so many times smaller, over all that is drawn."""
+        moved = _Moved(np.array(corner), 1.0 / shrunk)
+        self.windows += [moved.window(window) for window in other.windows]
+        self._shapes += [moved.shape(shape) for shape in other._shapes]
+        self.words += [moved.text(words) for words in other.words]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Moved:
+    """Shapes of a drawing on another one: scaled, then moved by `corner` (2,)."""
+
+    corner: Array
+    scale: float
+
+    def window(self, window: Window) -> Window:
+        shapes = tuple(self.shape(shape) for shape in window.shapes)
+        return Window(self._at(window.corner), self._size(window.size), shapes)
+
+    def shape(self, shape: Stroke | Raster) -> Stroke | Raster:
+        if isinstance(shape, Raster):
+            return replace(shape, corner=self._at(shape.corner), size=self._size(shape.size))
+        points = self.corner + self.scale * shape.points
+        return replace(shape, points=points, width=self.scale * shape.width)
+
+    def text(self, words: Words) -> Words:
+        return replace(words, at=self._at(words.at), size=self.scale * words.size)
+
+    def _at(self, point: Point) -> Point:
+        x, y = (self.corner + self.scale * np.array(point)).tolist()
+        return x, y
+
+    def _size(self, size: Point) -> Point:
+        return self.scale * size[0], self.scale * size[1]
 
 
 def _corners(corner: Point, size: Point) -> Array:

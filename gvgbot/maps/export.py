@@ -6,17 +6,11 @@ from pathlib import Path
 from gvgbot.errors import UsageError
 from gvgbot.maps import geojson, graphml
 from gvgbot.maps.atomic_files import write_files
-from gvgbot.maps.canvas import Canvas
-from gvgbot.maps.drawing import Drawing
-from gvgbot.maps.pdf import pdf
-from gvgbot.maps.picture import S, draw_map_on
+from gvgbot.maps.picture_files import PICTURES
 from gvgbot.maps.saved_run import SavedRun
-from gvgbot.maps.svg import svg
+from gvgbot.maps.show import picture_of
 
-FORMATS: dict[str, Callable[[SavedRun], bytes]] = {
-    ".png": lambda run: _map_on(Canvas, run).png(),
-    ".svg": lambda run: svg(_map_on(Drawing, run)),
-    ".pdf": lambda run: pdf(_map_on(Drawing, run)),
+GRAPHS: dict[str, Callable[[SavedRun], bytes]] = {
     ".graphml": lambda run: graphml.encode(run.graph),
     ".geojson": lambda run: geojson.encode(run.graph).encode(),
 }
@@ -28,21 +22,15 @@ def export(directory: Path, out: Path) -> None:
     Raises UsageError if there is no such format, or the run cannot be read; GvgbotError if nothing
     can be written.
     """
-    encode = FORMATS.get(out.suffix.lower())
-    if encode is None:
-        raise UsageError(f"{out}: let its name end in one of {', '.join(FORMATS)}")
+    suffix = out.suffix.lower()
+    if suffix not in PICTURES and suffix not in GRAPHS:
+        raise UsageError(f"{out}: let its name end in one of {', '.join((*PICTURES, *GRAPHS))}")
     run = SavedRun.read(directory)
     if not out.parent.is_dir():
         raise UsageError(f"cannot write {out}: there is no directory {out.parent}")
-    write_files(out.parent, {out.name: encode(run)})
+    write_files(out.parent, {out.name: _encoded(run, suffix)})
 
 
-def _map_on(sheet: Callable[[int, int], S], run: SavedRun) -> S:
-    return draw_map_on(
-        sheet,
-        run.graph,
-        grid=run.grid,
-        estimate=run.estimate,
-        odometry=run.odometry,
-        title=run.name,
-    )
+def _encoded(run: SavedRun, suffix: str) -> bytes:
+    encode = PICTURES.get(suffix)
+    return GRAPHS[suffix](run) if encode is None else encode(picture_of(run))

@@ -2,15 +2,17 @@
 
 import io
 import math
+from collections.abc import Callable
 
 import numpy as np
 from PIL import Image
 
 from gvgbot.maps import legend, symbols
-from gvgbot.maps.canvas import Canvas, indexed, png
+from gvgbot.maps.canvas import Canvas, indexed
 from gvgbot.maps.growth import Growth, frontiers
 from gvgbot.maps.picture import counts, draw_ground, known_corners
 from gvgbot.maps.route_graph import MapEdge, MapVertex
+from gvgbot.maps.surface import S, Surface
 from gvgbot.maps.view import View, box_around, pair
 
 _WIDTH, _TALLEST, _NARROWEST = 800, 640, 560  # pixels of the map in a picture
@@ -32,32 +34,38 @@ _ENTRIES = (
 def gif(growth: Growth, frames: int) -> bytes:
     """A GIF of so many frames, equally long apart, that begins anew after a pause."""
     scene = _Scene(growth)
-    images = [
-        indexed(_stacked(scene.picture(time), scene.footer(_caption(growth, time))))
-        for time in _times(growth, frames)
-    ]
+    images = [indexed(_frame(scene, growth, time)) for time in _times(growth, frames)]
     pauses = [_FRAME_MS] * (frames - 1) + [_LAST_FRAME_MS]
     file = io.BytesIO()
     images[0].save(file, "GIF", save_all=True, append_images=images[1:], duration=pauses, loop=0)
     return file.getvalue()
 
 
-def strip(growth: Growth, moments: int) -> bytes:
-    """A PNG of so many moments, equally long apart, side by side, with one legend for all."""
+def _frame(scene: "_Scene", growth: Growth, time: float) -> Image.Image:
+    """The map at a time, and what stands under it."""
+    width, height = scene.size
+    signs = _footer(Canvas, _caption(growth, time), width, scene.scale)
+    whole = Canvas(width, height + signs.height)
+    whole.paste(scene.picture(Canvas, time), (0, 0))
+    whole.paste(signs, (0, height))
+    return whole.image()
+
+
+def draw_strip(sheet: Callable[[int, int], S], growth: Growth, moments: int) -> S:
+    """So many moments, equally long apart, side by side, with one legend for all."""
     scene = _Scene(growth, narrowest=2 * _NARROWEST // min(moments, _MOST_COLUMNS))
-    times = _times(growth, moments)
     width, height = scene.size[0] // 2, scene.size[1] // 2 + _TITLE
     rows = math.ceil(moments / min(_MOST_COLUMNS, _STRIP_WIDTH // width))
     columns = math.ceil(moments / rows)
-    corners = [(i % columns * width, i // columns * height) for i in range(moments)]
-    sheet = Canvas(columns * width, rows * height)
-    for (x, y), time in zip(corners, times, strict=True):
-        sheet.text((x + width / 2, y + _TITLE / 2 + 4), clock(time), 18, anchor="mm")
-    image = sheet.image()
-    for (x, y), time in zip(corners, times, strict=True):
-        image.paste(scene.picture(time).reduce(2), (x, y + _TITLE))
     caption = f"{growth.run.name}: {_facts(growth, growth.duration)}"
-    return png(_stacked(image, _footer(caption, image.width, scene.scale / 2)))
+    signs = _footer(sheet, caption, columns * width, scene.scale / 2)
+    whole = sheet(columns * width, rows * height + signs.height)
+    for i, time in enumerate(_times(growth, moments)):
+        x, y = i % columns * width, i // columns * height
+        whole.paste(scene.picture(sheet, time), (x, y + _TITLE), shrunk=2)
+        whole.text((x + width / 2, y + _TITLE / 2 + 4), clock(time), 18, anchor="mm")
+    whole.paste(signs, (0, rows * height))
+    return whole
 
 
 def clock(time: float) -> str:
@@ -81,9 +89,9 @@ class _Scene:
         self.size = (width + 2 * _MARGIN, round(view.size[1]) + 2 * _MARGIN)
         self.scale = view.scale
 
-    def picture(self, time: float) -> Image.Image:
+    def picture(self, sheet: Callable[[int, int], S], time: float) -> S:
         """The map, all that was known of it, and the robot."""
-        view, canvas = self._view, Canvas(*self.size)
+        view, canvas = self._view, sheet(*self.size)
         vertices, edges = self._growth.graph(time)
         path = self._growth.path(time)
         draw_ground(canvas, view, self._growth.grid(time))
@@ -94,14 +102,10 @@ class _Scene:
             _draw_vertex(canvas, view, vertex, edges)
         symbols.draw_robot(canvas, view.pixel(path[-1, :2]), float(path[-1, 2]))
         canvas.frame(pair(view.corner), pair(view.size))
-        return canvas.image()
-
-    def footer(self, caption: str) -> Image.Image:
-        """What stands under the picture."""
-        return _footer(caption, self.size[0], self.scale)
+        return canvas
 
 
-def _draw_vertex(canvas: Canvas, view: View, vertex: MapVertex, edges: list[MapEdge]) -> None:
+def _draw_vertex(canvas: Surface, view: View, vertex: MapVertex, edges: list[MapEdge]) -> None:
     """The vertex, with the frontiers that it has as long as there are only these edges."""
     at = view.pixel(vertex.position)
     if vertex.kind == "endpoint":
@@ -112,19 +116,11 @@ def _draw_vertex(canvas: Canvas, view: View, vertex: MapVertex, edges: list[MapE
     symbols.draw_meetpoint(canvas, at)
 
 
-def _footer(caption: str, width: int, scale: float) -> Image.Image:
+def _footer(sheet: Callable[[int, int], S], caption: str, width: int, scale: float) -> S:
     signs = legend.arranged(_ENTRIES, caption, width=width - 2 * _MARGIN, scale=scale)
-    canvas = Canvas(width, round(signs.height) + _MARGIN)
+    canvas = sheet(width, round(signs.height) + _MARGIN)
     signs.draw(canvas, (_MARGIN, 0.0), width - 2 * _MARGIN)
-    return canvas.image()
-
-
-def _stacked(upper: Image.Image, lower: Image.Image) -> Image.Image:
-    """One picture over another that is as wide."""
-    whole = Image.new("RGB", (upper.width, upper.height + lower.height))
-    whole.paste(upper, (0, 0))
-    whole.paste(lower, (0, upper.height))
-    return whole
+    return canvas
 
 
 def _times(growth: Growth, count: int) -> list[float]:

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable, Iterator, Sized
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +11,7 @@ from gvgbot.maps import legend, symbols
 from gvgbot.maps.canvas import Canvas, Ink, Point
 from gvgbot.maps.occupancy import UNKNOWN, OccupancyGrid
 from gvgbot.maps.route_graph import MapVertex, RouteGraph
-from gvgbot.maps.surface import Surface
+from gvgbot.maps.surface import S, Surface
 from gvgbot.maps.trajectory import Trajectory
 from gvgbot.maps.view import Box, View, box_around, pair
 
@@ -21,8 +20,6 @@ _MARGIN = 28  # pixels around everything
 _ID_SIZE = 16  # pixels
 _SIGMAS = 3.0  # of the ellipses
 _ASTRAY = 0.15  # of the map's size: how far odometry and ellipses may leave it uncut
-
-S = TypeVar("S", bound=Surface)
 
 _NO_POINTS = np.empty((0, 2))
 

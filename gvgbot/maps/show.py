@@ -1,7 +1,7 @@
 """What `gvgbot map` does: pictures of a run that was saved, and its facts in words."""
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +10,11 @@ from gvgbot.errors import UsageError
 from gvgbot.maps import film
 from gvgbot.maps.atomic_files import write_files
 from gvgbot.maps.growth import Growth
-from gvgbot.maps.picture import draw_map, known_corners
+from gvgbot.maps.picture import draw_map_on, known_corners
+from gvgbot.maps.picture_files import PICTURES, Paint
 from gvgbot.maps.route_graph import MapVertex, RouteGraph
 from gvgbot.maps.saved_run import SavedRun
+from gvgbot.maps.surface import S
 
 FRAMES = 60  # of a film, if nobody says how many
 
@@ -23,29 +25,51 @@ def show(directory: Path, out: Path | None, *, animate: bool, frames: int | None
     Raises UsageError if the run cannot be read or drawn so, GvgbotError if nothing can be written.
     """
     name = "film.gif" if animate else "picture.png" if frames is None else "strip.png"
-    out, suffix = out or directory / name, Path(name).suffix
-    if out.suffix.lower() != suffix:
-        raise UsageError(f"{out}: this picture is a {suffix[1:].upper()}, let its name end so")
+    out = out or directory / name
+    suffix, fit = out.suffix.lower(), [".gif"] if animate else list(PICTURES)
+    if suffix not in fit:
+        film_needs = "; a GIF needs --animate" if suffix == ".gif" else ""
+        raise UsageError(f"{out}: let its name end in {' or '.join(fit)}{film_needs}")
     run = SavedRun.read(directory)
     if not out.parent.is_dir():
         raise UsageError(f"cannot write {out}: there is no directory {out.parent}")
-    write_files(out.parent, {out.name: _drawn(run, animate=animate, frames=frames)})
+    if animate:
+        picture = film.gif(_growth(run), frames or FRAMES)
+    else:
+        picture = PICTURES[suffix](picture_of(run) if frames is None else _strip(run, frames))
+    write_files(out.parent, {out.name: picture})
     return out
 
 
-def _drawn(run: SavedRun, *, animate: bool, frames: int | None) -> bytes:
-    if not animate and frames is None:
-        return draw_map(
+def picture_of(run: SavedRun) -> Paint:
+    """The map of a run as a picture."""
+
+    def paint(sheet: Callable[[int, int], S], /) -> S:
+        return draw_map_on(
+            sheet,
             run.graph,
             grid=run.grid,
             estimate=run.estimate,
             odometry=run.odometry,
             title=run.name,
         )
+
+    return paint
+
+
+def _strip(run: SavedRun, moments: int) -> Paint:
+    growth = _growth(run)
+
+    def paint(sheet: Callable[[int, int], S], /) -> S:
+        return film.draw_strip(sheet, growth, moments)
+
+    return paint
+
+
+def _growth(run: SavedRun) -> Growth:
     if not len(run.estimate.stamps):
         raise UsageError(f"{run.name} has nothing to animate: the robot never got going")
-    growth = Growth.of(run)
-    return film.gif(growth, frames or FRAMES) if animate else film.strip(growth, frames or FRAMES)
+    return Growth.of(run)
 
 
 def facts(run: SavedRun) -> Iterator[str]:

@@ -1,6 +1,6 @@
 """What a map can be drawn on, be it pixels or shapes."""
 
-from typing import Literal, Protocol
+from typing import Literal, Protocol, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,9 @@ Anchor = Literal["lm", "mm", "rm"]  # left end, middle or right end of words, at
 
 class Surface(Protocol):
     """White at first; y grows downwards, and sizes are in pixels."""
+
+    width: int
+    height: int
 
     def raster(self, shades: NDArray[np.uint8], corner: Point, size: Point) -> None:
         """Palette indices (rows, columns), first row at the top, stretched over a rectangle."""
@@ -36,3 +39,9 @@ class Surface(Protocol):
         self, at: Point, words: str, size: int, ink: Ink = Ink.BLACK, anchor: Anchor = "lm"
     ) -> None:
         """Words with a white halo, over all that is drawn."""
+
+    def paste(self, other: Self, corner: Point, *, shrunk: int = 1) -> None:
+        """Put another sheet on this one, so many times smaller, over all that is drawn."""
+
+
+S = TypeVar("S", bound=Surface)

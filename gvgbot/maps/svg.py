@@ -5,7 +5,7 @@ from xml.etree import ElementTree as ET
 
 from PIL import Image
 
-from gvgbot.maps.canvas import COLOURS, Ink, palette, png
+from gvgbot.maps.canvas import COLOURS, Ink, palette, png, text_width
 from gvgbot.maps.drawing import Drawing, Raster, Stroke, Window, Words
 
 _ANCHORS = {"lm": "start", "mm": "middle", "rm": "end"}
@@ -45,7 +45,8 @@ def _add_shape(parent: ET.Element, shape: Stroke | Raster) -> None:
         image.putpalette(palette())
         link = "data:image/png;base64," + b64encode(png(image)).decode()
         attributes = _rectangle(shape.corner, shape.size)
-        attributes |= {"preserveAspectRatio": "none", "style": "image-rendering:pixelated"}
+        style = f"image-rendering:{_sampling(shape)}"
+        attributes |= {"preserveAspectRatio": "none", "style": style}
         ET.SubElement(parent, "image", attributes, href=link)
         return
     points = " ".join(f"{x:.2f},{y:.2f}" for x, y in shape.points.tolist())
@@ -60,10 +61,17 @@ def _add_shape(parent: ET.Element, shape: Stroke | Raster) -> None:
     ET.SubElement(parent, "polygon" if shape.is_closed else "polyline", attributes)
 
 
+def _sampling(raster: Raster) -> str:
+    """Square cells, or their mean where they are so small that thin walls would be left out."""
+    return "pixelated" if raster.size[0] > raster.shades.shape[1] else "auto"
+
+
 def _add_words(parent: ET.Element, words: Words) -> None:
     attributes = {
         "x": f"{words.at[0]:.2f}",
         "y": f"{words.at[1] + _MIDDLE * words.size:.2f}",
+        "textLength": f"{text_width(words.words, words.size):.2f}",  # whatever font there is
+        "lengthAdjust": "spacingAndGlyphs",
         "text-anchor": _ANCHORS[words.anchor],
         "font-family": "Helvetica, Arial, sans-serif",
         "font-size": str(words.size),

@@ -208,7 +208,7 @@ def test_different_maps_exit_with_1_and_a_picture_shows_where(
     [
         ["a", "missing"],
         ["missing", "a"],
-        ["a", "a", "--out", "both.svg"],
+        ["a", "a", "--out", "both.gif"],
         ["a", "a", "--out", "missing/both.png"],
     ],
 )
@@ -219,7 +219,7 @@ def test_what_cannot_be_compared_or_written_is_one_line(
     monkeypatch.chdir(tmp_path)
     assert main(["map", "diff", *arguments]) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert "missing" in line or "both.svg" in line
+    assert "missing" in line or "both.gif" in line
 
 
 @pytest.mark.parametrize("tolerance", ["0", "-1", "nan", "far"])

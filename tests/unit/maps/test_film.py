@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from PIL import Image
 from scipy import ndimage
 
-from gvgbot.maps.film import clock, gif, strip
+from gvgbot.maps.canvas import Canvas
+from gvgbot.maps.film import clock, draw_strip, gif
 from gvgbot.maps.growth import Growth
 from gvgbot.maps.saved_run import SavedRun
 from tests.unit.maps.small_run import write_run
@@ -74,7 +75,7 @@ def test_graph_and_frontiers_appear_when_they_were_found(growth: Growth) -> None
 
 @pytest.mark.parametrize("moments", [2, 5, 7])
 def test_a_strip_has_a_frame_for_each_moment(growth: Growth, moments: int) -> None:
-    with Image.open(io.BytesIO(strip(growth, moments))) as image:
+    with Image.open(io.BytesIO(draw_strip(Canvas, growth, moments).png())) as image:
         assert image.format == "PNG"
         picture = np.asarray(image.convert("RGB"))
     assert 560 <= picture.shape[1] <= 1400
@@ -88,7 +89,8 @@ def test_a_strip_has_a_frame_for_each_moment(growth: Growth, moments: int) -> No
 
 def test_the_same_run_gives_the_same_bytes(growth: Growth) -> None:
     assert gif(growth, 4) == gif(growth, 4)
-    assert strip(growth, 4) == strip(growth, 4)
+    strips = [draw_strip(Canvas, growth, 4).png() for _ in range(2)]
+    assert strips[0] == strips[1]
 
 
 @pytest.mark.parametrize(
