@@ -11,7 +11,6 @@ With --out every world leaves a line of JSON when it is done, and is not run aga
 
 import argparse
 import asyncio
-import json
 import math
 from collections import Counter
 from dataclasses import asdict, dataclass, field
@@ -19,6 +18,8 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks import campaign
+from benchmarks.campaign import Row
 from gvgbot.autonomy.destinations import foot_of, route_to_foot, route_to_vertex
 from gvgbot.autonomy.errands import Declined
 from gvgbot.autonomy.events import ErrandEnded, Event
@@ -208,14 +209,6 @@ async def explore_and_visit(config: Config, score: Score, count: int, *, verbose
             task.cancel()
 
 
-def done_before(out: Path | None) -> dict[tuple[str, int], Score]:
-    """The worlds of an earlier start."""
-    if out is None or not out.exists():
-        return {}
-    scores = [Score(**json.loads(line)) for line in out.read_text().splitlines()]
-    return {(score.world, score.seed): score for score in scores}
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("--worlds", nargs="+", default=["office", "ring", "rooms", "cave"])
@@ -225,22 +218,28 @@ def main() -> None:
     parser.add_argument("--verbose", action="store_true", help="tell of all that was not reached")
     parser.add_argument("--set", dest="overrides", action="append", default=[])
     options = parser.parse_args()
-    done = done_before(options.out)
     print(HEAD)
-    for world in options.worlds:
-        score = done.get((world, options.seed))
-        if score is None:
-            score = Score(world, options.seed)
-            chosen = [f"twin.world={world}", f"twin.seed={options.seed}", *options.overrides]
-            config = load_config(None, chosen)
-            work = explore_and_visit(config, score, options.requests, verbose=options.verbose)
-            run_in_virtual_time(work)
-            if options.out is not None:
-                with options.out.open("a") as file:
-                    file.write(json.dumps(asdict(score)) + "\n")
+    for row in campaign.rows(
+        options.out,
+        [(world, options.seed) for world in options.worlds],
+        lambda cases: (scored(world, options) for world, _ in cases),
+        case_of=lambda row: (row["world"], row["seed"]),
+    ):
+        score = Score(**row)
         print(score.row, flush=True)
         for reason, times in sorted(score.reasons.items(), key=lambda item: -item[1]):
             print(f"    {times:3} {reason}")
+
+
+def scored(world: str, options: argparse.Namespace) -> Row:
+    """What becomes of the requests in a world."""
+    score = Score(world, options.seed)
+    chosen = [f"twin.world={world}", f"twin.seed={options.seed}", *options.overrides]
+    work = explore_and_visit(
+        load_config(None, chosen), score, options.requests, verbose=options.verbose
+    )
+    run_in_virtual_time(work)
+    return asdict(score)
 
 
 if __name__ == "__main__":

@@ -31,8 +31,9 @@ from concurrent.futures import Executor, ThreadPoolExecutor, as_completed
 from contextlib import contextmanager
 from pathlib import Path
 from statistics import fmean, median
-from typing import Any
 
+from benchmarks import campaign
+from benchmarks.campaign import Row
 from benchmarks.score_run import score_run
 from gvgbot.drivers.hokuyo.models import MODELS
 from gvgbot.errors import GvgbotError
@@ -62,7 +63,6 @@ COLUMNS = (
 )
 HEAD = "world            laser    seed outcome  " + " ".join(f"{t:>6}" for _, t, _ in COLUMNS)
 
-Row = dict[str, Any]
 Command = tuple[str, ...]  # arguments of `gvgbot`, but for the run directory
 
 
@@ -157,22 +157,24 @@ def executor(jobs: int, scheduler: str | None) -> Iterator[Executor]:
 
 
 def _rows(wanted: list[Command], out: Path, pool: Executor) -> Iterator[Row]:
-    """The results that are in `out`, then the others as they come; each is kept at once."""
-    results = out / RESULTS
-    results.touch()
-    known = [json.loads(text) for text in results.read_text(encoding="utf-8").splitlines()]
-    kept = {row["command"]: row for row in known if row["outcome"] != CRASHED}
-    yield from (kept[text] for text in map(_text, wanted) if text in kept)
-    with results.open("a", encoding="utf-8") as file:
-        runs = [pool.submit(run, c, out / _slug(c)) for c in wanted if _text(c) not in kept]
+    """The results that are in `out`, then the others as they come."""
+    by_text = {_text(command): command for command in wanted}
+
+    def run_all(texts: list[str]) -> Iterator[Row]:
+        runs = [pool.submit(run, by_text[text], out / _slug(by_text[text])) for text in texts]
         try:
             for done in as_completed(runs):
-                row = done.result()
-                file.write(json.dumps(row) + "\n")
-                file.flush()
-                yield row
+                yield done.result()
         finally:
             pool.shutdown(cancel_futures=True)
+
+    return campaign.rows(
+        out / RESULTS,
+        by_text,
+        run_all,
+        case_of=lambda row: str(row["command"]),
+        is_good=lambda row: row["outcome"] != CRASHED,
+    )
 
 
 def _text(command: Command) -> str:

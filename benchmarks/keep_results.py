@@ -13,7 +13,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks.explore_table import Row
+from benchmarks.campaign import Row
 from gvgbot.worlds import NAMES
 
 RESULTS = Path(__file__).parent / "results"

@@ -10,19 +10,21 @@ half an hour. Distance and time are what passes until a right claim. Maps and re
 """
 
 import argparse
-import json
 import math
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
+from functools import partial
+from itertools import product, starmap
 from pathlib import Path
 from statistics import median
-from typing import Any
 
 import numpy as np
 import structlog
 from scipy import ndimage
 
+from benchmarks import campaign
+from benchmarks.campaign import Row
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.config import Config, load_config
 from gvgbot.daemon import explore
@@ -44,14 +46,11 @@ SPARE_M = 0.1  # between the robot that is put down and a wall
 PATIENCE_S = 1800.0
 LOOK_S = 0.1  # between two looks at the robot
 
-Row = dict[str, Any]
-
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run and print a line for each pose, then one for each world; 1 if a claim was wrong."""
     structlog.configure(wrapper_class=structlog.make_filtering_bound_logger(50))
     options = _options(arguments)
-    options.out.mkdir(parents=True, exist_ok=True)
     rows = []
     for row in _rows(options):
         rows.append(row)
@@ -74,20 +73,15 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
 
 
 def _rows(options: argparse.Namespace) -> Iterator[Row]:
-    """The results that are in `out`, and the others as they come; each is kept at once."""
-    results = options.out / RESULTS
-    results.touch()
-    lines = results.read_text(encoding="utf-8").splitlines()
-    kept = {(row["world"], row["pose"]): row for row in map(json.loads, lines)}
-    with results.open("a", encoding="utf-8") as file:
-        for world in options.worlds:
-            for number in options.only or range(1, options.poses + 1):
-                if (world, number) not in kept or options.only:
-                    row = _put_down(options, world, number)
-                    file.write(json.dumps(row) + "\n")
-                    file.flush()
-                    kept[world, number] = row
-                yield kept[world, number]
+    """The results that are in `out`, then the others as they come."""
+    numbers = options.only or range(1, options.poses + 1)
+    return campaign.rows(
+        options.out / RESULTS,
+        product(options.worlds, numbers),
+        lambda cases: starmap(partial(_put_down, options), cases),
+        case_of=lambda row: (row["world"], row["pose"]),
+        anew=options.only is not None,
+    )
 
 
 def _put_down(options: argparse.Namespace, world: str, number: int) -> Row:

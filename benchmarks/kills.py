@@ -11,7 +11,6 @@ Results stay in `--out`, and a second call goes on from there; the exit status i
 """
 
 import argparse
-import json
 import sys
 import tempfile
 from collections import Counter
@@ -23,6 +22,8 @@ import numpy as np
 import structlog
 from scipy.optimize import linear_sum_assignment
 
+from benchmarks import campaign
+from benchmarks.campaign import Row
 from benchmarks.small_worlds import two_rings
 from gvgbot.config import load_config
 from gvgbot.geometry import Array
@@ -39,7 +40,6 @@ PARTNERS_M = 0.5  # farther apart, they are not the same
 TAIL = 200  # bytes at the end of a file in which it is damaged
 SHORTEST_S = 1.0  # from a start to the next kill
 
-Row = dict[str, Any]
 Points = dict[str, Array]
 
 
@@ -47,7 +47,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run and print a line for each run, then all of them together; 1 if one failed."""
     structlog.configure(wrapper_class=structlog.make_filtering_bound_logger(50))
     options = _options(arguments)
-    options.out.mkdir(parents=True, exist_ok=True)
     rows = []
     for row in _rows(options):
         rows.append(row)
@@ -69,17 +68,14 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
 
 
 def _rows(options: argparse.Namespace) -> Iterator[Row]:
-    """The results that are in `out`, and the others as they come; each is kept at once."""
-    results = options.out / RESULTS
-    results.touch()
-    kept = {row["run"]: row for row in map(json.loads, results.read_text().splitlines())}
-    with results.open("a", encoding="utf-8") as file:
-        for number in options.only or range(1, options.runs + 1):
-            if number not in kept or options.only:
-                kept[number] = interrupted(options.world, number, options.kills)
-                file.write(json.dumps(kept[number]) + "\n")
-                file.flush()
-            yield kept[number]
+    """The results that are in `out`, then the others as they come."""
+    return campaign.rows(
+        options.out / RESULTS,
+        options.only or range(1, options.runs + 1),
+        lambda numbers: (interrupted(options.world, n, options.kills) for n in numbers),
+        case_of=lambda row: int(row["run"]),
+        anew=options.only is not None,
+    )
 
 
 def interrupted(world: str | None, number: int, kills: int) -> Row:

@@ -11,7 +11,6 @@ The exit status is 1 if a seed failed.
 """
 
 import argparse
-import json
 import os
 import sys
 import time
@@ -20,10 +19,11 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 import structlog
 
+from benchmarks import campaign
+from benchmarks.campaign import Row
 from benchmarks.faults import FAULTS, LAYER, Fault, draw
 from benchmarks.trial import trial
 
@@ -43,8 +43,6 @@ ORACLES = {
 }
 GROWTH = 1.3  # times the memory of the second trial of a process: something leaks
 ONE_CORE = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-
-Row = dict[str, Any]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -77,22 +75,14 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
 
 
 def _rows(seeds: Iterable[int], options: argparse.Namespace) -> Iterator[Row]:
-    """The results that are in `out`, then the others; each is kept at once."""
-    kept: dict[int, Row] = {}
-    results = None if options.out is None else options.out / RESULTS
-    if results is not None:
-        options.out.mkdir(parents=True, exist_ok=True)
-        results.touch()
-        if options.seed is None:
-            lines = results.read_text(encoding="utf-8").splitlines()
-            kept = {row["seed"]: row for row in map(json.loads, lines)}
-    wanted = [seed for seed in seeds if seed not in kept]
-    yield from (kept[seed] for seed in seeds if seed in kept)
-    for row in _run(wanted, options.jobs):
-        if results is not None:
-            with results.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(row) + "\n")
-        yield row
+    """The results that are in `out`, then the others as they come."""
+    return campaign.rows(
+        None if options.out is None else options.out / RESULTS,
+        seeds,
+        lambda wanted: _run(wanted, options.jobs),
+        case_of=lambda row: int(row["seed"]),
+        anew=options.seed is not None,
+    )
 
 
 def _run(seeds: list[int], jobs: int) -> Iterator[Row]:

@@ -9,10 +9,10 @@ from typing import Any
 import distributed
 import pytest
 
+from benchmarks.campaign import Row
 from benchmarks.explore_table import (
     CRASHED,
     RESULTS,
-    Row,
     _options,
     commands,
     executor,
