@@ -18,14 +18,21 @@ from tests.twin.run_rig import STOP, Daemon, base_commands
 
 pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(300)]
 
-RUNS, REQUESTS_A_RUN = 5, 200
+RUNS, REQUESTS_A_RUN = 5, 200  # ten a second
 BRAKING_S = 2.0
 STILL_M = 0.005
+DRIVING = ("resume", "home", "goto", "patrol", "coverage", "explore", "relocalise")
+LIFTED_AT, NO_LASER_AT = 60, 120  # requests before somebody lifts the robot, or pulls a cable
+LASTS_S, REACTION_S = 2.5, 1.0
 
 numbers = st.one_of(st.integers(-3, 12), st.floats(-20.0, 20.0), st.just(math.inf))
 fitting = st.one_of(
     st.tuples(st.sampled_from([r for r in REQUESTS if r not in ("goto", "set")]), st.just({})),
     st.tuples(st.just("goto"), st.fixed_dictionaries({"vertex": st.integers(-1, 8)})),
+    st.tuples(
+        st.just("patrol"),
+        st.fixed_dictionaries({"vertices": st.lists(st.integers(-1, 8), max_size=5)}),
+    ),
     st.tuples(st.just("goto"), st.fixed_dictionaries({"x": numbers, "y": numbers})),
     st.tuples(
         st.just("set"),
@@ -49,6 +56,35 @@ requests = st.lists(
 )
 
 
+class Dangers:
+    """Lifts the robot for a while, and later pulls the laser's cable: nothing may move it then."""
+
+    def __init__(self, daemon: Daemon) -> None:
+        self._daemon = daemon
+        self._since = -math.inf
+        self._written = 0  # bytes to the base, before the last check
+
+    def come(self, count: int, now: float) -> None:
+        """Let what is due after so many requests happen."""
+        if count not in (LIFTED_AT, NO_LASER_AT):
+            return
+        self._since, simulation = now, self._daemon.session.simulation
+        assert simulation is not None
+        if count == LIFTED_AT:
+            simulation.base_twin._device.inject("wheel drop", LASTS_S)  # type: ignore[attr-defined]
+        else:
+            simulation.laser_twin.inject("unplug", LASTS_S)
+
+    def check(self, asked: Asked, answer: Answer, now: float) -> None:
+        written = bytes(self._daemon.cable.written[self._written :])
+        self._written += len(written)
+        if REACTION_S < now - self._since < LASTS_S:
+            assert self._daemon.robot.contact is not None
+            assert self._daemon.robot.contact.wheel_drop or self._daemon.robot.away is not None
+            assert set(base_commands(written)) == {STOP}
+            assert not (answer.done and asked.name in DRIVING)
+
+
 @given(requests=requests)
 @settings(
     max_examples=RUNS,
@@ -59,6 +95,7 @@ requests = st.lists(
 def test_a_thousand_random_requests_do_no_harm(requests: list[Asked]) -> None:
     with tempfile.TemporaryDirectory() as out:
         daemon, answers = Daemon(Path(out)), list[Answer]()
+        met = Dangers(daemon)
         limit_mm = 1000 * daemon.config.robot.limits.max_speed_mps
 
         async def story(clock: Clock) -> None:
@@ -67,7 +104,9 @@ def test_a_thousand_random_requests_do_no_harm(requests: list[Asked]) -> None:
             stood: Pose | None = None
             await clock.sleep_until(3.0)
             for asked in requests:
+                met.come(len(answers), clock.now())
                 answers.append(await daemon.network._handle(asked))
+                met.check(asked, answers[-1], clock.now())
                 if not errands.is_paused:
                     paused_at = stood = None
                 elif paused_at is None:
