@@ -43,6 +43,8 @@ _CHANCE = (
 _LOOKS = 5  # before anything is said
 _SURE = 0.995
 _HOPELESS = 0.01
+_UNLIKE = 5  # of the points of all walls may differ in a building with several sides alike
+_MOST_SIDES = 8
 _GUESSED = np.diag([0.3**2, 0.3**2, 0.1**2])
 _FOLLOWED = np.diag([0.1**2, 0.1**2, 0.03**2])
 
@@ -77,12 +79,33 @@ class KnownWalls:
     def _cells(self, points: Array, cell: float) -> tuple[NDArray[np.int64], ...]:
         return tuple(((points - self._corner) / cell).astype(np.int64).T)
 
-    def scores(self, points: Array) -> Array:
-        """How well points (..., 2) lie on walls, 0..1 (...)."""
-        i, j = np.moveaxis(((points - self._corner) / _WALL_CELL_M).astype(np.int64), -1, 0)
-        rows, columns = self._score.shape
-        inside = (i >= 0) & (j >= 0) & (i < rows) & (j < columns)
-        return np.where(inside, self._score[np.where(inside, i, 0), np.where(inside, j, 0)], 0.0)
+    def scores(self, places: Array, around: Array) -> Array:
+        """How well points lie on walls around each place, 0..1 (N, H), on average.
+
+        `places` (N, 2) are some of the map's; `around` (H, K, 2) are H sets of points, seen from a
+        place and nearer than is compared, so that all are inside. Places stand in one of few ways
+        on the cells of walls, and all that stand in the same way share the cells of the points.
+        """
+        at = (places - self._corner) / _WALL_CELL_M
+        cells = np.floor(at).astype(np.int64)
+        ways, way_of = np.unique((at - cells).round(3), axis=0, return_inverse=True)
+        columns = self._score.shape[1]
+        found = np.empty((len(places), len(around)))
+        for number, way in enumerate(ways):
+            these = np.flatnonzero(way_of.ravel() == number)
+            i, j = np.moveaxis(np.floor(around / _WALL_CELL_M + way).astype(np.int64), -1, 0)
+            flat = (cells[these] @ [columns, 1])[:, None, None] + (i * columns + j)
+            found[these] = self._score.take(flat, mode="clip").mean(axis=-1)
+        return found
+
+    def is_alike(self, turn: Pose, matching: ScanMatchingConfig) -> bool:
+        """Whether the whole map looks the same after a turn about some point, nearly `turn`."""
+        some = _some(self.points, _POINTS)
+        found = register(some, self.tree, self.points, turn, _GUESSED, matching)
+        if found is None:
+            return False
+        distance = np.asarray(self.tree.query(found.pose.transform(self.points))[0])
+        return int((distance > _NEAR_M).sum()) <= _UNLIKE
 
     def is_seen(self, points: Array) -> Bools:
         """Whether the map has seen anything where points (N, 2) are."""
@@ -132,6 +155,7 @@ class Opinion:
     confidence: float
     possible: int
     looks: int
+    is_hopeless: bool = False  # the whole map looks the same from every place that is possible
 
     @property
     def is_sure(self) -> bool:
@@ -164,10 +188,26 @@ class Relocaliser:
         weights = np.array([h.weight for h in [*self._hypotheses, self._nowhere]])
         weights = np.exp(weights - weights.max())
         shares = weights / weights.sum()
-        best = int(np.argmax(shares[:-1]))
-        possible = int((shares[:-1] > _HOPELESS).sum())
-        best_place = self._hypotheses[best].map_local
-        return Opinion(best_place, float(shares[best]), possible, self._looks)
+        best = self._hypotheses[int(np.argmax(shares[:-1]))]
+        others = [
+            hypothesis
+            for hypothesis, share in zip(self._hypotheses, shares[:-1], strict=True)
+            if hypothesis is not best and share > _HOPELESS
+        ]
+        return Opinion(
+            best.map_local,
+            float(shares[:-1].max()),
+            int((shares[:-1] > _HOPELESS).sum()),
+            self._looks,
+            self._looks >= _LOOKS and self._are_alike(best, others),
+        )
+
+    def _are_alike(self, best: Hypothesis, others: list[Hypothesis]) -> bool:
+        """Whether no drive can tell the best place from the others."""
+        turns = (other.map_local.compose(best.map_local.inverse()) for other in others)
+        return 0 < len(others) < _MOST_SIDES and all(
+            self._known.is_alike(turn, self._matching) for turn in turns
+        )
 
     def _working(self) -> Generator[None, None, None]:
         while True:
@@ -198,8 +238,7 @@ class Relocaliser:
         places = self._known.places
         for first in range(0, len(places), _TRIED):
             some = places[first : first + _TRIED]
-            laid = [self._known.scores(place + turned).mean(axis=1) for place in some]
-            found.append(_best_turned(some, np.array(laid)))
+            found.append(_best_turned(some, self._known.scores(some, turned)))
             yield
         return _peaks(np.concatenate([np.empty((0, 4)), *found]))
 
@@ -257,8 +296,9 @@ class Relocaliser:
         seen = self._known.is_seen(laid)
         distance = np.asarray(self._known.tree.query(laid)[0])
         unknown_to_map = float(np.where(seen, distance > _NEAR_M, _CHANCE).mean())
-        around = self._known.tree.query_ball_point(map_base.position, _REACH_M)
-        there = look.local_base.compose(map_base.inverse()).transform(self._known.points[around])
+        walls = self._known.points
+        near = np.hypot(*(walls - map_base.position).T) < _REACH_M
+        there = look.local_base.compose(map_base.inverse()).transform(walls[near])
         there = there[look.local_map.known(there)]
         if len(there) == 0:
             return 1.0

@@ -138,7 +138,7 @@ class ReturningPipeline(Pipeline):
             reason = f"{opinion.confidence:.3f} sure after {opinion.looks} looks"
             return [Recovery(scan.stamp, "go on from its place on the map", reason)]
         self.mission.reason = _doubt(opinion)
-        if self._goes_on(seeker, scan.stamp):
+        if not opinion.is_hopeless and self._goes_on(seeker, scan.stamp):
             return []
         self.mission.outcome, self._seeker = "failed", None
         return [Finished(scan.stamp, "failed", self.mission.reason)]
@@ -217,6 +217,8 @@ def _doubt(opinion: Opinion) -> str:
     """How unsure it is, in words."""
     if not opinion.possible:
         return "not sure where it is: no place on the map fits yet"
+    if opinion.is_hopeless:
+        return f"not sure where it is: all the map looks the same from {opinion.possible} places"
     places = "place fits" if opinion.possible == 1 else "places fit"
     return (
         f"not sure where it is: {opinion.possible} {places}, {opinion.confidence:.2f} for the best"

@@ -62,12 +62,14 @@ def test_walls_that_are_all_alike_leave_every_place_possible_however_long_it_dri
     assert formed[-1].looks > 20
     assert not any(opinion.is_sure for opinion in formed)
     assert {opinion.possible for opinion in formed[-40:]} == {4}
+    assert formed[-1].is_hopeless
 
 
 def test_it_is_sure_when_it_has_seen_the_branch_and_not_before() -> None:
     path = along([(1.2, 0.5), *CORNERS[1:], (1.0, 10.0)])
     formed = opinions(WITH_BRANCH, path)
     for pose, opinion in zip(path, formed, strict=True):
+        assert not opinion.is_hopeless
         if pose.y < 2.0 and pose.x < 8.0:  # out of sight of the branch and of its mouth
             assert not opinion.is_sure
         if opinion.is_sure:
