@@ -16,7 +16,7 @@ from gvgbot.autonomy.loop import Loop
 from gvgbot.clock import LoopClock, VirtualTimeLoop
 from gvgbot.config import Config
 from gvgbot.drivers.people import Walkways
-from gvgbot.errors import UsageError, WorldError
+from gvgbot.errors import WorldError
 from gvgbot.geometry import Pose
 from gvgbot.hal.guard import Guard
 from gvgbot.hal.messages import Odometry
@@ -44,13 +44,10 @@ _TRIES = 1000  # to draw a start
 def explore_together(config: Config, count: int, *, out: Path | None, real_time: bool) -> int:
     """Explore a simulated world with several robots, print where the map is; the exit status.
 
-    Raises UsageError for a world or directory that cannot be used.
+    Raises UsageError for a world or directory that cannot be used, or that has no room for all.
     """
     set_up_logging(sys.stderr, os.environ, "warning")
-    place = open_place(config)
-    if place.walkways is not None:
-        raise UsageError("several robots do not go among people yet: --set twin.people=0")
-    places = [replace(place, start=start) for start in _starts(config, place, count)]
+    places = _places(config, open_place(config), count)
     with contextlib.ExitStack() as stack:
         directory = stack.enter_context(RunDirectory.create(out, world=place.world.name))
         robots = [
@@ -66,6 +63,13 @@ def explore_together(config: Config, count: int, *, out: Path | None, real_time:
                 robot.session.save()
             joined = _save(directory, robots)
     return _conclude(directory, robots, joined)
+
+
+def _places(config: Config, place: Place, count: int) -> list[Place]:
+    """The world as each robot finds it. Raises WorldError if there is no room."""
+    starts = _starts(config, place, count)
+    walkways = place.walkways and Walkways(place.world, place.start, starts[1:])
+    return [replace(place, start=start, walkways=walkways) for start in starts]
 
 
 def _starts(config: Config, place: Place, count: int) -> list[Pose]:
@@ -117,7 +121,11 @@ class _Robot:
 async def _explore(robots: list[_Robot]) -> None:
     """Let all of them explore until each has an outcome, or there is no more time."""
     clock = LoopClock()
-    simulations = [Simulation(r.session.config, _place(r.session), clock) for r in robots]
+    simulations: list[Simulation] = []
+    for robot in robots:
+        people = simulations[0].people if simulations else None
+        place = _place(robot.session)
+        simulations.append(Simulation(robot.session.config, place, clock, people))
     for robot, simulation in zip(robots, simulations, strict=True):
         robot.session.simulation = simulation
         simulation.meet(other for other in simulations if other is not simulation)

@@ -55,15 +55,18 @@ class Simulation:
     Whoever joins `laser_twin` and `base_twin` to other streams does not call `run`.
     """
 
-    def __init__(self, config: Config, place: Place, clock: Clock) -> None:
+    def __init__(
+        self, config: Config, place: Place, clock: Clock, people: People | None = None
+    ) -> None:
+        """`people` are those whom other robots of this world meet as well."""
         self.place = place
         shape = BodyConfig(radius_m=config.robot.radius_m, wheel_base_m=config.base.wheel_base_m)
         seeds = np.random.SeedSequence(config.twin.seed).generate_state(4)
         laser_seed, base_seed, people_seed, glass_seed = (int(seed) for seed in seeds)
-        people = None
-        if place.walkways is not None:
+        if people is None and place.walkways is not None:
             count = _people_count(config, place.world)
             people = People(place.walkways, count, people_seed, clock.now())
+        self.people = people
         self.body = RobotBody(place.world, place.start, shape, clock.now(), people)
         sight = Sight(place.world, people, glass_seed, self.body.others)
         self._clock = clock

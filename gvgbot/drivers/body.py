@@ -71,7 +71,8 @@ class RobotBody:
         """Move on to the time `now`, s; an earlier time than the last is ignored."""
         while self._people is not None and self._people.next_step <= now:
             self._drive_until(self._people.next_step)
-            self._people.step(self.pose, self.config.radius_m)
+            poses = [self.pose, *(other.pose for other in self.others)]
+            self._people.step(poses, self.config.radius_m)
         self._drive_until(now)
 
     def _drive_until(self, now: float) -> None:

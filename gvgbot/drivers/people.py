@@ -1,6 +1,7 @@
 """People in the simulated world: discs that walk along free ways, stand about and let robots be."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -34,17 +35,18 @@ Nodes = NDArray[np.intp]
 class Walkways:
     """Where people can walk in the part of a world that holds the robot's start.
 
-    Raises WorldError if that is nowhere.
+    `others` are starts of more robots. Raises WorldError if there is no room.
     """
 
-    def __init__(self, world: World, start: Pose) -> None:
+    def __init__(self, world: World, start: Pose, others: Sequence[Pose] = ()) -> None:
         self.points, self._links = _network(world)
         if len(self.points):
             _, parts = csgraph.connected_components(self._links, directed=False)
             here = np.flatnonzero(parts == parts[KDTree(self.points).query(start.position)[1]])
             self.points, self._links = self.points[here], self._links[here][:, here]
-        distances = np.hypot(*(self.points - start.position).T)
-        self.beginnings: Nodes = np.flatnonzero(distances >= FAR_FROM_START)
+        starts = np.array([pose.position for pose in (start, *others)])
+        away, _ = KDTree(starts).query(self.points)
+        self.beginnings: Nodes = np.flatnonzero(away >= FAR_FROM_START)
         if len(self.beginnings) == 0:
             raise WorldError(
                 f"world {world.name}: no room for people; set twin.people=0 or choose another world"
@@ -123,11 +125,11 @@ class People:
         self.radii = np.array([person.radius for person in self._people])  # (N,), m
         self.next_step = stamp + STEP  # s
 
-    def step(self, robot: Pose, robot_radius: float) -> None:
-        """Walk on to `next_step`, past a robot that is at world_base `robot`."""
+    def step(self, robots: Sequence[Pose], robot_radius: float) -> None:
+        """Walk on to `next_step`, past robots that are at these poses in the world."""
         for k, person in enumerate(self._people):
             if person.stands_until <= self.next_step:
-                self.centres[k] = self._walked(person, self.centres[k], robot, robot_radius)
+                self.centres[k] = self._walked(person, self.centres[k], robots, robot_radius)
         self.next_step += STEP
 
     def offsets(self, x: float, y: float, reach: float) -> Array:
@@ -143,7 +145,9 @@ class People:
         nowhere = place[None], np.zeros(1), 0.0
         return _Person(radius, speed, *nowhere, stamp + float(self._rng.uniform(0, STANDING[0])))
 
-    def _walked(self, person: _Person, here: Array, robot: Pose, robot_radius: float) -> Array:
+    def _walked(
+        self, person: _Person, here: Array, robots: Sequence[Pose], robot_radius: float
+    ) -> Array:
         """Where the person is a step later."""
         if person.along >= person.length:
             if person.length and self._rng.random() >= RESTLESS:
@@ -152,9 +156,10 @@ class People:
             return here
         along = min(person.along + person.speed * STEP, person.length)
         there = person.place(along)
-        kept = math.dist(there, robot.position)
-        if kept < math.dist(here, robot.position) and (
-            kept < person.radius + robot_radius + DISTANCE_KEPT
+        kept = person.radius + robot_radius + DISTANCE_KEPT
+        if any(
+            math.dist(there, robot.position) < min(kept, math.dist(here, robot.position))
+            for robot in robots
         ):
             self._stand(person, WAITING)
             self._set_out(person, here)

@@ -38,11 +38,13 @@ def still(world: World, centre: tuple[float, float]) -> People:
     return people
 
 
-def walked(people: People, seconds: float, robot: Pose = FAR_AWAY) -> Array:
+def walked(
+    people: People, seconds: float, robot: Pose = FAR_AWAY, others: tuple[Pose, ...] = ()
+) -> Array:
     """Where everybody is after each step: (steps, N, 2)."""
     places = []
     for _ in range(round(seconds / STEP)):
-        people.step(robot, RADIUS)
+        people.step([*others, robot], RADIUS)
         places.append(people.centres.copy())
     return np.array(places)
 
@@ -85,6 +87,32 @@ def test_nobody_walks_into_a_robot_that_stands_in_a_corridor(seed: int) -> None:
     gaps = np.hypot(*(places - robot.position).T).T - people.radii - RADIUS
     assert gaps.min() >= 0.3
     assert gaps.min() < 0.4  # somebody did come up to it
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_people_keep_away_from_each_of_several_robots(seed: int) -> None:
+    robots = Pose(11.0, 1.6, 0.0), Pose(4.0, 1.6, 0.0)
+    walkways = Walkways(corridor(), robots[0], robots[1:])
+    people = People(walkways, 4, seed)
+    begins = people.centres.copy()
+    places = walked(people, 200.0, robots[0], robots[1:])
+    for robot in robots:
+        assert np.hypot(*(begins - robot.position).T).min() >= 1.5
+        assert (np.hypot(*(places - robot.position).T).T - people.radii - RADIUS).min() >= 0.3
+
+
+def test_who_walks_with_one_robot_stops_for_the_others() -> None:
+    world, robots = corridor(), (Pose(11.0, 1.6, 0.0), Pose(4.0, 1.6, 0.0))
+    people = People(Walkways(world, robots[0], robots[1:]), 4, seed=1)
+    one, two = (RobotBody(world, robot, people=people) for robot in robots)
+    one.others, two.others = [two], [one]
+    least = math.inf
+    for now in np.arange(0.0, 200.0, STEP):
+        one.advance(float(now))
+        two.advance(float(now))
+        gaps = np.hypot(*(people.centres - robots[1].position).T) - people.radii - RADIUS
+        least = min(least, float(gaps.min()))
+    assert 0.3 <= least < 0.4
 
 
 def test_who_is_stopped_by_the_robot_turns_elsewhere() -> None:
