@@ -20,6 +20,7 @@ from gvgbot.recording.config import RecordingConfig
 from gvgbot.ros2.config import Ros2Config
 from gvgbot.strict_yaml import load, load_text
 from gvgbot.team.member import TeamConfig
+from gvgbot.team.troubles import TroublesConfig
 from gvgbot.topics import TelemetryConfig, is_robot_name
 
 DEFAULT = "sim.yaml"
@@ -53,6 +54,7 @@ class TwinConfig:
     time_limit_s: Annotated[float, Range(1.0, 1e6)] = 14_400.0  # simulated; then `explore` ends
     laser: HokuyoTwinConfig = field(default_factory=HokuyoTwinConfig)
     base: KobukiTwinConfig = field(default_factory=KobukiTwinConfig)
+    team: TroublesConfig = field(default_factory=TroublesConfig)  # of `explore --robots`
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

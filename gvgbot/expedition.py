@@ -32,7 +32,8 @@ from gvgbot.session import Session
 from gvgbot.simulation import Place, Simulation, open_place
 from gvgbot.team.chart import chart_of
 from gvgbot.team.member import Member
-from gvgbot.team.news import decode, encode
+from gvgbot.team.news import Course, News, decode, encode
+from gvgbot.team.troubles import Troubles
 
 log = structlog.get_logger()
 
@@ -49,7 +50,7 @@ def explore_together(config: Config, count: int, *, out: Path | None, real_time:
     set_up_logging(sys.stderr, os.environ, "warning")
     places = _places(config, open_place(config), count)
     with contextlib.ExitStack() as stack:
-        directory = stack.enter_context(RunDirectory.create(out, world=place.world.name))
+        directory = stack.enter_context(RunDirectory.create(out, world=places[0].world.name))
         robots = [
             _Robot.made(stack, config, number, one, directory.path)
             for number, one in enumerate(places)
@@ -57,7 +58,7 @@ def explore_together(config: Config, count: int, *, out: Path | None, real_time:
         try:
             factory = None if real_time else VirtualTimeLoop
             with asyncio.Runner(loop_factory=factory) as runner:
-                runner.run(_explore(robots))
+                runner.run(_explore(robots, config))
         finally:
             for robot in robots:
                 robot.session.save()
@@ -93,7 +94,11 @@ def _starts(config: Config, place: Place, count: int) -> list[Pose]:
 class _Robot:
     session: Session
     member: Member
-    told: float = float("-inf")  # stamp
+    told: float = float("-inf")  # stamp of its news
+    steered: float = float("-inf")  # stamp of its course
+    is_over: bool = False  # it has done all it can
+    sent_bytes: int = 0
+    is_broken: bool = False  # and cannot even tell of it
 
     @classmethod
     def made(
@@ -118,9 +123,38 @@ class _Robot:
         return cls(session, member)
 
 
-async def _explore(robots: list[_Robot]) -> None:
+class _Air:
+    """What robots tell each other by, in a world with troubles."""
+
+    def __init__(self, robots: list[_Robot], troubles: Troubles, clock: LoopClock) -> None:
+        self.robots, self.troubles = robots, troubles
+        self._clock, self._began = clock, clock.now()
+
+    async def until(self, seconds: float) -> None:
+        """Wait until so many seconds after the beginning."""
+        await self._clock.sleep_until(self._began + seconds)
+
+    @property
+    def is_quiet(self) -> bool:
+        """Whether nobody explores any more."""
+        return all(robot.is_over for robot in self.robots)
+
+    def send(self, told: News | Course, robot: _Robot) -> None:
+        """Let the others hear something, as bytes, if the network is there."""
+        data, seconds = encode(told), self._clock.now() - self._began
+        if self.troubles.is_silent(self.robots.index(robot), seconds):
+            return
+        robot.sent_bytes += len(data)
+        for number, other in enumerate(self.robots):
+            if other is not robot and not self.troubles.is_silent(number, seconds):
+                other.member.hear(decode(data), self._clock.now())
+
+
+async def _explore(robots: list[_Robot], config: Config) -> None:
     """Let all of them explore until each has an outcome, or there is no more time."""
     clock = LoopClock()
+    troubles = Troubles(config.twin.team, len(robots), config.twin.seed)
+    air = _Air(robots, troubles, clock)
     simulations: list[Simulation] = []
     for robot in robots:
         people = simulations[0].people if simulations else None
@@ -131,7 +165,7 @@ async def _explore(robots: list[_Robot]) -> None:
         simulation.meet(other for other in simulations if other is not simulation)
     async with asyncio.TaskGroup() as tasks:
         for robot in robots:
-            tasks.create_task(_live(robot, robots, clock), name=robot.member.name)
+            tasks.create_task(_live(robot, air, clock), name=robot.member.name)
 
 
 def _place(session: Session) -> Place:
@@ -139,9 +173,10 @@ def _place(session: Session) -> Place:
     return session.place
 
 
-async def _live(robot: _Robot, robots: list[_Robot], clock: LoopClock) -> None:
+async def _live(robot: _Robot, air: _Air, clock: LoopClock) -> None:
     """One robot's exploration; it stands in the world, and tells the others, until all are done."""
-    session = robot.session
+    session, number = robot.session, air.robots.index(robot)
+    await air.until(air.troubles.sets_out_s(number))
     devices = Devices(Links(session.config, clock, session.simulation, session.tap))
     config = session.config.robot
     loop = Loop(
@@ -150,52 +185,60 @@ async def _live(robot: _Robot, robots: list[_Robot], clock: LoopClock) -> None:
         session.pipeline,
         Guard(config.limits, config.radius_m),
         on_events=session.on_events,
-        on_cycle=partial(_on_cycle, robot, robots, devices),
+        on_cycle=partial(_on_cycle, robot, air, devices),
         log=None,
     )
-    limit = session.config.twin.time_limit_s
     async with asyncio.TaskGroup() as tasks:
         serving = tasks.create_task(devices.run(), name="devices")
+        limit = session.config.twin.time_limit_s
+        breaks_down = air.troubles.breaks_down_s(number)
         try:
-            async with asyncio.timeout(limit):
+            async with asyncio.timeout(min(limit, breaks_down)):
                 await loop.run()
         except TimeoutError:
+            robot.is_broken = breaks_down < limit
             session.failure = devices.away or f"not explored after {limit:g} s"
-        _tell(robot, robots, clock.now())
+            if robot.is_broken:
+                session.failure = f"it broke down after {breaks_down:.0f} s, as configured"
         serving.cancel()
+    robot.is_over = True
+    while not (air.is_quiet or robot.is_broken):
+        _tell(robot, air, clock.now())
+        await clock.sleep_until(clock.now() + session.config.team.tell_every_s)
 
 
-def _on_cycle(robot: _Robot, robots: list[_Robot], devices: Devices, odometry: Odometry) -> None:
+def _on_cycle(robot: _Robot, air: _Air, devices: Devices, odometry: Odometry) -> None:
     robot.session.on_cycle(odometry, devices.base.contact)
-    robot.session.pipeline.company = list(robot.member.others().values())
-    for other in robots:
-        if other is not robot:
-            other.member.hear_pose(robot.member.name, robot.session.pipeline.map_base)
-    if odometry.stamp >= robot.told + robot.session.config.team.tell_every_s:
-        _tell(robot, robots, odometry.stamp)
+    pipeline, config = robot.session.pipeline, robot.session.config.team
+    if odometry.stamp >= robot.steered + config.steer_every_s:
+        robot.steered = odometry.stamp
+        air.send(robot.member.course(odometry.stamp, pipeline.map_base, pipeline.track), robot)
+        pipeline.company = robot.member.company()
+    if odometry.stamp >= robot.told + config.tell_every_s:
+        _tell(robot, air, odometry.stamp)
         robot.member.look(odometry.stamp)
         for met in robot.member.met:
             log.info("maps joined", robot=robot.member.name, other=met.robot)
+        robot.member.met.clear()
 
 
-def _tell(robot: _Robot, robots: list[_Robot], stamp: float) -> None:
-    """Let the others hear the news, as bytes."""
+def _tell(robot: _Robot, air: _Air, stamp: float) -> None:
+    """Let the others hear the news."""
     robot.told = stamp
     pipeline = robot.session.pipeline
-    is_over = pipeline.mission.outcome is not None or robot.session.failure is not None
-    data = encode(robot.member.news(stamp, pipeline.map_base, 0.0, finished=is_over))
-    for other in robots:
-        if other is not robot:
-            other.member.hear(decode(data), stamp)
+    air.send(robot.member.news(stamp, pipeline.map_base, 0.0, finished=robot.is_over), robot)
 
 
 def _save(directory: RunDirectory, robots: list[_Robot]) -> list[_Robot]:
-    """Write the map of all whose maps could be joined to the first one's; which these are."""
-    first = robots[0]
+    """Write the map of all whose maps could be joined to one; which these are, that one first.
+
+    It is the map of who knows most others, as a rule the first robot's.
+    """
+    first = max(robots, key=lambda robot: len(robot.member.frames))
     graph = _graph(first)
     joined, frames = [first], first.member.frames
     poses = {first.member.name: Pose()}
-    for robot in robots[1:]:
+    for robot in (other for other in robots if other is not first):
         pose = frames.get(robot.member.name)
         if pose is not None:
             graph, poses[robot.member.name] = merged(graph, _graph(robot), pose)
@@ -218,11 +261,9 @@ def _summary(
     robots: list[_Robot], joined: list[_Robot], poses: dict[str, Pose], graph: RouteGraph
 ) -> dict[str, object]:
     missions = [robot.session.pipeline.mission for robot in robots]
-    outcomes = [mission.outcome or "failed" for mission in missions]
-    everything = all(outcome == "explored" for outcome in outcomes)
-    durations = [_duration(robot) for robot in robots]
+    tallies = [robot.session.tally for robot in robots]
     return {
-        "outcome": "explored" if everything else next(o for o in outcomes if o != "explored"),
+        "outcome": _outcome(robots),
         "reason": "; ".join(
             f"{r.member.name}: {m.reason or r.session.failure or 'stopped from outside'}"
             for r, m in zip(robots, missions, strict=True)
@@ -231,14 +272,22 @@ def _summary(
         "joined": [robot.member.name for robot in joined],
         "frames": {name: (pose.x, pose.y, pose.theta) for name, pose in poses.items()},
         "distance_m": sum(robot.session.pipeline.travelled for robot in robots),
-        "duration_s": max(durations),
-        "durations_s": durations,
+        "duration_s": max(t.last_stamp for t in tallies)
+        - min(t.first_stamp or 0.0 for t in tallies),
+        "durations_s": [_duration(robot) for robot in robots],
         "vertices": len(graph.vertices),
         "edges": len(graph.edges),
+        "sent_bytes": [robot.sent_bytes for robot in robots],
         "contacts": sum(robot.session.contacts for robot in robots),
         "seed": robots[0].session.config.twin.seed,
         "version": __version__,
     }
+
+
+def _outcome(robots: list[_Robot]) -> str:
+    """Explored, if that is what all say that can still say something."""
+    outcomes = [r.session.pipeline.mission.outcome or "failed" for r in robots if not r.is_broken]
+    return next((outcome for outcome in outcomes if outcome != "explored"), "explored")
 
 
 def _duration(robot: _Robot) -> float:
@@ -248,10 +297,8 @@ def _duration(robot: _Robot) -> float:
 
 def _conclude(directory: RunDirectory, robots: list[_Robot], joined: list[_Robot]) -> int:
     """Print the outcome and where the map is; the exit status."""
-    is_explored = True
     for robot in robots:
         mission = robot.session.pipeline.mission
-        is_explored &= mission.outcome == "explored"
         _say(
             f"{robot.member.name}: {mission.outcome or 'failed'}: "
             f"{mission.reason or robot.session.failure}; "
@@ -260,7 +307,7 @@ def _conclude(directory: RunDirectory, robots: list[_Robot], joined: list[_Robot
     _say(f"maps joined: {len(joined)} of {len(robots)}")
     _say(f"map:     {directory.path / 'map.geojson'}")
     _say(f"picture: {directory.path / 'map.png'}")
-    return 0 if is_explored else 1
+    return 0 if _outcome(robots) == "explored" else 1
 
 
 def _say(text: str) -> None:

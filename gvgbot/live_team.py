@@ -14,6 +14,7 @@ from gvgbot.team.alignment import Alignment
 from gvgbot.team.chart import chart_of
 from gvgbot.team.member import Comparison, Member, TeamConfig
 from gvgbot.team.news import decode, encode
+from gvgbot.topics import TeamPart
 
 log = structlog.get_logger()
 
@@ -21,8 +22,8 @@ log = structlog.get_logger()
 class TeamNetwork(Protocol):
     """How robots of a team hear each other."""
 
-    def tell_team(self, news: bytes) -> None:
-        """Send to all that listen, without waiting."""
+    def tell_team(self, part: TeamPart, data: bytes) -> None:
+        """Send to all that listen, without waiting; the newest of each part is what counts."""
 
     async def hear_team(self, handle: Callable[[bytes], None]) -> None:
         """Hand on what others tell, until cancelled."""
@@ -51,6 +52,7 @@ class LiveTeam:
             tasks.create_task(self._network.hear_team(self._hear), name="hear team")
             tasks.create_task(self._compare(off_loop), name="compare maps")
             tasks.create_task(self._tell(), name="tell team")
+            tasks.create_task(self._steer(), name="steer clear of team")
 
     def _hear(self, data: bytes) -> None:
         try:
@@ -65,9 +67,19 @@ class LiveTeam:
                 finished = pipeline.errands.is_resting
                 now = self._clock.now()
                 news = self.member.news(now, pipeline.map_base, 0.0, finished=finished)
-                self._network.tell_team(encode(news))
-                pipeline.company = list(self.member.standing().values())
+                self._network.tell_team("team", encode(news))
             await self._clock.sleep_until(self._clock.now() + self._config.tell_every_s)
+
+    async def _steer(self) -> None:
+        """Tell where the robot is and drives, and keep it clear of the others."""
+        pipeline = self._pipeline
+        while True:
+            if not pipeline.is_lost:
+                now = self._clock.now()
+                course = self.member.course(now, pipeline.map_base, pipeline.track)
+                self._network.tell_team("course", encode(course))
+                pipeline.company = self.member.company()
+            await self._clock.sleep_until(self._clock.now() + self._config.steer_every_s)
 
     async def _compare(self, off_loop: Callable[[Callable[[], None]], Awaitable[None]]) -> None:
         while True:

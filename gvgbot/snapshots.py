@@ -9,7 +9,7 @@ from gvgbot.autonomy.slam.ekf import Belief, OdometryNoise, predict
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
 from gvgbot.geometry import STANDSTILL, Array, Pose, wrap_angle
 from gvgbot.hal.messages import Battery, Odometry, Scan
-from gvgbot.topics import NOTHING_IN_RANGE, NOTHING_TRUSTED, LinkHealth, Phase, State, packed
+from gvgbot.topics import NOTHING_IN_RANGE, NOTHING_TRUSTED, LinkHealth, Mate, Phase, State, packed
 
 _FARTHEST_MM = NOTHING_IN_RANGE - 1
 
@@ -45,6 +45,7 @@ def state(
         reason=mission.reason or away or "",
         errand=pipeline.errands.progress,
         requests=requests,
+        team=tuple(Mate(name=one.name, pose=_triple(one.pose)) for one in pipeline.company or ()),
         uptime=uptime,
         pose=(map_base.x, map_base.y, map_base.theta),
         covariance=tuple(pose_covariance(pipeline, odometry, noise).ravel().tolist()),

@@ -13,7 +13,17 @@ import zenoh.ext
 
 from gvgbot.errors import GvgbotError
 from gvgbot.requests import JSON, MESSAGEPACK, Answer, Asked, request_key
-from gvgbot.topics import HEARTBEAT, TOPICS, Payload, TelemetryConfig, Topic, alive_key, team_key
+from gvgbot.topics import (
+    HEARTBEAT,
+    TEAM_PARTS,
+    TOPICS,
+    Payload,
+    TeamPart,
+    TelemetryConfig,
+    Topic,
+    alive_key,
+    team_key,
+)
 from gvgbot.zenoh_config import reason, session_config
 
 _WAITING_QUERIES = 32  # more than this are dropped, oldest first; who asked gets nothing
@@ -83,11 +93,14 @@ class Telemetry:
         except zenoh.ZError:
             self.failures += 1
 
-    def tell_team(self, news: bytes) -> None:
-        """Send news to the other robots, without waiting, and without complaining if it fails."""
+    def tell_team(self, part: TeamPart, data: bytes) -> None:
+        """Send to the other robots, without waiting, and without complaining if it fails.
+
+        Of each part they may get the newest only.
+        """
         try:
             self._session.put(
-                team_key(self._robot), news, congestion_control=zenoh.CongestionControl.DROP
+                team_key(self._robot, part), data, congestion_control=zenoh.CongestionControl.DROP
             )
         except zenoh.ZError:
             self.failures += 1
@@ -99,11 +112,13 @@ class Telemetry:
 
         def take(sample: zenoh.Sample) -> None:
             key = str(sample.key_expr)
-            if len(newest) < _MAX_SESSIONS or key in newest:
+            if len(newest) < 2 * _MAX_SESSIONS or key in newest:
                 newest[key] = sample.payload.to_bytes()
                 loop.call_soon_threadsafe(arrived.set)
 
-        with self._session.declare_subscriber(team_key("*"), take):
+        with contextlib.ExitStack() as stack:
+            for part in TEAM_PARTS:
+                stack.enter_context(self._session.declare_subscriber(team_key("*", part), take))
             while True:
                 await arrived.wait()
                 arrived.clear()

@@ -14,6 +14,7 @@ from gvgbot.ranges import Range
 from gvgbot.requests import RequestName
 
 Phase = Literal["starting", "exploring", "errand", "waiting", "paused", "halted", "finished"]
+TeamPart = Literal["team", "course"]  # what robots know; and where each is and drives
 Priority = Literal["interactive_high", "data_high", "data", "data_low"]
 
 
@@ -68,6 +69,13 @@ class LinkHealth(msgspec.Struct, frozen=True, kw_only=True):
     clock_offset: float | None  # s, the robot's clock minus the device's; None while unknown
 
 
+class Mate(msgspec.Struct, frozen=True, kw_only=True):
+    """Another robot of the team, in the map of this one."""
+
+    name: str  # its `robot.name`
+    pose: tuple[float, float, float]  # x, y, theta: m and rad
+
+
 class State(msgspec.Struct, frozen=True, kw_only=True):
     """The robot in a nutshell. SI units; poses in the map frame, whose origin is the start.
 
@@ -98,6 +106,7 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
     slips: int  # times that gyro and wheels began to disagree
     laser: LinkHealth
     base: LinkHealth
+    team: tuple[Mate, ...] = ()  # the other robots, as far as this one knows where they are
 
 
 def packed(points: NDArray[np.floating]) -> bytes:
@@ -355,6 +364,7 @@ HEALTH = Topic("health", Health, 1, 1.0, "data", 1, queryable=True)
 ODOMETRY = Topic("odometry", Odometry, 1, 20.0, "data_high", 0, queryable=False)
 SCAN = Topic("scan", Scan, 1, 40.0, "data", 0, queryable=False)
 TOPICS = (STATE, MAP, GRID, TRAJECTORY, EVENTS, PLAN, HEALTH, ODOMETRY, SCAN)
+TEAM_PARTS: tuple[TeamPart, ...] = ("team", "course")
 HEARTBEAT = 2.0  # s, how often a topic that is sent on change says which sample was its last
 EVENTS_KEPT = 64  # in a message
 TRAJECTORY_POSES = 2000  # in a message, at most
@@ -366,6 +376,6 @@ def alive_key(robot: str) -> str:
     return f"gvgbot/{robot}/alive"
 
 
-def team_key(robot: str) -> str:
+def team_key(robot: str, part: TeamPart) -> str:
     """The key expression of what a robot tells the other robots of its team."""
-    return f"gvgbot/{robot}/team"
+    return f"gvgbot/{robot}/{part}"

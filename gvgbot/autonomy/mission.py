@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 
+from gvgbot.autonomy.control.company import Companion, in_front, patience, refuge
 from gvgbot.autonomy.control.edge_follower import Track
 from gvgbot.autonomy.events import Decision, Event, Finished, Recovery
 from gvgbot.autonomy.exploration.access import NEAR_M, way_to_edge
@@ -21,7 +22,7 @@ from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.autonomy.start_edge import StartEdge, is_at_start
 from gvgbot.autonomy.views import Correspondence, View
 from gvgbot.autonomy.whereabouts import Passage, Situation, Whereabouts
-from gvgbot.geometry import Array
+from gvgbot.geometry import Array, Pose
 from gvgbot.ranges import Range
 
 _ARRIVED_M = 0.3  # at the end of a track, when no more of it is left
@@ -115,6 +116,8 @@ class Mission:
         self._obstructions = Obstructions(config.retries, config.retry_after_s)
         self._obstructed = ""  # why there is no way on, since the last view
         self._held = False
+        self._patience = 1.0  # share of the usual one, with what is in the way
+        self._in_front: Companion | None = None  # another robot that goes first; local frame
         self._held_since: float | None = None
         self._lost_since: float | None = None
         self._stranded_since: float | None = None
@@ -191,6 +194,11 @@ class Mission:
         self._lost_since = _later(self._lost_since, seconds)
         self._stranded_since = _later(self._stranded_since, seconds)
         self._examining_since = _later(self._examining_since, seconds)
+
+    def meet(self, local_base: Pose, company: list[Companion]) -> None:
+        """Note where other robots are, local frame."""
+        self._patience = patience(local_base, company)
+        self._in_front = in_front(local_base, company)
 
     def hold(self) -> None:
         """Note that the robot cannot go on just now: somebody may be in its way."""
@@ -269,14 +277,10 @@ class Mission:
             self.target = self._reconsidered(view, here, target)
         if self.outcome is not None:
             return Stand()
-        if self.target is None and self._obstructions.waiting:
+        if self.target is None and (self._obstructions.waiting or self._waits_for_others()):
             self._last_progress = view.stamp
             self._stay.end()
-            return Stand()
-        if self.target is None and self._waits_for_others():
-            self._last_progress = view.stamp
-            self._stay.end()
-            return Stand()
+            return self._make_way(view, here)
         if self.target is None and graph.frontiers():
             return self._wait_for_a_way(view, here)
         if self.target is None and graph.vertices:
@@ -394,6 +398,12 @@ class Mission:
             self._turned_back = not self._turned_back
         return self._drive(view, here, path)
 
+    def _make_way(self, view: View, here: Situation) -> Order:
+        """Stand, but aside of a robot that goes first."""
+        other = self._in_front
+        way = None if other is None else refuge(here.gvg, here.place, other.pose.position)
+        return Stand() if way is None else self._drive(view, here, way)
+
     def _drive(self, view: View, here: Situation, path: tuple[Branch, ...]) -> Order:
         line, room = view.gvg.line_from(here.place, path)
         if here.place.distance > _BESIDE_M:  # straight to the edge first, or it may scrape along
@@ -427,7 +437,7 @@ class Mission:
             self._held_since = None
         self._held = False
         waited = 0.0 if self._held_since is None else view.stamp - self._held_since
-        if not self._obstructed and waited > self._config.in_the_way_s:
+        if not self._obstructed and waited > self._patience * self._config.in_the_way_s:
             self._obstructed = "something stands in the way"
         if self._obstructed:
             self._block(view, self._obstructed)

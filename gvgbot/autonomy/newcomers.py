@@ -28,6 +28,8 @@ _FLAT = 0.06  # of its width: what bulges less towards the laser is a piece of w
 _ROUND = 0.06  # of its radius: what strays less from a circle, r.m.s., may be a leg or a body
 _GLIMPSE_S = 3.0  # what is half hidden behind something nearer is only kept waiting so long
 _BLUR_M = 0.1  # beyond its rim, beams may still end on something
+_NEAR_M = 3.0  # who is farther away is not followed from scan to scan
+_GONE_M = 1.0  # between two looks, at most
 _MOVED_M = 0.3  # what stands is found again within this
 _STRAY = 0.1  # of the beams towards a place: so many may end there though nothing is there
 _LOST_S = 3.0  # and what is out of sight for so long, beyond the time it stood, has gone
@@ -76,6 +78,7 @@ class Newcomers:
         self._config = config
         self._all: list[Newcomer] = []
         self.company: list[tuple[Array, float]] = []  # other robots: where they say they are
+        self._glanced: list[tuple[Array, float]] | None = None  # where those are that move on
 
     def sift(
         self,
@@ -98,6 +101,30 @@ class Newcomers:
         waiting = [(one.centre, one.radius) for one in self._all if not one.is_let_in]
         # At times one is seen in parts only, or has moved a little: both discs count.
         return _without(scan, local_base, [*seen, *waiting, *self.company])
+
+    def glance(self, scan: Scan, local_base: Pose) -> None:
+        """See how those have moved that are near, without learning anything else."""
+        known = self.discs
+        if min((np.hypot(*(c - local_base.position)) for c, _ in known), default=np.inf) > _NEAR_M:
+            self._glanced = None
+            return
+        self._glanced = [
+            (island.centre, island.radius)
+            for island in _islands(scan, local_base)
+            if island.is_whole and any(np.hypot(*(island.centre - c)) < _GONE_M for c, _ in known)
+        ]
+
+    @property
+    def discs(self) -> list[tuple[Array, float]]:
+        """Centres (2,), local frame, and radii of those seen whole not in the map, m."""
+        return [
+            (one.centre, one.radius) for one in self._all if one.is_whole and not one.is_let_in
+        ]
+
+    @property
+    def latest(self) -> list[tuple[Array, float]]:
+        """As `discs`, but by the last glance."""
+        return self.discs if self._glanced is None else self._glanced
 
     def _is_company(self, island: _Island) -> bool:
         """Whether it is another robot that says where it is."""

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import numpy as np
 
+from gvgbot.autonomy.control import company
+from gvgbot.autonomy.control.company import Companion
 from gvgbot.autonomy.control.edge_follower import EdgeFollowerConfig, follow
 from gvgbot.autonomy.control.reflexes import (
     Felt,
@@ -44,9 +46,7 @@ _NOTHING_FELT = Felt()
 _LIFTED = np.diag([0.3**2, 0.3**2, 0.1**2])  # how far a robot is carried that is put down again
 _SEEN_SHARE = 0.8  # of the laser's range: walls farther off cannot be relied on
 _ROOM_BESIDE_EDGES_M = 0.08  # on each side, where no edge leads
-_COMPANY_M = 0.1  # by which another robot may be elsewhere than it says
-_ROOM_FOR_BOTH_M = 0.3  # between two robots, before either has to be slow
-_BOTH_BRAKE_MPS2 = 0.5  # of each, so that two that come towards each other stop
+_COMPANY_M = 0.15  # by which another robot may be elsewhere than it says
 _LONGEST_GAP_S = 2.0  # between keyframes; a longer one is an outage of a device
 _FORGOTTEN = np.diag([1.0, 1.0, 0.3**2])  # covariance of a way that is not kept
 _SCAN_EVERY_M, _SCAN_EVERY_RAD = 0.7, 0.5  # scans that are kept for the occupancy grid
@@ -133,8 +133,8 @@ class Pipeline:
         self._reflexes = Reflexes(config.reflexes)
         self._hazards = Hazards(config.hazards)
         self._newcomers = Newcomers(config.newcomers)
-        # where other robots say that they are, map frame; None if there are surely none
-        self.company: list[Pose] | None = None
+        # other robots as they tell of themselves, map frame; None if there are surely none
+        self.company: list[Companion] | None = None
         self._incidents: list[tuple[str, str]] = []  # action and reason, since the last scan
         self._was_lifted = self._look_now = False
         self._last: Keyframe | None = None
@@ -197,6 +197,9 @@ class Pipeline:
         happened: list[Event] = [Recovery(scan.stamp, *what) for what in self._incidents]
         self._incidents.clear()
         odom_base = self._odometry.odom_base_at(scan.stamp)
+        if self.company is not None and odom_base is not None and self._last is not None:
+            local_base = self._last.local_base.compose(self._last.odom_base.to(odom_base))
+            self._newcomers.glance(scan, local_base)
         if (
             odom_base is None
             or (self.errands.is_resting and self._last is not None)
@@ -208,7 +211,9 @@ class Pipeline:
             self.mission.skip(max(0.0, scan.stamp - self._last.stamp - _LONGEST_GAP_S))
         scan = deskewed(scan, self._odometry.motion_during(scan))
         local_base = self._localise(scan, odom_base)
-        self._newcomers.company = self._company(local_base)
+        nearby = self._nearby(local_base)
+        self._newcomers.company = self._discs(nearby, _COMPANY_M)
+        self.mission.meet(local_base, nearby)
         is_way = partial(self.mapper.is_way, local_base)
         scan = self._newcomers.sift(scan, local_base, self._maps.near, is_way)
         self._maps.insert(scan, local_base, self.travelled)
@@ -246,13 +251,16 @@ class Pipeline:
         self._obey(order)
         return done
 
-    def _company(self, local_base: Pose) -> list[tuple[Array, float]]:
-        """Other robots as discs in the local frame: about as large as this one."""
+    def _nearby(self, local_base: Pose) -> list[Companion]:
+        """Other robots in the local frame; the base of the belief is at a pose there."""
+        if not self.company:
+            return []
         local_map = local_base.compose(self.mapper.belief.map_base.inverse())
-        return [
-            (local_map.compose(pose).position, self._radius + _COMPANY_M)
-            for pose in self.company or ()
-        ]
+        return [company.moved(one, local_map) for one in self.company]
+
+    def _discs(self, nearby: list[Companion], more: float) -> list[tuple[Array, float]]:
+        """Other robots by centre and radius: about as large as this one."""
+        return [(one.pose.position, self._radius + more) for one in nearby]
 
     def _local_gvg(self, local_base: Pose, range_max: float) -> LocalGvg:
         """The GVG around the base, by what the local map shows and the map holds."""
@@ -372,16 +380,16 @@ class Pipeline:
 
     def _careful(self, twist: Twist, local_base: Pose) -> Twist:
         """The twist, slow enough to stop with room for somebody ahead who comes as fast."""
-        if self.company is None:
+        if self.company is None or self._last is None:
             return twist
-        points = local_base.inverse().transform(self._newcomers.points)
-        ahead = points[points[:, 0] > 0.0]
-        gap = float(np.hypot(*ahead.T).min(initial=np.inf)) - self._radius - _ROOM_FOR_BOTH_M
-        limit = math.sqrt(max(0.0, _BOTH_BRAKE_MPS2 * gap))
-        limit = max(limit, self._config.edge_follower.min_speed_mps)
-        if twist.linear <= limit:
-            return twist
-        return Twist(limit, twist.angular * limit / twist.linear)
+        base_local = local_base.inverse()
+        others = self._discs(self._nearby(self._last.local_base), 0.0) + self._newcomers.latest
+        discs = [(base_local.transform(centre), radius) for centre, radius in others]
+        slow = self._config.edge_follower.min_speed_mps
+        careful = company.careful(twist, discs, self._radius, slow)
+        if careful.linear == 0.0 < twist.linear:
+            self.errands.hold()
+        return careful
 
     def _room_behind(self, local_base: Pose) -> float:
         """How far the robot can go straight back, by what the map knows; m."""

@@ -6,19 +6,25 @@ go, and which of its own frontiers leads to where nobody has been.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated
 
+import numpy as np
+
+from gvgbot.autonomy.control import company
+from gvgbot.autonomy.control.company import Companion
 from gvgbot.autonomy.exploration.paths import Approach, shortest_paths
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
-from gvgbot.geometry import Pose
+from gvgbot.geometry import Array, Pose
 from gvgbot.ranges import Range
 from gvgbot.team.alignment import Alignment, align, refined
 from gvgbot.team.chart import Chart, moved
-from gvgbot.team.news import Claim, Frame, News, told_edges, told_vertices
+from gvgbot.team.news import Claim, Course, Frame, News, told_edges, told_vertices
 from gvgbot.team.site import Frontier, Site
 
 _STANDING_M = 0.1  # moved less from news to news, a robot stands
+_FRESH_S = 1.0  # a robot that drives is no longer where it was told to be before
+_SPARSE = 4  # every so manieth point of a track is told
 _TAKES_OVER_M = 2.0  # nearer to a frontier than who claims it, one takes it
 
 
@@ -31,6 +37,7 @@ class TeamConfig:
     align_every_s: Annotated[float, Range(1.0, 600.0)] = (
         15.0  # laying the maps of two on each other
     )
+    steer_every_s: Annotated[float, Range(0.05, 2.0)] = 0.2  # of where one is and drives
     # silence after which a robot counts as lost; what it was about to do is free for others
     lost_after_s: Annotated[float, Range(1.0, 600.0)] = 10.0
 
@@ -43,6 +50,10 @@ class _Mate:
     chart: Chart
     heard: float  # stamp of the own clock
     map_base: Pose  # in its own map
+    told_at: Pose  # the same, by the news
+    seen: float  # stamp of that
+    course: Array = field(default_factory=lambda: np.empty((0, 2)))
+    courses: int = 0  # the number of the newest
     is_standing: bool = False  # since the news before
     alignment: Alignment | None = None
     tried: float = float("-inf")  # stamp of the last attempt to align
@@ -89,7 +100,7 @@ class Member:
         self._claim: Claim | None = None
         self._claimed_end: HalfEdgeId | None = None
         self._stamp = 0.0
-        self._sequence = 0
+        self._sequence = self._courses = 0
         self._others_claim_all = self._nothing_left = False
         self.met: list[Met] = []  # lately; whoever tells of it takes it out
 
@@ -121,24 +132,46 @@ class Member:
             edges=told_edges(self._chart),
         )
 
-    def hear(self, news: News, stamp: float) -> None:
+    def course(self, stamp: float, map_base: Pose, track: Array) -> Course:
+        """What to tell the others in between: where one is, and what one drives along (N, 2)."""
+        self._stamp = stamp
+        self._courses += 1
+        return Course(
+            robot=self.name,
+            life=self._life,
+            sequence=self._courses,
+            pose=(map_base.x, map_base.y, map_base.theta),
+            line=track[::_SPARSE].astype("<f4").tobytes(),
+        )
+
+    def hear(self, told: News | Course, stamp: float) -> None:
         """Take in what another one tells."""
         self._stamp = max(self._stamp, stamp)
-        if news.robot == self.name:
+        if told.robot == self.name:
             return
+        if isinstance(told, Course):
+            self._follow(told, stamp)
+        else:
+            self._learn(told, stamp)
+
+    def _follow(self, course: Course, stamp: float) -> None:
+        mate = self._mates.get(course.robot)
+        if mate is None or mate.news.life != course.life or course.sequence <= mate.courses:
+            return
+        mate.courses, mate.seen = course.sequence, stamp
+        mate.map_base, mate.course = Pose(*course.pose), course.points
+
+    def _learn(self, news: News, stamp: float) -> None:
         mate = self._mates.get(news.robot)
         if mate is None or mate.news.life != news.life:
-            self._mates[news.robot] = _Mate(news, news.chart, stamp, Pose(*news.pose))
+            there = Pose(*news.pose)
+            self._mates[news.robot] = _Mate(news, news.chart, stamp, there, there, stamp)
         elif news.sequence > mate.news.sequence:
             mate.news, mate.chart, mate.heard = news, news.chart, stamp
-            before, mate.map_base = mate.map_base, Pose(*news.pose)
+            before, mate.map_base, mate.seen = mate.told_at, Pose(*news.pose), stamp
+            mate.told_at = mate.map_base
             mate.is_standing = before.distance(mate.map_base) < _STANDING_M
         self._site = None
-
-    def hear_pose(self, robot: str, map_base: Pose) -> None:
-        """Take in where another robot is in its own map, which it tells more often than all."""
-        if robot in self._mates:
-            self._mates[robot].map_base = map_base
 
     def look(self, stamp: float) -> None:
         """Try to lay the maps of others onto the own one, where that is due."""
@@ -205,13 +238,19 @@ class Member:
             if not self.is_lost(name) or self._mates[name].news.finished
         }
 
-    def standing(self) -> dict[str, Pose]:
-        """Those of the others that have not moved lately."""
-        return {
-            name: pose
-            for name, pose in self.others().items()
-            if self._mates[name].is_standing or self._mates[name].news.finished
-        }
+    def company(self) -> list[Companion]:
+        """The others whose place is known now, own map frame; by their names, the first one goes.
+
+        Who was on the way when it was last heard is left out after a moment: it is elsewhere.
+        """
+        frames, found = self.frames, []
+        for name in sorted(self.others()):
+            mate = self._mates[name]
+            is_fresh = self._stamp - mate.seen <= _FRESH_S
+            if is_fresh or mate.is_standing or mate.news.finished:
+                one = Companion(name, mate.map_base, name < self.name, mate.course)
+                found.append(company.moved(one, frames[name]))
+        return found
 
     # -- which frontier is whose -------------------------------------------------------------------
 

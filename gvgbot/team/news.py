@@ -49,7 +49,22 @@ class Frame(msgspec.Struct, frozen=True, array_like=True):
     pose: tuple[float, float, float]
 
 
-class News(msgspec.Struct, frozen=True, kw_only=True):
+class Course(msgspec.Struct, frozen=True, kw_only=True, tag="course"):
+    """Where a robot is and what it drives along: told more often than all the rest."""
+
+    robot: str
+    life: int
+    sequence: int  # of the courses
+    pose: tuple[float, float, float]  # map_base
+    line: bytes  # little-endian float32 pairs x, y, m, map frame
+
+    @property
+    def points(self) -> Array:
+        """What it drives along (N, 2), m, its map frame."""
+        return np.frombuffer(self.line, "<f4").reshape(-1, 2).astype(np.float64)
+
+
+class News(msgspec.Struct, frozen=True, kw_only=True, tag="news"):
     """All that a robot tells its team."""
 
     robot: str
@@ -73,18 +88,29 @@ class News(msgspec.Struct, frozen=True, kw_only=True):
         )
 
 
-def encode(news: News) -> bytes:
-    """The news in MessagePack."""
-    return msgspec.msgpack.encode(news)
+def encode(told: News | Course) -> bytes:
+    """What is told in MessagePack."""
+    return msgspec.msgpack.encode(told)
 
 
-def decode(data: bytes) -> News:
+def decode(data: bytes) -> News | Course:
     """What `encode` wrote. Raises GvgbotError if it is damaged, or does not hang together."""
     try:
-        news = msgspec.msgpack.decode(data, type=News)
-        chart = news.chart
+        told = msgspec.msgpack.decode(data, type=News | Course)
+        if isinstance(told, Course):
+            return _checked_course(told)
+        return _checked(told, told.chart)
     except (msgspec.MsgspecError, ValueError) as error:
         raise GvgbotError(f"damaged news of a team: {error}") from error
+
+
+def _checked_course(course: Course) -> Course:
+    if not (np.isfinite(course.pose).all() and np.isfinite(course.points).all()):
+        raise ValueError("a course leads nowhere")
+    return course
+
+
+def _checked(news: News, chart: Chart) -> News:
     for edge in chart.edges.values():
         for end in (edge.a, edge.b):
             vertex = chart.vertices.get(end.vertex)

@@ -20,7 +20,7 @@ def test_what_one_robot_tells_its_team_is_heard_by_the_other() -> None:
             async with asyncio.timeout(15), asyncio.TaskGroup() as tasks:
                 listening = tasks.create_task(two.hear_team(heard.put_nowait))
                 while heard.empty():  # until they have found each other
-                    one.tell_team(b"\x00 what one has seen \xff")
+                    one.tell_team("team", b"\x00 what one has seen \xff")
                     await asyncio.sleep(0.05)
                 listening.cancel()
         return heard.get_nowait()

@@ -10,6 +10,7 @@ from gvgbot.autonomy.pipeline import AutonomyConfig, Pipeline
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.live_team import LiveTeam
 from gvgbot.team.member import TeamConfig
+from gvgbot.topics import TeamPart
 
 CONFIG = TeamConfig(enabled=True)
 
@@ -21,9 +22,9 @@ class Air:
         self.ears: list[asyncio.Queue[bytes]] = []
         self.is_cut = False
 
-    def tell_team(self, news: bytes) -> None:
+    def tell_team(self, part: TeamPart, data: bytes) -> None:
         for ear in self.ears if not self.is_cut else ():
-            ear.put_nowait(news)
+            ear.put_nowait(data)
 
     async def hear_team(self, handle: Callable[[bytes], None]) -> None:
         ear = asyncio.Queue[bytes]()
@@ -72,9 +73,9 @@ def test_robots_hear_of_each_other_and_lose_each_other() -> None:
 @pytest.mark.parametrize("noise", [b"", b"\xff" * 40, b"\x80"])
 def test_noise_from_the_network_changes_nothing(noise: bytes) -> None:
     async def scene(air: Air, parts: list[LiveTeam]) -> None:
-        air.tell_team(noise)
+        air.tell_team("team", noise)
         await asyncio.sleep(5.0)
-        air.tell_team(noise)
+        air.tell_team("team", noise)
         await asyncio.sleep(5.0)
         assert not parts[0].member.is_lost("two")
 

@@ -90,6 +90,7 @@ PLAIN = {
         "reconnects": 2,
         "clock_offset": None,
     },
+    "team": [],
 }
 
 

@@ -47,6 +47,6 @@ def test_the_liveliness_token_is_listed() -> None:
 
 
 def test_what_travels_within_a_payload_is_explained_too() -> None:
-    text = section(STATE).split("\n### LinkHealth\n")[1]
+    text = section(STATE).split("\n### LinkHealth\n")[1].split("\n### ")[0]
     rows = [line.split("|")[1].strip() for line in text.splitlines() if line[:2] == "| "]
     assert rows == ["field", *(f"`{name}`" for name in LinkHealth.__struct_fields__)]

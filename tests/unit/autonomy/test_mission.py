@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from gvgbot.autonomy.control.company import Companion
 from gvgbot.autonomy.events import Decision, Event, Finished, Recovery
 from gvgbot.autonomy.gvg.local import LocalGvg
 from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
@@ -196,6 +197,21 @@ def test_a_robot_that_cannot_move_gives_up_its_target_after_its_patience() -> No
     half = robot.mapper.graph.half_edge(first)
     assert half is not None
     assert half.blocked
+
+
+def test_who_has_nowhere_to_go_but_past_one_that_goes_first_makes_way() -> None:
+    """Held up west of the tee by a robot behind it, until every way is closed for a while."""
+    robot = Robot()
+    robot.stand(TEE, 8)
+    begin, order = robot.stamp, robot.look(TEE)
+    while robot.mission.target is not None and robot.stamp < begin + 60.0:
+        robot.mission.meet(robot.pose, [Companion("other", Pose(-1.0, 0.0, 0.0), goes_first=True)])
+        robot.mission.hold()
+        order = robot.look(TEE)
+    assert robot.stamp - begin < 2 * CONFIG.in_the_way_s  # three ways, a third of that for each
+    assert end_of(order) == pytest.approx((3.0, -4.0))
+    robot.mission.meet(robot.pose, [Companion("other", Pose(-1.0, 0.0, 0.0), goes_first=False)])
+    assert isinstance(robot.look(TEE), Stand)
 
 
 def test_to_and_fro_on_the_spot_is_no_progress() -> None:

@@ -229,3 +229,18 @@ def test_a_laser_that_tells_nothing_shows_nobody() -> None:
     blind = replace(scan, ranges=np.full_like(scan.ranges, np.nan))
     watch = Watch(EMPTY)
     assert np.isnan(watch.newcomers.sift(blind, HERE, watch.map).ranges).all()
+
+
+def test_a_glance_shows_where_somebody_near_has_gone_and_adds_nobody() -> None:
+    watch = Watch(EMPTY)
+    watch.dropped(EMPTY, person=(2.0, 0.0))
+    scan = sweep(EMPTY, HERE)
+    for person in ((2.3, 0.4), (-2.0, 0.0)):
+        seen = replace(scan, ranges=np.minimum(scan.ranges, to_disc(scan.bearings, person)))
+        watch.newcomers.glance(seen, HERE)
+        latest = [centre for centre, _ in watch.newcomers.latest]
+        is_followed = person[0] > 0.0  # whoever else is there has not been looked at yet
+        assert len(latest) == is_followed
+        if is_followed:
+            assert np.hypot(*(latest[0] - person)) < 0.1
+    assert np.hypot(*(watch.newcomers.discs[0][0] - [2.0, 0.0])) < 0.1

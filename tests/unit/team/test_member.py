@@ -1,16 +1,22 @@
+import copy
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
 from gvgbot.autonomy.exploration.paths import Approach
 from gvgbot.autonomy.slam.graph import Edge, GvgGraph, HalfEdge, HalfEdgeId, Vertex
-from gvgbot.geometry import Pose
+from gvgbot.geometry import Array, Pose
 from gvgbot.team.chart import Chart
 from gvgbot.team.member import Member, TeamConfig
 from gvgbot.team.news import decode, encode
 from tests.unit.team.building import Building, irregular
 
-START = {"one": Pose(3.0, -2.0, 0.7), "two": Pose(11.0, 6.0, -2.4)}
+START = {
+    "one": Pose(3.0, -2.0, 0.7),
+    "two": Pose(11.0, 6.0, -2.4),
+    "three": Pose(5.0, 5.0, 1.0),
+}
 LEFT, RIGHT = {0, 1, 2, 3, 5, 6, 7, 8, 10, 11, 12, 13}, {1, 2, 3, 6, 7, 8, 11, 12, 13, 14, 9, 4}
 CONFIG = TeamConfig(enabled=True)
 
@@ -27,10 +33,16 @@ class Robot:
         start = Approach(0.0, HalfEdgeId(self.at, -1))
         return self.member.choose(graph_of(self.chart), [start])
 
-    def tell(self, stamp: float, *others: "Robot", finished: bool = False) -> None:
-        news = encode(self.member.news(stamp, Pose(), 0.0, finished=finished))
+    def tell(
+        self, stamp: float, *others: "Robot", finished: bool = False, at: Pose | None = None
+    ) -> None:
+        news = encode(self.member.news(stamp, at or Pose(), 0.0, finished=finished))
         for other in others:
             other.member.hear(decode(news), stamp)
+
+    def steer(self, stamp: float, other: "Robot", map_base: Pose, track: Array) -> None:
+        course = encode(self.member.course(stamp, map_base, track))
+        other.member.hear(decode(course), stamp)
 
 
 def graph_of(chart: Chart) -> GvgGraph:
@@ -48,9 +60,14 @@ def robot(name: str, building: Building, seen: set[int], at: int) -> Robot:
     return Robot(Member(name, CONFIG, lambda: chart), chart, at)
 
 
-def team(seed: int = 1) -> tuple[Robot, Robot]:
+def team() -> tuple[Robot, Robot]:
     """Two robots that have told each other what they know, and laid it on each other."""
-    building = irregular(seed)
+    return copy.deepcopy(_met())
+
+
+@cache
+def _met() -> tuple[Robot, Robot]:
+    building = irregular(1)
     one, two = robot("one", building, LEFT, 0), robot("two", building, RIGHT, 14)
     for _ in range(2):
         one.tell(0.0, two)
@@ -118,3 +135,80 @@ def test_old_news_do_not_replace_new_ones_and_a_restart_begins_anew() -> None:
     restarted = Member("two", CONFIG, lambda: two.chart, life=1)
     one.member.hear(restarted.news(5.0, Pose(), 0.0, finished=False), 5.0)
     assert "two" not in one.member.frames  # its map frame is another one now
+
+
+def is_joined(one: Robot, two: Robot) -> bool:
+    """Whether one has laid the other's map where it belongs."""
+    pose = one.member.frames.get(two.member.name)
+    true = START[one.member.name].to(START[two.member.name])
+    return pose is not None and pose.distance(true) < 0.05
+
+
+def test_after_a_minute_without_network_robots_go_on_together() -> None:
+    one, two = team()
+    for stamp in np.arange(2.0, 62.0, 2.0).tolist():  # each for itself
+        one.tell(stamp)
+        two.tell(stamp)
+    assert one.member.is_lost("two")
+    assert one.member.company() == []
+    one.tell(64.0, two)
+    two.tell(64.0, one)
+    assert not one.member.is_lost("two")
+    assert is_joined(one, two)
+    assert is_joined(two, one)
+    assert len(one.member.company()) == 1
+
+
+def test_a_robot_that_comes_late_or_begins_anew_is_joined() -> None:
+    one, two = team()
+    three = robot("three", irregular(1), LEFT, 0)
+    for stamp in (100.0, 102.0):
+        three.tell(stamp, one, two)
+        one.tell(stamp, three)
+    one.member.look(103.0)
+    three.member.look(103.0)
+    assert is_joined(one, three)
+    assert is_joined(three, one)
+    again = robot("two", irregular(1), RIGHT, 14)
+    again.member = Member("two", CONFIG, lambda: again.chart, life=1)
+    again.tell(120.0, one)
+    assert "two" not in one.member.frames
+    one.member.look(121.0)
+    assert is_joined(one, again)
+
+
+def test_company_is_where_the_newest_course_says_and_leads_along_it() -> None:
+    one, two = team()
+    map_base, track = Pose(2.0, 1.0, 0.3), np.array([[2.0, 1.0], [3.0, 1.3]])
+    two.steer(2.0, one, map_base, track)
+    (companion,) = one.member.company()
+    true = START["one"].inverse().compose(START["two"])
+    assert companion.pose.distance(true.compose(map_base)) < 0.05
+    assert np.abs(companion.course[0] - true.transform(track[0])).max() < 0.05
+    assert not companion.goes_first
+    one.steer(2.0, two, Pose(), np.zeros((0, 2)))
+    assert [other.goes_first for other in two.member.company()] == [True]
+
+
+def test_who_drives_and_falls_silent_is_not_believed_to_be_there_for_long() -> None:
+    one, two = team()
+    two.steer(2.0, one, Pose(1.0, 0.0, 0.0), np.zeros((0, 2)))
+    two.tell(2.0, one, at=Pose(1.0, 0.0, 0.0))
+    assert len(one.member.company()) == 1
+    one.tell(4.0)
+    assert one.member.company() == []
+    two.tell(5.0, one, at=Pose(1.0, 0.0, 0.0))  # it stands there
+    one.tell(9.0)
+    assert len(one.member.company()) == 1
+    two.tell(10.0, one, finished=True, at=Pose(1.0, 0.0, 0.0))
+    one.tell(100.0)
+    assert len(one.member.company()) == 1
+
+
+def test_an_old_course_changes_nothing() -> None:
+    one, two = team()
+    old = two.member.course(3.0, Pose(5.0, 5.0, 0.0), np.zeros((0, 2)))
+    two.steer(3.2, one, Pose(1.0, 0.0, 0.0), np.zeros((0, 2)))
+    there = one.member.company()[0].pose
+    one.member.hear(old, 3.3)
+    assert one.member.company()[0].pose == there

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from gvgbot.errors import GvgbotError
 from gvgbot.geometry import Pose
 from gvgbot.team.chart import Chart
-from gvgbot.team.news import Claim, Frame, News, decode, encode, told_edges, told_vertices
+from gvgbot.team.news import Claim, Course, Frame, News, decode, encode, told_edges, told_vertices
 from tests.unit.team.building import irregular
 
 CHART = irregular(1).chart({0, 1, 2, 5, 6, 7}, Pose(3.0, -2.0, 0.7))
@@ -31,6 +31,7 @@ def news(chart: Chart) -> News:
 
 def test_a_chart_arrives_as_it_was_to_the_centimetre() -> None:
     heard = decode(encode(news(CHART)))
+    assert isinstance(heard, News)
     assert heard.claim == Claim(1.0, 2.0, 0.1, 12.0)
     assert heard.frames == (Frame("two", (4.0, 5.0, 0.6)),)
     chart = heard.chart
@@ -55,6 +56,7 @@ def test_damaged_news_are_refused_or_whole(data: st.DataObject) -> None:
         heard = decode(bytes(told))
     except GvgbotError:
         return
+    assert isinstance(heard, News)
     ends = {end.vertex for e in heard.chart.edges.values() for end in (e.a, e.b)}
     assert ends <= heard.chart.vertices.keys()
 
@@ -66,3 +68,19 @@ def test_an_edge_that_ends_nowhere_is_refused() -> None:
     damaged = msgspec.structs.replace(told, vertices=others)
     with pytest.raises(GvgbotError, match="ends nowhere"):
         decode(encode(damaged))
+
+
+def test_a_course_arrives_as_it_was() -> None:
+    line = np.array([[1.0, 2.0], [3.0, -4.5]], "<f4")
+    course = Course(robot="one", life=3, sequence=7, pose=(1.0, 2.0, 0.5), line=line.tobytes())
+    heard = decode(encode(course))
+    assert heard == course
+    assert isinstance(heard, Course)
+    np.testing.assert_array_equal(heard.points, line)
+
+
+@pytest.mark.parametrize("line", [b"\x00" * 7, np.array([np.nan, 0.0], "<f4").tobytes()])
+def test_a_damaged_course_is_refused(line: bytes) -> None:
+    course = Course(robot="one", life=3, sequence=7, pose=(1.0, 2.0, 0.5), line=line)
+    with pytest.raises(GvgbotError, match="damaged"):
+        decode(encode(course))

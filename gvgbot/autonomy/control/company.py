@@ -1,0 +1,109 @@
+"""Driving among other robots: never nearer than both need to stop, and out of each other's way."""
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from gvgbot.autonomy.gvg.local import Branch, LocalGvg, Place
+from gvgbot.geometry import Array, Pose, Twist
+from gvgbot.hal.sweep import free_distance
+
+_KEPT_M = 0.12  # between two bodies, always,
+_BLUR_M = 0.09  # and so much more where there is room
+_ROOM_FOR_BOTH_M = 0.3  # between two robots, before either has to be slow
+_BOTH_BRAKE_MPS2 = 0.5  # of each, so that two that come towards each other stop
+_CREEP_MPS = 0.02  # slower than this is a stop
+_FACING_M = 1.6  # from middle to middle: who is as near may be held up by the other
+_SOONER, _LATER = 0.3, 2.0  # shares of the usual patience
+_ASIDE_M = 0.5  # beyond the disc of a vertex, another robot can pass it
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Companion:
+    """Another robot: where it is, and what it drives along (N, 2), m; both in one frame."""
+
+    name: str
+    pose: Pose
+    goes_first: bool  # by a rule that both know
+    course: Array = field(default_factory=lambda: np.empty((0, 2)))
+
+
+def moved(companion: Companion, pose: Pose) -> Companion:
+    """The companion in the frame in which its frame has this pose."""
+    course = pose.transform(companion.course)
+    return replace(companion, pose=pose.compose(companion.pose), course=course)
+
+
+def careful(
+    twist: Twist, discs: list[tuple[Array, float]], radius: float, least_speed: float
+) -> Twist:
+    """The twist, slow enough to stop with room for whoever is ahead and comes as fast.
+
+    `discs` are others by centre (2,), base frame, and radius, m. With room beside them it is not
+    slower than `least_speed`, m/s; what leads closer to them than is safe is a stop.
+    """
+    if twist.linear <= 0.0 or not discs:
+        return twist
+    limit = min(_safe_speed(twist, centre, radius + r, least_speed) for centre, r in discs)
+    if limit < _CREEP_MPS:
+        return Twist(0.0, twist.angular)
+    if twist.linear <= limit:
+        return twist
+    return Twist(limit, twist.angular * limit / twist.linear)
+
+
+def _safe_speed(twist: Twist, centre: Array, touch: float, least_speed: float) -> float:
+    """The speed at which the robot may pass one disc, whose middle it would touch at `touch` m."""
+    x, y = centre[:1], centre[1:]
+    if x[0] <= 0.0:
+        return math.inf
+    free = free_distance((x, y), twist, radius=touch + _KEPT_M, margin=_BLUR_M)
+    gap = float(np.hypot(*centre)) - touch - _ROOM_FOR_BOTH_M
+    slow = max(math.sqrt(_BOTH_BRAKE_MPS2 * max(0.0, gap)), least_speed)
+    return min(slow, math.sqrt(_BOTH_BRAKE_MPS2 * free))
+
+
+def patience(local_base: Pose, company: list[Companion]) -> float:
+    """How long to wait for what is in the way, as a share of the usual time.
+
+    Of two that hold each other up, one tries another way soon, and the other one lets it.
+    """
+    near = [one for one in company if one.pose.distance(local_base) < _FACING_M]
+    if not near:
+        return 1.0
+    return _SOONER if any(one.goes_first for one in near) else _LATER
+
+
+def in_front(local_base: Pose, company: list[Companion]) -> Companion | None:
+    """The nearest one that has the right of way, if it is so near that it may wait for this one."""
+    near = [one for one in company if one.goes_first and one.pose.distance(local_base) < _FACING_M]
+    return min(near, key=lambda one: one.pose.distance(local_base), default=None)
+
+
+def refuge(gvg: LocalGvg, place: Place, other: Array) -> tuple[Branch, ...] | None:
+    """The way to the nearest side branch in which the robot lets another one (2,) pass.
+
+    None if there is no such way that leads away from it.
+    """
+    ways = []
+    for node, (metres, path) in gvg.routes(place).items():
+        if not gvg.nodes[node].is_meetpoint:
+            continue
+        for branch in gvg.nodes[node].branches:
+            if branch == Branch(path[-1].edge, not path[-1].forward):
+                continue
+            way = (*path, branch)
+            line, _ = gvg.line_from(place, way)
+            away = np.hypot(*(line - other).T)
+            is_deep = gvg.edges[branch.edge].length > gvg.nodes[node].clearance + _ASIDE_M
+            if is_deep and away.min() > away[0] - 2 * _KEPT_M:
+                ways.append((metres, _straightness(gvg, way), way))
+    return min(ways)[2] if ways else None
+
+
+def _straightness(gvg: LocalGvg, way: tuple[Branch, ...]) -> float:
+    """How much a way goes straight on at its last node: 1 for that, 0 for a right angle."""
+    arrived = Branch(way[-2].edge, not way[-2].forward)
+    clearance = gvg.nodes[gvg.end_of(way[-2])].clearance
+    return -math.cos(gvg.bearing(way[-1], clearance) - gvg.bearing(arrived, clearance))

@@ -1,0 +1,131 @@
+"""Robots that meet: two discs with brakes on a plane, and junctions drawn by hand."""
+
+import math
+
+import numpy as np
+import pytest
+
+from gvgbot.autonomy.control.company import Companion, careful, in_front, patience, refuge
+from gvgbot.autonomy.gvg.local import Branch
+from gvgbot.geometry import Array, Pose, Twist
+from tests.unit.autonomy.local_graphs import drawn
+
+RADIUS = 0.177  # m
+FULL, SLOW = 0.6, 0.15  # m/s
+BRAKE, CYCLE = 1.0, 0.02  # m/s^2, s
+LEAST_GAP = 0.1  # m between two bodies
+
+# A corridor from west to east with a side branch to the south at x = 3.
+TEE = drawn(
+    {1: (-3.0, 0.0), 2: (3.0, 0.0), 3: (8.0, 0.0), 4: (3.0, -4.0)},
+    {10: (1, 2, []), 11: (2, 3, []), 12: (2, 4, [])},
+)
+
+
+class Disc:
+    """A robot that drives straight on at full speed, as far as care lets it."""
+
+    def __init__(self, pose: Pose) -> None:
+        self.pose, self.speed = pose, FULL
+
+    def drive(self, other: Array) -> None:
+        """One cycle by what it knows of where the other one is."""
+        seen = self.pose.inverse().transform(other)
+        wish = careful(Twist(FULL, 0.0), [(seen, RADIUS)], RADIUS, SLOW).linear
+        self.speed = max(wish, self.speed - BRAKE * CYCLE)
+        self.pose = self.pose.compose(Pose(self.speed * CYCLE, 0.0, 0.0))
+
+
+def least_gap(one: Disc, two: Disc, *, told_every: int) -> float:
+    """Between both in half a minute, told only now and then where the other is."""
+    gaps, told = [], (one.pose.position, two.pose.position)
+    for cycle in range(round(30.0 / CYCLE)):
+        if cycle % told_every == 0:
+            told = one.pose.position, two.pose.position
+        one.drive(told[1])
+        two.drive(told[0])
+        gaps.append(one.pose.distance(two.pose) - 2 * RADIUS)
+    return min(gaps)
+
+
+@pytest.mark.parametrize("aside", [0.0, 0.1, 0.2, 0.3, 0.4])
+@pytest.mark.parametrize("told_every", [1, 10])
+def test_two_that_drive_at_each_other_keep_apart(aside: float, told_every: int) -> None:
+    one, two = Disc(Pose(0.0, 0.0, 0.0)), Disc(Pose(6.0, aside, math.pi))
+    assert least_gap(one, two, told_every=told_every) >= LEAST_GAP
+
+
+@pytest.mark.parametrize("bearing", [0.5, 1.0, 1.57, 2.2])
+def test_two_whose_ways_cross_keep_apart(bearing: float) -> None:
+    two = Disc(Pose(4.0, 0.0, bearing).compose(Pose(-4.0, 0.0, 0.0)))
+    assert least_gap(Disc(Pose()), two, told_every=10) >= LEAST_GAP
+
+
+def test_two_with_room_between_them_pass_each_other_slowly() -> None:
+    one, two = Disc(Pose(0.0, 0.0, 0.0)), Disc(Pose(6.0, 2 * RADIUS + 0.25, math.pi))
+    speeds = []
+    for _ in range(round(30.0 / CYCLE)):
+        here, there = one.pose.position, two.pose.position
+        one.drive(there)
+        two.drive(here)
+        speeds.append(one.speed)
+    assert one.pose.x > 6.0
+    assert two.pose.x < 0.0
+    assert SLOW <= min(speeds) < 0.3
+
+
+def test_who_is_behind_or_far_away_holds_nobody_up() -> None:
+    twist = Twist(FULL, 0.3)
+    for place in ((-0.6, 0.0), (-0.5, 0.3), (5.0, 0.0)):
+        assert careful(twist, [(np.array(place), RADIUS)], RADIUS, SLOW) == twist
+
+
+def test_a_slower_robot_stays_on_its_arc_and_may_turn_where_it_stands() -> None:
+    wish = Twist(FULL, 0.4)
+    slower = careful(wish, [(np.array([1.2, 0.1]), RADIUS)], RADIUS, SLOW)
+    assert 0.0 < slower.linear < FULL
+    assert slower.angular / slower.linear == pytest.approx(0.4 / FULL)
+    stopped = careful(wish, [(np.array([0.4, 0.0]), RADIUS)], RADIUS, SLOW)
+    assert stopped == Twist(0.0, 0.4)
+
+
+@pytest.mark.parametrize(
+    ("others", "impatient"),
+    [
+        ([(1.0, True)], True),
+        ([(1.0, False)], False),
+        ([(1.0, False), (1.2, True)], True),
+        ([(3.0, True)], None),
+        ([], None),
+    ],
+)
+def test_of_two_that_hold_each_other_up_the_later_one_tries_another_way_first(
+    others: list[tuple[float, bool]], impatient: bool | None
+) -> None:
+    company = [Companion("other", Pose(x, 0.0, 0.0), first) for x, first in others]
+    share = patience(Pose(), company)
+    assert (share < 1.0, share > 1.0) == (impatient is True, impatient is False)
+
+
+def test_the_nearest_one_that_goes_first_is_the_one_to_make_way_for() -> None:
+    far, near, later = (
+        Companion("other", Pose(x, 0.0, 0.0), first)
+        for x, first in ((1.5, True), (1.1, True), (0.8, False))
+    )
+    assert in_front(Pose(), [far, later, near]) is near
+    assert in_front(Pose(), [later]) is None
+
+
+def way_out(x: float, other: float) -> tuple[Branch, ...] | None:
+    place = TEE.place(np.array([x, 0.0]))
+    assert place is not None
+    return refuge(TEE, place, np.array([other, 0.0]))
+
+
+def test_the_refuge_is_the_side_branch_of_the_next_junction_away_from_the_other() -> None:
+    assert way_out(1.0, -0.3) == (Branch(10, forward=True), Branch(12, forward=True))
+    assert way_out(5.0, 6.3) == (Branch(11, forward=False), Branch(12, forward=True))
+
+
+def test_there_is_no_refuge_beyond_the_other() -> None:
+    assert way_out(1.0, 1.9) is None
