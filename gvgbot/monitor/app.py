@@ -99,6 +99,7 @@ async def _watch(robot: Robot, show: Show) -> None:
             _way(trajectory.latest, state),
             robot.plan().latest,
             None if state is None else state.pose,
+            () if state is None else tuple(mate.pose for mate in state.team),
         )
         picture = Picture(
             headline(robot.name, presence, state, others),

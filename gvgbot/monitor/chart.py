@@ -11,10 +11,10 @@ from gvgbot.monitor.braille import Dots, lit, patterns
 from gvgbot.monitor.view import Points, View
 from gvgbot.topics import Map, Plan, Raster
 
-Layer = Literal["empty", "wall", "trail", "edge", "plan", "frontier", "vertex", "robot"]
+Layer = Literal["empty", "wall", "trail", "edge", "plan", "frontier", "vertex", "mate", "robot"]
 
 LAYERS: tuple[Layer, ...] = (
-    *("empty", "wall", "trail", "edge", "plan", "frontier", "vertex", "robot"),
+    *("empty", "wall", "trail", "edge", "plan", "frontier", "vertex", "mate", "robot"),
 )
 _OCCUPIED = 65  # percent, as map_server has it
 _ARROWS = "→↗↑↖←↙↓↘"
@@ -33,6 +33,7 @@ class Scene:
     trail: Points = field(default_factory=lambda: np.zeros((0, 2)))
     plan: Plan | None = None
     pose: tuple[float, float, float] | None = None
+    team: tuple[tuple[float, float, float], ...] = ()  # poses of other robots
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,6 +68,8 @@ def chart(scene: Scene, width: int, height: int) -> Chart:
         canvas.lay("plan", _drawn(view, [scene.plan.ahead, scene.plan.further]))
     if scene.graph is not None:
         _mark_vertices(canvas, scene.graph)
+    for x, y, theta in scene.team:
+        canvas.mark("mate", (x, y), _arrow(theta))
     if scene.pose is not None:
         canvas.mark("robot", scene.pose[:2], _arrow(scene.pose[2]))
     return Chart(canvas.codes, canvas.layers, floor, 2.0 * view.metres_per_dot)
@@ -104,6 +107,7 @@ def _box(scene: Scene) -> tuple[Points, Points]:
     points = [np.zeros((1, 2)), scene.trail]
     if scene.pose is not None:
         points.append(np.array([scene.pose[:2]]))
+    points.append(np.array([pose[:2] for pose in scene.team]).reshape(-1, 2))
     if scene.floor is not None:
         points.append(_cells(scene.floor, scene.floor.cells >= 0))
     if scene.graph is not None:

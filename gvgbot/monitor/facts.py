@@ -12,6 +12,7 @@ Tone = Literal["plain", "good", "warning", "bad", "faint"]
 _STUCK_AFTER = 1.0  # s without a control cycle
 _LOW_BATTERY = 0.2  # of a full charge
 _GAUGE = 8  # characters
+_LONGEST_NAME = 9  # characters, of another robot
 _QUIET = {"edge_joined"}  # too many of them, and they say little
 _PHASES: Mapping[str, Tone] = {
     "starting": "warning",
@@ -52,6 +53,8 @@ def facts(state: State, plan: Plan | None, health: Health | None) -> Iterator[Fa
     yield Fact("base", *_link(state.base))
     yield Fact("control", *_control(state, health))
     yield Fact("program", *_program(health))
+    for mate in state.team:
+        yield Fact(mate.name[:_LONGEST_NAME], f"{mate.pose[0]:.2f} {mate.pose[1]:.2f} m")
 
 
 def _tone_of_phase(state: State) -> Tone:

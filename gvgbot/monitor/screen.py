@@ -20,6 +20,7 @@ _COLOURS: dict[Layer, str] = {
     "plan": "magenta",
     "frontier": "bold magenta",
     "vertex": "bold green",
+    "mate": "bold yellow",
     "robot": "bold red",
 }
 _FLOOR = " on grey15"

@@ -54,6 +54,7 @@ function takeState(value) {
   if (state !== null && value.sequence < state.sequence) picture.forget(); // it began anew
   state = value;
   picture.covariance = value.covariance;
+  picture.team = value.team ?? [];
   picture.setPose(value.pose, value.stamp);
   sigmaPlot.add(value.stamp, words.sigma(value));
   batteryPlot.add(value.stamp, value.battery_fraction);

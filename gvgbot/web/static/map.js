@@ -25,6 +25,7 @@ export class MapPicture {
     this.shown = new Set(LAYERS.map(([name]) => name));
     this.known = this.plan = this.scan = this.pose = this.covariance = this.selected = this.tapped = null;
     this.floor = null;
+    this.team = [];
     this.trail = []; // x, y and so on
     this.way = []; // [stamp, x, y] since the trail was made
   }
@@ -96,6 +97,7 @@ export class MapPicture {
       if (this.shown.has(name)) layers[name]();
     }
     this.drawTapped();
+    this.drawTeam();
     this.drawRobot();
   }
 
@@ -237,22 +239,36 @@ export class MapPicture {
     }
   }
 
+  drawTeam() {
+    this.c.font = "12px sans-serif";
+    this.c.fillStyle = this.colours.trail;
+    for (const { name, pose } of this.team) {
+      this.drawArrow(pose, this.colours.trail);
+      const [px, py] = this.view.toScreen(pose[0], pose[1]);
+      this.c.fillText(name, px + 14, py - 10);
+    }
+  }
+
   drawRobot() {
     if (this.pose === null) return;
     if (this.covariance !== null && this.shown.has("ellipses")) {
       this.ellipse(this.pose[0], this.pose[1], this.covariance[0], this.covariance[1], this.covariance[4]);
     }
+    this.drawArrow(this.pose, this.colours.robot);
+  }
+
+  drawArrow(pose, colour) {
     const c = this.c, size = Math.max(10, 0.2 * this.view.scale);
     c.save();
-    c.translate(...this.view.toScreen(this.pose[0], this.pose[1]));
-    c.rotate(-this.pose[2]);
+    c.translate(...this.view.toScreen(pose[0], pose[1]));
+    c.rotate(-pose[2]);
     c.beginPath();
     c.moveTo(1.35 * size, 0);
     c.lineTo(-0.85 * size, 0.85 * size);
     c.lineTo(-0.45 * size, 0);
     c.lineTo(-0.85 * size, -0.85 * size);
     c.closePath();
-    c.fillStyle = this.colours.robot;
+    c.fillStyle = colour;
     c.fill();
     c.strokeStyle = this.colours.paper;
     c.lineWidth = 1.5;

@@ -46,6 +46,7 @@ export function facts(state, plan) {
     ["control", ...control(state)],
     ["guard", state.guard ?? "free", state.guard ? "warning" : "plain"],
     ["contacts", contacts(state), state.contacts || state.slips ? "warning" : "plain"],
+    ...(state.team ?? []).map(({ name, pose }) => [name, `${pose[0].toFixed(2)}, ${pose[1].toFixed(2)} m`, "plain"]),
   ];
 }
 

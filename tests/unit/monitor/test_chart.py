@@ -135,6 +135,17 @@ def test_vertices_frontiers_and_the_robot_are_signs_where_they_are() -> None:
     assert found.text() == ["       ○", "    →   ", "?       ", "● ?     "]
 
 
+def test_other_robots_are_arrows_of_a_layer_of_their_own() -> None:
+    team = ((1.0, 1.0, math.pi / 2), (15.0, 15.0, math.pi))
+    scene = Scene(floor=a_floor(EMPTY, origin=HALF), pose=(8.0, 9.0, 0.0), team=team)
+    found = chart(scene, 8, 4)
+    assert found.text() == ["       ←", "    →   ", "        ", "↑       "]
+    mates = found.layers == LAYERS.index("mate")
+    assert mates[3, 0]
+    assert mates[0, 7]
+    assert mates.sum() == len(team)
+
+
 @pytest.mark.parametrize(
     ("degrees", "arrow"),
     [

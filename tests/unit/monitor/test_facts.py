@@ -7,6 +7,7 @@ import pytest
 
 from gvgbot.client import Event, Health, Plan, Presence
 from gvgbot.monitor.facts import Fact, duration, facts, headline, told
+from gvgbot.topics import Mate
 from tests.unit.test_telemetry import EXAMPLE
 
 DECISION = Event(
@@ -156,3 +157,11 @@ def test_a_kind_of_event_that_is_not_known_yet_is_told_all_the_same() -> None:
 )
 def test_durations(seconds: float, text: str) -> None:
     assert duration(seconds) == text
+
+
+def test_each_other_robot_of_the_team_has_a_line_with_its_place() -> None:
+    team = (Mate(name="karl", pose=(3.21, -4.5, 0.0)), Mate(name="otto", pose=(0.0, 7.0, 1.0)))
+    state = msgspec.structs.replace(EXAMPLE, team=team)
+    lines = {fact.name: fact.text for fact in facts(state, None, None)}
+    assert lines["karl"] == "3.21 -4.50 m"
+    assert lines["otto"] == "0.00 7.00 m"
