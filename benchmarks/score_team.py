@@ -31,7 +31,7 @@ def score_team(run: Path) -> dict[str, Any]:
     each = {name: json.loads((run / name / "summary.json").read_text("utf-8")) for name in names}
     starts = {name: Pose(*each[name]["config"]["twin"]["start"]) for name in names}
     radius = each[names[0]]["config"]["robot"]["radius_m"]
-    world, start = load_world(run / "world.yaml"), starts[names[0]]
+    world, start = load_world(run / "world.yaml"), starts[summary["joined"][0]]
     route = geojson.decode((run / "map.geojson").read_text(encoding="utf-8"))
     ways = [np.loadtxt(run / name / "truth.tum", usecols=(0, 1, 2), ndmin=2) for name in names]
     clearances = [score_trajectory(way, world)["min_clearance_m"] for way in ways]
