@@ -162,6 +162,14 @@ def _words(event: Event) -> str:
             return f"{get('action')}: {get('reason')}"
         case "finished":
             return f"{get('outcome')}: {get('reason')}"
+        case "requested":
+            refused = "" if get("done") else " refused"
+            return f"{get('request')}{refused}: {get('answer')} ({get('origin')})"
+        case "errand_ended":
+            why = f", {get('reason')}" if get("reason") else ""
+            return f"{get('errand')} {get('outcome')}{why}"
+        case "round_ended":
+            return f"round {get('round')}: {get('reached')} reached, {get('missed')} missed"
         case _:
             said = ", ".join(f"{name} {value}" for name, value in event.details.items())
             return f"{event.kind.replace('_', ' ')}: {said}"

@@ -32,7 +32,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from gvgbot import client
 from gvgbot.requests import Answer, Asked, Goto
 from gvgbot.telemetry import Telemetry
-from gvgbot.topics import Event, Events, Health, TelemetryConfig, Trajectory
+from gvgbot.topics import Event, Events, Health, State, TelemetryConfig, Trajectory
 from gvgbot.web.server import Web
 from gvgbot.web.viewers import Audience
 from gvgbot.web.wire import Reply, Wish
@@ -321,6 +321,7 @@ class Play:
     endpoint: str
     page: Page
     sequence: int = 0
+    state: State = HERE
 
     def __post_init__(self) -> None:
         self.robot = Telemetry(TelemetryConfig(listen=(self.endpoint,)), "karl")
@@ -336,7 +337,7 @@ class Play:
         end = time.perf_counter() + PATIENCE
         while True:
             self.sequence += 1
-            self.robot.publish(msgspec.structs.replace(HERE, sequence=self.sequence))
+            self.robot.publish(msgspec.structs.replace(self.state, sequence=self.sequence))
             if self.page.look(expression):
                 return
             assert time.perf_counter() < end, (expression, self.page.text())
@@ -515,7 +516,9 @@ def test_two_fingers_zoom_on_a_phone(page: Page) -> None:
             assert page.look(f"{scale} / {text}") == pytest.approx(2 * before, rel=0.1)
 
 
-def test_a_silent_robot_one_that_left_and_a_lost_server_are_told_apart(page: Page) -> None:
+def test_a_robot_that_is_stuck_waits_is_silent_or_has_left_and_a_lost_server_are_told_apart(
+    page: Page,
+) -> None:
     endpoint = free_endpoint()
     banner = "document.querySelector('#banner').innerText"
     with web("--connect", endpoint) as address:
@@ -525,6 +528,13 @@ def test_a_silent_robot_one_that_left_and_a_lost_server_are_told_apart(page: Pag
         play = Play(endpoint, page)
         with play.robot:
             play.until("document.querySelector('#banner').hidden")
+            headline = "document.querySelector('#headline').innerText"
+            there = msgspec.structs.replace(HERE.base, connected=True)
+            waits = msgspec.structs.replace(HERE, reason="", phase="paused", base=there)
+            play.state = msgspec.structs.replace(waits, cycle_age=5.0)
+            play.until(f"{headline} === 'its control loop is stuck'")
+            play.state = waits
+            play.until(f"{headline} === 'paused'")
             page.until(f"{banner}.startsWith('quiet since 3 s')")
             assert page.look("document.querySelector('[data-request=pause]').disabled")
             play.until("document.querySelector('#banner').hidden")

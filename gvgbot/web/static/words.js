@@ -132,6 +132,9 @@ export function told(event) {
     }
     case "recovery": return [`${d.action}: ${d.reason}`, "warning"];
     case "finished": return [`${d.outcome.replaceAll("_", " ")}: ${d.reason}`, "good"];
+    case "requested": return [`${d.request}${d.done ? "" : " refused"}: ${d.answer} (${d.origin})`, "plain"];
+    case "errand_ended": return [`${d.errand} ${d.outcome}${d.reason ? `, ${d.reason}` : ""}`, "plain"];
+    case "round_ended": return [`round ${d.round}: ${d.reached} reached, ${d.missed} missed`, "plain"];
     default: {
       const said = Object.entries(d).map(([name, value]) => `${name.replaceAll("_", " ")} ${value}`);
       return [`${event.kind.replaceAll("_", " ")}: ${said.join(", ")}`, "plain"];

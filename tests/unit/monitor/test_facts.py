@@ -138,6 +138,36 @@ def test_an_event_is_a_sentence_with_its_age() -> None:
     assert told(DECISION, 13.5) == Fact("    12 s", "go to vertex 7, 90°: nearest frontier")
 
 
+@pytest.mark.parametrize(
+    ("kind", "details", "text"),
+    [
+        (
+            "requested",
+            {"request": "goto 7", "origin": "ann@desk", "done": True, "answer": "it drives"},
+            "goto 7: it drives (ann@desk)",
+        ),
+        (
+            "requested",
+            {"request": "home", "origin": "ann@desk", "done": False, "answer": "it is lifted"},
+            "home refused: it is lifted (ann@desk)",
+        ),
+        (
+            "errand_ended",
+            {"errand": "goto 7", "outcome": "given up", "reason": "no way is left"},
+            "goto 7 given up, no way is left",
+        ),
+        ("errand_ended", {"errand": "home", "outcome": "arrived", "reason": ""}, "home arrived"),
+        ("round_ended", {"round": 3, "reached": 5, "missed": 1}, "round 3: 5 reached, 1 missed"),
+    ],
+)
+def test_what_people_asked_for_is_told_in_their_words(
+    kind: str, details: dict[str, str | int | float | bool | None], text: str
+) -> None:
+    fact = told(Event(number=1, stamp=0.0, kind=kind, details=details), 0.0)
+    assert fact is not None
+    assert fact.text == text
+
+
 def test_a_kind_of_event_that_is_not_known_yet_is_told_all_the_same() -> None:
     strange = Event(number=1, stamp=0.0, kind="wheel_lost", details={"wheel": "left"})
     fact = told(strange, 0.0)
