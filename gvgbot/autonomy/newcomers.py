@@ -117,9 +117,7 @@ class Newcomers:
     @property
     def discs(self) -> list[tuple[Array, float]]:
         """Centres (2,), local frame, and radii of those seen whole not in the map, m."""
-        return [
-            (one.centre, one.radius) for one in self._all if one.is_whole and not one.is_let_in
-        ]
+        return [(one.centre, one.radius) for one in self._all if one.is_whole and not one.is_let_in]
 
     @property
     def latest(self) -> list[tuple[Array, float]]:
@@ -147,9 +145,10 @@ class Newcomers:
         return not one.is_let_in
 
     def _patience(self, one: Newcomer) -> float:
-        if not one.is_whole:
-            return min(_GLIMPSE_S, self._config.found_after_s)
-        return self._config.came_after_s if one.came else self._config.found_after_s
+        if one.came:
+            return self._config.came_after_s
+        found_after = self._config.found_after_s
+        return found_after if one.is_whole else min(_GLIMPSE_S, found_after)
 
     def _forget(self, scan: Scan, local_base: Pose, local_map: LocalMap) -> None:
         """Let those go that have gone, or whom nobody has seen long, or who are far away."""
@@ -173,14 +172,17 @@ class Newcomers:
 
     @property
     def points(self) -> Array:
-        """The rims (N, 2), local frame, of company, and of those seen whole not in the map."""
-        whole = (
+        """The rims (N, 2), local frame, of company, and of those not in the map.
+
+        Who was found half hidden is left out, for nobody knows how wide that is.
+        """
+        standing = (
             one.centre + one.radius * _RIM
             for one in self._all
-            if one.is_whole and not one.is_let_in
+            if (one.is_whole or one.came) and not one.is_let_in
         )
         others = (centre + radius * _RIM for centre, radius in self.company)
-        return np.concatenate([np.empty((0, 2)), *whole, *others])
+        return np.concatenate([np.empty((0, 2)), *standing, *others])
 
 
 class _Walls:

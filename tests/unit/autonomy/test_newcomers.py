@@ -207,11 +207,16 @@ def test_who_was_half_hidden_for_long_and_steps_forward_is_kept_out_again() -> N
     assert len(watch.newcomers.points) > 0
 
 
-def test_who_is_cut_off_where_the_sweep_ends_is_kept_out_for_a_glimpse() -> None:
+@pytest.mark.parametrize("known", [None, EMPTY])
+def test_who_is_cut_off_where_the_sweep_ends_is_waited_for_if_the_place_was_free(
+    known: World | None,
+) -> None:
     """Half of a person straight behind the laser, the other half beyond its last beam."""
-    watch = Watch(EMPTY)
+    watch = Watch(known)
     assert watch.dropped(EMPTY, person=(-2.0, 0.0)) > 0
-    assert len(watch.newcomers.points) == 0
+    assert len(watch.newcomers.points) == (0 if known is None else 12)
+    assert watch.dropped(EMPTY, 2.0, person=(-2.0, 0.0)) > 0
+    assert (watch.dropped(EMPTY, 4.0, person=(-2.0, 0.0)) > 0) == (known is not None)
 
 
 def test_the_stretch_of_wall_within_a_short_range_is_no_newcomer() -> None:
