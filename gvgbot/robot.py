@@ -30,7 +30,7 @@ from gvgbot.requests import Answer, Asked
 from gvgbot.service import Notifier
 from gvgbot.session import Session
 from gvgbot.simulation import Simulation
-from gvgbot.snapshots import state
+from gvgbot.snapshots import sign, state
 from gvgbot.steering import Steering
 from gvgbot.topics import EVENTS_KEPT, HEALTH, MAP, STATE, Event, Events, Health, Payload, State
 from gvgbot.vitals import Vitals
@@ -344,6 +344,7 @@ class Robot:
                 self._network.publish(Events(events=tuple(self._latest_events)))
                 self._told = self._happened
         self._notifier.status(status_line(now))
+        self._devices.base.show(sign(now, is_lost=self._pipeline.is_lost))
         stuck = now.cycle_age is not None and now.cycle_age > STUCK_AFTER
         if not stuck or self._devices.base.away is not None:
             self._notifier.alive()

@@ -8,9 +8,10 @@ from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.ekf import Belief, OdometryNoise, predict
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
 from gvgbot.geometry import STANDSTILL, Array, Pose, wrap_angle
-from gvgbot.hal.messages import Battery, Odometry, Scan
+from gvgbot.hal.messages import Battery, Odometry, Scan, Sign
 from gvgbot.topics import NOTHING_IN_RANGE, NOTHING_TRUSTED, LinkHealth, Mate, Phase, State, packed
 
+_NEEDS_SOMEBODY = ("wheel drop", "over-current", "no scan")
 _FARTHEST_MM = NOTHING_IN_RANGE - 1
 
 
@@ -77,6 +78,19 @@ def _phase(pipeline: Pipeline, away: str | None) -> Phase:
     if errands.progress is not None:
         return "errand"
     return "waiting" if errands.is_waiting else "exploring"
+
+
+def sign(now: State, *, is_lost: bool) -> Sign:
+    """What people beside the robot are shown of its state."""
+    if now.phase == "starting":
+        return "starting"
+    if now.phase == "halted" or now.guard in _NEEDS_SOMEBODY:
+        return "trouble"
+    if now.phase == "finished":
+        return "trouble" if now.outcome == "failed" else "finished"
+    if now.phase in ("paused", "waiting"):
+        return "standing"
+    return "searching" if is_lost else "busy"
 
 
 def pose_covariance(pipeline: Pipeline, odometry: Odometry | None, noise: OdometryNoise) -> Array:

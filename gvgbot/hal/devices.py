@@ -3,7 +3,7 @@
 from typing import Protocol
 
 from gvgbot.geometry import Twist
-from gvgbot.hal.messages import Battery, Contact, Odometry, Scan
+from gvgbot.hal.messages import Battery, Contact, Odometry, Scan, Sign
 
 
 class Laser(Protocol):
@@ -32,6 +32,12 @@ class Base(Protocol):
         """Send the twist now and return what the base will really do.
 
         It writes without waiting, so that a stop gets out while every task is being cancelled.
+        """
+
+    def show(self, sign: Sign) -> None:
+        """Show people what the robot is about, as far as the base can, without waiting.
+
+        A sign that is shown already costs nothing: say it as often as you like.
         """
 
     @property

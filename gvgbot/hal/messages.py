@@ -9,6 +9,10 @@ from gvgbot.geometry import Array, Pose, Twist
 
 DockBeam = Literal["near left", "near centre", "near right", "far left", "far centre", "far right"]
 
+# what a base shows to people beside it: the robot drives, looks for its place, stands until it is
+# asked for something, is done, or needs somebody
+Sign = Literal["off", "starting", "busy", "searching", "standing", "finished", "trouble"]
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scan:

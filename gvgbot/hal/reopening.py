@@ -11,7 +11,7 @@ from gvgbot.errors import DeviceLost, DeviceRefused
 from gvgbot.geometry import STANDSTILL, Twist
 from gvgbot.hal.devices import Base, Laser
 from gvgbot.hal.latest import Latest
-from gvgbot.hal.messages import Battery, Contact, Odometry, Scan
+from gvgbot.hal.messages import Battery, Contact, Odometry, Scan, Sign
 
 RETRY = 0.5  # s between losing a device, or not finding it, and trying again
 
@@ -145,6 +145,11 @@ class ReopeningBase(_Reopening[Base]):
     def drive(self, twist: Twist) -> Twist:
         """Send the twist now; what the base will really do."""
         return STANDSTILL if self._device is None else self._device.drive(twist)
+
+    def show(self, sign: Sign) -> None:
+        """Show people what the robot is about; one that comes back is to be told again."""
+        if self._device is not None:
+            self._device.show(sign)
 
     @property
     def contact(self) -> Contact | None:

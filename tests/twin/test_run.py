@@ -17,7 +17,7 @@ from gvgbot.clock import Clock
 from gvgbot.errors import DeviceLost
 from gvgbot.geometry import Pose, Twist
 from gvgbot.hal.devices import Base, Laser
-from gvgbot.hal.messages import Contact, Odometry
+from gvgbot.hal.messages import Contact, Odometry, Sign
 from gvgbot.links import Close, Links
 from gvgbot.topics import Grid
 from tests.twin.run_rig import STOP, Daemon, base_commands
@@ -226,6 +226,9 @@ class Frozen:
 
     def drive(self, twist: Twist) -> Twist:
         return twist
+
+    def show(self, sign: Sign) -> None:
+        pass
 
 
 class FrozenLinks(NoPorts):

@@ -22,12 +22,13 @@ from gvgbot.drivers.kobuki.commands import (
 )
 from gvgbot.drivers.kobuki.feedback import FeedbackReader, Identity, LinkStatistics
 from gvgbot.drivers.kobuki.limits import Accelerations, ramped, slowed
+from gvgbot.drivers.kobuki.signs import LAMPS, SIGNS
 from gvgbot.drivers.kobuki.wheel_odometry import TICK_ANGLE, WHEEL_BASE, DriveGeometry, Heading
 from gvgbot.drivers.transport import ByteStream
 from gvgbot.errors import DeviceLost
 from gvgbot.geometry import STANDSTILL, Twist
 from gvgbot.hal.latest import Latest
-from gvgbot.hal.messages import Battery, Contact, Docking, Odometry
+from gvgbot.hal.messages import Battery, Contact, Docking, Odometry, Sign
 from gvgbot.ranges import Range
 
 _STOP_REPEAT_S = 0.1  # while the base is to stand, it is told so again this often
@@ -56,6 +57,7 @@ class KobukiConfig:
     silence_stop_s: Annotated[float, Range(0.05, 2.0)] = 0.5  # without feedback: stop
     silence_lost_s: Annotated[float, Range(0.1, 10.0)] = 1.0  # without feedback: give up
     link_delay_s: Annotated[float, Range(0.0, 0.1)] = 0.0  # from measuring to arrival, at best
+    sounds: bool = True  # a tune when it is done, and one when it needs somebody
     identity_attempts: Annotated[int, Range(0, 100)] = 10  # to learn version and serial number
 
     @property
@@ -97,6 +99,7 @@ class KobukiBase:
         self._identity_asked = 0
         self._identity_due = -math.inf
         self._output = ALL_POWER
+        self._shown: Sign = "off"
         self._started = clock.now()
         self._accelerations = config.accelerations
         self._driven = -math.inf
@@ -112,6 +115,7 @@ class KobukiBase:
                 await self._listen(until=self._next_watch())
         finally:
             self._send(_STOP)
+            self.show("off")
 
     async def next_odometry(self) -> Odometry:
         """The newest odometry not handed out before; waits for one."""
@@ -130,6 +134,16 @@ class KobukiBase:
         control = BaseControl.from_twist(self._permitted(twist, before), wheel_base_mm)
         self._twist = control.twist_on(wheel_base_mm) if self._send(control) else STANDSTILL
         return self._twist
+
+    def show(self, sign: Sign) -> None:
+        """Show people what the robot is about, by lamps and, unless muted, by tunes."""
+        if sign == self._shown or self._feedback.heard < self._started:
+            return
+        self._shown = sign
+        lamps, melody = SIGNS[sign]
+        self.switch(on=lamps, off=LAMPS & ~lamps)
+        if melody is not None and self._config.sounds:
+            self.play(melody)
 
     def play(self, melody: Melody) -> None:
         """Play one of the base's tunes."""

@@ -11,7 +11,7 @@ import structlog
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.errors import DeviceLost, DeviceRefused
 from gvgbot.geometry import STANDSTILL, Pose, Twist
-from gvgbot.hal.messages import Battery, Contact, Odometry, Scan
+from gvgbot.hal.messages import Battery, Contact, Odometry, Scan, Sign
 from gvgbot.hal.reopening import Opened, ReopeningBase, ReopeningLaser
 
 
@@ -150,6 +150,7 @@ class Wheels:
 
     def __init__(self) -> None:
         self.driven: list[Twist] = []
+        self.shown: list[Sign] = []
         self.fail = asyncio.Event()
         self.contact: Contact | None = Contact(0.0, bumper_left=True)
         self.battery: Battery | None = Battery(0.0, 16.0, 0.9, charging=False)
@@ -165,6 +166,9 @@ class Wheels:
     def drive(self, twist: Twist) -> Twist:
         self.driven.append(twist)
         return twist
+
+    def show(self, sign: Sign) -> None:
+        self.shown.append(sign)
 
 
 def with_a_base(story: Callable[[ReopeningBase, list[Wheels]], Awaitable[None]]) -> None:
@@ -194,6 +198,7 @@ def test_before_it_is_opened_a_base_can_be_driven_in_vain() -> None:
     async def main() -> None:
         base = ReopeningBase(never, LoopClock())
         assert base.drive(Twist(0.3, 0.0)) == STANDSTILL
+        base.show("busy")
         assert base.contact is None
         assert base.battery is None
 
