@@ -95,7 +95,7 @@ def interrupted(world: str | None, number: int, kills: int) -> Row:
             last = lives.run([moments] * kills)
         except Exception as error:  # noqa: BLE001
             return row | {"outcome": "crashed", "reason": f"{type(error).__name__}: {error}"}
-        return row | _compared(last, lives, wanted, vertices(Path(other)))
+        return row | _ended(last, lives) | compared(wanted, vertices(Path(other)))
 
 
 class _Lifetimes:
@@ -134,7 +134,8 @@ class Damage:
         path.write_bytes(data)
 
 
-def _compared(last: Session, lives: Lives, wanted: Points, found: Points) -> Row:
+def compared(wanted: Points, found: Points) -> Row:
+    """How the vertices of a map differ from those of the map that was wanted."""
     lost, extra, offs = 0, 0, [0.0]
     for kind in wanted.keys() | found.keys():
         one, other = (points.get(kind, np.empty((0, 2))) for points in (wanted, found))
@@ -143,18 +144,28 @@ def _compared(last: Session, lives: Lives, wanted: Points, found: Points) -> Row
         near = [gaps[i, j] for i, j in pairs if gaps[i, j] < PARTNERS_M]
         lost, extra = lost + len(one) - len(near), extra + len(other) - len(near)
         offs += near
-    told = (lives.out / EVENTS).read_text(encoding="utf-8")
     return {
-        "outcome": last.pipeline.mission.outcome,
-        "reason": last.pipeline.mission.reason,
         "vertices": sum(len(points) for points in wanted.values()),
         "lost": lost,
         "extra": extra,
         "off_m": float(max(offs)),
-        "searches": told.count("look for its place on the map"),
+    }
+
+
+def _ended(last: Session, lives: Lives) -> Row:
+    return {
+        "outcome": last.pipeline.mission.outcome,
+        "reason": last.pipeline.mission.reason,
+        "searches": searches(lives.out),
         "contacts": lives.world.body.contacts,
         "duration_s": last.tally.last_stamp,
     }
+
+
+def searches(out: Path) -> int:
+    """How often a robot had to look for its place on the map."""
+    told = (out / EVENTS).read_text(encoding="utf-8")
+    return told.count("look for its place on the map")
 
 
 def vertices(out: Path) -> Points:
