@@ -17,8 +17,9 @@ import numpy as np
 from gvgbot.errors import GvgbotError, UsageError
 from gvgbot.maps.atomic_files import write_files
 
-EVENTS = "events.jsonl"
+EVENTS, EVENTS_BEFORE = "events.jsonl", "events-before.jsonl"
 SUMMARY = "summary.json"
+_MOST_EVENTS = 10_000_000  # bytes, of each of these files
 
 
 class RunDirectory:
@@ -47,7 +48,8 @@ class RunDirectory:
         run = cls(path)
         try:
             run._events.truncate(0)
-            (path / SUMMARY).unlink(missing_ok=True)
+            for name in (SUMMARY, EVENTS_BEFORE):
+                (path / name).unlink(missing_ok=True)
         except OSError as error:
             run.close()
             raise _unfit(path, error) from error
@@ -65,13 +67,25 @@ class RunDirectory:
     def append_event(self, event: object) -> None:
         """Add a line to `events.jsonl`: the fields of a dataclass after its name as `event`.
 
+        When that has become long, it takes the place of the older ones, and a new one begins.
         Raises TypeError if the event is no dataclass, GvgbotError if the line cannot be written.
         """
         line = json.dumps(record_of(event), ensure_ascii=False, allow_nan=False) + "\n"
         try:
             _write_all(self._events, line.encode())
+            if self._events.tell() > _MOST_EVENTS:
+                self._turn_over()
         except OSError as error:
             raise GvgbotError(f"cannot write {self.path / EVENTS}: {error.strerror}") from error
+
+    def _turn_over(self) -> None:
+        """Begin a new list of events; go on with the old one if that is not possible."""
+        before = self._events
+        with contextlib.suppress(OSError):
+            with contextlib.suppress(FileNotFoundError):  # an earlier attempt got so far
+                (self.path / EVENTS).replace(self.path / EVENTS_BEFORE)
+            self._events = (self.path / EVENTS).open("ab", buffering=0)
+            before.close()
 
     def close(self) -> None:
         """No more events."""

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gvgbot.autonomy.events import Recovery
 from gvgbot.errors import GvgbotError, UsageError
 from gvgbot.maps.run_directory import RunDirectory
 
@@ -100,6 +101,23 @@ def test_an_opened_run_goes_on_and_a_new_one_begins_anew(tmp_path: Path) -> None
     RunDirectory.create(tmp_path, world="office").close()
     assert (tmp_path / "events.jsonl").read_text() == ""
     assert not (tmp_path / "summary.json").exists()
+
+
+def test_of_very_many_events_the_latest_stay(tmp_path: Path) -> None:
+    """Ten megabytes and the ten before them at most."""
+    line = 1_000_000
+    with RunDirectory(tmp_path) as run:
+        for number in range(35):
+            run.append_event(Recovery(float(number), "", "x" * line))
+    kept = [
+        json.loads(text)["stamp"]
+        for name in ("events-before.jsonl", "events.jsonl")
+        for text in (tmp_path / name).read_text().splitlines()
+    ]
+    assert kept == [float(number) for number in range(35 - len(kept), 35)]
+    assert 10 * line < sum(path.stat().st_size for path in tmp_path.iterdir()) < 22 * line
+    RunDirectory.create(tmp_path, world="").close()
+    assert [path.stat().st_size for path in tmp_path.iterdir()] == [0]
 
 
 def test_a_summary_is_strict_json_whatever_is_in_it(tmp_path: Path) -> None:
