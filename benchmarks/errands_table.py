@@ -17,6 +17,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 import numpy as np
+import structlog
 
 from benchmarks import campaign
 from benchmarks.campaign import Row
@@ -218,6 +219,7 @@ def main() -> None:
     parser.add_argument("--verbose", action="store_true", help="tell of all that was not reached")
     parser.add_argument("--set", dest="overrides", action="append", default=[])
     options = parser.parse_args()
+    structlog.configure(wrapper_class=structlog.make_filtering_bound_logger(50))
     print(HEAD)
     for row in campaign.rows(
         options.out,

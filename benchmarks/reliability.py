@@ -175,10 +175,12 @@ def page(text: str) -> str:
         "in virtual time, with three to eight random faults from every layer. A seed decides all\n"
         "of it, and `python -m benchmarks.reliability --seed N` repeats one alone. A seed that\n"
         "fails prints the shortest schedule of its faults that still fails.\n\n"
-        "This page is written by `python -m benchmarks.reliability --write`. Two campaigns look\n"
-        "closer at one thing each: `python -m benchmarks.kills` kills explorations with damage to\n"
-        "their files and compares the maps, and `python -m benchmarks.kidnapping` puts a robot\n"
-        "down anywhere on a map that it knows.\n\n"
+        "This page is written by `python -m benchmarks.reliability --write`. Others look closer\n"
+        "at one thing each: `python -m benchmarks.kills` kills explorations with damage to their\n"
+        "files and compares the maps, `benchmarks.process_kills` does so with real processes,\n"
+        "`benchmarks.kidnapping` puts a robot down anywhere on a map that it knows,\n"
+        "`benchmarks.errands_table` asks it for vertices and points, and `benchmarks.patrol` lets\n"
+        "it patrol for many hours while doors close and open.\n\n"
         f"{text}\n"
     )
 
