@@ -6,7 +6,13 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from gvgbot.autonomy.control.company import Companion, in_front, patience, refuge
+from gvgbot.autonomy.control.company import (
+    Companion,
+    free_metres,
+    in_front,
+    patience,
+    refuge,
+)
 from gvgbot.autonomy.control.edge_follower import Track
 from gvgbot.autonomy.events import Decision, Event, Finished, Recovery
 from gvgbot.autonomy.exploration.access import NEAR_M, way_to_edge
@@ -117,7 +123,8 @@ class Mission:
         self._obstructed = ""  # why there is no way on, since the last view
         self._held = False
         self._patience = 1.0  # share of the usual one, with what is in the way
-        self._in_front: Companion | None = None  # another robot that goes first; local frame
+        self._company: list[Companion] = []  # local frame
+        self._in_front: Companion | None = None  # that goes first, and is near
         self._held_since: float | None = None
         self._lost_since: float | None = None
         self._stranded_since: float | None = None
@@ -199,6 +206,7 @@ class Mission:
         """Note where other robots are, local frame."""
         self._patience = patience(local_base, company)
         self._in_front = in_front(local_base, company)
+        self._company = company
 
     def hold(self) -> None:
         """Note that the robot cannot go on just now: somebody may be in its way."""
@@ -409,7 +417,11 @@ class Mission:
         if here.place.distance > _BESIDE_M:  # straight to the edge first, or it may scrape along
             base = view.local_base.position
             line, room = np.vstack([base, line]), np.concatenate([room[:1], room])
-        track = Track.of(line, room)
+        free = self._free_metres(view, line)
+        if free < _ARRIVED_M:
+            self._held = True
+            return Stand()
+        track = Track.of(line, room).until(free)
         end = view.gvg.end_of(path[-1])
         waited = view.stamp - self._last_progress
         if track.length < _ARRIVED_M and end not in here.known.vertex_of and end in view.doubted:
@@ -426,6 +438,13 @@ class Mission:
             self._events.append(Recovery(view.stamp, "look around", "standing at the end of sight"))
             return LookAround(math.tau)
         return Drive(track)
+
+    def _free_metres(self, view: View, line: Array) -> float:
+        """How far to drive before another robot has to come through where two cannot pass."""
+        if not self._company:
+            return math.inf
+        from_walls, _ = view.local_map.tree().query(line)
+        return free_metres(line, np.asarray(from_walls), self._company)
 
     # -- something in the way ----------------------------------------------------------------------
 

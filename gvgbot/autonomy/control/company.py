@@ -16,6 +16,10 @@ _BOTH_BRAKE_MPS2 = 0.5  # of each, so that two that come towards each other stop
 _CREEP_MPS = 0.02  # slower than this is a stop
 _FACING_M = 1.6  # from middle to middle: who is as near may be held up by the other
 _SOONER, _LATER = 0.3, 2.0  # shares of the usual patience
+_ABREAST_M = 0.75  # from a wall on either side: with less, two cannot pass each other
+_ONE_WAY_M = 0.5  # from middle to middle: courses so near to each other lead over one place
+_EQUAL_M = 1.0  # who is nearer by less than this is not nearer for sure
+_CLEAR_OF_IT_M = 0.6  # before a narrow place, there is room to come out of it
 _ASIDE_M = 0.5  # beyond the disc of a vertex, another robot can pass it
 
 
@@ -62,6 +66,39 @@ def _safe_speed(twist: Twist, centre: Array, touch: float, least_speed: float) -
     gap = float(np.hypot(*centre)) - touch - _ROOM_FOR_BOTH_M
     slow = max(math.sqrt(_BOTH_BRAKE_MPS2 * max(0.0, gap)), least_speed)
     return min(slow, math.sqrt(_BOTH_BRAKE_MPS2 * free))
+
+
+def free_metres(line: Array, from_walls: Array, company: list[Companion]) -> float:
+    """How far to drive along a line (N, 2) before one has to wait for somebody to come through.
+
+    `from_walls` (N,) is how far its points are from walls. Where that is little, one robot at a
+    time drives: who is nearer, and of two that are equally near, who goes first anyway.
+    """
+    stations = _stations(line)
+    ends = (_end_of_way(line, stations, from_walls, one) for one in company)
+    return min(ends, default=math.inf)
+
+
+def _end_of_way(line: Array, stations: Array, from_walls: Array, other: Companion) -> float:
+    course = other.course
+    if len(line) < 2 or len(course) < 2:
+        return math.inf
+    away = np.hypot(*(line[:, None] - course[None]).transpose(2, 0, 1))
+    nearest = away.argmin(axis=1)
+    opposed = (np.gradient(line, axis=0) * np.gradient(course, axis=0)[nearest]).sum(axis=1) < 0.0
+    shared = opposed & (from_walls < _ABREAST_M) & (away.min(axis=1) < _ONE_WAY_M)
+    if not shared.any():
+        return math.inf
+    mine = float(stations[shared].min())
+    theirs = float(_stations(course)[nearest[shared]].min())
+    is_first = theirs < mine if abs(theirs - mine) > _EQUAL_M else other.goes_first
+    return max(0.0, mine - _CLEAR_OF_IT_M) if is_first else math.inf
+
+
+def _stations(line: Array) -> Array:
+    """Metres along a line (N, 2) to each of its points."""
+    steps = np.hypot(*np.diff(line, axis=0).T)
+    return np.concatenate([[0.0], np.cumsum(steps)])
 
 
 def patience(local_base: Pose, company: list[Companion]) -> float:

@@ -53,6 +53,13 @@ class Track:
         """Metres from end to end."""
         return float(self.stations[-1])
 
+    def until(self, metres: float) -> "Track":
+        """The beginning of it, so long; at least two points."""
+        if metres >= self.length:
+            return self
+        count = max(2, int(np.searchsorted(self.stations, metres)))
+        return Track(self.polyline[:count], self.clearance[:count], self.stations[:count])
+
 
 def follow(
     track: Track, local_base: Pose, speed: float, robot_radius: float, config: EdgeFollowerConfig

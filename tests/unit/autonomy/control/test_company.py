@@ -5,7 +5,14 @@ import math
 import numpy as np
 import pytest
 
-from gvgbot.autonomy.control.company import Companion, careful, in_front, patience, refuge
+from gvgbot.autonomy.control.company import (
+    Companion,
+    careful,
+    free_metres,
+    in_front,
+    patience,
+    refuge,
+)
 from gvgbot.autonomy.gvg.local import Branch
 from gvgbot.geometry import Array, Pose, Twist
 from tests.unit.autonomy.local_graphs import drawn
@@ -129,3 +136,50 @@ def test_the_refuge_is_the_side_branch_of_the_next_junction_away_from_the_other(
 
 def test_there_is_no_refuge_beyond_the_other() -> None:
     assert way_out(1.0, 1.9) is None
+
+
+def straight(x0: float, x1: float, y: float = 0.0) -> Array:
+    """A way along x, a decimetre from point to point."""
+    x = np.linspace(x0, x1, 1 + round(abs(x1 - x0) / 0.1))
+    return np.stack([x, np.full_like(x, y)], axis=1)
+
+
+def beside_door(line: Array) -> Array:
+    """Distance to the walls of a hall with a wall at x = 0 that has a door one metre wide."""
+    posts = np.array([[0.0, 0.5], [0.0, -0.5]])
+    through = np.hypot(*(line[:, None] - posts).transpose(2, 0, 1)).min(axis=1)
+    past = np.where(np.abs(line[:, 1]) > 0.5, np.abs(line[:, 0]), np.inf)
+    walls: Array = np.minimum(np.minimum(through, past), 2.0)
+    return walls
+
+
+def free(line: Array, course: Array, *, goes_first: bool) -> float:
+    pose = Pose(float(course[0, 0]), float(course[0, 1]), 0.0)
+    return free_metres(line, beside_door(line), [Companion("other", pose, goes_first, course)])
+
+
+@pytest.mark.parametrize("mine", [0.7, 2.0, 2.8, 3.0, 3.2, 5.0])
+@pytest.mark.parametrize("theirs", [0.7, 2.0, 3.0, 5.0])
+def test_of_two_that_come_to_a_door_exactly_one_waits(mine: float, theirs: float) -> None:
+    west, east = straight(-mine, 3.0), straight(theirs, -3.0)
+    ways = free(west, east, goes_first=False), free(east, west, goes_first=True)
+    assert sum(math.isinf(way) for way in ways) == 1
+    if abs(mine - theirs) > 1.1:
+        assert math.isinf(ways[0]) == (mine < theirs)
+    stops = min(way - (mine, theirs)[k] for k, way in enumerate(ways))
+    if max(mine, theirs) > 1.5:
+        assert stops < -0.8  # so far before the door, there is room to come out of it
+
+
+def test_nobody_waits_for_who_goes_the_same_way_or_passes_elsewhere() -> None:
+    mine = straight(-4.0, 3.0)
+    ahead, aside = straight(-0.5, 3.0), straight(-2.0, -2.0 - 1.0, y=1.5)
+    for course in (ahead, aside, straight(-1.2, -3.0), np.zeros((0, 2))):
+        one = Companion("other", Pose(), goes_first=True, course=course)
+        assert math.isinf(free_metres(mine, beside_door(mine), [one]))
+
+
+def test_in_a_wide_corridor_nobody_waits() -> None:
+    mine, wide = straight(-4.0, 3.0), np.full(71, 1.0)
+    one = Companion("other", Pose(), goes_first=True, course=straight(3.0, -4.0))
+    assert math.isinf(free_metres(mine, wide, [one]))
