@@ -124,7 +124,7 @@ class Mission:
         self._held = False
         self._patience = 1.0  # share of the usual one, with what is in the way
         self._company: list[Companion] = []  # local frame
-        self._in_front: Companion | None = None  # that goes first, and is near
+        self._in_front: Companion | None = None  # that is near
         self._held_since: float | None = None
         self._lost_since: float | None = None
         self._stranded_since: float | None = None
@@ -407,7 +407,7 @@ class Mission:
         return self._drive(view, here, path)
 
     def _make_way(self, view: View, here: Situation) -> Order:
-        """Stand, but aside of a robot that goes first."""
+        """Stand, but aside of a robot that is near and may want to pass."""
         other = self._in_front
         way = None if other is None else refuge(here.gvg, here.place, other.pose.position)
         return Stand() if way is None else self._drive(view, here, way)

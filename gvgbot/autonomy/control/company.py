@@ -113,8 +113,8 @@ def patience(local_base: Pose, company: list[Companion]) -> float:
 
 
 def in_front(local_base: Pose, company: list[Companion]) -> Companion | None:
-    """The nearest one that has the right of way, if it is so near that it may wait for this one."""
-    near = [one for one in company if one.goes_first and one.pose.distance(local_base) < _FACING_M]
+    """The nearest other robot, if it is so near that it may wait for this one to go."""
+    near = [one for one in company if one.pose.distance(local_base) < _FACING_M]
     return min(near, key=lambda one: one.pose.distance(local_base), default=None)
 
 

@@ -199,7 +199,7 @@ def test_a_robot_that_cannot_move_gives_up_its_target_after_its_patience() -> No
     assert half.blocked
 
 
-def test_who_has_nowhere_to_go_but_past_one_that_goes_first_makes_way() -> None:
+def test_who_has_nowhere_to_go_but_past_another_robot_makes_way() -> None:
     """Held up west of the tee by a robot behind it, until every way is closed for a while."""
     robot = Robot()
     robot.stand(TEE, 8)
@@ -210,7 +210,7 @@ def test_who_has_nowhere_to_go_but_past_one_that_goes_first_makes_way() -> None:
         order = robot.look(TEE)
     assert robot.stamp - begin < 2 * CONFIG.in_the_way_s  # three ways, a third of that for each
     assert end_of(order) == pytest.approx((3.0, -4.0))
-    robot.mission.meet(robot.pose, [Companion("other", Pose(-1.0, 0.0, 0.0), goes_first=False)])
+    robot.mission.meet(robot.pose, [Companion("other", Pose(-2.5, 0.0, 0.0), goes_first=True)])
     assert isinstance(robot.look(TEE), Stand)
 
 

@@ -114,13 +114,14 @@ def test_of_two_that_hold_each_other_up_the_later_one_tries_another_way_first(
     assert (share < 1.0, share > 1.0) == (impatient is True, impatient is False)
 
 
-def test_the_nearest_one_that_goes_first_is_the_one_to_make_way_for() -> None:
+def test_the_nearest_one_is_the_one_to_make_way_for_unless_it_is_far() -> None:
     far, near, later = (
         Companion("other", Pose(x, 0.0, 0.0), first)
-        for x, first in ((1.5, True), (1.1, True), (0.8, False))
+        for x, first in ((1.7, True), (1.1, True), (0.8, False))
     )
-    assert in_front(Pose(), [far, later, near]) is near
-    assert in_front(Pose(), [later]) is None
+    assert in_front(Pose(), [far, later, near]) is later
+    assert in_front(Pose(), [far, near]) is near
+    assert in_front(Pose(), [far]) is None
 
 
 def way_out(x: float, other: float) -> tuple[Branch, ...] | None:

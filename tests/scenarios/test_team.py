@@ -1,0 +1,123 @@
+"""Two robots meet where they cannot pass each other; each knows where the other one is."""
+
+import asyncio
+from dataclasses import dataclass, field, replace
+
+import pytest
+
+from gvgbot.autonomy.control.company import Companion, moved
+from gvgbot.autonomy.loop import Loop
+from gvgbot.autonomy.pipeline import Pipeline
+from gvgbot.clock import LoopClock, run_in_virtual_time
+from gvgbot.config import Config
+from gvgbot.drivers.hokuyo.twin import HokuyoTwinConfig
+from gvgbot.drivers.world import World
+from gvgbot.geometry import Pose
+from gvgbot.hal.guard import Guard
+from gvgbot.hal.messages import Odometry
+from gvgbot.links import Devices, Links
+from gvgbot.simulation import Place, Simulation
+from gvgbot.worlds.canvas import Canvas
+
+CONFIG = Config()
+RADIUS = CONFIG.robot.radius_m
+LEAST_GAP = 0.1  # m between both bodies
+TOLD_EVERY = 0.2  # s
+WEST, EAST = 4.0, 9.0  # the ends of the narrow corridor, m along x
+STARTS = Pose(2.0, 2.5, 1.57), Pose(11.0, 6.5, -1.57)
+
+
+def twin_tees() -> World:
+    """Two tees of corridors, joined by one that is a metre wide and five long."""
+    canvas = Canvas(13.0, 9.0)
+    for x, mouth in ((2.0, WEST), (11.0, EAST)):
+        canvas.carve_path([(x, 1.5), (x, 7.5)], 1.6)
+        canvas.carve_path([(min(x, mouth), 4.5), (max(x, mouth), 4.5)], 1.6)
+    canvas.carve_path([(WEST, 4.5), (EAST, 4.5)], 1.0)
+    return canvas.world("twin tees")
+
+
+@dataclass(eq=False)
+class Explorer:
+    """One of the two, and where it has been."""
+
+    start: Pose
+    simulation: Simulation
+    pipeline: Pipeline
+    told: float = 0.0
+    way: list[Pose] = field(default_factory=list)
+
+    @property
+    def here(self) -> Pose:
+        return self.simulation.body.pose
+
+    @property
+    def has_crossed(self) -> bool:
+        x = [pose.x for pose in self.way]
+        return bool(x) and min(x) < WEST and max(x) > EAST
+
+    def hear(self, other: "Explorer", *, goes_first: bool) -> None:
+        """Be told where the other one is and what it drives along."""
+        mind = other.pipeline
+        companion = Companion("other", mind.map_base, goes_first, mind.track)
+        map_map = self.start.inverse().compose(other.here).compose(mind.map_base.inverse())
+        self.pipeline.company = [moved(companion, map_map)]
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+def test_two_robots_that_meet_in_a_narrow_corridor_both_get_to_the_other_side() -> None:
+    one, two = run_in_virtual_time(_met())
+    assert one.has_crossed
+    assert two.has_crossed
+    gaps = [a.distance(b) - 2 * RADIUS for a, b in zip(one.way, two.way, strict=False)]
+    assert LEAST_GAP <= min(gaps) < 2.0  # they did meet
+    assert one.simulation.body.contacts == two.simulation.body.contacts == 0
+
+
+async def _met() -> tuple[Explorer, Explorer]:
+    clock, world = LoopClock(), twin_tees()
+    laser = HokuyoTwinConfig(model="URG-04LX")
+    config = replace(CONFIG, twin=replace(CONFIG.twin, laser=laser))
+    both = [
+        Explorer(
+            start,
+            Simulation(config, Place(world, start), clock),
+            Pipeline(config.autonomy, config.exploration, RADIUS),
+        )
+        for start in STARTS
+    ]
+    for explorer, other in (both, both[::-1]):
+        explorer.simulation.meet([other.simulation])
+    async with asyncio.TaskGroup() as tasks:
+        lives = [tasks.create_task(_live(k, both, config, clock)) for k in range(2)]
+        while clock.now() < 150.0 and not all(explorer.has_crossed for explorer in both):
+            await asyncio.sleep(0.1)
+            for explorer in both:
+                explorer.way.append(explorer.here)
+        for life in lives:
+            life.cancel()
+    return both[0], both[1]
+
+
+async def _live(number: int, both: list[Explorer], config: Config, clock: LoopClock) -> None:
+    explorer, other = both[number], both[1 - number]
+    devices = Devices(Links(config, clock, explorer.simulation, None))
+
+    def on_cycle(odometry: Odometry) -> None:
+        if odometry.stamp >= explorer.told + TOLD_EVERY:
+            explorer.told = odometry.stamp
+            explorer.hear(other, goes_first=number == 1)
+
+    guard = Guard(config.robot.limits, RADIUS)
+    loop = Loop(
+        devices.laser,
+        devices.base,
+        explorer.pipeline,
+        guard,
+        on_events=lambda happened: None,
+        on_cycle=on_cycle,
+    )
+    async with asyncio.TaskGroup() as tasks:
+        tasks.create_task(devices.run())
+        await loop.run()
