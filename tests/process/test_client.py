@@ -13,7 +13,9 @@ import time
 import tracemalloc
 import zlib
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import ExitStack, contextmanager
+from itertools import permutations
 from threading import Event as Flag
 
 import msgspec
@@ -503,6 +505,32 @@ def test_the_last_map_arrives_though_a_stalled_link_has_dropped_it(endpoint: str
                 pass
         finally:
             watcher.kill()
+
+
+ORDERS = list(permutations(["router", "robot", "watcher"]))
+
+
+@pytest.mark.parametrize("order", ORDERS, ids="-".join)
+def test_router_robot_and_watcher_start_in_any_order(endpoint: str, order: list[str]) -> None:
+    config = TelemetryConfig(listen=(free_endpoint(),), connect=(endpoint,))
+    seen = client.connect("near", endpoint, patience_s=PATIENCE)
+    with ExitStack() as stack, ThreadPoolExecutor() as pool:
+
+        def start(which: str) -> None:
+            if which == "router":
+                stack.enter_context(router(endpoint))
+            elif which == "robot":
+                stack.enter_context(Telemetry(config, "near")).publish(numbered(7))
+            else:
+                opening.append(pool.submit(seen.open))
+                stack.callback(seen.close)
+
+        opening: list[Future[None]] = []
+        for one in order:
+            start(one)
+        opening[0].result(PATIENCE)
+        until(lambda: seen.presence.word == "alive")
+        until(lambda: seen.state().latest == numbered(7))
 
 
 def test_a_router_in_between_may_come_and_go(endpoint: str) -> None:
