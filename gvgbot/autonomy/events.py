@@ -49,6 +49,36 @@ class LoopClosed:
 
 
 @dataclass(frozen=True, slots=True)
+class PlaceDoubted:
+    """A vertex entered the map that may be a known one: the next vertices decide."""
+
+    stamp: float
+    vertex: int
+    rivals: tuple[int, ...]  # vertices that it may be, likeliest first
+    costs: tuple[float, ...]  # of taking it for each: minus twice the log likelihood
+    novelty: float  # the cost of taking it for a new one
+
+
+@dataclass(frozen=True, slots=True)
+class DoubtSettled:
+    """It became certain which vertex a doubted one is, or that it is a new one."""
+
+    stamp: float
+    vertex: int
+    known: int | None  # the vertex that it is, and has become part of; None: it is a new one
+    margin: float  # by which any other reading costs more: minus twice the log likelihood
+    offset_m: float | None  # between the two just before
+
+
+@dataclass(frozen=True, slots=True)
+class ClosureRevoked:
+    """A closure was taken back, with all that was found since: the next vertices contradict it."""
+
+    stamp: float
+    vertex: int
+
+
+@dataclass(frozen=True, slots=True)
 class Decision:
     """Where to go next, and why."""
 
@@ -124,6 +154,9 @@ Event = (
     | VertexRemoved
     | EdgeJoined
     | LoopClosed
+    | PlaceDoubted
+    | DoubtSettled
+    | ClosureRevoked
     | Decision
     | Recovery
     | Finished

@@ -2,14 +2,15 @@
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from gvgbot.autonomy.slam import ekf
+from gvgbot.autonomy.slam.doubts import NEW_PER_M2, match_cost, novelty_cost, room_for_new
 from gvgbot.autonomy.slam.ekf import Belief
-from gvgbot.autonomy.slam.graph import Vertex
+from gvgbot.autonomy.slam.graph import GvgGraph, Vertex
 from gvgbot.autonomy.slam.recognition import (
     RecognitionConfig,
     Sighting,
@@ -25,6 +26,8 @@ CLOSE_M = 1.5  # as near as one needs to be to tell vertices apart
 _WALL_M = 0.15  # a point so near to a wall lies on it
 _BESIDE_M = 0.4  # walls that agree only so far off are another vertex's
 _KNOWN_SHARE = 0.4  # of a vertex's walls must lie where something has been seen
+_RIVALS = 4  # that are kept in mind
+_COMPARED = 12  # vertices elsewhere, to tell how many look like what is seen
 _REGISTRATION_FLOOR = np.diag([4e-4, 4e-4, 9e-6])  # what registration cannot know of itself
 
 
@@ -52,12 +55,28 @@ class Match:
     metres: float
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Recognition:
+    """What a sighting was recognised as, and the vertices that it may be.
+
+    `costs` are those of taking it for each (minus twice the log likelihood), likeliest first;
+    `density`, 1/m^2, is that of new vertices that look like it, and `novelty` the cost of one.
+    """
+
+    match: Match | None = None
+    rivals: tuple[int, ...] = ()
+    costs: tuple[float, ...] = ()
+    density: float = NEW_PER_M2
+    novelty: float = 0.0
+
+
 class Recogniser:
     """Knows vertices again that were out of sight for long.
 
     `min_inliers` is the share of a vertex's walls that must be found again, `min_inliers_far` that
     of one which is not where it should be; `margin` says how much deeper in its gate (squared
-    Mahalanobis distance) a match must lie than any other.
+    Mahalanobis distance) a match must lie than any other, `novelty_margin` how much less it must
+    cost (minus twice the log likelihood) than a new vertex.
     """
 
     def __init__(
@@ -68,19 +87,76 @@ class Recogniser:
         min_inliers: float,
         min_inliers_far: float,
         margin: float,
+        novelty_margin: float,
     ) -> None:
         self._config, self._matching, self._margin = config, matching, margin
+        self._novelty_margin = novelty_margin
         self._min_inliers, self._min_inliers_far = min_inliers, min_inliers_far
 
     def find(
-        self, belief: Belief, vertices: Iterable[Vertex], view: View, sighting: Sighting
-    ) -> Match | None:
-        """The vertex that a sighting is beyond doubt; of two that pass all tests, neither."""
+        self,
+        belief: Belief,
+        graph: GvgGraph,
+        vertices: Iterable[Vertex],
+        view: View,
+        sighting: Sighting,
+        *,
+        wary: bool = False,
+    ) -> Recognition:
+        """Which of some vertices a sighting is, if that is beyond doubt.
+
+        Of two that pass all tests it is neither, nor is it one that a new vertex may be as well.
+        Who is wary takes none for it but one whose place is known.
+        """
         compared = (
             self._compare(belief, view, sighting, candidate)
             for candidate in self.candidates(belief, vertices, view, sighting)
         )
-        return self._beyond_doubt(belief, [m for m in compared if m is not None], sighting)
+        matches = [match for match in compared if match is not None]
+        best = self._beyond_doubt(belief, matches, sighting)
+        if not matches or (best is not None and self._is_in_place(belief, best)):
+            return Recognition(best)
+        found = self._against_new(belief, graph, matches, best, view, sighting)
+        return replace(found, match=None) if wary else found
+
+    def _is_in_place(self, belief: Belief, match: Match) -> bool:
+        """Whether it is where it should be, and that is known better than vertices lie apart."""
+        _, S, _ = ekf.innovation(belief, match.vertex.id, Pose(), np.zeros((2, 2)))
+        reach = self._config.same_place_m
+        return match.metres < reach and bool(np.trace(S) < reach**2)
+
+    def _against_new(
+        self,
+        belief: Belief,
+        graph: GvgGraph,
+        matches: list[Match],
+        best: Match | None,
+        view: View,
+        sighting: Sighting,
+    ) -> Recognition:
+        """The best match, if it costs less than a new vertex; otherwise what it may be."""
+        seen = view.local_base.inverse().transform(sighting.position)
+        R = detection_covariance(float(np.hypot(*seen)), self._config)
+        r, S = ekf.offsets(belief, seen, R)
+        at = {vertex: i for i, vertex in enumerate(belief.ids)}
+        reach = np.array([graph.reach(graph.vertices[vertex]) for vertex in belief.ids])
+        density = NEW_PER_M2 * self._commonness(belief, graph, view, sighting)
+        novelty = novelty_cost(density, room_for_new(r, S, reach))
+        costs = {m.vertex.id: match_cost(r[at[m.vertex.id]], S[at[m.vertex.id]]) for m in matches}
+        if best is not None and costs[best.vertex.id] > novelty - self._novelty_margin:
+            best = None
+        rivals = tuple(sorted(costs, key=lambda vertex: costs[vertex]))[:_RIVALS]
+        return Recognition(best, rivals, tuple(costs[v] for v in rivals), density, novelty)
+
+    def _commonness(self, belief: Belief, graph: GvgGraph, view: View, sighting: Sighting) -> float:
+        """The share of vertices that look like a sighting, by those that it cannot be."""
+        far = gate_distances(belief, sighting, view.local_base, self._config)
+        elsewhere = sorted((metres, v) for v, (d2, metres) in far.items() if d2 > self._config.gate)
+        alike = 0
+        for metres, v in elsewhere[:_COMPARED]:
+            candidate = Candidate(0.0, metres, graph.vertices[v])
+            alike += self._compare(belief, view, sighting, candidate) is not None
+        return (1 + alike) / (2 + len(elsewhere[:_COMPARED]))
 
     def candidates(
         self, belief: Belief, vertices: Iterable[Vertex], view: View, sighting: Sighting

@@ -1,13 +1,13 @@
-"""Changes of the graph where a vertex is found on an edge, or proves to be none."""
+"""Changes of the graph where a vertex is found on an edge, proves to be none, or a known one."""
 
 import math
 
 import numpy as np
 
-from gvgbot.autonomy.slam.ekf import Belief
+from gvgbot.autonomy.slam.ekf import Belief, apart
 from gvgbot.autonomy.slam.graph import Edge, GvgGraph, HalfEdgeId, Vertex
 from gvgbot.autonomy.slam.recognition import match_bearings
-from gvgbot.geometry import Array
+from gvgbot.geometry import Array, Pose
 
 _OUT_M = 1.0  # from a vertex, where the direction of an edge is taken
 
@@ -17,8 +17,8 @@ def split_edge_at(
 ) -> None:
     """Make two edges of one that was joined before a vertex on it was found.
 
-    The edge must pass the vertex within `reach` m, and leave it within `angle` rad of two of its
-    half-edges.
+    The edge must pass the vertex within `reach` m, where it is known as well as that, and leave it
+    within `angle` rad of two of its half-edges.
     """
     vertex_map = belief.map_vertex(vertex.id).inverse()
     for edge in list(graph.edges.values()):
@@ -26,6 +26,9 @@ def split_edge_at(
         parts = _parted(line, reach)
         if parts is None:
             continue
+        _, S = apart(belief, vertex.id, [edge.a.vertex])
+        if np.trace(S[0]) > reach**2:
+            continue  # it may as well be elsewhere
         known = {key: half.bearing for key, half in vertex.half_edges.items()}
         matched = match_bearings(tuple(_direction(part) for part in parts), known, angle)
         if len(matched) < 2:
@@ -74,6 +77,36 @@ def take_out(graph: GvgGraph, belief: Belief, vertex: Vertex) -> None:
     clearance = min(one.min_clearance, other.min_clearance)
     edge = graph.join(start, end, line, clearance, driven=one.driven and other.driven)
     edge.established = one.established and other.established
+
+
+def fuse(
+    graph: GvgGraph, kept: Vertex, gone: Vertex, kept_gone: Pose, angle: float
+) -> dict[HalfEdgeId, HalfEdgeId]:
+    """Make one vertex of two, the second of which stands at a pose in the frame of the first.
+
+    Departures within `angle` rad are the same; an edge that both have is kept once. Returns what
+    has become of the second's half-edges.
+    """
+    turned = tuple(half.bearing + kept_gone.theta for half in gone.half_edges.values())
+    known = {key: half.bearing for key, half in kept.half_edges.items()}
+    matched = match_bearings(turned, known, angle)
+    renamed = {
+        HalfEdgeId(gone.id, key): HalfEdgeId(
+            kept.id, matched[i] if i in matched else kept.add_half_edge(turned[i])
+        )
+        for i, key in enumerate(gone.half_edges)
+    }
+    for edge in [e for e in graph.edges.values() if gone.id in (e.a.vertex, e.b.vertex)]:
+        graph.unjoin(edge)
+        a, b = renamed.get(edge.a, edge.a), renamed.get(edge.b, edge.b)
+        if a == b or graph.edge_at(a) is not None or graph.edge_at(b) is not None:
+            continue
+        begins_here = edge.a.vertex == gone.id
+        line = kept_gone.transform(edge.polyline) if begins_here else edge.polyline
+        joined = graph.join(a, b, line, edge.min_clearance, driven=edge.driven)
+        joined.traversals, joined.established = edge.traversals, edge.established
+    del graph.vertices[gone.id]
+    return renamed
 
 
 def _outwards(belief: Belief, edge: Edge, end: HalfEdgeId) -> Array:

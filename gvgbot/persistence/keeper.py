@@ -39,6 +39,8 @@ _SETTLED = (
     events.VertexRemoved,
     events.EdgeJoined,
     events.LoopClosed,
+    events.DoubtSettled,
+    events.ClosureRevoked,
     events.Requested,
     events.ErrandEnded,
     events.Finished,

@@ -7,6 +7,7 @@ literature: F, G Jacobians, H measurement Jacobian, K gain, S innovation covaria
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Annotated
 
@@ -194,6 +195,16 @@ def distances(belief: Belief, base_point: Array, R: Array) -> tuple[Array, Array
 
     Squared Mahalanobis distances and metres, both (N,), in the order of the belief's ids.
     """
+    r, S = offsets(belief, base_point, R)
+    d2 = (r * np.linalg.solve(S, r[:, :, None])[:, :, 0]).sum(axis=1)
+    return d2, np.hypot(r[:, 0], r[:, 1])
+
+
+def offsets(belief: Belief, base_point: Array, R: Array) -> tuple[Array, Array]:
+    """A point (2,) in the base frame, with covariance R (2, 2), as seen from each vertex.
+
+    Offsets (N, 2) in the base frame and their covariances (N, 2, 2), in the order of the ids.
+    """
     c, s = math.cos(belief.x[2]), math.sin(belief.x[2])
     base_map = np.array([[c, s], [-s, c]])  # rotation
     foreseen = (belief.x[3:].reshape(-1, 3)[:, :2] - belief.x[:2]) @ base_map.T
@@ -204,9 +215,37 @@ def distances(belief: Belief, base_point: Array, R: Array) -> tuple[Array, Array
     H[:, 0, 2], H[:, 1, 2] = foreseen[:, 1], -foreseen[:, 0]
     at = np.tile(np.arange(5), (n, 1))
     at[:, 3:] += 3 * np.arange(n)[:, None]
-    S = H @ belief.P[at[:, :, None], at[:, None, :]] @ H.swapaxes(1, 2) + R
-    d2 = (r * np.linalg.solve(S, r[:, :, None])[:, :, 0]).sum(axis=1)
-    return d2, np.hypot(r[:, 0], r[:, 1])
+    return r, H @ belief.P[at[:, :, None], at[:, None, :]] @ H.swapaxes(1, 2) + R
+
+
+def apart(belief: Belief, vertex: int, others: Sequence[int]) -> tuple[Array, Array]:
+    """A vertex as seen from others, map frame: offsets (N, 2) and their covariances (N, 2, 2)."""
+    i = 3 + 3 * belief.ids.index(vertex)
+    at = np.array([3 + 3 * belief.ids.index(other) for other in others], int)
+    j = at[:, None] + np.arange(2)
+    P, here = belief.P, slice(i, i + 2)
+    across = P[here][:, j].transpose(1, 0, 2)
+    S = P[here, here] + P[j[:, :, None], j[:, None, :]] - across - across.swapaxes(1, 2)
+    return belief.x[here] - belief.x[j], S
+
+
+def unite(belief: Belief, kept: int, gone: int, R: Array) -> Belief:
+    """The belief when two vertices are one, whose places were seen with R (2, 2); one id goes."""
+    i, j = (3 + 3 * belief.ids.index(vertex) for vertex in (kept, gone))
+    H = np.zeros((2, len(belief.x)))
+    H[:, i : i + 2], H[:, j : j + 2] = np.eye(2), -np.eye(2)
+    S = H @ belief.P @ H.T + R
+    K = np.asarray(np.linalg.solve(S, H @ belief.P).T, np.float64)
+    x = _wrapped(belief.x + K @ (belief.x[j : j + 2] - belief.x[i : i + 2]))
+    P = belief.P - K @ S @ K.T
+    return remove_vertex(Belief(x, (P + P.T) / 2, belief.ids), gone)
+
+
+def part(belief: Belief, vertices: Sequence[int]) -> Belief:
+    """The belief of the robot and of some of the vertices, all else left out."""
+    at = [3 + 3 * belief.ids.index(vertex) for vertex in vertices]
+    rows = np.concatenate([np.arange(3), *(np.arange(i, i + 3) for i in at)])
+    return Belief(belief.x[rows], belief.P[np.ix_(rows, rows)], tuple(vertices))
 
 
 def update(belief: Belief, vertex: int, base_vertex: Pose, R: Array) -> Belief:

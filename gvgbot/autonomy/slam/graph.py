@@ -131,6 +131,11 @@ class GvgGraph:
         half = self.half_edge(end)
         return None if half is None or half.edge is None else self.edges[half.edge]
 
+    def reach(self, vertex: Vertex) -> float:
+        """How far around a vertex, m, there is surely no other: half its shortest edge."""
+        edges = (self.edge_at(HalfEdgeId(vertex.id, key)) for key in vertex.half_edges)
+        return min((e.length / 2 for e in edges if e is not None), default=vertex.clearance)
+
     def join(
         self, a: HalfEdgeId, b: HalfEdgeId, polyline: Array, min_clearance: float, *, driven: bool
     ) -> Edge:

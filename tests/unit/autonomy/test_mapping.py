@@ -9,12 +9,24 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gvgbot.autonomy.events import EdgeJoined, Event, VertexAdded, VertexRemoved
+from gvgbot.autonomy.events import (
+    ClosureRevoked,
+    DoubtSettled,
+    EdgeJoined,
+    Event,
+    LoopClosed,
+    PlaceDoubted,
+    VertexAdded,
+    VertexRemoved,
+)
 from gvgbot.autonomy.gvg.local import Branch, LocalGvg
 from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
 from gvgbot.autonomy.mapping import Mapper, MappingConfig
-from gvgbot.autonomy.slam.graph import HalfEdgeId
-from gvgbot.autonomy.slam.recognition import RecognitionConfig
+from gvgbot.autonomy.recogniser import Match, Recognition
+from gvgbot.autonomy.slam import ekf
+from gvgbot.autonomy.slam.ekf import Belief
+from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex
+from gvgbot.autonomy.slam.recognition import RecognitionConfig, Sighting
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
 from gvgbot.autonomy.views import Correspondence, View, touching
 from gvgbot.geometry import Array, Pose
@@ -410,3 +422,84 @@ def test_what_stays_away_for_longer_than_a_day_was_walled_up() -> None:
 def test_before_it_is_finished_a_map_learns_as_fast_as_ever() -> None:
     seen = Seen().look(TEE, 20).look(PLAIN, 20)
     assert len(of_type(seen.events, VertexRemoved)) >= 1
+
+
+class Believing:
+    """Recognises one vertex whenever something is seen for which no vertex is in sight."""
+
+    def __init__(self, known: int, *, as_rival: bool) -> None:
+        self._known, self._as_rival = known, as_rival
+
+    def candidates(self, *_: object) -> list[object]:
+        return []
+
+    def find(
+        self,
+        belief: Belief,
+        graph: GvgGraph,
+        vertices: list[Vertex],
+        view: View,
+        sighting: Sighting,
+        *,
+        wary: bool,
+    ) -> Recognition:
+        if not sighting.meetpoint or self._known not in {vertex.id for vertex in vertices}:
+            return Recognition()
+        if self._as_rival or wary:
+            return Recognition(None, (self._known,), (5.0,), 0.01, 9.0)
+        local = Pose(float(sighting.position[0]), float(sighting.position[1]), 0.0)
+        foreseen, _ = ekf.expected(belief, self._known)
+        off = foreseen.distance(view.local_base.to(local))
+        vertex = graph.vertices[self._known]
+        return Recognition(Match(vertex, local, 0.01 * np.eye(3), 1.0, 1.0, off))
+
+
+def crossed(*, as_rival: bool) -> Seen:
+    """A tee, and after a long way another place of which it is said to be the same."""
+    seen = Seen().look(TEE, CONFIG.candidates.endpoint_sightings)
+    tee = seen.known.vertex_of[2]
+    seen.mapper._recogniser = Believing(tee, as_rival=as_rival)  # type: ignore[assignment]
+    seen.drive_elsewhere(20.0)
+    seen.mapper.move(Pose(4.0, 3.0, 0.0), np.diag([9.0, 9.0, 0.01]))
+    return seen.look(TEE, CONFIG.candidates.meetpoint_sightings)
+
+
+def test_a_closure_that_the_next_vertices_contradict_is_taken_back() -> None:
+    seen = crossed(as_rival=False)
+    mapper = seen.mapper
+    assert len(of_type(seen.events, LoopClosed)) == 1
+    (edge,) = mapper.graph.edges.values()
+    mapper.note_way(edge, arrived=99)  # not at its far end
+    seen.look(TEE)
+    assert len(of_type(seen.events, ClosureRevoked)) == 1
+    assert (mapper.belief.map_base.x, mapper.belief.map_base.y) == pytest.approx((4.0, 3.0))
+    assert np.trace(mapper.belief.P[:2, :2]) > 17.9  # as uncertain as the way there has left it
+    assert not mapper.belief.ids or max(s.vertex for s in mapper.observations) in mapper.belief.ids
+
+
+def test_a_closure_that_leads_on_over_a_known_edge_stays() -> None:
+    seen = crossed(as_rival=False)
+    (edge,) = seen.mapper.graph.edges.values()
+    seen.mapper.note_way(edge, arrived=edge.b.vertex)
+    seen.mapper.note_way(edge, arrived=99)
+    seen.look(TEE)
+    assert of_type(seen.events, ClosureRevoked) == []
+
+
+def test_a_vertex_in_doubt_becomes_part_of_the_known_one_as_soon_as_that_is_certain() -> None:
+    seen = crossed(as_rival=True)
+    mapper = seen.mapper
+    (doubt,) = of_type(seen.events, PlaceDoubted)
+    assert isinstance(doubt, PlaceDoubted)
+    (tee,) = doubt.rivals
+    assert {tee, doubt.vertex} <= mapper.graph.vertices.keys()
+    # walls tell where the robot truly is: three metres before the tee
+    mapper.belief = ekf.update(mapper.belief, tee, Pose(3.0, 0.0), 0.01 * np.eye(3))
+    mapper._has_news = True
+    seen.look(TEE)
+    (settled,) = of_type(seen.events, DoubtSettled)
+    assert isinstance(settled, DoubtSettled)
+    assert (settled.vertex, settled.known) == (doubt.vertex, tee)
+    assert doubt.vertex not in mapper.graph.vertices
+    assert seen.known.vertex_of[2] == tee
+    assert {s.vertex for s in mapper.observations} <= set(mapper.belief.ids)

@@ -15,12 +15,15 @@ from gvgbot.autonomy.slam.ekf import (
     OdometryNoise,
     add_vertex,
     advance,
+    apart,
     distances,
     expected,
     innovation,
     mahalanobis,
+    part,
     predict,
     remove_vertex,
+    unite,
     update,
 )
 from gvgbot.geometry import Array, Pose, wrap_angle
@@ -378,3 +381,41 @@ def test_distances_of_all_vertices_are_those_of_each_innovation(seed: int, verti
         r, S, _ = innovation(belief, vertex, Pose(*point.tolist()), R)
         assert d2[i] == pytest.approx(mahalanobis(r, S))
         assert metres[i] == pytest.approx(math.hypot(*r))
+
+
+@given(seeds)
+def test_vertices_apart_are_those_that_many_draws_show(seed: int) -> None:
+    belief = random_belief(np.random.default_rng(seed), 3)
+    r, S = apart(belief, 11, [10, 12])
+    for offset, covariance, i in zip(r, S, (3, 9), strict=True):
+        A = np.zeros((2, len(belief.x)))
+        A[:, 6:8], A[:, i : i + 2] = np.eye(2), -np.eye(2)
+        np.testing.assert_allclose(offset, A @ belief.x)
+        np.testing.assert_allclose(covariance, A @ belief.P @ A.T, atol=1e-12)
+
+
+@given(seeds)
+def test_uniting_two_vertices_is_the_information_form_with_one_more_row(seed: int) -> None:
+    """Their difference is measured as nought; the rest follows by the normal equations."""
+    rng = np.random.default_rng(seed)
+    belief, R = random_belief(rng, 3), random_covariance(rng, 2)
+    belief.x[2::3] = 0.1 * belief.x[2::3]  # far from where angles wrap
+    united = unite(belief, 10, 12, R)
+    A = np.zeros((2, len(belief.x)))
+    A[:, 3:5], A[:, 9:11] = np.eye(2), -np.eye(2)
+    information = np.linalg.inv(belief.P) + A.T @ np.linalg.inv(R) @ A
+    x = np.linalg.solve(information, np.linalg.solve(belief.P, belief.x))
+    assert united.ids == (10, 11)
+    off = united.x - x[:9]
+    off[2::3] = [wrap_angle(angle) for angle in off[2::3]]
+    np.testing.assert_allclose(off, 0.0, atol=1e-5)
+    np.testing.assert_allclose(united.P, np.linalg.inv(information)[:9, :9], atol=1e-5)
+
+
+def test_a_part_of_a_belief_is_the_marginal_of_some_vertices() -> None:
+    belief = random_belief(np.random.default_rng(1), 3)
+    rows = [0, 1, 2, 9, 10, 11, 3, 4, 5]
+    some = part(belief, [12, 10])
+    assert some.ids == (12, 10)
+    np.testing.assert_array_equal(some.x, belief.x[rows])
+    np.testing.assert_array_equal(some.P, belief.P[np.ix_(rows, rows)])

@@ -1,0 +1,47 @@
+"""What was believed before a closure, in case the next vertices contradict it."""
+
+import copy
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+from gvgbot.autonomy.slam import ekf
+from gvgbot.autonomy.slam.doubts import Doubt
+from gvgbot.autonomy.slam.ekf import Belief
+from gvgbot.autonomy.slam.graph import GvgGraph
+from gvgbot.geometry import Array, Pose
+
+
+@dataclass(slots=True, eq=False)
+class Revocable:
+    """A closure at a vertex, what there was before it, and how the robot has moved since.
+
+    `observations` is how many vertices had been observed.
+    """
+
+    vertex: int
+    belief: Belief
+    graph: GvgGraph
+    doubts: list[Doubt]
+    observations: int
+    moves: list[tuple[Pose, Array]] = field(default_factory=list)
+    is_contradicted: bool = False  # by a way that led elsewhere
+
+    @classmethod
+    def before(
+        cls,
+        vertex: int,
+        belief: Belief,
+        graph: GvgGraph,
+        doubts: Sequence[Doubt],
+        observations: int,
+    ) -> "Revocable":
+        """As things are, just before a closure."""
+        own = replace(belief, P=belief.P.copy())
+        return cls(vertex, own, copy.deepcopy(graph), list(doubts), observations)
+
+    def relived(self) -> Belief:
+        """What would be believed now without the closure, and without what was seen since."""
+        belief = self.belief
+        for motion, covariance in self.moves:
+            belief = ekf.advance(belief, motion, covariance)
+        return belief

@@ -1,0 +1,92 @@
+"""Two vertices made one, on a regular town."""
+
+import math
+
+import numpy as np
+import pytest
+
+from gvgbot.autonomy.slam.ekf import Belief
+from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex
+from gvgbot.autonomy.topology import fuse, split_edge_at
+from gvgbot.geometry import Pose
+from tests.unit.autonomy.graphs import STREET, between, streets
+
+TURN = 0.3  # rad, of the doubled vertex' frame
+ANGLE = math.radians(40)
+
+
+def doubled(graph: GvgGraph, *bearings: float) -> Vertex:
+    """A vertex entered a second time, with departures at bearings in the town's frame."""
+    vertex = Vertex(graph.next_id(), 1.0, Pose(), 0.0, 0.0)
+    for bearing in bearings:
+        vertex.add_half_edge(bearing - TURN)
+    graph.vertices[vertex.id] = vertex
+    return vertex
+
+
+def is_sound(graph: GvgGraph) -> bool:
+    degrees = sum(vertex.degree for vertex in graph.vertices.values())
+    ends = [end for edge in graph.edges.values() for end in (edge.a, edge.b)]
+    paired = all(
+        graph.edge_at(edge.a) is graph.edge_at(edge.b) is edge for edge in graph.edges.values()
+    )
+    return paired and degrees == len(ends) + len(graph.frontiers()) and len(set(ends)) == len(ends)
+
+
+@pytest.mark.parametrize(("sigma", "edges"), [(0.1, 2), (2.0, 1)])
+def test_a_vertex_parts_an_edge_only_if_it_surely_stands_there(sigma: float, edges: int) -> None:
+    graph, ids = streets(2, 1)
+    (street,) = graph.edges.values()
+    street.polyline = np.linspace(street.polyline[0], street.polyline[-1], 11)
+    middle = doubled(graph, TURN, TURN + math.pi)
+    places = np.array([[0.0, 0.0], [STREET, 0.0], [STREET / 2, 0.1]])
+    P = np.zeros((12, 12))
+    P[9:11, 9:11] = sigma**2 / 2 * np.eye(2)
+    x = np.hstack([np.zeros(3), np.pad(places, ((0, 0), (0, 1))).ravel()])
+    belief = Belief(x, P, (ids[0, 0], ids[1, 0], middle.id))
+    split_edge_at(graph, belief, middle, reach=0.8, angle=ANGLE)
+    assert len(graph.edges) == edges
+    assert is_sound(graph)
+
+
+def test_an_edge_of_the_doubled_vertex_goes_to_the_known_one() -> None:
+    """Found from the east, the corner gets the street that nobody knew there."""
+    graph, ids = streets(2, 1)
+    west, east = (graph.vertices[ids[x, 0]] for x in (0, 1))
+    graph.unjoin(next(iter(graph.edges.values())))
+    again = doubled(graph, 0.0)
+    line = STREET * np.array([[0.0, 0.0], [math.cos(-TURN), math.sin(-TURN)]])
+    graph.join(HalfEdgeId(again.id, 0), HalfEdgeId(east.id, 0), line, 0.8, driven=True)
+    renamed = fuse(graph, west, again, Pose(theta=TURN), ANGLE)
+    assert renamed == {HalfEdgeId(again.id, 0): HalfEdgeId(west.id, 0)}
+    (edge,) = graph.edges.values()
+    assert {edge.a.vertex, edge.b.vertex} == {west.id, east.id}
+    assert edge.polyline[-1] == pytest.approx((STREET, 0.0))
+    assert again.id not in graph.vertices
+    assert is_sound(graph)
+
+
+def test_an_edge_that_both_have_is_kept_once() -> None:
+    """A street driven twice, both its ends doubled; uniting the one leaves the other open."""
+    graph, ids = streets(2, 1)
+    west, east = (graph.vertices[ids[x, 0]] for x in (0, 1))
+    west_again, east_again = doubled(graph, 0.0), doubled(graph, math.pi)
+    ends = HalfEdgeId(west_again.id, 0), HalfEdgeId(east_again.id, 0)
+    graph.join(*ends, np.array([[0.0, 0.0], [STREET, 0.0]]), 1.0, driven=True)
+    fuse(graph, west, west_again, Pose(theta=TURN), ANGLE)
+    assert graph.frontiers() == [ends[1]]
+    fuse(graph, east, east_again, Pose(theta=TURN), ANGLE)
+    assert graph.frontiers() == []
+    assert between(graph, west.id, east.id)
+    assert len(graph.edges) == 1
+    assert is_sound(graph)
+
+
+def test_a_departure_that_only_the_doubled_vertex_has_is_a_frontier() -> None:
+    graph, ids = streets(2, 1)
+    west = graph.vertices[ids[0, 0]]
+    fuse(graph, west, doubled(graph, 0.0, math.pi / 2), Pose(theta=TURN), ANGLE)
+    (frontier,) = graph.frontiers()
+    assert frontier.vertex == west.id
+    assert west.half_edges[frontier.key].bearing == pytest.approx(math.pi / 2)
+    assert is_sound(graph)
