@@ -52,7 +52,12 @@ class Watched(Pipeline):
     """Takes down what it believed of its pose at each keyframe."""
 
     def __init__(self, config: Config) -> None:
-        super().__init__(config.autonomy, config.exploration, config.robot.radius_m)
+        super().__init__(
+            config.autonomy,
+            config.exploration,
+            config.robot.radius_m,
+            localisation=config.localisation,
+        )
         self.believed: list[tuple[Pose, Array]] = []
         self.closures: list[tuple[int, LoopClosed]] = []  # with their keyframes
 
@@ -130,6 +135,8 @@ def _poses(pipeline: Watched, truth: list[Pose]) -> Row:
         "pose_sigma_m": float(np.sqrt((s[:, :2] ** 2).sum(axis=1).mean())),
         "heading_rms": float(np.sqrt((e[:, 2] ** 2).mean())),
         "heading_sigma": float(np.sqrt((s[:, 2] ** 2).mean())),
+        "pose_peak_m": float(np.hypot(*s[:, :2].T).max()),
+        "pose_last_m": float(np.hypot(*s[-1, :2])),
         "end_error_m": float(np.hypot(*e[-1, :2])),
         "along": np.hypot(*e[at, :2].T).round(4).tolist(),
         "along_sigma": np.hypot(*s[at, :2].T).round(4).tolist(),
@@ -154,6 +161,9 @@ def _vertices(pipeline: Pipeline, places: Array) -> Row:
     return {
         "vertices": len(ids),
         "twice": len(near),
+        "vertex_sigma_m": float(
+            np.mean([np.sqrt(np.trace(C)) for C in estimate.covariances.values()])
+        ),
         "vertex_nees": _mean_nees(mapped),
         "filter_vertex_nees": _mean_nees(held),
         "vertex_rmse_m": float(np.sqrt(np.mean([d @ d for d, _ in mapped]))) if mapped else None,
@@ -234,13 +244,13 @@ def summary(rows: list[Row]) -> list[str]:
 
 
 def plot(rows: list[Row], directory: Path) -> None:
-    """Three pictures: NEES per run, error and sigma along the runs, vertices against chi-square."""
+    """NEES per run, error and sigma along the runs, vertices and NIS against chi-square."""
     import matplotlib as mpl  # noqa: PLC0415
 
     mpl.use("Agg")
     from matplotlib import pyplot as plt  # noqa: PLC0415
 
-    figure, axes = plt.subplots(1, 3, figsize=(13, 3.8), layout="constrained")
+    figure, axes = plt.subplots(1, 4, figsize=(16, 3.8), layout="constrained")
     nees = sorted(row["pose_nees"] for row in rows)
     axes[0].plot(nees, np.arange(1, len(nees) + 1) / len(nees), label="pose, 3 degrees of freedom")
     of_vertices = sorted(row["vertex_nees"] for row in rows if row["vertex_nees"] is not None)
@@ -255,12 +265,15 @@ def plot(rows: list[Row], directory: Path) -> None:
     axes[1].plot(share, sigma, label="sigma that the filter gives")
     axes[1].set(xlabel="share of the run", ylabel="position of the robot, m")
     axes[1].legend()
-    distances = np.concatenate([row["vertex_distances"] for row in rows])
     x = np.linspace(0, 8, 33)
-    axes[2].hist(distances, x, density=True, label="vertices")
-    axes[2].plot(x, chi2.pdf(x, 2), label="chi-square, 2")
-    axes[2].set(xlabel="squared Mahalanobis distance", ylabel="density")
-    axes[2].legend()
+    for axis, key, what in (
+        (axes[2], "vertex_distances", "vertices of the map (NEES)"),
+        (axes[3], "nis", "innovations of closures (NIS)"),
+    ):
+        axis.hist(np.concatenate([row[key] for row in rows]), x, density=True, label=what)
+        axis.plot(x, chi2.pdf(x, 2), label="chi-square, 2")
+        axis.set(xlabel="squared Mahalanobis distance", ylabel="density")
+        axis.legend()
     figure.savefig(directory / "consistency.png", dpi=110)
 
 
@@ -270,7 +283,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     worlds = [(world, seed) for world in options.worlds for seed in options.seeds]
     low, high = options.plans or (1, 0)
     worlds += [(f"floor_plan:{number}", number) for number in range(low, high + 1)]
-    known = _known(options.out)
+    known = known_rows(options.out)
     rows = []
     for world, seed in worlds:
         for odometry in options.odometry:
@@ -298,7 +311,8 @@ def _row(name: str, world: str, seed: int, odometry: str, options: argparse.Name
     return {"name": name, "odometry": odometry, **run(settings)}
 
 
-def _known(out: Path | None) -> dict[str, Row]:
+def known_rows(out: Path | None) -> dict[str, Row]:
+    """The runs that a file holds, by name."""
     if out is None or not out.exists():
         return {}
     rows = [json.loads(text) for text in out.read_text(encoding="utf-8").splitlines()]
