@@ -49,7 +49,6 @@ LOOK_S = 0.1  # between two looks at the robot
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run and print a line for each pose, then one for each world; 1 if a claim was wrong."""
-    structlog.configure(wrapper_class=structlog.make_filtering_bound_logger(50))
     options = _options(arguments)
     rows = []
     for row in _rows(options):
@@ -96,6 +95,7 @@ def _put_down(options: argparse.Namespace, world: str, number: int) -> Row:
 
 def kidnapped(config: Config, known: Path, number: int, out: Path) -> Row:
     """What becomes of a robot that wakes at pose `number` of a world whose map is in `known`."""
+    structlog.configure(wrapper_class=structlog.make_filtering_bound_logger(50))
     place = open_place(config)
     rng = np.random.default_rng((number, 7))
     start = free_pose(place.world, place.start, config.robot.radius_m + SPARE_M, rng)
