@@ -22,6 +22,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from pathlib import Path
 from statistics import fmean, median
 
@@ -115,6 +116,7 @@ def run(command: tuple[str, ...], out: Path) -> Row:
         "world": world,
         "seed": int(seed),
         "robots": int(robots),
+        "settings": [text for word, text in pairwise(command) if word == "--set"],
         "status": done.returncode,
     }
     try:
@@ -162,9 +164,8 @@ def line(row: Row) -> str:
     """A row of the table."""
     cells = [form.format(row[key]) if row.get(key) is not None else "-" for key, _, form in COLUMNS]
     outcome = row["outcome"].removeprefix("explored_with_")
-    return f"{row['world']:16} {row['robots']:6} {row['seed']:4} {outcome:8} " + " ".join(
-        f"{cell:>6}" for cell in cells
-    )
+    words = [f"{row['world']:16} {row['robots']:6} {row['seed']:4} {outcome:8}"]
+    return " ".join([*words, *(f"{cell:>6}" for cell in cells), *row["settings"]])
 
 
 def summary(rows: list[Row]) -> list[str]:

@@ -12,7 +12,7 @@ import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from benchmarks import explore_table, relations
+from benchmarks import explore_table, relations, team_table
 from benchmarks.explore_table import Row
 
 ROOT = Path(__file__).parents[1]
@@ -77,6 +77,12 @@ def mappers(rows: list[Row]) -> str:
     return _block([relations.HEAD, *map(relations.line, rows)])
 
 
+def teams(rows: list[Row]) -> str:
+    """A line for each run of several robots, and what these have in common."""
+    lines = [team_table.HEAD, *map(team_table.line, rows)]
+    return _block([*lines, *"\n".join(team_table.summary(rows)).splitlines()])
+
+
 def _block(lines: list[str]) -> str:
     return "\n".join(["```", *lines, "```"])
 
@@ -86,6 +92,7 @@ VIEWS: dict[str, Callable[..., str]] = {
     "summary": summary,
     "last_words": last_words,
     "mappers": mappers,
+    "teams": teams,
 }
 
 
