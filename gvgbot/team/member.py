@@ -270,8 +270,7 @@ class Member:
             for frontier, (cost, end) in costs.items()
             if not self._is_taken(frontier, cost, claims)
         ]
-        others_drive = any(not self._mates[name].news.finished for name in self.others())
-        may_come = others_drive and any(site.open.values())
+        may_come = any(self._is_busy(name) for name in self.others()) and any(site.open.values())
         self._nothing_left = bool(reached) and not costs and not may_come
         self._others_claim_all = bool(reached) and not mine and (bool(costs) or may_come)
         if not mine:
@@ -281,6 +280,11 @@ class Member:
         self._claim = Claim(frontier.x, frontier.y, frontier.bearing, cost)
         self._claimed_end = end
         return end, reached[end.vertex]
+
+    def _is_busy(self, name: str) -> bool:
+        """Whether another robot goes somewhere, so that it may find more, and does not wait."""
+        mate = self._mates[name]
+        return not mate.news.finished and not (mate.is_standing and mate.news.claim is None)
 
     def _is_taken(self, frontier: Frontier, cost: float, claims: list[tuple[str, Claim]]) -> bool:
         """Whether another robot is on its way to a frontier, and not much farther from it."""

@@ -1,5 +1,5 @@
 import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -212,3 +212,26 @@ def test_an_old_course_changes_nothing() -> None:
     there = one.member.company()[0].pose
     one.member.hear(old, 3.3)
     assert one.member.company()[0].pose == there
+
+
+def given_up(chart: Chart) -> Chart:
+    """The chart of a robot to which every frontier is blocked."""
+    vertices = {
+        key: replace(
+            vertex,
+            departures=tuple(replace(d, blocked=d.edge is None) for d in vertex.departures),
+        )
+        for key, vertex in chart.vertices.items()
+    }
+    return replace(chart, vertices=vertices)
+
+
+def test_two_that_have_given_up_do_not_wait_for_each_other() -> None:
+    one, two = team()
+    one.chart = one.member._chart = given_up(one.chart)
+    one.member._own_chart = lambda: one.chart
+    two.tell(2.0, one, at=Pose(1.0, 0.0, 0.0))  # it drives, and may find another way
+    assert (one.choose(), one.member.is_waiting, one.member.is_done) == (None, True, False)
+    for stamp in (4.0, 6.0):
+        two.tell(stamp, one, at=Pose(1.0, 0.0, 0.0))  # it stands, and is on its way to nothing
+    assert (one.choose(), one.member.is_waiting, one.member.is_done) == (None, False, True)
