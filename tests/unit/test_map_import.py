@@ -82,7 +82,7 @@ def test_the_run_holds_a_mission_on_which_a_daemon_can_begin(tmp_path: Path) -> 
     saved = MissionFiles(tmp_path / "run").read()
     assert saved is not None
     assert len(saved.memory.graph.vertices) == 5
-    assert len(saved.past) == saved.memory.keyframes
+    assert len(saved.past) == saved.memory.keyframes == saved.memory.lasting
     assert saved.memory.intent.outcome is None
     assert main(["map", "show", str(tmp_path / "run")]) == 0
 
