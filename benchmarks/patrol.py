@@ -7,7 +7,8 @@ vertex to vertex from then on. Two doors in the bar swing at random moments. Aft
 line says how many vertices were reached and missed, how far the worst vertex is from where it was
 when the patrol began and the robot from where it believes to be, what the map and the mission have
 come to, in memory and on disk, and what the hour cost. The exit status is 1 if the map has changed,
-or if the mission of the last hour is more than a tenth larger than that of the second.
+if the robot touched something, or if at the end the journal is a tenth longer than it ever was
+before, or memory holds a tenth more objects than after the second hour.
 """
 
 import argparse
@@ -26,7 +27,7 @@ import structlog
 
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.config import Config, load_config
-from gvgbot.maps.run_directory import RunDirectory
+from gvgbot.maps.run_directory import EVENTS, RunDirectory
 from gvgbot.persistence.keeper import Keeper
 from gvgbot.persistence.mission_files import JOURNAL, SNAPSHOT, MissionFiles
 from gvgbot.robot import Robot
@@ -45,6 +46,8 @@ HEAD = (
     "snapshot kB events kB objects k memory MB  CPU s"
 )
 
+KEPT = (JOURNAL, SNAPSHOT, EVENTS)
+Door = tuple[float, float, float, float]  # x, x, y, y
 Row = dict[str, Any]
 
 
@@ -75,7 +78,7 @@ class Patrol:
         self._session = Session(config, run, Place(self._world, START))
         self._keeper = Keeper(self._session, MissionFiles(run.path))
         self._rng = np.random.default_rng((config.twin.seed, 13))
-        self._shut: dict[tuple[float, float, float, float], bool] = {MIDDLE: False, FLUSH: False}
+        self._shut: dict[Door, bool] = {MIDDLE: False, FLUSH: False}
         self._places: dict[int, np.ndarray] = {}
         self._cpu = time.process_time()
         self.rows: list[Row] = []
@@ -104,10 +107,10 @@ class Patrol:
             self._take_down(hour)
         return "the end"
 
-    def _next(self, now: float, door: tuple[float, float, float, float]) -> float:
+    def _next(self, now: float, door: Door) -> float:
         return now + float(self._rng.exponential(SHUT_S if self._shut[door] else OPEN_S))
 
-    def _is_in(self, door: tuple[float, float, float, float]) -> bool:
+    def _is_in(self, door: Door) -> bool:
         """Whether the robot stands in a door or so near that it could not close."""
         assert self._session.simulation is not None
         here = self._session.simulation.body.pose
@@ -155,11 +158,8 @@ class Patrol:
                 file.write(json.dumps(row) + "\n")
 
 
-KEPT = (JOURNAL, SNAPSHOT, "events.jsonl")
-
-
 def _lines(path: Path) -> Iterator[dict[str, Any]]:
-    for text in (path / "events.jsonl").read_text(encoding="utf-8").splitlines():
+    for text in (path / EVENTS).read_text(encoding="utf-8").splitlines():
         yield json.loads(text)
 
 
