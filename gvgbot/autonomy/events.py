@@ -50,13 +50,16 @@ class LoopClosed:
 
 @dataclass(frozen=True, slots=True)
 class PlaceDoubted:
-    """A vertex entered the map that may be a known one: the next vertices decide."""
+    """A vertex entered the map that may be a known one: the next vertices decide.
+
+    There is one for each known vertex that it may be, likeliest first.
+    """
 
     stamp: float
     vertex: int
-    rivals: tuple[int, ...]  # vertices that it may be, likeliest first
-    costs: tuple[float, ...]  # of taking it for each: minus twice the log likelihood
-    novelty: float  # the cost of taking it for a new one
+    known: int  # the vertex that it may be
+    cost: float  # of taking it for that one: minus twice the log likelihood
+    novelty: float  # of taking it for a new one
 
 
 @dataclass(frozen=True, slots=True)

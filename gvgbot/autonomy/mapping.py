@@ -261,10 +261,8 @@ class Mapper:
         """Keep in mind which known vertices a new one may be."""
         self._doubts.note(Doubt(vertex.id, found.rivals, found.density))
         self._has_news = True
-        if found.rivals:
-            self._events.append(
-                PlaceDoubted(view.stamp, vertex.id, found.rivals, found.costs, found.novelty)
-            )
+        for known, cost in zip(found.rivals, found.costs, strict=True):
+            self._events.append(PlaceDoubted(view.stamp, vertex.id, known, cost, found.novelty))
 
     def _may_be_known(self, view: View, sighting: Sighting) -> bool:
         vertices = self.graph.vertices.values()

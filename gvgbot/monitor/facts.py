@@ -14,6 +14,12 @@ _LOW_BATTERY = 0.2  # of a full charge
 _GAUGE = 8  # characters
 _LONGEST_NAME = 9  # characters, of another robot
 _QUIET = {"edge_joined"}  # too many of them, and they say little
+_TONES: Mapping[str, Tone] = {
+    "recovery": "warning",
+    "closure_revoked": "warning",
+    "finished": "good",
+    "loop_closed": "good",
+}
 _PHASES: Mapping[str, Tone] = {
     "starting": "warning",
     "exploring": "good",
@@ -139,9 +145,7 @@ def told(event: Event, now: float) -> Fact | None:
     """An event as a line at a stamp, s; None for those that only fill the list."""
     if event.kind in _QUIET:
         return None
-    tone: Tone = {"recovery": "warning", "finished": "good", "loop_closed": "good"}.get(
-        event.kind, "plain"
-    )  # type: ignore[assignment]
+    tone = _TONES.get(event.kind, "plain")
     return Fact(f"{duration(now - event.stamp):>8}", _words(event), tone)
 
 
@@ -158,6 +162,13 @@ def _words(event: Event) -> str:
             away = get("away_m")
             far = f" after {away:.0f} m" if isinstance(away, float) else ""
             return f"loop closed at vertex {get('vertex')}{far}"
+        case "place_doubted":
+            return f"vertex {get('vertex')} may be {get('known')}: the next ones tell"
+        case "doubt_settled":
+            known = get("known")
+            return f"vertex {get('vertex')} is {'a new one' if known is None else known}"
+        case "closure_revoked":
+            return f"closure at vertex {get('vertex')} taken back"
         case "recovery":
             return f"{get('action')}: {get('reason')}"
         case "finished":

@@ -130,6 +130,9 @@ export function told(event) {
       const far = typeof d.away_m === "number" ? ` after ${d.away_m.toFixed(0)} m` : "";
       return [`loop closed at vertex ${d.vertex}${far}`, "good"];
     }
+    case "place_doubted": return [`vertex ${d.vertex} may be ${d.known}: the next ones tell`, "plain"];
+    case "doubt_settled": return [`vertex ${d.vertex} is ${d.known ?? "a new one"}`, "plain"];
+    case "closure_revoked": return [`closure at vertex ${d.vertex} taken back`, "warning"];
     case "recovery": return [`${d.action}: ${d.reason}`, "warning"];
     case "finished": return [`${d.outcome.replaceAll("_", " ")}: ${d.reason}`, "good"];
     case "requested": return [`${d.request}${d.done ? "" : " refused"}: ${d.answer} (${d.origin})`, "plain"];

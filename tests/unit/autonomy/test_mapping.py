@@ -491,7 +491,7 @@ def test_a_vertex_in_doubt_becomes_part_of_the_known_one_as_soon_as_that_is_cert
     mapper = seen.mapper
     (doubt,) = of_type(seen.events, PlaceDoubted)
     assert isinstance(doubt, PlaceDoubted)
-    (tee,) = doubt.rivals
+    tee = doubt.known
     assert {tee, doubt.vertex} <= mapper.graph.vertices.keys()
     # walls tell where the robot truly is: three metres before the tee
     mapper.belief = ekf.update(mapper.belief, tee, Pose(3.0, 0.0), 0.01 * np.eye(3))

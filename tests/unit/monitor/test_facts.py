@@ -158,9 +158,13 @@ def test_an_event_is_a_sentence_with_its_age() -> None:
         ),
         ("errand_ended", {"errand": "home", "outcome": "arrived", "reason": ""}, "home arrived"),
         ("round_ended", {"round": 3, "reached": 5, "missed": 1}, "round 3: 5 reached, 1 missed"),
+        ("place_doubted", {"vertex": 9, "known": 2}, "vertex 9 may be 2: the next ones tell"),
+        ("doubt_settled", {"vertex": 9, "known": 2}, "vertex 9 is 2"),
+        ("doubt_settled", {"vertex": 9, "known": None}, "vertex 9 is a new one"),
+        ("closure_revoked", {"vertex": 2}, "closure at vertex 2 taken back"),
     ],
 )
-def test_what_people_asked_for_is_told_in_their_words(
+def test_what_happened_is_told_in_words(
     kind: str, details: dict[str, str | int | float | bool | None], text: str
 ) -> None:
     fact = told(Event(number=1, stamp=0.0, kind=kind, details=details), 0.0)
