@@ -37,6 +37,8 @@ from gvgbot.vitals import Vitals
 
 SAVE_EVERY = 30.0  # s at least between two savings while the map grows
 STUCK_AFTER = 1.0  # s without a control cycle, though the base is there
+# what changes the past as it is known now
+_CORRECTIONS = events.LoopClosed | events.DoubtSettled | events.ClosureRevoked
 
 log = structlog.get_logger()
 
@@ -290,7 +292,7 @@ class Robot:
                 self._finished.set()
             if isinstance(event, events.Decision):
                 self._decided = event.reason
-            if isinstance(event, events.LoopClosed | events.Finished):
+            if isinstance(event, _CORRECTIONS | events.Finished):
                 self._doubt_the_past()
 
     def _doubt_the_past(self) -> None:
