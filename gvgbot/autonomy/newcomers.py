@@ -25,6 +25,7 @@ _SMOOTH_M = 0.15  # in range from beam to beam, on it: two legs of a chair are f
 _BEAMS = 3  # fewer see nothing for sure
 _SLIM_M, _WIDE_M = 0.1, 0.8  # people are between these; what is slimmer is furniture
 _FLAT = 0.06  # of its width: what bulges less towards the laser is a piece of wall, or of glass
+_ARC_BEAMS = 8  # fewer lie on a circle by chance
 _ROUND = 0.06  # of its radius: what strays less from a circle, r.m.s., may be a leg or a body
 _GLIMPSE_S = 3.0  # what is half hidden behind something nearer is only kept waiting so long
 _BLUR_M = 0.1  # beyond its rim, beams may still end on something
@@ -56,7 +57,7 @@ class Newcomer:
     first: float
     last: float
     came: bool
-    is_whole: bool  # both sides of it have been seen
+    is_whole: bool  # both sides of it have been seen, or so much that the rest is known
     is_let_in: bool = False  # it has stood for long enough to be in the map
     was_let_in: bool = False  # or it had, for what was seen of it at first
 
@@ -69,6 +70,7 @@ class _Island:
     centre: Array
     radius: float
     is_whole: bool
+    is_round: bool
 
 
 class Newcomers:
@@ -200,7 +202,7 @@ class _Walls:
 
         For what is round, once or twice is not enough: that may have been a part of a person.
         """
-        tree = self._tree if _is_round(island) else self._map.tree()
+        tree = self._tree if island.is_round else self._map.tree()
         distance, _ = tree.query(island.ends, distance_upper_bound=self._reach)
         return bool(np.isfinite(distance).mean() > 0.5)
 
@@ -234,10 +236,15 @@ def _islands(scan: Scan, local_base: Pose) -> list[_Island]:
             continue
         ends = _ends(scan, told[start:stop], depth[start:stop], local_laser)
         width = float(np.hypot(*(ends[-1] - ends[0])))
-        if _SLIM_M <= width < _WIDE_M and not (all(rims) and _is_flat(ends, width)):
+        if not _SLIM_M <= width < _WIDE_M or (all(rims) and _is_flat(ends, width)):
+            continue
+        circle = _circle(ends)
+        if circle is not None and circle[1] < width:  # a sixth of it, or more
+            found.append(_Island(ends, *circle, is_whole=True, is_round=True))
+        else:
             away = ends.mean(axis=0) - local_laser.position
             centre = ends.mean(axis=0) + 0.3 * width * away / np.hypot(*away)
-            found.append(_Island(ends, centre, width / 2, all(rims)))
+            found.append(_Island(ends, centre, width / 2, all(rims), is_round=False))
     return found
 
 
@@ -253,19 +260,21 @@ def _is_flat(ends: Array, width: float) -> bool:
     return bool(bulge[third:-third].mean() - rims < _FLAT * width)
 
 
-def _is_round(island: _Island) -> bool:
-    """Whether what was seen from side to side lies on a circle, as a leg or a body does.
+def _circle(ends: Array) -> tuple[Array, float] | None:
+    """Centre (2,) and radius, m, of what looks like a leg or a body by its ends (N, 2); or None.
 
     The circle is the algebraic least-squares fit of Kåsa: |p|² = 2 c·p + r² - |c|².
     """
-    if not island.is_whole:
-        return False
-    ends = island.ends - island.centre
-    equations = np.column_stack([2 * ends, np.ones(len(ends))])
-    (x, y, rest), *_ = np.linalg.lstsq(equations, (ends**2).sum(axis=1))
-    radius = np.sqrt(rest + x**2 + y**2)
-    misfit = np.hypot(*(ends - (x, y)).T) - radius
-    return bool(np.std(misfit) < _ROUND * island.radius and radius < 2.0 * island.radius)
+    if len(ends) < _ARC_BEAMS:
+        return None
+    middle = ends.mean(axis=0)
+    about = ends - middle
+    equations = np.column_stack([2 * about, np.ones(len(ends))])
+    (x, y, rest), *_ = np.linalg.lstsq(equations, (about**2).sum(axis=1))
+    radius = float(np.sqrt(rest + x**2 + y**2))
+    misfit = np.hypot(*(about - (x, y)).T) - radius
+    is_one = _SLIM_M < 2.0 * radius < _WIDE_M and np.std(misfit) < _ROUND * radius
+    return (middle + np.array([x, y]), radius) if is_one else None
 
 
 def _without(scan: Scan, local_base: Pose, discs: list[tuple[Array, float]]) -> Scan:
