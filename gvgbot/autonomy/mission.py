@@ -279,6 +279,8 @@ class Mission:
 
     def _decide(self, view: View, here: Situation) -> Order:
         graph = self._mapper.graph
+        if self.sharing is not None:  # what was in the way may have been one that drives on
+            self._reopen(view, "the way may be free again")
         target = self.target
         half = None if target is None else graph.half_edge(target)
         if target is None or half is None or not half.open:
@@ -310,7 +312,7 @@ class Mission:
         chosen, reason = self._ear(here), "ear"
         if chosen is None:
             nearest = self._nearest(here.starts())
-            if nearest is None and self._reopen(view):
+            if nearest is None and self._reopen(view, "nothing else is left"):
                 nearest = self._nearest(here.starts())
             if nearest is None:
                 if self._is_left_to_others():
@@ -477,11 +479,11 @@ class Mission:
         self._events.append(Recovery(view.stamp, "try another way", reason))
         self.target = None
 
-    def _reopen(self, view: View) -> bool:
+    def _reopen(self, view: View, reason: str) -> bool:
         """Open what was closed long enough ago; whether there was something."""
         opened = self._obstructions.open(self._mapper.graph, view.stamp)
         if opened:
-            self._events.append(Recovery(view.stamp, "try again", "nothing else is left"))
+            self._events.append(Recovery(view.stamp, "try again", reason))
         return opened
 
     # -- giving up ---------------------------------------------------------------------------------

@@ -8,11 +8,13 @@ import pytest
 
 from gvgbot.autonomy.control.company import Companion
 from gvgbot.autonomy.events import Decision, Event, Finished, Recovery
+from gvgbot.autonomy.exploration.ears import nearest_frontier
+from gvgbot.autonomy.exploration.paths import Approach
 from gvgbot.autonomy.gvg.local import LocalGvg
 from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
 from gvgbot.autonomy.mapping import Mapper, MappingConfig
 from gvgbot.autonomy.mission import Drive, ExplorationConfig, LookAround, Mission, Order, Stand
-from gvgbot.autonomy.slam.graph import HalfEdgeId
+from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
 from gvgbot.autonomy.slam.recognition import RecognitionConfig
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
 from gvgbot.autonomy.views import View
@@ -212,6 +214,40 @@ def test_who_has_nowhere_to_go_but_past_another_robot_makes_way() -> None:
     assert end_of(order) == pytest.approx((3.0, -4.0))
     robot.mission.meet(robot.pose, [Companion("other", Pose(-2.5, 0.0, 0.0), goes_first=True)])
     assert isinstance(robot.look(TEE), Stand)
+
+
+class Alone:
+    """Shares the frontiers with others of whom nothing has been heard."""
+
+    is_waiting = is_done = False
+
+    def choose(self, graph: GvgGraph, starts: list[Approach]) -> tuple[HalfEdgeId, Approach] | None:
+        return nearest_frontier(graph, starts)
+
+    def keeps(self, target: HalfEdgeId, graph: GvgGraph, starts: list[Approach]) -> bool:
+        return True
+
+    def enter(self) -> None:
+        pass
+
+
+@pytest.mark.parametrize("is_in_team", [False, True])
+def test_in_a_team_a_way_that_was_closed_is_open_again_before_all_others_are_driven(
+    is_in_team: bool,
+) -> None:
+    robot = Robot()
+    robot.mission.sharing = Alone() if is_in_team else None
+    robot.stand(TEE, 8)
+    closed = robot.mission.target
+    assert closed is not None
+    while robot.mission.target == closed:
+        robot.mission.hold()
+        robot.look(TEE)
+    half = robot.mapper.graph.half_edge(closed)
+    assert half is not None
+    assert half.blocked
+    robot.stand(TEE, round(CONFIG.retry_after_s / 0.5) + 2)
+    assert half.blocked != is_in_team
 
 
 def test_to_and_fro_on_the_spot_is_no_progress() -> None:
