@@ -1,7 +1,10 @@
 """The command line: arguments in, exit status out, one clear line for every failure."""
 
+import signal
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from types import FrameType
 
 from gvgbot import __version__
 from gvgbot.cli.arguments import BAD_USAGE, Parser
@@ -19,7 +22,25 @@ FAILURE, INTERRUPTED = 1, 130
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status; wrong arguments raise SystemExit(2)."""
     options = parser().parse_args(arguments)
-    return status_of(lambda: options.command(options))
+    with _any_stop_as_by_ctrl_c():
+        return status_of(lambda: options.command(options))
+
+
+@contextmanager
+def _any_stop_as_by_ctrl_c() -> Iterator[None]:
+    """Let a command that is told to end, or loses its terminal, tidy up as after Ctrl-C."""
+    taken = [
+        number
+        for number in (signal.SIGTERM, signal.SIGHUP)
+        if signal.getsignal(number) is signal.SIG_DFL  # `nohup` has it ignored
+    ]
+    for number in taken:
+        signal.signal(number, _interrupt)
+    try:
+        yield
+    finally:
+        for number in taken:
+            signal.signal(number, signal.SIG_DFL)
 
 
 def status_of(command: Callable[[], int]) -> int:
@@ -37,6 +58,12 @@ def status_of(command: Callable[[], int]) -> int:
         return _fail(str(error), FAILURE)
     except BrokenPipeError:  # whoever read our output has gone, as `head` does
         return FAILURE
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    """Do what Ctrl-C does now: a running loop has it end its tasks."""
+    handler = signal.getsignal(signal.SIGINT)
+    (handler if callable(handler) else signal.default_int_handler)(number, frame)
 
 
 def _fail(message: str, status: int) -> int:

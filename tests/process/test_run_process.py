@@ -2,6 +2,7 @@
 
 import json
 import os
+import select
 import signal
 import socket
 import subprocess
@@ -124,6 +125,22 @@ def test_a_running_robot_is_watched_asked_and_stopped(
     assert json.loads((out / "summary.json").read_text())["outcome"] == "stopped"
     assert f"signal={number.name}" in log
     assert "Traceback" not in log
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_simulated_exploration_that_is_stopped_leaves_its_map(
+    number: signal.Signals, tmp_path: Path
+) -> None:
+    events = tmp_path / "run" / "events.jsonl"
+    with gvgbot("explore", "--out", "run", cwd=tmp_path) as process:
+        while not (events.exists() and "edge_joined" in events.read_text()):
+            assert process.poll() is None
+            select.select([], [], [], 0.1)
+        process.send_signal(number)
+        log, _ = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 130
+    assert log.strip().endswith("gvgbot: interrupted")
+    assert json.loads((events.parent / "map.geojson").read_text())["features"]
 
 
 def test_an_address_in_use_is_one_line_and_leaves_nothing(endpoint: str, tmp_path: Path) -> None:
