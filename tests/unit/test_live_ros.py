@@ -2,6 +2,7 @@
 
 import math
 from collections import defaultdict
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -20,6 +21,7 @@ from gvgbot.ros2.topics import TOPICS, Topic
 from gvgbot.ros2.translation import occupancy_grid
 from gvgbot.ros_markers import markers
 from tests.unit.ros2.oracle import STORE
+from tests.unit.test_live_past import RADIUS_M, drive
 
 NOISE = OdometryNoise()
 LATER = 1.7e9  # s from the start of the robot's clock to 1970
@@ -168,6 +170,28 @@ def test_a_grid_lies_where_its_corner_is() -> None:
     corner = told.info.origin
     assert (corner.position.x, corner.position.y, corner.orientation.w) == (-1.0, 2.0, 1.0)
     assert told.header.frame_id == "map"
+
+
+def test_the_map_is_drawn_anew_when_a_loop_has_closed() -> None:
+    pipeline, heard = drive(), Heard(topics.MAP)
+    around = np.full(360, 3.0)  # round walls, wherever it stood
+    pipeline.keyframes = [
+        replace(one, scan=Scan(one.stamp, around, -math.pi, math.tau / 360, 0.1, 30.0))
+        for one in pipeline.keyframes
+    ]
+    live = LiveRos([heard], pipeline, NOISE, lambda stamp: stamp + LATER)
+    later, pipeline.keyframes = pipeline.keyframes, pipeline.keyframes[:1]
+    for stamp in (0.0, 10.0, 20.0):
+        draw = live.draw(stamp)
+        assert draw is not None
+        draw()
+        pipeline.keyframes = later
+        if stamp > 0.0:
+            live.doubt()
+    _, believed, corrected = ((m.info.width, m.info.height) for m in heard.got[topics.MAP])
+    whole = 2 * (RADIUS_M + 3.0) + 1.0  # with a margin of half a metre
+    assert np.multiply(corrected, 0.05) == pytest.approx([whole, whole], abs=0.3)
+    assert np.abs(np.multiply(believed, 0.05) - whole).max() > 0.6
 
 
 def vertex(number: int, x: float, kind: Any, frontiers: tuple[float, ...] = ()) -> MapVertex:
