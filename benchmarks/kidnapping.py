@@ -39,7 +39,7 @@ from gvgbot.session import Session
 from gvgbot.simulation import Place, open_place
 from tests.twin.run_rig import at_once
 
-WORLDS = ("office", "floor_plan:3", "grid", "rooms", "ring")
+WORLDS = ("office", "floor_plan:3", "jittered:1", "grid", "rooms", "ring")
 RESULTS = "kidnapping.jsonl"
 NEAR_M, NEAR_RAD = 0.5, math.radians(15.0)  # of the truth, a place is right
 SPARE_M = 0.1  # between the robot that is put down and a wall
