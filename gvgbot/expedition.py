@@ -232,9 +232,9 @@ def _tell(robot: _Robot, air: _Air, stamp: float) -> None:
 def _save(directory: RunDirectory, robots: list[_Robot]) -> list[_Robot]:
     """Write the map of all whose maps could be joined to one; which these are, that one first.
 
-    It is the map of who knows most others, as a rule the first robot's.
+    It is the map of who knows most others, and of these the one with most vertices.
     """
-    first = max(robots, key=lambda robot: len(robot.member.frames))
+    first = max(robots, key=lambda r: (len(r.member.frames), len(_graph(r).vertices)))
     graph = _graph(first)
     joined, frames = [first], first.member.frames
     poses = {first.member.name: Pose()}
