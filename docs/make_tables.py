@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from benchmarks import explore_table, relations, team_table
-from benchmarks.explore_table import Row
+from benchmarks.campaign import Row
 
 ROOT = Path(__file__).parents[1]
 QUOTE = re.compile(
