@@ -68,7 +68,7 @@ class MappingConfig:
     margin: Annotated[float, Range(0.0, 50.0)] = 9.0  # in squared Mahalanobis distance, to the next
     # by which a place must be likelier a known one than a new one, or two that may be one be so:
     # minus twice the log likelihood
-    novelty_margin: Annotated[float, Range(0.0, 50.0)] = 6.0
+    novelty_margin: Annotated[float, Range(0.0, 50.0)] = 10.0
     # around a vertex, walls are kept to know it again
     snapshot_m: Annotated[float, Range(1.0, 20.0)] = 6.0
 
