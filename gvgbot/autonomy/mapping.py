@@ -37,6 +37,7 @@ from gvgbot.autonomy.views import Correspondence, Observation, View
 from gvgbot.geometry import Array, Pose
 from gvgbot.ranges import Range
 
+_MADE_BY_M = 0.15  # beyond its disc: what made a vertex is nearer, wherever exactly that is
 _HIDES_M = 1.0  # what stands so near to a vertex's disc may close a branch
 _FRESH_M = 6.0  # driven since a vertex was seen: the local frame still tells its place
 _IN_FULL_VIEW_M = 4.0  # from so near, it would be seen that a vertex is none
@@ -499,16 +500,18 @@ class Mapper:
                 self.graph.remove_half_edge(HalfEdgeId(vertex.id, key))
 
     def _refute(self, view: View, known: Correspondence) -> None:
-        """Remove vertices where a plain edge is seen to pass through."""
+        """Remove vertices where a plain edge is seen to pass through, or no wall that made them."""
         for vertex, place in self._in_full_view(view):
             near_by = vertex.clearance + _HIDES_M
             if vertex.id in known.node_of or view.is_doubtful(place, near_by):
                 continue
-            if self._passes_through(view, place, known):
+            stands_free = view.stands_free(place, vertex.clearance + _MADE_BY_M)
+            if stands_free or self._passes_through(view, place, known):
                 vertex.misses += 1
                 refuted = vertex.misses > self._config.misses
                 if refuted and self._has_changed(vertex, view.stamp):
-                    self.remove(view, vertex, "an edge passes here")
+                    gone = "the walls about it have gone" if stands_free else "an edge passes here"
+                    self.remove(view, vertex, gone)
 
     def _in_full_view(self, view: View) -> list[tuple[Vertex, Array]]:
         """The vertices that should be seen near by, and where (2,), local frame, for certain."""

@@ -29,6 +29,11 @@ class View:
         """Whether something that may go stands so near to a place (2,)."""
         return bool((np.hypot(*(self.doubtful - place).T) < within_m).any())
 
+    def stands_free(self, place: Array, within_m: float) -> bool:
+        """Whether it is certain that neither wall nor glass is so near to a place (2,)."""
+        gap, _ = self.local_map.tree().query(place, distance_upper_bound=within_m)
+        return bool(np.isinf(gap)) and self.local_map.is_bare(place, within_m)
+
 
 def touching(gvg: LocalGvg, points: Array) -> frozenset[int]:
     """The nodes that would be elsewhere, or not at all, without obstacles (N, 2)."""

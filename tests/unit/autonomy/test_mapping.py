@@ -31,6 +31,7 @@ from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
 from gvgbot.autonomy.views import Correspondence, View, touching
 from gvgbot.geometry import Array, Pose
 from tests.unit.autonomy.local_graphs import Point, drawn
+from tests.unit.autonomy.sights import carved, sweep
 
 CONFIG = MappingConfig()
 NOTHING_SEEN = LocalMap(LocalMapConfig())
@@ -66,10 +67,11 @@ class Seen:
         at: Pose | None = None,
         *,
         doubtful: Array | None = None,
+        local_map: LocalMap = NOTHING_SEEN,
     ) -> "Seen":
         for _ in range(times):
             view = View(
-                self._count, float(self._count), 0.1 * self._count, at or Pose(), gvg, NOTHING_SEEN
+                self._count, float(self._count), 0.1 * self._count, at or Pose(), gvg, local_map
             )
             if doubtful is not None:
                 view = replace(view, doubtful=doubtful, doubted=touching(gvg, doubtful))
@@ -349,6 +351,20 @@ def test_a_vertex_is_not_refuted_while_somebody_may_hide_its_branch() -> None:
     seen = Seen().look(TEE, 10)
     seen.look(PLAIN, 30, doubtful=np.array([[3.0, -1.5]]))
     assert len(seen.places("meetpoint")) == 1
+
+
+@pytest.mark.parametrize(("room", "vertices"), [(4.0, 0), (1.0, 1)])
+def test_a_vertex_whose_walls_have_gone_is_none_wherever_the_edges_are(
+    room: float, vertices: int
+) -> None:
+    """The tee of clearance 1 m was between people: half the width of the hall is `room`."""
+    seen = Seen().look(TEE, CONFIG.candidates.meetpoint_sightings)
+    hall, hall_map = carved([(-4.0, -room, 8.0, room)]), LocalMap(LocalMapConfig())
+    for _ in range(3):
+        hall_map.insert(sweep(hall, Pose()), Pose(), 0.0)
+    beside = drawn({1: (-2.0, 0.8), 3: (6.0, 0.8)}, {10: (1, 3, [])}, unseen=UNSEEN)
+    seen.look(beside, CONFIG.misses + 1, local_map=hall_map)
+    assert len(seen.places("meetpoint")) == vertices
 
 
 def test_the_robot_s_uncertainty_is_in_the_place_of_a_vertex_seen_later() -> None:
