@@ -32,7 +32,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from gvgbot import client
 from gvgbot.requests import Answer, Asked, Goto
 from gvgbot.telemetry import Telemetry
-from gvgbot.topics import Event, Events, Health, State, TelemetryConfig, Trajectory
+from gvgbot.topics import Event, Events, Health, Mate, State, TelemetryConfig, Trajectory
 from gvgbot.web.server import Web
 from gvgbot.web.viewers import Audience
 from gvgbot.web.wire import Reply, Wish
@@ -493,6 +493,22 @@ def test_walls_the_way_driven_and_the_health_are_shown_as_they_change(page: Page
             play.until_drawn(
                 lambda seen: seen["floor"][1] < 1000 and seen["robot"][1] > 20, "floor", "robot"
             )
+
+
+def test_the_other_robots_of_the_team_are_shown_where_they_are(page: Page) -> None:
+    endpoint = free_endpoint()
+    anna = Mate(name="anna", pose=(3.0, 4.0, 0.0))  # two metres to the north
+    with web("--connect", endpoint) as address:
+        play = Play(endpoint, page, state=msgspec.structs.replace(HERE, team=(anna,)))
+        with play.robot:
+            desktop(page, address)
+            play.until_read("anna")
+            play.until_read("3.00, 4.00 m")
+            names = ("robot", "vertex", "trail")
+            seen = play.until_drawn(lambda seen: min(seen[n][1] for n in names) > 20, *names)
+            robot, ahead, mate = (seen[name][0] for name in names)
+            scale = (ahead - robot)[0] / 3.0
+            assert (mate - robot) / scale == pytest.approx([0.0, -2.0], abs=0.4)
 
 
 def test_two_fingers_zoom_on_a_phone(page: Page) -> None:
