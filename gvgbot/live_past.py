@@ -42,6 +42,8 @@ class LivePast:
         Call each such function before asking for the next. Where somebody else drives, only what is
         new is found: the best estimate takes too long there.
         """
+        if not pipeline.keyframes:
+            return None
         if self._taken > len(pipeline.keyframes):  # the latest of a long way was all that stayed
             self._taken = len(pipeline.keyframes)
             self._drawn[self._taken - 1 :] = [pipeline.keyframes[-1].map_base]
@@ -55,7 +57,7 @@ class LivePast:
 
     def _portion(self, new: Sequence[Keyframe], past: Pipeline | None, stamp: float) -> Portion:
         self._drawn += [keyframe.map_base for keyframe in new]
-        if past is None or not past.keyframes:
+        if past is None:
             return Portion(new, is_all=False)
         best = smoothed_keyframes(past)
         if _farthest(self._drawn, best) < TOLERANCE_M:

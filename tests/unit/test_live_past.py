@@ -158,3 +158,9 @@ def test_the_trajectory_that_is_shown_closes_with_the_loop() -> None:
     way = from_centre(shown(live, pipeline, 2.0))
     assert len(way) > 90
     assert way == pytest.approx(RADIUS_M, abs=2 * TOLERANCE_M)
+
+
+def test_before_the_first_keyframe_there_is_nothing_to_draw() -> None:
+    pipeline = drive()
+    pipeline.keyframes = []
+    assert LivePast().update(pipeline, 0.0) is None
