@@ -63,6 +63,14 @@ COLUMNS = (
 )
 HEAD = "world            laser    seed outcome  " + " ".join(f"{t:>6}" for _, t, _ in COLUMNS)
 
+# The peak that a parent is told of a child includes the parent's own size when it started it.
+_TELLS_PEAK = """
+import atexit, pathlib, runpy, sys
+peak = pathlib.Path(sys.argv.pop(1))
+atexit.register(lambda: peak.write_text(pathlib.Path("/proc/self/status").read_text()))
+runpy.run_module("gvgbot", run_name="__main__", alter_sys=True)
+"""
+
 Command = tuple[str, ...]  # arguments of `gvgbot`, but for the run directory
 
 
@@ -187,19 +195,17 @@ def _slug(command: Command) -> str:
 
 def run(command: Command, directory: Path) -> Row:
     """Explore once, as a process of its own, and score what it leaves."""
-    process = subprocess.Popen(
-        [sys.executable, "-m", "gvgbot", *command, "--out", str(directory)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        env=os.environ | ONE_CORE,
-    )
-    assert process.stdout is not None
-    with process.stdout:
-        said = process.stdout.read().strip().splitlines() or [""]
-    _, status, usage = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)
-    row = _named(command) | {"status": process.returncode, "memory_mb": usage.ru_maxrss / 1024}
+    with tempfile.NamedTemporaryFile("r", encoding="utf-8") as peak:
+        done = subprocess.run(
+            [sys.executable, "-c", _TELLS_PEAK, peak.name, *command, "--out", str(directory)],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            env=os.environ | ONE_CORE,
+            check=False,
+        )
+        row = _named(command) | {"status": done.returncode, "memory_mb": _peak_mb(peak.read())}
+    said = done.stdout.strip().splitlines() or [""]
     try:
         row |= _outcome(directory)
     except OSError:
@@ -208,6 +214,12 @@ def run(command: Command, directory: Path) -> Row:
         return row | score_run(directory)
     except (GvgbotError, OSError) as error:
         return row | {"reason": f"not scored: {error}"}
+
+
+def _peak_mb(status: str) -> float | None:
+    """The most memory that a process had (MiB) by its /proc/PID/status; None if it was killed."""
+    found = re.search(r"^VmHWM:\s*(\d+) kB$", status, re.MULTILINE)
+    return None if found is None else int(found[1]) / 1024
 
 
 def _outcome(directory: Path) -> Row:

@@ -69,6 +69,15 @@ def test_each_command_is_one_that_the_program_takes() -> None:
         assert config.robot.limits.max_speed_mps == 0.3
 
 
+def test_the_memory_of_a_run_is_not_that_of_who_started_it(tmp_path: Path) -> None:
+    ballast = b"\1" * (400 << 20)
+    command = ("explore", "--world", "nowhere", "--seed", "1", "--set", "twin.laser.model=UTM-30LX")
+    row = run(command, tmp_path / "run")
+    assert len(ballast) == 400 << 20
+    assert row["status"] == 2
+    assert 10 < row["memory_mb"] < 300
+
+
 def test_each_floor_plan_is_drawn_and_run_with_its_own_number() -> None:
     drawn = commands(_options(["--worlds", "--plans", "3"]))
     assert [c[1:5] for c in drawn] == [
