@@ -41,6 +41,7 @@ _MADE_BY_M = 0.15  # beyond its disc: what made a vertex is nearer, wherever exa
 _HIDES_M = 1.0  # what stands so near to a vertex's disc may close a branch
 _FRESH_M = 6.0  # driven since a vertex was seen: the local frame still tells its place
 _IN_FULL_VIEW_M = 4.0  # from so near, it would be seen that a vertex is none
+_IN_CLEAR_M = 2.0  # and from so near, that it has no departure where one was seen
 _WELL_KNOWN_M = 0.2  # the uncertainty of its place with which that can be told
 _DOOR_M = 0.5  # from an edge, a dead end is what stands on it
 _AT_END_M = 0.5  # so near to the end of a dead end, it has been driven
@@ -506,7 +507,10 @@ class Mapper:
             if vertex.id in known.node_of or view.is_doubtful(place, near_by):
                 continue
             stands_free = view.stands_free(place, vertex.clearance + _MADE_BY_M)
-            if stands_free or self._passes_through(view, place, known):
+            # A door is easily missed from along the wall; the robot will come where one was seen.
+            is_promising = any(half.open for half in vertex.half_edges.values())
+            is_clear = not is_promising or math.dist(place, view.local_base.position) < _IN_CLEAR_M
+            if stands_free or (is_clear and self._passes_through(view, place, known)):
                 vertex.misses += 1
                 refuted = vertex.misses > self._config.misses
                 if refuted and self._has_changed(vertex, view.stamp):
