@@ -118,8 +118,15 @@ class Newcomers:
 
     @property
     def discs(self) -> list[tuple[Array, float]]:
-        """Centres (2,), local frame, and radii of those seen whole not in the map, m."""
-        return [(one.centre, one.radius) for one in self._all if one.is_whole and not one.is_let_in]
+        """Centres (2,), local frame, and radii of those not in the map, m.
+
+        Who was found half hidden is left out, for nobody knows how wide that is.
+        """
+        return [
+            (one.centre, one.radius)
+            for one in self._all
+            if (one.is_whole or one.came) and not one.is_let_in
+        ]
 
     @property
     def latest(self) -> list[tuple[Array, float]]:
@@ -174,17 +181,9 @@ class Newcomers:
 
     @property
     def points(self) -> Array:
-        """The rims (N, 2), local frame, of company, and of those not in the map.
-
-        Who was found half hidden is left out, for nobody knows how wide that is.
-        """
-        standing = (
-            one.centre + one.radius * _RIM
-            for one in self._all
-            if (one.is_whole or one.came) and not one.is_let_in
-        )
-        others = (centre + radius * _RIM for centre, radius in self.company)
-        return np.concatenate([np.empty((0, 2)), *standing, *others])
+        """The rims (N, 2), local frame, of company and of `discs`."""
+        rims = [centre + radius * _RIM for centre, radius in [*self.discs, *self.company]]
+        return np.concatenate([np.empty((0, 2)), *rims])
 
 
 class _Walls:
