@@ -1,0 +1,46 @@
+"""A robot whose closures are taken back while it explores maps the building all the same."""
+
+import json
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from benchmarks.score_run import score_run
+from gvgbot.autonomy.mapping import Mapper
+from gvgbot.autonomy.recogniser import Match
+from gvgbot.autonomy.views import View
+from gvgbot.cli import main
+
+pytestmark = [pytest.mark.slow, pytest.mark.twin, pytest.mark.timeout(120)]
+
+EVERY, AT_MOST = 40, 3  # keyframes between closures that are taken back, and how many are
+
+
+def test_what_was_found_since_is_found_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    close, revoke, views = Mapper._close_loop, Mapper._revoke, Counter[str]()
+
+    def close_revocably(self: Mapper, view: View, match: Match) -> None:
+        if self._revocable is None:
+            self._be_ready_to_revoke(match.vertex)
+        close(self, view, match)
+
+    def revoke_at_times(self: Mapper, view: View) -> None:
+        views["all"] += 1
+        if self._revocable is not None and views["all"] % EVERY == 0 and views["bad"] < AT_MOST:
+            views["bad"] += 1
+            self._revocable.is_contradicted = True
+        revoke(self, view)
+
+    monkeypatch.setattr(Mapper, "_close_loop", close_revocably)
+    monkeypatch.setattr(Mapper, "_revoke", revoke_at_times)
+    out = tmp_path / "run"
+    assert main(["explore", "--world", "office", "--seed", "1", "--out", str(out)]) == 0
+    happened = Counter(
+        json.loads(line)["event"] for line in (out / "events.jsonl").read_text().splitlines()
+    )
+    assert happened["closure_revoked"] == AT_MOST
+    score = score_run(out)
+    assert score["recall"] == score["precision"] == score["edge_recall"] == 1.0
