@@ -115,7 +115,7 @@ class Steering:
             case "resume", _:
                 return errands.resume()
             case "stop", _:
-                return f"{errands.stop(stamp)}; map saved in {await self._save()}"
+                return f"{errands.stop(stamp)}; {await self._saved_or_why_not()}"
             case "home", _:
                 return errands.home(stamp)
             case "explore", _:
@@ -134,6 +134,13 @@ class Steering:
                 return self._set(key, value)
             case _:
                 return f"map saved in {await self._save()}"
+
+    async def _saved_or_why_not(self) -> str:
+        """What to say of the map after something that is done whether it can be saved or not."""
+        try:
+            return f"map saved in {await self._save()}"
+        except GvgbotError as error:
+            return f"map not saved: {error}"
 
     def _set(self, key: str, value: bool | float | str) -> str:
         if key not in SETTABLE:

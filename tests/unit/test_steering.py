@@ -165,6 +165,12 @@ def test_a_map_that_cannot_be_saved_is_said_to_be_so() -> None:
     assert Rig(disk_is_full=True).ask("save") == Answer(done=False, text="no space left")
 
 
+def test_a_robot_that_stops_says_so_though_its_map_cannot_be_saved() -> None:
+    rig = Rig(disk_is_full=True)
+    assert rig.ask("stop") == Answer(done=True, text="did stop; map not saved: no space left")
+    assert rig.errands.did == ["stop"]
+
+
 def test_a_value_takes_effect_and_the_next_one_counts_from_there() -> None:
     rig = Rig()
     assert rig.ask("set", key="robot.limits.max_speed_mps", value=0.2).done
