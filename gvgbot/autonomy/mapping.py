@@ -8,23 +8,17 @@ import numpy as np
 
 from gvgbot.autonomy.candidates import Candidates, CandidatesConfig
 from gvgbot.autonomy.events import (
-    ClosureRevoked,
-    DoubtSettled,
     EdgeJoined,
     Event,
     LoopClosed,
-    PlaceDoubted,
     VertexAdded,
     VertexRemoved,
 )
 from gvgbot.autonomy.gvg.local import Branch, LocalEdge, LocalGvg, LocalNode
 from gvgbot.autonomy.gvg.reduction import KnownVertices
 from gvgbot.autonomy.recogniser import CLOSE_M, Match, Recogniser, Recognition
-from gvgbot.autonomy.revocable import Revocable
 from gvgbot.autonomy.slam import ekf
-from gvgbot.autonomy.slam.doubts import SAME, Doubt, Doubts, habit_density
-from gvgbot.autonomy.slam.ekf import Belief
-from gvgbot.autonomy.slam.graph import Edge, GvgGraph, HalfEdgeId, Kind, Vertex
+from gvgbot.autonomy.slam.graph import Edge, HalfEdgeId, Kind, Vertex
 from gvgbot.autonomy.slam.recognition import (
     RecognitionConfig,
     Sighting,
@@ -32,7 +26,8 @@ from gvgbot.autonomy.slam.recognition import (
     match_bearings,
 )
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
-from gvgbot.autonomy.topology import fuse, split_edge_at, take_out
+from gvgbot.autonomy.topology import split_edge_at, take_out
+from gvgbot.autonomy.unsettled import Knowledge, Unsettled
 from gvgbot.autonomy.views import Correspondence, Observation, View
 from gvgbot.geometry import Array, Pose
 from gvgbot.ranges import Range
@@ -75,7 +70,7 @@ class MappingConfig:
     snapshot_m: Annotated[float, Range(1.0, 20.0)] = 6.0
 
 
-class Mapper:
+class Mapper(Knowledge):
     """Keeps the belief and the graph; both are corrected by every view."""
 
     def __init__(
@@ -87,6 +82,7 @@ class Mapper:
         drive_dead_ends: bool = False,
         by_position: bool = False,
     ) -> None:
+        super().__init__()
         self._config, self._recognition = config, recognition
         self._recogniser = Recogniser(
             recognition,
@@ -98,23 +94,19 @@ class Mapper:
         )
         self._drive_dead_ends = drive_dead_ends
         self._by_position = by_position
-        self.belief = Belief()
-        self.graph = GvgGraph()
-        self.observations: list[Observation] = []
+        self.unsettled = Unsettled(
+            self,
+            margin=config.novelty_margin,
+            same_bearing=math.radians(recognition.bearing_deg),
+        )
         self._unbelieved = Candidates(config.candidates)
-        self._doubts = Doubts()
-        self._has_news = False  # on what is in doubt
         self._rivals: dict[int, Recognition] = {}  # by nodes of this view that may be known ones
-        self._revocable: Revocable | None = None
-        self._is_wary = False  # no closure without the next vertices
-        self._renamed: dict[HalfEdgeId, HalfEdgeId] = {}  # of vertices that proved to be known ones
         self._events: list[Event] = []
 
     def move(self, motion: Pose, covariance: Array) -> None:
         """Account for a motion of the base, with its covariance (3, 3)."""
         self.belief = ekf.advance(self.belief, motion, covariance)
-        if self._revocable is not None:
-            self._revocable.moves.append((motion, covariance))
+        self.unsettled.note_move(motion, covariance)
 
     def known_around(self, local_base: Pose, within_m: float) -> KnownVertices:
         """The vertices around the base, seen lately or not, in the local frame."""
@@ -146,8 +138,7 @@ class Mapper:
         The list of what happened grows with what is joined or removed before the next view.
         """
         self._events, self._rivals = [], {}
-        self._revoke(view)
-        self._settle_doubts(view)
+        self._events += self.unsettled.revoke(view.stamp) + self.unsettled.settle(view.stamp)
         known = Correspondence()
         sightings = self._sightings(view)
         self._track(view, sightings, known)
@@ -206,7 +197,7 @@ class Mapper:
                 continue
             vertices = [v for key, v in self.graph.vertices.items() if key not in known.node_of]
             found = self._recogniser.find(
-                self.belief, self.graph, vertices, view, sighting, wary=self._is_wary
+                self.belief, self.graph, vertices, view, sighting, wary=self.unsettled.is_wary
             )
             if found.match is not None:
                 self._close_loop(view, found.match)
@@ -217,9 +208,9 @@ class Mapper:
     def _close_loop(self, view: View, match: Match) -> None:
         """Correct the belief by a vertex that has been recognised."""
         vertex = match.vertex
-        self._has_news = True
-        if self._revocable is None and match.metres > self._recognition.same_place_m:
-            self._be_ready_to_revoke(vertex)
+        self.unsettled.note_closure(
+            vertex, is_surprising=match.metres > self._recognition.same_place_m
+        )
         self._events.append(
             LoopClosed(
                 view.stamp,
@@ -256,15 +247,9 @@ class Mapper:
             old = self._back_again(view, sighting, known)
             if old is None:
                 old = self._add(view, sighting)
-                self._doubt(view, old, self._rivals.get(node, Recognition()))
+                found = self._rivals.get(node, Recognition())
+                self._events += self.unsettled.doubt(old, found, view.stamp)
             known.pair(node, old.id)
-
-    def _doubt(self, view: View, vertex: Vertex, found: Recognition) -> None:
-        """Keep in mind which known vertices a new one may be."""
-        self._doubts.note(Doubt(vertex.id, found.rivals, found.density))
-        self._has_news = True
-        for known, cost in zip(found.rivals, found.costs, strict=True):
-            self._events.append(PlaceDoubted(view.stamp, vertex.id, known, cost, found.novelty))
 
     def _may_be_known(self, view: View, sighting: Sighting) -> bool:
         vertices = self.graph.vertices.values()
@@ -319,106 +304,6 @@ class Mapper:
         near = np.hypot(*(walls - vertex.local.position).T) < self._config.snapshot_m
         vertex.snapshot = vertex.local.inverse().transform(walls[near])
         vertex.sights = Pose(theta=-vertex.local.theta).transform(view.local_map.sights()[near])
-
-    # -- which of the known ones it is after all ----------------------------------------------
-
-    def _settle_doubts(self, view: View) -> None:
-        """Take for one what proves to be one, by all that was found since."""
-        if not self._has_news or not self._doubts.recent:
-            return
-        self._has_news = False
-        self._doubts.recent = [
-            replace(doubt, habit=self._habit(doubt.vertex)) for doubt in self._doubts.recent
-        ]
-        reach = {v.id: self.graph.reach(v) for v in self.graph.vertices.values()}
-        verdict = self._doubts.weigh(self.belief, reach, self._config.novelty_margin)
-        if verdict is None:
-            return
-        self._has_news = True  # the others may be certain now
-        self._is_wary = False
-        off = None
-        if verdict.known is None:
-            self._doubts.believe(verdict.vertex)
-        else:
-            kept, gone = (self.graph.vertices[v] for v in (verdict.known, verdict.vertex))
-            places = (self.belief.map_vertex(v.id) for v in (kept, gone))
-            off = next(places).distance(next(places))
-            self._be_ready_to_revoke(kept)
-            self._unite(kept, gone)
-            self._events.append(VertexRemoved(view.stamp, gone.id, f"it is vertex {kept.id}"))
-        self._events.append(
-            DoubtSettled(view.stamp, verdict.vertex, verdict.known, verdict.margin, off)
-        )
-
-    def _be_ready_to_revoke(self, vertex: Vertex) -> None:
-        """Keep what is believed, before it is corrected by a closure at a vertex."""
-        self._revocable = Revocable.before(
-            vertex.id, self.belief, self.graph, self._doubts.recent, len(self.observations)
-        )
-
-    def note_way(self, edge: Edge, arrived: int) -> None:
-        """Learn to which vertex an edge that was known has led the robot.
-
-        It speaks for the latest closure, or against it if the edge was known before.
-        """
-        if self._revocable is None or edge.id not in self._revocable.graph.edges:
-            return
-        if arrived in (edge.a.vertex, edge.b.vertex):
-            self._revocable = None
-        else:
-            self._revocable.is_contradicted = True
-
-    def _revoke(self, view: View) -> None:
-        """Go back to before the latest closure, if it is contradicted."""
-        was = self._revocable
-        if was is None or not was.is_contradicted:
-            return
-        self._events.append(ClosureRevoked(view.stamp, was.vertex))
-        for vertex in sorted(self.graph.vertices.keys() - was.graph.vertices.keys()):
-            self._events.append(VertexRemoved(view.stamp, vertex, "a closure was revoked"))
-        was.graph.serial = self.graph.serial
-        self.graph, self.belief = was.graph, was.relived()
-        del self.observations[was.observations :]
-        self._doubts.recent = was.doubts
-        self._doubts.refute(was.vertex)
-        self._revocable, self._is_wary = None, True
-        self._renamed.clear()
-
-    def _habit(self, vertex: int) -> float:
-        """How dense, 1/m^2, new vertices are where this one is, by the edges of the map."""
-        doubted = {doubt.vertex for doubt in self._doubts.recent}
-        ways, own = list[Array](), list[Array]()
-        for edge in self.graph.edges.values():
-            a, b = edge.a.vertex, edge.b.vertex
-            way = self.belief.map_vertex(b).position - self.belief.map_vertex(a).position
-            if vertex in (a, b):
-                own.append(way if vertex == b else -way)
-            elif not {a, b} & doubted:
-                ways += [way, -way]
-        known = np.array(ways).reshape(-1, 2)
-        return max((habit_density(way, known) for way in own), default=0.0)
-
-    def _unite(self, kept: Vertex, gone: Vertex) -> None:
-        """Make one vertex of two."""
-        turn = self.belief.map_vertex(gone.id).theta - self.belief.map_vertex(kept.id).theta
-        self.belief = ekf.unite(self.belief, kept.id, gone.id, SAME)
-        if gone.seen_at > kept.seen_at:
-            kept.local = gone.local.compose(Pose(theta=-turn))
-            kept.seen_at, kept.updated_at = gone.seen_at, gone.updated_at
-        kept.visits += gone.visits
-        limit = math.radians(self._recognition.bearing_deg)
-        self._renamed |= fuse(self.graph, kept, gone, Pose(theta=turn), limit)
-        self.observations[:] = [
-            replace(seen, vertex=kept.id, R=seen.R[:2, :2]) if seen.vertex == gone.id else seen
-            for seen in self.observations
-        ]
-        self._doubts.forget(gone.id)
-
-    def current(self, end: HalfEdgeId | None) -> HalfEdgeId | None:
-        """What a half-edge is called now: its vertex may have proved to be a known one."""
-        while end is not None and end in self._renamed:
-            end = self._renamed[end]
-        return end
 
     # -- what is known better ----------------------------------------------------------------
 
@@ -644,7 +529,7 @@ class Mapper:
         """Take a vertex out of the map; of two edges that met there one is made."""
         take_out(self.graph, self.belief, vertex)
         self.belief = ekf.remove_vertex(self.belief, vertex.id)
-        self._doubts.forget(vertex.id)
+        self.unsettled.forget(vertex.id)
         self._events.append(VertexRemoved(view.stamp, vertex.id, reason))
 
     def close_ring(self, view: View, line: Array, min_clearance: float) -> None:
@@ -667,7 +552,7 @@ class Mapper:
             replace(seen, keyframe=first) for seen in self.observations if seen.keyframe == last
         ]
         self.observations[:] = before + there
-        self._revocable = None  # it counts on all of them
+        self.unsettled.take_for_granted()  # what would be revoked counts on all of them
 
     def in_local_frame(self, view: View, vertex: int) -> Pose:
         """Where a vertex, seen lately or not, stands in the local frame."""

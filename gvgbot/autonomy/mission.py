@@ -220,8 +220,8 @@ class Mission:
 
     def _learn(self, view: View, known: Correspondence, place: Place) -> None:
         """Account for what has been driven."""
-        self.where.on_edge = self._mapper.current(self.where.on_edge)
-        self.target = self._mapper.current(self.target)
+        self.where.on_edge = self._mapper.unsettled.current(self.where.on_edge)
+        self.target = self._mapper.unsettled.current(self.target)
         clearance = view.gvg.edges[place.edge].clearance_at(place.station)
         self._close_ring(view, clearance)
         passage = self.where.follow(view.gvg, place, known, view.local_base.position)
@@ -239,7 +239,7 @@ class Mission:
             return
         edge = graph.edge_at(left)
         if edge is not None:
-            self._mapper.note_way(edge, arrived.vertex)
+            self._mapper.unsettled.note_way(edge, arrived.vertex)
             edge.traversals += 1
             edge.doubted_since = None
             return

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from benchmarks.score_run import score_run
-from gvgbot.autonomy.mapping import Mapper
-from gvgbot.autonomy.recogniser import Match
-from gvgbot.autonomy.views import View
+from gvgbot.autonomy.events import Event
+from gvgbot.autonomy.slam.graph import Vertex
+from gvgbot.autonomy.unsettled import Unsettled
 from gvgbot.cli import main
 
 pytestmark = [pytest.mark.slow, pytest.mark.twin, pytest.mark.timeout(120)]
@@ -20,22 +20,20 @@ EVERY, AT_MOST = 40, 3  # keyframes between closures that are taken back, and ho
 def test_what_was_found_since_is_found_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    close, revoke, views = Mapper._close_loop, Mapper._revoke, Counter[str]()
+    close, revoke, views = Unsettled.note_closure, Unsettled.revoke, Counter[str]()
 
-    def close_revocably(self: Mapper, view: View, match: Match) -> None:
-        if self._revocable is None:
-            self._be_ready_to_revoke(match.vertex)
-        close(self, view, match)
+    def close_revocably(self: Unsettled, vertex: Vertex, *, is_surprising: bool) -> None:
+        close(self, vertex, is_surprising=True)
 
-    def revoke_at_times(self: Mapper, view: View) -> None:
+    def revoke_at_times(self: Unsettled, stamp: float) -> list[Event]:
         views["all"] += 1
         if self._revocable is not None and views["all"] % EVERY == 0 and views["bad"] < AT_MOST:
             views["bad"] += 1
             self._revocable.is_contradicted = True
-        revoke(self, view)
+        return revoke(self, stamp)
 
-    monkeypatch.setattr(Mapper, "_close_loop", close_revocably)
-    monkeypatch.setattr(Mapper, "_revoke", revoke_at_times)
+    monkeypatch.setattr(Unsettled, "note_closure", close_revocably)
+    monkeypatch.setattr(Unsettled, "revoke", revoke_at_times)
     out = tmp_path / "run"
     assert main(["explore", "--world", "office", "--seed", "1", "--out", str(out)]) == 0
     happened = Counter(

@@ -497,7 +497,7 @@ def test_a_closure_that_the_next_vertices_contradict_is_taken_back() -> None:
     mapper = seen.mapper
     assert len(of_type(seen.events, LoopClosed)) == 1
     (edge,) = mapper.graph.edges.values()
-    mapper.note_way(edge, arrived=99)  # not at its far end
+    mapper.unsettled.note_way(edge, arrived=99)  # not at its far end
     seen.look(TEE)
     assert len(of_type(seen.events, ClosureRevoked)) == 1
     assert (mapper.belief.map_base.x, mapper.belief.map_base.y) == pytest.approx((4.0, 3.0))
@@ -508,8 +508,8 @@ def test_a_closure_that_the_next_vertices_contradict_is_taken_back() -> None:
 def test_a_closure_that_leads_on_over_a_known_edge_stays() -> None:
     seen = crossed(as_rival=False)
     (edge,) = seen.mapper.graph.edges.values()
-    seen.mapper.note_way(edge, arrived=edge.b.vertex)
-    seen.mapper.note_way(edge, arrived=99)
+    seen.mapper.unsettled.note_way(edge, arrived=edge.b.vertex)
+    seen.mapper.unsettled.note_way(edge, arrived=99)
     seen.look(TEE)
     assert of_type(seen.events, ClosureRevoked) == []
 
@@ -523,7 +523,7 @@ def test_a_vertex_in_doubt_becomes_part_of_the_known_one_as_soon_as_that_is_cert
     assert {tee, doubt.vertex} <= mapper.graph.vertices.keys()
     # walls tell where the robot truly is: three metres before the tee
     mapper.belief = ekf.update(mapper.belief, tee, Pose(3.0, 0.0), 0.01 * np.eye(3))
-    mapper._has_news = True
+    mapper.unsettled._has_news = True
     seen.look(TEE)
     (settled,) = of_type(seen.events, DoubtSettled)
     assert isinstance(settled, DoubtSettled)
