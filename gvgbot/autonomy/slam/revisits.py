@@ -5,10 +5,13 @@ after the run. A match must lie where the uncertainty since the last one allows 
 of what both visits saw; smoothing doubts one that then disagrees with all the others.
 """
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.slam.ekf import Belief, predict
@@ -32,9 +35,11 @@ _LEAST_IN_VIEW = 0.6  # share of the points
 _LEAST_AGREEMENT = 0.75  # share of the points in view that lie on walls
 _FLOOR = np.diag([0.02**2, 0.02**2, 0.004**2])  # what matching cannot know of itself
 _NO_NEWS_M = 0.05  # a match that moves the robot less need not be accounted for at once
+_ROUGHLY_M = 1e-3  # so well must be known where places are in which matches are looked for
+_ROW = 1 << 32  # more cells than any building has side by side
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Passage:
     """A whole run: the steps from keyframe to keyframe, and what walls were seen at some of them.
 
@@ -44,6 +49,17 @@ class Passage:
 
     steps: list[tuple[Pose, Array]]
     walls: dict[int, Array]
+
+    @cached_property
+    def looks(self) -> NDArray[np.int64]:
+        """The keyframes (K,) at which walls were seen, in order."""
+        return np.array(sorted(self.walls), np.int64)
+
+    @cached_property
+    def driven(self) -> Array:
+        """Metres driven until each keyframe (N,)."""
+        steps = [math.hypot(motion.x, motion.y) for motion, _ in self.steps]
+        return np.concatenate([[0.0], np.cumsum(steps)])
 
 
 def revisits(passage: Passage, matching: ScanMatchingConfig) -> list[Constraint]:
@@ -61,8 +77,17 @@ def revisits(passage: Passage, matching: ScanMatchingConfig) -> list[Constraint]
         found.append(match)
         belief.P[:] = 0.0
         if np.abs(_residual(x, match)[:2]).max() > _NO_NEWS_M:
-            x = PoseGraph(chain + found).solve(x)
+            _bend(x, i, PoseGraph(chain[:i] + found))
     return found
+
+
+def _bend(x: Array, last: int, graph: PoseGraph) -> None:
+    """Let the poses (N, 3) up to a last one agree, and move those that follow along with it."""
+    before = _pose(x, last)
+    x[: last + 1] = graph.solve(x[: last + 1], within=_ROUGHLY_M)
+    moved = _pose(x, last).compose(before.inverse())
+    x[last + 1 :, :2] = moved.transform(x[last + 1 :, :2])
+    x[last + 1 :, 2] += moved.theta
 
 
 def _laid_out(passage: Passage) -> Array:
@@ -78,26 +103,20 @@ def _tries(passage: Passage) -> Iterator[tuple[int, Belief]]:
 
     Whoever knows a place again sets the covariance of that motion to zero.
     """
-    belief, last, driven, tried = Belief(), 0, _driven(passage), 0.0
-    for i in sorted(passage.walls):
+    belief, last, tried = Belief(), 0, 0.0
+    for i in passage.looks.tolist():
         for motion, covariance in passage.steps[last:i]:
             belief = predict(belief, motion, _OVERRATED * covariance)
         last = i
-        if driven[i] - tried >= _EVERY_M:
-            tried = driven[i]
+        if passage.driven[i] - tried >= _EVERY_M:
+            tried = passage.driven[i]
             yield i, belief
-
-
-def _driven(passage: Passage) -> Array:
-    """Metres driven until each keyframe."""
-    steps = [np.hypot(motion.x, motion.y) for motion, _ in passage.steps]
-    return np.concatenate([[0.0], np.cumsum(steps)])
 
 
 def _earlier_visit(x: Array, passage: Passage, i: int, belief: Belief) -> int | None:
     """The nearest keyframe of an earlier visit to the place of one."""
-    driven, seen = _driven(passage), np.array(sorted(passage.walls))
-    earlier = seen[driven[seen] < driven[i] - _LEAST_LOOP_M]
+    looks, driven = passage.looks, passage.driven
+    earlier = looks[driven[looks] < driven[i] - _LEAST_LOOP_M]
     if len(earlier) == 0:
         return None
     distance = np.hypot(*(x[earlier, :2] - x[i, :2]).T)
@@ -137,16 +156,15 @@ def _place(x: Array, passage: Passage, i: int) -> Array:
 
     One point for each cell of a grid.
     """
-    seen = sorted(passage.walls)
-    at, here = seen.index(i), _pose(x, i)
+    at, here = int(np.searchsorted(passage.looks, i)), _pose(x, i)
     points = np.concatenate(
         [
             here.to(_pose(x, k)).transform(passage.walls[k])
-            for k in seen[max(0, at - _AROUND) : at + _AROUND + 1]
+            for k in passage.looks[max(0, at - _AROUND) : at + _AROUND + 1].tolist()
         ]
     )
-    cells = np.floor(points / _CELL_M).astype(np.int64)
-    return points[np.unique(cells, axis=0, return_index=True)[1]]
+    cells = np.floor(points / _CELL_M).astype(np.int64) @ (_ROW, 1)
+    return points[np.unique(cells, return_index=True)[1]]
 
 
 def _residual(x: Array, match: Constraint) -> Array:

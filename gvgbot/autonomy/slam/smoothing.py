@@ -6,6 +6,7 @@ the less the more the others disagree with them, as if their errors had Cauchy's
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,17 +45,21 @@ class PoseGraph:
         self._W = np.array([c.information for c in constraints]).reshape(-1, 3, 3)
         self._doubtful = np.array([c.doubtful for c in constraints], np.bool_)
 
-    def solve(self, poses: Array) -> Array:
-        """The poses (N, 3) that agree best with all constraints, the first one staying in place."""
+    def solve(self, poses: Array, within: float = _CONVERGED) -> Array:
+        """The poses (N, 3) that agree best with all constraints, the first one staying in place.
+
+        As well as that can be told when a step moves none by more than `within`, m and rad.
+        """
         x = poses.copy()
         if not len(self._a):
             return x
+        blocks = _Blocks.of(self._a, self._b, len(x))
         for iteration in range(_ITERATIONS):
-            H, g = self._normal_equations(x, trusting=iteration == 0)
+            H, g = self._normal_equations(x, blocks, trusting=iteration == 0)
             change = -_factors(H).solve(g).reshape(-1, 3)
             x += change
             x[:, 2] = np.remainder(x[:, 2] + np.pi, 2 * np.pi) - np.pi
-            if np.abs(change).max() < _CONVERGED and iteration > 0:
+            if np.abs(change).max() < within and iteration > 0:
                 break
         return x
 
@@ -62,37 +67,61 @@ class PoseGraph:
         """Covariances (K, 3, 3) of K of the solved poses (N, 3), against the first, m and rad."""
         if not wanted:
             return np.empty((0, 3, 3))
-        H, _ = self._normal_equations(poses, trusting=False)
+        blocks = _Blocks.of(self._a, self._b, len(poses))
+        H, _ = self._normal_equations(poses, blocks, trusting=False)
         rows = 3 * np.array(wanted)[:, None] + np.arange(3)
         columns = np.zeros((3 * len(poses), rows.size))
         columns[rows.ravel(), np.arange(rows.size)] = 1.0
         P = _factors(H).solve(columns).reshape(len(columns), len(wanted), 3)
         return np.array([P[row, i] for i, row in enumerate(rows)])
 
-    def _normal_equations(self, x: Array, *, trusting: bool) -> tuple[csc_array, Array]:
+    def _normal_equations(
+        self, x: Array, blocks: "_Blocks", *, trusting: bool
+    ) -> tuple[csc_array, Array]:
         """Information matrix H (3N, 3N) and gradient g (3N,); trusting, nothing is doubted."""
         r, A, B = _residuals(x, self._a, self._b, self._z)
         W = self._W if trusting else self._W * self._weights(r)[:, None, None]
-        ends = ((self._a, A), (self._b, B))
-        k = np.arange(3)
-        values, rows, columns = [np.full(3, _FIXED)], [k], [k]
+        AW, BW = A.swapaxes(1, 2) @ W, B.swapaxes(1, 2) @ W
+        ab = AW @ B
+        H = blocks.matrix(np.concatenate([AW @ A, BW @ B, ab, ab.swapaxes(1, 2)]))
         g = np.zeros((len(x), 3))
-        for p, P in ends:
-            PW = P.swapaxes(1, 2) @ W
-            np.add.at(g, p, (PW @ r[:, :, None])[:, :, 0])
-            for q, Q in ends:
-                h = PW @ Q
-                values.append(h.ravel())
-                rows.append(np.broadcast_to((3 * p[:, None] + k)[:, :, None], h.shape).ravel())
-                columns.append(np.broadcast_to((3 * q[:, None] + k)[:, None, :], h.shape).ravel())
-        n = 3 * len(x)
-        at = (np.concatenate(rows), np.concatenate(columns))
-        return csc_array((np.concatenate(values), at), (n, n)), g.ravel()
+        np.add.at(g, self._a, (AW @ r[:, :, None])[:, :, 0])
+        np.add.at(g, self._b, (BW @ r[:, :, None])[:, :, 0])
+        return H, g.ravel()
 
     def _weights(self, r: Array) -> Array:
         """How much each constraint counts (K,), by its residuals (K, 3)."""
         distance = np.einsum("ki,kij,kj->k", r, self._W, r)
         return np.where(self._doubtful, 1.0 / (1.0 + distance / _DOUBT), 1.0)
+
+
+class _Blocks(NamedTuple):
+    """Where values of a sparse matrix lie that come as blocks (3, 3), of which some coincide.
+
+    They come in the order aa, bb, ab, ba for all pairs of poses a and b, after that which holds the
+    first pose in place.
+    """
+
+    place: Index  # in the matrix's data, of every value
+    rows: NDArray[np.intc]
+    starts: NDArray[np.intc]  # of the columns
+
+    @classmethod
+    def of(cls, a: Index, b: Index, n: int) -> Self:
+        """The blocks of pairs (K,) of N poses."""
+        row, column = np.concatenate([[0], a, b, a, b]), np.concatenate([[0], a, b, b, a])
+        k = np.arange(3)
+        rows, columns = (3 * row[:, None] + k)[:, :, None], (3 * column[:, None] + k)[:, None, :]
+        kept, place = np.unique((3 * n * columns + rows).ravel(), return_inverse=True)
+        starts = np.searchsorted(kept, 3 * n * np.arange(3 * n + 1))
+        return cls(place, (kept % (3 * n)).astype(np.intc), starts.astype(np.intc))
+
+    def matrix(self, values: Array) -> csc_array:
+        """The matrix of blocks (4K, 3, 3), those at the same place added up."""
+        all_values = np.concatenate([(_FIXED * np.eye(3)).ravel(), values.ravel()])
+        data = np.bincount(self.place, all_values, minlength=len(self.rows))
+        n = len(self.starts) - 1
+        return csc_array((data, self.rows, self.starts), (n, n))
 
 
 def _factors(H: csc_array) -> SuperLU:
