@@ -13,16 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from gvgbot.geometry import Array, Pose
+from gvgbot.geometry import Array, Pose, wrap_angle
 from gvgbot.ranges import Range
-
-Index = NDArray[np.intp]
 
 _NEIGHBOURS = 5
 _FEWEST = 3  # of them make a line
 _FLATNESS = 0.08  # smallest over largest spread of the neighbours of a point on a wall
 _REACH_M = 0.35  # as far away as neighbours on one wall may be
 _ITERATIONS = 6
+_CONVERGED = 1e-4  # metres and radians
 _SAME_PAIRS_M, _SAME_PAIRS_RAD = 0.02, 0.005  # moved less, points are near to the same walls
 
 
@@ -66,13 +65,15 @@ class Sides(NamedTuple):
         return Sides(self.of_walls, Pose(theta=angle).transform(self.of_points))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Pairs:
-    """Points by their index (K,), and the walls they are near to: centre and normal (K, 2)."""
+class _Pairs(NamedTuple):
+    """Points (2, K) of the frame that is registered, and the walls they are near to.
 
-    index: Index
-    centre: Array
+    Of a wall its normal (2, K), and its distance (K,) from the origin along that.
+    """
+
+    points: Array
     normal: Array
+    distance: Array
 
 
 def register(
@@ -99,28 +100,28 @@ def register(
 
     def paired(pose: Pose) -> _Pairs:
         turned = None if sides is None else sides.turned(pose.theta)
-        return _pairs(pose.transform(points), tree, walls, counts, config.max_pair_m, turned)
+        return _pairs(points, pose, tree, walls, counts, config.max_pair_m, turned)
 
     paired_at, pairs = pose, paired(pose)
     for _ in range(_ITERATIONS):
-        world = pose.transform(points)
-        if _is_elsewhere(paired_at.to(pose)):
+        if _is_elsewhere(paired_at, pose):
             paired_at, pairs = pose, paired(pose)
-        index, normal, residual = _near(world, pairs, config.max_pair_m)
-        if len(index) < config.min_pairs:
+        residual, J = _linear(pairs, pose, prior, config.max_pair_m)
+        if len(residual) < config.min_pairs:
             return None
         weight = (
             config.independent_share
             / config.pair_sigma_m**2
-            / np.maximum(1.0, np.abs(residual) / (2 * config.pair_sigma_m))
+            / np.maximum(1.0, np.abs(residual) * (0.5 / config.pair_sigma_m))
         )
-        J = _jacobian(points[index], normal, pose, prior)
-        A = information + (J * weight[:, None]).T @ J
-        change = -np.linalg.solve(A, information @ step + J.T @ (weight * residual))
+        JW = J * weight
+        A = information + JW @ J.T
+        change = -np.linalg.solve(A, information @ step + JW @ residual)
         step = step + change
         pose = prior.compose(Pose.from_array(step))
-        inliers, rms = len(index) / len(points), float(np.sqrt(np.mean(residual**2)))
-        if np.abs(change).max() < 1e-4:
+        inliers = len(residual) / len(points)
+        rms = math.sqrt(float(residual @ residual) / len(residual))
+        if max(map(abs, change.tolist())) < _CONVERGED:
             break
     return Registration(pose, np.linalg.inv(A), inliers, rms)
 
@@ -148,63 +149,66 @@ def register_coarsely(
     return register(points, tree, walls, prior, Q, config, hits, sides)
 
 
-def _is_elsewhere(motion: Pose) -> bool:
+def _is_elsewhere(before: Pose, now: Pose) -> bool:
     """Whether points have moved so far that they may be near to another part of the walls."""
-    return math.hypot(motion.x, motion.y) > _SAME_PAIRS_M or abs(motion.theta) > _SAME_PAIRS_RAD
+    turned = abs(wrap_angle(now.theta - before.theta))
+    return before.distance(now) > _SAME_PAIRS_M or turned > _SAME_PAIRS_RAD
 
 
 def _pairs(
-    world: Array, tree: cKDTree, walls: Array, hits: Array, reach: float, sides: Sides | None
+    points: Array,
+    pose: Pose,
+    tree: cKDTree,
+    walls: Array,
+    hits: Array,
+    reach: float,
+    sides: Sides | None,
 ) -> _Pairs:
-    """The points that are near to a wall, and its line there."""
+    """The points (N, 2) that are near to a wall when laid down at a pose, and its line there."""
+    world = pose.transform(points)
     found = tree.query(world, k=_NEIGHBOURS, distance_upper_bound=max(reach, _REACH_M))
     distance, near = np.asarray(found[0]), np.asarray(found[1])
-    index = np.nonzero(np.isfinite(distance[:, _FEWEST - 1]) & (distance[:, 0] < reach))[0]
-    present = np.isfinite(distance[index])
-    near = np.where(present, near[index], near[index][:, :1])
-    group, weight = walls[near], present * hits[near]
-    centre, normal, flat = _lines(group, weight)
+    is_near = np.isfinite(distance[:, _FEWEST - 1]) & (distance[:, 0] < reach)
+    present, points = np.isfinite(distance[is_near]), points[is_near]
+    near = np.where(present, near[is_near], near[is_near][:, :1])
+    (x, y), weight = walls.T[:, near], present * hits[near]
+    centre, normal, flat = _lines(x, y, weight)
     if sides is not None:
-        before = np.einsum("kij,kj->ki", sides.of_walls[near], normal)
-        now = (sides.of_points[index] * normal).sum(axis=1)
+        now = np.einsum("kj,jk->k", sides.of_points[is_near], normal)
+        before = np.einsum("jkg,jk->kg", sides.of_walls.T[:, near], normal)
         facing = before * now[:, None] >= 0.0
         weight *= facing
         enough = np.count_nonzero(weight, axis=1) >= _FEWEST
         mixed = np.flatnonzero(enough & (present & ~facing).any(axis=1))
-        centre[mixed], normal[mixed], flat[mixed] = _lines(group[mixed], weight[mixed])
+        centre[:, mixed], normal[:, mixed], flat[mixed] = _lines(x[mixed], y[mixed], weight[mixed])
         flat &= enough
-    return _Pairs(index[flat], centre[flat], normal[flat])
+    centre, normal = centre[:, flat], normal[:, flat]
+    return _Pairs(points[flat].T, normal, (centre * normal).sum(axis=0))
 
 
-def _near(world: Array, pairs: _Pairs, reach: float) -> tuple[Index, Array, Array]:
-    """Indices of the points near a wall, the wall's normals (K, 2), and signed distances (K,)."""
-    residual = ((world[pairs.index] - pairs.centre) * pairs.normal).sum(axis=1)
+def _linear(pairs: _Pairs, pose: Pose, prior: Pose, reach: float) -> tuple[Array, Array]:
+    """Signed distances (K,) from the walls within reach, and their derivative (3, K).
+
+    That is the derivative by a step of the pose in the prior's frame.
+    """
+    (x, y), (nx, ny) = pairs.points, pairs.normal
+    c, s = math.cos(pose.theta), math.sin(pose.theta)
+    u, v = c * x - s * y, s * x + c * y
+    residual = (u + pose.x) * nx + (v + pose.y) * ny - pairs.distance
+    c, s = math.cos(prior.theta), math.sin(prior.theta)
+    J = np.stack([c * nx + s * ny, c * ny - s * nx, u * ny - v * nx])
     near = np.abs(residual) < reach
-    return pairs.index[near], pairs.normal[near], residual[near]
+    return (residual, J) if near.all() else (residual[near], J[:, near])
 
 
-def _lines(group: Array, weight: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Centres (K, 2) and normals (K, 2) of groups of points (K, G, 2), and which are lines (K,)."""
+def _lines(x: Array, y: Array, weight: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Centres (2, K) and normals (2, K) of groups of points (K, G), and which are lines (K,)."""
     weight = weight / weight.sum(axis=1, keepdims=True)
-    x, y = group[..., 0], group[..., 1]
-    centre = np.stack([(weight * x).sum(axis=1), (weight * y).sum(axis=1)], axis=1)
-    dx, dy = x - centre[:, :1], y - centre[:, 1:]
-    xx, yy, xy = ((weight * p).sum(axis=1) for p in (dx * dx, dy * dy, dx * dy))
+    centre = np.stack([np.einsum("kg,kg->k", weight, p) for p in (x, y)])
+    dx, dy = x - centre[0, :, None], y - centre[1, :, None]
+    wx, wy = weight * dx, weight * dy
+    xx, yy, xy = (np.einsum("kg,kg->k", a, b) for a, b in ((wx, dx), (wy, dy), (wx, dy)))
     angle = 0.5 * np.arctan2(2 * xy, xx - yy)  # of the wall
     spread = np.hypot((xx - yy) / 2, xy)
     large, small = (xx + yy) / 2 + spread, (xx + yy) / 2 - spread
-    normal = np.stack([-np.sin(angle), np.cos(angle)], axis=1)
-    return centre, normal, small < _FLATNESS * large
-
-
-def _jacobian(points: Array, normal: Array, pose: Pose, prior: Pose) -> Array:
-    """Derivative (K, 3) of the distances by a step of the pose in the prior's frame."""
-    c, s = np.cos(prior.theta), np.sin(prior.theta)
-    along = np.stack(
-        [c * normal[:, 0] + s * normal[:, 1], -s * normal[:, 0] + c * normal[:, 1]], axis=1
-    )
-    c, s = np.cos(pose.theta), np.sin(pose.theta)
-    turned = np.stack(
-        [-s * points[:, 0] - c * points[:, 1], c * points[:, 0] - s * points[:, 1]], axis=1
-    )
-    return np.concatenate([along, (turned * normal).sum(axis=1)[:, None]], axis=1)
+    return centre, np.stack([-np.sin(angle), np.cos(angle)]), small < _FLATNESS * large
