@@ -26,7 +26,7 @@ from gvgbot.autonomy.slam.recognition import (
     match_bearings,
 )
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
-from gvgbot.autonomy.topology import split_edge_at, take_out
+from gvgbot.autonomy.topology import loose_ends, split_edge_at, take_out
 from gvgbot.autonomy.unsettled import Knowledge, Unsettled
 from gvgbot.autonomy.views import Correspondence, Observation, View
 from gvgbot.geometry import Array, Pose
@@ -101,6 +101,8 @@ class Mapper(Knowledge):
         )
         self._unbelieved = Candidates(config.candidates)
         self._rivals: dict[int, Recognition] = {}  # by nodes of this view that may be known ones
+        # by half-edges of vertices that this view took out, as `loose_ends`, but in the local frame
+        self.came_from: dict[HalfEdgeId, tuple[HalfEdgeId, Array]] = {}
         self._events: list[Event] = []
 
     def move(self, motion: Pose, covariance: Array) -> None:
@@ -137,7 +139,7 @@ class Mapper(Knowledge):
 
         The list of what happened grows with what is joined or removed before the next view.
         """
-        self._events, self._rivals = [], {}
+        self._events, self._rivals, self.came_from = [], {}, {}
         self._events += self.unsettled.revoke(view.stamp) + self.unsettled.settle(view.stamp)
         known = Correspondence()
         sightings = self._sightings(view)
@@ -527,6 +529,9 @@ class Mapper(Knowledge):
 
     def remove(self, view: View, vertex: Vertex, reason: str) -> None:
         """Take a vertex out of the map; of two edges that met there one is made."""
+        local_map = view.local_base.compose(self.belief.map_base.inverse())
+        for end, (far, line) in loose_ends(self.graph, self.belief, vertex).items():
+            self.came_from[end] = far, local_map.transform(line)
         take_out(self.graph, self.belief, vertex)
         self.belief = ekf.remove_vertex(self.belief, vertex.id)
         self.unsettled.forget(vertex.id)

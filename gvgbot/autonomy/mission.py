@@ -222,12 +222,21 @@ class Mission:
         """Account for what has been driven."""
         self.where.on_edge = self._mapper.unsettled.current(self.where.on_edge)
         self.target = self._mapper.unsettled.current(self.target)
+        self._rejoin()
         clearance = view.gvg.edges[place.edge].clearance_at(place.station)
         self._close_ring(view, clearance)
         passage = self.where.follow(view.gvg, place, known, view.local_base.position)
         if passage is not None:
             self._account_for(view, known, passage)
         self._close_start_edge(view, clearance)
+
+    def _rejoin(self) -> None:
+        """Go on with the edge before, if the vertex that the present one left was none."""
+        came_from = self._mapper.came_from
+        if self.target in came_from:
+            self.target = came_from[self.target][0]
+        if self.where.on_edge in came_from:
+            self.where.rejoin(*came_from[self.where.on_edge])
 
     def _account_for(self, view: View, known: Correspondence, passage: Passage) -> None:
         """Count a traversal, or close the edge that was driven from a vertex now out of sight."""

@@ -79,6 +79,24 @@ def take_out(graph: GvgGraph, belief: Belief, vertex: Vertex) -> None:
     edge.established = one.established and other.established
 
 
+def loose_ends(
+    graph: GvgGraph, belief: Belief, vertex: Vertex
+) -> dict[HalfEdgeId, tuple[HalfEdgeId, Array]]:
+    """Where one comes from who is on an edge of a vertex that proves to be none.
+
+    For half-edges of the vertex: the far end of their edge, or of the only one that ends there, and
+    the polyline (N, 2), map frame, from there to the vertex.
+    """
+    ends = [HalfEdgeId(vertex.id, key) for key in vertex.half_edges]
+    edges = {end: edge for end in ends if (edge := graph.edge_at(end)) is not None}
+    found = {}
+    for end in ends:
+        near = end if end in edges or len(edges) != 1 else next(iter(edges))
+        if near in edges and edges[near].other(near).vertex != vertex.id:
+            found[end] = edges[near].other(near), _outwards(belief, edges[near], near)[::-1]
+    return found
+
+
 def fuse(
     graph: GvgGraph, kept: Vertex, gone: Vertex, kept_gone: Pose, angle: float
 ) -> dict[HalfEdgeId, HalfEdgeId]:

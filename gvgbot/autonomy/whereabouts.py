@@ -69,6 +69,15 @@ class Whereabouts:
         self._extend(foot if is_beside else base)
         return passage
 
+    def rejoin(self, end: HalfEdgeId, line: Array) -> None:
+        """Be on the edge that begins at another end, which a line (N, 2), local frame, comes from.
+
+        The vertex at which the present edge began, where the line ends, is none.
+        """
+        since, self.trail, self.on_edge = self.trail, list(line), end
+        for point in since:
+            self._extend(point)
+
     def _passage(self, gvg: LocalGvg, place: Place, known: Correspondence, node: int) -> Passage:
         centre = gvg.nodes[node].position
         trail = np.array(self.trail).reshape(-1, 2)

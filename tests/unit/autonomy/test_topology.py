@@ -7,7 +7,7 @@ import pytest
 
 from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex
-from gvgbot.autonomy.topology import fuse, split_edge_at
+from gvgbot.autonomy.topology import fuse, loose_ends, split_edge_at
 from gvgbot.geometry import Pose
 from tests.unit.autonomy.graphs import STREET, between, streets
 
@@ -90,3 +90,27 @@ def test_a_departure_that_only_the_doubled_vertex_has_is_a_frontier() -> None:
     assert frontier.vertex == west.id
     assert west.half_edges[frontier.key].bearing == pytest.approx(math.pi / 2)
     assert is_sound(graph)
+
+
+def test_who_goes_on_from_a_vertex_that_is_none_came_from_the_one_before() -> None:
+    """Turned about the origin, the town has its west corner in the south."""
+    graph, ids = streets(2, 1)
+    west, east = (graph.vertices[ids[x, 0]] for x in (0, 1))
+    arrival, onward = HalfEdgeId(east.id, next(iter(east.half_edges))), east.add_half_edge(0.5)
+    x = np.array([0.0, 0.0, 0.0, 1.0, -STREET, math.pi / 2, 1.0, 0.0, math.pi / 2])
+    belief = Belief(x, np.eye(9), (west.id, east.id))
+    found = loose_ends(graph, belief, east)
+    assert found.keys() == {arrival, HalfEdgeId(east.id, onward)}
+    for far, line in found.values():
+        assert far.vertex == west.id
+        assert line[[0, -1]] == pytest.approx(np.array([[1.0, -STREET], [1.0, 0.0]]))
+
+
+def test_beside_two_edges_nobody_knows_which_one_who_goes_on_came_over() -> None:
+    graph, ids = streets(3, 1)
+    middle = graph.vertices[ids[1, 0]]
+    onward = HalfEdgeId(middle.id, middle.add_half_edge(1.5))
+    x = np.hstack([np.zeros(3), np.pad(STREET * np.eye(3)[:, :2], ((0, 0), (0, 1))).ravel()])
+    found = loose_ends(graph, Belief(x, np.eye(12), tuple(ids[k, 0] for k in range(3))), middle)
+    assert onward not in found
+    assert {far.vertex for far, _ in found.values()} == {ids[0, 0], ids[2, 0]}
