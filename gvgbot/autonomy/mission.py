@@ -130,18 +130,26 @@ class Mission:
         self._stranded_since: float | None = None
         self._turned_back = False  # looking for a way, after the end of sight
         self._examining_since: float | None = None
+        self._sees_known = False  # a vertex at least
+        self._going_back = self._went_back = False  # to where it does, for the present target
         self._events: list[Event] = []
 
     def advance(self, view: View, known: Correspondence) -> tuple[Order, list[Event]]:
         """The order for the next keyframe interval."""
         self._events = []
+        self._sees_known = bool(known.vertex_of)
         place = view.gvg.place(view.local_base.position)
+        is_beside = place is not None and place.distance <= NEAR_M
+        if place is not None and is_beside:
+            self._lost_since = None
+            self._learn(view, known, place)
+        back = self._go_back(view) if self._going_back else None
+        if back is not None:
+            return back, self._events
         if place is None:
             return self._search(view), self._events
-        if place.distance > NEAR_M:
+        if not is_beside:
             return self._access(view), self._events
-        self._lost_since = None
-        self._learn(view, known, place)
         graph = self._mapper.graph
         here = Situation(view.gvg, known, graph, self.where, place, view.local_base, view.doubted)
         self._watch_progress(view)
@@ -184,7 +192,7 @@ class Mission:
         self.target = None
         self._stay.end()
         self._looked_around = 0
-        self._held = False
+        self._held = self._going_back = False
         self._held_since = self._lost_since = None
         self._stranded_since = self._examining_since = None
 
@@ -401,6 +409,7 @@ class Mission:
         self._budget_m = view.travelled + 2 * (away + total) + self._config.patience_m
         self._newest_m = 0.0
         self._looked_around = 0
+        self._went_back = False
         self._examining_since = None
         vertex = self._mapper.graph.vertices[chosen.vertex]
         psi = self._mapper.belief.map_vertex(chosen.vertex).theta
@@ -451,6 +460,18 @@ class Mission:
                 return Stand()
             self._events.append(Recovery(view.stamp, "look around", "standing at the end of sight"))
             return LookAround(math.tau)
+        return Drive(track)
+
+    def _go_back(self, view: View) -> Order | None:
+        """Over where the robot came from, until it sees vertices that it knows."""
+        self._watch_progress(view)
+        line = self.where.way_back(view.local_base.position)
+        room, _ = view.local_map.tree().query(line)
+        free = self._free_metres(view, line)
+        track = Track.of(line, np.asarray(room)).until(free)
+        if self._sees_known or self.target is None or track.length < _ARRIVED_M:
+            self._going_back = False
+            return None
         return Drive(track)
 
     def _free_metres(self, view: View, line: Array) -> float:
@@ -517,7 +538,7 @@ class Mission:
             self._give_up(view, "no progress")
 
     def _give_up(self, view: View, reason: str) -> None:
-        """Mark the target as blocked; without one, that is the end."""
+        """Mark the target as blocked, after having gone back; without one, that is the end."""
         self._looked_around = 0
         half = None if self.target is None else self._mapper.graph.half_edge(self.target)
         if half is None:
@@ -529,6 +550,11 @@ class Mission:
                 self._end(view, "explored_with_blocked", f"{given_up} frontiers left: {reason}")
             else:
                 self._end(view, "failed", f"no vertex found, perhaps no way out: {reason}")
+            return
+        has_left = self.where.on_edge not in (None, self.target) and not self._sees_known
+        if has_left and not self._went_back:
+            self._going_back = self._went_back = True
+            self._events.append(Recovery(view.stamp, "go back", reason))
             return
         half.blocked = True
         self._events.append(Recovery(view.stamp, "give up a frontier", reason))

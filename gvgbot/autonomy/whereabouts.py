@@ -42,6 +42,11 @@ class Whereabouts:
         points = np.array(self.trail)
         return float(np.hypot(*np.diff(points, axis=0).T).sum()) if len(points) > 1 else 0.0
 
+    def way_back(self, base: Array) -> Array:
+        """The way (N, 2) back over where the robot came from, from beside it to its vertex."""
+        points = np.array(self.trail).reshape(-1, 2)
+        return points[np.argmin(np.hypot(*(points - base).T)) :: -1] if len(points) else points
+
     def follow(
         self, gvg: LocalGvg, place: Place, known: Correspondence, base: Array
     ) -> "Passage | None":

@@ -178,6 +178,27 @@ def test_the_end_of_sight_is_looked_around_at_twice_before_a_frontier_is_given_u
     assert robot.mission.target.key != east
 
 
+def test_who_has_lost_sight_of_all_that_is_known_goes_back_over_the_way_it_came() -> None:
+    """Five metres past the tee, nothing but a stretch that leads away from there is in sight."""
+    elsewhere = drawn({5: (8.0, 0.0), 6: (9.0, 1.0)}, {20: (5, 6, [])}, unseen={5: 2.0, 6: 0.8})
+    robot = Robot()
+    robot.stand(TEE, 8)
+    (vertex,) = robot.mapper.graph.vertices.values()
+    east, _, south = sorted(
+        vertex.half_edges, key=lambda key: vertex.half_edges[key].bearing % math.tau
+    )
+    robot.mission.target = HalfEdgeId(vertex.id, east)
+    robot.drive(TEE, (0.0, 0.0), (8.0, 0.0))
+    robot.mission.target = HalfEdgeId(vertex.id, south)
+    robot.drive(elsewhere, (8.0, 0.0), (9.0, 1.0), (8.0, 0.0))
+    while robot.stamp < 200.0 and not any("go back" in str(e) for e in robot.said(Recovery)):
+        robot.stand(elsewhere, 1)
+    assert math.dist(end_of(robot.look(elsewhere)), (3.0, 0.0)) < 0.5
+    robot.drive(elsewhere, (8.0, 0.0), (4.0, 0.0))
+    assert end_of(robot.look(TEE)) == (3.0, -4.0)
+    assert vertex.half_edges[south].open
+
+
 def test_a_robot_that_drives_to_and_fro_gives_up_its_target_after_its_patience() -> None:
     """Between two places a metre apart, which it may do when two ways look equally good."""
     robot = Robot()
