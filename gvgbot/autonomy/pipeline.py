@@ -50,6 +50,7 @@ _COMPANY_M = 0.15  # by which another robot may be elsewhere than it says
 _LONGEST_GAP_S = 2.0  # between keyframes; a longer one is an outage of a device
 _FORGOTTEN = np.diag([1.0, 1.0, 0.3**2])  # covariance of a way that is not kept
 _SCAN_EVERY_M, _SCAN_EVERY_RAD = 0.7, 0.5  # scans that are kept for the occupancy grid
+_LED_EVERY_M, _LED_EVERY_RAD = 0.4, 1.0  # looks for the GVG, where nobody waits for a way
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -139,6 +140,7 @@ class Pipeline:
         self._was_lifted = self._look_now = False
         self._last: Keyframe | None = None
         self._kept: Pose | None = None  # local_base of the last scan that was kept
+        self._looked: Pose | None = None  # local_base of the last look for the GVG
         self._turning_to: float | None = None  # odom heading still to turn through, unwrapped sum
         self._turned = 0.0
         self._twist = STANDSTILL
@@ -218,6 +220,9 @@ class Pipeline:
         scan = self._newcomers.sift(scan, local_base, self._maps.near, is_way)
         self._maps.insert(scan, local_base, self.travelled)
         self._hazards.forget(self.travelled)
+        if self.led and not self._worth_a_gvg(local_base):
+            self._keep(scan, odom_base, local_base)
+            return happened
         self.gvg = self._local_gvg(local_base, scan.range_max)
         doubtful = np.concatenate(
             [self._hazards.doubtful, self._newcomers.points, self._maps.near.suspects()]
@@ -286,6 +291,18 @@ class Pipeline:
             or abs(moved.theta) >= c.turn_rad
             or scan.stamp - self._last.stamp >= c.interval_s
         )
+
+    def _worth_a_gvg(self, local_base: Pose) -> bool:
+        """Whether a robot that is led has come on; it is taken down."""
+        moved = None if self._looked is None else self._looked.to(local_base)
+        if (
+            moved is not None
+            and math.hypot(moved.x, moved.y) < _LED_EVERY_M
+            and abs(moved.theta) < _LED_EVERY_RAD
+        ):
+            return False
+        self._looked = local_base
+        return True
 
     def _localise(self, scan: Scan, odom_base: Pose) -> Pose:
         """The base in the local frame; the belief moves with it."""

@@ -1,4 +1,4 @@
-"""Localisation as published, beside the full one."""
+"""Localisation as published, beside the full one; and how often who is led looks for the GVG."""
 
 from dataclasses import replace
 
@@ -37,3 +37,20 @@ def test_as_published_odometry_alone_tells_the_way_between_vertices() -> None:
 
 def test_walls_tell_it_better() -> None:
     assert driven("full").keyframes[-1].local_base.x == pytest.approx(2.0, abs=0.03)
+
+
+@pytest.mark.parametrize(("led", "looks"), [(False, 11), (True, 3)])
+def test_who_is_led_looks_for_the_gvg_only_after_some_way(led: bool, looks: int) -> None:
+    """Steps of 0.3 rad on the spot, then of 0.3 m: led, it looks at 0 and 1.2 rad, and 0.6 m on."""
+    config = load_config()
+    pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m, led=led)
+    turned = [Pose(0.0, 0.0, 0.3 * k) for k in range(8)]
+    way = turned + [turned[-1].compose(Pose(0.3 * k, 0.0, 0.0)) for k in range(1, 4)]
+    gvgs = []
+    for step, pose in enumerate(way):
+        pipeline.control(Odometry(0.1 * step, pose, STANDSTILL))
+        scan = sweep(ROOMS, Pose(1.0, 0.0, 0.0).compose(pose), field_of_view=LASER_270)
+        pipeline.perceive(replace(scan, stamp=0.1 * step, time_increment=0.0))
+        gvgs.append(pipeline.gvg)
+    assert len(pipeline.keyframes) == len(way)
+    assert len({id(gvg) for gvg in gvgs}) == looks
