@@ -65,28 +65,26 @@ def follow(
     track: Track, local_base: Pose, speed: float, robot_radius: float, config: EdgeFollowerConfig
 ) -> Twist:
     """The twist that drives along a track; standstill at its end. `speed` is what it is, m/s."""
-    d = np.hypot(track.polyline[:, 0] - local_base.x, track.polyline[:, 1] - local_base.y)
-    here = int(np.argmin(d))
-    remaining = track.length - float(track.stations[here])
+    line, stations, clearance = track.polyline, track.stations, track.clearance
+    here = int(np.hypot(line[:, 0] - local_base.x, line[:, 1] - local_base.y).argmin())
+    station = float(stations[here])
+    remaining = track.length - station
     ahead = config.look_ahead_m + config.look_ahead_s * max(speed, 0.0)
-    soon = track.clearance[
-        here : int(np.searchsorted(track.stations, track.stations[here] + ahead))
-    ]
+    soon = clearance[here : int(stations.searchsorted(station + ahead))]
+    room = float(soon.min(initial=np.inf))
     # Who looks far ahead cuts corners: where it is narrow, there is no room for that.
-    ahead = min(ahead, max(_LEAST_LOOK_AHEAD_M, _CUT * float(soon.min(initial=np.inf))))
-    aim = int(np.searchsorted(track.stations, track.stations[here] + ahead))
-    target = track.polyline[min(aim, len(track.polyline) - 1)]
-    away = math.hypot(target[0] - local_base.x, target[1] - local_base.y)
+    ahead = min(ahead, max(_LEAST_LOOK_AHEAD_M, _CUT * room))
+    aim = int(stations.searchsorted(station + ahead))
+    x, y = line[min(aim, len(line) - 1)].tolist()
+    away = math.hypot(x - local_base.x, y - local_base.y)
     if remaining < 0.05 and away < 0.1:
         return STANDSTILL
-    angle = wrap_angle(
-        math.atan2(target[1] - local_base.y, target[0] - local_base.x) - local_base.theta
-    )
-    is_tight = float(soon.min(initial=np.inf)) < robot_radius + _TIGHT_M
+    angle = wrap_angle(math.atan2(y - local_base.y, x - local_base.x) - local_base.theta)
+    is_tight = room < robot_radius + _TIGHT_M
     if abs(angle) > (_TIGHT_TURN_RAD if is_tight else config.turn_on_the_spot_rad) and away > 0.05:
         return Twist(0.0, math.copysign(min(config.max_turn_rate_radps, 1.5 * abs(angle)), angle))
-    window = slice(here, max(here + 1, aim + 5))
-    limit = _speed_limit(float(track.clearance[window].min()), robot_radius, config)
+    narrowest = float(clearance[here : max(here + 1, aim + 5)].min())
+    limit = _speed_limit(narrowest, robot_radius, config)
     limit = min(limit, math.sqrt(2 * config.braking_mps2 * max(remaining, away - 0.05, 0.0)))
     curvature = 2 * math.sin(angle) / max(away, 0.1)
     if abs(curvature) > 1e-6:
