@@ -423,7 +423,9 @@ class Mission:
             self._events.append(Recovery(view.stamp, "drive on", "no way leads to the frontier"))
         if view.stamp - self._stranded_since > self._config.patience_s:
             self._stranded_since = None
-            self._give_up(view, "no way leads there")
+            self._mapper.forget_strays(view)
+            if self.target is None or self._mapper.graph.half_edge(self.target) is not None:
+                self._give_up(view, "no way leads there")
         path = here.astern() if self._turned_back else here.ahead()
         if Track.of(*view.gvg.line_from(here.place, path)).length < _ARRIVED_M:
             self._turned_back = not self._turned_back

@@ -14,7 +14,8 @@ from gvgbot.autonomy.gvg.local import LocalGvg
 from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
 from gvgbot.autonomy.mapping import Mapper, MappingConfig
 from gvgbot.autonomy.mission import Drive, ExplorationConfig, LookAround, Mission, Order, Stand
-from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
+from gvgbot.autonomy.slam.ekf import add_vertex
+from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex
 from gvgbot.autonomy.slam.recognition import RecognitionConfig
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
 from gvgbot.autonomy.views import View
@@ -197,6 +198,29 @@ def test_who_has_lost_sight_of_all_that_is_known_goes_back_over_the_way_it_came(
     robot.drive(elsewhere, (8.0, 0.0), (4.0, 0.0))
     assert end_of(robot.look(TEE)) == (3.0, -4.0)
     assert vertex.half_edges[south].open
+
+
+def test_what_hangs_together_with_nothing_is_forgotten_and_not_called_blocked() -> None:
+    """Seen through a pane, say: no edge leads to the vertex whose frontier the robot is after."""
+    with_end = drawn(
+        {1: (-3.0, 0.0), 2: (3.0, 0.0), 3: (8.0, 0.0), 4: (3.0, -4.0)},
+        {10: (1, 2, []), 11: (2, 3, []), 12: (2, 4, [])},
+        unseen={3: 0.0, 4: -math.pi / 2},
+    )
+    robot = Robot()
+    robot.stand(with_end, 30)
+    graph = robot.mapper.graph
+    stray = Vertex(graph.next_id(), 1.0, Pose(50.0), 0.0, 0.0)
+    robot.mission.target = HalfEdgeId(stray.id, stray.add_half_edge(0.0))
+    graph.vertices[stray.id] = stray
+    robot.mapper.belief = add_vertex(
+        robot.mapper.belief, stray.id, Pose(50.0), np.diag([1e-4, 1e-4, 1e-4])
+    )
+    while robot.stamp < CONFIG.patience_s + 30.0:
+        robot.drive(with_end, (-3.0, 0.0), (2.5, 0.0), (-3.0, 0.0))
+    assert stray.id not in graph.vertices
+    assert not graph.blocked()
+    assert robot.mission.target in graph.frontiers()
 
 
 def test_a_robot_that_drives_to_and_fro_gives_up_its_target_after_its_patience() -> None:
