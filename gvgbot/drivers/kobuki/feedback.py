@@ -7,6 +7,7 @@ from functools import lru_cache
 from gvgbot.drivers.kobuki.device_clock import DeviceClock, advance_clock, start_clock
 from gvgbot.drivers.kobuki.frames import BadFrame, FrameParser
 from gvgbot.drivers.kobuki.payloads import (
+    DIAGNOSTICS,
     CoreSensors,
     DockIr,
     FeedbackPart,
@@ -124,7 +125,8 @@ class FeedbackReader:
         frames = [frame for frame in self._parser.feed(data) if not isinstance(frame, BadFrame)]
         for later, frame in zip(reversed(range(len(frames))), frames, strict=True):
             made_by = arrival - later * FRAME_PERIOD
-            newest = self._take_parts(decode_feedback(frame.payload), made_by) or newest
+            parts = decode_feedback(frame.payload, unread=DIAGNOSTICS)
+            newest = self._take_parts(parts, made_by) or newest
         return newest
 
     @property
@@ -176,7 +178,7 @@ class FeedbackReader:
         )
 
     def _take_parts(self, parts: list[FeedbackPart], arrival: float) -> Odometry | None:
-        if isinstance(parts[-1], Truncated):
+        if parts and isinstance(parts[-1], Truncated):
             self._malformed += 1
             return None
         core: CoreSensors | None = None

@@ -5,7 +5,7 @@ Fields are the wire's integers in the wire's order; a suffix gives the unit (`_m
 """
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Container, Iterable
 from dataclasses import dataclass
 from struct import Struct
 from typing import Any
@@ -269,9 +269,16 @@ _ENCODERS: dict[type, tuple[int, Callable[[Any], bytes]]] = {
 }
 
 
-def decode_feedback(payload: bytes) -> list[FeedbackPart]:
-    """The values that the base reports in one frame, in the order sent. Never raises."""
-    return decode_parts(payload, _DECODERS)
+# What every frame has and nobody drives by: cliff distances, motor currents, raw gyro, inputs.
+DIAGNOSTICS: frozenset[int] = frozenset({5, 6, 13, 16})
+
+
+def decode_feedback(payload: bytes, unread: Container[int] = ()) -> list[FeedbackPart]:
+    """The values that the base reports in one frame, in the order sent, but for `unread` ids.
+
+    Never raises.
+    """
+    return decode_parts(payload, _DECODERS, unread)
 
 
 def encode_feedback(parts: Iterable[FeedbackPart]) -> bytes:

@@ -3,7 +3,7 @@
 What is known under which id is a table of decoders, and one of encoders, that the caller brings.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Container, Iterable, Iterator
 from dataclasses import dataclass, fields
 from operator import attrgetter
 from struct import Struct
@@ -40,14 +40,21 @@ def split_payload(payload: bytes) -> Iterator[tuple[int, bytes] | Truncated]:
         start = end
 
 
-def decode_parts(payload: bytes, decoders: dict[int, Decoder]) -> list[Any]:
-    """The values in a payload; what the decoders do not know or refuse becomes `Unknown`."""
+def decode_parts(
+    payload: bytes, decoders: dict[int, Decoder], unread: Container[int] = ()
+) -> list[Any]:
+    """The values in a payload, without those with `unread` ids.
+
+    What the decoders do not know or refuse becomes `Unknown`.
+    """
     parts: list[Any] = []
     for item in split_payload(payload):
         if isinstance(item, Truncated):
             parts.append(item)
             continue
         number, data = item
+        if number in unread:
+            continue
         decode = decoders.get(number)
         value = None if decode is None else decode(data)
         parts.append(Unknown(number, data) if value is None else value)

@@ -75,6 +75,16 @@ def test_gyro_samples_must_match_their_count() -> None:
     assert isinstance(decode_feedback(bytes((13, 8, 0, 5)) + bytes(6))[0], Unknown)
 
 
+@given(st.lists(feedback_parts, max_size=8), st.sets(st.sampled_from([1, 3, 5, 13, 16])))
+def test_parts_that_are_not_read_are_left_out_and_no_others(
+    parts: list[FeedbackPart], unread: set[int]
+) -> None:
+    by_number = {1: CoreSensors, 3: DockIr, 5: CliffAdc, 13: RawGyro, 16: GpInput}
+    left_out = tuple(by_number[number] for number in unread)
+    kept = [part for part in parts if not isinstance(part, left_out)]
+    assert decode_feedback(encode_feedback(parts), unread=unread) == kept
+
+
 @pytest.mark.parametrize("kept", [1, 2, 8])
 def test_a_short_end_is_told_apart_and_what_came_before_is_read(kept: int) -> None:
     dock, inertia = DockIr(1, 2, 4), Inertia(5, 6)
