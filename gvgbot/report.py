@@ -1,5 +1,6 @@
 """What a run leaves: the map, its picture, the trajectories and the summary, as files by name."""
 
+import math
 import tempfile
 from bisect import bisect_left
 from dataclasses import dataclass, field, replace
@@ -18,7 +19,7 @@ from gvgbot.maps.map_server import encode_map_server
 from gvgbot.maps.occupancy import occupancy_grid
 from gvgbot.maps.picture import draw_map
 from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
-from gvgbot.maps.trajectory import Trajectory, encode_tum, to_trajectory
+from gvgbot.maps.trajectory import Trajectory, encode_tum
 
 
 @dataclass(slots=True)
@@ -65,40 +66,66 @@ def map_files(pipeline: Pipeline, journey: Journey, title: str) -> dict[str, byt
     grid = occupancy_grid(scans)
     estimate = _trajectory(journey, _corrected(journey, pipeline, keyframes))
     start = pipeline.keyframes[0].odom_base if pipeline.keyframes else Pose()
-    odometry = _trajectory(journey, [start.to(pose) for pose in journey.odom_base])
+    odometry = _trajectory(journey, _seen_from(_rows([start]), _rows(journey.odom_base)))
     files: dict[str, bytes | str] = {
         "map.geojson": geojson.encode(graph),
         "map.png": draw_map(graph, grid=grid, estimate=estimate, odometry=odometry, title=title),
         "estimate.tum": encode_tum(estimate),
-        "online.tum": encode_tum(_trajectory(journey, journey.map_base)),
+        "online.tum": encode_tum(_trajectory(journey, _rows(journey.map_base))),
         "odometry.tum": encode_tum(odometry),
     }
     if journey.world_base:
-        files["truth.tum"] = encode_tum(_trajectory(journey, journey.world_base))
+        files["truth.tum"] = encode_tum(_trajectory(journey, _rows(journey.world_base)))
     return files | encode_map_server(grid)
 
 
-def _trajectory(journey: Journey, poses: list[Pose]) -> Trajectory:
-    return to_trajectory(zip(journey.stamps, poses, strict=True))
+def _trajectory(journey: Journey, poses: Array) -> Trajectory:
+    return Trajectory(np.array(journey.stamps, np.float64), poses)
 
 
-def _corrected(journey: Journey, pipeline: Pipeline, keyframes: list[Pose]) -> list[Pose]:
-    """The journey hung on the smoothed keyframes: map_base of each row.
+def _rows(poses: list[Pose]) -> Array:
+    """Poses as rows (N, 3)."""
+    return np.array([(p.x, p.y, p.theta) for p in poses], np.float64).reshape(-1, 3)
+
+
+def _corrected(journey: Journey, pipeline: Pipeline, keyframes: list[Pose]) -> Array:
+    """The journey hung on the smoothed keyframes: map_base of each row (N, 3).
 
     What odometry is wrong by from one keyframe to the next is spread over the time between.
     """
-    corrected = list[Pose]()
-    for k, stamp, odom_base in zip(
-        journey.keyframes, journey.stamps, journey.odom_base, strict=True
-    ):
-        before, *after = pipeline.keyframes[k : k + 2]
-        pose = keyframes[k].compose(before.odom_base.to(odom_base))
-        for keyframe in after:
-            share = (stamp - before.stamp) / max(keyframe.stamp - before.stamp, 1e-9)
-            by_next = keyframes[k + 1].compose(keyframe.odom_base.to(odom_base))
-            pose = pose.compose(pose.to(by_next).part(min(max(share, 0.0), 1.0)))
-        corrected.append(pose)
-    return corrected
+    taken, last = pipeline.keyframes, len(pipeline.keyframes) - 1
+    stamps, odom_base = np.array(journey.stamps), _rows(journey.odom_base)
+    taken_at, felt = np.array([k.stamp for k in taken]), _rows([k.odom_base for k in taken])
+    before = np.array(journey.keyframes, np.intp)
+    later = np.minimum(before + 1, last)
+    before = np.where(taken_at[later] <= stamps, later, before)  # it was learnt from too late
+    after, smoothed_base = np.minimum(before + 1, last), _rows(keyframes)
+    by_last, by_next = (
+        _composed(smoothed_base[k], _seen_from(felt[k], odom_base)) for k in (before, after)
+    )
+    time_between = np.maximum(taken_at[after] - taken_at[before], 1e-9)
+    share = np.clip((stamps - taken_at[before]) / time_between, 0.0, 1.0)
+    return _composed(by_last, share[:, None] * _seen_from(by_last, by_next))
+
+
+def _composed(a_b: Array, b_c: Array) -> Array:
+    """Poses a_c (N, 3) of a_b and b_c."""
+    cos, sin = np.cos(a_b[:, 2]), np.sin(a_b[:, 2])
+    x, y, turn = b_c.T
+    theta = _wrapped(a_b[:, 2] + turn)
+    return np.column_stack([a_b[:, 0] + cos * x - sin * y, a_b[:, 1] + sin * x + cos * y, theta])
+
+
+def _seen_from(a_b: Array, a_c: Array) -> Array:
+    """Poses b_c (N, 3) of a_b and a_c."""
+    cos, sin = np.cos(a_b[:, 2]), np.sin(a_b[:, 2])
+    x, y, turn = (a_c - a_b).T
+    return np.column_stack([cos * x + sin * y, cos * y - sin * x, _wrapped(turn)])
+
+
+def _wrapped(angles: Array) -> Array:
+    wrapped: Array = np.remainder(angles + np.pi, math.tau) - np.pi
+    return wrapped
 
 
 def route_graph(
