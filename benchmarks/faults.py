@@ -50,12 +50,16 @@ FAULTS: dict[str, dict[str, tuple[float, float]]] = {
         "restart": (0.5, 3.0),
     },
     "disk": {"disk full": (1.0, 20.0)},
-    "network": {"nobody listens": (1.0, 20.0), "garbage": (1.0, 5.0)},
+    "network": {
+        "nobody listens": (1.0, 20.0),
+        "garbage": (1.0, 5.0),
+        "driven carelessly": (4.0, 10.0),
+    },
     "requests": {
         "pause": (3.0, 8.0),
-        "goto": (0.0, 0.0),
-        "home": (0.0, 0.0),
-        "relocalise": (0.0, 0.0),
+        "goto": (6.0, 12.0),  # until it is asked to explore again
+        "home": (6.0, 12.0),
+        "relocalise": (6.0, 12.0),
         "stop": (2.0, 5.0),
         "save": (0.0, 0.0),
         "set": (0.0, 0.0),

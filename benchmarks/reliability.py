@@ -1,16 +1,17 @@
 """A campaign: the whole daemon on twins in virtual time, with random faults from every layer.
 
     python -m benchmarks.reliability --seeds 1000 --jobs 2
-    python -m benchmarks.reliability --seed 17
+    python -m benchmarks.reliability --seed 17 --log
 
 Each seed draws a schedule of faults (`benchmarks.faults`), and what must not happen in spite of
 them is judged by the truth of the simulation (`benchmarks.trial`). A seed that fails is tried
-again with ever fewer faults, and its shortest schedule that still fails is printed. Results stay
-in `--out`, and a second call goes on from there; `--write` puts the table into docs/reliability.md.
-The exit status is 1 if a seed failed.
+again with ever fewer faults, and its shortest schedule that still fails is printed. `--log` tells
+what happened in between, by the robot's clock. Results stay in `--out`, and a second call goes on
+from there. The exit status is 1 if a seed failed.
 """
 
 import argparse
+import asyncio
 import os
 import sys
 import time
@@ -18,17 +19,20 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
+from multiprocessing import get_context
 from pathlib import Path
+from statistics import fmean
 
 import structlog
+from structlog.typing import EventDict, WrappedLogger
 
 from benchmarks import campaign
 from benchmarks.campaign import Row
-from benchmarks.faults import FAULTS, LAYER, Fault, draw
-from benchmarks.trial import trial
+from benchmarks.faults import FAULTS, Fault, draw
+from benchmarks.trial import once, trial
 
 RESULTS = "reliability.jsonl"
-PAGE = Path("docs/reliability.md")
+DIGITS = 5  # that are kept of a number
 ORACLES = {
     "contact at speed": "touches a wall or a person faster than 0.12 m/s",
     "does not stop": "moves, though it is blind, deaf, dead, lifted, touched or asked to stand",
@@ -37,28 +41,26 @@ ORACLES = {
     "wrong place": "is 0.75 m or more from where it believes, ten seconds after the last fault",
     "map unreadable": "leaves a map or a mission that cannot be read",
     "exception": "ends with an exception",
+    "does not end": "goes on for 5 s after it was told to end",
     "task left": "leaves a task running",
-    "memory": "keeps more memory or disk than its way is worth",
+    "memory": "leaves memory behind, or a journal longer than its way is worth",
     "cycles late": "gives its service manager no sign of life for 5 s",
 }
-GROWTH = 1.3  # times the memory of the second trial of a process: something leaks
 ONE_CORE = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run and print a line for each seed, then the table; 1 if one failed."""
     options = _options(arguments)
+    if options.log:
+        _set_up_log("info")
+        once(options.seed, draw(options.seed))
     seeds = [options.seed] if options.seed is not None else range(1, options.seeds + 1)
     rows = []
     for row in _rows(seeds, options):
         rows.append(row)
-        print(line(row), flush=True)
-        for text in row["shortest"]:
-            print(f"    {text}")
-    text = "\n".join(table(rows))
-    print(text)
-    if options.write:
-        PAGE.write_text(page(text), encoding="utf-8")
+        print("\n".join(story(row)), flush=True)
+    print("\n".join(("", *totals(rows), "", *by_layer(rows), "", *by_oracle(rows))))
     return int(any(row["violations"] for row in rows))
 
 
@@ -70,8 +72,25 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--seed", type=int, help="this one alone, anew")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--out", type=Path, help="default: nothing is kept")
-    parser.add_argument("--write", action="store_true", help=f"the table to {PAGE}")
-    return parser.parse_args(arguments)
+    parser.add_argument("--log", action="store_true", help="with --seed: what happens, when")
+    options = parser.parse_args(arguments)
+    if options.log and options.seed is None:
+        parser.error("--log needs --seed")
+    return options
+
+
+def _set_up_log(least: str) -> None:
+    renderer = structlog.dev.ConsoleRenderer(colors=False, sort_keys=False, pad_event_to=0)
+    structlog.configure(
+        processors=[_at, renderer],
+        wrapper_class=structlog.make_filtering_bound_logger(least),
+    )
+
+
+def _at(logger: WrappedLogger, method: str, event: EventDict) -> EventDict:
+    """Put the time of the simulation before an event."""
+    event["event"] = f"{asyncio.get_running_loop().time():6.2f} s: {event['event']}"
+    return event
 
 
 def _rows(seeds: Iterable[int], options: argparse.Namespace) -> Iterator[Row]:
@@ -90,35 +109,32 @@ def _run(seeds: list[int], jobs: int) -> Iterator[Row]:
         yield from map(one, seeds)
         return
     os.environ.update(ONE_CORE)
-    with ProcessPoolExecutor(jobs) as pool:
+    with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:  # loads numpy with those
         yield from pool.map(one, seeds)
-
-
-_blocks: list[int] = []  # of memory after each trial of this process
 
 
 def one(seed: int) -> Row:
     """A seed's result."""
-    structlog.configure(wrapper_class=structlog.make_filtering_bound_logger(50))
+    _set_up_log("critical")
     began, faults = time.process_time(), draw(seed)
     verdict = trial(seed, faults)
-    _blocks.append(verdict.blocks)
-    if len(_blocks) > 2 and verdict.blocks > GROWTH * _blocks[1]:
-        verdict.hurt("memory", f"{verdict.blocks} blocks, after {_blocks[1]} in the second trial")
     cpu = time.process_time() - began
     least = shrunk(seed, faults, set(verdict.violations)) if verdict.violations else []
-    return asdict(verdict) | {
+    row = asdict(verdict) | {
         "seed": seed,
         "cpu_s": cpu,
         "faults": [fault.name for fault in faults],
         "shortest": [str(fault) for fault in least],
     }
+    return {key: _short(value) for key, value in row.items()}
+
+
+def _short(value: object) -> object:
+    return float(f"{value:.{DIGITS}g}") if isinstance(value, float) else value
 
 
 def shrunk(seed: int, faults: list[Fault], oracles: set[str]) -> list[Fault]:
     """A schedule in which no fault can be left out, if one of the oracles shall be hurt."""
-    if oracles == {"memory"}:
-        return faults
     return shortest(faults, lambda fewer: bool(oracles & trial(seed, fewer).violations.keys()))
 
 
@@ -142,47 +158,43 @@ def line(row: Row) -> str:
     )
 
 
-def table(rows: list[Row]) -> Iterator[str]:
-    """Faults by class, and the seeds that hurt each oracle."""
-    count = Counter(name for row in rows for name in row["faults"])
-    bad = {oracle: [r["seed"] for r in rows if oracle in r["violations"]] for oracle in ORACLES}
+def story(row: Row) -> Iterator[str]:
+    """What became of a seed, and the least that it takes if it failed."""
+    yield line(row)
+    yield from (f"    {text}" for text in row["shortest"])
+
+
+def totals(rows: Sequence[Row]) -> Iterator[str]:
+    """One line about all."""
     failed = sum(bool(row["violations"]) for row in rows)
     yield (
-        f"{len(rows)} seeds, {count.total()} faults, {sum(row['lives'] for row in rows)} lives, "
+        f"{len(rows)} seeds, {sum(len(row['faults']) for row in rows)} faults, "
+        f"{sum(row['lives'] for row in rows)} lives, "
         f"{sum(row['duration_s'] for row in rows) / 3600:.1f} h of the robot's time, "
-        f"{sum(row['driven_m'] for row in rows) / 1000:.1f} km; {failed} seeds failed."
+        f"{sum(row['driven_m'] for row in rows) / 1000:.1f} km, "
+        f"{fmean(row['cpu_s'] for row in rows):.1f} s of computing each; "
+        f"{failed} failed."
     )
-    yield ""
+
+
+def by_layer(rows: Sequence[Row]) -> Iterator[str]:
+    """How many faults there were of each class, Markdown."""
+    count = Counter(name for row in rows for name in row["faults"])
     yield "| layer | faults |"
     yield "|---|---|"
     for layer, names in FAULTS.items():
-        number = sum(n for name, n in count.items() if LAYER[name] == layer)
+        number = sum(count[name] for name in names)
         listed = ", ".join(f"{name} {count[name]}" for name in names)
         yield f"| {layer} | {number}: {listed} |"
-    yield ""
+
+
+def by_oracle(rows: Sequence[Row]) -> Iterator[str]:
+    """Which seeds hurt each oracle, Markdown."""
     yield "| what must not happen: the robot | seeds |"
     yield "|---|---|"
     for oracle, meaning in ORACLES.items():
-        listed = f": {', '.join(map(str, bad[oracle][:10]))}" if bad[oracle] else ""
-        yield f"| {meaning} | {len(bad[oracle])}{listed} |"
-
-
-def page(text: str) -> str:
-    """docs/reliability.md."""
-    return (
-        "# Reliability\n\n"
-        "`make reliability` drives the whole daemon through a small world on simulated devices,\n"
-        "in virtual time, with three to eight random faults from every layer. A seed decides all\n"
-        "of it, and `python -m benchmarks.reliability --seed N` repeats one alone. A seed that\n"
-        "fails prints the shortest schedule of its faults that still fails.\n\n"
-        "This page is written by `python -m benchmarks.reliability --write`. Others look closer\n"
-        "at one thing each: `python -m benchmarks.kills` kills explorations with damage to their\n"
-        "files and compares the maps, `benchmarks.process_kills` does so with real processes,\n"
-        "`benchmarks.kidnapping` puts a robot down anywhere on a map that it knows,\n"
-        "`benchmarks.errands_table` asks it for vertices and points, and `benchmarks.patrol` lets\n"
-        "it patrol for many hours while doors close and open.\n\n"
-        f"{text}\n"
-    )
+        bad = [str(row["seed"]) for row in rows if oracle in row["violations"]]
+        yield f"| {meaning} | {len(bad)}{': ' if bad else ''}{', '.join(bad[:10])} |"
 
 
 if __name__ == "__main__":

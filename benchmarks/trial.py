@@ -22,7 +22,7 @@ import msgspec
 import numpy as np
 from scipy import ndimage
 
-from benchmarks.faults import Fault
+from benchmarks.faults import LAYER, Fault
 from benchmarks.reference_gvg import reference_gvg
 from benchmarks.small_worlds import one_ring
 from gvgbot.clock import LoopClock, run_in_virtual_time
@@ -32,7 +32,7 @@ from gvgbot.drivers.kobuki.twin import KobukiTwin
 from gvgbot.drivers.link_faults import FaultyLink, LinkFaultConfig
 from gvgbot.drivers.people import Walkways
 from gvgbot.errors import GvgbotError
-from gvgbot.geometry import Array, Pose
+from gvgbot.geometry import STANDSTILL, Array, Pose, Twist
 from gvgbot.maps import geojson
 from gvgbot.maps.run_directory import RunDirectory
 from gvgbot.persistence.keeper import Keeper
@@ -51,12 +51,18 @@ LOOK_S = 0.05  # between two looks at the truth
 END_S, QUIET_S = 60.0, 5.0  # it ends then, or so long after the last fault when all is explored
 STILL_MPS, SPEED_MPS = 0.03, 0.12  # standing; touching something faster than this is a collision
 VERTEX_M = 0.6  # from the nearest true one, a vertex is false,
-FELT_M = 1.5  # unless it is near something that was felt and is taken for a fact
+FELT_M = 1.5  # unless it is near something that was felt and is taken for a fact,
+STOOD_S = 10.0  # or, as long as the robot explores, near somebody who stands about for so long
 PLACE_M = 0.75  # from the true pose, the robot is not where it believes
-SETTLING_S = 10.0  # after a fault, in which it may find its place again
+SETTLING_S = 10.0  # after a fault in one of
+DISTURBING = {"link", "device", "sensing", "world", "process"}  # it may find its place again
+PATIENCE_S = 1.0  # before the robot is asked once more for what it refused
+HAND_S, STEADY_S = 0.1, 3.0  # who drives by hand says so as often, and changes his mind
 WATCHDOG_S = 5.0  # without a sign of life, a service manager would restart the daemon
+ENDS_S = 5.0  # after a signal; a service manager would kill it later
 JOURNAL_BYTES_PER_S = 100_000
 TAIL = 200  # bytes at the end of a file in which it is damaged
+KEPT = 1_000  # blocks of memory that a trial may leave behind; a robot is several times as many
 NOISE = LinkFaultConfig(
     jitter_s=0.005,
     flipped_bits_per_kb=2.0,
@@ -79,12 +85,6 @@ STOPS = {
     "base wheel drop": FELT_S,
     "base over-current": FELT_S,
     "carried": FELT_S,
-    "kill": ABANDONED_S,
-    "kill, journal cut": ABANDONED_S,
-    "kill, journal bit": ABANDONED_S,
-    "kill, snapshot cut": ABANDONED_S,
-    "pause": ASKED_S,
-    "stop": ASKED_S,
 }
 BACKS_OFF = {"base bump": FELT_S, "base cliff": FELT_S}  # it may go back then, but not on
 
@@ -100,7 +100,7 @@ class Verdict:
     driven_m: float = 0.0
     contacts: int = 0
     duration_s: float = 0.0
-    blocks: int = 0  # of memory, allocated when all is over
+    kept: int = 0  # blocks of memory that are allocated after it, and were not before
 
     def hurt(self, oracle: str, how: str) -> None:
         self.violations.setdefault(oracle, how)
@@ -177,11 +177,45 @@ class Listeners:
         finally:  # the robot is dead, or has ended
             self._handle = None
 
-    async def ask(self, name: str, data: bytes) -> None:
-        """Ask the robot for something, if it is there."""
-        if self._handle is not None:
-            answer = await self._handle(Asked(name, data, MESSAGEPACK, "a trial"))
-            assert answer.text
+    async def ask(self, name: str, data: bytes) -> bool:
+        """Ask the robot for something, and whether it is there and does so."""
+        if self._handle is None:
+            return False
+        answer = await self._handle(Asked(name, data, MESSAGEPACK, "a trial"))
+        assert answer.text
+        return answer.done
+
+
+class Hand:
+    """Somebody who may drive the robot."""
+
+    def __init__(self) -> None:
+        self._drive: Callable[[Twist], None] | None = None
+
+    async def hear(self, drive: Callable[[Twist], None]) -> None:
+        self._drive = drive
+        try:
+            await asyncio.Event().wait()
+        finally:
+            self._drive = None
+
+    def drive(self, twist: Twist) -> None:
+        """Let the robot drive so, if it is there."""
+        if self._drive is not None:
+            self._drive(twist)
+
+
+class Standers:
+    """Takes down who stands about."""
+
+    def __init__(self) -> None:
+        self._since: dict[tuple[float, float], float] = {}  # s
+
+    def look(self, centres: Array, now: float) -> list[Array]:
+        """Places of people (N, 2) who have not moved for long, of those who are there now."""
+        here = [(float(x), float(y)) for x, y in centres]
+        self._since = {place: self._since.get(place, now) for place in here}
+        return [np.array(p) for p, since in self._since.items() if now - since > STOOD_S]
 
 
 class Manager(Notifier):
@@ -208,7 +242,7 @@ class Trial:
         self._faults, self._out = faults, out
         self._rng = np.random.default_rng((seed, 22))
         self._config, self._place = _set_up(seed, faults, overrides)
-        self._disk, self._network = Disk(), Listeners()
+        self._disk, self._network, self._hand = Disk(), Listeners(), Hand()
         self._clock: LoopClock
         self._world: GoingWorld
         self._session: Session | None = None  # of the robot that is alive
@@ -217,8 +251,10 @@ class Trial:
         self._is_over = False
         self._damage = ""
         self._dead_s = 0.0
+        self._shall_stand_from = math.inf  # s; a while after it was asked to, or ended
         self._contacts, self._fastest = 0, 0.0
         self._felt: list[Array] = []  # places where it felt a cliff or a bump (2,), m
+        self._stood: list[Array] = []  # places where somebody stood about (2,), m
 
     async def run(self) -> None:
         """Live until the end, judged all the time."""
@@ -253,10 +289,22 @@ class Trial:
             links = CabledLinks(self._config, clock, self._world)
             links.cable = self._cable = Cable(self._world.base)
             self._session, self._ends = session, ""
+            self._shall_stand_from = math.inf  # the robot may have forgotten what it was asked
             manager = Manager(clock.now)
-            robot = Robot(session, manager, self._network, off_loop=at_once, keeper=keeper)
-            await robot.serve(self._ended(), links)
-            self._session = None
+            robot = Robot(
+                session,
+                manager,
+                self._network,
+                off_loop=at_once,
+                keeper=keeper,
+                driver=self._hand,
+            )
+            try:
+                async with asyncio.timeout(None) as patience:
+                    await robot.serve(self._ended(patience), links)
+            except TimeoutError:
+                self.verdict.hurt("does not end", f"after {self._ends} for {ENDS_S:g} s")
+            self._session, self._shall_stand_from = None, clock.now() + ABANDONED_S
             if manager.longest > WATCHDOG_S:
                 self.verdict.hurt("cycles late", f"no sign of life for {manager.longest:.1f} s")
             if self._ends == "SIGTERM":
@@ -269,9 +317,10 @@ class Trial:
         self._spoil()
         await clock.sleep_until(clock.now() + self._dead_s)
 
-    async def _ended(self) -> str:
+    async def _ended(self, patience: asyncio.Timeout) -> str:
         while not self._ends:
             await self._clock.sleep_until(self._clock.now() + LOOK_S)
+        patience.reschedule(asyncio.get_running_loop().time() + ENDS_S)
         self._cable.is_cut = self._ends == "SIGKILL"
         return self._ends
 
@@ -333,19 +382,23 @@ class Trial:
                 strike(what, fault.lasts)
             case "carried", _:
                 await self._carry(fault)
-            case "kill," | "kill" | "restart", _:
+            case "kill," | "kill" | "restart", _ if self._session is not None:
                 self._ends = "SIGTERM" if device == "restart" else "SIGKILL"
                 self._damage, self._dead_s = what, fault.lasts
             case "disk", _:
                 self._disk.is_full = True
                 await self._clock.sleep_until(fault.at + fault.lasts)
                 self._disk.is_full = False
+            case "kill," | "kill" | "restart", _:
+                pass  # it is dead already
             case "nobody", _:
                 self._network.is_deaf = True
                 await self._clock.sleep_until(fault.at + fault.lasts)
                 self._network.is_deaf = False
             case "garbage", _:
                 await self._talk_nonsense(fault)
+            case "driven", _:
+                await self._drive(fault)
             case _:
                 await self._ask(fault)
 
@@ -366,43 +419,70 @@ class Trial:
             body.pose = there
 
     async def _ask(self, fault: Fault) -> None:
-        """Ask for something, as a person would."""
-        match fault.name:
-            case "pause":
-                await self._request("pause")
-                await self._clock.sleep_until(fault.at + fault.lasts)
-                await self._request("resume")
-            case "stop":
-                await self._request("stop")
-                await self._clock.sleep_until(fault.at + fault.lasts)
-                await self._request("explore")
-            case "goto":
-                await self._request("goto", vertex=int(self._rng.integers(0, 4)))
-            case "set":
-                await self._request("set", key="robot.limits.max_speed_mps", value=0.3)
-            case name:
-                await self._request(name)
+        """Ask for something, as a person would, and to go on some time later."""
+        arguments: dict[str, object] = {}
+        if fault.name == "goto":
+            arguments = {"vertex": int(self._rng.integers(0, 4))}
+        elif fault.name == "set":
+            arguments = {"key": "robot.limits.max_speed_mps", "value": 0.3}
+        is_done = await self._request(fault.name, **arguments)
+        if not is_done or not fault.lasts:
+            return
+        await self._clock.sleep_until(fault.at + fault.lasts)
+        await self._insist("resume" if fault.name == "pause" else "explore")
 
-    async def _request(self, name: str, **arguments: object) -> None:
-        await self._network.ask(name, msgspec.msgpack.encode(arguments))
+    async def _drive(self, fault: Fault) -> None:
+        """Drive without looking where."""
+        twist, turns_at = STANDSTILL, fault.at
+        while (now := self._clock.now()) < fault.at + fault.lasts:
+            if now >= turns_at:
+                linear, angular = self._rng.uniform((0.1, -0.5), (0.7, 0.5)).tolist()
+                twist, turns_at = Twist(linear, angular), now + STEADY_S
+            if self._session is not None and not self._session.pipeline.errands.is_paused:
+                self._shall_stand_from = math.inf
+            self._hand.drive(twist)
+            await self._clock.sleep_until(now + HAND_S)
+        await self._insist("explore")
+
+    async def _insist(self, name: str) -> None:
+        """Ask until the robot is there and does it."""
+        while not await self._request(name):
+            await self._clock.sleep_until(self._clock.now() + PATIENCE_S)
+
+    async def _request(self, name: str, **arguments: object) -> bool:
+        """Whether the robot does what it is asked for."""
+        return await self._say(name, msgspec.msgpack.encode(arguments))
+
+    async def _say(self, name: str, data: bytes) -> bool:
+        is_done = await self._network.ask(name, data)
+        if is_done and name in ("pause", "stop"):
+            self._shall_stand_from = min(self._shall_stand_from, self._clock.now() + ASKED_S)
+        elif is_done and name not in ("save", "set"):
+            self._shall_stand_from = math.inf
+        return is_done
 
     async def _talk_nonsense(self, fault: Fault) -> None:
-        """Send what no client sends."""
+        """Send what no client sends; no arguments at all may be right, so go on afterwards."""
         while self._clock.now() < fault.at + fault.lasts:
             name = str(self._rng.choice([*REQUESTS, "", "reboot"]))
-            await self._network.ask(name, self._rng.bytes(int(self._rng.integers(0, 40))))
+            await self._say(name, self._rng.bytes(int(self._rng.integers(0, 40))))
             await self._clock.sleep_until(self._clock.now() + 0.1)
+        await self._insist("resume")
+        await self._insist("explore")
 
     # -- oracles -----------------------------------------------------------------------------------
 
     async def _judge(self) -> None:
         last = max((fault.at + fault.lasts for fault in self._timed()), default=0.0)
+        standers = Standers()
         while not self._is_over:
             now = self._clock.now()
             self._world.body.advance(now)
             self._judge_contact(now)
             self._judge_stops(now)
             self._judge_place(now)
+            if self._world.people is not None:
+                self._stood += standers.look(self._world.people.centres, now)
             session = self._session
             is_done = session is not None and session.pipeline.mission.outcome is not None
             if session is not None and (now > END_S or (is_done and now > last + QUIET_S)):
@@ -418,6 +498,8 @@ class Trial:
 
     def _judge_stops(self, now: float) -> None:
         speed = self._world.body.linear
+        if now > self._shall_stand_from and abs(speed) > STILL_MPS:
+            self._does_not_stop(now, "it was asked to stand, or has ended")
         for fault in self._faults:
             if not fault.at <= now < fault.at + fault.lasts:
                 continue
@@ -425,30 +507,22 @@ class Trial:
                 self._felt.append(self._world.body.pose.position)
             if fault.name in STOPS and now > fault.at + STOPS[fault.name]:
                 moves = abs(speed) > STILL_MPS
-            elif fault.name in BACKS_OFF and now > fault.at + BACKS_OFF[fault.name]:
-                moves = speed > STILL_MPS
             else:
-                continue
-            if moves and not self._is_overtaken(fault, now):
-                self.verdict.hurt(
-                    "does not stop", f"{speed:.2f} m/s at {now:.1f} s, though {fault}"
-                )
+                backs_off = fault.name in BACKS_OFF and now > fault.at + BACKS_OFF[fault.name]
+                moves = backs_off and speed > STILL_MPS
+            if moves:
+                self._does_not_stop(now, str(fault))
 
-    def _is_overtaken(self, fault: Fault, now: float) -> bool:
-        """Whether something else lets the robot drive although it was asked to stand.
-
-        A pause does not outlive a kill in the second after it, and a request may be refused.
-        """
-        if fault.name not in ("pause", "stop"):
-            return False
-        return any(f is not fault and fault.at - 8.0 <= f.at <= now for f in self._faults)
+    def _does_not_stop(self, now: float, why: str) -> None:
+        speed = self._world.body.linear
+        self.verdict.hurt("does not stop", f"{speed:.2f} m/s at {now:.1f} s, though {why}")
 
     def _judge_place(self, now: float) -> None:
         session = self._session
         if session is None or session.pipeline.is_lost or not session.journey.world_base:
             return
-        recent = any(f.at <= now < f.at + f.lasts + SETTLING_S for f in self._timed())
-        if recent:
+        disturbing = (fault for fault in self._timed() if LAYER[fault.name] in DISTURBING)
+        if any(fault.at <= now < fault.at + fault.lasts + SETTLING_S for fault in disturbing):
             return
         truth = _world_map(session).inverse().compose(self._world.body.pose)
         off = truth.distance(session.pipeline.map_base)
@@ -465,11 +539,12 @@ class Trial:
         if not session.journey.world_base:
             return
         world_map, mapper = _world_map(session), session.pipeline.mapper
-        felt = np.array(self._felt).reshape(-1, 2)
+        felt = self._felt + (self._stood if self.verdict.outcome is None else [])
+        excused = np.array(felt).reshape(-1, 2)
         for vertex in mapper.graph.vertices:
             place = world_map.transform(mapper.belief.map_vertex(vertex).position)
             off = float(np.hypot(*(_true_vertices() - place).T).min())
-            if off > VERTEX_M and np.hypot(*(felt - place).T).min(initial=math.inf) > FELT_M:
+            if off > VERTEX_M and np.hypot(*(excused - place).T).min(initial=math.inf) > FELT_M:
                 self.verdict.hurt("false vertex", f"vertex {vertex}, {off:.2f} m from any")
 
 
@@ -512,6 +587,17 @@ def _clearance(place: Place, pose: Pose) -> float:
 
 def trial(seed: int, faults: list[Fault], overrides: Sequence[str] = ()) -> Verdict:
     """The verdict on a schedule, the same each time; `overrides` are of the configuration."""
+    verdict = once(seed, faults, overrides)
+    if verdict.kept > KEPT:  # modules that were loaded and caches that were filled, or a leak
+        again = once(seed, faults, overrides)
+        if again.kept > KEPT:
+            verdict.hurt("memory", f"{again.kept} blocks stay, each time")
+    return verdict
+
+
+def once(seed: int, faults: list[Fault], overrides: Sequence[str] = ()) -> Verdict:
+    """The verdict but for memory, of which the first trial of a process always keeps some."""
+    before = _blocks()
     with tempfile.TemporaryDirectory() as out:
         tried = Trial(seed, faults, Path(out), overrides)
         try:
@@ -520,9 +606,14 @@ def trial(seed: int, faults: list[Fault], overrides: Sequence[str] = ()) -> Verd
             tried.verdict.hurt("exception", _innermost(error))
         verdict = tried.verdict
     del tried
-    gc.collect()
-    verdict.blocks = sys.getallocatedblocks()
+    verdict.kept = _blocks() - before
     return verdict
+
+
+def _blocks() -> int:
+    """How much is allocated by Python itself, but for what nobody can reach."""
+    gc.collect()
+    return sys.getallocatedblocks()
 
 
 def _innermost(error: BaseException) -> str:

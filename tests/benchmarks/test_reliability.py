@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from benchmarks.faults import FAULTS, LAYER, Fault, draw
-from benchmarks.reliability import RESULTS, line, main, one, shortest
-from benchmarks.trial import trial
+from benchmarks.reliability import ORACLES, RESULTS, by_oracle, line, main, one, shortest
+from benchmarks.trial import once
 
 
 def test_a_seed_draws_one_schedule_and_many_seeds_draw_every_fault() -> None:
@@ -24,12 +24,27 @@ def test_the_shortest_schedule_has_all_that_it_takes_and_no_more() -> None:
     assert shortest(faults, lambda fewer: set(needed) <= set(fewer)) == needed
 
 
+def test_the_table_names_the_seeds_that_hurt_an_oracle() -> None:
+    rows = [{"seed": seed, "violations": {"false vertex": "far"}} for seed in range(3, 15)]
+    rows.append({"seed": 2, "violations": {}})
+    table = dict(row[2:-2].split(" | ") for row in list(by_oracle(rows))[2:])
+    assert table.pop(ORACLES["false vertex"]) == "12: 3, 4, 5, 6, 7, 8, 9, 10, 11, 12"
+    assert set(table.values()) == {"0"}
+
+
+def test_a_log_is_of_one_seed(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["--seeds", "3", "--log"])
+    assert ended.value.code == 2
+    assert "--log needs --seed" in capsys.readouterr().err
+
+
 @pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_a_base_that_drives_on_when_nobody_commands_it_any_more_is_found_out() -> None:
     killed = [Fault(6.0, "kill", 6.0)]
-    assert not trial(1, killed).violations
-    wild = trial(1, killed, ["twin.base.has_command_timeout=false"])
+    assert not once(1, killed).violations
+    wild = once(1, killed, ["twin.base.has_command_timeout=false"])
     assert {"does not stop", "contact at speed"} & wild.violations.keys()
 
 
@@ -38,10 +53,12 @@ def test_a_base_that_drives_on_when_nobody_commands_it_any_more_is_found_out() -
 def test_a_seed_repeats_itself_and_what_was_kept_is_not_run_again(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    arguments = ["--seed", "10", "--out", str(tmp_path)]
+    arguments = ["--seed", "10", "--log", "--out", str(tmp_path)]
     assert main(arguments) == 0
     kept = (tmp_path / RESULTS).read_text(encoding="utf-8")
-    assert line(one(10)).rsplit(",", 1)[0] in capsys.readouterr().out  # but for computing time
+    printed = capsys.readouterr().out
+    assert line(one(10)).rsplit(",", 1)[0] in printed  # but for computing time
+    assert " s: finished outcome=explored" in printed
     (tmp_path / RESULTS).write_text(kept.replace('"seed": 10', '"seed": 1'), encoding="utf-8")
     assert main(["--seeds", "1", "--out", str(tmp_path)]) == 0
     assert "1 seeds, 3 faults" in capsys.readouterr().out
