@@ -6,7 +6,10 @@ import pytest
 
 from benchmarks.faults import FAULTS, LAYER, Fault, draw
 from benchmarks.reliability import ORACLES, RESULTS, by_oracle, line, main, one, shortest
+from benchmarks.sabotage import SABOTAGES, Sabotage
 from benchmarks.trial import once
+
+ROOT = Path(__file__).parents[2]
 
 
 def test_a_seed_draws_one_schedule_and_many_seeds_draw_every_fault() -> None:
@@ -22,6 +25,12 @@ def test_the_shortest_schedule_has_all_that_it_takes_and_no_more() -> None:
     faults = [Fault(float(i), name, 1.0) for i, name in enumerate(LAYER)]
     needed = [faults[3], faults[9], faults[17]]
     assert shortest(faults, lambda fewer: set(needed) <= set(fewer)) == needed
+
+
+@pytest.mark.parametrize("sabotage", SABOTAGES, ids=lambda sabotage: sabotage.what)
+def test_what_is_broken_on_purpose_is_still_there_to_be_broken(sabotage: Sabotage) -> None:
+    text = (ROOT / "gvgbot" / sabotage.module).read_text(encoding="utf-8")
+    compile(sabotage.broken(text), sabotage.module, "exec")
 
 
 def test_the_table_names_the_seeds_that_hurt_an_oracle() -> None:
