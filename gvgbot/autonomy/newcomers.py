@@ -93,6 +93,8 @@ class Newcomers:
 
         `is_way` tells of a place (2,), local frame, whether a way is known to lead over it.
         """
+        if not max(self._config.came_after_s, self._config.found_after_s):  # who comes, stays
+            return _without(scan, local_base, self.company)
         self._forget(scan, local_base, local_map)
         walls = _Walls(local_map, self._config.away_from_walls_m, is_way)
         seen = [

@@ -262,3 +262,13 @@ def test_a_glance_shows_where_somebody_near_has_gone_and_adds_nobody() -> None:
         if is_followed:
             assert np.hypot(*(latest[0] - person)) < 0.1
     assert np.hypot(*(watch.newcomers.discs[0][0] - [2.0, 0.0])) < 0.1
+
+
+def test_without_patience_whoever_comes_is_taken_for_a_wall_at_once() -> None:
+    watch = Watch(EMPTY)
+    watch.newcomers = Newcomers(NewcomersConfig(found_after_s=0.0, came_after_s=0.0))
+    assert watch.dropped(EMPTY, person=(2.0, 0.0)) == 0
+    assert watch.inside() > 0
+    assert len(watch.newcomers.points) == 0
+    watch.newcomers.company = [(np.array([2.0, 0.0]), RADIUS)]
+    assert watch.dropped(EMPTY, person=(2.0, 0.0)) > 0
