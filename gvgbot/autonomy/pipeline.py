@@ -107,7 +107,8 @@ class Keyframe:
 class _Drawn:
     """A scan that is in the local maps, and nothing has been learnt from yet.
 
-    `step` is the way from the keyframe before, None for the first, `travelled` m driven in all.
+    `step` is the way from the keyframe before, None for the first, `travelled` m driven in all;
+    `is_turning` if the robot is about to see more.
     """
 
     scan: Scan
@@ -115,6 +116,7 @@ class _Drawn:
     local_base: Pose
     step: Step | None
     travelled: float
+    is_turning: bool = False
 
 
 class Pipeline:
@@ -248,7 +250,7 @@ class Pipeline:
         is_way = partial(self.mapper.is_way, known)
         scan = self._newcomers.sift(scan, drawn.local_base, self._maps.near, is_way)
         self._maps.insert(scan, drawn.local_base, drawn.travelled)
-        return replace(drawn, scan=scan)
+        return replace(drawn, scan=scan, is_turning=self._turning())
 
     def _learn(self, drawn: _Drawn) -> list[Event]:
         """Learn from what the local map shows around a scan, and decide; what happened."""
@@ -280,18 +282,18 @@ class Pipeline:
         )
         known, learnt = self.mapper.observe(view)
         self._keep(drawn)
-        done = self._act(view, known, scan)
+        done = self._act(view, known, drawn)
         happened = learnt + done  # what was done may have taught the mapper more
         return happened + self._forget(scan.stamp, happened)
 
-    def _act(self, view: View, known: Correspondence, scan: Scan) -> list[Event]:
+    def _act(self, view: View, known: Correspondence, drawn: _Drawn) -> list[Event]:
         """Decide what to do next; what happened by that."""
         if self.led:
             return self.mission.witness(view, known)
-        if self._turning():
+        if drawn.is_turning:
             return []
         if len(self.keyframes) == 1:
-            self._turn(_blind_angle(scan))
+            self._turn(_blind_angle(drawn.scan))
             return []
         order, done = self.errands.advance(view, known)
         self._obey(order)

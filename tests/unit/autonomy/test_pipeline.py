@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gvgbot.autonomy.events import Event
+from gvgbot.autonomy.events import Decision, Event
 from gvgbot.autonomy.localisation import Localisation
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.config import load_config
-from gvgbot.geometry import STANDSTILL, Pose
+from gvgbot.geometry import STANDSTILL, Pose, Twist
 from gvgbot.hal.messages import Odometry
 from tests.unit.autonomy.sights import LASER_270, carved, sweep
 
@@ -60,11 +60,11 @@ def test_who_is_led_looks_for_the_gvg_only_after_some_way() -> None:
     assert looks(led=False) >= 10
 
 
-def looked(pipeline: Pipeline, stamp: float) -> list[Event]:
-    """Stand still between the walls, and look."""
-    pipeline.control(Odometry(stamp, Pose(), STANDSTILL))
-    scan = sweep(ROOMS, Pose(-1.5, 0.0, 0.0), field_of_view=LASER_270)
-    return pipeline.perceive(replace(scan, stamp=stamp, time_increment=0.0))
+def looked(pipeline: Pipeline, stamp: float, theta: float = 0.0) -> tuple[Twist, list[Event]]:
+    """Stand between the walls, turned by an angle, and look: how it drives, and what it learns."""
+    twist = pipeline.control(Odometry(stamp, Pose(0.0, 0.0, theta), STANDSTILL))
+    scan = sweep(ROOMS, Pose(-1.5, 0.0, theta), field_of_view=LASER_270)
+    return twist, pipeline.perceive(replace(scan, stamp=stamp, time_increment=0.0))
 
 
 def test_no_scan_costs_both_to_draw_and_to_learn_from_what_is_drawn() -> None:
@@ -92,3 +92,15 @@ def test_who_is_told_to_wait_learns_from_what_is_drawn_when_it_goes_on() -> None
     pipeline.errands.is_paused = False
     looked(pipeline, 2.2)
     assert [keyframe.stamp for keyframe in pipeline.keyframes] == [0.0, 2.0]
+
+
+def test_it_decides_by_nothing_that_was_seen_before_it_had_turned_round() -> None:
+    config = load_config()
+    pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
+    twists, decided, theta, stamp = dict[float, Twist](), list[float](), 0.0, 0.0
+    while not decided:
+        twists[stamp], happened = looked(pipeline, stamp, theta)
+        decided += [event.stamp for event in happened if isinstance(event, Decision)]
+        theta, stamp = theta + 0.125 * (twists[stamp].angular > 0.0), stamp + 0.1
+    assert any(twist.angular > 0.0 for twist in twists.values())
+    assert twists[decided[0]] == STANDSTILL
