@@ -50,7 +50,7 @@ _COMPANY_M = 0.15  # by which another robot may be elsewhere than it says
 _LONGEST_GAP_S = 2.0  # between keyframes; a longer one is an outage of a device
 _FORGOTTEN = np.diag([1.0, 1.0, 0.3**2])  # covariance of a way that is not kept
 _SCAN_EVERY_M, _SCAN_EVERY_RAD = 0.7, 0.5  # scans that are kept for the occupancy grid
-_LED_EVERY_M, _LED_EVERY_RAD = 0.4, 1.0  # looks for the GVG, where nobody waits for a way
+_LED_EVERY_M, _LED_EVERY_RAD = 0.4, 2.0  # looks for the GVG, where nobody waits for a way
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

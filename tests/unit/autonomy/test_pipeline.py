@@ -56,7 +56,7 @@ def looks(*, led: bool) -> int:
 
 
 def test_who_is_led_looks_for_the_gvg_only_after_some_way() -> None:
-    assert looks(led=True) == 3  # at 0 and 1.2 rad, and 0.6 m on
+    assert looks(led=True) == 3  # at 0 and 2.1 rad, and 0.6 m on
     assert looks(led=False) >= 10
 
 
