@@ -57,6 +57,42 @@ class Sabotage:
 
 SABOTAGES = (
     Sabotage(
+        "a snapshot is written without its last byte, and over the one before",
+        "persistence/mission_files.py",
+        "_replace(self._snapshot, content, keep=self._before if self._is_whole else None)",
+        "self._snapshot.write_bytes(content[:-1])",
+    ),
+    Sabotage(
+        "a full disk is not expected",
+        "persistence/keeper.py",
+        "except OSError as error:",
+        "except PermissionError as error:",
+    ),
+    Sabotage(
+        "a task is started that nobody ends",
+        "robot.py",
+        'log.info("stopping", signal=await stopped)',
+        "asyncio.get_running_loop().create_task(asyncio.sleep(3600.0)); await stopped",
+    ),
+    Sabotage(
+        "one task does not hear that it shall end",
+        "robot.py",
+        "for task in serving:",
+        "for task in serving[1:]:",
+    ),
+    Sabotage(
+        "a cache keeps every robot that ever was",
+        "persistence/keeper.py",
+        "    def clock(self) -> LoopClock:",
+        '    @__import__("functools").cache\n    def clock(self) -> LoopClock:',
+    ),
+    Sabotage(
+        "no sign of life while the base is away",
+        "robot.py",
+        "if not stuck or self._devices.base.away is not None:",
+        "if not stuck:",
+    ),
+    Sabotage(
         "the guard sees no obstacle",
         "hal/guard.py",
         "way = free_distance(points, wish, radius=self.radius, margin=limits.margin_m)",
@@ -98,42 +134,6 @@ SABOTAGES = (
         "best = self._beyond_doubt(belief, matches, sighting)",
         "best = matches[0] if matches else None",
     ),
-    Sabotage(
-        "a snapshot is written without its last byte, and over the one before",
-        "persistence/mission_files.py",
-        "_replace(self._snapshot, content, keep=self._before if self._is_whole else None)",
-        "self._snapshot.write_bytes(content[:-1])",
-    ),
-    Sabotage(
-        "a full disk is not expected",
-        "persistence/keeper.py",
-        "except OSError as error:",
-        "except PermissionError as error:",
-    ),
-    Sabotage(
-        "a task is started that nobody ends",
-        "robot.py",
-        'log.info("stopping", signal=await stopped)',
-        "asyncio.get_running_loop().create_task(asyncio.sleep(3600.0)); await stopped",
-    ),
-    Sabotage(
-        "one task does not hear that it shall end",
-        "robot.py",
-        "for task in serving:",
-        "for task in serving[1:]:",
-    ),
-    Sabotage(
-        "a cache keeps every robot that ever was",
-        "persistence/keeper.py",
-        "    def clock(self) -> LoopClock:",
-        '    @__import__("functools").cache\n    def clock(self) -> LoopClock:',
-    ),
-    Sabotage(
-        "no sign of life while the base is away",
-        "robot.py",
-        "if not stuck or self._devices.base.away is not None:",
-        "if not stuck:",
-    ),
 )
 
 
@@ -145,8 +145,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.only in sabotage.what:
             rows.append(tried(sabotage, options.seeds))
             print(line(rows[-1]), flush=True)
-    if options.keep:
-        keep(rows)
+            if options.keep:
+                keep(rows)
     return int(any(row["seed"] is None for row in rows))
 
 
