@@ -12,8 +12,9 @@ import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from benchmarks import explore_table, relations, team_table
+from benchmarks import explore_table, relations, reliability, sabotage, team_table
 from benchmarks.campaign import Row
+from benchmarks.faults import draw
 
 ROOT = Path(__file__).parents[1]
 QUOTE = re.compile(
@@ -83,6 +84,32 @@ def teams(rows: list[Row]) -> str:
     return _block([*lines, *"\n".join(team_table.summary(rows)).splitlines()])
 
 
+def totals(rows: list[Row]) -> str:
+    """How much a campaign was."""
+    return "\n".join(reliability.totals(rows))
+
+
+def faults(rows: list[Row]) -> str:
+    """The faults of a campaign by class."""
+    return "\n".join(reliability.by_layer(rows))
+
+
+def oracles(rows: list[Row]) -> str:
+    """What must not happen in a campaign, and where it did."""
+    return "\n".join(reliability.by_oracle(rows))
+
+
+def trial(rows: list[Row], seed: str) -> str:
+    """What befell one robot of a campaign, and what became of it."""
+    row = next(row for row in rows if row["seed"] == int(seed))
+    return _block([*map(str, draw(int(seed))), *reliability.story(row)])
+
+
+def sabotages(rows: list[Row]) -> str:
+    """Which oracles noticed what was broken on purpose."""
+    return "\n".join(sabotage.table(rows))
+
+
 def _block(lines: list[str]) -> str:
     return "\n".join(["```", *lines, "```"])
 
@@ -93,6 +120,11 @@ VIEWS: dict[str, Callable[..., str]] = {
     "last_words": last_words,
     "mappers": mappers,
     "teams": teams,
+    "totals": totals,
+    "faults": faults,
+    "oracles": oracles,
+    "trial": trial,
+    "sabotages": sabotages,
 }
 
 
