@@ -21,7 +21,7 @@ from gvgbot.geometry import Array, Pose, rotated_covariance
 
 _AROUND = 4  # scans before and after one, whose walls belong to its place
 _LEAST_LOOP_M = 10.0  # driven in between, or it is the same visit
-_EVERY_M = 1.0  # driven between two tries
+_EVERY_M = 1.5  # driven between two tries
 _NEAR_M, _FARTHEST_M = 2.0, 7.0  # between two visits of a place, without and with uncertainty
 _POINTS = 250  # of a place that are laid onto another
 _CELL_M = 0.1  # of the grid that thins the walls of a place
@@ -35,7 +35,7 @@ _LEAST_IN_VIEW = 0.6  # share of the points
 _LEAST_AGREEMENT = 0.75  # share of the points in view that lie on walls
 _FLOOR = np.diag([0.02**2, 0.02**2, 0.004**2])  # what matching cannot know of itself
 _NO_NEWS_M = 0.05  # a match that moves the robot less need not be accounted for at once
-_ROUGHLY_M = 1e-3  # so well must be known where places are in which matches are looked for
+_ROUGHLY_M = 5e-3  # so well must be known where places are in which matches are looked for
 _ROW = 1 << 32  # more cells than any building has side by side
 
 

@@ -21,7 +21,7 @@ _FEWEST = 3  # of them make a line
 _FLATNESS = 0.08  # smallest over largest spread of the neighbours of a point on a wall
 _REACH_M = 0.35  # as far away as neighbours on one wall may be
 _ITERATIONS = 6
-_CONVERGED = 1e-4  # metres and radians
+_CONVERGED, _ROUGHLY = 1e-4, 2e-2  # metres and radians
 _SAME_PAIRS_M, _SAME_PAIRS_RAD = 0.02, 0.005  # moved less, points are near to the same walls
 
 
@@ -85,11 +85,13 @@ def register(
     config: ScanMatchingConfig,
     hits: Array | None = None,
     sides: Sides | None = None,
+    within: float = _CONVERGED,
 ) -> Registration | None:
     """The pose that lays points (N, 2) of its frame onto wall points (M, 2), near a prior.
 
     `hits` (M,) is how much each wall point counts beside its neighbours, by default all the same;
-    without `sides` a point may lie on either face of a wall.
+    without `sides` a point may lie on either face of a wall. It is found when a step is less than
+    `within`, m and rad.
     Q (3, 3) is the prior's covariance in its own frame. None when too few points find a wall.
     """
     information = np.linalg.inv(Q)
@@ -121,7 +123,7 @@ def register(
         pose = prior.compose(Pose.from_array(step))
         inliers = len(residual) / len(points)
         rms = math.sqrt(float(residual @ residual) / len(residual))
-        if max(map(abs, change.tolist())) < _CONVERGED:
+        if max(map(abs, change.tolist())) < within:
             break
     return Registration(pose, np.linalg.inv(A), inliers, rms)
 
@@ -142,9 +144,8 @@ def register_coarsely(
     A match is where the next one starts, with the same Q around it.
     """
     for reach in reaches:
-        near = register(
-            points, tree, walls, prior, Q, replace(config, max_pair_m=reach), hits, sides
-        )
+        far = replace(config, max_pair_m=reach)
+        near = register(points, tree, walls, prior, Q, far, hits, sides, _ROUGHLY)
         prior = prior if near is None else near.pose
     return register(points, tree, walls, prior, Q, config, hits, sides)
 
