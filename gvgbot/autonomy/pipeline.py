@@ -234,7 +234,10 @@ class Pipeline:
         ):
             return happened
         scan = deskewed(scan, self._odometry.motion_during(scan))
-        self._drawn = self._draw(scan, odom_base)
+        drawn = self._draw(scan, odom_base)
+        if self.led:  # nobody waits for it, and no scan may be lost at the end of a log
+            return happened + self._learn(drawn)
+        self._drawn = drawn
         return happened
 
     @property
