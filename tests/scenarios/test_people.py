@@ -6,6 +6,8 @@ import pytest
 
 from gvgbot.autonomy.events import VertexAdded
 from gvgbot.autonomy.mission import ExplorationConfig
+from gvgbot.config import TwinConfig
+from gvgbot.drivers.hokuyo.twin_config import HokuyoTwinConfig
 from gvgbot.geometry import Pose
 from tests.scenarios.rig import (
     FAR_AWAY,
@@ -135,6 +137,25 @@ def test_a_person_half_hidden_at_first_is_no_pillar() -> None:
         run.put_person(*FAR_AWAY)
 
     run = play(world, START, story=story, with_person=True)
+    assert run.outcome == "explored", run.pipeline.mission.reason
+    assert run.contacts == 0
+    added = [event.kind for event in run.events if isinstance(event, VertexAdded)]
+    assert added == ["endpoint", "endpoint"]
+
+
+@pytest.mark.parametrize("seed", [0, 2])
+def test_a_person_half_hidden_from_a_noisy_laser_is_no_pillar(seed: int) -> None:
+    """With three times the usual noise, and four times the failures, no single scan tells."""
+    world = carved([(-4.0, -1.1, 6.0, 1.1), (3.8, -1.1, 6.0, 5.0)])
+    noisy = HokuyoTwinConfig(model="URG-04LX", range_sigma_m=0.03, dropout_fraction=0.02)
+
+    async def story(run: Play) -> None:
+        run.put_person(4.9, 1.3)
+        await run.until(lambda: run.here.x > 2.0)
+        run.put_person(*FAR_AWAY)
+
+    twin = TwinConfig(seed=seed, laser=noisy)
+    run = play(world, START, story=story, with_person=True, twin=twin)
     assert run.outcome == "explored", run.pipeline.mission.reason
     assert run.contacts == 0
     added = [event.kind for event in run.events if isinstance(event, VertexAdded)]

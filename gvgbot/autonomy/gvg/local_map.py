@@ -180,6 +180,10 @@ class LocalMap:
         i, j = self._disc(centre, radius)
         self._votes[i, j] = np.minimum(self._votes[i, j], 1)
 
+    def clear(self, centre: Array, radius: float) -> None:
+        """Forget, at the next scan, what stands in a disc, local frame."""
+        self._votes[self._disc(centre, radius)] = 0
+
     def _disc(self, centre: Array, radius: float) -> tuple[Index, Index]:
         """Rows and columns of the cells whose middles lie in a disc, local frame."""
         reach = math.ceil(radius / self._cell)

@@ -24,8 +24,9 @@ Point = tuple[float, float]
 class Watch:
     """Somebody who looks from one place, and what of each sweep is kept out of the map."""
 
-    def __init__(self, known: World | None = None) -> None:
+    def __init__(self, known: World | None = None, *, noise: float = 0.0) -> None:
         self.map, self.newcomers = LocalMap(LocalMapConfig()), Newcomers(CONFIG)
+        self._noise, self._rng = noise, np.random.default_rng(1)
         if known is not None:
             for _ in range(3):
                 self.map.insert(sweep(known, HERE), HERE, 0.0)
@@ -42,13 +43,15 @@ class Watch:
         scan = replace(sweep(world, HERE), stamp=stamp)
         if person is not None:
             scan = replace(scan, ranges=np.minimum(scan.ranges, to_disc(scan.bearings, person)))
+        errors = self._noise * self._rng.standard_normal(len(scan.ranges))
+        scan = replace(scan, ranges=scan.ranges + errors)
         sifted = self.newcomers.sift(scan, HERE, self.map, lambda xy: math.dist(xy, way) < 0.5)
         self.map.insert(sifted, HERE, 0.0)
         return int(np.isnan(sifted.ranges).sum() - np.isnan(scan.ranges).sum())
 
-    def glimpse(self, ranges: Array, offsets: Array) -> None:
-        """Two looks of three beams each, those with the least offset (N,), at what is new here."""
-        for second in range(2):
+    def glimpse(self, ranges: Array, offsets: Array, looks: int = 2) -> None:
+        """Looks of three beams each, those with the least offset (N,), at what is new here."""
+        for second in range(looks):
             few = np.where(
                 np.isin(np.arange(len(ranges)), np.argsort(abs(offsets))[:3]), ranges, np.inf
             )
@@ -213,6 +216,47 @@ def test_who_was_half_hidden_for_long_and_steps_forward_is_kept_out_again() -> N
         watch.dropped(world, second, person=spot)
     assert watch.dropped(world, 8.0, person=(2.5, -0.35)) > 0
     assert len(watch.newcomers.points) > 0
+
+
+def test_who_looked_like_a_wall_for_long_is_taken_out_when_more_is_seen() -> None:
+    """A narrow part of somebody, again and again, as through the gap of a door."""
+    for noise in (0.01, 0.03):
+        watch = Watch(EMPTY, noise=noise)
+        bearings = sweep(EMPTY, HERE).bearings
+        watch.glimpse(to_disc(bearings, (2.0, 0.0)), bearings, looks=10)
+        kept_out = [watch.dropped(EMPTY, 10.0 + k / 2, person=(2.0, 0.0)) > 0 for k in range(12)]
+        assert all(kept_out[6:])
+        assert np.hypot(*(watch.map.points() - [2.0, 0.0]).T).min() > 1.0
+        assert np.hypot(*(watch.newcomers.discs[0][0] - [2.0, 0.0])) < 0.1
+        watch.dropped(EMPTY, 20.0)
+        assert len(watch.newcomers.points) == 0
+
+
+def test_who_stands_beside_a_wall_is_kept_out_by_roundness() -> None:
+    """With 0.13 m of air behind the shoulder, seen along a wall and in front of one."""
+    for spot in ((2.0, 3.0 - RADIUS - 0.13), (4.0 - RADIUS - 0.13, 0.0)):
+        watch = Watch()
+        for second in range(math.ceil(CONFIG.found_after_s)):
+            assert watch.dropped(EMPTY, second, person=spot) > 0
+        assert np.abs(np.hypot(*(watch.newcomers.points - spot).T) - RADIUS).max() < 0.03
+
+
+def test_who_stands_where_the_laser_hardly_reaches_is_kept_out() -> None:
+    local_map, newcomers = LocalMap(LocalMapConfig()), Newcomers(CONFIG)
+    hall = carved([(-9.0, -9.0, 9.0, 9.0)])
+    scan = sweep(hall, HERE, reach=5.6)
+    scan = replace(scan, ranges=np.minimum(scan.ranges, to_disc(scan.bearings, (5.6, 0.0))))
+    assert 5.6 - scan.ranges.min() < 0.3
+    assert np.isnan(newcomers.sift(scan, HERE, local_map).ranges).any()
+
+
+def test_in_noise_a_corner_is_a_wall_as_soon_as_without() -> None:
+    """A cupboard, half behind a corner: in the end it stays in the map."""
+    world = carved([ROOM], [(1.0, 0.0, 1.1, 3.0), (2.3, -0.3, 2.7, 0.1)])
+    watch = Watch(noise=0.03)
+    looks = [watch.dropped(world, second / 2) > 0 for second in range(20)]
+    assert not any(looks[10:])
+    assert watch.inside() > 0
 
 
 def test_who_is_cut_off_where_the_sweep_ends_is_led_round_too() -> None:

@@ -1,0 +1,129 @@
+"""What may be people, by one scan: beams that end nearer than those beside them."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvgbot.autonomy.roundness import SURE, range_noise, round_evidence
+from gvgbot.geometry import Array, Pose
+from gvgbot.hal.messages import Scan
+
+_STEP_M = 0.3  # in range from beam to beam, at the rim of something that stands free
+_SMOOTH_M = 0.15  # in range from beam to beam, on it: two legs of a chair are farther apart
+_GAP_M = 0.1  # in range from beam to beam, from a person to what is close behind or before
+_NOISE = 4.0  # sigma: what differs by more is no noise
+_BEAMS = 3  # fewer see nothing for sure
+_ARC_BEAMS = 8  # fewer lie on a circle by chance
+_SLIM_M, _WIDE_M = 0.1, 0.8  # people are between these; what is slimmer is furniture
+_FLAT = 0.06  # of its width: what bulges less towards the laser is a piece of wall, or of glass
+
+Piece = tuple[int, int]  # the first beam, and the one after the last
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Island:
+    """Beams that end on something narrow with more room on one side or both; local frame."""
+
+    ends: Array  # (N, 2)
+    centre: Array
+    radius: float
+    is_whole: bool  # there is more room on both sides
+    evidence: float  # that it is round: log-likelihood ratio
+
+    @property
+    def is_round(self) -> bool:
+        """Whether this look alone shows somebody."""
+        return self.evidence > SURE
+
+
+def islands(scan: Scan, local_base: Pose) -> list[Island]:
+    """What people may be.
+
+    A beam without an echo has the room of the whole range; one that failed tells nothing. Where a
+    wall is so close to somebody that this is no room, only roundness tells them apart.
+    """
+    told = np.flatnonzero(~np.isnan(scan.ranges))
+    if not len(told):  # it is blind
+        return []
+    look = _Look(scan, local_base.compose(scan.base_laser), told)
+    found = []
+    for piece in _pieces((0, len(told)), look.steps >= _STEP_M):
+        island = look.island(piece)
+        if island is not None:
+            found.append(island)
+            continue
+        parts = (part for part in _pieces(piece, look.is_gap) if part[1] - part[0] >= _ARC_BEAMS)
+        found += [one for one in map(look.island, parts) if one is not None and one.is_round]
+    return found
+
+
+class _Look:
+    """A scan without the beams that failed."""
+
+    def __init__(self, scan: Scan, local_laser: Pose, told: NDArray[np.intp]) -> None:
+        self._scan, self._laser, self._told = scan, local_laser, told
+        self._noise = range_noise(scan.ranges)
+        self._smooth = math.hypot(_SMOOTH_M, _NOISE * self._noise)
+        self._depth = np.minimum(scan.ranges[told], scan.range_max)
+        # who is cut off at the first or the last beam is half hidden
+        self._beside = np.concatenate([[-np.inf], self._depth, [-np.inf]])
+        self.steps = np.abs(np.diff(self._depth))
+        is_echo = self._depth < scan.range_max
+        least = max(_GAP_M, _NOISE * math.sqrt(2.0) * self._noise)
+        self.is_gap = (self.steps >= least) | (is_echo[1:] != is_echo[:-1])
+
+    def island(self, piece: Piece) -> Island | None:
+        """What may be somebody; None if it is too wide, too slim, behind something or in parts."""
+        start, stop = piece
+        if stop - start < _BEAMS:
+            return None
+        depth, beside = self._depth[start:stop], self._beside
+        rims = depth[0] < beside[start], depth[-1] < beside[stop + 1]
+        is_one = self.steps[start : stop - 1].max(initial=0.0) < self._smooth
+        if not any(rims) or not is_one:
+            return None
+        ends = beam_ends(self._scan, self._told[start:stop], depth, self._laser)
+        width = float(np.hypot(*(ends[-1] - ends[0])))
+        return self._shaped(ends, width, all(rims)) if _SLIM_M <= width < _WIDE_M else None
+
+    def _shaped(self, ends: Array, width: float, is_whole: bool) -> Island | None:
+        eye, evidence = self._laser.position, 0.0
+        if len(ends) >= _ARC_BEAMS:
+            evidence, centre, radius = round_evidence(ends, eye, self._noise)
+            if evidence > SURE:
+                return Island(ends, centre, radius, is_whole, evidence)
+        if is_whole and evidence <= 0.0 and _is_flat(ends, width):
+            return None
+        away = ends.mean(axis=0) - eye
+        centre = ends.mean(axis=0) + 0.3 * width * away / np.hypot(*away)
+        return Island(ends, centre, width / 2, is_whole, evidence)
+
+
+def _pieces(piece: Piece, is_end: NDArray[np.bool_]) -> Iterator[Piece]:
+    """The parts of a piece, each up to a beam that is the end of one."""
+    start, stop = piece
+    ends = np.flatnonzero(is_end[start : stop - 1]) + start + 1
+    return pairwise([start, *ends.tolist(), stop])
+
+
+def _is_flat(ends: Array, width: float) -> bool:
+    """Whether ends (N, 2) seen from side to side, m, are on a line, as on no leg and no body.
+
+    Glass shows a flat patch where it is seen head-on, which wanders along it with the robot.
+    """
+    along = (ends[-1] - ends[0]) / width
+    bulge = np.abs((ends - ends[0]) @ np.array([-along[1], along[0]]))
+    third = len(ends) // 3
+    rims = (bulge[:third].mean() + bulge[-third:].mean()) / 2
+    return bool(bulge[third:-third].mean() - rims < _FLAT * width)
+
+
+def beam_ends(scan: Scan, beams: NDArray[np.intp], depth: Array, local_laser: Pose) -> Array:
+    """Where beams of these depths, m, end (N, 2), local frame."""
+    bearings = scan.angle_min + scan.angle_increment * beams
+    directions = np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
+    return local_laser.transform(depth[:, None] * directions)

@@ -1,0 +1,99 @@
+"""How much a stretch of a scan speaks for a leg or a body, and how much for walls and corners.
+
+Two explanations compete for where the beams end: a circle as wide as people, and two straight
+lines. What each leaves unexplained, by the noise of the laser, makes a log-likelihood, and those of
+several looks add up: they tell together what no single one does.
+"""
+
+import math
+
+import numpy as np
+
+from gvgbot.geometry import Array
+
+SURE = 3.0  # of the log-likelihood: twenty to one
+_RADII_M = (0.05, 0.4)  # of a leg, and of somebody in a coat
+_SURFACE_M = 0.005  # r.m.s., by which even without noise nothing is a circle or a line
+_ROUND = 0.06  # of its radius: a body strays from a circle by no more than this and the noise
+_SPARE = 1.5  # of the log-likelihood: what two lines gain by mere noise, having more freedom
+_MOST = 8.0  # that one look can tell: whatever hides a part of somebody is not known either
+_FADING = 0.8  # of the evidence is left at the next look: looks from one place err alike
+_STEPS = 5
+_NEGLIGIBLE_M = 1e-4
+_MEDIAN = 0.6745  # sigma: half of the errors are smaller
+
+
+def range_noise(ranges: Array) -> float:
+    """The noise, 1 sigma in m, by how ranges (N,) stray from the mean of their neighbours."""
+    told = np.where(np.isfinite(ranges), ranges, np.nan)
+    stray = np.abs(told[:-2] - 2.0 * told[1:-1] + told[2:])
+    stray = stray[~np.isnan(stray)]
+    return float(np.median(stray)) / (_MEDIAN * math.sqrt(6.0)) if len(stray) else 0.0
+
+
+def round_evidence(ends: Array, eye: Array, noise: float) -> tuple[float, Array, float]:
+    """Log-likelihood ratio of a circle to two lines; the circle's centre (2,) and radius, m.
+
+    `ends` (N, 2), in the order of their beams, were seen from `eye` (2,) with this noise, m.
+    """
+    centre, radius = _circle(ends, eye)
+    stray = np.hypot(*(ends - centre).T) - radius
+    gain = _off_two_lines(ends) - float(stray @ stray)
+    variance = noise**2 + _SURFACE_M**2
+    evidence = gain / (2.0 * variance) + _SPARE * noise**2 / variance
+    if np.std(stray) > math.hypot(_ROUND * radius, noise):  # it is neither
+        evidence = min(evidence, 0.0)
+    return max(-_MOST, min(evidence, _MOST)), centre, radius
+
+
+def with_look(evidence: float, look: float) -> float:
+    """The evidence of some looks, and now of one more."""
+    return _FADING * evidence + look
+
+
+def _circle(ends: Array, eye: Array) -> tuple[Array, float]:
+    """Centre (2,) and radius, m, of the nearest circle to ends (N, 2) that bulges to the eye.
+
+    Gauss-Newton, from the algebraic fit of Kåsa: |p|² = 2 c·p + r² - |c|².
+    """
+    middle = ends.mean(axis=0)
+    about = ends - middle
+    equations = np.column_stack([2.0 * about, np.ones(len(ends))])
+    (x, y, rest), *_ = np.linalg.lstsq(equations, (about**2).sum(axis=1))
+    centre, radius = np.array([x, y]), _possible(math.sqrt(rest + x**2 + y**2))
+    away = (middle - eye) / np.hypot(*(middle - eye))
+    if centre @ away <= 0.0 or np.hypot(x, y) > radius:
+        centre = radius * away
+    for _ in range(_STEPS):
+        to_centre = about - centre
+        distance = np.hypot(*to_centre.T)
+        slopes = np.column_stack([to_centre / distance[:, None], np.ones(len(ends))])
+        step, *_ = np.linalg.lstsq(slopes, distance - radius)
+        if _possible(radius + step[2]) != radius + step[2]:
+            wider = _possible(radius + step[2]) - radius
+            moved, *_ = np.linalg.lstsq(slopes[:, :2], distance - radius - wider)
+            step = np.array([*moved, wider])
+        step /= max(1.0, float(np.hypot(*step[:2])) / radius)
+        centre, radius = centre + step[:2], radius + float(step[2])
+        if np.abs(step).max() < _NEGLIGIBLE_M:
+            break
+    return middle + centre, radius
+
+
+def _possible(radius: float) -> float:
+    return min(max(radius, _RADII_M[0]), _RADII_M[1])
+
+
+def _off_two_lines(ends: Array) -> float:
+    """Sum of the squared distances, m², of ends (N, 2) to two lines, the first ones to one."""
+    x, y = (ends - ends.mean(axis=0)).T
+    moments = np.stack([np.ones(len(x)), x, y, x * x, y * y, x * y], axis=1).cumsum(axis=0)
+    return float((_off_line(moments[:-1]) + _off_line(moments[-1] - moments[:-1])).min())
+
+
+def _off_line(moments: Array) -> Array:
+    """Squared distances (M,), m², of points to their nearest line, by their moments (M, 6)."""
+    n, x, y, xx, yy, xy = moments.T
+    xx, yy, xy = xx - x * x / n, yy - y * y / n, xy - x * y / n
+    off: Array = np.maximum((xx + yy) / 2 - np.hypot((xx - yy) / 2, xy), 0.0)
+    return off
