@@ -180,12 +180,14 @@ def _cell(pose: Pose, cell: float) -> tuple[int, int]:
 def _vote(ballot: _Ballot, disc: _Disc, map_laser: Pose, scan: Scan, *, age: float) -> None:
     """Add what one scan saw, `age` seconds after the first, to the votes around its laser."""
     here = np.array(_cell(map_laser, disc.cell))
-    half = _half_width(disc, scan)
-    row, column = here - ballot.corner - half
-    around = np.s_[row : row + 2 * half + 1, column : column + 2 * half + 1]
+    hits = _hits(disc, map_laser, scan) - here
+    free_ranges = _free_ranges(disc, map_laser, scan)
+    low, high = _extent(disc, hits, free_ranges)
+    first = here - ballot.corner
+    around = _box(first + low, first + high)
     window, seen_s = ballot.votes[around], ballot.seen_s[around]
-    hits = _hits(disc, map_laser, scan) - here + half
-    free = _seen_through(disc, half, _free_ranges(disc, map_laser, scan))
+    hits -= low
+    free = _seen_through(disc, _box(disc.half + low, disc.half + high), free_ranges)
     free[hits[:, 0], hits[:, 1]] = False
     window += free.view(np.int8) * np.int8(_MISS)
     window[hits[:, 0], hits[:, 1]] += np.int8(_HIT)
@@ -194,11 +196,12 @@ def _vote(ballot: _Ballot, disc: _Disc, map_laser: Pose, scan: Scan, *, age: flo
     seen_s[free & np.isinf(seen_s)] = age
 
 
-def _half_width(disc: _Disc, scan: Scan) -> int:
-    """Cells from the laser's cell to the border of a window that holds all that the scan saw."""
-    seen = np.minimum(scan.ranges, scan.range_max)
-    farthest = float(np.fmax.reduce(seen, initial=0.0))
-    return min(disc.half, math.ceil(farthest / disc.cell) + 2)
+def _extent(disc: _Disc, hits: Indices, free_ranges: Array) -> tuple[Indices, Indices]:
+    """From which (row, column) up to which a scan tells of cells, from the laser's cell."""
+    ends = np.floor((free_ranges[:, None] * _TOWARDS)[:, ::-1] / disc.cell).astype(np.int64)
+    told = np.concatenate([[[0, 0]], ends, hits])
+    low, high = told.min(axis=0) - 1, told.max(axis=0) + 2
+    return np.maximum(low, -disc.half), np.minimum(high, disc.half + 1)
 
 
 def _hits(disc: _Disc, map_laser: Pose, scan: Scan) -> Indices:
@@ -209,11 +212,12 @@ def _hits(disc: _Disc, map_laser: Pose, scan: Scan) -> Indices:
     return np.floor(map_laser.transform(ends)[:, ::-1] / disc.cell).astype(np.int64)
 
 
-def _seen_through(disc: _Disc, half: int, free_ranges: Array) -> NDArray[np.bool_]:
-    """Which cells of a window (2 half + 1 square) are nearer than it is free in their direction."""
-    inner = slice(disc.half - half, disc.half + half + 1)
-    limits = free_ranges.astype(np.float32)[disc.direction[inner, inner]]
-    return disc.distance[inner, inner] < limits
+def _seen_through(
+    disc: _Disc, window: tuple[slice, slice], free_ranges: Array
+) -> NDArray[np.bool_]:
+    """Which cells of a window of the disc are nearer than it is free in their direction."""
+    limits = free_ranges.astype(np.float32)[disc.direction[window]]
+    return disc.distance[window] < limits
 
 
 def _free_ranges(disc: _Disc, map_laser: Pose, scan: Scan) -> Array:
