@@ -409,7 +409,7 @@ class Pipeline:
         if before is not None:
             self._turned += wrap_angle(odometry.odom_base.theta - before.odom_base.theta)
         self._odometry.append(odometry)
-        if self._last is None:
+        if self._last is None or self.led:
             return STANDSTILL
         local_base = self._last.local_base.compose(self._last.odom_base.to(odometry.odom_base))
         moment = Moment(odometry.stamp, local_base, self._wish(local_base), felt)
