@@ -142,9 +142,10 @@ def test_a_paused_robot_is_not_driven_and_exploring_takes_it_back(daemon: Driven
 
         await clock.sleep_until(clock.now() + 1.0)
         daemon.ros.drive(Twist(0.0, -0.4))  # before it knows its surroundings: not taken
+        await clock.sleep_until(clock.now() + 0.4)
         phases["too early"] = daemon.network.states[-1].phase
-        await looked_around(daemon, clock)
         speeds["before"] = daemon.newest.twist.angular
+        await looked_around(daemon, clock)
         await drive_for(1.0)
         phases["driven"] = daemon.network.states[-1].phase
         assert (await daemon.network.ask("pause")).done
