@@ -61,7 +61,7 @@ ALL_KNOWN = known_as(ENDS, {1: 1, 2: 2, 3: 3})
 @pytest.mark.parametrize(("onwards", "length"), [(2.0, 8.0), (-2.0, 4.0)])
 def test_a_vertex_that_is_none_is_left_out_of_the_way(onwards: float, length: float) -> None:
     """Six metres from the end to what is none, and two metres on from there, or back."""
-    where = Whereabouts(HalfEdgeId(2, EAST), resampled([(6.0, 0.0), (6.0 + onwards, 0.0)]))
+    where = Whereabouts(HalfEdgeId(2, EAST), list(resampled([(6.0, 0.0), (6.0 + onwards, 0.0)])))
     where.rejoin(HalfEdgeId(1, EAST), np.array(resampled([(0.0, 0.0), (6.0, 0.0)])))
     assert where.on_edge == HalfEdgeId(1, EAST)
     assert where.trail_length == pytest.approx(length, abs=0.4)
