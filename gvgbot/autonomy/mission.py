@@ -15,7 +15,7 @@ from gvgbot.autonomy.control.company import (
 )
 from gvgbot.autonomy.control.edge_follower import Track
 from gvgbot.autonomy.events import Decision, Event, Finished, Recovery
-from gvgbot.autonomy.exploration.access import NEAR_M, way_to_edge
+from gvgbot.autonomy.exploration.access import NEAR_M, way_into_the_open, way_to_edge
 from gvgbot.autonomy.exploration.certainty import CertaintyConfig, vertex_sigma
 from gvgbot.autonomy.exploration.ears import ear_next, nearest_frontier
 from gvgbot.autonomy.exploration.obstructions import Obstructions
@@ -37,6 +37,7 @@ _LEAST_LOOP_M = 4.0  # an edge with both ends in sight is left to sight unless s
 _WORTH_TURNING_M = 1.0  # a new frontier must be so much nearer than the old one
 _FACING_RAD = 1.0  # looking so far past a thing, one would not see it go
 _FACING_POINTS = 6  # of a polyline tell where its end points to
+_MOST_SOUGHT = 5  # places to look for an edge from
 _LONGEST_VIEW_S = 2.0  # a longer gap between views is an outage, not a lack of progress
 
 Outcome = Literal["explored", "explored_with_blocked", "failed", "stopped"]
@@ -127,6 +128,8 @@ class Mission:
         self._in_front: Companion | None = None  # that is near
         self._held_since: float | None = None
         self._lost_since: float | None = None
+        self._sought: list[Array] = []  # places to see an edge from, local frame
+        self._seeking: Track | None = None  # to the last of them
         self._stranded_since: float | None = None
         self._turned_back = False  # looking for a way, after the end of sight
         self._examining_since: float | None = None
@@ -269,7 +272,10 @@ class Mission:
 
     def _close_ring(self, view: View, clearance: float) -> None:
         """Give an edge without an end a vertex, when the robot has come round to its start."""
-        if not self._mapper.graph.vertices and self._is_round(clearance):
+        if self._mapper.graph.vertices or not self.where.trail:
+            return
+        map_local = self._mapper.belief.map_base.compose(view.local_base.inverse())
+        if self._is_round(map_local.transform(self.where.trail[0]), clearance):
             self._mapper.close_ring(view, np.array(self.where.trail), self.where.narrowest)
 
     def _close_start_edge(self, view: View, clearance: float) -> None:
@@ -280,17 +286,18 @@ class Mission:
         ends = (graph.half_edge(on_edge), graph.half_edge(start.end))
         if any(half is None or not half.open for half in ends):
             return
-        if not self._is_round(clearance):
+        map_vertex = self._mapper.belief.map_vertex(start.end.vertex)
+        if not self._is_round(map_vertex.transform(start.line[0]), clearance):
             return
         rest = self._mapper.in_local_frame(view, start.end.vertex).transform(start.line)
         line = np.concatenate([np.array(self.where.trail), rest])
         narrowest = min(self.where.narrowest, start.narrowest)
         self._mapper.join(view, on_edge, start.end, line, narrowest, driven=True)
 
-    def _is_round(self, clearance: float) -> bool:
-        """Whether the robot has come back to where it started."""
+    def _is_round(self, start: Array, clearance: float) -> bool:
+        """Whether the robot has come back to where it came onto its first edge (2,), map frame."""
         driven = self.where.trail_length > _LEAST_LOOP_M
-        return driven and is_at_start(self._mapper.belief, clearance)
+        return driven and is_at_start(self._mapper.belief, start, clearance)
 
     # -- where next ------------------------------------------------------------------------------
 
@@ -572,16 +579,35 @@ class Mission:
         return Stand() if self.outcome is not None else Drive(Track.of(*way))
 
     def _search(self, view: View) -> Order:
-        """No edge in sight: look around, and give up after a while."""
+        """No edge in sight: look around, here and where there is more room, and then give up."""
+        reason = "no edge in sight"
         if self._lost_since is None:
-            self._lost_since = view.stamp
-            self._events.append(Recovery(view.stamp, "look around", "no edge in sight"))
-        elif view.stamp - self._lost_since > self._config.nothing_in_sight_s:
-            self._end(
-                view, "failed", "no edge in sight: there are no walls within range, or no way out"
-            )
+            self._lost_since, self._sought, self._seeking = view.stamp, [], None
+            self._events.append(Recovery(view.stamp, "look around", reason))
+            return LookAround(math.tau)
+        if self._seeking is not None:
+            if self._is_under_way(view, self._seeking):
+                return Drive(self._seeking)
+            self._seeking = None
+            return LookAround(math.tau)
+        seeks = len(self._sought) < _MOST_SOUGHT
+        way = way_into_the_open(view, self._sought) if seeks else None
+        if way is not None:
+            self._sought.append(way[0][-1])
+            self._seeking, self._last_progress = Track.of(*way), view.stamp
+            self._events.append(Recovery(view.stamp, "go where there is more room", reason))
+            return Drive(self._seeking)
+        if view.stamp - self._lost_since > self._config.nothing_in_sight_s:
+            self._end(view, "failed", f"{reason}: there are no walls within range, or no way out")
             return Stand()
         return LookAround(math.tau)
+
+    def _is_under_way(self, view: View, track: Track) -> bool:
+        """Whether the robot has not come to the end of a track yet, and nothing keeps it."""
+        self._watch_progress(view)
+        waited = view.stamp - self._last_progress
+        away = math.dist(view.local_base.position, track.polyline[-1])
+        return away > _ARRIVED_M and waited < self._config.in_the_way_s
 
     def _examine(self, view: View, here: Situation) -> Order:
         """Go where something in sight may prove to be a vertex, before all is called explored."""

@@ -26,11 +26,11 @@ class StartEdge:
     narrowest: float
 
 
-def is_at_start(belief: Belief, clearance: float) -> bool:
-    """Whether the robot is where it started: the map's origin, inside its own maximal disc.
+def is_at_start(belief: Belief, start: Array, clearance: float) -> bool:
+    """Whether the robot is where it came onto its first edge (2,), map frame, in its maximal disc.
 
-    The covariance of the robot is that of its pose against the start.
+    That is near the map's origin, against which the covariance of its pose is.
     """
-    away = belief.x[:2]
+    away = belief.x[:2] - start
     near = float(np.hypot(*away)) < min(_FAR_M, clearance)
     return near and mahalanobis(away, belief.P[:2, :2] + np.eye(2) * _AT_M**2) < _GATE

@@ -23,13 +23,22 @@ from tests.unit.autonomy.sights import Rectangle, carved
 pytestmark = [pytest.mark.slow, pytest.mark.twin, pytest.mark.timeout(120)]
 
 
-def test_a_hall_without_a_wall_in_sight_ends_the_run_with_a_reason() -> None:
-    """A laser that sees 5.6 m, in the middle of 13 m by 13 m."""
-    twin = TwinConfig(laser=HokuyoTwinConfig(model="URG-04LX"))
-    run = play(carved([(-6.5, -6.5, 6.5, 6.5)]), Pose(), twin=twin, limit=120.0)
+SHORT_SIGHTED = TwinConfig(laser=HokuyoTwinConfig(model="URG-04LX"))  # sees 5.6 m
+
+
+def test_a_field_without_a_wall_in_sight_ends_the_run_with_a_reason() -> None:
+    run = play(carved([(-30.0, -30.0, 30.0, 30.0)]), Pose(), twin=SHORT_SIGHTED, limit=150.0)
     assert run.outcome == "failed"
     assert "no walls within range" in run.pipeline.mission.reason
     assert run.contacts == 0
+
+
+def test_a_hall_whose_walls_are_out_of_sight_at_first_is_left_by_its_corridor() -> None:
+    rooms = [(-6.5, -6.5, 6.5, 6.5), (6.5, -0.8, 14.0, 0.8)]
+    run = play(carved(rooms), Pose(), twin=SHORT_SIGHTED, limit=400.0)
+    assert_explored(run)
+    assert "go where there is more room" in run.recoveries()
+    assert_found(run, "endpoint", [(13.2, 0.0)])
 
 
 @pytest.mark.parametrize("offset", [0.0, 0.15], ids=["straight", "perturbed"])
@@ -66,6 +75,19 @@ def test_a_pillar_in_a_dead_end_makes_an_edge_from_a_vertex_to_itself() -> None:
     loops = [edge for edge in graph.edges.values() if edge.a.vertex == edge.b.vertex]
     assert len(loops) == 1
     assert graph_shape(run) == (1, 1, 2)
+
+
+def test_a_ring_is_closed_where_the_robot_came_onto_it() -> None:
+    """A metre and a half from where it was put down, beside the wall."""
+    run = play(
+        carved([(-5.0, -5.0, 5.0, 5.0)], [(-1.2, -1.2, 1.2, 1.2)]),
+        Pose(-4.5, 0.0, math.pi / 2),
+        limit=150.0,
+    )
+    assert_explored(run)
+    assert graph_shape(run) == (1, 0, 1)
+    (vertex,) = run.vertices("meetpoint")
+    assert np.hypot(*run.pipeline.mapper.belief.map_vertex(vertex).position) > 1.0
 
 
 def test_a_ring_without_a_vertex_is_driven_round_once() -> None:

@@ -24,4 +24,6 @@ def belief(x: float, y: float, sigma: float) -> Belief:
 def test_the_start_is_near_within_the_disc_and_within_the_uncertainty(
     *, x: float, y: float, sigma: float, clearance: float, there: bool
 ) -> None:
-    assert is_at_start(belief(x, y, sigma), clearance) == there
+    start = np.array([2.0, -1.0])
+    here = belief(2.0 + x, -1.0 + y, sigma)
+    assert is_at_start(here, start, clearance) == there
