@@ -1,7 +1,7 @@
 """Every stage from HAL messages to a twist, in the order of the flow. No I/O, clock or chance."""
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Annotated
 
@@ -103,22 +103,6 @@ class Keyframe:
     scan: Scan | None
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Drawn:
-    """A scan that is in the local maps, and nothing has been learnt from yet.
-
-    `step` is the way from the keyframe before, None for the first, `travelled` m driven in all;
-    `is_turning` if the robot is about to see more.
-    """
-
-    scan: Scan
-    odom_base: Pose
-    local_base: Pose
-    step: Step | None
-    travelled: float
-    is_turning: bool = False
-
-
 class Pipeline:
     """The robot's mind: feed it odometry and scans, ask it for twists."""
 
@@ -155,7 +139,6 @@ class Pipeline:
         self._incidents: list[tuple[str, str]] = []  # action and reason, since the last scan
         self._was_lifted = self._look_now = False
         self._last: Keyframe | None = None
-        self._drawn: _Drawn | None = None
         self._kept: Pose | None = None  # local_base of the last scan that was kept
         self._looked: Pose | None = None  # local_base of the last look for the GVG
         self._turning_to: float | None = None  # odom heading still to turn through, unwrapped sum
@@ -212,63 +195,34 @@ class Pipeline:
     # -- perception, per scan --------------------------------------------------------------------
 
     def perceive(self, scan: Scan) -> list[Event]:
-        """Learn from a scan, if it was taken somewhere new; what happened.
-
-        A look is laid onto the local maps at once, and what they show then is learnt with the next
-        scan: both together would take twice as long as a scan ever does.
-        """
+        """Learn from a scan, if it was taken somewhere new; what happened."""
         happened: list[Event] = [Recovery(scan.stamp, *what) for what in self._incidents]
         self._incidents.clear()
         odom_base = self._odometry.odom_base_at(scan.stamp)
         if self.company is not None and odom_base is not None and self._last is not None:
             local_base = self._last.local_base.compose(self._last.odom_base.to(odom_base))
             self._newcomers.glance(scan, local_base)
-        if self._drawn is not None and not self._is_at_rest:
-            drawn, self._drawn = self._drawn, None
-            happened += self._learn(drawn)
         if (
             odom_base is None
-            or self._is_at_rest
+            or (self.errands.is_resting and self._last is not None)
             or self._reflexes.is_lifted
             or not self._worth_a_look(scan, odom_base)
         ):
             return happened
-        scan = deskewed(scan, self._odometry.motion_during(scan))
-        drawn = self._draw(scan, odom_base)
-        if self.led:  # nobody waits for it, and no scan may be lost at the end of a log
-            return happened + self._learn(drawn)
-        self._drawn = drawn
-        return happened
-
-    @property
-    def _is_at_rest(self) -> bool:
-        """Whether there is nothing to look for; a first look is taken in any case."""
-        return self.errands.is_resting and self._last is not None
-
-    def _draw(self, scan: Scan, odom_base: Pose) -> _Drawn:
-        """Lay a scan onto the local maps, and draw it there."""
-        drawn = self._localise(scan, odom_base)
-        known = Pose() if self._last is None else self._last.local_base
-        self._newcomers.company = self._discs(self._nearby(known), _COMPANY_M)
-        is_way = partial(self.mapper.is_way, known)
-        scan = self._newcomers.sift(scan, drawn.local_base, self._maps.near, is_way)
-        self._maps.insert(scan, drawn.local_base, drawn.travelled)
-        return replace(drawn, scan=scan, is_turning=self._turning())
-
-    def _learn(self, drawn: _Drawn) -> list[Event]:
-        """Learn from what the local map shows around a scan, and decide; what happened."""
-        scan, local_base = drawn.scan, drawn.local_base
         if self._last is not None:
             self.mission.skip(max(0.0, scan.stamp - self._last.stamp - _LONGEST_GAP_S))
-        if drawn.step is not None:
-            self.steps.append(drawn.step)
-            self.mapper.move(drawn.step.motion, drawn.step.covariance)
-        self.travelled = drawn.travelled
-        self.mission.meet(local_base, self._nearby(local_base))
+        scan = deskewed(scan, self._odometry.motion_during(scan))
+        local_base = self._localise(scan, odom_base)
+        nearby = self._nearby(local_base)
+        self._newcomers.company = self._discs(nearby, _COMPANY_M)
+        self.mission.meet(local_base, nearby)
+        is_way = partial(self.mapper.is_way, local_base)
+        scan = self._newcomers.sift(scan, local_base, self._maps.near, is_way)
+        self._maps.insert(scan, local_base, self.travelled)
         self._hazards.forget(self.travelled)
         if self.led and not self._worth_a_gvg(local_base):
-            self._keep(drawn)
-            return []
+            self._keep(scan, odom_base, local_base)
+            return happened
         self.gvg = self._local_gvg(local_base, scan.range_max)
         doubtful = np.concatenate(
             [self._hazards.doubtful, self._newcomers.points, self._maps.near.suspects()]
@@ -284,19 +238,19 @@ class Pipeline:
             touching(self.gvg, doubtful),
         )
         known, learnt = self.mapper.observe(view)
-        self._keep(drawn)
-        done = self._act(view, known, drawn)
-        happened = learnt + done  # what was done may have taught the mapper more
+        self._keep(scan, odom_base, local_base)
+        done = self._act(view, known, scan)
+        happened += learnt + done  # what was done may have taught the mapper more
         return happened + self._forget(scan.stamp, happened)
 
-    def _act(self, view: View, known: Correspondence, drawn: _Drawn) -> list[Event]:
+    def _act(self, view: View, known: Correspondence, scan: Scan) -> list[Event]:
         """Decide what to do next; what happened by that."""
         if self.led:
             return self.mission.witness(view, known)
-        if drawn.is_turning:
+        if self._turning():
             return []
         if len(self.keyframes) == 1:
-            self._turn(_blind_angle(drawn.scan))
+            self._turn(_blind_angle(scan))
             return []
         order, done = self.errands.advance(view, known)
         self._obey(order)
@@ -350,11 +304,12 @@ class Pipeline:
         self._looked = local_base
         return True
 
-    def _localise(self, scan: Scan, odom_base: Pose) -> _Drawn:
-        """Where in the local frame a scan was taken, and the step to there."""
+    def _localise(self, scan: Scan, odom_base: Pose) -> Pose:
+        """The base in the local frame; the belief moves with it."""
         if self._last is None:
-            return _Drawn(scan, odom_base, Pose(), None, self.travelled)
+            return Pose()
         motion = self._last.odom_base.to(odom_base)
+        self.travelled += math.hypot(motion.x, motion.y)
         duration = scan.stamp - self._last.stamp
         noise = self._config.odometry_noise.covariance(motion, duration)
         is_doubted, self.errands.is_lost = self.errands.is_lost, False
@@ -369,22 +324,22 @@ class Pipeline:
         )
         moved = self._last.local_base.to(local_base)
         step = Step(moved, rotated_covariance(covariance, motion.theta))
-        travelled = self.travelled + math.hypot(motion.x, motion.y)
-        return _Drawn(scan, odom_base, local_base, step, travelled)
+        self.steps.append(step)
+        self.mapper.move(step.motion, step.covariance)
+        return local_base
 
-    def _keep(self, drawn: _Drawn) -> None:
-        scan, local_base, map_base = drawn.scan, drawn.local_base, self.mapper.belief.map_base
+    def _keep(self, scan: Scan, odom_base: Pose, local_base: Pose) -> None:
+        map_base = self.mapper.belief.map_base
         moved = self._kept.to(local_base) if self._kept is not None else None
-        is_new = (
+        if (
             moved is None
             or math.hypot(moved.x, moved.y) > _SCAN_EVERY_M
             or abs(moved.theta) > _SCAN_EVERY_RAD
-        )
-        if is_new:
+        ):
             self._kept = local_base
-        self._last = Keyframe(
-            scan.stamp, drawn.odom_base, local_base, map_base, scan if is_new else None
-        )
+            self._last = Keyframe(scan.stamp, odom_base, local_base, map_base, scan)
+        else:
+            self._last = Keyframe(scan.stamp, odom_base, local_base, map_base, None)
         self.keyframes.append(self._last)
 
     def _forget(self, stamp: float, happened: list[Event]) -> list[Event]:
