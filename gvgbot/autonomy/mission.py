@@ -37,6 +37,8 @@ _LEAST_LOOP_M = 4.0  # an edge with both ends in sight is left to sight unless s
 _WORTH_TURNING_M = 1.0  # a new frontier must be so much nearer than the old one
 _FACING_RAD = 1.0  # looking so far past a thing, one would not see it go
 _FACING_POINTS = 6  # of a polyline tell where its end points to
+_MOST_NEAR = 2  # vertices to go to, for what no known way leads to
+_AT_VERTEX_M = 0.5  # so near, all that there is to see from a vertex is seen
 _MOST_SOUGHT = 5  # places to look for an edge from
 _LONGEST_VIEW_S = 2.0  # a longer gap between views is an outage, not a lack of progress
 
@@ -131,6 +133,7 @@ class Mission:
         self._sought: list[Array] = []  # places to see an edge from, local frame
         self._seeking: Track | None = None  # to the last of them
         self._stranded_since: float | None = None
+        self._gone_near = set[int]()  # vertices that the robot has been at since
         self._turned_back = False  # looking for a way, after the end of sight
         self._examining_since: float | None = None
         self._sees_known = False  # a vertex at least
@@ -427,7 +430,12 @@ class Mission:
         """Drive on until a known vertex comes into sight, before a frontier is given up."""
         if self._stranded_since is None:
             self._stranded_since, self._turned_back = view.stamp, False
+            self._gone_near = set()
             self._events.append(Recovery(view.stamp, "drive on", "no way leads to the frontier"))
+        near = self._way_near(here) if self.target is None else None
+        if near is not None:
+            self._stranded_since = view.stamp
+            return self._drive(view, here, near)
         if view.stamp - self._stranded_since > self._config.patience_s:
             self._stranded_since = None
             self._mapper.forget_strays(view)
@@ -437,6 +445,26 @@ class Mission:
         if Track.of(*view.gvg.line_from(here.place, path)).length < _ARRIVED_M:
             self._turned_back = not self._turned_back
         return self._drive(view, here, path)
+
+    def _way_near(self, here: Situation) -> tuple[Branch, ...] | None:
+        """To the vertices next to a frontier that no known way leads to: one may be seen there."""
+        graph, belief = self._mapper.graph, self._mapper.belief
+        approaches = shortest_paths(graph, here.starts())
+        lost = {end.vertex for end in graph.frontiers()} - approaches.keys()
+        rest = sorted(approaches.keys() - self._gone_near)
+        if not lost or not rest or len(self._gone_near) >= _MOST_NEAR:
+            return None
+        places = np.array([belief.map_vertex(vertex).position for vertex in sorted(lost)])
+        nearest = min(
+            rest,
+            key=lambda v: np.hypot(*(places - belief.map_vertex(v).position).T).min(),
+        )
+        approach = approaches[nearest]
+        if approach.metres < _AT_VERTEX_M:
+            self._gone_near.add(nearest)
+            return None
+        first = approach.departures[0].vertex if approach.departures else nearest
+        return here.path_over(first, approach.departures)
 
     def _make_way(self, view: View, here: Situation) -> Order:
         """Stand, but aside of a robot that is near and may want to pass."""

@@ -223,6 +223,27 @@ def test_what_hangs_together_with_nothing_is_forgotten_and_not_called_blocked() 
     assert robot.mission.target in graph.frontiers()
 
 
+def test_the_robot_goes_near_what_no_known_way_leads_to_before_it_gives_that_up() -> None:
+    """Two vertices behind the robot, beyond its corridor, that are joined to each other only."""
+    robot = Robot()
+    graph = robot.mapper.graph
+    beyond = [Vertex(graph.next_id(), 1.0, Pose(x), 0.0, 0.0) for x in (-7.0, -9.0)]
+    for vertex in beyond:
+        graph.vertices[vertex.id] = vertex
+        robot.mapper.belief = add_vertex(
+            robot.mapper.belief, vertex.id, vertex.local, np.diag([1e-4, 1e-4, 1e-4])
+        )
+    ends = [HalfEdgeId(vertex.id, vertex.add_half_edge(math.pi)) for vertex in beyond]
+    graph.join(ends[0], ends[1], np.array([[0.0, 0.0], [-2.0, 0.0]]), 1.0, driven=True)
+    beyond[1].add_half_edge(math.pi)
+    robot.stand(CLOSED, 40)
+    assert end_of(robot.look(CLOSED)) == pytest.approx((-1.0, 0.0))
+    robot.drive(CLOSED, (0.0, 0.0), (-0.9, 0.0))
+    while robot.mission.outcome is None and robot.stamp < 5 * CONFIG.patience_s:
+        robot.look(CLOSED)
+    assert robot.mission.outcome == "explored_with_blocked"
+
+
 def test_a_robot_that_drives_to_and_fro_gives_up_its_target_after_its_patience() -> None:
     """Between two places a metre apart, which it may do when two ways look equally good."""
     robot = Robot()
