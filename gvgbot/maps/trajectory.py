@@ -1,13 +1,12 @@
 """Trajectories and their TUM form: a line `t x y z qx qy qz qw` per pose."""
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
 from gvgbot.errors import UsageError
-from gvgbot.geometry import Array, Pose
+from gvgbot.geometry import Array
 
 _TUM_LINE = "%.6f %.6f %.6f 0 0 0 %.9f %.9f\n"
 
@@ -29,13 +28,6 @@ class Trajectory:
     def positions(self) -> Array:
         """x, y (N, 2) in m."""
         return self.poses[:, :2]
-
-
-def to_trajectory(stamped_poses: Iterable[tuple[float, Pose]]) -> Trajectory:
-    """The trajectory through poses with their stamps (s)."""
-    rows = [(stamp, pose.x, pose.y, pose.theta) for stamp, pose in stamped_poses]
-    table = np.array(rows, np.float64).reshape(-1, 4)
-    return Trajectory(table[:, 0], table[:, 1:])
 
 
 def encode_tum(trajectory: Trajectory) -> str:

@@ -15,7 +15,7 @@ from gvgbot.drivers.world import save_world
 from gvgbot.geometry import Pose
 from gvgbot.maps import geojson
 from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
-from gvgbot.maps.trajectory import encode_tum, to_trajectory
+from gvgbot.maps.trajectory import Trajectory, encode_tum
 from gvgbot.worlds.canvas import Canvas
 
 PLACES = {1: (0.0, 0.0), 2: (10.0, 0.0), 3: (10.0, 10.0), 4: (0.0, 10.0), 5: (20.0, 0.0)}
@@ -118,14 +118,16 @@ def corridor_run(tmp_path: Path) -> Path:
     canvas.carve(1.0, 2.0, 19.0, 4.0)
     save_world(canvas.world("world"), tmp_path)
     start = Pose(3.0, 2.7, math.pi / 2)
-    truth = [(float(t), Pose(3.0 + t / 5, 2.7, 0.0)) for t in range(41)]
-    estimate = [(t, start.to(Pose(pose.x + 0.2, pose.y, 0.0))) for t, pose in truth]
+    seconds = np.arange(41.0)
+    truth = [Pose(3.0 + t / 5, 2.7, 0.0) for t in seconds]
+    estimate = [start.to(Pose(pose.x + 0.2, pose.y, 0.0)) for pose in truth]
     graph = route({1: (2.0, 3.0), 2: (18.0, 3.0)}, [(1, 2)], start)
     twin = {"world": "elsewhere/world.yaml", "start": [start.x, start.y, start.theta]}
     summary = {"config": {"twin": twin, "robot": {"radius_m": 0.177}}}
     (tmp_path / "map.geojson").write_text(geojson.encode(graph))
-    (tmp_path / "truth.tum").write_text(encode_tum(to_trajectory(truth)))
-    (tmp_path / "estimate.tum").write_text(encode_tum(to_trajectory(estimate)))
+    for name, poses in (("truth.tum", truth), ("estimate.tum", estimate)):
+        rows = np.array([(pose.x, pose.y, pose.theta) for pose in poses])
+        (tmp_path / name).write_text(encode_tum(Trajectory(seconds, rows)))
     (tmp_path / "summary.json").write_text(json.dumps(summary))
     return tmp_path
 

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gvgbot.errors import UsageError
-from gvgbot.geometry import Pose, wrap_angle
-from gvgbot.maps.trajectory import Trajectory, decode_tum, encode_tum, to_trajectory
+from gvgbot.geometry import wrap_angle
+from gvgbot.maps.trajectory import Trajectory, decode_tum, encode_tum
 
 HALF_ROOT = math.sqrt(0.5)
 
@@ -25,7 +25,7 @@ HALF_ROOT = math.sqrt(0.5)
 def test_a_line_is_the_stamp_the_place_and_the_quaternion(
     theta: float, qz: float, qw: float
 ) -> None:
-    line = encode_tum(to_trajectory([(12.5, Pose(1.0, -2.0, theta))]))
+    line = encode_tum(Trajectory(np.array([12.5]), np.array([[1.0, -2.0, theta]])))
     assert line.endswith("\n")
     assert line.count("\n") == 1
     numbers = [float(word) for word in line.split()]
@@ -44,7 +44,8 @@ rows = st.lists(
 
 @given(rows)
 def test_a_saved_trajectory_loads_as_it_was(table: list[tuple[float, ...]]) -> None:
-    saved = to_trajectory((t, Pose(x, y, theta)) for t, x, y, theta in table)
+    columns = np.array(table, np.float64).reshape(-1, 4)
+    saved = Trajectory(columns[:, 0], columns[:, 1:])
     loaded = decode_tum(encode_tum(saved))
     assert loaded.stamps == pytest.approx(saved.stamps, abs=1e-6)
     assert loaded.positions == pytest.approx(saved.positions, abs=1e-6)
@@ -84,5 +85,5 @@ def test_stamps_and_poses_must_be_as_many() -> None:
 
 
 def test_no_pose_is_an_empty_file() -> None:
-    assert encode_tum(to_trajectory([])) == ""
+    assert encode_tum(Trajectory(np.empty(0), np.empty((0, 3)))) == ""
     assert decode_tum("").poses.shape == (0, 3)
