@@ -77,7 +77,8 @@ class Newcomers:
     def __init__(self, config: NewcomersConfig) -> None:
         self._config = config
         self._all: list[Newcomer] = []
-        self.company: list[tuple[Array, float]] = []  # other robots: where they say they are
+        self.company: list[tuple[Array, float]] = []  # other robots: where they say they are,
+        self._met: list[tuple[Array, float]] = []  # and where they are seen
         self._glanced: list[tuple[Array, float]] | None = None  # where those are that move on
 
     def sift(
@@ -95,14 +96,15 @@ class Newcomers:
             return _without(scan, local_base, self.company)
         self._forget(scan, local_base, local_map)
         walls = _Walls(local_map, self._config.away_from_walls_m, is_way)
-        seen = [
-            (island.centre, island.radius)
-            for island in islands(scan, local_base)
-            if not self._is_company(island) and self._is_passing(island, scan.stamp, walls)
-        ]
+        self._met, seen = [], []
+        for island in islands(scan, local_base):
+            if self._is_company(island):
+                self._met.append((island.centre, island.radius))
+            elif self._is_passing(island, scan.stamp, walls):
+                seen.append((island.centre, island.radius))
         waiting = [(one.centre, one.radius) for one in self._all if not one.is_let_in]
         # At times one is seen in parts only, or has moved a little: both discs count.
-        return _without(scan, local_base, [*seen, *waiting, *self.company])
+        return _without(scan, local_base, [*seen, *waiting, *self._met, *self.company])
 
     def glance(self, scan: Scan, local_base: Pose) -> None:
         """See how those have moved that are near, without learning anything else."""
@@ -123,11 +125,12 @@ class Newcomers:
 
         Who was found half hidden is left out, for nobody knows how wide that is.
         """
-        return [
+        waiting = [
             (one.centre, one.radius)
             for one in self._all
             if (one.is_whole or one.is_round or one.came) and not one.is_let_in
         ]
+        return waiting + self._met
 
     @property
     def latest(self) -> list[tuple[Array, float]]:

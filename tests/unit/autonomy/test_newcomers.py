@@ -316,3 +316,14 @@ def test_without_patience_whoever_comes_is_taken_for_a_wall_at_once() -> None:
     assert len(watch.newcomers.points) == 0
     watch.newcomers.company = [(np.array([2.0, 0.0]), RADIUS)]
     assert watch.dropped(EMPTY, person=(2.0, 0.0)) > 0
+
+
+def test_another_robot_is_kept_out_of_the_map_where_it_is_seen_not_only_where_it_says_it_is() -> None:
+    """Its frame is known to half a metre: what stands there goes with it, however long it waits."""
+    watch = Watch(EMPTY)
+    watch.newcomers.company = [(np.array([2.0, 0.5]), RADIUS)]
+    for stamp in (0.0, 200.0, 400.0):
+        assert watch.dropped(EMPTY, stamp, person=(2.0, 0.0)) > 0
+        assert watch.inside() == 0
+    centre, _ = watch.newcomers.discs[0]
+    assert np.hypot(*(centre - [2.0, 0.0])) < 0.1
