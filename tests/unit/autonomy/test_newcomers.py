@@ -318,8 +318,8 @@ def test_without_patience_whoever_comes_is_taken_for_a_wall_at_once() -> None:
     assert watch.dropped(EMPTY, person=(2.0, 0.0)) > 0
 
 
-def test_another_robot_is_kept_out_of_the_map_where_it_is_seen_not_only_where_it_says_it_is() -> None:
-    """Its frame is known to half a metre: what stands there goes with it, however long it waits."""
+def test_another_robot_is_kept_out_of_the_map_where_it_is_seen_not_where_it_says_it_is() -> None:
+    """Its frame is known to half a metre only; and however long it waits, it will go."""
     watch = Watch(EMPTY)
     watch.newcomers.company = [(np.array([2.0, 0.5]), RADIUS)]
     for stamp in (0.0, 200.0, 400.0):
