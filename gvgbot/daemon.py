@@ -182,7 +182,8 @@ def _telemetry(config: Config, stack: contextlib.ExitStack) -> Telemetry | None:
         if config.team.enabled:
             raise UsageError("team.enabled needs the network: set telemetry.enabled=true as well")
         return None
-    return stack.enter_context(Telemetry(config.telemetry, config.robot.name))
+    relays = config.team.enabled
+    return stack.enter_context(Telemetry(config.telemetry, config.robot.name, relays=relays))
 
 
 def _ros2(config: Config, stack: contextlib.ExitStack) -> Ros2Node | None:

@@ -45,12 +45,15 @@ class Telemetry:
     A session left open keeps the process from ending, so close it on every way out.
     """
 
-    def __init__(self, config: TelemetryConfig, robot: str) -> None:
-        """Listen. Raises GvgbotError if an address cannot be had."""
+    def __init__(self, config: TelemetryConfig, robot: str, *, relays: bool = False) -> None:
+        """Listen. Raises GvgbotError if an address cannot be had.
+
+        `relays`: also hand on what those say to each other who meet here, or at a router.
+        """
         self.failures = 0  # samples that could not be sent
         self._latest: dict[Topic, Payload] = {}
         self._robot = robot
-        self._session = _open(config)
+        self._session = _open(config, relays=relays)
         self._publishers = {topic.payload: (topic, self._publisher(topic)) for topic in TOPICS}
         self._alive = self._session.liveliness().declare_token(alive_key(robot))
 
@@ -118,7 +121,10 @@ class Telemetry:
 
         with contextlib.ExitStack() as stack:
             for part in TEAM_PARTS:
-                stack.enter_context(self._session.declare_subscriber(team_key("*", part), take))
+                others = self._session.declare_subscriber(
+                    team_key("*", part), take, allowed_origin=zenoh.Locality.REMOTE
+                )
+                stack.enter_context(others)
             while True:
                 await arrived.wait()
                 arrived.clear()
@@ -247,9 +253,9 @@ def _form(topic: Topic, wanted: str | None) -> tuple[Callable[[Payload], bytes],
     return msgspec.msgpack.encode, zenoh.Encoding(topic.encoding)
 
 
-def _open(config: TelemetryConfig) -> zenoh.Session:
+def _open(config: TelemetryConfig, *, relays: bool) -> zenoh.Session:
     try:
-        return zenoh.open(_session_config(config))
+        return zenoh.open(_session_config(config, relays=relays))
     except zenoh.ZError as error:
         where = ", ".join(config.listen)
         raise GvgbotError(
@@ -258,10 +264,10 @@ def _open(config: TelemetryConfig) -> zenoh.Session:
         ) from error
 
 
-def _session_config(config: TelemetryConfig) -> zenoh.Config:
+def _session_config(config: TelemetryConfig, *, relays: bool) -> zenoh.Config:
     return session_config(
         {
-            "mode": "peer",
+            "mode": "router" if relays else "peer",  # peers of one router do not hear each other
             "listen/endpoints": config.listen,
             "connect/endpoints": config.connect,
             "transport/link/tx/lease": round(1000 * config.lease_s),

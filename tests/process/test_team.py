@@ -1,28 +1,60 @@
-"""Robots of a team hear each other over the network, and a robot alone goes on."""
+"""Robots of a team hear all others over the network, wherever they meet, but not themselves."""
 
 import asyncio
+import contextlib
+from collections.abc import Callable
 
 import pytest
 
 from gvgbot.telemetry import Telemetry
 from gvgbot.topics import TelemetryConfig
-from tests.process.addresses import free_endpoint
+from tests.process.addresses import free_endpoint, router
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(60)]
+
+NAMES = ("one", "two", "three")
 
 
-@pytest.mark.slow
-def test_what_one_robot_tells_its_team_is_heard_by_the_other() -> None:
-    async def exchanged() -> bytes:
-        heard = asyncio.Queue[bytes]()
-        endpoint = free_endpoint()
-        near = TelemetryConfig(listen=(endpoint,))
-        far = TelemetryConfig(listen=(free_endpoint(),), connect=(endpoint,))
-        with Telemetry(near, "one") as one, Telemetry(far, "two") as two:
-            async with asyncio.timeout(15), asyncio.TaskGroup() as tasks:
-                listening = tasks.create_task(two.hear_team(heard.put_nowait))
-                while heard.empty():  # until they have found each other
-                    one.tell_team("team", b"\x00 what one has seen \xff")
-                    await asyncio.sleep(0.05)
-                listening.cancel()
-        return heard.get_nowait()
+def at_a_router(robots: list[str], meeting: str) -> list[tuple[str, ...]]:
+    return [(meeting,) for _ in robots]
 
-    assert asyncio.run(exchanged()) == b"\x00 what one has seen \xff"
+
+def at_the_first(robots: list[str], meeting: str) -> list[tuple[str, ...]]:
+    return [(), *((robots[0],) for _ in robots[1:])]
+
+
+def in_a_row(robots: list[str], meeting: str) -> list[tuple[str, ...]]:
+    return [(), *((robot,) for robot in robots[:-1])]
+
+
+@pytest.mark.parametrize("meet", [at_a_router, at_the_first, in_a_row])
+def test_all_robots_of_a_team_hear_all_others(
+    meet: Callable[[list[str], str], list[tuple[str, ...]]],
+) -> None:
+    heard: dict[str, set[bytes]] = {name: set() for name in NAMES}
+    meeting, endpoints = free_endpoint(), [free_endpoint() for _ in NAMES]
+
+    async def talk(team: list[Telemetry]) -> None:
+        async with asyncio.timeout(30), asyncio.TaskGroup() as tasks:
+            hearing = [
+                tasks.create_task(robot.hear_team(heard[name].add))
+                for name, robot in zip(NAMES, team, strict=True)
+            ]
+            while any(len(others) < 2 for others in heard.values()):  # not found each other yet
+                for name, robot in zip(NAMES, team, strict=True):
+                    robot.tell_team("team", b"\x00 by " + name.encode() + b"\xff")
+                await asyncio.sleep(0.05)
+            for task in hearing:
+                task.cancel()
+
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(router(meeting))
+        team = [
+            stack.enter_context(
+                Telemetry(TelemetryConfig(listen=(here,), connect=there), name, relays=True)
+            )
+            for name, here, there in zip(NAMES, endpoints, meet(endpoints, meeting), strict=True)
+        ]
+        asyncio.run(talk(team))
+    for name, others in heard.items():
+        assert others == {b"\x00 by " + n.encode() + b"\xff" for n in NAMES if n != name}
