@@ -16,6 +16,8 @@ from gvgbot.team.member import Comparison, Member, TeamConfig
 from gvgbot.team.news import decode, encode
 from gvgbot.topics import TeamPart
 
+_COMPLAINTS = 10  # different ones; then it is known that something is wrong
+
 log = structlog.get_logger()
 
 
@@ -39,6 +41,8 @@ class LiveTeam:
         self._clock: Clock
         mapper = pipeline.mapper
         life = secrets.randbits(31)
+        self._lives = {life}  # of robots by this name
+        self._complaints: set[str] = set()
         self.member = Member(name, config, lambda: chart_of(mapper.graph, mapper.belief), life)
         pipeline.mission.sharing = self.member
         pipeline.company = []
@@ -56,9 +60,20 @@ class LiveTeam:
 
     def _hear(self, data: bytes) -> None:
         try:
-            self.member.hear(decode(data), self._clock.now())
+            told = decode(data)
         except GvgbotError as error:
-            log.warning("news of a team dropped", reason=str(error))
+            self._complain(str(error))
+            return
+        if told.robot == self.member.name and told.life not in self._lives:
+            self._lives.add(told.life)
+            log.warning("another robot has this name; give one another robot.name", name=told.robot)
+        self.member.hear(told, self._clock.now())
+
+    def _complain(self, reason: str) -> None:
+        """Say once why something is not understood: the same will come several times a second."""
+        if reason not in self._complaints and len(self._complaints) < _COMPLAINTS:
+            self._complaints.add(reason)
+            log.warning("news of a team dropped", reason=reason)
 
     async def _tell(self) -> None:
         pipeline = self._pipeline

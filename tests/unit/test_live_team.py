@@ -1,9 +1,10 @@
 """Two daemons' parts in a team, joined by a network in memory that can be cut; virtual time."""
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 
 import pytest
+import structlog
 
 from gvgbot.autonomy.mission import ExplorationConfig
 from gvgbot.autonomy.pipeline import AutonomyConfig, Pipeline
@@ -37,13 +38,15 @@ async def at_once(work: Callable[[], None]) -> None:
     work()
 
 
-def together(scene: Callable[[Air, list[LiveTeam]], Awaitable[None]]) -> None:
-    """Let two robots that have seen nothing take part while a scene goes on."""
+def together(
+    scene: Callable[[Air, list[LiveTeam]], Awaitable[None]], names: Sequence[str] = ("one", "two")
+) -> None:
+    """Let robots that have seen nothing take part while a scene goes on."""
 
     async def play() -> None:
         air, clock = Air(), LoopClock()
-        minds = (Pipeline(AutonomyConfig(), ExplorationConfig(), 0.177) for _ in range(2))
-        parts = [LiveTeam(n, CONFIG, p, air) for n, p in zip(("one", "two"), minds, strict=True)]
+        minds = [Pipeline(AutonomyConfig(), ExplorationConfig(), 0.177) for _ in names]
+        parts = [LiveTeam(n, CONFIG, p, air) for n, p in zip(names, minds, strict=True)]
         async with asyncio.TaskGroup() as tasks:
             running = [tasks.create_task(part.take_part(clock, at_once)) for part in parts]
             await scene(air, parts)
@@ -80,3 +83,32 @@ def test_noise_from_the_network_changes_nothing(noise: bytes) -> None:
         assert not parts[0].member.is_lost("two")
 
     together(scene)
+
+
+@pytest.mark.parametrize(
+    ("names", "warnings"), [(("one", "two"), 0), (("one", "one"), 2), (("one", "one", "two"), 2)]
+)
+def test_who_hears_another_robot_by_its_own_name_says_so_once(
+    names: tuple[str, ...], warnings: int
+) -> None:
+    async def scene(air: Air, parts: list[LiveTeam]) -> None:
+        await asyncio.sleep(20.0)
+
+    with structlog.testing.capture_logs() as lines:
+        together(scene, names)
+    said = [line for line in lines if line["log_level"] == "warning"]
+    assert len(said) == warnings
+    assert all("robot.name" in line["event"] and line["name"] == "one" for line in said)
+
+
+def test_what_is_not_understood_is_said_once_for_each_reason() -> None:
+    async def scene(air: Air, parts: list[LiveTeam]) -> None:
+        for _ in range(50):
+            air.tell_team("team", b"")
+            air.tell_team("team", b"\x80")  # an empty map
+            await asyncio.sleep(0.1)
+
+    with structlog.testing.capture_logs() as lines:
+        together(scene, ["one"])
+    reasons = [line["reason"] for line in lines if line["log_level"] == "warning"]
+    assert len(reasons) == len(set(reasons)) == 2
