@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -59,6 +59,29 @@ def islands(scan: Scan, local_base: Pose) -> list[Island]:
         parts = (part for part in _pieces(piece, look.is_gap) if part[1] - part[0] >= _ARC_BEAMS)
         found += [one for one in map(look.island, parts) if one is not None and one.is_round]
     return found
+
+
+def without_fringes(scan: Scan) -> Scan:
+    """The scan without what its first and its last beams show too little of.
+
+    Something stands free there, and all but a sliver of it is out of sight: that may be a person.
+    """
+    told = np.flatnonzero(~np.isnan(scan.ranges))
+    depth = np.minimum(scan.ranges[told], scan.range_max)
+    ends = np.flatnonzero(np.abs(np.diff(depth)) >= _STEP_M)
+    if not len(ends):
+        return scan
+    first, last = ends[0] + 1, ends[-1] + 1
+    ranges = scan.ranges.copy()
+    for fringe, beside in ((slice(first), first), (slice(last, None), last - 1)):
+        metres = depth[fringe]
+        if metres.max() < depth[beside] and metres.max() * _angle(scan, told[fringe]) < _SLIM_M:
+            ranges[told[fringe]] = np.nan
+    return replace(scan, ranges=ranges)
+
+
+def _angle(scan: Scan, beams: NDArray[np.intp]) -> float:
+    return float(beams[-1] - beams[0]) * scan.angle_increment
 
 
 class _Look:

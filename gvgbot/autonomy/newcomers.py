@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.gvg.local_map import LocalMap
-from gvgbot.autonomy.islands import Island, beam_ends, islands
+from gvgbot.autonomy.islands import Island, beam_ends, islands, without_fringes
 from gvgbot.autonomy.roundness import SURE, with_look
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
@@ -95,6 +95,7 @@ class Newcomers:
         if not max(self._config.came_after_s, self._config.found_after_s):  # who comes, stays
             return _without(scan, local_base, self.company)
         self._forget(scan, local_base, local_map)
+        scan = without_fringes(scan)
         walls = _Walls(local_map, self._config.away_from_walls_m, is_way)
         self._met, seen = [], []
         for island in islands(scan, local_base):

@@ -10,7 +10,7 @@ from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
 from gvgbot.autonomy.newcomers import Newcomers, NewcomersConfig
 from gvgbot.drivers.world import World
 from gvgbot.geometry import Array, Pose
-from tests.unit.autonomy.sights import Rectangle, carved, sweep
+from tests.unit.autonomy.sights import LASER_270, Rectangle, carved, sweep
 
 ROOM: Rectangle = (-4.0, -3.0, 4.0, 3.0)
 EMPTY = carved([ROOM])
@@ -327,3 +327,23 @@ def test_another_robot_is_kept_out_of_the_map_where_it_is_seen_not_where_it_says
         assert watch.inside() == 0
     centre, _ = watch.newcomers.discs[0]
     assert np.hypot(*(centre - [2.0, 0.0])) < 0.1
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_sliver_of_somebody_at_the_rim_of_sight_is_kept_out_of_the_map(side: float) -> None:
+    """The outermost beams end on who is all but out of sight: too little to know anybody by."""
+    away = 2.0
+    hidden = LASER_270 / 2 + math.asin(RADIUS / away) - math.radians(1.5)
+    person = (away * math.cos(hidden), side * away * math.sin(hidden))
+    watch, scan = Watch(EMPTY), sweep(EMPTY, HERE, field_of_view=LASER_270)
+    seen = replace(scan, ranges=np.minimum(scan.ranges, to_disc(scan.bearings, person)))
+    on_person = seen.ranges < scan.ranges
+    assert 1 < np.count_nonzero(on_person) < 8
+    watch.map.insert(watch.newcomers.sift(seen, HERE, watch.map), HERE, 0.0)
+    assert watch.inside() == 0
+
+
+def test_a_wall_at_the_rim_of_sight_is_no_sliver() -> None:
+    watch, scan = Watch(), sweep(EMPTY, HERE, field_of_view=LASER_270)
+    sifted = watch.newcomers.sift(scan, HERE, watch.map)
+    assert np.array_equal(sifted.ranges, scan.ranges)
