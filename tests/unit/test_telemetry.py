@@ -132,10 +132,14 @@ def test_the_state_topic_is_the_promised_one() -> None:
     assert STATE.queryable
 
 
-def test_a_session_listens_where_it_is_told_and_is_not_found_by_shouting() -> None:
-    session = _session_config(TelemetryConfig(listen=("tcp/127.0.0.1:7000",), lease_s=1.5))
+@pytest.mark.parametrize(("relays", "mode"), [(False, "peer"), (True, "router")])
+def test_a_session_listens_where_it_is_told_and_is_not_found_by_shouting(
+    relays: bool, mode: str
+) -> None:
+    config = TelemetryConfig(listen=("tcp/127.0.0.1:7000",), lease_s=1.5)
+    session = _session_config(config, relays=relays)
     told = {
-        "mode": "peer",
+        "mode": mode,
         "listen/endpoints": ["tcp/127.0.0.1:7000"],
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": False,
