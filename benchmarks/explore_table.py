@@ -23,6 +23,7 @@ import json
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -195,6 +196,7 @@ def _slug(command: Command) -> str:
 
 def run(command: Command, directory: Path) -> Row:
     """Explore once, as a process of its own, and score what it leaves."""
+    shutil.rmtree(directory, ignore_errors=True)  # of an attempt that crashed
     with tempfile.NamedTemporaryFile("r", encoding="utf-8") as peak:
         done = subprocess.run(
             [sys.executable, "-c", _TELLS_PEAK, peak.name, *command, "--out", str(directory)],

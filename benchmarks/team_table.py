@@ -18,6 +18,7 @@ import json
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -101,6 +102,7 @@ def _commands(options: argparse.Namespace) -> Iterator[tuple[str, ...]]:
 def run(command: tuple[str, ...], out: Path) -> Row:
     """Explore once, as a process of its own, and score what it leaves."""
     directory = out / re.sub(r"[^\w.]+", "-", " ".join(command[1:])).strip("-")
+    shutil.rmtree(directory, ignore_errors=True)  # of an attempt that crashed
     done = subprocess.run(
         [sys.executable, "-m", "gvgbot", *command, "--out", str(directory)],
         capture_output=True,

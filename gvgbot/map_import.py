@@ -22,7 +22,7 @@ from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
 from gvgbot.maps.run_directory import RunDirectory
 from gvgbot.persistence.keeper import Keeper
-from gvgbot.persistence.mission_files import SNAPSHOT, MissionFiles
+from gvgbot.persistence.mission_files import MissionFiles
 from gvgbot.session import Session
 
 _BEAMS = 720  # of a scan, all around
@@ -37,8 +37,6 @@ def import_map(path: Path, out: Path, config: Config) -> tuple[int, int]:
     Raises UsageError for a map or a directory that cannot be used, GvgbotError if nothing can be
     written.
     """
-    if (out / SNAPSHOT).exists():
-        raise UsageError(f"{out} holds a mission already: choose another directory")
     world, known = load_map(path)
     if known.size > _MOST_CELLS:
         raise UsageError(f"{path}: {known.size} pixels are too many; at most {_MOST_CELLS} will do")

@@ -7,6 +7,7 @@ vertices just before and just after each loop closure.
 import asyncio
 import json
 import re
+import shutil
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -160,6 +161,7 @@ def explored(world: str | Path, *settings: str, seed: int = 1) -> Run:
 
 
 def _explore(config: Config, path: Path) -> None:
+    shutil.rmtree(path, ignore_errors=True)  # of an attempt that was interrupted
     with RunDirectory.create(path, world="figures") as directory:
         session = Watched(config, directory)
         with asyncio.Runner(loop_factory=VirtualTimeLoop) as runner:

@@ -18,7 +18,7 @@ from gvgbot.errors import GvgbotError, UsageError
 from gvgbot.maps.atomic_files import write_files
 
 EVENTS, EVENTS_BEFORE = "events.jsonl", "events-before.jsonl"
-SUMMARY = "summary.json"
+SUMMARY, MAP = "summary.json", "map.geojson"
 _MOST_EVENTS = 10_000_000  # bytes, of each of these files
 
 
@@ -41,19 +41,11 @@ class RunDirectory:
     def create(cls, out: Path | None = None, *, world: str, runs: Path = Path("runs")) -> Self:
         """The directory of a new run: `out`, or the next free `runs/<world>-<n>`.
 
-        The events and the summary of an earlier run in `out` go; its other files stay until this
-        run replaces them. Raises UsageError if the directory cannot be written to.
+        Raises UsageError if the directory cannot be written to, or holds an earlier run.
         """
-        path = _next_free(runs, world) if out is None else out
-        run = cls(path)
-        try:
-            run._events.truncate(0)
-            for name in (SUMMARY, EVENTS_BEFORE):
-                (path / name).unlink(missing_ok=True)
-        except OSError as error:
-            run.close()
-            raise _unfit(path, error) from error
-        return run
+        if out is not None and _holds_run(out):
+            raise UsageError(f"{out} holds a run already: choose another directory, or remove it")
+        return cls(_next_free(runs, world) if out is None else out)
 
     def write(self, contents: Mapping[str, bytes | str]) -> None:
         """Replace these files together; if that fails (GvgbotError), the old ones stand."""
@@ -151,6 +143,18 @@ def _fields(value: Any) -> dict[str, Any]:
 
 def _snake_case(name: str) -> str:
     return re.sub(r"(?<=.)([A-Z])", r"_\1", name).lower()
+
+
+def _holds_run(path: Path) -> bool:
+    """Whether a run has left anything there: at the end, as it went, or only in its events."""
+    try:
+        if any((path / name).exists() for name in (SUMMARY, MAP)):
+            return True
+        return (path / EVENTS).stat().st_size > 0
+    except FileNotFoundError:
+        return False
+    except OSError as error:
+        raise _unfit(path, error) from error
 
 
 def _next_free(runs: Path, world: str) -> Path:

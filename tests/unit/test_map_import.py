@@ -102,7 +102,7 @@ def test_a_run_that_is_there_is_not_overwritten(
     assert main(words) == 0
     capsys.readouterr()
     assert main(words) == 2
-    assert "holds a mission already" in capsys.readouterr().err
+    assert "holds a run already" in capsys.readouterr().err
 
 
 def broken(directory: Path, what: str) -> Path:

@@ -89,7 +89,7 @@ def test_every_event_is_a_line_that_is_there_at_once(tmp_path: Path) -> None:
         assert (tmp_path / "events.jsonl").read_text().count("\n") == 2
 
 
-def test_an_opened_run_goes_on_and_a_new_one_begins_anew(tmp_path: Path) -> None:
+def test_an_opened_run_goes_on(tmp_path: Path) -> None:
     with RunDirectory.create(tmp_path, world="office") as run:
         run.append_event(LoopClosed(1.0, 1, 0.0))
         run.write_summary({"outcome": "explored"})
@@ -98,9 +98,24 @@ def test_an_opened_run_goes_on_and_a_new_one_begins_anew(tmp_path: Path) -> None
     lines = (tmp_path / "events.jsonl").read_text().splitlines()
     assert [json.loads(line)["stamp"] for line in lines] == [1.0, 2.0]
     assert (tmp_path / "summary.json").exists()
-    RunDirectory.create(tmp_path, world="office").close()
-    assert (tmp_path / "events.jsonl").read_text() == ""
-    assert not (tmp_path / "summary.json").exists()
+
+
+@pytest.mark.parametrize("name", ["events.jsonl", "map.geojson", "summary.json"])
+def test_a_run_that_is_there_stays(tmp_path: Path, name: str) -> None:
+    """Whether it has ended, was killed after its map was saved, or before."""
+    (tmp_path / name).write_text("mine\n")
+    with pytest.raises(UsageError, match="holds a run already: choose another directory"):
+        RunDirectory.create(tmp_path, world="office")
+    assert names(tmp_path) == {name}
+    assert (tmp_path / name).read_text() == "mine\n"
+
+
+def test_a_directory_with_other_files_will_do(tmp_path: Path) -> None:
+    """A world to explore, say, and the empty list of a run that did not get going."""
+    (tmp_path / "floor.yaml").write_text("mine")
+    for _ in range(2):
+        RunDirectory.create(tmp_path, world="office").close()
+    assert names(tmp_path) == {"floor.yaml", "events.jsonl"}
 
 
 def test_of_very_many_events_the_latest_stay(tmp_path: Path) -> None:
@@ -116,8 +131,6 @@ def test_of_very_many_events_the_latest_stay(tmp_path: Path) -> None:
     ]
     assert kept == [float(number) for number in range(35 - len(kept), 35)]
     assert 10 * line < sum(path.stat().st_size for path in tmp_path.iterdir()) < 22 * line
-    RunDirectory.create(tmp_path, world="").close()
-    assert [path.stat().st_size for path in tmp_path.iterdir()] == [0]
 
 
 def test_a_summary_is_strict_json_whatever_is_in_it(tmp_path: Path) -> None:
