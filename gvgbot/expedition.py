@@ -118,7 +118,12 @@ class _Robot:
         directory = stack.enter_context(RunDirectory.create(out / name, world=name))
         session = Session(config, directory, place)
         mapper = session.pipeline.mapper
-        member = Member(name, config.team, lambda: chart_of(mapper.graph, mapper.belief))
+        member = Member(
+            name,
+            config.team,
+            lambda: chart_of(mapper.graph, mapper.belief),
+            radius=config.robot.radius_m,
+        )
         session.pipeline.mission.sharing = member
         return cls(session, member)
 

@@ -9,6 +9,7 @@ import structlog
 
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.clock import Clock
+from gvgbot.config import RobotConfig
 from gvgbot.errors import GvgbotError
 from gvgbot.team.alignment import Alignment
 from gvgbot.team.chart import chart_of
@@ -35,7 +36,7 @@ class LiveTeam:
     """Makes a mission share its frontiers with other robots on a network."""
 
     def __init__(
-        self, name: str, config: TeamConfig, pipeline: Pipeline, network: TeamNetwork
+        self, robot: RobotConfig, config: TeamConfig, pipeline: Pipeline, network: TeamNetwork
     ) -> None:
         self._config, self._pipeline, self._network = config, pipeline, network
         self._clock: Clock
@@ -43,7 +44,13 @@ class LiveTeam:
         life = secrets.randbits(31)
         self._lives = {life}  # of robots by this name
         self._complaints: set[str] = set()
-        self.member = Member(name, config, lambda: chart_of(mapper.graph, mapper.belief), life)
+        self.member = Member(
+            robot.name,
+            config,
+            lambda: chart_of(mapper.graph, mapper.belief),
+            radius=robot.radius_m,
+            life=life,
+        )
         pipeline.mission.sharing = self.member
         pipeline.company = []
 

@@ -90,8 +90,8 @@ class Robot:
         """
         self._team: LiveTeam | None = None
         if team is not None:
-            name, config = session.config.robot.name, session.config.team
-            self._team = LiveTeam(name, config, session.pipeline, team)
+            config = session.config
+            self._team = LiveTeam(config.robot, config.team, session.pipeline, team)
         self._neighbours, self._driver = neighbours, driver
         self._session, self._notifier = session, notifier
         self._network, self._off_loop, self._keeper = network, off_loop, keeper

@@ -264,8 +264,8 @@ class Pipeline:
         return [company.moved(one, local_map) for one in self.company]
 
     def _discs(self, nearby: list[Companion], more: float) -> list[tuple[Array, float]]:
-        """Other robots by centre and radius: about as large as this one."""
-        return [(one.pose.position, self._radius + more) for one in nearby]
+        """Other robots by centre and radius."""
+        return [(one.pose.position, one.radius + more) for one in nearby]
 
     def _local_gvg(self, local_base: Pose, range_max: float) -> LocalGvg:
         """The GVG around the base, by what the local map shows and the map holds."""

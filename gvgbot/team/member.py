@@ -89,10 +89,16 @@ class Member:
     """Takes part in a team; the `Sharing` of a mission."""
 
     def __init__(
-        self, name: str, config: TeamConfig, tell: Callable[[], Chart], life: int = 0
+        self,
+        name: str,
+        config: TeamConfig,
+        tell: Callable[[], Chart],
+        *,
+        radius: float,
+        life: int = 0,
     ) -> None:
-        """`tell` makes the own chart."""
-        self.name, self._config, self._life = name, config, life
+        """`tell` makes the own chart; `radius` is that of the own body, m."""
+        self.name, self._config, self._radius, self._life = name, config, radius, life
         self._own_chart = tell
         self._chart = Chart()
         self._mates: dict[str, _Mate] = {}
@@ -124,6 +130,7 @@ class Member:
             sequence=self._sequence,
             stamp=stamp,
             pose=(map_base.x, map_base.y, map_base.theta),
+            radius=self._radius,
             speed=speed,
             claim=self._claim,
             finished=finished,
@@ -248,7 +255,8 @@ class Member:
             mate = self._mates[name]
             is_fresh = self._stamp - mate.seen <= _FRESH_S
             if is_fresh or mate.is_standing or mate.news.finished:
-                one = Companion(name, mate.map_base, name < self.name, mate.course)
+                first, radius = name < self.name, mate.news.radius
+                one = Companion(name, mate.map_base, first, mate.course, radius=radius)
                 found.append(company.moved(one, frames[name]))
         return found
 

@@ -1,5 +1,7 @@
 """What robots of a team tell each other: all of it each time, so that any message may be lost."""
 
+from typing import Annotated
+
 import msgspec
 import numpy as np
 
@@ -10,15 +12,19 @@ from gvgbot.team.chart import Chart, ChartEdge, ChartVertex, Departure
 
 _WALL_M = 0.01  # unit of the walls around a vertex, as they travel
 
+Number = Annotated[float, msgspec.Meta(ge=-1e5, le=1e5)]  # and one: whoever tells may be broken
+Radius = Annotated[float, msgspec.Meta(gt=0.0, le=10.0)]
+Triple = tuple[Number, Number, Number]  # a pose: x, y, m, and theta, rad
+
 
 class TeamVertex(msgspec.Struct, frozen=True, array_like=True):
     """A vertex of a chart."""
 
     id: int
-    position: tuple[float, float]  # m, the robot's map frame
-    covariance: tuple[float, float, float, float]  # of the position, 2x2 row-major, m^2
-    clearance: float  # m
-    departures: tuple[tuple[int, float, int | None, bool], ...]  # key, bearing, edge, blocked
+    position: tuple[Number, Number]  # m, the robot's map frame
+    covariance: tuple[Number, Number, Number, Number]  # of the position, 2x2 row-major, m^2
+    clearance: Number  # m
+    departures: tuple[tuple[int, Number, int | None, bool], ...]  # key, bearing, edge, blocked
     walls: bytes  # little-endian int16 pairs x, y, cm, from the vertex
 
 
@@ -28,25 +34,25 @@ class TeamEdge(msgspec.Struct, frozen=True, array_like=True):
     id: int
     a: tuple[int, int]  # vertex, key
     b: tuple[int, int]
-    length: float  # m
-    min_clearance: float  # m
+    length: Number  # m
+    min_clearance: Number  # m
     points: bytes  # little-endian float32 pairs x, y, m, map frame
 
 
 class Claim(msgspec.Struct, frozen=True, array_like=True):
     """A frontier that a robot is on its way to, and the metres that are left of the way."""
 
-    x: float  # m, the robot's map frame
-    y: float
-    bearing: float  # rad
-    metres: float
+    x: Number  # m, the robot's map frame
+    y: Number
+    bearing: Number  # rad
+    metres: Number
 
 
 class Frame(msgspec.Struct, frozen=True, array_like=True):
     """Where the map frame of another robot lies in one's own, m and rad."""
 
     robot: str
-    pose: tuple[float, float, float]
+    pose: Triple
 
 
 class Course(msgspec.Struct, frozen=True, kw_only=True, tag="course"):
@@ -55,7 +61,7 @@ class Course(msgspec.Struct, frozen=True, kw_only=True, tag="course"):
     robot: str
     life: int
     sequence: int  # of the courses
-    pose: tuple[float, float, float]  # map_base
+    pose: Triple  # map_base
     line: bytes  # little-endian float32 pairs x, y, m, map frame
 
     @property
@@ -71,7 +77,8 @@ class News(msgspec.Struct, frozen=True, kw_only=True, tag="news"):
     life: int  # another one after a restart: the map frame is a new one
     sequence: int
     stamp: float  # s, the robot's own clock
-    pose: tuple[float, float, float]  # map_base
+    pose: Triple  # map_base
+    radius: Radius  # m, of its body
     speed: float  # m/s
     claim: Claim | None
     finished: bool  # it does not drive any more
@@ -105,7 +112,7 @@ def decode(data: bytes) -> News | Course:
 
 
 def _checked_course(course: Course) -> Course:
-    if not (np.isfinite(course.pose).all() and np.isfinite(course.points).all()):
+    if not np.isfinite(course.points).all():
         raise ValueError("a course leads nowhere")
     return course
 

@@ -59,7 +59,7 @@ class Explorer:
     def hear(self, other: "Explorer", *, goes_first: bool) -> None:
         """Be told where the other one is and what it drives along."""
         mind = other.pipeline
-        companion = Companion("other", mind.map_base, goes_first, mind.track)
+        companion = Companion("other", mind.map_base, goes_first, mind.track, radius=0.177)
         map_map = self.start.inverse().compose(other.here).compose(mind.map_base.inverse())
         self.pipeline.company = [moved(companion, map_map)]
 

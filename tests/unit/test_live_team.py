@@ -9,6 +9,7 @@ import structlog
 from gvgbot.autonomy.mission import ExplorationConfig
 from gvgbot.autonomy.pipeline import AutonomyConfig, Pipeline
 from gvgbot.clock import LoopClock, run_in_virtual_time
+from gvgbot.config import RobotConfig
 from gvgbot.live_team import LiveTeam
 from gvgbot.team.member import TeamConfig
 from gvgbot.topics import TeamPart
@@ -46,7 +47,9 @@ def together(
     async def play() -> None:
         air, clock = Air(), LoopClock()
         minds = [Pipeline(AutonomyConfig(), ExplorationConfig(), 0.177) for _ in names]
-        parts = [LiveTeam(n, CONFIG, p, air) for n, p in zip(names, minds, strict=True)]
+        parts = [
+            LiveTeam(RobotConfig(name=n), CONFIG, p, air) for n, p in zip(names, minds, strict=True)
+        ]
         async with asyncio.TaskGroup() as tasks:
             running = [tasks.create_task(part.take_part(clock, at_once)) for part in parts]
             await scene(air, parts)

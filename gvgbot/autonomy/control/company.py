@@ -25,12 +25,16 @@ _ASIDE_M = 0.5  # beyond the disc of a vertex, another robot can pass it
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Companion:
-    """Another robot: where it is, and what it drives along (N, 2), m; both in one frame."""
+    """Another robot: where it is, and what it drives along (N, 2), m; both in one frame.
+
+    `radius` is that of its body, m.
+    """
 
     name: str
     pose: Pose
     goes_first: bool  # by a rule that both know
     course: Array = field(default_factory=lambda: np.empty((0, 2)))
+    radius: float = field(kw_only=True)
 
 
 def moved(companion: Companion, pose: Pose) -> Companion:

@@ -273,12 +273,16 @@ def test_who_has_nowhere_to_go_but_past_another_robot_makes_way() -> None:
     robot.stand(TEE, 8)
     begin, order = robot.stamp, robot.look(TEE)
     while robot.mission.target is not None and robot.stamp < begin + 60.0:
-        robot.mission.meet(robot.pose, [Companion("other", Pose(-1.0, 0.0, 0.0), goes_first=True)])
+        robot.mission.meet(
+            robot.pose, [Companion("other", Pose(-1.0, 0.0, 0.0), goes_first=True, radius=0.2)]
+        )
         robot.mission.hold()
         order = robot.look(TEE)
     assert robot.stamp - begin < 2 * CONFIG.in_the_way_s  # three ways, a third of that for each
     assert end_of(order) == pytest.approx((3.0, -4.0))
-    robot.mission.meet(robot.pose, [Companion("other", Pose(-2.5, 0.0, 0.0), goes_first=True)])
+    robot.mission.meet(
+        robot.pose, [Companion("other", Pose(-2.5, 0.0, 0.0), goes_first=True, radius=0.2)]
+    )
     assert isinstance(robot.look(TEE), Stand)
 
 

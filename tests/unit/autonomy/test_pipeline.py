@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gvgbot.autonomy.control.company import Companion
 from gvgbot.autonomy.events import Decision, Event
 from gvgbot.autonomy.localisation import Localisation
 from gvgbot.autonomy.pipeline import Pipeline
@@ -77,3 +78,23 @@ def test_it_decides_by_nothing_that_was_seen_before_it_had_turned_round() -> Non
         theta, stamp = theta + 0.125 * (twists[stamp].angular > 0.0), stamp + 0.1
     assert any(twist.angular > 0.0 for twist in twists.values())
     assert twists[decided[0]] == STANDSTILL
+
+
+def speed_before(radius: float) -> float:
+    """How fast somebody sets out who has another robot of a radius 0.9 m before it, m/s."""
+    config = load_config()
+    pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
+    here, stamp, twist = Pose(), 0.0, STANDSTILL
+    while twist.linear == 0.0:
+        here, stamp = here.compose(Pose(0.0, 0.0, 0.1 * twist.angular)), stamp + 0.1
+        scan = sweep(ROOMS, Pose(-1.5, 0.0, 0.0).compose(here), field_of_view=LASER_270)
+        twist = pipeline.control(Odometry(stamp, here, STANDSTILL))
+        pipeline.perceive(replace(scan, stamp=stamp, time_increment=0.0))
+    ahead = pipeline.map_base.compose(Pose(0.9, 0.0, 0.0))
+    pipeline.company = [Companion("other", ahead, goes_first=True, radius=radius)]
+    return pipeline.control(Odometry(stamp + 0.02, here, STANDSTILL)).linear
+
+
+def test_a_large_robot_is_kept_away_from_as_far_as_it_is_large() -> None:
+    assert speed_before(radius=0.177) > 0.0  # 0.55 m are free between both bodies
+    assert speed_before(radius=0.65) == 0.0  # 0.07 m

@@ -17,6 +17,7 @@ START = {
     "two": Pose(11.0, 6.0, -2.4),
     "three": Pose(5.0, 5.0, 1.0),
 }
+RADIUS = {"one": 0.177, "two": 0.5, "three": 0.2}
 LEFT, RIGHT = {0, 1, 2, 3, 5, 6, 7, 8, 10, 11, 12, 13}, {1, 2, 3, 6, 7, 8, 11, 12, 13, 14, 9, 4}
 CONFIG = TeamConfig(enabled=True)
 
@@ -57,7 +58,7 @@ def graph_of(chart: Chart) -> GvgGraph:
 
 def robot(name: str, building: Building, seen: set[int], at: int) -> Robot:
     chart = building.chart(seen, START[name])
-    return Robot(Member(name, CONFIG, lambda: chart), chart, at)
+    return Robot(Member(name, CONFIG, lambda: chart, radius=RADIUS[name]), chart, at)
 
 
 def team() -> tuple[Robot, Robot]:
@@ -132,7 +133,7 @@ def test_old_news_do_not_replace_new_ones_and_a_restart_begins_anew() -> None:
     place_then = one.member.others()["two"]
     one.member.hear(old, 4.0)
     assert one.member.others()["two"] == place_then
-    restarted = Member("two", CONFIG, lambda: two.chart, life=1)
+    restarted = Member("two", CONFIG, lambda: two.chart, radius=0.2, life=1)
     one.member.hear(restarted.news(5.0, Pose(), 0.0, finished=False), 5.0)
     assert "two" not in one.member.frames  # its map frame is another one now
 
@@ -170,7 +171,7 @@ def test_a_robot_that_comes_late_or_begins_anew_is_joined() -> None:
     assert is_joined(one, three)
     assert is_joined(three, one)
     again = robot("two", irregular(1), RIGHT, 14)
-    again.member = Member("two", CONFIG, lambda: again.chart, life=1)
+    again.member = Member("two", CONFIG, lambda: again.chart, radius=0.2, life=1)
     again.tell(120.0, one)
     assert "two" not in one.member.frames
     one.member.look(121.0)
@@ -186,6 +187,7 @@ def test_company_is_where_the_newest_course_says_and_leads_along_it() -> None:
     assert companion.pose.distance(true.compose(map_base)) < 0.05
     assert np.abs(companion.course[0] - true.transform(track[0])).max() < 0.05
     assert not companion.goes_first
+    assert companion.radius == RADIUS["two"]
     one.steer(2.0, two, Pose(), np.zeros((0, 2)))
     assert [other.goes_first for other in two.member.company()] == [True]
 

@@ -1,3 +1,5 @@
+import math
+
 import msgspec
 import numpy as np
 import pytest
@@ -20,6 +22,7 @@ def news(chart: Chart) -> News:
         sequence=7,
         stamp=12.5,
         pose=(1.0, 2.0, 0.5),
+        radius=0.25,
         speed=0.3,
         claim=Claim(1.0, 2.0, 0.1, 12.0),
         finished=False,
@@ -68,6 +71,27 @@ def test_an_edge_that_ends_nowhere_is_refused() -> None:
     damaged = msgspec.structs.replace(told, vertices=others)
     with pytest.raises(GvgbotError, match="ends nowhere"):
         decode(encode(damaged))
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf, -1e9])
+@pytest.mark.parametrize("part", ["position", "covariance", "clearance", "departures"])
+def test_news_with_a_number_that_is_none_are_refused(part: str, number: float) -> None:
+    told = news(CHART)
+    broken = {
+        "position": (number, 0.0),
+        "covariance": (1.0, number, 0.0, 1.0),
+        "clearance": number,
+        "departures": ((0, number, None, False),),
+    }
+    vertex = msgspec.structs.replace(told.vertices[0], **{part: broken[part]})
+    with pytest.raises(GvgbotError, match="damaged"):
+        decode(encode(msgspec.structs.replace(told, vertices=(vertex, *told.vertices[1:]))))
+
+
+@pytest.mark.parametrize("changes", [{"radius": 0.0}, {"pose": (0.0, math.nan, 0.0)}])
+def test_news_of_an_impossible_robot_are_refused(changes: dict[str, object]) -> None:
+    with pytest.raises(GvgbotError, match="damaged"):
+        decode(encode(msgspec.structs.replace(news(CHART), **changes)))
 
 
 def test_a_course_arrives_as_it_was() -> None:

@@ -109,14 +109,14 @@ def test_a_slower_robot_stays_on_its_arc_and_may_turn_where_it_stands() -> None:
 def test_of_two_that_hold_each_other_up_the_later_one_tries_another_way_first(
     others: list[tuple[float, bool]], impatient: bool | None
 ) -> None:
-    company = [Companion("other", Pose(x, 0.0, 0.0), first) for x, first in others]
+    company = [Companion("other", Pose(x, 0.0, 0.0), first, radius=0.2) for x, first in others]
     share = patience(Pose(), company)
     assert (share < 1.0, share > 1.0) == (impatient is True, impatient is False)
 
 
 def test_the_nearest_one_is_the_one_to_make_way_for_unless_it_is_far() -> None:
     far, near, later = (
-        Companion("other", Pose(x, 0.0, 0.0), first)
+        Companion("other", Pose(x, 0.0, 0.0), first, radius=0.2)
         for x, first in ((1.7, True), (1.1, True), (0.8, False))
     )
     assert in_front(Pose(), [far, later, near]) is later
@@ -156,7 +156,9 @@ def beside_door(line: Array) -> Array:
 
 def free(line: Array, course: Array, *, goes_first: bool) -> float:
     pose = Pose(float(course[0, 0]), float(course[0, 1]), 0.0)
-    return free_metres(line, beside_door(line), [Companion("other", pose, goes_first, course)])
+    return free_metres(
+        line, beside_door(line), [Companion("other", pose, goes_first, course, radius=0.2)]
+    )
 
 
 @pytest.mark.parametrize("mine", [0.7, 2.0, 2.8, 3.0, 3.2, 5.0])
@@ -176,11 +178,11 @@ def test_nobody_waits_for_who_goes_the_same_way_or_passes_elsewhere() -> None:
     mine = straight(-4.0, 3.0)
     ahead, aside = straight(-0.5, 3.0), straight(-2.0, -2.0 - 1.0, y=1.5)
     for course in (ahead, aside, straight(-1.2, -3.0), np.zeros((0, 2))):
-        one = Companion("other", Pose(), goes_first=True, course=course)
+        one = Companion("other", Pose(), goes_first=True, course=course, radius=0.2)
         assert math.isinf(free_metres(mine, beside_door(mine), [one]))
 
 
 def test_in_a_wide_corridor_nobody_waits() -> None:
     mine, wide = straight(-4.0, 3.0), np.full(71, 1.0)
-    one = Companion("other", Pose(), goes_first=True, course=straight(3.0, -4.0))
+    one = Companion("other", Pose(), goes_first=True, course=straight(3.0, -4.0), radius=0.2)
     assert math.isinf(free_metres(mine, wide, [one]))
