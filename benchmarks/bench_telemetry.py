@@ -25,7 +25,7 @@ import numpy as np
 
 from benchmarks.report import report, report_fact
 from gvgbot import client
-from gvgbot.autonomy.mission import ExplorationConfig
+from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.pipeline import AutonomyConfig, Keyframe, Pipeline, Step
 from gvgbot.autonomy.slam.ekf import Belief, OdometryNoise
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
 
 from benchmarks.reference_gvg import reference_gvg
-from gvgbot.autonomy.mission import ExplorationConfig
+from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.pipeline import AutonomyConfig, Pipeline
 from gvgbot.drivers.world import World
 from gvgbot.geometry import STANDSTILL, Array, Pose, Twist

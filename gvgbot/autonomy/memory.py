@@ -153,7 +153,7 @@ def _intent(pipeline: Pipeline) -> Intent:
         mission.reason,
         mission._budget_m,
         mission._newest_m,
-        mission._start_edge,
+        mission._driven.start,
         mission._frontiers,
         Closed(closed._times, closed._since),
         errands.is_paused,
@@ -251,7 +251,7 @@ def _recall_mission(mission: Mission, intent: Intent) -> None:
     mission.where, mission.target = intent.where, intent.target
     mission.outcome, mission.reason = intent.outcome, intent.reason
     mission._budget_m, mission._newest_m = intent.budget_m, intent.newest_m
-    mission._start_edge, mission._frontiers = intent.start_edge, intent.frontiers
+    mission._driven.start, mission._frontiers = intent.start_edge, intent.frontiers
     closed: Obstructions = mission._obstructions
     closed._times, closed._since = intent.closed.times, intent.closed.since
 

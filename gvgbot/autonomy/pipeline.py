@@ -10,6 +10,7 @@ import numpy as np
 from gvgbot.autonomy.control import company
 from gvgbot.autonomy.control.company import Companion
 from gvgbot.autonomy.control.edge_follower import EdgeFollowerConfig, follow
+from gvgbot.autonomy.control.orders import Drive, LookAround, Order, Stand
 from gvgbot.autonomy.control.reflexes import (
     Felt,
     Held,
@@ -22,6 +23,7 @@ from gvgbot.autonomy.control.reflexes import (
 )
 from gvgbot.autonomy.errands import Errands
 from gvgbot.autonomy.events import EdgeJoined, Event, Recovery, VertexAdded, WayForgotten
+from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.gvg.local import LocalGvg
 from gvgbot.autonomy.gvg.local_map import LocalMapConfig
 from gvgbot.autonomy.gvg.reduction import ReductionConfig, reduce_graph
@@ -29,7 +31,7 @@ from gvgbot.autonomy.gvg.voronoi import fine_graph
 from gvgbot.autonomy.hazards import HazardConfig, Hazards
 from gvgbot.autonomy.localisation import Localisation, LocalMaps
 from gvgbot.autonomy.mapping import Mapper, MappingConfig
-from gvgbot.autonomy.mission import Drive, ExplorationConfig, LookAround, Mission, Order, Stand
+from gvgbot.autonomy.mission import Mission
 from gvgbot.autonomy.newcomers import Newcomers, NewcomersConfig
 from gvgbot.autonomy.odometry_log import OdometryLog
 from gvgbot.autonomy.slam.ekf import OdometryNoise

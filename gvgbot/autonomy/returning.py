@@ -17,9 +17,9 @@ from gvgbot.autonomy.control.reflexes import Felt
 from gvgbot.autonomy.errands import Declined
 from gvgbot.autonomy.estimate import Estimate, smoothed
 from gvgbot.autonomy.events import Event, Finished, Recovery
+from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.localisation import Localisation
 from gvgbot.autonomy.memory import Growth, Memory, recall
-from gvgbot.autonomy.mission import ExplorationConfig
 from gvgbot.autonomy.pipeline import AutonomyConfig, Pipeline, Step
 from gvgbot.autonomy.relocalisation import KnownWalls, Look, Opinion, Relocaliser
 from gvgbot.autonomy.slam.ekf import Belief

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from gvgbot.autonomy.events import Event, Recovery
+from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.loop import Loop
-from gvgbot.autonomy.mission import ExplorationConfig
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.graph import Vertex
 from gvgbot.clock import LoopClock, run_in_virtual_time

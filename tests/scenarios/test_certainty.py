@@ -4,7 +4,7 @@ import pytest
 
 from gvgbot.autonomy.events import Decision, ErrandEnded
 from gvgbot.autonomy.exploration.certainty import CertaintyConfig
-from gvgbot.autonomy.mission import ExplorationConfig
+from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.geometry import Pose
 from tests.scenarios.rig import assert_explored, play
 from tests.unit.autonomy.sights import carved

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from gvgbot.autonomy.events import VertexAdded
-from gvgbot.autonomy.mission import ExplorationConfig
+from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.config import TwinConfig
 from gvgbot.drivers.hokuyo.twin_config import HokuyoTwinConfig
 from gvgbot.geometry import Pose

@@ -6,7 +6,7 @@ from collections.abc import Awaitable, Callable, Sequence
 import pytest
 import structlog
 
-from gvgbot.autonomy.mission import ExplorationConfig
+from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.pipeline import AutonomyConfig, Pipeline
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.config import RobotConfig

@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 
 from gvgbot.autonomy.control.edge_follower import Track
+from gvgbot.autonomy.control.orders import Drive, LookAround, Order, Stand
 from gvgbot.autonomy.destinations import (
     Foot,
     Route,
@@ -20,9 +21,10 @@ from gvgbot.autonomy.errands.kinds import Home, Look, Past, Rest, Stop, ToPoint,
 from gvgbot.autonomy.events import Event, Recovery
 from gvgbot.autonomy.exploration.access import NEAR_M, straight_way, way_to_edge
 from gvgbot.autonomy.exploration.certainty import robot_sigma
+from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.exploration.paths import Approach
 from gvgbot.autonomy.mapping import Mapper
-from gvgbot.autonomy.mission import Drive, ExplorationConfig, LookAround, Mission, Order, Stand
+from gvgbot.autonomy.mission import Mission
 from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.autonomy.views import Correspondence, View
 from gvgbot.autonomy.whereabouts import Situation

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from gvgbot.autonomy.control.orders import Order, Stand
 from gvgbot.autonomy.destinations import Route, foot_of, route_to_foot, route_to_vertex
 from gvgbot.autonomy.errands.driving import DIRECT_M, Driving, Ended, Ground
 from gvgbot.autonomy.errands.kinds import (
@@ -18,8 +19,9 @@ from gvgbot.autonomy.errands.kinds import (
 from gvgbot.autonomy.errands.plans import Here, Kept, Plan, plan_for, recalled
 from gvgbot.autonomy.events import Decision, ErrandEnded, Event
 from gvgbot.autonomy.exploration.certainty import Revisiting
+from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.mapping import Mapper
-from gvgbot.autonomy.mission import ExplorationConfig, Mission, Order, Stand
+from gvgbot.autonomy.mission import Mission
 from gvgbot.autonomy.views import Correspondence, View
 from gvgbot.autonomy.whereabouts import Situation
 from gvgbot.geometry import STANDSTILL, Twist

@@ -1,0 +1,83 @@
+"""What the map learns from where the robot drives: edges that it has followed to their ends."""
+
+import numpy as np
+
+from gvgbot.autonomy.gvg.local import Place
+from gvgbot.autonomy.mapping import Mapper
+from gvgbot.autonomy.start_edge import StartEdge, is_at_start
+from gvgbot.autonomy.views import Correspondence, View
+from gvgbot.autonomy.whereabouts import Passage, Whereabouts
+from gvgbot.geometry import Array
+
+_LEAST_LOOP_M = 4.0  # an edge with both ends in sight is left to sight unless so much was driven
+
+
+class DrivenEdges:
+    """Counts traversals, and joins the two ends of an edge that was driven out of sight."""
+
+    def __init__(self, mapper: Mapper) -> None:
+        self._mapper = mapper
+        self.start: StartEdge | None = None
+
+    def learn(self, view: View, known: Correspondence, place: Place, where: Whereabouts) -> None:
+        """Account for the robot's present place, `where` included."""
+        where.on_edge = self._mapper.unsettled.current(where.on_edge)
+        came_from = self._mapper.came_from
+        if where.on_edge in came_from:  # the vertex that the present edge left was none
+            where.rejoin(*came_from[where.on_edge])
+        clearance = view.gvg.edges[place.edge].clearance_at(place.station)
+        self._close_ring(view, where, clearance)
+        passage = where.follow(view.gvg, place, known, view.local_base.position)
+        if passage is not None:
+            self._account_for(view, known, passage)
+        self._close_start_edge(view, where, clearance)
+
+    def _account_for(self, view: View, known: Correspondence, passage: Passage) -> None:
+        """Count a traversal, or close the edge that was driven from a vertex now out of sight."""
+        graph, left, arrived = self._mapper.graph, passage.left, passage.arrived
+        if left is None and arrived is not None and self.start is None:
+            line = graph.vertices[arrived.vertex].local.inverse().transform(passage.line)
+            self.start = StartEdge(arrived, line, passage.narrowest)
+        if left is None or arrived is None or left == arrived:
+            return
+        edge = graph.edge_at(left)
+        if edge is not None:
+            self._mapper.unsettled.note_way(edge, arrived.vertex)
+            edge.traversals += 1
+            edge.doubted_since = None
+            return
+        far, near = graph.half_edge(arrived), graph.half_edge(left)
+        if far is None or near is None or not (far.open and near.open):
+            return
+        if left in known.branch_of and passage.driven < _LEAST_LOOP_M:
+            return
+        self._mapper.join(view, left, arrived, passage.line, passage.narrowest, driven=True)
+
+    def _close_ring(self, view: View, where: Whereabouts, clearance: float) -> None:
+        """Give an edge without an end a vertex, when the robot has come round to its start."""
+        if self._mapper.graph.vertices or not where.trail:
+            return
+        map_local = self._mapper.belief.map_base.compose(view.local_base.inverse())
+        if self._is_round(where, map_local.transform(where.trail[0]), clearance):
+            self._mapper.close_ring(view, np.array(where.trail), where.narrowest)
+
+    def _close_start_edge(self, view: View, where: Whereabouts, clearance: float) -> None:
+        """Join the edge that the robot started on, when it comes there from the other end."""
+        start, on_edge, graph = self.start, where.on_edge, self._mapper.graph
+        if start is None or on_edge is None or on_edge == start.end:
+            return
+        ends = (graph.half_edge(on_edge), graph.half_edge(start.end))
+        if any(half is None or not half.open for half in ends):
+            return
+        map_vertex = self._mapper.belief.map_vertex(start.end.vertex)
+        if not self._is_round(where, map_vertex.transform(start.line[0]), clearance):
+            return
+        rest = self._mapper.in_local_frame(view, start.end.vertex).transform(start.line)
+        line = np.concatenate([np.array(where.trail), rest])
+        narrowest = min(where.narrowest, start.narrowest)
+        self._mapper.join(view, on_edge, start.end, line, narrowest, driven=True)
+
+    def _is_round(self, where: Whereabouts, start: Array, clearance: float) -> bool:
+        """Whether the robot has come back to where it came onto its first edge (2,), map frame."""
+        driven = where.trail_length > _LEAST_LOOP_M
+        return driven and is_at_start(self._mapper.belief, start, clearance)

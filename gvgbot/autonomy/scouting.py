@@ -1,0 +1,72 @@
+"""What to do while no known way leads to where the robot wants to go."""
+
+import numpy as np
+
+from gvgbot.autonomy.control.edge_follower import Track
+from gvgbot.autonomy.control.orders import ARRIVED_M
+from gvgbot.autonomy.exploration.paths import shortest_paths
+from gvgbot.autonomy.gvg.local import Branch
+from gvgbot.autonomy.slam.ekf import Belief
+from gvgbot.autonomy.whereabouts import Situation
+
+_MOST_NEAR = 2  # vertices to go to, for what no known way leads to
+_AT_VERTEX_M = 0.5  # so near, all that there is to see from a vertex is seen
+
+
+class Scouting:
+    """For a way: goes near what cannot be reached, and then along the present edge, to and fro."""
+
+    def __init__(self) -> None:
+        self._since: float | None = None  # stamp
+        self._gone_near = set[int]()  # vertices that the robot has been at since
+        self._turned_back = False  # after the end of sight
+
+    @property
+    def is_on(self) -> bool:
+        """Whether a way is being looked for."""
+        return self._since is not None
+
+    def begin(self, stamp: float) -> None:
+        """Look for a way."""
+        self._since, self._gone_near, self._turned_back = stamp, set(), False
+
+    def end(self) -> None:
+        """There is a way, or no hope of one."""
+        self._since = None
+
+    def skip(self, seconds: float) -> None:
+        """Do not count a time in which nothing was to be seen."""
+        self._since = None if self._since is None else self._since + seconds
+
+    def lasted(self, stamp: float) -> float:
+        """For how many seconds it has looked, since it was last on its way to a vertex."""
+        return 0.0 if self._since is None else stamp - self._since
+
+    def path_near(self, here: Situation, belief: Belief, stamp: float) -> tuple[Branch, ...] | None:
+        """To the vertices next to a frontier that no known way leads to: one may be seen there."""
+        approaches = shortest_paths(here.graph, here.starts())
+        lost = {end.vertex for end in here.graph.frontiers()} - approaches.keys()
+        rest = sorted(approaches.keys() - self._gone_near)
+        if not lost or not rest or len(self._gone_near) >= _MOST_NEAR:
+            return None
+        places = np.array([belief.map_vertex(vertex).position for vertex in sorted(lost)])
+        nearest = min(
+            rest,
+            key=lambda v: np.hypot(*(places - belief.map_vertex(v).position).T).min(),
+        )
+        approach = approaches[nearest]
+        if approach.metres < _AT_VERTEX_M:
+            self._gone_near.add(nearest)
+            return None
+        first = approach.departures[0].vertex if approach.departures else nearest
+        path = here.path_over(first, approach.departures)
+        if path is not None:
+            self._since = stamp
+        return path
+
+    def path_on(self, here: Situation) -> tuple[Branch, ...]:
+        """On along the present edge; at the end of sight the robot turns back."""
+        path = here.astern() if self._turned_back else here.ahead()
+        if Track.of(*here.gvg.line_from(here.place, path)).length < ARRIVED_M:
+            self._turned_back = not self._turned_back
+        return path

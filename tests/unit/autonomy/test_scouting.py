@@ -1,0 +1,101 @@
+"""Where a robot looks for a way that it does not know."""
+
+import math
+
+import numpy as np
+import pytest
+
+from gvgbot.autonomy.gvg.local import Branch
+from gvgbot.autonomy.scouting import Scouting
+from gvgbot.autonomy.slam.ekf import Belief, add_vertex
+from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex
+from gvgbot.autonomy.views import Correspondence
+from gvgbot.autonomy.whereabouts import Situation, Whereabouts
+from gvgbot.geometry import Pose
+from tests.unit.autonomy.local_graphs import drawn
+
+STREET = drawn({1: (-3.0, 0.0), 2: (4.0, 0.0)}, {10: (1, 2, [])}, unseen={1: math.pi, 2: 0.0})
+
+
+class Town:
+    """Two vertices at the ends of a street, and perhaps another one that nothing leads to."""
+
+    def __init__(self, lost: float | None = None) -> None:
+        self.graph, self.belief = GvgGraph(), Belief()
+        west, east = self._vertex(-3.0), self._vertex(4.0)
+        self.ends = west.add_half_edge(0.0), east.add_half_edge(math.pi)
+        line = np.array([[0.0, 0.0], [7.0, 0.0]])
+        a, b = HalfEdgeId(west.id, self.ends[0]), HalfEdgeId(east.id, self.ends[1])
+        self.graph.join(a, b, line, 1.0, driven=True)
+        self.known = Correspondence()
+        for node, vertex in ((1, west), (2, east)):
+            self.known.pair(node, vertex.id)
+        self.known.pair_branch(Branch(10, forward=True), a)
+        self.known.pair_branch(Branch(10, forward=False), b)
+        self.where = Whereabouts(on_edge=a)
+        if lost is not None:
+            self._vertex(lost).add_half_edge(0.0)
+
+    def _vertex(self, x: float) -> Vertex:
+        vertex = Vertex(self.graph.next_id(), 1.0, Pose(x), 0.0, 0.0)
+        self.graph.vertices[vertex.id] = vertex
+        self.belief = add_vertex(self.belief, vertex.id, vertex.local, np.eye(3) * 1e-4)
+        return vertex
+
+    def seen_from(self, x: float) -> Situation:
+        place = STREET.place(np.array([x, 0.0]))
+        assert place is not None
+        return Situation(STREET, self.known, self.graph, self.where, place, Pose(x))
+
+
+def end_of(path: tuple[Branch, ...] | None) -> tuple[float, float] | None:
+    if path is None:
+        return None
+    x, y = STREET.nodes[STREET.end_of(path[-1])].position
+    return float(x), float(y)
+
+
+@pytest.mark.parametrize(("lost", "near"), [(-9.0, -3.0), (12.0, 4.0)])
+def test_it_goes_to_the_vertex_that_is_nearest_to_what_is_lost_and_then_to_the_next(
+    lost: float, near: float
+) -> None:
+    town, scouting = Town(lost), Scouting()
+    scouting.begin(0.0)
+    assert end_of(scouting.path_near(town.seen_from(0.0), town.belief, 1.0)) == (near, 0.0)
+    assert scouting.path_near(town.seen_from(near), town.belief, 2.0) is None
+    other = 1.0 - near
+    assert end_of(scouting.path_near(town.seen_from(near), town.belief, 3.0)) == (other, 0.0)
+    assert scouting.path_near(town.seen_from(other), town.belief, 4.0) is None
+    assert scouting.path_near(town.seen_from(0.0), town.belief, 5.0) is None
+
+
+def test_with_nothing_lost_there_is_nothing_to_go_near_to() -> None:
+    town = Town()
+    assert Scouting().path_near(town.seen_from(0.0), town.belief, 0.0) is None
+
+
+def test_patience_runs_while_it_is_not_on_its_way_to_a_vertex() -> None:
+    town, scouting = Town(12.0), Scouting()
+    assert scouting.lasted(100.0) == 0.0
+    scouting.begin(0.0)
+    assert scouting.lasted(5.0) == 5.0
+    scouting.path_near(town.seen_from(0.0), town.belief, 5.0)
+    assert scouting.lasted(8.0) == 3.0
+    scouting.skip(2.0)
+    assert scouting.lasted(8.0) == 1.0
+    scouting.end()
+    assert not scouting.is_on
+
+
+def test_at_the_end_of_sight_it_turns_back() -> None:
+    town, scouting = Town(), Scouting()
+    scouting.begin(0.0)
+
+    def aim(x: float) -> tuple[float, float] | None:
+        return end_of(scouting.path_on(town.seen_from(x)))
+
+    assert aim(0.0) == (4.0, 0.0)
+    assert aim(4.0) == (4.0, 0.0)  # where it stands: from now on the other way
+    assert aim(3.9) == (-3.0, 0.0)
+    assert aim(-3.0) == (-3.0, 0.0)
+    assert aim(-2.9) == (4.0, 0.0)
