@@ -59,7 +59,9 @@ def read_carmen(path: Path, *, no_echo_m: float, base_laser: Pose) -> CarmenLog:
         except ValueError:
             damaged += 1
     if not scans:
-        raise UsageError(f"{path} has no FLASER line that can be read: is it a CARMEN log?")
+        raise UsageError(
+            f"{path} is no recording (MCAP), and as a CARMEN log it has no FLASER line to read"
+        )
     by_stamp = attrgetter("stamp")
     return CarmenLog(sorted(odometry, key=by_stamp), sorted(scans, key=by_stamp), damaged)
 
@@ -80,7 +82,7 @@ def _lines(path: Path) -> Iterator[str]:
 
 def _text(path: Path, line: bytes) -> str:
     if b"\0" in line:
-        raise UsageError(f"{path} is not text: a CARMEN log is needed")
+        raise UsageError(f"{path} is neither a recording (MCAP) nor a CARMEN log")
     return line.decode(errors="replace")
 
 

@@ -34,8 +34,7 @@ def _split(words: Sequence[str]) -> tuple[str | None, str, Sequence[str]]:
     is_named = words[0] not in REQUESTS or (len(words) > 1 and words[1] in REQUESTS)
     name, rest = (words[0], words[1:]) if is_named else (None, words)
     if not rest or rest[0] not in REQUESTS:
-        what = f"{rest[0]!r} is no request" if rest else f"{words[0]!r} is not asked for anything"
-        raise UsageError(f"{what}: there are {', '.join(REQUESTS)}")
+        raise UsageError(f"{(rest or words)[0]!r} is no request: there are {', '.join(REQUESTS)}")
     return name, rest[0], rest[1:]
 
 

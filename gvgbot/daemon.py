@@ -14,7 +14,7 @@ from gvgbot import __version__
 from gvgbot.autonomy.loop import Loop
 from gvgbot.clock import LoopClock, VirtualTimeLoop
 from gvgbot.config import Config
-from gvgbot.errors import GvgbotError, UsageError
+from gvgbot.errors import ExtraMissing, GvgbotError, UsageError
 from gvgbot.hal.guard import Guard
 from gvgbot.hal.messages import Odometry
 from gvgbot.links import Devices, Links
@@ -200,9 +200,7 @@ def _foxglove(config: Config, stack: contextlib.ExitStack) -> "FoxgloveServer | 
     except ModuleNotFoundError as error:
         if error.name is None or not error.name.startswith("foxglove"):
             raise
-        raise GvgbotError(
-            "the live view needs foxglove-sdk: pip install 'gvgbot[foxglove]'"
-        ) from error
+        raise ExtraMissing("the live view needs foxglove-sdk", "foxglove") from error
     return stack.enter_context(FoxgloveServer(config.foxglove, config.robot.name))
 
 

@@ -1,8 +1,18 @@
 """The errors a user or the daemon can do something about."""
 
+import sys
+
 
 class GvgbotError(Exception):
     """A failure with one clear line that says what to do; the command line exits with 1."""
+
+
+class ExtraMissing(GvgbotError):
+    """A part of the program needs packages that only an extra installs."""
+
+    def __init__(self, what: str, extra: str) -> None:
+        """Say how to install it where this program is, whichever environment the shell is in."""
+        super().__init__(f"{what}: {sys.executable} -m pip install 'gvgbot[{extra}]'")
 
 
 class UsageError(GvgbotError):

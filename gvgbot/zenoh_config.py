@@ -55,5 +55,7 @@ def reason(error: zenoh.ZError) -> str:
     """What the library says is wrong, without the places in its own source."""
     if "already in use" in str(error):
         return "the address is already in use, perhaps by another gvgbot"
+    if at := re.search(r"--> (\d+):(\d+)[\s\S]*= (.*)", str(error)):  # what the JSON5 parser says
+        return f"line {at[1]}, column {at[2]}: {at[3]}"
     found = re.search(r"\[([^\]]*)\]", str(error))
     return re.sub(r" at /\S+", "", found.group(1) if found else str(error)).strip(". ")

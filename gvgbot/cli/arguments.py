@@ -1,10 +1,14 @@
 """What commands have in common: kinds of arguments, shared options, and printing a line."""
 
 import argparse
+import contextlib
 import re
-from math import isfinite
+from collections.abc import Callable
+from math import inf, isfinite
 from pathlib import Path
-from typing import Any, NoReturn, TypeAlias
+from typing import Any, NoReturn, TypeAlias, TypeVar
+
+Number = TypeVar("Number", int, float)
 
 BAD_USAGE = 2
 MOST_FRAMES = 200
@@ -69,27 +73,18 @@ def say(text: str) -> None:
 
 
 def number(text: str) -> float:
-    """A finite number. Raises ValueError."""
-    value = float(text)
-    if not isfinite(value):
-        raise ValueError(text)
-    return value
+    """A finite number. Raises ArgumentTypeError."""
+    return _value(float, text, "a number", isfinite)
 
 
 def positive(text: str) -> float:
-    """A finite number above 0. Raises ValueError."""
-    value = number(text)
-    if value <= 0.0:
-        raise ValueError(text)
-    return value
+    """A finite number above 0. Raises ArgumentTypeError."""
+    return _value(float, text, "a number above 0", lambda value: 0.0 < value < inf)
 
 
 def seed(text: str) -> int:
-    """A whole number, not negative. Raises ValueError."""
-    value = int(text)
-    if value < 0:
-        raise ValueError(text)
-    return value
+    """A whole number, not negative. Raises ArgumentTypeError."""
+    return _value(int, text, "a whole number from 0 on", lambda value: value >= 0)
 
 
 def tcp_port(text: str) -> int:
@@ -102,8 +97,15 @@ def tcp_port(text: str) -> int:
 
 
 def frames(text: str) -> int:
-    """A number of pictures that still makes a film. Raises ValueError."""
-    value = int(text)
-    if not 2 <= value <= MOST_FRAMES:
-        raise ValueError(text)
-    return value
+    """A number of pictures that still makes a film. Raises ArgumentTypeError."""
+    allowed = f"a whole number from 2 to {MOST_FRAMES}"
+    return _value(int, text, allowed, lambda value: 2 <= value <= MOST_FRAMES)
+
+
+def _value(
+    kind: Callable[[str], Number], text: str, allowed: str, fits: Callable[[Number], bool]
+) -> Number:
+    with contextlib.suppress(ValueError):
+        if fits(value := kind(text)):
+            return value
+    raise argparse.ArgumentTypeError(f"{text!r} must be {allowed}")

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from gvgbot.cli.arguments import Commands, add_overrides, frames, positive, say
-from gvgbot.errors import GvgbotError, UsageError
+from gvgbot.errors import ExtraMissing, UsageError
 
 
 def add_map(commands: Commands) -> None:
@@ -164,7 +164,7 @@ def _export_bag(options: argparse.Namespace) -> int:
     except ModuleNotFoundError as error:
         if error.name is None or not error.name.startswith("rosbags"):
             raise
-        raise GvgbotError("bags need rosbags: pip install 'gvgbot[ros2]'") from error
+        raise ExtraMissing("bags need rosbags", "ros2") from error
 
     for line in export_bag(options.run, options.file, sensors_only=options.sensors_only):
         say(line)

@@ -3,7 +3,7 @@
 import argparse
 
 from gvgbot.cli.arguments import Commands, add_connection, say, tcp_port
-from gvgbot.errors import GvgbotError
+from gvgbot.errors import ExtraMissing
 
 
 def add_monitor(commands: Commands) -> None:
@@ -29,7 +29,7 @@ def _monitor(options: argparse.Namespace) -> int:
     except ModuleNotFoundError as error:
         if error.name is None or not error.name.startswith("rich"):
             raise
-        raise GvgbotError("the monitor needs rich: pip install 'gvgbot[tui]'") from error
+        raise ExtraMissing("the monitor needs rich", "tui") from error
 
     return monitor(options.robot or options.named, options.connect, options.zenoh_file)
 
@@ -70,7 +70,7 @@ def _web(options: argparse.Namespace) -> int:
     except ModuleNotFoundError as error:
         if error.name is None or not error.name.startswith("websockets"):
             raise
-        raise GvgbotError("the page needs websockets: pip install 'gvgbot[web]'") from error
+        raise ExtraMissing("the page needs websockets", "web") from error
 
     connection = (options.robot, options.connect, options.zenoh_file)
     return web(*connection, host=options.host, port=options.port, say=say)
@@ -92,8 +92,8 @@ def add_ctl(commands: Commands) -> None:
     ctl.add_argument(
         "words",
         nargs="+",
-        metavar="WORD",
-        help="the robot's robot.name (default: the only one there is), and the request",
+        metavar="REQUEST",
+        help="what to do, after the robot's robot.name if there are several",
     )
     add_connection(ctl)
     ctl.set_defaults(command=_ctl)

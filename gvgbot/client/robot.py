@@ -100,7 +100,7 @@ def only_robot(endpoint: str, patience_s: float = 10.0, zenoh_file: Path | None 
     if len(names) > 1:
         raise UsageError(f"there are several robots: {', '.join(names)}; name one of them")
     if not names:
-        raise GvgbotError(f"no robot at {endpoint}")
+        raise GvgbotError(f"no robot at {endpoint}: is one running there, or connected to it?")
     return names[0]
 
 
@@ -468,6 +468,8 @@ def _open(endpoint: str, patience_s: float, file: Path | None) -> zenoh.Session:
     except zenoh.ZError as error:
         where = ", ".join(json.loads(config.get_json("connect/endpoints")))
         if "Unable to connect" in str(error):
-            keys = "" if file is None else f", or it does not accept the keys of {file}"
-            raise GvgbotError(f"nobody answers at {where}{keys}") from error
+            why = "is a robot running there?"
+            if file is not None:
+                why = f"no robot is running there, or it does not accept the keys of {file}"
+            raise GvgbotError(f"nobody answers at {where}: {why}") from error
         raise GvgbotError(f"cannot connect to {where}: {reason(error)}") from error

@@ -176,8 +176,10 @@ def _read_yaml(path: Path) -> dict[str, Any]:
         content = yaml.safe_load(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise WorldError(f"{path}: no such file; give the path of a map_server YAML file") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise WorldError(f"{path}: cannot be read as text ({_line(error)})") from None
+    except OSError as error:
+        raise WorldError(f"{path}: cannot read the file: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise WorldError(f"{path}: cannot be read as text; give a map_server YAML file") from None
     except yaml.YAMLError as error:
         raise WorldError(f"{path}: not valid YAML ({_line(error)})") from None
     if not isinstance(content, dict):

@@ -80,8 +80,8 @@ def facts(run: SavedRun) -> Iterator[str]:
         yield f"driven     {run.summary.distance_m:.1f} m in {film.clock(run.summary.duration_s)}"
         yield f"closures   {run.summary.loop_closures}"
     yield (
-        f"vertices   {len(graph.vertices)}: {kinds['meetpoint']} meetpoints, "
-        f"{kinds['endpoint']} endpoints"
+        f"vertices   {len(graph.vertices)}: {_counted(kinds['meetpoint'], 'meetpoint')}, "
+        f"{_counted(kinds['endpoint'], 'endpoint')}"
     )
     yield f"frontiers  {sum(len(vertex.frontiers) for vertex in graph.vertices)} left"
     yield f"edges      {len(graph.edges)} of {sum(e.length for e in graph.edges):.1f} m in all"
@@ -92,6 +92,10 @@ def facts(run: SavedRun) -> Iterator[str]:
         yield f"extent     {width:.1f} m x {height:.1f} m, {_free_area(run):.0f} m^2 of it free"
     if graph.vertices:
         yield _accuracy(graph)
+
+
+def _counted(count: int, what: str) -> str:
+    return f"{count} {what}{'' if count == 1 else 's'}"
 
 
 def _free_area(run: SavedRun) -> float:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from gvgbot.autonomy.loop import Cycle
-from gvgbot.errors import GvgbotError
+from gvgbot.errors import ExtraMissing
 from gvgbot.hal.messages import Battery, Scan
 
 Lived = Scan | Cycle | Battery
@@ -16,10 +16,10 @@ Lived = Scan | Cycle | Battery
 
 @contextmanager
 def extra_needed() -> Iterator[None]:
-    """Turns a missing package into a GvgbotError that names the extra which has it."""
+    """Turns a missing package into an ExtraMissing."""
     try:
         yield
     except ModuleNotFoundError as error:
         if error.name is None or error.name.split(".")[0] not in ("mcap", "google", "zstandard"):
             raise
-        raise GvgbotError(f"recordings need {error.name}: pip install 'gvgbot[record]'") from error
+        raise ExtraMissing("recordings need mcap and protobuf", "record") from error

@@ -83,7 +83,7 @@ def test_a_packed_log_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
     [
         (b"", "no FLASER"),
         (ODOM.encode(), "no FLASER"),
-        (b"\x7fELF\0\0\1\n", "not text"),
+        (b"\x7fELF\0\0\1\n", "neither a recording"),
         (b"\x1f\x8bnot gzip at all", "cannot read"),
     ],
 )

@@ -1,12 +1,13 @@
 """The command line says in one line what is wrong, with the right exit status."""
 
+import sys
 from pathlib import Path
 
 import pytest
 
 from gvgbot import __version__
 from gvgbot.cli import main, status_of
-from gvgbot.errors import ConfigError, DeviceLost, Unsafe, UsageError, WorldError
+from gvgbot.errors import ConfigError, DeviceLost, ExtraMissing, Unsafe, UsageError, WorldError
 
 Captured = pytest.CaptureFixture[str]
 
@@ -22,15 +23,23 @@ BAD_ARGUMENTS = {
     "unknown command": (["dance"], "dance"),
     "unknown option": (["explore", "--wrold", "office"], "--wrold"),
     "two numbers for a start": (["explore", "--start", "1", "2"], "--start"),
-    "a start that is no number": (["explore", "--start", "1", "2", "north"], "north"),
-    "a start that is not finite": (["explore", "--start", "1", "nan", "0"], "nan"),
-    "a seed that is no number": (["explore", "--seed", "x"], "--seed"),
-    "a negative seed": (["explore", "--seed", "-1"], "--seed"),
+    "a start that is no number": (
+        ["explore", "--start", "1", "2", "north"],
+        "'north' must be",
+    ),
+    "a start that is not finite": (
+        ["explore", "--start", "1", "nan", "0"],
+        "'nan' must be",
+    ),
+    "a seed that is no number": (["explore", "--seed", "x"], "from 0 on"),
+    "a negative seed": (["explore", "--seed", "-1"], "from 0 on"),
     "no robot": (["explore", "--robots", "0"], "1 to 8"),
     "too many robots": (["explore", "--robots", "9"], "1 to 8"),
     "no action on a map": (["map"], "COMMAND"),
-    "one frame": (["map", "show", ".", "--frames", "1"], "--frames"),
-    "too many frames": (["map", "show", ".", "--frames", "100000"], "--frames"),
+    "one frame": (["map", "show", ".", "--frames", "1"], "from 2 to 200"),
+    "too many frames": (["map", "show", ".", "--frames", "100000"], "from 2 to 200"),
+    "a tolerance below 0": (["map", "diff", ".", ".", "--tolerance", "-1"], "above 0"),
+    "no request": (["ctl"], "REQUEST"),
     "two configurations": (["run", "a.yaml", "b.yaml"], "b.yaml"),
 }
 
@@ -53,6 +62,7 @@ BAD_CONFIGURATIONS = {
     "override without value": (["explore", "--set", "robot.name"], "must be key=value"),
     "unknown key": (["explore", "--set", "robot.nmae=x"], "did you mean robot.name?"),
     "unknown profile": (["explore", "--set", "twin.base.odometry=ideal"], "one of perfect"),
+    "a directory for a world": (["explore", "--world", "/"], "/: cannot read the file: Is a dir"),
     "no run to show": (["map", "show", "absent"], "absent is no run directory"),
     "no run to tell of": (["map", "info", "absent"], "absent is no run directory"),
     "seed out of range": (["explore", "--seed", str(2**40)], "twin.seed"),
@@ -74,6 +84,12 @@ def test_a_bad_configuration_is_one_line_that_names_it_and_exits_2(
     (line,) = said(capsys)
     assert line.startswith("gvgbot: ")
     assert named in line
+
+
+def test_a_missing_extra_is_one_line_to_copy_whatever_the_shell_knows(capsys: Captured) -> None:
+    assert status_of(lambda: raising(ExtraMissing("the page needs websockets", "web"))) == 1
+    (line,) = said(capsys)
+    assert f": {sys.executable} -m pip install 'gvgbot[web]'" in line
 
 
 def test_every_mistake_of_a_configuration_has_its_own_line(

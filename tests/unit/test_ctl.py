@@ -37,7 +37,7 @@ def test_a_value_is_a_number_or_a_truth_or_text(text: str, value: object) -> Non
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (["dance"], "not asked for anything"),
+        (["dance"], "'dance' is no request"),
         (["sim", "dance"], "'dance' is no request"),
         (["goto"], "goto needs a vertex, or x and y"),
         (["goto", "seven"], "'seven' must be the id of a vertex"),

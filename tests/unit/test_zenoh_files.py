@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from gvgbot.errors import UsageError
 from gvgbot.zenoh_config import session_config
 
 FILES = sorted(path.name for path in (files("gvgbot") / "configs" / "zenoh").iterdir())
@@ -24,3 +25,17 @@ def test_the_router_keeps_what_robots_publish() -> None:
         "gvgbot/*/map",
         "gvgbot/*/state",
     }
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [("# a heading\n", "line 1, column 1"), ("{\n  mode: }\n", "line 2, column 9")],
+)
+def test_what_is_no_json5_is_one_line_that_says_where(text: str, says: str, tmp_path: Path) -> None:
+    path = tmp_path / "wrong.json5"
+    path.write_text(text)
+    with pytest.raises(
+        UsageError, match=rf"wrong\.json5 is no configuration of zenoh: {says}"
+    ) as refusal:
+        session_config({}, path)
+    assert "\n" not in str(refusal.value)

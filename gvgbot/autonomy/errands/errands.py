@@ -27,6 +27,7 @@ from gvgbot.autonomy.whereabouts import Situation
 from gvgbot.geometry import STANDSTILL, Twist
 
 _OFF_GRAPH_M = 3.0  # a point farther from every edge is out of reach
+_MOST_NAMED = 40  # vertices, in an answer
 _MOST_STOPS = 10  # that are passed at once
 _HOLD_S = 0.5  # that a twist of somebody who drives holds; without another one the robot stands
 
@@ -264,7 +265,8 @@ class Errands:
         ids = self._mapper.graph.vertices
         if not ids:
             return "none is known yet"
-        return f"there are {len(ids)}, with ids from {min(ids)} to {max(ids)}"
+        named = ", ".join(str(vertex) for vertex in sorted(ids)[:_MOST_NAMED])
+        return f"there are {named}" + (" and others" if len(ids) > _MOST_NAMED else "")
 
     def whereabouts(self) -> Situation | None:
         """Where the robot was on the graph when it last looked; None if that was off it."""

@@ -166,7 +166,7 @@ def test_a_file_that_is_no_world_is_named(tmp_path: Path, content: bytes, compla
 def test_a_missing_file_and_a_folder_are_named(tmp_path: Path) -> None:
     with pytest.raises(WorldError, match="no such file"):
         load_world(tmp_path / "absent.yaml")
-    with pytest.raises(WorldError, match="cannot be read"):
+    with pytest.raises(WorldError, match="cannot read the file: Is a directory"):
         load_world(tmp_path)
 
 

@@ -186,6 +186,13 @@ def test_equal_maps_exit_with_0(tmp_path: Path, capsys: Captured) -> None:
     assert main(["map", "diff", str(one), str(other), "--tolerance", "0.01"]) == 1
 
 
+@pytest.mark.parametrize("turn", [1e-4, -1e-4])
+def test_next_to_no_turn_has_no_sign(turn: float, tmp_path: Path, capsys: Captured) -> None:
+    one, other = a_run(tmp_path / "a", town()), a_run(tmp_path / "b", town(turn))
+    assert main(["map", "diff", str(one), str(other)]) == 0
+    assert "was turned by 0.0 deg" in capsys.readouterr().out
+
+
 def test_different_maps_exit_with_1_and_a_picture_shows_where(
     tmp_path: Path, capsys: Captured
 ) -> None:

@@ -43,7 +43,7 @@ def test_info_says_what_the_map_holds(run: Path, capsys: Captured) -> None:
     words = {line.split()[0]: " ".join(line.split()[1:]) for line in lines}
     assert words["outcome"] == "explored: no frontier is left"
     assert words["driven"] == "10.0 m in 0:10"
-    assert words["vertices"] == "4: 3 meetpoints, 1 endpoints"
+    assert words["vertices"] == "4: 3 meetpoints, 1 endpoint"
     assert words["frontiers"] == "4 left"
     assert words["edges"] == "3 of 11.0 m in all"
     assert words["narrowest"] == "0.90 m to the walls"
