@@ -146,7 +146,7 @@ def told(event: Event, now: float) -> Fact | None:
     if event.kind in _QUIET:
         return None
     tone = _TONES.get(event.kind, "plain")
-    return Fact(f"{duration(now - event.stamp):>8}", _words(event), tone)
+    return Fact(f"{_age(now - event.stamp):>8}", _words(event), tone)
 
 
 def _words(event: Event) -> str:
@@ -210,6 +210,14 @@ def _alive(robot: str, state: State | None) -> Fact:
     if state.cycle_age is not None and state.cycle_age > _STUCK_AFTER and state.base.connected:
         return Fact(robot, "its control loop is stuck", "bad")
     return Fact(robot, state.reason or "alive", _tone_of_phase(state))
+
+
+def _age(seconds: float) -> str:
+    """A time span as short as a column is: 12 s, 3 min, 2 h."""
+    whole = int(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    return f"{whole // 60} min" if whole < 3600 else f"{whole // 3600} h"
 
 
 def duration(seconds: float) -> str:

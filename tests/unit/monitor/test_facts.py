@@ -139,6 +139,17 @@ def test_an_event_is_a_sentence_with_its_age() -> None:
 
 
 @pytest.mark.parametrize(
+    ("seconds", "age"),
+    [(59.9, "59 s"), (79.0, "1 min"), (3599.0, "59 min"), (7260.0, "2 h"), (720_000.0, "200 h")],
+)
+def test_the_age_of_an_event_fits_its_column(seconds: float, age: str) -> None:
+    fact = told(DECISION, DECISION.stamp + seconds)
+    assert fact is not None
+    assert fact.name.strip() == age
+    assert len(fact.name) == 8
+
+
+@pytest.mark.parametrize(
     ("kind", "details", "text"),
     [
         (
