@@ -217,7 +217,10 @@ def _on_cycle(robot: _Robot, air: _Air, devices: Devices, odometry: Odometry) ->
     pipeline, config = robot.session.pipeline, robot.session.config.team
     if odometry.stamp >= robot.steered + config.steer_every_s:
         robot.steered = odometry.stamp
-        air.send(robot.member.course(odometry.stamp, pipeline.map_base, pipeline.track), robot)
+        course = robot.member.course(
+            odometry.stamp, pipeline.map_base, pipeline.track, pipeline.seen
+        )
+        air.send(course, robot)
         pipeline.company = robot.member.company()
     if odometry.stamp >= robot.told + config.tell_every_s:
         _tell(robot, air, odometry.stamp)

@@ -98,7 +98,7 @@ class LiveTeam:
         while True:
             if not pipeline.is_lost:
                 now = self._clock.now()
-                course = self.member.course(now, pipeline.map_base, pipeline.track)
+                course = self.member.course(now, pipeline.map_base, pipeline.track, pipeline.seen)
                 self._network.tell_team("course", encode(course))
                 pipeline.company = self.member.company()
             await self._clock.sleep_until(self._clock.now() + self._config.steer_every_s)

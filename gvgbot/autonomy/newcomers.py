@@ -79,6 +79,7 @@ class Newcomers:
         self._all: list[Newcomer] = []
         self.company: list[tuple[Array, float]] = []  # other robots: where they say they are,
         self._met: list[tuple[Array, float]] = []  # and where they are seen
+        self.bodies: Array = np.empty((0, 3))  # round ones in the last look: x, y, radius, m
         self._glanced: list[tuple[Array, float]] | None = None  # where those are that move on
 
     def sift(
@@ -98,7 +99,11 @@ class Newcomers:
         scan = without_fringes(scan)
         walls = _Walls(local_map, self._config.away_from_walls_m, is_way)
         self._met, seen = [], []
-        for island in islands(scan, local_base):
+        found = islands(scan, local_base)
+        self.bodies = np.array(
+            [(*island.centre, island.radius) for island in found if island.is_round]
+        ).reshape(-1, 3)
+        for island in found:
             if self._is_company(island):
                 self._met.append((island.centre, island.radius))
             elif self._is_passing(island, scan.stamp, walls):

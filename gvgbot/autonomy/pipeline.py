@@ -8,7 +8,7 @@ from typing import Annotated
 import numpy as np
 
 from gvgbot.autonomy.control import company
-from gvgbot.autonomy.control.company import Companion
+from gvgbot.autonomy.control.company import BodiesSeen, Companion
 from gvgbot.autonomy.control.edge_follower import EdgeFollowerConfig, follow
 from gvgbot.autonomy.control.orders import Drive, LookAround, Order, Stand
 from gvgbot.autonomy.control.reflexes import (
@@ -137,6 +137,7 @@ class Pipeline:
         self._hazards = Hazards(config.hazards)
         self._newcomers = Newcomers(config.newcomers)
         # other robots as they tell of themselves, map frame; None if there are surely none
+        self.seen: BodiesSeen | None = None  # bodies in the last look
         self.company: list[Companion] | None = None
         self._incidents: list[tuple[str, str]] = []  # action and reason, since the last scan
         self._was_lifted = self._look_now = False
@@ -220,6 +221,7 @@ class Pipeline:
         self.mission.meet(local_base, nearby)
         is_way = partial(self.mapper.is_way, local_base)
         scan = self._newcomers.sift(scan, local_base, self._maps.near, is_way)
+        self.seen = self._bodies_seen(scan.stamp, local_base)
         self._maps.insert(scan, local_base, self.travelled)
         self._hazards.forget(self.travelled)
         if self.led and not self._worth_a_gvg(local_base):
@@ -257,6 +259,12 @@ class Pipeline:
         order, done = self.errands.advance(view, known)
         self._obey(order)
         return done
+
+    def _bodies_seen(self, stamp: float, local_base: Pose) -> BodiesSeen:
+        """The round bodies of the last look, map frame."""
+        map_base, bodies = self.mapper.belief.map_base, self._newcomers.bodies.copy()
+        bodies[:, :2] = map_base.compose(local_base.inverse()).transform(bodies[:, :2])
+        return BodiesSeen(stamp, map_base, bodies)
 
     def _nearby(self, local_base: Pose) -> list[Companion]:
         """Other robots in the local frame; the base of the belief is at a pose there."""

@@ -58,6 +58,7 @@ _LEAST_PAIRS, _LEAST_MEETPOINTS = 4, 3
 _AGAINST_SHARE = 0.1  # of all vertices that are judged,
 _MISSED_SHARE = 0.3
 _SURE = 0.995
+_MISTAKES = 2  # vertices of either kind do not refute what was sure
 
 Complex = NDArray[np.complex128]
 
@@ -103,6 +104,15 @@ class _Evidence:
             and self.against <= _AGAINST_SHARE * judged
             and self.missed <= _MISSED_SHARE * judged
             and self.crossed <= _CROSSING * self.judged
+        )
+
+    @property
+    def is_refuted(self) -> bool:
+        """Whether more than a few mistakes of either robot speaks against it."""
+        return (
+            self.against > max(_MISTAKES, self.agreeing)
+            or self.missed > max(_MISTAKES, self.agreeing)
+            or self.crossed > max(_ONE_CROSSING_M, 3 * _CROSSING * self.judged)
         )
 
 
@@ -206,10 +216,10 @@ def align(ours: Chart, theirs: Chart) -> Alignment | None:
 
 
 def refined(ours: Chart, theirs: Chart, known: Alignment) -> Alignment | None:
-    """The same alignment by charts that have grown since; None if they do not bear it out."""
+    """The same alignment by charts that have grown since; None if they speak against it."""
     evidence = _examine(Side(ours), Side(theirs), known.pose)
     if not evidence.is_possible:
-        return None
+        return None if evidence.is_refuted else known
     pose, covariance = fitted(ours, theirs, evidence.pairs)
     return Alignment(pose, covariance, evidence.pairs, known.confidence)
 
@@ -305,7 +315,7 @@ def _examine(a: Side, b: Side, pose: Pose) -> _Evidence:
         before, partners = partners, _partners(a, b, pose)
         if partners == before or len(partners) < _FIXED_BY:
             break
-        pose, _ = _least_squares(
+        pose, _ = least_squares(
             a.points[[i for i, _ in partners]], b.points[[j for _, j in partners]]
         )
     likeness = {(i, j): _likeness(a, b, i, j, pose) for i, j in partners}
@@ -371,7 +381,7 @@ def _agreement(a: Side, b: Side, ours: ChartVertex, theirs: ChartVertex, pose: P
         found = np.isfinite(np.asarray(away))
         if np.count_nonzero(found) < max(_LEAST_PAIRS, _HOPELESS_SHARE * len(found)):
             return 0.0
-        local, _ = _least_squares(a.walls.data[np.asarray(index)[found]], near_b[found])
+        local, _ = least_squares(a.walls.data[np.asarray(index)[found]], near_b[found])
     shift = local.transform(theirs.position) - pose.transform(theirs.position)
     if np.hypot(*shift) > _SHIFT_M or abs(wrap_angle(local.theta - pose.theta)) > _TURN_RAD:
         return 0.0
@@ -456,10 +466,10 @@ def fitted(ours: Chart, theirs: Chart, pairs: tuple[tuple[int, int], ...]) -> tu
     """
     a = np.array([ours.vertices[i].position for i, _ in pairs])
     b = np.array([theirs.vertices[j].position for _, j in pairs])
-    return _least_squares(a, b)
+    return least_squares(a, b)
 
 
-def _least_squares(a: Array, b: Array) -> tuple[Pose, Array]:
+def least_squares(a: Array, b: Array) -> tuple[Pose, Array]:
     """The pose for which b's points (N, 2), laid by it, are nearest to a's; its covariance."""
     u, v = a[:, 0] + 1j * a[:, 1], b[:, 0] + 1j * b[:, 1]
     turn = np.vdot(v - v.mean(), u - u.mean())

@@ -5,6 +5,7 @@ its graph hold only what it has measured itself. What the others have found tell
 go, and which of its own frontiers leads to where nobody has been.
 """
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Annotated
@@ -12,19 +13,30 @@ from typing import Annotated
 import numpy as np
 
 from gvgbot.autonomy.control import company
-from gvgbot.autonomy.control.company import Companion
+from gvgbot.autonomy.control.company import BodiesSeen, Companion
 from gvgbot.autonomy.exploration.paths import Approach, shortest_paths
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
 from gvgbot.geometry import Array, Pose
 from gvgbot.ranges import Range
 from gvgbot.team.alignment import Alignment, align, refined
 from gvgbot.team.chart import Chart, moved
-from gvgbot.team.news import Claim, Course, Frame, News, told_edges, told_vertices
+from gvgbot.team.encounter import WINDOW_S, frame_of
+from gvgbot.team.news import (
+    Claim,
+    Course,
+    Frame,
+    News,
+    ToldLook,
+    told_edges,
+    told_vertices,
+)
 from gvgbot.team.site import Frontier, Site
 
 _STANDING_M = 0.1  # moved less from news to news, a robot stands
 _FRESH_S = 1.0  # a robot that drives is no longer where it was told to be before
 _SPARSE = 4  # every so manieth point of a track is told
+_RECOGNISE_S = 1.0  # between two attempts to recognise a robot by how it moves
+_SURE_BY_SIGHT = 0.999  # that the robot met is the one that says so
 _TAKES_OVER_M = 2.0  # nearer to a frontier than who claims it, one takes it
 
 
@@ -58,6 +70,8 @@ class _Mate:
     alignment: Alignment | None = None
     tried: float = float("-inf")  # stamp of the last attempt to align
     sizes: tuple[int, ...] = ()  # of both charts then
+    looks: deque[BodiesSeen] = field(default_factory=deque)  # lately; stamps of the own clock
+    recognised: float = float("-inf")  # stamp of the last attempt to
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -108,6 +122,7 @@ class Member:
         self._stamp = 0.0
         self._sequence = self._courses = 0
         self._others_claim_all = self._nothing_left = False
+        self._looks: deque[BodiesSeen] = deque()  # lately
         self.met: list[Met] = []  # lately; whoever tells of it takes it out
 
     # -- what is told and heard --------------------------------------------------------------------
@@ -139,16 +154,27 @@ class Member:
             edges=told_edges(self._chart),
         )
 
-    def course(self, stamp: float, map_base: Pose, track: Array) -> Course:
-        """What to tell the others in between: where one is, and what one drives along (N, 2)."""
+    def course(
+        self, stamp: float, map_base: Pose, track: Array, seen: BodiesSeen | None = None
+    ) -> Course:
+        """What to tell the others in between: where one is, and what one drives along (N, 2).
+
+        `seen` is what was seen last.
+        """
         self._stamp = stamp
         self._courses += 1
+        look = None
+        if seen is not None and (not self._looks or seen.stamp > self._looks[-1].stamp):
+            _remember(self._looks, seen)
+            pose, bodies = seen.map_base, tuple((x, y, r) for x, y, r in seen.bodies.tolist())
+            look = ToldLook(max(0.0, stamp - seen.stamp), (pose.x, pose.y, pose.theta), bodies)
         return Course(
             robot=self.name,
             life=self._life,
             sequence=self._courses,
             pose=(map_base.x, map_base.y, map_base.theta),
             line=track[::_SPARSE].astype("<f4").tobytes(),
+            look=look,
         )
 
     def hear(self, told: News | Course, stamp: float) -> None:
@@ -167,6 +193,23 @@ class Member:
             return
         mate.courses, mate.seen = course.sequence, stamp
         mate.map_base, mate.course = Pose(*course.pose), course.points
+        if course.look is not None:
+            bodies = np.array(course.look.bodies).reshape(-1, 3)
+            pose = Pose(*course.look.pose)
+            _remember(mate.looks, BodiesSeen(stamp - course.look.age, pose, bodies))
+            self._recognise(course.robot, mate, stamp)
+
+    def _recognise(self, name: str, mate: _Mate, stamp: float) -> None:
+        """Find out whether a body that is seen is another robot whose frame is not known yet."""
+        if mate.alignment is not None or stamp - mate.recognised < _RECOGNISE_S:
+            return
+        mate.recognised = stamp
+        found = frame_of(self._looks, mate.looks, self._radius, mate.news.radius)
+        if found is None:
+            return
+        alignment = Alignment(*found, (), _SURE_BY_SIGHT)
+        if refined(self._chart, mate.chart, alignment) is not None:
+            self._lay(name, mate, alignment)
 
     def _learn(self, news: News, stamp: float) -> None:
         mate = self._mates.get(news.robot)
@@ -204,10 +247,16 @@ class Member:
     def settle(self, comparison: "Comparison", alignment: Alignment | None) -> None:
         """Take in what a comparison has shown, unless the other has begun anew meanwhile."""
         mate = self._mates.get(comparison.robot)
-        if mate is None or mate.news.life != comparison.life:
-            return
+        if (
+            mate is not None
+            and mate.news.life == comparison.life
+            and mate.alignment is comparison.before  # it was not recognised meanwhile
+        ):
+            self._lay(comparison.robot, mate, alignment)
+
+    def _lay(self, name: str, mate: _Mate, alignment: Alignment | None) -> None:
         if alignment is not None and mate.alignment is None:
-            self.met.append(Met(comparison.robot, alignment))
+            self.met.append(Met(name, alignment))
         mate.alignment = alignment
         self._site = None
 
@@ -219,11 +268,20 @@ class Member:
             if mate.alignment is not None
         }
 
+    def _told(self) -> dict[str, Pose]:
+        """The same, by what those robots found."""
+        return {
+            name: Pose(*frame.pose).inverse()
+            for name, mate in self._mates.items()
+            for frame in mate.news.frames
+            if frame.robot == self.name
+        }
+
     @property
     def frames(self) -> dict[str, Pose]:
         """Poses of all known frames in the own one: found, or told by one whose frame is known."""
-        known = {self.name: Pose()} | self._direct()
-        waiting = sorted(self._direct())
+        known = {self.name: Pose()} | self._told() | self._direct()
+        waiting = sorted(known.keys() - {self.name})
         while waiting:
             name = waiting.pop(0)
             for frame in self._mates[name].news.frames if name in self._mates else ():
@@ -356,6 +414,13 @@ class Member:
             charts += [moved(self._mates[n].chart, pose) for n, pose in self.frames.items()]
             self._site = Site(charts)
         return self._site
+
+
+def _remember(looks: deque[BodiesSeen], seen: BodiesSeen) -> None:
+    """Add a look, and forget those of long before."""
+    looks.append(seen)
+    while looks[0].stamp < seen.stamp - WINDOW_S:
+        looks.popleft()
 
 
 def _claim_at(claim: Claim, there: Pose) -> Claim:

@@ -55,6 +55,14 @@ class Frame(msgspec.Struct, frozen=True, array_like=True):
     pose: Triple
 
 
+class ToldLook(msgspec.Struct, frozen=True, array_like=True):
+    """Where a robot was when it looked, and what bodies it saw."""
+
+    age: Annotated[float, msgspec.Meta(ge=0.0, le=60.0)]  # s, when it is told
+    pose: Triple  # map_base
+    bodies: tuple[tuple[Number, Number, Radius], ...]  # x, y, m, map frame, and radius, m
+
+
 class Course(msgspec.Struct, frozen=True, kw_only=True, tag="course"):
     """Where a robot is and what it drives along: told more often than all the rest."""
 
@@ -63,6 +71,7 @@ class Course(msgspec.Struct, frozen=True, kw_only=True, tag="course"):
     sequence: int  # of the courses
     pose: Triple  # map_base
     line: bytes  # little-endian float32 pairs x, y, m, map frame
+    look: ToldLook | None = None  # the newest, if it has not been told before
 
     @property
     def points(self) -> Array:

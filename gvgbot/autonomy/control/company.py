@@ -37,6 +37,18 @@ class Companion:
     radius: float = field(kw_only=True)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class BodiesSeen:
+    """A look around: its stamp, s, where the robot was, and round bodies that it saw.
+
+    `bodies` (N, 3) are centres, m, in the map frame as believed then, and radii, m.
+    """
+
+    stamp: float
+    map_base: Pose
+    bodies: Array
+
+
 def moved(companion: Companion, pose: Pose) -> Companion:
     """The companion in the frame in which its frame has this pose."""
     course = pose.transform(companion.course)

@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from gvgbot.team.alignment import align, refined
 from tests.unit.team.building import irregular, lattice
 
 STARTS = Pose(3.0, -2.0, 0.7), Pose(11.0, 6.0, -2.4)
+SHIFTED = np.array([0.0, 0.5])
 LEFT, RIGHT = {0, 1, 2, 3, 5, 6, 7, 8, 10, 11, 12, 13}, {1, 2, 3, 4, 6, 7, 8, 9, 11, 12, 13, 14}
 
 
@@ -59,6 +61,19 @@ def test_an_alignment_that_the_charts_no_longer_bear_out_is_taken_back() -> None
     assert refined(ours, theirs, found) is not None
     elsewhere = irregular(12).chart(RIGHT, STARTS[1])
     assert refined(ours, elsewhere, found) is None
+
+
+def test_a_vertex_that_one_robot_took_somebody_for_does_not_part_the_maps() -> None:
+    building = irregular(1)
+    ours, theirs = building.chart(LEFT, STARTS[0]), building.chart(RIGHT, STARTS[1])
+    found = align(ours, theirs)
+    assert found is not None
+    shared = sorted(LEFT & RIGHT)[0]
+    mistaken = replace(theirs.vertices[shared], walls=theirs.vertices[shared].walls + SHIFTED)
+    theirs = replace(theirs, vertices=theirs.vertices | {shared: mistaken})
+    kept = refined(ours, theirs, found)
+    assert kept is not None
+    assert kept.pose.distance(found.pose) < 0.1
 
 
 def test_the_covariance_of_a_frame_grows_with_how_far_apart_the_charts_stay() -> None:

@@ -4,13 +4,14 @@ from functools import cache
 
 import numpy as np
 
+from gvgbot.autonomy.control.company import BodiesSeen
 from gvgbot.autonomy.exploration.paths import Approach
 from gvgbot.autonomy.slam.graph import Edge, GvgGraph, HalfEdge, HalfEdgeId, Vertex
 from gvgbot.geometry import Array, Pose
 from gvgbot.team.chart import Chart
 from gvgbot.team.member import Member, TeamConfig
 from gvgbot.team.news import decode, encode
-from tests.unit.team.building import Building, irregular
+from tests.unit.team.building import Building, irregular, lattice
 
 START = {
     "one": Pose(3.0, -2.0, 0.7),
@@ -41,8 +42,15 @@ class Robot:
         for other in others:
             other.member.hear(decode(news), stamp)
 
-    def steer(self, stamp: float, other: "Robot", map_base: Pose, track: Array) -> None:
-        course = encode(self.member.course(stamp, map_base, track))
+    def steer(
+        self,
+        stamp: float,
+        other: "Robot",
+        map_base: Pose,
+        track: Array,
+        seen: BodiesSeen | None = None,
+    ) -> None:
+        course = encode(self.member.course(stamp, map_base, track, seen))
         other.member.hear(decode(course), stamp)
 
 
@@ -237,3 +245,39 @@ def test_two_that_have_given_up_do_not_wait_for_each_other() -> None:
     for stamp in (4.0, 6.0):
         two.tell(stamp, one, at=Pose(1.0, 0.0, 0.0))  # it stands, and is on its way to nothing
     assert (one.choose(), one.member.is_waiting, one.member.is_done) == (None, False, True)
+
+
+def test_robots_that_pass_each_other_find_their_frames_where_maps_tell_nothing() -> None:
+    """In a grid of equal corridors; each sees the other come, and hears where it says it is."""
+    grid = lattice(6.0 * np.arange(5), 6.0 * np.arange(4))
+    one, two = robot("one", grid, {5, 6, 7}, 5), robot("two", grid, {8, 9}, 9)
+    one.tell(0.0, two)
+    two.tell(0.0, one)
+    for t in np.arange(0.0, 12.0, 0.4).tolist():
+        places = {"one": Pose(10.0 + 0.4 * t, 5.8, 0.0), "two": Pose(17.0 - 0.4 * t, 6.3, np.pi)}
+        for here, there in ((one, two), (two, one)):
+            start = START[here.member.name]
+            map_base = start.to(places[here.member.name])
+            x, y = start.inverse().transform(places[there.member.name].position)
+            body = np.array([[x, y, RADIUS[there.member.name]]])
+            here.steer(t + 0.1, there, map_base, np.zeros((0, 2)), BodiesSeen(t, map_base, body))
+    for here, there in ((one, two), (two, one)):
+        found = here.member.frames[there.member.name]
+        true = START[here.member.name].to(START[there.member.name])
+        middle = START[there.member.name].inverse().transform(np.array([13.0, 6.0]))
+        assert np.hypot(*(found.transform(middle) - true.transform(middle))) < 0.02
+        assert [met.robot for met in here.member.met] == [there.member.name]
+    one.member.look(20.0)
+    assert one.member.frames, "equal corridors do not speak against it"
+
+
+def test_who_hears_that_its_frame_was_found_knows_the_other_ones() -> None:
+    building = irregular(1)
+    one, two = robot("one", building, LEFT, 0), robot("two", building, RIGHT, 14)
+    one.tell(0.0, two)
+    two.tell(0.0, one)
+    one.member.look(1.0)
+    one.tell(2.0, two)
+    true, found = START["two"].to(START["one"]), two.member.frames["one"]
+    middle = START["one"].inverse().transform(np.array([6.0, 2.0]))
+    assert np.hypot(*(found.transform(middle) - true.transform(middle))) < 0.1

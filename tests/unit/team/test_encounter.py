@@ -1,0 +1,97 @@
+"""Two robots that see each other know where the other's frame lies; other bodies tell nothing."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from gvgbot.autonomy.control.company import BodiesSeen
+from gvgbot.geometry import Array, Pose, wrap_angle
+from gvgbot.team.encounter import frame_of
+
+STARTS = Pose(3.0, -2.0, 0.7), Pose(11.0, 6.0, -2.4)  # of either map frame, world frame
+RADIUS = 0.177
+SIGHT_M = 5.0
+
+Way = Callable[[float], Array]  # where something is (2,), m, at a time, s; world frame
+
+
+def straight(x: float, y: float, vx: float, vy: float, until: float = math.inf) -> Way:
+    return lambda t: np.array([x + vx * min(t, until), y + vy * min(t, until)])
+
+
+EAST = straight(0.0, 0.0, 0.4, 0.0, until=8.0)  # and then it waits, to let the other one pass
+WEST = straight(7.0, 0.6, -0.45, 0.0)
+
+
+def looks(number: int, way: Way, *bodies: Way, radius: float = RADIUS) -> list[BodiesSeen]:
+    """What a robot sees from its way, to a centimetre; two robots do not look at the same time."""
+    rng = np.random.default_rng(number)
+    found = []
+    for t in (np.arange(0.0, 15.0, 0.4) + 0.17 * number).tolist():
+        dx, dy = way(t + 0.1) - way(t)
+        map_base = STARTS[number].to(Pose(*way(t).tolist(), math.atan2(dy, dx)))
+        seen = [body(t) for body in bodies if math.dist(body(t), way(t)) < SIGHT_M]
+        centres = STARTS[number].inverse().transform(np.array(seen).reshape(-1, 2))
+        centres += rng.normal(0.0, 0.01, centres.shape)
+        rows = np.column_stack([centres, np.full(len(centres), radius)])
+        found.append(BodiesSeen(t, map_base, rows))
+    return found
+
+
+def frame(mine: list[BodiesSeen], theirs: list[BodiesSeen]) -> tuple[Pose, Array] | None:
+    return frame_of(mine, theirs, RADIUS, RADIUS)
+
+
+def is_right(pose: Pose, true: Pose) -> bool:
+    """In the middle of where they met, to two centimetres and a degree."""
+    there = true.inverse().transform(STARTS[0].inverse().transform(WEST(6.0)))
+    off = math.dist(pose.transform(there), true.transform(there))
+    return off < 0.02 and abs(wrap_angle(pose.theta - true.theta)) < 0.02
+
+
+@pytest.mark.parametrize("passer_by", [(), (straight(2.0, 1.0, 0.1, 0.3),)])
+def test_two_that_pass_each_other_know_how_their_frames_lie(passer_by: tuple[Way, ...]) -> None:
+    """Whether or not both see somebody else as well."""
+    one, two = looks(0, EAST, WEST, *passer_by), looks(1, WEST, EAST, *passer_by)
+    true = STARTS[0].to(STARTS[1])
+    for found, right in ((frame(one, two), true), (frame(two, one), true.inverse())):
+        assert found is not None
+        pose, covariance = found
+        if right is true:
+            assert is_right(pose, right)
+        off = pose.inverse().compose(right)
+        assert abs(wrap_angle(off.theta)) < 3.0 * math.sqrt(covariance[2, 2])
+
+
+def test_who_sees_without_being_seen_does_not_know_whom() -> None:
+    assert frame(looks(0, EAST, WEST), looks(1, WEST)) is None
+
+
+def test_two_that_stand_before_each_other_may_be_any_two() -> None:
+    here, there = straight(0.0, 0.0, 0.0, 0.0), straight(2.0, 0.0, 0.0, 0.0)
+    assert frame(looks(0, here, there), looks(1, there, here)) is None
+
+
+def test_two_that_meet_others_at_the_same_time_are_not_taken_for_each_other() -> None:
+    """Both drive along corridors, and somebody comes towards each, who is not the other one."""
+    mine, theirs = (
+        looks(0, EAST, straight(6.0, 0.6, -0.3, 0.05)),
+        looks(1, WEST, straight(1.0, 0.0, 0.5, 0.0)),
+    )
+    assert frame(mine, theirs) is None
+
+
+def test_a_body_of_another_width_is_not_the_robot() -> None:
+    assert frame(looks(0, EAST, WEST, radius=0.3), looks(1, WEST, EAST)) is None
+
+
+def test_who_was_silent_while_it_was_seen_is_not_known_to_have_been_there() -> None:
+    told = [look for look in looks(1, WEST, EAST) if not 1.0 < look.stamp < 14.0]
+    assert frame(looks(0, EAST, WEST), told) is None
+
+
+def test_nobody_is_recognised_before_anything_was_seen() -> None:
+    assert frame([], []) is None
+    assert frame(looks(0, EAST), looks(1, WEST)) is None
