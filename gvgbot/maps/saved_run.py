@@ -56,6 +56,9 @@ class SavedRun:
         """The run in a directory. Raises UsageError if a file is missing or damaged."""
         if not (directory / "map.geojson").exists():
             raise UsageError(f"{directory} is no run directory: there is no map.geojson in it")
+        if robots := sorted(path.parent for path in directory.glob("*/map.geojson")):
+            several = ", ".join(str(robot) for robot in robots)
+            raise UsageError(f"{directory} is a run of several robots: name one of {several}")
         return cls(
             name=directory.resolve().name,
             graph=_decoded(directory / "map.geojson", geojson.decode),

@@ -119,3 +119,12 @@ def test_a_run_that_never_began_has_a_map_but_no_film(run: Path, capsys: Capture
     capsys.readouterr()
     assert main(["map", "show", str(run), "--animate"]) == 2
     assert "nothing to animate" in capsys.readouterr().err
+
+
+def test_of_several_robots_one_has_to_be_named(run: Path, capsys: Captured) -> None:
+    """The joined map has no grid and no trajectory of its own."""
+    (run.parent / "map.geojson").write_bytes((run / "map.geojson").read_bytes())
+    assert main(["map", "show", str(run.parent)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.endswith(f"is a run of several robots: name one of {run}")
+    assert main(["map", "show", str(run)]) == 0
