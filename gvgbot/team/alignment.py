@@ -2,8 +2,8 @@
 
 Stretches of as many metres between vertices that look alike suggest transforms. Each that lays
 several vertices on each other is examined: vertices must agree in kind, departures, clearance and
-the walls around them, hang together by edges of equal length in both charts, and nothing may speak
-against it. How much it says that they agree is measured in the building itself: each chart is laid
+the walls around them, some must hang together by edges of equal length in both charts, and nothing
+may speak against it. How much it says that they agree is measured in the building itself: each chart is laid
 onto itself in all the wrong ways, and where that often fits, as in a grid of equal corridors,
 agreement says little. If what is shared can be laid elsewhere in either chart, it says nothing.
 """
@@ -54,7 +54,7 @@ _AGAINST = 3.0  # a vertex that looks otherwise
 _MISSED = 1.5  # one that should be there and is not: either robot may have been mistaken
 _FIXED_BY = 2  # pairs that any transform lays on each other
 _TRIES = 6.0  # log of how many transforms chance may choose from
-_LEAST_PAIRS, _LEAST_MEETPOINTS = 4, 3
+_LEAST_PAIRS, _LEAST_CONNECTED, _LEAST_MEETPOINTS = 4, 3, 3
 _AGAINST_SHARE = 0.1  # of all vertices that are judged,
 _MISSED_SHARE = 0.3
 _SURE = 0.995
@@ -86,9 +86,9 @@ class _Evidence:
     """What speaks for and against a transform."""
 
     pose: Pose
-    pairs: tuple[tuple[int, int], ...]  # that agree in everything and hang together
+    pairs: tuple[tuple[int, int], ...]  # vertices that agree in everything
     partners: int  # vertices that lie where one of the other chart does
-    agreeing: int  # of them, in everything, whether they hang together or not
+    connected: int  # pairs that hang together by edges of equal length in both charts
     against: int  # vertices that look otherwise
     missed: int  # those that the other robot should have seen where it followed an edge
     meetpoints: int
@@ -100,6 +100,7 @@ class _Evidence:
         judged = len(self.pairs) + self.against + self.missed
         return (
             len(self.pairs) >= _LEAST_PAIRS
+            and self.connected >= _LEAST_CONNECTED
             and self.meetpoints >= _LEAST_MEETPOINTS
             and self.against <= _AGAINST_SHARE * judged
             and self.missed <= _MISSED_SHARE * judged
@@ -110,8 +111,8 @@ class _Evidence:
     def is_refuted(self) -> bool:
         """Whether more than a few mistakes of either robot speaks against it."""
         return (
-            self.against > max(_MISTAKES, self.agreeing)
-            or self.missed > max(_MISTAKES, self.agreeing)
+            self.against > max(_MISTAKES, len(self.pairs))
+            or self.missed > max(_MISTAKES, len(self.pairs))
             or self.crossed > max(_ONE_CROSSING_M, 3 * _CROSSING * self.judged)
         )
 
@@ -128,7 +129,7 @@ class _Chance:
         """As wrong transforms have it, on top of what is so in any building."""
         (agreeing, partners), (crossed, judged) = _SEEN_BEFORE, _CROSSED_BEFORE
         for evidence in wrong:
-            agreeing += evidence.agreeing
+            agreeing += len(evidence.pairs)
             partners += evidence.partners
             crossed += evidence.crossed
             judged += evidence.judged
@@ -319,20 +320,18 @@ def _examine(a: Side, b: Side, pose: Pose) -> _Evidence:
             a.points[[i for i, _ in partners]], b.points[[j for _, j in partners]]
         )
     likeness = {(i, j): _likeness(a, b, i, j, pose) for i, j in partners}
-    agreeing = [pair for pair, share in likeness.items() if share >= _ALIKE_SHARE]
-    pairs = [(a.ids[i], b.ids[j]) for i, j in agreeing]
-    connected = _connected(a.chart, b.chart, pairs)
+    pairs = [(a.ids[i], b.ids[j]) for (i, j), share in likeness.items() if share >= _ALIKE_SHARE]
     against = sum(share < _UNLIKE_SHARE for share in likeness.values())
     lone_a = set(range(len(a.ids))) - {i for i, _ in partners}
     lone_b = set(range(len(b.ids))) - {j for _, j in partners}
     missed = _missed(a, b, pose.inverse(), lone_a) + _missed(b, a, pose, lone_b)
-    meetpoints = sum(a.chart.vertices[i].is_meetpoint for i, _ in connected)
+    meetpoints = sum(a.chart.vertices[i].is_meetpoint for i, _ in pairs)
     judged, crossed = np.add(_crossing(a, b, pose.inverse()), _crossing(b, a, pose)) / 2
     return _Evidence(
         pose,
-        tuple(connected),
+        tuple(pairs),
         len(partners),
-        len(agreeing),
+        _connected(a.chart, b.chart, pairs),
         against,
         missed,
         meetpoints,
@@ -402,8 +401,8 @@ def _around(vertex: ChartVertex) -> Array:
     return near
 
 
-def _connected(ours: Chart, theirs: Chart, pairs: list[tuple[int, int]]) -> list[tuple[int, int]]:
-    """The pairs of the largest part that hangs together by edges of equal length in both."""
+def _connected(ours: Chart, theirs: Chart, pairs: list[tuple[int, int]]) -> int:
+    """How many pairs the largest part has that hangs together by edges of equal length in both."""
     of = dict(pairs)
     links: dict[int, set[int]] = {i: set() for i in of}
     lengths: dict[frozenset[int], list[float]] = {}
@@ -425,7 +424,7 @@ def _connected(ours: Chart, theirs: Chart, pairs: list[tuple[int, int]]) -> list
             part = _reached(start, links)
             seen |= part
             largest = max(largest, part, key=len)
-    return [(i, j) for i, j in pairs if i in largest]
+    return len(largest)
 
 
 def _reached(start: int, links: dict[int, set[int]]) -> set[int]:

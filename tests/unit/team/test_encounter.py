@@ -31,7 +31,7 @@ def looks(number: int, way: Way, *bodies: Way, radius: float = RADIUS) -> list[B
     found = []
     for t in (np.arange(0.0, 15.0, 0.4) + 0.17 * number).tolist():
         dx, dy = way(t + 0.1) - way(t)
-        map_base = STARTS[number].to(Pose(*way(t).tolist(), math.atan2(dy, dx)))
+        map_base = STARTS[number].to(Pose(way(t)[0], way(t)[1], math.atan2(dy, dx)))
         seen = [body(t) for body in bodies if math.dist(body(t), way(t)) < SIGHT_M]
         centres = STARTS[number].inverse().transform(np.array(seen).reshape(-1, 2))
         centres += rng.normal(0.0, 0.01, centres.shape)
