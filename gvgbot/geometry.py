@@ -16,6 +16,12 @@ def wrap_angle(angle: float) -> float:
     return math.pi if wrapped == -math.pi else wrapped
 
 
+def wrap_angles(angles: Array) -> Array:
+    """The same directions in (-pi, pi], of any shape; what is in there already stays as it is."""
+    wrapped = angles - math.tau * np.rint(angles / math.tau)
+    return np.where(np.abs(wrapped) >= math.pi, math.pi, wrapped)
+
+
 @dataclass(frozen=True, slots=True)
 class Pose:
     """A frame seen from another, named parent_child: `map_base` is the base in the map.

@@ -9,7 +9,7 @@ import numpy as np
 
 from gvgbot.autonomy.estimate import smoothed_keyframes, still_past
 from gvgbot.autonomy.pipeline import Keyframe, Pipeline
-from gvgbot.geometry import Pose, wrap_angle
+from gvgbot.geometry import Pose, wrap_angles
 
 TOLERANCE_M = 0.05  # by which what is drawn may be wrong: a cell of the grid
 _WALLS_M = 4.0  # about so far off they are: a turn moves them by so much times its angle
@@ -70,5 +70,5 @@ class LivePast:
 def _farthest(drawn: Sequence[Pose], best: Sequence[Pose]) -> float:
     """How far (m) walls seen from poses move, at most, when these are corrected."""
     a, b = (np.array([(p.x, p.y, p.theta) for p in poses]) for poses in (drawn, best))
-    turns = np.array([wrap_angle(turn) for turn in (b - a)[:, 2].tolist()])
+    turns = wrap_angles((b - a)[:, 2])
     return float((np.hypot(*(b - a)[:, :2].T) + _WALLS_M * np.abs(turns)).max())

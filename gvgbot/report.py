@@ -1,6 +1,5 @@
 """What a run leaves: the map, its picture, the trajectories and the summary, as files by name."""
 
-import math
 import tempfile
 from bisect import bisect_left
 from dataclasses import dataclass, field, replace
@@ -12,7 +11,7 @@ from gvgbot.autonomy.estimate import smoothed
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.graph import Edge, Vertex
 from gvgbot.drivers.world import World, save_world
-from gvgbot.geometry import Array, Pose
+from gvgbot.geometry import Array, Pose, wrap_angles
 from gvgbot.hal.messages import Odometry
 from gvgbot.maps import geojson
 from gvgbot.maps.map_server import encode_map_server
@@ -112,7 +111,7 @@ def _composed(a_b: Array, b_c: Array) -> Array:
     """Poses a_c (N, 3) of a_b and b_c."""
     cos, sin = np.cos(a_b[:, 2]), np.sin(a_b[:, 2])
     x, y, turn = b_c.T
-    theta = _wrapped(a_b[:, 2] + turn)
+    theta = wrap_angles(a_b[:, 2] + turn)
     return np.column_stack([a_b[:, 0] + cos * x - sin * y, a_b[:, 1] + sin * x + cos * y, theta])
 
 
@@ -120,12 +119,7 @@ def _seen_from(a_b: Array, a_c: Array) -> Array:
     """Poses b_c (N, 3) of a_b and a_c."""
     cos, sin = np.cos(a_b[:, 2]), np.sin(a_b[:, 2])
     x, y, turn = (a_c - a_b).T
-    return np.column_stack([cos * x + sin * y, cos * y - sin * x, _wrapped(turn)])
-
-
-def _wrapped(angles: Array) -> Array:
-    wrapped: Array = np.remainder(angles + np.pi, math.tau) - np.pi
-    return wrapped
+    return np.column_stack([cos * x + sin * y, cos * y - sin * x, wrap_angles(turn)])
 
 
 def route_graph(

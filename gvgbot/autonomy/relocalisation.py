@@ -19,7 +19,7 @@ from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.gvg.local_map import LocalMap
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig, register
-from gvgbot.geometry import Array, Pose, wrap_angle
+from gvgbot.geometry import Array, Pose, wrap_angle, wrap_angles
 from gvgbot.hal.messages import Scan
 
 _CELL_M, _WALL_CELL_M = 0.25, 0.1
@@ -325,7 +325,7 @@ def _peaks(guesses: Array) -> list[Pose]:
     while len(peaks) < _GUESSES and len(left):
         x, y, heading = left[0, :3].tolist()
         peaks.append(Pose(x, y, wrap_angle(heading)))
-        turn = np.abs((left[:, 2] - heading + math.pi) % math.tau - math.pi)
+        turn = np.abs(wrap_angles(left[:, 2] - heading))
         left = left[(np.hypot(left[:, 0] - x, left[:, 1] - y) > _APART_M) | (turn > _APART_RAD)]
     return peaks
 

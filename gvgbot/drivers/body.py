@@ -9,7 +9,7 @@ import numpy as np
 from gvgbot.drivers.discs import disc_offsets
 from gvgbot.drivers.people import People
 from gvgbot.drivers.world import World
-from gvgbot.geometry import Array, Pose, wrap_angle
+from gvgbot.geometry import Array, Pose, wrap_angle, wrap_angles
 from gvgbot.ranges import Range
 
 MAX_STRIDE = 0.01  # m of travel per integration step, so that no wall is jumped over
@@ -93,8 +93,7 @@ class RobotBody:
         near = self._obstacles(self.pose.x, self.pose.y, self.config.radius_m + TOUCH)
         if len(near) == 0:
             return False, False, False
-        bearings = np.arctan2(near[:, 1], near[:, 0]) - self.pose.theta
-        bearings = np.arctan2(np.sin(bearings), np.cos(bearings))
+        bearings = wrap_angles(np.arctan2(near[:, 1], near[:, 0]) - self.pose.theta)
         front = np.abs(bearings) <= math.pi / 2
         left = front & (bearings > BUMPER_EDGE)
         right = front & (bearings < -BUMPER_EDGE)

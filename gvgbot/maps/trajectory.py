@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gvgbot.errors import UsageError
-from gvgbot.geometry import Array
+from gvgbot.geometry import Array, wrap_angles
 
 _TUM_LINE = "%.6f %.6f %.6f 0 0 0 %.9f %.9f\n"
 
@@ -32,7 +32,7 @@ class Trajectory:
 
 def encode_tum(trajectory: Trajectory) -> str:
     """The trajectory in TUM form: planar, so z, qx and qy are 0; qw is never negative."""
-    half = np.remainder(trajectory.poses[:, 2] + np.pi, 2.0 * np.pi) / 2.0 - np.pi / 2.0
+    half = wrap_angles(trajectory.poses[:, 2]) / 2.0
     rows = np.column_stack([trajectory.stamps, trajectory.positions, np.sin(half), np.cos(half)])
     return "".join(_TUM_LINE % tuple(row) for row in rows.tolist())
 

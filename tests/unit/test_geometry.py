@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gvgbot.geometry import STANDSTILL, Pose, Twist, wrap_angle
+from gvgbot.geometry import STANDSTILL, Pose, Twist, wrap_angle, wrap_angles
 
 angles = st.floats(-50.0, 50.0)
 lengths = st.floats(-100.0, 100.0)
@@ -37,6 +37,26 @@ def test_a_wrapped_angle_is_the_same_direction_in_the_half_open_turn(angle: floa
 )
 def test_the_ends_of_the_turn_wrap_to_plus_pi(angle: float, wrapped: float) -> None:
     assert wrap_angle(angle) == pytest.approx(wrapped)
+
+
+@given(st.lists(angles))
+def test_wrapped_arrays_are_what_the_remainder_of_a_whole_turn_says(turned: list[float]) -> None:
+    wrapped = wrap_angles(np.array(turned))
+    assert wrapped.shape == (len(turned),)
+    assert np.all((-math.pi < wrapped) & (wrapped <= math.pi))
+    for angle, here in zip(turned, wrapped.tolist(), strict=True):
+        away = abs(here - math.remainder(angle, math.tau))
+        assert min(away, math.tau - away) < 1e-13
+        if abs(angle) < math.pi:
+            assert here == angle
+
+
+def test_the_ends_of_the_turn_wrap_to_plus_pi_in_arrays_too() -> None:
+    ends = [math.pi * turn for turn in range(-99, 100, 2)]
+    wrapped = wrap_angles(np.array([*ends, *(math.nextafter(end, 0.0) for end in ends)]))
+    assert np.all((-math.pi < wrapped) & (wrapped <= math.pi))
+    assert np.abs(wrapped) == pytest.approx(math.pi, abs=1e-12)
+    assert wrap_angles(np.array([[math.pi, -math.pi]])).tolist() == [[math.pi, math.pi]]
 
 
 @given(poses, poses)

@@ -14,7 +14,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from gvgbot.geometry import Array, Pose, wrap_angle
+from gvgbot.geometry import Array, Pose, wrap_angle, wrap_angles
 from gvgbot.ranges import Range
 
 Index = NDArray[np.intp]
@@ -296,9 +296,9 @@ def _subtract(P: Array, left: Array, right: Array) -> None:
 
 
 def _wrapped(x: Array) -> Array:
-    """A state, or a difference of two, with its headings in [-pi, pi]."""
+    """A state, or a difference of two, with its headings wrapped."""
     x = x.copy()
-    x[2::3] -= math.tau * np.rint(x[2::3] / math.tau)
+    x[2::3] = wrap_angles(x[2::3])
     return x
 
 

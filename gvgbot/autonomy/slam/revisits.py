@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from gvgbot.autonomy.slam.ekf import Belief, predict
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig, register_coarsely
 from gvgbot.autonomy.slam.smoothing import Constraint, PoseGraph
-from gvgbot.geometry import Array, Pose, rotated_covariance
+from gvgbot.geometry import Array, Pose, rotated_covariance, wrap_angle
 
 _AROUND = 4  # scans before and after one, whose walls belong to its place
 _LEAST_LOOP_M = 10.0  # driven in between, or it is the same visit
@@ -171,7 +171,7 @@ def _residual(x: Array, match: Constraint) -> Array:
     """Expected minus measured, in the frame of the first pose."""
     expected = _array(_pose(x, match.a).to(_pose(x, match.b)))
     r = expected - _array(match.a_b)
-    r[2] = np.remainder(r[2] + np.pi, 2 * np.pi) - np.pi
+    r[2] = wrap_angle(r[2])
     return r
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import SuperLU, splu
 
-from gvgbot.geometry import Array, Pose
+from gvgbot.geometry import Array, Pose, wrap_angles
 
 Index = NDArray[np.intp]
 
@@ -58,7 +58,7 @@ class PoseGraph:
             H, g = self._normal_equations(x, blocks, trusting=iteration == 0)
             change = -_factors(H).solve(g).reshape(-1, 3)
             x += change
-            x[:, 2] = np.remainder(x[:, 2] + np.pi, 2 * np.pi) - np.pi
+            x[:, 2] = wrap_angles(x[:, 2])
             if np.abs(change).max() < within and iteration > 0:
                 break
         return x
@@ -137,7 +137,7 @@ def _residuals(x: Array, a: Index, b: Index, z: Array) -> tuple[Array, Array, Ar
     d = x[b] - x[a]
     expected = np.stack([c * d[:, 0] + s * d[:, 1], -s * d[:, 0] + c * d[:, 1], d[:, 2]], axis=1)
     r = expected - z
-    r[:, 2] = np.remainder(r[:, 2] + np.pi, 2 * np.pi) - np.pi
+    r[:, 2] = wrap_angles(r[:, 2])
     A = np.zeros((len(a), 3, 3))
     A[:, 0, 0], A[:, 0, 1], A[:, 0, 2] = -c, -s, expected[:, 1]
     A[:, 1, 0], A[:, 1, 1], A[:, 1, 2] = s, -c, -expected[:, 0]
