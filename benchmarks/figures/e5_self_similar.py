@@ -38,6 +38,8 @@ def find() -> Finding:
     right.semilogx(by_sigma, clear, "o-", label="the gate alone tells which crossing it is")
     right.semilogx(by_sigma, list(wrong.values()), "s-", label="another one alike is in the gate")
     right.axvline(BLOCK_M, color=drawing.PALE)
+    right.set_xticks(by_sigma, [f"{sigma:.1f}" for sigma in by_sigma])
+    right.set_xticks([], minor=True)
     right.legend(fontsize=7)
     drawing.labelled(
         right, f"{len(SEEDS)} tours each", "largest sigma of the robot, m", "share of arrivals"

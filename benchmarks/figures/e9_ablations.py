@@ -32,7 +32,8 @@ def find() -> Finding:
     figure, (left, right) = drawing.stage(1, 2, (11.0, 3.8), ratios=[1.6, 1])
     for name, run in runs.items():
         metres, u_robot, _ = run.series()
-        left.semilogy(metres, np.sqrt(np.maximum(u_robot, 1e-6)), lw=1.0, label=name)
+        style = "-" if name in (next(iter(IN_OFFICE)), next(iter(ON_BRANCHES))) else "--"
+        left.semilogy(metres, np.sqrt(np.maximum(u_robot, 1e-6)), style, lw=1.2, label=name)
     left.legend(fontsize=6)
     drawing.labelled(left, "uncertainty along the runs", "m driven", "sigma of the robot, m")
     nees = {
