@@ -79,6 +79,21 @@ class Pose:
         return cls(float(values[0]), float(values[1]), float(values[2]))
 
 
+def composed(a_b: Array, b_c: Array) -> Array:
+    """Poses a_c as rows (N, 3) of x, y, theta, from a_b and b_c: `Pose.compose` for many."""
+    cos, sin = np.cos(a_b[:, 2]), np.sin(a_b[:, 2])
+    x, y, turn = b_c.T
+    theta = wrap_angles(a_b[:, 2] + turn)
+    return np.column_stack([a_b[:, 0] + cos * x - sin * y, a_b[:, 1] + sin * x + cos * y, theta])
+
+
+def seen_from(a_b: Array, a_c: Array) -> Array:
+    """Poses b_c as rows (N, 3) of x, y, theta, from a_b and a_c: `Pose.to` for many."""
+    cos, sin = np.cos(a_b[:, 2]), np.sin(a_b[:, 2])
+    x, y, turn = (a_c - a_b).T
+    return np.column_stack([cos * x + sin * y, cos * y - sin * x, wrap_angles(turn)])
+
+
 @dataclass(frozen=True, slots=True)
 class Twist:
     """Velocity of the base in its own frame: m/s ahead, rad/s anticlockwise."""

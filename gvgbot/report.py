@@ -11,7 +11,7 @@ from gvgbot.autonomy.estimate import smoothed
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.graph import Edge, Vertex
 from gvgbot.drivers.world import World, save_world
-from gvgbot.geometry import Array, Pose, wrap_angles
+from gvgbot.geometry import Array, Pose, composed, seen_from
 from gvgbot.hal.messages import Odometry
 from gvgbot.maps import geojson
 from gvgbot.maps.map_server import encode_map_server
@@ -65,7 +65,7 @@ def map_files(pipeline: Pipeline, journey: Journey, title: str) -> dict[str, byt
     grid = occupancy_grid(scans)
     estimate = _trajectory(journey, _corrected(journey, pipeline, keyframes))
     start = pipeline.keyframes[0].odom_base if pipeline.keyframes else Pose()
-    odometry = _trajectory(journey, _seen_from(_rows([start]), _rows(journey.odom_base)))
+    odometry = _trajectory(journey, seen_from(_rows([start]), _rows(journey.odom_base)))
     files: dict[str, bytes | str] = {
         "map.geojson": geojson.encode(graph),
         "map.png": draw_map(graph, grid=grid, estimate=estimate, odometry=odometry, title=title),
@@ -100,26 +100,11 @@ def _corrected(journey: Journey, pipeline: Pipeline, keyframes: list[Pose]) -> A
     before = np.where(taken_at[later] <= stamps, later, before)  # it was learnt from too late
     after, smoothed_base = np.minimum(before + 1, last), _rows(keyframes)
     by_last, by_next = (
-        _composed(smoothed_base[k], _seen_from(felt[k], odom_base)) for k in (before, after)
+        composed(smoothed_base[k], seen_from(felt[k], odom_base)) for k in (before, after)
     )
     time_between = np.maximum(taken_at[after] - taken_at[before], 1e-9)
     share = np.clip((stamps - taken_at[before]) / time_between, 0.0, 1.0)
-    return _composed(by_last, share[:, None] * _seen_from(by_last, by_next))
-
-
-def _composed(a_b: Array, b_c: Array) -> Array:
-    """Poses a_c (N, 3) of a_b and b_c."""
-    cos, sin = np.cos(a_b[:, 2]), np.sin(a_b[:, 2])
-    x, y, turn = b_c.T
-    theta = wrap_angles(a_b[:, 2] + turn)
-    return np.column_stack([a_b[:, 0] + cos * x - sin * y, a_b[:, 1] + sin * x + cos * y, theta])
-
-
-def _seen_from(a_b: Array, a_c: Array) -> Array:
-    """Poses b_c (N, 3) of a_b and a_c."""
-    cos, sin = np.cos(a_b[:, 2]), np.sin(a_b[:, 2])
-    x, y, turn = (a_c - a_b).T
-    return np.column_stack([cos * x + sin * y, cos * y - sin * x, wrap_angles(turn)])
+    return composed(by_last, share[:, None] * seen_from(by_last, by_next))
 
 
 def route_graph(

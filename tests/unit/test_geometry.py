@@ -8,7 +8,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gvgbot.geometry import STANDSTILL, Pose, Twist, wrap_angle, wrap_angles
+from gvgbot.geometry import (
+    STANDSTILL,
+    Pose,
+    Twist,
+    composed,
+    seen_from,
+    wrap_angle,
+    wrap_angles,
+)
 
 angles = st.floats(-50.0, 50.0)
 lengths = st.floats(-100.0, 100.0)
@@ -119,3 +127,22 @@ def test_a_pose_is_read_from_an_array() -> None:
 
 def test_a_standstill_does_not_move() -> None:
     assert Twist(0.0, 0.0) == STANDSTILL
+
+
+@given(st.lists(st.tuples(poses, poses), min_size=1, max_size=5))
+def test_rows_of_poses_are_composed_and_seen_from_each_other_as_matrices_say(
+    pairs: list[tuple[Pose, Pose]],
+) -> None:
+    a_b, other = (np.array([(p.x, p.y, p.theta) for p in row]) for row in zip(*pairs, strict=True))
+    together, apart = composed(a_b, other), seen_from(a_b, other)
+    assert together.shape == apart.shape == (len(pairs), 3)
+    for (one, two), a_c, b_c in zip(pairs, together, apart, strict=True):
+        product = homogeneous(one) @ homogeneous(two)
+        assert np.allclose(homogeneous(Pose.from_array(a_c)), product, atol=1e-9)
+        quotient = np.linalg.inv(homogeneous(one)) @ homogeneous(two)
+        assert np.allclose(homogeneous(Pose.from_array(b_c)), quotient, atol=1e-9)
+
+
+def test_no_poses_composed_are_none() -> None:
+    nothing = np.zeros((0, 3))
+    assert composed(nothing, nothing).shape == seen_from(nothing, nothing).shape == (0, 3)

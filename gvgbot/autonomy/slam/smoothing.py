@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import SuperLU, splu
 
-from gvgbot.geometry import Array, Pose, wrap_angles
+from gvgbot.geometry import Array, Pose, seen_from, wrap_angles
 
 Index = NDArray[np.intp]
 
@@ -133,11 +133,10 @@ def _factors(H: csc_array) -> SuperLU:
 
 def _residuals(x: Array, a: Index, b: Index, z: Array) -> tuple[Array, Array, Array]:
     """Expected minus measured relative poses r (K, 3), and Jacobians by both poses (K, 3, 3)."""
-    c, s = np.cos(x[a, 2]), np.sin(x[a, 2])
-    d = x[b] - x[a]
-    expected = np.stack([c * d[:, 0] + s * d[:, 1], -s * d[:, 0] + c * d[:, 1], d[:, 2]], axis=1)
+    expected = seen_from(x[a], x[b])
     r = expected - z
     r[:, 2] = wrap_angles(r[:, 2])
+    c, s = np.cos(x[a, 2]), np.sin(x[a, 2])
     A = np.zeros((len(a), 3, 3))
     A[:, 0, 0], A[:, 0, 1], A[:, 0, 2] = -c, -s, expected[:, 1]
     A[:, 1, 0], A[:, 1, 1], A[:, 1, 2] = s, -c, -expected[:, 0]
