@@ -75,7 +75,7 @@ clean:
 # The stamps: what is installed for running, and for developing. A changed pyproject.toml renews them.
 .venv/core: pyproject.toml
 	@$(call make_venv)
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[tui]'
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[tui,web,record]'
 	@touch $@
 
 .venv/dev: pyproject.toml

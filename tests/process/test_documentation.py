@@ -68,6 +68,20 @@ def test_python_samples_compile(page: Path) -> None:
             compile(text, str(page), "exec")
 
 
+def test_make_has_installed_what_the_pages_say_it_has() -> None:
+    """The extras of the environment that `make explore` makes, and that the first pages use."""
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    (installed,) = re.findall(r"^\.venv/core:(?:.*\n\t)*.*'\.\[([\w,]+)\]'$", makefile, re.M)
+    promised = {
+        extra
+        for page in PAGES
+        for extra in re.findall(r"'gvgbot\[(\w+)\]' +# .*`make` has", page.read_text("utf-8"))
+    }
+    assert {"web", "record"} <= promised <= set(installed.split(","))
+    tutorial = (ROOT / "docs" / "tutorial" / "simulation.md").read_text(encoding="utf-8")
+    assert f"pip install '.[{installed}]'" in tutorial
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_links_lead_to_files(page: Path) -> None:
     targets = re.findall(r"\]\(([^)#:\s]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8"))
