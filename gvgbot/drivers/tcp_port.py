@@ -73,7 +73,10 @@ class TcpPort:
         try:
             self._listener = socket.create_server((host, number))
         except OSError as error:
-            raise UsageError(f"{SCHEME}{host}:{number}: {error.strerror}") from error
+            reason = str(error.strerror).partition(" (while")[0]  # what it was doing is clear
+            raise UsageError(
+                f"{SCHEME}{host}:{number}: {reason}: choose another address, or port 0 for any"
+            ) from error
         self._listener.setblocking(False)
         self._address = host, self._listener.getsockname()[1]
         self._loop.add_reader(self._listener, self._accept)

@@ -121,7 +121,7 @@ def test_an_address_that_cannot_be_had_is_told_to_the_user() -> None:
     async def main() -> None:
         with socket.create_server(("127.0.0.1", 0)) as taken:
             number = taken.getsockname()[1]
-            with pytest.raises(UsageError, match=f":{number}: .*in use"):
+            with pytest.raises(UsageError, match=f":{number}: [^()]*in use: choose another"):
                 TcpPort(f"tcp://127.0.0.1:{number}")
         with pytest.raises(UsageError, match="write tcp://host:10940"):
             TcpPort("tcp://nowhere")
