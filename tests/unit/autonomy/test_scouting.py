@@ -23,10 +23,8 @@ class Town:
     def __init__(self, lost: float | None = None) -> None:
         self.graph, self.belief = GvgGraph(), Belief()
         west, east = self._vertex(-3.0), self._vertex(4.0)
-        self.ends = west.add_half_edge(0.0), east.add_half_edge(math.pi)
-        line = np.array([[0.0, 0.0], [7.0, 0.0]])
-        a, b = HalfEdgeId(west.id, self.ends[0]), HalfEdgeId(east.id, self.ends[1])
-        self.graph.join(a, b, line, 1.0, driven=True)
+        self._east = east
+        a, b = self._street(west, east)
         self.known = Correspondence()
         for node, vertex in ((1, west), (2, east)):
             self.known.pair(node, vertex.id)
@@ -35,6 +33,17 @@ class Town:
         self.where = Whereabouts(on_edge=a)
         if lost is not None:
             self._vertex(lost).add_half_edge(0.0)
+
+    def add_vertex_beyond(self) -> None:
+        """One more, east of the street, that a known way leads to."""
+        self._street(self._east, self._vertex(9.0))
+
+    def _street(self, west: Vertex, east: Vertex) -> tuple[HalfEdgeId, HalfEdgeId]:
+        a = HalfEdgeId(west.id, west.add_half_edge(0.0))
+        b = HalfEdgeId(east.id, east.add_half_edge(math.pi))
+        line = np.array([[0.0, 0.0], [east.local.x - west.local.x, 0.0]])
+        self.graph.join(a, b, line, 1.0, driven=True)
+        return a, b
 
     def _vertex(self, x: float) -> Vertex:
         vertex = Vertex(self.graph.next_id(), 1.0, Pose(x), 0.0, 0.0)
@@ -67,6 +76,16 @@ def test_it_goes_to_the_vertex_that_is_nearest_to_what_is_lost_and_then_to_the_n
     assert end_of(scouting.path_near(town.seen_from(near), town.belief, 3.0)) == (other, 0.0)
     assert scouting.path_near(town.seen_from(other), town.belief, 4.0) is None
     assert scouting.path_near(town.seen_from(0.0), town.belief, 5.0) is None
+
+
+def test_it_goes_to_two_vertices_and_to_no_more() -> None:
+    town, scouting = Town(-9.0), Scouting()
+    town.add_vertex_beyond()
+    scouting.begin(0.0)
+    for x in (-3.0, 4.0):
+        assert end_of(scouting.path_near(town.seen_from(0.5), town.belief, 1.0)) == (x, 0.0)
+        assert scouting.path_near(town.seen_from(x), town.belief, 2.0) is None
+    assert scouting.path_near(town.seen_from(0.5), town.belief, 3.0) is None
 
 
 def test_with_nothing_lost_there_is_nothing_to_go_near_to() -> None:

@@ -29,7 +29,8 @@ def test_who_stands_has_waited_since_it_came_there() -> None:
 
 
 def test_to_and_fro_on_the_spot_is_no_headway() -> None:
-    assert noted([0.0, 0.2] * 10)[1] == 19.0
+    headway, waited = noted([0.0, 0.2] * 10)
+    assert waited == headway.waited(19.0) == 19.0
 
 
 def test_to_and_fro_about_one_place_is_none_either() -> None:

@@ -26,6 +26,14 @@ def test_without_anything_in_the_way_there_is_no_reason() -> None:
     assert not hindrance.reason_to_turn(1e6, has_come_on=False, patience_s=10.0)
 
 
+def test_what_was_in_the_way_once_and_is_no_longer_is_none() -> None:
+    hindrance = Hindrance()
+    held(hindrance, 0.0)
+    assert not hindrance.reason_to_turn(1.0, has_come_on=True, patience_s=10.0)
+    for stamp in (2.0, 100.0):
+        assert not hindrance.reason_to_turn(stamp, has_come_on=False, patience_s=10.0)
+
+
 def test_where_there_is_no_way_on_nobody_waits() -> None:
     hindrance = Hindrance()
     hindrance.obstruct("a wall")
