@@ -136,7 +136,7 @@ class Member:
         if finished:
             self._claim = None
         frames = tuple(
-            Frame(name, (pose.x, pose.y, pose.theta))
+            Frame(name, self._mates[name].news.life, (pose.x, pose.y, pose.theta))
             for name, pose in sorted(self._direct().items())
         )
         return News(
@@ -274,7 +274,7 @@ class Member:
             name: Pose(*frame.pose).inverse()
             for name, mate in self._mates.items()
             for frame in mate.news.frames
-            if frame.robot == self.name
+            if (frame.robot, frame.life) == (self.name, self._life)
         }
 
     @property
@@ -284,12 +284,13 @@ class Member:
         waiting = sorted(known.keys() - {self.name})
         while waiting:
             name = waiting.pop(0)
-            for frame in self._mates[name].news.frames if name in self._mates else ():
-                if frame.robot not in known:
+            for frame in self._mates[name].news.frames:
+                mate = self._mates.get(frame.robot)
+                if frame.robot not in known and mate is not None and mate.news.life == frame.life:
                     known[frame.robot] = known[name].compose(Pose(*frame.pose))
                     waiting.append(frame.robot)
         del known[self.name]
-        return {name: pose for name, pose in known.items() if name in self._mates}
+        return known
 
     def is_lost(self, name: str) -> bool:
         """Whether nothing has been heard of a robot for long."""

@@ -52,6 +52,7 @@ class Frame(msgspec.Struct, frozen=True, array_like=True):
     """Where the map frame of another robot lies in one's own, m and rad."""
 
     robot: str
+    life: int  # of that robot, whose map has this frame
     pose: Triple
 
 

@@ -281,3 +281,22 @@ def test_who_hears_that_its_frame_was_found_knows_the_other_ones() -> None:
     true, found = START["two"].to(START["one"]), two.member.frames["one"]
     middle = START["one"].inverse().transform(np.array([6.0, 2.0]))
     assert np.hypot(*(found.transform(middle) - true.transform(middle))) < 0.1
+
+
+def test_where_a_robot_was_before_it_began_anew_says_nothing_of_its_new_map() -> None:
+    one, two = team()
+    three = robot("three", irregular(1), LEFT, 0)
+    three.tell(2.0, one)
+    one.tell(2.0, three)
+    three.member.look(3.0)
+    again = robot("two", irregular(1), RIGHT, 14)
+    again.member = Member("two", CONFIG, lambda: again.chart, radius=0.2, life=1)
+    again.tell(4.0, three)
+    one.tell(4.0, again, three)  # who has not heard yet that it began anew
+    assert again.member.frames == {}
+    assert "two" not in three.member.frames
+    again.tell(6.0, one)
+    one.member.look(20.0)
+    one.tell(20.0, again, three)
+    assert is_joined(again, one)
+    assert is_joined(three, again)

@@ -26,7 +26,7 @@ def news(chart: Chart) -> News:
         speed=0.3,
         claim=Claim(1.0, 2.0, 0.1, 12.0),
         finished=False,
-        frames=(Frame("two", (4.0, 5.0, 0.6)),),
+        frames=(Frame("two", 8, (4.0, 5.0, 0.6)),),
         vertices=told_vertices(chart),
         edges=told_edges(chart),
     )
@@ -36,7 +36,7 @@ def test_a_chart_arrives_as_it_was_to_the_centimetre() -> None:
     heard = decode(encode(news(CHART)))
     assert isinstance(heard, News)
     assert heard.claim == Claim(1.0, 2.0, 0.1, 12.0)
-    assert heard.frames == (Frame("two", (4.0, 5.0, 0.6)),)
+    assert heard.frames == (Frame("two", 8, (4.0, 5.0, 0.6)),)
     chart = heard.chart
     assert chart.vertices.keys() == CHART.vertices.keys()
     for key, vertex in CHART.vertices.items():
