@@ -284,7 +284,7 @@ def test_who_hears_that_its_frame_was_found_knows_the_other_ones() -> None:
 
 
 def test_where_a_robot_was_before_it_began_anew_says_nothing_of_its_new_map() -> None:
-    one, two = team()
+    one, _ = team()
     three = robot("three", irregular(1), LEFT, 0)
     three.tell(2.0, one)
     one.tell(2.0, three)
