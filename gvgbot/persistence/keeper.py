@@ -93,6 +93,7 @@ class Keeper:
             session.pipeline.errands.is_paused = True
         if not self._goes_on:
             session.pipeline.mission.outcome, session.pipeline.mission.reason = None, ""
+            session.pipeline.errands.is_waiting = False
         else:
             self._counts = list(saved.counts)
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from benchmarks.kills import vertices
+from gvgbot.autonomy.errands import Declined
 from gvgbot.autonomy.errands.kinds import Patrol
 from gvgbot.autonomy.memory import growth, remember
 from gvgbot.autonomy.pipeline import AutonomyConfig, KeyframeConfig
@@ -28,6 +29,7 @@ pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(300)]
 
 TWIN = TwinConfig(base=KobukiTwinConfig(odometry="perfect"))
 START = Pose(2.5, 1.5, 0.1)
+ARM = (4.5, 3.3)
 CROSSING = (4.5, 1.675)  # as far from the corners (3.8, 2.2) and (5.2, 2.2) as from the wall at 0.8
 LATEST = 30  # keyframes
 AUTONOMY = AutonomyConfig(keyframe=KeyframeConfig(latest=LATEST))
@@ -106,3 +108,58 @@ def test_a_patrol_goes_on_with_what_was_left_of_its_round(tmp_path: Path) -> Non
     assert rounds(tmp_path) == [(1, 3, 0), (2, 2, 0), (3, 3, 0)]
     assert lives.world.body.contacts == 0
     check_forgotten(lives, last)
+
+
+@pytest.mark.parametrize("dead_s", [3.0, 100.0], ids=["wheels counted on", "perhaps carried"])
+def test_a_robot_that_had_finished_can_be_sent_about_after_a_restart(
+    tmp_path: Path, dead_s: float
+) -> None:
+    """It stands until it is asked to explore: that lets it find its place, and whatever then is."""
+    refused: list[str] = []
+    finished: list[float] = []
+
+    def dies(session: Session, now: float) -> bool:
+        if explored(session):
+            finished.append(now)
+        return bool(finished) and now > finished[0] + SNAPSHOT_EVERY + 1.0
+
+    def is_there(session: Session) -> bool:
+        pipeline = session.pipeline
+        if session is lives.sessions[0] or not explored(session):
+            return False
+        errands, stamp = pipeline.errands, pipeline.keyframes[-1].stamp
+        x, y = START.inverse().transform(np.array(ARM)).tolist()
+        if not refused:
+            with pytest.raises(Declined) as caught:
+                errands.goto_point(x, y, stamp)
+            refused.append(str(caught.value))
+            errands.explore(stamp)
+        elif not errands.is_waiting and errands.errand is None:
+            errands.goto_point(x, y, stamp)
+        return errands.is_waiting
+
+    config = Config(twin=TWIN, autonomy=AUTONOMY)
+    lives = Lives(config, tee(), tmp_path, dead_s=dead_s, over=is_there)
+    last = lives.run([dies])
+    assert "ask it to explore" in refused[0]
+    assert not last.pipeline.is_lost
+    assert len(last.pipeline.mapper.graph.vertices) == 4
+    body = lives.world.body
+    assert math.dist((body.pose.x, body.pose.y), ARM) < 0.3
+    assert body.contacts == 0
+
+
+def test_a_map_that_is_lent_lends_no_waiting(tmp_path: Path) -> None:
+    """Who begins with the map of a run that ended after an errand explores all the same."""
+    config = Config(twin=TWIN, autonomy=AUTONOMY)
+
+    def has_been_sent(session: Session) -> bool:
+        errands = session.pipeline.errands
+        if explored(session) and not errands.is_waiting and errands.errand is None:
+            errands.goto_point(1.0, 0.0, session.pipeline.keyframes[-1].stamp)
+        return errands.is_waiting
+
+    Lives(config, tee(), tmp_path / "known", over=has_been_sent).run([])
+    last = Lives(config, tee(), tmp_path / "run", known=tmp_path / "known").run([])
+    assert last.pipeline.mission.outcome == "explored"
+    assert not last.pipeline.is_lost

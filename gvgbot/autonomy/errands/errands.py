@@ -126,8 +126,9 @@ class Errands:
         return "the exploration has ended"
 
     def explore(self, stamp: float) -> str:
-        """Go on exploring, even if that had ended."""
-        self._check_going(stamp)
+        """Go on exploring, even if that had ended; after a restart by finding its place first."""
+        if not self.is_resting or self.is_paused:
+            self._check_going(stamp)
         if self._plan is None and self._command is None and not self.is_resting:
             return "it is exploring already"
         self._end(stamp, "replaced", "by explore")
@@ -252,6 +253,8 @@ class Errands:
     def _check_going(self, stamp: float) -> None:
         if self.is_paused:
             raise Declined("it is paused: ask it to resume first")
+        if self._seen is None and self.is_resting:
+            raise Declined("it has not looked for its place since its start: ask it to explore")
         if self._seen is None:
             raise Declined("it has not seen enough yet to know where it is")
         self.closures.open_due(self._mapper.graph, stamp)
