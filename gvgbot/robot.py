@@ -92,6 +92,7 @@ class Robot:
         if team is not None:
             config = session.config
             self._team = LiveTeam(config.robot, config.team, session.pipeline, team)
+            session.member = self._team.member
         self._neighbours, self._driver = neighbours, driver
         self._session, self._notifier = session, notifier
         self._network, self._off_loop, self._keeper = network, off_loop, keeper

@@ -18,9 +18,13 @@ from gvgbot.drivers.tapped import Tap
 from gvgbot.errors import GvgbotError
 from gvgbot.geometry import Pose
 from gvgbot.hal.messages import Contact, Odometry
-from gvgbot.maps.run_directory import RunDirectory, record_of
+from gvgbot.maps import geojson
+from gvgbot.maps.run_directory import MAP, RunDirectory, record_of
+from gvgbot.maps.team_map import team_files
 from gvgbot.report import Journey, map_files, world_files
 from gvgbot.simulation import Place, Simulation
+from gvgbot.team.chart import Chart
+from gvgbot.team.member import Member
 
 if TYPE_CHECKING:  # it needs packages that only those have who record
     from gvgbot.recording.recorder import Recorder
@@ -59,6 +63,7 @@ class Session:
         self.journey = Journey(period=0.0) if led else Journey()
         self.title = config.robot.name if place is None else place.world.name  # of the picture
         self.simulation: Simulation | None = None
+        self.member: Member | None = None  # of a team, if it is in one
         self.recorder: Recorder | None = None
         self.failure: str | None = None  # what ended the run, if it was neither mission nor person
         self._counts = {events.LoopClosed: 0, events.Recovery: 0}
@@ -148,10 +153,22 @@ class Session:
         `unfinished` is the reason that the summary gives as long as there is no outcome.
         """
         summary = self._summary(unfinished)
-        return partial(self._write, still(self.pipeline), still_journey(self.journey), summary)
+        others = None if self.member is None else self.member.charts
+        pipeline, journey = still(self.pipeline), still_journey(self.journey)
+        return partial(self._write, pipeline, journey, others, summary)
 
-    def _write(self, pipeline: Pipeline, journey: Journey, summary: dict[str, object]) -> None:
+    def _write(
+        self,
+        pipeline: Pipeline,
+        journey: Journey,
+        others: dict[str, tuple[Chart, Pose]] | None,
+        summary: dict[str, object],
+    ) -> None:
         files = map_files(pipeline, journey, self.title)
+        if others is not None:
+            files |= team_files(geojson.decode(str(files[MAP])), others, self.title)
+            poses = {name: pose for name, (_, pose) in others.items()}
+            summary |= {"frames": {name: (p.x, p.y, p.theta) for name, p in poses.items()}}
         if self.place is not None:
             files |= world_files(self.place.world)
         self.directory.write(files)

@@ -10,7 +10,6 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 
 from gvgbot.geometry import Array, Pose, wrap_angle
@@ -78,6 +77,8 @@ def _fitted(ours: RouteGraph, theirs: RouteGraph, pose: Pose) -> Pose:
 
 def _pairs(ours: RouteGraph, theirs: RouteGraph) -> list[tuple[int, int]]:
     """Indices of the vertices that both have."""
+    from scipy.optimize import linear_sum_assignment
+
     a, b = (np.array([v.position for v in g.vertices]).reshape(-1, 2) for g in (ours, theirs))
     away = np.minimum(cdist(a, b), _SAME_M)
     rows, columns = linear_sum_assignment(away)

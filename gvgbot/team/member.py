@@ -292,6 +292,12 @@ class Member:
         del known[self.name]
         return known
 
+    @property
+    def charts(self) -> dict[str, tuple[Chart, Pose]]:
+        """The charts of all whose frame is known, and the pose of that frame in the own one."""
+        frames = sorted(self.frames.items())
+        return {name: (self._mates[name].chart, pose) for name, pose in frames}
+
     def is_lost(self, name: str) -> bool:
         """Whether nothing has been heard of a robot for long."""
         return self._stamp - self._mates[name].heard > self._config.lost_after_s

@@ -20,7 +20,7 @@ Triple = tuple[Number, Number, Number]  # a pose: x, y, m, and theta, rad
 class TeamVertex(msgspec.Struct, frozen=True, array_like=True):
     """A vertex of a chart."""
 
-    id: int
+    id: Annotated[int, msgspec.Meta(ge=0)]
     position: tuple[Number, Number]  # m, the robot's map frame
     covariance: tuple[Number, Number, Number, Number]  # of the position, 2x2 row-major, m^2
     clearance: Number  # m

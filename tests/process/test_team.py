@@ -128,4 +128,8 @@ def test_daemons_see_each_other_on_their_maps_and_live_on_alone(
     assert "Traceback" not in log
     (joined,) = [line for line in log.splitlines() if "maps joined" in line]
     assert "lisa" in joined
-    assert json.loads((tmp_path / "karl" / "summary.json").read_text())["vertices"] >= 6
+    summary = json.loads((tmp_path / "karl" / "summary.json").read_text())
+    assert summary["frames"]["lisa"] == pytest.approx([0.0, 0.0, 0.0], abs=0.2)
+    both = json.loads((tmp_path / "karl" / "team.geojson").read_text())
+    points = [f for f in both["features"] if f["geometry"]["type"] == "Point"]
+    assert len(points) >= summary["vertices"] >= 6

@@ -1,0 +1,53 @@
+"""The map of a team as one robot knows it: its own, with the charts of others laid on it."""
+
+from collections.abc import Mapping
+
+from gvgbot.geometry import Pose
+from gvgbot.maps import geojson
+from gvgbot.maps.merging import merged
+from gvgbot.maps.picture import draw_map
+from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
+from gvgbot.team.chart import Chart, ChartEdge, ChartVertex
+
+
+def team_files(
+    own: RouteGraph, others: Mapping[str, tuple[Chart, Pose]], title: str
+) -> dict[str, bytes | str]:
+    """Files by name. `others` has charts, and where their frames lie in that of the own map."""
+    graph = own
+    for chart, pose in others.values():
+        graph, _ = merged(graph, route_graph(chart), pose)
+    return {"team.geojson": geojson.encode(graph), "team.png": draw_map(graph, title=title)}
+
+
+def route_graph(chart: Chart) -> RouteGraph:
+    """A chart as a map. Of how often its robot came by, a chart says nothing."""
+    return RouteGraph(
+        tuple(_vertex(vertex) for vertex in chart.vertices.values()),
+        tuple(_edge(edge) for edge in chart.edges.values()),
+    )
+
+
+def _vertex(vertex: ChartVertex) -> MapVertex:
+    x, y = vertex.position.tolist()
+    xx, xy, yx, yy = vertex.covariance.ravel().tolist()
+    return MapVertex(
+        id=vertex.id,
+        kind="meetpoint" if vertex.is_meetpoint else "endpoint",
+        position=(x, y),
+        degree=len(vertex.departures),
+        bearings=vertex.bearings,
+        clearance=vertex.clearance,
+        covariance=(xx, xy, yx, yy),
+        frontiers=tuple(one.bearing for one in vertex.departures if one.edge is None),
+    )
+
+
+def _edge(edge: ChartEdge) -> MapEdge:
+    return MapEdge(
+        start=edge.a.vertex,
+        end=edge.b.vertex,
+        polyline=edge.polyline.copy(),
+        length=edge.length,
+        min_clearance=edge.min_clearance,
+    )

@@ -1,0 +1,54 @@
+"""Charts whose truth is known by construction, as one map."""
+
+import math
+
+import numpy as np
+import pytest
+
+from gvgbot.geometry import Pose
+from gvgbot.maps import geojson
+from gvgbot.maps.team_map import route_graph, team_files
+from tests.unit.team.building import irregular
+
+BUILDING = irregular(1)
+HERE, THERE = Pose(3.0, -2.0, 0.7), Pose(11.0, 6.0, -2.4)
+LEFT, RIGHT = {0, 1, 2, 5, 6, 7, 10, 11, 12}, {2, 3, 4, 7, 8, 9, 12, 13, 14}
+
+
+def test_what_two_know_is_one_map_in_the_frame_of_the_first() -> None:
+    own = route_graph(BUILDING.chart(LEFT, HERE))
+    others = {"two": (BUILDING.chart(RIGHT, THERE), HERE.to(THERE))}
+    files = team_files(own, others, "a building")
+    joined = geojson.decode(str(files["team.geojson"]))
+    true = HERE.inverse().transform(BUILDING.places[sorted(LEFT | RIGHT)])
+    found = np.array([vertex.position for vertex in joined.vertices])
+    assert len(found) == len(true)
+    away = np.hypot(*(found[:, None] - true).transpose(2, 0, 1))
+    assert away.min(axis=0).max() < 0.01
+    ways = {frozenset(pair) for pair in BUILDING.corridors}
+    known = {way for way in ways if way <= LEFT or way <= RIGHT}
+    assert len(joined.edges) == len(known)
+    picture = files["team.png"]
+    assert isinstance(picture, bytes)
+    assert picture.startswith(b"\x89PNG")
+
+
+def test_who_is_alone_leaves_its_own_map() -> None:
+    own = route_graph(BUILDING.chart(LEFT, HERE))
+    joined = geojson.decode(str(team_files(own, {}, "a building")["team.geojson"]))
+    assert {v.id: v.position for v in joined.vertices} == {
+        v.id: pytest.approx(v.position) for v in own.vertices
+    }
+
+
+def test_a_chart_keeps_its_frontiers_and_lengths() -> None:
+    chart = BUILDING.chart(LEFT, HERE)
+    graph = route_graph(chart)
+    for vertex in graph.vertices:
+        corridors = [pair for pair in BUILDING.corridors if vertex.id in pair]
+        away = [pair for pair in corridors if not set(pair) <= LEFT]
+        assert vertex.degree == len(corridors)
+        assert len(vertex.frontiers) == len(away)
+    for edge in graph.edges:
+        straight = math.dist(BUILDING.places[edge.start], BUILDING.places[edge.end])
+        assert edge.length == pytest.approx(straight)
