@@ -3,9 +3,10 @@
 Stretches of as many metres between vertices that look alike suggest transforms. Each that lays
 several vertices on each other is examined: vertices must agree in kind, departures, clearance and
 the walls around them, some must hang together by edges of equal length in both charts, and nothing
-may speak against it. How much it says that they agree is measured in the building itself: each chart is laid
-onto itself in all the wrong ways, and where that often fits, as in a grid of equal corridors,
-agreement says little. If what is shared can be laid elsewhere in either chart, it says nothing.
+may speak against it. How much it says that they agree is measured in the building itself: each
+chart is laid onto itself in all the wrong ways, and where that often fits, as in a grid of equal
+corridors, agreement says little. If what is shared can be laid elsewhere in either chart, it says
+nothing.
 """
 
 import math

@@ -55,7 +55,10 @@ class ChartVertex:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ChartEdge:
-    """An edge between two half-edges; polyline (N, 2) from a to b, map frame, m."""
+    """An edge between two half-edges; polyline (N, 2) from a to b, map frame, m.
+
+    `traversed`: the robot has driven along it, and not only seen it.
+    """
 
     id: int
     a: HalfEdgeId
@@ -63,6 +66,7 @@ class ChartEdge:
     length: float
     min_clearance: float
     polyline: Array
+    traversed: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,6 +88,7 @@ def chart_of(graph: GvgGraph, belief: Belief) -> Chart:
             edge.length,
             edge.min_clearance,
             belief.map_vertex(edge.a.vertex).transform(edge.polyline),
+            edge.traversals > 0,
         )
         for edge in graph.edges.values()
     }

@@ -37,6 +37,7 @@ class TeamEdge(msgspec.Struct, frozen=True, array_like=True):
     length: Number  # m
     min_clearance: Number  # m
     points: bytes  # little-endian float32 pairs x, y, m, map frame
+    traversed: bool = False
 
 
 class Claim(msgspec.Struct, frozen=True, array_like=True):
@@ -157,6 +158,7 @@ def told_edges(chart: Chart) -> tuple[TeamEdge, ...]:
             edge.length,
             edge.min_clearance,
             edge.polyline.astype("<f4").tobytes(),
+            edge.traversed,
         )
         for edge in chart.edges.values()
     )
@@ -188,5 +190,11 @@ def _edge(told: TeamEdge) -> ChartEdge:
     if len(line) < 2 or not np.isfinite(line).all():
         raise ValueError(f"edge {told.id} has no line")
     return ChartEdge(
-        told.id, HalfEdgeId(*told.a), HalfEdgeId(*told.b), told.length, told.min_clearance, line
+        told.id,
+        HalfEdgeId(*told.a),
+        HalfEdgeId(*told.b),
+        told.length,
+        told.min_clearance,
+        line,
+        told.traversed,
     )

@@ -95,7 +95,11 @@ class Site:
         known = self._followed(number, end.vertex, departure.bearing)
         if number == 0 and known is not None:
             self.onward[end] = known
-        if known is not None or (departure.blocked and number > 0):
+        if (
+            known is not None
+            or (departure.blocked and number > 0)
+            or self._is_refuted(number, place)
+        ):
             return
         x, y = self._points[place]
         frontier = Frontier(float(x), float(y), departure.bearing)
@@ -104,6 +108,15 @@ class Site:
             self.open.setdefault(place, []).append(frontier)
         if number == 0:
             self.own[end] = same[0] if same else frontier
+
+    def _is_refuted(self, number: int, place: int) -> bool:
+        """Whether another robot has driven over a place, and found no vertex there."""
+        return any(
+            edge.traversed and _passes(edge.polyline, self._points[place])
+            for other, chart in enumerate(self._charts)
+            if other != number and other not in self._members[place]
+            for edge in chart.edges.values()
+        )
 
     def _followed(self, number: int, vertex: int, bearing: float) -> Onward | None:
         """What another chart has behind a departure."""
@@ -176,6 +189,12 @@ class Site:
                 if other not in done:
                     heapq.heappush(queue, (metres + length, other, end))
         return best
+
+
+def _passes(polyline: Array, point: Array) -> bool:
+    """Whether a line leads over a point and well on, to both sides."""
+    away = np.hypot(*(polyline - point).T)
+    return bool(away.min() < _ON_EDGE_M and away[[0, -1]].min() > _AHEAD_M)
 
 
 def _improve(

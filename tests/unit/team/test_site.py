@@ -1,4 +1,6 @@
 import math
+from dataclasses import replace
+from itertools import permutations
 
 import networkx as nx  # type: ignore[import-untyped]
 import numpy as np
@@ -64,3 +66,13 @@ def test_a_vertex_that_only_one_robot_knows_lies_on_the_edge_of_the_other() -> N
     assert sorted(onward.metres for onward in site.onward.values()) == pytest.approx(
         [6.0, 6.0], abs=0.2
     )
+
+
+def test_a_vertex_where_another_robot_drove_and_found_none_is_no_frontier() -> None:
+    """Seen from afar, half a room may look like a junction; who has been there knows better."""
+    places = np.array([(0.0, 0.0), (6.0, 0.0), (12.0, 0.0), (6.0, 5.0)])
+    with_side = Building(places, ((0, 1), (1, 2), (1, 3))).chart({1}, HERE)
+    straight = Building(places, ((0, 2),)).chart({0, 2}, HERE)
+    edges = {key: replace(edge, traversed=True) for key, edge in straight.edges.items()}
+    for charts in permutations([with_side, replace(straight, edges=edges)]):
+        assert not Site(list(charts)).open
