@@ -29,6 +29,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(60)]
 
 PACKAGED = Path(str(files("gvgbot") / "configs" / "zenoh"))
 INSTALLED = "/etc/gvgbot/zenoh"
+WORDS = {"operator": "strong", "monitor": "weak", "somebody": "known", "teammate": "close"}
 WAY = Trajectory(stamp=1.0, stamps=bytes(8), poses=bytes(12))
 
 
@@ -56,7 +57,7 @@ def certificates(tmp_path_factory: pytest.TempPathFactory) -> Path:
     if shutil.which("openssl") is None:
         pytest.skip("needs openssl")
     directory = tmp_path_factory.mktemp("certificates")
-    people = ["operator", "monitor", "somebody"]
+    people = ["operator", "monitor", "somebody", "teammate"]
     for place, names in ((directory, people), (directory / "foreign", ["operator"])):
         script = [str(PACKAGED / "make_certificates.sh"), str(place), "localhost,127.0.0.1"]
         subprocess.run([*script, *names], check=True, capture_output=True, timeout=30)
@@ -87,8 +88,8 @@ def tls(certificates: Path, tmp_path: Path) -> Network:
 def passwords(tmp_path: Path) -> Network:
     endpoint = free_endpoint()
     known = tmp_path / "passwords.txt"
-    known.write_text("operator:strong\nmonitor:weak\nsomebody:known\n")
-    said = {"operator": "strong", "monitor": "weak", "somebody": "known", "foreign/operator": "x"}
+    known.write_text("".join(f"{name}:{word}\n" for name, word in WORDS.items()))
+    said = WORDS | {"foreign/operator": "x"}
 
     def of(person: str) -> Path:
         return adapted(
@@ -211,6 +212,32 @@ def test_who_is_known_but_has_no_rights_gets_nothing(network: Network) -> None:
                 robot.stop().result()
 
     assert visit(network, intrude) == []
+
+
+def test_robots_of_a_team_hear_each_other(network: Network) -> None:
+    file = network.client("teammate")
+    heard: dict[str, set[bytes]] = {"near": set(), "far": set()}
+
+    async def talk(near: Telemetry, far: Telemetry) -> None:
+        async with asyncio.timeout(30), asyncio.TaskGroup() as tasks:
+            hearing = [
+                tasks.create_task(near.hear_team(heard["near"].add)),
+                tasks.create_task(far.hear_team(heard["far"].add)),
+            ]
+            while not all(heard.values()):
+                near.tell_team("team", b"near")
+                far.tell_team("team", b"far")
+                await asyncio.sleep(0.05)
+            for task in hearing:
+                task.cancel()
+
+    config = TelemetryConfig(listen=(free_endpoint(),), zenoh_file=file)
+    with (
+        Telemetry(TelemetryConfig(zenoh_file=network.robot), "near", relays=True) as near,
+        Telemetry(config, "far", relays=True) as far,
+    ):
+        asyncio.run(talk(near, far))
+    assert heard == {"near": {b"far"}, "far": {b"near"}}
 
 
 def test_a_stranger_is_not_let_in(network: Network) -> None:
