@@ -30,7 +30,7 @@ class TelemetryConfig:
     requests: tuple[RequestName, ...] = ()  # what the robot may be asked for
     zenoh_file: Path | None = None  # JSON5: keys, passwords, access control; see configs/zenoh
     listen: tuple[str, ...] = ("tcp/127.0.0.1:7447",)  # addresses that others can reach it at
-    connect: tuple[str, ...] = ()  # zenoh routers to join, as often as they come back
+    connect: tuple[str, ...] = ()  # routers or robots of the team, joined again when they are back
     lease_s: Annotated[float, Range(0.5, 60.0)] = (
         2.0  # silence after which the robot counts as gone
     )
