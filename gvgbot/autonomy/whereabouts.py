@@ -258,10 +258,18 @@ class Situation:
             if not onwards:
                 return path
             straight = self.gvg.bearing(arrived, node.clearance) + math.pi
-            onward = min(onwards, key=lambda b: self._turn(b, node, straight))
+            onward = min(
+                onwards, key=lambda b: (self._leads_back(b), self._turn(b, node, straight))
+            )
             if any(b.edge == onward.edge for b in path):
                 return path
             path = (*path, onward)
+
+    def _leads_back(self, branch: Branch) -> bool:
+        """Whether a branch ends where the robot has come from: as one round somebody does."""
+        end = self.gvg.nodes[self.gvg.end_of(branch)].position
+        trail = np.array(self.where.trail).reshape(-1, 2)
+        return bool((np.hypot(*(trail - end).T) < _LOOP_M).any())
 
     def _turn(self, branch: Branch, node: LocalNode, straight: float) -> float:
         """How much a branch turns away from straight on, rad."""

@@ -237,6 +237,27 @@ def test_with_a_trail_ahead_is_away_from_where_the_robot_came_from(heading: floa
     assert line[-1] == pytest.approx([6.0, 0.0])
 
 
+def test_the_way_leads_round_somebody_once_and_then_on_though_it_turns_more() -> None:
+    """Somebody stands in a room; the way out of it turns back more than that round the body."""
+    gvg = drawn(
+        {1: (0.0, 0.0), 2: (4.0, 0.0), 3: (7.0, 0.0), 4: (7.0, -5.0)},
+        {
+            10: (1, 2, []),
+            11: (2, 3, [(4.0, -1.5), (7.0, -1.5)]),
+            12: (2, 3, [(4.0, 1.5), (7.0, 1.5)]),
+            13: (3, 4, [(5.8, -1.0), (5.8, -5.0)]),
+        },
+    )
+    known = known_as({Branch(10, forward=True): HalfEdgeId(1, EAST)}, {1: 1})
+    walk = Walk().along(gvg, known, (0.5, 0.0), (4.0, 0.0), (4.0, -1.0))
+    place = gvg.place(np.array([4.0, -1.0]))
+    assert place is not None
+    pose, doubted = Pose(4.0, -1.0, -math.pi / 2), frozenset({2, 3})
+    here = Situation(gvg, known, corridor_graph(), walk.where, place, pose, doubted)
+    line, _ = gvg.line_from(place, here.ahead())
+    assert line[-1] == pytest.approx([7.0, -5.0])
+
+
 def test_an_edge_that_is_recognised_late_has_been_driven_round_its_bend() -> None:
     """Vertex 1 is 10 m back, 6 of them before a right angle; then it is out of sight."""
     bend = drawn(
