@@ -33,6 +33,7 @@ from gvgbot.geometry import Array, Pose
 from gvgbot.ranges import Range
 
 _MADE_BY_M = 0.15  # beyond its disc: what made a vertex is nearer, wherever exactly that is
+_BEHIND_M = 2.5  # the nearest walls of a vertex, others tell what it looks like
 _HIDES_M = 1.0  # what stands so near to a vertex's disc may close a branch
 _FRESH_M = 6.0  # driven since a vertex was seen: the local frame still tells its place
 _IN_FULL_VIEW_M = 4.0  # from so near, it would be seen that a vertex is none
@@ -66,7 +67,7 @@ class MappingConfig:
     # by which a place must be likelier a known one than a new one, or two that may be one be so:
     # minus twice the log likelihood
     novelty_margin: Annotated[float, Range(0.0, 50.0)] = 10.0
-    # around a vertex, walls are kept to know it again
+    # around a vertex, walls are kept to know it again; farther where the nearest are so far off
     snapshot_m: Annotated[float, Range(1.0, 20.0)] = 6.0
 
 
@@ -303,7 +304,8 @@ class Mapper(Knowledge):
     def _picture(self, view: View, vertex: Vertex) -> None:
         """Keep the walls around a vertex, to know them again."""
         walls = view.local_map.points()
-        near = np.hypot(*(walls - vertex.local.position).T) < self._config.snapshot_m
+        reach = max(self._config.snapshot_m, vertex.clearance + _BEHIND_M)
+        near = np.hypot(*(walls - vertex.local.position).T) < reach
         vertex.snapshot = vertex.local.inverse().transform(walls[near])
         vertex.sights = Pose(theta=-vertex.local.theta).transform(view.local_map.sights()[near])
 

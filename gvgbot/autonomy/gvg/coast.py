@@ -81,12 +81,14 @@ def with_coast(
 def _cuts(diagram: Diagram, walls: Array, radius: float) -> _Cuts:
     a, b = diagram.a, diagram.b
     farthest = np.maximum(diagram.clearance[a], diagram.clearance[b])  # on a ridge that ends
-    far = np.flatnonzero((b >= 0) & (farthest > radius - _TOUCH_M))
+    far = np.flatnonzero((b < 0) | (farthest > radius - _TOUCH_M))
     p, q = walls[diagram.generators[far, 0]], walls[diagram.generators[far, 1]]
     middle, half = (p + q) / 2, np.hypot(*(q - p).T) / 2
     across = (q - p) / (2 * half)[:, None]
     direction = np.stack([-across[:, 1], across[:, 0]], axis=1)
     start, end = (((diagram.points[i] - middle) * direction).sum(axis=1) for i in (a[far], b[far]))
+    inwards = ((walls.mean(axis=0) - middle) * direction).sum(axis=1)
+    end = np.where(b[far] < 0, -np.copysign(np.inf, inwards), end)  # out of the hull
     low, high = np.minimum(start, end), np.maximum(start, end)
     away = np.sqrt(np.maximum(radius**2 - half**2, 0.0))
     cut, along = [], []
@@ -108,7 +110,7 @@ def _cut_ridges(diagram: Diagram, cuts: _Cuts, radius: float) -> Indices:
     single = np.flatnonzero((count[cuts.ridge] == 1) & diagram.parts[cuts.ridge])
     ridge = cuts.ridge[single]
     a, b = diagram.a[ridge], diagram.b[ridge]
-    inner = np.where(diagram.clearance[a] <= radius, a, b)
+    inner = np.where((b < 0) | (diagram.clearance[a] <= radius), a, b)
     links.append(np.stack([inner, first + single], axis=1))
     double = np.flatnonzero((count[cuts.ridge] == 2) & diagram.parts[cuts.ridge])
     pairs = double[np.argsort(cuts.ridge[double], kind="stable")].reshape(-1, 2)

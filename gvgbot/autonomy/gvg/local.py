@@ -8,6 +8,9 @@ import numpy as np
 
 from gvgbot.geometry import Array
 
+_WIDE_M = 4.0  # a disc with such a radius holds other meetpoints
+_LEAST_M, _IN_WIDE_M = 0.5, 1.0  # from a node, where the direction of a branch is taken
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LocalEdge:
@@ -124,10 +127,11 @@ class LocalGvg:
     def bearing(self, branch: Branch, clearance: float) -> float:
         """Direction of a branch as it leaves its node's disc, rad in the local frame.
 
-        A point at which nothing certain branches off is no end of it.
+        A point at which nothing certain branches off is no end of it. In a wide disc it is taken so
+        near that no other meetpoint lies between: what is seen of one makes no difference.
         """
         line = self.leaving(branch)
-        wanted = max(0.5, 0.9 * clearance)
+        wanted = max(_LEAST_M, 0.9 * clearance) if clearance < _WIDE_M else _IN_WIDE_M
         origin, passed = line[0], {branch.edge}
         while np.hypot(*(line - origin).T).max() < wanted:
             onwards = self.onwards(branch)

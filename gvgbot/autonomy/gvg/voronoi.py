@@ -74,6 +74,7 @@ def fine_graph(
         coast = with_coast(diagram, generators, open_clearance, local_map)
         if coast is not None:
             points, clearance, links = coast
+            endless = endless[:0]  # they end at the coast
     wide = clearance >= min_clearance
     asked = np.zeros(len(points), bool)
     asked[links] = asked[a[endless]] = True

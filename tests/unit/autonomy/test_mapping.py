@@ -31,7 +31,7 @@ from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
 from gvgbot.autonomy.views import Correspondence, View, touching
 from gvgbot.geometry import Array, Pose
 from tests.unit.autonomy.local_graphs import Point, drawn
-from tests.unit.autonomy.sights import carved, sweep
+from tests.unit.autonomy.sights import carved, looked, sweep
 
 CONFIG = MappingConfig()
 NOTHING_SEEN = LocalMap(LocalMapConfig())
@@ -192,6 +192,29 @@ def test_a_vertex_is_found_again_where_it_was_and_not_added_twice() -> None:
     assert len(seen.mapper.graph.vertices) == 2
     (place,) = seen.places("meetpoint")
     assert place == pytest.approx((3.05, -0.05), abs=0.1)
+
+
+def test_a_vertex_far_from_all_walls_is_known_again_by_them_from_afar() -> None:
+    """In a hall 12 m wide, no wall is nearer to its middle than 6 m."""
+    ends = {2: math.pi, 3: 0.0, 4: -math.pi / 2}
+    fork = drawn(
+        {1: (0.0, 0.0), 2: (-4.0, 0.0), 3: (4.0, 0.0), 4: (0.0, -4.0)},
+        {10: (1, 2, []), 11: (1, 3, []), 12: (1, 4, [])},
+        clearance=6.0,
+        unseen=ends,
+    )
+    aside = Pose(3.0, 0.0)
+    hall = looked(carved([(-9.0, -6.0, 9.0, 6.0)]), [Pose(), aside])
+    seen = Seen()
+    seen.mapper.move(aside, np.zeros((3, 3)))
+    seen.look(fork, CONFIG.candidates.meetpoint_sightings, at=aside, local_map=hall)
+    seen.drive_elsewhere(20.0)
+    seen.mapper.move(Pose(), np.diag([0.04, 0.04, 1e-4]))
+    seen.look(fork, at=aside, local_map=hall)
+    (closed,) = of_type(seen.events, LoopClosed)
+    assert isinstance(closed, LoopClosed)
+    assert closed.agreement > 0.9
+    assert len(seen.mapper.graph.vertices) == 1
 
 
 def test_a_vertex_through_which_a_plain_edge_runs_is_taken_back() -> None:

@@ -91,3 +91,18 @@ def test_corridors_are_as_they_were() -> None:
     )
     assert np.array_equal(with_limit.points, without.points)
     assert np.array_equal(with_limit.ridges, without.ridges)
+
+
+def test_a_coast_around_all_that_is_in_sight_has_no_dead_end() -> None:
+    """Two pillars 2.6 m apart, and nothing else within the map: their coasts meet between them."""
+    pillars: tuple[Rectangle, ...] = ((-1.7, -0.2, -1.3, 0.2), (1.3, -0.2, 1.7, 0.2))
+    round_them = [Pose(x, y, 0.0) for x, y in ((3.0, 3.0), (-3.0, 3.0), (-3.0, -3.0), (3.0, -3.0))]
+    config = LocalMapConfig(half_width_m=8.0, cell_m=0.1)
+    free = carved([(-20.0, -20.0, 20.0, 20.0)], pillars)
+    local_map = looked(free, round_them, config=config)
+    assert np.abs(local_map.points()).max() < 2.0
+    local = reduce_graph(graph(local_map), ReductionConfig())
+    assert not any(node.is_endpoint for node in local.nodes.values())
+    found = sorted((n.position.tolist() for n in local.nodes.values() if n.is_meetpoint), key=str)
+    off = 0.2 + math.sqrt(R**2 - 1.3**2)  # as far as R from the corners of both
+    assert np.array(found) == pytest.approx(np.array([[0.0, -off], [0.0, off]]), abs=0.1)

@@ -106,3 +106,19 @@ def test_a_bearing_looks_past_a_point_where_nothing_branches_off() -> None:
     beyond = math.sqrt(1.8**2 - 0.5**2)
     expected = math.atan2(-0.5, beyond)
     assert gvg.bearing(Branch(1, forward=True), 2.0) == pytest.approx(expected, abs=0.03)
+
+
+@pytest.mark.parametrize("seen", [True, False])
+def test_a_bearing_is_the_same_whether_the_next_meetpoint_is_seen_or_not(seen: bool) -> None:
+    """In a hall, the next one may stand deep inside the disc; the way leaves towards it."""
+    points = {1: (0.0, 0.0), 2: (1.3, 0.0), 3: (1.3, 6.0), 4: (-6.0, 0.0), 5: (0.0, -6.0)}
+    lines: dict[int, tuple[int, int, list[Point]]] = {
+        1: (1, 2, []),
+        2: (2, 3, []),
+        3: (1, 4, []),
+        4: (1, 5, []),
+    }
+    if seen:
+        points[6], lines[5] = (1.3, -6.0), (2, 6, [])
+    gvg = drawn(points, lines, clearance=6.0)
+    assert gvg.bearing(Branch(1, forward=True), 6.0) == pytest.approx(0.0, abs=1e-6)
