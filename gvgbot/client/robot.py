@@ -370,7 +370,11 @@ class Robot:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        await asyncio.to_thread(self.close)
+        try:
+            await asyncio.to_thread(self.close)
+        except asyncio.CancelledError:  # perhaps before a thread was free for it
+            self.close()
+            raise
 
 
 class EventStream:

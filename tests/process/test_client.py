@@ -131,6 +131,23 @@ with client.connect("near", sys.argv[1]) as robot:
     for known in robot.map():
         print(known.stamp, flush=True)
 """
+HURRIED = """
+import asyncio, contextlib, sys
+from concurrent.futures import ThreadPoolExecutor
+from threading import Event
+from gvgbot import client
+async def leave():
+    busy, free = ThreadPoolExecutor(1), Event()
+    asyncio.get_running_loop().set_default_executor(busy)
+    try:
+        async with client.connect("near", sys.argv[1]):
+            busy.submit(free.wait)
+            asyncio.get_running_loop().call_later(0.1, asyncio.current_task().cancel)
+    finally:
+        free.set()
+with contextlib.suppress(asyncio.CancelledError):
+    asyncio.run(leave())
+"""
 
 
 def until(is_so: Callable[[], bool], *, patience_s: float = PATIENCE) -> float:
@@ -338,6 +355,12 @@ def test_closing_ends_every_iteration_and_leaves_no_session_behind(endpoint: str
         assert asyncio.run(watch()) == [EXAMPLE]
         info = robot._session.info
         until(lambda: not info.peers_zid() and not info.routers_zid())
+
+
+def test_a_program_that_is_ended_while_it_leaves_ends(endpoint: str) -> None:
+    program = [sys.executable, "-c", HURRIED, endpoint]
+    with a_robot(endpoint):
+        assert subprocess.run(program, check=False, timeout=PATIENCE).returncode == 0
 
 
 def test_a_state_of_another_version_is_refused_in_words(endpoint: str) -> None:
