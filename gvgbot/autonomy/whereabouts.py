@@ -14,6 +14,7 @@ from gvgbot.geometry import Array, Pose, wrap_angle
 _LOOP_M = 0.4  # a trail that comes this near to itself has been driven back
 _AWAY_M = 0.7  # nearer to a vertex than this, the trail does not tell its edges apart
 _BESIDE_M = 0.2, 1.5  # from the edge, the trail goes on beside the robot, on the edge
+_ABREAST_M = 0.15  # along its edge, the robot came from neither side
 _BACK_M = 0.8  # how far back along the trail one looks to tell ahead from behind
 
 
@@ -132,17 +133,18 @@ class Whereabouts:
         if out is not None and out.edge == place.edge:
             return Branch(out.edge, not out.forward)
         edge = gvg.edges[place.edge]
+        i = min(int(np.searchsorted(edge.stations, place.station)), len(edge.polyline) - 2)
+        along = edge.polyline[i + 1] - edge.polyline[i]
         if len(self.trail) > 1:
             points = np.array(self.trail)
             back = np.cumsum(np.hypot(*np.diff(points[::-1], axis=0).T))
-            i = len(points) - 2 - min(int(np.searchsorted(back, _BACK_M)), len(points) - 2)
-            d = np.hypot(*(edge.polyline - points[i]).T)
+            came = points[len(points) - 2 - min(int(np.searchsorted(back, _BACK_M)), len(back) - 1)]
+            d = np.hypot(*(edge.polyline - came).T)
             offset = float(edge.stations[int(np.argmin(d))]) - place.station
-            if abs(offset) > 0.15:
-                return Branch(place.edge, forward=offset > 0)
-        i = min(int(np.searchsorted(edge.stations, place.station)), len(edge.polyline) - 2)
-        dx, dy = edge.polyline[i + 1] - edge.polyline[i]
-        same = abs(wrap_angle(math.atan2(dy, dx) - local_base.theta)) < math.pi / 2
+            if abs(offset) < _ABREAST_M:  # it came from beside: the same answer however it turns
+                offset = float((came - local_base.position) @ along)
+            return Branch(place.edge, forward=offset > 0)
+        same = abs(wrap_angle(math.atan2(along[1], along[0]) - local_base.theta)) < math.pi / 2
         return Branch(place.edge, forward=not same)
 
 

@@ -237,6 +237,20 @@ def test_with_a_trail_ahead_is_away_from_where_the_robot_came_from(heading: floa
     assert line[-1] == pytest.approx([6.0, 0.0])
 
 
+@pytest.mark.parametrize("came_from", [-0.3, 0.3])
+def test_who_came_from_beside_its_edge_goes_back_the_same_way_however_it_turns(
+    came_from: float,
+) -> None:
+    """Else it would turn to and fro for ever: whither it turns, the way back is behind it."""
+    trail = [np.array([3.0 + came_from * share, 2.0 * share]) for share in (1.0, 0.5, 0.0)]
+    place = CORRIDOR.place(np.array([3.0, 0.0]))
+    assert place is not None
+    where, unknown = Whereabouts(None, trail), Correspondence()
+    for heading in (0.0, 1.5, 3.1, -1.5):
+        back = where.backwards(CORRIDOR, place, unknown, Pose(3.0, 0.0, heading))
+        assert back == Branch(10, forward=came_from > 0.0)
+
+
 def test_the_way_leads_round_somebody_once_and_then_on_though_it_turns_more() -> None:
     """Somebody stands in a room; the way out of it turns back more than that round the body."""
     gvg = drawn(
