@@ -2,7 +2,9 @@
 
 import asyncio
 from dataclasses import dataclass, field, replace
+from functools import cache
 
+import numpy as np
 import pytest
 
 from gvgbot.autonomy.control.company import Companion, moved
@@ -12,11 +14,14 @@ from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.config import Config
 from gvgbot.drivers.hokuyo.twin import HokuyoTwinConfig
 from gvgbot.drivers.world import World
-from gvgbot.geometry import Pose
+from gvgbot.geometry import Pose, wrap_angle
 from gvgbot.hal.guard import Guard
 from gvgbot.hal.messages import Odometry
 from gvgbot.links import Devices, Links
 from gvgbot.simulation import Place, Simulation
+from gvgbot.team.chart import Chart
+from gvgbot.team.member import Member, TeamConfig
+from gvgbot.team.news import decode, encode
 from gvgbot.worlds.canvas import Canvas
 
 CONFIG = Config()
@@ -44,6 +49,7 @@ class Explorer:
     start: Pose
     simulation: Simulation
     pipeline: Pipeline
+    member: Member
     told: float = 0.0
     way: list[Pose] = field(default_factory=list)
 
@@ -57,22 +63,43 @@ class Explorer:
         return bool(x) and min(x) < WEST and max(x) > EAST
 
     def hear(self, other: "Explorer", *, goes_first: bool) -> None:
-        """Be told where the other one is and what it drives along."""
+        """Be told where the other one is and what it drives along, and what it sees."""
         mind = other.pipeline
+        course = other.member.course(other.told, mind.map_base, mind.track, mind.seen)
+        self.member.hear(decode(encode(course)), other.told)
         companion = Companion("other", mind.map_base, goes_first, mind.track, radius=0.177)
         map_map = self.start.inverse().compose(other.here).compose(mind.map_base.inverse())
         self.pipeline.company = [moved(companion, map_map)]
 
 
+@cache
+def met() -> tuple["Explorer", "Explorer"]:
+    both: tuple[Explorer, Explorer] = run_in_virtual_time(_met())
+    return both
+
+
 @pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_two_robots_that_meet_in_a_narrow_corridor_both_get_to_the_other_side() -> None:
-    one, two = run_in_virtual_time(_met())
+    one, two = met()
     assert one.has_crossed
     assert two.has_crossed
     gaps = [a.distance(b) - 2 * RADIUS for a, b in zip(one.way, two.way, strict=False)]
     assert LEAST_GAP <= min(gaps) < 2.0  # they did meet
     assert one.simulation.body.contacts == two.simulation.body.contacts == 0
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+def test_two_robots_that_met_know_how_their_maps_lie() -> None:
+    """By their lasers and by what they told each other, as they have no vertex in common yet."""
+    one, two = met()
+    for here, there in ((one, two), (two, one)):
+        frame = here.member.frames[there.member.name]
+        middle = there.start.inverse().transform(np.array([6.5, 4.5]))
+        true = here.start.to(there.start)
+        assert np.hypot(*(frame.transform(middle) - true.transform(middle))) < 0.15
+        assert abs(wrap_angle(frame.theta - true.theta)) < 0.05
 
 
 async def _met() -> tuple[Explorer, Explorer]:
@@ -84,9 +111,12 @@ async def _met() -> tuple[Explorer, Explorer]:
             start,
             Simulation(config, Place(world, start), clock),
             Pipeline(config.autonomy, config.exploration, RADIUS),
+            Member(name, TeamConfig(), Chart, radius=RADIUS),
         )
-        for start in STARTS
+        for name, start in zip(("one", "two"), STARTS, strict=True)
     ]
+    for explorer, other in (both, both[::-1]):
+        explorer.member.hear(other.member.news(0.0, Pose(), 0.0, finished=False), 0.0)
     for explorer, other in (both, both[::-1]):
         explorer.simulation.meet([other.simulation])
     async with asyncio.TaskGroup() as tasks:
