@@ -22,7 +22,10 @@ from gvgbot.hal.guard import Guard
 from gvgbot.hal.messages import Odometry
 from gvgbot.links import Devices, Links
 from gvgbot.maps import geojson
+from gvgbot.maps.joined_grid import joined_grid
+from gvgbot.maps.map_server import encode_map_server, read_map_server
 from gvgbot.maps.merging import merged
+from gvgbot.maps.occupancy import OccupancyGrid
 from gvgbot.maps.picture import draw_map
 from gvgbot.maps.route_graph import RouteGraph
 from gvgbot.maps.run_directory import RunDirectory
@@ -254,7 +257,9 @@ def _save(directory: RunDirectory, robots: list[_Robot]) -> list[_Robot]:
     world = _place(first.session).world
     files = world_files(world)
     files["map.geojson"] = geojson.encode(graph)
-    files["map.png"] = draw_map(graph, title=world.name)
+    grid = joined_grid([(_grid(robot), poses[robot.member.name]) for robot in joined])
+    files |= encode_map_server(grid)
+    files["map.png"] = draw_map(graph, grid=grid, title=world.name)
     directory.write(files)
     directory.write_summary(_summary(robots, joined, poses, graph))
     return joined
@@ -263,6 +268,10 @@ def _save(directory: RunDirectory, robots: list[_Robot]) -> list[_Robot]:
 def _graph(robot: _Robot) -> RouteGraph:
     path = robot.session.directory.path / "map.geojson"
     return geojson.decode(path.read_text(encoding="utf-8"))
+
+
+def _grid(robot: _Robot) -> OccupancyGrid:
+    return read_map_server(robot.session.directory.path)
 
 
 def _summary(

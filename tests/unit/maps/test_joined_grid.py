@@ -1,0 +1,44 @@
+"""Two halves of a room, seen in different frames, are one room in the joined grid."""
+
+import math
+
+import numpy as np
+
+from gvgbot.geometry import Pose
+from gvgbot.maps.joined_grid import joined_grid
+from gvgbot.maps.occupancy import UNKNOWN, OccupancyGrid
+
+CELL = 0.05
+
+
+def grid(rows: list[str], origin: tuple[float, float] = (0.0, 0.0)) -> OccupancyGrid:
+    """Drawn with y upwards: # wall, . free, ? unknown."""
+    meaning = {"#": 100, ".": 0, "?": UNKNOWN}
+    cells = np.array([[meaning[c] for c in row] for row in rows[::-1]], np.int8)
+    seen = np.where(cells == UNKNOWN, np.inf, 1.0).astype(np.float32)
+    return OccupancyGrid(cells, CELL, origin, seen)
+
+
+def drawn(joined: OccupancyGrid) -> list[str]:
+    marks = {100: "#", 0: ".", UNKNOWN: "?"}
+    return ["".join(marks[int(value)] for value in row) for row in joined.cells[::-1]]
+
+
+def test_one_grid_is_itself() -> None:
+    one = grid(["##?", "..#"], origin=(-0.35, 1.0))
+    joined = joined_grid([(one, Pose())])
+    assert drawn(joined) == ["##?", "..#"]
+    assert np.allclose(joined.origin, one.origin)
+
+
+def test_what_one_robot_has_not_seen_is_as_the_other_one_saw_it() -> None:
+    """The other one's frame lies five cells to the right and is turned to the left by a quarter."""
+    one, two = grid(["##??", "#..?"]), grid([".#", ".#", "##"])
+    joined = joined_grid([(one, Pose()), (two, Pose(5 * CELL, 0.0, math.pi / 2))])
+    assert drawn(joined) == ["#####", "#...#"]  # its bottom row stands upright at the right
+    assert joined.seen_s is not None
+    assert np.isfinite(joined.seen_s).all()
+
+
+def test_where_two_differ_it_is_a_wall() -> None:
+    assert drawn(joined_grid([(grid(["#.?"]), Pose()), (grid([".#?"]), Pose())])) == ["##?"]
