@@ -58,7 +58,7 @@ class ReductionConfig:
     roughness_m: Annotated[float, Range(0.0, 0.2)] = (
         0.03  # unevenness of a flat wall, noise included
     )
-    open_clearance_m: Annotated[float, Range(1.0, 30.0)] = 6.0  # farther off, follow one wall
+    open_clearance_m: Annotated[float, Range(1.0, 30.0)] = 8.0  # farther off, follow one wall
 
 
 @dataclass(slots=True, eq=False)

@@ -106,3 +106,15 @@ def test_a_coast_around_all_that_is_in_sight_has_no_dead_end() -> None:
     found = sorted((n.position.tolist() for n in local.nodes.values() if n.is_meetpoint), key=str)
     off = 0.2 + math.sqrt(R**2 - 1.3**2)  # as far as R from the corners of both
     assert np.array(found) == pytest.approx(np.array([[0.0, -off], [0.0, off]]), abs=0.1)
+
+
+def test_a_hall_15_m_wide_has_its_middle_and_no_coast_unless_asked_for() -> None:
+    walls = carved([(-12.0, -7.5, 12.0, 7.5)])
+    local_map = looked(walls, [Pose(x, 0.0) for x in (-1.0, 0.0, 1.0)])
+    limit = ReductionConfig().open_clearance_m
+    fine = fine_graph(
+        local_map, np.zeros(2), min_clearance=RADIUS, roughness=0.03, open_clearance=limit
+    )
+    near = fine.points[np.abs(fine.points[:, 0]) < 1.0]
+    assert len(near)
+    assert np.abs(near[:, 1]).max() < 0.1
