@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
 from gvgbot.geometry import Array, Pose, wrap_angle
@@ -89,12 +90,22 @@ def _pairs(ours: RouteGraph, theirs: RouteGraph) -> list[tuple[int, int]]:
 def _refuted(graph: RouteGraph, paired: set[int], other: RouteGraph) -> set[int]:
     """Vertices where the other robot drove along a plain edge and saw none.
 
-    Somebody may have stood there. Nothing else may hang on them than what both know.
+    Somebody may have stood there. Nothing else may hang on them than what both know, and they must
+    lead nowhere where the other one knows no way.
     """
+    ways = [point for edge in other.edges for point in edge.polyline]
+    tree = cKDTree(ways) if ways else None
+    leading = {
+        end
+        for edge in graph.edges
+        if tree is None or np.max(tree.query(edge.polyline)[0]) > _BESIDE_M
+        for end in (edge.start, edge.end)
+    }
     wrong = {
         vertex.id
         for vertex in graph.vertices
-        if vertex.id not in paired and any(_is_inside(vertex, edge) for edge in other.edges)
+        if vertex.id not in paired | leading
+        and any(_is_inside(vertex, edge) for edge in other.edges)
     }
     while True:
         holding = {

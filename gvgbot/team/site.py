@@ -98,7 +98,7 @@ class Site:
         if (
             known is not None
             or (departure.blocked and number > 0)
-            or self._is_refuted(number, place)
+            or self._is_refuted(number, end.vertex)
         ):
             return
         x, y = self._points[place]
@@ -109,8 +109,11 @@ class Site:
         if number == 0:
             self.own[end] = same[0] if same else frontier
 
-    def _is_refuted(self, number: int, place: int) -> bool:
-        """Whether another robot has driven over a place, and found no vertex there."""
+    def _is_refuted(self, number: int, vertex: int) -> bool:
+        """Whether another robot found no vertex where it drove, and this one has not been there."""
+        place, own = self._place[number, vertex], self._charts[number].edges.values()
+        if any(edge.traversed and vertex in (edge.a.vertex, edge.b.vertex) for edge in own):
+            return False
         return any(
             edge.traversed and _passes(edge.polyline, self._points[place])
             for other, chart in enumerate(self._charts)

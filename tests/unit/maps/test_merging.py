@@ -1,13 +1,15 @@
 """Halves of a known map make the whole; fused places are never surer than they may be."""
 
 import math
+from dataclasses import replace
+from itertools import pairwise, permutations
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gvgbot.geometry import Pose
+from gvgbot.geometry import Array, Pose
 from gvgbot.maps.merging import covariance_intersection, merged
 from gvgbot.maps.moved import moved_graph
 from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
@@ -70,6 +72,49 @@ def test_two_halves_that_overlap_make_the_whole(off: Pose) -> None:
     places = np.array([v.position for v in whole.vertices])
     for true in PLACES.values():
         assert np.hypot(*(places - true).T).min() < 1e-6
+
+
+def positions(graph: RouteGraph) -> set[tuple[float, float]]:
+    return {(round(v.position[0], 6), round(v.position[1], 6)) for v in graph.vertices}
+
+
+def way(start: int, end: int, line: Array) -> MapEdge:
+    """An edge that was driven."""
+    length = float(np.hypot(*np.diff(line, axis=0).T).sum())
+    return MapEdge(
+        start=start, end=end, polyline=line, length=length, min_clearance=0.4, traversals=1
+    )
+
+
+def driven(graph: RouteGraph) -> RouteGraph:
+    return replace(graph, edges=tuple(replace(edge, traversals=1) for edge in graph.edges))
+
+
+def passage(*places: int) -> RouteGraph:
+    """What a robot knows that drove past some places, and saw none but the first and the last."""
+    known = [replace(v, frontiers=()) for v in seen({places[0], places[-1]}).vertices]
+    line = np.concatenate([np.linspace(PLACES[a], PLACES[b], 30) for a, b in pairwise(places)])
+    return RouteGraph(tuple(known), (way(places[0], places[-1], line),))
+
+
+def test_a_vertex_from_which_a_way_leads_that_the_other_lacks_stays() -> None:
+    """The other one drove past, and did not see the way: somebody may have stood in it."""
+    past, round_about = passage(0, 1, 2), passage(0, 3, 4)
+    other = RouteGraph((*past.vertices, round_about.vertices[1]), (*past.edges, *round_about.edges))
+    for maps in permutations([driven(seen({0, 1, 2, 4})), other]):
+        whole, _ = merged(*maps, Pose())
+        assert positions(whole) == {PLACES[v] for v in (0, 1, 2, 4)}
+
+
+def test_a_vertex_beside_somebody_who_stood_there_goes_with_both_ways_round_him() -> None:
+    body = [(6.0, 0.5), (6.0, -0.5)]
+    points = {0: PLACES[0], 1: (5.2, 0.0), 2: (6.8, 0.0), 3: PLACES[2]}
+    lines = [(0, 1, []), (1, 2, body[:1]), (1, 2, body[1:]), (2, 3, [])]
+    edges = tuple(way(a, b, np.array([points[a], *by, points[b]])) for a, b, by in lines)
+    template = seen({0}).vertices[0]
+    vertices = tuple(replace(template, id=i, position=p, frontiers=()) for i, p in points.items())
+    whole, _ = merged(passage(0, 1, 2), RouteGraph(vertices, edges), Pose())
+    assert positions(whole) == {PLACES[0], PLACES[2]}
 
 
 def test_what_nobody_followed_stays_a_frontier() -> None:

@@ -76,3 +76,16 @@ def test_a_vertex_where_another_robot_drove_and_found_none_is_no_frontier() -> N
     edges = {key: replace(edge, traversed=True) for key, edge in straight.edges.items()}
     for charts in permutations([with_side, replace(straight, edges=edges)]):
         assert not Site(list(charts)).open
+
+
+def test_a_vertex_that_a_robot_has_been_at_is_one_though_another_one_drove_past() -> None:
+    places = np.array([(0.0, 0.0), (6.0, 0.0), (12.0, 0.0), (6.0, 5.0)])
+    with_side = Building(places, ((0, 1), (1, 2), (1, 3))).chart({0, 1}, HERE)
+    straight = Building(places, ((0, 2),)).chart({0, 2}, HERE)
+    both = [
+        replace(c, edges={k: replace(e, traversed=True) for k, e in c.edges.items()})
+        for c in (with_side, straight)
+    ]
+    for charts in permutations(both):
+        (frontier,) = (f for many in Site(list(charts)).open.values() for f in many)
+        assert frontier.bearing == pytest.approx(math.pi / 2)
