@@ -101,8 +101,8 @@ def test_a_vertex_from_which_a_way_leads_that_the_other_lacks_stays() -> None:
     """The other one drove past, and did not see the way: somebody may have stood in it."""
     past, round_about = passage(0, 1, 2), passage(0, 3, 4)
     other = RouteGraph((*past.vertices, round_about.vertices[1]), (*past.edges, *round_about.edges))
-    for maps in permutations([driven(seen({0, 1, 2, 4})), other]):
-        whole, _ = merged(*maps, Pose())
+    for one, two in permutations([driven(seen({0, 1, 2, 4})), other]):
+        whole, _ = merged(one, two, Pose())
         assert positions(whole) == {PLACES[v] for v in (0, 1, 2, 4)}
 
 
