@@ -3,28 +3,21 @@
 import asyncio
 import contextlib
 import json
-import math
 import signal
 import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from gvgbot import client
 from gvgbot.telemetry import Telemetry
-from gvgbot.topics import State, TelemetryConfig
+from gvgbot.topics import TelemetryConfig
 from tests.process.addresses import free_endpoint, router
 from tests.process.test_run_process import gvgbot
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(60)]
 
 NAMES = ("one", "two", "three")
-WORLD = ("--set", "twin.world=floor_plan:3", "--set", "twin.seed=3")
-STARTS_AT = ("8.78", "1.43", "2.79")
-AWAY_M = 1.0  # a robot drives on while others are told where it is
 
 
 def at_a_router(robots: list[str], meeting: str) -> list[tuple[str, ...]]:
@@ -72,64 +65,27 @@ def test_all_robots_of_a_team_hear_all_others(
         assert others == {b"\x00 by " + n.encode() + b"\xff" for n in NAMES if n != name}
 
 
-@pytest.fixture
-def known(tmp_path: Path) -> Path:
-    """The first rooms of a building, as a run knows them that had no more time."""
-    run = tmp_path / "known"
-    command = ["explore", *WORLD, "--set", "twin.time_limit_s=50", "--out", str(run)]
-    subprocess.run(
-        [sys.executable, "-m", "gvgbot", *command, "--start", *STARTS_AT],
-        check=False,
-        capture_output=True,
-    )
-    return run
+def test_daemons_at_a_router_hear_each_other(tmp_path: Path) -> None:
+    """Two by one name say so as soon as they do, and neither minds that the other one is killed."""
+    meeting = free_endpoint()
 
-
-def until(robot: client.Robot, is_so: Callable[[State], bool]) -> State:
-    """The first state for which something is so."""
-    return next(state for state in robot.state() if is_so(state))
-
-
-@pytest.mark.timeout(300)
-def test_daemons_see_each_other_on_their_maps_and_live_on_alone(
-    known: Path, tmp_path: Path
-) -> None:
-    """Both begin with the same map: so each has to see the other where that one says it is."""
-    _, x, y, *_, z, w = np.loadtxt(known / "truth.tum")[-1]
-    meeting, start = free_endpoint(), f"twin.start=[{x}, {y}, {2 * math.atan2(z, w)}]"
-
-    def daemon(name: str) -> contextlib.AbstractContextManager["subprocess.Popen[str]"]:
+    def daemon(run: str) -> contextlib.AbstractContextManager["subprocess.Popen[str]"]:
         settings = [
-            *(start, f"robot.name={name}", f"telemetry.listen=[{free_endpoint()}]"),
-            *(f"telemetry.connect=[{meeting}]", "team.enabled=true", "team.align_every_s=1"),
+            *("robot.name=karl", "team.enabled=true", f"telemetry.connect=[{meeting}]"),
+            f"telemetry.listen=[{free_endpoint()}]",
         ]
         more = [word for setting in settings for word in ("--set", setting)]
-        run = ["run", *WORLD, *more, "--map", str(known), "--out", str(tmp_path / name)]
-        return gvgbot(*run, cwd=tmp_path)
+        return gvgbot("run", *more, "--out", str(tmp_path / run), cwd=tmp_path)
 
-    with (
-        router(meeting),
-        daemon("karl") as one,
-        daemon("lisa") as two,
-        client.connect("karl", meeting) as karl,
-        client.connect("lisa", meeting) as lisa,
-    ):
-        for robot, other in ((karl, lisa), (lisa, karl)):
-            (mate,) = until(robot, lambda state: bool(state.team)).team
-            assert mate.name == other.name
-            there = next(iter(other.state())).pose
-            assert math.dist(mate.pose[:2], there[:2]) < AWAY_M
+    with router(meeting), daemon("one") as one, daemon("two") as two:
+        for process in (one, two):
+            assert process.stdout is not None
+            said = next(line for line in process.stdout if "warning" in line and "name" in line)
+            assert "robot.name" in said
         two.kill()
-        went = next(iter(karl.state())).cycles
-        until(karl, lambda state: state.cycles > went + 50)  # alone
         one.send_signal(signal.SIGTERM)
-        log, _ = one.communicate(timeout=60)
+        log, _ = one.communicate(timeout=40)
     assert one.returncode == 0, log
     assert "Traceback" not in log
-    (joined,) = [line for line in log.splitlines() if "maps joined" in line]
-    assert "lisa" in joined
-    summary = json.loads((tmp_path / "karl" / "summary.json").read_text())
-    assert summary["frames"]["lisa"] == pytest.approx([0.0, 0.0, 0.0], abs=0.2)
-    both = json.loads((tmp_path / "karl" / "team.geojson").read_text())
-    points = [f for f in both["features"] if f["geometry"]["type"] == "Point"]
-    assert len(points) >= summary["vertices"] >= 6
+    assert json.loads((tmp_path / "one" / "summary.json").read_text())["frames"] == {}
+    assert json.loads((tmp_path / "one" / "team.geojson").read_text())["features"] is not None

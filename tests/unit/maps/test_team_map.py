@@ -1,14 +1,20 @@
 """Charts whose truth is known by construction, as one map."""
 
+import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from gvgbot.config import load_config
 from gvgbot.geometry import Pose
 from gvgbot.maps import geojson
+from gvgbot.maps.run_directory import RunDirectory
 from gvgbot.maps.team_map import route_graph, team_files
+from gvgbot.session import Session
 from tests.unit.team.building import irregular
+from tests.unit.team.test_member import START, team
 
 BUILDING = irregular(1)
 HERE, THERE = Pose(3.0, -2.0, 0.7), Pose(11.0, 6.0, -2.4)
@@ -52,3 +58,21 @@ def test_a_chart_keeps_its_frontiers_and_lengths() -> None:
     for edge in graph.edges:
         straight = math.dist(BUILDING.places[edge.start], BUILDING.places[edge.end])
         assert edge.length == pytest.approx(straight)
+
+
+def test_a_robot_of_a_team_saves_where_the_others_maps_lie_and_what_is_on_them(
+    tmp_path: Path,
+) -> None:
+    one, two = team()
+    with RunDirectory.create(tmp_path, world="somewhere") as directory:
+        session = Session(load_config(), directory, None)  # that has seen nothing itself
+        session.member = one.member
+        session.save()
+    true = START["one"].to(START["two"])
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["frames"]["two"] == pytest.approx([true.x, true.y, true.theta], abs=0.05)
+    joined = geojson.decode((tmp_path / "team.geojson").read_text())
+    assert len(joined.vertices) == len(two.chart.vertices)
+    found = np.array([vertex.position for vertex in joined.vertices])
+    for vertex in two.chart.vertices.values():
+        assert np.hypot(*(found - true.transform(vertex.position)).T).min() < 0.1
