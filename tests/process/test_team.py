@@ -65,6 +65,7 @@ def test_all_robots_of_a_team_hear_all_others(
         assert others == {b"\x00 by " + n.encode() + b"\xff" for n in NAMES if n != name}
 
 
+@pytest.mark.timeout(120)
 def test_daemons_at_a_router_hear_each_other(tmp_path: Path) -> None:
     """Two by one name say so as soon as they do, and neither minds that the other one is killed."""
     meeting = free_endpoint()
