@@ -117,6 +117,7 @@ class Member:
         self._chart = Chart()
         self._mates: dict[str, _Mate] = {}
         self._site: Site | None = None
+        self._frontiers = frozenset[HalfEdgeId]()  # own ones at the last choice
         self._claim: Claim | None = None
         self._claimed_end: HalfEdgeId | None = None
         self._stamp = 0.0
@@ -330,6 +331,9 @@ class Member:
     def choose(self, graph: GvgGraph, starts: list[Approach]) -> tuple[HalfEdgeId, Approach] | None:
         """The frontier that nobody else is nearer to, by the shortest way; see `Sharing`."""
         reached = shortest_paths(graph, starts)
+        frontiers = frozenset(graph.frontiers())
+        if frontiers != self._frontiers:
+            self._frontiers, self._site = frontiers, None
         site = self._current_site()
         metres = {vertex: way.metres for vertex, way in reached.items()}
         costs = {

@@ -133,6 +133,21 @@ def test_alone_a_robot_takes_the_nearest_frontier_of_its_own() -> None:
     assert not one.member.is_done
 
 
+def test_a_frontier_found_since_the_last_news_is_chosen_at_once() -> None:
+    building = irregular(1)
+    alone = robot("one", building, {0, 1}, 0)
+    before = alone.choose()
+    grown = building.chart({0, 1, 2, 5, 6}, START["one"])
+    alone.chart.vertices.update(grown.vertices)
+    alone.chart.edges.update(grown.edges)
+    chosen = alone.choose()
+    assert before is not None
+    assert chosen is not None
+    half = grown.vertices[chosen[0].vertex].departures
+    assert next(d for d in half if d.key == chosen[0].key).edge is None
+    assert not alone.member.is_done
+
+
 def test_old_news_do_not_replace_new_ones_and_a_restart_begins_anew() -> None:
     one, two = team()
     old = decode(encode(two.member.news(3.0, Pose(), 0.0, finished=False)))
