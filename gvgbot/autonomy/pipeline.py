@@ -46,7 +46,7 @@ from gvgbot.ranges import Range
 
 _NOTHING_FELT = Felt()
 _LIFTED = np.diag([0.3**2, 0.3**2, 0.1**2])  # how far a robot is carried that is put down again
-_SEEN_SHARE = 0.8  # of the laser's range: walls farther off cannot be relied on
+_SEEN_SHARE = 0.8  # of the laser's range, and of the map's half width: walls farther off may lack
 _ROOM_BESIDE_EDGES_M = 0.08  # on each side, where no edge leads
 _COMPANY_M = 0.15  # by which another robot may be elsewhere than it says
 _LONGEST_GAP_S = 2.0  # between keyframes; a longer one is an outage of a device
@@ -279,16 +279,18 @@ class Pipeline:
 
     def _local_gvg(self, local_base: Pose, range_max: float) -> LocalGvg:
         """The GVG around the base, by what the local map shows and the map holds."""
-        reduction = self._config.reduction
+        reduction, half_width = self._config.reduction, self._config.local_map.half_width_m
         fine = fine_graph(
             self._maps.near,
             local_base.position,
             min_clearance=self._radius + self._config.passage_margin_m,
             roughness=reduction.roughness_m,
-            open_clearance=min(reduction.open_clearance_m, _SEEN_SHARE * range_max),
+            open_clearance=min(
+                reduction.open_clearance_m, _SEEN_SHARE * min(range_max, half_width)
+            ),
             felt=np.concatenate([self._hazards.points, self._newcomers.points]),
         )
-        known = self.mapper.known_around(local_base, self._config.local_map.half_width_m)
+        known = self.mapper.known_around(local_base, half_width)
         return reduce_graph(fine, reduction, known)
 
     def _worth_a_look(self, scan: Scan, odom_base: Pose) -> bool:
