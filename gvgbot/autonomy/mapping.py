@@ -26,7 +26,7 @@ from gvgbot.autonomy.slam.recognition import (
     match_bearings,
 )
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
-from gvgbot.autonomy.topology import loose_ends, split_edge_at, take_out
+from gvgbot.autonomy.topology import loose_ends, split_edge_at, strays, take_out
 from gvgbot.autonomy.unsettled import Knowledge, Unsettled
 from gvgbot.autonomy.views import Correspondence, Observation, View
 from gvgbot.geometry import Array, Pose
@@ -521,13 +521,9 @@ class Mapper(Knowledge):
                         self.remove(view, vertex, "its edge ends elsewhere")
 
     def forget_strays(self, view: View) -> None:
-        """Take out vertices that hang together with nothing, if there is anything to hang on to.
-
-        One with a departure that was tried in vain stays: somebody has been there.
-        """
-        for vertex in list(self.graph.vertices.values()) if self.graph.edges else ():
-            if all(half.open for half in vertex.half_edges.values()):
-                self.remove(view, vertex, "nothing leads there")
+        """Take out vertices that hang together with nothing, if there is anything to hang on to."""
+        for vertex in strays(self.graph):
+            self.remove(view, vertex, "nothing leads there")
 
     def remove(self, view: View, vertex: Vertex, reason: str) -> None:
         """Take a vertex out of the map; of two edges that met there one is made."""

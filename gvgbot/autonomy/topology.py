@@ -3,6 +3,8 @@
 import math
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from gvgbot.autonomy.slam.ekf import Belief, apart
 from gvgbot.autonomy.slam.graph import Edge, GvgGraph, HalfEdgeId, Vertex
@@ -10,6 +12,7 @@ from gvgbot.autonomy.slam.recognition import match_bearings
 from gvgbot.geometry import Array, Pose
 
 _OUT_M = 1.0  # from a vertex, where the direction of an edge is taken
+_STRAYS = 3  # vertices that hang together with nothing else: more are a part of the building
 
 
 def split_edge_at(
@@ -77,6 +80,39 @@ def take_out(graph: GvgGraph, belief: Belief, vertex: Vertex) -> None:
     clearance = min(one.min_clearance, other.min_clearance)
     edge = graph.join(start, end, line, clearance, driven=one.driven and other.driven)
     edge.established = one.established and other.established
+
+
+def strays(graph: GvgGraph) -> list[Vertex]:
+    """Vertices from which nothing leads to most of the graph, nor was a way tried in vain.
+
+    One was seen through glass, or a few are what is left of the ways round somebody who has gone:
+    where the robot has driven, all that it drove over hangs together.
+    """
+    if not graph.edges:
+        return []
+    rest = _pieces(graph)
+    rest.remove(max(rest, key=len))
+    return [
+        vertex
+        for piece in rest
+        if len(piece) <= _STRAYS and not any(_was_tried(vertex) for vertex in piece)
+        for vertex in piece
+    ]
+
+
+def _was_tried(vertex: Vertex) -> bool:
+    return any(half.blocked and half.edge is None for half in vertex.half_edges.values())
+
+
+def _pieces(graph: GvgGraph) -> list[list[Vertex]]:
+    """The vertices of each connected part of a graph."""
+    ids = list(graph.vertices)
+    number = {vertex: i for i, vertex in enumerate(ids)}
+    ends = [(number[e.a.vertex], number[e.b.vertex]) for e in graph.edges.values()]
+    rows, columns = zip(*ends, strict=True)
+    links = coo_array((np.ones(len(ends)), (rows, columns)), (len(ids), len(ids)))
+    count, piece = connected_components(links, directed=False)
+    return [[graph.vertices[ids[i]] for i in np.flatnonzero(piece == k)] for k in range(count)]
 
 
 def loose_ends(

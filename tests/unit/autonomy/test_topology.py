@@ -7,7 +7,7 @@ import pytest
 
 from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex
-from gvgbot.autonomy.topology import fuse, loose_ends, split_edge_at
+from gvgbot.autonomy.topology import fuse, loose_ends, split_edge_at, strays
 from gvgbot.geometry import Pose
 from tests.unit.autonomy.graphs import STREET, between, streets
 
@@ -114,3 +114,18 @@ def test_beside_two_edges_nobody_knows_which_one_who_goes_on_came_over() -> None
     found = loose_ends(graph, Belief(x, np.eye(12), tuple(ids[k, 0] for k in range(3))), middle)
     assert onward not in found
     assert {far.vertex for far, _ in found.values()} == {ids[0, 0], ids[2, 0]}
+
+
+@pytest.mark.parametrize(("size", "strange"), [(1, 1), (3, 3), (4, 0)])
+def test_a_few_vertices_that_nothing_leads_to_are_strays(size: int, strange: int) -> None:
+    """A street of ten crossings is parted after some; what was tried in vain stays."""
+    graph, ids = streets(10, 1)
+    assert strays(graph) == []
+    first, other = ids[size - 1, 0], ids[size, 0]
+    cut = between(graph, first, other)
+    edge = graph.edge_at(cut)
+    assert edge is not None
+    graph.unjoin(edge)
+    assert {vertex.id for vertex in strays(graph)} == {ids[x, 0] for x in range(strange)}
+    graph.vertices[first].half_edges[cut.key].blocked = True
+    assert strays(graph) == []
