@@ -77,6 +77,7 @@ class Newcomers:
     def __init__(self, config: NewcomersConfig) -> None:
         self._config = config
         self._all: list[Newcomer] = []
+        self.in_team = False  # bodies of robots pass by so close that slivers of them are seen
         self.company: list[tuple[Array, float]] = []  # other robots: where they say they are,
         self._met: list[tuple[Array, float]] = []  # and where they are seen
         self.bodies: Array = np.empty((0, 3))  # round ones in the last look: x, y, radius, m
@@ -96,7 +97,7 @@ class Newcomers:
         if not max(self._config.came_after_s, self._config.found_after_s):  # who comes, stays
             return _without(scan, local_base, self.company)
         self._forget(scan, local_base, local_map)
-        scan = without_fringes(scan)
+        scan = without_fringes(scan) if self.in_team else scan
         walls = _Walls(local_map, self._config.away_from_walls_m, is_way)
         self._met, seen = [], []
         found = islands(scan, local_base)

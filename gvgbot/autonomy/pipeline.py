@@ -217,6 +217,7 @@ class Pipeline:
         scan = deskewed(scan, self._odometry.motion_during(scan))
         local_base = self._localise(scan, odom_base)
         nearby = self._nearby(local_base)
+        self._newcomers.in_team = self.company is not None
         self._newcomers.company = self._discs(nearby, _COMPANY_M)
         self.mission.meet(local_base, nearby)
         is_way = partial(self.mapper.is_way, local_base)

@@ -330,12 +330,13 @@ def test_another_robot_is_kept_out_of_the_map_where_it_is_seen_not_where_it_says
 
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])
-def test_a_sliver_of_somebody_at_the_rim_of_sight_is_kept_out_of_the_map(side: float) -> None:
+def test_a_sliver_of_another_robot_at_the_rim_of_sight_is_kept_out_of_the_map(side: float) -> None:
     """The outermost beams end on who is all but out of sight: too little to know anybody by."""
     away = 2.0
     hidden = LASER_270 / 2 + math.asin(RADIUS / away) - math.radians(1.5)
     person = (away * math.cos(hidden), side * away * math.sin(hidden))
     watch, scan = Watch(EMPTY), sweep(EMPTY, HERE, field_of_view=LASER_270)
+    watch.newcomers.in_team = True
     seen = replace(scan, ranges=np.minimum(scan.ranges, to_disc(scan.bearings, person)))
     on_person = seen.ranges < scan.ranges
     assert 1 < np.count_nonzero(on_person) < 8
@@ -345,5 +346,6 @@ def test_a_sliver_of_somebody_at_the_rim_of_sight_is_kept_out_of_the_map(side: f
 
 def test_a_wall_at_the_rim_of_sight_is_no_sliver() -> None:
     watch, scan = Watch(), sweep(EMPTY, HERE, field_of_view=LASER_270)
+    watch.newcomers.in_team = True
     sifted = watch.newcomers.sift(scan, HERE, watch.map)
     assert np.array_equal(sifted.ranges, scan.ranges)
