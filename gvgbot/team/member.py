@@ -165,7 +165,8 @@ class Member:
         self._stamp = stamp
         self._courses += 1
         look = None
-        if seen is not None and (not self._looks or seen.stamp > self._looks[-1].stamp):
+        told = self._looks[-1].stamp if self._looks else stamp - WINDOW_S
+        if seen is not None and seen.stamp > told:
             _remember(self._looks, seen)
             pose, bodies = seen.map_base, tuple((x, y, r) for x, y, r in seen.bodies.tolist())
             look = ToldLook(max(0.0, stamp - seen.stamp), (pose.x, pose.y, pose.theta), bodies)

@@ -286,6 +286,17 @@ def test_robots_that_pass_each_other_find_their_frames_where_maps_tell_nothing()
     assert one.member.frames, "equal corridors do not speak against it"
 
 
+def test_what_was_seen_long_ago_is_not_told_and_nothing_twice() -> None:
+    one = robot("one", irregular(1), LEFT, 0).member
+    seen = BodiesSeen(5.0, Pose(), np.array([[1.0, 2.0, 0.2]]))
+    assert one.course(90.0, Pose(), np.zeros((0, 2)), seen).look is None
+    seen = replace(seen, stamp=89.5)
+    first = one.course(90.0, Pose(), np.zeros((0, 2)), seen).look
+    assert first is not None
+    assert first.age == 0.5
+    assert one.course(90.2, Pose(), np.zeros((0, 2)), seen).look is None
+
+
 def test_who_hears_that_its_frame_was_found_knows_the_other_ones() -> None:
     building = irregular(1)
     one, two = robot("one", building, LEFT, 0), robot("two", building, RIGHT, 14)
