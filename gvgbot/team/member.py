@@ -5,6 +5,7 @@ its graph hold only what it has measured itself. What the others have found tell
 go, and which of its own frontiers leads to where nobody has been.
 """
 
+import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -165,8 +166,8 @@ class Member:
         self._stamp = stamp
         self._courses += 1
         look = None
-        told = self._looks[-1].stamp if self._looks else stamp - WINDOW_S
-        if seen is not None and seen.stamp > told:
+        told = self._looks[-1].stamp if self._looks else -math.inf
+        if seen is not None and seen.stamp > max(told, stamp - WINDOW_S):
             _remember(self._looks, seen)
             pose, bodies = seen.map_base, tuple((x, y, r) for x, y, r in seen.bodies.tolist())
             look = ToldLook(max(0.0, stamp - seen.stamp), (pose.x, pose.y, pose.theta), bodies)

@@ -295,6 +295,8 @@ def test_what_was_seen_long_ago_is_not_told_and_nothing_twice() -> None:
     assert first is not None
     assert first.age == 0.5
     assert one.course(90.2, Pose(), np.zeros((0, 2)), seen).look is None
+    seen = replace(seen, stamp=91.0)
+    assert one.course(200.0, Pose(), np.zeros((0, 2)), seen).look is None
 
 
 def test_who_hears_that_its_frame_was_found_knows_the_other_ones() -> None:
