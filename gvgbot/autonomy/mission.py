@@ -80,7 +80,16 @@ class Mission:
         if not is_beside:
             return self._access(view), self._events
         graph = self._mapper.graph
-        here = Situation(view.gvg, known, graph, self.where, place, view.local_base, view.doubted)
+        here = Situation(
+            view.gvg,
+            known,
+            graph,
+            self.where,
+            place,
+            view.local_base,
+            view.doubted,
+            in_team=self.sharing is not None,
+        )
         self._watch_progress(view)
         self._watch_the_way(view)
         order = Stand() if self.outcome is not None else self._decide(view, here)

@@ -159,6 +159,7 @@ class Situation:
     place: Place
     local_base: Pose
     doubted: frozenset[int] = frozenset()  # nodes that may be there for a while only
+    in_team: bool = False  # who stands in a room may be a robot that has nothing left to do
 
     def starts(self) -> list[Approach]:
         """The first vertices that the robot can reach along the edge it is on."""
@@ -268,7 +269,9 @@ class Situation:
             path = (*path, onward)
 
     def _leads_back(self, branch: Branch) -> bool:
-        """Whether a branch ends where the robot has come from: as one round somebody does."""
+        """Whether a branch ends where the robot has come from: as one round another one does."""
+        if not self.in_team:
+            return False
         end = self.gvg.nodes[self.gvg.end_of(branch)].position
         trail = np.array(self.where.trail).reshape(-1, 2)
         return bool((np.hypot(*(trail - end).T) < _LOOP_M).any())

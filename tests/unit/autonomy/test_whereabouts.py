@@ -251,8 +251,8 @@ def test_who_came_from_beside_its_edge_goes_back_the_same_way_however_it_turns(
         assert back == Branch(10, forward=came_from > 0.0)
 
 
-def test_the_way_leads_round_somebody_once_and_then_on_though_it_turns_more() -> None:
-    """Somebody stands in a room; the way out of it turns back more than that round the body."""
+def test_the_way_leads_round_another_robot_once_and_then_on_though_it_turns_more() -> None:
+    """It stands in a room; the way out of it turns back more than that round the body."""
     gvg = drawn(
         {1: (0.0, 0.0), 2: (4.0, 0.0), 3: (7.0, 0.0), 4: (7.0, -5.0)},
         {
@@ -267,7 +267,7 @@ def test_the_way_leads_round_somebody_once_and_then_on_though_it_turns_more() ->
     place = gvg.place(np.array([4.0, -1.0]))
     assert place is not None
     pose, doubted = Pose(4.0, -1.0, -math.pi / 2), frozenset({2, 3})
-    here = Situation(gvg, known, corridor_graph(), walk.where, place, pose, doubted)
+    here = Situation(gvg, known, corridor_graph(), walk.where, place, pose, doubted, in_team=True)
     line, _ = gvg.line_from(place, here.ahead())
     assert line[-1] == pytest.approx([7.0, -5.0])
 
