@@ -167,8 +167,7 @@ class Session:
         files = map_files(pipeline, journey, self.title)
         if others is not None:
             files |= team_files(geojson.decode(str(files[MAP])), others, self.title)
-            poses = {name: pose for name, (_, pose) in others.items()}
-            summary |= {"frames": {name: (p.x, p.y, p.theta) for name, p in poses.items()}}
+            summary["frames"] = {name: (p.x, p.y, p.theta) for name, (_, p) in others.items()}
         if self.place is not None:
             files |= world_files(self.place.world)
         self.directory.write(files)

@@ -137,8 +137,8 @@ class Pipeline:
         self._hazards = Hazards(config.hazards)
         self._newcomers = Newcomers(config.newcomers)
         # other robots as they tell of themselves, map frame; None if there are surely none
-        self.seen: BodiesSeen | None = None  # bodies in the last look
         self.company: list[Companion] | None = None
+        self.seen: BodiesSeen | None = None  # what may be robots of a team, in the last look
         self._incidents: list[tuple[str, str]] = []  # action and reason, since the last scan
         self._was_lifted = self._look_now = False
         self._last: Keyframe | None = None
@@ -222,7 +222,8 @@ class Pipeline:
         self.mission.meet(local_base, nearby)
         is_way = partial(self.mapper.is_way, local_base)
         scan = self._newcomers.sift(scan, local_base, self._maps.near, is_way)
-        self.seen = self._bodies_seen(scan.stamp, local_base)
+        if self.company is not None:
+            self.seen = self._bodies_seen(scan.stamp, local_base)
         self._maps.insert(scan, local_base, self.travelled)
         self._hazards.forget(self.travelled)
         if self.led and not self._worth_a_gvg(local_base):

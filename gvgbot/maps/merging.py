@@ -16,6 +16,7 @@ from scipy.spatial.distance import cdist
 from gvgbot.geometry import Array, Pose, wrap_angle
 from gvgbot.maps.moved import moved_graph
 from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
+from gvgbot.team.alignment import least_squares
 
 _SAME_M = 0.6  # vertices nearer to each other are one
 _SAME_RAD = 0.7  # departures nearer to each other are one
@@ -68,11 +69,9 @@ def _fitted(ours: RouteGraph, theirs: RouteGraph, pose: Pose) -> Pose:
         pairs = _pairs(ours, moved_graph(theirs, pose))
         if len(pairs) < 2:
             break
-        a = np.array([complex(*ours.vertices[i].position) for i, _ in pairs])
-        b = np.array([complex(*theirs.vertices[j].position) for _, j in pairs])
-        turn = np.vdot(b - b.mean(), a - a.mean())
-        shift = a.mean() - b.mean() * turn / (abs(turn) or 1.0)
-        pose = Pose(float(shift.real), float(shift.imag), float(np.angle(turn)))
+        here = np.array([ours.vertices[i].position for i, _ in pairs])
+        there = np.array([theirs.vertices[j].position for _, j in pairs])
+        pose, _ = least_squares(here, there)
     return pose
 
 

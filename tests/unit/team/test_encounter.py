@@ -44,25 +44,18 @@ def frame(mine: list[BodiesSeen], theirs: list[BodiesSeen]) -> tuple[Pose, Array
     return frame_of(mine, theirs, RADIUS, RADIUS)
 
 
-def is_right(pose: Pose, true: Pose) -> bool:
-    """In the middle of where they met, to two centimetres and a degree."""
-    there = true.inverse().transform(STARTS[0].inverse().transform(WEST(6.0)))
-    off = math.dist(pose.transform(there), true.transform(there))
-    return off < 0.02 and abs(wrap_angle(pose.theta - true.theta)) < 0.02
-
-
 @pytest.mark.parametrize("passer_by", [(), (straight(2.0, 1.0, 0.1, 0.3),)])
 def test_two_that_pass_each_other_know_how_their_frames_lie(passer_by: tuple[Way, ...]) -> None:
     """Whether or not both see somebody else as well."""
     one, two = looks(0, EAST, WEST, *passer_by), looks(1, WEST, EAST, *passer_by)
-    true = STARTS[0].to(STARTS[1])
-    for found, right in ((frame(one, two), true), (frame(two, one), true.inverse())):
+    for here, there, mine, theirs in ((*STARTS, one, two), (*STARTS[::-1], two, one)):
+        found = frame(mine, theirs)
         assert found is not None
         pose, covariance = found
-        if right is true:
-            assert is_right(pose, right)
-        off = pose.inverse().compose(right)
-        assert abs(wrap_angle(off.theta)) < 3.0 * math.sqrt(covariance[2, 2])
+        true, meeting = here.to(there), there.inverse().transform(WEST(6.0))
+        assert math.dist(pose.transform(meeting), true.transform(meeting)) < 0.02
+        off = wrap_angle(pose.theta - true.theta)
+        assert abs(off) < min(0.02, 3.0 * math.sqrt(covariance[2, 2]))
 
 
 def test_who_sees_without_being_seen_does_not_know_whom() -> None:
