@@ -106,7 +106,8 @@ class Keeper:
         clock = LoopClock()
         if self._saved is not None:
             beat, now = self._saved.beat, clock.now()
-            self._same_life = beat.boot == self._boot and now + beat.ahead >= beat.stamp
+            is_same_boot = beat.boot == self._boot and now + beat.ahead >= beat.stamp
+            self._same_life = self._goes_on and is_same_boot
             self._ahead = beat.ahead if self._same_life else beat.stamp + _PAUSE_S - now
             clock = LoopClock(self._ahead)
         return clock

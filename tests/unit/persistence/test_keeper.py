@@ -1,8 +1,11 @@
-"""The keeper beside a disk that refuses for a while."""
+"""The keeper: beside a disk that refuses for a while, and with a map from elsewhere."""
 
+import asyncio
 import copy
+from dataclasses import replace
 from pathlib import Path
 
+import msgspec
 import pytest
 import structlog
 
@@ -12,6 +15,7 @@ from gvgbot.config import load_config
 from gvgbot.maps.run_directory import RunDirectory
 from gvgbot.persistence.keeper import Keeper
 from gvgbot.persistence.mission_files import JOURNAL, MissionFiles
+from gvgbot.persistence.mission_state import boot_id
 from gvgbot.persistence.records import packed
 from gvgbot.session import Session
 from tests.unit.persistence.test_mission_files import full_disk
@@ -100,3 +104,18 @@ def test_a_robot_that_saw_nothing_leaves_no_mission(tmp_path: Path) -> None:
     keeper.keeping(1.0)()
     keeper.finish()
     assert MissionFiles(tmp_path).read() is None
+
+
+def test_time_goes_on_where_a_map_from_elsewhere_ended(tmp_path: Path) -> None:
+    """The map may be that of a simulation on this computer, whose clock began with zero."""
+    known = MissionFiles(MISSION).read()
+    assert known is not None
+    beat = msgspec.structs.replace(known.beat, stamp=1.0, boot=boot_id(), ahead=0.0)
+    with RunDirectory(tmp_path) as directory:
+        session = Session(load_config(), directory, None)
+    keeper = Keeper(session, MissionFiles(tmp_path), replace(known, beat=beat))
+
+    async def begins() -> float:
+        return keeper.clock().now()
+
+    assert asyncio.run(begins()) == pytest.approx(2.0, abs=1.0)
