@@ -363,9 +363,9 @@ class Mapper(Knowledge):
         at_it = np.hypot(*(vertex.local.position - base)) < self._config.passed_m
         vertex.unclear = vertex.unclear + at_it if new else 0
         # What stays unclear although the robot is there must be driven to: it becomes a frontier.
-        if vertex.unclear >= self._config.candidates.meetpoint_sightings:
+        if vertex.unclear >= self._config.candidates.meetpoint_sightings * vertex.hesitation:
             certain = new
-        elif vertex.surplus < self._config.surplus:
+        elif vertex.surplus < self._config.surplus * vertex.hesitation:
             certain = []
         if certain:
             vertex.surplus = vertex.unclear = 0
@@ -379,12 +379,13 @@ class Mapper(Knowledge):
 
     def _doubt_half_edges(self, view: View, vertex: Vertex, seen: set[int], degree: int) -> None:
         """Drop departures that a clear view keeps not showing."""
+        misses = self._config.misses * vertex.hesitation
         for key, half in list(vertex.half_edges.items()):
             if key in seen or vertex.degree <= degree:
                 continue
             half.misses += 1
             edge = self.graph.edge_at(HalfEdgeId(vertex.id, key))
-            if half.misses <= self._config.misses or (edge is not None and edge.driven):
+            if half.misses <= misses or (edge is not None and edge.driven):
                 continue
             if edge is None or self._has_changed(edge, view.stamp):
                 self.graph.remove_half_edge(HalfEdgeId(vertex.id, key))

@@ -407,7 +407,17 @@ class Mission:
         elif waited > self._config.patience_s:
             self._headway.restart(view.stamp)
             self._headway.restart_stay()
+            if self.target is None or self._mapper.graph.half_edge(self.target) is None:
+                self.target = self._frontier_beside(view)  # one that comes and goes
             self._give_up(view, "no progress")
+
+    def _frontier_beside(self, view: View) -> HalfEdgeId | None:
+        """The frontier nearest to the robot as the crow flies."""
+
+        def away(end: HalfEdgeId) -> float:
+            return self._mapper.in_local_frame(view, end.vertex).distance(view.local_base)
+
+        return min(self._mapper.graph.frontiers(), key=away, default=None)
 
     def _give_up(self, view: View, reason: str) -> None:
         """Mark the target as blocked, after having gone back; without one, that is the end."""

@@ -82,6 +82,14 @@ class Vertex:
         return len(self.half_edges)
 
     @property
+    def hesitation(self) -> int:
+        """How many times as much must be seen to change its departures: 1, and 1 by each dropped.
+
+        What comes and goes, as half a corner in sight may, is then no news for ever.
+        """
+        return 1 + self.serial - self.degree
+
+    @property
     def kind(self) -> Kind:
         """An endpoint has one departure."""
         return "meetpoint" if self.degree > 1 else "endpoint"

@@ -237,6 +237,22 @@ def test_a_departure_that_a_clear_view_keeps_not_showing_is_dropped() -> None:
     assert vertex.degree == 3
 
 
+def test_a_departure_that_comes_and_goes_is_decided_upon_in_the_end() -> None:
+    """A branch of which now and then enough can be seen: each time it would be a new frontier."""
+    lines = {**TEE_LINES, 13: (2, 5, [])}
+    crossing = drawn({**TEE_POINTS, 5: (3.0, 4.0)}, lines, unseen={**UNSEEN, 5: math.pi / 2})
+    seen = Seen().look(TEE, 20)
+    vertex = seen.mapper.graph.vertices[seen.known.vertex_of[2]]
+    known = []
+    for sight in [crossing, TEE] * 20:
+        seen.look(sight, 10)
+        known.append(tuple(vertex.half_edges))
+    assert len(set(known[:10])) > 1
+    assert len(set(known[10:])) == 1
+    seen.look(TEE, 200)
+    assert vertex.degree == 3
+
+
 def test_a_departure_seen_only_later_is_added() -> None:
     seen = Seen().look(TEE, 20)
     lines = {**TEE_LINES, 13: (2, 5, [])}

@@ -269,6 +269,24 @@ def test_a_robot_that_cannot_move_gives_up_its_target_after_its_patience() -> No
     assert half.blocked
 
 
+def test_a_target_that_vanishes_when_patience_ends_costs_one_frontier_and_not_all() -> None:
+    waiting = Robot()
+    waiting.stand(TEE, 8)
+    looks = 8
+    while not waiting.said(Recovery):
+        waiting.look(TEE)
+        looks += 1
+    robot = Robot()
+    robot.stand(TEE, looks - 1)
+    graph, target = robot.mapper.graph, robot.mission.target
+    assert target is not None
+    graph.remove_half_edge(target)
+    robot.look(TEE)
+    assert robot.mission.outcome is None
+    assert len(graph.blocked()) == 1
+    assert graph.frontiers()
+
+
 def test_who_has_nowhere_to_go_but_past_another_robot_makes_way() -> None:
     """Held up west of the tee by a robot behind it, until every way is closed for a while."""
     robot = Robot()
