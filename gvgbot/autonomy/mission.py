@@ -11,7 +11,7 @@ from gvgbot.autonomy.control.edge_follower import Track
 from gvgbot.autonomy.control.orders import ARRIVED_M, Drive, LookAround, Order, Stand
 from gvgbot.autonomy.driven_edges import DrivenEdges
 from gvgbot.autonomy.events import Decision, Event, Finished, Recovery
-from gvgbot.autonomy.exploration.access import NEAR_M, way_to_edge
+from gvgbot.autonomy.exploration.access import NEAR_M, access, way_to_edge
 from gvgbot.autonomy.exploration.certainty import vertex_sigma
 from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.exploration.ears import ear_next, nearest_frontier
@@ -29,7 +29,6 @@ from gvgbot.autonomy.views import Correspondence, View
 from gvgbot.autonomy.whereabouts import Situation, Whereabouts
 from gvgbot.geometry import Array, Pose
 
-_BESIDE_M = 0.15  # farther from its edge than this, the robot goes there first
 _WORTH_TURNING_M = 1.0  # a new frontier must be so much nearer than the old one
 _FACING_RAD = 1.0  # looking so far past a thing, one would not see it go
 _FACING_POINTS = 6  # of a polyline tell where its end points to
@@ -67,15 +66,15 @@ class Mission:
         """The order for the next keyframe interval."""
         self._events = []
         self._backtracking.sees_known = bool(known.vertex_of)
-        place = view.gvg.place(view.local_base.position)
-        is_beside = place is not None and place.distance <= NEAR_M
-        if place is not None and is_beside:
+        found = access(view)
+        is_beside = found is not None and found.place.distance <= NEAR_M
+        if found is not None and is_beside:
             self._search.end()
-            self._learn(view, known, place)
+            self._learn(view, known, found.place)
         back = self._go_back(view) if self._backtracking.is_on else None
         if back is not None:
             return back, self._events
-        if place is None:
+        if found is None:
             return self._look_for_an_edge(view), self._events
         if not is_beside:
             return self._access(view), self._events
@@ -85,10 +84,11 @@ class Mission:
             known,
             graph,
             self.where,
-            place,
+            found.place,
             view.local_base,
             view.doubted,
             in_team=self.sharing is not None,
+            access=found,
         )
         self._watch_progress(view)
         self._watch_the_way(view)
@@ -105,9 +105,9 @@ class Mission:
     def witness(self, view: View, known: Correspondence) -> list[Event]:
         """Learn from where somebody else drives the robot."""
         self._events = []
-        place = view.gvg.place(view.local_base.position)
-        if place is not None and place.distance <= NEAR_M:
-            self._learn(view, known, place)
+        found = access(view)
+        if found is not None and found.place.distance <= NEAR_M:
+            self._learn(view, known, found.place)
         return self._events
 
     def stop(self, stamp: float, reason: str) -> Event:
@@ -320,10 +320,7 @@ class Mission:
         return Stand() if way is None else self._drive(view, here, way)
 
     def _drive(self, view: View, here: Situation, path: tuple[Branch, ...]) -> Order:
-        line, room = view.gvg.line_from(here.place, path)
-        if here.place.distance > _BESIDE_M:  # straight to the edge first, or it may scrape along
-            base = view.local_base.position
-            line, room = np.vstack([base, line]), np.concatenate([room[:1], room])
+        line, room = here.line_along(path)
         free = self._free_metres(view, line)
         if free < ARRIVED_M:
             self._hindrance.hold()

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from gvgbot.autonomy.exploration.access import Access
 from gvgbot.autonomy.exploration.paths import Approach, shortest_paths
 from gvgbot.autonomy.gvg.local import Branch, LocalGvg, LocalNode, Place
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
@@ -160,6 +161,7 @@ class Situation:
     local_base: Pose
     doubted: frozenset[int] = frozenset()  # nodes that may be there for a while only
     in_team: bool = False  # who stands in a room may be a robot that has nothing left to do
+    access: Access | None = None  # to the place, if the robot is not there
 
     def starts(self) -> list[Approach]:
         """The first vertices that the robot can reach along the edge it is on."""
@@ -222,6 +224,13 @@ class Situation:
 
     def _back(self) -> Branch:
         return self.where.backwards(self.gvg, self.place, self.known, self.local_base)
+
+    def line_along(self, path: tuple[Branch, ...]) -> tuple[Array, Array]:
+        """What to drive to the place and on along a path: points (N, 2), m, and clearance (N,)."""
+        line, room = self.gvg.line_from(self.place, path)
+        if self.access is None:
+            return line, room
+        return np.vstack([self.access.line, line]), np.concatenate([self.access.room, room])
 
     def ahead(self) -> tuple[Branch, ...]:
         """Straight on along the present edge, as far as it is in sight."""

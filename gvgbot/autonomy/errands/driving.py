@@ -19,7 +19,7 @@ from gvgbot.autonomy.destinations import (
 from gvgbot.autonomy.errands.closures import Closures
 from gvgbot.autonomy.errands.kinds import Home, Look, Past, Rest, Stop, ToPoint, ToVertex
 from gvgbot.autonomy.events import Event, Recovery
-from gvgbot.autonomy.exploration.access import NEAR_M, straight_way, way_to_edge
+from gvgbot.autonomy.exploration.access import NEAR_M, access, straight_way, way_to_edge
 from gvgbot.autonomy.exploration.certainty import robot_sigma
 from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.exploration.paths import Approach
@@ -64,11 +64,12 @@ class Ground:
 
     def situation(self, view: View, known: Correspondence) -> Situation | None:
         """Where the robot is on the graph; None if it is off it."""
-        place = view.gvg.place(view.local_base.position)
-        if place is None or place.distance > NEAR_M:
+        found = access(view)
+        if found is None or found.place.distance > NEAR_M:
             return None
         graph, where = self.mapper.graph, self.mission.where
-        return Situation(view.gvg, known, graph, where, place, view.local_base, view.doubted)
+        base, doubted = view.local_base, view.doubted
+        return Situation(view.gvg, known, graph, where, found.place, base, doubted, access=found)
 
     def is_at(self, view: View, vertex: int) -> bool:
         """Whether the robot is about at a vertex."""
@@ -303,7 +304,7 @@ class Driving:
         if route.metres < self._nearest_m - _PROGRESS_M:
             self._nearest_m, self._progress = route.metres, view.stamp
         path = route.branches(here) or here.ahead()
-        line, clearance = view.gvg.line_from(here.place, path)
+        line, clearance = here.line_along(path)
         if end is not None:
             d = np.hypot(*(line - end).T)
             if d.min() < _ALMOST_M:

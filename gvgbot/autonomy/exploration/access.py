@@ -1,19 +1,82 @@
 """Access: from a place off the GVG, in a wide space or beside it, onto the nearest edge."""
 
 import math
+from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.spatial import cKDTree
 
+from gvgbot.autonomy.gvg.local import Place
 from gvgbot.autonomy.views import View
 from gvgbot.geometry import Array
 
 NEAR_M = 1.5  # from an edge, one is as good as on it
+BESIDE_M = 0.15  # farther from its edge than this, the robot goes there first
+_BETWEEN_M = 0.1  # from a straight way, a wall is between its ends
+_CLIMB_M = 0.05  # steps away from the walls
+_AROUND = np.stack([f(np.arange(16) * np.pi / 8) for f in (np.cos, np.sin)], axis=1)
 _ROOM_M = 0.35  # from the walls, on the way
 _SPACING_M = 0.1
 _BEARINGS, _STEP_M, _FARTHEST_M = 16, 0.5, 4.0  # of places to go to where no edge is in sight
 _ROOM_ENOUGH_M = 5.0  # from the walls: more says nothing
 _SOUGHT_M = 1.5  # so near, one has been
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Access:
+    """Where on the local GVG the robot is, and the way there.
+
+    Points (N, 2), local frame, and their distances (N,) from the walls, m; none if it is on it.
+    """
+
+    place: Place
+    line: Array = field(default_factory=lambda: np.empty((0, 2)))
+    room: Array = field(default_factory=lambda: np.empty(0))
+
+
+def access(view: View) -> Access | None:
+    """The access to the nearest edge, or to another one if walls are in the way; None without any.
+
+    Beside a wall the robot drives away from it first.
+    """
+    base = view.local_base.position
+    places = sorted(view.gvg.places(base), key=lambda place: place.distance)
+    if not places:
+        return None
+    nearest = places[0]
+    if not BESIDE_M < nearest.distance <= NEAR_M:
+        return Access(nearest)
+    near = (place for place in places if place.distance <= NEAR_M)
+    return (
+        _straight(view, nearest, _ROOM_M)
+        or _uphill(view)
+        or next(filter(None, (_straight(view, place, _BETWEEN_M) for place in near)), None)
+        or Access(nearest, base[None], np.atleast_1d(view.local_map.tree().query(base)[0]))
+    )
+
+
+def _straight(view: View, place: Place, least_room: float) -> Access | None:
+    way = straight_way(view, view.gvg.point(place), least_room)
+    return None if way is None else Access(place, *way)
+
+
+def _uphill(view: View) -> Access | None:
+    """To where there is more and more room, until an edge is near."""
+    base, tree = view.local_base.position, view.local_map.tree()
+    line = [base]
+    rooms = [float(tree.query(base)[0])]
+    for _ in range(round(NEAR_M / _CLIMB_M)):
+        around = line[-1] + _CLIMB_M * _AROUND
+        room = np.asarray(tree.query(around)[0])
+        best = int(room.argmax())
+        if room[best] <= rooms[-1]:
+            return None
+        line.append(around[best])
+        rooms.append(float(room[best]))
+        place = view.gvg.place(line[-1])
+        if place is not None and place.distance <= BESIDE_M:
+            away = float(np.hypot(*(view.gvg.point(place) - base)))
+            return Access(place._replace(distance=away), np.array(line), np.array(rooms))
+    return None
 
 
 def way_to_edge(view: View) -> tuple[Array, Array] | None:
@@ -41,7 +104,7 @@ def way_into_the_open(view: View, sought: list[Array]) -> tuple[Array, Array] | 
     goals = base.position + (
         metres[:, None, None] * np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
     ).reshape(-1, 2)
-    room = np.asarray(cKDTree(view.local_map.points()).query(goals)[0])
+    room = np.asarray(view.local_map.tree().query(goals)[0])
     for goal in goals[np.argsort(-np.minimum(room, _ROOM_ENOUGH_M), kind="stable")]:
         if all(math.dist(goal, place) > _SOUGHT_M for place in sought):
             way = straight_way(view, goal, _ROOM_M)
@@ -58,7 +121,7 @@ def straight_way(view: View, goal: Array, least_room: float) -> tuple[Array, Arr
     base = view.local_base.position
     distance = float(np.hypot(*(goal - base)))
     line = np.linspace(base, goal, math.ceil(distance / _SPACING_M) + 1)
-    room = np.asarray(cKDTree(view.local_map.points()).query(line)[0])
+    room = np.asarray(view.local_map.tree().query(line)[0])
     narrow = room < min(least_room, float(room[0]))  # where it stands, it may stand close
     if narrow.any() or not view.local_map.known(line).all():
         return None

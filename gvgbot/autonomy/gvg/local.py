@@ -106,13 +106,21 @@ class LocalGvg:
 
     def place(self, point: Array) -> Place | None:
         """The point of the graph nearest to a point (2,); None on an empty graph."""
-        best: Place | None = None
+        return min(self.places(point), key=lambda place: place.distance, default=None)
+
+    def places(self, point: Array) -> list[Place]:
+        """The point of each edge that is nearest to a point (2,)."""
+        found = []
         for key, edge in self.edges.items():
             d = np.hypot(edge.polyline[:, 0] - point[0], edge.polyline[:, 1] - point[1])
             i = int(np.argmin(d))
-            if best is None or d[i] < best.distance:
-                best = Place(key, float(edge.stations[i]), float(d[i]))
-        return best
+            found.append(Place(key, float(edge.stations[i]), float(d[i])))
+        return found
+
+    def point(self, place: Place) -> Array:
+        """The point (2,) that a place is."""
+        edge = self.edges[place.edge]
+        return np.asarray(edge.polyline[int(np.abs(edge.stations - place.station).argmin())])
 
     def leaving(self, branch: Branch) -> Array:
         """Polyline (N, 2) along a branch, from its node outwards."""

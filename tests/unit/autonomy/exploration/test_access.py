@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gvgbot.autonomy.exploration.access import way_to_edge
+from gvgbot.autonomy.exploration.access import access, way_to_edge
 from gvgbot.autonomy.gvg.local import LocalGvg
 from gvgbot.autonomy.views import View
 from gvgbot.geometry import Pose
@@ -35,3 +35,43 @@ def test_the_edge_behind_a_wall_is_not_the_way_although_it_is_nearer() -> None:
 def test_with_walls_before_every_edge_there_is_no_way() -> None:
     gvg = drawn({1: (-3.0, -3.1), 2: (3.0, -3.1)}, {10: (1, 2, [])})
     assert way_to_edge(view_of(gvg)) is None
+
+
+def test_on_an_edge_there_is_no_way_to_go() -> None:
+    gvg = drawn({1: (-2.0, -1.1), 2: (2.0, -1.1)}, {10: (1, 2, [])})
+    found = access(view_of(gvg))
+    assert found is not None
+    assert found.place.distance == pytest.approx(0.1, abs=0.03)
+    assert len(found.line) == len(found.room) == 0
+
+
+def test_the_robot_is_not_on_an_edge_behind_a_wall_although_that_is_nearer() -> None:
+    """The wall from y = -2.2 to -2.0 is between: 1.3 m and 1.4 m away."""
+    here = Pose(0.0, -1.6, 0.0)
+    gvg = drawn({1: (-3.0, -2.9), 2: (3.0, -2.9), 3: (-2.0, -0.2), 4: (2.0, -0.2)}, NEAR)
+    found = access(View(0, 0.0, 0.0, here, gvg, looked(ROOM_AND_CORRIDOR, [here])))
+    assert found is not None
+    assert found.place.edge == 11
+    assert found.line[0] == pytest.approx(here.position)
+    assert found.line[0][1] < found.line[-1][1] == pytest.approx(-0.2, abs=0.16)
+
+
+def test_who_would_scrape_along_a_post_drives_away_from_it_to_another_edge() -> None:
+    """Straight ahead, 0.85 m off, is the nearest edge, and a post of 10 cm to the right of the way.
+
+    The other one is the parabola between the post and the wall at y = 2.
+    """
+    room = carved([(-4.0, -2.0, 4.0, 2.0)], [(0.10, -0.26, 0.20, -0.16)])
+    along = np.linspace(-2.0, 0.6, 20)
+    parabola = [(float(x), float(0.92 - (x - 0.14) ** 2 / 4.32)) for x in along]
+    points = {1: (0.85, -1.5), 2: (0.85, 0.6), 3: parabola[0], 4: parabola[-1]}
+    gvg = drawn(points, {10: (1, 2, []), 11: (3, 4, parabola[1:-1])})
+    here = Pose(0.0, 0.0, 0.0)
+    local_map = looked(room, [here, Pose(0.0, 0.5, 0.0)])
+    found = access(View(0, 0.0, 0.0, here, gvg, local_map))
+    assert found is not None
+    assert found.place.edge == 11
+    dx, dy = found.line[1] - found.line[0]
+    assert np.degrees(np.arctan2(dy, dx)) == pytest.approx(180.0 - 58.0, abs=20.0)
+    assert np.all(np.diff(found.room) > 0.0)
+    assert found.room[-1] > 0.7
