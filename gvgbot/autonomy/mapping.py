@@ -39,6 +39,7 @@ _FRESH_M = 6.0  # driven since a vertex was seen: the local frame still tells it
 _IN_FULL_VIEW_M = 4.0  # from so near, it would be seen that a vertex is none
 _IN_CLEAR_M = 2.0  # and from so near, that it has no departure where one was seen
 _WELL_KNOWN_M = 0.2  # the uncertainty of its place with which that can be told
+_DRIVEN = 5  # times as often must a driven edge be missed
 _DOOR_M = 0.5  # from an edge, a dead end is what stands on it
 _AT_END_M = 0.5  # so near to the end of a dead end, it has been driven
 
@@ -384,11 +385,27 @@ class Mapper(Knowledge):
             if key in seen or vertex.degree <= degree:
                 continue
             half.misses += 1
-            edge = self.graph.edge_at(HalfEdgeId(vertex.id, key))
-            if half.misses <= misses or (edge is not None and edge.driven):
+            end = HalfEdgeId(vertex.id, key)
+            edge = self.graph.edge_at(end)
+            if half.misses <= misses * self._weight(edge, end):
                 continue
             if edge is None or self._has_changed(edge, view.stamp):
-                self.graph.remove_half_edge(HalfEdgeId(vertex.id, key))
+                self.graph.remove_half_edge(end)
+
+    def _weight(self, edge: Edge | None, end: HalfEdgeId) -> float:
+        """How many times as often as others a departure must be missed before it is dropped."""
+        if edge is None or not edge.driven:
+            return 1.0
+        return _DRIVEN if self._is_left_open(edge.other(end)) else math.inf
+
+    def _is_left_open(self, end: HalfEdgeId) -> bool:
+        """Whether nothing is known beyond a vertex, and there are ways on.
+
+        What the robot drove round, and took for a vertex on the way, may have gone since.
+        """
+        halves = self.graph.vertices[end.vertex].half_edges
+        beyond = [half for key, half in halves.items() if key != end.key]
+        return all(half.edge is None for half in beyond) and any(half.open for half in beyond)
 
     def _refute(self, view: View, known: Correspondence) -> None:
         """Remove vertices where a plain edge is seen to pass through, or no wall that made them."""

@@ -237,6 +237,27 @@ def test_a_departure_that_a_clear_view_keeps_not_showing_is_dropped() -> None:
     assert vertex.degree == 3
 
 
+@pytest.mark.parametrize(("beyond", "stays"), [("ways on", False), ("a dead end", True)])
+def test_a_driven_edge_that_is_gone_stays_only_if_more_than_ways_on_hangs_on_it(
+    beyond: str, *, stays: bool
+) -> None:
+    """North of the tee, 4 m off, the robot has met a fork, as there is round somebody."""
+    points = {**TEE_POINTS, 5: (3.0, 4.0), 6: (1.0, 4.0), 7: (5.0, 4.0)}
+    lines = {**TEE_LINES, 13: (2, 5, []), 14: (5, 6, []), 15: (5, 7, [])}
+    unseen = {**UNSEEN, 6: math.pi}
+    if beyond == "ways on":
+        unseen[7] = 0.0
+    seen = Seen().look(drawn(points, lines, unseen=unseen), 20)
+    fork = seen.mapper.graph.vertices[seen.known.vertex_of[5]]
+    edges = seen.mapper.graph.edges.values()
+    (edge,) = (e for e in edges if {e.a.vertex, e.b.vertex} == {fork.id, seen.known.vertex_of[2]})
+    edge.driven = True
+    seen.look(TEE, 2 * CONFIG.misses)
+    assert edge in seen.mapper.graph.edges.values()
+    seen.look(TEE, 20 * CONFIG.misses)
+    assert (edge in seen.mapper.graph.edges.values()) == stays
+
+
 def test_a_departure_that_comes_and_goes_is_decided_upon_in_the_end() -> None:
     """A branch of which now and then enough can be seen: each time it would be a new frontier."""
     lines = {**TEE_LINES, 13: (2, 5, [])}
