@@ -21,7 +21,6 @@ from gvgbot.autonomy.exploration.obstructions import Obstructions
 from gvgbot.autonomy.exploration.paths import Approach, shortest_paths
 from gvgbot.autonomy.exploration.sharing import Sharing
 from gvgbot.autonomy.gvg.local import Branch, Place
-from gvgbot.autonomy.hidden import Hidden
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.scouting import Scouting
 from gvgbot.autonomy.search import NO_EDGE, Search
@@ -61,16 +60,12 @@ class Mission:
         self._in_front: Companion | None = None  # that is near
         self._search, self._scouting, self._backtracking = Search(), Scouting(), Backtracking()
         self._examining_since: float | None = None
-        self._hidden = Hidden()
         self._events: list[Event] = []
 
     def advance(self, view: View, known: Correspondence) -> tuple[Order, list[Event]]:
         """The order for the next keyframe interval."""
         self._events = []
         self._backtracking.sees_known = bool(known.vertex_of)
-        if self.sharing is None:  # who stands in the way in a team may be another robot
-            map_local = self._mapper.belief.map_base.compose(view.local_base.inverse())
-            self._hidden.note(view, map_local)
         found = access(view)
         is_beside = found is not None and found.place.distance <= NEAR_M
         if found is not None and is_beside:
@@ -151,7 +146,6 @@ class Mission:
         self._search.skip(seconds)
         self._scouting.skip(seconds)
         self._hindrance.skip(seconds)
-        self._hidden.skip(seconds)
         if self._examining_since is not None:
             self._examining_since += seconds
 
@@ -475,10 +469,6 @@ class Mission:
         )
         if paths and view.stamp - self._examining_since < self._config.patience_s:
             return self._drive(view, here, paths[0][2])
-        path = self._hidden.path(view, here, self._mapper, self._config.patience_s)
-        if path is not None:
-            self._examining_since = view.stamp
-            return self._drive(view, here, path)
         blocked = self._given_up()
         if blocked:
             self._end(view, "explored_with_blocked", f"{blocked} frontiers were given up")

@@ -230,8 +230,9 @@ class Pipeline:
             self._keep(scan, odom_base, local_base)
             return happened
         self.gvg = self._local_gvg(local_base, scan.range_max)
-        people = self._newcomers.points
-        doubtful = np.concatenate([self._hazards.doubtful, people, self._maps.near.suspects()])
+        doubtful = np.concatenate(
+            [self._hazards.doubtful, self._newcomers.points, self._maps.near.suspects()]
+        )
         view = View(
             len(self.keyframes),
             scan.stamp,
@@ -241,7 +242,6 @@ class Pipeline:
             self._maps.near,
             doubtful,
             touching(self.gvg, doubtful),
-            people,
         )
         known, learnt = self.mapper.observe(view)
         self._keep(scan, odom_base, local_base)

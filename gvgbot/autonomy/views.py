@@ -24,7 +24,6 @@ class View:
     local_map: LocalMap
     doubtful: Array = field(default_factory=lambda: np.empty((0, 2)))  # obstacles that may go
     doubted: frozenset[int] = frozenset()  # nodes that may be there for a while only
-    people: Array = field(default_factory=lambda: np.empty((0, 2)))  # rims of those among them
 
     def is_doubtful(self, place: Array, within_m: float) -> bool:
         """Whether something that may go stands so near to a place (2,)."""

@@ -41,7 +41,7 @@ class Town:
     def _street(self, west: Vertex, east: Vertex) -> tuple[HalfEdgeId, HalfEdgeId]:
         a = HalfEdgeId(west.id, west.add_half_edge(0.0))
         b = HalfEdgeId(east.id, east.add_half_edge(math.pi))
-        line = np.linspace([0.0, 0.0], [east.local.x - west.local.x, 0.0], 30)
+        line = np.array([[0.0, 0.0], [east.local.x - west.local.x, 0.0]])
         self.graph.join(a, b, line, 1.0, driven=True)
         return a, b
 
