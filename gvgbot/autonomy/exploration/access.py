@@ -11,6 +11,7 @@ from gvgbot.geometry import Array
 
 NEAR_M = 1.5  # from an edge, one is as good as on it
 BESIDE_M = 0.15  # farther from its edge than this, the robot goes there first
+_TIGHT_M = 0.25  # nearer to a wall, the robot would scrape along it
 _BETWEEN_M = 0.1  # from a straight way, a wall is between its ends
 _CLIMB_M = 0.05  # steps away from the walls
 _AROUND = np.stack([f(np.arange(16) * np.pi / 8) for f in (np.cos, np.sin)], axis=1)
@@ -45,10 +46,13 @@ def access(view: View) -> Access | None:
     nearest = places[0]
     if not BESIDE_M < nearest.distance <= NEAR_M:
         return Access(nearest)
+    straight = _straight(view, nearest, _ROOM_M)
+    if straight is not None and straight.room[0] > _TIGHT_M:
+        return straight
     near = (place for place in places if place.distance <= NEAR_M)
     return (
-        _straight(view, nearest, _ROOM_M)
-        or _uphill(view)
+        _uphill(view)
+        or straight
         or next(filter(None, (_straight(view, place, _BETWEEN_M) for place in near)), None)
         or Access(nearest, base[None], np.atleast_1d(view.local_map.tree().query(base)[0]))
     )
