@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cache, partial
 from typing import Annotated
 
 import numpy as np
@@ -49,6 +49,7 @@ _LIFTED = np.diag([0.3**2, 0.3**2, 0.1**2])  # how far a robot is carried that i
 _SEEN_SHARE = 0.8  # of the laser's range, and of the map's half width: walls farther off may lack
 _ROOM_BESIDE_EDGES_M = 0.08  # on each side, where no edge leads
 _COMPANY_M = 0.15  # by which another robot may be elsewhere than it says
+_BEHIND_M, _GRAIN_M = 0.2, 0.05  # what must be known to be free, when it backs off
 _LONGEST_GAP_S = 2.0  # between keyframes; a longer one is an outage of a device
 _FORGOTTEN = np.diag([1.0, 1.0, 0.3**2])  # covariance of a way that is not kept
 _SCAN_EVERY_M, _SCAN_EVERY_RAD = 0.7, 0.5  # scans that are kept for the occupancy grid
@@ -423,10 +424,13 @@ class Pipeline:
         return careful
 
     def _room_behind(self, local_base: Pose) -> float:
-        """How far the robot can go straight back, by what the map knows; m."""
-        points = seen_from(local_base, self._maps.near.points())
+        """How far the robot can go straight back over what it knows to be free, m."""
+        behind = local_base.transform(_behind(self._radius))
+        unknown = behind[~self._maps.near.known(behind)]
+        points = [self._maps.near.points(), self._newcomers.points, self._hazards.points, unknown]
+        seen = seen_from(local_base, np.concatenate(points))
         margin = self._config.passage_margin_m
-        return free_distance(points, Twist(-1.0, 0.0), radius=self._radius, margin=margin)
+        return free_distance(seen, Twist(-1.0, 0.0), radius=self._radius, margin=margin)
 
     def _take_down(self, incident: Incident, local_base: Pose) -> None:
         """Let the next look, which is due now, take account of an incident."""
@@ -458,6 +462,14 @@ class Pipeline:
         if self._turning_to is not None and self._turned >= self._turning_to:
             self._turning_to = None
         return self._turning_to is not None
+
+
+@cache
+def _behind(radius: float) -> Array:
+    """Points (N, 2) of the base frame that a robot of a radius, m, sweeps when it backs off."""
+    x, y = np.mgrid[-radius - _BEHIND_M : 0.0 : _GRAIN_M, -radius:radius:_GRAIN_M]
+    outside = np.hypot(x, y) > radius
+    return np.stack([x[outside], y[outside]], axis=1)
 
 
 def _blind_angle(scan: Scan) -> float:

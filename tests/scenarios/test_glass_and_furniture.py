@@ -7,6 +7,7 @@ import pytest
 from gvgbot.geometry import Pose
 from gvgbot.worlds.canvas import Canvas
 from tests.scenarios.rig import assert_explored, play
+from tests.unit.autonomy.sights import carved
 
 pytestmark = [pytest.mark.slow, pytest.mark.twin, pytest.mark.timeout(120)]
 
@@ -37,3 +38,31 @@ def test_the_legs_of_a_chair_are_led_round_without_hesitation() -> None:
     assert_explored(run)
     assert "back off" not in run.recoveries()
     assert max(pose.x for pose in run.truth) > 4.2  # beyond the chair
+
+
+def legs(*places: tuple[float, float]) -> list[tuple[float, float, float, float]]:
+    """Legs of 6 cm."""
+    return [(x - 0.03, y - 0.03, x + 0.03, y + 0.03) for x, y in places]
+
+
+@pytest.mark.parametrize("heading", [0.0, 0.4, -0.4])
+def test_a_robot_among_legs_drives_away_from_them_and_does_not_scrape_along(heading: float) -> None:
+    """Two centimetres beside a leg; the nearest edge is ahead of it."""
+    among = legs((0.05, -0.21), (-0.24, 0.16), (-0.34, 0.06), (-0.07, 0.32))
+    world = carved([(-3.0, -2.0, 3.0, 2.0), (3.0, -0.6, 6.0, 0.6)], among)
+    run = play(world, Pose(0.0, 0.0, heading), limit=200.0)
+    assert run.outcome == "explored", run.pipeline.mission.reason
+    assert run.contacts == 0
+    assert "back off" not in run.recoveries()
+
+
+@pytest.mark.parametrize("heading", [0.0, math.pi])
+def test_a_robot_backs_off_only_over_what_it_knows_to_be_free(
+    heading: float,
+) -> None:
+    """Between three legs that it hardly fits through, one of which is always behind it."""
+    between = legs((0.12, -0.2), (0.12, 0.25), (-0.25, 0.0))
+    world = carved([(-3.0, -2.0, 3.0, 2.0), (3.0, -0.6, 6.0, 0.6)], between)
+    run = play(world, Pose(0.0, 0.0, heading), limit=80.0)
+    assert "back off" in run.recoveries()
+    assert run.contacts == 0
