@@ -122,5 +122,5 @@ def _free_arc(x: Array, y: Array, reach: float, turn: float) -> float:
     x, below, away = x[hit], below[hit], away[hit]
     abreast = np.arctan2(x, below)  # angle along the arc to where the point is abreast
     cosine = (away * away + (turn - reach) * (turn + reach)) / (2.0 * turn * away)
-    half = np.arccos(np.maximum(cosine, -1.0))  # how much of that angle the disc spans
+    half = np.arccos(np.clip(cosine, -1.0, 1.0))  # how much of that angle the disc spans
     return turn * max(0.0, float(np.min(abreast - half)))

@@ -106,6 +106,14 @@ def test_left_and_right_are_alike(x: float, y: float, angular: float) -> None:
     assert left == pytest.approx(right, rel=1e-9)
 
 
+def test_what_an_arc_grazes_is_touched_abreast_however_it_is_rounded() -> None:
+    """A point on the rim of what is swept, but for the last digit."""
+    x, y, turn = 1.3040764957793665, 0.7739040911957085, 1.9145154450911486
+    points = np.array([x]), np.array([y])
+    free = free_distance(points, Twist(0.1, 0.1 / turn), radius=0.177, margin=0.005)
+    assert free == pytest.approx(turn * math.atan2(x, turn - y), abs=1e-3)
+
+
 def test_the_margin_counts_as_footprint() -> None:
     assert way([(1.0, 0.0)], Twist(0.3, 0.0), margin=0.05) == pytest.approx(0.75)
 
