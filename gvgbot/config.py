@@ -47,6 +47,7 @@ class TwinConfig:
 
     enabled: bool = True  # false: the devices are real, and the robot moves
     world: str = "office"  # a built-in world, or the path of a map_server YAML
+    unknown: Literal["free", "wall"] = "free"  # what a map_server map does not know
     start: tuple[float, float, float] | None = None  # x (m), y (m), theta (rad); None: the world's
     people: Annotated[int | None, Range(0, 100)] = None  # who walk about; None: the world's own
     # draws all errors of the twins, and the ways of people

@@ -39,7 +39,7 @@ def open_place(config: Config) -> Place:
 
     Raises WorldError if it cannot be had, the start does not fit, or people have no room.
     """
-    world, default = open_world(config.twin.world)
+    world, default = open_world(config.twin.world, unknown_is_wall=config.twin.unknown == "wall")
     start = Pose(*config.twin.start) if config.twin.start is not None else default or Pose()
     check_start(world, start, config.robot.radius_m)
     return Place(world, start, Walkways(world, start) if _people_count(config, world) else None)

@@ -125,13 +125,14 @@ def check_start(world: World, pose: Pose, radius: float) -> None:
         )
 
 
-def load_world(path: Path) -> World:
+def load_world(path: Path, *, unknown_is_wall: bool = False) -> World:
     """The world that a map_server YAML file describes.
 
-    A pixel is a wall where its occupancy exceeds `occupied_thresh`; unknown pixels are free.
-    Raises WorldError, in one line, for whatever is wrong with the file or its image.
+    A pixel is a wall where its occupancy exceeds `occupied_thresh`; unknown pixels are free, or
+    walls. Raises WorldError, in one line, for whatever is wrong with the file or its image.
     """
-    return load_map(path)[0]
+    world, known = load_map(path)
+    return replace(world, occupied=world.occupied | ~known) if unknown_is_wall else world
 
 
 def load_map(path: Path) -> tuple[World, Mask]:

@@ -49,17 +49,18 @@ def builtin(name: str) -> tuple[World, Pose]:
     return _MAKERS[maker](int(seed or 0))
 
 
-def open_world(name_or_path: str) -> tuple[World, Pose | None]:
+def open_world(name_or_path: str, *, unknown_is_wall: bool = False) -> tuple[World, Pose | None]:
     """A built-in world with its start pose, or the world of a map_server YAML file without one.
 
-    Raises WorldError when it is neither, or the file is unfit.
+    What the file does not know is free, or wall. Raises WorldError when it is neither, or the file
+    is unfit.
     """
     if name_or_path.partition(":")[0] in _MAKERS:
         return builtin(name_or_path)
     path = Path(name_or_path)
     if not path.exists() and path.suffix not in (".yaml", ".yml"):
         raise WorldError(_unknown(name_or_path))
-    return load_world(path), None
+    return load_world(path, unknown_is_wall=unknown_is_wall), None
 
 
 def _unknown(name: str) -> str:

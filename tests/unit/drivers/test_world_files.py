@@ -35,6 +35,13 @@ def test_a_pixel_is_a_wall_where_its_occupancy_exceeds_the_threshold(tmp_path: P
     assert world.occupied.tolist() == [[True, True, False, False, False, False]]
 
 
+def test_what_a_map_does_not_know_is_wall_if_that_is_wanted(tmp_path: Path) -> None:
+    # unknown is what lies between 0.196, a grey of 205.02, and 0.65, one of 89.25
+    path = write(tmp_path, [[0, 89, 90, 205, 206, 255]])
+    world = load_world(path, unknown_is_wall=True)
+    assert world.occupied.tolist() == [[True, True, True, True, False, False]]
+
+
 def test_negate_makes_bright_pixels_walls(tmp_path: Path) -> None:
     # grey / 255 > 0.65 holds from 165.75 on
     world = load_world(write(tmp_path, [[0, 165, 166, 255]], negate=1))
