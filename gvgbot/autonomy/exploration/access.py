@@ -10,7 +10,7 @@ from gvgbot.autonomy.views import View
 from gvgbot.geometry import Array
 
 NEAR_M = 1.5  # from an edge, one is as good as on it
-BESIDE_M = 0.15  # farther from its edge than this, the robot goes there first
+_BESIDE_M = 0.15  # farther from its edge than this, the robot goes there first
 _TIGHT_M = 0.25  # nearer to a wall, the robot would scrape along it
 _BETWEEN_M = 0.1  # from a straight way, a wall is between its ends
 _CLIMB_M = 0.05  # steps away from the walls
@@ -39,12 +39,11 @@ def access(view: View) -> Access | None:
 
     Beside a wall the robot drives away from it first.
     """
-    base = view.local_base.position
-    places = sorted(view.gvg.places(base), key=lambda place: place.distance)
+    base, places = view.local_base.position, _places(view)
     if not places:
         return None
     nearest = places[0]
-    if not BESIDE_M < nearest.distance <= NEAR_M:
+    if not _BESIDE_M < nearest.distance <= NEAR_M:
         return Access(nearest)
     straight = _straight(view, nearest, _ROOM_M)
     if straight is not None and straight.room[0] > _TIGHT_M:
@@ -58,13 +57,21 @@ def access(view: View) -> Access | None:
     )
 
 
+def _places(view: View) -> list[Place]:
+    """The nearest point of each edge, the nearest of them first."""
+    return sorted(view.gvg.places(view.local_base.position), key=lambda place: place.distance)
+
+
 def _straight(view: View, place: Place, least_room: float) -> Access | None:
     way = straight_way(view, view.gvg.point(place), least_room)
     return None if way is None else Access(place, *way)
 
 
 def _uphill(view: View) -> Access | None:
-    """To where there is more and more room, until an edge is near."""
+    """To where there is more and more room, until an edge is near: as the method reaches the GVG.
+
+    None if there is most room, but no edge, before that.
+    """
     base, tree = view.local_base.position, view.local_map.tree()
     line = [base]
     rooms = [float(tree.query(base)[0])]
@@ -77,7 +84,7 @@ def _uphill(view: View) -> Access | None:
         line.append(around[best])
         rooms.append(float(room[best]))
         place = view.gvg.place(line[-1])
-        if place is not None and place.distance <= BESIDE_M:
+        if place is not None and place.distance <= _BESIDE_M:
             away = float(np.hypot(*(view.gvg.point(place) - base)))
             return Access(place._replace(distance=away), np.array(line), np.array(rooms))
     return None
@@ -88,11 +95,7 @@ def way_to_edge(view: View) -> tuple[Array, Array] | None:
 
     The very nearest edge may be behind a wall. As `straight_way` has it.
     """
-    base = view.local_base.position
-    lines = (edge.polyline for edge in view.gvg.edges.values())
-    nearest = [line[int(np.argmin(np.hypot(*(line - base).T)))] for line in lines]
-    nearest.sort(key=lambda point: float(np.hypot(*(point - base))))
-    ways = (straight_way(view, goal, _ROOM_M) for goal in nearest)
+    ways = (straight_way(view, view.gvg.point(place), _ROOM_M) for place in _places(view))
     return next((way for way in ways if way is not None), None)
 
 
