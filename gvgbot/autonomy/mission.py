@@ -426,7 +426,7 @@ class Mission:
                 return
             if self._mapper.graph.vertices:
                 given_up = len(self._mapper.graph.frontiers()) + self._given_up()
-                self._end(view, "explored_with_blocked", f"{given_up} frontiers left: {reason}")
+                self._end(view, "explored_with_blocked", f"frontiers left: {given_up}; {reason}")
             else:
                 self._end(view, "failed", f"no vertex found, perhaps no way out: {reason}")
             return
@@ -471,7 +471,7 @@ class Mission:
             return self._drive(view, here, paths[0][2])
         blocked = self._given_up()
         if blocked:
-            self._end(view, "explored_with_blocked", f"{blocked} frontiers were given up")
+            self._end(view, "explored_with_blocked", f"frontiers given up: {blocked}")
         else:
             self._end(view, "explored", f"no frontier is left{self.remark}")
         return Stand()
@@ -488,7 +488,7 @@ class Mission:
         self._mapper.forget_strays(view)
         frontiers = len(self._mapper.graph.frontiers())
         if frontiers:
-            self._end(view, "explored_with_blocked", f"{frontiers} frontiers cannot be reached")
+            self._end(view, "explored_with_blocked", f"frontiers that cannot be reached: {frontiers}")
 
     def _end(self, view: View, outcome: Outcome, reason: str) -> None:
         self.outcome, self.reason = outcome, reason
