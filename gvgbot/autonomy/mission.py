@@ -84,11 +84,10 @@ class Mission:
             known,
             graph,
             self.where,
-            found.place,
+            found,
             view.local_base,
             view.doubted,
             in_team=self.sharing is not None,
-            access=found,
         )
         self._watch_progress(view)
         self._watch_the_way(view)
@@ -488,7 +487,8 @@ class Mission:
         self._mapper.forget_strays(view)
         frontiers = len(self._mapper.graph.frontiers())
         if frontiers:
-            self._end(view, "explored_with_blocked", f"frontiers that cannot be reached: {frontiers}")
+            reason = f"frontiers that cannot be reached: {frontiers}"
+            self._end(view, "explored_with_blocked", reason)
 
     def _end(self, view: View, outcome: Outcome, reason: str) -> None:
         self.outcome, self.reason = outcome, reason

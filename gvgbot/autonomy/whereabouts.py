@@ -157,11 +157,15 @@ class Situation:
     known: Correspondence
     graph: GvgGraph
     where: Whereabouts
-    place: Place
+    access: Access
     local_base: Pose
     doubted: frozenset[int] = frozenset()  # nodes that may be there for a while only
     in_team: bool = False  # who stands in a room may be a robot that has nothing left to do
-    access: Access | None = None  # to the place, if the robot is not there
+
+    @property
+    def place(self) -> Place:
+        """Where on the local GVG the robot is."""
+        return self.access.place
 
     def starts(self) -> list[Approach]:
         """The first vertices that the robot can reach along the edge it is on."""
@@ -228,8 +232,6 @@ class Situation:
     def line_along(self, path: tuple[Branch, ...]) -> tuple[Array, Array]:
         """What to drive to the place and on along a path: points (N, 2), m, and clearance (N,)."""
         line, room = self.gvg.line_from(self.place, path)
-        if self.access is None:
-            return line, room
         return np.vstack([self.access.line, line]), np.concatenate([self.access.room, room])
 
     def ahead(self) -> tuple[Branch, ...]:

@@ -68,8 +68,7 @@ class Ground:
         if found is None or found.place.distance > NEAR_M:
             return None
         graph, where = self.mapper.graph, self.mission.where
-        base, doubted = view.local_base, view.doubted
-        return Situation(view.gvg, known, graph, where, found.place, base, doubted, access=found)
+        return Situation(view.gvg, known, graph, where, found, view.local_base, view.doubted)
 
     def is_at(self, view: View, vertex: int) -> bool:
         """Whether the robot is about at a vertex."""

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from gvgbot.autonomy.exploration.access import Access
 from gvgbot.autonomy.gvg.local import Branch
 from gvgbot.autonomy.scouting import Scouting
 from gvgbot.autonomy.slam.ekf import Belief, add_vertex
@@ -54,7 +55,7 @@ class Town:
     def seen_from(self, x: float) -> Situation:
         place = STREET.place(np.array([x, 0.0]))
         assert place is not None
-        return Situation(STREET, self.known, self.graph, self.where, place, Pose(x))
+        return Situation(STREET, self.known, self.graph, self.where, Access(place), Pose(x))
 
 
 def end_of(path: tuple[Branch, ...] | None) -> tuple[float, float] | None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
+from gvgbot.autonomy.exploration.access import Access
 from gvgbot.autonomy.gvg.local import Branch, LocalGvg
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex
 from gvgbot.autonomy.views import Correspondence
@@ -185,7 +186,7 @@ def situation(x: float, known: Correspondence = ALL_KNOWN) -> Situation:
     place = CORRIDOR.place(np.array([x, 0.0]))
     assert place is not None
     where = Whereabouts(HalfEdgeId(1, EAST), [np.array([0.0, 0.0]), np.array([x, 0.0])])
-    return Situation(CORRIDOR, known, corridor_graph(), where, place, Pose(x, 0.0, 0.0))
+    return Situation(CORRIDOR, known, corridor_graph(), where, Access(place), Pose(x, 0.0, 0.0))
 
 
 def test_the_first_vertices_within_reach_are_the_ends_of_the_edge_with_their_distances() -> None:
@@ -220,7 +221,7 @@ def test_without_a_trail_ahead_is_where_the_robot_faces(heading: float, end: Poi
     place = CORRIDOR.place(np.array([3.0, 0.0]))
     assert place is not None
     here = Situation(
-        CORRIDOR, ALL_KNOWN, corridor_graph(), Whereabouts(), place, Pose(3.0, 0.0, heading)
+        CORRIDOR, ALL_KNOWN, corridor_graph(), Whereabouts(), Access(place), Pose(3.0, 0.0, heading)
     )
     line, _ = CORRIDOR.line_from(place, here.ahead())
     assert line[-1] == pytest.approx(end)
@@ -232,7 +233,7 @@ def test_with_a_trail_ahead_is_away_from_where_the_robot_came_from(heading: floa
     place = CORRIDOR.place(np.array([3.0, 0.0]))
     assert place is not None
     pose = Pose(3.0, 0.0, heading)
-    here = Situation(CORRIDOR, ALL_KNOWN, corridor_graph(), walk.where, place, pose)
+    here = Situation(CORRIDOR, ALL_KNOWN, corridor_graph(), walk.where, Access(place), pose)
     line, _ = CORRIDOR.line_from(place, here.ahead())
     assert line[-1] == pytest.approx([6.0, 0.0])
 
@@ -267,7 +268,9 @@ def test_the_way_leads_round_another_robot_once_and_then_on_though_it_turns_more
     place = gvg.place(np.array([4.0, -1.0]))
     assert place is not None
     pose, doubted = Pose(4.0, -1.0, -math.pi / 2), frozenset({2, 3})
-    here = Situation(gvg, known, corridor_graph(), walk.where, place, pose, doubted, in_team=True)
+    here = Situation(
+        gvg, known, corridor_graph(), walk.where, Access(place), pose, doubted, in_team=True
+    )
     line, _ = gvg.line_from(place, here.ahead())
     assert line[-1] == pytest.approx([7.0, -5.0])
 
