@@ -14,6 +14,7 @@ from gvgbot.geometry import Array, Pose, wrap_angle
 
 _LOOP_M = 0.4  # a trail that comes this near to itself has been driven back
 _AWAY_M = 0.7  # nearer to a vertex than this, the trail does not tell its edges apart
+_PAST_M = 0.5  # a vertex: to turn back to it would be in vain
 _BESIDE_M = 0.2, 1.5  # from the edge, the trail goes on beside the robot, on the edge
 _ABREAST_M = 0.15  # along its edge, the robot came from neither side
 _BACK_M = 0.8  # how far back along the trail one looks to tell ahead from behind
@@ -215,10 +216,16 @@ class Situation:
             branch = self.known.branch_of.get(departure)
             if branch is None:
                 break
-            path = (*path, branch)
+            path = (branch,) if self._is_past(path, branch) else (*path, branch)
             if self.gvg.end_of(branch) not in self.known.vertex_of:
                 return self._extended(path)
         return path
+
+    def _is_past(self, path: tuple[Branch, ...], branch: Branch) -> bool:
+        """Whether the robot is so little past a vertex on this branch that it need not go back."""
+        edge = self.gvg.edges[branch.edge]
+        past = self.place.station if branch.forward else edge.length - self.place.station
+        return path == (Branch(branch.edge, not branch.forward),) and past < _PAST_M
 
     def along_own_edge(self, *, ahead: bool) -> tuple[Branch, ...]:
         """Along the present edge, away from the vertex that it leaves from, or back to it."""

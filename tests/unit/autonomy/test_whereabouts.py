@@ -211,6 +211,15 @@ def test_the_way_to_a_frontier_goes_into_it(x: float, key: int, end: Point) -> N
     assert line[-1] == pytest.approx(end)
 
 
+def test_who_is_a_step_past_a_vertex_on_its_way_does_not_go_back_to_it() -> None:
+    here = situation(6.2)
+    path = here.path_to(HalfEdgeId(2, EAST))
+    assert path is not None
+    line, _ = CORRIDOR.line_from(here.place, path)
+    assert np.all(np.diff(line[:, 0]) > 0.0)
+    assert line[-1] == pytest.approx((12.0, 0.0))
+
+
 def test_there_is_no_way_to_a_frontier_of_another_piece_of_the_graph() -> None:
     here = situation(2.0, known_as({Branch(10, forward=True): HalfEdgeId(1, EAST)}, {1: 1}))
     assert here.path_to(HalfEdgeId(3, 1)) is None
