@@ -37,7 +37,8 @@ class Access:
 def access(view: View) -> Access | None:
     """The access to the nearest edge, or to another one if walls are in the way; None without any.
 
-    Beside a wall the robot drives away from it first.
+    Beside a wall the robot drives away from it first. With walls before all edges it is the
+    nearest one, straight ahead: the guard stops the robot, and what is then tried is the mission's.
     """
     base, places = view.local_base.position, _places(view)
     if not places:
