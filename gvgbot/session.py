@@ -23,6 +23,7 @@ from gvgbot.maps.run_directory import MAP, RunDirectory, record_of
 from gvgbot.maps.team_map import team_files
 from gvgbot.report import Journey, map_files, world_files
 from gvgbot.simulation import Place, Simulation
+from gvgbot.survey import survey
 from gvgbot.team.chart import Chart
 from gvgbot.team.member import Member
 
@@ -53,12 +54,14 @@ class Session:
         self, config: Config, directory: RunDirectory, place: Place | None, *, led: bool = False
     ) -> None:
         self.config, self.directory, self.place = config, directory, place
-        self.pipeline = Pipeline(
-            config.autonomy,
-            config.exploration,
-            config.robot.radius_m,
-            led=led,
-            localisation=config.localisation,
+        self.begin_with(
+            Pipeline(
+                config.autonomy,
+                config.exploration,
+                config.robot.radius_m,
+                led=led,
+                localisation=config.localisation,
+            )
         )
         self.journey = Journey(period=0.0) if led else Journey()
         self.title = config.robot.name if place is None else place.world.name  # of the picture
@@ -73,6 +76,11 @@ class Session:
         self._started = time.perf_counter()
         self._first_stamp: float | None = None
         self._last_stamp = 0.0
+
+    def begin_with(self, pipeline: Pipeline) -> None:
+        """Let this be the robot's mind."""
+        self.pipeline = pipeline
+        pipeline.errands.own_tasks.survey = partial(survey, pipeline)
 
     @property
     def tap(self) -> Tap | None:

@@ -458,7 +458,11 @@ class Mission:
         return order
 
     def _examine(self, view: View, here: Situation) -> Order:
-        """Go where something in sight may prove to be a vertex, before all is called explored."""
+        """Go where something in sight may prove to be a vertex, before all is called explored.
+
+        That is not called so at once: the robot may have something else to do before.
+        """
+        is_new = self._examining_since is None
         if self._examining_since is None:
             self._examining_since = view.stamp
         paths = sorted(
@@ -468,6 +472,8 @@ class Mission:
         )
         if paths and view.stamp - self._examining_since < self._config.patience_s:
             return self._drive(view, here, paths[0][2])
+        if is_new:
+            return Stand()
         blocked = self._given_up()
         if blocked:
             self._end(view, "explored_with_blocked", f"frontiers given up: {blocked}")

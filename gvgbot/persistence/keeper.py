@@ -80,14 +80,16 @@ class Keeper:
         session.count_on(saved.beat.tally)
         session.journey = saved.journey
         config = session.config
-        session.pipeline = ReturningPipeline(
-            config.autonomy,
-            config.exploration,
-            config.robot.radius_m,
-            saved.memory,
-            saved.past,
-            self._is_vouched,
-            localisation=config.localisation,
+        session.begin_with(
+            ReturningPipeline(
+                config.autonomy,
+                config.exploration,
+                config.robot.radius_m,
+                saved.memory,
+                saved.past,
+                self._is_vouched,
+                localisation=config.localisation,
+            )
         )
         if session.config.service.resume == "paused":
             session.pipeline.errands.is_paused = True

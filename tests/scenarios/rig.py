@@ -5,6 +5,7 @@ import math
 from collections import Counter
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -26,6 +27,7 @@ from gvgbot.geometry import Pose
 from gvgbot.hal.guard import Guard
 from gvgbot.hal.messages import Odometry
 from gvgbot.simulation import Place, Simulation
+from gvgbot.survey import survey
 
 ROBOT_RADIUS = 0.177  # m
 NEAR = 0.3  # m that a vertex may be off
@@ -142,6 +144,7 @@ async def _played(
     if grip is not None:
         _lose_grip(simulation.body, grip)
     pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
+    pipeline.errands.own_tasks.survey = partial(survey, pipeline)
     run = Play(simulation, pipeline, clock)
     if walkways is not None:
         people = simulation.body._people

@@ -181,3 +181,24 @@ def test_a_person_who_jumps_into_the_way_is_not_touched() -> None:
     stood = run.truth[round((when + 4.0) * 50) : round((when + 5.0) * 50)]
     assert math.dist((stood[0].x, stood[0].y), (stood[-1].x, stood[-1].y)) < 0.02
     assert run.outcome == "explored", run.pipeline.mission.reason
+
+
+def test_a_room_is_found_though_somebody_stood_before_its_door_as_the_robot_passed() -> None:
+    """Round the bend the robot does not see how the way becomes free."""
+    corridor, bend = (-4.0, -1.0, 8.0, 1.0), (6.0, -1.0, 8.0, 6.0)
+    door, room = (0.6, 0.9, 1.4, 1.3), (-1.0, 1.2, 3.0, 4.0)
+
+    async def story(run: Play) -> None:
+        await run.until(lambda: run.here.x > -2.5)
+        run.put_person(1.0, 0.75)
+        await run.until(lambda: run.here.y > 1.0)
+        run.put_person(*FAR_AWAY)
+
+    world = carved([corridor, bend, door, room])
+    run = play(world, START, story=story, with_person=True)
+    assert run.outcome == "explored", run.pipeline.mission.reason
+    assert run.contacts == 0
+    assert any(
+        run.world(vertex)[0] < 3.0 and run.world(vertex)[1] > 1.3
+        for vertex in run.pipeline.mapper.graph.vertices
+    )

@@ -16,9 +16,9 @@ from gvgbot.autonomy.errands.kinds import (
     ToPoint,
     ToVertex,
 )
+from gvgbot.autonomy.errands.own_tasks import OwnTasks
 from gvgbot.autonomy.errands.plans import Here, Kept, Plan, plan_for, recalled
-from gvgbot.autonomy.events import Decision, ErrandEnded, Event
-from gvgbot.autonomy.exploration.certainty import Revisiting
+from gvgbot.autonomy.events import ErrandEnded, Event
 from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.mission import Mission
@@ -47,14 +47,14 @@ class Errands:
         self, mission: Mission, mapper: Mapper, config: ExplorationConfig, room_m: float
     ) -> None:
         self._mission, self._mapper, self._config = mission, mapper, config
-        self._ground = Ground(mission, mapper, room_m)
+        self.room_m, self._ground = room_m, Ground(mission, mapper, room_m)
         self.closures = self._ground.closures
         self.is_paused = False
         self.is_waiting = False  # after an errand, for what comes next
         self.is_lost = False  # somebody doubts the pose; whoever takes that into account resets it
         self.happened: list[Event] = []  # because of requests; whoever tells of it takes it out
         self._seen: tuple[View, Correspondence] | None = None
-        self._revisiting = Revisiting(config.certainty)
+        self.own_tasks = OwnTasks(config.certainty, mission, mapper)
         self._is_own = False  # the errand: nobody asked for it, and exploring goes on after it
         self._plan: Plan | None = None
         self._driving: Driving | None = None
@@ -88,7 +88,7 @@ class Errands:
     def configure(self, config: ExplorationConfig) -> None:
         """Use another configuration from now on."""
         self._config = config
-        self._revisiting.configure(config.certainty)
+        self.own_tasks.configure(config.certainty)
         self._mission.configure(config)
         if self._driving is not None:
             self._driving.config = config
@@ -311,30 +311,18 @@ class Errands:
         self.closures.open_due(self._mapper.graph, view.stamp)
         if self._command is not None:
             return Stand(), self._mission.witness(view, known) + self.take_events()
-        if self._plan is None and not self._revisit(view):
-            self._revisiting.note_target(self._mission.target)
-            return self._mission.advance(view, known)
+        if self._plan is None:
+            task = self.own_tasks.next(view, self.whereabouts)
+            if task is None:
+                return self._mission.advance(view, known)
+            if isinstance(task, Stand):
+                return task, self._mission.witness(view, known)
+            self._take(task.errand, view.stamp)
+            self._is_own = True
+            self.happened.append(task.decision)
         happened = self._mission.witness(view, known)
         order = self._pursue(view, known)
         return order, happened + self.take_events()
-
-    def _revisit(self, view: View) -> bool:
-        """Go back to a vertex, if that is to be done before exploring goes on; whether it is."""
-        here = self.whereabouts()
-        if here is None or not self._mission.is_choosing:
-            return False
-        belief = self._mapper.belief
-        wanted = self._revisiting.next(self._mapper.graph, belief, here.starts())
-        if wanted is None:
-            doubtful = self._revisiting.too_uncertain(belief)
-            self._mission.remark = (
-                f"; {len(doubtful)} vertices stay less certain than wanted" if doubtful else ""
-            )
-            return False
-        self._take(ToVertex(wanted.vertex), view.stamp)
-        self._is_own = True
-        self.happened.append(Decision(view.stamp, wanted.vertex, None, wanted.reason))
-        return True
 
     def take_events(self) -> list[Event]:
         """What has happened and was not told of yet."""

@@ -1,0 +1,88 @@
+"""What the robot does unasked before exploring goes on, or ends: drives for a better map."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from gvgbot.autonomy.control.orders import Stand
+from gvgbot.autonomy.destinations import foot_of, route_to_foot
+from gvgbot.autonomy.errands.kinds import ToPoint, ToVertex
+from gvgbot.autonomy.events import Decision
+from gvgbot.autonomy.exploration.certainty import CertaintyConfig, Revisiting
+from gvgbot.autonomy.exploration.unseen import Unseen
+from gvgbot.autonomy.mapping import Mapper
+from gvgbot.autonomy.mission import Mission
+from gvgbot.autonomy.views import View
+from gvgbot.autonomy.whereabouts import Situation
+from gvgbot.geometry import Array
+
+
+class Task(NamedTuple):
+    """Where to drive, and what to say about that."""
+
+    errand: ToVertex | ToPoint
+    decision: Decision
+
+
+class OwnTasks:
+    """Back to vertices for the sake of certainty; to gaps in the map when all is explored."""
+
+    def __init__(self, config: CertaintyConfig, mission: Mission, mapper: Mapper) -> None:
+        self._mission, self._mapper = mission, mapper
+        self._revisiting, self._unseen = Revisiting(config), Unseen()
+        # finds places (N, 2), m, map frame, from where there is floor to be seen that nobody has
+        self.survey: Callable[[], Array] | None = None
+
+    def configure(self, config: CertaintyConfig) -> None:
+        """Use another configuration from now on."""
+        self._revisiting.configure(config)
+
+    def next(self, view: View, whereabouts: Callable[[], Situation | None]) -> Task | Stand | None:
+        """What to do now; None to go on with the mission. Stand: a survey is to come."""
+        mission = self._mission
+        if not mission.is_choosing:
+            self._revisiting.note_target(mission.target)
+            self._unseen.begin_anew()
+            return None
+        here = whereabouts()
+        if here is None:
+            return None
+        task = self._revisit(view, here) or self._look_at_gap(view, here)
+        mission.remark = self._remark()
+        return task
+
+    def _revisit(self, view: View, here: Situation) -> Task | None:
+        """Back to a vertex that makes the robot or the map surer."""
+        belief = self._mapper.belief
+        wanted = self._revisiting.next(self._mapper.graph, belief, here.starts())
+        if wanted is None:
+            return None
+        decision = Decision(view.stamp, wanted.vertex, None, wanted.reason)
+        return Task(ToVertex(wanted.vertex), decision)
+
+    def _look_at_gap(self, view: View, here: Situation) -> Task | Stand | None:
+        """To floor that nobody has seen, when all frontiers are explored."""
+        is_alone = self._mission.sharing is None  # others may have seen it
+        if self.survey is None or self._mapper.graph.frontiers() or not is_alone:
+            return None
+        if self._unseen.is_done:
+            return None
+        if not self._unseen.is_standing(view.travelled):
+            return Stand()
+        starts = here.starts()
+
+        def metres_to(place: Array) -> float | None:
+            foot = foot_of(self._mapper, place)
+            route = None if foot is None else route_to_foot(here, starts, foot)
+            return None if route is None else route.metres
+
+        place = self._unseen.next(self.survey(), metres_to)
+        if place is None:
+            return None
+        decision = Decision(view.stamp, None, None, "floor there is still unseen")
+        return Task(ToPoint(*place.round(2).tolist()), decision)
+
+    def _remark(self) -> str:
+        """What there is to say about the map, if that is the end."""
+        doubtful, unseen = self._revisiting.too_uncertain(self._mapper.belief), self._unseen.left
+        remark = f"; {len(doubtful)} vertices stay less certain than wanted" if doubtful else ""
+        return remark + (f"; {unseen} gaps in the map stay unseen" if unseen else "")

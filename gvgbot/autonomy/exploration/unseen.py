@@ -1,0 +1,54 @@
+"""Where to look in the end, when all frontiers are explored and some floor is still unseen.
+
+Somebody may have stood in a door, or glass may have hidden it, as the robot passed.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from gvgbot.geometry import Array
+
+_SAME_M = 1.0  # places nearer to each other are one
+_STILL_M = 0.01  # from look to look, at most
+_TRIES = 2  # visits of a place that come to nothing
+_MOST = 30  # visits altogether: where walls cannot be seen there is no end of unseen floor
+
+
+class Unseen:
+    """Remembers where the robot has gone for a look."""
+
+    def __init__(self) -> None:
+        self._visits: list[Array] = []
+        self._stands_at: float | None = None  # `travelled` when it was asked to stand
+        self.is_done = False  # there is nothing to be gained
+        self.left = 0  # places that are of no use
+
+    def begin_anew(self) -> None:
+        """Note that the robot explores, so that there is more to be seen."""
+        self._stands_at, self.is_done, self.left = None, False, 0
+
+    def is_standing(self, travelled: float) -> bool:
+        """Whether the robot stands, as it should while the survey takes its time."""
+        before, self._stands_at = self._stands_at, travelled
+        return before is not None and travelled - before < _STILL_M
+
+    def next(self, places: Array, metres_to: Callable[[Array], float | None]) -> Array | None:
+        """Which of these (2,), m, map frame, to visit now: the nearest, less tried ones first."""
+        self._stands_at = None
+        chances = [
+            (tries, metres, place.tolist())
+            for place in places
+            if (tries := self._tries(place)) < _TRIES
+            and (metres := metres_to(place)) is not None
+            and len(self._visits) < _MOST
+        ]
+        self.is_done = not chances
+        if not chances:
+            self.left = len(places)
+            return None
+        self._visits.append(np.array(min(chances)[2]))
+        return self._visits[-1]
+
+    def _tries(self, place: Array) -> int:
+        return sum(bool(np.hypot(*(place - visit)) < _SAME_M) for visit in self._visits)

@@ -1,0 +1,68 @@
+"""Gaps of a grid: where floor that the robot can reach borders on floor that nobody has seen."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from gvgbot.geometry import Array
+from gvgbot.maps.occupancy import OccupancyGrid
+
+_FREE, _OCCUPIED = 25, 65  # percent: below it is floor, from there on a wall
+_DEPTH_M, _AREA_M2 = 1.0, 0.5  # so deep and so large is the unseen floor that is worth a drive
+
+Mask = NDArray[np.bool_]
+
+
+def gaps(grid: OccupancyGrid, around: Array, passage_m: float) -> Array:
+    """Places (N, 2), m, map frame, on seen floor from which the robot could drive onto unseen.
+
+    `around` (2,) is where the robot is; it keeps `passage_m` from walls. Shadows of furniture and
+    slits between walls are no gaps. Floor behind them is not reached, and not told of.
+    """
+    cell = grid.resolution_m
+    margin = math.ceil(_DEPTH_M / cell)  # what is beyond the grid is unseen as well
+    cells = np.pad(grid.cells, margin, constant_values=-1)
+    corner = np.array(grid.origin) - margin * cell
+    is_wall = cells >= _OCCUPIED
+    if not is_wall.any():
+        return np.empty((0, 2))
+    has_room = ndimage.distance_transform_edt(~is_wall) * cell > passage_m
+    is_floor = (cells >= 0) & (cells < _FREE)
+    floor = _reachable(is_floor & has_room, (around - corner)[::-1] / cell)
+    unseen = has_room & ~is_floor & ~is_wall
+    brink = unseen & ndimage.binary_dilation(floor)
+    labels, _ = ndimage.label(ndimage.binary_dilation(brink, iterations=margin // 10))
+    found = []
+    for number, box in enumerate(ndimage.find_objects(labels), start=1):
+        wide = tuple(slice(max(0, s.start - margin), s.stop + margin) for s in box)
+        own = brink[wide] & (labels[wide] == number)
+        if _is_worth(own, unseen[wide], cell):
+            found.append(_beside(own, floor[wide]) + [s.start for s in wide])
+    return corner + (np.array(found).reshape(-1, 2)[:, ::-1] + 0.5) * cell
+
+
+def _reachable(floor: Mask, here: Array) -> Mask:
+    """The part of the floor that hangs together and is nearest to a (row, column)."""
+    labels, _ = ndimage.label(floor)
+    places = np.argwhere(floor)
+    if not len(places):
+        return floor
+    nearest = places[np.argmin(np.hypot(*(places + 0.5 - here).T))]
+    return np.asarray(labels == labels[tuple(nearest)])
+
+
+def _is_worth(brink: Mask, unseen: Mask, cell: float) -> bool:
+    """Whether so much is unseen behind it that something may be there."""
+    steps = math.ceil(_DEPTH_M / cell)
+    behind = ndimage.binary_dilation(brink, iterations=steps, mask=unseen)
+    return bool(behind.sum() * cell**2 >= _AREA_M2)
+
+
+def _beside(brink: Mask, floor: Mask) -> Array:
+    """The (row, column) of seen floor that is nearest to the middle of the brink."""
+    places = np.argwhere(floor)
+    middle = np.argwhere(brink).mean(axis=0)
+    nearest: Array = places[np.argmin(np.hypot(*(places - middle).T))].astype(np.float64)
+    return nearest

@@ -1,0 +1,66 @@
+"""Which gap comes next, and when there is nothing more to be gained."""
+
+import numpy as np
+
+from gvgbot.autonomy.exploration.unseen import Unseen
+from gvgbot.geometry import Array
+
+NEAR, FAR, WALLED_OFF = [1.0, 0.0], [5.0, 0.0], [0.0, 9.0]
+
+
+def metres_to(place: Array) -> float | None:
+    """From the origin; no way leads north."""
+    return None if place[1] > 5.0 else float(np.hypot(*place))
+
+
+def places(*which: list[float]) -> Array:
+    return np.array(which).reshape(-1, 2)
+
+
+def test_the_nearest_comes_first_and_each_has_had_its_turn_before_one_is_tried_again() -> None:
+    unseen = Unseen()
+    all_of_them = places(FAR, NEAR, WALLED_OFF)
+    visited = [unseen.next(all_of_them, metres_to) for _ in range(5)]
+    assert [None if one is None else one.tolist() for one in visited] == [
+        NEAR,
+        FAR,
+        NEAR,
+        FAR,
+        None,
+    ]
+    assert unseen.is_done
+    assert unseen.left == 3
+
+
+def test_a_gap_that_has_moved_a_little_is_the_same() -> None:
+    unseen = Unseen()
+    for _ in range(2):
+        assert unseen.next(places(FAR), metres_to) is not None
+    assert unseen.next(places([5.3, 0.4]), metres_to) is None
+    assert unseen.left == 1
+
+
+def test_without_walls_in_sight_it_ends_although_there_are_always_new_ones() -> None:
+    unseen = Unseen()
+    visits = 0
+    while unseen.next(places([2.0 * visits, 0.0]), metres_to) is not None:
+        visits += 1
+        assert visits < 100
+    assert visits > 10
+
+
+def test_what_has_been_seen_after_all_is_not_complained_about() -> None:
+    unseen = Unseen()
+    unseen.next(places(FAR), metres_to)
+    assert unseen.next(places(), metres_to) is None
+    assert unseen.is_done
+    assert unseen.left == 0
+    unseen.begin_anew()
+    assert not unseen.is_done
+
+
+def test_a_robot_stands_when_two_looks_find_it_at_the_same_place() -> None:
+    unseen = Unseen()
+    assert not unseen.is_standing(10.0)
+    assert not unseen.is_standing(10.3)
+    assert unseen.is_standing(10.3)
