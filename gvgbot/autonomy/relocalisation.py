@@ -11,6 +11,7 @@ only as long as it is the newest, and then with the share of its walls that has 
 import math
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,16 +25,20 @@ from gvgbot.hal.messages import Scan
 
 _CELL_M, _WALL_CELL_M = 0.25, 0.1
 _REACH_M = 8.0  # around the robot, what is compared
-_NEAR_M = 0.2  # walls so near to each other are one
+_NEAR_M, _OFF_M = 0.2, 0.4  # walls so near to each other are one, and so far off are two
 _ROOM_M = 0.2  # from the walls, a robot may stand
 _HEADINGS = 120  # that are tried at each place
 _TRIED = 100  # places in one go
 _ROUGH_M = 0.4  # walls so far off do not speak for a rough guess
 _ROUGH_POINTS, _POINTS = 80, 300
+_ROUGH_GUESSES = 1200  # whose scores are worked out better: in a corridor one is like the next
 _GUESSES = 150  # that are looked at closely: a place that is left out can never be found
+_FINER_M, _FINER_RAD = _CELL_M / 3, math.tau / _HEADINGS / 3  # steps to a better score
+_STEPS = np.array(list(product((-1, 0, 1), repeat=3))) * [_FINER_M, _FINER_M, _FINER_RAD]
 _FITS_A_STEP = 4
 _APART_M, _APART_RAD = 0.6, 0.3  # guesses nearer to each other are the same
-_COMPARED = 5000  # guesses in that
+_COMPARED = 8000  # guesses in that
+_PEAKS_A_STEP = 100
 _ONE_M, _ONE_RAD = 0.4, 0.2  # hypotheses nearer to each other are the same
 _LOOK_EVERY_M = 1.0  # driven between two looks
 _TELLING = 0.01  # share of the walls: who disagrees with so much more is e times less likely
@@ -42,6 +47,9 @@ _CHANCE = (
 )
 _LOOKS = 5  # before anything is said
 _SURE = 0.995
+_SURE_LOOKS = (
+    3  # in a row, with the same place: one may be wrong about a wall that has moved a little
+)
 _HOPELESS = 0.01
 _UNLIKE = 5  # of the points of all walls may differ in a building with several sides alike
 _MOST_SIDES = 8
@@ -97,6 +105,21 @@ class KnownWalls:
             flat = (cells[these] @ [columns, 1])[:, None, None] + (i * columns + j)
             found[these] = self._score.take(flat, mode="clip").mean(axis=-1)
         return found
+
+    def scores_at(self, guesses: Array, base_walls: Array) -> Array:
+        """The same (N,) for guesses (N, 3), x, y and heading, and points (K, 2) as seen there."""
+        x, y, theta = guesses[:, :, None].transpose(1, 0, 2)
+        c, s = np.cos(theta), np.sin(theta)
+        laid = np.stack(
+            [
+                x + c * base_walls[:, 0] - s * base_walls[:, 1],
+                y + s * base_walls[:, 0] + c * base_walls[:, 1],
+            ],
+            axis=-1,
+        )
+        i, j = np.moveaxis(((laid - self._corner) / _WALL_CELL_M).astype(np.int64), -1, 0)
+        flat = i * self._score.shape[1] + j
+        return np.asarray(self._score.take(flat, mode="clip").mean(axis=1))
 
     def is_alike(self, turn: Pose, matching: ScanMatchingConfig) -> bool:
         """Whether the whole map looks the same after a turn about some point, nearly `turn`."""
@@ -156,11 +179,12 @@ class Opinion:
     possible: int
     looks: int
     is_hopeless: bool = False  # the whole map looks the same from every place that is possible
+    sure_looks: int = 0  # the newest, after which it was the same place that was sure
 
     @property
     def is_sure(self) -> bool:
         """Whether to act on it."""
-        return self.looks >= _LOOKS and self.confidence >= _SURE
+        return self.looks >= _LOOKS and self.sure_looks >= _SURE_LOOKS
 
 
 class Relocaliser:
@@ -172,6 +196,8 @@ class Relocaliser:
         self._hypotheses: list[Hypothesis] = []
         self._nowhere = _nowhere()
         self._looks = 0
+        self._surest: Hypothesis | None = None  # by the newest looks
+        self._sure_looks = 0
         self._opinion = Opinion(None, 0.0, 0, 0)
         self._work = self._working()
 
@@ -189,6 +215,11 @@ class Relocaliser:
         weights = np.exp(weights - weights.max())
         shares = weights / weights.sum()
         best = self._hypotheses[int(np.argmax(shares[:-1]))]
+        if shares[:-1].max() < _SURE:
+            self._sure_looks = 0
+        else:
+            self._sure_looks = self._sure_looks + 1 if best is self._surest else 1
+        self._surest = best
         others = [
             hypothesis
             for hypothesis, share in zip(self._hypotheses, shares[:-1], strict=True)
@@ -200,6 +231,7 @@ class Relocaliser:
             int((shares[:-1] > _HOPELESS).sum()),
             self._looks,
             self._looks >= _LOOKS and self._are_alike(best, others),
+            self._sure_looks,
         )
 
     def _are_alike(self, best: Hypothesis, others: list[Hypothesis]) -> bool:
@@ -240,7 +272,23 @@ class Relocaliser:
             some = places[first : first + _TRIED]
             found.append(_best_turned(some, self._known.scores(some, turned)))
             yield
-        return _peaks(np.concatenate([np.empty((0, 4)), *found]))
+        peaks = yield from _peaks(np.concatenate([np.empty((0, 4)), *found]))
+        return (yield from self._best(peaks, base_walls))
+
+    def _best(self, peaks: Array, base_walls: Array) -> Generator[None, None, list[Pose]]:
+        """The best of guesses (N, 3) after a few small steps to where each fits better.
+
+        Else the best would be those that happen to be near to what was tried.
+        """
+        best, scores = peaks, np.full(len(peaks), -1.0)
+        for step in _STEPS:
+            there = peaks + step
+            found = self._known.scores_at(there, base_walls)
+            is_better = found > scores
+            best, scores = np.where(is_better[:, None], there, best), np.maximum(found, scores)
+            yield
+        order = np.argsort(-scores, kind="stable")[:_GUESSES]
+        return [Pose(x, y, wrap_angle(heading)) for x, y, heading in best[order].tolist()]
 
     def _begin(self, look: Look, guesses: list[Pose]) -> Generator[None, None, None]:
         """Make hypotheses of what fits closely, too."""
@@ -294,16 +342,20 @@ class Relocaliser:
         """Share of the walls, of either map, that the other one should have and has not."""
         laid = map_base.transform(base_walls)
         seen = self._known.is_seen(laid)
-        distance = np.asarray(self._known.tree.query(laid)[0])
-        unknown_to_map = float(np.where(seen, distance > _NEAR_M, _CHANCE).mean())
+        unknown_to_map = float(np.where(seen, _apart(self._known.tree, laid), _CHANCE).mean())
         walls = self._known.points
         near = np.hypot(*(walls - map_base.position).T) < _REACH_M
         there = look.local_base.compose(map_base.inverse()).transform(walls[near])
         there = there[look.local_map.known(there)]
         if len(there) == 0:
             return 1.0
-        distance = np.asarray(look.local_map.tree().query(there)[0])
-        return max(unknown_to_map, float((distance > _NEAR_M).mean()))
+        return max(unknown_to_map, float(_apart(look.local_map.tree(), there).mean()))
+
+
+def _apart(walls: cKDTree, points: Array) -> Array:
+    """How surely points (N, 2) are on none of the walls, 0..1 (N,): maps are a little bent."""
+    distance = np.asarray(walls.query(points)[0])
+    return np.clip((distance - _NEAR_M) / (_OFF_M - _NEAR_M), 0.0, 1.0)
 
 
 def _nowhere() -> Hypothesis:
@@ -318,16 +370,18 @@ def _best_turned(places: Array, scores: Array) -> Array:
     return np.column_stack([places[i], k * (math.tau / _HEADINGS), scores[i, k]])
 
 
-def _peaks(guesses: Array) -> list[Pose]:
-    """The best poses of guesses (N, 4), none near a better one."""
+def _peaks(guesses: Array) -> Generator[None, None, Array]:
+    """The best (N, 3), x, y and heading, of guesses (N, 4), none near a better one."""
     left = guesses[np.argsort(-guesses[:, 3], kind="stable")[:_COMPARED]]
-    peaks: list[Pose] = []
-    while len(peaks) < _GUESSES and len(left):
+    peaks: list[Array] = []
+    while len(peaks) < _ROUGH_GUESSES and len(left):
         x, y, heading = left[0, :3].tolist()
-        peaks.append(Pose(x, y, wrap_angle(heading)))
+        peaks.append(left[0, :3])
         turn = np.abs(wrap_angles(left[:, 2] - heading))
         left = left[(np.hypot(left[:, 0] - x, left[:, 1] - y) > _APART_M) | (turn > _APART_RAD)]
-    return peaks
+        if len(peaks) % _PEAKS_A_STEP == 0:
+            yield
+    return np.array(peaks).reshape(-1, 3)
 
 
 def _some(points: Array, count: int) -> Array:
