@@ -33,6 +33,8 @@ _ROUGH_M = 0.4  # walls so far off do not speak for a rough guess
 _ROUGH_POINTS, _POINTS = 80, 300
 _ROUGH_GUESSES = 1200  # whose scores are worked out better: in a corridor one is like the next
 _GUESSES = 150  # that are looked at closely: a place that is left out can never be found
+_ALIKE = 0.05  # in score, from the best: what is left out may be the place if it differs by less
+_MOST_ROUNDS = 20  # of guessing again a little farther on, before some are left out nevertheless
 _FINER_M, _FINER_RAD = _CELL_M / 3, math.tau / _HEADINGS / 3  # steps to a better score
 _STEPS = np.array(list(product((-1, 0, 1), repeat=3))) * [_FINER_M, _FINER_M, _FINER_RAD]
 _FITS_A_STEP = 4
@@ -242,10 +244,13 @@ class Relocaliser:
         )
 
     def _working(self) -> Generator[None, None, None]:
+        rounds = 0
         while True:
             look = self._look
-            guesses = yield from self._guesses(look)
-            yield from self._begin(look, guesses)
+            guesses, are_all = yield from self._guesses(look)
+            rounds = 0 if are_all else rounds + 1
+            if are_all or rounds > _MOST_ROUNDS:
+                yield from self._begin(look, guesses)
             while self._hypotheses:
                 before = self._look.local_base
                 while (driven := self._look.local_base.distance(before)) < _LOOK_EVERY_M:
@@ -254,8 +259,8 @@ class Relocaliser:
             while self._look.local_base.distance(look.local_base) < _LOOK_EVERY_M:
                 yield
 
-    def _guesses(self, look: Look) -> Generator[None, None, list[Pose]]:
-        """map_base where the walls around fit roughly, the best first."""
+    def _guesses(self, look: Look) -> Generator[None, None, tuple[list[Pose], bool]]:
+        """map_base where the walls around fit roughly, the best first; and whether that are all."""
         base_walls = look.local_base.inverse().transform(_some(look.walls, _ROUGH_POINTS))
         headings = np.arange(_HEADINGS) * math.tau / _HEADINGS
         c, s = np.cos(headings), np.sin(headings)
@@ -275,10 +280,13 @@ class Relocaliser:
         peaks = yield from _peaks(np.concatenate([np.empty((0, 4)), *found]))
         return (yield from self._best(peaks, base_walls))
 
-    def _best(self, peaks: Array, base_walls: Array) -> Generator[None, None, list[Pose]]:
+    def _best(
+        self, peaks: Array, base_walls: Array
+    ) -> Generator[None, None, tuple[list[Pose], bool]]:
         """The best of guesses (N, 3) after a few small steps to where each fits better.
 
-        Else the best would be those that happen to be near to what was tried.
+        Else the best would be those that happen to be near to what was tried. In the middle of a
+        corridor there may be too many that are as good: then these are not all.
         """
         best, scores = peaks, np.full(len(peaks), -1.0)
         for step in _STEPS:
@@ -287,8 +295,10 @@ class Relocaliser:
             is_better = found > scores
             best, scores = np.where(is_better[:, None], there, best), np.maximum(found, scores)
             yield
-        order = np.argsort(-scores, kind="stable")[:_GUESSES]
-        return [Pose(x, y, wrap_angle(heading)) for x, y, heading in best[order].tolist()]
+        order = np.argsort(-scores, kind="stable")
+        are_all = len(order) <= _GUESSES or scores[order[_GUESSES]] < scores[order[0]] - _ALIKE
+        some = best[order[:_GUESSES]].tolist()
+        return [Pose(x, y, wrap_angle(heading)) for x, y, heading in some], bool(are_all)
 
     def _begin(self, look: Look, guesses: list[Pose]) -> Generator[None, None, None]:
         """Make hypotheses of what fits closely, too."""
