@@ -423,11 +423,7 @@ class Mission:
             self._mapper.forget_strays(view)
             if self._mapper.graph.vertices and not self._mapper.graph.frontiers():
                 return
-            if self._mapper.graph.vertices:
-                given_up = len(self._mapper.graph.frontiers()) + self._given_up()
-                self._end(view, "explored_with_blocked", f"frontiers left: {given_up}; {reason}")
-            else:
-                self._end(view, "failed", f"no vertex found, perhaps no way out: {reason}")
+            self._end_early(view, f"no vertex found, perhaps no way out: {reason}", reason)
             return
         has_left = self.where.on_edge not in (None, self.target)
         if has_left and self._backtracking.begin():
@@ -454,8 +450,17 @@ class Mission:
         self._events += done
         if isinstance(order, Stand):
             reason = f"{NO_EDGE}: there are no walls within range, or no way out"
-            self._end(view, "failed", reason)
+            self._end_early(view, reason, NO_EDGE)
         return order
+
+    def _end_early(self, view: View, without_map: str, reason: str) -> None:
+        """End because nothing more can be done; why, if nothing is mapped, and if something is."""
+        graph = self._mapper.graph
+        if not graph.vertices:
+            self._end(view, "failed", without_map)
+            return
+        left = len(graph.frontiers()) + self._given_up()
+        self._end(view, "explored_with_blocked", f"frontiers left: {left}; {reason}")
 
     def _examine(self, view: View, here: Situation) -> Order:
         """Go where something in sight may prove to be a vertex, before all is called explored.

@@ -140,6 +140,16 @@ def test_without_an_edge_in_sight_the_robot_looks_around_and_then_gives_up() -> 
     assert len(robot.said(Finished)) == 1
 
 
+def test_who_has_a_map_and_sees_no_edge_any_more_has_not_failed() -> None:
+    """Stuck in a narrow door, for instance: what it has mapped is there all the same."""
+    robot = Robot()
+    robot.stand(TEE, 8)
+    while robot.mission.outcome is None and robot.stamp < 100.0:
+        robot.look(LocalGvg())
+    assert robot.mission.outcome == "explored_with_blocked"
+    assert robot.mission.reason == "frontiers left: 3; no edge in sight"
+
+
 def test_an_outage_costs_no_patience() -> None:
     """As if the robot had been asleep: it searches for as long as it would have without."""
     robot, outage = Robot(), 300.0
