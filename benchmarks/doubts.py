@@ -27,7 +27,7 @@ from benchmarks.figures.tours import (
     Crossing,
     Tour,
 )
-from gvgbot.autonomy.mapping import MappingConfig
+from gvgbot.autonomy.evidence import MappingConfig
 from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.doubts import (
     NEW_PER_M2,

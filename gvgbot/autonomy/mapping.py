@@ -1,12 +1,12 @@
 """From what is seen of the GVG to what is known of it: vertices matched, added and joined."""
 
 import math
-from dataclasses import dataclass, field, replace
-from typing import Annotated
+from dataclasses import replace
 
 import numpy as np
 
-from gvgbot.autonomy.candidates import Candidates, CandidatesConfig
+from gvgbot.autonomy.association import is_crowded, pair_tracked, sightings_of
+from gvgbot.autonomy.candidates import Candidates
 from gvgbot.autonomy.events import (
     EdgeJoined,
     Event,
@@ -14,62 +14,25 @@ from gvgbot.autonomy.events import (
     VertexAdded,
     VertexRemoved,
 )
-from gvgbot.autonomy.gvg.local import Branch, LocalEdge, LocalGvg, LocalNode
+from gvgbot.autonomy.evidence import Evidence, MappingConfig
+from gvgbot.autonomy.gvg.local import Branch, LocalEdge, LocalNode
 from gvgbot.autonomy.gvg.reduction import KnownVertices
 from gvgbot.autonomy.recogniser import CLOSE_M, Match, Recogniser, Recognition
 from gvgbot.autonomy.slam import ekf
-from gvgbot.autonomy.slam.graph import Edge, HalfEdgeId, Kind, Vertex
-from gvgbot.autonomy.slam.recognition import (
-    RecognitionConfig,
-    Sighting,
-    detection_covariance,
-    match_bearings,
-)
+from gvgbot.autonomy.slam.graph import Edge, HalfEdgeId, Vertex
+from gvgbot.autonomy.slam.recognition import RecognitionConfig, Sighting, detection_covariance
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
 from gvgbot.autonomy.topology import loose_ends, split_edge_at, strays, take_out
 from gvgbot.autonomy.unsettled import Knowledge, Unsettled
 from gvgbot.autonomy.views import Correspondence, Observation, View
 from gvgbot.geometry import Array, Pose
-from gvgbot.ranges import Range
 
-_MADE_BY_M = 0.15  # beyond its disc: what made a vertex is nearer, wherever exactly that is
+_TURN_VARIANCE = 1e-6  # rad^2; a new vertex's frame is turned as the local one is
+_MEAN_OF = 10  # sightings, about, of which the place of a vertex is the mean
+_BESIDE_M = 1.0  # from so near, the walls around a vertex are seen well
 _BEHIND_M = 2.5  # the nearest walls of a vertex, others tell what it looks like
-_HIDES_M = 1.0  # what stands so near to a vertex's disc may close a branch
-_FRESH_M = 6.0  # driven since a vertex was seen: the local frame still tells its place
-_IN_FULL_VIEW_M = 4.0  # from so near, it would be seen that a vertex is none
-_IN_CLEAR_M = 2.0  # and from so near, that it has no departure where one was seen
-_WELL_KNOWN_M = 0.2  # the uncertainty of its place with which that can be told
-_DRIVEN = 5  # times as often must a driven edge be missed
 _DOOR_M = 0.5  # from an edge, a dead end is what stands on it
 _AT_END_M = 0.5  # so near to the end of a dead end, it has been driven
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MappingConfig:
-    """How much must be seen before it is believed."""
-
-    candidates: CandidatesConfig = field(default_factory=CandidatesConfig)
-    trust_m: Annotated[float, Range(1.0, 30.0)] = 7.0  # vertices farther away are not yet believed
-    # for so long must sight speak against a part of a finished map: doors close, and open again
-    changed_after_s: Annotated[float, Range(0.0, 1e7)] = 86_400.0
-    misses: Annotated[int, Range(1, 50)] = 6  # sightings of a plain edge that refute a vertex
-    conflicts: Annotated[int, Range(1, 50)] = 4  # sightings that overrule an edge
-    surplus: Annotated[int, Range(1, 50)] = 3  # sightings in a row that add a departure to a vertex
-    passed_m: Annotated[float, Range(0.3, 5.0)] = 1.0  # from so near, what there is to see is seen
-    # driven between two corrections by the same vertex
-    update_every_m: Annotated[float, Range(0.1, 10.0)] = 1.0
-    # vertices farther away are not looked up
-    recognise_within_m: Annotated[float, Range(1.0, 20.0)] = 5.0
-    min_inliers: Annotated[float, Range(0.1, 1.0)] = 0.7  # share of a vertex's walls found again
-    min_inliers_far: Annotated[float, Range(0.1, 1.0)] = (
-        0.9  # of one that is not where it should be
-    )
-    margin: Annotated[float, Range(0.0, 50.0)] = 9.0  # in squared Mahalanobis distance, to the next
-    # by which a place must be likelier a known one than a new one, or two that may be one be so:
-    # minus twice the log likelihood
-    novelty_margin: Annotated[float, Range(0.0, 50.0)] = 10.0
-    # around a vertex, walls are kept to know it again; farther where the nearest are so far off
-    snapshot_m: Annotated[float, Range(1.0, 20.0)] = 6.0
 
 
 class Mapper(Knowledge):
@@ -101,6 +64,7 @@ class Mapper(Knowledge):
             margin=config.novelty_margin,
             same_bearing=math.radians(recognition.bearing_deg),
         )
+        self._evidence = Evidence(self, config, recognition)
         self._unbelieved = Candidates(config.candidates)
         self._rivals: dict[int, Recognition] = {}  # by nodes of this view that may be known ones
         # by half-edges of vertices that this view took out, as `loose_ends`, but in the local frame
@@ -114,17 +78,12 @@ class Mapper(Knowledge):
 
     def known_around(self, local_base: Pose, within_m: float) -> KnownVertices:
         """The vertices around the base, seen lately or not, in the local frame."""
-        positions = self._vertices_from(local_base)
+        positions = self.positions_from(local_base)
         near = np.hypot(*(positions - local_base.position).T) < within_m
         degrees = np.array(
             [self.graph.vertices[self.belief.ids[i]].degree for i in np.flatnonzero(near)], int
         )
         return KnownVertices(positions[near], degrees)
-
-    def _vertices_from(self, local_base: Pose) -> Array:
-        """Where the vertices are (N, 2), local frame, in the order of the belief's ids."""
-        local_map = local_base.compose(self.belief.map_base.inverse())
-        return local_map.transform(self.belief.x[3:].reshape(-1, 3)[:, :2])
 
     def is_way(self, local_base: Pose, place: Array) -> bool:
         """Whether a known edge passes a place (2,), local frame, nearer than any wall of its."""
@@ -144,50 +103,22 @@ class Mapper(Knowledge):
         self._events, self._rivals, self.came_from = [], {}, {}
         self._events += self.unsettled.revoke(view.stamp) + self.unsettled.settle(view.stamp)
         known = Correspondence()
-        sightings = self._sightings(view)
-        self._track(view, sightings, known)
+        sightings = sightings_of(view, self._config.trust_m)
+        pair_tracked(self.graph, view, sightings, known, self._recognition)
         self._recognise(view, sightings, known)
         self._consider(view, sightings, known)
         for node, key in list(known.vertex_of.items()):
             vertex = self.graph.vertices[key]
             if node in view.doubted:
-                self._find_half_edges(view, view.gvg.nodes[node], vertex, known)
+                self._evidence.pair_departures(view, view.gvg.nodes[node], vertex, known)
             else:
                 self._refresh(view, sightings[node], view.gvg.nodes[node], vertex, known)
-        self._refute(view, known)
+        for vertex, reason in self._evidence.refuted(view, known):
+            self.remove(view, vertex, reason)
         self._join(view, known)
         return known, self._events
 
     # -- which vertex is it ------------------------------------------------------------------
-
-    def _sightings(self, view: View) -> dict[int, Sighting]:
-        base = view.local_base.position
-        return {
-            key: _sighting(view.gvg, node)
-            for key, node in view.gvg.nodes.items()
-            if node.may_be_vertex and np.hypot(*(node.position - base)) < self._config.trust_m
-        }
-
-    def _track(self, view: View, sightings: dict[int, Sighting], known: Correspondence) -> None:
-        """Vertices seen moments ago are told by their place in the local map.
-
-        What was taken for a fork in a room may prove to be its end, and the other way round.
-        """
-        pairs = sorted(
-            (
-                sighting.meetpoint != (vertex.kind == "meetpoint"),
-                float(np.hypot(*(sighting.position - vertex.local.position))),
-                node,
-                vertex.id,
-            )
-            for vertex in self.graph.vertices.values()
-            if view.travelled - vertex.seen_at < self._recognition.tracked_m
-            for node, sighting in sightings.items()
-        )
-        for changed, metres, node, vertex_id in pairs:
-            reach = self._recognition.same_place_m * (0.5 if changed else 1.0)
-            if metres < reach and node not in known.vertex_of and vertex_id not in known.node_of:
-                known.pair(node, vertex_id)
 
     def _recognise(self, view: View, sightings: dict[int, Sighting], known: Correspondence) -> None:
         """Vertices that were out of sight for long must pass all the tests.
@@ -243,7 +174,7 @@ class Mapper(Knowledge):
             if not self._unbelieved.is_believable(candidate, view.gvg.nodes[node], away):
                 continue
             examined = away < CLOSE_M and self._unbelieved.is_examined(candidate)
-            if self._crowded(view, sighting) or (
+            if is_crowded(self.graph, view, sighting, self._recognition) or (
                 not examined and self._may_be_known(view, sighting)
             ):
                 continue  # it may be a known one: look at it from closer
@@ -259,18 +190,8 @@ class Mapper(Knowledge):
         vertices = self.graph.vertices.values()
         return bool(self._recogniser.candidates(self.belief, vertices, view, sighting))
 
-    def _crowded(self, view: View, sighting: Sighting) -> bool:
-        """Whether a vertex of this kind that is in sight stands here already."""
-        return any(
-            np.hypot(*(vertex.local.position - sighting.position))
-            < 0.5 * self._recognition.same_place_m
-            for vertex in self.graph.vertices.values()
-            if view.travelled - vertex.seen_at < self._recognition.tracked_m
-            and sighting.meetpoint == (vertex.kind == "meetpoint")
-        )
-
     def _add(self, view: View, sighting: Sighting) -> Vertex:
-        kind: Kind = "meetpoint" if sighting.meetpoint else "endpoint"
+        """Make a vertex of a sighting."""
         local = Pose(float(sighting.position[0]), float(sighting.position[1]), 0.0)
         vertex = Vertex(
             self.graph.next_id(), sighting.clearance, local, view.travelled, view.travelled
@@ -283,7 +204,7 @@ class Mapper(Knowledge):
         R[:2, :2] = detection_covariance(
             math.hypot(base_vertex.x, base_vertex.y), self._recognition
         )
-        R[2, 2] = 1e-6
+        R[2, 2] = _TURN_VARIANCE
         self.belief = ekf.add_vertex(self.belief, vertex.id, base_vertex, R)
         self.observations.append(Observation(view.keyframe, vertex.id, base_vertex, R))
         self._picture(view, vertex)
@@ -295,10 +216,9 @@ class Mapper(Knowledge):
             reach=self._recognition.same_place_m,
             angle=math.radians(self._recognition.bearing_deg),
         )
+        kind, degree = sighting.kind, vertex.degree
         self._events.append(
-            VertexAdded(
-                view.stamp, vertex.id, kind, place.x, place.y, vertex.degree, vertex.clearance
-            )
+            VertexAdded(view.stamp, vertex.id, kind, place.x, place.y, degree, vertex.clearance)
         )
         return vertex
 
@@ -316,18 +236,18 @@ class Mapper(Knowledge):
         self, view: View, sighting: Sighting, node: LocalNode, vertex: Vertex, known: Correspondence
     ) -> None:
         """Sharpen a vertex by a further sighting."""
-        share = 1.0 / min(vertex.sightings + 1, 10)
+        share = 1.0 / min(vertex.sightings + 1, _MEAN_OF)
         position = (1 - share) * vertex.local.position + share * sighting.position
         vertex.local = Pose(float(position[0]), float(position[1]), vertex.local.theta)
         vertex.sightings += 1
         vertex.misses, vertex.doubted_since = 0, None
         vertex.seen_at = view.travelled
-        near = np.hypot(*(position - view.local_base.position)) < 1.0
+        is_beside = np.hypot(*(position - view.local_base.position)) < _BESIDE_M
         if node.settled:
             vertex.clearance += share * (sighting.clearance - vertex.clearance)
-        if near and vertex.visits == 1 and node.settled:
+        if is_beside and vertex.visits == 1 and node.settled:
             self._picture(view, vertex)
-        self._match_half_edges(view, node, vertex, known)
+        self._evidence.weigh_departures(view, node, vertex, known)
         if view.travelled - vertex.updated_at > self._config.update_every_m:
             vertex.updated_at = view.travelled
             base_vertex = view.local_base.to(vertex.local)
@@ -339,124 +259,9 @@ class Mapper(Knowledge):
         self.belief = ekf.correct(self.belief, vertex.id, base_vertex, R)
         self.observations.append(Observation(view.keyframe, vertex.id, base_vertex, R))
 
-    def _find_half_edges(
-        self, view: View, node: LocalNode, vertex: Vertex, known: Correspondence
-    ) -> tuple[list[Branch], tuple[float, ...], dict[int, int]]:
-        """A node's branches, their bearings, and which are the known half-edges of its vertex."""
-        branches = sorted(node.branches, key=lambda branch: branch in node.weak)
-        bearings = tuple(view.gvg.bearing(b, node.clearance) for b in branches)
-        turned = {k: h.bearing + vertex.local.theta for k, h in vertex.half_edges.items()}
-        limit = math.radians(self._recognition.bearing_deg)
-        matched = match_bearings(bearings, turned, limit)
-        for i, key in matched.items():
-            known.pair_branch(branches[i], HalfEdgeId(vertex.id, key))
-        return branches, bearings, matched
-
-    def _match_half_edges(
-        self, view: View, node: LocalNode, vertex: Vertex, known: Correspondence
-    ) -> None:
-        """Pair a node's branches with the half-edges of its vertex; add certain new ones."""
-        branches, bearings, matched = self._find_half_edges(view, node, vertex, known)
-        new = [i for i in range(len(branches)) if i not in matched]
-        certain = [i for i in new if branches[i] not in node.weak]
-        vertex.surplus = vertex.surplus + 1 if certain else 0
-        base = view.local_base.position
-        at_it = np.hypot(*(vertex.local.position - base)) < self._config.passed_m
-        vertex.unclear = vertex.unclear + at_it if new else 0
-        # What stays unclear although the robot is there must be driven to: it becomes a frontier.
-        if vertex.unclear >= self._config.candidates.meetpoint_sightings * vertex.hesitation:
-            certain = new
-        elif vertex.surplus < self._config.surplus * vertex.hesitation:
-            certain = []
-        if certain:
-            vertex.surplus = vertex.unclear = 0
-        for i in certain:
-            matched[i] = vertex.add_half_edge(bearings[i] - vertex.local.theta)
-            known.pair_branch(branches[i], HalfEdgeId(vertex.id, matched[i]))
-        for key in matched.values():
-            vertex.half_edges[key].misses = 0
-        if node.lead is None and len(matched) == len(branches):
-            self._doubt_half_edges(view, vertex, set(matched.values()), len(branches))
-
-    def _doubt_half_edges(self, view: View, vertex: Vertex, seen: set[int], degree: int) -> None:
-        """Drop departures that a clear view keeps not showing."""
-        misses = self._config.misses * vertex.hesitation
-        for key, half in list(vertex.half_edges.items()):
-            if key in seen or vertex.degree <= degree:
-                continue
-            half.misses += 1
-            end = HalfEdgeId(vertex.id, key)
-            edge = self.graph.edge_at(end)
-            if half.misses <= misses * self._weight(edge, end):
-                continue
-            if edge is None or self._has_changed(edge, view.stamp):
-                self.graph.remove_half_edge(end)
-
-    def _weight(self, edge: Edge | None, end: HalfEdgeId) -> float:
-        """How many times as often as others a departure must be missed before it is dropped."""
-        if edge is None or not edge.driven:
-            return 1.0
-        return _DRIVEN if self._is_left_open(edge.other(end)) else math.inf
-
-    def _is_left_open(self, end: HalfEdgeId) -> bool:
-        """Whether nothing is known beyond a vertex, and there are ways on.
-
-        What the robot drove round, and took for a vertex on the way, may have gone since.
-        """
-        halves = self.graph.vertices[end.vertex].half_edges
-        beyond = [half for key, half in halves.items() if key != end.key]
-        return all(half.edge is None for half in beyond) and any(half.open for half in beyond)
-
-    def _refute(self, view: View, known: Correspondence) -> None:
-        """Remove vertices where a plain edge is seen to pass through, or no wall that made them."""
-        for vertex, place in self._in_full_view(view):
-            near_by = vertex.clearance + _HIDES_M
-            if vertex.id in known.node_of or view.is_doubtful(place, near_by):
-                continue
-            stands_free = view.stands_free(place, vertex.clearance + _MADE_BY_M)
-            # A door is easily missed from along the wall; the robot will come where one was seen.
-            is_promising = any(half.open for half in vertex.half_edges.values())
-            is_clear = not is_promising or math.dist(place, view.local_base.position) < _IN_CLEAR_M
-            if stands_free or (is_clear and self._passes_through(view, place, known)):
-                vertex.misses += 1
-                refuted = vertex.misses > self._config.misses
-                if refuted and self._has_changed(vertex, view.stamp):
-                    gone = "the walls about it have gone" if stands_free else "an edge passes here"
-                    self.remove(view, vertex, gone)
-
-    def _in_full_view(self, view: View) -> list[tuple[Vertex, Array]]:
-        """The vertices that should be seen near by, and where (2,), local frame, for certain."""
-        found = []
-        for vertex_id, believed in zip(
-            self.belief.ids, self._vertices_from(view.local_base), strict=True
-        ):
-            vertex = self.graph.vertices[vertex_id]
-            is_fresh = view.travelled - vertex.seen_at < _FRESH_M
-            place = vertex.local.position if is_fresh else believed
-            away = math.hypot(place[0] - view.local_base.x, place[1] - view.local_base.y)
-            if away <= _IN_FULL_VIEW_M and (is_fresh or self._is_well_known(vertex)):
-                found.append((vertex, place))
-        return found
-
-    def _is_well_known(self, vertex: Vertex) -> bool:
-        """Whether it is certain where a vertex stands as seen from the robot."""
-        _, S, _ = ekf.innovation(self.belief, vertex.id, Pose(), np.zeros((2, 2)))
-        return bool(np.trace(S) < _WELL_KNOWN_M**2)
-
-    def _passes_through(self, view: View, point: Array, known: Correspondence) -> bool:
-        """Whether an edge is seen where a vertex should be, or another vertex at its end there."""
-        place = view.gvg.place(point)
-        if place is None or place.distance > 0.3:
-            return False
-        edge = view.gvg.edges[place.edge]
-        reach = self._recognition.same_place_m
-        from_end = min(place.station, edge.length - place.station)
-        end = edge.a if place.station < edge.length / 2 else edge.b
-        return from_end > reach or end in known.vertex_of
-
     # -- what was finished once --------------------------------------------------------------
 
-    def settle(self) -> None:
+    def establish(self) -> None:
         """Take the map for the building: what speaks against it must do so for long, from now on.
 
         Otherwise every door that is shut for an hour would take vertices along.
@@ -466,23 +271,15 @@ class Mapper(Knowledge):
         for edge in self.graph.edges.values():
             edge.established = True
 
-    def _has_changed(self, part: Vertex | Edge, stamp: float) -> bool:
-        """Whether a part of the map may go that sight speaks against."""
-        if not part.established:
-            return True
-        if part.doubted_since is None:
-            part.doubted_since = stamp
-        return stamp - part.doubted_since >= self._config.changed_after_s
-
     def _back_again(self, view: View, sighting: Sighting, known: Correspondence) -> Vertex | None:
         """The vertex of the finished map that a sighting stands beside: a door was shut there."""
         for vertex in self.graph.vertices.values():
             is_away = vertex.id not in known.node_of and vertex.doubted_since is not None
-            if not is_away or sighting.meetpoint != (vertex.kind == "meetpoint"):
+            if not is_away or sighting.kind != vertex.kind:
                 continue
             place = self.in_local_frame(view, vertex.id)
             off = float(np.hypot(*(place.position - sighting.position)))
-            if off < self._recognition.same_place_m and self._is_well_known(vertex):
+            if off < self._recognition.same_place_m and self._evidence.is_well_known(vertex):
                 x, y = sighting.position
                 vertex.local = Pose(float(x), float(y), place.theta)
                 vertex.seen_at = vertex.updated_at = view.travelled
@@ -528,10 +325,7 @@ class Mapper(Knowledge):
     def _dispute(self, view: View, known: Correspondence, *disputed: Edge | None) -> None:
         """Sight speaks against edges believed so far; after a few times it wins."""
         for edge in disputed:
-            if edge is None:
-                continue
-            edge.conflicts += 1
-            if edge.conflicts > self._config.conflicts and self._has_changed(edge, view.stamp):
+            if edge is not None and self._evidence.is_overruled(edge, view.stamp):
                 self.graph.unjoin(edge)
                 for end in (edge.a, edge.b):
                     vertex = self.graph.vertices[end.vertex]
@@ -593,13 +387,3 @@ class Mapper(Knowledge):
         line = self.graph.vertices[a.vertex].local.inverse().transform(local_line)
         edge = self.graph.join(a, b, line, min_clearance, driven=driven)
         self._events.append(EdgeJoined(view.stamp, a.vertex, b.vertex, edge.length, driven))
-
-
-def _sighting(gvg: LocalGvg, node: LocalNode) -> Sighting:
-    branches = (
-        node.branches if node.is_suspect else [b for b in node.branches if b not in node.weak]
-    )
-    bearings = [gvg.bearing(branch, node.clearance) for branch in branches]
-    if node.is_suspect and node.lead is not None:
-        bearings.append(node.lead)
-    return Sighting(node.position, node.clearance, tuple(bearings), not node.is_endpoint)

@@ -23,6 +23,7 @@ from gvgbot.autonomy.control.reflexes import (
 )
 from gvgbot.autonomy.errands import Errands
 from gvgbot.autonomy.events import EdgeJoined, Event, Recovery, VertexAdded, WayForgotten
+from gvgbot.autonomy.evidence import MappingConfig
 from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.gvg.local import LocalGvg
 from gvgbot.autonomy.gvg.local_map import LocalMapConfig
@@ -30,7 +31,7 @@ from gvgbot.autonomy.gvg.reduction import ReductionConfig, reduce_graph
 from gvgbot.autonomy.gvg.voronoi import fine_graph
 from gvgbot.autonomy.hazards import HazardConfig, Hazards
 from gvgbot.autonomy.localisation import Localisation, LocalMaps
-from gvgbot.autonomy.mapping import Mapper, MappingConfig
+from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.mission import Mission
 from gvgbot.autonomy.newcomers import Newcomers, NewcomersConfig
 from gvgbot.autonomy.odometry_log import OdometryLog

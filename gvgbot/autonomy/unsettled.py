@@ -30,6 +30,11 @@ class Knowledge:
     graph: GvgGraph = field(default_factory=GvgGraph)
     observations: list[Observation] = field(default_factory=list)
 
+    def positions_from(self, local_base: Pose) -> Array:
+        """Where the vertices are (N, 2), local frame, in the order of the belief's ids."""
+        local_map = local_base.compose(self.belief.map_base.inverse())
+        return local_map.transform(self.belief.positions)
+
 
 class Unsettled:
     """Decides, and corrects what is known by it.

@@ -151,7 +151,7 @@ class Doubts:
 
 def _around(belief: Belief, doubts: Sequence[Doubt]) -> Belief:
     """The part of a belief that has a say: doubted vertices, and all around them."""
-    map_all = belief.x[3:].reshape(-1, 3)[:, :2]
+    map_all = belief.positions
     at = [belief.ids.index(doubt.vertex) for doubt in doubts]
     away = np.hypot(*(map_all[:, None] - map_all[at]).transpose(2, 0, 1)).min(axis=1)
     rivals = {rival for doubt in doubts for rival in doubt.rivals}

@@ -74,6 +74,11 @@ class Belief:
         """The robot's pose."""
         return Pose.from_array(self.x[:3])
 
+    @property
+    def positions(self) -> Array:
+        """Where the vertices are (N, 2), in the order of `ids`."""
+        return self.x[3:].reshape(-1, 3)[:, :2]
+
     def _at(self, vertex: int) -> int:
         return 3 + 3 * self.ids.index(vertex)
 
@@ -207,7 +212,7 @@ def offsets(belief: Belief, base_point: Array, R: Array) -> tuple[Array, Array]:
     """
     c, s = math.cos(belief.x[2]), math.sin(belief.x[2])
     base_map = np.array([[c, s], [-s, c]])  # rotation
-    foreseen = (belief.x[3:].reshape(-1, 3)[:, :2] - belief.x[:2]) @ base_map.T
+    foreseen = (belief.positions - belief.x[:2]) @ base_map.T
     r = base_point - foreseen
     n = len(r)
     H = np.empty((n, 2, 5))  # by the pose of the robot and the vertex's position

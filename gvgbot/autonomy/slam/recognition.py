@@ -12,7 +12,7 @@ from typing import Annotated
 import numpy as np
 
 from gvgbot.autonomy.slam.ekf import Belief, distances
-from gvgbot.autonomy.slam.graph import Vertex
+from gvgbot.autonomy.slam.graph import Kind, Vertex
 from gvgbot.geometry import Array, Pose, wrap_angle
 from gvgbot.ranges import Range
 
@@ -45,6 +45,11 @@ class Sighting:
     clearance: float
     bearings: tuple[float, ...]
     meetpoint: bool
+
+    @property
+    def kind(self) -> Kind:
+        """What a vertex of this shape is."""
+        return "meetpoint" if self.meetpoint else "endpoint"
 
 
 def detection_covariance(distance: float, config: RecognitionConfig) -> Array:
@@ -86,7 +91,7 @@ def looks_alike(
     A degree that differs by one passes: of a pair of close meetpoints either may be seen as one.
     Clearance changes at most as much as the place: a vertex found from afar may have lain beside.
     """
-    if (vertex.kind == "meetpoint") != sighting.meetpoint:
+    if vertex.kind != sighting.kind:
         return False
     if abs(vertex.degree - len(sighting.bearings)) > 1:
         return False

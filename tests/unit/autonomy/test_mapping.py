@@ -19,9 +19,10 @@ from gvgbot.autonomy.events import (
     VertexAdded,
     VertexRemoved,
 )
+from gvgbot.autonomy.evidence import MappingConfig
 from gvgbot.autonomy.gvg.local import Branch, LocalGvg
 from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
-from gvgbot.autonomy.mapping import Mapper, MappingConfig
+from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.recogniser import Match, Recognition
 from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.ekf import Belief
@@ -491,7 +492,7 @@ def test_a_door_that_is_shut_for_a_while_takes_no_vertex_out_of_a_finished_map()
     """The branch of the tee is out of sight, and what is left is a plain corridor."""
     seen = Seen().look(TEE, 20)
     vertices = set(seen.mapper.graph.vertices)
-    seen.mapper.settle()
+    seen.mapper.establish()
     seen.look(PLAIN, 100)
     assert set(seen.mapper.graph.vertices) == vertices
     assert of_type(seen.events, VertexRemoved) == []
@@ -499,7 +500,7 @@ def test_a_door_that_is_shut_for_a_while_takes_no_vertex_out_of_a_finished_map()
 
 def test_what_stays_away_for_longer_than_a_day_was_walled_up() -> None:
     seen = Seen().look(TEE, 20)
-    seen.mapper.settle()
+    seen.mapper.establish()
     seen.look_near(PLAIN, 20)
     seen.drive_elsewhere(CONFIG.changed_after_s / 10.0)  # a second for each 0.1 m
     seen.look_near(PLAIN, 20)

@@ -9,12 +9,13 @@ import pytest
 from gvgbot.autonomy.control.company import Companion
 from gvgbot.autonomy.control.orders import Drive, LookAround, Order, Stand
 from gvgbot.autonomy.events import Decision, Event, Finished, Recovery
+from gvgbot.autonomy.evidence import MappingConfig
 from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.exploration.ears import nearest_frontier
 from gvgbot.autonomy.exploration.paths import Approach
 from gvgbot.autonomy.gvg.local import LocalGvg
 from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
-from gvgbot.autonomy.mapping import Mapper, MappingConfig
+from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.mission import Mission
 from gvgbot.autonomy.slam.ekf import add_vertex
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex

@@ -419,3 +419,10 @@ def test_a_part_of_a_belief_is_the_marginal_of_some_vertices() -> None:
     assert some.ids == (12, 10)
     np.testing.assert_array_equal(some.x, belief.x[rows])
     np.testing.assert_array_equal(some.P, belief.P[np.ix_(rows, rows)])
+
+
+@pytest.mark.parametrize("vertices", [0, 1, 4])
+def test_positions_of_all_vertices_are_those_of_each(vertices: int) -> None:
+    belief = random_belief(np.random.default_rng(vertices), vertices)
+    each = [belief.map_vertex(vertex).position for vertex in belief.ids]
+    np.testing.assert_array_equal(belief.positions, np.array(each).reshape(-1, 2))

@@ -1,0 +1,73 @@
+"""Data association from look to look: what may be a vertex, and which ones are still in sight."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from gvgbot.autonomy.gvg.local import LocalGvg, LocalNode
+from gvgbot.autonomy.slam.graph import GvgGraph, Vertex
+from gvgbot.autonomy.slam.recognition import RecognitionConfig, Sighting
+from gvgbot.autonomy.views import Correspondence, View
+
+
+def sightings_of(view: View, within_m: float) -> dict[int, Sighting]:
+    """What may be vertices, not farther than that from the base, by nodes of the local GVG."""
+    base = view.local_base.position
+    return {
+        key: _sighting(view.gvg, node)
+        for key, node in view.gvg.nodes.items()
+        if node.may_be_vertex and np.hypot(*(node.position - base)) < within_m
+    }
+
+
+def _sighting(gvg: LocalGvg, node: LocalNode) -> Sighting:
+    branches = (
+        node.branches if node.is_suspect else [b for b in node.branches if b not in node.weak]
+    )
+    bearings = [gvg.bearing(branch, node.clearance) for branch in branches]
+    if node.is_suspect and node.lead is not None:
+        bearings.append(node.lead)
+    return Sighting(node.position, node.clearance, tuple(bearings), not node.is_endpoint)
+
+
+def pair_tracked(
+    graph: GvgGraph,
+    view: View,
+    sightings: dict[int, Sighting],
+    known: Correspondence,
+    config: RecognitionConfig,
+) -> None:
+    """Note which sightings, by node, are vertices seen moments ago: those at the same place.
+
+    What was taken for a fork in a room may prove to be its end, and the other way round.
+    """
+    pairs = sorted(
+        (
+            sighting.kind != vertex.kind,
+            float(np.hypot(*(sighting.position - vertex.local.position))),
+            node,
+            vertex.id,
+        )
+        for vertex in _tracked(graph, view, config)
+        for node, sighting in sightings.items()
+    )
+    for changed, metres, node, vertex_id in pairs:
+        reach = config.same_place_m * (0.5 if changed else 1.0)
+        if metres < reach and node not in known.vertex_of and vertex_id not in known.node_of:
+            known.pair(node, vertex_id)
+
+
+def is_crowded(graph: GvgGraph, view: View, sighting: Sighting, config: RecognitionConfig) -> bool:
+    """Whether a vertex of the kind of a sighting that is still tracked stands there already."""
+    return any(
+        np.hypot(*(vertex.local.position - sighting.position)) < 0.5 * config.same_place_m
+        for vertex in _tracked(graph, view, config)
+        if vertex.kind == sighting.kind
+    )
+
+
+def _tracked(graph: GvgGraph, view: View, config: RecognitionConfig) -> Iterator[Vertex]:
+    """Vertices seen so lately that the local frame tells their place."""
+    for vertex in graph.vertices.values():
+        if view.travelled - vertex.seen_at < config.tracked_m:
+            yield vertex

@@ -1,0 +1,224 @@
+"""What sight says for and against parts of the map, counted until it is enough to change them."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Annotated
+
+import numpy as np
+
+from gvgbot.autonomy.candidates import CandidatesConfig
+from gvgbot.autonomy.gvg.local import Branch, LocalNode
+from gvgbot.autonomy.slam import ekf
+from gvgbot.autonomy.slam.graph import Edge, HalfEdgeId, Vertex
+from gvgbot.autonomy.slam.recognition import RecognitionConfig, match_bearings
+from gvgbot.autonomy.unsettled import Knowledge
+from gvgbot.autonomy.views import Correspondence, View
+from gvgbot.geometry import Array, Pose
+from gvgbot.ranges import Range
+
+_MADE_BY_M = 0.15  # beyond its disc: what made a vertex is nearer, wherever exactly that is
+_HIDES_M = 1.0  # what stands so near to a vertex's disc may close a branch
+_FRESH_M = 6.0  # driven since a vertex was seen: the local frame still tells its place
+_IN_FULL_VIEW_M = 4.0  # from so near, it would be seen that a vertex is none
+_IN_CLEAR_M = 2.0  # and from so near, that it has no departure where one was seen
+_WELL_KNOWN_M = 0.2  # the uncertainty of its place with which that can be told
+_ON_EDGE_M = 0.3  # so near to a vertex's place, an edge that is seen passes through it
+_DRIVEN = 5  # times as often must a driven edge be missed
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MappingConfig:
+    """How much must be seen before it is believed."""
+
+    candidates: CandidatesConfig = field(default_factory=CandidatesConfig)
+    trust_m: Annotated[float, Range(1.0, 30.0)] = 7.0  # vertices farther away are not yet believed
+    # for so long must sight speak against a part of a finished map: doors close, and open again
+    changed_after_s: Annotated[float, Range(0.0, 1e7)] = 86_400.0
+    misses: Annotated[int, Range(1, 50)] = 6  # sightings of a plain edge that refute a vertex
+    conflicts: Annotated[int, Range(1, 50)] = 4  # sightings that overrule an edge
+    surplus: Annotated[int, Range(1, 50)] = 3  # sightings in a row that add a departure to a vertex
+    passed_m: Annotated[float, Range(0.3, 5.0)] = 1.0  # from so near, what there is to see is seen
+    # driven between two corrections by the same vertex
+    update_every_m: Annotated[float, Range(0.1, 10.0)] = 1.0
+    # vertices farther away are not looked up
+    recognise_within_m: Annotated[float, Range(1.0, 20.0)] = 5.0
+    min_inliers: Annotated[float, Range(0.1, 1.0)] = 0.7  # share of a vertex's walls found again
+    min_inliers_far: Annotated[float, Range(0.1, 1.0)] = (
+        0.9  # of one that is not where it should be
+    )
+    margin: Annotated[float, Range(0.0, 50.0)] = 9.0  # in squared Mahalanobis distance, to the next
+    # by which a place must be likelier a known one than a new one, or two that may be one be so:
+    # minus twice the log likelihood
+    novelty_margin: Annotated[float, Range(0.0, 50.0)] = 10.0
+    # around a vertex, walls are kept to know it again; farther where the nearest are so far off
+    snapshot_m: Annotated[float, Range(1.0, 20.0)] = 6.0
+
+
+class Evidence:
+    """Adds and drops departures of vertices, and says which vertices and edges are refuted."""
+
+    def __init__(
+        self, known: Knowledge, config: MappingConfig, recognition: RecognitionConfig
+    ) -> None:
+        self._known, self._config, self._recognition = known, config, recognition
+
+    # -- departures --------------------------------------------------------------------------
+
+    def pair_departures(
+        self, view: View, node: LocalNode, vertex: Vertex, known: Correspondence
+    ) -> tuple[list[Branch], tuple[float, ...], dict[int, int]]:
+        """Note which branches of a node are which half-edges of its vertex.
+
+        The branches, weak ones last; their bearings, rad, local frame; and by index of the branch
+        the key of its half-edge.
+        """
+        branches = sorted(node.branches, key=lambda branch: branch in node.weak)
+        bearings = tuple(view.gvg.bearing(b, node.clearance) for b in branches)
+        turned = {k: h.bearing + vertex.local.theta for k, h in vertex.half_edges.items()}
+        limit = math.radians(self._recognition.bearing_deg)
+        matched = match_bearings(bearings, turned, limit)
+        for i, key in matched.items():
+            known.pair_branch(branches[i], HalfEdgeId(vertex.id, key))
+        return branches, bearings, matched
+
+    def weigh_departures(
+        self, view: View, node: LocalNode, vertex: Vertex, known: Correspondence
+    ) -> None:
+        """Pair a node's branches with the half-edges of its vertex; add certain new ones."""
+        branches, bearings, matched = self.pair_departures(view, node, vertex, known)
+        new = [i for i in range(len(branches)) if i not in matched]
+        certain = [i for i in new if branches[i] not in node.weak]
+        for i in self._believed(view, vertex, new, certain):
+            matched[i] = vertex.add_half_edge(bearings[i] - vertex.local.theta)
+            known.pair_branch(branches[i], HalfEdgeId(vertex.id, matched[i]))
+        for key in matched.values():
+            vertex.half_edges[key].misses = 0
+        if node.lead is None and len(matched) == len(branches):
+            self._doubt_departures(view, vertex, set(matched.values()), len(branches))
+
+    def _believed(
+        self, view: View, vertex: Vertex, new: list[int], certain: list[int]
+    ) -> list[int]:
+        """Which branches that are no known departure, some of them for certain, become one now.
+
+        What stays unclear although the robot is there must be driven to: it becomes a frontier.
+        """
+        vertex.surplus = vertex.surplus + 1 if certain else 0
+        base = view.local_base.position
+        at_it = np.hypot(*(vertex.local.position - base)) < self._config.passed_m
+        vertex.unclear = vertex.unclear + at_it if new else 0
+        if vertex.unclear >= self._config.candidates.meetpoint_sightings * vertex.hesitation:
+            believed = new
+        elif vertex.surplus >= self._config.surplus * vertex.hesitation:
+            believed = certain
+        else:
+            return []
+        vertex.surplus = vertex.unclear = 0
+        return believed
+
+    def _doubt_departures(self, view: View, vertex: Vertex, seen: set[int], degree: int) -> None:
+        """Drop departures that a clear view keeps not showing."""
+        graph, misses = self._known.graph, self._config.misses * vertex.hesitation
+        for key, half in list(vertex.half_edges.items()):
+            if key in seen or vertex.degree <= degree:
+                continue
+            half.misses += 1
+            end = HalfEdgeId(vertex.id, key)
+            edge = graph.edge_at(end)
+            if half.misses <= misses * self._weight(edge, end):
+                continue
+            if edge is None or self._has_changed(edge, view.stamp):
+                graph.remove_half_edge(end)
+
+    def _weight(self, edge: Edge | None, end: HalfEdgeId) -> float:
+        """How many times as often as others a departure must be missed before it is dropped."""
+        if edge is None or not edge.driven:
+            return 1.0
+        return _DRIVEN if self._is_left_open(edge.other(end)) else math.inf
+
+    def _is_left_open(self, end: HalfEdgeId) -> bool:
+        """Whether nothing is known beyond a vertex, and there are ways on.
+
+        What the robot drove round, and took for a vertex on the way, may have gone since.
+        """
+        halves = self._known.graph.vertices[end.vertex].half_edges
+        beyond = [half for key, half in halves.items() if key != end.key]
+        return all(half.edge is None for half in beyond) and any(half.open for half in beyond)
+
+    # -- vertices ----------------------------------------------------------------------------
+
+    def refuted(self, view: View, known: Correspondence) -> Iterator[tuple[Vertex, str]]:
+        """The vertices that sight has spoken against often enough, each with the reason.
+
+        Whoever takes one out does so before the next is judged: that may have a way on then.
+        """
+        for vertex, place in self._in_full_view(view):
+            reason = self._objection(view, vertex, place, known)
+            if reason is None:
+                continue
+            vertex.misses += 1
+            if vertex.misses > self._config.misses and self._has_changed(vertex, view.stamp):
+                yield vertex, reason
+
+    def _in_full_view(self, view: View) -> list[tuple[Vertex, Array]]:
+        """The vertices that should be seen near by, and where (2,), local frame, for certain."""
+        known, found = self._known, []
+        places = known.positions_from(view.local_base)
+        for vertex_id, believed in zip(known.belief.ids, places, strict=True):
+            vertex = known.graph.vertices[vertex_id]
+            is_fresh = view.travelled - vertex.seen_at < _FRESH_M
+            place = vertex.local.position if is_fresh else believed
+            away = math.hypot(place[0] - view.local_base.x, place[1] - view.local_base.y)
+            if away <= _IN_FULL_VIEW_M and (is_fresh or self.is_well_known(vertex)):
+                found.append((vertex, place))
+        return found
+
+    def _objection(
+        self, view: View, vertex: Vertex, place: Array, known: Correspondence
+    ) -> str | None:
+        """Why no vertex can be at its place (2,), local frame; None if it may, or is hidden.
+
+        A door is easily missed from along the wall; the robot will come where one was seen.
+        """
+        if vertex.id in known.node_of or view.is_doubtful(place, vertex.clearance + _HIDES_M):
+            return None
+        if view.stands_free(place, vertex.clearance + _MADE_BY_M):
+            return "the walls about it have gone"
+        is_promising = any(half.open for half in vertex.half_edges.values())
+        if is_promising and math.dist(place, view.local_base.position) >= _IN_CLEAR_M:
+            return None
+        return "an edge passes here" if self._passes_through(view, place, known) else None
+
+    def _passes_through(self, view: View, point: Array, known: Correspondence) -> bool:
+        """Whether an edge is seen where a vertex should be, or another vertex at its end there."""
+        place = view.gvg.place(point)
+        if place is None or place.distance > _ON_EDGE_M:
+            return False
+        edge = view.gvg.edges[place.edge]
+        reach = self._recognition.same_place_m
+        from_end = min(place.station, edge.length - place.station)
+        end = edge.a if place.station < edge.length / 2 else edge.b
+        return from_end > reach or end in known.vertex_of
+
+    def is_well_known(self, vertex: Vertex) -> bool:
+        """Whether it is certain where a vertex stands as seen from the robot."""
+        _, S, _ = ekf.innovation(self._known.belief, vertex.id, Pose(), np.zeros((2, 2)))
+        return bool(np.trace(S) < _WELL_KNOWN_M**2)
+
+    # -- edges -------------------------------------------------------------------------------
+
+    def is_overruled(self, edge: Edge, stamp: float) -> bool:
+        """Count that another edge is seen in the place of one; whether that was often enough."""
+        edge.conflicts += 1
+        return edge.conflicts > self._config.conflicts and self._has_changed(edge, stamp)
+
+    # -- what was finished once --------------------------------------------------------------
+
+    def _has_changed(self, part: Vertex | Edge, stamp: float) -> bool:
+        """Whether a part of the map may go that sight speaks against: of a finished one, later."""
+        if not part.established:
+            return True
+        if part.doubted_since is None:
+            part.doubted_since = stamp
+        return stamp - part.doubted_since >= self._config.changed_after_s
