@@ -136,6 +136,7 @@ class Errands:
         self.closures.open_all(self._mapper.graph)
         if self._mission.outcome is not None:
             self._mission.reopen()
+            self.own_tasks.reopen()
         return f"it explores; {len(self._mapper.graph.frontiers())} frontiers are known"
 
     def relocalise(self, stamp: float) -> str:

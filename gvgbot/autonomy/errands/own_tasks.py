@@ -36,6 +36,10 @@ class OwnTasks:
         """Use another configuration from now on."""
         self._revisiting.configure(config)
 
+    def reopen(self) -> None:
+        """Look at every gap once more: somebody wants the exploration to go on after its end."""
+        self._unseen = Unseen()
+
     def next(self, view: View, whereabouts: Callable[[], Situation | None]) -> Task | Stand | None:
         """What to do now; None to go on with the mission. Stand: a survey is to come."""
         mission = self._mission
@@ -85,4 +89,4 @@ class OwnTasks:
         """What there is to say about the map, if that is the end."""
         doubtful, unseen = self._revisiting.too_uncertain(self._mapper.belief), self._unseen.left
         remark = f"; {len(doubtful)} vertices stay less certain than wanted" if doubtful else ""
-        return remark + (f"; {unseen} gaps in the map stay unseen" if unseen else "")
+        return remark + (f"; gaps in the map that stay unseen: {unseen}" if unseen else "")

@@ -1,0 +1,88 @@
+"""What a robot does unasked: it looks at gaps in its map before it calls all explored."""
+
+import numpy as np
+
+from gvgbot.autonomy.control.orders import Drive, Order, Stand
+from gvgbot.autonomy.errands import Errands
+from gvgbot.autonomy.events import Decision, ErrandEnded
+from gvgbot.autonomy.views import View
+from gvgbot.geometry import Array, Pose
+from tests.unit.autonomy.test_mission import CLOSED, CONFIG, NOTHING_SEEN, TEE, Robot
+
+GAP = [2.0, 0.0]
+
+
+class Explorer(Robot):
+    """A robot that also has errands; its surveys find what they are told to find."""
+
+    def __init__(self, *surveys: list[list[float]]) -> None:
+        super().__init__()
+        self.errands = Errands(self.mission, self.mapper, CONFIG, room_m=0.2)
+        self.left = list(surveys)
+        self.errands.own_tasks.survey = self._survey
+
+    def _survey(self) -> Array:
+        return np.array(self.left.pop(0)).reshape(-1, 2)
+
+    def look(self, gvg: object, *, period: float = 0.5) -> Order:
+        view = View(self._count, self.stamp, self.travelled, self.pose, CLOSED, NOTHING_SEEN)
+        known, seen = self.mapper.observe(view)
+        order, done = self.errands.advance(view, known)
+        self.events += [*seen, *done]
+        self.stamp, self._count = self.stamp + period, self._count + 1
+        return order
+
+    def until_it_moves_or_ends(self) -> Order:
+        order: Order = Stand()
+        while self.mission.outcome is None and self.stamp < 60.0:
+            order = self.look(CLOSED)
+            if isinstance(order, Drive) and self.errands.errand is not None:
+                break
+        return order
+
+
+def test_it_drives_to_a_gap_before_all_is_explored() -> None:
+    robot = Explorer([GAP], [])
+    order = robot.until_it_moves_or_ends()
+    assert isinstance(order, Drive)
+    assert order.track.polyline[-1].tolist() == GAP
+    robot.drive(CLOSED, (0.0, 0.0), (2.0, 0.0))
+    robot.until_it_moves_or_ends()
+    assert robot.mission.outcome == "explored"
+    assert robot.mission.reason == "no frontier is left"
+    assert not robot.left
+    (ended,) = robot.said(ErrandEnded)
+    assert isinstance(ended, ErrandEnded)
+    assert ended.outcome == "arrived"
+    (decision,) = [d for d in robot.said(Decision) if isinstance(d, Decision) and d.vertex is None]
+    assert decision.reason == "floor there is still unseen"
+
+
+def test_a_gap_that_stays_is_told_of() -> None:
+    """Twice it goes there; the third survey shows that it is of no use."""
+    robot = Explorer([GAP], [GAP], [GAP])
+    robot.until_it_moves_or_ends()
+    robot.drive(CLOSED, (0.0, 0.0), (2.0, 0.0))
+    robot.until_it_moves_or_ends()
+    assert not robot.left
+    assert robot.mission.outcome == "explored"
+    assert robot.mission.reason == "no frontier is left; gaps in the map that stay unseen: 1"
+
+
+def test_who_asks_it_to_go_on_gets_another_look_at_every_gap() -> None:
+    robot = Explorer([], [GAP])
+    robot.until_it_moves_or_ends()
+    assert robot.mission.outcome == "explored"
+    robot.errands.explore(robot.stamp)
+    order = robot.until_it_moves_or_ends()
+    assert isinstance(order, Drive)
+    assert order.track.polyline[-1].tolist() == GAP
+
+
+def test_while_frontiers_are_left_there_is_no_survey() -> None:
+    robot = Explorer()
+    view = View(0, 0.0, 0.0, Pose(), TEE, NOTHING_SEEN)
+    for _ in range(20):
+        known, _ = robot.mapper.observe(view)
+        robot.errands.advance(view, known)
+    assert robot.mission.target is not None
