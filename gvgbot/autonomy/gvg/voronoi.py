@@ -4,7 +4,6 @@ A Voronoi vertex whose maximal disc lies wholly in known space is a point of the
 the unseen rest of the building looks like; nothing else is used.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -59,47 +58,44 @@ def fine_graph(
     that the map does not show.
     """
     generators = np.concatenate([local_map.points(), felt])
-    if len(generators) < 4:
+    triangles = _triangulated(generators)
+    if triangles is None:
         return EMPTY
-    try:
-        triangles = Delaunay(generators)
-    except QhullError:
-        return EMPTY
+    room = _Room(local_map, generators, min_clearance, open_clearance)
     diagram = _diagram(triangles, min_clearance, roughness)
-    points, clearance, a, b = diagram.points, diagram.clearance, diagram.a, diagram.b
-    endless = np.flatnonzero(diagram.parts & (b < 0))
-    whole = np.flatnonzero(diagram.parts & (b >= 0))
-    links = np.stack([a[whole], b[whole]], axis=1)
-    if np.isfinite(open_clearance):
-        coast = with_coast(diagram, generators, open_clearance, local_map)
-        if coast is not None:
-            points, clearance, links = coast
-            endless = endless[:0]  # they end at the coast
-    wide = clearance >= min_clearance
-    asked = np.zeros(len(points), bool)
-    asked[links] = asked[a[endless]] = True
-    asked &= wide & (clearance <= open_clearance)
-    certain, discs = np.zeros(len(points), bool), np.flatnonzero(asked)
-    certain[discs] = _disc_is_known(local_map, points[discs], clearance[discs])
+    points, clearance, links, endless = _ridges_that_count(diagram, room)
+    used = np.zeros(len(points), bool)
+    used[links] = used[diagram.a[endless]] = True
+    certain = np.zeros(len(points), bool)
+    certain[used] = room.is_certain(points[used], clearance[used])
     here, there = certain[links.T]
-    inner = np.flatnonzero(here & there)
     rim = np.concatenate([links[here & ~there], links[there & ~here, ::-1]])
-    cut = rim[wide[rim[:, 1]]]
-    endless = endless[certain[a[endless]]]
-    away = _FARTHEST_M * _outwards(triangles, a[endless], diagram.generators[endless])
+    rim = rim[clearance[rim[:, 1]] >= min_clearance]
+    endless = endless[certain[diagram.a[endless]]]
+    away = _FARTHEST_M * _outwards(triangles, diagram, endless)
     rays = _Rays(
-        np.concatenate([cut[:, 0], a[endless]]),
-        np.concatenate([points[cut[:, 1]] - points[cut[:, 0]], away]),
+        np.concatenate([rim[:, 0], diagram.a[endless]]),
+        np.concatenate([points[rim[:, 1]] - points[rim[:, 0]], away]),
     )
-    joined = links[inner]
+    return _piece_of_robot(*_prolonged(points, clearance, links[here & there], rays, room), robot)
 
-    def in_sight(places: Array) -> tuple[Array, NDArray[np.bool_]]:
-        room = np.asarray(cKDTree(generators).query(places)[0])
-        fits = (room >= min_clearance) & (room <= open_clearance)
-        fits[fits] = _disc_is_known(local_map, places[fits], room[fits])
-        return room, fits
 
-    return _piece_of_robot(*_prolonged(points, clearance, joined, rays, in_sight), robot)
+class _Room(NamedTuple):
+    """What is known around the generators (N, 2), and how much room the robot wants.
+
+    Its discs are those with a radius, m, from `min_clearance` to `open_clearance`.
+    """
+
+    local_map: Space
+    generators: Array
+    min_clearance: float
+    open_clearance: float
+
+    def is_certain(self, centres: Array, clearance: Array) -> NDArray[np.bool_]:
+        """Which maximal discs, by centres (N, 2) and radii (N,), are such and surely there."""
+        fits = (clearance >= self.min_clearance) & (clearance <= self.open_clearance)
+        fits[fits] = _disc_is_known(self.local_map, centres[fits], clearance[fits])
+        return fits
 
 
 class _Rays(NamedTuple):
@@ -107,6 +103,16 @@ class _Rays(NamedTuple):
 
     start: NDArray[np.int64]
     way: Array
+
+
+def _triangulated(generators: Array) -> Delaunay | None:
+    """The Delaunay triangulation of points (N, 2); None if they are too few, or on one line."""
+    if len(generators) < 4:
+        return None
+    try:
+        return Delaunay(generators)
+    except QhullError:
+        return None
 
 
 def _diagram(triangles: Delaunay, min_clearance: float, roughness: float) -> Diagram:
@@ -122,13 +128,31 @@ def _diagram(triangles: Delaunay, min_clearance: float, roughness: float) -> Dia
     return Diagram(points, clearance, a, b, pair, parts)
 
 
-def _outwards(triangles: Delaunay, a: NDArray[np.int64], pair: NDArray[np.int32]) -> Array:
-    """Directions (N, 2) of ridges without end, square to the hull: away from triangles a (N,)."""
-    p, q = (triangles.points[pair[:, k]] for k in (0, 1))
+def _ridges_that_count(
+    diagram: Diagram, room: _Room
+) -> tuple[Array, Array, NDArray[np.int64], NDArray[np.int64]]:
+    """Points (N, 2), clearance (N,) and links (M, 2), and which ridges (K,) go on without end.
+
+    In the open they are those of the coast, where all ridges end.
+    """
+    is_whole = diagram.b >= 0
+    endless = np.flatnonzero(diagram.parts & ~is_whole)
+    if np.isfinite(room.open_clearance):
+        coast = with_coast(diagram, room.generators, room.open_clearance, room.local_map)
+        if coast is not None:
+            return *coast, endless[:0]
+    whole = np.flatnonzero(diagram.parts & is_whole)
+    links = np.stack([diagram.a[whole], diagram.b[whole]], axis=1)
+    return diagram.points, diagram.clearance, links, endless
+
+
+def _outwards(triangles: Delaunay, diagram: Diagram, endless: NDArray[np.int64]) -> Array:
+    """Directions (N, 2) of ridges (N,) without end, square to the hull and away from it."""
+    p, q = (triangles.points[diagram.generators[endless, k]] for k in (0, 1))
     along = q - p
     normal = np.stack([-along[:, 1], along[:, 0]], axis=1)
     normal /= np.hypot(*normal.T)[:, None]
-    inner = triangles.points[triangles.simplices[a]].mean(axis=1)
+    inner = triangles.points[triangles.simplices[diagram.a[endless]]].mean(axis=1)
     normal[((inner - p) * normal).sum(axis=1) > 0] *= -1
     return normal
 
@@ -138,7 +162,7 @@ def _prolonged(
     clearance: Array,
     links: NDArray[np.int64],
     rays: _Rays,
-    in_sight: Callable[[Array], tuple[Array, NDArray[np.bool_]]],
+    room: _Room,
 ) -> tuple[Array, Array, NDArray[np.int64], Array]:
     """Points, clearance, links and leads, with what is certain of ridges that end in the unknown.
 
@@ -154,8 +178,9 @@ def _prolonged(
     steps = np.arange(_STEP_M, _FARTHEST_M, _STEP_M)
     places = points[rays.start[long], None] + steps[:, None] * unit[long, None]
     seen = steps < length[long, None]
-    room = np.zeros(seen.shape)
-    room[seen], seen[seen] = in_sight(places[seen])
+    radius = np.zeros(seen.shape)
+    radius[seen] = cKDTree(room.generators).query(places[seen])[0]
+    seen[seen] = room.is_certain(places[seen], radius[seen])
     seen = np.logical_and.accumulate(seen, axis=1)
     number = np.full(seen.shape, -1)
     number[seen] = len(points) + np.arange(np.count_nonzero(seen))
@@ -167,7 +192,7 @@ def _prolonged(
     lead[end] = _direction(rays.way)
     return (
         np.concatenate([points, places[seen]]),
-        np.concatenate([clearance, room[seen]]),
+        np.concatenate([clearance, radius[seen]]),
         np.concatenate([links, np.stack([chain[:, :-1][onwards], chain[:, 1:][onwards]], axis=1)]),
         lead,
     )

@@ -96,14 +96,13 @@ def register(
     """
     information = np.linalg.inv(Q)
     counts = np.ones(len(walls)) if hits is None else hits
-    step = np.zeros(3)  # of the pose, in the prior's frame
-    pose, A = prior, information
-    inliers, rms = 0.0, 0.0
 
     def paired(pose: Pose) -> _Pairs:
         turned = None if sides is None else sides.turned(pose.theta)
         return _pairs(points, pose, tree, walls, counts, config.max_pair_m, turned)
 
+    pose, step = prior, np.zeros(3)  # from the prior to the pose
+    A, residual = information, np.empty(0)
     paired_at, pairs = pose, paired(pose)
     for _ in range(_ITERATIONS):
         if _is_elsewhere(paired_at, pose):
@@ -111,21 +110,15 @@ def register(
         residual, J = _linear(pairs, pose, prior, config.max_pair_m)
         if len(residual) < config.min_pairs:
             return None
-        weight = (
-            config.independent_share
-            / config.pair_sigma_m**2
-            / np.maximum(1.0, np.abs(residual) * (0.5 / config.pair_sigma_m))
-        )
-        JW = J * weight
+        JW = J * _weights(residual, config)
         A = information + JW @ J.T
         change = -np.linalg.solve(A, information @ step + JW @ residual)
         step = step + change
         pose = prior.compose(Pose.from_array(step))
-        inliers = len(residual) / len(points)
-        rms = math.sqrt(float(residual @ residual) / len(residual))
         if max(map(abs, change.tolist())) < within:
             break
-    return Registration(pose, np.linalg.inv(A), inliers, rms)
+    rms = math.sqrt(float(residual @ residual) / len(residual))
+    return Registration(pose, np.linalg.inv(A), len(residual) / len(points), rms)
 
 
 def register_coarsely(
@@ -148,6 +141,14 @@ def register_coarsely(
         near = register(points, tree, walls, prior, Q, far, hits, sides, _ROUGHLY)
         prior = prior if near is None else near.pose
     return register(points, tree, walls, prior, Q, config, hits, sides)
+
+
+def _weights(residual: Array, config: ScanMatchingConfig) -> Array:
+    """What pairs count, 1/m^2, by their residuals (K,): Huber's, less from two sigmas on."""
+    sigma = config.pair_sigma_m
+    far = np.maximum(1.0, np.abs(residual) * (0.5 / sigma))
+    weights: Array = config.independent_share / sigma**2 / far
+    return weights
 
 
 def _is_elsewhere(before: Pose, now: Pose) -> bool:
