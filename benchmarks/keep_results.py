@@ -4,7 +4,8 @@
 
 The runs in named worlds go to benchmarks/results/worlds.jsonl, those in floor plans to
 floor_plans.jsonl beside it, each in the place of what was there; a file for which there is no run
-stays. Only plain runs count: a world, a seed, a laser, and the default for all the rest.
+stays. Only plain runs count: a world, a seed, a laser, and the default for all the rest. Those of
+`explore_table --rough --people N` in floor plans go to rough_floor_plans.jsonl.
 """
 
 import json
@@ -14,6 +15,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from benchmarks.campaign import Row
+from benchmarks.explore_table import ROUGH
 from gvgbot.worlds import NAMES
 
 RESULTS = Path(__file__).parent / "results"
@@ -21,14 +23,17 @@ PLANS = "floor_plan"
 LONG = "UTM-30LX"  # the laser that comes first
 DIGITS = 5  # that are kept of a number
 PLAIN = ["gvgbot", "explore", "--world", "", "--seed", "", "--set", ""]  # as many words
+PEOPLE = "twin.people="
 
 
 def keep(rows: list[Row], to: Path = RESULTS) -> dict[str, int]:
     """Write the plain runs to their files, worlds in order; how many went to each."""
-    plain = sorted(filter(is_plain, rows), key=_order)
+    known = sorted((row for row in rows if _family(row) in NAMES), key=_order)
+    plans = [row for row in known if _family(row) == PLANS]
     kept = {
-        "worlds.jsonl": [row for row in plain if _family(row) != PLANS],
-        "floor_plans.jsonl": [row for row in plain if _family(row) == PLANS],
+        "worlds.jsonl": [row for row in known if row not in plans and not _extras(row)],
+        "floor_plans.jsonl": [row for row in plans if not _extras(row)],
+        "rough_floor_plans.jsonl": [row for row in plans if is_rough(row)],
     }
     for name, some in kept.items():
         if some:
@@ -37,9 +42,15 @@ def keep(rows: list[Row], to: Path = RESULTS) -> dict[str, int]:
     return {name: len(some) for name, some in kept.items()}
 
 
-def is_plain(row: Row) -> bool:
-    """Whether nothing but world, seed and laser was chosen."""
-    return len(shlex.split(row["command"])) == len(PLAIN) and _family(row) in NAMES
+def is_rough(row: Row) -> bool:
+    """Whether only the laser was made worse, and people walked about, if anything."""
+    extras = [extra for extra in _extras(row) if not extra.startswith(PEOPLE)]
+    return extras == ROUGH
+
+
+def _extras(row: Row) -> list[str]:
+    """What was chosen beside world, seed and laser."""
+    return [word for word in shlex.split(row["command"])[len(PLAIN) :] if word != "--set"]
 
 
 def _family(row: Row) -> str:
