@@ -10,7 +10,7 @@ from gvgbot.clock import Clock
 from gvgbot.config import Config
 from gvgbot.drivers.body import BodyConfig, RobotBody
 from gvgbot.drivers.cable import Cable
-from gvgbot.drivers.hokuyo.models import MODELS
+from gvgbot.drivers.hokuyo.models import MODELS, Model
 from gvgbot.drivers.hokuyo.twin import HokuyoTwin
 from gvgbot.drivers.kobuki.twin import KobukiTwin
 from gvgbot.drivers.link_faults import FaultyLink
@@ -49,6 +49,36 @@ def _people_count(config: Config, world: World) -> int:
     return world.people if config.twin.people is None else config.twin.people
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Eye:
+    """What the laser on a body sees; it may hang upside down."""
+
+    body: RobotBody
+    sight: Sight
+    model: Model
+    base_laser: Pose
+    is_flipped: bool
+
+    def sweep(self, stamp: float) -> Array:
+        """Ranges (N,), m, of a sweep that begins at a stamp, the body going on as it moves then."""
+        self.body.advance(stamp)
+        parameters, seen = self.model.parameters, []
+        bearings = parameters.bearings
+        for beams in np.array_split(np.arange(len(bearings)), _SECTORS):
+            late = (parameters.first_step + float(beams.mean())) * parameters.step_time
+            moved = Pose(self.body.linear * late, 0.0, self.body.angular * late)
+            world_laser = self.body.pose.compose(moved).compose(self.base_laser)
+            seen.append(self._look(world_laser, bearings[beams]))
+        return np.concatenate(seen)
+
+    def _look(self, world_laser: Pose, bearings: Array) -> Array:
+        """Ranges (N,), m, along bearings (N,), rad, of the laser."""
+        reach = self.model.usable_mm / 1000
+        if not self.is_flipped:
+            return self.sight.look(world_laser, bearings, reach)
+        return self.sight.look(world_laser, -bearings[::-1], reach)[::-1]
+
+
 class Simulation:
     """Both twins in one world; `laser` and `base` are the drivers' ends of their streams.
 
@@ -69,31 +99,15 @@ class Simulation:
         self.people = people
         self.body = RobotBody(place.world, place.start, shape, clock.now(), people)
         sight = Sight(place.world, people, glass_seed, self.body.others)
-        self._clock = clock
-        mount = config.laser.base_laser
         model = MODELS[config.twin.laser.model]
-        bearings, reach = model.parameters.bearings, model.usable_mm / 1000
-        flipped = config.laser.upside_down
-
-        def sense(stamp: float) -> Array:
-            """What a sweep that begins at a stamp sees, the body going on as it moves then."""
-            self.body.advance(stamp)
-            seen = []
-            for beams in np.array_split(np.arange(len(bearings)), _SECTORS):
-                late = (
-                    model.parameters.first_step + float(beams.mean())
-                ) * model.parameters.step_time
-                moved = Pose(self.body.linear * late, 0.0, self.body.angular * late)
-                world_laser = self.body.pose.compose(moved).compose(mount)
-                seen.append(_looked(sight, world_laser, bearings[beams], reach, flipped))
-            return np.concatenate(seen)
-
+        eye = _Eye(self.body, sight, model, config.laser.base_laser, config.laser.upside_down)
+        self._clock = clock
         cable, laser_cable = Cable(), Cable()
         self._laser_has_usb = config.twin.laser.serial_baud == 0
         self.plug_base: Callable[[bool], None] = cable.plug  # of the link that is in use
         self.plug_laser: Callable[[bool], None] = laser_cable.plug
         self.laser_twin = FaultyLink(
-            HokuyoTwin(config.twin.laser, sense, laser_seed, self._reboot_laser),
+            HokuyoTwin(config.twin.laser, eye.sweep, laser_seed, self._reboot_laser),
             config.twin.laser.link,
             laser_seed,
             self._pull_laser,
@@ -138,10 +152,3 @@ class Simulation:
 
     async def _serve_base(self) -> None:
         await serve_twin(self.base_twin, self._base_end, self._clock)
-
-
-def _looked(sight: Sight, world_laser: Pose, bearings: Array, reach: float, flipped: bool) -> Array:
-    """Ranges (N,) in m along bearings (N,) of the laser, which may hang upside down."""
-    if not flipped:
-        return sight.look(world_laser, bearings, reach)
-    return sight.look(world_laser, -bearings[::-1], reach)[::-1]

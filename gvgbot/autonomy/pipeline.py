@@ -146,8 +146,8 @@ class Pipeline:
         self._last: Keyframe | None = None
         self._kept: Pose | None = None  # local_base of the last scan that was kept
         self._looked: Pose | None = None  # local_base of the last look for the GVG
-        self._turning_to: float | None = None  # odom heading still to turn through, unwrapped sum
-        self._turned = 0.0
+        self._turning_to: float | None = None  # rad, anticlockwise, while it turns in place
+        self._turned = 0.0  # rad, since it began to
         self._twist = STANDSTILL
         self._order: Order = Stand()
         self.gvg = LocalGvg()
@@ -204,20 +204,36 @@ class Pipeline:
         happened: list[Event] = [Recovery(scan.stamp, *what) for what in self._incidents]
         self._incidents.clear()
         odom_base = self._odometry.odom_base_at(scan.stamp)
-        if self.company is not None and odom_base is not None and self._last is not None:
-            local_base = self._last.local_base.compose(self._last.odom_base.to(odom_base))
-            self._newcomers.glance(scan, local_base)
-        if (
-            odom_base is None
-            or (self.errands.is_resting and self._last is not None)
-            or self._reflexes.is_lifted
-            or not self._worth_a_look(scan, odom_base)
-        ):
+        if odom_base is None:
+            return happened
+        self._glance(scan, odom_base)
+        if not self._worth_a_look(scan, odom_base):
             return happened
         if self._last is not None:
             self.mission.skip(max(0.0, scan.stamp - self._last.stamp - _LONGEST_GAP_S))
         scan = deskewed(scan, self._odometry.motion_during(scan))
         local_base = self._localise(scan, odom_base)
+        scan = self._sift(scan, local_base)
+        self._maps.insert(scan, local_base, self.travelled)
+        self._hazards.forget(self.travelled)
+        if self.led and not self._worth_a_gvg(local_base):
+            self._keep(scan, odom_base, local_base)
+            return happened
+        view = self._view(scan, local_base)
+        known, learnt = self.mapper.observe(view)
+        self._keep(scan, odom_base, local_base)
+        done = self._act(view, known, scan)
+        happened += learnt + done  # what was done may have taught the mapper more
+        return happened + self._forget(scan.stamp, happened)
+
+    def _glance(self, scan: Scan, odom_base: Pose) -> None:
+        """Look out for other robots in every scan: they move."""
+        if self.company is not None and self._last is not None:
+            local_base = self._last.local_base.compose(self._last.odom_base.to(odom_base))
+            self._newcomers.glance(scan, local_base)
+
+    def _sift(self, scan: Scan, local_base: Pose) -> Scan:
+        """The scan without what may be people or robots; the mission hears of the robots."""
         nearby = self._nearby(local_base)
         self._newcomers.in_team = self.company is not None
         self._newcomers.company = self._discs(nearby, _COMPANY_M)
@@ -226,16 +242,15 @@ class Pipeline:
         scan = self._newcomers.sift(scan, local_base, self._maps.near, is_way)
         if self.company is not None:
             self.seen = self._bodies_seen(scan.stamp, local_base)
-        self._maps.insert(scan, local_base, self.travelled)
-        self._hazards.forget(self.travelled)
-        if self.led and not self._worth_a_gvg(local_base):
-            self._keep(scan, odom_base, local_base)
-            return happened
+        return scan
+
+    def _view(self, scan: Scan, local_base: Pose) -> View:
+        """What there is to be seen of the GVG, and what of that is doubtful."""
         self.gvg = self._local_gvg(local_base, scan.range_max)
         doubtful = np.concatenate(
             [self._hazards.doubtful, self._newcomers.points, self._maps.near.suspects()]
         )
-        view = View(
+        return View(
             len(self.keyframes),
             scan.stamp,
             self.travelled,
@@ -245,11 +260,6 @@ class Pipeline:
             doubtful,
             touching(self.gvg, doubtful),
         )
-        known, learnt = self.mapper.observe(view)
-        self._keep(scan, odom_base, local_base)
-        done = self._act(view, known, scan)
-        happened += learnt + done  # what was done may have taught the mapper more
-        return happened + self._forget(scan.stamp, happened)
 
     def _act(self, view: View, known: Correspondence, scan: Scan) -> list[Event]:
         """Decide what to do next; what happened by that."""
@@ -298,6 +308,10 @@ class Pipeline:
         return reduce_graph(fine, reduction, known)
 
     def _worth_a_look(self, scan: Scan, odom_base: Pose) -> bool:
+        """Whether the robot is about something, and has come on, turned or waited enough."""
+        is_idle = self.errands.is_resting and self._last is not None
+        if is_idle or self._reflexes.is_lifted:
+            return False
         if self._last is None or self._look_now:
             self._look_now = False
             return True
