@@ -6,7 +6,7 @@ Two meetpoints, 5 m apart over the bar in the middle and 12 m around either side
 import asyncio
 import json
 import math
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
@@ -33,6 +33,8 @@ RING = ((2.0, 2.0), (9.0, 2.0), (9.0, 7.0), (2.0, 7.0), (2.0, 2.0))
 BESIDE = (8.8, 4.5)  # 0.2 m beside the middle of the eastern corridor
 NEAR = 0.3  # m
 
+Point = tuple[float, float]  # m, world frame
+
 
 def theta(width: float = 1.4, *, with_person: bool = False) -> Place:
     canvas = Canvas(11.0, 9.0)
@@ -49,7 +51,7 @@ class Trip:
     answer: Answer
     outcome: str = ""
     reason: str = ""
-    world: tuple[float, float] = (math.nan, math.nan)
+    world: Point = (math.nan, math.nan)
     driven: float = math.nan
     fastest: float = math.nan
 
@@ -62,13 +64,13 @@ class Tour:
     """All that happened on the way."""
 
     daemon: Daemon
-    paused: list[tuple[float, float]] = field(default_factory=list)
+    paused: list[Point] = field(default_factory=list)
     answers: dict[str, Answer] = field(default_factory=dict)
     trips: dict[str, Trip] = field(default_factory=dict)
     phases: dict[str, str] = field(default_factory=dict)
-    vertices: dict[int, tuple[float, float]] = field(default_factory=dict)  # world
+    vertices: dict[int, Point] = field(default_factory=dict)
     errors: list[tuple[float, float]] = field(default_factory=list)  # of the pose: m, rad
-    covered: list[tuple[float, float]] = field(default_factory=list)  # world
+    covered: list[Point] = field(default_factory=list)
     doing: set[str | None] = field(default_factory=set)  # on patrol, as it was published
 
     def lines(self, kind: str) -> list[dict[str, Any]]:
@@ -88,98 +90,126 @@ async def a_while(clock: Clock, seconds: float) -> None:
     await clock.sleep_until(clock.now() + seconds)
 
 
-def story(tour: Tour) -> Callable[[Clock], Awaitable[None]]:
-    daemon, ask = tour.daemon, tour.daemon.network.ask
-    pipeline, states = daemon.session.pipeline, daemon.network.states
+class Story:
+    """What somebody asks for on the way, and what is taken down of what comes of it."""
 
-    async def trip(clock: Clock, title: str, name: str, **arguments: object) -> None:
-        begin, first = pipeline.travelled, len(states)
-        made = tour.trips[title] = Trip(await ask(name, **arguments))
-        await until(clock, lambda: pipeline.errands.errand is None)
-        await a_while(clock, 1.0)
-        (*_, end) = [e for e in daemon.network.events[-1].events if e.kind == "errand_ended"]
-        made.outcome, made.reason = str(end.details["outcome"]), str(end.details["reason"])
-        made.world = (daemon.place.x, daemon.place.y)
-        made.driven = pipeline.travelled - begin
-        made.fastest = max(abs(state.twist[0]) for state in states[first:])
+    def __init__(self, tour: Tour, clock: Clock) -> None:
+        self.tour, self.clock = tour, clock
+        self.daemon, self.states = tour.daemon, tour.daemon.network.states
+        self.pipeline = tour.daemon.session.pipeline
 
-    def carry() -> None:
-        """Put the robot elsewhere, along the corridor and turned, so that it feels nothing."""
-        assert daemon.session.simulation is not None
-        here = daemon.place
-        daemon.session.simulation.body.pose = Pose(here.x + 0.7, here.y, here.theta + 0.2)
+    async def tell(self) -> None:
+        await self.explore()
+        await self.visit_every_vertex()
+        await self.cover()
+        await self.patrol()
+        await self.trip("home", "home")
+        await self.ask("no limit", "set", key="robot.limits.max_speed_mps", value=0.7)
+        await self.ask("unknown", "goto", vertex=999)
+        await self.ask("outside", "goto", x=50.0, y=50.0)
+        await self.ask("save", "save")
+        await self.be_carried()
+        await self.explore_on()
+        await self.ask("stop", "stop")
 
-    def note_error() -> None:
-        error = START.compose(pipeline.map_base).to(daemon.place)
-        tour.errors.append((math.hypot(error.x, error.y), abs(error.theta)))
-
-    async def cover() -> None:
-        """Take down where the robot is, for as long as nobody stops that."""
-        while True:
-            tour.covered.append((daemon.place.x, daemon.place.y))
-            await asyncio.sleep(0.3)
-
-    async def patrol(clock: Clock) -> None:
-        tour.answers["patrol"] = await ask("patrol", vertices=list(meetpoints(tour)))
-        await until(clock, lambda: len(tour.lines("round_ended")) == 2)
-        tour.answers["patrol again"] = await ask("patrol", vertices=list(meetpoints(tour)))
-        await a_while(clock, 1.0)
-        tour.doing = {state.errand for state in states[-5:]}
-        tour.answers["patrol of one"] = await ask("patrol", vertices=[min(tour.vertices)])
-        tour.answers["patrol of none"] = await ask("patrol", vertices=[min(tour.vertices), 999])
-
-    async def pausing(clock: Clock) -> None:
-        tour.answers["pause"] = await ask("pause")
-        tour.answers["pause again"] = await ask("pause")
-        await a_while(clock, 1.5)  # to brake
-        for _ in range(2):
-            tour.paused.append((daemon.place.x, daemon.place.y))
-            await a_while(clock, 20.0)
-        tour.phases["paused"] = states[-1].phase
-        tour.answers["goto while paused"] = await ask("goto", x=0.0, y=0.0)
-        tour.answers["resume"] = await ask("resume")
-        tour.answers["resume again"] = await ask("resume")
-        await a_while(clock, 5.0)
-        tour.paused.append((daemon.place.x, daemon.place.y))
-        tour.phases["resumed"] = states[-1].phase
-
-    async def tell(clock: Clock) -> None:
-        await a_while(clock, 1.5)
-        tour.answers["too early"] = await ask("home")
-        await a_while(clock, 8.0)
-        await pausing(clock)
-        await until(clock, lambda: states[-1].phase == "finished")
-        graph, belief = pipeline.mapper.graph, pipeline.mapper.belief
-        for vertex in graph.vertices:
+    async def explore(self) -> None:
+        await a_while(self.clock, 1.5)
+        await self.ask("too early", "home")
+        await a_while(self.clock, 8.0)
+        await self.pause()
+        await until(self.clock, lambda: self.states[-1].phase == "finished")
+        belief = self.pipeline.mapper.belief
+        for vertex in belief.ids:
             x, y = START.transform(belief.map_vertex(vertex).position)
-            tour.vertices[vertex] = (float(x), float(y))
-        for vertex in (*graph.vertices, *graph.vertices):
-            await trip(clock, f"goto {vertex}", "goto", vertex=vertex)
-        tour.phases["after a trip"] = states[-1].phase
-        tour.answers["there already"] = await ask("goto", vertex=max(graph.vertices))
-        await until(clock, lambda: pipeline.errands.errand is None)
-        x, y = START.inverse().transform(np.array(BESIDE))
-        await trip(clock, "beside", "goto", x=float(x), y=float(y))
-        tour.answers["limit"] = await ask("set", key="robot.limits.max_speed_mps", value=0.2)
-        watching = asyncio.ensure_future(cover())  # noqa: TID251
-        await trip(clock, "coverage", "coverage")
-        watching.cancel()
-        await patrol(clock)
-        await trip(clock, "home", "home")
-        tour.answers["no limit"] = await ask("set", key="robot.limits.max_speed_mps", value=0.7)
-        tour.answers["unknown"] = await ask("goto", vertex=999)
-        tour.answers["outside"] = await ask("goto", x=50.0, y=50.0)
-        tour.answers["save"] = await ask("save")
-        carry()
-        note_error()
-        await trip(clock, "relocalise", "relocalise")
-        note_error()
-        tour.answers["explore"] = await ask("explore")
-        tour.phases["explore"] = "" if pipeline.errands.is_resting else "exploring"
-        await until(clock, lambda: pipeline.mission.outcome is not None)
-        tour.answers["stop"] = await ask("stop")
+            self.tour.vertices[vertex] = (float(x), float(y))
 
-    return tell
+    async def pause(self) -> None:
+        await self.ask("pause", "pause")
+        await self.ask("pause again", "pause")
+        await a_while(self.clock, 1.5)  # to brake
+        for _ in range(2):
+            self.tour.paused.append(self.place)
+            await a_while(self.clock, 20.0)
+        self.tour.phases["paused"] = self.states[-1].phase
+        await self.ask("goto while paused", "goto", x=0.0, y=0.0)
+        await self.ask("resume", "resume")
+        await self.ask("resume again", "resume")
+        await a_while(self.clock, 5.0)
+        self.tour.paused.append(self.place)
+        self.tour.phases["resumed"] = self.states[-1].phase
+
+    async def visit_every_vertex(self) -> None:
+        for vertex in (*self.tour.vertices, *self.tour.vertices):
+            await self.trip(f"goto {vertex}", "goto", vertex=vertex)
+        self.tour.phases["after a trip"] = self.states[-1].phase
+        await self.ask("there already", "goto", vertex=max(self.tour.vertices))
+        await until(self.clock, self.is_done)
+        x, y = START.inverse().transform(np.array(BESIDE))
+        await self.trip("beside", "goto", x=float(x), y=float(y))
+
+    async def cover(self) -> None:
+        """Drive over all edges, slowly, and take down where the robot is."""
+
+        async def watch() -> None:
+            while True:
+                self.tour.covered.append(self.place)
+                await asyncio.sleep(0.3)
+
+        await self.ask("limit", "set", key="robot.limits.max_speed_mps", value=0.2)
+        watching = asyncio.ensure_future(watch())  # noqa: TID251
+        await self.trip("coverage", "coverage")
+        watching.cancel()
+
+    async def patrol(self) -> None:
+        tour, ends = self.tour, list(meetpoints(self.tour))
+        await self.ask("patrol", "patrol", vertices=ends)
+        await until(self.clock, lambda: len(tour.lines("round_ended")) == 2)
+        await self.ask("patrol again", "patrol", vertices=ends)
+        await a_while(self.clock, 1.0)
+        tour.doing = {state.errand for state in self.states[-5:]}
+        await self.ask("patrol of one", "patrol", vertices=[min(tour.vertices)])
+        await self.ask("patrol of none", "patrol", vertices=[min(tour.vertices), 999])
+
+    async def be_carried(self) -> None:
+        """Somebody puts the robot elsewhere, along the corridor and turned: it feels nothing."""
+        assert self.daemon.session.simulation is not None
+        here = self.daemon.place
+        self.daemon.session.simulation.body.pose = Pose(here.x + 0.7, here.y, here.theta + 0.2)
+        self.note_error()
+        await self.trip("relocalise", "relocalise")
+        self.note_error()
+
+    async def explore_on(self) -> None:
+        await self.ask("explore", "explore")
+        is_resting = self.pipeline.errands.is_resting
+        self.tour.phases["explore"] = "" if is_resting else "exploring"
+        await until(self.clock, lambda: self.pipeline.mission.outcome is not None)
+
+    async def ask(self, title: str, name: str, **arguments: object) -> None:
+        self.tour.answers[title] = await self.daemon.network.ask(name, **arguments)
+
+    async def trip(self, title: str, name: str, **arguments: object) -> None:
+        begin, first = self.pipeline.travelled, len(self.states)
+        made = self.tour.trips[title] = Trip(await self.daemon.network.ask(name, **arguments))
+        await until(self.clock, self.is_done)
+        await a_while(self.clock, 1.0)
+        events = self.daemon.network.events[-1].events
+        (*_, end) = [event for event in events if event.kind == "errand_ended"]
+        made.outcome, made.reason = str(end.details["outcome"]), str(end.details["reason"])
+        made.world = self.place
+        made.driven = self.pipeline.travelled - begin
+        made.fastest = max(abs(state.twist[0]) for state in self.states[first:])
+
+    def is_done(self) -> bool:
+        return self.pipeline.errands.errand is None
+
+    @property
+    def place(self) -> Point:
+        return self.daemon.place.x, self.daemon.place.y
+
+    def note_error(self) -> None:
+        error = START.compose(self.pipeline.map_base).to(self.daemon.place)
+        self.tour.errors.append((math.hypot(error.x, error.y), abs(error.theta)))
 
 
 def meetpoints(tour: Tour) -> tuple[int, ...]:
@@ -195,7 +225,7 @@ def meetpoints(tour: Tour) -> tuple[int, ...]:
 def tour(tmp_path_factory: pytest.TempPathFactory) -> Tour:
     made = Tour(Daemon(tmp_path_factory.mktemp("theta"), theta()))
     with made.daemon.session.directory:
-        made.daemon.run(story(made))  # type: ignore[arg-type]
+        made.daemon.run(lambda clock: Story(made, clock).tell())
     return made
 
 
