@@ -23,40 +23,38 @@ from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig, register
 from gvgbot.geometry import Array, Pose, wrap_angle, wrap_angles
 from gvgbot.hal.messages import Scan
 
-_CELL_M, _WALL_CELL_M = 0.25, 0.1
+_CELL_M, _WALL_CELL_M = 0.25, 0.1  # of what has been seen, and of walls
 _REACH_M = 8.0  # around the robot, what is compared
 _NEAR_M, _OFF_M = 0.2, 0.4  # walls so near to each other are one, and so far off are two
 _ROOM_M = 0.2  # from the walls, a robot may stand
 _HEADINGS = 120  # that are tried at each place
 _TRIED = 100  # places in one go
 _ROUGH_M = 0.4  # walls so far off do not speak for a rough guess
-_ROUGH_POINTS, _POINTS = 80, 300
+_ROUGH_POINTS, _POINTS = 80, 300  # of the walls, for a rough guess and for a close look
 _ROUGH_GUESSES = 1200  # whose scores are worked out better: in a corridor one is like the next
 _GUESSES = 150  # that are looked at closely: a place that is left out can never be found
 _ALIKE = 0.05  # in score, from the best: what is left out may be the place if it differs by less
 _MOST_ROUNDS = 20  # of guessing again a little farther on, before some are left out nevertheless
 _FINER_M, _FINER_RAD = _CELL_M / 3, math.tau / _HEADINGS / 3  # steps to a better score
 _STEPS = np.array(list(product((-1, 0, 1), repeat=3))) * [_FINER_M, _FINER_M, _FINER_RAD]
-_FITS_A_STEP = 4
+_FITS_A_STEP = 4  # hypotheses that are laid onto the map in one go
 _APART_M, _APART_RAD = 0.6, 0.3  # guesses nearer to each other are the same
 _COMPARED = 8000  # guesses in that
-_PEAKS_A_STEP = 100
+_PEAKS_A_STEP = 100  # found in one go
 _ONE_M, _ONE_RAD = 0.4, 0.2  # hypotheses nearer to each other are the same
 _LOOK_EVERY_M = 1.0  # driven between two looks
 _TELLING = 0.01  # share of the walls: who disagrees with so much more is e times less likely
-_CHANCE = (
-    0.15  # where it looks alike by chance, and of what the map has not seen: that says nothing
-)
+# where it looks alike by chance, and of what the map has not seen: that says nothing
+_CHANCE = 0.15
 _LOOKS = 5  # before anything is said
-_SURE = 0.995
-_SURE_LOOKS = (
-    3  # in a row, with the same place: one may be wrong about a wall that has moved a little
-)
-_HOPELESS = 0.01
+_SURE = 0.995  # share of a place
+# in a row, with the same place: one may be wrong about a wall that has moved a little
+_SURE_LOOKS = 3
+_HOPELESS = 0.01  # share of a place that need not be thought of
 _UNLIKE = 5  # of the points of all walls may differ in a building with several sides alike
 _MOST_SIDES = 8
-_GUESSED = np.diag([0.3**2, 0.3**2, 0.1**2])
-_FOLLOWED = np.diag([0.1**2, 0.1**2, 0.03**2])
+_GUESSED = np.diag([0.3**2, 0.3**2, 0.1**2])  # covariance of a guess
+_FOLLOWED = np.diag([0.1**2, 0.1**2, 0.03**2])  # and of a hypothesis, since the last look
 
 Bools = NDArray[np.bool_]
 
@@ -66,12 +64,13 @@ class KnownWalls:
 
     def __init__(self, scans: Sequence[tuple[Pose, Scan]]) -> None:
         """Scans taken at map_base poses."""
-        ends = [base.compose(scan.base_laser).transform(_ends(scan)) for base, scan in scans]
+        ends = [base.compose(scan.base_laser).transform(scan.ends) for base, scan in scans]
         points = np.concatenate([np.empty((0, 2)), *ends])
         self.points = _thinned(points, _WALL_CELL_M)
         self.tree = cKDTree(self.points)
-        low = self.points.min(axis=0) if len(self.points) else np.zeros(2)
-        high = self.points.max(axis=0) if len(self.points) else np.zeros(2)
+        told = np.array([*self.points, *(base.position for base, _ in scans)]).reshape(-1, 2)
+        low = told.min(axis=0) if len(told) else np.zeros(2)
+        high = told.max(axis=0) if len(told) else np.zeros(2)
         self._corner = low - 2 * _REACH_M
         shape = np.ceil((high - low + 4 * _REACH_M) / _WALL_CELL_M).astype(int)
         walls = np.zeros(shape, bool)
@@ -411,17 +410,9 @@ def _thinned(points: Array, cell: float) -> Array:
     return np.stack(means, axis=1)
 
 
-def _ends(scan: Scan) -> Array:
-    """Where beams hit (N, 2), laser frame."""
-    hit = np.isfinite(scan.ranges)
-    bearings = scan.bearings[hit]
-    ends: Array = scan.ranges[hit, None] * np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
-    return ends
-
-
 def _passed(scan: Scan) -> Array:
     """Points (N, 2) along the beams, as far as is compared, laser frame."""
-    ends = _ends(scan)[::4]
+    ends = scan.ends[::4]
     away = np.hypot(*ends.T)
     shares = np.arange(0.0, 2 * _REACH_M, _CELL_M)[None] / np.maximum(away, 1e-6)[:, None]
     i, k = np.nonzero(shares < 1.0)

@@ -101,10 +101,8 @@ class ReturningPipeline(Pipeline):
         offset = before.compose(motion).to(local_base)
         if np.hypot(offset.x, offset.y) > _MOVED_M or abs(offset.theta) > _MOVED_RAD:
             return False
-        walls, hit = self._maps.near.points(), np.isfinite(scan.ranges)
-        bearings = scan.bearings[hit]
-        ends = scan.ranges[hit, None] * np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
-        ends = local_base.compose(scan.base_laser).transform(ends)
+        walls = self._maps.near.points()
+        ends = local_base.compose(scan.base_laser).transform(scan.ends)
         ends = ends[self._maps.near.known(ends)]
         if not len(walls) or len(ends) < self._matching.min_pairs:
             return False

@@ -40,6 +40,16 @@ class Scan:
         """Beam directions (N,) in the laser frame, rad."""
         return self.angle_min + self.angle_increment * np.arange(len(self.ranges), dtype=np.float64)
 
+    @property
+    def ends(self) -> Array:
+        """Where beams hit something (N, 2), m, laser frame, in the order of the beams."""
+        hit = np.isfinite(self.ranges)
+        bearings = self.bearings[hit]
+        ends: Array = self.ranges[hit, None] * np.stack(
+            [np.cos(bearings), np.sin(bearings)], axis=1
+        )
+        return ends
+
 
 @dataclass(frozen=True, slots=True)
 class Odometry:

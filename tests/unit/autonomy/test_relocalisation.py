@@ -23,6 +23,7 @@ SQUARE: list[Rectangle] = [
 CORNERS = [(0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0)]
 ALIKE = carved(SQUARE)  # turned by a quarter about its middle, it is the same
 WITH_BRANCH = carved([*SQUARE, (2.0, 9.0, 4.0, 15.0)])
+HALL = carved([(0.0, 0.0, 60.0, 40.0)])
 STEP_M = 0.5
 WORK = 200  # steps of the relocaliser between two looks; more than it needs
 
@@ -35,6 +36,15 @@ def along(corners: Iterable[tuple[float, float]]) -> list[Pose]:
             x, y = xa + share * (xb - xa), ya + share * (yb - ya)
             poses.append(Pose(float(x), float(y), math.atan2(yb - ya, xb - xa)))
     return poses
+
+
+def test_who_stands_far_from_all_the_walls_that_are_known_has_still_seen_the_floor() -> None:
+    here = Pose(27.0, 20.0, math.pi)  # of the hall it sees the western wall only, 27 m away
+    known = KnownWalls([(here, sweep(HALL, here, field_of_view=math.pi / 3))])
+    assert len(known.points) > 0
+    assert known.points[:, 0] == pytest.approx(0.0, abs=0.05)
+    assert known.is_seen(np.array([[20.0, 20.0]])).all()
+    assert not known.is_seen(np.array([[27.0, 30.0], [200.0, 20.0]])).any()
 
 
 def opinions(
