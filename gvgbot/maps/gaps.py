@@ -7,10 +7,11 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from gvgbot.geometry import Array
-from gvgbot.maps.occupancy import OccupancyGrid
+from gvgbot.maps.occupancy import UNKNOWN, OccupancyGrid
 
 _FREE, _OCCUPIED = 25, 65  # percent: below it is floor, from there on a wall
 _DEPTH_M, _AREA_M2 = 1.0, 0.5  # so deep and so large is the unseen floor that is worth a drive
+_JOINED_M = 0.1  # a brink is thickened by so much, to be in one piece
 
 Mask = NDArray[np.bool_]
 
@@ -23,7 +24,7 @@ def gaps(grid: OccupancyGrid, around: Array, passage_m: float) -> Array:
     """
     cell = grid.resolution_m
     margin = math.ceil(_DEPTH_M / cell)  # what is beyond the grid is unseen as well
-    cells = np.pad(grid.cells, margin, constant_values=-1)
+    cells = np.pad(grid.cells, margin, constant_values=UNKNOWN)
     corner = np.array(grid.origin) - margin * cell
     is_wall = cells >= _OCCUPIED
     if not is_wall.any():
@@ -33,7 +34,8 @@ def gaps(grid: OccupancyGrid, around: Array, passage_m: float) -> Array:
     floor = _reachable(is_floor & has_room, (around - corner)[::-1] / cell)
     unseen = has_room & ~is_floor & ~is_wall
     brink = unseen & ndimage.binary_dilation(floor)
-    labels, _ = ndimage.label(ndimage.binary_dilation(brink, iterations=margin // 10))
+    joined = ndimage.binary_dilation(brink, iterations=max(1, round(_JOINED_M / cell)))
+    labels, _ = ndimage.label(joined)
     found = []
     for number, box in enumerate(ndimage.find_objects(labels), start=1):
         wide = tuple(slice(max(0, s.start - margin), s.stop + margin) for s in box)

@@ -29,7 +29,10 @@ class Unseen:
         self._stands_at, self.is_done, self.left = None, False, 0
 
     def is_standing(self, travelled: float) -> bool:
-        """Whether the robot stands, as it should while the survey takes its time."""
+        """Whether the robot has come no further since this was asked last, at the look before.
+
+        It should stand while the survey takes its time.
+        """
         before, self._stands_at = self._stands_at, travelled
         return before is not None and travelled - before < _STILL_M
 

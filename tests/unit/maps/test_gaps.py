@@ -65,9 +65,10 @@ def test_the_shadow_of_a_post_is_none_but_that_of_a_cupboard_is() -> None:
     assert len(found(painted((slice(20, 30), slice(30, 31), 100), shadow))) >= 1
 
 
-def test_two_gaps_are_told_apart() -> None:
+@pytest.mark.parametrize("cell", [0.05, 0.1, 0.2])
+def test_two_gaps_are_told_apart(cell: float) -> None:
     room = ("### ###", "#.....#", "#.....#", "#.....#", "### ###")
-    places = found(drawn(*room))
+    places = found(drawn(*room, cell=cell))
     assert sorted(places[:, 1].round().tolist()) == [-1.0, 2.0]
     assert places[:, 0] == pytest.approx([2.5, 2.5], abs=0.1)
 
