@@ -26,7 +26,7 @@ _NEAR_M = 3.0  # who is farther away is not followed from scan to scan
 _GONE_M = 1.0  # between two looks, at most
 _MOVED_M = 0.3  # what stands is found again within this
 _STRAY = 0.1  # of the beams towards a place: so many may end there though nothing is there
-_LOST_S = 3.0  # and what is out of sight for so long, beyond the time it stood, has gone
+_LOST_S = 3.0  # what is out of sight for so long, beyond the time it stood, may have gone
 _RIM = np.stack([f(np.arange(12) * np.pi / 6) for f in (np.cos, np.sin)], axis=1)
 
 
@@ -186,15 +186,15 @@ class Newcomers:
         for one in gone:
             if one.was_let_in:
                 local_map.doubt(one.centre, one.radius + _BLUR_M)
+        lost = [one for one in self._all if one not in gone and _is_lost(one, scan.stamp)]
+        for one in lost:  # it may have gone, or stand there still
+            local_map.forget(one.centre, one.radius + _BLUR_M)
         self._all = [
             one
             for one in self._all
             if one not in gone
-            and (
-                local_map.covers(one.centre)
-                if one.is_let_in
-                else scan.stamp - one.last < _LOST_S + one.last - one.first
-            )
+            and one not in lost
+            and (not one.is_let_in or local_map.covers(one.centre))
         ]
 
     @property
@@ -235,6 +235,11 @@ class _Walls:
 
 def _is_at(one: Newcomer, centre: Array) -> bool:
     return bool(np.hypot(*(one.centre - centre)) < _MOVED_M)
+
+
+def _is_lost(one: Newcomer, stamp: float) -> bool:
+    """Whether it has been out of sight for so long that nobody knows whether it still stands."""
+    return not one.is_let_in and stamp - one.last >= _LOST_S + one.last - one.first
 
 
 def _without(scan: Scan, local_base: Pose, discs: list[tuple[Array, float]]) -> Scan:

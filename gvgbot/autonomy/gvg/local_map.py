@@ -184,6 +184,10 @@ class LocalMap:
         """Forget, at the next scan, what stands in a disc, local frame."""
         self._votes[self._disc(centre, radius)] = 0
 
+    def forget(self, centre: Array, radius: float) -> None:
+        """Know no floor in a disc, local frame, from the next scan on, but what that sees."""
+        self._free[self._disc(centre, radius)] = False
+
     def _disc(self, centre: Array, radius: float) -> tuple[Index, Index]:
         """Rows and columns of the cells whose middles lie in a disc, local frame."""
         reach = math.ceil(radius / self._cell)

@@ -178,6 +178,22 @@ def test_who_goes_is_forgotten_as_soon_as_that_is_seen() -> None:
     assert len(watch.newcomers.points) == 0
 
 
+def test_where_somebody_was_last_seen_nobody_knows_the_floor_until_it_is_seen() -> None:
+    """A screen is put before him, who stays or goes, and taken away after a minute."""
+    watch, spot = Watch(EMPTY), np.array([2.0, 0.0])
+    screened = carved([ROOM], [(1.0, -1.0, 1.1, 1.0)])
+    watch.dropped(EMPTY, 0.0, person=(2.0, 0.0))
+    assert watch.map.known(spot)
+    for second in range(1, 60):
+        watch.dropped(screened, second)
+    assert len(watch.newcomers.points) == 0
+    assert not watch.map.known(spot)
+    assert not watch.map.is_bare(spot, RADIUS)
+    for second in range(60, 63):
+        watch.dropped(EMPTY, second)
+    assert watch.map.is_bare(spot, RADIUS)
+
+
 def test_a_post_between_panes_of_glass_stays_where_it_is() -> None:
     """Most beams towards the disc around it go through the panes."""
     watch, post = Watch(), carved([ROOM], [(2.0, -0.07, 2.1, 0.07)])
