@@ -85,6 +85,12 @@ class Mapper(Knowledge):
         )
         return KnownVertices(positions[near], degrees)
 
+    def explains(self, view: View, known: Correspondence, place: Array) -> bool:
+        """Whether a vertex should stand at a place (2,), local frame, and is seen nowhere else."""
+        gaps = np.hypot(*(self.positions_from(view.local_base) - place).T)
+        near = np.flatnonzero(gaps < self._recognition.same_place_m)
+        return any(self.belief.ids[i] not in known.node_of for i in near)
+
     def is_way(self, local_base: Pose, place: Array) -> bool:
         """Whether a known edge passes a place (2,), local frame, nearer than any wall of its."""
         x, y = self.belief.map_base.transform(local_base.inverse().transform(place))

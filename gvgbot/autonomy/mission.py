@@ -473,7 +473,7 @@ class Mission:
         paths = sorted(
             (metres, node, path)
             for node, (metres, path) in here.gvg.routes(here.place).items()
-            if node not in here.known.vertex_of and here.gvg.nodes[node].may_be_vertex
+            if self._may_be_new(view, here, node)
         )
         if paths and view.stamp - self._examining_since < self._config.patience_s:
             return self._drive(view, here, paths[0][2])
@@ -485,6 +485,12 @@ class Mission:
         else:
             self._end(view, "explored", f"no frontier is left{self.remark}")
         return Stand()
+
+    def _may_be_new(self, view: View, here: Situation, node: int) -> bool:
+        """Whether a node in sight may prove to be a vertex that the map lacks."""
+        seen, known = here.gvg.nodes[node], here.known
+        is_open = seen.may_be_vertex and node not in known.vertex_of
+        return is_open and not self._mapper.explains(view, known, seen.position)
 
     def _given_up(self) -> int:
         """How many frontiers were given up."""

@@ -130,6 +130,34 @@ def test_a_map_without_frontiers_is_explored() -> None:
     assert end.reason
 
 
+LONG = drawn({1: (0.0, 0.0), 2: (20.0, 0.0)}, {10: (1, 2, [])})
+
+
+def test_the_robot_does_not_go_back_for_a_look_at_what_it_knows() -> None:
+    """From one dead end it sees the other, too far off to be measured again."""
+    robot = Robot()
+    robot.stand(LONG, 8)
+    robot.drive(LONG, (0.0, 0.0), (20.0, 0.0))
+    orders = [robot.look(LONG)]
+    while robot.mission.outcome is None and robot.stamp < 100.0:
+        orders.append(robot.look(LONG))
+    assert robot.mission.outcome == "explored"
+    assert not any(isinstance(order, Drive) and order.track.length > 1.0 for order in orders)
+
+
+def test_what_is_seen_far_off_and_not_known_is_looked_at_before_all_is_called_explored() -> None:
+    """A side corridor that was not to be seen in passing."""
+    robot = Robot()
+    robot.stand(LONG, 8)
+    robot.drive(LONG, (0.0, 0.0), (12.0, 0.0))
+    with_side = drawn(
+        {1: (0.0, 0.0), 2: (20.0, 0.0), 3: (4.0, 0.0), 4: (4.0, 3.0)},
+        {10: (1, 3, []), 11: (3, 2, []), 12: (3, 4, [])},
+    )
+    robot.drive(with_side, (12.0, 0.0), (20.0, 0.0))
+    assert end_of(robot.stand(with_side, 2)) == pytest.approx((4.0, 0.0))
+
+
 def test_without_an_edge_in_sight_the_robot_looks_around_and_then_gives_up() -> None:
     robot = Robot()
     orders = []
