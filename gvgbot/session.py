@@ -80,7 +80,7 @@ class Session:
     def begin_with(self, pipeline: Pipeline) -> None:
         """Let this be the robot's mind."""
         self.pipeline = pipeline
-        pipeline.errands.own_tasks.survey = partial(survey, pipeline)
+        pipeline.mission.survey = partial(survey, pipeline)
 
     @property
     def tap(self) -> Tap | None:

@@ -1,6 +1,7 @@
 """What the robot is about: explore every frontier, give up what is out of reach, say why."""
 
 import math
+from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
@@ -43,6 +44,8 @@ class Mission:
         self._config, self._mapper = config, mapper
         self.where = Whereabouts()
         self.sharing: Sharing | None = None  # of frontiers with other robots, if there are any
+        # finds places (N, 2), m, map frame, from where there is floor to be seen that nobody has
+        self.survey: Callable[[], Array] | None = None
         self.target: HalfEdgeId | None = None
         self.outcome: Outcome | None = None
         self.reason = ""
@@ -423,6 +426,9 @@ class Mission:
             self._mapper.forget_strays(view)
             if self._mapper.graph.vertices and not self._mapper.graph.frontiers():
                 return
+            if not self._mapper.graph.vertices and self._sees_all():
+                self._end(view, "explored", "a space without edges, and no way out")
+                return
             self._end_early(view, f"no vertex found, perhaps no way out: {reason}", reason)
             return
         has_left = self.where.on_edge not in (None, self.target)
@@ -432,6 +438,10 @@ class Mission:
         half.blocked = True
         self._events.append(Recovery(view.stamp, "give up a frontier", reason))
         self.target = None
+
+    def _sees_all(self) -> bool:
+        """Whether no floor is unseen that the robot could drive onto: it is in a closed room."""
+        return self.survey is not None and not len(self.survey())
 
     def _access(self, view: View) -> Order:
         """Go to the nearest edge, if the way there is free."""

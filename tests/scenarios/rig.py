@@ -144,7 +144,7 @@ async def _played(
     if grip is not None:
         _lose_grip(simulation.body, grip)
     pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
-    pipeline.errands.own_tasks.survey = partial(survey, pipeline)
+    pipeline.mission.survey = partial(survey, pipeline)
     run = Play(simulation, pipeline, clock)
     if walkways is not None:
         people = simulation.body._people

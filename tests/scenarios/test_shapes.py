@@ -41,6 +41,13 @@ def test_a_hall_whose_walls_are_out_of_sight_at_first_is_left_by_its_corridor() 
     assert_found(run, "endpoint", [(13.2, 0.0)])
 
 
+def test_a_square_closet_is_explored_without_an_edge() -> None:
+    """All corners are as far from its middle: there is nothing to drive along, and no way out."""
+    run = play(carved([(-0.6, -0.6, 0.6, 0.6)]), Pose(-0.2, -0.1, 0.0), limit=60.0)
+    assert_explored(run)
+    assert graph_shape(run) == (0, 0, 0)
+
+
 @pytest.mark.parametrize("offset", [0.0, 0.15], ids=["straight", "perturbed"])
 def test_a_crossing_is_one_meetpoint_of_four(offset: float) -> None:
     """Arms that face each other, or are a little off: far less than half the robot apart."""

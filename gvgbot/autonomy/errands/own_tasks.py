@@ -29,8 +29,6 @@ class OwnTasks:
     def __init__(self, config: CertaintyConfig, mission: Mission, mapper: Mapper) -> None:
         self._mission, self._mapper = mission, mapper
         self._revisiting, self._unseen = Revisiting(config), Unseen()
-        # finds places (N, 2), m, map frame, from where there is floor to be seen that nobody has
-        self.survey: Callable[[], Array] | None = None
 
     def configure(self, config: CertaintyConfig) -> None:
         """Use another configuration from now on."""
@@ -66,7 +64,8 @@ class OwnTasks:
     def _look_at_gap(self, view: View, here: Situation) -> Task | Stand | None:
         """To floor that nobody has seen, when all frontiers are explored."""
         is_alone = self._mission.sharing is None  # others may have seen it
-        if self.survey is None or self._mapper.graph.frontiers() or not is_alone:
+        survey = self._mission.survey
+        if survey is None or self._mapper.graph.frontiers() or not is_alone:
             return None
         if self._unseen.is_done:
             return None
@@ -79,7 +78,7 @@ class OwnTasks:
             route = None if foot is None else route_to_foot(here, starts, foot)
             return None if route is None else route.metres
 
-        place = self._unseen.next(self.survey(), metres_to)
+        place = self._unseen.next(survey(), metres_to)
         if place is None:
             return None
         decision = Decision(view.stamp, None, None, "floor there is still unseen")

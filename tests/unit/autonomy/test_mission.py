@@ -22,7 +22,7 @@ from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex
 from gvgbot.autonomy.slam.recognition import RecognitionConfig
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
 from gvgbot.autonomy.views import View
-from gvgbot.geometry import Pose
+from gvgbot.geometry import Array, Pose
 from tests.unit.autonomy.local_graphs import Point, drawn
 
 CONFIG = ExplorationConfig()
@@ -218,6 +218,23 @@ def test_the_end_of_sight_is_looked_around_at_twice_before_a_frontier_is_given_u
     assert robot.mission.outcome is None  # there are others
     assert robot.mission.target is not None
     assert robot.mission.target.key != east
+
+
+@pytest.mark.parametrize(
+    ("unseen", "outcome"),
+    [(np.empty((0, 2)), "explored"), (np.array([[2.0, 1.0]]), "failed")],
+    ids=["closed", "open"],
+)
+def test_a_room_without_a_vertex_is_explored_when_all_of_it_is_seen(
+    unseen: Array, outcome: str
+) -> None:
+    """The middle of a round or square room, of which an edge is no longer than an error."""
+    middle = drawn({1: (-0.05, 0.0), 2: (0.05, 0.0)}, {10: (1, 2, [])}, unseen={1: 2.0, 2: -1.0})
+    robot = Robot()
+    robot.mission.survey = lambda: unseen
+    robot.stand(middle, 100)
+    assert not robot.mapper.graph.vertices
+    assert robot.mission.outcome == outcome
 
 
 def test_who_has_lost_sight_of_all_that_is_known_goes_back_over_the_way_it_came() -> None:

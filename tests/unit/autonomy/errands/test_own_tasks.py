@@ -19,7 +19,7 @@ class Explorer(Robot):
         super().__init__()
         self.errands = Errands(self.mission, self.mapper, CONFIG, room_m=0.2)
         self.left = list(surveys)
-        self.errands.own_tasks.survey = self._survey
+        self.mission.survey = self._survey
 
     def _survey(self) -> Array:
         return np.array(self.left.pop(0)).reshape(-1, 2)
