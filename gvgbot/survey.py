@@ -1,8 +1,11 @@
-"""What a robot that has explored all has still not seen: gaps in the grid of all its scans."""
+"""What a robot that has explored all may have missed, by the grid of all its scans."""
+
+import numpy as np
 
 from gvgbot.autonomy.estimate import smoothed_keyframes
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.geometry import Array
+from gvgbot.maps.blanks import blanks
 from gvgbot.maps.gaps import gaps
 from gvgbot.maps.occupancy import occupancy_grid
 
@@ -10,15 +13,28 @@ _RESOLUTION_M, _REACH_M = 0.1, 8.0  # coarser than the saved grid: the robot sta
 
 
 def survey(pipeline: Pipeline) -> Array:
-    """Places (N, 2), m, map frame, on seen floor from which the robot could drive onto unseen."""
+    """Places (N, 2), m, map frame, that are worth another look.
+
+    From there the robot could drive onto floor that nobody has seen, or sees some that was seen but
+    that no edge leads to.
+    """
     poses = smoothed_keyframes(pipeline)
     scans = [
         (pose, keyframe.scan)
         for pose, keyframe in zip(poses, pipeline.keyframes, strict=True)
         if keyframe.scan is not None
     ]
-    return gaps(
-        occupancy_grid(scans, _RESOLUTION_M, _REACH_M),
-        pipeline.map_base.position,
-        pipeline.errands.room_m,
-    )
+    grid = occupancy_grid(scans, _RESOLUTION_M, _REACH_M)
+    here, room = pipeline.map_base.position, pipeline.errands.room_m
+    return np.concatenate([gaps(grid, here, room), blanks(grid, _ways(pipeline), here, room)])
+
+
+def _ways(pipeline: Pipeline) -> Array:
+    """Points (N, 2), m, map frame, along all edges."""
+    belief, points = pipeline.mapper.belief, [np.empty((0, 2))]
+    for edge in pipeline.mapper.graph.edges.values():
+        line = belief.map_vertex(edge.a.vertex).transform(edge.polyline)
+        along = np.concatenate([[0.0], np.hypot(*np.diff(line, axis=0).T).cumsum()])
+        stations = np.arange(0.0, along[-1], _RESOLUTION_M)
+        points.append(np.stack([np.interp(stations, along, line[:, k]) for k in (0, 1)], axis=1))
+    return np.concatenate(points)

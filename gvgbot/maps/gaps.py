@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from gvgbot.geometry import Array
-from gvgbot.maps.occupancy import UNKNOWN, OccupancyGrid
+from gvgbot.maps.occupancy import UNKNOWN, Cells, OccupancyGrid
 
 _FREE, _OCCUPIED = 25, 65  # percent: below it is floor, from there on a wall
 _DEPTH_M, _AREA_M2 = 1.0, 0.5  # so deep and so large is the unseen floor that is worth a drive
@@ -26,13 +26,12 @@ def gaps(grid: OccupancyGrid, around: Array, passage_m: float) -> Array:
     margin = math.ceil(_DEPTH_M / cell)  # what is beyond the grid is unseen as well
     cells = np.pad(grid.cells, margin, constant_values=UNKNOWN)
     corner = np.array(grid.origin) - margin * cell
-    is_wall = cells >= _OCCUPIED
-    if not is_wall.any():
+    wall, seen = is_wall(cells), is_floor(cells)
+    if not wall.any():
         return np.empty((0, 2))
-    has_room = ndimage.distance_transform_edt(~is_wall) * cell > passage_m
-    is_floor = (cells >= 0) & (cells < _FREE)
-    floor = _reachable(is_floor & has_room, (around - corner)[::-1] / cell)
-    unseen = has_room & ~is_floor & ~is_wall
+    has_room = ndimage.distance_transform_edt(~wall) * cell > passage_m
+    floor = reachable(seen & has_room, (around - corner)[::-1] / cell)
+    unseen = has_room & ~seen & ~wall
     brink = unseen & ndimage.binary_dilation(floor)
     joined = ndimage.binary_dilation(brink, iterations=max(1, round(_JOINED_M / cell)))
     labels, _ = ndimage.label(joined)
@@ -45,7 +44,17 @@ def gaps(grid: OccupancyGrid, around: Array, passage_m: float) -> Array:
     return corner + (np.array(found).reshape(-1, 2)[:, ::-1] + 0.5) * cell
 
 
-def _reachable(floor: Mask, here: Array) -> Mask:
+def is_wall(cells: Cells) -> Mask:
+    """Which cells are occupied."""
+    return np.asarray(cells >= _OCCUPIED)
+
+
+def is_floor(cells: Cells) -> Mask:
+    """Which cells are seen to be free."""
+    return np.asarray((cells >= 0) & (cells < _FREE))
+
+
+def reachable(floor: Mask, here: Array) -> Mask:
     """The part of the floor that hangs together and is nearest to a (row, column)."""
     labels, _ = ndimage.label(floor)
     places = np.argwhere(floor)
