@@ -8,6 +8,7 @@ from gvgbot.geometry import Array
 from gvgbot.maps.blanks import blanks
 from gvgbot.maps.gaps import gaps
 from gvgbot.maps.occupancy import occupancy_grid
+from gvgbot.maps.viewpoints import viewpoints
 
 _RESOLUTION_M, _REACH_M = 0.1, 8.0  # coarser than the saved grid: the robot stands and waits for it
 
@@ -26,7 +27,11 @@ def survey(pipeline: Pipeline) -> Array:
     ]
     grid = occupancy_grid(scans, _RESOLUTION_M, _REACH_M)
     here, room = pipeline.map_base.position, pipeline.errands.room_m
-    return np.concatenate([gaps(grid, here, room), blanks(grid, _ways(pipeline), here, room)])
+    ways, found = _ways(pipeline), gaps(grid, here, room)
+    if not len(ways):
+        return found
+    found = np.concatenate([found, blanks(grid, ways, here, room)])
+    return viewpoints(grid, ways, found, here, room)
 
 
 def _ways(pipeline: Pipeline) -> Array:

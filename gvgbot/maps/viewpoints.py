@@ -1,0 +1,64 @@
+"""Viewpoints: from where a robot that keeps to its ways sees what lies off them."""
+
+import numpy as np
+from scipy import ndimage
+
+from gvgbot.geometry import Array
+from gvgbot.maps.gaps import Mask, is_floor, is_wall, reachable
+from gvgbot.maps.occupancy import OccupancyGrid
+
+_BESIDE_M = 0.2  # a place so near to a way is on it
+_OFF_M = 2.0  # the robot goes so far off its ways: through a door, and it faces what it looks at
+_NEIGHBOURS = np.array([(0, 1), (1, 0), (0, -1), (-1, 0)])
+
+
+def viewpoints(
+    grid: OccupancyGrid, ways: Array, places: Array, around: Array, passage_m: float
+) -> Array:
+    """Where to go (M, 2), m, map frame, for a look at places (N, 2) to which the floor leads.
+
+    That is on the shortest path over the floor from the nearest way (points (K, 2), a cell or less
+    apart) to the place. The robot is at `around` (2,) and keeps `passage_m` from walls.
+    """
+    cell, corner = grid.resolution_m, np.array(grid.origin)
+    walls = is_wall(grid.cells)
+    has_room = ndimage.distance_transform_edt(~walls) * cell > passage_m
+    floor = reachable(is_floor(grid.cells) & has_room, (around - corner)[::-1] / cell)
+    near_ways = _cells_near(ways, grid, floor)
+    found = []
+    for row, column in ((places - corner)[:, ::-1] / cell).astype(np.int64).tolist():
+        view = _on_the_way_there((row, column), floor, near_ways, round(_OFF_M / cell))
+        if view is not None:
+            found.append(view)
+    return corner + (np.array(found).reshape(-1, 2)[:, ::-1] + 0.5) * cell
+
+
+def _cells_near(ways: Array, grid: OccupancyGrid, floor: Mask) -> Mask:
+    """The cells of the floor beside ways."""
+    near = np.zeros(floor.shape, np.bool_)
+    rows, columns = ((ways - grid.origin) / grid.resolution_m).astype(np.int64).T[::-1]
+    inside = (rows >= 0) & (columns >= 0) & (rows < floor.shape[0]) & (columns < floor.shape[1])
+    near[rows[inside], columns[inside]] = True
+    near = ndimage.binary_dilation(near, iterations=round(_BESIDE_M / grid.resolution_m))
+    return np.asarray(near & floor)
+
+
+def _on_the_way_there(
+    place: tuple[int, int], floor: Mask, near_ways: Mask, off: int
+) -> Array | None:
+    """The (row, column) at most so many cells off the nearest way, on the path to a place."""
+    steps = np.full(floor.shape, -1)
+    reached = np.zeros(floor.shape, np.bool_)
+    reached[place] = floor[place]
+    front, count = reached, 0
+    while not (front & near_ways).any():
+        if not front.any():
+            return None
+        steps[front] = count
+        grown = ndimage.binary_dilation(reached, mask=floor)
+        front, reached, count = grown & ~reached, grown, count + 1
+    here = np.argwhere(front & near_ways)[0]
+    for _ in range(min(off, count)):
+        count -= 1
+        here = next(there for there in here + _NEIGHBOURS if steps[tuple(there)] == count)
+    return np.asarray(here, np.float64)

@@ -1,0 +1,42 @@
+"""From where to look, in hand-drawn maps: a metre for each letter; expected by looking."""
+
+import numpy as np
+import pytest
+
+from gvgbot.geometry import Array
+from gvgbot.maps.viewpoints import viewpoints
+from tests.unit.maps.test_blanks import way
+from tests.unit.maps.test_gaps import drawn
+
+# A corridor along y = 0.5 and above it a room, with a door of 1 m at x from 4 to 5 between them.
+# The corner of the map is at (-1, -2).
+HOUSE = (
+    "##########",
+    "#........#",
+    "#........#",
+    "#####.####",
+    "#........#",
+    "##########",
+    "##########",
+)
+CORRIDOR = way((0.5, 0.5), (7.5, 0.5))
+
+
+def found(*places: tuple[float, float]) -> Array:
+    return viewpoints(drawn(*HOUSE), CORRIDOR, np.array(places), np.array([1.5, 0.5]), 0.25)
+
+
+def test_a_room_is_looked_at_through_its_door_and_not_from_behind_its_wall() -> None:
+    (view,) = found((0.5, 3.5))  # the corridor is 3 m from there, the door 4 m
+    assert 4.0 < view[0] < 5.0
+    assert 1.0 < view[1] < 3.0
+
+
+def test_what_is_near_a_way_is_gone_to() -> None:
+    (view,) = found((2.0, 0.7))
+    assert view == pytest.approx([2.0, 0.7], abs=0.15)
+
+
+def test_where_no_floor_leads_there_is_no_viewpoint() -> None:
+    assert len(found((1.5, 1.5))) == 0  # in the wall
+    assert len(viewpoints(drawn(*HOUSE), CORRIDOR, np.empty((0, 2)), np.zeros(2), 0.25)) == 0
