@@ -15,6 +15,9 @@ _PASSED_M = 1.0  # from so near, what cannot be seen of an edge must be driven t
 _LEFT_BEHIND_M = 0.3  # the robot has passed a point if it was nearer by this
 _SAME_M = 0.5  # sightings nearer than this are of one candidate
 _MEMORY_M = 12.0  # driven, after which a candidate is forgotten
+_MISTAKEN_M = 1.0  # around a mistake
+_MISTAKES = 2  # at a place, after which a vertex there is only believed from near
+_MISTAKES_KEPT_M = 100.0  # driven, after which a mistake is forgotten
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,6 +46,12 @@ class Candidates:
     def __init__(self, config: CandidatesConfig) -> None:
         self._config = config
         self._all: list[Candidate] = []
+        self._mistakes: list[tuple[Array, float]] = []  # where, local frame, and metres driven
+
+    def note_mistake(self, position: Array, travelled: float) -> None:
+        """Take down that a vertex at a place (2,), local frame, has proved to be none."""
+        self._mistakes = [one for one in self._mistakes if travelled - one[1] < _MISTAKES_KEPT_M]
+        self._mistakes.append((position, travelled))
 
     def note(self, sighting: Sighting, away: float, travelled: float) -> Candidate:
         """The candidate of a sighting from `away` metres, with this sighting counted."""
@@ -68,13 +77,20 @@ class Candidates:
         """Whether it has been seen often enough; a suspect must have been passed, too.
 
         A side edge that could not be seen to the end in passing is not forgotten: it becomes a
-        frontier, and a closer look decides.
+        frontier, and a closer look decides. What has proved to be none whenever the robot came near
+        is not driven to for ever.
         """
+        if away > _PASSED_M and self._is_mistakable(candidate.position):
+            return False
         if node.is_suspect:
             passed = away > candidate.nearest + _LEFT_BEHIND_M
             enough = self._config.meetpoint_sightings * (1 if passed else 2)
             return candidate.near_sightings >= enough
         return candidate.sightings >= self._needed(candidate)
+
+    def _is_mistakable(self, position: Array) -> bool:
+        near = [np.hypot(*(position - place)) < _MISTAKEN_M for place, _ in self._mistakes]
+        return near.count(True) >= _MISTAKES
 
     def is_examined(self, candidate: Candidate) -> bool:
         """Whether it has been seen twice as often as needed: enough to tell it from a known one."""

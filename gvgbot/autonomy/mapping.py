@@ -120,6 +120,8 @@ class Mapper(Knowledge):
             else:
                 self._refresh(view, sightings[node], view.gvg.nodes[node], vertex, known)
         for vertex, reason in self._evidence.refuted(view, known):
+            place = self.in_local_frame(view, vertex.id).position
+            self._unbelieved.note_mistake(place, view.travelled)
             self.remove(view, vertex, reason)
         self._join(view, known)
         return known, self._events

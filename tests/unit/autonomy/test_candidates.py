@@ -1,0 +1,50 @@
+"""What is believed of vertices that have been seen, and from how far."""
+
+import numpy as np
+import pytest
+
+from gvgbot.autonomy.candidates import Candidates, CandidatesConfig
+from gvgbot.autonomy.gvg.local import LocalNode
+from gvgbot.autonomy.slam.recognition import Sighting
+from tests.unit.autonomy.local_graphs import drawn
+
+CONFIG = CandidatesConfig(meetpoint_sightings=3)
+PLACE = np.array([5.0, 0.0])
+NODE: LocalNode = drawn(
+    {1: (5.0, 0.0), 2: (9.0, 0.0), 3: (5.0, 4.0), 4: (0.0, 0.0)},
+    {10: (1, 2, []), 11: (1, 3, []), 12: (1, 4, [])},
+).nodes[1]
+SIGHTING = Sighting(PLACE, 1.0, (0.0, 1.57, 3.14), meetpoint=True)
+
+
+def sightings_until_believed(
+    candidates: Candidates, away: float, *, travelled: float
+) -> int | None:
+    """How often it must be seen from so far; None if it is not believed after many times."""
+    for count in range(1, 50):
+        candidate = candidates.note(SIGHTING, away, travelled)
+        if candidates.is_believable(candidate, NODE, away):
+            candidates.drop(candidate)
+            return count
+    return None
+
+
+@pytest.mark.parametrize(
+    ("mistakes", "away", "believed_after"),
+    [(0, 6.0, 3), (1, 6.0, 3), (2, 6.0, None), (2, 0.5, 3)],
+    ids=["new", "wrong once", "wrong twice", "wrong twice, seen from near"],
+)
+def test_what_was_none_twice_is_believed_from_near_only(
+    mistakes: int, away: float, believed_after: int | None
+) -> None:
+    candidates = Candidates(CONFIG)
+    for _ in range(mistakes):
+        candidates.note_mistake(np.array([5.3, -0.2]), 10.0)
+    assert sightings_until_believed(candidates, away, travelled=20.0) == believed_after
+
+
+def test_mistakes_elsewhere_do_not_count() -> None:
+    candidates = Candidates(CONFIG)
+    for _ in range(5):
+        candidates.note_mistake(np.array([7.0, 0.0]), 10.0)
+    assert sightings_until_believed(candidates, 6.0, travelled=20.0) == 3
