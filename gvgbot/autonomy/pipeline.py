@@ -53,6 +53,8 @@ _COMPANY_M = 0.15  # by which another robot may be elsewhere than it says
 _BEHIND_M, _GRAIN_M = 0.2, 0.05  # what must be known to be free, when it backs off
 _LONGEST_GAP_S = 2.0  # between keyframes; a longer one is an outage of a device
 _FORGOTTEN = np.diag([1.0, 1.0, 0.3**2])  # covariance of a way that is not kept
+_OVERLAP_RAD = 0.2  # of what is seen before and after the first turn
+_TURN_SHARE = 0.8  # of the fastest turn, to look around
 _SCAN_EVERY_M, _SCAN_EVERY_RAD = 0.7, 0.5  # scans that are kept for the occupancy grid
 _LED_EVERY_M, _LED_EVERY_RAD = 0.4, 2.0  # looks for the GVG, where nobody waits for a way
 
@@ -414,7 +416,7 @@ class Pipeline:
             self._order = Stand()
             return STANDSTILL
         if self._turning():
-            return Twist(0.0, self._config.edge_follower.max_turn_rate_radps * 0.8)
+            return Twist(0.0, self._config.edge_follower.max_turn_rate_radps * _TURN_SHARE)
         match self._order:
             case Drive(track=track):
                 self._twist = follow(
@@ -490,4 +492,4 @@ def _behind(radius: float) -> Array:
 def _blind_angle(scan: Scan) -> float:
     """How far to turn so that every direction has been seen, with some overlap; rad."""
     seen = scan.angle_increment * (len(scan.ranges) - 1)
-    return max(0.0, math.tau - seen) + 0.2
+    return max(0.0, math.tau - seen) + _OVERLAP_RAD

@@ -28,6 +28,8 @@ _BESIDE_M = 0.4  # walls that agree only so far off are another vertex's
 _KNOWN_SHARE = 0.4  # of a vertex's walls must lie where something has been seen
 _RIVALS = 4  # that are kept in mind
 _COMPARED = 12  # vertices elsewhere, to tell how many look like what is seen
+_PLACE_SIGMA_M = 0.15  # of a vertex laid onto what is seen, before its walls are
+_TURN_SIGMA_RAD = 0.02  # and of its turn, beside the robot's own
 _REGISTRATION_FLOOR = np.diag([4e-4, 4e-4, 9e-6])  # what registration cannot know of itself
 
 
@@ -204,8 +206,8 @@ class Recogniser:
         self, belief: Belief, view: View, vertex: Vertex, prior: Pose
     ) -> tuple[Registration | None, float]:
         """A vertex's frame laid onto the local map, and the share of its walls found where seen."""
-        turn_sigma = math.sqrt(float(belief.P[2, 2])) + 0.02
-        Q = np.diag([0.15**2, 0.15**2, turn_sigma**2])
+        turn_sigma = math.sqrt(float(belief.P[2, 2])) + _TURN_SIGMA_RAD
+        Q = np.diag([_PLACE_SIGMA_M**2, _PLACE_SIGMA_M**2, turn_sigma**2])
         walls, tree = view.local_map.points(), view.local_map.tree()
         sides = Sides(view.local_map.sights(), vertex.sights)
         found = register(vertex.snapshot, tree, walls, prior, Q, self._matching, sides=sides)

@@ -12,6 +12,10 @@ from gvgbot.ranges import Range
 _LEAST_LOOK_AHEAD_M = 0.12
 _TIGHT_M, _TIGHT_TURN_RAD = 0.1, 0.35  # room beside the robot in which an arc would scrape
 _CUT = 0.8  # of the clearance, the farthest to look ahead
+_END_M, _AIM_M = 0.05, 0.1  # from the end of a track, and from the point to steer for, it is there
+_TURN_PER_RAD = 1.5  # 1/s; on the spot, the robot turns the slower the less is left
+_POINTS_BEYOND = 5  # the point to steer for, where there must be room as well
+_LEAST_SHARE = 0.2  # of the speed, however far off course
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,19 +81,21 @@ def follow(
     aim = int(stations.searchsorted(station + ahead))
     x, y = line[min(aim, len(line) - 1)].tolist()
     away = math.hypot(x - local_base.x, y - local_base.y)
-    if remaining < 0.05 and away < 0.1:
+    if remaining < _END_M and away < _AIM_M:
         return STANDSTILL
     angle = wrap_angle(math.atan2(y - local_base.y, x - local_base.x) - local_base.theta)
     is_tight = room < robot_radius + _TIGHT_M
-    if abs(angle) > (_TIGHT_TURN_RAD if is_tight else config.turn_on_the_spot_rad) and away > 0.05:
-        return Twist(0.0, math.copysign(min(config.max_turn_rate_radps, 1.5 * abs(angle)), angle))
-    narrowest = float(clearance[here : max(here + 1, aim + 5)].min())
+    most = _TIGHT_TURN_RAD if is_tight else config.turn_on_the_spot_rad
+    if abs(angle) > most and away > _END_M:
+        rate = min(config.max_turn_rate_radps, _TURN_PER_RAD * abs(angle))
+        return Twist(0.0, math.copysign(rate, angle))
+    narrowest = float(clearance[here : max(here + 1, aim + _POINTS_BEYOND)].min())
     limit = _speed_limit(narrowest, robot_radius, config)
-    limit = min(limit, math.sqrt(2 * config.braking_mps2 * max(remaining, away - 0.05, 0.0)))
-    curvature = 2 * math.sin(angle) / max(away, 0.1)
+    limit = min(limit, math.sqrt(2 * config.braking_mps2 * max(remaining, away - _END_M, 0.0)))
+    curvature = 2 * math.sin(angle) / max(away, _AIM_M)
     if abs(curvature) > 1e-6:
         limit = min(limit, config.max_turn_rate_radps / abs(curvature))
-    limit *= max(0.2, math.cos(angle))
+    limit *= max(_LEAST_SHARE, math.cos(angle))
     return Twist(limit, limit * curvature)
 
 

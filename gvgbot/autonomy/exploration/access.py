@@ -18,6 +18,7 @@ _AROUND = np.stack([f(np.arange(16) * np.pi / 8) for f in (np.cos, np.sin)], axi
 _ROOM_M = 0.35  # from the walls, on the way
 _SPACING_M = 0.1
 _BEARINGS, _STEP_M, _FARTHEST_M = 16, 0.5, 4.0  # of places to go to where no edge is in sight
+_NEAREST_M = 1.0  # of those places
 _ROOM_ENOUGH_M = 5.0  # from the walls: more says nothing
 _SOUGHT_M = 1.5  # so near, one has been
 
@@ -108,7 +109,7 @@ def way_into_the_open(view: View, sought: list[Array]) -> tuple[Array, Array] | 
     """
     base = view.local_base
     bearings = base.theta + np.linspace(0.0, math.tau, _BEARINGS, endpoint=False)
-    metres = np.arange(_FARTHEST_M, 0.9, -_STEP_M)
+    metres = np.arange(_FARTHEST_M, _NEAREST_M - _STEP_M / 2, -_STEP_M)
     goals = base.position + (
         metres[:, None, None] * np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
     ).reshape(-1, 2)

@@ -18,7 +18,9 @@ from gvgbot.geometry import Array
 
 _RING = np.stack([f(np.arange(16) * np.pi / 8) for f in (np.cos, np.sin)], axis=1)
 _WITHIN = np.concatenate([0.5 * _RING[::2], np.zeros((1, 2))])
+_RIM_M = 0.2  # of a maximal disc, two cells: its walls may hide that
 _MAX_UNKNOWN = 1  # of the sampled points of a disc
+_INFINITE_M = 1e6  # to the centre of a circle around three points on a line
 _NOTHING: Array = np.empty((0, 2))
 _LONG_RIDGE_M, _STEP_M, _FARTHEST_M = 1.0, 0.2, 8.0  # of ridges that end in the unknown
 
@@ -212,14 +214,14 @@ def _circumcircles(generators: Array, triangles: NDArray[np.int32]) -> tuple[Arr
     bb, cc = bx * bx + by * by, cx * cx + cy * cy
     with np.errstate(divide="ignore", invalid="ignore"):
         offset = np.stack([(cy * bb - by * cc) / cross, (bx * cc - cx * bb) / cross], axis=1)
-    offset[~(np.isfinite(offset[:, 0]) & np.isfinite(offset[:, 1]))] = 1e6
+    offset[~(np.isfinite(offset[:, 0]) & np.isfinite(offset[:, 1]))] = _INFINITE_M
     centres = np.stack([x[0], y[0]], axis=1) + offset
     return centres, np.hypot(offset[:, 0], offset[:, 1])
 
 
 def _disc_is_known(local_map: Space, centres: Array, radii: Array) -> NDArray[np.bool_]:
     """Whether the maximal discs, but for a rim of two cells, lie in known space."""
-    outer = np.maximum(radii - 0.2, 0.5 * radii)
+    outer = np.maximum(radii - _RIM_M, 0.5 * radii)
     unknown = _unknown(local_map, centres, outer, _WITHIN)
     hopeful = np.flatnonzero(unknown <= _MAX_UNKNOWN)
     unknown[hopeful] += _unknown(local_map, centres[hopeful], outer[hopeful], _RING)

@@ -16,6 +16,8 @@ from gvgbot.autonomy.slam.graph import Kind, Vertex
 from gvgbot.geometry import Array, Pose, wrap_angle
 from gvgbot.ranges import Range
 
+_SIGMA_PER_M = 0.015  # of a vertex's place, m per metre from which it is seen
+_CLEARANCE_SHARE = 0.15  # by which two sightings may differ in a wide space
 _BESIDE_M = 0.4  # where a vertex is known to be, and where it is: as far apart as that may be
 
 
@@ -54,7 +56,7 @@ class Sighting:
 
 def detection_covariance(distance: float, config: RecognitionConfig) -> Array:
     """Covariance (2, 2) of a vertex position seen from a distance, m^2."""
-    return np.eye(2) * (config.detection_sigma_m**2 + (0.015 * distance) ** 2)
+    return np.eye(2) * (config.detection_sigma_m**2 + (_SIGMA_PER_M * distance) ** 2)
 
 
 def match_bearings(
@@ -96,7 +98,7 @@ def looks_alike(
     if abs(vertex.degree - len(sighting.bearings)) > 1:
         return False
     beside = min(float(np.hypot(*(sighting.position - local_vertex.position))), _BESIDE_M)
-    tolerance = max(config.clearance_m, 0.15 * vertex.clearance) + beside
+    tolerance = max(config.clearance_m, _CLEARANCE_SHARE * vertex.clearance) + beside
     if abs(vertex.clearance - sighting.clearance) > tolerance:
         return False
     known = {key: half.bearing + local_vertex.theta for key, half in vertex.half_edges.items()}
