@@ -31,6 +31,7 @@ from gvgbot.autonomy.whereabouts import Situation, Whereabouts
 from gvgbot.geometry import Array, Pose
 
 _WORTH_TURNING_M = 1.0  # a new frontier must be so much nearer than the old one
+_SECOND = 1  # try, in the end, of what was given up: things may have changed
 _FACING_RAD = 1.0  # looking so far past a thing, one would not see it go
 _FACING_POINTS = 6  # of a polyline tell where its end points to
 
@@ -435,7 +436,8 @@ class Mission:
         if has_left and self._backtracking.begin():
             self._events.append(Recovery(view.stamp, "go back", reason))
             return
-        half.blocked = True
+        assert self.target is not None, "it has a half-edge"
+        self._obstructions.close(self._mapper.graph, [self.target], view.stamp, retries=_SECOND)
         self._events.append(Recovery(view.stamp, "give up a frontier", reason))
         self.target = None
 

@@ -19,15 +19,23 @@ class Obstructions:
         """Whether something closed will be tried again."""
         return bool(self._since)
 
-    def close(self, graph: GvgGraph, ends: Iterable[HalfEdgeId], stamp: float) -> None:
-        """Block these ends."""
+    def close(
+        self,
+        graph: GvgGraph,
+        ends: Iterable[HalfEdgeId],
+        stamp: float,
+        *,
+        retries: int | None = None,
+    ) -> None:
+        """Block these ends, to be opened again at most so many times, if not as often as others."""
+        most = self._retries if retries is None else min(retries, self._retries)
         for end in ends:
             half = graph.half_edge(end)
             if half is None:
                 continue
             half.blocked = True
             self._times[end] = self._times.get(end, 0) + 1
-            if self._times[end] <= self._retries:
+            if self._times[end] <= most:
                 self._since[end] = stamp
 
     def open(self, graph: GvgGraph, stamp: float) -> bool:

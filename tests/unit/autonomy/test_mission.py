@@ -426,6 +426,8 @@ def test_with_everything_given_up_the_outcome_says_so() -> None:
     assert robot.mission.outcome == "explored_with_blocked"
     assert len(robot.mapper.graph.blocked()) == 3
     assert len(robot.said(Finished)) == 1
+    given_up = [e for e in robot.said(Recovery) if "give up" in str(e)]
+    assert len(given_up) == 2 * 3  # each has had a second chance
 
 
 def test_turning_into_the_first_open_street_on_the_left_after_driving_an_edge() -> None:

@@ -42,3 +42,13 @@ def test_an_end_that_is_gone_is_not_waited_for() -> None:
     graph.remove_vertex(end.vertex)
     obstructions.close(graph, [end], 0.0)
     assert not obstructions.waiting
+
+
+def test_some_are_opened_less_often_than_others() -> None:
+    graph, end = graph_with_a_frontier()
+    obstructions = Obstructions(retries=3, retry_after=20.0)
+    obstructions.close(graph, [end], 0.0, retries=1)
+    assert obstructions.open(graph, 50.0)
+    obstructions.close(graph, [end], 100.0, retries=1)
+    assert not obstructions.waiting
+    assert graph.blocked() == [end]
