@@ -81,11 +81,11 @@ class OwnTasks:
         place = self._unseen.next(survey(), metres_to)
         if place is None:
             return None
-        decision = Decision(view.stamp, None, None, "floor there is still unseen")
+        decision = Decision(view.stamp, None, None, "something may be missing there")
         return Task(ToPoint(*place.round(2).tolist()), decision)
 
     def _remark(self) -> str:
         """What there is to say about the map, if that is the end."""
         doubtful, unseen = self._revisiting.too_uncertain(self._mapper.belief), self._unseen.left
         remark = f"; {len(doubtful)} vertices stay less certain than wanted" if doubtful else ""
-        return remark + (f"; gaps in the map that stay unseen: {unseen}" if unseen else "")
+        return remark + (f"; places that may lack something: {unseen}" if unseen else "")

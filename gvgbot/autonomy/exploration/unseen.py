@@ -1,4 +1,4 @@
-"""Where to look in the end, when all frontiers are explored and some floor is still unseen.
+"""Where to look in the end, when all frontiers are explored and something may be missing.
 
 Somebody may have stood in a door, or glass may have hidden it, as the robot passed.
 """

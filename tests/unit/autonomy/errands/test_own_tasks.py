@@ -55,7 +55,7 @@ def test_it_drives_to_a_gap_before_all_is_explored() -> None:
     assert isinstance(ended, ErrandEnded)
     assert ended.outcome == "arrived"
     (decision,) = [d for d in robot.said(Decision) if isinstance(d, Decision) and d.vertex is None]
-    assert decision.reason == "floor there is still unseen"
+    assert decision.reason == "something may be missing there"
 
 
 def test_a_gap_that_stays_is_told_of() -> None:
@@ -66,7 +66,7 @@ def test_a_gap_that_stays_is_told_of() -> None:
     robot.until_it_moves_or_ends()
     assert not robot.left
     assert robot.mission.outcome == "explored"
-    assert robot.mission.reason == "no frontier is left; gaps in the map that stay unseen: 1"
+    assert robot.mission.reason == "no frontier is left; places that may lack something: 1"
 
 
 def test_who_asks_it_to_go_on_gets_another_look_at_every_gap() -> None:
