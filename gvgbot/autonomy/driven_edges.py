@@ -6,10 +6,8 @@ from gvgbot.autonomy.gvg.local import Place
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.start_edge import StartEdge, is_at_start
 from gvgbot.autonomy.views import Correspondence, View
-from gvgbot.autonomy.whereabouts import Passage, Whereabouts
+from gvgbot.autonomy.whereabouts import LEAST_LOOP_M, Passage, Whereabouts
 from gvgbot.geometry import Array
-
-_LEAST_LOOP_M = 4.0  # an edge with both ends in sight is left to sight unless so much was driven
 
 
 class DrivenEdges:
@@ -49,17 +47,23 @@ class DrivenEdges:
         far, near = graph.half_edge(arrived), graph.half_edge(left)
         if far is None or near is None or not (far.open and near.open):
             return
-        if left in known.branch_of and passage.driven < _LEAST_LOOP_M:
-            return
+        if left in known.branch_of and passage.driven < LEAST_LOOP_M:
+            return  # both ends are in sight
         self._mapper.join(view, left, arrived, passage.line, passage.narrowest, driven=True)
 
     def _close_ring(self, view: View, where: Whereabouts, clearance: float) -> None:
-        """Give an edge without an end a vertex, when the robot has come round to its start."""
+        """Give an edge without an end a vertex, when the robot has come round to its start.
+
+        It may have come onto it later: what seemed to be an edge before was none.
+        """
         if self._mapper.graph.vertices or not where.trail:
             return
         map_local = self._mapper.belief.map_base.compose(view.local_base.inverse())
+        start = where.round_from(view.local_base.position)
         if self._is_round(where, map_local.transform(where.trail[0]), clearance):
-            self._mapper.close_ring(view, np.array(where.trail), where.narrowest)
+            start = 0
+        if start is not None:
+            self._mapper.close_ring(view, np.array(where.trail[start:]), where.narrowest)
 
     def _close_start_edge(self, view: View, where: Whereabouts, clearance: float) -> None:
         """Join the edge that the robot started on, when it comes there from the other end."""
@@ -79,5 +83,5 @@ class DrivenEdges:
 
     def _is_round(self, where: Whereabouts, start: Array, clearance: float) -> bool:
         """Whether the robot has come back to where it came onto its first edge (2,), map frame."""
-        driven = where.trail_length > _LEAST_LOOP_M
+        driven = where.trail_length > LEAST_LOOP_M
         return driven and is_at_start(self._mapper.belief, start, clearance)

@@ -12,6 +12,8 @@ from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
 from gvgbot.autonomy.views import Correspondence
 from gvgbot.geometry import Array, Pose, wrap_angle
 
+LEAST_LOOP_M = 4.0  # a shorter way is none round anything
+_STEP_M = 1.0  # from view to view, at most
 _LOOP_M = 0.4  # a trail that comes this near to itself has been driven back
 _AWAY_M = 0.7  # nearer to a vertex than this, the trail does not tell its edges apart
 _PAST_M = 0.5  # a vertex: to turn back to it would be in vain
@@ -76,6 +78,20 @@ class Whereabouts:
         is_beside = _BESIDE_M[0] < place.distance < _BESIDE_M[1]
         self._extend(foot if is_beside else base)
         return passage
+
+    def round_from(self, base: Array) -> int | None:
+        """Which point of the trail the robot is at once more, the way round that it has driven.
+
+        None if it has not come round, or not along the trail.
+        """
+        points = np.array(self.trail).reshape(-1, 2)
+        away = np.hypot(*(points - base).T)
+        if len(points) < 2 or away[-1] > _STEP_M:
+            return None
+        lengths = np.hypot(*np.diff(points, axis=0).T)
+        since = np.append(lengths[::-1].cumsum()[::-1], 0.0)
+        found = np.flatnonzero((since > LEAST_LOOP_M) & (away < _LOOP_M))
+        return int(found[np.argmin(away[found])]) if len(found) else None
 
     def rejoin(self, end: HalfEdgeId, line: Array) -> None:
         """Be on the edge that begins at another end, which a line (N, 2), local frame, comes from.

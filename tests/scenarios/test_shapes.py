@@ -119,6 +119,17 @@ def test_a_ring_without_a_vertex_is_driven_round_once() -> None:
     assert (joined.start, joined.end, joined.driven) == (vertex, vertex, True)
 
 
+def test_a_ring_is_closed_whose_beginning_was_taken_for_another_edge() -> None:
+    """A pillar as wide as people: for twenty seconds it may be one, and the room has no ring."""
+    canvas = Canvas(8.0, 8.0)
+    canvas.carve(1.0, 1.0, 7.0, 7.0)
+    canvas.build_disc(4.3, 3.6, 0.3)
+    twin = TwinConfig(seed=1, laser=HokuyoTwinConfig(model="URG-04LX"))
+    run = play(canvas.world("pillar"), Pose(2.0, 2.0, 0.0), twin=twin, limit=150.0)
+    assert_explored(run)
+    assert graph_shape(run) == (1, 0, 1)
+
+
 def test_two_ways_round_a_block_are_two_edges_between_the_same_vertices() -> None:
     """West and east of a block with a corridor on either side, and a dead end at each vertex."""
     free: list[Rectangle] = [

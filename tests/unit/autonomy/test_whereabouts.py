@@ -299,3 +299,23 @@ def test_an_edge_that_is_recognised_late_has_been_driven_round_its_bend() -> Non
     assert place is not None
     back = walk.where.backwards(later, place, Correspondence(), Pose(here.x, here.y, -math.pi / 2))
     assert back == Branch(20, forward=False)  # towards the south
+
+
+RING = [(1.0 + math.cos(a), math.sin(a)) for a in np.arange(math.pi, 3.0 * math.pi, 0.2)]
+
+
+@pytest.mark.parametrize(
+    ("way", "here", "found"),
+    [
+        ([(-1.0, 0.0), (-0.5, 0.0), *RING], (0.0, 0.1), 2),
+        ([(0.25 * i, 0.0) for i in range(20)], (4.9, 0.0), None),
+        ([(0.25 * i, 0.0) for i in range(20)], (0.5, 0.1), None),
+    ],
+    ids=["round", "straight on", "back by another way"],
+)
+def test_the_robot_has_come_round_where_it_is_on_its_way_once_more(
+    way: list[tuple[float, float]], here: tuple[float, float], found: int | None
+) -> None:
+    """A circle of radius 1 after a straight way onto it."""
+    where = Whereabouts(trail=[np.array(point) for point in way])
+    assert where.round_from(np.array(here)) == found
