@@ -45,7 +45,7 @@ class Mission:
         self._config, self._mapper = config, mapper
         self.where = Whereabouts()
         self.sharing: Sharing | None = None  # of frontiers with other robots, if there are any
-        # finds places (N, 2), m, map frame, from where there is floor to be seen that nobody has
+        # finds places (N, 2), m, map frame, that are worth another look when all is explored
         self.survey: Callable[[], Array] | None = None
         self.target: HalfEdgeId | None = None
         self.outcome: Outcome | None = None
@@ -493,7 +493,7 @@ class Mission:
             return Stand()
         blocked = self._given_up()
         if blocked:
-            self._end(view, "explored_with_blocked", f"frontiers given up: {blocked}")
+            self._end(view, "explored_with_blocked", f"frontiers given up: {blocked}{self.remark}")
         else:
             self._end(view, "explored", f"no frontier is left{self.remark}")
         return Stand()

@@ -24,7 +24,7 @@ class Task(NamedTuple):
 
 
 class OwnTasks:
-    """Back to vertices for the sake of certainty; to gaps in the map when all is explored."""
+    """Back to vertices for the sake of certainty; to what the map may lack when all is explored."""
 
     def __init__(self, config: CertaintyConfig, mission: Mission, mapper: Mapper) -> None:
         self._mission, self._mapper = mission, mapper
@@ -35,7 +35,7 @@ class OwnTasks:
         self._revisiting.configure(config)
 
     def reopen(self) -> None:
-        """Look at every gap once more: somebody wants the exploration to go on after its end."""
+        """Look at every place once more: somebody wants the exploration to go on after its end."""
         self._unseen = Unseen()
 
     def next(self, view: View, whereabouts: Callable[[], Situation | None]) -> Task | Stand | None:
@@ -48,7 +48,7 @@ class OwnTasks:
         here = whereabouts()
         if here is None:
             return None
-        task = self._revisit(view, here) or self._look_at_gap(view, here)
+        task = self._revisit(view, here) or self._look_again(view, here)
         mission.remark = self._remark()
         return task
 
@@ -61,8 +61,8 @@ class OwnTasks:
         decision = Decision(view.stamp, wanted.vertex, None, wanted.reason)
         return Task(ToVertex(wanted.vertex), decision)
 
-    def _look_at_gap(self, view: View, here: Situation) -> Task | Stand | None:
-        """To floor that nobody has seen, when all frontiers are explored."""
+    def _look_again(self, view: View, here: Situation) -> Task | Stand | None:
+        """To where the map may lack something, when all frontiers are explored."""
         is_alone = self._mission.sharing is None  # others may have seen it
         survey = self._mission.survey
         if survey is None or self._mapper.graph.frontiers() or not is_alone:
