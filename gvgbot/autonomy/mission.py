@@ -105,6 +105,11 @@ class Mission:
         half = None if self.target is None else graph.half_edge(self.target)
         return self.outcome is None and bool(graph.vertices) and (half is None or not half.open)
 
+    @property
+    def is_waiting(self) -> bool:
+        """Whether ways are closed that will be tried again."""
+        return self._obstructions.waiting
+
     def witness(self, view: View, known: Correspondence) -> list[Event]:
         """Learn from where somebody else drives the robot."""
         self._events = []
@@ -392,6 +397,7 @@ class Mission:
         """Open what was closed long enough ago; whether there was something."""
         opened = self._obstructions.open(self._mapper.graph, view.stamp)
         if opened:
+            self._examining_since = None
             self._events.append(Recovery(view.stamp, "try again", reason))
         return opened
 

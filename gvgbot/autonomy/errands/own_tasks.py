@@ -67,7 +67,7 @@ class OwnTasks:
         survey = self._mission.survey
         if survey is None or self._mapper.graph.frontiers() or not is_alone:
             return None
-        if self._unseen.is_done:
+        if self._unseen.is_done or self._mission.is_waiting:
             return None
         if not self._unseen.is_standing(view.travelled):
             return Stand()

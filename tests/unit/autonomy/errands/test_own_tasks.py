@@ -86,3 +86,15 @@ def test_while_frontiers_are_left_there_is_no_survey() -> None:
         known, _ = robot.mapper.observe(view)
         robot.errands.advance(view, known)
     assert robot.mission.target is not None
+
+
+def test_a_survey_waits_until_ways_are_open_again() -> None:
+    """Somebody stands in the only edge: no way leads to the gap until it is tried again."""
+    robot = Explorer([GAP], [])
+    while len(robot.mapper.graph.edges) == 0:
+        robot.look(CLOSED)
+    (edge,) = robot.mapper.graph.edges.values()
+    robot.mission._obstructions.close(robot.mapper.graph, [edge.a, edge.b], robot.stamp)
+    order = robot.until_it_moves_or_ends()
+    assert isinstance(order, Drive)
+    assert robot.stamp > CONFIG.retry_after_s
