@@ -10,7 +10,7 @@ from gvgbot.maps.gaps import gaps
 from gvgbot.maps.occupancy import occupancy_grid
 from gvgbot.maps.viewpoints import viewpoints
 
-_RESOLUTION_M, _REACH_M = 0.1, 8.0  # coarser than the saved grid: the robot stands and waits for it
+_STEP_M = 0.05  # between points of a way: a cell of the grid
 
 
 def survey(pipeline: Pipeline) -> Array:
@@ -25,7 +25,7 @@ def survey(pipeline: Pipeline) -> Array:
         for pose, keyframe in zip(poses, pipeline.keyframes, strict=True)
         if keyframe.scan is not None
     ]
-    grid = occupancy_grid(scans, _RESOLUTION_M, _REACH_M)
+    grid = occupancy_grid(scans)
     here, room = pipeline.map_base.position, pipeline.errands.room_m
     ways, found = _ways(pipeline), gaps(grid, here, room)
     if not len(ways):
@@ -40,6 +40,6 @@ def _ways(pipeline: Pipeline) -> Array:
     for edge in pipeline.mapper.graph.edges.values():
         line = belief.map_vertex(edge.a.vertex).transform(edge.polyline)
         along = np.concatenate([[0.0], np.hypot(*np.diff(line, axis=0).T).cumsum()])
-        stations = np.arange(0.0, along[-1], _RESOLUTION_M)
+        stations = np.arange(0.0, along[-1], _STEP_M)
         points.append(np.stack([np.interp(stations, along, line[:, k]) for k in (0, 1)], axis=1))
     return np.concatenate(points)

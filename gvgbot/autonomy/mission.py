@@ -316,7 +316,7 @@ class Mission:
             return self._drive(view, here, near)
         if scouting.lasted(view.stamp) > self._config.patience_s:
             scouting.end()
-            self._mapper.forget_strays(view)
+            self._forget_strays(view)
             if self.target is None or self._mapper.graph.half_edge(self.target) is not None:
                 self._give_up(view, "no way leads there")
         return self._drive(view, here, scouting.path_on(here))
@@ -430,7 +430,7 @@ class Mission:
         self._looked_around = 0
         half = None if self.target is None else self._mapper.graph.half_edge(self.target)
         if half is None:
-            self._mapper.forget_strays(view)
+            self._forget_strays(view)
             if self._mapper.graph.vertices and not self._mapper.graph.frontiers():
                 return
             if not self._mapper.graph.vertices and self._sees_all():
@@ -446,6 +446,11 @@ class Mission:
         self._obstructions.close(self._mapper.graph, [self.target], view.stamp, retries=_SECOND)
         self._events.append(Recovery(view.stamp, "give up a frontier", reason))
         self.target = None
+
+    def _forget_strays(self, view: View) -> None:
+        """Forget what nothing leads to; perhaps something is missing there now."""
+        self._mapper.forget_strays(view)
+        self._examining_since = None
 
     def _sees_all(self) -> bool:
         """Whether no floor is unseen that the robot could drive onto: it is in a closed room."""
@@ -519,7 +524,7 @@ class Mission:
         """Some frontiers cannot be reached: that is the end, after having looked for a way."""
         if self._scouting.lasted(view.stamp) < self._config.patience_s:
             return
-        self._mapper.forget_strays(view)
+        self._forget_strays(view)
         frontiers = len(self._mapper.graph.frontiers())
         if frontiers:
             reason = f"frontiers that cannot be reached: {frontiers}"

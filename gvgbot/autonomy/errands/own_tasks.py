@@ -29,6 +29,7 @@ class OwnTasks:
     def __init__(self, config: CertaintyConfig, mission: Mission, mapper: Mapper) -> None:
         self._mission, self._mapper = mission, mapper
         self._revisiting, self._unseen = Revisiting(config), Unseen()
+        self._surveyed: set[int] = set()  # edges that there were
 
     def configure(self, config: CertaintyConfig) -> None:
         """Use another configuration from now on."""
@@ -67,11 +68,12 @@ class OwnTasks:
         survey = self._mission.survey
         if survey is None or self._mapper.graph.frontiers() or not is_alone:
             return None
-        if self._unseen.is_done or self._mission.is_waiting:
+        edges = set(self._mapper.graph.edges)
+        if self._mission.is_waiting or (self._unseen.is_done and edges == self._surveyed):
             return None
         if not self._unseen.is_standing(view.travelled):
             return Stand()
-        starts = here.starts()
+        self._surveyed, starts = edges, here.starts()
 
         def metres_to(place: Array) -> float | None:
             foot = foot_of(self._mapper, place)

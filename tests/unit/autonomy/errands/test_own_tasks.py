@@ -98,3 +98,14 @@ def test_a_survey_waits_until_ways_are_open_again() -> None:
     order = robot.until_it_moves_or_ends()
     assert isinstance(order, Drive)
     assert robot.stamp > CONFIG.retry_after_s
+
+
+def test_another_survey_is_made_when_edges_have_gone_since_the_last() -> None:
+    """What nothing leads to is forgotten late: then there may be a blank where it was."""
+    robot = Explorer([], [GAP])
+    while robot.left == [[], [GAP]]:
+        robot.look(CLOSED)
+    robot.errands.own_tasks._surveyed.add(999)  # an edge that is not there any more
+    order = robot.until_it_moves_or_ends()
+    assert robot.left == []
+    assert isinstance(order, Drive)
