@@ -45,8 +45,9 @@ class Mission:
         self._config, self._mapper = config, mapper
         self.where = Whereabouts()
         self.sharing: Sharing | None = None  # of frontiers with other robots, if there are any
-        # finds places (N, 2), m, map frame, that are worth another look when all is explored
-        self.survey: Callable[[], Array] | None = None
+        # finds places (N, 2), m, map frame, that are worth another look when all is explored;
+        # None as long as that takes
+        self.survey: Callable[[], Array | None] | None = None
         self.target: HalfEdgeId | None = None
         self.outcome: Outcome | None = None
         self.reason = ""
@@ -433,10 +434,11 @@ class Mission:
             self._forget_strays(view)
             if self._mapper.graph.vertices and not self._mapper.graph.frontiers():
                 return
-            if not self._mapper.graph.vertices and self._sees_all():
+            is_closed = not self._mapper.graph.vertices and self._sees_all()
+            if is_closed:
                 self._end(view, "explored", "a space without edges, and no way out")
-                return
-            self._end_early(view, f"no vertex found, perhaps no way out: {reason}", reason)
+            elif is_closed is not None:
+                self._end_early(view, f"no vertex found, perhaps no way out: {reason}", reason)
             return
         has_left = self.where.on_edge not in (None, self.target)
         if has_left and self._backtracking.begin():
@@ -452,9 +454,15 @@ class Mission:
         self._mapper.forget_strays(view)
         self._examining_since = None
 
-    def _sees_all(self) -> bool:
-        """Whether no floor is unseen that the robot could drive onto: it is in a closed room."""
-        return self.survey is not None and not len(self.survey())
+    def _sees_all(self) -> bool | None:
+        """Whether no floor is unseen that the robot could drive onto: it is in a closed room.
+
+        None as long as the survey takes.
+        """
+        if self.survey is None:
+            return False
+        places = self.survey()
+        return None if places is None else not len(places)
 
     def _access(self, view: View) -> Order:
         """Go to the nearest edge, if the way there is free."""

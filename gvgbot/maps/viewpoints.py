@@ -9,6 +9,7 @@ from gvgbot.maps.occupancy import OccupancyGrid
 
 _BESIDE_M = 0.2  # a place so near to a way is on it
 _OFF_M = 2.0  # the robot goes so far off its ways: through a door, and it faces what it looks at
+_FAR_M = 8.0  # what is farther from all ways, on either axis, is not gone to
 _NEIGHBOURS = np.array([(0, 1), (1, 0), (0, -1), (-1, 0)])
 
 
@@ -25,11 +26,16 @@ def viewpoints(
     has_room = ndimage.distance_transform_edt(~walls) * cell > passage_m
     floor = reachable(is_floor(grid.cells) & has_room, (around - corner)[::-1] / cell)
     near_ways = _cells_near(ways, grid, floor)
-    found = []
-    for row, column in ((places - corner)[:, ::-1] / cell).astype(np.int64).tolist():
-        view = _on_the_way_there((row, column), floor, near_ways, round(_OFF_M / cell))
+    found, far = [], round(_FAR_M / cell)
+    for place in ((places - corner)[:, ::-1] / cell).astype(np.int64):
+        first = np.maximum(place - far, 0)
+        around_it = tuple(slice(a, b) for a, b in zip(first, place + far, strict=True))
+        row, column = (place - first).tolist()
+        view = _on_the_way_there(
+            (row, column), floor[around_it], near_ways[around_it], round(_OFF_M / cell)
+        )
         if view is not None:
-            found.append(view)
+            found.append(view + first)
     return corner + (np.array(found).reshape(-1, 2)[:, ::-1] + 0.5) * cell
 
 

@@ -1,5 +1,7 @@
 """Gaps in what a robot has seen of buildings of known walls."""
 
+import asyncio
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +12,7 @@ from gvgbot.config import load_config
 from gvgbot.drivers.world import World
 from gvgbot.geometry import STANDSTILL, Array, Pose
 from gvgbot.hal.messages import Odometry
+from gvgbot.robot import BackgroundSurvey
 from gvgbot.survey import survey
 from tests.unit.autonomy.sights import carved, sweep
 
@@ -38,3 +41,36 @@ def test_what_lies_in_the_shadow_of_a_corner_is_a_gap_until_the_robot_looks_roun
     (place,) = places_after(building, 3.0)
     assert place == pytest.approx([3.0, 1.5], abs=0.3)
     assert len(places_after(building, 6.0)) == 0
+
+
+def test_a_daemon_makes_its_survey_off_the_loop_and_forgets_it_when_the_robot_drives_on() -> None:
+    config = load_config()
+    pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
+    in_background = BackgroundSurvey(pipeline)
+    done: list[float] = []
+
+    async def off_loop(function: Callable[[], None]) -> None:
+        await asyncio.sleep(0.0)
+        function()
+        done.append(pipeline.travelled)
+
+    async def until_there_is_something() -> Array | None:
+        for _ in range(10):
+            await asyncio.sleep(0.0)
+        return in_background.places()
+
+    async def story() -> None:
+        async with asyncio.TaskGroup() as tasks:
+            making = tasks.create_task(in_background.make(off_loop))
+            assert in_background.places() is None
+            found = await until_there_is_something()
+            assert found is not None
+            assert len(found) == 0
+            assert in_background.places() is None
+            pipeline.travelled = 5.0
+            assert await until_there_is_something() is None  # it was made elsewhere
+            assert await until_there_is_something() is not None
+            making.cancel()
+
+    asyncio.run(story())
+    assert done == [0.0, 5.0, 5.0]

@@ -73,6 +73,9 @@ class OwnTasks:
             return None
         if not self._unseen.is_standing(view.travelled):
             return Stand()
+        places = survey()
+        if places is None:
+            return Stand()
         self._surveyed, starts = edges, here.starts()
 
         def metres_to(place: Array) -> float | None:
@@ -80,7 +83,7 @@ class OwnTasks:
             route = None if foot is None else route_to_foot(here, starts, foot)
             return None if route is None else route.metres
 
-        place = self._unseen.next(survey(), metres_to)
+        place = self._unseen.next(places, metres_to)
         if place is None:
             return None
         decision = Decision(view.stamp, None, None, "something may be missing there")
