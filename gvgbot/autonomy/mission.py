@@ -450,9 +450,12 @@ class Mission:
         self.target = None
 
     def _forget_strays(self, view: View) -> None:
-        """Forget what nothing leads to; perhaps something is missing there now."""
+        """Forget what nothing leads to; if there was something, it may be missing now."""
+        vertices = self._mapper.graph.vertices
+        before = len(vertices)
         self._mapper.forget_strays(view)
-        self._examining_since = None
+        if len(vertices) < before:
+            self._examining_since = None
 
     def _sees_all(self) -> bool | None:
         """Whether no floor is unseen that the robot could drive onto: it is in a closed room.
