@@ -29,9 +29,10 @@ PEOPLE = "twin.people="
 def keep(rows: list[Row], to: Path = RESULTS) -> dict[str, int]:
     """Write the plain runs to their files, worlds in order; how many went to each."""
     known = sorted((row for row in rows if _family(row) in NAMES), key=_order)
+    worlds = [row for row in known if _family(row) != PLANS]
     plans = [row for row in known if _family(row) == PLANS]
     kept = {
-        "worlds.jsonl": [row for row in known if row not in plans and not _extras(row)],
+        "worlds.jsonl": [row for row in worlds if not _extras(row)],
         "floor_plans.jsonl": [row for row in plans if not _extras(row)],
         "rough_floor_plans.jsonl": [row for row in plans if is_rough(row)],
     }

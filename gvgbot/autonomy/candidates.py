@@ -53,6 +53,11 @@ class Candidates:
         self._mistakes = [one for one in self._mistakes if travelled - one[1] < _MISTAKES_KEPT_M]
         self._mistakes.append((position, travelled))
 
+    def forget(self) -> None:
+        """Begin anew: the local frame is another one."""
+        self._all.clear()
+        self._mistakes.clear()
+
     def note(self, sighting: Sighting, away: float, travelled: float) -> Candidate:
         """The candidate of a sighting from `away` metres, with this sighting counted."""
         self._all = [c for c in self._all if travelled - c.seen_at < _MEMORY_M]

@@ -195,7 +195,7 @@ class ReturningPipeline(Pipeline):
             vertex.seen_at = min(
                 vertex.seen_at, self.travelled - self._config.recognition.tracked_m
             )
-        mapper._unbelieved._all.clear()
+        mapper._unbelieved.forget()
         self.mission.where, self.mission.target = Whereabouts(), None
         self.mission.reason = ""
 

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from gvgbot.geometry import Array
+from gvgbot.maps.map_server import FREE_THRESH, OCCUPIED_THRESH
 from gvgbot.maps.occupancy import UNKNOWN, Cells, OccupancyGrid
 
-_FREE, _OCCUPIED = 25, 65  # percent: below it is floor, from there on a wall
 _DEPTH_M, _AREA_M2 = 1.0, 0.5  # so deep and so large is the unseen floor that is worth a drive
 _JOINED_M = 0.1  # a brink is thickened by so much, to be in one piece
 
@@ -45,13 +45,13 @@ def gaps(grid: OccupancyGrid, around: Array, passage_m: float) -> Array:
 
 
 def is_wall(cells: Cells) -> Mask:
-    """Which cells are occupied."""
-    return np.asarray(cells >= _OCCUPIED)
+    """Which cells are a wall, as in a saved map."""
+    return np.asarray(cells > 100.0 * OCCUPIED_THRESH)
 
 
 def is_floor(cells: Cells) -> Mask:
-    """Which cells are seen to be free."""
-    return np.asarray((cells >= 0) & (cells < _FREE))
+    """Which cells are seen to be free, as in a saved map."""
+    return np.asarray((cells >= 0) & (cells < 100.0 * FREE_THRESH))
 
 
 def reachable(floor: Mask, here: Array) -> Mask:

@@ -53,9 +53,10 @@ def _on_the_way_there(
     place: tuple[int, int], floor: Mask, near_ways: Mask, off: int
 ) -> Array | None:
     """The (row, column) at most so many cells off the nearest way, on the path to a place."""
+    floor, near_ways = np.pad(floor, 1), np.pad(near_ways, 1)  # every cell has four neighbours
     steps = np.full(floor.shape, -1)
     reached = np.zeros(floor.shape, np.bool_)
-    reached[place] = floor[place]
+    reached[place[0] + 1, place[1] + 1] = floor[place[0] + 1, place[1] + 1]
     front, count = reached, 0
     while not (front & near_ways).any():
         if not front.any():
@@ -67,4 +68,4 @@ def _on_the_way_there(
     for _ in range(min(off, count)):
         count -= 1
         here = next(there for there in here + _NEIGHBOURS if steps[tuple(there)] == count)
-    return np.asarray(here, np.float64)
+    return np.asarray(here - 1, np.float64)

@@ -21,7 +21,7 @@ from gvgbot.autonomy.slam.ekf import add_vertex
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex
 from gvgbot.autonomy.slam.recognition import RecognitionConfig
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
-from gvgbot.autonomy.views import View
+from gvgbot.autonomy.views import Correspondence, View
 from gvgbot.geometry import Array, Pose
 from tests.unit.autonomy.local_graphs import Point, drawn
 
@@ -53,10 +53,14 @@ class Robot:
         """The order after one more view from where the robot is."""
         view = View(self._count, self.stamp, self.travelled, self.pose, gvg, NOTHING_SEEN)
         known, seen = self.mapper.observe(view)
-        order, done = self.mission.advance(view, known)
+        order, done = self.decide(view, known)
         self.events += [*seen, *done]
         self.stamp, self._count = self.stamp + period, self._count + 1
         return order
+
+    def decide(self, view: View, known: Correspondence) -> tuple[Order, list[Event]]:
+        """What it is asked for."""
+        return self.mission.advance(view, known)
 
     def stand(self, gvg: LocalGvg, times: int, *, period: float = 0.5) -> Order:
         """The last order after some views from the same place."""

@@ -4,10 +4,10 @@ import numpy as np
 
 from gvgbot.autonomy.control.orders import Drive, Order, Stand
 from gvgbot.autonomy.errands import Errands
-from gvgbot.autonomy.events import Decision, ErrandEnded
-from gvgbot.autonomy.views import View
-from gvgbot.geometry import Array, Pose
-from tests.unit.autonomy.test_mission import CLOSED, CONFIG, NOTHING_SEEN, TEE, Robot
+from gvgbot.autonomy.events import Decision, ErrandEnded, Event
+from gvgbot.autonomy.views import Correspondence, View
+from gvgbot.geometry import Array
+from tests.unit.autonomy.test_mission import CLOSED, CONFIG, TEE, Robot
 
 GAP = [2.0, 0.0]
 
@@ -24,13 +24,8 @@ class Explorer(Robot):
     def _survey(self) -> Array:
         return np.array(self.left.pop(0)).reshape(-1, 2)
 
-    def look(self, gvg: object, *, period: float = 0.5) -> Order:
-        view = View(self._count, self.stamp, self.travelled, self.pose, CLOSED, NOTHING_SEEN)
-        known, seen = self.mapper.observe(view)
-        order, done = self.errands.advance(view, known)
-        self.events += [*seen, *done]
-        self.stamp, self._count = self.stamp + period, self._count + 1
-        return order
+    def decide(self, view: View, known: Correspondence) -> tuple[Order, list[Event]]:
+        return self.errands.advance(view, known)
 
     def until_it_moves_or_ends(self) -> Order:
         order: Order = Stand()
@@ -81,10 +76,7 @@ def test_who_asks_it_to_go_on_gets_another_look_at_every_gap() -> None:
 
 def test_while_frontiers_are_left_there_is_no_survey() -> None:
     robot = Explorer()
-    view = View(0, 0.0, 0.0, Pose(), TEE, NOTHING_SEEN)
-    for _ in range(20):
-        known, _ = robot.mapper.observe(view)
-        robot.errands.advance(view, known)
+    robot.stand(TEE, 20)
     assert robot.mission.target is not None
 
 
