@@ -111,3 +111,10 @@ def rotated_covariance(covariance: Array, angle: float) -> Array:
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     rotated: Array = turn @ covariance @ turn.T
     return rotated
+
+
+def resampled(line: Array, spacing: float) -> Array:
+    """Points (M, 2) along a line (N, 2), its ends among them, not farther apart than `spacing`."""
+    along = np.concatenate([[0.0], np.hypot(*np.diff(line, axis=0).T).cumsum()])
+    at = np.linspace(0.0, along[-1], 2 + int(along[-1] / spacing))
+    return np.column_stack([np.interp(at, along, values) for values in line.T])

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gvgbot.autonomy.estimate import smoothed
+from gvgbot.autonomy.estimate import scans_at, smoothed
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.graph import Edge, Vertex
 from gvgbot.drivers.world import World, save_world
@@ -57,12 +57,7 @@ def map_files(pipeline: Pipeline, journey: Journey, title: str) -> dict[str, byt
     """All files of a run but summary and events, by name."""
     keyframes, vertices, covariances = smoothed(pipeline)
     graph = route_graph(pipeline, vertices, covariances)
-    scans = [
-        (pose, keyframe.scan)
-        for pose, keyframe in zip(keyframes, pipeline.keyframes, strict=True)
-        if keyframe.scan is not None
-    ]
-    grid = occupancy_grid(scans)
+    grid = occupancy_grid(scans_at(keyframes, pipeline))
     estimate = _trajectory(journey, _corrected(journey, pipeline, keyframes))
     start = pipeline.keyframes[0].odom_base if pipeline.keyframes else Pose()
     odometry = _trajectory(journey, seen_from(_rows([start]), _rows(journey.odom_base)))

@@ -12,11 +12,10 @@ import structlog
 from gvgbot.autonomy import events
 from gvgbot.autonomy.errands import Declined
 from gvgbot.autonomy.loop import Loop
-from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.clock import Clock, LoopClock
 from gvgbot.config import Config
 from gvgbot.errors import GvgbotError
-from gvgbot.geometry import Array, Twist
+from gvgbot.geometry import Twist
 from gvgbot.hal.guard import Guard, Reason
 from gvgbot.hal.messages import Contact, Odometry, Scan
 from gvgbot.journal import GuardJournal, log_event, status_line
@@ -24,21 +23,20 @@ from gvgbot.links import Devices, Links
 from gvgbot.live_feed import LiveFeed, Pace
 from gvgbot.live_map import LiveMap, News
 from gvgbot.live_ros import LiveRos, Neighbour, UnixTime
+from gvgbot.live_survey import LiveSurvey
 from gvgbot.live_team import LiveTeam, TeamNetwork
 from gvgbot.maps.run_directory import record_of
 from gvgbot.persistence.keeper import Keeper
 from gvgbot.requests import Answer, Asked
 from gvgbot.service import Notifier
-from gvgbot.session import Session, still
+from gvgbot.session import Session
 from gvgbot.simulation import Simulation
 from gvgbot.snapshots import sign, state
 from gvgbot.steering import Steering
-from gvgbot.survey import survey
 from gvgbot.topics import EVENTS_KEPT, HEALTH, MAP, STATE, Event, Events, Health, Payload, State
 from gvgbot.vitals import Vitals
 
 SAVE_EVERY = 30.0  # s at least between two savings while the map grows
-_DRIVEN_ON_M = 0.1  # since a survey was begun
 STUCK_AFTER = 1.0  # s without a control cycle, though the base is there
 # what changes the past as it is known now
 _CORRECTIONS = events.LoopClosed | events.DoubtSettled | events.ClosureRevoked
@@ -102,7 +100,7 @@ class Robot:
         self._pipeline = session.pipeline
         self._grown, self._finished = asyncio.Event(), asyncio.Event()
         self._saving = asyncio.Lock()  # one at a time
-        self._survey = BackgroundSurvey(session.pipeline)
+        self._survey = LiveSurvey(session.pipeline)
         self._pipeline.mission.survey = self._survey.places
         self._odometry: Odometry | None = None
         self._sequence = 0
@@ -382,40 +380,6 @@ class Robot:
             base=self._devices.base_health,
             requests=self._session.config.telemetry.requests,
         )
-
-
-class BackgroundSurvey:
-    """What the map may lack, found off the loop: that takes longer than a robot may be deaf."""
-
-    def __init__(self, pipeline: Pipeline) -> None:
-        self._pipeline = self._past = pipeline
-        self._wanted = asyncio.Event()
-        self._found: Array | None = None
-        self._travelled = 0.0  # by the pipeline, when the survey began
-
-    def places(self) -> Array | None:
-        """The places (N, 2), m, map frame; None while they are looked for.
-
-        What was found for a robot that has driven on since is of no use.
-        """
-        if self._wanted.is_set():
-            return None
-        found, self._found = self._found, None
-        if found is not None and self._pipeline.travelled < self._travelled + _DRIVEN_ON_M:
-            return found
-        self._travelled, self._past = self._pipeline.travelled, still(self._pipeline)
-        self._wanted.set()
-        return None
-
-    async def make(self, off_loop: Callable[[Callable[[], None]], Awaitable[None]]) -> None:
-        """Make surveys that are wanted, until cancelled."""
-        while True:
-            await self._wanted.wait()
-            await off_loop(self._look)
-            self._wanted.clear()
-
-    def _look(self) -> None:
-        self._found = survey(self._past)
 
 
 def _publish_drawn(network: Network, draw: Callable[[], list[News]]) -> None:

@@ -1,6 +1,5 @@
 """One exploration: the mind, the way it went, and what both leave in the run directory."""
 
-import copy
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,7 +10,7 @@ import structlog
 
 from gvgbot import __version__
 from gvgbot.autonomy import events
-from gvgbot.autonomy.estimate import still_past
+from gvgbot.autonomy.estimate import still
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.config import Config
 from gvgbot.drivers.tapped import Tap
@@ -198,16 +197,6 @@ class Session:
             "version": __version__,
             "config": self.config,
         }
-
-
-def still(pipeline: Pipeline) -> Pipeline:
-    """A copy, for reports, that does not change as the pipeline goes on.
-
-    What is only ever appended to is copied as a list, what is changed in place is copied deeply.
-    """
-    copied = still_past(pipeline)
-    copied.mapper.graph = copy.deepcopy(pipeline.mapper.graph)
-    return copied
 
 
 def still_journey(journey: Journey) -> Journey:

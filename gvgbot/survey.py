@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from gvgbot.autonomy.estimate import smoothed_keyframes
+from gvgbot.autonomy.estimate import scans_at, smoothed_keyframes
 from gvgbot.autonomy.pipeline import Pipeline
-from gvgbot.geometry import Array
+from gvgbot.geometry import Array, resampled
 from gvgbot.maps.blanks import blanks
 from gvgbot.maps.gaps import gaps
 from gvgbot.maps.occupancy import occupancy_grid
@@ -19,13 +19,7 @@ def survey(pipeline: Pipeline) -> Array:
     From there the robot could drive onto floor that nobody has seen, or sees some that was seen but
     that no edge leads to.
     """
-    poses = smoothed_keyframes(pipeline)
-    scans = [
-        (pose, keyframe.scan)
-        for pose, keyframe in zip(poses, pipeline.keyframes, strict=True)
-        if keyframe.scan is not None
-    ]
-    grid = occupancy_grid(scans)
+    grid = occupancy_grid(scans_at(smoothed_keyframes(pipeline), pipeline))
     here, room = pipeline.map_base.position, pipeline.errands.room_m
     ways, found = _ways(pipeline), gaps(grid, here, room)
     if not len(ways):
@@ -39,7 +33,5 @@ def _ways(pipeline: Pipeline) -> Array:
     belief, points = pipeline.mapper.belief, [np.empty((0, 2))]
     for edge in pipeline.mapper.graph.edges.values():
         line = belief.map_vertex(edge.a.vertex).transform(edge.polyline)
-        along = np.concatenate([[0.0], np.hypot(*np.diff(line, axis=0).T).cumsum()])
-        stations = np.arange(0.0, along[-1], _STEP_M)
-        points.append(np.stack([np.interp(stations, along, line[:, k]) for k in (0, 1)], axis=1))
+        points.append(resampled(line, _STEP_M))
     return np.concatenate(points)

@@ -11,6 +11,7 @@ from gvgbot.autonomy.slam.revisits import Passage, revisits
 from gvgbot.autonomy.slam.smoothing import Constraint, PoseGraph
 from gvgbot.autonomy.views import Observation
 from gvgbot.geometry import Array, Pose
+from gvgbot.hal.messages import Scan
 
 
 class Estimate(NamedTuple):
@@ -47,6 +48,25 @@ def still_past(pipeline: Pipeline) -> Pipeline:
     copied.mapper = copy.copy(pipeline.mapper)
     copied.mapper.observations = pipeline.mapper.observations.copy()
     return copied
+
+
+def still(pipeline: Pipeline) -> Pipeline:
+    """A copy, for reports, that does not change as the pipeline goes on.
+
+    What is only ever appended to is copied as a list, what is changed in place is copied deeply.
+    """
+    copied = still_past(pipeline)
+    copied.mapper.graph = copy.deepcopy(pipeline.mapper.graph)
+    return copied
+
+
+def scans_at(keyframes: list[Pose], pipeline: Pipeline) -> list[tuple[Pose, Scan]]:
+    """The scans that were kept, each with where its keyframe is estimated to be (map_base)."""
+    return [
+        (pose, keyframe.scan)
+        for pose, keyframe in zip(keyframes, pipeline.keyframes, strict=True)
+        if keyframe.scan is not None
+    ]
 
 
 def _solved(pipeline: Pipeline) -> tuple[list[Pose], PoseGraph, Array]:

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.control.reflexes import Felt
 from gvgbot.autonomy.errands import Declined
-from gvgbot.autonomy.estimate import Estimate, smoothed
+from gvgbot.autonomy.estimate import Estimate, scans_at, smoothed
 from gvgbot.autonomy.events import Event, Finished, Recovery
 from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.localisation import Localisation
@@ -113,11 +113,7 @@ class ReturningPipeline(Pipeline):
 
     def _begin_to_seek(self, scan: Scan) -> list[Event]:
         self._estimate = smoothed(self)
-        scans = [
-            (pose, keyframe.scan)
-            for pose, keyframe in zip(self._estimate.keyframes, self.keyframes, strict=True)
-            if keyframe.scan is not None
-        ]
+        scans = scans_at(self._estimate.keyframes, self)
         self._relocaliser = Relocaliser(KnownWalls(scans), self._matching)
         self._seeker, self._tour = self._new_mind(), None
         self._seeker._odometry = self._odometry

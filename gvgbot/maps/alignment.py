@@ -12,7 +12,7 @@ from scipy.optimize import linear_sum_assignment
 from scipy.spatial import KDTree
 from scipy.spatial.distance import cdist
 
-from gvgbot.geometry import Array, Pose
+from gvgbot.geometry import Array, Pose, resampled
 from gvgbot.maps.moved import moved_graph
 from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
 
@@ -146,19 +146,12 @@ def _edge_distances(a: RouteGraph, b: RouteGraph, names: dict[int, int], reach: 
 
 def _farthest(edge: MapEdge, other: MapEdge) -> float:
     """How far (m) the point of an edge that is farthest from another is from it."""
-    points, begins = _sampled(edge)[:, None], other.polyline[:-1]
+    points, begins = resampled(edge.polyline, _STEP_M)[:, None], other.polyline[:-1]
     ways = np.diff(other.polyline, axis=0)
     squares = np.maximum((ways**2).sum(axis=1), np.finfo(float).tiny)
     shares = np.clip(((points - begins) * ways).sum(axis=2) / squares, 0.0, 1.0)
     gaps = points - (begins + shares[..., None] * ways)
     return float(np.hypot(gaps[..., 0], gaps[..., 1]).min(axis=1).max())
-
-
-def _sampled(edge: MapEdge) -> Array:
-    """Points (N, 2) along an edge, close to each other."""
-    lengths = np.concatenate([[0.0], np.hypot(*np.diff(edge.polyline, axis=0).T).cumsum()])
-    at = np.linspace(0.0, lengths[-1], 2 + int(lengths[-1] / _STEP_M))
-    return np.column_stack([np.interp(at, lengths, values) for values in edge.polyline.T])
 
 
 def _ends(graph: RouteGraph) -> Complex:

@@ -21,7 +21,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
 from gvgbot.autonomy.slam.recognition import match_bearings
-from gvgbot.geometry import Array, Pose, wrap_angle
+from gvgbot.geometry import Array, Pose, resampled, wrap_angle
 from gvgbot.team.chart import Chart, ChartVertex, thinned
 
 _SAME_M = 0.7  # vertices nearer to each other may be one
@@ -167,7 +167,9 @@ class Side:
     @cached_property
     def ways(self) -> tuple[Array, Array]:
         """Points (N, 2) along all edges, and how far (N,) there is surely no wall."""
-        lines = [(_sampled(e.polyline), e.min_clearance) for e in self.chart.edges.values()]
+        lines = [
+            (resampled(e.polyline, _SPACING_M), e.min_clearance) for e in self.chart.edges.values()
+        ]
         points = np.concatenate([np.empty((0, 2)), *(line for line, _ in lines)])
         free = np.concatenate([np.empty(0), *(np.full(len(line), c) for line, c in lines)])
         return points, free
@@ -486,10 +488,3 @@ def least_squares(a: Array, b: Array) -> tuple[Pose, Array]:
     covariance[:2, 2] = covariance[2, :2] = of_turn * lever
     covariance[2, 2] = of_turn
     return pose, covariance
-
-
-def _sampled(polyline: Array) -> Array:
-    """Points (N, 2) along a line, close to each other."""
-    along = np.concatenate([[0.0], np.hypot(*np.diff(polyline, axis=0).T).cumsum()])
-    at = np.linspace(0.0, along[-1], 2 + int(along[-1] / _SPACING_M))
-    return np.column_stack([np.interp(at, along, values) for values in polyline.T])

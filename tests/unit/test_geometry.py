@@ -13,6 +13,7 @@ from gvgbot.geometry import (
     Pose,
     Twist,
     composed,
+    resampled,
     seen_from,
     wrap_angle,
     wrap_angles,
@@ -146,3 +147,15 @@ def test_rows_of_poses_are_composed_and_seen_from_each_other_as_matrices_say(
 def test_no_poses_composed_are_none() -> None:
     nothing = np.zeros((0, 3))
     assert composed(nothing, nothing).shape == seen_from(nothing, nothing).shape == (0, 3)
+
+
+@pytest.mark.parametrize("spacing", [0.05, 0.3, 10.0])
+def test_a_line_keeps_its_ends_and_its_corner_when_it_is_resampled(spacing: float) -> None:
+    """An L of 3 m and 4 m: every point is on one of its legs, and none far from the next."""
+    points = resampled(np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 4.0]]), spacing)
+    assert points[[0, -1]].tolist() == [[0.0, 0.0], [3.0, 4.0]]
+    on_first = (points[:, 1] == 0.0) & (points[:, 0] <= 3.0)
+    on_second = np.isclose(points[:, 0], 3.0) & (points[:, 1] <= 4.0)
+    assert (on_first | on_second).all()
+    steps = np.hypot(*np.diff(points, axis=0).T)
+    assert steps.max() <= spacing

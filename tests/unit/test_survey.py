@@ -12,7 +12,7 @@ from gvgbot.config import load_config
 from gvgbot.drivers.world import World
 from gvgbot.geometry import STANDSTILL, Array, Pose
 from gvgbot.hal.messages import Odometry
-from gvgbot.robot import BackgroundSurvey
+from gvgbot.live_survey import LiveSurvey
 from gvgbot.survey import survey
 from tests.unit.autonomy.sights import carved, sweep
 
@@ -46,7 +46,7 @@ def test_what_lies_in_the_shadow_of_a_corner_is_a_gap_until_the_robot_looks_roun
 def test_a_daemon_makes_its_survey_off_the_loop_and_forgets_it_when_the_robot_drives_on() -> None:
     config = load_config()
     pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
-    in_background = BackgroundSurvey(pipeline)
+    in_background = LiveSurvey(pipeline)
     done: list[float] = []
 
     async def off_loop(function: Callable[[], None]) -> None:
