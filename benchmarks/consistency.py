@@ -6,7 +6,7 @@
 
 All runs are in this process, one after the other, in virtual time. For each a line is printed:
 NEES of the pose at keyframes (3 degrees of freedom), of the vertices of the map and of the filter
-(2), and of closures against where the vertex truly is from (3); how many closures were wrong, and
+(2), and of closures against the sight of the vertex before (3); how many closures were wrong, and
 how many vertices were entered twice; end error and vertex RMSE. FILE keeps the numbers as lines of
 JSON; runs that are in there are not run again. Then the means, each with the band in which 95 % of
 such means lie if the errors are as the covariances say. Errors of one run hang together, so a run
@@ -172,17 +172,27 @@ def _vertices(pipeline: Pipeline, places: Array) -> Row:
 
 
 def _closures(pipeline: Watched, truth: list[Pose]) -> Row:
-    """Each closure against the place where the vertex was before it, both by the true poses."""
+    """Each closure against the place where the vertex was before it, both by the true poses.
+
+    How wrong it is, is by the newest sight of the vertex before; how wrong in units of what both
+    claim, by the newest one from near by, which told the heading as well.
+    """
     closed = {(keyframe, event.vertex) for keyframe, event in pipeline.closures}
-    last, errors, offs = dict[int, Pose](), list[tuple[Array, Array]](), list[float]()
+    newest, whole = dict[int, Pose](), dict[int, tuple[Pose, Array]]()
+    errors, offs = list[tuple[Array, Array]](), list[float]()
     for seen in pipeline.mapper.observations:
         here = truth[seen.keyframe].compose(seen.base_vertex)
-        if (seen.keyframe, seen.vertex) in closed and seen.vertex in last:
-            off = _difference(here, last[seen.vertex])
+        is_whole = len(seen.R) == 3
+        covariance = rotated_covariance(seen.R, truth[seen.keyframe].theta) if is_whole else seen.R
+        if (seen.keyframe, seen.vertex) in closed and seen.vertex in newest:
+            off = _difference(here, newest[seen.vertex])
             offs.append(float(np.hypot(*off[:2])))
-            if len(seen.R) == 3:
-                errors.append((off, rotated_covariance(seen.R, truth[seen.keyframe].theta)))
-        last[seen.vertex] = here
+            if is_whole and seen.vertex in whole:
+                before, claimed = whole[seen.vertex]
+                errors.append((_difference(here, before), covariance + claimed))
+        newest[seen.vertex] = here
+        if is_whole:
+            whole[seen.vertex] = here, covariance
     return {
         "closures": len(offs),
         "wrong": sum(off > WRONG_M for off in offs),

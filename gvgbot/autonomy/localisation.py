@@ -69,7 +69,7 @@ class LocalMaps:
         Both covariances are in the frame of the base. Without enough walls it is where odometry
         has it. Wheels may have turned without effect, so it may as well be where it was `before`.
         """
-        motion = self._calibration.corrected(motion, duration)
+        motion, Q = self._calibration.corrected(motion, duration), self._calibration.scattered(Q)
         prior = before.compose(motion)
         still = Pose(before.x, before.y, prior.theta)
         slipping = [] if self._matching.search_rad else [(still, _SLIPPING * Q)]

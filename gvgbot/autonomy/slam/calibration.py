@@ -1,7 +1,8 @@
 """What is constantly wrong with odometry, learnt from how scan matching corrects it.
 
 A scale of all distances, a scale of all turns, and a turn rate that is felt while there is none.
-Walls correct each step only in part, so what is left of a constant error would add up.
+Walls correct each step only in part, so what is left of a constant error would add up. How far the
+corrections scatter tells how noisy odometry is: wheels wear, and no floor is like another.
 """
 
 import numpy as np
@@ -11,15 +12,22 @@ from gvgbot.geometry import Array, Pose
 _SIGMA = np.array([0.02, 0.01, 0.0005])  # before anything is known: 1, 1, rad/s
 _WANDER = np.array([1e-5, 1e-5, 1e-6])  # of each with every step
 _SURPRISING = 16.0  # squared Mahalanobis distance of a correction that tells of a slip
+_NOISE = (0.5, 25.0)  # variance of odometry, least and most, in units of what is expected
+_RATE, _FEW = 0.02, 20.0  # at which it is learnt with each step, and the steps until it is that low
+_ODDEST = 9.0  # a correction says no more than one of three sigmas
 _LEAST = 1e-10 * np.eye(3)  # variance of a correction where walls say nothing, m^2 and rad^2
 
 
 class Calibration:
-    """Belief about the three errors: mean and covariance."""
+    """Belief about the three errors: mean and covariance.
+
+    `noise` (2,) is the variance of distances and of turns, in units of what is expected.
+    """
 
     def __init__(self) -> None:
         self.x = np.zeros(3)
         self.P = np.diag(_SIGMA**2)
+        self.noise, self._told = np.ones(2), np.zeros(2)  # and how many steps told of it
 
     def corrected(self, motion: Pose, duration: float) -> Pose:
         """A motion that odometry felt in some seconds, as it most probably was."""
@@ -29,6 +37,11 @@ class Calibration:
             motion.y * (1.0 + distance),
             motion.theta * (1.0 + turn) + rate * duration,
         )
+
+    def scattered(self, Q: Array) -> Array:
+        """The covariance (3, 3) of a motion, which is expected to be Q, as it has proved to be."""
+        sigmas = np.sqrt(self.noise[[0, 0, 1]])
+        return np.asarray(Q * np.outer(sigmas, sigmas), np.float64)
 
     def learn(self, motion: Pose, duration: float, change: Pose, Q: Array, C: Array) -> None:
         """Account for the change that walls made to the pose after a corrected motion.
@@ -49,9 +62,22 @@ class Calibration:
         r = np.array([change.x, change.y, change.theta])
         P = self.P + np.diag(_WANDER**2)
         S = H @ P @ H.T + Q - C + _LEAST
+        self._learn_noise(r, S, Q, C)
         if r @ np.linalg.solve(S, r) > _SURPRISING:
             return
         K = np.linalg.solve(S, H @ P).T
         self.x = self.x + K @ r
         P -= K @ S @ K.T
         self.P = (P + P.T) / 2
+
+    def _learn_noise(self, r: Array, S: Array, Q: Array, C: Array) -> None:
+        """Let the noise follow the squares of corrections r (3,) over their variances in S (3, 3).
+
+        They are 1 on average if it is right; a step counts by how much of an error it makes good.
+        """
+        axes = [0, 2]  # along the way, and the heading
+        counts = np.maximum(0.0, 1.0 - C[axes, axes] / Q[axes, axes]) ** 2
+        self._told += counts
+        rate = np.maximum(_RATE, 1.0 / (_FEW + self._told)) * counts
+        odd = np.minimum(r[axes] ** 2 / S[axes, axes], _ODDEST)
+        self.noise = np.clip(self.noise * np.exp(rate * (odd - 1.0)), *_NOISE)

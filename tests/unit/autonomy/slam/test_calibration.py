@@ -92,3 +92,40 @@ def test_the_frame_of_the_step_does_not_matter() -> None:
     change = Pose(0.004 * np.cos(angle), -0.004 * np.sin(angle), 0.0)
     turned.learn(Pose(0.25, 0.0, angle), 0.0, change, around[0], around[1])
     assert np.isclose(turned.x[0], straight.x[0])
+
+
+def noise_found(actual: float, walls: Array, *, seed: int, steps: int = 400) -> Array:
+    """What is learnt of wheels and gyro whose variance is so many times what Q says."""
+    rng, calibration = np.random.default_rng(seed), Calibration()
+    sigmas = np.where(np.diag(walls) > 0, 1 / np.sqrt(np.maximum(np.diag(walls), 1)), 0.0)
+    for _ in range(steps):
+        expected = calibration.scattered(Q)
+        C = np.asarray(np.linalg.inv(np.linalg.inv(expected) + walls), np.float64)
+        off = rng.multivariate_normal(np.zeros(3), actual * Q) + rng.normal(0.0, sigmas)
+        change = Pose.from_array(C @ walls @ off)
+        calibration.learn(Pose(0.25, 0.0, 0.0), 0.5, change, expected, C)
+    return calibration.noise
+
+
+def test_how_noisy_odometry_is_is_found() -> None:
+    found = np.array([noise_found(4.0, WALLS, seed=seed) for seed in range(10)])
+    assert np.allclose(found.mean(axis=0), 4.0, rtol=0.25)
+
+
+def test_noise_as_expected_stays() -> None:
+    found = np.array([noise_found(1.0, WALLS, seed=seed) for seed in range(10)])
+    assert np.allclose(found.mean(axis=0), 1.0, rtol=0.15)
+
+
+def test_walls_along_which_one_drives_say_nothing_about_the_noise_of_distances() -> None:
+    side_walls = np.diag([0.0, 1.0 / 0.004**2, 1.0 / 0.001**2])
+    along, heading = noise_found(4.0, side_walls, seed=1)
+    assert along == 1.0
+    assert heading > 2.0
+
+
+def test_one_slip_makes_no_noise() -> None:
+    calibration = Calibration()
+    change = Pose(-0.25, 0.0, 0.0)
+    calibration.learn(Pose(0.25, 0.0, 0.0), 0.5, change, Q, matched(WALLS))
+    assert calibration.noise[0] < 1.5
