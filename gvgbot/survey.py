@@ -8,6 +8,7 @@ from gvgbot.geometry import Array, resampled
 from gvgbot.maps.blanks import blanks
 from gvgbot.maps.gaps import gaps
 from gvgbot.maps.occupancy import occupancy_grid
+from gvgbot.maps.passages import Way, passages
 from gvgbot.maps.viewpoints import viewpoints
 
 _STEP_M = 0.05  # between points of a way: a cell of the grid
@@ -17,21 +18,32 @@ def survey(pipeline: Pipeline) -> Array:
     """Places (N, 2), m, map frame, that are worth another look.
 
     From there the robot could drive onto floor that nobody has seen, or sees some that was seen but
-    that no edge leads to.
+    that no edge leads to, or where no edge leads through.
     """
     grid = occupancy_grid(scans_at(smoothed_keyframes(pipeline), pipeline))
     here, room = pipeline.map_base.position, pipeline.errands.room_m
     ways, found = _ways(pipeline), gaps(grid, here, room)
-    if not len(ways):
+    if not ways:
         return found
-    found = np.concatenate([found, blanks(grid, ways, here, room)])
-    return viewpoints(grid, ways, found, here, room)
+    beside = np.concatenate([resampled(way.polyline, _STEP_M) for way in ways])
+    found = np.concatenate(
+        [
+            found,
+            blanks(grid, beside, here, room),
+            passages(grid, ways, here, room, pipeline.open_clearance),
+        ]
+    )
+    return viewpoints(grid, beside, found, here, room)
 
 
-def _ways(pipeline: Pipeline) -> Array:
-    """Points (N, 2), m, map frame, along all edges."""
-    belief, points = pipeline.mapper.belief, [np.empty((0, 2))]
-    for edge in pipeline.mapper.graph.edges.values():
-        line = belief.map_vertex(edge.a.vertex).transform(edge.polyline)
-        points.append(resampled(line, _STEP_M))
-    return np.concatenate(points)
+def _ways(pipeline: Pipeline) -> list[Way]:
+    """All edges, map frame."""
+    mapper = pipeline.mapper
+    return [
+        Way(
+            edge.a.vertex,
+            edge.b.vertex,
+            mapper.belief.map_vertex(edge.a.vertex).transform(edge.polyline),
+        )
+        for edge in mapper.graph.edges.values()
+    ]

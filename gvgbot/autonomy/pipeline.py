@@ -153,6 +153,7 @@ class Pipeline:
         self._twist = STANDSTILL
         self._order: Order = Stand()
         self.gvg = LocalGvg()
+        self.open_clearance = config.reduction.open_clearance_m  # from walls; farther is no edge
         self.keyframes: list[Keyframe] = []
         self.steps: list[Step] = []
         self.lasting = 0  # keyframes that are kept for good: the map hangs on them
@@ -248,7 +249,11 @@ class Pipeline:
 
     def _view(self, scan: Scan, local_base: Pose) -> View:
         """What there is to be seen of the GVG, and what of that is doubtful."""
-        self.gvg = self._local_gvg(local_base, scan.range_max)
+        half_width = self._config.local_map.half_width_m
+        self.open_clearance = min(
+            self._config.reduction.open_clearance_m, _SEEN_SHARE * min(scan.range_max, half_width)
+        )
+        self.gvg = self._local_gvg(local_base)
         doubtful = np.concatenate(
             [self._hazards.doubtful, self._newcomers.points, self._maps.near.suspects()]
         )
@@ -293,7 +298,7 @@ class Pipeline:
         """Other robots by centre and radius."""
         return [(one.pose.position, one.radius + more) for one in nearby]
 
-    def _local_gvg(self, local_base: Pose, range_max: float) -> LocalGvg:
+    def _local_gvg(self, local_base: Pose) -> LocalGvg:
         """The GVG around the base, by what the local map shows and the map holds."""
         reduction, half_width = self._config.reduction, self._config.local_map.half_width_m
         fine = fine_graph(
@@ -301,9 +306,7 @@ class Pipeline:
             local_base.position,
             min_clearance=self._radius + self._config.passage_margin_m,
             roughness=reduction.roughness_m,
-            open_clearance=min(
-                reduction.open_clearance_m, _SEEN_SHARE * min(range_max, half_width)
-            ),
+            open_clearance=self.open_clearance,
             felt=np.concatenate([self._hazards.points, self._newcomers.points]),
         )
         known = self.mapper.known_around(local_base, half_width)
