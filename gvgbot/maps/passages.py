@@ -13,6 +13,7 @@ from gvgbot.geometry import Array, resampled
 from gvgbot.maps.gaps import Mask, is_floor, is_wall, reachable
 from gvgbot.maps.occupancy import OccupancyGrid
 
+_CELL_M = 0.1  # a wall, with the room that the robot keeps from it, is wider
 _STEP_M = 0.25  # between points of an edge
 _ASIDE_M = 4.0  # a passage is looked for so far from the edges
 _SPARED_M, _SPARED = 6.0, 3.0  # more, and that many times its length, is a long way round
@@ -44,6 +45,8 @@ def passages(
     clearance = ndimage.distance_transform_edt(~is_wall(grid.cells)) * cell
     has_room = (clearance > passage_m) & (clearance < _NOT_OPEN * open_m)
     floor = reachable(is_floor(grid.cells) & has_room, (around - corner)[::-1] / cell)
+    coarse = max(1, round(_CELL_M / cell))
+    floor, cell = floor[::coarse, ::coarse], cell * coarse
     if not ways or not floor.any():
         return np.empty((0, 2))
     points, along = _network(ways)

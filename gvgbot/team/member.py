@@ -349,7 +349,7 @@ class Member:
             for frontier, (cost, end) in costs.items()
             if not self._is_taken(frontier, cost, claims)
         ]
-        may_come = any(self._is_busy(name) for name in self.others()) and any(site.open.values())
+        may_come = any(self._is_busy(name) for name in self.others())
         self._nothing_left = bool(reached) and not costs and not may_come
         self._others_claim_all = bool(reached) and not mine and (bool(costs) or may_come)
         if not mine:

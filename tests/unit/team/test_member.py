@@ -262,6 +262,27 @@ def test_two_that_have_given_up_do_not_wait_for_each_other() -> None:
     assert (one.choose(), one.member.is_waiting, one.member.is_done) == (None, False, True)
 
 
+def all_followed(chart: Chart) -> Chart:
+    """The chart of a robot for which there is no frontier."""
+    vertices = {
+        key: replace(vertex, departures=tuple(d for d in vertex.departures if d.edge is not None))
+        for key, vertex in chart.vertices.items()
+    }
+    return replace(chart, vertices=vertices)
+
+
+def test_who_has_nothing_left_waits_while_another_one_drives_and_may_want_to_pass() -> None:
+    one, two = team()
+    for part in (one, two):
+        part.chart = part.member._chart = all_followed(part.chart)
+    one.member._own_chart = lambda: one.chart
+    two.member._own_chart = lambda: two.chart
+    two.tell(2.0, one, at=Pose(1.0, 0.0, 0.0))
+    assert (one.choose(), one.member.is_waiting, one.member.is_done) == (None, True, False)
+    two.tell(4.0, one, at=Pose(1.0, 0.0, 0.0), finished=True)
+    assert (one.choose(), one.member.is_waiting, one.member.is_done) == (None, False, True)
+
+
 def test_robots_that_pass_each_other_find_their_frames_where_maps_tell_nothing() -> None:
     """In a grid of equal corridors; each sees the other come, and hears where it says it is."""
     grid = lattice(6.0 * np.arange(5), 6.0 * np.arange(4))
