@@ -10,9 +10,11 @@ vertices that have a partner, `precision` the share of the map's vertices that h
 is nothing to tell of is null.
 """
 
+import argparse
 import json
 import sys
 from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +24,7 @@ from scipy.spatial import KDTree
 
 from benchmarks.reference_gvg import Node, Reference, reference_gvg
 from gvgbot.drivers.world import World, load_world
+from gvgbot.errors import GvgbotError
 from gvgbot.geometry import Array, Pose
 from gvgbot.maps import geojson
 from gvgbot.maps.route_graph import RouteGraph
@@ -136,11 +139,29 @@ def _least_clearance(points: Array, world: World) -> float | None:
     )
 
 
-def main() -> int:
-    """Print the score of every run directory of the command line."""
-    for run in sys.argv[1:]:
-        print(json.dumps({"run": run} | score_run(Path(run))))
+def print_scores(
+    what: str | None, score: Callable[[Path], Mapping[str, object]], arguments: Sequence[str] | None
+) -> int:
+    """Print a line of JSON for every run directory of the command line; the exit status.
+
+    `what` the program does is told by --help.
+    """
+    parser = argparse.ArgumentParser(
+        description=what, formatter_class=argparse.RawTextHelpFormatter
+    )
+    parser.add_argument("runs", nargs="+", type=Path, metavar="RUN_DIR")
+    for run in parser.parse_args(arguments).runs:
+        try:
+            print(json.dumps({"run": str(run), **score(run)}))
+        except (OSError, GvgbotError) as error:
+            print(f"{run}: {error}", file=sys.stderr)
+            return 2
     return 0
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print the score of every run directory of the command line."""
+    return print_scores(__doc__, score_run, arguments)
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.reference_gvg import reference_gvg
-from benchmarks.score_run import score_map, score_trajectory
+from benchmarks.score_run import print_scores, score_map, score_trajectory
 from gvgbot.drivers.world import load_world
 from gvgbot.geometry import Array, Pose, wrap_angle
 from gvgbot.maps import geojson
@@ -73,9 +73,7 @@ def _gap(a: Array, b: Array) -> float:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the score of each run directory."""
-    for run in sys.argv[1:] if arguments is None else arguments:
-        print(json.dumps({"run": run} | score_team(Path(run))), flush=True)
-    return 0
+    return print_scores(__doc__, score_team, arguments)
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from benchmarks.reference_gvg import Reference
-from benchmarks.score_run import Score, score_map, score_run
+from benchmarks.score_run import Score, main, score_map, score_run
 from gvgbot.drivers.world import save_world
 from gvgbot.geometry import Pose
 from gvgbot.maps import geojson
@@ -143,3 +143,13 @@ def test_a_run_is_scored_from_its_directory_alone(corridor_run: Path) -> None:
     # A metre back to the near end and then 16 m to the other one, from x = 3.
     assert score["tour_m"] == pytest.approx(1.0 + 16.0, abs=0.1)
     assert score["path_ratio"] == pytest.approx(8.0 / 17.0, rel=0.01)
+
+
+def test_a_directory_that_is_no_run_gets_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([str(tmp_path)]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.count("\n") == 1
+    assert err.startswith(f"{tmp_path}: ")
