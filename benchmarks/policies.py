@@ -1,14 +1,15 @@
-"""Which frontier next: each policy over the same floor plans, with what it drives and how certain.
+"""What to do next: each choice over the same floor plans, with what it drives and how certain.
 
-    python -m benchmarks.policies [--plans FROM TO] [--policies ears nearest balanced]
-        [--laser UTM-30LX] [--set key=value ...] [--out FILE]
+    python -m benchmarks.policies [--plans FROM TO] [--choices nearest ears ...]
+        [--laser URG-04LX] [--set key=value ...] [--out FILE]
 
-One run after the other, in this process and in virtual time, each plan with its number as seed. A
-line for each: outcome, metres driven, closures, standard deviation of the robot's position (largest
-and at the end) and of the map's vertices (mean, at the end), and their RMSE against the truth. FILE
-keeps them as lines of JSON; runs that are in there are not run again. Then a table of the means
-over the plans that all policies have explored, and by how much each is better than the first, with
-the standard error of that difference.
+The choices are which frontier comes next, and when the robot goes back to what it knows. One run
+after the other, in this process and in virtual time, each plan with its number as seed. A line for
+each: outcome, metres driven, closures, standard deviation of the robot's position (largest and at
+the end) and of the map's vertices (mean, at the end), and their RMSE against the truth. FILE keeps
+them as lines of JSON; runs that are in there are not run again. Then a table of the means over the
+plans that were explored whatever the choice, and by how much each differs from the first choice,
+with the standard error of that difference.
 """
 
 import argparse
@@ -23,7 +24,15 @@ import numpy as np
 from benchmarks.consistency import known_rows, run
 from gvgbot.errors import GvgbotError
 
-POLICIES = ("ears", "nearest", "balanced")
+CHOICES = {  # the default comes first: the others are compared with it
+    "nearest": "exploration.policy=nearest",
+    "ears": "exploration.policy=ears",
+    "balanced": "exploration.policy=balanced",
+    "p_explore 0.9": "exploration.certainty.p_explore=0.9",
+    "p_explore 0.7": "exploration.certainty.p_explore=0.7",
+    "pose_sigma 0.1 m": "exploration.certainty.pose_sigma_m=0.1",
+    "pose_sigma 0.05 m": "exploration.certainty.pose_sigma_m=0.05",
+}
 COLUMNS = (
     ("driven_m", "way, m", "{:.1f}"),
     ("closures", "closures", "{:.1f}"),
@@ -42,35 +51,35 @@ def line(row: Row) -> str:
     return f"{row['name']:36} {row['outcome'] or '-':10.10} " + "  ".join(values)
 
 
-def explored_by_all(rows: Sequence[Row], policies: Sequence[str]) -> dict[str, list[Row]]:
-    """The runs of each policy over the plans that every one has explored, in the same order."""
-    done = {
-        policy: {r["plan"]: r for r in rows if r["policy"] == policy and r["outcome"] == "explored"}
-        for policy in policies
-    }
+def explored_by_all(rows: Sequence[Row]) -> dict[str, list[Row]]:
+    """The runs of each choice over the plans that every one has explored, in the same order."""
+    done: dict[str, dict[int, Row]] = {row["choice"]: {} for row in rows}
+    for row in rows:
+        if row["outcome"] == "explored":
+            done[row["choice"]][row["plan"]] = row
     common = sorted(set.intersection(*(set(plans) for plans in done.values())))
-    return {policy: [plans[plan] for plan in common] for policy, plans in done.items()}
+    return {choice: [plans[plan] for plan in common] for choice, plans in done.items()}
 
 
-def table(rows: Sequence[Row], policies: Sequence[str]) -> Iterator[str]:
-    """The means as a table in Markdown; in brackets the mean difference to the first policy."""
-    by_policy = explored_by_all(rows, policies)
-    count = len(by_policy[policies[0]])
-    yield f"{count} plans that all policies have explored."
-    if not count:
+def table(rows: Sequence[Row]) -> Iterator[str]:
+    """The means as a table in Markdown; in brackets the mean difference to the first choice."""
+    by_choice = explored_by_all(rows)
+    first = next(iter(by_choice))
+    yield f"{len(by_choice[first])} plans that were explored whatever the choice."
+    if not by_choice[first]:
         return
     yield ""
-    yield "| policy | " + " | ".join(title for _, title, _ in COLUMNS) + " |"
+    yield "| choice | " + " | ".join(title for _, title, _ in COLUMNS) + " |"
     yield "|---" * (len(COLUMNS) + 1) + "|"
-    for policy in policies:
-        cells = (_cell(by_policy, policies[0], policy, key, form) for key, _, form in COLUMNS)
-        yield f"| `{policy}` | " + " | ".join(cells) + " |"
+    for choice in by_choice:
+        cells = (_cell(by_choice, first, choice, key, form) for key, _, form in COLUMNS)
+        yield f"| {choice} | " + " | ".join(cells) + " |"
 
 
-def _cell(by_policy: dict[str, list[Row]], first: str, policy: str, key: str, form: str) -> str:
-    mine, theirs = (np.array([row[key] for row in by_policy[p]]) for p in (policy, first))
+def _cell(by_choice: dict[str, list[Row]], first: str, choice: str, key: str, form: str) -> str:
+    mine, theirs = (np.array([row[key] for row in by_choice[c]]) for c in (choice, first))
     mean = form.format(mine.mean())
-    if policy == first or len(mine) < 2:
+    if choice == first or len(mine) < 2:
         return mean
     off = mine - theirs
     error = off.std(ddof=1) / np.sqrt(len(off))
@@ -83,27 +92,29 @@ def main(arguments: Sequence[str] | None = None) -> int:
     low, high = options.plans
     kept, rows = known_rows(options.out), []
     for plan in range(low, high + 1):
-        for policy in options.policies:
-            name = f"floor_plan:{plan} {policy} {options.laser}"
-            row = kept.get(name) or _row(name, plan, policy, options)
+        for choice in options.choices:
+            name = f"floor_plan:{plan} {choice} {options.laser}"
+            row = kept.get(name) or _row(name, plan, choice, options)
             rows.append(row)
             print(line(row), flush=True)
             if options.out is not None and name not in kept:
                 with options.out.open("a", encoding="utf-8") as file:
                     file.write(json.dumps(row) + "\n")
-    print("\n".join(table(rows, options.policies)))
+    print("\n".join(table(rows)))
     return 0
 
 
-def _row(name: str, plan: int, policy: str, options: argparse.Namespace) -> Row:
+def _row(name: str, plan: int, choice: str, options: argparse.Namespace) -> Row:
     settings = [
         f"twin.world=floor_plan:{plan}",
         f"twin.seed={plan}",
         f"twin.laser.model={options.laser}",
-        f"exploration.policy={policy}",
+        CHOICES[choice],
         *options.overrides,
     ]
-    return {"name": name, "plan": plan, "policy": policy, **run(settings)}
+    found = run(settings)
+    kept = {key: found[key] for key in ("outcome", *(key for key, _, _ in COLUMNS))}
+    return {"name": name, "plan": plan, "choice": choice, **kept}
 
 
 def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
@@ -111,8 +122,8 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
     parser.add_argument("--plans", nargs=2, type=int, metavar=("FROM", "TO"), default=(1, 30))
-    parser.add_argument("--policies", nargs="+", choices=POLICIES, default=POLICIES)
-    parser.add_argument("--laser", default="UTM-30LX")
+    parser.add_argument("--choices", nargs="+", choices=CHOICES, default=list(CHOICES))
+    parser.add_argument("--laser", default="URG-04LX")
     parser.add_argument("--set", dest="overrides", nargs="+", default=[])
     parser.add_argument("--out", type=Path)
     return parser.parse_args(arguments)

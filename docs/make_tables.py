@@ -12,7 +12,14 @@ import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from benchmarks import explore_table, relations, reliability, sabotage, team_table
+from benchmarks import (
+    explore_table,
+    policies,
+    relations,
+    reliability,
+    sabotage,
+    team_table,
+)
 from benchmarks.campaign import Row
 from benchmarks.faults import draw
 
@@ -84,6 +91,11 @@ def teams(rows: list[Row]) -> str:
     return _block([*lines, *"\n".join(team_table.summary(rows)).splitlines()])
 
 
+def choices(rows: list[Row]) -> str:
+    """What each choice of what to do next costs, and what it is good for."""
+    return "\n".join(policies.table(rows))
+
+
 def totals(rows: list[Row]) -> str:
     """How much a campaign was."""
     return "\n".join(reliability.totals(rows))
@@ -120,6 +132,7 @@ VIEWS: dict[str, Callable[..., str]] = {
     "last_words": last_words,
     "mappers": mappers,
     "teams": teams,
+    "choices": choices,
     "totals": totals,
     "faults": faults,
     "oracles": oracles,

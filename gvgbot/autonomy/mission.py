@@ -65,6 +65,7 @@ class Mission:
         self._in_front: Companion | None = None  # that is near
         self._search, self._scouting, self._backtracking = Search(), Scouting(), Backtracking()
         self._examining_since: float | None = None
+        self.is_ending = False  # there is nothing more to be done but to say so
         self._events: list[Event] = []
 
     def advance(self, view: View, known: Correspondence) -> tuple[Order, list[Event]]:
@@ -139,7 +140,7 @@ class Mission:
         self.target = None
         self._headway.restart_stay()
         self._looked_around = 0
-        self._examining_since = None
+        self._stop_examining()
         self._hindrance.end()
         self._search.end()
         self._scouting.end()
@@ -298,7 +299,7 @@ class Mission:
         self._newest_m = 0.0
         self._looked_around = 0
         self._backtracking.renew()
-        self._examining_since = None
+        self._stop_examining()
         vertex = self._mapper.graph.vertices[chosen.vertex]
         psi = self._mapper.belief.map_vertex(chosen.vertex).theta
         bearing = vertex.half_edges[chosen.key].bearing + psi
@@ -398,7 +399,7 @@ class Mission:
         """Open what was closed long enough ago; whether there was something."""
         opened = self._obstructions.open(self._mapper.graph, view.stamp)
         if opened:
-            self._examining_since = None
+            self._stop_examining()
             self._events.append(Recovery(view.stamp, "try again", reason))
         return opened
 
@@ -455,7 +456,7 @@ class Mission:
         before = len(vertices)
         self._mapper.forget_strays(view)
         if len(vertices) < before:
-            self._examining_since = None
+            self._stop_examining()
 
     def _sees_all(self) -> bool | None:
         """Whether no floor is unseen that the robot could drive onto: it is in a closed room.
@@ -501,7 +502,6 @@ class Mission:
 
         That is not called so at once: the robot may have something else to do before.
         """
-        is_new = self._examining_since is None
         if self._examining_since is None:
             self._examining_since = view.stamp
         paths = sorted(
@@ -510,8 +510,10 @@ class Mission:
             if self._may_be_new(view, here, node)
         )
         if paths and view.stamp - self._examining_since < self._config.patience_s:
+            self.is_ending = False
             return self._drive(view, here, paths[0][2])
-        if is_new:
+        if not self.is_ending:
+            self.is_ending = True
             return Stand()
         blocked = self._given_up()
         if blocked:
@@ -519,6 +521,9 @@ class Mission:
         else:
             self._end(view, "explored", f"no frontier is left{self.remark}")
         return Stand()
+
+    def _stop_examining(self) -> None:
+        self._examining_since, self.is_ending = None, False
 
     def _may_be_new(self, view: View, here: Situation, node: int) -> bool:
         """Whether a node in sight may prove to be a vertex that the map lacks."""

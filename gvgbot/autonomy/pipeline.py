@@ -216,8 +216,8 @@ class Pipeline:
             self.mission.skip(max(0.0, scan.stamp - self._last.stamp - _LONGEST_GAP_S))
         scan = deskewed(scan, self._odometry.motion_during(scan))
         local_base = self._localise(scan, odom_base)
-        scan = self._sift(scan, local_base)
-        self._maps.insert(scan, local_base, self.travelled)
+        whole, scan = scan, self._sift(scan, local_base)
+        self._maps.insert(scan, local_base, self.travelled, whole)
         self._hazards.forget(self.travelled)
         if self.led and not self._worth_a_gvg(local_base):
             self._keep(scan, odom_base, local_base)

@@ -15,6 +15,8 @@ from gvgbot.autonomy.views import View
 from gvgbot.autonomy.whereabouts import Situation
 from gvgbot.geometry import Array
 
+_DRIVEN_ON_M = 0.5  # what can be seen there is new
+
 
 class Task(NamedTuple):
     """Where to drive, and what to say about that."""
@@ -29,7 +31,8 @@ class OwnTasks:
     def __init__(self, config: CertaintyConfig, mission: Mission, mapper: Mapper) -> None:
         self._mission, self._mapper = mission, mapper
         self._revisiting, self._unseen = Revisiting(config), Unseen()
-        self._surveyed: set[int] = set()  # edges that there were
+        self._surveyed: set[int] = set()  # edges that there were,
+        self._surveyed_m = 0.0  # and `travelled`
 
     def configure(self, config: CertaintyConfig) -> None:
         """Use another configuration from now on."""
@@ -69,14 +72,17 @@ class OwnTasks:
         if survey is None or self._mapper.graph.frontiers() or not is_alone:
             return None
         edges = set(self._mapper.graph.edges)
-        if self._mission.is_waiting or (self._unseen.is_done and edges == self._surveyed):
+        has_news = edges != self._surveyed or (
+            self._mission.is_ending and view.travelled > self._surveyed_m + _DRIVEN_ON_M
+        )
+        if self._mission.is_waiting or (self._unseen.is_done and not has_news):
             return None
         if not self._unseen.is_standing(view.travelled):
             return Stand()
         places = survey()
         if places is None:
             return Stand()
-        self._surveyed, starts = edges, here.starts()
+        self._surveyed, self._surveyed_m, starts = edges, view.travelled, here.starts()
 
         def metres_to(place: Array) -> float | None:
             foot = foot_of(self._mapper, place)

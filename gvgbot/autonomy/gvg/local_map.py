@@ -87,12 +87,19 @@ class LocalMap:
         self._offsets_x = np.broadcast_to(centres[:, None], (n, n))
         self._offsets_y = np.broadcast_to(centres[None, :], (n, n))
 
-    def insert(self, scan: Scan, local_laser: Pose, travelled: float) -> None:
-        """Add a scan taken at the laser pose after so many metres driven."""
+    def insert(
+        self, scan: Scan, local_laser: Pose, travelled: float, free: Array | None = None
+    ) -> None:
+        """Add a scan taken at the laser pose after so many metres driven.
+
+        `free` (N,) is how far, m, there was nothing on each beam, if that is more than its range
+        tells: up to somebody who is left out.
+        """
         self._recentre(local_laser)
         ranges, bearings = _without_single_dropouts(scan.ranges), scan.bearings
         directions = np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
-        self._carve(scan, ranges, directions, local_laser, travelled)
+        passed = ranges if free is None else np.fmax(ranges, free)
+        self._carve(scan, passed, directions, local_laser, travelled)
         points = _bridged(
             local_laser.transform(_hits(ranges, directions, self._reach)),
             self._config.bridge_gap_m,

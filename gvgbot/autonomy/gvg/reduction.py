@@ -21,6 +21,7 @@ from gvgbot.ranges import Range
 _SPACING = 0.1  # metres between the points of an edge
 _MERGE_HYSTERESIS = 1.3  # by which factor an edge must differ to overrule what the map says of it
 _REACH_HYSTERESIS = 1.12
+_SPECK = 4.0  # so many of the shortest edges around open space are no way round it
 _FALL_IN_CORNER = 0.3  # metres of clearance lost per metre, at least, towards a corner
 _ENDPOINT_M = 0.6  # a point so near to a known endpoint is that endpoint
 
@@ -275,7 +276,11 @@ def _merge(draft: _Draft, merge_m: float, known: KnownVertices) -> None:
             and (length := chain.length()) < merge_m * _known_length(draft, chain, merge_m, known)
         ]
         if not short:
-            return
+            speck = _speck(draft, _SPECK * merge_m)
+            if speck is None:
+                return
+            _drop(draft, speck)
+            continue
         chain = draft.remove(min(short)[1])
         keep, gone = chain.a, chain.b
         centre = (draft.position[keep] + draft.position[gone]) / 2
@@ -292,6 +297,34 @@ def _merge(draft: _Draft, merge_m: float, known: KnownVertices) -> None:
             draft.ends[keep].append((key, out))
         for key, out in draft.ends[keep]:
             _attach(draft.chains[key], centre, at_start=out)
+
+
+def _speck(draft: _Draft, longest: float) -> int | None:
+    """The longest chain of a loop of one or two that is too short to go round a wall.
+
+    What goes round a wall at a clearance c is 2 pi c long, at least. The coast of a speck of open
+    space is shorter.
+    """
+    between: dict[frozenset[int], list[int]] = {}
+    for key, chain in draft.chains.items():
+        between.setdefault(frozenset((chain.a, chain.b)), []).append(key)
+    for ends, keys in between.items():
+        loop = sorted(keys, key=lambda key: draft.chains[key].length())[: len(ends)]
+        if len(loop) < len(ends) or any(draft.degree(end) < 3 for end in ends):
+            continue
+        chains = [draft.chains[key] for key in loop]
+        shortest = min(longest, *(math.tau * float(chain.clearance.min()) for chain in chains))
+        if sum(chain.length() for chain in chains) < shortest:
+            return loop[-1]
+    return None
+
+
+def _drop(draft: _Draft, key: int) -> None:
+    """Take a chain out, and the vertices with it that are none without it."""
+    chain = draft.remove(key)
+    for end in {chain.a, chain.b}:
+        if len(draft.ends[end]) == 2 and not draft.open(end):
+            draft.splice(end)
 
 
 def _known_length(draft: _Draft, chain: _Chain, merge_m: float, known: KnownVertices) -> float:

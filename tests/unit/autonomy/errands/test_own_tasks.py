@@ -53,6 +53,17 @@ def test_it_drives_to_a_gap_before_all_is_explored() -> None:
     assert decision.reason == "something may be missing there"
 
 
+def test_who_has_driven_on_since_the_survey_makes_another_one_before_the_end() -> None:
+    """It went to look at something, and saw more of the floor on the way."""
+    robot = Explorer([], [GAP])
+    while len(robot.left) > 1:
+        robot.look(CLOSED)
+    robot.travelled += 2.0
+    robot.until_it_moves_or_ends()
+    assert robot.mission.outcome is None
+    assert robot.errands.errand is not None
+
+
 def test_a_gap_that_stays_is_told_of() -> None:
     """Twice it goes there; the third survey shows that it is of no use."""
     robot = Explorer([GAP], [GAP], [GAP])

@@ -123,3 +123,34 @@ def test_twigs_of_a_corner_branch_do_not_shift_the_dead_end() -> None:
     gvg = reduce_graph(graph, CONFIG)
     assert degrees(gvg) == []
     assert sorted(tuple(node.position.round(3)) for node in gvg.nodes.values()) == [door, far]
+
+
+def cross_around_a_square(side: float, clearance: float) -> LocalGvg:
+    """Four ways that end at the corners of a square."""
+    corners = [(x * side / 2, y * side / 2) for x, y in ((1, 1), (-1, 1), (-1, -1), (1, -1))]
+    lines = [
+        *pairwise([*corners, corners[0]]),
+        *((c, (9 * c[0] / side, 9 * c[1] / side)) for c in corners),
+    ]
+    graph = fine(lines)
+    return reduce_graph(replace(graph, clearance=np.full(len(graph.points), clearance)), CONFIG)
+
+
+@pytest.mark.parametrize("side", [0.1, 0.2, 0.35])
+def test_round_a_speck_of_open_space_goes_no_edge(side: float) -> None:
+    """Where the coast of the open is shorter than a way round the thinnest post would be."""
+    gvg = cross_around_a_square(side, 4.5)
+    assert sum(degree - 2 for degree in degrees(gvg)) == 2  # as many as the ways need
+    pairs = [{edge.a, edge.b} for edge in gvg.edges.values()]
+    assert all(len(pair) == 2 and pairs.count(pair) == 1 for pair in pairs)
+
+
+def test_round_a_larger_one_there_are_meetpoints() -> None:
+    assert degrees(cross_around_a_square(1.5, 4.5)) == [3, 3, 3, 3]
+
+
+@pytest.mark.parametrize("side", [0.1, 0.35])
+def test_a_short_way_round_a_post_is_an_edge(side: float) -> None:
+    """What a robot that is small enough keeps a twentieth of the way's length from."""
+    gvg = cross_around_a_square(side, 4 * side / 20)
+    assert sum(degree - 2 for degree in degrees(gvg)) == 4
