@@ -1,7 +1,7 @@
 """Explore worlds and compare what the robot believes with the truth: is it as wrong as it says?
 
     python -m benchmarks.consistency [--worlds floor_plan:1 ring ...] [--seeds 1 2]
-        [--plans FROM TO] [--odometry kobuki worn] [--laser UTM-30LX] [--set key=value ...]
+        [--plans FROM TO] [--odometry kobuki worn] [--lasers UTM-30LX ...] [--set key=value ...]
         [--out FILE] [--plot DIRECTORY]
 
 All runs are in this process, one after the other, in virtual time. For each a line is printed:
@@ -19,6 +19,7 @@ import json
 import sys
 import time
 from collections.abc import Sequence
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -253,6 +254,40 @@ def summary(rows: list[Row]) -> list[str]:
     return lines
 
 
+def table(rows: list[Row]) -> list[str]:
+    """A line in Markdown for the runs in each kind of world, with each laser and odometry.
+
+    In brackets is the band of the mean NEES in which 95 % of such means would lie.
+    """
+    groups: dict[tuple[str, str, str], list[Row]] = {}
+    for row in rows:
+        world, _, odometry, laser = row["name"].split()
+        groups.setdefault((world.partition(":")[0], laser, odometry), []).append(row)
+    lines = [
+        "| worlds | laser | odometry | runs | NEES pose (3) | vertices (2) | closures (3) "
+        "| closed, wrong | twice | vertex RMSE mean, worst, m | end error, worst, m |",
+        "|---" * 11 + "|",
+    ]
+    for (family, laser, odometry), some in sorted(groups.items()):
+        nees = [_mean_in_band(some, key, n) for key, n in COLUMNS if key != "filter_vertex_nees"]
+        rmse = [row["vertex_rmse_m"] for row in some if row["vertex_rmse_m"] is not None]
+        closed, wrong, twice = (sum(row[k] for row in some) for k in ("closures", "wrong", "twice"))
+        end = max(row["end_error_m"] for row in some)
+        lines.append(
+            f"| `{family}` | {laser} | `{odometry}` | {len(some)} | {' | '.join(nees)} "
+            f"| {closed}, {wrong} | {twice} | {np.mean(rmse):.3f}, {max(rmse):.3f} | {end:.3f} |"
+        )
+    return lines
+
+
+def _mean_in_band(rows: list[Row], key: str, freedom: int) -> str:
+    values = [row[key] for row in rows if row[key] is not None]
+    if not values:
+        return "–"
+    low, high = (chi2.ppf(p, freedom * len(values)) / len(values) for p in (0.025, 0.975))
+    return f"{np.mean(values):.2f} ({low:.1f} to {high:.1f})"
+
+
 def plot(rows: list[Row], directory: Path) -> None:
     """NEES per run, error and sigma along the runs, vertices and NIS against chi-square."""
     import matplotlib as mpl  # noqa: PLC0415
@@ -295,28 +330,28 @@ def main(arguments: Sequence[str] | None = None) -> int:
     worlds += [(f"floor_plan:{number}", number) for number in range(low, high + 1)]
     known = known_rows(options.out)
     rows = []
-    for world, seed in worlds:
-        for odometry in options.odometry:
-            name = f"{world} {seed} {odometry} {options.laser}"
-            row = known.get(name) or _row(name, world, seed, odometry, options)
-            rows.append(row)
-            print(line(row), flush=True)
-            if options.out is not None and name not in known:
-                with options.out.open("a", encoding="utf-8") as file:
-                    file.write(json.dumps(row) + "\n")
+    for (world, seed), odometry, laser in product(worlds, options.odometry, options.lasers):
+        name = f"{world} {seed} {odometry} {laser}"
+        row = known.get(name) or _row(name, options.overrides)
+        rows.append(row)
+        print(line(row), flush=True)
+        if options.out is not None and name not in known:
+            with options.out.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(row) + "\n")
     print("\n".join(summary(rows)))
     if options.plot is not None:
         plot(rows, options.plot)
     return 0
 
 
-def _row(name: str, world: str, seed: int, odometry: str, options: argparse.Namespace) -> Row:
+def _row(name: str, overrides: Sequence[str]) -> Row:
+    world, seed, odometry, laser = name.split()
     settings = [
         f"twin.world={world}",
         f"twin.seed={seed}",
         f"twin.base.odometry={odometry}",
-        f"twin.laser.model={options.laser}",
-        *options.overrides,
+        f"twin.laser.model={laser}",
+        *overrides,
     ]
     return {"name": name, "odometry": odometry, **run(settings)}
 
@@ -337,7 +372,7 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--seeds", nargs="+", type=int, default=[1])
     parser.add_argument("--plans", nargs=2, type=int, metavar=("FROM", "TO"))
     parser.add_argument("--odometry", nargs="+", default=["kobuki", "worn"])
-    parser.add_argument("--laser", default="UTM-30LX")
+    parser.add_argument("--lasers", nargs="+", default=["UTM-30LX"])
     parser.add_argument("--set", dest="overrides", nargs="+", default=[])
     parser.add_argument("--out", type=Path)
     parser.add_argument("--plot", type=Path)

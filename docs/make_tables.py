@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from benchmarks import (
+    consistency,
     explore_table,
     policies,
     relations,
@@ -96,6 +97,11 @@ def choices(rows: list[Row]) -> str:
     return "\n".join(policies.table(rows))
 
 
+def nees(rows: list[Row]) -> str:
+    """How honest the covariances are, by kind of world, laser and odometry."""
+    return "\n".join(consistency.table(rows))
+
+
 def totals(rows: list[Row]) -> str:
     """How much a campaign was."""
     return "\n".join(reliability.totals(rows))
@@ -133,6 +139,7 @@ VIEWS: dict[str, Callable[..., str]] = {
     "mappers": mappers,
     "teams": teams,
     "choices": choices,
+    "nees": nees,
     "totals": totals,
     "faults": faults,
     "oracles": oracles,

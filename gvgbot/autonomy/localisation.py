@@ -33,7 +33,7 @@ _SLIPPING = 25.0  # times the covariance of odometry, when the wheels slip
 _LOST = np.diag([0.5**2, 0.5**2, 0.05**2])  # of a base that nobody heard for a while
 _SEEN_SHARE = 0.3  # of the walls must be known to a robot that comes round a corner unseen
 _MOST_SHARED = 100.0  # scans that a wall can be the mean of
-_BODY_M = 0.2  # before somebody: he may move, and swings his legs
+_BODY_M = 2.0  # before somebody: what looks like a body may be a piece of a wall, or of glass
 _PER_M = np.diag([0.004**2, 0.004**2, 0.0001**2])  # per metre: what cells do to walls
 
 # full: scans are matched, and vertices are poses. paper: odometry alone between vertices, and a

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.consistency import Row, _mean_nees, summary
+from benchmarks.consistency import Row, _mean_nees, summary, table
 
 
 def drawn(scale: float, size: int) -> float:
@@ -27,21 +27,32 @@ def test_nothing_seen_has_no_nees() -> None:
     assert _mean_nees([]) is None
 
 
+ROW: Row = {
+    "name": "floor_plan:7 7 worn UTM-30LX",
+    "odometry": "worn",
+    "closures": 3,
+    "wrong": 1,
+    "twice": 2,
+    "vertex_rmse_m": 0.1,
+    "end_error_m": 0.2,
+    "pose_nees": 3.0,
+    "vertex_nees": 2.0,
+    "filter_vertex_nees": None,
+    "closure_nees": None,
+}
+
+
 def test_the_summary_counts_what_all_runs_did_wrong_and_gives_the_band() -> None:
     """100 runs of 2 degrees of freedom: chi-square with 200, 162.7 to 241.1 in 95 %."""
-    row: Row = {
-        "name": "a",
-        "odometry": "worn",
-        "closures": 3,
-        "wrong": 1,
-        "twice": 2,
-        "vertex_rmse_m": 0.1,
-        "end_error_m": 0.2,
-        "pose_nees": 3.0,
-        "vertex_nees": 2.0,
-        "filter_vertex_nees": None,
-        "closure_nees": None,
-    }
-    said = "\n".join(summary([row] * 100))
+    said = "\n".join(summary([ROW] * 100))
     assert "band 1.63 to 2.41" in said
     assert "closures 300, wrong 100, vertices twice 200" in said
+
+
+def test_the_table_has_a_line_for_each_kind_of_world_laser_and_odometry() -> None:
+    grid = ROW | {"name": "grid 1 kobuki URG-04LX", "vertex_rmse_m": 0.3}
+    other = ROW | {"name": "floor_plan:8 8 worn UTM-30LX", "vertex_rmse_m": 0.2}
+    _, _, plans, streets = table([ROW, grid, other])
+    assert plans.startswith("| `floor_plan` | UTM-30LX | `worn` | 2 | 3.00 (0.6 to 7.2) | 2.00 (")
+    assert plans.endswith("| – | 6, 2 | 4 | 0.150, 0.200 | 0.200 |")
+    assert streets.startswith("| `grid` | URG-04LX | `kobuki` | 1 |")

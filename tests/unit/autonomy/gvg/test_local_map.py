@@ -109,6 +109,18 @@ def test_a_block_of_lost_beams_is_unknown_rather_than_free() -> None:
     assert lost.known(cells_of(-2.8, -0.2, -1.0, 0.2)).all()
 
 
+def test_before_somebody_who_is_left_out_the_floor_is_free_and_behind_him_unknown() -> None:
+    """A block of beams straight ahead, of which all is left out but that 1.5 m are free."""
+    scan = sweep(ROOM, ORIGIN)
+    ahead = list(range(480, 601))
+    free = with_faults(scan, ahead, 1.5).ranges
+    local_map = LocalMap(LocalMapConfig())
+    local_map.insert(with_faults(scan, ahead, math.nan), ORIGIN, 0.0, free)
+    assert local_map.known(cells_of(0.2, -0.1, 1.3, 0.1)).all()
+    assert not local_map.known(cells_of(1.7, -0.2, 2.8, 0.2)).any()
+    assert wall_points_near(local_map, 1.5, 0.0) == 0
+
+
 def test_beams_that_hit_nothing_show_free_space_without_a_wall() -> None:
     empty = after(with_faults(sweep(ROOM, ORIGIN), list(range(1081)), math.inf))
     assert empty.known(cells_of(-5, -5, 5, 5)).all()
