@@ -11,6 +11,8 @@ from gvgbot.maps.occupancy import occupancy_grid
 from gvgbot.maps.passages import Way, passages
 from gvgbot.maps.viewpoints import viewpoints
 
+_INTO_M = 2.0  # off its ways: through a door, and the robot faces what it looks at
+_TOWARDS_M = 1.0  # what seems to be a passage may be a pane of glass
 _STEP_M = 0.05  # between points of a way: a cell of the grid
 
 
@@ -26,14 +28,14 @@ def survey(pipeline: Pipeline) -> Array:
     if not ways:
         return found
     beside = np.concatenate([resampled(way.polyline, _STEP_M) for way in ways])
-    found = np.concatenate(
+    found = np.concatenate([found, blanks(grid, beside, here, room)])
+    through = passages(grid, ways, here, room, pipeline.open_clearance)
+    return np.concatenate(
         [
-            found,
-            blanks(grid, beside, here, room),
-            passages(grid, ways, here, room, pipeline.open_clearance),
+            viewpoints(grid, beside, found, here, room, _INTO_M),
+            viewpoints(grid, beside, through, here, room, _TOWARDS_M),
         ]
     )
-    return viewpoints(grid, beside, found, here, room)
 
 
 def _ways(pipeline: Pipeline) -> list[Way]:

@@ -8,18 +8,23 @@ from gvgbot.maps.gaps import Mask, is_floor, is_wall, reachable
 from gvgbot.maps.occupancy import OccupancyGrid
 
 _BESIDE_M = 0.2  # a place so near to a way is on it
-_OFF_M = 2.0  # the robot goes so far off its ways: through a door, and it faces what it looks at
 _FAR_M = 8.0  # what is farther from all ways, on either axis, is not gone to
 _NEIGHBOURS = np.array([(0, 1), (1, 0), (0, -1), (-1, 0)])
 
 
 def viewpoints(
-    grid: OccupancyGrid, ways: Array, places: Array, around: Array, passage_m: float
+    grid: OccupancyGrid,
+    ways: Array,
+    places: Array,
+    around: Array,
+    passage_m: float,
+    off_m: float,
 ) -> Array:
     """Where to go (M, 2), m, map frame, for a look at places (N, 2) to which the floor leads.
 
     That is on the shortest path over the floor from the nearest way (points (K, 2), a cell or less
-    apart) to the place. The robot is at `around` (2,) and keeps `passage_m` from walls.
+    apart) to the place, `off_m` off that way at most. The robot is at `around` (2,) and keeps
+    `passage_m` from walls.
     """
     cell, corner = grid.resolution_m, np.array(grid.origin)
     walls = is_wall(grid.cells)
@@ -32,7 +37,7 @@ def viewpoints(
         around_it = tuple(slice(a, b) for a, b in zip(first, place + far, strict=True))
         row, column = (place - first).tolist()
         view = _on_the_way_there(
-            (row, column), floor[around_it], near_ways[around_it], round(_OFF_M / cell)
+            (row, column), floor[around_it], near_ways[around_it], round(off_m / cell)
         )
         if view is not None:
             found.append(view + first)
