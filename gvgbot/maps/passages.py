@@ -47,10 +47,12 @@ def passages(
     floor = reachable(is_floor(grid.cells) & has_room, (around - corner)[::-1] / cell)
     coarse = max(1, round(_CELL_M / cell))
     floor, cell = floor[::coarse, ::coarse], cell * coarse
-    if not ways or not floor.any():
+    if not ways:
         return np.empty((0, 2))
     points, along = _network(ways)
     meeting = _meeting(floor, (points - corner) / cell, _ASIDE_M / cell)
+    if meeting is None:
+        return np.empty((0, 2))
     meeting = meeting._replace(length=meeting.length * cell)
     is_long = _is_long_way_round(along, meeting)
     shortest = np.flatnonzero(is_long)[np.argsort(meeting.length[is_long], kind="stable")]
@@ -93,8 +95,11 @@ def _network(ways: list[Way]) -> tuple[Array, csr_array]:
     return np.concatenate(points), csr_array(joined)
 
 
-def _meeting(floor: Mask, points: Array, farthest: float) -> _Meeting:
-    """Where ways over the floor from points (N, 2), by column and row, meet; all in cells."""
+def _meeting(floor: Mask, points: Array, farthest: float) -> _Meeting | None:
+    """Where ways over the floor from points (N, 2), by column and row, meet; all in cells.
+
+    None if no point is on the floor.
+    """
     places = np.argwhere(floor)
     number = np.full(floor.shape, -1)
     number[floor] = np.arange(len(places))
@@ -104,6 +109,8 @@ def _meeting(floor: Mask, points: Array, farthest: float) -> _Meeting:
     at[inside] = number[rows[inside], columns[inside]]
     sources, first = np.unique(at, return_index=True)
     sources, first = sources[sources >= 0], first[sources >= 0]
+    if not len(sources):
+        return None
     a, b, step = _neighbours(number)
     links = coo_array((step, (a, b)), (len(places), len(places))).tocsr()
     away, _, source = dijkstra(

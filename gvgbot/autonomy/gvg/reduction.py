@@ -302,8 +302,8 @@ def _merge(draft: _Draft, merge_m: float, known: KnownVertices) -> None:
 def _speck(draft: _Draft, longest: float) -> int | None:
     """The longest chain of a loop of one or two that is too short to go round a wall.
 
-    What goes round a wall at a clearance c is 2 pi c long, at least. The coast of a speck of open
-    space is shorter.
+    What goes round a wall at a clearance c is 2 pi c long, at least, or a little less where
+    meetpoints have been merged. The coast of a speck of open space is far shorter.
     """
     between: dict[frozenset[int], list[int]] = {}
     for key, chain in draft.chains.items():
@@ -313,7 +313,7 @@ def _speck(draft: _Draft, longest: float) -> int | None:
         if len(loop) < len(ends) or any(draft.degree(end) < 3 for end in ends):
             continue
         chains = [draft.chains[key] for key in loop]
-        shortest = min(longest, *(math.tau * float(chain.clearance.min()) for chain in chains))
+        shortest = min(longest, *(math.pi * float(chain.clearance.min()) for chain in chains))
         if sum(chain.length() for chain in chains) < shortest:
             return loop[-1]
     return None

@@ -86,6 +86,12 @@ def test_a_map_without_floor_has_none() -> None:
     assert len(found("###", "###", "###", "###", ways=LOWER)) == 0
 
 
+def test_edges_that_keep_no_room_from_the_walls_are_not_on_the_floor() -> None:
+    """All of them run so close to a wall that the robot has less room than it wants."""
+    along_wall = [Way(1, 2, np.array([(0.1, -0.5), (0.1, 7.5)]))]
+    assert len(found(*ROOMS, ways=along_wall)) == 0
+
+
 def test_edges_may_reach_out_of_the_grid() -> None:
     """The scans that are kept need not show all that the robot drove through."""
     far = Way(3, 9, np.array([BELOW_RIGHT, (40.0, -0.5)]))
