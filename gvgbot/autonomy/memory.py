@@ -54,14 +54,15 @@ class Cells:
 class Odds:
     """What is known to be wrong with odometry: mean (3,) and covariance (3, 3).
 
-    `shared` is how many scans the walls in sight are the mean of, and `noise` (2,) how noisy
-    odometry has proved to be.
+    `shared` is how many scans the walls in sight are the mean of, `noise` (2,) how noisy odometry
+    has proved to be, and `told` (2,) how many steps told of that.
     """
 
     x: Array
     P: Array
     shared: float = 1.0
     noise: Array = field(default_factory=lambda: np.ones(2))
+    told: Array = field(default_factory=lambda: np.zeros(2))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -138,7 +139,7 @@ def remember(pipeline: Pipeline) -> Memory:
         intent=_intent(pipeline),
         near=_cells(maps.near),
         far=_cells(maps._far),
-        odds=Odds(calibration.x, calibration.P, maps._shared, calibration.noise),
+        odds=Odds(calibration.x, calibration.P, maps._shared, calibration.noise, calibration.told),
         hazards=pipeline._hazards._all,
         newcomers=pipeline._newcomers._all,
         lasting=pipeline.lasting,
@@ -218,7 +219,7 @@ def recall(pipeline: Pipeline, memory: Memory, past: list[Growth]) -> None:
         _recall_cells(pipeline._maps._far, memory.far)
     calibration = pipeline._maps._calibration
     calibration.x, calibration.P = memory.odds.x, memory.odds.P
-    calibration.noise = memory.odds.noise
+    calibration.noise, calibration.told = memory.odds.noise, memory.odds.told
     pipeline._maps._shared = memory.odds.shared
     pipeline._hazards._all = list(memory.hazards)
     pipeline._newcomers._all = list(memory.newcomers)

@@ -21,13 +21,14 @@ _LEAST = 1e-10 * np.eye(3)  # variance of a correction where walls say nothing, 
 class Calibration:
     """Belief about the three errors: mean and covariance.
 
-    `noise` (2,) is the variance of distances and of turns, in units of what is expected.
+    `noise` (2,) is the variance of distances and of turns, in units of what is expected, and `told`
+    (2,) how many steps told of it.
     """
 
     def __init__(self) -> None:
         self.x = np.zeros(3)
         self.P = np.diag(_SIGMA**2)
-        self.noise, self._told = np.ones(2), np.zeros(2)  # and how many steps told of it
+        self.noise, self.told = np.ones(2), np.zeros(2)
 
     def corrected(self, motion: Pose, duration: float) -> Pose:
         """A motion that odometry felt in some seconds, as it most probably was."""
@@ -77,7 +78,7 @@ class Calibration:
         """
         axes = [0, 2]  # along the way, and the heading
         counts = np.maximum(0.0, 1.0 - C[axes, axes] / Q[axes, axes]) ** 2
-        self._told += counts
-        rate = np.maximum(_RATE, 1.0 / (_FEW + self._told)) * counts
+        self.told = self.told + counts
+        rate = np.maximum(_RATE, 1.0 / (_FEW + self.told)) * counts
         odd = np.minimum(r[axes] ** 2 / S[axes, axes], _ODDEST)
         self.noise = np.clip(self.noise * np.exp(rate * (odd - 1.0)), *_NOISE)
