@@ -12,7 +12,7 @@ from gvgbot.geometry import Array, Pose
 _SIGMA = np.array([0.02, 0.01, 0.0005])  # before anything is known: 1, 1, rad/s
 _WANDER = np.array([1e-5, 1e-5, 1e-6])  # of each with every step
 _SURPRISING = 16.0  # squared Mahalanobis distance of a correction that tells of a slip
-_NOISE = (0.2, 25.0)  # variance of odometry, least and most, in units of what is expected
+_NOISE = (0.5, 25.0)  # variance of odometry, least and most, in units of what is expected
 _RATE, _FEW = 0.02, 20.0  # at which it is learnt with each step, and the steps until it is that low
 _ODDEST = 9.0  # a correction says no more than one of three sigmas
 _LEAST = 1e-10 * np.eye(3)  # variance of a correction where walls say nothing, m^2 and rad^2
