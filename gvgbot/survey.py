@@ -30,12 +30,8 @@ def survey(pipeline: Pipeline) -> Array:
     beside = np.concatenate([resampled(way.polyline, _STEP_M) for way in ways])
     found = np.concatenate([found, blanks(grid, beside, here, room)])
     through = passages(grid, ways, here, room, pipeline.open_clearance)
-    return np.concatenate(
-        [
-            viewpoints(grid, beside, found, here, room, _INTO_M),
-            viewpoints(grid, beside, through, here, room, _TOWARDS_M),
-        ]
-    )
+    off = np.repeat([_INTO_M, _TOWARDS_M], [len(found), len(through)])
+    return viewpoints(grid, beside, np.concatenate([found, through]), here, room, off)
 
 
 def _ways(pipeline: Pipeline) -> list[Way]:

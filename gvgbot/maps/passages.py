@@ -51,8 +51,6 @@ def passages(
         return np.empty((0, 2))
     points, along = _network(ways)
     meeting = _meeting(floor, (points - corner) / cell, _ASIDE_M / cell)
-    if meeting is None:
-        return np.empty((0, 2))
     meeting = meeting._replace(length=meeting.length * cell)
     is_long = _is_long_way_round(along, meeting)
     shortest = np.flatnonzero(is_long)[np.argsort(meeting.length[is_long], kind="stable")]
@@ -95,11 +93,8 @@ def _network(ways: list[Way]) -> tuple[Array, csr_array]:
     return np.concatenate(points), csr_array(joined)
 
 
-def _meeting(floor: Mask, points: Array, farthest: float) -> _Meeting | None:
-    """Where ways over the floor from points (N, 2), by column and row, meet; all in cells.
-
-    None if no point is on the floor.
-    """
+def _meeting(floor: Mask, points: Array, farthest: float) -> _Meeting:
+    """Where ways over the floor from points (N, 2), by column and row, meet; all in cells."""
     places = np.argwhere(floor)
     number = np.full(floor.shape, -1)
     number[floor] = np.arange(len(places))
@@ -109,8 +104,6 @@ def _meeting(floor: Mask, points: Array, farthest: float) -> _Meeting | None:
     at[inside] = number[rows[inside], columns[inside]]
     sources, first = np.unique(at, return_index=True)
     sources, first = sources[sources >= 0], first[sources >= 0]
-    if not len(sources):
-        return None
     a, b, step = _neighbours(number)
     links = coo_array((step, (a, b)), (len(places), len(places))).tocsr()
     away, _, source = dijkstra(

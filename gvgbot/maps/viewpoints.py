@@ -18,12 +18,12 @@ def viewpoints(
     places: Array,
     around: Array,
     passage_m: float,
-    off_m: float,
+    off_m: Array,
 ) -> Array:
     """Where to go (M, 2), m, map frame, for a look at places (N, 2) to which the floor leads.
 
     That is on the shortest path over the floor from the nearest way (points (K, 2), a cell or less
-    apart) to the place, `off_m` off that way at most. The robot is at `around` (2,) and keeps
+    apart) to the place, `off_m` (N,) off that way at most. The robot is at `around` (2,) and keeps
     `passage_m` from walls.
     """
     cell, corner = grid.resolution_m, np.array(grid.origin)
@@ -32,13 +32,12 @@ def viewpoints(
     floor = reachable(is_floor(grid.cells) & has_room, (around - corner)[::-1] / cell)
     near_ways = _cells_near(ways, grid, floor)
     found, far = [], round(_FAR_M / cell)
-    for place in ((places - corner)[:, ::-1] / cell).astype(np.int64):
+    cells = ((places - corner)[:, ::-1] / cell).astype(np.int64)
+    for place, off in zip(cells, np.rint(off_m / cell).astype(int).tolist(), strict=True):
         first = np.maximum(place - far, 0)
         around_it = tuple(slice(a, b) for a, b in zip(first, place + far, strict=True))
         row, column = (place - first).tolist()
-        view = _on_the_way_there(
-            (row, column), floor[around_it], near_ways[around_it], round(off_m / cell)
-        )
+        view = _on_the_way_there((row, column), floor[around_it], near_ways[around_it], off)
         if view is not None:
             found.append(view + first)
     return corner + (np.array(found).reshape(-1, 2)[:, ::-1] + 0.5) * cell

@@ -26,7 +26,8 @@ OFF_M = 2.0
 
 
 def found(*places: tuple[float, float], off_m: float = OFF_M) -> Array:
-    return viewpoints(drawn(*HOUSE), CORRIDOR, np.array(places), np.array([1.5, 0.5]), 0.25, off_m)
+    off = np.full(len(places), off_m)
+    return viewpoints(drawn(*HOUSE), CORRIDOR, np.array(places), np.array([1.5, 0.5]), 0.25, off)
 
 
 def test_a_room_is_looked_at_through_its_door_and_not_from_behind_its_wall() -> None:
@@ -52,7 +53,7 @@ def test_what_is_near_a_way_is_gone_to() -> None:
 def test_a_way_at_the_end_of_what_is_looked_at_is_none_or_the_one(away: float, side: float) -> None:
     hall = drawn("#" * 30, "#" + "." * 28 + "#", "#" * 30)
     place, ways = np.array([[14.05, -0.45]]), np.array([[14.05 + side * away, -0.45]])
-    views = viewpoints(hall, ways, place, np.array([14.0, -0.5]), 0.25, OFF_M)
+    views = viewpoints(hall, ways, place, np.array([14.0, -0.5]), 0.25, np.array([OFF_M]))
     for view in views:
         assert 1.7 < side * (ways[0, 0] - view[0]) < 2.3  # from the way towards the place
     assert len(views) == 1 or away > 7.9
@@ -60,4 +61,7 @@ def test_a_way_at_the_end_of_what_is_looked_at_is_none_or_the_one(away: float, s
 
 def test_where_no_floor_leads_there_is_no_viewpoint() -> None:
     assert len(found((1.5, 1.5))) == 0  # in the wall
-    assert len(viewpoints(drawn(*HOUSE), CORRIDOR, np.empty((0, 2)), np.zeros(2), 0.25, OFF_M)) == 0
+    assert (
+        len(viewpoints(drawn(*HOUSE), CORRIDOR, np.empty((0, 2)), np.zeros(2), 0.25, np.empty(0)))
+        == 0
+    )
