@@ -127,7 +127,7 @@ class _Robot:
             lambda: chart_of(mapper.graph, mapper.belief),
             radius=config.robot.radius_m,
         )
-        session.pipeline.mission.sharing = member
+        session.pipeline.mission.choice.sharing = member
         return cls(session, member)
 
 

@@ -7,20 +7,18 @@ from typing import Literal
 import numpy as np
 
 from gvgbot.autonomy.backtracking import Backtracking
+from gvgbot.autonomy.choice import Choice
 from gvgbot.autonomy.control.company import Companion, free_metres, in_front, patience, refuge
 from gvgbot.autonomy.control.edge_follower import Track
 from gvgbot.autonomy.control.orders import ARRIVED_M, Drive, LookAround, Order, Stand
 from gvgbot.autonomy.driven_edges import DrivenEdges
 from gvgbot.autonomy.events import Decision, Event, Finished, Recovery
+from gvgbot.autonomy.examination import Examination
 from gvgbot.autonomy.exploration.access import NEAR_M, access, way_to_edge
-from gvgbot.autonomy.exploration.certainty import vertex_sigma
 from gvgbot.autonomy.exploration.config import ExplorationConfig
-from gvgbot.autonomy.exploration.ears import ear_next, nearest_frontier
 from gvgbot.autonomy.exploration.headway import Headway
 from gvgbot.autonomy.exploration.hindrance import Hindrance
 from gvgbot.autonomy.exploration.obstructions import Obstructions
-from gvgbot.autonomy.exploration.paths import Approach, shortest_paths
-from gvgbot.autonomy.exploration.sharing import Sharing
 from gvgbot.autonomy.gvg.local import Branch, Place
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.scouting import Scouting
@@ -30,7 +28,6 @@ from gvgbot.autonomy.views import Correspondence, View
 from gvgbot.autonomy.whereabouts import Situation, Whereabouts
 from gvgbot.geometry import Array, Pose
 
-_WORTH_TURNING_M = 1.0  # a new frontier must be so much nearer than the old one
 _SECOND = 1  # try, in the end, of what was given up: things may have changed
 _FACING_RAD = 1.0  # looking so far past a thing, one would not see it go
 _FACING_POINTS = 6  # of a polyline tell where its end points to
@@ -44,7 +41,7 @@ class Mission:
     def __init__(self, config: ExplorationConfig, mapper: Mapper) -> None:
         self._config, self._mapper = config, mapper
         self.where = Whereabouts()
-        self.sharing: Sharing | None = None  # of frontiers with other robots, if there are any
+        self.choice = Choice(config, mapper)
         # finds places (N, 2), m, map frame, that are worth another look when all is explored;
         # None as long as that takes
         self.survey: Callable[[], Array | None] | None = None
@@ -64,8 +61,7 @@ class Mission:
         self._company: list[Companion] = []  # local frame
         self._in_front: Companion | None = None  # that is near
         self._search, self._scouting, self._backtracking = Search(), Scouting(), Backtracking()
-        self._examining_since: float | None = None
-        self.is_ending = False  # there is nothing more to be done but to say so
+        self._examination = Examination(mapper)
         self._events: list[Event] = []
 
     def advance(self, view: View, known: Correspondence) -> tuple[Order, list[Event]]:
@@ -93,7 +89,7 @@ class Mission:
             found,
             view.local_base,
             view.doubted,
-            in_team=self.sharing is not None,
+            in_team=self.choice.sharing is not None,
         )
         self._watch_progress(view)
         self._watch_the_way(view)
@@ -106,6 +102,11 @@ class Mission:
         graph = self._mapper.graph
         half = None if self.target is None else graph.half_edge(self.target)
         return self.outcome is None and bool(graph.vertices) and (half is None or not half.open)
+
+    @property
+    def is_ending(self) -> bool:
+        """Whether there is nothing more to be done but to say so."""
+        return self._examination.is_over
 
     @property
     def is_waiting(self) -> bool:
@@ -140,7 +141,7 @@ class Mission:
         self.target = None
         self._headway.restart_stay()
         self._looked_around = 0
-        self._stop_examining()
+        self._examination.end()
         self._hindrance.end()
         self._search.end()
         self._scouting.end()
@@ -148,7 +149,7 @@ class Mission:
 
     def configure(self, config: ExplorationConfig) -> None:
         """Use another configuration from now on."""
-        self._config = config
+        self._config = self.choice.config = config
 
     def skip(self, seconds: float) -> None:
         """Let no patience run out by a time in which nothing was to be seen."""
@@ -156,8 +157,7 @@ class Mission:
         self._search.skip(seconds)
         self._scouting.skip(seconds)
         self._hindrance.skip(seconds)
-        if self._examining_since is not None:
-            self._examining_since += seconds
+        self._examination.skip(seconds)
 
     def meet(self, local_base: Pose, company: list[Companion]) -> None:
         """Note where other robots are, local frame."""
@@ -185,7 +185,7 @@ class Mission:
 
     def _decide(self, view: View, here: Situation) -> Order:
         graph = self._mapper.graph
-        if self.sharing is not None:  # what was in the way may have been one that drives on
+        if self.choice.sharing is not None:  # what was in the way may have been one that drives on
             self._reopen(view, "the way may be free again")
         target = self.target
         half = None if target is None else graph.half_edge(target)
@@ -196,7 +196,7 @@ class Mission:
             self.target = self._reconsidered(view, here, target)
         if self.outcome is not None:
             return Stand()
-        if self.target is None and (self._obstructions.waiting or self._waits_for_others()):
+        if self.target is None and (self._obstructions.waiting or self.choice.waits_for_others):
             self._headway.restart(view.stamp)
             self._headway.restart_stay()
             return self._make_way(view, here)
@@ -215,15 +215,15 @@ class Mission:
         graph = self._mapper.graph
         if not graph.vertices:
             return None
-        chosen, reason = self._ear(here), "ear"
+        chosen, reason = self.choice.ear(self.target), "ear"
         if chosen is None:
-            nearest = self._nearest(here.starts())
+            nearest = self.choice.nearest(here.starts())
             if nearest is None and self._reopen(view, "nothing else is left"):
-                nearest = self._nearest(here.starts())
+                nearest = self.choice.nearest(here.starts())
             if nearest is None:
-                if self._is_left_to_others():
+                if self.choice.is_left_to_others and not self._obstructions.waiting:
                     self._end(view, "explored", "no frontier of the team is left")
-                elif not self._waits_for_others():
+                elif not self.choice.waits_for_others:
                     self._finish(view)
                 return None
             self._scouting.end()
@@ -236,60 +236,16 @@ class Mission:
         frontiers = set(self._mapper.graph.frontiers())
         found, self._frontiers = frontiers - self._frontiers, frontiers
         if self.where.on_edge == target:
-            if self.sharing is not None:
-                self.sharing.enter()
+            self.choice.enter()
             return target
         starts = here.starts()
-        if self.sharing is not None and not self.sharing.keeps(target, self._mapper.graph, starts):
+        if not self.choice.keeps(target, starts):
             return self._choose(view, here)
-        if not found:
+        nearer = self.choice.nearer(target, found, starts)
+        if nearer is None:
             return target
-        way = shortest_paths(self._mapper.graph, starts).get(target.vertex)
-        nearest = self._nearest(starts)
-        if nearest is None or nearest[0].vertex not in {end.vertex for end in found}:
-            return target
-        if way is not None and nearest[1].metres > way.metres - _WORTH_TURNING_M:
-            return target
-        self._commit(view, here, nearest[0], "nearer frontier")
-        return nearest[0]
-
-    def _nearest(self, starts: list[Approach]) -> tuple[HalfEdgeId, Approach] | None:
-        graph, belief = self._mapper.graph, self._mapper.belief
-        if self.sharing is not None:
-            return self.sharing.choose(graph, starts)
-        if self._config.policy != "balanced":
-            return nearest_frontier(graph, starts)
-
-        def handicap(vertex: int) -> float:
-            return self._config.detour_m_per_m * vertex_sigma(belief, vertex)
-
-        return nearest_frontier(graph, starts, handicap)
-
-    def _waits_for_others(self) -> bool:
-        """Whether other robots are on their way to every frontier that is left."""
-        return self.sharing is not None and self.sharing.is_waiting
-
-    def _is_left_to_others(self) -> bool:
-        """Whether there are frontiers, but others have followed all of them."""
-        return (
-            self.sharing is not None
-            and self.sharing.is_done
-            and not self._obstructions.waiting
-            and bool(self._mapper.graph.frontiers())
-        )
-
-    def _ear(self, here: Situation) -> HalfEdgeId | None:
-        """The ear rule at the end of the edge just explored."""
-        graph = self._mapper.graph
-        if (
-            self._config.policy != "ears"
-            or self.sharing is not None
-            or self.target is None
-            or graph.half_edge(self.target) is None
-        ):
-            return None
-        edge = graph.edge_at(self.target)
-        return None if edge is None else ear_next(graph, edge.other(self.target))
+        self._commit(view, here, nearer, "nearer frontier")
+        return nearer
 
     def _commit(self, view: View, here: Situation, chosen: HalfEdgeId, reason: str) -> None:
         starts = here.starts()
@@ -299,7 +255,7 @@ class Mission:
         self._newest_m = 0.0
         self._looked_around = 0
         self._backtracking.renew()
-        self._stop_examining()
+        self._examination.end()
         vertex = self._mapper.graph.vertices[chosen.vertex]
         psi = self._mapper.belief.map_vertex(chosen.vertex).theta
         bearing = vertex.half_edges[chosen.key].bearing + psi
@@ -399,7 +355,7 @@ class Mission:
         """Open what was closed long enough ago; whether there was something."""
         opened = self._obstructions.open(self._mapper.graph, view.stamp)
         if opened:
-            self._stop_examining()
+            self._examination.end()
             self._events.append(Recovery(view.stamp, "try again", reason))
         return opened
 
@@ -456,7 +412,7 @@ class Mission:
         before = len(vertices)
         self._mapper.forget_strays(view)
         if len(vertices) < before:
-            self._stop_examining()
+            self._examination.end()
 
     def _sees_all(self) -> bool | None:
         """Whether no floor is unseen that the robot could drive onto: it is in a closed room.
@@ -498,22 +454,13 @@ class Mission:
         self._end(view, "explored_with_blocked", f"frontiers left: {left}; {reason}")
 
     def _examine(self, view: View, here: Situation) -> Order:
-        """Go where something in sight may prove to be a vertex, before all is called explored.
-
-        That is not called so at once: the robot may have something else to do before.
-        """
-        if self._examining_since is None:
-            self._examining_since = view.stamp
-        paths = sorted(
-            (metres, node, path)
-            for node, (metres, path) in here.gvg.routes(here.place).items()
-            if self._may_be_new(view, here, node)
-        )
-        if paths and view.stamp - self._examining_since < self._config.patience_s:
-            self.is_ending = False
-            return self._drive(view, here, paths[0][2])
-        if not self.is_ending:
-            self.is_ending = True
+        """Look at what may be a vertex, give others a chance to know more to do, and end."""
+        path = self._examination.path(view, here, self._config.patience_s)
+        if path is not None:
+            self._examination.is_over = False
+            return self._drive(view, here, path)
+        if not self._examination.is_over:
+            self._examination.is_over = True
             return Stand()
         blocked = self._given_up()
         if blocked:
@@ -521,15 +468,6 @@ class Mission:
         else:
             self._end(view, "explored", f"no frontier is left{self.remark}")
         return Stand()
-
-    def _stop_examining(self) -> None:
-        self._examining_since, self.is_ending = None, False
-
-    def _may_be_new(self, view: View, here: Situation, node: int) -> bool:
-        """Whether a node in sight may prove to be a vertex that the map lacks."""
-        seen, known = here.gvg.nodes[node], here.known
-        is_open = seen.may_be_vertex and node not in known.vertex_of
-        return is_open and not self._mapper.explains(view, known, seen.position)
 
     def _given_up(self) -> int:
         """How many frontiers were given up."""

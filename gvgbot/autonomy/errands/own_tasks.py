@@ -67,7 +67,7 @@ class OwnTasks:
 
     def _look_again(self, view: View, here: Situation) -> Task | Stand | None:
         """To where the map may lack something, when all frontiers are explored."""
-        is_alone = self._mission.sharing is None  # others may have seen it
+        is_alone = self._mission.choice.sharing is None  # others may have seen it
         survey = self._mission.survey
         if survey is None or self._mapper.graph.frontiers() or not is_alone:
             return None

@@ -386,7 +386,7 @@ def test_in_a_team_a_way_that_was_closed_is_open_again_before_all_others_are_dri
     is_in_team: bool,
 ) -> None:
     robot = Robot()
-    robot.mission.sharing = Alone() if is_in_team else None
+    robot.mission.choice.sharing = Alone() if is_in_team else None
     robot.stand(TEE, 8)
     closed = robot.mission.target
     assert closed is not None

@@ -1,0 +1,73 @@
+"""Which frontier to explore next."""
+
+from gvgbot.autonomy.exploration.certainty import vertex_sigma
+from gvgbot.autonomy.exploration.config import ExplorationConfig
+from gvgbot.autonomy.exploration.ears import ear_next, nearest_frontier
+from gvgbot.autonomy.exploration.paths import Approach, shortest_paths
+from gvgbot.autonomy.exploration.sharing import Sharing
+from gvgbot.autonomy.mapping import Mapper
+from gvgbot.autonomy.slam.graph import HalfEdgeId
+
+_WORTH_TURNING_M = 1.0  # a new frontier must be so much nearer than the old one
+
+
+class Choice:
+    """Of the next frontier: by the policy, or as the robots of a team have agreed."""
+
+    def __init__(self, config: ExplorationConfig, mapper: Mapper) -> None:
+        self.config, self._mapper = config, mapper
+        self.sharing: Sharing | None = None  # with other robots, if there are any
+
+    @property
+    def waits_for_others(self) -> bool:
+        """Whether other robots are on their way to every frontier that is left."""
+        return self.sharing is not None and self.sharing.is_waiting
+
+    @property
+    def is_left_to_others(self) -> bool:
+        """Whether there are frontiers, but others have followed all of them."""
+        is_done = self.sharing is not None and self.sharing.is_done
+        return is_done and bool(self._mapper.graph.frontiers())
+
+    def ear(self, explored: HalfEdgeId | None) -> HalfEdgeId | None:
+        """By the ear rule, at the end of the edge just explored, if that is the policy."""
+        graph = self._mapper.graph
+        is_alone = self.sharing is None
+        if self.config.policy != "ears" or not is_alone or explored is None:
+            return None
+        edge = None if graph.half_edge(explored) is None else graph.edge_at(explored)
+        return None if edge is None else ear_next(graph, edge.other(explored))
+
+    def nearest(self, starts: list[Approach]) -> tuple[HalfEdgeId, Approach] | None:
+        """What costs least to reach; None if nothing can be reached, or is left to this robot."""
+        graph, belief = self._mapper.graph, self._mapper.belief
+        if self.sharing is not None:
+            return self.sharing.choose(graph, starts)
+        if self.config.policy != "balanced":
+            return nearest_frontier(graph, starts)
+
+        def handicap(vertex: int) -> float:
+            return self.config.detour_m_per_m * vertex_sigma(belief, vertex)
+
+        return nearest_frontier(graph, starts, handicap)
+
+    def keeps(self, target: HalfEdgeId, starts: list[Approach]) -> bool:
+        """Whether a target is still this robot's own."""
+        return self.sharing is None or self.sharing.keeps(target, self._mapper.graph, starts)
+
+    def enter(self) -> None:
+        """Note that the robot has come to its target, and follows it."""
+        if self.sharing is not None:
+            self.sharing.enter()
+
+    def nearer(
+        self, target: HalfEdgeId, found: set[HalfEdgeId], starts: list[Approach]
+    ) -> HalfEdgeId | None:
+        """A frontier `found` just now that is nearer than what is left of the way to the target."""
+        nearest = self.nearest(starts) if found else None
+        if nearest is None or nearest[0].vertex not in {end.vertex for end in found}:
+            return None
+        way = shortest_paths(self._mapper.graph, starts).get(target.vertex)
+        if way is not None and nearest[1].metres > way.metres - _WORTH_TURNING_M:
+            return None
+        return nearest[0]
