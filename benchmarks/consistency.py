@@ -1,8 +1,8 @@
 """Explore worlds and compare what the robot believes with the truth: is it as wrong as it says?
 
     python -m benchmarks.consistency [--worlds floor_plan:1 ring ...] [--seeds 1 2]
-        [--plans FROM TO] [--odometry kobuki worn] [--lasers UTM-30LX ...] [--set key=value ...]
-        [--out FILE] [--plot DIRECTORY]
+        [--plans FROM TO] [--odometry kobuki worn] [--worse 2 4 8] [--lasers UTM-30LX ...]
+        [--set key=value ...] [--out FILE] [--plot DIRECTORY]
 
 All runs are in this process, one after the other, in virtual time. For each a line is printed:
 NEES of the pose at keyframes (3 degrees of freedom), of the vertices of the map and of the filter
@@ -10,7 +10,8 @@ NEES of the pose at keyframes (3 degrees of freedom), of the vertices of the map
 how many vertices were entered twice; end error and vertex RMSE. FILE keeps the numbers as lines of
 JSON; runs that are in there are not run again. Then the means, each with the band in which 95 % of
 such means lie if the errors are as the covariances say. Errors of one run hang together, so a run
-counts as one. --plot needs matplotlib (the extra `plot`).
+counts as one. --worse makes the errors of wheels and gyro so many times as large as the profile has
+them. --plot needs matplotlib (the extra `plot`).
 """
 
 import argparse
@@ -18,10 +19,12 @@ import asyncio
 import json
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import astuple
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -36,6 +39,7 @@ from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.config import Config, load_config
 from gvgbot.drivers.hokuyo.driver import HokuyoLaser
 from gvgbot.drivers.kobuki.driver import KobukiBase
+from gvgbot.drivers.kobuki.odometry_error import PROFILES, OdometryError, OdometryProfile
 from gvgbot.errors import GvgbotError
 from gvgbot.geometry import Array, Pose, rotated_covariance, wrap_angle
 from gvgbot.hal.guard import Guard
@@ -44,6 +48,7 @@ from gvgbot.simulation import Simulation, open_place
 
 MATCH = 1.5  # m: a vertex farther from the true one is another
 WRONG_M = 1.0  # a closure that lays a vertex this far from where it is is wrong
+TIMES_WORSE = "*"  # between the name of a profile and how many times it is worse
 TIMES = 50  # of the error and the sigma along a run, that are kept for the plot
 
 Row = dict[str, Any]
@@ -330,7 +335,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     worlds += [(f"floor_plan:{number}", number) for number in range(low, high + 1)]
     known = known_rows(options.out)
     rows = []
-    for (world, seed), odometry, laser in product(worlds, options.odometry, options.lasers):
+    profiles = [_profile(*both) for both in product(options.odometry, options.worse)]
+    for (world, seed), odometry, laser in product(worlds, profiles, options.lasers):
         name = f"{world} {seed} {odometry} {laser}"
         row = known.get(name) or _row(name, options.overrides)
         rows.append(row)
@@ -344,8 +350,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
+def _profile(odometry: str, worse: float) -> str:
+    return odometry if worse == 1.0 else f"{odometry}{TIMES_WORSE}{worse:g}"
+
+
 def _row(name: str, overrides: Sequence[str]) -> Row:
-    world, seed, odometry, laser = name.split()
+    world, seed, profile, laser = name.split()
+    odometry, _, worse = profile.partition(TIMES_WORSE)
     settings = [
         f"twin.world={world}",
         f"twin.seed={seed}",
@@ -353,7 +364,20 @@ def _row(name: str, overrides: Sequence[str]) -> Row:
         f"twin.laser.model={laser}",
         *overrides,
     ]
-    return {"name": name, "odometry": odometry, **run(settings)}
+    with made_worse(odometry, float(worse or 1.0)):
+        return {"name": name, "odometry": profile, **run(settings)}
+
+
+@contextmanager
+def made_worse(odometry: str, times: float) -> Iterator[None]:
+    """A profile whose wheels and gyro err so many times as much."""
+    name = cast(OdometryProfile, odometry)
+    usual = PROFILES[name]
+    PROFILES[name] = OdometryError(*(times * value for value in astuple(usual)))
+    try:
+        yield
+    finally:
+        PROFILES[name] = usual
 
 
 def known_rows(out: Path | None) -> dict[str, Row]:
@@ -372,6 +396,7 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--seeds", nargs="+", type=int, default=[1])
     parser.add_argument("--plans", nargs=2, type=int, metavar=("FROM", "TO"))
     parser.add_argument("--odometry", nargs="+", default=["kobuki", "worn"])
+    parser.add_argument("--worse", nargs="+", type=float, default=[1.0])
     parser.add_argument("--lasers", nargs="+", default=["UTM-30LX"])
     parser.add_argument("--set", dest="overrides", nargs="+", default=[])
     parser.add_argument("--out", type=Path)

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from benchmarks.consistency import Row, _mean_nees, summary, table
+from benchmarks.consistency import Row, _mean_nees, made_worse, summary, table
+from gvgbot.drivers.kobuki.odometry_error import PROFILES, ErringSensors
 
 
 def drawn(scale: float, size: int) -> float:
@@ -56,3 +57,21 @@ def test_the_table_has_a_line_for_each_kind_of_world_laser_and_odometry() -> Non
     assert plans.startswith("| `floor_plan` | UTM-30LX | `worn` | 2 | 3.00 (0.6 to 7.2) | 2.00 (")
     assert plans.endswith("| – | 6, 2 | 4 | 0.150, 0.200 | 0.200 |")
     assert streets.startswith("| `grid` | URG-04LX | `kobuki` | 1 |")
+
+
+def felt_scatter(metres: float = 1.0, tries: int = 2000) -> float:
+    """The standard deviation, m, of what a worn base feels of a stretch of so many metres."""
+    felt = [
+        ErringSensors(PROFILES["worn"], np.random.default_rng(seed)).feel(metres, metres, 0.0, 1.0)
+        for seed in range(tries)
+    ]
+    return float(np.std([left for left, _, _ in felt]))
+
+
+def test_a_profile_is_made_worse_for_a_while() -> None:
+    """0.025 of scale and 0.06 m per root metre, so 0.065 m in a metre, but for what slips add."""
+    usual = felt_scatter()
+    with pytest.raises(KeyError), made_worse("worn", 4.0):
+        assert felt_scatter() == pytest.approx(4.0 * 0.065, rel=0.05)
+        raise KeyError
+    assert felt_scatter() == usual == pytest.approx(0.065, rel=0.05)
