@@ -22,6 +22,7 @@ BAD_ARGUMENTS = {
     "no command": ([], "COMMAND"),
     "unknown command": (["dance"], "dance"),
     "unknown option": (["explore", "--wrold", "office"], "--wrold"),
+    "another command's option": (["run", "--config", "a.yaml"], "see gvgbot run --help"),
     "two numbers for a start": (["explore", "--start", "1", "2"], "--start"),
     "a start that is no number": (
         ["explore", "--start", "1", "2", "north"],
