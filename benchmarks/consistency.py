@@ -16,11 +16,11 @@ them. --plot needs matplotlib (the extra `plot`).
 
 import argparse
 import asyncio
+import contextlib
 import json
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import astuple
 from itertools import product
 from pathlib import Path
@@ -78,7 +78,7 @@ class Watched(Pipeline):
 
 
 async def explore(config: Config, pipeline: Pipeline, truth: list[tuple[float, ...]]) -> None:
-    """Drive through the twins until there is an outcome; rows of stamp and world_base."""
+    """Drive until there is an outcome, or no more time; rows of stamp and world_base."""
     clock = LoopClock()
     simulation = Simulation(config, open_place(config), clock)
     laser = HokuyoLaser(simulation.laser, config.laser, clock)
@@ -93,7 +93,9 @@ async def explore(config: Config, pipeline: Pipeline, truth: list[tuple[float, .
     loop = Loop(laser, base, pipeline, guard, on_events=lambda _: None, on_cycle=note)
     async with asyncio.TaskGroup() as tasks:
         serving = [tasks.create_task(part.run()) for part in (laser, base, simulation)]
-        await loop.run()
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(config.twin.time_limit_s):
+                await loop.run()
         for task in serving:
             task.cancel()
 
@@ -368,7 +370,7 @@ def _row(name: str, overrides: Sequence[str]) -> Row:
         return {"name": name, "odometry": profile, **run(settings)}
 
 
-@contextmanager
+@contextlib.contextmanager
 def made_worse(odometry: str, times: float) -> Iterator[None]:
     """A profile whose wheels and gyro err so many times as much."""
     name = cast(OdometryProfile, odometry)

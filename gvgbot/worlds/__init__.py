@@ -10,7 +10,7 @@ from gvgbot.worlds.buildings import comb, grid, hall, jittered, office, ring, sp
 from gvgbot.worlds.cave import cave
 from gvgbot.worlds.clutter import clutter
 from gvgbot.worlds.difficult_plans import crowd, doors, glass, narrow
-from gvgbot.worlds.floor_plan import floor_plan
+from gvgbot.worlds.floor_plan import floor_plan, large_plan
 from gvgbot.worlds.open_hall import open_hall
 from gvgbot.worlds.rooms import rooms
 from gvgbot.worlds.slopes import slopes
@@ -26,6 +26,7 @@ _MAKERS: dict[str, Callable[[int], tuple[World, Pose]]] = {
     "ring": ring,
     "hall": hall,
     "floor_plan": floor_plan,
+    "large_plan": large_plan,
     "narrow": narrow,
     "doors": doors,
     "clutter": clutter,

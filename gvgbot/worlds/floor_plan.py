@@ -69,6 +69,12 @@ def floor_plan(seed: int = 0) -> tuple[World, Pose]:
     return building.canvas().world("floor_plan"), building.start
 
 
+def large_plan(seed: int = 0) -> tuple[World, Pose]:
+    """The same over 60 by 60 m: more than a hundred rooms and corridors."""
+    building = Building(Style(building_sides=(60.0, 60.0)), np.random.default_rng(seed))
+    return building.canvas().world("large_plan"), building.start
+
+
 class Building:
     """A building drawn at random: its `spaces`, the `walls` between them, and the `doors` there.
 

@@ -14,7 +14,7 @@ from gvgbot.worlds import NAMES, builtin, open_world
 
 DRAWN = (
     *("jittered", "rooms", "cave", "floor_plan", "narrow", "doors", "clutter", "slopes"),
-    *("open_hall", "glass", "crowd"),
+    *("open_hall", "glass", "crowd", "large_plan"),
 )
 TIGHT = ("doors", "clutter")  # with gaps that a robot does not fit through
 RESOLUTIONS = {"doors": 0.025, "clutter": 0.02}  # m, where not 0.05
@@ -177,6 +177,12 @@ def test_the_office_is_of_the_size_of_a_floor() -> None:
     rows, columns = np.nonzero(~world.occupied)
     assert 30.0 < np.ptp(columns) * 0.05 < 40.0
     assert 18.0 < np.ptp(rows) * 0.05 < 25.0
+
+
+def test_the_large_plan_covers_60_by_60_metres() -> None:
+    world, _ = builtin("large_plan")
+    free = np.argwhere(~world.occupied)
+    assert np.ptp(free, axis=0) * 0.05 == pytest.approx([60.0, 60.0], abs=1.1)  # but outer walls
 
 
 def test_a_name_opens_a_built_in_world_and_a_path_a_file(tmp_path: Path) -> None:
