@@ -9,6 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gvgbot.config import load_config
+from gvgbot.errors import ConfigError
 from gvgbot.geometry import STANDSTILL, Array, Pose, Twist
 from gvgbot.hal.guard import Guard, GuardConfig, GuardState, Reason
 from gvgbot.hal.messages import Contact, Odometry, Scan
@@ -219,6 +221,37 @@ def test_no_step_exceeds_the_acceleration_limits(
     permitted, _ = permit_once(Twist(asked_v, asked_w), last=Twist(v, w))
     assert v - 1.0 * 0.01 - 1e-9 <= permitted.linear <= v + 0.5 * 0.01 + 1e-9
     assert abs(permitted.angular - w) <= 3.5 * 0.01 + 1e-9
+
+
+@pytest.mark.parametrize(("last", "asked"), [(0.4, 0.0), (0.4, 0.2), (0.1, -0.1), (-0.08, 0.0)])
+def test_slowing_down_takes_half_as_long_as_speeding_up(last: float, asked: float) -> None:
+    """At 1 m/s^2, not at 0.5, in a hundredth of a second."""
+    permitted, _ = permit_once(Twist(asked, 0.0), last=Twist(last, 0.0))
+    assert abs(permitted.linear - last) == pytest.approx(0.01)
+
+
+BOUNDS = {
+    "max_speed_mps": (0.05, 0.7),  # a Kobuki's fastest
+    "max_reverse_speed_mps": (0.0, 0.3),
+    "max_turn_rate_radps": (0.1, 3.14),  # 180 degrees a second
+    "max_acceleration_mps2": (0.05, 3.0),
+    "max_braking_mps2": (0.05, 3.0),
+    "max_angular_acceleration_radps2": (0.1, 20.0),
+    "max_scan_age_s": (0.05, 2.0),
+    "margin_m": (0.0, 0.5),
+    "response_time_s": (0.0, 1.0),
+}
+
+
+@pytest.mark.parametrize(("key", "bounds"), BOUNDS.items(), ids=BOUNDS)
+def test_nobody_can_set_a_limit_beyond_its_bounds(key: str, bounds: tuple[float, float]) -> None:
+    least, most = bounds
+    for allowed in bounds:
+        limits = load_config(None, [f"robot.limits.{key}={allowed}"]).robot.limits
+        assert getattr(limits, key) == allowed
+    for beyond in (least - 0.001, most + 0.001):
+        with pytest.raises(ConfigError, match=key):
+            load_config(None, [f"robot.limits.{key}={beyond}"])
 
 
 def test_the_robot_takes_a_second_to_reach_half_a_metre_per_second() -> None:

@@ -23,6 +23,12 @@ def add_vertex(graph: GvgGraph, *bearings: float, at: tuple[float, float] = (0.0
     return vertex
 
 
+def test_a_new_vertex_has_been_seen_once_and_nothing_speaks_against_it() -> None:
+    vertex = Vertex(1, 1.0, Pose(), 0.0, 0.0)
+    assert (vertex.sightings, vertex.visits) == (1, 1)
+    assert (vertex.misses, vertex.surplus, vertex.unclear, vertex.doubted_since) == (0, 0, 0, None)
+
+
 def join(graph: GvgGraph, a: HalfEdgeId, b: HalfEdgeId) -> Edge:
     return graph.join(a, b, LINE, 0.5, driven=True)
 

@@ -162,6 +162,15 @@ def test_a_cut_scan_does_not_take_the_next_one_with_it() -> None:
         assert messages[-1].stamp == 1
 
 
+def test_after_several_cut_scans_the_whole_one_is_read() -> None:
+    vectors = {vector["name"]: vector["rx"].encode("latin-1") for vector in VECTORS}
+    cut, whole = vectors["BAD truncated"], vectors["MD 22 points (value 21 straddles)"]
+    bad, scan = ScipParser().feed(3 * cut + whole)
+    assert isinstance(bad, BadReply)
+    assert isinstance(scan, ScanReply)
+    assert scan.stamp == 1
+
+
 def test_a_scan_without_one_of_its_blocks_is_bad() -> None:
     whole = next(v["rx"] for v in VECTORS if v["name"] == "MS 33 points").encode()
     start = whole.index(b"\n", whole.index(b"99b\n") + 4) + 1

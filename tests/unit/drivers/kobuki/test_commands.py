@@ -13,6 +13,7 @@ from gvgbot.drivers.kobuki.commands import (
     GetGain,
     GpOutput,
     Melody,
+    Output,
     RequestExtra,
     SetGain,
     Sound,
@@ -110,6 +111,20 @@ def test_speeds_beyond_the_field_saturate() -> None:
 
 def test_a_note_is_its_period() -> None:
     assert Sound.of_frequency(440.0, 0.2) == Sound(826, 200)
+
+
+def test_a_note_too_low_or_too_long_is_the_lowest_and_the_longest() -> None:
+    assert Sound.of_frequency(1.0, 60.0) == Sound(65535, 255)
+
+
+def test_the_bits_of_the_outputs_are_those_of_the_protocol() -> None:
+    """Digital outputs 0 to 3, power, then two lamps of two colours: one bit after the other."""
+    assert [output.name for output in Output] == [
+        "DIGITAL_0", "DIGITAL_1", "DIGITAL_2", "DIGITAL_3",
+        "POWER_3V3", "POWER_5V", "POWER_12V_5A", "POWER_12V_1A5",
+        "LED1_RED", "LED1_GREEN", "LED2_RED", "LED2_GREEN",
+    ]  # fmt: skip
+    assert [int(output) for output in Output] == [1 << bit for bit in range(12)]
 
 
 def test_the_tunes_have_the_numbers_of_the_protocol() -> None:
