@@ -149,8 +149,8 @@ def _mutants() -> Iterator[str]:
     killed, tried = (sum(row[key] for row in found) for key in ("killed", "mutants"))
     yield (
         f"## Do the tests notice?\n\n{killed} of {tried} mutants were killed: small changes of the "
-        "source, drawn by `python -m benchmarks.mutation` from all that cosmic-ray can make, and "
-        "tried with the fast unit tests of their part alone.\n\n"
+        "source, drawn by `python -m benchmarks.mutation` from all that cosmic-ray can make but "
+        "for the flags of dataclasses, and tried with the fast unit tests of their part alone.\n\n"
         + table(("part", "mutants", "killed"), rows)
     )
 

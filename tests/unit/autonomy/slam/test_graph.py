@@ -27,6 +27,14 @@ def test_a_new_vertex_has_been_seen_once_and_nothing_speaks_against_it() -> None
     vertex = Vertex(1, 1.0, Pose(), 0.0, 0.0)
     assert (vertex.sightings, vertex.visits) == (1, 1)
     assert (vertex.misses, vertex.surplus, vertex.unclear, vertex.doubted_since) == (0, 0, 0, None)
+    assert vertex.snapshot.shape == vertex.sights.shape == (0, 2)
+
+
+@pytest.mark.parametrize(
+    ("degree", "kind"), [(1, "endpoint"), (2, "meetpoint"), (3, "meetpoint"), (5, "meetpoint")]
+)
+def test_a_vertex_with_one_way_only_is_an_endpoint(degree: int, kind: str) -> None:
+    assert add_vertex(GvgGraph(), *range(degree)).kind == kind
 
 
 def join(graph: GvgGraph, a: HalfEdgeId, b: HalfEdgeId) -> Edge:
