@@ -42,9 +42,14 @@ class Drive:
     """A robot that does at once what the guard permits, with a 10 Hz laser 0.1 s late."""
 
     def __init__(
-        self, walls: list[Segment], *, noise: float = 0.0, base_laser: Pose | None = None
+        self,
+        walls: list[Segment],
+        *,
+        noise: float = 0.0,
+        base_laser: Pose | None = None,
+        braking: float = 1.0,
     ) -> None:
-        self.guard = Guard(GuardConfig(), RADIUS)
+        self.guard = Guard(GuardConfig(max_braking_mps2=braking), RADIUS)
         self.state = GuardState()
         self.walls, self.noise, self.mount = walls, noise, base_laser or Pose()
         self.rng = np.random.default_rng(7)
@@ -330,13 +335,14 @@ def test_the_robot_comes_close_before_it_stops(asked: Twist) -> None:
     assert drive.clearance < RADIUS + 0.03
 
 
-def test_before_a_wall_the_robot_slows_as_its_brakes_allow() -> None:
+@pytest.mark.parametrize("braking", [0.3, 1.0, 3.0])
+def test_before_a_wall_the_robot_slows_as_its_brakes_allow(braking: float) -> None:
     """It never drives faster than v = sqrt(2 a d), which stops it in the free distance d."""
-    drive = Drive(WALL_AHEAD)
+    drive = Drive(WALL_AHEAD, braking=braking)
     while drive.step < 400:
         drive.run(Twist(0.5, 0.0), PERIOD)
         free = 2.0 - drive.pose.x - RADIUS
-        assert drive.twist.linear <= math.sqrt(2.0 * 1.0 * max(free, 0.0)) + 1e-6
+        assert drive.twist.linear <= math.sqrt(2.0 * braking * max(free, 0.0)) + 1e-6
     assert "obstacle near" in drive.reasons
 
 

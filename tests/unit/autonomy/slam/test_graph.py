@@ -37,6 +37,26 @@ def test_a_vertex_with_one_way_only_is_an_endpoint(degree: int, kind: str) -> No
     assert add_vertex(GvgGraph(), *range(degree)).kind == kind
 
 
+def test_a_new_half_edge_leads_somewhere_and_an_edge_has_nothing_against_it() -> None:
+    graph = GvgGraph()
+    a, b = (add_vertex(graph, 0.0) for _ in range(2))
+    assert (a.id, b.id) == (1, 2)
+    assert a.half_edges[0].open
+    assert a.half_edges[0].misses == 0
+    edge = join(graph, HalfEdgeId(a.id, 0), HalfEdgeId(b.id, 0))
+    assert (edge.conflicts, edge.established, edge.doubted_since) == (0, False, None)
+
+
+def test_there_is_no_other_vertex_nearer_than_half_the_shortest_edge() -> None:
+    graph = GvgGraph()
+    vertex, a, b = add_vertex(graph, 0.0, 1.0, 2.0), add_vertex(graph, 0.0), add_vertex(graph, 0.0)
+    assert graph.reach(vertex) == vertex.clearance
+    for key, other, line in ((0, a, LINE), (2, b, 2 * LINE)):
+        ends = HalfEdgeId(vertex.id, key), HalfEdgeId(other.id, 0)
+        graph.join(*ends, line, 0.5, driven=True)
+    assert (graph.reach(vertex), graph.reach(b)) == (3.5, 7.0)
+
+
 def join(graph: GvgGraph, a: HalfEdgeId, b: HalfEdgeId) -> Edge:
     return graph.join(a, b, LINE, 0.5, driven=True)
 
