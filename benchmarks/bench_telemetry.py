@@ -25,8 +25,10 @@ import numpy as np
 
 from benchmarks.report import report, report_fact
 from gvgbot import client
+from gvgbot.autonomy.config import AutonomyConfig
 from gvgbot.autonomy.exploration.config import ExplorationConfig
-from gvgbot.autonomy.pipeline import AutonomyConfig, Keyframe, Pipeline, Step
+from gvgbot.autonomy.keyframes import Keyframe, Step
+from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.ekf import Belief, OdometryNoise
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex
 from gvgbot.geometry import Pose, Twist

@@ -14,8 +14,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
 
 from benchmarks.reference_gvg import reference_gvg
+from gvgbot.autonomy.config import AutonomyConfig
 from gvgbot.autonomy.exploration.config import ExplorationConfig
-from gvgbot.autonomy.pipeline import AutonomyConfig, Pipeline
+from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.drivers.world import World
 from gvgbot.geometry import STANDSTILL, Array, Pose, Twist
 from gvgbot.hal.guard import GuardConfig

@@ -6,9 +6,9 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Literal
 
+from gvgbot.autonomy.config import AutonomyConfig
 from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.localisation import Localisation
-from gvgbot.autonomy.pipeline import AutonomyConfig
 from gvgbot.drivers.hokuyo.driver import HokuyoConfig
 from gvgbot.drivers.hokuyo.twin import HokuyoTwinConfig
 from gvgbot.drivers.kobuki.driver import KobukiConfig

@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 
-from gvgbot.autonomy.pipeline import Keyframe
+from gvgbot.autonomy.keyframes import Keyframe
 from gvgbot.maps.occupancy import GrowingGrid
 from gvgbot.topics import Grid, Tile
 

@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvgbot.autonomy.pipeline import Keyframe, Pipeline
+from gvgbot.autonomy.keyframes import Keyframe
+from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.graph import Vertex
 from gvgbot.geometry import Array, Pose
 from gvgbot.live_grid import LiveGrid

@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from gvgbot.autonomy.estimate import smoothed_keyframes, still_past
-from gvgbot.autonomy.pipeline import Keyframe, Pipeline
+from gvgbot.autonomy.keyframes import Keyframe
+from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.geometry import Pose, wrap_angles
 
 TOLERANCE_M = 0.05  # by which what is drawn may be wrong: a cell of the grid

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvgbot.autonomy.gvg.local import Branch, LocalEdge, LocalGvg
-from gvgbot.autonomy.pipeline import Keyframe, Pipeline, Step
+from gvgbot.autonomy.keyframes import Keyframe, Step
+from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex
 from gvgbot.autonomy.views import Observation

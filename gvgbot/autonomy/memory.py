@@ -16,10 +16,11 @@ from gvgbot.autonomy.errands.plans import Kept
 from gvgbot.autonomy.exploration.obstructions import Obstructions
 from gvgbot.autonomy.gvg.local_map import LocalMap
 from gvgbot.autonomy.hazards import Hazard
+from gvgbot.autonomy.keyframes import Keyframe, Step
 from gvgbot.autonomy.mission import Mission, Outcome
 from gvgbot.autonomy.newcomers import Newcomer
 from gvgbot.autonomy.odometry_log import OdometryLog
-from gvgbot.autonomy.pipeline import Keyframe, Pipeline, Step
+from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId

@@ -1,15 +1,14 @@
 """Every stage from HAL messages to a twist, in the order of the flow. No I/O, clock or chance."""
 
 import math
-from dataclasses import dataclass, field
 from functools import cache, partial
-from typing import Annotated
 
 import numpy as np
 
+from gvgbot.autonomy.config import AutonomyConfig
 from gvgbot.autonomy.control import company
 from gvgbot.autonomy.control.company import BodiesSeen, Companion
-from gvgbot.autonomy.control.edge_follower import EdgeFollowerConfig, follow
+from gvgbot.autonomy.control.edge_follower import follow
 from gvgbot.autonomy.control.orders import Drive, LookAround, Order, Stand
 from gvgbot.autonomy.control.reflexes import (
     Felt,
@@ -18,32 +17,27 @@ from gvgbot.autonomy.control.reflexes import (
     Incident,
     Moment,
     PutDown,
-    ReflexConfig,
     Reflexes,
 )
 from gvgbot.autonomy.errands import Errands
 from gvgbot.autonomy.events import EdgeJoined, Event, Recovery, VertexAdded, WayForgotten
-from gvgbot.autonomy.evidence import MappingConfig
 from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.gvg.local import LocalGvg
-from gvgbot.autonomy.gvg.local_map import LocalMapConfig
-from gvgbot.autonomy.gvg.reduction import ReductionConfig, reduce_graph
+from gvgbot.autonomy.gvg.reduction import reduce_graph
 from gvgbot.autonomy.gvg.voronoi import fine_graph
-from gvgbot.autonomy.hazards import HazardConfig, Hazards
+from gvgbot.autonomy.hazards import Hazards
+from gvgbot.autonomy.keyframes import Keyframe, Step
 from gvgbot.autonomy.localisation import Localisation, LocalMaps
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.mission import Mission
-from gvgbot.autonomy.newcomers import Newcomers, NewcomersConfig
+from gvgbot.autonomy.newcomers import Newcomers
 from gvgbot.autonomy.odometry_log import OdometryLog
-from gvgbot.autonomy.slam.ekf import OdometryNoise
-from gvgbot.autonomy.slam.recognition import RecognitionConfig
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
 from gvgbot.autonomy.views import Correspondence, View, touching
 from gvgbot.geometry import STANDSTILL, Array, Pose, Twist, rotated_covariance, wrap_angle
 from gvgbot.hal.deskew import deskewed
 from gvgbot.hal.messages import Odometry, Scan
 from gvgbot.hal.sweep import free_distance, seen_from
-from gvgbot.ranges import Range
 
 _NOTHING_FELT = Felt()
 _LIFTED = np.diag([0.3**2, 0.3**2, 0.1**2])  # how far a robot is carried that is put down again
@@ -57,56 +51,6 @@ _OVERLAP_RAD = 0.2  # of what is seen before and after the first turn
 _TURN_SHARE = 0.8  # of the fastest turn, to look around
 _SCAN_EVERY_M, _SCAN_EVERY_RAD = 0.7, 0.5  # scans that are kept for the occupancy grid
 _LED_EVERY_M, _LED_EVERY_RAD = 0.4, 2.0  # looks for the GVG, where nobody waits for a way
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class KeyframeConfig:
-    """How much motion makes a new look worth its cost."""
-
-    distance_m: Annotated[float, Range(0.02, 2.0)] = 0.25  # driven since the last one
-    turn_rad: Annotated[float, Range(0.02, 2.0)] = 0.25  # turned since the last one
-    interval_s: Annotated[float, Range(0.1, 10.0)] = 1.0  # since the last one
-    latest: Annotated[int, Range(1, 1_000_000)] = 1000  # kept of errands that showed nothing new
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class AutonomyConfig:
-    """All parts of autonomy, by their module's name."""
-
-    keyframe: KeyframeConfig = field(default_factory=KeyframeConfig)
-    local_map: LocalMapConfig = field(default_factory=lambda: LocalMapConfig(half_width_m=10.0))
-    far_map: LocalMapConfig = field(
-        default_factory=lambda: LocalMapConfig(half_width_m=20.0, cell_m=0.25, bridge_gap_m=0.0)
-    )  # only matched with: the end of a long corridor is what tells how far one has come
-    reduction: ReductionConfig = field(default_factory=ReductionConfig)
-    edge_follower: EdgeFollowerConfig = field(default_factory=EdgeFollowerConfig)
-    reflexes: ReflexConfig = field(default_factory=ReflexConfig)
-    hazards: HazardConfig = field(default_factory=HazardConfig)
-    newcomers: NewcomersConfig = field(default_factory=NewcomersConfig)
-    mapping: MappingConfig = field(default_factory=MappingConfig)
-    recognition: RecognitionConfig = field(default_factory=RecognitionConfig)
-    scan_matching: ScanMatchingConfig = field(default_factory=ScanMatchingConfig)
-    odometry_noise: OdometryNoise = field(default_factory=OdometryNoise)
-    passage_margin_m: Annotated[float, Range(0.0, 0.5)] = 0.05  # beyond the radius, on each side
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Step:
-    """The motion from one keyframe to the next, and its covariance (3, 3), in the first frame."""
-
-    motion: Pose
-    covariance: Array
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Keyframe:
-    """The poses at which a scan was used; the scan itself only where it shows something new."""
-
-    stamp: float
-    odom_base: Pose
-    local_base: Pose
-    map_base: Pose
-    scan: Scan | None
 
 
 class Pipeline:

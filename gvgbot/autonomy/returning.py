@@ -13,14 +13,16 @@ from functools import partial
 import numpy as np
 from scipy.spatial import cKDTree
 
+from gvgbot.autonomy.config import AutonomyConfig
 from gvgbot.autonomy.control.reflexes import Felt
 from gvgbot.autonomy.errands import Declined
 from gvgbot.autonomy.estimate import Estimate, scans_at, smoothed
 from gvgbot.autonomy.events import Event, Finished, Recovery
 from gvgbot.autonomy.exploration.config import ExplorationConfig
+from gvgbot.autonomy.keyframes import Step
 from gvgbot.autonomy.localisation import Localisation
 from gvgbot.autonomy.memory import Growth, Memory, recall
-from gvgbot.autonomy.pipeline import AutonomyConfig, Pipeline, Step
+from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.relocalisation import KnownWalls, Look, Opinion, Relocaliser
 from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.whereabouts import Whereabouts

@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 from benchmarks.kills import vertices
+from gvgbot.autonomy.config import AutonomyConfig
 from gvgbot.autonomy.errands import Declined
 from gvgbot.autonomy.errands.kinds import Patrol
+from gvgbot.autonomy.keyframes import KeyframeConfig
 from gvgbot.autonomy.memory import growth, remember
-from gvgbot.autonomy.pipeline import AutonomyConfig, KeyframeConfig
 from gvgbot.config import Config, TwinConfig
 from gvgbot.drivers.kobuki.twin import KobukiTwinConfig
 from gvgbot.geometry import Pose

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gvgbot.autonomy.pipeline import Keyframe
+from gvgbot.autonomy.keyframes import Keyframe
 from gvgbot.geometry import Pose
 from gvgbot.hal.messages import Scan
 from gvgbot.live_grid import LiveGrid

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gvgbot.autonomy.pipeline import Keyframe, Step
+from gvgbot.autonomy.keyframes import Keyframe, Step
 from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.slam.graph import GvgGraph
 from gvgbot.autonomy.views import Observation

@@ -6,8 +6,9 @@ from collections.abc import Awaitable, Callable, Sequence
 import pytest
 import structlog
 
+from gvgbot.autonomy.config import AutonomyConfig
 from gvgbot.autonomy.exploration.config import ExplorationConfig
-from gvgbot.autonomy.pipeline import AutonomyConfig, Pipeline
+from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.config import RobotConfig
 from gvgbot.live_team import LiveTeam

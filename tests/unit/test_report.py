@@ -2,7 +2,8 @@
 
 import pytest
 
-from gvgbot.autonomy.pipeline import Keyframe, Pipeline
+from gvgbot.autonomy.keyframes import Keyframe
+from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.config import Config
 from gvgbot.geometry import Pose
 from gvgbot.report import Journey, _corrected

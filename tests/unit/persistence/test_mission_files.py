@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gvgbot.autonomy.keyframes import Keyframe, Step
 from gvgbot.autonomy.memory import Growth, remember
-from gvgbot.autonomy.pipeline import Keyframe, Pipeline, Step
+from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.config import Config
 from gvgbot.geometry import Pose
 from gvgbot.persistence.mission_files import JOURNAL, SNAPSHOT, SNAPSHOT_BEFORE, MissionFiles

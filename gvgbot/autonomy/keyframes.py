@@ -1,0 +1,37 @@
+"""The way of the robot as it is kept: where scans were used, and what lies between."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from gvgbot.geometry import Array, Pose
+from gvgbot.hal.messages import Scan
+from gvgbot.ranges import Range
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KeyframeConfig:
+    """How much motion makes a new look worth its cost."""
+
+    distance_m: Annotated[float, Range(0.02, 2.0)] = 0.25  # driven since the last one
+    turn_rad: Annotated[float, Range(0.02, 2.0)] = 0.25  # turned since the last one
+    interval_s: Annotated[float, Range(0.1, 10.0)] = 1.0  # since the last one
+    latest: Annotated[int, Range(1, 1_000_000)] = 1000  # kept of errands that showed nothing new
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Step:
+    """The motion from one keyframe to the next, and its covariance (3, 3), in the first frame."""
+
+    motion: Pose
+    covariance: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Keyframe:
+    """The poses at which a scan was used; the scan itself only where it shows something new."""
+
+    stamp: float
+    odom_base: Pose
+    local_base: Pose
+    map_base: Pose
+    scan: Scan | None
