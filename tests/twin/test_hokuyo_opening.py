@@ -103,13 +103,16 @@ def test_no_scan_of_a_stale_backlog_is_handed_on(backlog_s: float) -> None:
 
 
 class HostPort:
-    """The host's end of a serial line."""
+    """The host's end of a serial line, at a port that lacks some bit rates."""
 
-    def __init__(self, stream: ByteStream, baud: int) -> None:
+    def __init__(self, stream: ByteStream, baud: int, lacks: tuple[int, ...] = ()) -> None:
         self.baud = baud
+        self.lacks = lacks
         self.read, self.write, self.close = stream.read, stream.write, stream.close
 
     def set_baud(self, baud: int) -> None:
+        if baud in self.lacks:
+            raise DeviceLost(f"no {baud} bit/s here")
         self.baud = baud
 
 
@@ -134,11 +137,13 @@ class SerialLine:
         return self.carried(self.device.advance(now), baud)
 
 
-async def serve_rated(device: HokuyoTwin, wanted: int) -> tuple[HokuyoLaser, HostPort]:
-    """A laser driver that has had three scans over a serial line."""
+async def serve_rated(
+    device: HokuyoTwin, wanted: int, lacks: tuple[int, ...] = ()
+) -> tuple[HokuyoLaser, HostPort]:
+    """A laser driver that has had three scans over a serial line; the port `lacks` bit rates."""
     here, there = pipe()
     clock = LoopClock()
-    line = HostPort(here, wanted)
+    line = HostPort(here, wanted, lacks)
     laser = HokuyoLaser(line, HokuyoConfig(baud=wanted, link="serial"), clock)
     async with asyncio.TaskGroup() as tasks:
         served = tasks.create_task(serve_twin(SerialLine(device, line), there, clock))
@@ -156,6 +161,23 @@ def test_a_laser_at_another_bit_rate_is_found_and_changed(found: int) -> None:
         device = twin_of(World(beams=682), model="URG-04LX", serial_baud=found)
         laser, line = await serve_rated(device, 115200)
         assert device.baud == line.baud == 115200
+        assert laser.link.scans == 3
+
+    run_in_virtual_time(main())
+
+
+@pytest.mark.parametrize(
+    ("lacks", "agreed"),
+    [
+        pytest.param((250000, 500000), 115200, id="rates that are searched"),
+        pytest.param((115200,), 750000, id="the wanted one"),
+    ],
+)
+def test_a_rate_that_the_port_lacks_is_passed_over(lacks: tuple[int, ...], agreed: int) -> None:
+    async def main() -> None:
+        device = twin_of(World(beams=682), model="URG-04LX", serial_baud=750000)
+        laser, line = await serve_rated(device, 115200, lacks)
+        assert device.baud == line.baud == agreed
         assert laser.link.scans == 3
 
     run_in_virtual_time(main())

@@ -96,7 +96,8 @@ async def tune(dialogue: Dialogue, wanted: int, *, patience: float) -> int:
 async def _search(dialogue: Dialogue, stream: Tunable, wanted: int, patience: float) -> int:
     """The rate at which the laser is at rest now. Raises DeviceLost or DeviceRefused."""
     for baud, tries in _rates(wanted):
-        stream.set_baud(baud)
+        if not _takes(stream, baud):
+            continue
         try:
             await quiet(dialogue, patience=tries * dialogue.timeout - dialogue.timeout / 2)
         except DeviceLost:
@@ -112,13 +113,31 @@ def _rates(wanted: int) -> Iterator[tuple[int, int]]:
     yield from ((baud, 1) for baud in BIT_RATES if baud != wanted)
 
 
+def _takes(stream: Tunable, baud: int) -> bool:
+    """Whether the port has this bit rate, which it then is set to."""
+    try:
+        stream.set_baud(baud)
+    except DeviceLost:
+        return False
+    return True
+
+
 async def _set_rate(dialogue: Dialogue, stream: Tunable, found: int, wanted: int) -> int:
-    dialogue.send(f"SS{wanted:06}")
-    reply = await dialogue.reply_to(f"SS{wanted:06}")
-    if reply is None or reply.status != ACCEPTED:
+    """Set both sides to the wanted rate if both know it. Returns the rate that holds then."""
+    is_possible = _takes(stream, wanted)  # a laser at a rate that the port lacks is out of reach
+    stream.set_baud(found)
+    if not (is_possible and await _changes(dialogue, wanted)):
         log.warning("laser keeps its bit rate", baud=found, wanted=wanted)
         return found
     stream.set_baud(wanted)
     await quiet(dialogue, patience=dialogue.timeout)
     log.info("laser changed its bit rate", before=found, baud=wanted)
     return wanted
+
+
+async def _changes(dialogue: Dialogue, baud: int) -> bool:
+    """Whether the laser agrees to change its bit rate."""
+    command = f"SS{baud:06}"
+    dialogue.send(command)
+    reply = await dialogue.reply_to(command)
+    return reply is not None and reply.status == ACCEPTED
