@@ -8,11 +8,11 @@ from functools import partial
 from gvgbot.clock import Clock
 from gvgbot.config import Config
 from gvgbot.drivers.hokuyo.driver import HokuyoLaser, LinkStatistics
-from gvgbot.drivers.kobuki.driver import KobukiBase
+from gvgbot.drivers.kobuki.driver import STANDSTILL_FRAME, KobukiBase
 from gvgbot.drivers.kobuki.feedback import FeedbackReader
 from gvgbot.drivers.tapped import Tap, TappedStream
 from gvgbot.drivers.tcp import SCHEME, TcpStream
-from gvgbot.drivers.transport import ByteStream, open_serial
+from gvgbot.drivers.transport import ByteStream, SerialStream, open_serial
 from gvgbot.errors import DeviceLost
 from gvgbot.hal.devices import Base, Laser
 from gvgbot.hal.reopening import ReopeningBase, ReopeningLaser
@@ -61,6 +61,8 @@ class Links:
         config = self.config.base
         if self.simulation is None:
             stream, close = await _open_port("base", config.port, config.baud)
+            if isinstance(stream, SerialStream):
+                stream.watch_over(STANDSTILL_FRAME, config.deadman_s)
         else:
             stream, close = self.simulation.base, _leave_open
         stream = self._tapped("base", stream)

@@ -12,6 +12,7 @@ from typing import Protocol
 import serial
 
 from gvgbot.clock import Clock
+from gvgbot.drivers.deadman import Deadman
 from gvgbot.errors import DeviceLost
 
 
@@ -104,6 +105,7 @@ class SerialStream:
         self._arrived = bytearray()
         self._readable = asyncio.Event()
         self._gone = self._is_closed = False
+        self._deadman: Deadman | None = None
         self._loop = asyncio.get_running_loop()
         self._loop.add_reader(self._fd, self._on_readable)
 
@@ -143,6 +145,10 @@ class SerialStream:
             self._readable.set()
             raise DeviceLost(f"{self._path} is gone: plug it in again") from error
 
+    def watch_over(self, last_words: bytes, patience_s: float) -> None:
+        """Write the last words while the event loop hangs for longer than that."""
+        self._deadman = Deadman(self._fd, last_words, patience_s)
+
     def set_baud(self, baud: int) -> None:
         """Send and receive at this rate (bit/s) from now on. Raises DeviceLost."""
         try:
@@ -155,6 +161,8 @@ class SerialStream:
         if self._is_closed:
             return
         self._gone = self._is_closed = True
+        if self._deadman is not None:
+            self._deadman.close()
         self._loop.remove_reader(self._fd)
         if _has_unsent(self._port):  # which the kernel may wait for
             self._loop.run_in_executor(None, _close, self._port)

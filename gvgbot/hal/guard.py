@@ -40,7 +40,7 @@ class GuardConfig:
     max_scan_age_s: Annotated[float, Range(0.05, 2.0)] = 0.5  # older than this, the robot stops
     margin_m: Annotated[float, Range(0.0, 0.5)] = 0.015  # kept free around the footprint
     # from a command to the first effect on the motors
-    response_time_s: Annotated[float, Range(0.0, 1.0)] = 0.1
+    response_time_s: Annotated[float, Range(0.0, 1.0)] = 0.25
 
 
 @dataclass(frozen=True, slots=True, eq=False)

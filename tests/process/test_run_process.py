@@ -33,6 +33,8 @@ RUN = {
     "truth.tum",
 }
 PATIENCE = 20.0  # s, for a busy machine
+# header, length, base control of speed 0 and radius 0, and the XOR of 06 01 04
+STANDSTILL = bytes.fromhex("aa55 06 01 04 0000 0000 03")
 
 
 @pytest.fixture
@@ -181,8 +183,47 @@ def test_the_base_can_be_stopped_from_outside(tmp_path: Path) -> None:
     try:
         done = subprocess.run(command, check=False, capture_output=True, timeout=PATIENCE)
         assert done.returncode == 0, done.stderr
-        # header, length, base control of speed 0 and radius 0, and the XOR of 06 01 04
-        assert os.read(here, 100) == bytes.fromhex("aa55 06 01 04 0000 0000 03")
+        assert os.read(here, 100) == STANDSTILL
     finally:
         os.close(here)
         os.close(there)
+
+
+def test_a_base_on_the_network_can_be_stopped_from_outside(tmp_path: Path) -> None:
+    config = tmp_path / "robot.yaml"
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = f"tcp://127.0.0.1:{server.getsockname()[1]}"
+        config.write_text(f"{{twin: {{enabled: false}}, base: {{port: '{port}'}}}}")
+        command = [sys.executable, "-m", "gvgbot.stop_base", str(config)]
+        with subprocess.Popen(command) as process:
+            base, _ = server.accept()
+            with base:  # which says nothing
+                base.settimeout(PATIENCE)
+                assert base.recv(100) == STANDSTILL
+                assert process.wait(PATIENCE) == 0
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ("{twin: {enabled: false}, base: {port: /no/such/port}}", "/no/such/port"),
+        ("{twin: {enabled: false}, base: {prot: /dev/null}}", "prot"),
+        ("twin: [", "not a configuration"),
+    ],
+)
+def test_a_base_that_cannot_be_stopped_is_a_line_and_exit_status_1(
+    text: str, named: str, tmp_path: Path
+) -> None:
+    config = tmp_path / "robot.yaml"
+    config.write_text(text)
+    command = [sys.executable, "-m", "gvgbot.stop_base", str(config)]
+    done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=PATIENCE)
+    assert done.returncode == 1
+    assert named in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_what_stops_the_base_loads_nothing_that_takes_long() -> None:
+    code = "import sys, gvgbot.stop_base; print('scipy' in sys.modules, 'zenoh' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    assert done.stdout.split() == ["False", "False"]

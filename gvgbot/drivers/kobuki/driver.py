@@ -35,6 +35,7 @@ _STOP_REPEAT_S = 0.1  # while the base is to stand, it is told so again this oft
 _IDENTITY_RETRY_S = 0.5
 _ALL_EXTRAS = Extra.HARDWARE | Extra.FIRMWARE | Extra.UDID
 _STOP = BaseControl(0, 0)
+STANDSTILL_FRAME = encode_commands([_STOP])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

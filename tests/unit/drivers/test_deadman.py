@@ -1,0 +1,68 @@
+"""A base is told to stand while the event loop hangs, and only then."""
+
+import asyncio
+import os
+import threading
+import tty
+from collections.abc import Iterator
+
+import pytest
+
+from gvgbot.drivers.transport import SerialStream
+
+LAST_WORDS = b"stand still"
+PATIENCE_S = 0.1
+
+
+@pytest.fixture
+def ends() -> Iterator[tuple[int, str]]:
+    """The base's end of a line, which never blocks, and the path of ours."""
+    here, there = os.openpty()
+    tty.setraw(there)
+    os.set_blocking(here, False)
+    yield here, os.ttyname(there)
+    os.close(here)
+    os.close(there)
+
+
+def heard(end: int) -> bytes:
+    try:
+        return os.read(end, 10_000)
+    except BlockingIOError:
+        return b""
+
+
+def hang(seconds: float) -> None:
+    """Hold the event loop, as a disk that does not answer may."""
+    threading.Event().wait(seconds)
+
+
+def test_a_hung_loop_does_not_keep_the_base_going(ends: tuple[int, str]) -> None:
+    end, path = ends
+
+    async def drive() -> None:
+        stream = SerialStream(path, 115200)
+        stream.watch_over(LAST_WORDS, PATIENCE_S)
+        stream.write(b"drive")
+        hang(5 * PATIENCE_S)
+        said = heard(end)
+        assert said.startswith(b"drive" + LAST_WORDS)
+        assert said.count(LAST_WORDS) >= 2  # as long as it lasts
+        stream.close()
+
+    asyncio.run(drive())
+
+
+def test_a_loop_that_runs_is_left_alone_and_so_is_a_closed_port(ends: tuple[int, str]) -> None:
+    end, path = ends
+
+    async def drive() -> None:
+        stream = SerialStream(path, 115200)
+        stream.watch_over(LAST_WORDS, 20.0)
+        await asyncio.sleep(PATIENCE_S)
+        assert "deadman" in {thread.name for thread in threading.enumerate()}
+        stream.close()
+        assert "deadman" not in {thread.name for thread in threading.enumerate()}
+
+    asyncio.run(drive())
+    assert heard(end) == b""
