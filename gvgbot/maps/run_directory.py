@@ -28,11 +28,13 @@ class RunDirectory:
     def __init__(self, path: Path) -> None:
         """Open the directory of a run, made if it is missing; its events go on where they ended.
 
-        Raises UsageError if the directory cannot be written to.
+        What a power cut has left of an event is cut off. Raises UsageError if the
+        directory cannot be written to.
         """
         self.path = path
         try:
             path.mkdir(parents=True, exist_ok=True)
+            _cut_to_lines(path / EVENTS)
             self._events = (path / EVENTS).open("ab", buffering=0)
         except OSError as error:
             raise _unfit(path, error) from error
@@ -93,6 +95,16 @@ class RunDirectory:
         trace: TracebackType | None,
     ) -> None:
         self.close()
+
+
+def _cut_to_lines(path: Path) -> None:
+    """Cut off what follows the last whole line of a file, made if it is missing. Raises OSError."""
+    with path.open("a+b", buffering=0) as file:
+        length = file.seek(0, io.SEEK_END)
+        file.seek(0)
+        lines = file.read(length).rfind(b"\n") + 1
+        if lines < length:
+            file.truncate(lines)
 
 
 def _write_all(file: io.FileIO, content: bytes) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Self, TypeVar
 
 import msgspec
+import structlog
 
 from gvgbot.errors import UsageError
 from gvgbot.maps import geojson
@@ -16,6 +17,8 @@ from gvgbot.maps.run_directory import EVENTS, SUMMARY
 from gvgbot.maps.trajectory import Trajectory, decode_tum
 
 T = TypeVar("T")
+
+log = structlog.get_logger()
 
 
 class Happening(msgspec.Struct, frozen=True):
@@ -70,9 +73,9 @@ class SavedRun:
         )
 
 
-def _text(path: Path) -> str:
+def _text(path: Path, errors: str = "strict") -> str:
     try:
-        return path.read_text("utf-8")
+        return path.read_text("utf-8", errors)
     except OSError as error:
         raise UsageError(f"cannot read {path}: {error.strerror}") from error
     except UnicodeDecodeError as error:
@@ -89,15 +92,27 @@ def _decoded(path: Path, decode: Callable[[str], T]) -> T:
 
 
 def _events(path: Path) -> tuple[Happening, ...]:
-    """All whole lines: the last one of a run that was killed may be cut short."""
-    *lines, _ = _text(path).split("\n")
-    happenings = []
-    for number, line in enumerate(lines, start=1):
-        try:
-            happenings.append(msgspec.json.decode(line, type=Happening))
-        except msgspec.MsgspecError as error:
-            raise UsageError(f"{path}, line {number} is no event: {error}") from error
-    return tuple(happenings)
+    """Those of all lines that can be read, with one warning if there are others.
+
+    What follows the last whole line is none: a run that was killed may have cut it short.
+    """
+    *lines, _ = _text(path, "replace").split("\n")
+    found = [_happening(line) for line in lines]
+    if None in found:
+        log.warning(
+            "events that cannot be read are left out",
+            path=str(path),
+            first_line=found.index(None) + 1,
+            lines=found.count(None),
+        )
+    return tuple(happening for happening in found if happening is not None)
+
+
+def _happening(line: str) -> Happening | None:
+    try:
+        return msgspec.json.decode(line, type=Happening)
+    except msgspec.MsgspecError:
+        return None
 
 
 def _summary(path: Path) -> Summary | None:

@@ -100,6 +100,24 @@ def test_an_opened_run_goes_on(tmp_path: Path) -> None:
     assert (tmp_path / "summary.json").exists()
 
 
+@pytest.mark.parametrize("rest", [b'{"event": "loop_cl', b"\0" * 700, b'{"event": "l\0\0\0', b""])
+def test_what_a_power_cut_has_left_of_an_event_is_cut_off(tmp_path: Path, rest: bytes) -> None:
+    with RunDirectory(tmp_path) as run:
+        run.append_event(LoopClosed(1.0, 1, 0.0))
+    with (tmp_path / "events.jsonl").open("ab") as events:
+        events.write(rest)
+    with RunDirectory(tmp_path) as run:
+        run.append_event(LoopClosed(2.0, 2, 0.0))
+    lines = (tmp_path / "events.jsonl").read_text().splitlines()
+    assert [json.loads(line)["stamp"] for line in lines] == [1.0, 2.0]
+
+
+def test_of_a_list_that_ends_in_its_first_event_nothing_is_kept(tmp_path: Path) -> None:
+    (tmp_path / "events.jsonl").write_bytes(b'{"event": "loop_cl')
+    RunDirectory(tmp_path).close()
+    assert (tmp_path / "events.jsonl").read_bytes() == b""
+
+
 @pytest.mark.parametrize("name", ["events.jsonl", "map.geojson", "summary.json"])
 def test_a_run_that_is_there_stays(tmp_path: Path, name: str) -> None:
     """Whether it has ended, was killed after its map was saved, or before."""

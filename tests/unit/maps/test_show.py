@@ -3,9 +3,11 @@
 from pathlib import Path
 
 import pytest
+import structlog
 from PIL import Image
 
 from gvgbot.cli import main
+from gvgbot.maps.saved_run import SavedRun
 from tests.unit.maps.small_run import write_run
 
 Captured = pytest.CaptureFixture[str]
@@ -60,12 +62,32 @@ def test_a_run_that_was_killed_can_still_be_looked_at(run: Path, capsys: Capture
     assert main(["map", "show", str(run), "--frames", "2"]) == 0
 
 
+BROKEN = [
+    b'{"event": "vertex_a{"event": "decision", "stamp": 1006.0}',
+    b"\0\0\0",
+    b"\xff\xfe",
+    b"[]",
+    b'{"event": "finished"}',
+]
+
+
+@pytest.mark.parametrize("broken", BROKEN)
+def test_events_that_cannot_be_read_are_left_out_with_one_warning(run: Path, broken: bytes) -> None:
+    whole = SavedRun.read(run).events
+    before, *after = (run / "events.jsonl").read_bytes().splitlines(keepends=True)
+    (run / "events.jsonl").write_bytes(b"".join([before, broken, b"\n", *after, broken, b"\n"]))
+    with structlog.testing.capture_logs() as logs:
+        assert SavedRun.read(run).events == whole
+    (warning,) = logs
+    assert (warning["log_level"], warning["first_line"], warning["lines"]) == ("warning", 2, 2)
+    assert warning["path"] == str(run / "events.jsonl")
+    assert main(["map", "show", str(run), "--frames", "2"]) == 0
+
+
 DAMAGES: dict[str, tuple[str, str]] = {
     "no graph": ("map.geojson", "{"),
     "no trajectory": ("estimate.tum", "1 2 3\n"),
     "no odometry": ("odometry.tum", "1 2 3 0 0 0 0 nan\n"),
-    "no event": ("events.jsonl", "[]\n"),
-    "an event without a stamp": ("events.jsonl", '{"event": "finished"}\n'),
     "no summary": ("summary.json", "{}"),
     "no grid": ("map.pgm", "P5"),
 }
