@@ -50,6 +50,76 @@ def test_it_opens_a_laser_that_is(config: dict[str, object], seconds: float) -> 
     on_bench(twin_of(World(beams=beams), **config), scenario)
 
 
+@pytest.mark.parametrize(
+    "mute",
+    [
+        pytest.param((b"TM1\n",), id="TM1"),
+        pytest.param((b"TM0\n",), id="TM0"),
+        pytest.param((b"TM0\n", b"TM1\n", b"TM2\n"), id="TM altogether"),
+    ],
+)
+def test_a_laser_that_keeps_its_time_to_itself_is_opened(mute: tuple[bytes, ...]) -> None:
+    """As some UBG do."""
+
+    async def scenario(bench: Bench) -> None:
+        await opens_within(bench, 3.0)
+        assert bench.laser.synchronisation is None
+        scans = await bench.scans(20)
+        assert [scan.stamp for scan in scans] == pytest.approx(world.stamps[-20:], abs=0.003)
+
+    world = World()
+    on_bench(Scripted(dict.fromkeys(mute, b""), twin_of(world)), scenario)
+
+
+class TiresOfTime(Scripted):
+    """A laser that tells its time so often, and then no more; one that is `dying` says nothing."""
+
+    def __init__(self, twin: HokuyoTwin, times: int, *, dying: bool = False) -> None:
+        super().__init__({}, twin)
+        self.times = times
+        self.is_dying = dying
+
+    def answer(self, command: bytes, now: float) -> bytes:
+        is_question = command == b"TM1\n"
+        self.times -= is_question
+        is_mute = self.times < 0 and (is_question or self.is_dying)
+        return b"" if is_mute else super().answer(command, now)
+
+
+def test_times_from_before_a_silence_say_nothing_of_the_clock() -> None:
+    async def scenario(bench: Bench) -> None:
+        await opens_within(bench, 3.0)
+        assert bench.laser.synchronisation is None
+
+    on_bench(TiresOfTime(twin_of(), 5), scenario)
+
+
+def test_a_laser_that_goes_dead_while_it_is_asked_for_its_time_is_lost() -> None:
+    async def main() -> None:
+        here, there = pipe()
+        clock = LoopClock()
+        async with asyncio.TaskGroup() as tasks:
+            twin = TiresOfTime(twin_of(), 5, dying=True)
+            served = tasks.create_task(serve_twin(twin, there, clock))
+            with pytest.raises(DeviceLost, match="does not answer"):
+                await HokuyoLaser(here, HokuyoConfig(), clock).run()
+            assert clock.now() < 4.0
+            served.cancel()
+
+    run_in_virtual_time(main())
+
+
+@pytest.mark.parametrize(
+    "reply", [pytest.param(b"", id="none"), pytest.param(b"II\n00P\nMODL:x;x\n\n", id="damaged")]
+)
+def test_a_laser_that_does_not_tell_its_condition_is_opened(reply: bytes) -> None:
+    async def scenario(bench: Bench) -> None:
+        await opens_within(bench, 2.0)
+        assert not bench.laser.status
+
+    on_bench(Scripted({b"II\n": reply}, twin_of()), scenario)
+
+
 def test_an_abnormal_laser_is_rebooted_once() -> None:
     async def scenario(bench: Bench) -> None:
         await bench.scans(3)

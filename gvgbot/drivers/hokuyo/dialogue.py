@@ -23,6 +23,13 @@ class Refusal(DeviceRefused):
         self.status = status
 
 
+class Silence(DeviceLost):
+    """The laser did not answer a command; the link itself may well be alive."""
+
+    def __init__(self, command: str) -> None:
+        super().__init__(f"the laser does not answer {command}")
+
+
 class Dialogue:
     """Sends commands and hears messages. Raises DeviceLost whenever the link is gone."""
 
@@ -47,7 +54,7 @@ class Dialogue:
         self.stream.write(b"\n")
 
     async def ask(self, command: str) -> Reply:
-        """The reply to a command. Raises Refusal, or DeviceLost when none comes."""
+        """The reply to a command. Raises Refusal, or Silence when none comes."""
         for _ in range(ASK_ATTEMPTS):
             self.send(command)
             reply = await self.reply_to(command)
@@ -57,7 +64,7 @@ class Dialogue:
             if reply.status != ACCEPTED:
                 raise Refusal(command, reply.status)
             return reply
-        raise DeviceLost(f"the laser does not answer {command}")
+        raise Silence(command)
 
     async def reply_to(self, command: str, within: float | None = None) -> Reply | None:
         """The next reply that echoes the command; None when none comes `within` s."""

@@ -13,7 +13,7 @@ from gvgbot.clock import Clock
 from gvgbot.drivers.hokuyo import clock_sync
 from gvgbot.drivers.hokuyo.clock_sync import ClockMap, Synchronisation, TimeSample
 from gvgbot.drivers.hokuyo.config import HokuyoConfig
-from gvgbot.drivers.hokuyo.dialogue import Arrival, Dialogue, Refusal
+from gvgbot.drivers.hokuyo.dialogue import Arrival, Dialogue, Refusal, Silence
 from gvgbot.drivers.hokuyo.models import Identity, Parameters
 from gvgbot.drivers.hokuyo.modes import Mode, choose_mode, link_rate
 from gvgbot.drivers.hokuyo.opening import ABNORMAL, quiet, reboot, tune
@@ -161,7 +161,7 @@ class HokuyoLaser:
             self._parameters = Parameters.from_lines(reply.fields)
         except ValueError as error:
             raise DeviceRefused(f"the laser's PP reply makes no sense: {error}") from error
-        with contextlib.suppress(Refusal):
+        with contextlib.suppress(Refusal, Silence):
             self._status = (await self._dialogue.ask("II")).fields
         self._mode = self._choose(self._parameters)
         if self._mode.adapted is not None:
@@ -183,18 +183,24 @@ class HokuyoLaser:
             return None
         samples: list[TimeSample] = []
         try:
-            await self._enter_time_mode()
-            while len(samples) < TIME_SAMPLES:
-                samples.append(await self._time_sample())
-                await self._pause(len(samples))
+            await self._sample_time(samples)
         except (Refusal, DamagedError) as error:
             log.info("laser does not tell its time", reason=str(error))
-        self._dialogue.send("TM2")
-        await self._dialogue.reply_to("TM2")
+        except Silence as silence:
+            log.info("laser does not tell its time", reason=str(silence))
+            samples.clear()  # in the silence it may have rebooted, which resets its clock
+        await self._leave_time_mode()
         return clock_sync.synchronise(samples)
 
+    async def _sample_time(self, samples: list[TimeSample]) -> None:
+        """Raises Refusal, DamagedError or Silence; the samples until then count."""
+        await self._enter_time_mode()
+        while len(samples) < TIME_SAMPLES:
+            samples.append(await self._time_sample())
+            await self._pause(len(samples))
+
     async def _enter_time_mode(self) -> None:
-        """Raises Refusal if the laser cannot."""
+        """Raises Refusal if the laser cannot, Silence if it does not answer."""
         for _ in range(LOST_STOPS):
             try:
                 await self._dialogue.ask("TM0")
@@ -206,8 +212,14 @@ class HokuyoLaser:
                 return
         raise Refusal("TM0", DENIED)
 
+    async def _leave_time_mode(self) -> None:
+        """A laser that does not answer that has to come to rest. Raises DeviceLost if it cannot."""
+        self._dialogue.send("TM2")
+        if await self._dialogue.reply_to("TM2") is None:
+            await quiet(self._dialogue, patience=2 * self._config.reply_timeout_s)
+
     async def _time_sample(self) -> TimeSample:
-        """Raises Refusal or DamagedError."""
+        """Raises Refusal, DamagedError or Silence."""
         sent = self._dialogue.clock.now()
         reply = await self._dialogue.ask("TM1")
         return TimeSample(sent, decode_time(reply), self._dialogue.answered)
