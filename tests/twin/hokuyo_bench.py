@@ -10,6 +10,8 @@ import numpy as np
 
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.drivers.hokuyo.driver import HokuyoConfig, HokuyoLaser
+from gvgbot.drivers.hokuyo.scip import encode_reply
+from gvgbot.drivers.hokuyo.scip_messages import Reply
 from gvgbot.drivers.hokuyo.twin import HokuyoTwinConfig
 from gvgbot.drivers.transport import ByteStream, TwinDevice, pipe, serve_twin
 from gvgbot.errors import DeviceLost
@@ -133,6 +135,36 @@ class Scripted(Deaf):
 
     def next_due(self) -> float:
         return self.twin.next_due()
+
+
+class Reports(Scripted):
+    """A laser that for a while has a status in place of every scan; an empty one is silence.
+
+    `since` and `until` (s) are counted from its last MD, or from the beginning of time.
+    """
+
+    def __init__(
+        self, twin: TwinDevice, status: str, since: float, until: float, *, after_md: bool = False
+    ) -> None:
+        super().__init__({}, twin)
+        self.status, self.since, self.until = status, since, until
+        self.after_md = after_md
+        self.began = 0.0
+        self.echo = ""
+        self.heard_resets = 0
+
+    def answer(self, command: bytes, now: float) -> bytes:
+        self.heard_resets += command == b"RS\n"
+        if command.startswith(b"MD"):
+            self.echo = command.decode().strip()
+            self.began = now if self.after_md else 0.0
+        return super().answer(command, now)
+
+    def advance(self, now: float) -> bytes:
+        frame = self.twin.advance(now)
+        if not frame or not self.since <= now - self.began < self.until:
+            return frame
+        return encode_reply(Reply(self.echo, self.status)) if self.status else b""
 
 
 class LosesStops(Scripted):

@@ -20,6 +20,7 @@ from tests.twin.hokuyo_bench import (
     Deaf,
     FrozenClock,
     LosesStops,
+    Reports,
     Scripted,
     SlowLink,
     World,
@@ -291,3 +292,16 @@ def test_a_refused_stream_is_reported_with_its_status() -> None:
             served.cancel()
 
     run_in_virtual_time(main())
+
+
+@pytest.mark.parametrize("mark", ["", "gvgbot 1"])
+@pytest.mark.parametrize("status", ["50", "97", "0L"])
+def test_a_fault_of_its_own_ends_the_stream_at_once(mark: str, status: str) -> None:
+    async def scenario(bench: Bench) -> None:
+        await bench.running
+        assert bench.clock.now() == pytest.approx(5.0, abs=0.15)
+        link = bench.laser.link
+        assert (link.refused_scans, link.stray_messages, link.restarts) == (1, 0, 0)
+
+    twin = Reports(HokuyoTwin(PERFECT, World(), seed=20), status, 5.0, 6.0)
+    on_bench(twin, scenario, HokuyoConfig(user_string=mark))

@@ -306,7 +306,7 @@ class HokuyoLaser:
         match message:
             case ScanReply(request=stream.request):
                 return self._timed_scan(message, arrival, stream)
-            case Reply(command=command, status=status) if command == stream.request.text():
+            case Reply(echo=echo, status=status) if echo == stream.request.text():
                 self._no_scan(status)
             case BadReply():
                 pass  # counted as it was heard
