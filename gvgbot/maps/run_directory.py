@@ -40,14 +40,27 @@ class RunDirectory:
             raise _unfit(path, error) from error
 
     @classmethod
-    def create(cls, out: Path | None = None, *, world: str, runs: Path = Path("runs")) -> Self:
-        """The directory of a new run: `out`, or the next free `runs/<world>-<n>`.
+    def create(
+        cls,
+        out: Path | None = None,
+        *,
+        world: str,
+        runs: Path = Path("runs"),
+        after_all: bool = False,
+    ) -> Self:
+        """The directory of a new run: `out`, or the next `runs/<world>-<n>`.
+
+        The number is greater than that of any run of this world, or of any at all if it shall come
+        `after_all`.
 
         Raises UsageError if the directory cannot be written to, or holds an earlier run.
         """
         if out is not None and _holds_run(out):
             raise UsageError(f"{out} holds a run already: choose another directory, or remove it")
-        return cls(_next_free(runs, world) if out is None else out)
+        if out is None:
+            others = numbers(runs, None if after_all else world)
+            out = _next_free(runs, world, 1 + max(others.values(), default=0))
+        return cls(out)
 
     def write(self, contents: Mapping[str, bytes | str]) -> None:
         """Replace these files together; if that fails (GvgbotError), the old ones stand."""
@@ -120,6 +133,13 @@ def _write_all(file: io.FileIO, content: bytes) -> None:
         raise
 
 
+def numbers(runs: Path, world: str | None = None) -> dict[Path, int]:
+    """The numbers of the runs in a directory, by their paths: of a world, or all there are."""
+    name = ".+" if world is None else re.escape(world)
+    found = ((path, re.fullmatch(rf"{name}-(\d+)", path.name)) for path in runs.glob("*"))
+    return {path: int(match[1]) for path, match in found if match is not None}
+
+
 def record_of(event: object) -> dict[str, Any]:
     """An event as its line has it: the fields of the dataclass after its name as `event`."""
     return {"event": _snake_case(type(event).__name__)} | _fields(event)
@@ -169,9 +189,8 @@ def _holds_run(path: Path) -> bool:
         raise _unfit(path, error) from error
 
 
-def _next_free(runs: Path, world: str) -> Path:
-    """The first `<world>-<n>` that did not exist; making it is what claims it."""
-    number = 1
+def _next_free(runs: Path, world: str, number: int) -> Path:
+    """The first `<world>-<n>` from a number on that did not exist; making it is what claims it."""
     while True:
         path = runs / f"{world}-{number}"
         try:

@@ -1,6 +1,5 @@
 """Where a run begins: in a new directory, in the one where it ended, or with the map of another."""
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,7 +8,7 @@ import structlog
 
 from gvgbot.config import Config
 from gvgbot.errors import UsageError
-from gvgbot.maps.run_directory import RunDirectory
+from gvgbot.maps.run_directory import RunDirectory, numbers
 from gvgbot.persistence.mission_files import SNAPSHOT, SNAPSHOT_BEFORE, MissionFiles
 from gvgbot.persistence.mission_state import Saved
 from gvgbot.persistence.records import Damaged
@@ -66,8 +65,10 @@ def begin(wanted: Wanted, *, world: str) -> Start:
 
 
 def _new(wanted: Wanted, world: str) -> RunDirectory:
-    runs = Path("runs") if wanted.state_dir is None else wanted.state_dir / "runs"
-    return RunDirectory.create(wanted.out, world=world, runs=runs)
+    if wanted.state_dir is None:
+        return RunDirectory.create(wanted.out, world=world)
+    runs = wanted.state_dir / "runs"
+    return RunDirectory.create(wanted.out, world=world, runs=runs, after_all=True)
 
 
 def _known(path: Path) -> Saved:
@@ -82,13 +83,15 @@ def _known(path: Path) -> Saved:
 
 
 def _newest(state_dir: Path | None) -> Path | None:
-    """The run with the highest number that has left a mission."""
+    """The run that was begun last of those that have left a mission: it has the highest number.
+
+    Times of files would not tell: the clock of a robot may go back when its power is cut.
+    """
     if state_dir is None:
         return None
     found = [
-        (int(number[1]), path.name, path)
-        for path in (state_dir / "runs").glob("*")
-        if (number := re.search(r"-(\d+)$", path.name))
-        and any((path / name).exists() for name in (SNAPSHOT, SNAPSHOT_BEFORE))
+        (number, path)
+        for path, number in numbers(state_dir / "runs").items()
+        if any((path / name).exists() for name in (SNAPSHOT, SNAPSHOT_BEFORE))
     ]
-    return max(found)[2] if found else None
+    return max(found)[1] if found else None

@@ -29,6 +29,16 @@ def test_runs_of_a_world_are_numbered(tmp_path: Path) -> None:
     assert names(tmp_path / "runs") == {"office-1", "office-2", "cave-1"}
 
 
+@pytest.mark.parametrize(("after_all", "number"), [(False, 13), (True, 31)])
+def test_a_number_is_greater_than_those_before(
+    tmp_path: Path, after_all: bool, number: int
+) -> None:
+    for name in ("office-2", "office-12", "office-old", "cave-30", "office.yaml-40x", "50"):
+        (tmp_path / name).mkdir()
+    with RunDirectory.create(world="office", runs=tmp_path, after_all=after_all) as run:
+        assert run.path == tmp_path / f"office-{number}"
+
+
 def test_a_directory_that_was_asked_for_is_made_with_its_parents(tmp_path: Path) -> None:
     with RunDirectory.create(tmp_path / "a" / "b", world="office") as run:
         run.write({"map.pgm": b"P5", "map.yaml": "image: map.pgm — ü\n"})

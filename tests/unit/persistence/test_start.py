@@ -61,6 +61,37 @@ def test_the_run_with_the_highest_number_that_left_a_mission_goes_on(tmp_path: P
     assert (start.directory.path / "events.jsonl").read_text() == "{}\n"
 
 
+def test_a_new_mission_goes_on_after_a_restart_whatever_older_ones_were_removed(
+    tmp_path: Path,
+) -> None:
+    mission(tmp_path / "runs" / "office-5")
+    new = begun(Wanted(anew=True, state_dir=tmp_path)).directory.path
+    written(new)
+    assert begun(Wanted(state_dir=tmp_path)).directory.path == new
+
+
+def test_a_new_mission_goes_on_after_a_restart_whatever_the_robot_was_called(
+    tmp_path: Path,
+) -> None:
+    mission(tmp_path / "runs" / "old-7")
+    new = begun(Wanted(anew=True, state_dir=tmp_path)).directory.path
+    assert new.name.startswith("office-")
+    written(new)
+    assert begun(Wanted(state_dir=tmp_path)).directory.path == new
+
+
+def test_only_one_mission_is_begun_because_another_cannot_be_read(tmp_path: Path) -> None:
+    damaged = mission(tmp_path / "runs" / "office-9")
+    for name in (SNAPSHOT, SNAPSHOT_BEFORE):
+        (damaged / name).write_bytes(b"?")
+    new = begun(Wanted(state_dir=tmp_path)).directory.path
+    assert new != damaged
+    written(new)
+    again = begun(Wanted(state_dir=tmp_path))
+    assert again.directory.path == new
+    assert again.saved is not None
+
+
 @pytest.mark.parametrize("given", ["anew", "out"])
 def test_a_new_map_can_be_asked_for(tmp_path: Path, given: str) -> None:
     old = mission(tmp_path / "runs" / "office-1")
