@@ -402,12 +402,12 @@ def _thinned(points: Array, cell: float) -> Array:
     """One point (M, 2) for each cell that points (N, 2) are in: the mean of these."""
     if not len(points):
         return points
-    _, index, count = np.unique(
-        np.floor(points / cell).astype(np.int64), axis=0, return_inverse=True, return_counts=True
-    )
-    index = index.ravel()
-    means = [np.bincount(index, points[:, k]) / count for k in (0, 1)]
-    return np.stack(means, axis=1)
+    cells = np.floor(points / cell).astype(np.int64)
+    i, j = (cells - cells.min(axis=0)).T
+    index = i * (j.max() + 1) + j  # counted, not sorted: of a large building there are a million
+    count = np.bincount(index)
+    used = count > 0
+    return np.stack([np.bincount(index, points[:, k])[used] / count[used] for k in (0, 1)], axis=1)
 
 
 def _passed(scan: Scan) -> Array:
