@@ -1,5 +1,7 @@
-"""Files that are either the old one or the new one, never half of each."""
+"""Files that are either the old one or the new one, never half of each, even after a power cut."""
 
+import contextlib
+import os
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -7,7 +9,7 @@ from gvgbot.errors import GvgbotError
 
 
 def write_files(directory: Path, contents: Mapping[str, bytes | str]) -> None:
-    """Replace these files of the directory: all are written aside before the first is renamed.
+    """Replace these files of the directory: all are on the disk before the first is renamed.
 
     Text is UTF-8. Raises GvgbotError if one cannot be written; then the old files stand, and
     nothing is left beside them, whatever the failure was.
@@ -15,12 +17,31 @@ def write_files(directory: Path, contents: Mapping[str, bytes | str]) -> None:
     aside = {directory / name: directory / f".{name}.tmp" for name in contents}
     try:
         for path, content in zip(aside.values(), contents.values(), strict=True):
-            path.write_bytes(content.encode() if isinstance(content, str) else content)
+            _write_through(path, content.encode() if isinstance(content, str) else content)
         for path, temporary in aside.items():
             temporary.replace(path)
+        _sync_directory(directory)
     except OSError as error:
         names = ", ".join(contents)
         raise GvgbotError(f"cannot write {names} to {directory}: {error.strerror}") from error
     finally:
         for temporary in aside.values():
             temporary.unlink(missing_ok=True)
+
+
+def _write_through(path: Path, content: bytes) -> None:
+    """Write a file, and wait until it is on the disk. Raises OSError."""
+    with path.open("wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def _sync_directory(path: Path) -> None:
+    """Wait until its names are on the disk, where the filesystem has a way to do that."""
+    with contextlib.suppress(OSError):
+        directory = os.open(path, os.O_RDONLY | os.O_DIRECTORY)
+        try:
+            os.fsync(directory)
+        finally:
+            os.close(directory)

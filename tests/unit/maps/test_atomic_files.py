@@ -1,0 +1,70 @@
+"""What is on the disk, and when, if the power may be cut at any moment."""
+
+import errno
+import os
+import stat
+from pathlib import Path
+
+import pytest
+
+from gvgbot.errors import GvgbotError
+from gvgbot.maps.atomic_files import write_files
+
+OLD = {"map.yaml": b"old", "map.png": b"old"}
+NEW: dict[str, bytes | str] = {"map.yaml": "new\n", "map.png": b"new one"}
+
+
+@pytest.fixture
+def directory(tmp_path: Path) -> Path:
+    write_files(tmp_path, OLD)
+    return tmp_path
+
+
+def contents(directory: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in directory.iterdir()}
+
+
+def is_directory(descriptor: int) -> bool:
+    return stat.S_ISDIR(os.fstat(descriptor).st_mode)
+
+
+def test_all_is_on_the_disk_before_an_old_file_goes_and_then_its_name(
+    directory: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    synced: list[int | str] = []
+
+    def fsync(descriptor: int) -> None:
+        if is_directory(descriptor):
+            assert contents(directory) == {"map.yaml": b"new\n", "map.png": b"new one"}
+            synced.append("directory")
+        else:
+            assert contents(directory).items() >= OLD.items()
+            synced.append(os.fstat(descriptor).st_size)
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    write_files(directory, NEW)
+    assert synced == [4, 7, "directory"]
+
+
+def test_a_disk_that_does_not_take_a_file_keeps_the_old_ones(
+    directory: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fsync(descriptor: int) -> None:
+        raise OSError(errno.EIO, "Input/output error")
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    with pytest.raises(GvgbotError, match=r"map\.png .*Input/output error"):
+        write_files(directory, NEW)
+    assert contents(directory) == OLD
+
+
+def test_a_filesystem_may_be_unable_to_sync_a_directory(
+    directory: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fsync(descriptor: int) -> None:
+        if is_directory(descriptor):
+            raise OSError(errno.EINVAL, "Invalid argument")
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    write_files(directory, NEW)
+    assert (directory / "map.png").read_bytes() == b"new one"
