@@ -140,7 +140,8 @@ class Scripted(Deaf):
 class Reports(Scripted):
     """A laser that for a while has a status in place of every scan; an empty one is silence.
 
-    `since` and `until` (s) are counted from its last MD, or from the beginning of time.
+    `since` and `until` (s) are counted from its last MD, or from the beginning of time. `resets`
+    counts those that it was told to do.
     """
 
     def __init__(
@@ -151,10 +152,10 @@ class Reports(Scripted):
         self.after_md = after_md
         self.began = 0.0
         self.echo = ""
-        self.heard_resets = 0
+        self.resets = 0
 
     def answer(self, command: bytes, now: float) -> bytes:
-        self.heard_resets += command == b"RS\n"
+        self.resets += command == b"RS\n"
         if command.startswith(b"MD"):
             self.echo = command.decode().strip()
             self.began = now if self.after_md else 0.0

@@ -305,3 +305,72 @@ def test_a_fault_of_its_own_ends_the_stream_at_once(mark: str, status: str) -> N
 
     twin = Reports(HokuyoTwin(PERFECT, World(), seed=20), status, 5.0, 6.0)
     on_bench(twin, scenario, HokuyoConfig(user_string=mark))
+
+
+@pytest.mark.parametrize("status", ["", "0M", "21", "98"])
+@pytest.mark.parametrize("wait", [0.8, 2.0, 4.5])
+def test_a_motor_may_take_its_time_before_the_first_scan(wait: float, status: str) -> None:
+    async def scenario(bench: Bench) -> None:
+        await bench.scans(20)
+        assert bench.clock.now() == pytest.approx(wait + 2.0, abs=0.4)
+        assert bench.laser.link.restarts == twin.resets == 0
+
+    twin = Reports(HokuyoTwin(PERFECT, World(), seed=21), status, 0.0, wait, after_md=True)
+    on_bench(twin, scenario)
+
+
+@pytest.mark.parametrize("status", ["", "0M", "21"])
+def test_a_laser_without_a_first_scan_is_reset_and_lost(status: str) -> None:
+    async def scenario(bench: Bench) -> None:
+        await bench.running
+        assert bench.clock.now() == pytest.approx(5.0, abs=0.4)
+        assert twin.resets == 1
+
+    twin = Reports(HokuyoTwin(PERFECT, World(), seed=22), status, 0.0, math.inf)
+    on_bench(twin, scenario)
+
+
+@pytest.mark.parametrize("status", ["0M", "21", "49", "98"])
+def test_a_laser_that_says_why_there_is_no_scan_is_waited_for(status: str) -> None:
+    async def scenario(bench: Bench) -> None:
+        gaps = increments(scan.stamp for scan in await bench.scans(60))
+        assert gaps.max() == pytest.approx(4.5, abs=0.11)
+        assert np.delete(gaps, gaps.argmax()) == pytest.approx(0.1, abs=0.0021)
+        link = bench.laser.link
+        assert (link.restarts, twin.resets) == (0, 0)
+        assert link.missed_scans == link.refused_scans == pytest.approx(44, abs=1)
+
+    twin = Reports(HokuyoTwin(PERFECT, World(), seed=23), status, 2.0, 6.4)
+    on_bench(twin, scenario)
+
+
+@pytest.mark.parametrize(
+    ("status", "patience"),
+    [
+        pytest.param("0M", 5.0, id="unstable for ever"),
+        pytest.param("21", 5.0, id="checking for ever"),
+        pytest.param("0E", 0.3, id="knows no such stream"),
+        pytest.param("", 0.3, id="silent"),
+    ],
+)
+def test_a_stream_without_scans_is_started_again_in_time(status: str, patience: float) -> None:
+    async def scenario(bench: Bench) -> None:
+        while not bench.laser.link.restarts:
+            await bench.clock.sleep_until(bench.clock.now() + 0.01)
+        assert bench.clock.now() == pytest.approx(2.0 + patience, abs=0.15)
+
+    on_bench(Reports(HokuyoTwin(PERFECT, World(), seed=24), status, 2.0, math.inf), scenario)
+
+
+@pytest.mark.parametrize("status", ["", "0M", "21"])
+def test_silence_is_noticed_at_once_after_the_laser_took_its_time(status: str) -> None:
+    async def scenario(bench: Bench) -> None:
+        await bench.scans(1)
+        bench.served.cancel()
+        silent_since = bench.clock.now()
+        while not bench.laser.link.restarts:
+            await bench.clock.sleep_until(bench.clock.now() + 0.01)
+        assert bench.clock.now() - silent_since == pytest.approx(0.3, abs=0.15)
+
+    twin = Reports(HokuyoTwin(PERFECT, World(), seed=25), status, 0.0, 1.0, after_md=True)
+    on_bench(twin, scenario)

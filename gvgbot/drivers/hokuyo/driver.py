@@ -2,7 +2,6 @@
 
 import asyncio
 import contextlib
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -41,7 +40,11 @@ GOLDEN = 0.618034  # its multiples spread evenly over a beat
 DENIED = "10"  # of TM0: the laser still measures
 LOST_STOPS = 3  # in a row; a stop that comes as a scan begins can be lost
 UNKNOWN_COMMAND = frozenset({"0C", "0D", "0E", "0F"})  # firmware generations disagree on which
+UNSTABLE = "0M"  # in place of a scan: the motor is not at its speed
+HALTED = range(21, 50)  # statuses of a laser that looks into a fault, and is silent until it knows
+RESUMED = "98"  # what it says when there was none
 BROKEN = range(50, 98)  # statuses of hardware trouble
+LONGEST_WITHOUT_SCAN = 5.0  # s, for a motor to reach its speed or a laser to check itself
 SIMPLER = {"NE": "ND", "ND": "MD", "ME": "MD"}  # what to ask for when a command is unknown
 
 log = structlog.get_logger()
@@ -49,17 +52,41 @@ log = structlog.get_logger()
 
 @dataclass(slots=True)
 class _Stream:
-    """A running stream of scans; `interval`, `delay` and `silence` in s."""
+    """A running stream of scans; `interval`, `delay`, `silence` and `patience` in s.
+
+    It has stopped when nothing was heard for the silence, or no scan for the patience. Before the
+    first scan only the patience counts.
+    """
 
     request: ScanRequest
     geometry: ScanGeometry
     interval: float
     delay: float
     silence: float
+    patience: float
+    last_scan: float  # when it came, s; before the first one when the stream began
+    until: float  # when it will have stopped if nothing more comes, s
     sync: Synchronisation | None = None
     clock_map: ClockMap | None = None
     is_fresh: bool = True  # no scan was handed on yet
     is_doubted: bool = False  # the first one fits no synchronisation
+
+    def note_scan(self, now: float) -> None:
+        """One more scan has come."""
+        self.last_scan = now
+        self.until = now + self.silence
+
+    def note_status(self, status: str, now: float) -> None:
+        """There is no scan, but the laser says why."""
+        limit = self.last_scan + self.patience
+        if _is_in(status, HALTED):
+            self.until = limit
+        elif status in {UNSTABLE, RESUMED}:
+            self.until = max(self.until, min(now + self.silence, limit))
+
+
+def _is_in(status: str, statuses: range) -> bool:
+    return status.isdecimal() and int(status) in statuses
 
 
 class HokuyoLaser:
@@ -79,7 +106,6 @@ class HokuyoLaser:
         self._reboots_before = link.reboots
         self._clock_map: ClockMap | None = None
         self._scans: Latest[Scan] = Latest()
-        self._last_scan = -math.inf  # when it came, s
         self._baud = config.baud
         self._identity: Identity | None = None
         self._parameters: Parameters | None = None
@@ -257,68 +283,65 @@ class HokuyoLaser:
     def _stream(self, request: ScanRequest, parameters: Parameters) -> _Stream:
         config = self._config
         interval = parameters.period * (request.skip + 1)
+        silence = max(SHORTEST_SILENCE, config.missed_scans * interval)
+        patience = max(LONGEST_WITHOUT_SCAN, config.reply_timeout_s + silence)
+        now = self._dialogue.clock.now()
         return _Stream(
             request,
             scan_geometry(config, parameters, request),
             interval,
             arrival_delay(config, parameters, request),
-            max(SHORTEST_SILENCE, config.missed_scans * interval),
-            self._sync,
+            silence,
+            patience,
+            last_scan=now,
+            until=now + patience,
+            sync=self._sync,
         )
 
     # -- streaming ---------------------------------------------------------------------------------
 
     async def _stream_until_silence(self, stream: _Stream) -> None:
         """Hand on scans until they stop coming. Raises DeviceLost if not one came."""
-        if not await self._scan_within(self._config.reply_timeout_s + stream.silence, stream):
+        while stream.until > self._dialogue.clock.now():
+            await self._listen(stream)
+        if stream.is_fresh:
             self._dialogue.send("RS")
             raise DeviceLost("the laser answers but sends no scans: switch it off and on")
-        clock = self._dialogue.clock
-        while (until := self._last_scan + stream.silence) > clock.now():
-            await self._listen(stream, until)
 
-    async def _listen(self, stream: _Stream, until: float) -> None:
+    async def _listen(self, stream: _Stream) -> None:
         """Hand on what comes; a timer for each scan would cost more than its checksums."""
+        until = stream.until
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout_at(until):
-                while True:
+                while stream.until >= until:
                     self._hand_on(await self._dialogue.receive(), stream)
 
-    async def _scan_within(self, seconds: float, stream: _Stream) -> bool:
-        with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(seconds):
-                while not self._hand_on(await self._dialogue.receive(), stream):
-                    pass
-                return True
-        return False
-
-    def _hand_on(self, arrivals: list[Arrival], stream: _Stream) -> bool:
-        """Whether there was a scan among the messages."""
-        scans = [self._take(message, arrival, stream) for message, arrival in arrivals]
-        fresh = [scan for scan in scans if scan is not None]
-        for scan in fresh:
-            self._scans.put(scan)
-            self._last_scan = self._dialogue.clock.now()
-        self.link.scans += len(fresh)
-        return bool(fresh)
+    def _hand_on(self, arrivals: list[Arrival], stream: _Stream) -> None:
+        for message, arrival in arrivals:
+            scan = self._take(message, arrival, stream)
+            if scan is not None:
+                self._scans.put(scan)
+                self.link.scans += 1
+                stream.note_scan(self._dialogue.clock.now())
 
     def _take(self, message: Message, arrival: float, stream: _Stream) -> Scan | None:
         match message:
             case ScanReply(request=stream.request):
                 return self._timed_scan(message, arrival, stream)
             case Reply(echo=echo, status=status) if echo == stream.request.text():
-                self._no_scan(status)
+                self._no_scan(status, stream)
             case BadReply():
                 pass  # counted as it was heard
             case _:
                 self.link.stray_messages += 1
         return None
 
-    def _no_scan(self, status: str) -> None:
+    def _no_scan(self, status: str, stream: _Stream) -> None:
         """What a status in place of a scan means. Raises DeviceLost if there will be none."""
         self.link.refused_scans += 1
-        if status == ABNORMAL or (status.isdecimal() and int(status) in BROKEN):
+        if status == ABNORMAL or _is_in(status, BROKEN):
             raise DeviceLost(f"the laser reports a fault of its own, status {status}")
+        stream.note_status(status, self._dialogue.clock.now())
 
     def _timed_scan(self, reply: ScanReply, arrival: float, stream: _Stream) -> Scan | None:
         before = stream.clock_map
