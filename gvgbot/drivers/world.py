@@ -20,6 +20,7 @@ from gvgbot.geometry import Array, Pose
 OCCUPIED_THRESHOLD = 0.65  # map_server's customary values, for files that leave them out
 FREE_THRESHOLD = 0.196
 FREE_GREY, OCCUPIED_GREY = 254, 0  # what map_saver writes
+OPAQUE = 255
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,8 +146,7 @@ def load_map(path: Path) -> tuple[World, Mask]:
     negate = entries.negate()
     threshold = entries.fraction("occupied_thresh", OCCUPIED_THRESHOLD)
     free_threshold = entries.fraction("free_thresh", FREE_THRESHOLD)
-    entries.require_trinary()
-    grey = _read_grey(path, entries.image())
+    grey = _read_grey(path, entries.image(), entries.mode())
     occupancy = (grey if negate else 255.0 - grey) / 255.0
     occupied = np.ascontiguousarray(np.flipud(occupancy > threshold))
     known = occupied | np.flipud(occupancy < free_threshold)
@@ -188,13 +188,13 @@ def _read_yaml(path: Path) -> dict[str, Any]:
     return content
 
 
-def _read_grey(path: Path, image: Path) -> Array:
-    """Brightness 0..255 of each pixel, the mean of its colours; row 0 at the top."""
+def _read_grey(path: Path, image: Path, mode: str) -> Array:
+    """Brightness 0..255 of each pixel, NaN where it tells nothing; row 0 at the top."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
             with Image.open(image) as picture:
-                return _grey(picture)
+                return _grey(picture, mode)
     except FileNotFoundError:
         raise WorldError(f"{path}: key image: no such file {image}; correct the name") from None
     except UnidentifiedImageError:
@@ -203,12 +203,21 @@ def _read_grey(path: Path, image: Path) -> Array:
         raise WorldError(f"{path}: key image: cannot read {image} ({_line(error)})") from None
 
 
-def _grey(picture: Image.Image) -> Array:
+def _grey(picture: Image.Image, mode: str) -> Array:
     if picture.mode.startswith("I"):
         return np.asarray(picture, dtype=np.float64) / 257.0  # sixteen bits
-    if picture.mode in ("1", "L", "LA"):
+    if picture.has_transparency_data:
+        return _grey_of_transparent(np.asarray(picture.convert("RGBA")), mode)
+    if picture.mode in ("1", "L"):
         return np.asarray(picture.convert("L"), dtype=np.float64)
     return np.asarray(np.asarray(picture.convert("RGB")).mean(axis=2))
+
+
+def _grey_of_transparent(pixels: NDArray[np.uint8], mode: str) -> Array:
+    """As map_server has it: alpha is one more colour, or in scale mode marks what is unknown."""
+    if mode == "scale":
+        return np.where(pixels[..., 3] == OPAQUE, pixels[..., :3].mean(axis=2), np.nan)
+    return np.asarray(pixels.mean(axis=2))
 
 
 def _line(error: Exception) -> str:
@@ -256,10 +265,11 @@ class _Entries:
             raise self.error("negate", f"must be 0 or 1, not {value!r}")
         return bool(value)
 
-    def require_trinary(self) -> None:
+    def mode(self) -> str:
         mode = self.content.get("mode", "trinary")
         if mode not in ("trinary", "scale"):
             raise self.error("mode", f"must be trinary or scale, not {mode!r}; save the map so")
+        return str(mode)
 
     def image(self) -> Path:
         value = self.required("image")

@@ -1,6 +1,7 @@
 """World files: what map_server's rules say of a pixel, and what is said of a user's mistake."""
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,7 @@ import pytest
 import yaml
 from PIL import Image
 
-from gvgbot.drivers.world import World, load_world, save_world
+from gvgbot.drivers.world import World, load_map, load_world, save_world
 from gvgbot.errors import WorldError
 
 ENTRIES: dict[str, Any] = {
@@ -58,6 +59,53 @@ def test_colours_count_by_their_plain_mean(tmp_path: Path) -> None:
     # one full channel gives a mean of 85, which is a wall; two give 170, which is not
     pixels = [[[0, 255, 0], [0, 0, 255], [255, 255, 0]]]
     assert load_world(write(tmp_path, pixels)).occupied.tolist() == [[True, True, False]]
+
+
+CLEAR = [[[255, 255, 255, 0], [255, 255, 255, 255], [0, 0, 0, 0], [0, 0, 0, 255], [0, 0, 0, 254]]]
+
+
+def test_transparency_counts_as_a_colour_in_trinary_mode(tmp_path: Path) -> None:
+    # the means are 191.25, 255, 0, 63.75 and 63.5: a quarter is unknown, three quarters are a wall
+    world, known = load_map(write(tmp_path, CLEAR))
+    assert world.occupied.tolist() == [[False, False, True, True, True]]
+    assert known.tolist() == [[False, True, True, True, True]]
+
+
+def test_what_is_not_opaque_is_unknown_in_scale_mode(tmp_path: Path) -> None:
+    world, known = load_map(write(tmp_path, CLEAR, mode="scale"))
+    assert world.occupied.tolist() == [[False, False, False, True, False]]
+    assert known.tolist() == [[False, True, False, True, False]]
+
+
+def transparent_grey() -> Image.Image:
+    """Free, and what is transparent."""
+    return Image.fromarray(np.array([[[254, 255], [254, 0]]], dtype=np.uint8), "LA")
+
+
+def transparent_palette() -> Image.Image:
+    picture = Image.new("P", (2, 1))
+    picture.putpalette([254, 254, 254, 253, 253, 253])
+    picture.putpixel((1, 0), 1)
+    picture.info["transparency"] = 1
+    return picture
+
+
+def transparent_shade() -> Image.Image:
+    picture = Image.fromarray(np.array([[254, 253]], dtype=np.uint8))
+    picture.info["transparency"] = 253
+    return picture
+
+
+@pytest.mark.parametrize("mode", ["trinary", "scale"])
+@pytest.mark.parametrize("made", [transparent_grey, transparent_palette, transparent_shade])
+def test_every_form_of_transparent_png_is_read(
+    tmp_path: Path, made: Callable[[], Image.Image], mode: str
+) -> None:
+    path = write(tmp_path, [[0]], mode=mode)
+    made().save(tmp_path / "plan.png")
+    world, known = load_map(path)
+    assert world.occupied.tolist() == [[False, False]]
+    assert known.tolist() == [[True, False]]
 
 
 def test_the_last_image_row_is_the_lowest_and_lies_at_the_origin(tmp_path: Path) -> None:
