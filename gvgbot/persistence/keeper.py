@@ -1,12 +1,14 @@
 """Keeps a session's mission on disk as it goes, and brings it back.
 
-The journal gets what is new about every second. The snapshot is renewed when the map has changed
-or the robot has come on, at most that often; the journal is synchronised with the disk before. A
-disk that is full, read-only or slow holds up nothing: what was not written is written later.
+The journal gets what is new about every second, and while nothing is, now and then a sign of life,
+by which it is known later that the base has counted all the time. The snapshot is renewed when the
+map has changed or the robot has come on, at most that often; the journal is synchronised with the
+disk before. A disk that is full, read-only or slow holds up nothing: what was not written is
+written later.
 """
 
 import math
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections.abc import Awaitable, Callable
 from functools import partial
 
@@ -32,6 +34,7 @@ from gvgbot.session import Session
 
 KEEP_EVERY = 0.5  # s between two batches
 SNAPSHOT_EVERY = 5.0  # s between two snapshots, if nothing but the robot's place has changed
+BEAT_EVERY = 20.0  # s between two signs of life, while nothing is new
 _PAUSE_S = 1.0  # that the robot's clock is said to have stood while the computer was off
 _COUNTING_S = 60.0  # away for longer, the base's counters may have come round
 _SETTLED = (
@@ -64,6 +67,7 @@ class Keeper:
         self._feedback: FeedbackReader | None = None
         self._counts: list[Count] = []  # of what is in the journal after each batch
         self._is_cut = False  # some of what is in the journal has been forgotten
+        self._beat_at = -math.inf  # stamp of the last batch
         self._snapshot_at = -math.inf  # stamp of the last snapshot
         self._snapshot_of = -1  # keyframes in it
         self._settled = False  # the map has changed since the last snapshot
@@ -149,7 +153,9 @@ class Keeper:
         before = self._counts[after - 1] if after else Count(0, 0)
         count = Count(len(pipeline.keyframes), len(self._session.journey.stamps))
         if count == before and not self._settled:
-            return _nothing
+            if stamp < self._beat_at + BEAT_EVERY:
+                return _nothing
+            after = bisect_left(self._counts, count) + 1  # one sign of life takes another's place
         beat = self._beat(stamp)
         batch = Batch(
             first=before.keyframes,
@@ -172,14 +178,15 @@ class Keeper:
     def finish(self) -> None:
         """Write all that is new; call when nothing runs any more."""
         self._settled = True
-        self.keeping(self._session.tally.last_stamp)()
+        heard = -math.inf if self._feedback is None else self._feedback.heard
+        self.keeping(max(heard, self._session.tally.last_stamp))()
 
     def _write(
         self, batch: bytes, counts: list[Count], snapshot: bytes | None, stamp: float
     ) -> None:
         try:
             self._files.append(batch, sync=snapshot is not None, after=len(counts) - 1)
-            self._counts = counts
+            self._counts, self._beat_at = counts, stamp
             if snapshot is not None:
                 self._files.save(snapshot)
                 self._snapshot_at, self._snapshot_of = stamp, counts[-1].keyframes

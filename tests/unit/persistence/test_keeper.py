@@ -13,7 +13,7 @@ from gvgbot.autonomy.events import WayForgotten
 from gvgbot.autonomy.memory import growth, recall, remember
 from gvgbot.config import load_config
 from gvgbot.maps.run_directory import RunDirectory
-from gvgbot.persistence.keeper import Keeper
+from gvgbot.persistence.keeper import BEAT_EVERY, Keeper
 from gvgbot.persistence.mission_files import JOURNAL, MissionFiles
 from gvgbot.persistence.mission_state import boot_id
 from gvgbot.persistence.records import packed
@@ -62,9 +62,28 @@ def test_what_did_not_change_is_not_written_again(session: Session, tmp_path: Pa
     keeper = Keeper(session, MissionFiles(tmp_path))
     keeper.keeping(20.0)()
     before = {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
-    for stamp in (20.5, 21.0, 60.0):
+    for stamp in (20.5, 21.0, 20.0 + BEAT_EVERY - 0.5):
         keeper.keeping(stamp)()
     assert {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()} == before
+
+
+def test_a_robot_at_rest_gives_signs_of_life_that_take_no_room(
+    session: Session, tmp_path: Path
+) -> None:
+    """By the newest it is known, a week later, that the base has counted all the time."""
+    keeper, sizes = Keeper(session, MissionFiles(tmp_path)), set()
+    keeper.keeping(20.0)()
+    whole = (tmp_path / JOURNAL).stat().st_size
+    for beat in range(1, 100):
+        stamp = 20.0 + beat * BEAT_EVERY
+        keeper.keeping(stamp)()
+        sizes.add((tmp_path / JOURNAL).stat().st_size)
+        saved = MissionFiles(tmp_path).read()
+        assert saved is not None
+        assert saved.beat.stamp == stamp
+        assert len(saved.past) == len(session.pipeline.keyframes)
+    assert max(sizes) < whole + 1000
+    assert max(sizes) < min(sizes) + 10  # as numbers grow
 
 
 def test_a_way_that_is_forgotten_leaves_the_journal_whole_and_short(
