@@ -1,6 +1,8 @@
 """The command `gvgbot map import`: a run made of a map_server map, to be localised on."""
 
 import math
+import os
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -23,6 +25,7 @@ from gvgbot.hal.messages import Scan
 from gvgbot.maps.run_directory import RunDirectory
 from gvgbot.persistence.keeper import Keeper
 from gvgbot.persistence.mission_files import MissionFiles
+from gvgbot.service import set_up_logging
 from gvgbot.session import Session
 
 _BEAMS = 720  # of a scan, all around
@@ -37,6 +40,7 @@ def import_map(path: Path, out: Path, config: Config) -> tuple[int, int]:
     Raises UsageError for a map or a directory that cannot be used, GvgbotError if nothing can be
     written.
     """
+    set_up_logging(sys.stderr, os.environ, "warning")
     world, known = load_map(path)
     if known.size > _MOST_CELLS:
         raise UsageError(f"{path}: {known.size} pixels are too many; at most {_MOST_CELLS} will do")

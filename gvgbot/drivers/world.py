@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import structlog
 import yaml
 from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
@@ -19,8 +20,10 @@ from gvgbot.geometry import Array, Pose
 
 OCCUPIED_THRESHOLD = 0.65  # map_server's customary values, for files that leave them out
 FREE_THRESHOLD = 0.196
-FREE_GREY, OCCUPIED_GREY = 254, 0  # what map_saver writes
+FREE_GREY, OCCUPIED_GREY, UNKNOWN_GREY = SAVED_GREYS = 254, 0, 205  # what map_saver writes
 OPAQUE = 255
+
+log = structlog.get_logger()
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,12 +148,27 @@ def load_map(path: Path) -> tuple[World, Mask]:
     origin = entries.origin()
     negate = entries.negate()
     threshold = entries.fraction("occupied_thresh", OCCUPIED_THRESHOLD)
-    free_threshold = entries.fraction("free_thresh", FREE_THRESHOLD)
     grey = _read_grey(path, entries.image(), entries.mode())
+    free_threshold = _free_threshold(entries, grey)
     occupancy = (grey if negate else 255.0 - grey) / 255.0
     occupied = np.ascontiguousarray(np.flipud(occupancy > threshold))
     known = occupied | np.flipud(occupancy < free_threshold)
     return World(occupied, resolution, origin, path.stem), known
+
+
+def _free_threshold(entries: "_Entries", grey: Array) -> float:
+    """`free_thresh`, or less where map_saver would take its own unknown pixels for free by it.
+
+    Nav2's wrote 0.25 for years, https://github.com/SteveMacenski/slam_toolbox/issues/587.
+    """
+    threshold = entries.fraction("free_thresh", FREE_THRESHOLD)
+    unknown = (255.0 - UNKNOWN_GREY) / 255.0
+    if threshold <= unknown or entries.mode() != "trinary" or entries.negate():
+        return threshold
+    if UNKNOWN_GREY not in grey or not np.isin(grey, SAVED_GREYS).all():
+        return threshold
+    log.warning("grey 205 is unknown, not free", path=str(entries.path), free_thresh=threshold)
+    return unknown
 
 
 def save_world(world: World, directory: Path) -> Path:

@@ -77,6 +77,20 @@ def test_what_is_unknown_becomes_a_frontier_and_no_wall(tmp_path: Path) -> None:
     assert sum(vertex.kind == "endpoint" for vertex in run.graph.vertices) == 3
 
 
+def test_a_map_of_older_nav2_is_told_apart_in_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It wrote a `free_thresh` by which its own unknown pixels are free."""
+    rows, columns = cross().occupied.shape
+    path = painted(tmp_path, np.s_[0:rows, columns * 10 // 15 : columns])
+    path.write_text(path.read_text().replace("free_thresh: 0.196", "free_thresh: 0.25"))
+    assert main(["map", "import", str(path), "--out", str(tmp_path / "run")]) == 0
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "grey 205 is unknown, not free" in line
+    graph = SavedRun.read(tmp_path / "run").graph
+    assert sum(len(vertex.frontiers) for vertex in graph.vertices) == 1
+
+
 def test_the_run_holds_a_mission_on_which_a_daemon_can_begin(tmp_path: Path) -> None:
     assert main(["map", "import", str(painted(tmp_path)), "--out", str(tmp_path / "run")]) == 0
     saved = MissionFiles(tmp_path / "run").read()

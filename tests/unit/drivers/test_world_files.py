@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import structlog
 import yaml
 from PIL import Image
 
@@ -59,6 +60,40 @@ def test_colours_count_by_their_plain_mean(tmp_path: Path) -> None:
     # one full channel gives a mean of 85, which is a wall; two give 170, which is not
     pixels = [[[0, 255, 0], [0, 0, 255], [255, 255, 0]]]
     assert load_world(write(tmp_path, pixels)).occupied.tolist() == [[True, True, False]]
+
+
+@pytest.mark.parametrize("pixels", [[0, 205, 254], [205, 205, 254], [0, 205, 205], [205] * 3])
+def test_the_unknown_that_map_saver_wrote_is_not_free_whatever_it_wrote_beside_it(
+    tmp_path: Path, pixels: list[int]
+) -> None:
+    # 205 is an occupancy of 0.196; a free_thresh of 0.25 was the default of Nav2
+    path = write(tmp_path, [pixels], free_thresh=0.25, mode="trinary")
+    with structlog.testing.capture_logs() as logs:
+        world, known = load_map(path)
+    assert world.occupied.tolist() == [[grey == 0 for grey in pixels]]
+    assert known.tolist() == [[grey != 205 for grey in pixels]]
+    (warning,) = logs
+    assert warning["event"] == "grey 205 is unknown, not free"
+    assert (warning["path"], warning["free_thresh"]) == (str(path), 0.25)
+
+
+@pytest.mark.parametrize(
+    ("pixels", "changes", "known"),
+    [
+        ([0, 205, 254, 206], {"free_thresh": 0.25}, [True, True, True, True]),  # painted otherwise
+        ([0, 205, 254], {"free_thresh": 0.25, "mode": "scale"}, [True, True, True]),
+        ([0, 205, 254], {"free_thresh": 0.25, "negate": 1}, [True, True, True]),
+        ([0, 205, 254], {}, [True, False, True]),
+        ([0, 254], {"free_thresh": 0.25}, [True, True]),
+    ],
+)
+def test_other_maps_mean_what_they_say(
+    tmp_path: Path, pixels: list[int], changes: dict[str, Any], known: list[bool]
+) -> None:
+    path = write(tmp_path, [pixels], **changes)
+    with structlog.testing.capture_logs() as logs:
+        assert load_map(path)[1].tolist() == [known]
+    assert not logs
 
 
 CLEAR = [[[255, 255, 255, 0], [255, 255, 255, 255], [0, 0, 0, 0], [0, 0, 0, 255], [0, 0, 0, 254]]]
