@@ -58,7 +58,7 @@ class RobotBody:
         self.others: list[RobotBody] = []
         self._world = world
         self._people = people
-        self._now = stamp
+        self.now = stamp
         self._linear = self._angular = 0.0
         self._target_linear = self._target_angular = 0.0
         self._in_contact = False
@@ -76,10 +76,10 @@ class RobotBody:
         self._drive_until(now)
 
     def _drive_until(self, now: float) -> None:
-        gap = now - self._now
+        gap = now - self.now
         if gap <= 0.0:
             return
-        self._now = now
+        self.now = now
         if not self._moves:
             return
         fastest = max(abs(self._linear), abs(self._target_linear))
