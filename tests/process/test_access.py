@@ -64,6 +64,14 @@ def certificates(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return directory
 
 
+def test_a_certificate_that_is_kept_is_said_to_be(certificates: Path) -> None:
+    before = (certificates / "robot.crt").read_bytes()
+    script = [str(PACKAGED / "make_certificates.sh"), str(certificates), "other.local", "guest"]
+    done = subprocess.run(script, check=True, capture_output=True, text=True, timeout=30)
+    assert f"{certificates}/robot.crt: kept" in done.stdout
+    assert (certificates / "robot.crt").read_bytes() == before
+
+
 def tls(certificates: Path, tmp_path: Path) -> Network:
     endpoint = free_endpoint().replace("tcp/", "tls/")
 

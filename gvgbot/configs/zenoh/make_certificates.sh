@@ -44,7 +44,11 @@ for name in $(echo "$names" | tr , ' '); do
   esac
   alternatives="$alternatives${alternatives:+,}$kind:$name"
 done
-[ -e robot.crt ] || issue robot "subjectAltName=$alternatives"
+if [ -e robot.crt ]; then
+  echo "$directory/robot.crt: kept; for other names remove it and run this again"
+else
+  issue robot "subjectAltName=$alternatives"
+fi
 for person in "$@"; do
   issue "$person" "extendedKeyUsage=clientAuth"
 done
