@@ -16,7 +16,7 @@ from gvgbot.autonomy.loop import Loop
 from gvgbot.clock import LoopClock, VirtualTimeLoop
 from gvgbot.config import Config
 from gvgbot.drivers.people import Walkways
-from gvgbot.errors import WorldError
+from gvgbot.errors import UsageError, WorldError
 from gvgbot.geometry import Pose
 from gvgbot.hal.guard import Guard
 from gvgbot.hal.messages import Odometry
@@ -48,8 +48,11 @@ _TRIES = 1000  # to draw a start
 def explore_together(config: Config, count: int, *, out: Path | None, real_time: bool) -> int:
     """Explore a simulated world with several robots, print where the map is; the exit status.
 
-    Raises UsageError for a world or directory that cannot be used, or that has no room for all.
+    Raises UsageError for a world or directory that cannot be used, or that has no room for all, and
+    if it shall be recorded.
     """
+    if config.recording.path is not None:
+        raise UsageError("recording.path: a team is not recorded; record a robot that is alone")
     set_up_logging(sys.stderr, os.environ, "warning")
     places = _places(config, open_place(config), count)
     with contextlib.ExitStack() as stack:

@@ -58,6 +58,10 @@ def status_of(command: Callable[[], int]) -> int:
         return _fail(str(error), FAILURE)
     except BrokenPipeError:  # whoever read our output has gone, as `head` does
         return FAILURE
+    except PermissionError as error:
+        if error.filename is None:
+            raise
+        return _fail(f"{error.filename}: permission denied: choose another, or sudo", FAILURE)
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:

@@ -87,6 +87,14 @@ def test_a_bad_configuration_is_one_line_that_names_it_and_exits_2(
     assert named in line
 
 
+def test_a_team_that_shall_be_recorded_is_refused(tmp_path: Path, capsys: Captured) -> None:
+    settings = ["--set", f"recording.path={tmp_path}/x.mcap", "--out", str(tmp_path / "run")]
+    assert main(["explore", "--world", "ring", "--robots", "2", *settings]) == 2
+    (line,) = said(capsys)
+    assert "recording.path: a team is not recorded" in line
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_missing_extra_is_one_line_to_copy_whatever_the_shell_knows(capsys: Captured) -> None:
     assert status_of(lambda: raising(ExtraMissing("the page needs websockets", "web"))) == 1
     (line,) = said(capsys)
@@ -122,6 +130,13 @@ def test_an_error_becomes_its_line_and_its_exit_status(
 ) -> None:
     assert status_of(lambda: raising(error)) == status
     assert said(capsys) == ["gvgbot: no such world"]
+
+
+def test_what_may_not_be_read_or_written_is_named(capsys: Captured) -> None:
+    error = PermissionError(13, "Permission denied", "/var/lib/gvgbot/map.geojson")
+    assert status_of(lambda: raising(error)) == 1
+    (line,) = said(capsys)
+    assert "/var/lib/gvgbot/map.geojson: permission denied" in line
 
 
 def test_an_interrupted_command_says_so_and_exits_as_shells_expect(capsys: Captured) -> None:
