@@ -6,6 +6,7 @@ import structlog
 
 from gvgbot.autonomy import events
 from gvgbot.topics import State
+from gvgbot.words import counted
 
 PASSING_S = 1.0  # an obstacle that holds the robot for less is part of driving
 
@@ -24,7 +25,8 @@ def log_event(event: events.Event) -> None:
                 y=round(event.y, 2),
             )
         case events.LoopClosed():
-            log.info("loop closed", vertex=event.vertex, away_m=round(event.away_m, 1))
+            away = {} if event.away_m is None else {"away_m": round(event.away_m, 1)}
+            log.info("loop closed", vertex=event.vertex, **away)
         case events.Recovery():
             log.info("recovery", action=event.action, reason=event.reason)
         case events.Finished():
@@ -76,6 +78,7 @@ def status_line(state: State) -> str:
     """The state in a few words, for the service manager."""
     if state.phase == "starting":
         return f"starting: {state.reason}" if state.reason else "starting"
-    graph = f"{state.vertices} vertices, {state.frontiers} frontiers"
+    vertices = counted(state.vertices, "vertex", "vertices")
+    graph = f"{vertices}, {counted(state.frontiers, 'frontier')}"
     what = state.outcome if state.phase == "finished" else state.errand or state.phase
     return f"{what}: {state.reason}; {graph}" if state.reason else f"{what}: {graph}"

@@ -38,11 +38,14 @@ class EdgeJoined:
 
 @dataclass(frozen=True, slots=True)
 class LoopClosed:
-    """A known vertex was recognised after the robot had been away; with what the tests measured."""
+    """A known vertex was recognised after the robot had been away; with what the tests measured.
+
+    `away_m` is None for a vertex of a map from elsewhere, at the first time.
+    """
 
     stamp: float
     vertex: int
-    away_m: float
+    away_m: float | None
     mahalanobis: float
     offset_m: float
     agreement: float  # share of its walls found again

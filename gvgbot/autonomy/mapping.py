@@ -158,7 +158,7 @@ class Mapper(Knowledge):
             LoopClosed(
                 view.stamp,
                 vertex.id,
-                view.travelled - vertex.seen_at,
+                view.travelled - vertex.seen_at if vertex.seen_at >= 0.0 else None,
                 match.distance,
                 match.metres,
                 match.agreement,

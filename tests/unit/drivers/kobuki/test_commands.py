@@ -8,6 +8,8 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from gvgbot.drivers.kobuki.commands import (
+    ALL_POWER,
+    NO_OUTPUT,
     BaseControl,
     Command,
     GetGain,
@@ -107,6 +109,11 @@ def test_an_arc_too_wide_to_send_becomes_straight(speed: float) -> None:
 
 def test_speeds_beyond_the_field_saturate() -> None:
     assert BaseControl.from_twist(Twist(40.0, 0.0)) == BaseControl(32767, 0)
+    assert BaseControl.from_twist(Twist(-40.0, 0.0)) == BaseControl(-32768, 0)
+
+
+def test_a_radius_that_means_a_turn_on_the_spot_is_sent_as_one() -> None:
+    assert BaseControl.from_twist(Twist(0.001, 1.0)) == BaseControl(115, 1)
 
 
 def test_a_note_is_its_period() -> None:
@@ -125,6 +132,7 @@ def test_the_bits_of_the_outputs_are_those_of_the_protocol() -> None:
         "LED1_RED", "LED1_GREEN", "LED2_RED", "LED2_GREEN",
     ]  # fmt: skip
     assert [int(output) for output in Output] == [1 << bit for bit in range(12)]
+    assert (int(NO_OUTPUT), int(ALL_POWER)) == (0, 0x00F0)
 
 
 def test_the_tunes_have_the_numbers_of_the_protocol() -> None:
