@@ -4,6 +4,7 @@ import sys
 import time
 
 from gvgbot.autonomy.pipeline import Pipeline
+from gvgbot.words import counted
 
 _BAR = 20  # characters
 _EVERY = 0.1  # s of wall time between two drawings
@@ -47,6 +48,6 @@ def _line(pipeline: Pipeline, simulated: float, wall: float) -> str:
     full = round(_BAR * (1 - frontiers / ends)) if ends else 0
     return (
         f"[{'#' * full}{'.' * (_BAR - full)}] "
-        f"{len(graph.vertices)} vertices, {frontiers} frontiers, "
+        f"{counted(len(graph.vertices), 'vertex', 'vertices')}, {counted(frontiers, 'frontier')}, "
         f"{pipeline.travelled:.0f} m, {simulated:.0f} s, {simulated / max(wall, 1e-3):.0f}x"
     )

@@ -11,6 +11,7 @@ from gvgbot.config import Config, config_in, load_config
 from gvgbot.errors import UsageError
 from gvgbot.geometry import Pose
 from gvgbot.hal.messages import Scan
+from gvgbot.maps.picture import counts
 from gvgbot.maps.run_directory import RunDirectory
 from gvgbot.recording import Lived, extra_needed
 from gvgbot.session import Session
@@ -79,8 +80,7 @@ def conclusion(session: Session, log: Log) -> list[str]:
     graph, mission = pipeline.mapper.graph, pipeline.mission
     outcome = f"{mission.outcome}: {mission.reason}; " if mission.outcome else ""
     return [
-        f"replayed: {outcome}{len(graph.vertices)} vertices, {len(graph.edges)} edges, "
-        f"{pipeline.travelled:.0f} m",
+        f"replayed: {outcome}{counts(graph.vertices, graph.edges)}, {pipeline.travelled:.0f} m",
         *log.flaws(),
         f"map:     {path / 'map.geojson'}",
         f"picture: {path / 'map.png'}",
@@ -124,6 +124,6 @@ def _carmen(wanted: Wanted) -> Log:
     mount = config.laser
     base_laser = Pose(mount.x_m, mount.y_m, math.radians(mount.yaw_deg))
     log = read_carmen(wanted.path, no_echo_m=wanted.no_echo_m, base_laser=base_laser)
-    flaws = [f"but:     {log.damaged} damaged lines were passed over"] if log.damaged else []
+    flaws = [f"but:     damaged lines that were passed over: {log.damaged}"] if log.damaged else []
     title = wanted.path.name.split(".")[0] or "log"
     return Log(title, config, messages(log), True, lambda: flaws)

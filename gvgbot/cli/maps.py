@@ -5,6 +5,7 @@ from pathlib import Path
 
 from gvgbot.cli.arguments import Commands, add_overrides, frames, positive, say
 from gvgbot.errors import ExtraMissing, UsageError
+from gvgbot.words import counted
 
 
 def add_map(commands: Commands) -> None:
@@ -101,7 +102,7 @@ def _import(options: argparse.Namespace) -> int:
 
     config = load_config(options.config, options.overrides)
     vertices, edges = import_map(options.map, options.out, config)
-    say(f"imported: {vertices} vertices, {edges} edges")
+    say(f"imported: {counted(vertices, 'vertex', 'vertices')}, {counted(edges, 'edge')}")
     say(f"to drive in it: gvgbot run --map {options.out}")
     return 0
 

@@ -14,6 +14,7 @@ from gvgbot.maps.route_graph import MapVertex, RouteGraph
 from gvgbot.maps.surface import S, Surface
 from gvgbot.maps.trajectory import Trajectory
 from gvgbot.maps.view import Box, View, box_around, pair
+from gvgbot.words import counted
 
 _WIDTH, _TALLEST, _NARROWEST = 1344, 1344, 900  # pixels of the map; a tall one is less wide
 _MARGIN = 28  # pixels around everything
@@ -177,7 +178,4 @@ def _caption(graph: RouteGraph, title: str) -> str:
 
 def counts(vertices: Sized, edges: Sized) -> str:
     """How many there are, in words."""
-    return (
-        f"{len(vertices)} {'vertex' if len(vertices) == 1 else 'vertices'}, "
-        f"{len(edges)} {'edge' if len(edges) == 1 else 'edges'}"
-    )
+    return f"{counted(len(vertices), 'vertex', 'vertices')}, {counted(len(edges), 'edge')}"

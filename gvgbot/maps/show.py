@@ -15,6 +15,7 @@ from gvgbot.maps.picture_files import PICTURES, Paint
 from gvgbot.maps.route_graph import MapVertex, RouteGraph
 from gvgbot.maps.saved_run import SavedRun
 from gvgbot.maps.surface import S
+from gvgbot.words import counted
 
 FRAMES = 60  # of a film, if nobody says how many
 
@@ -80,8 +81,8 @@ def facts(run: SavedRun) -> Iterator[str]:
         yield f"driven     {run.summary.distance_m:.1f} m in {film.clock(run.summary.duration_s)}"
         yield f"closures   {run.summary.loop_closures}"
     yield (
-        f"vertices   {len(graph.vertices)}: {_counted(kinds['meetpoint'], 'meetpoint')}, "
-        f"{_counted(kinds['endpoint'], 'endpoint')}"
+        f"vertices   {len(graph.vertices)}: {counted(kinds['meetpoint'], 'meetpoint')}, "
+        f"{counted(kinds['endpoint'], 'endpoint')}"
     )
     yield f"frontiers  {sum(len(vertex.frontiers) for vertex in graph.vertices)} left"
     yield f"edges      {len(graph.edges)} of {sum(e.length for e in graph.edges):.1f} m in all"
@@ -92,10 +93,6 @@ def facts(run: SavedRun) -> Iterator[str]:
         yield f"extent     {width:.1f} m x {height:.1f} m, {_free_area(run):.0f} m^2 of it free"
     if graph.vertices:
         yield _accuracy(graph)
-
-
-def _counted(count: int, what: str) -> str:
-    return f"{count} {what}{'' if count == 1 else 's'}"
 
 
 def _free_area(run: SavedRun) -> float:
