@@ -18,6 +18,7 @@ from gvgbot.errors import ExtraMissing, GvgbotError, UsageError
 from gvgbot.hal.guard import Guard
 from gvgbot.hal.messages import Odometry
 from gvgbot.links import Devices, Links
+from gvgbot.maps.picture import counts
 from gvgbot.maps.run_directory import RunDirectory
 from gvgbot.persistence.keeper import Keeper
 from gvgbot.persistence.mission_files import MissionFiles
@@ -105,7 +106,7 @@ def _conclude(session: Session) -> int:
     mission, graph = session.pipeline.mission, session.pipeline.mapper.graph
     print(
         f"{mission.outcome or 'failed'}: {mission.reason or session.failure}; "
-        f"{len(graph.vertices)} vertices, {len(graph.edges)} edges, "
+        f"{counts(graph.vertices, graph.edges)}, "
         f"{session.pipeline.travelled:.0f} m driven",
         file=sys.stdout if mission.outcome == "explored" else sys.stderr,
     )
@@ -133,7 +134,8 @@ def run(config: Config, *, out: Path | None, known: Path | None = None, anew: bo
         directory = stack.enter_context(start.directory)
         session = Session(config, directory, place)
         keeper = Keeper(session, start.files, start.saved)
-        _announce(session, resumed=start.saved is not None)
+        network = "off" if telemetry is None else telemetry.addresses
+        _announce(session, network, resumed=start.saved is not None)
         ros2, foxglove = _ros2(config, stack), _foxglove(config, stack)
         robot = Robot(
             session,
@@ -204,7 +206,7 @@ def _foxglove(config: Config, stack: contextlib.ExitStack) -> "FoxgloveServer | 
     return stack.enter_context(FoxgloveServer(config.foxglove, config.robot.name))
 
 
-def _announce(session: Session, *, resumed: bool) -> None:
+def _announce(session: Session, network: str, *, resumed: bool) -> None:
     config = session.config
     log.info(
         "started",
@@ -213,7 +215,7 @@ def _announce(session: Session, *, resumed: bool) -> None:
         world=None if session.place is None else session.place.world.name,
         laser="twin" if session.place else config.laser.port,
         base="twin" if session.place else config.base.port,
-        network=", ".join(config.telemetry.listen) if config.telemetry.enabled else "off",
+        network=network,
         out=str(session.directory.path),
         map="known" if resumed else "new",
     )

@@ -24,7 +24,7 @@ from gvgbot.topics import (
     alive_key,
     team_key,
 )
-from gvgbot.zenoh_config import reason, session_config
+from gvgbot.zenoh_config import addresses, reason, session_config
 
 _WAITING_QUERIES = 32  # more than this are dropped, oldest first; who asked gets nothing
 _WAITING_REQUESTS = 8
@@ -53,7 +53,9 @@ class Telemetry:
         self.failures = 0  # samples that could not be sent
         self._latest: dict[Topic, Payload] = {}
         self._robot = robot
-        self._session = _open(config, relays=relays)
+        settings = _session_config(config, relays=relays)
+        self.addresses = ", ".join(addresses(settings))  # a file may have others than the config
+        self._session = _open(settings, self.addresses)
         self._publishers = {topic.payload: (topic, self._publisher(topic)) for topic in TOPICS}
         self._alive = self._session.liveliness().declare_token(alive_key(robot))
 
@@ -253,11 +255,10 @@ def _form(topic: Topic, wanted: str | None) -> tuple[Callable[[Payload], bytes],
     return msgspec.msgpack.encode, zenoh.Encoding(topic.encoding)
 
 
-def _open(config: TelemetryConfig, *, relays: bool) -> zenoh.Session:
+def _open(config: zenoh.Config, where: str) -> zenoh.Session:
     try:
-        return zenoh.open(_session_config(config, relays=relays))
+        return zenoh.open(config)
     except zenoh.ZError as error:
-        where = ", ".join(config.listen)
         raise GvgbotError(
             f"cannot listen on {where}: {reason(error)}; "
             "choose another address (telemetry.listen), or set telemetry.enabled=false"

@@ -1,5 +1,6 @@
 """What all our zenoh sessions have in common, and what zenoh's errors mean."""
 
+import json
 import re
 from collections.abc import Mapping
 from importlib.resources import files
@@ -36,6 +37,14 @@ def session_config(settings: Mapping[str, object], file: Path | None = None) -> 
         if config.get_json(key) == plain.get_json(key):
             config.insert_json5(key, msgspec.json.encode(value).decode())
     return config
+
+
+def addresses(config: zenoh.Config) -> list[str]:
+    """Where a session of a configuration listens."""
+    found = json.loads(config.get_json("listen/endpoints"))
+    if isinstance(found, dict):  # for each mode its own
+        found = found.get(json.loads(config.get_json("mode")))
+    return found or []
 
 
 def _read(file: Path) -> zenoh.Config:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from gvgbot.errors import UsageError
-from gvgbot.zenoh_config import session_config
+from gvgbot.zenoh_config import addresses, session_config
 
 FILES = sorted(path.name for path in (files("gvgbot") / "configs" / "zenoh").iterdir())
 
@@ -15,6 +15,23 @@ FILES = sorted(path.name for path in (files("gvgbot") / "configs" / "zenoh").ite
 @pytest.mark.parametrize("name", [name for name in FILES if name.endswith(".json5")])
 def test_zenoh_reads_the_file(name: str) -> None:
     session_config({}, Path(name))
+
+
+@pytest.mark.parametrize(
+    ("text", "listens"),
+    [
+        ("{}", ["tcp/127.0.0.1:7447"]),
+        ('{listen: {endpoints: ["tls/0.0.0.0:7447"]}}', ["tls/0.0.0.0:7447"]),
+        ('{mode: "peer", listen: {endpoints: {peer: ["tcp/[::]:9"]}}}', ["tcp/[::]:9"]),
+    ],
+)
+def test_a_session_listens_where_the_file_says(
+    text: str, listens: list[str], tmp_path: Path
+) -> None:
+    path = tmp_path / "some.json5"
+    path.write_text(text)
+    settings = {"mode": "peer", "listen/endpoints": ["tcp/127.0.0.1:7447"]}
+    assert addresses(session_config(settings, path)) == listens
 
 
 def test_the_router_keeps_what_robots_publish() -> None:
