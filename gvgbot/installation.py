@@ -32,13 +32,13 @@ def install_service(
 ) -> int:
     """Write the files of the service, or only say what would be written; the exit status.
 
-    Raises ConfigError for a configuration with mistakes, GvgbotError if a file cannot be written
-    or the service could not run from where this program is.
+    Raises ConfigError for a configuration with mistakes, GvgbotError if the service could not run
+    from where this program is, also of a dry run, or if a file cannot be written.
     """
     source = packaged("turtlebot2.yaml" if config is None else config)
     load_config(source)
     home, programs = Path.home(), Path(sys.executable).parent
-    if not user and not dry_run:
+    if not user:
         _check_place(Path(sys.executable))
     version = _systemd_version()
     wanted = (

@@ -83,11 +83,12 @@ def test_a_configuration_with_mistakes_is_not_installed(
     assert list(tmp_path.iterdir()) == [bad]
 
 
+@pytest.mark.parametrize("options", [[], ["--dry-run"]], ids=["real", "dry"])
 def test_a_service_that_could_not_see_its_program_is_not_installed(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    options: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(sys, "executable", "/home/me/gvgbot/bin/python")
-    assert main(["install-service"]) == 1
+    assert main(["install-service", *options]) == 1
     (line,) = capsys.readouterr().err.splitlines()
     assert "/home/me/gvgbot/bin/python" in line
     assert "/opt/gvgbot" in line
