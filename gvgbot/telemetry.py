@@ -54,7 +54,7 @@ class Telemetry:
         self._latest: dict[Topic, Payload] = {}
         self._robot = robot
         settings = _session_config(config, relays=relays)
-        self.addresses = ", ".join(addresses(settings))  # a file may have others than the config
+        self.addresses = ", ".join(addresses(settings, "listen"))  # perhaps those of a file
         self._session = _open(settings, self.addresses)
         self._publishers = {topic.payload: (topic, self._publisher(topic)) for topic in TOPICS}
         self._alive = self._session.liveliness().declare_token(alive_key(robot))

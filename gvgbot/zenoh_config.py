@@ -5,6 +5,7 @@ import re
 from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
+from typing import Literal
 
 import msgspec
 import zenoh
@@ -39,9 +40,9 @@ def session_config(settings: Mapping[str, object], file: Path | None = None) -> 
     return config
 
 
-def addresses(config: zenoh.Config) -> list[str]:
-    """Where a session of a configuration listens."""
-    found = json.loads(config.get_json("listen/endpoints"))
+def addresses(config: zenoh.Config, what: Literal["listen", "connect"]) -> list[str]:
+    """Where a session of a configuration listens, or connects to."""
+    found = json.loads(config.get_json(f"{what}/endpoints"))
     if isinstance(found, dict):  # for each mode its own
         found = found.get(json.loads(config.get_json("mode")))
     return found or []

@@ -16,7 +16,7 @@ from gvgbot.ros2 import messages
 from gvgbot.ros2.cdr import decode_twist
 from gvgbot.ros2.config import Ros2Config
 from gvgbot.ros2.topics import TOPICS, Node, Topic, attachment, gid
-from gvgbot.zenoh_config import reason, session_config
+from gvgbot.zenoh_config import addresses, reason, session_config
 
 _HEARTBEAT_S = 0.5  # by which receivers of latched topics find out that they have missed one
 _TWISTS = {"Twist": messages.Twist, "TwistStamped": messages.TwistStamped}
@@ -34,7 +34,8 @@ class Ros2Node:
     def __init__(self, config: Ros2Config, robot: str) -> None:
         """Raises GvgbotError if the addresses cannot be used."""
         self._config, self._warned = config, False
-        self._session = _open(config)
+        settings = _settings(config)
+        self._session = _open(settings, config)
         self._node = Node(
             config.domain,
             str(self._session.info.zid()),
@@ -46,6 +47,14 @@ class Ros2Node:
         self._publishers = {
             topic: self._publisher(number, topic) for number, topic in enumerate(TOPICS, start=1)
         }
+        self._say_whether_met(", ".join(addresses(settings, "connect")))
+
+    def _say_whether_met(self, router: str) -> None:
+        """Opening the session has tried to connect once; later it tries again."""
+        if self._session.info.routers_zid() or self._session.info.peers_zid():
+            log.info("ROS 2 nodes can see the robot", router=router)
+        else:
+            log.warning("no ROS 2 router answers, trying again", router=router)
 
     def _declare_token(self, token: str) -> None:
         self._tokens.append(self._session.liveliness().declare_token(token))
@@ -152,21 +161,23 @@ class _Publisher:
             log.debug("not sent to ROS 2", reason=reason(error))
 
 
-def _open(config: Ros2Config) -> zenoh.Session:
-    """A session like those of ROS nodes: found and linked to by way of a router."""
+def _settings(config: Ros2Config) -> zenoh.Config:
+    """Those of a session like that of a ROS node: found and linked to by way of a router."""
+    return session_config(
+        {
+            "mode": "peer",
+            "listen/endpoints": config.listen,
+            "connect/endpoints": config.connect,
+            "scouting/gossip/enabled": True,
+            "timestamping/enabled": True,
+        },
+        config.zenoh_file,
+    )
+
+
+def _open(settings: zenoh.Config, config: Ros2Config) -> zenoh.Session:
     try:
-        return zenoh.open(
-            session_config(
-                {
-                    "mode": "peer",
-                    "listen/endpoints": config.listen,
-                    "connect/endpoints": config.connect,
-                    "scouting/gossip/enabled": True,
-                    "timestamping/enabled": True,
-                },
-                config.zenoh_file,
-            )
-        )
+        return zenoh.open(settings)
     except zenoh.ZError as error:
         raise GvgbotError(
             f"cannot meet ROS 2 from {', '.join(config.listen)}: {reason(error)}; "

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import structlog
 import zenoh
 import zenoh.ext
 
@@ -121,6 +122,15 @@ def network() -> Iterator[str]:
 def robot(network: str) -> Iterator[Ros2Node]:
     with Ros2Node(Ros2Config(enabled=True, connect=(network,), domain=DOMAIN), "a-b") as node:
         yield node
+
+
+def test_it_says_once_whether_there_is_a_router(network: str) -> None:
+    for address, says in ((network, "can see"), (free_endpoint(), "no ROS 2 router answers")):
+        with structlog.testing.capture_logs() as logs:
+            Ros2Node(Ros2Config(enabled=True, connect=(address,), domain=DOMAIN), "a").close()
+        (line,) = logs
+        assert says in line["event"]
+        assert line["router"] == address
 
 
 def test_a_latecomer_gets_the_map(network: str, robot: Ros2Node) -> None:

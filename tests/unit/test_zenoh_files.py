@@ -31,7 +31,7 @@ def test_a_session_listens_where_the_file_says(
     path = tmp_path / "some.json5"
     path.write_text(text)
     settings = {"mode": "peer", "listen/endpoints": ["tcp/127.0.0.1:7447"]}
-    assert addresses(session_config(settings, path)) == listens
+    assert addresses(session_config(settings, path), "listen") == listens
 
 
 def test_the_router_keeps_what_robots_publish() -> None:
