@@ -21,6 +21,7 @@ from gvgbot.replay import Log, Wanted, open_log
 from gvgbot.robot import Network, Robot
 from gvgbot.service import Notifier, StopSignals, set_up_logging
 from gvgbot.session import Session
+from gvgbot.steering import Steering
 from gvgbot.telemetry import Telemetry
 
 OffLoop = Callable[[Callable[[], None]], Awaitable[None]]
@@ -46,12 +47,13 @@ def serve(wanted: Wanted, *, out: Path | None, speed: float) -> int:
         directory = stack.enter_context(RunDirectory.create(out, world=played.title))
         session = Session(config, directory, place=None, led=played.led)
         session.title = played.title
-        log.info("playing", robot=config.robot.name, network=", ".join(telemetry.listen))
+        log.info("playing", robot=config.robot.name, network=network.addresses)
         try:
             with asyncio.Runner() as runner:
                 runner.run(PlayedRobot(session, network, played, speed).serve(signals.wait()))
         finally:
             session.save()
+            log.info("map saved", path=str(directory.path))
     return 0
 
 
@@ -84,6 +86,11 @@ class PlayedRobot(Robot):
     ) -> None:
         super().__init__(session, Notifier(None), network, off_loop)
         self._played, self._speed = played, speed
+
+    def _steering(self) -> Steering:
+        steering = super()._steering()
+        steering.declines = "this is a recording: it can only be watched"
+        return steering
 
     def _prepare(self, links: Links) -> None:
         super()._prepare(links)

@@ -62,6 +62,7 @@ class Steering:
         use: Callable[[Config], None],
         tell: Callable[[list[Event]], None],
     ) -> None:
+        self.declines: str | None = None  # why nothing is done, whatever is permitted
         self._config, self._limits = config, config.robot.limits
         self._errands, self._body = errands, body
         self._now, self._save, self._use, self._tell = now, save, use, tell
@@ -83,6 +84,8 @@ class Steering:
 
     def _check(self, name: str) -> None:
         """Raises Declined if that is not permitted, or not safe just now."""
+        if self.declines is not None:
+            raise Declined(self.declines)
         permitted = self._config.telemetry.requests
         if name not in permitted:
             raise Declined(

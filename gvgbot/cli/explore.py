@@ -20,7 +20,8 @@ def add_explore(commands: Commands) -> None:
     explore.add_argument(
         "--world",
         metavar="NAME|YAML",
-        help="a built-in world (office, cave, floor_plan:7 and others), or a map_server YAML",
+        help="a built-in world (office, cave, floor_plan:7 and others), or a map_server YAML "
+        "(default: that of the configuration; office in sim.yaml)",
     )
     explore.add_argument(
         "--start",
@@ -30,7 +31,12 @@ def add_explore(commands: Commands) -> None:
         help="where to start in the world: metres, metres, radians (default: a built-in world's "
         "own start, else 0 0 0)",
     )
-    explore.add_argument("--seed", type=seed, metavar="N", help="draws all errors of the devices")
+    explore.add_argument(
+        "--seed",
+        type=seed,
+        metavar="N",
+        help="draws all errors of the devices (default: that of the configuration; 1 in sim.yaml)",
+    )
     explore.add_argument(
         "--robots",
         type=robots,

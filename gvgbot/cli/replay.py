@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from gvgbot.cli.arguments import Commands, add_overrides, number, positive, say
+from gvgbot.errors import UsageError
 
 NO_ECHO_M = 80.0  # of the lasers that CARMEN logs were made with
 
@@ -46,9 +47,8 @@ def add_replay(commands: Commands) -> None:
     replay.add_argument(
         "--speed",
         type=positive,
-        default=1.0,
         metavar="N",
-        help="with --serve: so many times faster than life",
+        help="with --serve: so many times faster than life (default: 1)",
     )
     replay.set_defaults(command=_replay)
 
@@ -63,7 +63,9 @@ def _replay(options: argparse.Namespace) -> int:
         no_echo_m=options.no_echo,
     )
     if not options.serve:
+        if options.speed is not None:
+            raise UsageError("--speed is about playing it on the network: give --serve, too")
         return replay(wanted, say, out=options.out)
     from gvgbot.playback import serve
 
-    return serve(wanted, out=options.out, speed=options.speed)
+    return serve(wanted, out=options.out, speed=options.speed or 1.0)

@@ -117,6 +117,9 @@ def played(path: Path, out: Path, speed: float, seconds: float) -> Network:
 
             async def told() -> str:
                 await clock.sleep_until(clock.now() + seconds)
+                answer = await network.ask("pause")
+                assert not answer.done
+                assert "it can only be watched" in answer.text
                 return "SIGINT"
 
             await robot.serve(told(), Links(log.config, clock, None))

@@ -99,3 +99,8 @@ def test_a_bad_log_is_one_line_and_no_run(
     (line,) = capsys.readouterr().err.splitlines()
     assert ("recording (MCAP)" in line) == (content is not None)  # the other kind there is
     assert not (tmp_path / "run").exists()
+
+
+def test_a_speed_is_for_what_is_served(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["replay", str(tmp_path / "run.mcap"), "--speed", "5"]) == 2
+    assert "--serve" in capsys.readouterr().err

@@ -116,6 +116,14 @@ def test_nothing_sets_the_robot_in_motion_while_that_is_not_safe(
     assert rig.errands.did == []
 
 
+@pytest.mark.parametrize("name", REQUESTS)
+def test_what_cannot_be_steered_says_why_and_does_nothing(name: str) -> None:
+    rig = Rig()
+    rig.steering.declines = "this is a recording"
+    assert rig.ask(name, **FITTING.get(name, {})) == Answer(done=False, text="this is a recording")
+    assert rig.errands.did == []
+
+
 @pytest.mark.parametrize("name", ["pause", "stop", "save", "set"])
 def test_what_does_not_move_the_robot_is_done_whatever_it_feels(name: str) -> None:
     rig = Rig(body=touched(bumper_left=True))
