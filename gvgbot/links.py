@@ -143,6 +143,8 @@ async def _open_port(name: str, port: str, baud: int) -> tuple[ByteStream, Close
     try:
         stream = TcpStream(port) if port.startswith(SCHEME) else await open_serial(port, baud)
     except DeviceLost as error:
+        if "Inappropriate ioctl" in str(error):  # what the system says of any other file
+            raise DeviceLost(f"{port} is no serial port: set {name}.port") from error
         raise DeviceLost(f"{error}, or set {name}.port") from error
     return stream, stream.close
 

@@ -100,6 +100,13 @@ def test_a_port_that_is_not_there_or_none_is_named_with_what_to_do(tmp_path: Pat
         assert f"set {device}.port" in finding
 
 
+def test_a_file_that_is_no_port_is_called_so(tmp_path: Path) -> None:
+    file = tmp_path / "ttyUSB0"
+    file.touch()
+    verdict, finding = at_ports(str(file), str(tmp_path))["laser"]
+    assert (verdict, finding) == ("fail", f"{file} is no serial port: set laser.port")
+
+
 def test_a_port_that_another_program_holds_is_not_to_be_plugged_in(tmp_path: Path) -> None:
     with terminal(is_busy=True) as path:
         verdict, finding = at_ports(path, str(tmp_path))["laser"]
