@@ -136,6 +136,9 @@ def main() -> None:
     parser.add_argument("relations", type=Path)
     parser.add_argument("--keep", action="store_true", help="for docs/benchmarks.md to quote")
     options = parser.parse_args()
+    for path in (options.log, options.relations):
+        if not path.is_file():
+            parser.error(f"there is no file {path}: docs/how-to/recordings.md says what it is")
     relations = np.loadtxt(options.relations, ndmin=2)
     mappers = {"odometry": by_odometry, "gvgbot": by_gvgbot}
     if importlib.util.find_spec("yag_slam"):
