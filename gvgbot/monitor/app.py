@@ -83,7 +83,7 @@ async def _keep_watching(robot: str | None, connection: Connection, show: Show) 
         except UsageError:
             raise
         except GvgbotError as error:
-            show(Picture(Fact("gvgbot", f"{error}; trying again", "bad")))
+            show(Picture(Fact("gvgbot", f"{error} (trying again)", "bad")))
             await asyncio.sleep(_EVERY)
 
 

@@ -195,6 +195,8 @@ def headline(robot: str, presence: Presence, state: State | None, others: list[s
         case "gone":
             return Fact(robot, f"robot gone since {duration(presence.for_s)}", "bad")
         case "cut off":
+            if state is None:
+                return Fact(robot, "connecting to the robot", "faint")
             return Fact(
                 robot, f"connection lost since {duration(presence.for_s)}, trying again", "bad"
             )

@@ -5,11 +5,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 from gvgbot import client
-from gvgbot.errors import GvgbotError
+from gvgbot.errors import GvgbotError, UsageError
 from gvgbot.service import StopSignals
 from gvgbot.web.feed import Feed
 from gvgbot.web.server import Web
 from gvgbot.web.viewers import Audience
+
+_PATIENCE = 1.0  # s for a connection, before it is said that there is none
 
 
 def web(
@@ -47,11 +49,25 @@ async def _serve(
     feed = Feed(robot, endpoint, zenoh_file, audience)
     page = Web(*address, audience, feed.fulfil)
     async with await page.open() as server, asyncio.TaskGroup() as tasks:
+        trouble = await asyncio.to_thread(_trouble, endpoint, zenoh_file) if robot is None else None
         port = next(iter(server.sockets)).getsockname()[1]  # the one it got, if it asked for any
         say(f"the map is at http://{_shown(address[0])}:{port}/ (Ctrl-C ends)")
+        if trouble is not None:
+            say(f"{trouble} (trying again)")
         watching = tasks.create_task(feed.run())
         await signals.wait()
         watching.cancel()
+
+
+def _trouble(endpoint: str, zenoh_file: Path | None) -> str | None:
+    """Why there is no robot to watch yet. Raises UsageError if there are several."""
+    try:
+        client.only_robot(endpoint, _PATIENCE, zenoh_file)
+    except UsageError:
+        raise
+    except GvgbotError as error:
+        return str(error)
+    return None
 
 
 def _shown(host: str) -> str:

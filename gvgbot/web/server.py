@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import errno
 import logging
+import socket
 from collections.abc import Awaitable, Callable
 from http import HTTPStatus
 
@@ -109,4 +110,6 @@ def _why(error: OSError) -> str:
         return "the port is taken, perhaps by another gvgbot web; choose another with --port"
     if error.errno == errno.EACCES:
         return "only root may have that port; choose one from 1024 on with --port"
+    if error.errno == errno.EADDRNOTAVAIL or isinstance(error, socket.gaierror):
+        return "this machine has no such address; choose one of its own with --host"
     return error.strerror or str(error)

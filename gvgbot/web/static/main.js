@@ -35,7 +35,7 @@ function take(kind, value) {
     case "state": takeState(value); break;
     case "map":
       picture.setMap(value);
-      $("map").setAttribute("aria-label", `map, ${value.vertices.length} vertices, ${value.edges.length} edges; ${GESTURES}`);
+      $("map").setAttribute("aria-label", `map, ${words.size(value.vertices.length, value.edges.length)}; ${GESTURES}`);
       break;
     case "floor": picture.setFloor(value); break;
     case "tile": picture.floor?.take(value).then(redraw); break;
@@ -101,8 +101,8 @@ function drawPanel() {
 }
 
 function said() {
-  if (!isConnected) return ["connection to gvgbot web lost, trying again", "bad", true];
-  return robotLink === null ? ["connecting", "faint", false] : words.headline(robotLink, state);
+  if (isConnected && robotLink !== null) return words.headline(robotLink, state);
+  return robotLink === null ? ["connecting", "faint", false] : ["connection to gvgbot web lost, trying again", "bad", true];
 }
 
 // Make the children of a list say what they should, and touch only those that change.

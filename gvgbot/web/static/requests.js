@@ -37,7 +37,7 @@ export class Requests {
     }
     this.form.hidden = !this.allowed.has("set");
     for (const field of this.form.elements) field.disabled = !isReachable;
-    document.querySelector("#no-requests").hidden = this.allowed.size > 0;
+    document.querySelector("#no-requests").hidden = state === null || this.allowed.size > 0;
   }
 
   may(name) {

@@ -22,6 +22,9 @@ export function axes(xx, xy, yy) {
 export const sigma = (state) => axes(state.covariance[0], state.covariance[1], state.covariance[4])[0];
 export const length = (metres) => (metres < 1 ? `${(100 * metres).toFixed(1)} cm` : `${metres.toFixed(2)} m`);
 
+const counted = (count, one, many) => `${count} ${count === 1 ? one : many}`;
+export const size = (vertices, edges) => `${counted(vertices, "vertex", "vertices")}, ${counted(edges, "edge", "edges")}`;
+
 const TONES = { exploring: "good", errand: "good", waiting: "good", finished: "good", paused: "warning", starting: "warning", halted: "bad" };
 export const toneOfPhase = (state) =>
   state.outcome && state.outcome !== "explored" ? "warning" : TONES[state.phase] ?? "plain";
@@ -38,7 +41,7 @@ export function facts(state, plan) {
     ["sigma", `${length(sigma(state))}, ${((turn * 180) / Math.PI).toFixed(1)}°`, "plain"],
     ["speed", `${state.twist[0].toFixed(2)} m/s, ${degrees(state.twist[1])}/s`, "plain"],
     ["driven", `${state.distance.toFixed(1)} m`, "plain"],
-    ["map", `${state.vertices} vertices, ${state.edges} edges`, "plain"],
+    ["map", size(state.vertices, state.edges), "plain"],
     ["frontiers", `${state.frontiers} left`, "plain"],
     ["battery", ...battery(state)],
     ["laser", ...device(state.laser)],
@@ -100,10 +103,12 @@ const contacts = (state) => `${state.contacts}${state.slips ? `, ${state.slips} 
 export function headline(link, state) {
   const since = duration(link.for_s);
   switch (link.word) {
-    case "unreachable": return [`${link.trouble}; trying again`, "bad", true];
+    case "unreachable": return [`${link.trouble} (trying again)`, "bad", true];
     case "absent": return [`no robot named ${link.robot} here; there is ${link.others.join(", ") || "none"}`, "bad", true];
     case "gone": return [`robot gone since ${since}`, "bad", true];
-    case "cut off": return [`connection to the robot lost since ${since}, trying again`, "bad", true];
+    case "cut off":
+      if (state === null) return ["connecting to the robot", "faint", false];
+      return [`connection to the robot lost since ${since}, trying again`, "bad", true];
   }
   if (link.silence_s !== null && link.silence_s > STALE) {
     return [`quiet since ${duration(link.silence_s)}: its program hangs`, "bad", true];

@@ -128,6 +128,10 @@ def test_the_headline_says_how_things_are(word: str, others: list[str], text: st
     assert headline("karl", presence, state, others).text == text
 
 
+def test_before_its_first_word_a_robot_is_connected_to_and_not_lost() -> None:
+    assert headline("karl", Presence("cut off", 0.1), None, []).text == "connecting to the robot"
+
+
 def test_a_control_loop_that_is_stuck_makes_the_headline() -> None:
     laser = msgspec.structs.replace(EXAMPLE.base, connected=True)
     stuck = msgspec.structs.replace(EXAMPLE, cycle_age=7.0, base=laser)
