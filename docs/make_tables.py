@@ -15,6 +15,7 @@ from pathlib import Path
 from benchmarks import (
     consistency,
     explore_table,
+    patrol,
     policies,
     relations,
     reliability,
@@ -102,6 +103,12 @@ def nees(rows: list[Row]) -> str:
     return "\n".join(consistency.table(rows))
 
 
+def hours(rows: list[Row], every: str) -> str:
+    """A line for the first hour of a patrol, and for every so manieth."""
+    shown = [row for row in rows if row["hour"] == 1 or row["hour"] % int(every) == 0]
+    return _block([patrol.HEAD, *map(patrol.line, shown)])
+
+
 def totals(rows: list[Row]) -> str:
     """How much a campaign was."""
     return "\n".join(reliability.totals(rows))
@@ -138,6 +145,7 @@ VIEWS: dict[str, Callable[..., str]] = {
     "last_words": last_words,
     "mappers": mappers,
     "teams": teams,
+    "hours": hours,
     "choices": choices,
     "nees": nees,
     "totals": totals,
