@@ -78,7 +78,8 @@ def _known(path: Path) -> Saved:
     except Damaged as error:
         raise UsageError(f"cannot begin with {error}") from error
     if saved is None:
-        raise UsageError(f"cannot begin with {path}: there is no {SNAPSHOT} in it")
+        remedy = f"gvgbot map import {path}/map.yaml --out ..."
+        raise UsageError(f"cannot begin with {path}: there is no {SNAPSHOT} in it; try {remedy}")
     return saved
 
 
