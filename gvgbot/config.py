@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -18,7 +17,7 @@ from gvgbot.hal.guard import GuardConfig
 from gvgbot.ranges import Range
 from gvgbot.recording.config import RecordingConfig
 from gvgbot.ros2.config import Ros2Config
-from gvgbot.strict_yaml import load, load_text
+from gvgbot.strict_yaml import load, load_text, packaged
 from gvgbot.team.member import TeamConfig
 from gvgbot.team.troubles import TroublesConfig
 from gvgbot.topics import TelemetryConfig, is_robot_name
@@ -108,10 +107,3 @@ def config_in(text: str, source: str, overrides: Sequence[str] = ()) -> Config:
     Raises ConfigError; `source` is what mistakes in the text are blamed on.
     """
     return load_text(Config, text, source, overrides)
-
-
-def packaged(path: Path | str) -> Path:
-    """The path itself if it exists, else the packaged file of that name if there is one."""
-    inside = Path(str(files("gvgbot") / "configs")) / Path(path).name
-    is_bare_name = Path(path).name == str(path)
-    return inside if is_bare_name and not Path(path).exists() and inside.exists() else Path(path)

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 
-from gvgbot.config import load_config, packaged
+from gvgbot.config import load_config
 from gvgbot.errors import GvgbotError
+from gvgbot.strict_yaml import packaged
 
 _BACK_OFF_SINCE = 254  # the version of systemd from which on restarts can be spaced out
 _BACK_OFF = "RestartSteps=6\nRestartMaxDelaySec=60\n"

@@ -17,7 +17,7 @@ from gvgbot.drivers.tcp import SCHEME, TcpStream
 from gvgbot.drivers.transport import SerialStream
 from gvgbot.errors import ConfigError, GvgbotError
 from gvgbot.geometry import STANDSTILL
-from gvgbot.strict_yaml import load_text
+from gvgbot.strict_yaml import load_text, packaged
 
 _PATIENCE_S = 1.0  # until a base on the network has said something
 
@@ -25,7 +25,7 @@ _PATIENCE_S = 1.0  # until a base on the network has said something
 def main(arguments: list[str]) -> int:
     """Stop the base of a configuration file, if it is a real one; the exit status."""
     try:
-        config = _real_base(Path(arguments[0])) if arguments else None
+        config = _real_base(packaged(arguments[0])) if arguments else None
         if config is not None:
             asyncio.run(_write_stop(config))
     except GvgbotError as error:

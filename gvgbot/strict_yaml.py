@@ -4,6 +4,7 @@ import dataclasses
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from importlib.resources import files
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -46,6 +47,13 @@ class _Override:
         """Whether a mistake at this path can come from the override."""
         common = min(len(path), len(self.path))
         return path[:common] == self.path[:common]
+
+
+def packaged(path: Path | str) -> Path:
+    """The path itself if it exists, else the packaged file of that name if there is one."""
+    inside = Path(str(files("gvgbot") / "configs")) / Path(path).name
+    is_bare_name = Path(path).name == str(path)
+    return inside if is_bare_name and not Path(path).exists() and inside.exists() else Path(path)
 
 
 def load(cls: type[T], path: Path | None, overrides: Sequence[str] = ()) -> T:

@@ -20,7 +20,7 @@ def write_files(directory: Path, contents: Mapping[str, bytes | str]) -> None:
             _write_through(path, content.encode() if isinstance(content, str) else content)
         for path, temporary in aside.items():
             temporary.replace(path)
-        _sync_directory(directory)
+        sync_directory(directory)
     except OSError as error:
         names = ", ".join(contents)
         raise GvgbotError(f"cannot write {names} to {directory}: {error.strerror}") from error
@@ -37,7 +37,7 @@ def _write_through(path: Path, content: bytes) -> None:
         os.fsync(file.fileno())
 
 
-def _sync_directory(path: Path) -> None:
+def sync_directory(path: Path) -> None:
     """Wait until its names are on the disk, where the filesystem has a way to do that."""
     with contextlib.suppress(OSError):
         directory = os.open(path, os.O_RDONLY | os.O_DIRECTORY)

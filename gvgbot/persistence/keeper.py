@@ -155,7 +155,8 @@ class Keeper:
         if count == before and not self._settled:
             if stamp < self._beat_at + BEAT_EVERY:
                 return _nothing
-            after = bisect_left(self._counts, count) + 1  # one sign of life takes another's place
+            # one sign of life takes another's place
+            after = bisect_left(self._counts, count, hi=after) + 1
         beat = self._beat(stamp)
         batch = Batch(
             first=before.keyframes,

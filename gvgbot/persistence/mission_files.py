@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from gvgbot.autonomy.memory import Growth
+from gvgbot.maps.atomic_files import sync_directory
 from gvgbot.persistence.mission_state import (
     VERSION,
     Batch,
@@ -168,7 +169,7 @@ def _replace(path: Path, content: bytes, keep: Path | None = None) -> None:
         if keep is not None and path.exists():
             path.replace(keep)
         aside.replace(path)
-        _sync_directory(path.parent)
+        sync_directory(path.parent)
     finally:
         with contextlib.suppress(OSError):
             aside.unlink(missing_ok=True)
@@ -178,11 +179,3 @@ def _write_all(file: int, content: bytes) -> None:
     left = memoryview(content)
     while left:
         left = left[os.write(file, left) :]
-
-
-def _sync_directory(path: Path) -> None:
-    directory = os.open(path, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        os.fsync(directory)
-    finally:
-        os.close(directory)

@@ -16,7 +16,8 @@ from pathlib import Path
 import pytest
 
 from gvgbot.cli import parser
-from gvgbot.config import load_config, packaged
+from gvgbot.config import load_config
+from gvgbot.strict_yaml import packaged
 
 ROOT = Path(__file__).parents[2]
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").rglob("*.md"))]

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from gvgbot.config import Config, load_config, packaged
+from gvgbot.config import Config, load_config
 from gvgbot.errors import ConfigError
-from gvgbot.strict_yaml import as_mapping
+from gvgbot.strict_yaml import as_mapping, packaged
 
 
 def test_without_a_file_the_robot_is_simulated() -> None:

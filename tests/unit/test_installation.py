@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 
 from gvgbot.cli import main
-from gvgbot.config import load_config, packaged
+from gvgbot.config import load_config
 from gvgbot.installation import system_files, user_files
+from gvgbot.strict_yaml import packaged
 
 PROGRAMS = Path("/srv/robot/bin")
 SOURCE = packaged("turtlebot2.yaml")
