@@ -14,28 +14,23 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation, distance_transform_edt
 from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.gvg.local_map import LocalMap
+from gvgbot.autonomy.known_walls import CELL_M, REACH_M, KnownWalls
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig, register
 from gvgbot.geometry import Array, Pose, wrap_angle, wrap_angles
 from gvgbot.hal.messages import Scan
 
-_CELL_M, _WALL_CELL_M = 0.25, 0.1  # of what has been seen, and of walls
-_REACH_M = 8.0  # around the robot, what is compared
 _NEAR_M, _OFF_M = 0.2, 0.4  # walls so near to each other are one, and so far off are two
-_ROOM_M = 0.2  # from the walls, a robot may stand
 _HEADINGS = 120  # that are tried at each place
 _TRIED = 100  # places in one go
-_ROUGH_M = 0.4  # walls so far off do not speak for a rough guess
 _ROUGH_POINTS, _POINTS = 80, 300  # of the walls, for a rough guess and for a close look
 _ROUGH_GUESSES = 1200  # whose scores are worked out better: in a corridor one is like the next
 _GUESSES = 150  # that are looked at closely: a place that is left out can never be found
 _ALIKE = 0.05  # in score, from the best: what is left out may be the place if it differs by less
 _MOST_ROUNDS = 20  # of guessing again a little farther on, before some are left out nevertheless
-_FINER_M, _FINER_RAD = _CELL_M / 3, math.tau / _HEADINGS / 3  # steps to a better score
+_FINER_M, _FINER_RAD = CELL_M / 3, math.tau / _HEADINGS / 3  # steps to a better score
 _STEPS = np.array(list(product((-1, 0, 1), repeat=3))) * [_FINER_M, _FINER_M, _FINER_RAD]
 _FITS_A_STEP = 4  # hypotheses that are laid onto the map in one go
 _APART_M, _APART_RAD = 0.6, 0.3  # guesses nearer to each other are the same
@@ -56,89 +51,6 @@ _MOST_SIDES = 8
 _GUESSED = np.diag([0.3**2, 0.3**2, 0.1**2])  # covariance of a guess
 _FOLLOWED = np.diag([0.1**2, 0.1**2, 0.03**2])  # and of a hypothesis, since the last look
 
-Bools = NDArray[np.bool_]
-
-
-class KnownWalls:
-    """The walls of a known map, what of it has been seen, and where a robot may be."""
-
-    def __init__(self, scans: Sequence[tuple[Pose, Scan]]) -> None:
-        """Scans taken at map_base poses."""
-        ends = [base.compose(scan.base_laser).transform(scan.ends) for base, scan in scans]
-        points = np.concatenate([np.empty((0, 2)), *ends])
-        self.points = _thinned(points, _WALL_CELL_M)
-        self.tree = cKDTree(self.points)
-        told = np.array([*self.points, *(base.position for base, _ in scans)]).reshape(-1, 2)
-        low = told.min(axis=0) if len(told) else np.zeros(2)
-        high = told.max(axis=0) if len(told) else np.zeros(2)
-        self._corner = low - 2 * _REACH_M
-        shape = np.ceil((high - low + 4 * _REACH_M) / _WALL_CELL_M).astype(int)
-        walls = np.zeros(shape, bool)
-        walls[self._cells(self.points, _WALL_CELL_M)] = True
-        self._score = np.clip(
-            1.0 - distance_transform_edt(~walls) * _WALL_CELL_M / _ROUGH_M, 0.0, 1.0
-        ).astype(np.float32)
-        seen = np.zeros(np.ceil(shape * _WALL_CELL_M / _CELL_M).astype(int), bool)
-        for base, scan in scans:
-            seen[self._cells(base.compose(scan.base_laser).transform(_passed(scan)), _CELL_M)] = 1
-        self._seen: Bools = binary_dilation(seen, iterations=2)
-        free = self._corner + (np.argwhere(seen) + 0.5) * _CELL_M
-        self.places = free[self.tree.query(free)[0] > _ROOM_M]
-
-    def _cells(self, points: Array, cell: float) -> tuple[NDArray[np.int64], ...]:
-        return tuple(((points - self._corner) / cell).astype(np.int64).T)
-
-    def scores(self, places: Array, around: Array) -> Array:
-        """How well points lie on walls around each place, 0..1 (N, H), on average.
-
-        `places` (N, 2) are some of the map's; `around` (H, K, 2) are H sets of points, seen from a
-        place and nearer than is compared, so that all are inside. Places stand in one of few ways
-        on the cells of walls, and all that stand in the same way share the cells of the points.
-        """
-        at = (places - self._corner) / _WALL_CELL_M
-        cells = np.floor(at).astype(np.int64)
-        ways, way_of = np.unique((at - cells).round(3), axis=0, return_inverse=True)
-        columns = self._score.shape[1]
-        found = np.empty((len(places), len(around)))
-        for number, way in enumerate(ways):
-            these = np.flatnonzero(way_of.ravel() == number)
-            i, j = np.moveaxis(np.floor(around / _WALL_CELL_M + way).astype(np.int64), -1, 0)
-            flat = (cells[these] @ [columns, 1])[:, None, None] + (i * columns + j)
-            found[these] = self._score.take(flat, mode="clip").mean(axis=-1)
-        return found
-
-    def scores_at(self, guesses: Array, base_walls: Array) -> Array:
-        """The same (N,) for guesses (N, 3), x, y and heading, and points (K, 2) as seen there."""
-        x, y, theta = guesses[:, :, None].transpose(1, 0, 2)
-        c, s = np.cos(theta), np.sin(theta)
-        laid = np.stack(
-            [
-                x + c * base_walls[:, 0] - s * base_walls[:, 1],
-                y + s * base_walls[:, 0] + c * base_walls[:, 1],
-            ],
-            axis=-1,
-        )
-        i, j = np.moveaxis(((laid - self._corner) / _WALL_CELL_M).astype(np.int64), -1, 0)
-        flat = i * self._score.shape[1] + j
-        return np.asarray(self._score.take(flat, mode="clip").mean(axis=1))
-
-    def is_alike(self, turn: Pose, matching: ScanMatchingConfig) -> bool:
-        """Whether the whole map looks the same after a turn about some point, nearly `turn`."""
-        some = _some(self.points, _POINTS)
-        found = register(some, self.tree, self.points, turn, _GUESSED, matching)
-        if found is None:
-            return False
-        distance = np.asarray(self.tree.query(found.pose.transform(self.points))[0])
-        return int((distance > _NEAR_M).sum()) <= _UNLIKE
-
-    def is_seen(self, points: Array) -> Bools:
-        """Whether the map has seen anything where points (N, 2) are."""
-        i, j = ((points - self._corner) / _CELL_M).astype(np.int64).T
-        rows, columns = self._seen.shape
-        inside = (i >= 0) & (j >= 0) & (i < rows) & (j < columns)
-        found: Bools = inside & self._seen[np.where(inside, i, 0), np.where(inside, j, 0)]
-        return found
-
 
 @dataclass(frozen=True, slots=True)
 class Look:
@@ -152,7 +64,7 @@ class Look:
     def around(cls, local_base: Pose, local_map: LocalMap) -> "Look":
         """What a local map shows now; it is the map itself, which goes on to change."""
         points = local_map.points()
-        near = np.hypot(*(points - local_base.position).T) < _REACH_M
+        near = np.hypot(*(points - local_base.position).T) < REACH_M
         return cls(local_base, local_map, points[near])
 
 
@@ -191,8 +103,10 @@ class Opinion:
 class Relocaliser:
     """Forms an opinion, a little work at a time."""
 
-    def __init__(self, known: KnownWalls, matching: ScanMatchingConfig) -> None:
-        self._known, self._matching = known, matching
+    def __init__(self, scans: Sequence[tuple[Pose, Scan]], matching: ScanMatchingConfig) -> None:
+        """`scans` were taken at map_base poses; what they show is gathered by the first steps."""
+        self._scans, self._matching = scans, matching
+        self._known: KnownWalls
         self._look: Look
         self._hypotheses: list[Hypothesis] = []
         self._nowhere = _nowhere()
@@ -238,11 +152,20 @@ class Relocaliser:
     def _are_alike(self, best: Hypothesis, others: list[Hypothesis]) -> bool:
         """Whether no drive can tell the best place from the others."""
         turns = (other.map_local.compose(best.map_local.inverse()) for other in others)
-        return 0 < len(others) < _MOST_SIDES and all(
-            self._known.is_alike(turn, self._matching) for turn in turns
-        )
+        return 0 < len(others) < _MOST_SIDES and all(self._is_alike(turn) for turn in turns)
+
+    def _is_alike(self, turn: Pose) -> bool:
+        """Whether the whole map looks the same after a turn about some point, nearly `turn`."""
+        walls, tree = self._known.points, self._known.tree
+        some = _some(walls, _POINTS)
+        found = register(some, tree, walls, turn, _GUESSED, self._matching)
+        if found is None:
+            return False
+        distance = np.asarray(tree.query(found.pose.transform(walls))[0])
+        return int((distance > _NEAR_M).sum()) <= _UNLIKE
 
     def _working(self) -> Generator[None, None, None]:
+        self._known = yield from KnownWalls.gather(self._scans)
         rounds = 0
         while True:
             look = self._look
@@ -308,7 +231,7 @@ class Relocaliser:
 
     def _compare(self, look: Look, driven: float) -> Generator[None, None, None]:
         """Weigh every hypothesis by a look, so many metres after the one before."""
-        share = min(1.0, driven / (2 * _REACH_M))
+        share = min(1.0, driven / (2 * REACH_M))
         for hypothesis in [*self._hypotheses, self._nowhere]:
             hypothesis.behind += share * hypothesis.newest
         yield from self._weigh(look, _FOLLOWED)
@@ -353,7 +276,7 @@ class Relocaliser:
         seen = self._known.is_seen(laid)
         unknown_to_map = float(np.where(seen, _apart(self._known.tree, laid), _CHANCE).mean())
         walls = self._known.points
-        near = np.hypot(*(walls - map_base.position).T) < _REACH_M
+        near = np.hypot(*(walls - map_base.position).T) < REACH_M
         there = look.local_base.compose(map_base.inverse()).transform(walls[near])
         there = there[look.local_map.known(there)]
         if len(there) == 0:
@@ -396,25 +319,3 @@ def _peaks(guesses: Array) -> Generator[None, None, Array]:
 def _some(points: Array, count: int) -> Array:
     """About so many of the points, evenly taken."""
     return points[:: max(1, len(points) // count)]
-
-
-def _thinned(points: Array, cell: float) -> Array:
-    """One point (M, 2) for each cell that points (N, 2) are in: the mean of these."""
-    if not len(points):
-        return points
-    cells = np.floor(points / cell).astype(np.int64)
-    i, j = (cells - cells.min(axis=0)).T
-    index = i * (j.max() + 1) + j  # counted, not sorted: of a large building there are a million
-    count = np.bincount(index)
-    used = count > 0
-    return np.stack([np.bincount(index, points[:, k])[used] / count[used] for k in (0, 1)], axis=1)
-
-
-def _passed(scan: Scan) -> Array:
-    """Points (N, 2) along the beams, as far as is compared, laser frame."""
-    ends = scan.ends[::4]
-    away = np.hypot(*ends.T)
-    shares = np.arange(0.0, 2 * _REACH_M, _CELL_M)[None] / np.maximum(away, 1e-6)[:, None]
-    i, k = np.nonzero(shares < 1.0)
-    passed: Array = ends[i] * shares[i, k][:, None]
-    return passed

@@ -23,7 +23,7 @@ from gvgbot.autonomy.keyframes import Step
 from gvgbot.autonomy.localisation import Localisation
 from gvgbot.autonomy.memory import Growth, Memory, recall
 from gvgbot.autonomy.pipeline import Pipeline
-from gvgbot.autonomy.relocalisation import KnownWalls, Look, Opinion, Relocaliser
+from gvgbot.autonomy.relocalisation import Look, Opinion, Relocaliser
 from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.whereabouts import Whereabouts
 from gvgbot.geometry import STANDSTILL, Pose, Twist
@@ -116,7 +116,7 @@ class ReturningPipeline(Pipeline):
     def _begin_to_seek(self, scan: Scan) -> list[Event]:
         self._estimate = smoothed(self)
         scans = scans_at(self._estimate.keyframes, self)
-        self._relocaliser = Relocaliser(KnownWalls(scans), self._matching)
+        self._relocaliser = Relocaliser(scans, self._matching)
         self._seeker, self._tour = self._new_mind(), None
         self._seeker._odometry = self._odometry
         self.mission.reason = "not sure where it is"

@@ -1,17 +1,19 @@
 """Where on a known map a robot is: told by walls that differ, and never by walls that do not."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
-from gvgbot.autonomy.relocalisation import KnownWalls, Look, Opinion, Relocaliser
+from gvgbot.autonomy.known_walls import KnownWalls
+from gvgbot.autonomy.relocalisation import Look, Opinion, Relocaliser
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
 from gvgbot.drivers.world import World
 from gvgbot.geometry import Pose, wrap_angle
+from gvgbot.hal.messages import Scan
 from tests.unit.autonomy.sights import LASER_270, Rectangle, carved, sweep
 
 pytestmark = pytest.mark.slow
@@ -38,13 +40,31 @@ def along(corners: Iterable[tuple[float, float]]) -> list[Pose]:
     return poses
 
 
+def gathered(scans: list[tuple[Pose, Scan]]) -> KnownWalls:
+    """What scans show, all of it in one go."""
+    found = []
+
+    def work() -> Iterator[None]:
+        found.append((yield from KnownWalls.gather(scans)))
+
+    for _ in work():
+        pass
+    return found[0]
+
+
 def test_who_stands_far_from_all_the_walls_that_are_known_has_still_seen_the_floor() -> None:
     here = Pose(27.0, 20.0, math.pi)  # of the hall it sees the western wall only, 27 m away
-    known = KnownWalls([(here, sweep(HALL, here, field_of_view=math.pi / 3))])
+    known = gathered([(here, sweep(HALL, here, field_of_view=math.pi / 3))])
     assert len(known.points) > 0
     assert known.points[:, 0] == pytest.approx(0.0, abs=0.05)
     assert known.is_seen(np.array([[20.0, 20.0]])).all()
     assert not known.is_seen(np.array([[27.0, 30.0], [200.0, 20.0]])).any()
+
+
+def test_a_long_past_is_gathered_in_many_goes_none_of_which_holds_a_robot_up() -> None:
+    here = Pose(5.0, 0.0)
+    scans = [(here, sweep(ALIKE, here))] * 300
+    assert len(list(KnownWalls.gather(scans))) >= 20
 
 
 def opinions(
@@ -57,7 +77,7 @@ def opinions(
     rng = np.random.default_rng(3)
     tour = tour or [*CORNERS, CORNERS[0]]
     known = [(pose, sweep(world, pose)) for pose in along(tour)[::2]]
-    relocaliser = Relocaliser(KnownWalls(known), ScanMatchingConfig())
+    relocaliser = Relocaliser(known, ScanMatchingConfig())
     local_map, formed = LocalMap(LocalMapConfig(half_width_m=10.0)), []
     for number, pose in enumerate(path):
         view = LASER_270 if number else math.tau  # it turns before it drives
