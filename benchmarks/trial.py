@@ -8,6 +8,7 @@ import asyncio
 import gc
 import json
 import math
+import os
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
@@ -214,13 +215,16 @@ class Trial:
         is_the_only_one = path.name == SNAPSHOT and not (self._out / SNAPSHOT_BEFORE).exists()
         if not self._damage or not path.exists() or is_the_only_one:
             return
-        data = bytearray(path.read_bytes())
+        data, status = bytearray(path.read_bytes()), path.stat()
         place = int(self._rng.integers(1, min(TAIL, len(data)) + 1))
         if "bit" in self._damage:
             data[-place] ^= 1 << int(self._rng.integers(8))
         else:
             del data[-place:]
         path.write_bytes(data)
+        os.utime(
+            path, ns=(status.st_atime_ns, status.st_mtime_ns)
+        )  # a bad disk leaves that as it was
 
     def _conclude(self, session: Session) -> None:
         """What the robot leaves."""

@@ -116,6 +116,11 @@ class Pipeline:
         return False
 
     @property
+    def is_seeking(self) -> bool:
+        """Whether it drives about to find its place: what it knew of it is out of date."""
+        return False
+
+    @property
     def map_base(self) -> Pose:
         """The pose as believed now."""
         newest = self._odometry.newest

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.gvg.local_map import LocalMap
 from gvgbot.autonomy.known_walls import CELL_M, REACH_M, KnownWalls
@@ -22,7 +21,11 @@ from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig, register
 from gvgbot.geometry import Array, Pose, wrap_angle, wrap_angles
 from gvgbot.hal.messages import Scan
 
-_NEAR_M, _OFF_M = 0.2, 0.4  # walls so near to each other are one, and so far off are two
+# Walls so near to each other are one, and so far off are two, m: maps are a little bent. Corridors
+# may differ by less, so one looks closely before one is sure. Then 0.13 of the walls disagree at
+# most where the robot is, and 0.33 or more where it is not, because that is not on the map.
+_APART_BY_AND_LARGE, _APART_CLOSELY = (0.2, 0.4), (0.1, 0.2)
+_CLOSE = 0.2  # share of the walls that may disagree then
 _HEADINGS = 120  # that are tried at each place
 _TRIED = 100  # places in one go
 _ROUGH_POINTS, _POINTS = 80, 300  # of the walls, for a rough guess and for a close look
@@ -76,6 +79,7 @@ class Hypothesis:
     behind: float = 0.0  # log weight, by the walls that have been left behind
     newest: float = 0.0  # and by those of the newest look
     is_possible: bool = True
+    is_close: bool = True  # the newest look fits so well that it may be acted on
 
     @property
     def weight(self) -> float:
@@ -130,7 +134,7 @@ class Relocaliser:
         weights = np.exp(weights - weights.max())
         shares = weights / weights.sum()
         best = self._hypotheses[int(np.argmax(shares[:-1]))]
-        if shares[:-1].max() < _SURE:
+        if shares[:-1].max() < _SURE or not best.is_close:
             self._sure_looks = 0
         else:
             self._sure_looks = self._sure_looks + 1 if best is self._surest else 1
@@ -162,7 +166,7 @@ class Relocaliser:
         if found is None:
             return False
         distance = np.asarray(tree.query(found.pose.transform(walls))[0])
-        return int((distance > _NEAR_M).sum()) <= _UNLIKE
+        return int((distance > _APART_BY_AND_LARGE[0]).sum()) <= _UNLIKE
 
     def _working(self) -> Generator[None, None, None]:
         self._known = yield from KnownWalls.gather(self._scans)
@@ -267,27 +271,36 @@ class Relocaliser:
         if found is None:
             return False
         hypothesis.map_local = found.pose.compose(look.local_base.inverse())
-        hypothesis.newest = -self._disagreement(look, found.pose, points) / _TELLING
+        by_and_large, closely = self._disagreements(look, found.pose, points)
+        hypothesis.newest, hypothesis.is_close = -by_and_large / _TELLING, closely < _CLOSE
         return True
 
-    def _disagreement(self, look: Look, map_base: Pose, base_walls: Array) -> float:
-        """Share of the walls, of either map, that the other one should have and has not."""
+    def _disagreements(self, look: Look, map_base: Pose, base_walls: Array) -> tuple[float, float]:
+        """Share of the walls, of either map, that the other one should have and has not.
+
+        By and large, and for who looks closely.
+        """
         laid = map_base.transform(base_walls)
         seen = self._known.is_seen(laid)
-        unknown_to_map = float(np.where(seen, _apart(self._known.tree, laid), _CHANCE).mean())
+        off_map = np.asarray(self._known.tree.query(laid)[0])
         walls = self._known.points
         near = np.hypot(*(walls - map_base.position).T) < REACH_M
         there = look.local_base.compose(map_base.inverse()).transform(walls[near])
         there = there[look.local_map.known(there)]
-        if len(there) == 0:
-            return 1.0
-        return max(unknown_to_map, float(_apart(look.local_map.tree(), there).mean()))
+        off_look = np.asarray(look.local_map.tree().query(there)[0])
+        by_and_large, closely = (
+            max(
+                float(np.where(seen, _apart(off_map, *apart), _CHANCE).mean()),
+                float(_apart(off_look, *apart).mean()) if len(there) else 1.0,
+            )
+            for apart in (_APART_BY_AND_LARGE, _APART_CLOSELY)
+        )
+        return by_and_large, closely
 
 
-def _apart(walls: cKDTree, points: Array) -> Array:
-    """How surely points (N, 2) are on none of the walls, 0..1 (N,): maps are a little bent."""
-    distance = np.asarray(walls.query(points)[0])
-    return np.clip((distance - _NEAR_M) / (_OFF_M - _NEAR_M), 0.0, 1.0)
+def _apart(distance: Array, near: float, off: float) -> Array:
+    """How surely points at distances (N,), m, from walls are on none of these, 0..1 (N,)."""
+    return np.clip((distance - near) / (off - near), 0.0, 1.0)
 
 
 def _nowhere() -> Hypothesis:

@@ -69,6 +69,11 @@ class ReturningPipeline(Pipeline):
         """Whether it does not know where on its map it is."""
         return not self._is_back
 
+    @property
+    def is_seeking(self) -> bool:
+        """Whether it drives about to find its place: what it knew of it is out of date."""
+        return self._seeker is not None
+
     def perceive(self, scan: Scan) -> list[Event]:
         """Learn from a scan; while it is lost, where on the map it was taken."""
         if self._is_back:

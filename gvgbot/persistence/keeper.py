@@ -121,10 +121,10 @@ class Keeper:
     def attach(self, feedback: FeedbackReader) -> None:
         """Let odometry go on from where it ended: the wheels may have turned meanwhile."""
         self._feedback = feedback
-        beat = None if self._saved is None else self._saved.beat
-        if beat is not None and beat.odometer is not None:
+        if self._saved is not None and (beat := self._saved.beat).odometer is not None:
             away = LoopClock(self._ahead).now() - beat.stamp
-            feedback.recall(beat.odometer, counting=self._same_life and away < _COUNTING_S)
+            counting = self._same_life and self._saved.is_current and away < _COUNTING_S
+            feedback.recall(beat.odometer, counting=counting)
 
     # -- keeping -----------------------------------------------------------------------------------
 
@@ -147,6 +147,8 @@ class Keeper:
         Call each such function before asking for the next.
         """
         pipeline = self._session.pipeline
+        if pipeline.is_seeking:
+            return self._files.fall_behind
         if not pipeline.keyframes or pipeline.is_lost:
             return _nothing
         after = self._stays(pipeline.lasting) if self._is_cut else len(self._counts)
@@ -194,6 +196,7 @@ class Keeper:
         except OSError as error:
             self._settled = self._settled or snapshot is not None
             self._is_cut = self._is_cut or len(counts) <= len(self._counts)
+            self._files.fall_behind()
             self._complain(error.strerror or str(error))
         else:
             self._complain(None)

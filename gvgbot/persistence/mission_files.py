@@ -25,6 +25,8 @@ from gvgbot.persistence.records import Damaged, packed, record, records, unpacke
 
 JOURNAL, SNAPSHOT, SNAPSHOT_BEFORE = "journal.gvg", "snapshot.gvg", "snapshot-before.gvg"
 
+_BEHIND = 0.0  # s since 1970: when a journal was changed that lacks what happened last
+
 
 class MissionFiles:
     """The files of one mission in its directory."""
@@ -63,7 +65,8 @@ class MissionFiles:
             rows = counts[-1].rows if counts else 0
             counts.append(Count(len(past), rows + len(batch.rows.stamps)))
             newest = max(newest, batch.beat, key=lambda beat: beat.stamp)
-        return Saved(snapshot.memory, past, journey_of(parts, len(past)), newest, counts)
+        journey = journey_of(parts, len(past))
+        return Saved(snapshot.memory, past, journey, newest, counts, self._is_current())
 
     def _newest_snapshot(self) -> Snapshot | None:
         trouble: Damaged | None = None
@@ -97,6 +100,12 @@ class MissionFiles:
                 return
             self._ends.append(end)
 
+    def _is_current(self) -> bool:
+        try:
+            return self._journal.stat().st_mtime != _BEHIND
+        except OSError:
+            return False
+
     # -- writing -----------------------------------------------------------------------------------
 
     def begin(self) -> None:
@@ -125,6 +134,15 @@ class MissionFiles:
             if sync:
                 os.fsync(journal.fileno())
         self._ends.append(end + len(framed))
+
+    def fall_behind(self) -> None:
+        """Note that the robot lives through what is not kept, until something is added again.
+
+        The journal is dated back: there is room for that on the fullest disk.
+        """
+        with contextlib.suppress(OSError):
+            if self._is_current():
+                os.utime(self._journal, (_BEHIND, _BEHIND))
 
     def save(self, snapshot: bytes) -> None:
         """Replace the snapshot (MessagePack) at once; the old one stays beside it.

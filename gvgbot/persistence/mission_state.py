@@ -80,6 +80,7 @@ class Saved:
     journey: Journey
     beat: Beat  # the newest
     counts: list[Count]  # after each batch
+    is_current: bool  # nothing was lived through since that could not be kept
 
 
 def boot_id() -> str:

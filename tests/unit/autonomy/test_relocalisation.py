@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from benchmarks.small_worlds import one_ring
 from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
 from gvgbot.autonomy.known_walls import KnownWalls
 from gvgbot.autonomy.relocalisation import Look, Opinion, Relocaliser
@@ -87,6 +88,22 @@ def opinions(
         look = Look.around(local_base, local_map)
         formed.append([relocaliser.step(look) for _ in range(WORK)][-1])
     return formed
+
+
+@pytest.mark.parametrize(
+    ("tour", "path"),
+    [
+        ([(1.5, 3.0), (1.5, 1.5), (3.4, 1.5)], [(6.0, 4.4), (6.0, 6.5), (1.5, 6.5), (1.5, 4.0)]),
+        ([(1.5, 3.0), (1.5, 1.5), (3.4, 1.5)], [(3.5, 6.5), (6.0, 6.5), (6.0, 1.5), (5.0, 1.5)]),
+        ([(1.5, 3.0), (1.5, 6.5), (3.5, 6.5)], [(6.0, 4.0), (6.0, 1.5), (1.5, 1.5)]),
+    ],
+)
+def test_off_the_map_a_corner_of_corridors_with_other_widths_makes_nobody_sure(
+    tour: list[tuple[float, float]], path: list[tuple[float, float]]
+) -> None:
+    formed = opinions(one_ring().world, along(path), tour)
+    assert formed[-1].looks >= 5
+    assert not any(opinion.is_sure for opinion in formed)
 
 
 def test_walls_that_are_all_alike_leave_every_place_possible_however_long_it_drives() -> None:

@@ -69,6 +69,12 @@ def places(path: Path) -> list[float]:
     return [grown.keyframe.map_base.x for grown in saved.past]
 
 
+def is_current(path: Path) -> bool:
+    saved = MissionFiles(path).read()
+    assert saved is not None
+    return saved.is_current
+
+
 def test_where_nothing_was_written_nothing_is_read(tmp_path: Path) -> None:
     assert MissionFiles(tmp_path).read() is None
 
@@ -169,7 +175,11 @@ def test_a_disk_without_room_for_a_batch_takes_it_later(tmp_path: Path, room: in
     with full_disk(size + room), pytest.raises(OSError, match="too large"):
         files.append(batch(5, 40), sync=True)
     assert places(tmp_path) == [float(i) for i in range(5)]
+    with full_disk(size + room):
+        files.fall_behind()
+    assert not is_current(tmp_path)
     files.append(batch(5, 40), sync=True)
+    assert is_current(tmp_path)
     assert places(tmp_path) == [float(i) for i in range(45)]
 
 
