@@ -44,6 +44,7 @@ _LOOK_EVERY_M = 1.0  # driven between two looks
 _TELLING = 0.01  # share of the walls: who disagrees with so much more is e times less likely
 # where it looks alike by chance, and of what the map has not seen: that says nothing
 _CHANCE = 0.15
+_CHANCE_OUTSIDE = 0.07  # where half a building looks by chance like the other, unknown half
 _LOOKS = 5  # before anything is said
 _SURE = 0.995  # share of a place
 # in a row, with the same place: one may be wrong about a wall that has moved a little
@@ -107,13 +108,19 @@ class Opinion:
 class Relocaliser:
     """Forms an opinion, a little work at a time."""
 
-    def __init__(self, scans: Sequence[tuple[Pose, Scan]], matching: ScanMatchingConfig) -> None:
-        """`scans` were taken at map_base poses; what they show is gathered by the first steps."""
+    def __init__(
+        self, scans: Sequence[tuple[Pose, Scan]], matching: ScanMatchingConfig, *, is_whole: bool
+    ) -> None:
+        """`scans` were taken at map_base poses; what they show is gathered by the first steps.
+
+        `is_whole`: the building ends where the map does.
+        """
         self._scans, self._matching = scans, matching
+        self._chance = _CHANCE if is_whole else _CHANCE_OUTSIDE
         self._known: KnownWalls
         self._look: Look
         self._hypotheses: list[Hypothesis] = []
-        self._nowhere = _nowhere()
+        self._nowhere = self._elsewhere()
         self._looks = 0
         self._surest: Hypothesis | None = None  # by the newest looks
         self._sure_looks = 0
@@ -226,11 +233,15 @@ class Relocaliser:
         some = best[order[:_GUESSES]].tolist()
         return [Pose(x, y, wrap_angle(heading)) for x, y, heading in some], bool(are_all)
 
+    def _elsewhere(self) -> Hypothesis:
+        """Being nowhere on the map, where everything fits as it does by chance."""
+        return Hypothesis(Pose(), newest=-self._chance / _TELLING)
+
     def _begin(self, look: Look, guesses: list[Pose]) -> Generator[None, None, None]:
         """Make hypotheses of what fits closely, too."""
         inverse = look.local_base.inverse()
         self._hypotheses = [Hypothesis(guess.compose(inverse)) for guess in guesses]
-        self._nowhere, self._looks = _nowhere(), 0
+        self._nowhere, self._looks = self._elsewhere(), 0
         yield from self._weigh(look, _GUESSED)
 
     def _compare(self, look: Look, driven: float) -> Generator[None, None, None]:
@@ -290,7 +301,7 @@ class Relocaliser:
         off_look = np.asarray(look.local_map.tree().query(there)[0])
         by_and_large, closely = (
             max(
-                float(np.where(seen, _apart(off_map, *apart), _CHANCE).mean()),
+                float(np.where(seen, _apart(off_map, *apart), self._chance).mean()),
                 float(_apart(off_look, *apart).mean()) if len(there) else 1.0,
             )
             for apart in (_APART_BY_AND_LARGE, _APART_CLOSELY)
@@ -301,11 +312,6 @@ class Relocaliser:
 def _apart(distance: Array, near: float, off: float) -> Array:
     """How surely points at distances (N,), m, from walls are on none of these, 0..1 (N,)."""
     return np.clip((distance - near) / (off - near), 0.0, 1.0)
-
-
-def _nowhere() -> Hypothesis:
-    """Being nowhere on the map, where everything fits as it does by chance."""
-    return Hypothesis(Pose(), newest=-_CHANCE / _TELLING)
 
 
 def _best_turned(places: Array, scores: Array) -> Array:

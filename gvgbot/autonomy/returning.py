@@ -121,7 +121,9 @@ class ReturningPipeline(Pipeline):
     def _begin_to_seek(self, scan: Scan) -> list[Event]:
         self._estimate = smoothed(self)
         scans = scans_at(self._estimate.keyframes, self)
-        self._relocaliser = Relocaliser(scans, self._matching)
+        graph = self.mapper.graph
+        is_whole = bool(graph.edges) and not graph.frontiers()
+        self._relocaliser = Relocaliser(scans, self._matching, is_whole=is_whole)
         self._seeker, self._tour = self._new_mind(), None
         self._seeker._odometry = self._odometry
         self.mission.reason = "not sure where it is"

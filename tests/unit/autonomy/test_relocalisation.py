@@ -69,7 +69,11 @@ def test_a_long_past_is_gathered_in_many_goes_none_of_which_holds_a_robot_up() -
 
 
 def opinions(
-    world: World, path: list[Pose], tour: list[tuple[float, float]] | None = None
+    world: World,
+    path: list[Pose],
+    tour: list[tuple[float, float]] | None = None,
+    *,
+    is_whole: bool = True,
 ) -> list[Opinion]:
     """What is thought after each pose of a path (world frame, which is that of the map).
 
@@ -78,7 +82,7 @@ def opinions(
     rng = np.random.default_rng(3)
     tour = tour or [*CORNERS, CORNERS[0]]
     known = [(pose, sweep(world, pose)) for pose in along(tour)[::2]]
-    relocaliser = Relocaliser(known, ScanMatchingConfig())
+    relocaliser = Relocaliser(known, ScanMatchingConfig(), is_whole=is_whole)
     local_map, formed = LocalMap(LocalMapConfig(half_width_m=10.0)), []
     for number, pose in enumerate(path):
         view = LASER_270 if number else math.tau  # it turns before it drives
@@ -101,9 +105,19 @@ def opinions(
 def test_off_the_map_a_corner_of_corridors_with_other_widths_makes_nobody_sure(
     tour: list[tuple[float, float]], path: list[tuple[float, float]]
 ) -> None:
-    formed = opinions(one_ring().world, along(path), tour)
+    formed = opinions(one_ring().world, along(path), tour, is_whole=False)
     assert formed[-1].looks >= 5
     assert not any(opinion.is_sure for opinion in formed)
+
+
+def test_who_stays_on_half_a_map_is_sure_of_the_right_place_in_the_end() -> None:
+    tour = [(1.5, 3.0), (1.5, 1.5), (3.4, 1.5)]
+    path = along([*tour, (1.5, 1.5), (1.5, 3.0), (1.5, 1.5), (3.4, 1.5)])
+    formed = opinions(one_ring().world, path, tour, is_whole=False)
+    first = next(i for i, opinion in enumerate(formed) if opinion.is_sure)
+    found = formed[first].map_local
+    assert found is not None
+    assert found.compose(path[0].to(path[first])).distance(path[first]) < 0.1
 
 
 def test_walls_that_are_all_alike_leave_every_place_possible_however_long_it_drives() -> None:
