@@ -84,6 +84,7 @@ STOPS = {
     "base over-current": FELT_S,
     "carried": FELT_S,
 }
+MUTING = {"base silence", "base unplug"}  # nobody drives a base then that is driven by sight
 BACKS_OFF = {"base bump": FELT_S, "base cliff": FELT_S}  # it may go back then, but not on
 
 
@@ -138,6 +139,7 @@ class Trial:
         self._dead_s = 0.0
         self._shall_stand_from = math.inf  # s; a while after it was asked to, or ended
         self._contacts, self._fastest = 0, 0.0
+        self._is_mute, self._rolls_until = False, -math.inf  # s; nobody can tell the base to stop
         self._felt: list[Array] = []  # places where it felt a cliff or a bump (2,), m
         self._stood: list[Array] = []  # places where somebody stood about (2,), m
 
@@ -366,6 +368,7 @@ class Trial:
         while not self._is_over:
             now = self._clock.now()
             self._world.body.advance(now)
+            self._note_mute(now)
             self._judge_contact(now)
             self._judge_stops(now)
             self._judge_place(now)
@@ -377,10 +380,20 @@ class Trial:
                 self._is_over, self._ends = True, "SIGTERM"
             await self._clock.sleep_until(now + LOOK_S)
 
+    def _note_mute(self, now: float) -> None:
+        """Note from when on nobody tells the base what to do: it rolls on until it stops itself."""
+        was_mute, self._is_mute = self._is_mute, self._session is None or any(
+            fault.name in MUTING and fault.at <= now < fault.at + fault.lasts
+            for fault in self._faults
+        )
+        if self._is_mute and not was_mute:
+            self._rolls_until = now + ABANDONED_S
+
     def _judge_contact(self, now: float) -> None:
         body = self._world.body
         fastest = max(self._fastest, abs(body.linear))
-        if body.contacts > self._contacts and fastest > SPEED_MPS:
+        is_collision = fastest > SPEED_MPS and now > self._rolls_until
+        if body.contacts > self._contacts and is_collision:
             self.verdict.hurt("contact at speed", f"{fastest:.2f} m/s at {now:.1f} s")
         self._contacts, self._fastest = body.contacts, abs(body.linear)
 
@@ -393,7 +406,7 @@ class Trial:
                 continue
             if fault.name in BACKS_OFF:
                 self._felt.append(self._world.body.pose.position)
-            if fault.name in STOPS and now > fault.at + STOPS[fault.name]:
+            if fault.name in STOPS and now > max(fault.at + STOPS[fault.name], self._rolls_until):
                 moves = abs(speed) > STILL_MPS
             else:
                 backs_off = fault.name in BACKS_OFF and now > fault.at + BACKS_OFF[fault.name]
@@ -423,13 +436,16 @@ class Trial:
         return (fault for fault in self._faults if fault.lasts < math.inf)
 
     def _judge_map(self, session: Session) -> None:
-        """Every vertex must be where there is one in truth."""
+        """Every vertex must be where there is one in truth, but that of a ring, of all of which
+        the robot has seen no end: its branch may have been hidden by somebody.
+        """
         if not session.journey.world_base:
             return
         world_map, mapper = _world_map(session), session.pipeline.mapper
         felt = self._felt + (self._stood if self.verdict.outcome is None else [])
         excused = np.array(felt).reshape(-1, 2)
-        for vertex in mapper.graph.vertices:
+        of_rings = {vertex.id for vertex in mapper.graph.rings()}
+        for vertex in mapper.graph.vertices.keys() - of_rings:
             place = world_map.transform(mapper.belief.map_vertex(vertex).position)
             off = float(np.hypot(*(_true_vertices() - place).T).min())
             if off > VERTEX_M and np.hypot(*(excused - place).T).min(initial=math.inf) > FELT_M:

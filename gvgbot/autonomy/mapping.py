@@ -15,7 +15,7 @@ from gvgbot.autonomy.events import (
     VertexRemoved,
 )
 from gvgbot.autonomy.evidence import Evidence, MappingConfig
-from gvgbot.autonomy.gvg.local import Branch, LocalEdge, LocalNode
+from gvgbot.autonomy.gvg.local import Branch, LocalEdge, LocalGvg, LocalNode
 from gvgbot.autonomy.gvg.reduction import KnownVertices
 from gvgbot.autonomy.recogniser import CLOSE_M, Match, Recogniser, Recognition
 from gvgbot.autonomy.slam import ekf
@@ -85,6 +85,19 @@ class Mapper(Knowledge):
         )
         return KnownVertices(positions[near], degrees)
 
+    def marked(self, gvg: LocalGvg, local_base: Pose) -> tuple[LocalGvg, dict[int, Vertex]]:
+        """A local GVG with a node where the vertex of a ring should be, and these vertices."""
+        marks = {}
+        for vertex in self.graph.rings():
+            vertex.local = local_base.compose(ekf.expected(self.belief, vertex.id)[0])
+            place = gvg.place(vertex.local.position)
+            if place is None or place.distance > vertex.clearance:
+                continue
+            if len(gvg.edges[place.edge].stations) > 2:
+                gvg, node = gvg.divided(place)
+                marks[node] = vertex
+        return gvg, marks
+
     def explains(self, view: View, known: Correspondence, place: Array) -> bool:
         """Whether a vertex should stand at a place (2,), local frame, and is seen nowhere else."""
         gaps = np.hypot(*(self.positions_from(view.local_base) - place).T)
@@ -119,6 +132,9 @@ class Mapper(Knowledge):
                 self._evidence.pair_departures(view, view.gvg.nodes[node], vertex, known)
             else:
                 self._refresh(view, sightings[node], view.gvg.nodes[node], vertex, known)
+        for node, vertex in view.marks.items():
+            known.pair(node, vertex.id)
+            self._evidence.pair_departures(view, view.gvg.nodes[node], vertex, known)
         for vertex, reason in self._evidence.refuted(view, known):
             place = self.in_local_frame(view, vertex.id).position
             self._unbelieved.note_mistake(place, view.travelled)

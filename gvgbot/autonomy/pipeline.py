@@ -202,7 +202,7 @@ class Pipeline:
         self.open_clearance = min(
             self._config.reduction.open_clearance_m, _SEEN_SHARE * min(scan.range_max, half_width)
         )
-        self.gvg = self._local_gvg(local_base)
+        self.gvg, marks = self.mapper.marked(self._local_gvg(local_base), local_base)
         doubtful = np.concatenate(
             [self._hazards.doubtful, self._newcomers.points, self._maps.near.suspects()]
         )
@@ -215,6 +215,7 @@ class Pipeline:
             self._maps.near,
             doubtful,
             touching(self.gvg, doubtful),
+            marks,
         )
 
     def _act(self, view: View, known: Correspondence, scan: Scan) -> list[Event]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from gvgbot.autonomy.gvg.local import Branch, LocalGvg
 from gvgbot.autonomy.gvg.local_map import LocalMap
-from gvgbot.autonomy.slam.graph import HalfEdgeId
+from gvgbot.autonomy.slam.graph import HalfEdgeId, Vertex
 from gvgbot.geometry import Array, Pose
 
 _RIM_M = 0.25  # a point so near to a node's disc may shape it
@@ -24,6 +24,8 @@ class View:
     local_map: LocalMap
     doubtful: Array = field(default_factory=lambda: np.empty((0, 2)))  # obstacles that may go
     doubted: frozenset[int] = frozenset()  # nodes that may be there for a while only
+    # nodes that were made where the vertex of a ring should be: there is nothing to be seen of it
+    marks: dict[int, Vertex] = field(default_factory=dict)
 
     def is_doubtful(self, place: Array, within_m: float) -> bool:
         """Whether something that may go stands so near to a place (2,)."""

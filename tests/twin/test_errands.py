@@ -383,6 +383,41 @@ def test_a_stopped_exploration_is_over_until_somebody_wants_more(tmp_path: Path)
     assert phases == ["finished", "finished", "exploring"]
 
 
+def test_on_a_ring_without_meetpoints_every_place_is_driven_to_by_the_shorter_way(
+    tmp_path: Path,
+) -> None:
+    canvas = Canvas(11.0, 9.0)
+    canvas.carve_path(list(RING), 1.4)
+    tour = Tour(Daemon(tmp_path / "run", Place(canvas.world("ring"), START)))
+    east, north, west, south = (9.0, 4.5), (5.5, 7.0), (2.0, 4.5), (5.5, 2.0)
+    around = {east: 8.0, north: 6.0, south: 12.0, west: 6.0}  # m, from the place before
+
+    async def tell(clock: Clock) -> None:
+        story = Story(tour, clock)
+        await until(clock, lambda: story.pipeline.mission.outcome is not None)
+        for place in around:
+            x, y = START.inverse().transform(np.array(place)).round(3).tolist()
+            await story.trip(str(place), "goto", x=x, y=y)
+        await story.trip("home", "home")
+        (vertex,) = story.pipeline.mapper.graph.vertices
+        await story.trip("vertex", "goto", vertex=vertex)
+        await story.trip("coverage", "coverage")
+        await story.ask("patrol", "patrol")
+
+    with tour.daemon.session.directory:
+        tour.daemon.run(tell)
+    for place, metres in around.items():
+        trip = tour.trips[str(place)]
+        assert (trip.outcome, trip.reason) == ("arrived", "")
+        assert trip.off(*place) < NEAR
+        assert trip.driven < metres + 1.0
+    assert tour.trips["home"].off(START.x, START.y) < NEAR
+    assert tour.trips["vertex"].outcome == "arrived"
+    assert tour.trips["coverage"].outcome == "arrived"
+    assert tour.trips["coverage"].driven == pytest.approx(24.0, rel=0.1)
+    assert "two vertices or more" in tour.answers["patrol"].text
+
+
 def test_without_permission_nothing_is_done(tmp_path: Path) -> None:
     """As it comes: who can reach the robot can watch it, and that is all."""
     daemon = Daemon(tmp_path / "run", requests=())

@@ -1,7 +1,7 @@
 """The local GVG: meetpoints, ends and edges in sight, in the local frame."""
 
 import heapq
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -121,6 +121,32 @@ class LocalGvg:
         """The point (2,) that a place is."""
         edge = self.edges[place.edge]
         return np.asarray(edge.polyline[int(np.abs(edge.stations - place.station).argmin())])
+
+    def divided(self, place: Place) -> "tuple[LocalGvg, int]":
+        """The same graph with one more node, of degree 2, at a place; and that node.
+
+        The edge there must have a point between its ends.
+        """
+        old, node = self.edges[place.edge], max(self.nodes) + 1
+        at = int(np.clip(np.abs(old.stations - place.station).argmin(), 1, len(old.stations) - 2))
+        to_it, onwards = max(self.edges) + 1, max(self.edges) + 2
+        line, clearance, stations = old.polyline, old.clearance, old.stations
+        edges = {key: edge for key, edge in self.edges.items() if key != place.edge} | {
+            to_it: LocalEdge(old.a, node, line[: at + 1], clearance[: at + 1], stations[: at + 1]),
+            onwards: LocalEdge(
+                node, old.b, line[at:], clearance[at:], stations[at:] - stations[at]
+            ),
+        }
+        renamed = {Branch(place.edge, True): Branch(to_it, True)}
+        renamed[Branch(place.edge, False)] = Branch(onwards, False)
+        nodes = dict(self.nodes)
+        for end in {old.a, old.b}:
+            branches = tuple(renamed.get(b, b) for b in nodes[end].branches)
+            weak = frozenset(renamed.get(b, b) for b in nodes[end].weak)
+            nodes[end] = replace(nodes[end], branches=branches, weak=weak)
+        ways = (Branch(to_it, False), Branch(onwards, True))
+        nodes[node] = LocalNode(line[at], float(clearance[at]), None, ways, frozenset())
+        return LocalGvg(nodes, edges), node
 
     def leaving(self, branch: Branch) -> Array:
         """Polyline (N, 2) along a branch, from its node outwards."""

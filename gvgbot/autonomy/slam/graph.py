@@ -185,6 +185,11 @@ class GvgGraph:
             if half.open
         ]
 
+    def rings(self) -> list[Vertex]:
+        """The vertices of edges without an end, at which there is nothing but the edge to see."""
+        ends = ((edge.a.vertex, edge.b.vertex) for edge in self.edges.values())
+        return [self.vertices[a] for a, b in ends if a == b and self.vertices[a].degree == 2]
+
     def blocked(self) -> list[HalfEdgeId]:
         """All half-edges that were given up."""
         return [

@@ -122,3 +122,26 @@ def test_a_bearing_is_the_same_whether_the_next_meetpoint_is_seen_or_not(seen: b
         points[6], lines[5] = (1.3, -6.0), (2, 6, [])
     gvg = drawn(points, lines, clearance=6.0)
     assert gvg.bearing(Branch(1, forward=True), 6.0) == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("edge", "station", "at"),
+    [(10, 1.0, (1.0, 0.0)), (13, 3.0, (4.0, -2.0)), (14, 2.0, (6.0, 1.0))],
+)
+def test_a_further_node_on_an_edge_leaves_all_ways_as_long_as_they_were(
+    edge: int, station: float, at: Point
+) -> None:
+    divided, node = GVG.divided(Place(edge, station, 0.0))
+    assert divided.nodes[node].position == pytest.approx(at, abs=0.06)
+    assert divided.nodes[node].degree == 2
+    start = Place(12, 2.0, 0.0)  # at 4
+    before, after = (
+        {key: metres for key, (metres, _) in gvg.routes(start).items()} for gvg in (GVG, divided)
+    )
+    length = GVG.edges[edge].length
+    to_ends = [before[GVG.edges[edge].a] + station, before[GVG.edges[edge].b] + length - station]
+    assert after.pop(node) == pytest.approx(min(to_ends), abs=0.06)
+    assert after == pytest.approx(before)
+    assert {key: value.degree for key, value in divided.nodes.items() if key != node} == {
+        key: value.degree for key, value in GVG.nodes.items()
+    }
