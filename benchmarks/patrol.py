@@ -39,6 +39,8 @@ from tests.twin.run_rig import at_once
 
 OPEN_S, SHUT_S = 600.0, 300.0  # a door, on average
 HOUR_S = 3600.0
+ROOM_M = 0.4  # from a door, if it shall close
+REACTION_S, BRAKING_MPS2 = 0.4, 0.5  # of a robot on its way: a scan, and what a base takes to obey
 MOVED_M = 0.2  # a vertex may come to stand so far off
 GROWTH = 1.1
 HEAD = (
@@ -111,13 +113,13 @@ class Patrol:
         return now + float(self._rng.exponential(SHUT_S if self._shut[door] else OPEN_S))
 
     def _is_in(self, door: Door) -> bool:
-        """Whether the robot stands in a door or so near that it could not close."""
+        """Whether the robot stands in a door, or is so near that it could not stop before it."""
         assert self._session.simulation is not None
-        here = self._session.simulation.body.pose
+        body = self._session.simulation.body
         x0, x1, y0, y1 = door
-        return (
-            math.hypot(max(x0 - here.x, 0.0, here.x - x1), max(y0 - here.y, 0.0, here.y - y1)) < 0.4
-        )
+        here, speed = body.pose, abs(body.linear)
+        gap = math.hypot(max(x0 - here.x, 0.0, here.x - x1), max(y0 - here.y, 0.0, here.y - y1))
+        return gap < ROOM_M + REACTION_S * speed + speed**2 / (2 * BRAKING_MPS2)
 
     def _now(self) -> dict[int, np.ndarray]:
         """Where the vertices are, map frame."""

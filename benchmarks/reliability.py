@@ -34,7 +34,7 @@ from benchmarks.trial import once, trial
 RESULTS = "reliability.jsonl"
 DIGITS = 5  # that are kept of a number
 ORACLES = {
-    "contact at speed": "touches a wall or a person faster than 0.12 m/s, unless its base rolls on by itself",
+    "contact at speed": "is driven against a wall or a person faster than 0.12 m/s",
     "does not stop": "moves, though it is blind, deaf, dead, lifted, touched or asked to stand",
     "false vertex": "has a vertex in its map 0.6 m or more from every true one",
     "wrong closure": "has closed a loop and is 0.75 m or more from where it believes",

@@ -382,9 +382,13 @@ class Trial:
 
     def _note_mute(self, now: float) -> None:
         """Note from when on nobody tells the base what to do: it rolls on until it stops itself."""
-        was_mute, self._is_mute = self._is_mute, self._session is None or any(
-            fault.name in MUTING and fault.at <= now < fault.at + fault.lasts
-            for fault in self._faults
+        was_mute, self._is_mute = (
+            self._is_mute,
+            self._session is None
+            or any(
+                fault.name in MUTING and fault.at <= now < fault.at + fault.lasts
+                for fault in self._faults
+            ),
         )
         if self._is_mute and not was_mute:
             self._rolls_until = now + ABANDONED_S

@@ -71,3 +71,10 @@ def test_a_seed_repeats_itself_and_what_was_kept_is_not_run_again(
     (tmp_path / RESULTS).write_text(kept.replace('"seed": 10', '"seed": 1'), encoding="utf-8")
     assert main(["--seeds", "1", "--out", str(tmp_path)]) == 0
     assert "1 seeds, 3 faults" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [99, 145, 323, 416, 504, 822])
+def test_what_hurt_an_oracle_once_does_so_no_more(seed: int) -> None:
+    """Places beyond walls, a ring with a hidden door, what a full disk did not keep, half a map."""
+    assert once(seed, draw(seed)).violations == {}
