@@ -45,6 +45,8 @@ _TELLING = 0.01  # share of the walls: who disagrees with so much more is e time
 # where it looks alike by chance, and of what the map has not seen: that says nothing
 _CHANCE = 0.15
 _CHANCE_OUTSIDE = 0.07  # where half a building looks by chance like the other, unknown half
+_STAYED_M, _STAYED_RAD = 2.0, 1.0  # from where it was, a robot that nobody carried may have rolled
+_STAYED = 5.0  # log of how much likelier that is than any other place
 _LOOKS = 5  # before anything is said
 _SURE = 0.995  # share of a place
 # in a row, with the same place: one may be wrong about a wall that has moved a little
@@ -111,9 +113,10 @@ class Relocaliser:
     def __init__(
         self, scans: Sequence[tuple[Pose, Scan]], matching: ScanMatchingConfig, *, is_whole: bool
     ) -> None:
-        """`scans` were taken at map_base poses; what they show is gathered by the first steps.
+        """`scans` were taken at map_base poses, the last one where the robot was seen last.
 
-        `is_whole`: the building ends where the map does.
+        What they show is gathered by the first steps. `is_whole`: the building ends where the map
+        does.
         """
         self._scans, self._matching = scans, matching
         self._chance = _CHANCE if is_whole else _CHANCE_OUTSIDE
@@ -237,10 +240,17 @@ class Relocaliser:
         """Being nowhere on the map, where everything fits as it does by chance."""
         return Hypothesis(Pose(), newest=-self._chance / _TELLING)
 
+    def _has_stayed(self, hypothesis: Hypothesis) -> bool:
+        """Whether the local frame would begin where the robot was seen last."""
+        off = self._scans[-1][0].to(hypothesis.map_local)
+        return math.hypot(off.x, off.y) < _STAYED_M and abs(off.theta) < _STAYED_RAD
+
     def _begin(self, look: Look, guesses: list[Pose]) -> Generator[None, None, None]:
         """Make hypotheses of what fits closely, too."""
         inverse = look.local_base.inverse()
         self._hypotheses = [Hypothesis(guess.compose(inverse)) for guess in guesses]
+        for hypothesis in self._hypotheses:
+            hypothesis.behind = _STAYED * self._has_stayed(hypothesis)
         self._nowhere, self._looks = self._elsewhere(), 0
         yield from self._weigh(look, _GUESSED)
 

@@ -120,6 +120,17 @@ def test_who_stays_on_half_a_map_is_sure_of_the_right_place_in_the_end() -> None
     assert found.compose(path[0].to(path[first])).distance(path[first]) < 0.1
 
 
+def test_who_wakes_where_it_was_is_sure_of_that_on_half_a_map_as_well() -> None:
+    tour = [(1.5, 5.5), (1.5, 1.5), (4.0, 1.5)]
+    path = along([(3.5, 1.5), (6.0, 1.5), (6.0, 6.5)])  # and drives on from there
+    formed = opinions(one_ring().world, path, tour, is_whole=False)
+    sure = [i for i, opinion in enumerate(formed) if opinion.is_sure]
+    assert sure
+    found = formed[sure[0]].map_local
+    assert found is not None
+    assert found.compose(path[0].to(path[sure[0]])).distance(path[sure[0]]) < 0.1
+
+
 def test_walls_that_are_all_alike_leave_every_place_possible_however_long_it_drives() -> None:
     path = along([(5.0, 0.3), *CORNERS[1:], *CORNERS[:2]])
     formed = opinions(ALIKE, path)
