@@ -15,6 +15,7 @@ CELL_M = 0.25  # of what has been seen, and from place to place
 _WALL_CELL_M = 0.1
 _ROOM_M = 0.2  # from the walls, a robot may stand
 _ROUGH_M = 0.4  # walls so far off do not speak for a rough guess
+_AROUND_WHOLE, _AROUND_HALF = 2, 1  # cells
 _SCANS_A_STEP = 30  # gathered in one go
 
 Bools = NDArray[np.bool_]
@@ -41,8 +42,14 @@ class KnownWalls:
         self.places = np.empty((0, 2))
 
     @classmethod
-    def gather(cls, scans: Sequence[tuple[Pose, Scan]]) -> Generator[None, None, "KnownWalls"]:
-        """What scans taken at map_base poses show, a few of them in one go."""
+    def gather(
+        cls, scans: Sequence[tuple[Pose, Scan]], *, is_whole: bool = True
+    ) -> Generator[None, None, "KnownWalls"]:
+        """What scans taken at map_base poses show, a few of them in one go.
+
+        Around what they have seen, a map that `is_whole` counts as seen as well: there is nothing
+        more. Beside half a map, the walls go on.
+        """
         lasers = [base.compose(scan.base_laser) for base, scan in scans]
         ends = [np.empty((0, 2))]
         for number, (laser, (_, scan)) in enumerate(zip(lasers, scans, strict=True), 1):
@@ -58,7 +65,8 @@ class KnownWalls:
             known._seen[known._cells(laser.transform(_passed(scan)), CELL_M)] = True
         free = known._corner + (np.argwhere(known._seen) + 0.5) * CELL_M
         known.places = free[known.tree.query(free)[0] > _ROOM_M]
-        known._seen = binary_dilation(known._seen, iterations=2)
+        around = _AROUND_WHOLE if is_whole else _AROUND_HALF
+        known._seen = binary_dilation(known._seen, iterations=around)
         return known
 
     def _cells(self, points: Array, cell: float) -> tuple[NDArray[np.int64], ...]:

@@ -118,7 +118,7 @@ class Relocaliser:
         What they show is gathered by the first steps. `is_whole`: the building ends where the map
         does.
         """
-        self._scans, self._matching = scans, matching
+        self._scans, self._matching, self._is_whole = scans, matching, is_whole
         self._chance = _CHANCE if is_whole else _CHANCE_OUTSIDE
         self._known: KnownWalls
         self._look: Look
@@ -179,7 +179,7 @@ class Relocaliser:
         return int((distance > _APART_BY_AND_LARGE[0]).sum()) <= _UNLIKE
 
     def _working(self) -> Generator[None, None, None]:
-        self._known = yield from KnownWalls.gather(self._scans)
+        self._known = yield from KnownWalls.gather(self._scans, is_whole=self._is_whole)
         rounds = 0
         while True:
             look = self._look
@@ -299,7 +299,7 @@ class Relocaliser:
     def _disagreements(self, look: Look, map_base: Pose, base_walls: Array) -> tuple[float, float]:
         """Share of the walls, of either map, that the other one should have and has not.
 
-        By and large, and for who looks closely.
+        And of those of the known map alone, for who looks closely: these have been seen.
         """
         laid = map_base.transform(base_walls)
         seen = self._known.is_seen(laid)
@@ -309,14 +309,13 @@ class Relocaliser:
         there = look.local_base.compose(map_base.inverse()).transform(walls[near])
         there = there[look.local_map.known(there)]
         off_look = np.asarray(look.local_map.tree().query(there)[0])
-        by_and_large, closely = (
-            max(
-                float(np.where(seen, _apart(off_map, *apart), self._chance).mean()),
-                float(_apart(off_look, *apart).mean()) if len(there) else 1.0,
-            )
-            for apart in (_APART_BY_AND_LARGE, _APART_CLOSELY)
+        if not len(there):
+            return 1.0, 1.0
+        unknown_to_map = np.where(seen, _apart(off_map, *_APART_BY_AND_LARGE), self._chance).mean()
+        unseen = _apart(off_look, *_APART_BY_AND_LARGE).mean()
+        return max(float(unknown_to_map), float(unseen)), float(
+            _apart(off_look, *_APART_CLOSELY).mean()
         )
-        return by_and_large, closely
 
 
 def _apart(distance: Array, near: float, off: float) -> Array:

@@ -2,6 +2,7 @@
 
 import json
 import math
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +11,10 @@ import pytest
 from gvgbot.autonomy.returning import ReturningPipeline
 from gvgbot.config import Config, load_config
 from gvgbot.geometry import Pose
+from gvgbot.persistence import keeper
 from gvgbot.persistence.mission_files import JOURNAL, SNAPSHOT
 from gvgbot.session import Session
-from gvgbot.simulation import Place
+from gvgbot.simulation import Place, open_place
 from tests.replay.test_pipeline import LOLLIPOP, START
 from tests.twin.lives_rig import GoingWorld, Lives, at
 from tests.unit.autonomy.sights import carved
@@ -121,3 +123,27 @@ def test_in_another_building_it_claims_no_place_and_spoils_no_map(
     assert "not sure where it is" in str(summary(tmp_path)["reason"])
     assert vertices(tmp_path) == vertices(whole)
     assert not (tmp_path / SNAPSHOT).exists()
+
+
+@pytest.mark.parametrize("moment", [40.0, 120.0])
+def test_after_a_power_cut_in_half_a_building_it_finds_its_place_in_twenty_metres(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, moment: float
+) -> None:
+    """The computer has started anew, so that nothing vouches for the base."""
+    starts = count()
+    monkeypatch.setattr(keeper, "boot_id", lambda: f"start {next(starts)}")
+    config = load_config(None, ["twin.seed=2", "twin.world=floor_plan:5"])
+    place = open_place(config)
+    at_first = list[float]()
+
+    def is_found(session: Session) -> bool:
+        return len(lives.sessions) > 1 and not session.pipeline.is_lost
+
+    def take_down(world: GoingWorld, out: Path) -> None:
+        at_first.append(world.body.distance_m)
+
+    lives = Lives(config, place, tmp_path, over=is_found, between=take_down)
+    session = lives.run([at(moment)])
+    truth = place.start.inverse().compose(lives.world.body.pose)
+    assert session.pipeline.map_base.distance(truth) < 0.1
+    assert lives.world.body.distance_m - at_first[0] < 20.0
