@@ -49,8 +49,10 @@ LOOK_S = 0.05  # between two looks at the truth
 END_S, QUIET_S = 60.0, 5.0  # it ends then, or so long after the last fault when all is explored
 STILL_MPS, SPEED_MPS = 0.03, 0.12  # standing; touching something faster than this is a collision
 VERTEX_M = 0.6  # from the nearest true one, a vertex is false,
-FELT_M = 1.5  # unless it is near something that was felt and is taken for a fact,
-STOOD_S = 10.0  # or, as long as the robot explores, near somebody who stands about for so long
+FELT_M = 1.5  # unless it is so near to something that was felt and is taken for a fact,
+STOOD_M = 2.0  # or to somebody, before whom the way ends,
+STOOD_S = 10.0  # who stands there for so long, or stood, as long as the robot explores
+STIRS_M = 0.1  # who is jostled stands still
 PLACE_M = 0.75  # from the true pose, the robot is not where it believes
 SETTLING_S = 10.0  # after a fault in one of
 DISTURBING = {"link", "device", "sensing", "world", "process"}  # it may find its place again
@@ -109,13 +111,15 @@ class Standers:
     """Takes down who stands about."""
 
     def __init__(self) -> None:
-        self._since: dict[tuple[float, float], float] = {}  # s
+        self._stands: dict[int, tuple[Array, float]] = {}  # where, since when (s)
 
     def look(self, centres: Array, now: float) -> list[Array]:
-        """Places of people (N, 2) who have not moved for long, of those who are there now."""
-        here = [(float(x), float(y)) for x, y in centres]
-        self._since = {place: self._since.get(place, now) for place in here}
-        return [np.array(p) for p, since in self._since.items() if now - since > STOOD_S]
+        """Places of people (N, 2) who have not gone away for long, of those who are there now."""
+        for number, centre in enumerate(centres):
+            place, _ = self._stands.get(number, (centre, now))
+            if number not in self._stands or np.hypot(*(centre - place)) > STIRS_M:
+                self._stands[number] = centre.copy(), now
+        return [place for place, since in self._stands.values() if now - since > STOOD_S]
 
 
 class Trial:
@@ -142,6 +146,7 @@ class Trial:
         self._is_mute, self._rolls_until = False, -math.inf  # s; nobody can tell the base to stop
         self._felt: list[Array] = []  # places where it felt a cliff or a bump (2,), m
         self._stood: list[Array] = []  # places where somebody stood about (2,), m
+        self._standing: list[Array] = []  # and stands now
 
     async def run(self) -> None:
         """Live until the end, judged all the time."""
@@ -373,7 +378,8 @@ class Trial:
             self._judge_stops(now)
             self._judge_place(now)
             if self._world.people is not None:
-                self._stood += standers.look(self._world.people.centres, now)
+                self._standing = standers.look(self._world.people.centres, now)
+                self._stood += self._standing
             session = self._session
             is_done = session is not None and session.pipeline.mission.outcome is not None
             if session is not None and (now > END_S or (is_done and now > last + QUIET_S)):
@@ -446,13 +452,14 @@ class Trial:
         if not session.journey.world_base:
             return
         world_map, mapper = _world_map(session), session.pipeline.mapper
-        felt = self._felt + (self._stood if self.verdict.outcome is None else [])
-        excused = np.array(felt).reshape(-1, 2)
+        is_exploring = self.verdict.outcome is None  # and may come back to look
+        stood = self._stood if is_exploring else self._standing
+        excused = [(place, FELT_M) for place in self._felt] + [(place, STOOD_M) for place in stood]
         of_rings = {vertex.id for vertex in mapper.graph.rings()}
         for vertex in mapper.graph.vertices.keys() - of_rings:
             place = world_map.transform(mapper.belief.map_vertex(vertex).position)
             off = float(np.hypot(*(_true_vertices() - place).T).min())
-            if off > VERTEX_M and np.hypot(*(excused - place).T).min(initial=math.inf) > FELT_M:
+            if off > VERTEX_M and all(math.dist(place, by) > near for by, near in excused):
                 self.verdict.hurt("false vertex", f"vertex {vertex}, {off:.2f} m from any")
 
 
