@@ -75,7 +75,7 @@ class Pipeline:
             drive_dead_ends=exploration.drive_dead_ends,
             by_position=localisation == "paper",
         )
-        self._follow = self._maps.trust if localisation == "paper" else self._maps.match
+        self._trusts_odometry = localisation == "paper"
         self.mission = Mission(exploration, self.mapper)
         self.errands = Errands(
             self.mission, self.mapper, exploration, robot_radius + _ROOM_BESIDE_EDGES_M
@@ -299,9 +299,9 @@ class Pipeline:
         noise = self._config.odometry_noise.covariance(motion, duration)
         is_doubted, self.errands.is_lost = self.errands.is_lost, False
         lost = self._was_lifted or self._odometry.has_gap_since(self._last.stamp)
-        match = self._maps.find if lost else self._follow
-        if is_doubted:
-            match = partial(self._maps.find, is_doubted=True)
+        match = self._maps.trust if self._trusts_odometry else self._maps.match
+        if lost or is_doubted:
+            match = partial(self._maps.find, is_doubted=is_doubted)
         if self._was_lifted or is_doubted:
             self._was_lifted, noise = False, noise + _LIFTED
         local_base, covariance = match(
