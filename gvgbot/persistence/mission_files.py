@@ -25,7 +25,8 @@ from gvgbot.persistence.records import Damaged, packed, record, records, unpacke
 
 JOURNAL, SNAPSHOT, SNAPSHOT_BEFORE = "journal.gvg", "snapshot.gvg", "snapshot-before.gvg"
 
-_BEHIND = 0.0  # s since 1970: when a journal was changed that lacks what happened last
+# When a journal was changed that lacks what happened last: the year 2000, which FAT knows as well.
+_BEHIND = 946_684_800.0
 
 
 class MissionFiles:
