@@ -229,9 +229,8 @@ class Trial:
         else:
             del data[-place:]
         path.write_bytes(data)
-        os.utime(
-            path, ns=(status.st_atime_ns, status.st_mtime_ns)
-        )  # a bad disk leaves that as it was
+        # A bad disk leaves the dates as they were.
+        os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
 
     def _conclude(self, session: Session) -> None:
         """What the robot leaves."""
@@ -388,13 +387,10 @@ class Trial:
 
     def _note_mute(self, now: float) -> None:
         """Note from when on nobody tells the base what to do: it rolls on until it stops itself."""
-        was_mute, self._is_mute = (
-            self._is_mute,
-            self._session is None
-            or any(
-                fault.name in MUTING and fault.at <= now < fault.at + fault.lasts
-                for fault in self._faults
-            ),
+        was_mute = self._is_mute
+        self._is_mute = self._session is None or any(
+            fault.name in MUTING and fault.at <= now < fault.at + fault.lasts
+            for fault in self._faults
         )
         if self._is_mute and not was_mute:
             self._rolls_until = now + ABANDONED_S
@@ -446,8 +442,9 @@ class Trial:
         return (fault for fault in self._faults if fault.lasts < math.inf)
 
     def _judge_map(self, session: Session) -> None:
-        """Every vertex must be where there is one in truth, but that of a ring, of all of which
-        the robot has seen no end: its branch may have been hidden by somebody.
+        """Every vertex must be where there is one in truth.
+
+        But for that of a ring, which stands for no meetpoint: somebody may have hidden the branch.
         """
         if not session.journey.world_base:
             return

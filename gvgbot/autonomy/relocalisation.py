@@ -23,7 +23,7 @@ from gvgbot.hal.messages import Scan
 
 # Walls so near to each other are one, and so far off are two, m: maps are a little bent. Corridors
 # may differ by less, so one looks closely before one is sure. Then 0.13 of the walls disagree at
-# most where the robot is, and 0.33 or more where it is not, because that is not on the map.
+# most where the robot is, and 0.32 or more where it is not, because that is not on the map.
 _APART_BY_AND_LARGE, _APART_CLOSELY = (0.2, 0.4), (0.1, 0.2)
 _CLOSE = 0.2  # share of the walls that may disagree then
 _HEADINGS = 120  # that are tried at each place
@@ -46,7 +46,7 @@ _TELLING = 0.01  # share of the walls: who disagrees with so much more is e time
 _CHANCE = 0.15
 _CHANCE_OUTSIDE = 0.07  # where half a building looks by chance like the other, unknown half
 _STAYED_M, _STAYED_RAD = 2.0, 1.0  # from where it was, a robot that nobody carried may have rolled
-_STAYED = 5.0  # log of how much likelier that is than any other place
+_STAYED = 5.0  # log of how much likelier that is than any other place on half a map
 _LOOKS = 5  # before anything is said
 _SURE = 0.995  # share of a place
 # in a row, with the same place: one may be wrong about a wall that has moved a little
@@ -249,8 +249,9 @@ class Relocaliser:
         """Make hypotheses of what fits closely, too."""
         inverse = look.local_base.inverse()
         self._hypotheses = [Hypothesis(guess.compose(inverse)) for guess in guesses]
-        for hypothesis in self._hypotheses:
-            hypothesis.behind = _STAYED * self._has_stayed(hypothesis)
+        if not self._is_whole:  # what was being mapped, after a power cut; nobody was to carry it
+            for hypothesis in self._hypotheses:
+                hypothesis.behind = _STAYED * self._has_stayed(hypothesis)
         self._nowhere, self._looks = self._elsewhere(), 0
         yield from self._weigh(look, _GUESSED)
 
@@ -308,14 +309,12 @@ class Relocaliser:
         near = np.hypot(*(walls - map_base.position).T) < REACH_M
         there = look.local_base.compose(map_base.inverse()).transform(walls[near])
         there = there[look.local_map.known(there)]
-        off_look = np.asarray(look.local_map.tree().query(there)[0])
         if not len(there):
             return 1.0, 1.0
+        off_look = np.asarray(look.local_map.tree().query(there)[0])
         unknown_to_map = np.where(seen, _apart(off_map, *_APART_BY_AND_LARGE), self._chance).mean()
-        unseen = _apart(off_look, *_APART_BY_AND_LARGE).mean()
-        return max(float(unknown_to_map), float(unseen)), float(
-            _apart(off_look, *_APART_CLOSELY).mean()
-        )
+        by_and_large = max(unknown_to_map, _apart(off_look, *_APART_BY_AND_LARGE).mean())
+        return float(by_and_large), float(_apart(off_look, *_APART_CLOSELY).mean())
 
 
 def _apart(distance: Array, near: float, off: float) -> Array:

@@ -90,19 +90,6 @@ def test_a_robot_that_comes_round_a_corner_unseen_is_found_by_the_walls_it_knew(
     assert covariance[0, 0] < 0.05**2
 
 
-def test_walls_that_would_lie_behind_the_end_of_a_corridor_speak_for_no_place_there() -> None:
-    """Somebody who has come near hides some of what is known; farther on, less would contradict."""
-    corridor = (0.0, 0.0, 6.0, 1.2)
-    empty, with_somebody = carved([corridor]), carved([corridor], [(2.9, 0.1, 3.1, 0.4)])
-    local = maps()
-    for x in np.arange(0.7, 2.1, 0.25):
-        local.insert(sweep(empty, Pose(x, 0.6), field_of_view=LASER_270), Pose(x, 0.6), x)
-    here = Pose(2.0, 0.6)
-    scan = sweep(with_somebody, here, field_of_view=LASER_270)
-    found, _ = local.find(scan, here, Pose(), 1.0, LOOSE, is_doubted=True)
-    assert found.distance(here) < 0.05
-
-
 def test_a_drive_errs_about_as_much_as_its_steps_say_together() -> None:
     """Twenty matched steps: the drift of the walls adds up, the error of a match counts once."""
     rng, noise = np.random.default_rng(6), np.diag([0.01**2, 0.005**2, 0.003**2])
