@@ -11,14 +11,28 @@ from gvgbot.errors import DeviceLost
 SCHEME = "tcp://"
 CONNECT_TIMEOUT = 3.0  # s
 UNSENT_LIMIT = 65536  # bytes; a device that takes no more than this is gone
+_LAST_PORT = 65535
 
 
 def parse_address(port: str) -> tuple[str, int]:
     """Host and port number of `tcp://host:number`. Raises DeviceLost when it is none."""
     host, colon, number = port.removeprefix(SCHEME).rpartition(":")
-    if not port.startswith(SCHEME) or not host or not colon or not number.isdecimal():
+    if not port.startswith(SCHEME) or not colon or not _is_host(host) or not _is_number(number):
         raise DeviceLost(f"{port} is no address: write {SCHEME}host:10940")
     return host.strip("[]"), int(number)
+
+
+def _is_host(name: str) -> bool:
+    """Whether one can ask for a host of this name: no part of it may be empty, or too long."""
+    try:
+        return bool(name.encode("idna"))
+    except UnicodeError:
+        return False
+
+
+def _is_number(digits: str) -> bool:
+    """Whether it is the number of a port."""
+    return digits.isdecimal() and len(digits) <= len(str(_LAST_PORT)) and int(digits) <= _LAST_PORT
 
 
 class TcpStream:
@@ -79,8 +93,13 @@ class TcpStream:
         number = getattr(error, "errno", None)
         if isinstance(error, TimeoutError) or number is None:
             return DeviceLost(f"{self._name} does not answer: check address, cable and power")
-        reason = "refuses the connection" if number == errno.ECONNREFUSED else os.strerror(number)
-        return DeviceLost(f"{self._name}: {reason}")
+        return DeviceLost(f"{self._name}: {_reason(error, number)}")
+
+
+def _reason(error: Exception, number: int) -> str:
+    if isinstance(error, socket.gaierror):  # with numbers of its own
+        return str(error.strerror)
+    return "refuses the connection" if number == errno.ECONNREFUSED else os.strerror(number)
 
 
 def _waiting(writer: asyncio.StreamWriter) -> int:
