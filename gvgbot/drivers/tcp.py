@@ -22,6 +22,11 @@ def parse_address(port: str) -> tuple[str, int]:
     return host.strip("[]"), int(number)
 
 
+def written_address(host: str, number: int) -> str:
+    """What `parse_address` reads as this."""
+    return f"{SCHEME}[{host}]:{number}" if ":" in host else f"{SCHEME}{host}:{number}"
+
+
 def _is_host(name: str) -> bool:
     """Whether one can ask for a host of this name: no part of it may be empty, or too long."""
     try:

@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import socket
 
-from gvgbot.drivers.tcp import SCHEME, parse_address
+from gvgbot.drivers.tcp import parse_address, written_address
 from gvgbot.errors import DeviceLost, UsageError
 
 _CHUNK = 65536  # bytes
@@ -35,8 +35,7 @@ class TcpPort:
     @property
     def path(self) -> str | None:
         """What to open; None while unplugged."""
-        host, number = self._address
-        return None if self._listener is None else f"{SCHEME}{host}:{number}"
+        return None if self._listener is None else written_address(*self._address)
 
     def plug(self, is_plugged: bool) -> None:
         """Plug in or unplug; the client of an unplugged port sees its connection end."""
@@ -69,13 +68,15 @@ class TcpPort:
             self._listener = None
 
     def _listen(self) -> None:
-        host, number = self._address
+        host, _ = self._address
+        family = socket.AF_INET6 if ":" in host else socket.AF_INET
         try:
-            self._listener = socket.create_server((host, number))
+            self._listener = socket.create_server(self._address, family=family)
         except OSError as error:
             reason = str(error.strerror).partition(" (while")[0]  # what it was doing is clear
+            address = written_address(*self._address)
             raise UsageError(
-                f"{SCHEME}{host}:{number}: {reason}: choose another address, or port 0 for any"
+                f"{address}: {reason}: choose another address, or port 0 for any"
             ) from error
         self._listener.setblocking(False)
         self._address = host, self._listener.getsockname()[1]

@@ -5,7 +5,7 @@ import socket
 
 import pytest
 
-from gvgbot.drivers.tcp import TcpStream, parse_address
+from gvgbot.drivers.tcp import TcpStream, parse_address, written_address
 from gvgbot.errors import DeviceLost
 
 
@@ -20,6 +20,7 @@ from gvgbot.errors import DeviceLost
 )
 def test_an_address_names_host_and_number(port: str, host: str, number: int) -> None:
     assert parse_address(port) == (host, number)
+    assert written_address(host, number) == port
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """The device's end of a TCP connection, with plain sockets as its clients."""
 
 import asyncio
+import re
 import socket
 
 import pytest
@@ -10,6 +11,18 @@ from gvgbot.drivers.tcp_port import TcpPort
 from gvgbot.errors import UsageError
 
 ANY_PORT = "tcp://127.0.0.1:0"
+ANY_PORT_6 = "tcp://[::1]:0"
+
+
+def has_ipv6() -> bool:
+    try:
+        socket.create_server(("::1", 0), family=socket.AF_INET6).close()
+    except OSError:
+        return False
+    return True
+
+
+needs_ipv6 = pytest.mark.skipif(not has_ipv6(), reason="this machine has no IPv6")
 
 
 class Client:
@@ -34,9 +47,10 @@ async def until_served(port: TcpPort, client: Client) -> None:
     assert await port.read() == b"?"
 
 
-def test_clients_come_and_go() -> None:
+@pytest.mark.parametrize("address", [ANY_PORT, pytest.param(ANY_PORT_6, marks=needs_ipv6)])
+def test_clients_come_and_go(address: str) -> None:
     async def main() -> None:
-        port = TcpPort(ANY_PORT)
+        port = TcpPort(address)
         for word in (b"one", b"two"):
             client = await Client.of(port)
             client.writer.write(word)
@@ -112,6 +126,20 @@ def test_who_does_not_read_loses_whole_messages_only() -> None:
         port.write(b"next")
         assert await client.reader.readexactly(4) == b"next"
         await client.leave()
+        port.close()
+
+    asyncio.run(main())
+
+
+@needs_ipv6
+def test_an_address_of_ipv6_is_told_as_it_is_written() -> None:
+    async def main() -> None:
+        port = TcpPort(ANY_PORT_6)
+        address = port.path
+        assert address is not None
+        assert re.fullmatch(r"tcp://\[::1\]:\d+", address)
+        with pytest.raises(UsageError, match=f"{re.escape(address)}: [^()]*in use"):
+            TcpPort(address)
         port.close()
 
     asyncio.run(main())
