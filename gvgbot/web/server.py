@@ -52,7 +52,7 @@ class Web:
                 logger=_log,
                 server_header="gvgbot",
             )
-        except OSError as error:
+        except (OSError, UnicodeError) as error:  # the latter of a host like a..b
             where = f"{self._host}:{self._port}"
             raise GvgbotError(f"cannot serve at {where}: {_why(error)}") from error
 
@@ -105,11 +105,11 @@ async def _send(connection: ServerConnection, viewer: Viewer) -> None:
             await connection.send(await viewer.next())
 
 
-def _why(error: OSError) -> str:
+def _why(error: OSError | UnicodeError) -> str:
+    if isinstance(error, socket.gaierror | UnicodeError) or error.errno == errno.EADDRNOTAVAIL:
+        return "this machine has no such address; choose one of its own with --host"
     if error.errno == errno.EADDRINUSE:
         return "the port is taken, perhaps by another gvgbot web; choose another with --port"
     if error.errno == errno.EACCES:
         return "only root may have that port; choose one from 1024 on with --port"
-    if error.errno == errno.EADDRNOTAVAIL or isinstance(error, socket.gaierror):
-        return "this machine has no such address; choose one of its own with --host"
     return error.strerror or str(error)

@@ -230,6 +230,8 @@ def test_the_program_serves_its_page_and_ends_when_told() -> None:
     [
         (["--port", "{taken}"], 1, "--port"),
         (["--host", "192.0.2.1"], 1, "192.0.2.1:8080: this machine has no such address"),
+        (["--host", "a..b"], 1, "a..b:8080: this machine has no such address"),
+        (["--host", "a" * 70], 1, "a:8080: this machine has no such address"),
         (["--port", "99999"], 2, "'99999' is no port: there are 0 to 65535"),
         (["a/b"], 2, "a/b"),
         (["--connect", "here"], 2, "here"),
