@@ -7,12 +7,12 @@ import types
 import typing
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import isfinite
 from pathlib import Path
 from typing import Annotated, Any, Literal, Union
 
 from gvgbot.errors import GvgbotError
 from gvgbot.ranges import Range
+from gvgbot.yaml_text import is_finite
 
 KeyPath = tuple[str, ...]
 
@@ -74,19 +74,12 @@ def _fits(kind: Any, value: Any) -> bool:
     if typing.get_origin(kind) is Literal:
         return any(type(value) is type(one) and value == one for one in typing.get_args(kind))
     if kind is float:
-        return type(value) in (int, float) and _is_finite(value)
+        return type(value) in (int, float) and is_finite(value)
     if kind is Path:
         return isinstance(value, str) and value != ""
     if kind in NAMES:
         return type(value) is kind
     raise TypeError(f"a configuration key cannot be a {kind!r}")
-
-
-def _is_finite(value: float) -> bool:
-    try:
-        return isfinite(value)
-    except OverflowError:  # a whole number beyond any float
-        return False
 
 
 def _ranged(kind: Any, value: Any, path: KeyPath, problems: list[Problem]) -> Any:

@@ -1,7 +1,6 @@
 """YAML files and `key=value` overrides into frozen dataclasses: all mistakes in one error."""
 
 import dataclasses
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
@@ -12,27 +11,9 @@ import yaml
 
 from gvgbot.conversion import KeyPath, Problem, convert, shorten
 from gvgbot.errors import ConfigError
+from gvgbot.yaml_text import read_yaml
 
 T = TypeVar("T")
-
-EXPONENT = re.compile(r"[-+]?\d[\d_]*(\.[\d_]*)?[eE][-+]?\d+$")
-
-
-class _Loader(yaml.SafeLoader):
-    """Safe YAML that refuses a key given twice, and reads 1e-3 as a number."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        keys: set[str] = set()
-        for key, _ in node.value:
-            if isinstance(key, yaml.ScalarNode) and key.value in keys - {"<<"}:
-                raise yaml.MarkedYAMLError(
-                    problem=f"the key {key.value} is given twice", problem_mark=key.start_mark
-                )
-            keys.add(str(key.value))
-        return super().construct_mapping(node, deep)
-
-
-_Loader.add_implicit_resolver("tag:yaml.org,2002:float", EXPONENT, list("-+0123456789"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,21 +99,14 @@ def _read(path: Path) -> tuple[dict[Any, Any], list[str]]:
 def _parse(text: str, source: str) -> tuple[dict[Any, Any], list[str]]:
     """The mapping in a YAML text, and the lines that say what is wrong with it."""
     try:
-        content = yaml.load(text, _Loader)
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        return {}, [f"{source}: not valid YAML: {_syntax(error)}"]
+        content = read_yaml(text)
+    except ValueError as error:
+        return {}, [f"{source}: not valid YAML: {error}"]
     if content is None:
         return {}, []
     if not isinstance(content, dict):
         return {}, [f"{source}: {shorten(content)}: must be a mapping (key: value)"]
     return content, []
-
-
-def _syntax(error: Exception) -> str:
-    """What is wrong with the YAML, in one line with its place."""
-    mark = getattr(error, "problem_mark", None)
-    what = getattr(error, "problem", None) or str(error).partition("\n")[0]
-    return what if mark is None else f"line {mark.line + 1}, column {mark.column + 1}: {what}"
 
 
 def _parse_override(text: str) -> _Override | str:
@@ -142,9 +116,9 @@ def _parse_override(text: str) -> _Override | str:
     if not equals or not all(path):
         return f"--set {text}: must be key=value, such as robot.name=frida"
     try:
-        return _Override(text, path, yaml.load(value, _Loader))
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        return f"--set {text}: the value is not valid YAML: {_syntax(error)}"
+        return _Override(text, path, read_yaml(value))
+    except ValueError as error:
+        return f"--set {text}: the value is not valid YAML: {error}"
 
 
 def _merged(content: Mapping[Any, Any], assigned: Sequence[_Override]) -> dict[Any, Any]:

@@ -17,6 +17,7 @@ from scipy import ndimage
 from gvgbot.drivers.ray_casting import Mask, RayCaster
 from gvgbot.errors import WorldError
 from gvgbot.geometry import Array, Pose
+from gvgbot.yaml_text import is_finite, read_yaml
 
 OCCUPIED_THRESHOLD = 0.65  # map_server's customary values, for files that leave them out
 FREE_THRESHOLD = 0.196
@@ -192,15 +193,15 @@ def save_world(world: World, directory: Path) -> Path:
 
 def _read_yaml(path: Path) -> dict[str, Any]:
     try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+        content = read_yaml(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise WorldError(f"{path}: no such file; give the path of a map_server YAML file") from None
     except OSError as error:
         raise WorldError(f"{path}: cannot read the file: {error.strerror}") from None
     except UnicodeDecodeError:
         raise WorldError(f"{path}: cannot be read as text; give a map_server YAML file") from None
-    except yaml.YAMLError as error:
-        raise WorldError(f"{path}: not valid YAML ({_line(error)})") from None
+    except ValueError as error:
+        raise WorldError(f"{path}: not valid YAML ({error})") from None
     if not isinstance(content, dict):
         raise WorldError(f"{path}: not a map_server file; it must hold `key: value` lines")
     return content
@@ -297,4 +298,4 @@ class _Entries:
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    return isinstance(value, int | float) and not isinstance(value, bool) and is_finite(value)

@@ -4,6 +4,7 @@ A third file, which map_server does not know, says when each pixel was first see
 """
 
 import io
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -15,6 +16,7 @@ from PIL import Image
 
 from gvgbot.errors import UsageError
 from gvgbot.maps.occupancy import UNKNOWN, OccupancyGrid, Seconds
+from gvgbot.yaml_text import read_yaml
 
 IMAGE = "map.pgm"
 DESCRIPTION = "map.yaml"
@@ -24,10 +26,13 @@ FREE_THRESH = 0.196  # just below the probability that the grey of unknown stand
 WALL, FREE, UNSEEN = 0, 254, 205  # grey levels
 NEVER = 65535  # the level of a pixel in SEEN that no scan saw
 
+_LARGEST = sys.float_info.max
+_Finite = Annotated[float, msgspec.Meta(ge=-_LARGEST, le=_LARGEST)]
+
 
 class _Description(msgspec.Struct):
-    resolution: Annotated[float, msgspec.Meta(gt=0.0)]
-    origin: tuple[float, float, float]
+    resolution: Annotated[float, msgspec.Meta(gt=0.0, le=_LARGEST)]
+    origin: tuple[_Finite, _Finite, _Finite]
 
 
 def encode_map_server(grid: OccupancyGrid) -> dict[str, bytes | str]:
@@ -43,10 +48,10 @@ def read_map_server(directory: Path) -> OccupancyGrid:
     """
     try:
         text = (directory / DESCRIPTION).read_bytes()
-        description = msgspec.convert(yaml.safe_load(text), _Description)
+        description = msgspec.convert(read_yaml(text), _Description)
     except OSError as error:
         raise UsageError(f"cannot read {directory / DESCRIPTION}: {error.strerror}") from error
-    except (yaml.YAMLError, msgspec.ValidationError) as error:
+    except (ValueError, msgspec.ValidationError) as error:
         reason = " ".join(str(error).split())
         raise UsageError(f"{directory / DESCRIPTION} describes no map: {reason}") from error
     grey = _read_image(directory / IMAGE, "L")

@@ -198,6 +198,7 @@ def test_a_saved_world_is_what_map_server_reads(tmp_path: Path) -> None:
         ("resolution", "5 cm", "number"),
         ("resolution", True, "number"),
         ("resolution", float("nan"), "number"),
+        pytest.param("resolution", 10**400, "number", id="a number beyond floats"),
         ("resolution", 0, "greater than 0"),
         ("resolution", -0.05, "greater than 0"),
         ("origin", [0.0, 0.0], "three numbers"),
@@ -226,6 +227,13 @@ def test_a_bad_value_is_named_with_its_file_and_key(
     assert "\n" not in str(refusal.value)
 
 
+def test_powers_of_ten_without_a_point_are_numbers_as_they_are_for_ros(tmp_path: Path) -> None:
+    path = write(tmp_path, [[0, 255]])
+    path.write_text("image: plan.png\nresolution: 5e-2\norigin: [-1e-05, 2E0, 0e0]\n")
+    world = load_world(path)
+    assert (world.resolution_m, world.origin) == (0.05, (-1e-05, 2.0))
+
+
 @pytest.mark.parametrize("key", ["image", "resolution", "origin"])
 def test_a_missing_key_is_named(tmp_path: Path, key: str) -> None:
     path = write(tmp_path, [[0, 255]])
@@ -242,6 +250,9 @@ def test_a_missing_key_is_named(tmp_path: Path, key: str) -> None:
         (b"", "key: value"),
         (b"\x89PNG\r\n\x1a\n\xff\xfe", "cannot be read as text"),
         (b"image: a\n\x00", "not valid YAML"),
+        (b"image: a\nresolution: 2001-99-99\n", "not valid YAML"),
+        (b"image: " + b"[" * 5000, "not valid YAML"),
+        (b"resolution: 0.05\nresolution: 0.1\n", "line 2, column 1: the key resolution is given"),
     ],
 )
 def test_a_file_that_is_no_world_is_named(tmp_path: Path, content: bytes, complaint: str) -> None:

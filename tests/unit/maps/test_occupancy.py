@@ -304,10 +304,22 @@ def test_a_grid_without_a_record_of_what_was_seen_can_be_read(tmp_path: Path) ->
     assert read_map_server(tmp_path).seen_s is None
 
 
+def test_powers_of_ten_without_a_point_are_numbers(tmp_path: Path) -> None:
+    grid = OccupancyGrid(np.zeros((2, 3), np.int8), 0.05, (0.0, 0.0))
+    write_files(tmp_path, encode_map_server(grid))
+    (tmp_path / "map.yaml").write_text("resolution: 5e-2\norigin: [-1e-05, 2E0, 0]\n")
+    read = read_map_server(tmp_path)
+    assert (read.resolution_m, read.origin) == (0.05, (-1e-05, 2.0))
+
+
 @pytest.mark.parametrize(
     ("name", "content"),
     [
         ("map.yaml", b"resolution: 0.05"),
+        ("map.yaml", b"resolution: 2001-99-99\norigin: [0, 0, 0]"),
+        ("map.yaml", b"resolution: .inf\norigin: [0, 0, 0]"),
+        ("map.yaml", b"resolution: 0.05\norigin: [.nan, 0, 0]"),
+        ("map.yaml", b"resolution: " + b"[" * 5000),
         ("map.yaml", b"resolution: -1\norigin: [0, 0, 0]"),
         ("map.yaml", b"[}"),
         ("map.yaml", b"\xff\xfe\x00"),
