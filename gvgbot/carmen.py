@@ -28,15 +28,22 @@ _GZIP = b"\x1f\x8b"
 _TAIL = 9  # words of a FLASER line after the ranges
 _ODOM_WORDS = 10
 _LONGEST_GAP_S = 0.2  # between messages; logs leave some out
+_LONGEST_PAUSE_S = 300.0  # what is longer comes of a clock that was set, or of a damaged stamp
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CarmenLog:
-    """What a log holds, each by its stamp; `damaged` lines could not be read."""
+    """What a log holds, each by its stamp; `damaged` lines were left out."""
 
     odometry: list[Odometry]
     scans: list[Scan]
     damaged: int
+
+    @property
+    def pauses(self) -> int:
+        """How often it goes on after so long that nothing is known of the time between."""
+        stamps = pairwise(one.stamp for one in self.odometry)
+        return sum(later - earlier > _LONGEST_PAUSE_S for earlier, later in stamps)
 
 
 def read_carmen(path: Path, *, no_echo_m: float, base_laser: Pose) -> CarmenLog:
@@ -58,12 +65,31 @@ def read_carmen(path: Path, *, no_echo_m: float, base_laser: Pose) -> CarmenLog:
                     odometry.append(at)
         except ValueError:
             damaged += 1
-    if not scans:
+    log = _in_order(odometry, scans, damaged)
+    if not log.scans:
         raise UsageError(
             f"{path} is no recording (MCAP), and as a CARMEN log it has no FLASER line to read"
         )
+    return log
+
+
+def _in_order(odometry: list[Odometry], scans: list[Scan], damaged: int) -> CarmenLog:
+    """A log in the order of its stamps, without those that must be damaged."""
+    strays = _strays(sorted(one.stamp for one in odometry))
     by_stamp = attrgetter("stamp")
-    return CarmenLog(sorted(odometry, key=by_stamp), sorted(scans, key=by_stamp), damaged)
+    return CarmenLog(
+        sorted((one for one in odometry if one.stamp not in strays), key=by_stamp),
+        sorted((scan for scan in scans if scan.stamp not in strays), key=by_stamp),
+        damaged + len(strays),
+    )
+
+
+def _strays(stamps: list[float]) -> set[float]:
+    """Those of ascending stamps that are far from all others, unless all are."""
+    gaps = [math.inf, *(later - earlier for earlier, later in pairwise(stamps)), math.inf]
+    nearest = map(min, pairwise(gaps))
+    found = {s for s, gap in zip(stamps, nearest, strict=False) if gap > _LONGEST_PAUSE_S}
+    return found if len(found) < len(stamps) else set()
 
 
 def _lines(path: Path) -> Iterator[str]:
@@ -128,13 +154,14 @@ def messages(log: CarmenLog) -> Iterator[tuple[float, Lived]]:
 
 
 def _without_gaps(odometry: list[Odometry]) -> Iterator[Odometry]:
-    """The messages, and evenly spread ones in between where they are far apart in time."""
+    """The messages, and evenly spread ones in between, but none in pauses."""
     yield from odometry[:1]
     for earlier, later in pairwise(odometry):
         motion = earlier.odom_base.to(later.odom_base)
-        parts = max(1, math.ceil((later.stamp - earlier.stamp) / _LONGEST_GAP_S))
+        gap = later.stamp - earlier.stamp
+        parts = max(1, math.ceil(gap / _LONGEST_GAP_S)) if gap <= _LONGEST_PAUSE_S else 1
         for part in range(1, parts):
             share = part / parts
-            stamp = earlier.stamp + share * (later.stamp - earlier.stamp)
+            stamp = earlier.stamp + share * gap
             yield Odometry(stamp, earlier.odom_base.compose(motion.part(share)), later.twist)
         yield later

@@ -124,6 +124,10 @@ def _carmen(wanted: Wanted) -> Log:
     mount = config.laser
     base_laser = Pose(mount.x_m, mount.y_m, math.radians(mount.yaw_deg))
     log = read_carmen(wanted.path, no_echo_m=wanted.no_echo_m, base_laser=base_laser)
-    flaws = [f"but:     damaged lines that were passed over: {log.damaged}"] if log.damaged else []
+    found = {
+        "damaged lines that were passed over": log.damaged,
+        "long pauses, or a clock that was set": log.pauses,
+    }
+    flaws = [f"but:     {flaw}: {count}" for flaw, count in found.items() if count]
     title = wanted.path.name.split(".")[0] or "log"
     return Log(title, config, messages(log), True, lambda: flaws)

@@ -1,15 +1,17 @@
 """CARMEN logs: every field where the format has it, damage counted, no file that surprises."""
 
 import gzip
+import itertools
 import math
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from gvgbot.carmen import CarmenLog, read_carmen
+from gvgbot.carmen import CarmenLog, messages, read_carmen
 from gvgbot.errors import UsageError
 from gvgbot.geometry import Pose
+from gvgbot.hal.messages import Scan
 
 ODOM = "ODOM 1.0 2.0 0.5 0.1 0.2 0.0 7.25 host 3.0"
 FLASER = "FLASER 4 1.5 81.83 0.0 2.5 9.0 9.0 9.0 1.1 2.1 0.6 7.5 host 3.25"
@@ -66,6 +68,28 @@ def test_lines_that_come_late_are_put_in_order(tmp_path: Path) -> None:
     late = ODOM.replace("7.25", "7.9")
     log = read(written(tmp_path / "a.log", late, FLASER, ODOM))
     assert [o.stamp for o in log.odometry] == [7.25, 7.5, 7.9]
+
+
+def at(stamp: float) -> str:
+    return FLASER.replace("7.5", f"{stamp:.2f}")
+
+
+@pytest.mark.parametrize("stray", [76052857.0, 1976052857.0, -1e300, 1e300])
+def test_a_line_with_a_damaged_stamp_is_one_of_the_damaged(stray: float, tmp_path: Path) -> None:
+    lines = [at(976052857.0 + k) for k in range(50)]
+    log = read(written(tmp_path / "a.log", *lines[:20], at(stray), *lines[20:]))
+    stamps = [976052857.0 + k for k in range(50)]
+    assert [scan.stamp for scan in log.scans] == stamps
+    assert [one.stamp for one in log.odometry] == stamps
+    assert (log.damaged, log.pauses) == (1, 0)
+
+
+def test_a_clock_that_was_set_makes_no_messages(tmp_path: Path) -> None:
+    stamps = [5.0, 5.1, 976052857.0, 976052857.1]
+    log = read(written(tmp_path / "a.log", *map(at, stamps)))
+    lived = list(itertools.islice(messages(log), 100))
+    assert [message.stamp for _, message in lived if isinstance(message, Scan)] == stamps
+    assert (len(lived), log.damaged, log.pauses) == (8, 0, 1)
 
 
 def test_a_packed_log_is_read_as_far_as_it_goes(tmp_path: Path) -> None:

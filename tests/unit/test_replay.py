@@ -73,9 +73,9 @@ def test_a_log_becomes_a_map_that_is_truer_than_its_odometry(
     way = drive()
     odometry = write_log(tmp_path / "ring.log", way)
     with (tmp_path / "ring.log").open("a", encoding="utf-8") as log:
-        log.write("\nFLASER 180 1.0 2.0")
+        log.write("\nFLASER 180 1.0 2.0\nODOM 0 0 0 0 0 0 1e9 host 0")
     assert main(["replay", str(tmp_path / "ring.log"), "--out", str(tmp_path / "run")]) == 0
-    assert "passed over: 1\n" in capsys.readouterr().out
+    assert "passed over: 2\n" in capsys.readouterr().out
     estimate = decode_tum((tmp_path / "run" / "estimate.tum").read_text(encoding="utf-8"))
     true = [way[0].to(pose) for pose in way]
     at = np.searchsorted(estimate.stamps, np.arange(len(way)) - 1e-4)
