@@ -38,7 +38,9 @@ _DAMAGE = (
     DecodeError,
     zstandard.ZstdError,
     struct.error,
-    UnicodeDecodeError,
+    KeyError,  # of a channel, or of what a file says of itself
+    OverflowError,  # of a size
+    ValueError,
     msgspec.MsgspecError,
 )
 

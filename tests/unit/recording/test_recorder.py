@@ -8,7 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mcap.opcode import Opcode
 from mcap.reader import make_reader
+from mcap.writer import MCAP0_MAGIC
 from structlog.testing import capture_logs
 
 from gvgbot.autonomy.control.reflexes import Felt
@@ -163,6 +165,47 @@ def test_damage_ends_a_file_and_nothing_worse(tmp_path: Path) -> None:
         except UsageError:
             continue
         assert_begins_as(found, lived)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"), [(b"title", b"Title"), (b"part\1\0\0\0000", b"part\1\0\0\0p")]
+)
+def test_a_file_that_says_nonsense_of_itself_is_refused(
+    old: bytes, new: bytes, tmp_path: Path
+) -> None:
+    with Recorder(config(tmp_path / "run.mcap"), ABOUT) as to:
+        record(to, 5)
+    whole = (tmp_path / "run.mcap").read_bytes()
+    assert old in whole[:1000]
+    (tmp_path / "run.mcap").write_bytes(whole.replace(old, new, 1))
+    with pytest.raises(UsageError, match="nothing of a gvgbot recording"):
+        Recording(tmp_path / "run.mcap")
+
+
+@pytest.mark.parametrize(
+    ("at", "value"),
+    [
+        pytest.param(0, 0x7F, id="a record of no known kind, and no channels therefore"),
+        pytest.param(32, 0xFF, id="a size beyond any memory"),
+    ],
+)
+def test_a_damaged_first_chunk_ends_a_file(at: int, value: int, tmp_path: Path) -> None:
+    with Recorder(config(tmp_path / "run.mcap"), ABOUT, patient=True) as to:
+        record(to, 1000)
+    whole = bytearray((tmp_path / "run.mcap").read_bytes())
+    whole[first_chunk(whole) + at] = value
+    (tmp_path / "run.mcap").write_bytes(whole)
+    recording = Recording(tmp_path / "run.mcap")
+    assert list(recording.messages()) == []
+    assert recording.is_cut
+
+
+def first_chunk(whole: bytes | bytearray) -> int:
+    """Where its kind is said: a byte, and the length of what follows."""
+    at = len(MCAP0_MAGIC)
+    while whole[at] != Opcode.CHUNK:
+        at += 9 + int.from_bytes(whole[at + 1 : at + 9], "little")
+    return at
 
 
 def test_files_follow_each_other_and_are_read_as_one(tmp_path: Path) -> None:
