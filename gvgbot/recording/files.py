@@ -93,16 +93,22 @@ class McapFiles:
             self._synced = size
         if size > self._file_bytes:
             self.finish()
+            self._make_room()
             self._part += 1
             self._open()
 
     def finish(self) -> None:
-        """End the file with its index, and make room. Raises OSError."""
+        """End the file with its index. Raises OSError."""
         with self._file:
             self._writer.finish()  # type: ignore[no-untyped-call]
         self._done.append((self.path, self.path.stat().st_size))
-        while sum(size for _, size in self._done) + self._file_bytes > self._total_bytes:
+
+    def _make_room(self) -> None:
+        """For one more file. The newest stays, though it is a little larger than it should be."""
+        sizes = [size for _, size in self._done]
+        while len(sizes) > 1 and sum(sizes) + self._file_bytes > self._total_bytes:
             self._done.popleft()[0].unlink(missing_ok=True)
+            sizes.pop(0)
 
     def abandon(self) -> None:
         """Let go of the file as it is."""

@@ -232,6 +232,16 @@ def test_the_oldest_files_go_when_there_are_too_many_bytes(tmp_path: Path) -> No
     assert_begins_as(read(oldest)[::-1], lived[::-1])
 
 
+def test_where_there_is_room_for_two_files_the_one_before_the_last_stays(tmp_path: Path) -> None:
+    limited = config(tmp_path / "run.mcap", file_mb=0.1, total_mb=0.2)
+    with Recorder(limited, ABOUT, patient=True) as to:
+        lived = record(to, 3000)
+    before, last = sorted(tmp_path.iterdir(), key=lambda path: int(path.name.split(".")[1]))
+    assert before.stat().st_size > 0.1e6
+    assert before.stat().st_size + last.stat().st_size < 0.3e6
+    assert_begins_as(read(before)[::-1], lived[::-1])
+
+
 def test_an_earlier_recording_stays(tmp_path: Path) -> None:
     for _ in range(2):
         with Recorder(config(tmp_path / "run.mcap"), ABOUT) as to:
