@@ -217,9 +217,13 @@ class _Walls:
     def are_seen(self, island: Island) -> bool:
         """Whether most of it lies on what was seen before: a person may brush along a wall.
 
-        For what is rather round once or twice is not enough: that may have been a part of somebody.
+        For what is rather round once or twice is not enough, nor for what is cut off where the
+        floor was free: that may have been a part of somebody.
         """
-        tree = self._tree if island.evidence > 0.0 else self._map.tree()
+        may_be_part = island.evidence > 0.0 or (
+            not island.is_whole and self._map.was_free(island.centre, island.radius)
+        )
+        tree = self._tree if may_be_part else self._map.tree()
         distance, _ = tree.query(island.ends, distance_upper_bound=self._reach)
         return bool(np.isfinite(distance).mean() > 0.5)
 

@@ -182,6 +182,11 @@ class LocalMap:
         i, j = self._disc(centre, radius)
         return bool(len(i)) and bool((self._free[i, j] & (self._votes[i, j] <= 0)).all())
 
+    def was_free(self, centre: Array, radius: float) -> bool:
+        """Whether a disc, local frame, was free once, whatever has been seen there since."""
+        i, j = self._disc(centre, radius)
+        return bool(len(i)) and bool(self._free[i, j].all())
+
     def doubt(self, centre: Array, radius: float) -> None:
         """Let the next beams that pass through a disc, local frame, forget what is no glass."""
         i, j = self._disc(centre, radius)

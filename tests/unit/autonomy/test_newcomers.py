@@ -153,6 +153,15 @@ def test_of_whom_too_little_was_seen_at_first_is_no_wall_afterwards() -> None:
     assert len(watch.newcomers.points) > 0
 
 
+def test_of_whom_little_is_seen_beside_a_corner_and_less_was_at_first_is_no_wall() -> None:
+    """Seven beams, an arc too short to tell that it is round, three of them at the first look."""
+    corner, spot = carved([ROOM], [(1.0, 0.0, 1.1, 3.0)]), (3.3, 0.1)
+    watch = Watch(corner)
+    bearings = sweep(corner, HERE).bearings
+    watch.glimpse(to_disc(bearings, spot), bearings + math.radians(1.0), looks=1)
+    assert 3 <= watch.dropped(corner, 1.0, person=spot) < 8
+
+
 def test_the_corner_of_a_wall_is_one_however_little_was_seen_of_it_at_first() -> None:
     with_corner = carved([ROOM], [(1.6, -1.0, 2.0, -0.6)])
     watch = Watch(EMPTY)
