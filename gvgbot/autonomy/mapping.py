@@ -31,7 +31,7 @@ _TURN_VARIANCE = 1e-6  # rad^2; a new vertex's frame is turned as the local one 
 _MEAN_OF = 10  # sightings, about, of which the place of a vertex is the mean
 _BESIDE_M = 1.0  # from so near, the walls around a vertex are seen well
 _BEHIND_M = 2.5  # the nearest walls of a vertex, others tell what it looks like
-_DOOR_M = 0.5  # from an edge, a dead end is what stands on it
+_ON_EDGE_M = 0.5  # what is nearer to an edge stands on it
 _AT_END_M = 0.5  # so near to the end of a dead end, it has been driven
 
 
@@ -191,9 +191,11 @@ class Mapper(Knowledge):
     def _consider(self, view: View, sightings: dict[int, Sighting], known: Correspondence) -> None:
         """Count sightings of what is not known yet, and believe what has been seen often enough."""
         for node, sighting in sightings.items():
-            if node in known.vertex_of or node in view.doubted or self._is_door(view, sighting):
+            if node in known.vertex_of or node in view.doubted:
                 continue
             away = float(np.hypot(*(sighting.position - view.local_base.position)))
+            if self._is_out_of_place(view, sighting, away):
+                continue
             candidate = self._unbelieved.note(sighting, away, view.travelled)
             if not self._unbelieved.is_believable(candidate, view.gvg.nodes[node], away):
                 continue
@@ -310,14 +312,18 @@ class Mapper(Knowledge):
                 return vertex
         return None
 
-    def _is_door(self, view: View, sighting: Sighting) -> bool:
-        """Whether a dead end is seen in the middle of an edge of the finished map."""
-        if sighting.meetpoint:
+    def _is_out_of_place(self, view: View, sighting: Sighting, away: float) -> bool:
+        """Whether a vertex is seen `away` metres off, on an edge of the finished map.
+
+        A dead end is a door that is shut. A meetpoint may be none as long as a part of the walls is
+        out of sight: in passing the robot will see.
+        """
+        if sighting.meetpoint and away < self._config.passed_m:
             return False
         for edge in self.graph.edges.values():
             if edge.established:
                 line = self.in_local_frame(view, edge.a.vertex).transform(edge.polyline)
-                if np.hypot(*(line - sighting.position).T).min() < _DOOR_M:
+                if np.hypot(*(line - sighting.position).T).min() < _ON_EDGE_M:
                     return True
         return False
 

@@ -486,6 +486,7 @@ class Mission:
 
     def _end(self, view: View, outcome: Outcome, reason: str) -> None:
         self.outcome, self.reason = outcome, reason
+        self._mapper.establish()
         self._events.append(Finished(view.stamp, outcome, reason))
 
 

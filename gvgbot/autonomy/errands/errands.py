@@ -279,8 +279,6 @@ class Errands:
     def _take(self, errand: Errand, stamp: float) -> None:
         self._end(stamp, "replaced", f"by {errand}")
         self._mission.set_aside()
-        if self._mission.outcome in ("explored", "explored_with_blocked"):
-            self._mapper.establish()
         self.is_waiting = False
         self._plan = plan_for(errand)
 

@@ -1,5 +1,7 @@
 """What a robot does unasked: it looks at gaps in its map before it calls all explored."""
 
+import math
+
 import numpy as np
 
 from gvgbot.autonomy.control.orders import Drive, Order, Stand
@@ -7,6 +9,7 @@ from gvgbot.autonomy.errands import Errands
 from gvgbot.autonomy.events import Decision, ErrandEnded, Event
 from gvgbot.autonomy.views import Correspondence, View
 from gvgbot.geometry import Array
+from tests.unit.autonomy.local_graphs import drawn
 from tests.unit.autonomy.test_mission import CLOSED, CONFIG, TEE, Robot
 
 GAP = [2.0, 0.0]
@@ -112,3 +115,21 @@ def test_another_survey_is_made_when_edges_have_gone_since_the_last() -> None:
     order = robot.until_it_moves_or_ends()
     assert robot.left == []
     assert isinstance(order, Drive)
+
+
+def test_what_was_found_on_an_errand_goes_as_soon_as_it_is_gone() -> None:
+    """A gap between boxes in a corridor that is known: the map was finished without it."""
+    gap = drawn(
+        {1: (-1.0, 0.0), 2: (4.0, 0.0), 3: (1.5, 0.0), 4: (1.5, -3.0)},
+        {10: (1, 3, []), 11: (3, 2, []), 12: (3, 4, [])},
+        unseen={4: -math.pi / 2},
+    )
+    robot = Explorer([])
+    robot.until_it_moves_or_ends()
+    known = set(robot.mapper.graph.vertices)
+    robot.drive(gap, (0.0, 0.0), (1.0, 0.0))
+    robot.stand(gap, 20)
+    assert len(robot.mapper.graph.vertices) > len(known)
+    robot.errands.home(robot.stamp)
+    robot.stand(CLOSED, 20)
+    assert set(robot.mapper.graph.vertices) == known
