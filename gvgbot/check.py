@@ -284,5 +284,7 @@ def _contact(contact: Contact) -> Line:
         "over-current": contact.over_current,
     }
     pressed = ", ".join(name for name, is_felt in felt.items() if is_felt)
+    if contact.charger_cable:
+        return Line("warn", "contact", "the charger's cable is plugged in", "pull it out to drive")
     remedy = "put the robot on a flat floor, away from walls and stairs"
     return Line("warn" if pressed else "ok", "contact", pressed or "none", remedy)

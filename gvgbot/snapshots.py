@@ -11,7 +11,7 @@ from gvgbot.geometry import STANDSTILL, Array, Pose, wrap_angle
 from gvgbot.hal.messages import Battery, Odometry, Scan, Sign
 from gvgbot.topics import NOTHING_IN_RANGE, NOTHING_TRUSTED, LinkHealth, Mate, Phase, State, packed
 
-_NEEDS_SOMEBODY = ("wheel drop", "over-current", "no scan")
+_NEEDS_SOMEBODY = ("wheel drop", "over-current", "charger cable", "no scan")
 _FARTHEST_MM = NOTHING_IN_RANGE - 1
 
 

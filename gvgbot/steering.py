@@ -108,6 +108,8 @@ class Steering:
             return "it stands at a cliff"
         if contact is not None and contact.over_current:
             return "a motor is overloaded"
+        if contact is not None and contact.charger_cable:
+            return "the charger's cable is plugged in"
         return None if stopped_for in _HARMLESS else stopped_for
 
     async def _do(self, name: str, arguments: Arguments) -> str:

@@ -17,6 +17,7 @@ Reason = Literal[
     "bad command",
     "wheel drop",
     "over-current",
+    "charger cable",
     "no scan",
     "bumper",
     "cliff",
@@ -118,6 +119,8 @@ class Guard:
             return "wheel drop"
         if contact is not None and contact.over_current:
             return "over-current"
+        if contact is not None and contact.charger_cable:
+            return "charger cable"
         if scan is None or stamp - scan.stamp > self.config.max_scan_age_s:
             return "no scan"
         return None

@@ -62,7 +62,10 @@ class Odometry:
 
 @dataclass(frozen=True, slots=True)
 class Contact:
-    """What the base feels: bumper and cliff per side, wheels off the floor, motors overloaded."""
+    """What the base feels: bumper and cliff per side, wheels off the floor, motors overloaded.
+
+    And whether the charger's cable ties it to a wall.
+    """
 
     stamp: float
     bumper_left: bool = False
@@ -74,6 +77,7 @@ class Contact:
     wheel_drop_left: bool = False
     wheel_drop_right: bool = False
     over_current: bool = False
+    charger_cable: bool = False
 
     @property
     def bumper(self) -> bool:

@@ -66,6 +66,7 @@ TYPES: dict[str, list[_Field]] = {
         (8, "wheel_drop_left", "bool"),
         (9, "wheel_drop_right", "bool"),
         (10, "over_current", "bool"),
+        (11, "charger_cable", "bool"),
     ],
     "gvgbot.Cycle": [
         (1, "stamp", "double"),

@@ -102,6 +102,7 @@ def touched(**felt: bool) -> Body:
         (touched(cliff_centre=True), "at a cliff"),
         (touched(wheel_drop_left=True), "lifted"),
         (touched(over_current=True), "overloaded"),
+        (touched(charger_cable=True), "cable"),
         (Body(stopped_for="no scan"), "no scan"),
         (Body(stopped_for="bad command"), "bad command"),
     ],

@@ -198,13 +198,22 @@ class KobukiBase:
         """Stop the base if that is due; give up if it has been silent for too long."""
         now = self._clock.now()
         if now >= self._lost_due():
-            raise DeviceLost(
-                f"no feedback from the base for {self._config.silence_lost_s:g} s: "
-                f"check that it is switched on and its cable is plugged in ({self._config.port})"
-            )
+            raise DeviceLost(self._loss())
         if now >= self._stop_due():
             self._stopped, self._twist = now, STANDSTILL
             self._send(_STOP)
+
+    def _loss(self) -> str:
+        config = self._config
+        if self._feedback.spoke > self._heard:
+            return (
+                f"the base talks, but has told nothing new of its wheels and gyro for "
+                f"{config.silence_lost_s:g} s: switch it off and on ({config.port})"
+            )
+        return (
+            f"no feedback from the base for {config.silence_lost_s:g} s: "
+            f"check that it is switched on and its cable is plugged in ({config.port})"
+        )
 
     def _next_watch(self) -> float:
         return min(self._stop_due(), self._lost_due())

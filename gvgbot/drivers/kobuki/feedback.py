@@ -33,6 +33,7 @@ from gvgbot.geometry import wrap_angle
 from gvgbot.hal.messages import Battery, Contact, DockBeam, Docking, Odometry
 
 FRAME_PERIOD = 0.02  # s, of the base's stream
+_FELT_S = 0.1  # so long a touch is told of, however short: frames may come together, or late
 _JUMP_M = 0.25  # a wheel does not go this far between two frames,
 _JUMP_SPEED = 2.0  # m/s, nor this fast over a longer gap
 _JUMP_TURN = 0.35  # rad between two frames that no base turns,
@@ -113,7 +114,9 @@ class FeedbackReader:
         self.docking: Docking | None = None
         self._slips = 0
         self._is_slipping = False
-        self.heard = -math.inf  # arrival of the last frame of use, s
+        self._felt: list[tuple[float, CoreSensors]] = []  # what the last frames felt, and when
+        self.spoke = -math.inf  # arrival of the last frame, s
+        self.heard = -math.inf  # and of the last one that told how far the wheels have turned
         self.is_unbroken = True  # no motion has been missed since `recall`
 
     def take(self, data: bytes, arrival: float) -> Odometry | None:
@@ -122,6 +125,7 @@ class FeedbackReader:
         Of frames that come together, each was made at least a period before the next.
         """
         newest: Odometry | None = None
+        self._felt = [felt for felt in self._felt if arrival - felt[0] < _FELT_S]
         frames = [frame for frame in self._parser.feed(data) if not isinstance(frame, BadFrame)]
         for later, frame in zip(reversed(range(len(frames))), frames, strict=True):
             made_by = arrival - later * FRAME_PERIOD
@@ -210,17 +214,21 @@ class FeedbackReader:
     def _take_core(
         self, core: CoreSensors, inertia: Inertia | None, arrival: float
     ) -> Odometry | None:
-        self.heard = arrival
+        self.spoke = arrival
         before = self._clock
         clock = _clock_after(before, core.stamp_ms, arrival - self._link_delay)
         self._clock = clock
         self._missed += max(0, round(clock.step / FRAME_PERIOD) - 1)
-        self.contact = _contact(core, clock.stamp)
+        if core.feels:
+            self._felt.append((arrival, core))
+        self.contact = _contact([felt for _, felt in self._felt], core, clock.stamp)
         self.battery = _battery(core, clock.stamp)
         if inertia is None:
             return None
         reading = WheelReading(core.left_encoder, core.right_encoder, inertia.angle, inertia.rate)
         is_new = before is None or clock.resets > before.resets
+        if is_new or clock.elapsed > self._odometry_elapsed:
+            self.heard = arrival
         return self._take_reading(reading, clock, is_new=is_new)
 
     def _take_reading(
@@ -265,18 +273,26 @@ def _clock_after(clock: DeviceClock | None, raw_ms: int, arrival: float) -> Devi
     return advance_clock(clock, raw_ms, arrival)
 
 
-def _contact(core: CoreSensors, stamp: float) -> Contact:
+def _contact(felt: list[CoreSensors], newest: CoreSensors, stamp: float) -> Contact:
+    """What was felt in any of some frames, and whether the cable is plugged in by the newest."""
+    bumper = cliff = wheel_drop = over_current = 0
+    for core in felt:
+        bumper |= core.bumper
+        cliff |= core.cliff
+        wheel_drop |= core.wheel_drop
+        over_current |= core.over_current
     return Contact(
         stamp,
-        bumper_left=bool(core.bumper & 4),
-        bumper_centre=bool(core.bumper & 2),
-        bumper_right=bool(core.bumper & 1),
-        cliff_left=bool(core.cliff & 4),
-        cliff_centre=bool(core.cliff & 2),
-        cliff_right=bool(core.cliff & 1),
-        wheel_drop_left=bool(core.wheel_drop & 2),
-        wheel_drop_right=bool(core.wheel_drop & 1),
-        over_current=core.over_current != 0,
+        bumper_left=bool(bumper & 4),
+        bumper_centre=bool(bumper & 2),
+        bumper_right=bool(bumper & 1),
+        cliff_left=bool(cliff & 4),
+        cliff_centre=bool(cliff & 2),
+        cliff_right=bool(cliff & 1),
+        wheel_drop_left=bool(wheel_drop & 2),
+        wheel_drop_right=bool(wheel_drop & 1),
+        over_current=over_current != 0,
+        charger_cable=newest.has_adapter,
     )
 
 

@@ -50,6 +50,16 @@ class CoreSensors:
         """Whether the dock or the adapter is charging the battery."""
         return self.charger & 0x0F == 6
 
+    @property
+    def has_adapter(self) -> bool:
+        """Whether the charger's cable is plugged in, whether or not it is charging."""
+        return bool(self.charger & 0x10)
+
+    @property
+    def feels(self) -> bool:
+        """Whether the base touches or overhangs something, hangs in the air or is overloaded."""
+        return bool(self.bumper or self.cliff or self.wheel_drop or self.over_current)
+
 
 @dataclass(frozen=True, slots=True)
 class DockIr:

@@ -135,6 +135,7 @@ BUMPER = Contact(100.0, bumper_centre=True)
 CLIFF = Contact(100.0, cliff_left=True)
 WHEEL = Contact(100.0, wheel_drop_right=True)
 MOTOR = Contact(100.0, over_current=True)
+CABLE = Contact(100.0, charger_cable=True)
 
 CONTACTS = {
     "nothing felt, cruise": (Contact(100.0), CRUISE, CRUISE, None),
@@ -150,6 +151,8 @@ CONTACTS = {
     "wheel drop, cruise": (WHEEL, CRUISE, STANDSTILL, "wheel drop"),
     "wheel drop, turn in place": (WHEEL, TURN, STANDSTILL, "wheel drop"),
     "wheel drop, back off": (WHEEL, BACK, STANDSTILL, "wheel drop"),
+    "charger cable, cruise": (CABLE, CRUISE, STANDSTILL, "charger cable"),
+    "charger cable, turn in place": (CABLE, TURN, STANDSTILL, "charger cable"),
     "over-current, cruise": (MOTOR, CRUISE, STANDSTILL, "over-current"),
     "over-current, turn in place": (MOTOR, TURN, STANDSTILL, "over-current"),
     "over-current, back off": (MOTOR, BACK, STANDSTILL, "over-current"),

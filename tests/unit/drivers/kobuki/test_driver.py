@@ -33,11 +33,12 @@ from gvgbot.drivers.kobuki.payloads import (
 from gvgbot.drivers.transport import pipe
 from gvgbot.errors import DeviceLost
 from gvgbot.geometry import STANDSTILL, Twist
-from gvgbot.hal.messages import Odometry
+from gvgbot.hal.messages import Contact, Odometry
 
 TICKS_PER_M = 11724.41658
 STOP = BaseControl(0, 0)
 MOVE = BaseControl(200, 0)
+SILENCE_LOST_S = KobukiConfig().silence_lost_s
 
 
 def core(k: int = 0, left: int = 0, right: int = 0, **fields: int) -> CoreSensors:
@@ -329,6 +330,66 @@ def test_contact_and_battery_are_those_of_the_newest_frame() -> None:
         assert battery.fraction == pytest.approx(0.2515, abs=1e-4)
 
     play(script)
+
+
+def test_what_one_of_several_frames_felt_that_come_together_is_told() -> None:
+    """A tap of 20 ms, and all that the base sent for 0.2 s arrives at once; later all is well."""
+
+    async def script(bench: Bench) -> None:
+        tap = core(1, bumper=2, cliff=4, wheel_drop=1, over_current=1)
+        bench.wire.write(b"".join(frame(part) for part in (tap, *map(core, range(2, 11)))))
+        await asyncio.sleep(0.02)
+        contact = bench.base.contact
+        assert contact == Contact(
+            contact.stamp if contact else 0.0,
+            bumper_centre=True,
+            cliff_left=True,
+            wheel_drop_right=True,
+            over_current=True,
+        )
+        for k in range(11, 18):
+            await bench.say(core(k))
+        contact = bench.base.contact
+        assert contact == Contact(contact.stamp if contact else 0.0)
+
+    play(script)
+
+
+@pytest.mark.parametrize(
+    ("charger", "is_tied"), [(0, False), (2, False), (6, False), (18, True), (22, True)]
+)
+def test_the_cable_of_the_charger_is_felt_and_the_dock_is_not(charger: int, is_tied: bool) -> None:
+    """By the states of the charger in the base's protocol: 16 is the adapter."""
+
+    async def script(bench: Bench) -> None:
+        await bench.say(core(0, charger=charger))
+        assert bench.base.contact is not None
+        assert bench.base.contact.charger_cable == is_tied
+
+    play(script)
+
+
+@pytest.mark.parametrize("is_frozen", [True, False])
+def test_a_base_that_talks_but_tells_of_no_motion_is_lost(is_frozen: bool) -> None:
+    """It says the same frame for ever, or leaves out its gyro."""
+
+    async def main() -> None:
+        bench = Bench()
+
+        async def chatter() -> None:
+            await bench.stream(0.5)
+            while True:
+                bench.cycle += not is_frozen
+                await bench.say(core(bench.cycle), *([Inertia(0, 0)] if is_frozen else []))
+
+        async with asyncio.TaskGroup() as tasks:
+            chattering = tasks.create_task(chatter())
+            with pytest.raises(DeviceLost, match="nothing new of its wheels"):
+                await bench.base.run()
+            assert bench.clock.now() == pytest.approx(0.5 + SILENCE_LOST_S, abs=0.1)
+            chattering.cancel()
+
+    run_in_virtual_time(main())
 
 
 def test_before_the_first_frame_contact_and_battery_are_unknown() -> None:
