@@ -178,7 +178,9 @@ class LocalMap:
         return known
 
     def is_bare(self, centre: Array, radius: float) -> bool:
-        """Whether a disc, local frame, is free for certain."""
+        """Whether a disc, local frame, is free for certain, and all of it in the window."""
+        if not self.covers(np.array([centre - radius, centre + radius])).all():
+            return False
         i, j = self._disc(centre, radius)
         return bool(len(i)) and bool((self._free[i, j] & (self._votes[i, j] <= 0)).all())
 

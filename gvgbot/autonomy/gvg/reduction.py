@@ -241,16 +241,17 @@ def _forks(draft: _Draft, base: int, doomed: dict[int, list[tuple[int, int]]]) -
 
 
 def _is_corner(reach: float, tip: Array, base: Array, endpoints: Array) -> bool:
-    """Whether a branch is a corner, by its reach in units of the least; the map decides if near."""
-    if not 1 / _REACH_HYSTERESIS < reach < _REACH_HYSTERESIS:
-        return reach < 1.0
-    if _is_near(tip, endpoints):
-        return False
-    return reach < 1.0 or _is_near(base, endpoints)
+    """Whether a branch is a corner, by its reach in units of the least.
 
-
-def _is_near(point: Array, known: Array) -> bool:
-    return bool((np.hypot(*(known - point).T) < _ENDPOINT_M).any())
+    If that is about one, the map decides: the known endpoint is what is nearer to it.
+    """
+    if 1 / _REACH_HYSTERESIS < reach < _REACH_HYSTERESIS:
+        to_tip, to_base = (
+            np.hypot(*(endpoints - end).T).min(initial=_ENDPOINT_M) for end in (tip, base)
+        )
+        if to_tip != to_base:
+            return bool(to_base < to_tip)
+    return reach < 1.0
 
 
 def _doubt_stumps(draft: _Draft, min_reach: float) -> None:

@@ -275,3 +275,10 @@ def test_a_few_false_echoes_are_forgiven() -> None:
         local_map.insert(sweep(ROOM, ORIGIN), ORIGIN, 0.0)
     assert len(local_map.suspects()) == 0
     assert wall_points_near(local_map, PANE[0], 0.0, reach=1.0) == 0
+
+
+def test_of_a_disc_that_leaves_the_window_nobody_knows_whether_it_is_bare() -> None:
+    hall = carved([(-12.0, -12.0, 12.0, 12.0)])
+    local_map = looked(hall, [ORIGIN], config=LocalMapConfig(half_width_m=5.0))
+    assert local_map.is_bare(np.array([3.0, 0.0]), 1.5)
+    assert not local_map.is_bare(np.array([4.0, 0.0]), 1.5)

@@ -91,6 +91,8 @@ def ended(y: float) -> KnownVertices:
         (1.65, ended(0.65), True),  # a known dead end
         (1.45, ended(0.45), False),
         (1.8, ended(0.0), False),  # the map has the dead end at the foot of the branch
+        (1.75, ended(0.2), False),  # nearer to the foot than to the tip, and near enough to both
+        (1.75, ended(0.5), True),
         (1.95, ended(0.0), True),
         (1.65, ended(5.0), False),
     ],
