@@ -16,8 +16,10 @@ _LEFT_BEHIND_M = 0.3  # the robot has passed a point if it was nearer by this
 _SAME_M = 0.5  # sightings nearer than this are of one candidate
 _MEMORY_M = 12.0  # driven, after which a candidate is forgotten
 _MISTAKEN_M = 1.0  # around a mistake
-_MISTAKES = 2  # at a place, after which a vertex there is only believed from near
-_MISTAKES_KEPT_M = 100.0  # driven, after which a mistake is forgotten
+_MISTAKES = 2  # at a place of late, after which a vertex there is only believed from near
+_LATE_M = 100.0  # driven since a mistake
+_STUBBORN = 4  # mistakes at a place, after which what comes back there once more is left alone
+_MISTAKES_KEPT_M = 1000.0  # driven, after which a mistake is forgotten
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,7 +87,7 @@ class Candidates:
         frontier, and a closer look decides. What has proved to be none whenever the robot came near
         is not driven to for ever.
         """
-        if away > _PASSED_M and self._is_mistakable(candidate.position):
+        if away > _PASSED_M and self._is_mistakable(candidate):
             return False
         if node.is_suspect:
             passed = away > candidate.nearest + _LEFT_BEHIND_M
@@ -93,9 +95,21 @@ class Candidates:
             return candidate.near_sightings >= enough
         return candidate.sightings >= self._needed(candidate)
 
-    def _is_mistakable(self, position: Array) -> bool:
-        near = [np.hypot(*(position - place)) < _MISTAKEN_M for place, _ in self._mistakes]
-        return near.count(True) >= _MISTAKES
+    def _is_mistakable(self, candidate: Candidate) -> bool:
+        late = candidate.seen_at - _LATE_M
+        return sum(at > late for at in self._mistaken_at(candidate.position)) >= _MISTAKES
+
+    def is_stubborn(self, position: Array) -> bool:
+        """Whether what was seen at a place (2,), local frame, came back whenever it was taken out.
+
+        Sight at a threshold may go on like that for ever, and the robot with it.
+        """
+        return len(self._mistaken_at(position)) >= _STUBBORN
+
+    def _mistaken_at(self, position: Array) -> list[float]:
+        """Metres driven when there were mistakes about a place (2,)."""
+        near = (np.hypot(*(position - place)) < _MISTAKEN_M for place, _ in self._mistakes)
+        return [at for (_, at), is_near in zip(self._mistakes, near, strict=True) if is_near]
 
     def is_examined(self, candidate: Candidate) -> bool:
         """Whether it has been seen twice as often as needed: enough to tell it from a known one."""

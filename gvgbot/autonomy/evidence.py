@@ -7,7 +7,7 @@ from typing import Annotated
 
 import numpy as np
 
-from gvgbot.autonomy.candidates import CandidatesConfig
+from gvgbot.autonomy.candidates import Candidates, CandidatesConfig
 from gvgbot.autonomy.gvg.local import Branch, LocalNode
 from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.graph import Edge, HalfEdgeId, Vertex
@@ -59,9 +59,14 @@ class Evidence:
     """Adds and drops departures of vertices, and says which vertices and edges are refuted."""
 
     def __init__(
-        self, known: Knowledge, config: MappingConfig, recognition: RecognitionConfig
+        self,
+        known: Knowledge,
+        unbelieved: Candidates,
+        config: MappingConfig,
+        recognition: RecognitionConfig,
     ) -> None:
-        self._known, self._config, self._recognition = known, config, recognition
+        self._known, self._unbelieved = known, unbelieved
+        self._config, self._recognition = config, recognition
 
     # -- departures --------------------------------------------------------------------------
 
@@ -188,7 +193,8 @@ class Evidence:
         is_promising = any(half.open for half in vertex.half_edges.values())
         if is_promising and math.dist(place, view.local_base.position) >= _IN_CLEAR_M:
             return None
-        return "an edge passes here" if self._passes_through(view, place, known) else None
+        passes = self._passes_through(view, place, known)
+        return "an edge passes here" if passes and not self._unbelieved.is_stubborn(place) else None
 
     def _passes_through(self, view: View, point: Array, known: Correspondence) -> bool:
         """Whether an edge is seen where a vertex should be, or another vertex at its end there."""

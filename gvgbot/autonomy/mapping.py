@@ -64,8 +64,8 @@ class Mapper(Knowledge):
             margin=config.novelty_margin,
             same_bearing=math.radians(recognition.bearing_deg),
         )
-        self._evidence = Evidence(self, config, recognition)
         self._unbelieved = Candidates(config.candidates)
+        self._evidence = Evidence(self, self._unbelieved, config, recognition)
         self._rivals: dict[int, Recognition] = {}  # by nodes of this view that may be known ones
         # by half-edges of vertices that this view took out, as `loose_ends`, but in the local frame
         self.came_from: dict[HalfEdgeId, tuple[HalfEdgeId, Array]] = {}

@@ -488,6 +488,15 @@ def test_a_driven_edge_keeps_its_line_in_the_frame_of_its_first_vertex() -> None
     assert graph.edge_at(HalfEdgeId(*edge.b)) is edge
 
 
+def test_what_comes_back_whenever_it_is_taken_out_is_left_alone_in_the_end() -> None:
+    """Sight at a threshold: a branch that is worth a vertex now, and a corner then."""
+    seen = Seen()
+    for _ in range(10):
+        seen.look_near(TEE, 20).look_near(PLAIN, 20)
+    assert 1 < len(of_type(seen.events, VertexRemoved)) < 5
+    assert seen.places("meetpoint") == [pytest.approx((3.0, 0.0), abs=1e-3)]
+
+
 def test_a_door_that_is_shut_for_a_while_takes_no_vertex_out_of_a_finished_map() -> None:
     """The branch of the tee is out of sight, and what is left is a plain corridor."""
     seen = Seen().look(TEE, 20)
