@@ -6,7 +6,8 @@ from pathlib import Path
 from statistics import fmean, median
 from typing import Any
 
-from benchmarks.explore_table import Row, has_failed
+from benchmarks.campaign import Row
+from benchmarks.explore_table import has_failed
 from benchmarks.report import Measured
 from docs.source import table
 
