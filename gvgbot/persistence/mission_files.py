@@ -7,9 +7,10 @@ the snapshot or the one before. Functions that write raise OSError, and may be c
 import contextlib
 import os
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
-from gvgbot.autonomy.memory import Growth
+from gvgbot.autonomy.memory import Growth, Memory
 from gvgbot.maps.atomic_files import sync_directory
 from gvgbot.persistence.mission_state import (
     VERSION,
@@ -38,6 +39,7 @@ class MissionFiles:
         self._before = directory / SNAPSHOT_BEFORE
         self._ends: list[int] = []  # of the whole records of the journal: its head, the batches
         self._is_whole = True  # the newest snapshot, as far as that is known
+        self._is_read = False  # the mission that is here goes on
 
     @property
     def is_begun(self) -> bool:
@@ -54,6 +56,7 @@ class MissionFiles:
         snapshot = self._newest_snapshot()
         if snapshot is None:
             return None
+        self._is_read = True
         past: list[Growth] = []
         parts: list[Rows] = []
         counts: list[Count] = []
@@ -67,7 +70,8 @@ class MissionFiles:
             counts.append(Count(len(past), rows + len(batch.rows.stamps)))
             newest = max(newest, batch.beat, key=lambda beat: beat.stamp)
         journey = journey_of(parts, len(past))
-        return Saved(snapshot.memory, past, journey, newest, counts, self._is_current())
+        memory = _counted(snapshot.memory, past)
+        return Saved(memory, past, journey, newest, counts, self._is_current())
 
     def _newest_snapshot(self) -> Snapshot | None:
         trouble: Damaged | None = None
@@ -110,9 +114,10 @@ class MissionFiles:
     # -- writing -----------------------------------------------------------------------------------
 
     def begin(self) -> None:
-        """Begin an empty journal, and forget the mission that was here. Raises OSError."""
-        for path in (self._snapshot, self._before):
-            path.unlink(missing_ok=True)
+        """Begin an empty journal, and forget a mission that does not go on. Raises OSError."""
+        if not self._is_read:
+            for path in (self._snapshot, self._before):
+                path.unlink(missing_ok=True)
         start = record(packed(Header("gvgbot journal", VERSION)))
         _replace(self._journal, start)
         self._ends = [len(start)]
@@ -154,6 +159,17 @@ class MissionFiles:
         content = record(packed(Header("gvgbot snapshot", VERSION))) + record(snapshot)
         _replace(self._snapshot, content, keep=self._before if self._is_whole else None)
         self._is_whole = True
+
+
+def _counted(memory: Memory, past: list[Growth]) -> Memory:
+    """The memory, with its keyframes counted as in the journal.
+
+    One that lost some and goes on has the memory's last keyframe in the place of those.
+    """
+    for number, grown in enumerate(past, 1):
+        if memory.last is not None and grown.keyframe.stamp == memory.last.stamp:
+            return replace(memory, keyframes=number)
+    return memory
 
 
 def _two_records(path: Path) -> tuple[bytes, bytes]:

@@ -183,6 +183,22 @@ def test_a_disk_without_room_for_a_batch_takes_it_later(tmp_path: Path, room: in
     assert places(tmp_path) == [float(i) for i in range(45)]
 
 
+def test_a_mission_that_goes_on_without_its_journal_keeps_its_snapshots_on_a_full_disk(
+    tmp_path: Path,
+) -> None:
+    written(tmp_path)
+    (tmp_path / JOURNAL).write_bytes(b"")
+    files = MissionFiles(tmp_path)
+    assert files.read() is not None
+    with full_disk(100), pytest.raises(OSError, match="too large"):
+        files.append(batch(0, 40), sync=True)
+    for name in (SNAPSHOT, SNAPSHOT_BEFORE):
+        assert (tmp_path / name).exists()
+    assert places(tmp_path) == []
+    files.append(batch(0, 40), sync=True)
+    assert places(tmp_path) == [float(i) for i in range(40)]
+
+
 def test_a_disk_without_room_for_a_snapshot_keeps_the_old_ones(tmp_path: Path) -> None:
     files = written(tmp_path)
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
