@@ -93,7 +93,7 @@ class MissionFiles:
         """The batches of the journal, up to the first that is not whole."""
         try:
             data = self._journal.read_bytes()
-        except FileNotFoundError:
+        except OSError:  # the snapshot goes on alone
             return
         for number, (payload, end) in enumerate(records(data)):
             try:

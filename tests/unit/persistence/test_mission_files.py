@@ -218,6 +218,12 @@ def became_a_directory(path: Path) -> None:
     (path / JOURNAL).mkdir()
 
 
+def test_without_a_journal_that_can_be_read_there_is_still_a_map(tmp_path: Path) -> None:
+    written(tmp_path)
+    became_a_directory(tmp_path)
+    assert places(tmp_path) == []
+
+
 @pytest.mark.parametrize("mishap", [gone, became_a_directory])
 def test_what_cannot_be_written_is_an_error_and_no_loss(
     tmp_path: Path, mishap: Callable[[Path], None]
