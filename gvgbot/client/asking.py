@@ -32,7 +32,11 @@ class Asking(Future[str]):
 
 
 def ask(session: zenoh.Session, robot: str, name: RequestName, arguments: Arguments) -> Asking:
-    """Send a request, without waiting. Raises GvgbotError if the connection is closed."""
+    """Send a request, without waiting.
+
+    Raises GvgbotError if it cannot be sent, or the connection is closed.
+    """
+    payload = _payload(arguments)
     asking, replies = Asking(), list[zenoh.Reply]()
     asking.set_running_or_notify_cancel()  # what is sent cannot be called back
 
@@ -46,7 +50,7 @@ def ask(session: zenoh.Session, robot: str, name: RequestName, arguments: Argume
         session.get(
             request_key(robot, name),
             zenoh.handlers.Callback(replies.append, answered),
-            payload=msgspec.msgpack.encode(arguments),
+            payload=payload,
             encoding=zenoh.Encoding(MESSAGEPACK),
             attachment=_name(),
             timeout=PATIENCE_S,
@@ -54,6 +58,14 @@ def ask(session: zenoh.Session, robot: str, name: RequestName, arguments: Argume
     except zenoh.ZError as error:
         raise GvgbotError("the connection to the robot is closed") from error
     return asking
+
+
+def _payload(arguments: Arguments) -> bytes:
+    """Raises GvgbotError for what has no form on the network: a huge number, a broken character."""
+    try:
+        return msgspec.msgpack.encode(arguments)
+    except (OverflowError, UnicodeEncodeError) as error:
+        raise GvgbotError(f"this cannot be asked for: {error}") from error
 
 
 def _text(replies: list[zenoh.Reply], robot: str) -> str:

@@ -5,7 +5,7 @@ scan, events and health are as they travel between robot and client, and so is e
 grid; the others are below. From the page: a wish, in JSON.
 """
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
 
@@ -16,6 +16,8 @@ Known = Literal[
     "state", "map", "floor", "tile", "trajectory", "plan", "odometry", "scan", "events", "health"
 ]
 Kind = Known | Literal["link", "history", "reply"]
+
+_LARGEST = 2**53 - 1  # id that a browser counts to
 
 
 class Link(msgspec.Struct, frozen=True, kw_only=True):
@@ -56,7 +58,7 @@ class Reply(msgspec.Struct, frozen=True, kw_only=True):
 class Wish(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What somebody at the page wants of the robot."""
 
-    id: int  # for the reply
+    id: Annotated[int, msgspec.Meta(ge=0, le=_LARGEST)]  # for the reply
     name: RequestName
     arguments: dict[str, Any] = {}
 

@@ -44,6 +44,7 @@ def test_a_wish_has_the_arguments_of_its_request() -> None:
         pytest.param("[" * 1900, id="deep brackets"),
         pytest.param('{"id": 1, "name": "drive"}', id="no such request"),
         pytest.param('{"id": "a", "name": "pause"}', id="no number"),
+        pytest.param(f'{{"id": {10**30}, "name": "pause"}}', id="a number that cannot be replied"),
         pytest.param('{"id": 1, "name": "pause", "sudo": true}', id="a field too many"),
         pytest.param(b"\xff\xfe", id="no text"),
     ],
