@@ -10,6 +10,7 @@ import msgspec
 import zenoh
 
 from gvgbot import __version__
+from gvgbot.client.newest import UNREADABLE
 from gvgbot.errors import GvgbotError
 from gvgbot.requests import JSON, MESSAGEPACK, Answer, Arguments, RequestName, request_key
 
@@ -43,7 +44,7 @@ def ask(session: zenoh.Session, robot: str, name: RequestName, arguments: Argume
     def answered() -> None:
         try:
             asking.set_result(_text(replies, robot))
-        except GvgbotError as error:
+        except Exception as error:  # noqa: BLE001 - somebody waits
             asking.set_exception(error)
 
     try:
@@ -86,7 +87,7 @@ def _answer(payload: zenoh.ZBytes, encoding: zenoh.Encoding) -> Answer:
     decode = msgspec.json.decode if str(encoding).startswith(JSON) else msgspec.msgpack.decode
     try:
         return decode(payload.to_bytes(), type=Answer)
-    except msgspec.MsgspecError as error:
+    except UNREADABLE as error:
         raise GvgbotError(f"an answer that cannot be read: {error}") from error
 
 

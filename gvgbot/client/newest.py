@@ -15,6 +15,9 @@ from gvgbot.topics import Topic
 
 T = TypeVar("T")
 
+# What msgspec raises for bytes that are no message: also for letters that are none, and for depth.
+UNREADABLE = (msgspec.MsgspecError, UnicodeDecodeError, RecursionError)
+
 
 class Newest(Generic[T]):
     """Holds one value; whoever is slow misses some, and memory never grows.
@@ -109,7 +112,7 @@ def decoded(topic: Topic, payload: type[T], encoding: str, data: bytes) -> T:
         )
     try:
         return msgspec.msgpack.decode(data, type=payload)
-    except msgspec.MsgspecError as error:
+    except UNREADABLE as error:
         raise GvgbotError(f"a damaged sample of {topic.name}: {error}") from error
 
 
