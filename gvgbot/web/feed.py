@@ -69,7 +69,6 @@ class Feed:
             endpoint=self._endpoint,
             word="unreachable",
             for_s=now - self._lost_at,
-            silence_s=None,
             trouble=trouble,
         )
         self._audience.show("link", said)
@@ -134,7 +133,6 @@ class Feed:
             endpoint=self._endpoint,
             word=presence.word,
             for_s=presence.for_s,
-            silence_s=robot.state().age,
             others=tuple(others),
         )
 

@@ -27,7 +27,6 @@ class Link(msgspec.Struct, frozen=True, kw_only=True):
     endpoint: str  # where the server looks for it
     word: str  # as a Presence has it, or `unreachable`: no connection to the robot's address
     for_s: float  # since when
-    silence_s: float | None  # since the last state; None before the first
     others: tuple[str, ...] = ()  # who else is there, if the robot is absent
     trouble: str = ""  # why it is unreachable
 

@@ -554,6 +554,7 @@ def test_a_robot_that_is_stuck_waits_is_silent_or_has_left_and_a_lost_server_are
         page.until("document.querySelector('#banner').innerText.includes('nobody answers')")
         play = Play(endpoint, page)
         with play.robot:
+            page.until(f"{banner}.startsWith('quiet since')")  # it has not said anything
             play.until("document.querySelector('#banner').hidden")
             headline = "document.querySelector('#headline').innerText"
             there = msgspec.structs.replace(HERE.base, connected=True)

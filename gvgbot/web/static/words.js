@@ -1,6 +1,6 @@
-// A robot in words: the same words as those of `gvgbot monitor`.
+// A robot in words: what `gvgbot monitor` says of it too, with more room.
 
-export const LOW_BATTERY = 0.2, STALE = 3.0, STUCK = 1.0, LATE = 0.1; // of a full charge; s; s; s
+export const LOW_BATTERY = 0.2, STUCK = 1.0, LATE = 0.1; // of a full charge; s; s
 
 export const degrees = (angle) => `${Math.round((angle * 180) / Math.PI) + 0}°`;
 export const percent = (share) => `${Math.round(100 * share)} %`;
@@ -109,9 +109,7 @@ export function headline(link, state) {
     case "cut off":
       if (state === null) return ["connecting to the robot", "faint", false];
       return [`connection to the robot lost since ${since}, trying again`, "bad", true];
-  }
-  if (link.silence_s !== null && link.silence_s > STALE) {
-    return [`quiet since ${duration(link.silence_s)}: its program hangs`, "bad", true];
+    case "quiet": return [`quiet since ${since}: its program hangs`, "bad", true];
   }
   if (state === null) return ["it has not said anything yet", "warning", false];
   if (state.cycle_age > STUCK && state.base.connected) return ["its control loop is stuck", "bad", false];

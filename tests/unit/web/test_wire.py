@@ -14,7 +14,7 @@ from gvgbot.web.viewers import Audience, Viewer
 from gvgbot.web.wire import Link, Reply, frame, wish
 from tests.unit.test_telemetry import EXAMPLE
 
-A_LINK = Link(robot="karl", endpoint="tcp/h:1", word="alive", for_s=3.0, silence_s=0.1)
+A_LINK = Link(robot="karl", endpoint="tcp/h:1", word="alive", for_s=3.0)
 
 
 def kinds_waiting(viewer: Viewer) -> list[str]:
