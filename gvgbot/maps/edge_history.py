@@ -9,6 +9,8 @@ from gvgbot.maps.occupancy import OccupancyGrid
 from gvgbot.maps.route_graph import MapEdge
 from gvgbot.maps.saved_run import Happening, SavedRun
 
+_LONGER_M = 2.5  # than an edge was when it was found, the way along it may be, past new vertices
+
 
 def edges_found(
     run: SavedRun, vertex_found: Mapping[int, float], begin: float
@@ -49,7 +51,8 @@ class _History:
         """Take the event for the edges of a trail that vertices found later have cut."""
         if event.start is None or event.end is None:
             return
-        trails = list(self._trails(self._open(), event.start, event.end, time))
+        most = event.length + _LONGER_M
+        trails = list(self._trails(self._open(), event.start, event.end, time, most))
         if trails:
             trail = min(trails, key=lambda trail: abs(self._length(trail) - event.length))
             self.found.update(dict.fromkeys(trail, time))
@@ -61,18 +64,20 @@ class _History:
         return sum(self.edges[index].length for index in trail)
 
     def _trails(
-        self, unused: list[int], here: int, goal: int, time: float
+        self, unused: list[int], here: int, goal: int, time: float, most: float
     ) -> Iterator[tuple[int, ...]]:
-        """Ways from a vertex to another by unused edges, past vertices found after a time only."""
+        """Ways by unused edges, `most` m long at most, past vertices found after a time only."""
         for index in unused:
             edge, rest = self.edges[index], [i for i in unused if i != index]
+            left = most - edge.length
             for start, end in {(edge.start, edge.end), (edge.end, edge.start)}:
-                if start != here:
+                if start != here or left < 0.0:
                     continue
                 if end == goal:
                     yield (index,)
                 elif self.vertex_found[end] > time:
-                    yield from ((index, *way) for way in self._trails(rest, end, goal, time))
+                    ways = self._trails(rest, end, goal, time, left)
+                    yield from ((index, *way) for way in ways)
 
 
 def _seen_whole(edge: MapEdge, grid: OccupancyGrid) -> float:
