@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 
-from gvgbot.config import load_config
-from gvgbot.errors import GvgbotError
+from gvgbot.config import Config, load_config
+from gvgbot.errors import ConfigError, GvgbotError
 from gvgbot.strict_yaml import packaged
 
 _BACK_OFF_SINCE = 254  # the version of systemd from which on restarts can be spaced out
@@ -33,11 +33,12 @@ def install_service(
 ) -> int:
     """Write the files of the service, or only say what would be written; the exit status.
 
-    Raises ConfigError for a configuration with mistakes, GvgbotError if the service could not run
-    from where this program is, also of a dry run, or if a file cannot be written.
+    Raises ConfigError for a configuration with mistakes, or with files that the service would not
+    find, GvgbotError if the service could not run from where this program is, also of a dry run, or
+    if a file cannot be written.
     """
     source = packaged("turtlebot2.yaml" if config is None else config)
-    load_config(source)
+    _check_paths(source, load_config(source))
     home, programs = Path.home(), Path(sys.executable).parent
     if not user:
         _check_place(Path(sys.executable))
@@ -48,7 +49,7 @@ def install_service(
         else system_files(source, Path("/"), programs, version)
     )
     for file in wanted:
-        say(f"{'would write' if dry_run else _write(file)} {file.path}: {file.purpose}")
+        say(f"{_would(file) if dry_run else _write(file)} {file.path}: {file.purpose}")
     say("then run:")
     for command in USER_COMMANDS if user else SYSTEM_COMMANDS:
         say(f"  {command}")
@@ -116,11 +117,18 @@ def user_files(source: Path, home: Path, programs: Path, version: int | None) ->
 def _unit(name: str, programs: Path, config: Path, version: int | None) -> str:
     """A unit with the paths of this installation, and what this systemd knows beyond the common."""
     text = _packaged_text(name)
-    text = text.replace("/etc/gvgbot/gvgbot.yaml", str(config))
-    text = text.replace("/opt/gvgbot/bin", str(programs))
+    text = text.replace("/etc/gvgbot/gvgbot.yaml", _word(config))
+    for program in ("gvgbot", "python"):
+        text = text.replace(f"/opt/gvgbot/bin/{program}", _word(programs / program))
     if version is not None and version >= _BACK_OFF_SINCE:
         text = text.replace("RestartSec=1\n", "RestartSec=1\n" + _BACK_OFF)
     return text
+
+
+def _word(path: Path) -> str:
+    """A path as systemd reads it in a command."""
+    text = str(path).replace("%", "%%")
+    return f'"{text}"' if " " in text else text
 
 
 def _packaged_text(name: str) -> str:
@@ -129,6 +137,11 @@ def _packaged_text(name: str) -> str:
 
 def _text(path: Path) -> str:
     return path.read_text("utf-8")
+
+
+def _would(file: Written) -> str:
+    """What would be done with a file, in words."""
+    return "would keep" if file.kept and file.path.exists() else "would write"
 
 
 def _write(file: Written) -> str:
@@ -142,6 +155,19 @@ def _write(file: Written) -> str:
         hint = ": try sudo, or --user" if isinstance(error, PermissionError) else ""
         raise GvgbotError(f"cannot write {file.path}: {error.strerror}{hint}") from error
     return "wrote"
+
+
+def _check_paths(source: Path, config: Config) -> None:
+    """Raises ConfigError for a file that the service, which runs in a folder of its own, misses."""
+    wanted = {"twin.world": Path(config.twin.world)}
+    if config.telemetry.zenoh_file is not None:
+        wanted["telemetry.zenoh_file"] = config.telemetry.zenoh_file
+    for key, path in wanted.items():
+        if path.is_file() and not path.is_absolute():
+            raise ConfigError(
+                f"{source}: {key}: {path}: the service runs in another folder: "
+                f"must be {path.resolve()}, or wherever it shall be"
+            )
 
 
 def _check_place(executable: Path) -> None:

@@ -8,6 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from gvgbot.installation import user_files
+from gvgbot.strict_yaml import packaged
+
 UNITS = Path(__file__).parents[2] / "systemd"
 ANALYZE = shutil.which("systemd-analyze")
 EXPOSURE = 1.5  # of 10
@@ -25,6 +28,18 @@ def test_the_units_have_neither_mistakes_nor_unknown_keys(tmp_path: Path, name: 
     python = Path(sys.executable).parent
     unit = tmp_path / name
     unit.write_text((UNITS / name).read_text().replace("/opt/gvgbot/bin", str(python)))
+    done = analyze("verify", str(unit))
+    assert (done.returncode, done.stdout + done.stderr) == (0, "")
+
+
+def test_a_unit_in_a_folder_with_a_blank_has_no_mistakes(tmp_path: Path) -> None:
+    programs = tmp_path / "my 100% robot"
+    programs.mkdir()
+    for name in ("gvgbot", "python"):
+        (programs / name).symlink_to(sys.executable)
+    written = user_files(packaged("turtlebot2.yaml"), programs, programs, None)[1]
+    unit = tmp_path / written.path.name
+    unit.write_text(written.content)
     done = analyze("verify", str(unit))
     assert (done.returncode, done.stdout + done.stderr) == (0, "")
 

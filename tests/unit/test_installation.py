@@ -49,6 +49,15 @@ def test_a_person_s_service_stays_below_their_home(tmp_path: Path) -> None:
     assert f"run {tmp_path}/.config/gvgbot/gvgbot.yaml" in files[1].content
 
 
+def test_a_blank_in_the_name_of_a_home_is_part_of_a_path() -> None:
+    home = Path("/srv/my 100% robot")
+    unit = user_files(SOURCE, home, home / "bin", None)[1].content.splitlines()
+    quoted = '"/srv/my 100%% robot/'
+    config = f'{quoted}.config/gvgbot/gvgbot.yaml"'
+    assert f'ExecStart={quoted}bin/gvgbot" run {config}' in unit
+    assert f'ExecStopPost=-{quoted}bin/python" -m gvgbot.stop_base {config}' in unit
+
+
 def test_a_dry_run_says_all_and_writes_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -58,6 +67,18 @@ def test_a_dry_run_says_all_and_writes_nothing(
     assert f"would write {tmp_path}/.config/systemd/user/gvgbot.service" in said
     assert "systemctl --user" in said
     assert not list(tmp_path.iterdir())
+
+
+def test_a_dry_run_says_what_the_real_run_would_keep(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert main(["install-service", "--user"]) == 0
+    capsys.readouterr()
+    assert main(["install-service", "--user", "--dry-run"]) == 0
+    said = capsys.readouterr().out
+    assert f"would keep {tmp_path}/.config/gvgbot/gvgbot.yaml" in said
+    assert f"would write {tmp_path}/.config/systemd/user/gvgbot.service" in said
 
 
 def test_what_is_written_can_be_used_and_a_configuration_is_kept(
@@ -82,6 +103,29 @@ def test_a_configuration_with_mistakes_is_not_installed(
     assert main(["install-service", "--user", str(bad)]) != 0
     assert "nam" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == [bad]
+
+
+@pytest.mark.parametrize(
+    ("setting", "key"),
+    [("telemetry: {zenoh_file: mine}", "telemetry.zenoh_file"), ("twin: {world: mine}", "world")],
+)
+def test_a_configuration_with_files_that_the_service_would_not_find_is_not_installed(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    setting: str,
+    key: str,
+) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine").touch()
+    (tmp_path / "robot.yaml").write_text(setting)
+    assert main(["install-service", "--user", "robot.yaml"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert key in line
+    assert f"must be {tmp_path / 'mine'}" in line
+    (tmp_path / "robot.yaml").write_text(setting.replace("mine", str(tmp_path / "mine")))
+    assert main(["install-service", "--user", "--dry-run", "robot.yaml"]) == 0
 
 
 @pytest.mark.parametrize("options", [[], ["--dry-run"]], ids=["real", "dry"])
