@@ -187,7 +187,8 @@ def _place(session: Session) -> Place:
 async def _live(robot: _Robot, air: _Air, clock: LoopClock) -> None:
     """One robot's exploration; it stands in the world, and tells the others, until all are done."""
     session, number = robot.session, air.robots.index(robot)
-    await air.until(air.troubles.sets_out_s(number))
+    sets_out, breaks_down = air.troubles.sets_out_s(number), air.troubles.breaks_down_s(number)
+    await air.until(sets_out)
     devices = Devices(Links(session.config, clock, session.simulation, session.tap))
     config = session.config.robot
     loop = Loop(
@@ -201,13 +202,12 @@ async def _live(robot: _Robot, air: _Air, clock: LoopClock) -> None:
     )
     async with asyncio.TaskGroup() as tasks:
         serving = tasks.create_task(devices.run(), name="devices")
-        limit = session.config.twin.time_limit_s
-        breaks_down = air.troubles.breaks_down_s(number)
+        limit, lasts = session.config.twin.time_limit_s, breaks_down - sets_out
         try:
-            async with asyncio.timeout(min(limit, breaks_down)):
+            async with asyncio.timeout(min(limit, lasts)):
                 await loop.run()
         except TimeoutError:
-            robot.is_broken = breaks_down < limit
+            robot.is_broken = lasts < limit
             session.failure = devices.away or f"not explored after {limit:g} s"
             if robot.is_broken:
                 session.failure = f"it broke down after {breaks_down:.0f} s, as configured"

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from gvgbot.geometry import Array
+from gvgbot.team.troubles import Troubles, TroublesConfig
 
 RADIUS = 0.177  # m, of either
 LEAST_GAP = 0.1  # m between both
@@ -72,7 +73,8 @@ def test_equal_seeds_leave_equal_maps_to_the_byte(tmp_path: Path) -> None:
 def test_one_robot_may_come_late_and_one_break_down(tmp_path: Path) -> None:
     run = tmp_path / "run"
     troubles = [f"twin.team.late_s={LATE}", "twin.team.breaks_down=true", "twin.team.within_s=9"]
-    summary = explore(run, *troubles, "twin.team.silent_s=5", "twin.time_limit_s=15")
+    troubles += ["twin.team.silent_s=5", "twin.seed=2"]  # with which these are two
+    summary = explore(run, *troubles, "twin.time_limit_s=15")
     reasons = str(summary["reason"]).split("; ")
     broken = [f"robot-{n}" for n, reason in enumerate(reasons, 1) if "broke down" in reason]
     assert len(broken) == 1
@@ -84,3 +86,16 @@ def test_one_robot_may_come_late_and_one_break_down(tmp_path: Path) -> None:
     (other,) = ways.keys() - set(broken)
     assert ways[other][-1, 0] - ways[other][0, 0] > 14.0
     assert gap(*ways.values()) >= LEAST_GAP
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+def test_who_comes_late_breaks_down_no_later_for_it(tmp_path: Path) -> None:
+    run, seed = tmp_path / "run", 5  # with which the late one breaks down on its way
+    troubles = ["twin.team.late_s=3", "twin.team.breaks_down=true", "twin.team.within_s=9"]
+    explore(run, *troubles, f"twin.seed={seed}", "twin.time_limit_s=7")
+    config = TroublesConfig(late_s=3.0, breaks_down=True, within_s=9.0)
+    moment = Troubles(config, 2, seed).breaks_down_s(0)
+    late, other = way(run, "robot-1"), way(run, "robot-2")
+    assert late[0, 0] - other[0, 0] == pytest.approx(3.0, abs=1.0)
+    assert late[-1, 0] - other[0, 0] == pytest.approx(moment, abs=0.5)
