@@ -335,7 +335,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     worlds = [(world, seed) for world in options.worlds for seed in options.seeds]
     low, high = options.plans or (1, 0)
     worlds += [(f"floor_plan:{number}", number) for number in range(low, high + 1)]
-    known = known_rows(options.out)
+    known = known_rows(options.out, options.overrides)
     rows = []
     profiles = [_profile(*both) for both in product(options.odometry, options.worse)]
     for (world, seed), odometry, laser in product(worlds, profiles, options.lasers):
@@ -367,7 +367,8 @@ def _row(name: str, overrides: Sequence[str]) -> Row:
         *overrides,
     ]
     with made_worse(odometry, float(worse or 1.0)):
-        return {"name": name, "odometry": profile, **run(settings)}
+        named = {"name": name, "odometry": profile, "settings": list(overrides)}
+        return named | run(settings)
 
 
 @contextlib.contextmanager
@@ -382,12 +383,12 @@ def made_worse(odometry: str, times: float) -> Iterator[None]:
         PROFILES[name] = usual
 
 
-def known_rows(out: Path | None) -> dict[str, Row]:
-    """The runs that a file holds, by name."""
+def known_rows(out: Path | None, overrides: Sequence[str]) -> dict[str, Row]:
+    """The runs with these overrides that a file holds, by name."""
     if out is None or not out.exists():
         return {}
     rows = [json.loads(text) for text in out.read_text(encoding="utf-8").splitlines()]
-    return {row["name"]: row for row in rows}
+    return {row["name"]: row for row in rows if row.get("settings", []) == list(overrides)}
 
 
 def _options(arguments: Sequence[str] | None) -> argparse.Namespace:

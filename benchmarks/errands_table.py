@@ -48,6 +48,7 @@ class Score:
 
     world: str
     seed: int
+    settings: list[str] = field(default_factory=list)
     explored: str = ""
     reached: int = 0
     refused: int = 0
@@ -223,9 +224,9 @@ def main() -> None:
     print(HEAD)
     for row in campaign.rows(
         options.out,
-        [(world, options.seed) for world in options.worlds],
-        lambda cases: (scored(world, options) for world, _ in cases),
-        case_of=lambda row: (row["world"], row["seed"]),
+        [(world, options.seed, tuple(options.overrides)) for world in options.worlds],
+        lambda cases: (scored(world, options) for world, *_ in cases),
+        case_of=lambda row: (row["world"], row["seed"], tuple(row.get("settings", ()))),
     ):
         score = Score(**row)
         print(score.row, flush=True)
@@ -235,7 +236,7 @@ def main() -> None:
 
 def scored(world: str, options: argparse.Namespace) -> Row:
     """What becomes of the requests in a world."""
-    score = Score(world, options.seed)
+    score = Score(world, options.seed, options.overrides)
     chosen = [f"twin.world={world}", f"twin.seed={options.seed}", *options.overrides]
     work = explore_and_visit(
         load_config(None, chosen), score, options.requests, verbose=options.verbose

@@ -11,6 +11,7 @@ half an hour. Distance and time are what passes until a right claim. Maps and re
 
 import argparse
 import math
+import re
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -76,21 +77,22 @@ def _rows(options: argparse.Namespace) -> Iterator[Row]:
     numbers = options.only or range(1, options.poses + 1)
     return campaign.rows(
         options.out / RESULTS,
-        product(options.worlds, numbers),
-        lambda cases: starmap(partial(_put_down, options), cases),
-        case_of=lambda row: (row["world"], row["pose"]),
+        product(options.worlds, numbers, [tuple(options.overrides)]),
+        lambda cases: starmap(partial(_put_down, options.out), cases),
+        case_of=lambda row: (row["world"], row["pose"], tuple(row.get("settings", ()))),
         anew=options.only is not None,
     )
 
 
-def _put_down(options: argparse.Namespace, world: str, number: int) -> Row:
-    known = options.out / world.replace("/", "-").replace(":", "-")
-    config = load_config(None, [f"twin.world={world}", "twin.seed=1", *options.overrides])
+def _put_down(out: Path, world: str, number: int, settings: tuple[str, ...]) -> Row:
+    known = out / re.sub(r"[^\w.]", "-", " ".join([world, *settings]))
+    config = load_config(None, [f"twin.world={world}", "twin.seed=1", *settings])
     if not (known / SNAPSHOT).exists():
         explore(config, out=known, real_time=False)
-    config = load_config(None, [f"twin.world={world}", f"twin.seed={number}", *options.overrides])
+    config = load_config(None, [f"twin.world={world}", f"twin.seed={number}", *settings])
+    named = {"world": world, "pose": number, "settings": settings}
     with tempfile.TemporaryDirectory() as directory:
-        return {"world": world, "pose": number} | kidnapped(config, known, number, Path(directory))
+        return named | kidnapped(config, known, number, Path(directory))
 
 
 def kidnapped(config: Config, known: Path, number: int, out: Path) -> Row:

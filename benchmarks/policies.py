@@ -90,7 +90,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run, print a line for each and the table."""
     options = _options(arguments)
     low, high = options.plans
-    kept, rows = known_rows(options.out), []
+    kept, rows = known_rows(options.out, options.overrides), []
     for plan in range(low, high + 1):
         for choice in options.choices:
             name = f"floor_plan:{plan} {choice} {options.laser}"
@@ -114,7 +114,8 @@ def _row(name: str, plan: int, choice: str, options: argparse.Namespace) -> Row:
     ]
     found = run(settings)
     kept = {key: found[key] for key in ("outcome", *(key for key, _, _ in COLUMNS))}
-    return {"name": name, "plan": plan, "choice": choice, **kept}
+    named = {"name": name, "plan": plan, "choice": choice, "settings": options.overrides}
+    return named | kept
 
 
 def _options(arguments: Sequence[str] | None) -> argparse.Namespace:

@@ -1,9 +1,12 @@
 """The measure of consistency against errors that are drawn from their covariances."""
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from benchmarks.consistency import Row, _mean_nees, made_worse, summary, table
+from benchmarks.consistency import Row, _mean_nees, known_rows, made_worse, summary, table
 from gvgbot.drivers.kobuki.odometry_error import PROFILES, ErringSensors
 
 
@@ -57,6 +60,15 @@ def test_the_table_has_a_line_for_each_kind_of_world_laser_and_odometry() -> Non
     assert plans.startswith("| `floor_plan` | UTM-30LX | `worn` | 2 | 3.00 (0.6 to 7.2) | 2.00 (")
     assert plans.endswith("| – | 6, 2 | 4 | 0.150, 0.200 | 0.200 |")
     assert streets.startswith("| `grid` | URG-04LX | `kobuki` | 1 |")
+
+
+def test_a_run_with_other_settings_is_another_one(tmp_path: Path) -> None:
+    out, settings = tmp_path / "out.jsonl", ["localisation=paper"]
+    rows = [ROW | {"settings": settings}, ROW]  # older rows do not say that there were none
+    out.write_text("".join(json.dumps(row) + "\n" for row in rows))
+    assert known_rows(out, settings) == {str(ROW["name"]): rows[0]}
+    assert known_rows(out, []) == {str(ROW["name"]): rows[1]}
+    assert known_rows(out, ["localisation=full"]) == {}
 
 
 def felt_scatter(metres: float = 1.0, tries: int = 2000) -> float:
