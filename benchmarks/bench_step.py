@@ -22,11 +22,10 @@ from gvgbot.autonomy.loop import Loop
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.config import Config, load_config
-from gvgbot.drivers.hokuyo.driver import HokuyoLaser
-from gvgbot.drivers.kobuki.driver import KobukiBase
 from gvgbot.geometry import Twist
 from gvgbot.hal.guard import Guard
 from gvgbot.hal.messages import Odometry, Scan
+from gvgbot.links import Links
 from gvgbot.simulation import Simulation, open_place
 
 DEFAULT_WORLDS = ("office", "floor_plan:201")
@@ -87,8 +86,8 @@ async def explore(config: Config, pipeline: Pipeline) -> float:
     """Drive through the twins until there is an outcome; seconds of the robot's clock."""
     clock = LoopClock()
     simulation = Simulation(config, open_place(config), clock)
-    laser = HokuyoLaser(simulation.laser, config.laser, clock)
-    base = KobukiBase(simulation.base, config.base, clock)
+    links = Links(config, clock, simulation)
+    (laser, _), (base, _) = await links.open_laser(), await links.open_base()
     guard = Guard(config.robot.limits, config.robot.radius_m)
     loop = Loop(laser, base, pipeline, guard, on_events=lambda _: None, on_cycle=lambda _: None)
     async with asyncio.TaskGroup() as tasks:

@@ -37,13 +37,12 @@ from gvgbot.autonomy.loop import Loop
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.config import Config, load_config
-from gvgbot.drivers.hokuyo.driver import HokuyoLaser
-from gvgbot.drivers.kobuki.driver import KobukiBase
 from gvgbot.drivers.kobuki.odometry_error import PROFILES, OdometryError, OdometryProfile
 from gvgbot.errors import GvgbotError
 from gvgbot.geometry import Array, Pose, rotated_covariance, wrap_angle
 from gvgbot.hal.guard import Guard
 from gvgbot.hal.messages import Odometry, Scan
+from gvgbot.links import Links
 from gvgbot.simulation import Simulation, open_place
 
 MATCH = 1.5  # m: a vertex farther from the true one is another
@@ -81,8 +80,8 @@ async def explore(config: Config, pipeline: Pipeline, truth: list[tuple[float, .
     """Drive until there is an outcome, or no more time; rows of stamp and world_base."""
     clock = LoopClock()
     simulation = Simulation(config, open_place(config), clock)
-    laser = HokuyoLaser(simulation.laser, config.laser, clock)
-    base = KobukiBase(simulation.base, config.base, clock)
+    links = Links(config, clock, simulation)
+    (laser, _), (base, _) = await links.open_laser(), await links.open_base()
 
     def note(odometry: Odometry) -> None:
         simulation.body.advance(odometry.stamp)

@@ -6,8 +6,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.consistency import Row, _mean_nees, known_rows, made_worse, summary, table
+from benchmarks.consistency import (
+    Row,
+    Watched,
+    _mean_nees,
+    explore,
+    known_rows,
+    made_worse,
+    summary,
+    table,
+)
+from gvgbot.clock import run_in_virtual_time
+from gvgbot.config import load_config
 from gvgbot.drivers.kobuki.odometry_error import PROFILES, ErringSensors
+from gvgbot.geometry import Pose
 
 
 def drawn(scale: float, size: int) -> float:
@@ -69,6 +81,21 @@ def test_a_run_with_other_settings_is_another_one(tmp_path: Path) -> None:
     assert known_rows(out, settings) == {str(ROW["name"]): rows[0]}
     assert known_rows(out, []) == {str(ROW["name"]): rows[1]}
     assert known_rows(out, ["localisation=full"]) == {}
+
+
+def driven(*settings: str) -> list[Pose]:
+    """odom_base at the keyframes of the first seconds with wheels alone."""
+    usual = ["twin.world=ring", "twin.laser.model=URG-04LX", "twin.time_limit_s=8"]
+    config = load_config(None, [*usual, "twin.base.odometry=wheels", *settings])
+    pipeline = Watched(config)
+    run_in_virtual_time(explore(config, pipeline, []))
+    return [keyframe.odom_base for keyframe in pipeline.keyframes]
+
+
+def test_a_base_without_a_gyro_is_measured_by_its_wheels() -> None:
+    poses = driven()
+    assert len(poses) > 5
+    assert poses == driven("base.heading=wheels")
 
 
 def felt_scatter(metres: float = 1.0, tries: int = 2000) -> float:
