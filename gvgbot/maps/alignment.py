@@ -15,6 +15,7 @@ from scipy.spatial.distance import cdist
 from gvgbot.geometry import Array, Pose, resampled
 from gvgbot.maps.moved import moved_graph
 from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
+from gvgbot.team.alignment import least_squares
 
 _MOST_TRIES = 4000  # the longest edges come first: they give the best angles
 _FITS = 10  # rounds of pairing and fitting, more than were ever needed
@@ -82,15 +83,8 @@ def _fitted(a: Array, b: Array, pose: Pose, reach: float) -> Pose:
         if len(pairs) < 2:
             return pose
         ours, theirs = [i for i, _, _ in pairs], [j for _, j, _ in pairs]
-        pose = _least_squares(_as_complex(a[ours]), _as_complex(b[theirs]))
+        pose, _ = least_squares(a[ours, :2], b[theirs, :2])
     return pose
-
-
-def _least_squares(a: Complex, b: Complex) -> Pose:
-    """The pose of b's frame in a's for which point after point are nearest to each other."""
-    turn = np.vdot(b - b.mean(), a - a.mean())
-    shift = a.mean() - b.mean() * turn / (abs(turn) or 1.0)
-    return Pose(float(shift.real), float(shift.imag), float(np.angle(turn)))
 
 
 def _best(a: RouteGraph, b: RouteGraph, reach: float) -> Pose:

@@ -475,7 +475,8 @@ def least_squares(a: Array, b: Array) -> tuple[Pose, Array]:
     """The pose for which b's points (N, 2), laid by it, are nearest to a's; its covariance."""
     u, v = a[:, 0] + 1j * a[:, 1], b[:, 0] + 1j * b[:, 1]
     turn = np.vdot(v - v.mean(), u - u.mean())
-    shift = u.mean() - v.mean() * turn / (abs(turn) or 1.0)
+    turn = turn / abs(turn) if turn else 1.0  # one point says nothing of it
+    shift = u.mean() - v.mean() * turn
     pose = Pose(float(shift.real), float(shift.imag), float(np.angle(turn)))
     off = a - pose.transform(b)
     variance = max(float((off**2).sum() / max(1, 2 * len(a) - 3)), 1e-4)
