@@ -35,9 +35,5 @@ class DeviceRefused(GvgbotError):
     """The device answered that it cannot do what was asked."""
 
 
-class Unsafe(GvgbotError):
-    """Stand still until a person has looked."""
-
-
 class Deadlock(GvgbotError):
     """In virtual time every task waits for something that nothing will ever do."""

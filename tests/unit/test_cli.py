@@ -7,7 +7,7 @@ import pytest
 
 from gvgbot import __version__
 from gvgbot.cli import main, status_of
-from gvgbot.errors import ConfigError, DeviceLost, ExtraMissing, Unsafe, UsageError, WorldError
+from gvgbot.errors import ConfigError, DeviceLost, ExtraMissing, UsageError, WorldError
 
 Captured = pytest.CaptureFixture[str]
 
@@ -121,7 +121,6 @@ def raising(error: BaseException) -> int:
         (ConfigError("no such world"), 2),
         (WorldError("no such world"), 2),
         (DeviceLost("no such world"), 1),
-        (Unsafe("no such world"), 1),
     ],
     ids=lambda value: type(value).__name__,
 )

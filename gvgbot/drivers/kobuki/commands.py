@@ -21,7 +21,6 @@ from gvgbot.geometry import Twist
 WHEEL_BASE_MM = 230.0
 _EPSILON = 1e-4  # m/s and rad/s: less counts as zero
 _S16_MAX = 32767
-_NOTE_PERIOD_S = 0.00000275  # one digit of a note's period
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,12 +73,6 @@ class Sound:
 
     note: int
     duration_ms: int
-
-    @classmethod
-    def of_frequency(cls, frequency_hz: float, duration_s: float) -> Self:
-        """The note of a frequency, clamped to what the fields hold."""
-        note = int(1 / (frequency_hz * _NOTE_PERIOD_S))
-        return cls(min(note, 0xFFFF), min(round(1000 * duration_s), 0xFF))
 
 
 class Melody(IntEnum):

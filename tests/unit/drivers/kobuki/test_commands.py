@@ -116,14 +116,6 @@ def test_a_radius_that_means_a_turn_on_the_spot_is_sent_as_one() -> None:
     assert BaseControl.from_twist(Twist(0.001, 1.0)) == BaseControl(115, 1)
 
 
-def test_a_note_is_its_period() -> None:
-    assert Sound.of_frequency(440.0, 0.2) == Sound(826, 200)
-
-
-def test_a_note_too_low_or_too_long_is_the_lowest_and_the_longest() -> None:
-    assert Sound.of_frequency(1.0, 60.0) == Sound(65535, 255)
-
-
 def test_the_bits_of_the_outputs_are_those_of_the_protocol() -> None:
     """Digital outputs 0 to 3, power, then two lamps of two colours: one bit after the other."""
     assert [output.name for output in Output] == [
