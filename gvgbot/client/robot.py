@@ -184,9 +184,12 @@ class Robot:
         return self._signs.presence(time.perf_counter(), linked=self._is_linked())
 
     def others(self) -> list[str]:
-        """The names of all robots that are on this network now."""
+        """The names of all robots on this network now. Raises GvgbotError if it is closed."""
         assert self._session is not None, "the robot is not connected: use `with`"
-        return _names(self._session)
+        try:
+            return _names(self._session)
+        except zenoh.ZError as error:
+            raise GvgbotError("the connection to the robot is closed") from error
 
     def _is_linked(self) -> bool:
         if self._session is None:

@@ -440,6 +440,14 @@ def test_a_robot_of_another_name_is_told_from_none(endpoint: str) -> None:
         assert client.robots(endpoint) == ["near"]
 
 
+def test_what_is_asked_of_a_connection_that_is_closed_is_an_error_in_words(endpoint: str) -> None:
+    with a_robot(endpoint), client.connect("near", endpoint) as seen:
+        pass
+    for ask in (seen.others, seen.pause):
+        with pytest.raises(GvgbotError, match="the connection to the robot is closed"):
+            ask()
+
+
 def test_silence_is_told_from_absence(endpoint: str) -> None:
     with a_robot(endpoint) as robot, client.connect("near", endpoint) as seen:
         robot.publish(EXAMPLE)
