@@ -240,7 +240,7 @@ def _tell(robot: _Robot, air: _Air, stamp: float) -> None:
     """Let the others hear the news."""
     robot.told = stamp
     pipeline = robot.session.pipeline
-    air.send(robot.member.news(stamp, pipeline.map_base, 0.0, finished=robot.is_over), robot)
+    air.send(robot.member.news(stamp, pipeline.map_base, finished=robot.is_over), robot)
 
 
 def _save(directory: RunDirectory, robots: list[_Robot]) -> list[_Robot]:

@@ -88,7 +88,7 @@ class LiveTeam:
             if not pipeline.is_lost:
                 finished = pipeline.errands.is_resting
                 now = self._clock.now()
-                news = self.member.news(now, pipeline.map_base, 0.0, finished=finished)
+                news = self.member.news(now, pipeline.map_base, finished=finished)
                 self._network.tell_team("team", encode(news))
             await self._clock.sleep_until(self._clock.now() + self._config.tell_every_s)
 

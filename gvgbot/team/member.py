@@ -129,7 +129,7 @@ class Member:
 
     # -- what is told and heard --------------------------------------------------------------------
 
-    def news(self, stamp: float, map_base: Pose, speed: float, *, finished: bool) -> News:
+    def news(self, stamp: float, map_base: Pose, *, finished: bool) -> News:
         """What to tell the others now."""
         self._stamp = stamp
         self._chart = self._own_chart()
@@ -145,10 +145,8 @@ class Member:
             robot=self.name,
             life=self._life,
             sequence=self._sequence,
-            stamp=stamp,
             pose=(map_base.x, map_base.y, map_base.theta),
             radius=self._radius,
-            speed=speed,
             claim=self._claim,
             finished=finished,
             frames=frames,

@@ -87,10 +87,8 @@ class News(msgspec.Struct, frozen=True, kw_only=True, tag="news"):
     robot: str
     life: int  # another one after a restart: the map frame is a new one
     sequence: int
-    stamp: float  # s, the robot's own clock
     pose: Triple  # map_base
     radius: Radius  # m, of its body
-    speed: float  # m/s
     claim: Claim | None
     finished: bool  # it does not drive any more
     frames: tuple[Frame, ...]

@@ -116,7 +116,7 @@ async def _met() -> tuple[Explorer, Explorer]:
         for name, start in zip(("one", "two"), STARTS, strict=True)
     ]
     for explorer, other in (both, both[::-1]):
-        explorer.member.hear(other.member.news(0.0, Pose(), 0.0, finished=False), 0.0)
+        explorer.member.hear(other.member.news(0.0, Pose(), finished=False), 0.0)
     for explorer, other in (both, both[::-1]):
         explorer.simulation.meet([other.simulation])
     async with asyncio.TaskGroup() as tasks:

@@ -38,7 +38,7 @@ class Robot:
     def tell(
         self, stamp: float, *others: "Robot", finished: bool = False, at: Pose | None = None
     ) -> None:
-        news = encode(self.member.news(stamp, at or Pose(), 0.0, finished=finished))
+        news = encode(self.member.news(stamp, at or Pose(), finished=finished))
         for other in others:
             other.member.hear(decode(news), stamp)
 
@@ -150,14 +150,14 @@ def test_a_frontier_found_since_the_last_news_is_chosen_at_once() -> None:
 
 def test_old_news_do_not_replace_new_ones_and_a_restart_begins_anew() -> None:
     one, two = team()
-    old = decode(encode(two.member.news(3.0, Pose(), 0.0, finished=False)))
-    new = decode(encode(two.member.news(4.0, Pose(1.0, 0.0, 0.0), 0.0, finished=False)))
+    old = decode(encode(two.member.news(3.0, Pose(), finished=False)))
+    new = decode(encode(two.member.news(4.0, Pose(1.0, 0.0, 0.0), finished=False)))
     one.member.hear(new, 4.0)
     place_then = one.member.others()["two"]
     one.member.hear(old, 4.0)
     assert one.member.others()["two"] == place_then
     restarted = Member("two", CONFIG, lambda: two.chart, radius=0.2, life=1)
-    one.member.hear(restarted.news(5.0, Pose(), 0.0, finished=False), 5.0)
+    one.member.hear(restarted.news(5.0, Pose(), finished=False), 5.0)
     assert "two" not in one.member.frames  # its map frame is another one now
 
 

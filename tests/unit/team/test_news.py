@@ -20,10 +20,8 @@ def news(chart: Chart) -> News:
         robot="one",
         life=3,
         sequence=7,
-        stamp=12.5,
         pose=(1.0, 2.0, 0.5),
         radius=0.25,
-        speed=0.3,
         claim=Claim(1.0, 2.0, 0.1, 12.0),
         finished=False,
         frames=(Frame("two", 8, (4.0, 5.0, 0.6)),),
@@ -48,6 +46,12 @@ def test_a_chart_arrives_as_it_was_to_the_centimetre() -> None:
     for key, edge in CHART.edges.items():
         assert (chart.edges[key].a, chart.edges[key].b) == (edge.a, edge.b)
         np.testing.assert_allclose(chart.edges[key].polyline, edge.polyline, atol=1e-5)
+
+
+def test_what_older_robots_tell_besides_is_passed_over() -> None:
+    told = msgspec.msgpack.decode(encode(news(CHART)))
+    assert not {"stamp", "speed"} & set(told)
+    assert decode(msgspec.msgpack.encode(told | {"stamp": 12.5, "speed": 0.0})) == news(CHART)
 
 
 @given(data=st.data())
