@@ -15,6 +15,7 @@ from gvgbot.autonomy.driven_edges import DrivenEdges
 from gvgbot.autonomy.events import Decision, Event, Finished, Recovery
 from gvgbot.autonomy.examination import Examination
 from gvgbot.autonomy.exploration.access import NEAR_M, access, way_to_edge
+from gvgbot.autonomy.exploration.attempts import Attempts
 from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.exploration.headway import Headway
 from gvgbot.autonomy.exploration.hindrance import Hindrance
@@ -51,7 +52,7 @@ class Mission:
         self.remark = ""  # on how certain the map is, for the end
         self._budget_m = math.inf  # of `travelled`, for the present target
         self._newest_m = 0.0  # of the target edge that has been driven
-        self._headway = Headway()
+        self._headway, self._attempts = Headway(), Attempts()
         self._driven = DrivenEdges(mapper)
         self._frontiers: set[HalfEdgeId] = set()  # that were known at the last view
         self._looked_around = 0
@@ -190,6 +191,8 @@ class Mission:
         target = self.target
         half = None if target is None else graph.half_edge(target)
         if target is None or half is None or not half.open:
+            if target is not None:
+                self._attempts.end()
             self.target = self._choose(view, here)
             self._frontiers = set(graph.frontiers())
         else:
@@ -228,8 +231,15 @@ class Mission:
                 return None
             self._scouting.end()
             chosen, reason = nearest[0], "nearest frontier"
+        if self._attempts.are_vain(self._place_of(chosen)):
+            self._leave(view, chosen, "whenever it is explored there is another one", retries=0)
+            return None
         self._commit(view, here, chosen, reason)
         return chosen
+
+    def _place_of(self, end: HalfEdgeId) -> Array:
+        """Where its vertex stands (2,), m, map frame."""
+        return self._mapper.belief.map_vertex(end.vertex).position
 
     def _reconsidered(self, view: View, here: Situation, target: HalfEdgeId) -> HalfEdgeId | None:
         """The target, or a frontier found just now that is nearer than what is left of the way."""
@@ -242,12 +252,13 @@ class Mission:
         if not self.choice.keeps(target, starts):
             return self._choose(view, here)
         nearer = self.choice.nearer(target, found, starts)
-        if nearer is None:
+        if nearer is None or self._attempts.are_vain(self._place_of(nearer)):
             return target
         self._commit(view, here, nearer, "nearer frontier")
         return nearer
 
     def _commit(self, view: View, here: Situation, chosen: HalfEdgeId, reason: str) -> None:
+        self._attempts.begin(self._place_of(chosen))
         starts = here.starts()
         away = max((s.metres for s in starts), default=0.0)
         total = sum(e.length for e in self._mapper.graph.edges.values())
@@ -402,9 +413,13 @@ class Mission:
             self._events.append(Recovery(view.stamp, "go back", reason))
             return
         assert self.target is not None, "it has a half-edge"
-        self._obstructions.close(self._mapper.graph, [self.target], view.stamp, retries=_SECOND)
-        self._events.append(Recovery(view.stamp, "give up a frontier", reason))
+        self._leave(view, self.target, reason, retries=_SECOND)
         self.target = None
+
+    def _leave(self, view: View, frontier: HalfEdgeId, reason: str, *, retries: int) -> None:
+        """Give up a frontier, to be tried again so many times in the end."""
+        self._obstructions.close(self._mapper.graph, [frontier], view.stamp, retries=retries)
+        self._events.append(Recovery(view.stamp, "give up a frontier", reason))
 
     def _forget_strays(self, view: View) -> None:
         """Forget what nothing leads to; if there was something, it may be missing now."""

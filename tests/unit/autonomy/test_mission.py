@@ -173,6 +173,22 @@ def test_without_an_edge_in_sight_the_robot_looks_around_and_then_gives_up() -> 
     assert len(robot.said(Finished)) == 1
 
 
+def test_where_another_frontier_comes_whenever_one_is_explored_it_goes_away_in_the_end() -> None:
+    """A departure that is seen now and not then, at a threshold of sight."""
+    robot = Robot()
+    while robot.mission.outcome is None and robot.stamp < 10_000.0:
+        robot.look(TEE)
+        target = robot.mission.target
+        if target is not None:
+            vertex = robot.mapper.graph.vertices[target.vertex]
+            bearing = vertex.half_edges[target.key].bearing
+            robot.mapper.graph.remove_half_edge(target)
+            vertex.add_half_edge(bearing)
+    assert robot.mission.outcome == "explored_with_blocked"
+    given_up = [e.reason for e in robot.said(Recovery) if isinstance(e, Recovery)]
+    assert "whenever it is explored there is another one" in given_up
+
+
 def test_who_has_a_map_and_sees_no_edge_any_more_has_not_failed() -> None:
     """Stuck in a narrow door, for instance: what it has mapped is there all the same."""
     robot = Robot()
