@@ -19,6 +19,7 @@ RequestName = Literal[
     "set",
 ]
 REQUESTS: tuple[RequestName, ...] = get_args(RequestName)
+STOPS: tuple[RequestName, ...] = ("pause", "stop")  # are heard in any crowd
 MESSAGEPACK, JSON = "application/msgpack", "application/json"
 
 _LONGEST_KEY = 100  # characters

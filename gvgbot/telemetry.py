@@ -12,7 +12,7 @@ import zenoh
 import zenoh.ext
 
 from gvgbot.errors import GvgbotError
-from gvgbot.requests import JSON, MESSAGEPACK, Answer, Asked, request_key
+from gvgbot.requests import JSON, MESSAGEPACK, STOPS, Answer, Asked, request_key
 from gvgbot.topics import (
     HEARTBEAT,
     TEAM_PARTS,
@@ -27,7 +27,9 @@ from gvgbot.topics import (
 from gvgbot.zenoh_config import addresses, reason, session_config
 
 _WAITING_QUERIES = 32  # more than this are dropped, oldest first; who asked gets nothing
-_WAITING_REQUESTS = 8
+# While as many wait, others are refused; then dropped; then even those that stop the robot.
+_WAITING_REQUESTS, _WAITING_REFUSALS, _WAITING_STOPS = 8, 100, 200
+_CROWDED = Answer(done=False, text="too many requests wait: ask again")
 _MAX_SESSIONS = 32
 _LONGEST_NAME, _LONGEST_ARGUMENTS = 80, 1000  # bytes of who asks, and of what
 _MISSES = zenoh.ext.MissDetectionConfig(heartbeat=HEARTBEAT, sporadic_heartbeat=None)
@@ -37,6 +39,7 @@ _PRIORITIES = {
     "data": zenoh.Priority.DATA,
     "data_low": zenoh.Priority.DATA_LOW,
 }
+Handle = Callable[[Asked], Awaitable[Answer]]
 
 
 class Telemetry:
@@ -165,17 +168,22 @@ class Telemetry:
             encode, encoding = _form(topic, query.parameters.get("format"))
             query.reply(topic.key(self._robot), encode(latest), encoding=encoding)
 
-    async def hear(self, handle: Callable[[Asked], Awaitable[Answer]]) -> None:
+    async def hear(self, handle: Handle) -> None:
         """Put requests to the handler as they come, and send its answers, until cancelled.
 
-        A query for several keys at once is none: who reads all that a robot has to say must not
-        find that it has stopped.
+        Of a crowd the first are heard, and those that stop the robot. A query for several keys at
+        once is none: who reads all that a robot has to say must not find that it has stopped.
         """
         loop, arrived = asyncio.get_running_loop(), asyncio.Event()
-        waiting: deque[zenoh.Query] = deque(maxlen=_WAITING_REQUESTS)
+        waiting: deque[tuple[zenoh.Query, str, Handle]] = deque()
+        stops = {request_key(self._robot, name) for name in STOPS}
 
         def take(query: zenoh.Query) -> None:
-            waiting.append(query)
+            key, others = str(query.key_expr), len(waiting)
+            if others < (_WAITING_STOPS if key in stops else _WAITING_REQUESTS):
+                waiting.append((query, key, handle))
+            elif others < _WAITING_REFUSALS:
+                waiting.append((query, key, _refuse))
             loop.call_soon_threadsafe(arrived.set)
 
         every = request_key(self._robot, "*")
@@ -185,16 +193,13 @@ class Telemetry:
                     await arrived.wait()
                     arrived.clear()
                     while waiting:
-                        query = waiting.popleft()
-                        key = str(query.key_expr)
+                        query, key, handler = waiting.popleft()
                         if "*" in key:
                             query.drop()  # type: ignore[no-untyped-call]
                         else:  # one that takes long must not hold up the next
-                            tasks.create_task(self._put(query, key, handle))
+                            tasks.create_task(self._put(query, key, handler))
 
-    async def _put(
-        self, query: zenoh.Query, key: str, handle: Callable[[Asked], Awaitable[Answer]]
-    ) -> None:
+    async def _put(self, query: zenoh.Query, key: str, handle: Handle) -> None:
         with query:
             answer = await handle(_asked(query, key))
             await asyncio.to_thread(_tell, query, key, answer)
@@ -213,6 +218,10 @@ class Telemetry:
         trace: TracebackType | None,
     ) -> None:
         self.close()
+
+
+async def _refuse(_: Asked) -> Answer:
+    return _CROWDED
 
 
 def _asked(query: zenoh.Query, key: str) -> Asked:

@@ -5,6 +5,7 @@ import json
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from pathlib import Path
@@ -166,6 +167,29 @@ def test_a_slow_answer_does_not_hold_up_the_next_request(endpoint: str) -> None:
             assert await saving == "does save"
 
     asyncio.run(story())
+
+
+def test_a_crowd_of_requests_is_refused_and_a_pause_among_them_is_done(endpoint: str) -> None:
+    asked: list[str] = []
+
+    async def note(one: Asked) -> Answer:
+        asked.append(one.name)
+        return await obliging(one)
+
+    async def story() -> list[zenoh.Reply]:
+        async with a_robot(endpoint, note):
+            with plain_session(endpoint) as session:
+                names = [*["home"] * 30, "pause", *["home"] * 30]
+                replies = [session.get(f"gvgbot/near/ctl/{name}", timeout=5.0) for name in names]
+                time.sleep(0.5)  # noqa: ASYNC251, TID251  # a busy loop
+                return [reply for each in replies for reply in await asyncio.to_thread(list, each)]
+
+    replies = asyncio.run(story())
+    refusals = [msgspec.msgpack.decode(one.err.payload.to_bytes()) for one in replies if one.err]
+    assert len(replies) == 61
+    assert "pause" in asked
+    assert len(asked) + len(refusals) == 61
+    assert {told["text"] for told in refusals} == {"too many requests wait: ask again"}
 
 
 def test_who_asks_can_name_itself_but_not_flood_the_log(endpoint: str) -> None:
