@@ -11,7 +11,7 @@ from typing import TypeVar
 from gvgbot import client
 from gvgbot.client import Asking, Robot, State
 from gvgbot.errors import GvgbotError, UsageError
-from gvgbot.requests import Goto, Set
+from gvgbot.requests import Goto, Patrol, Set
 from gvgbot.topics import Events, Grid, Health, Map, Odometry, Plan, Scan, Tile, Trajectory
 from gvgbot.web.viewers import Audience
 from gvgbot.web.wire import Floor, History, Kind, Link, Reply, Wish
@@ -155,6 +155,8 @@ class Feed:
                 return robot.goto(vertex)
             case Set(key=key, value=value):
                 return robot.set(key, value)
+            case Patrol(vertices=vertices):
+                return robot.patrol(*vertices)
             case _:
                 return getattr(robot, wish.name)()  # type: ignore[no-any-return]
 

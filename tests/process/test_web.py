@@ -30,14 +30,16 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from gvgbot import client
-from gvgbot.requests import Answer, Asked, Goto
+from gvgbot.requests import REQUESTS, Answer, Asked, Goto, parse
 from gvgbot.telemetry import Telemetry
 from gvgbot.topics import Event, Events, Health, Mate, State, TelemetryConfig, Trajectory
+from gvgbot.web.feed import Feed
 from gvgbot.web.server import Web
 from gvgbot.web.viewers import Audience
 from gvgbot.web.wire import Reply, Wish
 from tests.process.addresses import free_endpoint, plain_session, router
 from tests.process.browser import Page, browser, chromium
+from tests.process.test_requests import a_robot
 from tests.unit.monitor.maps import a_grid, a_map, vertex
 from tests.unit.test_telemetry import EXAMPLE
 
@@ -113,6 +115,39 @@ def test_a_wish_is_answered_to_who_had_it() -> None:
             assert (await received(two))[0] == "events"
 
     run(story)
+
+
+WISHES: dict[str, dict[str, object]] = {
+    "pause": {},
+    "goto": {"vertex": 7},
+    "patrol": {"vertices": [3, 7]},
+    "set": {"key": "exploration.patience_s", "value": 30},
+}
+
+
+def test_a_wish_comes_to_the_robot_with_its_arguments() -> None:
+    wishes = [Wish(id=1, name="goto", arguments={"x": 1.5, "y": -2.0})]
+    wishes += [Wish(id=2, name=name, arguments=WISHES.get(name, {})) for name in REQUESTS]
+    asked: list[Asked] = []
+
+    async def note(one: Asked) -> Answer:
+        asked.append(one)
+        return Answer(done=True, text=f"does {one.name}")
+
+    async def story() -> list[str]:
+        endpoint = free_endpoint()
+        feed = Feed("near", endpoint, None, Audience())
+        async with a_robot(endpoint, note), asyncio.TaskGroup() as tasks:
+            watching = tasks.create_task(feed.run())
+            while not (await feed.fulfil(wishes[0])).done:  # noqa: ASYNC110
+                await asyncio.sleep(0.01)
+            told = [(await feed.fulfil(wish)).text for wish in wishes[1:]]
+            watching.cancel()
+            return told
+
+    assert asyncio.run(story()) == [f"does {wish.name}" for wish in wishes[1:]]
+    heard = [parse(one.name, one.data, one.encoding) for one in asked]
+    assert heard == [wish.typed for wish in wishes]
 
 
 @pytest.mark.parametrize("text", ["drive!", '{"id": 1, "name": "fly"}', "x" * 5000, b"\x00"])
