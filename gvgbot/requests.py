@@ -22,6 +22,7 @@ REQUESTS: tuple[RequestName, ...] = get_args(RequestName)
 STOPS: tuple[RequestName, ...] = ("pause", "stop")  # are heard in any crowd
 MESSAGEPACK, JSON = "application/msgpack", "application/json"
 
+LONGEST_ARGUMENTS = 25_000  # bytes; of the most vertices, by the largest ids, in JSON
 _LONGEST_KEY = 100  # characters
 _FARTHEST_M = 1e5
 _MOST_VERTICES = 1000
@@ -118,6 +119,8 @@ def parse(name: str, data: bytes, encoding: str) -> Arguments:
     """
     if name not in REQUESTS:
         raise ValueError(f"there is no such request; there are {', '.join(REQUESTS)}")
+    if len(data) > LONGEST_ARGUMENTS:
+        raise ValueError(f"wrong arguments of {name}: more than {LONGEST_ARGUMENTS} bytes")
     if not data:
         data, encoding = b"{}", JSON
     decode = msgspec.json.decode if encoding.startswith(JSON) else msgspec.msgpack.decode

@@ -12,7 +12,15 @@ import zenoh
 import zenoh.ext
 
 from gvgbot.errors import GvgbotError
-from gvgbot.requests import JSON, MESSAGEPACK, STOPS, Answer, Asked, request_key
+from gvgbot.requests import (
+    JSON,
+    LONGEST_ARGUMENTS,
+    MESSAGEPACK,
+    STOPS,
+    Answer,
+    Asked,
+    request_key,
+)
 from gvgbot.topics import (
     HEARTBEAT,
     TEAM_PARTS,
@@ -31,7 +39,7 @@ _WAITING_QUERIES = 32  # more than this are dropped, oldest first; who asked get
 _WAITING_REQUESTS, _WAITING_REFUSALS, _WAITING_STOPS = 8, 100, 200
 _CROWDED = Answer(done=False, text="too many requests wait: ask again")
 _MAX_SESSIONS = 32
-_LONGEST_NAME, _LONGEST_ARGUMENTS = 80, 1000  # bytes of who asks, and of what
+_LONGEST_NAME = 80  # bytes of who asks
 _MISSES = zenoh.ext.MissDetectionConfig(heartbeat=HEARTBEAT, sporadic_heartbeat=None)
 _PRIORITIES = {
     "interactive_high": zenoh.Priority.INTERACTIVE_HIGH,
@@ -227,8 +235,7 @@ async def _refuse(_: Asked) -> Answer:
 def _asked(query: zenoh.Query, key: str) -> Asked:
     data = b"" if query.payload is None else query.payload.to_bytes()
     encoding = MESSAGEPACK if query.encoding is None else str(query.encoding)
-    if len(data) > _LONGEST_ARGUMENTS:
-        data = data[:_LONGEST_ARGUMENTS]  # which is wrong, and will be called so
+    data = data[: LONGEST_ARGUMENTS + 1]  # what is cut is too long still, and will be called so
     return Asked(_printable(key.rpartition("/")[2]), data, encoding, _origin(query))
 
 

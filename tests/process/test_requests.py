@@ -16,7 +16,7 @@ import zenoh
 
 from gvgbot import client
 from gvgbot.errors import GvgbotError
-from gvgbot.requests import Answer, Asked, Goto, Set, parse
+from gvgbot.requests import Answer, Asked, Goto, Patrol, Set, parse
 from gvgbot.telemetry import Telemetry
 from gvgbot.topics import TelemetryConfig
 from tests.process.addresses import free_endpoint, plain_session, router
@@ -167,6 +167,26 @@ def test_a_slow_answer_does_not_hold_up_the_next_request(endpoint: str) -> None:
             assert await saving == "does save"
 
     asyncio.run(story())
+
+
+def test_a_long_patrol_is_heard_whole_and_what_is_longer_called_too_long(endpoint: str) -> None:
+    vertices = tuple(range(1000, 2000))
+    asked: list[Asked] = []
+
+    async def note(one: Asked) -> Answer:
+        asked.append(one)
+        return await obliging(one)
+
+    async def story() -> None:
+        async with a_robot(endpoint, note), client.connect("near", endpoint) as robot:
+            await robot.patrol(*vertices)
+            await robot.patrol(*range(2**62, 2**62 + 10_000))
+
+    asyncio.run(story())
+    whole, cut = [(one.name, one.data, one.encoding) for one in asked]
+    assert parse(*whole) == Patrol(vertices=vertices)
+    with pytest.raises(ValueError, match="more than 25000 bytes"):
+        parse(*cut)
 
 
 def test_a_crowd_of_requests_is_refused_and_a_pause_among_them_is_done(endpoint: str) -> None:

@@ -73,11 +73,20 @@ def test_nothing_at_all_stands_for_no_arguments() -> None:
         ("pause", '{"for": 3}', "for"),
         ("pause", "nonsense", "malformed"),
         ("pause", "[" * 900, ""),
+        ("pause", "[" * 24_000, ""),
+        ("pause", "[" * 30_000, "more than 25000 bytes"),
     ],
 )
 def test_wrong_arguments_are_called_wrong_in_words(name: str, text: str, says: str) -> None:
     with pytest.raises(ValueError, match=f"wrong arguments of {name}.*{says}"):
         parse(name, text.encode(), JSON)
+
+
+@pytest.mark.parametrize("space", ["", " "])
+def test_the_longest_patrol_is_not_too_long(space: str) -> None:
+    vertices = [2**63 - 1 - each for each in range(1000)]
+    text = json.dumps({"vertices": vertices}, separators=(f",{space}", f":{space}"))
+    assert parse("patrol", text.encode(), JSON) == Patrol(vertices=tuple(vertices))
 
 
 @given(st.sampled_from(REQUESTS), st.binary(max_size=200), st.sampled_from([JSON, MESSAGEPACK]))
