@@ -107,7 +107,7 @@ class Simulation:
         self.plug_base: Callable[[bool], None] = cable.plug  # of the link that is in use
         self.plug_laser: Callable[[bool], None] = laser_cable.plug
         self.laser_twin = FaultyLink(
-            HokuyoTwin(config.twin.laser, eye.sweep, laser_seed, self._reboot_laser),
+            HokuyoTwin(config.twin.laser, eye.sweep, laser_seed, self._reboot_laser, clock.now()),
             config.twin.laser.link,
             laser_seed,
             self._pull_laser,

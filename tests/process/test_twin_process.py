@@ -84,6 +84,16 @@ def frames(data: bytes) -> list[bytes]:
     return found
 
 
+def test_the_laser_boots_when_it_is_started_and_its_clock_begins_then(tmp_path: Path) -> None:
+    start_ms, boot_ms = 0x500000, 2000
+    settings = (f"twin.laser.clock_start_ms={start_ms}", f"twin.laser.boot_s={boot_ms / 1000}")
+    with twins(tmp_path, *settings), opened(tmp_path / "laser") as client:
+        os.write(client, b"II\n")
+        answer = collect(client, lambda data: data.endswith(b"\n\n"))
+    (shown,) = (line[5:11] for line in answer.split(b"\n") if line.startswith(b"TIME:"))
+    assert boot_ms <= int(shown, 16) - start_ms < boot_ms + 1000 * PATIENCE
+
+
 def test_any_program_can_talk_to_the_base_and_come_and_go(tmp_path: Path) -> None:
     with twins(tmp_path):
         for _ in range(2):

@@ -35,16 +35,20 @@ class HokuyoTwin:
         sense: Callable[[float], Array],
         seed: int,
         plug: Callable[[bool], None] = lambda _: None,
+        on_since: float = 0.0,
     ) -> None:
-        """`plug` is told when the laser leaves its link to reboot (False), and returns (True)."""
+        """`plug` is told when the laser leaves its link to reboot (False), and returns (True).
+
+        `on_since` is when it was switched on, s.
+        """
         self._config = config
-        self._head = Head(config, sense, seed)
+        self._head = Head(config, sense, seed, on_since)
         self._answers = Answers(config, self._head)
         self._reader = CommandReader()
         self._line = SerialLine(config.serial_baud)
         self._mishaps = FaultSchedule(config.mishaps.rates, np.random.default_rng((seed, 6)))
         self._plug = plug
-        self._awake_at = config.boot_s
+        self._awake_at = on_since + config.boot_s
         self._is_down = False
         self._heard_early = b""
         self._newest: tuple[float, bytes] | None = None  # frame that waits for a busy line

@@ -31,8 +31,9 @@ class Head:
     """Turns the world into frames, on the grid of its motor and the stamps of its clock."""
 
     def __init__(
-        self, config: HokuyoTwinConfig, sense: Callable[[float], Array], seed: int
+        self, config: HokuyoTwinConfig, sense: Callable[[float], Array], seed: int, on_since: float
     ) -> None:
+        """`on_since` is when its clock showed what it does at power-up, s."""
         self.model = MODELS[config.model]
         self.period = self.model.parameters.period * (1.0 + config.motor_error_ppm * 1e-6)
         self.is_sensitive = False
@@ -42,7 +43,7 @@ class Head:
         self._sense = sense
         self._rng = np.random.default_rng(seed)
         self._rate = 1000.0 * (1.0 + config.clock_drift_ppm * 1e-6)  # ms per s
-        self._start_ms = float(config.clock_start_ms)
+        self._start_ms = config.clock_start_ms - on_since * self._rate
 
     def device_ms(self, now: float) -> int:
         """The laser's clock at a time (s)."""

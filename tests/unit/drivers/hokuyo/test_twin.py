@@ -261,6 +261,17 @@ def test_commands_during_booting_are_answered_together_afterwards() -> None:
     assert twin.advance(2.0) == b"QT\n00P\n\nTM2\n03S\n\n"
 
 
+def test_a_laser_that_is_switched_on_late_boots_then_and_its_clock_begins_then() -> None:
+    """As in real time, where the host has long been up."""
+    config = HokuyoTwinConfig(boot_s=2.0, clock_start_ms=5000, clock_drift_ppm=0.0)
+    twin = HokuyoTwin(config, lambda stamp: RANGES, 0, on_since=1000.0)
+    assert twin.receive(b"TM0\n", 1001.9) == b""
+    assert twin.advance(1002.0) == b"TM0\n00P\n\n"
+    (time,) = replies(twin, b"TM1\n", 1003.0)
+    assert isinstance(time, Reply)
+    assert decode_time(time) == 8000
+
+
 def test_scip_1_ends_with_its_command() -> None:
     twin = laser(starts_in_scip_1=True)
     assert twin.receive(b"QT\n", 0.0) == b"QT\nE\n\n"
