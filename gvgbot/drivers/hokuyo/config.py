@@ -1,9 +1,11 @@
 """How the laser is connected, mounted and read."""
 
 import math
+import re
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
+from gvgbot.drivers.hokuyo.scip_messages import USER_STRING
 from gvgbot.geometry import Pose
 from gvgbot.ranges import Range
 
@@ -24,7 +26,7 @@ class HokuyoConfig:
     adapt: bool = True  # to a link that is too slow: coarser, shorter or fewer scans
     echo: Echo = "single"  # which of several returns along a beam; needs a multi-echo laser
     intensities: bool = False  # ask for them beside the ranges
-    user_string: str = ""  # marks the scans asked for; up to 16 letters and digits
+    user_string: str = ""  # marks the scans asked for; up to 16 of A-Z a-z 0-9 . _ + @ and space
     x_m: float = 0.0  # of the laser on the base
     y_m: float = 0.0  # likewise, to the left
     yaw_deg: Annotated[float, Range(-180.0, 180.0)] = 0.0  # likewise, anticlockwise
@@ -40,9 +42,14 @@ class HokuyoConfig:
     missed_scans: Annotated[int, Range(1, 100)] = 3  # before the stream is started again
 
     def __post_init__(self) -> None:
-        """Raise ValueError for angles in the wrong order."""
+        """Raise ValueError for angles in the wrong order, or a string that no laser accepts."""
         if self.last_angle_deg <= self.first_angle_deg:
             raise ValueError("last_angle_deg must be greater than first_angle_deg")
+        if self.user_string and not re.fullmatch(USER_STRING, self.user_string):
+            raise ValueError(
+                f"user_string = {self.user_string!r}: "
+                "must be up to 16 of A-Z a-z 0-9 . _ + @ and space"
+            )
 
     @property
     def base_laser(self) -> Pose:

@@ -9,7 +9,7 @@ from gvgbot.drivers.hokuyo.config import HokuyoConfig
 from gvgbot.drivers.hokuyo.models import MODELS
 from gvgbot.drivers.hokuyo.modes import choose_mode, configured_request, frame_bytes, link_rate
 from gvgbot.drivers.hokuyo.scan_geometry import one_per_step, scan_geometry
-from gvgbot.drivers.hokuyo.scip_messages import ScanReply, ScanRequest
+from gvgbot.drivers.hokuyo.scip_messages import ScanReply, ScanRequest, parse_request
 
 URG = MODELS["URG-04LX"].parameters
 HALF = {"first_angle_deg": -90.0, "last_angle_deg": 90.0}
@@ -131,6 +131,18 @@ def test_angles_without_a_beam_are_an_error() -> None:
         configured_request(config, MODELS["URG-04LX"].parameters)
     with pytest.raises(ValueError, match="greater"):
         HokuyoConfig(first_angle_deg=10.0, last_angle_deg=10.0)
+
+
+@pytest.mark.parametrize("string", ["ä", "a;b", "a\n", "a-b", "abcdefghijklmnopq", "٣"])
+def test_a_string_that_no_laser_accepts_is_an_error_in_the_configuration(string: str) -> None:
+    with pytest.raises(ValueError, match="must be up to 16 of A-Z"):
+        HokuyoConfig(user_string=string)
+
+
+@pytest.mark.parametrize("string", ["", "a7", "abcDEF_+@. 12345"])
+def test_a_string_as_scip_has_it_marks_the_scans(string: str) -> None:
+    request = configured_request(HokuyoConfig(user_string=string), MODELS["URG-04LX"].parameters)
+    assert parse_request(request.text().encode()) == request
 
 
 def test_a_laser_upside_down_sees_left_what_it_takes_for_right() -> None:
