@@ -16,6 +16,7 @@ from gvgbot.config import Config
 from gvgbot.drivers.hokuyo.driver import HokuyoLaser
 from gvgbot.drivers.kobuki.driver import KobukiBase
 from gvgbot.errors import DeviceLost, DeviceRefused
+from gvgbot.hal.guard import GuardConfig
 from gvgbot.hal.messages import Battery, Contact, Scan
 from gvgbot.links import Links
 from gvgbot.simulation import Simulation, open_place
@@ -134,7 +135,7 @@ async def _examine_laser(links: Links, clock: Clock) -> list[Line]:
     with contextlib.ExitStack() as stack:
         stack.callback(close)
         heard = await _listen(laser.run, next_stamp, lambda: laser.link.scans, clock)
-    return list(_laser_lines(laser, scans, heard))
+    return list(_laser_lines(laser, scans, heard, links.config.robot.limits))
 
 
 async def _examine_base(links: Links, clock: Clock) -> list[Line]:
@@ -184,7 +185,9 @@ async def _listen(
     return heard
 
 
-def _laser_lines(laser: HokuyoLaser, scans: list[Scan], heard: Heard) -> Iterator[Line]:
+def _laser_lines(
+    laser: HokuyoLaser, scans: list[Scan], heard: Heard, limits: GuardConfig
+) -> Iterator[Line]:
     identity = laser.identity
     if identity is not None:
         yield Line("ok", "laser", f"{identity.product}, serial {identity.serial}")
@@ -193,8 +196,11 @@ def _laser_lines(laser: HokuyoLaser, scans: list[Scan], heard: Heard) -> Iterato
     if heard.failure is not None or not heard.arrivals or parameters is None or mode is None:
         yield _absence("laser", heard, "sends no scans")
         return
-    nominal = 1.0 / (parameters.period * (mode.request.skip + 1))
-    yield _steadiness("laser rate", heard, nominal)
+    interval = parameters.period * (mode.request.skip + 1)
+    if interval + heard.delay[1] > limits.max_scan_age_s:
+        yield _rareness(heard, limits)
+    else:
+        yield _steadiness("laser rate", heard, 1.0 / interval)
     yield _link("laser link", laser.link)
     yield _timing("laser clock", heard)
     seen = float(np.mean([np.mean(~np.isnan(scan.ranges)) for scan in scans]))
@@ -241,6 +247,17 @@ def _steadiness(subject: str, heard: Heard, nominal: float) -> Line:
         subject,
         f"{heard.rate:.1f} of {nominal:g} messages per second",
         "check the cable, and what else the computer is busy with",
+    )
+
+
+def _rareness(heard: Heard, limits: GuardConfig) -> Line:
+    """That the newest scan is too old to drive by before the next one comes."""
+    return Line(
+        "fail",
+        "laser rate",
+        f"{heard.rate:.1f} messages per second, and the robot stops when the last one is older "
+        f"than {limits.max_scan_age_s:g} s (robot.limits.max_scan_age_s)",
+        "raise laser.rate_hz or laser.baud, or lower laser.skip",
     )
 
 

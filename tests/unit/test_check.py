@@ -69,6 +69,21 @@ def test_the_rate_is_compared_with_what_the_laser_was_asked_for() -> None:
     assert points["laser rate"][1].startswith("40.0 of 40")
 
 
+@pytest.mark.parametrize("setting", ["laser.rate_hz=0.5", "laser.skip=9", "laser.skip=4"])
+def test_a_laser_whose_scans_are_too_rare_to_drive_by_is_not_ready(setting: str) -> None:
+    """A URG-04LX turns ten times a second."""
+    status, points = said("twin.laser.model=URG-04LX", setting)
+    verdict, finding = points["laser rate"]
+    assert (status, verdict) == (1, "fail")
+    assert "robot.limits.max_scan_age_s" in finding
+    assert finding.endswith("raise laser.rate_hz or laser.baud, or lower laser.skip")
+
+
+def test_a_laser_whose_scans_are_just_in_time_is_ready() -> None:
+    status, points = said("twin.laser.model=URG-04LX", "laser.skip=3")
+    assert (status, points["laser rate"][0]) == (0, "ok")
+
+
 @contextmanager
 def terminal(*, is_busy: bool) -> Iterator[str]:
     """What to open; a busy one has been opened by another program already."""
