@@ -3,6 +3,7 @@
 import asyncio
 
 import pytest
+import structlog
 
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.drivers.hokuyo.driver import HokuyoConfig, HokuyoLaser
@@ -249,6 +250,28 @@ def test_a_rate_that_the_port_lacks_is_passed_over(lacks: tuple[int, ...], agree
         laser, line = await serve_rated(device, 115200, lacks)
         assert device.baud == line.baud == agreed
         assert laser.link.scans == 3
+
+    run_in_virtual_time(main())
+
+
+@pytest.mark.parametrize("boot_s", [0.0, 0.7, 1.1, 1.5, 2.5])
+def test_a_laser_that_was_silent_where_rates_mean_nothing_is_not_at_another_one(
+    boot_s: float,
+) -> None:
+    async def main() -> None:
+        here, there = pipe()
+        clock = LoopClock()
+        port = HostPort(here, 115200)
+        laser = HokuyoLaser(port, HokuyoConfig(), clock)
+        with structlog.testing.capture_logs() as logs:
+            async with asyncio.TaskGroup() as tasks:
+                served = tasks.create_task(serve_twin(twin_of(boot_s=boot_s), there, clock))
+                running = tasks.create_task(laser.run())
+                await laser.next_scan()
+                running.cancel()
+                served.cancel()
+        assert port.baud == 115200
+        assert [line for line in logs if "bit rate" in line["event"]] == []
 
     run_in_virtual_time(main())
 

@@ -90,19 +90,18 @@ async def tune(dialogue: Dialogue, wanted: int, *, patience: float) -> int:
         await quiet(dialogue, patience=patience)
         return wanted
     found = await _search(dialogue, stream, wanted, patience)
-    return found if found == wanted else await _set_rate(dialogue, stream, found, wanted)
+    # On USB a rate means nothing: a laser that was silent for a while is found at any.
+    if found == wanted or await _rests_at(dialogue, stream, wanted, 1):
+        return wanted
+    await _rests_at(dialogue, stream, found, TRIES_AT_A_RATE)
+    return await _set_rate(dialogue, stream, found, wanted)
 
 
 async def _search(dialogue: Dialogue, stream: Tunable, wanted: int, patience: float) -> int:
     """The rate at which the laser is at rest now. Raises DeviceLost or DeviceRefused."""
     for baud, tries in _rates(wanted):
-        if not _takes(stream, baud):
-            continue
-        try:
-            await quiet(dialogue, patience=tries * dialogue.timeout - dialogue.timeout / 2)
-        except DeviceLost:
-            continue
-        return baud
+        if await _rests_at(dialogue, stream, baud, tries):
+            return baud
     stream.set_baud(wanted)
     await quiet(dialogue, patience=patience)
     return wanted
@@ -111,6 +110,17 @@ async def _search(dialogue: Dialogue, stream: Tunable, wanted: int, patience: fl
 def _rates(wanted: int) -> Iterator[tuple[int, int]]:
     yield wanted, TRIES_AT_A_RATE
     yield from ((baud, 1) for baud in BIT_RATES if baud != wanted)
+
+
+async def _rests_at(dialogue: Dialogue, stream: Tunable, baud: int, tries: int) -> bool:
+    """Whether the laser comes to rest at this rate. Raises DeviceRefused."""
+    if not _takes(stream, baud):
+        return False
+    try:
+        await quiet(dialogue, patience=tries * dialogue.timeout - dialogue.timeout / 2)
+    except DeviceLost:
+        return False
+    return True
 
 
 def _takes(stream: Tunable, baud: int) -> bool:
