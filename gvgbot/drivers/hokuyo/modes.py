@@ -28,9 +28,21 @@ def configured_request(config: HokuyoConfig, parameters: Parameters) -> ScanRequ
     first, last = _steps(config, parameters)
     letters = ("M" if config.echo == "single" else "N", "E" if config.wants_intensities else "D")
     skip = _skip(config, parameters) if config.skip is None else config.skip
-    return ScanRequest(
+    wanted = ScanRequest(
         "".join(letters), first, last, config.cluster, skip, string=config.user_string
     )
+    return _in_whole_groups(wanted)
+
+
+def _in_whole_groups(request: ScanRequest) -> ScanRequest:
+    """Without the last steps that make no whole group: its middle would be elsewhere.
+
+    Raises ValueError if nothing is left.
+    """
+    steps = request.end - request.start + 1
+    if steps < request.group:
+        raise ValueError(f"laser.cluster is {request.group}, and there are {steps} steps only")
+    return replace(request, end=request.end - steps % request.group)
 
 
 def _skip(config: HokuyoConfig, parameters: Parameters) -> int:
@@ -93,7 +105,8 @@ def _alternatives(
     for skip in range(wanted.skip, MOST_SKIPPED + 1):
         for cluster in range(wanted.group, max(wanted.group, COARSEST) + 1):
             for command in commands:
-                yield replace(wanted, command=command, cluster=cluster, skip=skip)
+                request = replace(wanted, command=command, cluster=cluster, skip=skip)
+                yield _in_whole_groups(request)
 
 
 def _changes(

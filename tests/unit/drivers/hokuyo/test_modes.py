@@ -125,6 +125,36 @@ def test_cropped_beams_lie_within_the_angles_and_none_is_missing(
     assert bearings[-1] <= math.radians(75.0) + 1e-9
 
 
+@pytest.mark.parametrize("cluster", [2, 3, 7, 99])
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("upside_down", [False, True])
+def test_every_beam_of_a_cluster_is_in_the_middle_of_its_steps(
+    model: str, cluster: int, *, upside_down: bool
+) -> None:
+    parameters = MODELS[model].parameters
+    config = HokuyoConfig(cluster=cluster, upside_down=upside_down)
+    request = configured_request(config, parameters)
+    geometry = scan_geometry(config, parameters, request)
+    bearings = geometry.scan(np.full(request.values, 1000, np.int32), 0.0).bearings
+    steps = np.arange(request.start, request.end + 1)
+    groups = [steps[i : i + cluster] for i in range(0, len(steps), cluster)]
+    middles = [parameters.bearing(float(np.mean(group))) for group in groups]
+    expected = [-middle for middle in reversed(middles)] if upside_down else middles
+    assert bearings == pytest.approx(expected)
+    assert parameters.last_step - request.end < cluster
+
+
+def test_a_cluster_of_a_slow_link_has_no_short_one_at_its_end() -> None:
+    request = choose_mode(HokuyoConfig(skip=0), URG, 19200 * 4).request
+    assert (request.start, request.end, request.cluster) == (44, 724, 3)
+
+
+def test_a_cluster_that_is_wider_than_the_angles_is_an_error() -> None:
+    config = HokuyoConfig(cluster=99, first_angle_deg=-5.0, last_angle_deg=5.0)
+    with pytest.raises(ValueError, match="is 99, and there are 29 steps"):
+        configured_request(config, URG)
+
+
 def test_angles_without_a_beam_are_an_error() -> None:
     config = HokuyoConfig(first_angle_deg=150.0, last_angle_deg=170.0)
     with pytest.raises(ValueError, match="no beam"):
