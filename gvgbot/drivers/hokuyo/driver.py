@@ -356,7 +356,8 @@ class HokuyoLaser:
             stream.is_doubted = True  # a frozen laser begins with an old scan; the next one decides
             return None
         stream.is_fresh = False
-        ranges, intensities = one_per_step(reply, self._config.echo)
+        assert self._parameters is not None
+        ranges, intensities = one_per_step(reply, self._config.echo, self._parameters)
         if intensities is not None:
             self._intensities = intensities[::-1] if stream.geometry.is_reversed else intensities
         return stream.geometry.scan(ranges, now.host_stamp)

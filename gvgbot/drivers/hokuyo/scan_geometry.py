@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gvgbot.drivers.hokuyo.config import Echo, HokuyoConfig
 from gvgbot.drivers.hokuyo.models import Parameters, find_model
@@ -83,22 +84,33 @@ def arrival_delay(config: HokuyoConfig, parameters: Parameters, request: ScanReq
     return request.end * parameters.step_time + config.processing_latency_s
 
 
-def one_per_step(reply: ScanReply, echo: Echo) -> tuple[Values, Values | None]:
-    """Ranges (steps,) and intensities, if there are any, of the chosen echo of each step."""
+def one_per_step(
+    reply: ScanReply, echo: Echo, parameters: Parameters
+) -> tuple[Values, Values | None]:
+    """Ranges (steps,) and intensities, if there are any, of the chosen echo of each step.
+
+    An error code is chosen only where a step has nothing else.
+    """
     if reply.echoes is None:
         return reply.ranges, reply.intensities
-    chosen = _chosen(reply.echoes, reply.intensities, echo)
+    longest, shortest = parameters.range_max_mm, parameters.range_min_mm
+    is_code = (reply.ranges < shortest) | (reply.ranges > longest)
+    chosen = _chosen(reply.echoes, is_code, _demerits(reply, echo))
     intensities = None if reply.intensities is None else reply.intensities[chosen]
     return reply.ranges[chosen], intensities
 
 
-def _chosen(echoes: Values, intensities: Values | None, echo: Echo) -> Values:
+def _demerits(reply: ScanReply, echo: Echo) -> Values:
+    """What speaks against each echo: the least of a step is the echo of choice."""
+    if echo == "strongest" and reply.intensities is not None:
+        return -reply.intensities
+    places = np.arange(len(reply.ranges), dtype=np.int32)
+    return -places if echo == "last" else places
+
+
+def _chosen(echoes: Values, is_code: NDArray[np.bool_], demerits: Values) -> NDArray[np.intp]:
     """Where each step's echo of choice stands among all."""
-    firsts: Values = (np.cumsum(echoes) - echoes).astype(np.int32)
-    if echo == "last":
-        return firsts + echoes - 1
-    if echo != "strongest" or intensities is None:
-        return firsts
     steps = np.repeat(np.arange(len(echoes)), echoes)
-    by_strength = np.lexsort((-intensities, steps))
-    return by_strength[firsts].astype(np.int32)
+    best_first = np.lexsort((demerits, is_code, steps))
+    chosen: NDArray[np.intp] = best_first[np.cumsum(echoes) - echoes]
+    return chosen

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from gvgbot.drivers.hokuyo.config import HokuyoConfig
+from gvgbot.drivers.hokuyo.config import Echo, HokuyoConfig
 from gvgbot.drivers.hokuyo.models import MODELS
 from gvgbot.drivers.hokuyo.modes import choose_mode, configured_request, frame_bytes, link_rate
 from gvgbot.drivers.hokuyo.scan_geometry import one_per_step, scan_geometry
@@ -203,15 +203,38 @@ def echo_reply(*, with_intensities: bool = True) -> ScanReply:
 
 def test_one_echo_of_each_step_is_chosen() -> None:
     reply = echo_reply()
-    assert one_per_step(reply, "first")[0].tolist() == [700, 100, 50, 5]
-    assert one_per_step(reply, "last")[0].tolist() == [700, 900, 70, 5]
-    ranges, intensities = one_per_step(reply, "strongest")
+    assert one_per_step(reply, "first", URG)[0].tolist() == [700, 100, 50, 5]
+    assert one_per_step(reply, "last", URG)[0].tolist() == [700, 900, 70, 5]
+    ranges, intensities = one_per_step(reply, "strongest", URG)
     assert ranges.tolist() == [700, 900, 60, 5]
     assert intensities is not None
     assert intensities.tolist() == [10, 80, 90, 0]
 
 
 def test_without_intensities_the_strongest_echo_is_the_first() -> None:
-    ranges, intensities = one_per_step(echo_reply(with_intensities=False), "strongest")
+    ranges, intensities = one_per_step(echo_reply(with_intensities=False), "strongest", URG)
     assert ranges.tolist() == [700, 100, 50, 5]
     assert intensities is None
+
+
+@pytest.mark.parametrize(
+    ("echo", "ranges"),
+    [
+        ("first", [400, 500, 600, 7]),
+        ("last", [400, 500, 800, 9]),
+        ("strongest", [400, 500, 800, 8]),
+    ],
+)
+def test_an_error_code_hides_no_good_echo(echo: Echo, ranges: list[int]) -> None:
+    """A URG-04LX measures from 20 to 5600 mm."""
+    readings = [400, 0, 65533, 500, 1, 600, 800, 5601, 7, 8, 9]
+    strengths = [10, 99, 99, 10, 99, 10, 20, 99, 1, 3, 2]
+    reply = ScanReply(
+        ScanRequest("NE", 0, 3),
+        "99",
+        0,
+        np.array(readings, np.int32),
+        np.array(strengths, np.int32),
+        np.array([2, 3, 3, 3], np.int32),
+    )
+    assert one_per_step(reply, echo, URG)[0].tolist() == ranges
