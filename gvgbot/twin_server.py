@@ -11,6 +11,7 @@ from gvgbot.drivers.pty import PtyPort
 from gvgbot.drivers.tcp import SCHEME
 from gvgbot.drivers.tcp_port import TcpPort
 from gvgbot.drivers.transport import serve_twin
+from gvgbot.errors import UsageError
 from gvgbot.service import StopSignals
 from gvgbot.simulation import Place, Simulation, open_place
 
@@ -24,6 +25,10 @@ def serve(
 
     Raises UsageError for a world that cannot be used or a link that cannot be made.
     """
+    links = [link for link in (laser_link, base_link) if link is not None]
+    files = [Path(link).absolute() for link in links if not link.startswith(SCHEME)]
+    if len(set(files)) < len(files):
+        raise UsageError(f"{laser_link} cannot be both the laser and the base: name two links")
     place = open_place(config)
     with StopSignals() as signals, asyncio.Runner() as runner:
         runner.run(_serve(config, place, (laser_link, base_link), announce, signals.wait))
