@@ -113,7 +113,7 @@ def kind_of(name: str) -> type[Arguments]:
 
 
 def parse(name: str, data: bytes, encoding: str) -> Arguments:
-    """The arguments in a payload, JSON if its encoding says so; nothing stands for none.
+    """The arguments in a payload, JSON if its encoding says so, else MessagePack; empty for none.
 
     Raises ValueError that says what is wrong with them, or with the name.
     """
@@ -127,4 +127,6 @@ def parse(name: str, data: bytes, encoding: str) -> Arguments:
     try:
         return decode(data, type=kind_of(name))
     except (msgspec.MsgspecError, RecursionError) as error:
-        raise ValueError(f"wrong arguments of {name}: {error}") from error
+        is_known = encoding.startswith((JSON, MESSAGEPACK))
+        guess = "" if is_known else f", taken for {MESSAGEPACK} (its encoding does not say {JSON})"
+        raise ValueError(f"wrong arguments of {name}{guess}: {error}") from error

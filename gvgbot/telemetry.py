@@ -234,7 +234,7 @@ async def _refuse(_: Asked) -> Answer:
 
 def _asked(query: zenoh.Query, key: str) -> Asked:
     data = b"" if query.payload is None else query.payload.to_bytes()
-    encoding = MESSAGEPACK if query.encoding is None else str(query.encoding)
+    encoding = "" if query.encoding is None else str(query.encoding)
     data = data[: LONGEST_ARGUMENTS + 1]  # what is cut is too long still, and will be called so
     return Asked(_printable(key.rpartition("/")[2]), data, encoding, _origin(query))
 

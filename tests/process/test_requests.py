@@ -126,6 +126,27 @@ def test_who_speaks_json_is_answered_in_json(endpoint: str) -> None:
     )
 
 
+def test_json_without_its_encoding_is_told_so(endpoint: str) -> None:
+    async def read(asked: Asked) -> Answer:
+        try:
+            parse(asked.name, asked.data, asked.encoding)
+        except ValueError as error:
+            return Answer(done=False, text=str(error))
+        return await obliging(asked)
+
+    def ask() -> str:
+        with plain_session(endpoint) as session:
+            (reply,) = get(session, "ctl/goto", payload=b'{"vertex": 3}')
+        assert reply.err is not None
+        return str(msgspec.msgpack.decode(reply.err.payload.to_bytes())["text"])
+
+    async def story() -> str:
+        async with a_robot(endpoint, read):
+            return await asyncio.to_thread(ask)
+
+    assert "taken for application/msgpack" in asyncio.run(story())
+
+
 def test_who_reads_everything_asks_for_nothing(endpoint: str) -> None:
     """A query for all keys, as tools that look around make, must not stop the robot."""
     asked: list[Asked] = []

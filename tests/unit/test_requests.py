@@ -82,6 +82,15 @@ def test_wrong_arguments_are_called_wrong_in_words(name: str, text: str, says: s
         parse(name, text.encode(), JSON)
 
 
+@pytest.mark.parametrize("encoding", ["", "zenoh/bytes", "text/plain"])
+def test_json_that_does_not_say_so_is_told_what_it_was_taken_for(encoding: str) -> None:
+    with pytest.raises(ValueError, match=f"taken for {MESSAGEPACK} .*say {JSON}"):
+        parse("goto", b'{"vertex": 7}', encoding)
+    with pytest.raises(ValueError, match=r"^wrong arguments of goto: Expected"):
+        parse("goto", b'{"vertex": 7}', MESSAGEPACK)
+    assert parse("goto", msgspec.msgpack.encode({"vertex": 7}), encoding) == Goto(vertex=7)
+
+
 @pytest.mark.parametrize("space", ["", " "])
 def test_the_longest_patrol_is_not_too_long(space: str) -> None:
     vertices = [2**63 - 1 - each for each in range(1000)]
