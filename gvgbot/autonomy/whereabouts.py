@@ -72,11 +72,13 @@ class Whereabouts:
             line, rooms = gvg.line_from(place, (Branch(place.edge, not out.forward),))
             self.on_edge, self.trail = end, list(line[::-1])
             self.narrowest = float(rooms.min())
-        here = int(np.searchsorted(edge.stations, place.station))
-        self.narrowest = min(self.narrowest, float(edge.clearance[here]))
-        foot = edge.polyline[min(here, len(edge.polyline) - 1)]
-        is_beside = _BESIDE_M[0] < place.distance < _BESIDE_M[1]
-        self._extend(foot if is_beside else base)
+        station = int(np.searchsorted(edge.stations, place.station))
+        foot = edge.polyline[min(station, len(edge.polyline) - 1)]
+        here = foot if _BESIDE_M[0] < place.distance < _BESIDE_M[1] else base
+        if self.on_edge is None and self._leaps_to(here):
+            self.trail, self.narrowest = [], math.inf  # it has come onto another edge
+        self.narrowest = min(self.narrowest, float(edge.clearance[station]))
+        self._extend(here)
         return passage
 
     def round_from(self, base: Array) -> int | None:
@@ -133,6 +135,13 @@ class Whereabouts:
         if not path or any(gvg.end_of(branch) in known.vertex_of for branch in path[:-1]):
             return None
         return known.half_edge_of.get(Branch(path[-1].edge, not path[-1].forward))
+
+    def _leaps_to(self, point: Array) -> bool:
+        """Whether what lies between the trail and a point was not driven.
+
+        Between two edges, now one is nearer and now the other.
+        """
+        return bool(self.trail) and bool(np.hypot(*(self.trail[-1] - point)) > _STEP_M)
 
     def _extend(self, point: Array) -> None:
         if len(self.trail) > 3:

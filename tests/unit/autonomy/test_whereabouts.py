@@ -319,3 +319,33 @@ def test_the_robot_has_come_round_where_it_is_on_its_way_once_more(
     """A circle of radius 1 after a straight way onto it."""
     where = Whereabouts(trail=[np.array(point) for point in way])
     assert where.round_from(np.array(here)) == found
+
+
+# The two long sides of what is farther than the coast from all walls of a hall.
+COASTS = drawn(
+    {1: (-6.0, -1.0), 2: (6.0, -1.0), 3: (-6.0, 1.0), 4: (6.0, 1.0)},
+    {10: (1, 2, []), 11: (3, 4, [])},
+)
+
+
+def test_between_two_edges_of_which_now_one_is_nearer_and_now_the_other_nothing_is_round() -> None:
+    walk = Walk()
+    for x in np.arange(0.0, 0.8, 0.1):
+        for y in (-0.01, 0.01):
+            walk.along(COASTS, known_as({}, {}), (x, y))
+    assert walk.where.trail_length < 1.0  # the robot has driven less
+    assert walk.where.round_from(np.array([0.7, 0.01])) is None
+
+
+def test_who_came_onto_another_edge_has_driven_round_from_there() -> None:
+    """Along the lower one to the west, and then round a square that begins at the upper one."""
+    square: list[Point] = [(0.0, 1.0), (-4.0, 1.0), (-4.0, 5.0), (0.0, 5.0), (0.0, 1.5)]
+    sights = drawn(
+        {1: (3.0, -1.0), 2: (-3.0, -1.0), 3: (0.0, 1.0), 4: (0.0, 1.1)},
+        {10: (1, 2, []), 11: (3, 4, square[1:4])},
+    )
+    walk = Walk().along(sights, known_as({}, {}), (1.0, -1.0), (0.0, -1.0), *square)
+    start = walk.where.round_from(np.array([0.0, 1.3]))
+    assert start is not None
+    assert walk.where.trail[start] == pytest.approx([0.0, 1.0], abs=0.5)
+    assert walk.where.trail_length < 16.0
