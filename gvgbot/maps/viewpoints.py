@@ -1,6 +1,7 @@
 """Viewpoints: from where a robot that keeps to its ways sees what lies off them."""
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import ndimage
 
 from gvgbot.geometry import Array
@@ -8,8 +9,8 @@ from gvgbot.maps.gaps import Mask, is_floor, is_wall, reachable
 from gvgbot.maps.occupancy import OccupancyGrid
 
 _BESIDE_M = 0.2  # a place so near to a way is on it
-_FAR_M = 8.0  # what is farther from all ways, on either axis, is not gone to
-_NEIGHBOURS = np.array([(0, 1), (1, 0), (0, -1), (-1, 0)])
+
+Cell = NDArray[np.int64]  # its row and column
 
 
 def viewpoints(
@@ -31,16 +32,15 @@ def viewpoints(
     has_room = ndimage.distance_transform_edt(~walls) * cell > passage_m
     floor = reachable(is_floor(grid.cells) & has_room, (around - corner)[::-1] / cell)
     near_ways = _cells_near(ways, grid, floor)
-    found, far = [], round(_FAR_M / cell)
-    cells = ((places - corner)[:, ::-1] / cell).astype(np.int64)
+    floor, near_ways = np.pad(floor, 1), np.pad(near_ways, 1)  # every cell has four neighbours
+    found = []
+    cells = ((places - corner)[:, ::-1] / cell).astype(np.int64) + 1
     for place, off in zip(cells, np.rint(off_m / cell).astype(int).tolist(), strict=True):
-        first = np.maximum(place - far, 0)
-        around_it = tuple(slice(a, b) for a, b in zip(first, place + far, strict=True))
-        row, column = (place - first).tolist()
-        view = _on_the_way_there((row, column), floor[around_it], near_ways[around_it], off)
+        view = _on_the_way_there(place, floor, near_ways, off)
         if view is not None:
-            found.append(view + first)
-    return corner + (np.array(found).reshape(-1, 2)[:, ::-1] + 0.5) * cell
+            found.append(view - 1)
+    views: Array = corner + (np.array(found).reshape(-1, 2)[:, ::-1] + 0.5) * cell
+    return views
 
 
 def _cells_near(ways: Array, grid: OccupancyGrid, floor: Mask) -> Mask:
@@ -53,23 +53,21 @@ def _cells_near(ways: Array, grid: OccupancyGrid, floor: Mask) -> Mask:
     return np.asarray(near & floor)
 
 
-def _on_the_way_there(
-    place: tuple[int, int], floor: Mask, near_ways: Mask, off: int
-) -> Array | None:
+def _on_the_way_there(place: Cell, floor: Mask, near_ways: Mask, off: int) -> Cell | None:
     """The (row, column) at most so many cells off the nearest way, on the path to a place."""
-    floor, near_ways = np.pad(floor, 1), np.pad(near_ways, 1)  # every cell has four neighbours
-    steps = np.full(floor.shape, -1)
-    reached = np.zeros(floor.shape, np.bool_)
-    reached[place[0] + 1, place[1] + 1] = floor[place[0] + 1, place[1] + 1]
-    front, count = reached, 0
-    while not (front & near_ways).any():
-        if not front.any():
+    width, is_floor_at, is_near = floor.shape[1], floor.ravel(), near_ways.ravel()
+    beside = np.array([1, width, -1, -width])
+    steps = np.full(floor.size, -1, np.int32)
+    start = np.ravel_multi_index(tuple(place), floor.shape)
+    front, count = np.array([start])[is_floor_at[[start]]], 0
+    while not is_near[front].any():
+        if not len(front):
             return None
         steps[front] = count
-        grown = ndimage.binary_dilation(reached, mask=floor)
-        front, reached, count = grown & ~reached, grown, count + 1
-    here = np.argwhere(front & near_ways)[0]
+        around = np.unique(front[:, None] + beside)
+        front, count = around[is_floor_at[around] & (steps[around] < 0)], count + 1
+    here = front[is_near[front]][0]
     for _ in range(min(off, count)):
         count -= 1
-        here = next(there for there in here + _NEIGHBOURS if steps[tuple(there)] == count)
-    return np.asarray(here - 1, np.float64)
+        here = next(there for there in here + beside if steps[there] == count)
+    return np.array(np.divmod(here, width))
