@@ -2,7 +2,8 @@
 
 A dangling branch from vertex v to tip t has reach (length(v, t) + clearance(t)) / clearance(v). In
 a right-angled corner it is 1.41; a dead end worth a visit has more. Reach only grows while more of
-a branch is seen, so for a branch that ends in unseen space it is a lower bound.
+a branch is seen, so for a branch that ends in unseen space it is a lower bound. In a wide space it
+counts from where the branch is no longer in it: what is worth a visit does not grow with the space.
 """
 
 import math
@@ -21,6 +22,7 @@ from gvgbot.ranges import Range
 _SPACING = 0.1  # metres between the points of an edge
 _MERGE_HYSTERESIS = 1.3  # by which factor an edge must differ to overrule what the map says of it
 _REACH_HYSTERESIS = 1.12
+_WIDE_M = 4.0  # from the walls
 _SPECK = 4.0  # so many of the shortest edges around open space are no way round it
 _FALL_IN_CORNER = 0.3  # metres of clearance lost per metre, at least, towards a corner
 _ENDPOINT_M = 0.6  # a point so near to a known endpoint is that endpoint
@@ -107,10 +109,22 @@ class _Draft:
 
     def reach(self, leaf: int) -> tuple[float, int, int]:
         """Reach of the branch that ends at a leaf, its base and its chain."""
-        key, _ = self.ends[leaf][0]
+        key, out = self.ends[leaf][0]
         chain = self.chains[key]
-        base = chain.b if chain.a == leaf else chain.a
-        return (chain.length() + self.clearance[leaf]) / self.clearance[base], base, key
+        base = chain.b if out else chain.a
+        return self.reach_along(key, forward=not out), base, key
+
+    def reach_along(self, key: int, *, forward: bool) -> float:
+        """Reach of a chain from its node a to its node b if `forward`, else the other way."""
+        chain = self.chains[key]
+        base, tip = (chain.a, chain.b) if forward else (chain.b, chain.a)
+        room = self.clearance[base]
+        if room <= _WIDE_M:
+            return (chain.length() + self.clearance[tip]) / room
+        clearance = chain.clearance if forward else chain.clearance[::-1]
+        points = chain.points if forward else chain.points[::-1]
+        within, room = _out_of_the_wide(points, clearance)
+        return (chain.length() - within + self.clearance[tip]) / room
 
     def splice(self, node: int) -> None:
         """Make one chain of the two that meet at a node."""
@@ -130,6 +144,20 @@ class _Draft:
         self.add(
             _Chain(start, end, np.concatenate([points, more[1:]]), np.concatenate([room, wide[1:]]))
         )
+
+
+def _out_of_the_wide(points: Array, clearance: Array) -> tuple[float, float]:
+    """After how many metres points (N, 2) come out of a wide space, and their clearance there.
+
+    At their beginning, if they do not.
+    """
+    narrow = np.flatnonzero(clearance <= _WIDE_M)
+    if not len(narrow) or narrow[0] == 0:
+        return 0.0, float(clearance[0])
+    last = narrow[0]
+    before, after = clearance[last - 1], clearance[last]
+    steps = _steps(points[: last + 1])
+    return float(steps.sum() - steps[-1] * (_WIDE_M - after) / (before - after)), _WIDE_M
 
 
 def reduce_graph(
@@ -368,7 +396,7 @@ def _is_weak(draft: _Draft, branch: Branch, node: int, min_reach: float) -> bool
     tip = chain.b if branch.forward else chain.a
     if tip == node or len(draft.ends[tip]) != 1 or not draft.open(tip) or draft.degree(node) < 3:
         return False
-    return (chain.length() + draft.clearance[tip]) / draft.clearance[node] < min_reach
+    return draft.reach_along(branch.edge, forward=branch.forward) < min_reach
 
 
 def _edge(chain: _Chain) -> LocalEdge:

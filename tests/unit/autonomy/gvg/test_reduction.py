@@ -104,6 +104,25 @@ def test_a_branch_near_the_least_reach_stays_what_it_was(
     assert degrees(gvg) == ([3] if is_kept else [])
 
 
+def hall(corridor: float) -> FineGraph:
+    """The coast 8 m before the wall of a hall, and the way out there, so long beyond the wall."""
+    graph = fine([((0, -6), (0, 0)), ((0, 0), (0, 6)), ((0, 0), (8 + corridor, 0))])
+    return replace(graph, clearance=np.maximum(8.0 - graph.points[:, 0], CLEARANCE))
+
+
+def corner_of_a_hall() -> FineGraph:
+    """The coast 8 m before two walls, and the diagonal into their corner."""
+    graph = fine([((0, -6), (0, 0)), ((0, 0), (-6, 0)), ((0, 0), (7.8, 7.8))])
+    return replace(graph, clearance=np.minimum(8.0 - graph.points[:, 0], 8.0))
+
+
+def test_what_is_worth_a_visit_does_not_grow_with_the_space_before_it() -> None:
+    """Out of a wide space, four metres to the walls, a way of 2.8 m beyond them is 1.7 as far."""
+    assert degrees(reduce_graph(hall(4.0), CONFIG)) == [3]
+    assert degrees(reduce_graph(hall(1.5), CONFIG)) == []
+    assert degrees(reduce_graph(corner_of_a_hall(), CONFIG)) == []
+
+
 def test_twigs_of_a_corner_branch_do_not_shift_the_dead_end() -> None:
     """A room 4 m wide and 5.2 m deep, as its middle line has it; in one corner stands something."""
     door, near, far, fork = (0.0, -6.0), (0.0, -1.2), (0.0, 0.0), (1.0, -2.2)
