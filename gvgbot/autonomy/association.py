@@ -25,9 +25,13 @@ def _sighting(gvg: LocalGvg, node: LocalNode) -> Sighting:
         node.branches if node.is_suspect else [b for b in node.branches if b not in node.weak]
     )
     bearings = [gvg.bearing(branch, node.clearance) for branch in branches]
+    unclear = [gvg.bearing(branch, node.clearance) for branch in node.weak]
     if node.is_suspect and node.lead is not None:
         bearings.append(node.lead)
-    return Sighting(node.position, node.clearance, tuple(bearings), not node.is_endpoint)
+        unclear.append(node.lead)
+    return Sighting(
+        node.position, node.clearance, tuple(bearings), not node.is_endpoint, tuple(unclear)
+    )
 
 
 def pair_tracked(

@@ -2,13 +2,13 @@
 
 import math
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from gvgbot.autonomy.gvg.local import LocalNode
 from gvgbot.autonomy.slam.recognition import Sighting
-from gvgbot.geometry import Array
+from gvgbot.geometry import Array, wrap_angle
 from gvgbot.ranges import Range
 
 _PASSED_M = 1.0  # from so near, what cannot be seen of an edge must be driven to
@@ -20,6 +20,7 @@ _MISTAKES = 2  # at a place of late, after which a vertex there is only believed
 _LATE_M = 100.0  # driven since a mistake
 _STUBBORN = 4  # mistakes at a place, after which what comes back there once more is left alone
 _MISTAKES_KEPT_M = 1000.0  # driven, after which a mistake is forgotten
+_SAME_RAD = 0.5  # departures that differ by less are the same ones
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,8 +39,20 @@ class Candidate:
     meetpoint: bool
     seen_at: float  # metres driven
     nearest: float = math.inf
+    unclear: tuple[float, ...] = ()  # bearings of edges of which too little is seen
     sightings: int = 0
     near_sightings: int = 0
+
+
+class Mistake(NamedTuple):
+    """A vertex that has proved to be none: its place and bearings, local frame, and metres driven.
+
+    The bearings are those in which edges seemed to leave.
+    """
+
+    position: Array
+    bearings: tuple[float, ...]
+    at: float
 
 
 class Candidates:
@@ -48,12 +61,13 @@ class Candidates:
     def __init__(self, config: CandidatesConfig) -> None:
         self._config = config
         self._all: list[Candidate] = []
-        self._mistakes: list[tuple[Array, float]] = []  # where, local frame, and metres driven
+        self._mistakes: list[Mistake] = []
 
-    def note_mistake(self, position: Array, travelled: float) -> None:
-        """Take down that a vertex at a place (2,), local frame, has proved to be none."""
-        self._mistakes = [one for one in self._mistakes if travelled - one[1] < _MISTAKES_KEPT_M]
-        self._mistakes.append((position, travelled))
+    def note_mistake(self, mistake: Mistake) -> None:
+        """Take down that a vertex has proved to be none."""
+        late = mistake.at - _MISTAKES_KEPT_M
+        self._mistakes = [one for one in self._mistakes if one.at > late]
+        self._mistakes.append(mistake)
 
     def forget(self) -> None:
         """Begin anew: the local frame is another one."""
@@ -68,6 +82,7 @@ class Candidates:
             candidate = Candidate(sighting.position, sighting.meetpoint, travelled)
             self._all.append(candidate)
         candidate.position, candidate.seen_at = sighting.position, travelled
+        candidate.unclear = sighting.unclear
         candidate.nearest = min(candidate.nearest, away)
         candidate.sightings += 1
         candidate.near_sightings += away < _PASSED_M
@@ -84,12 +99,14 @@ class Candidates:
         """Whether it has been seen often enough; a suspect must have been passed, too.
 
         A side edge that could not be seen to the end in passing is not forgotten: it becomes a
-        frontier, and a closer look decides. What has proved to be none whenever the robot came near
-        is not driven to for ever.
+        frontier, and a closer look decides, once. What has proved to be none whenever the robot
+        came near is not driven to for ever.
         """
         if away > _PASSED_M and self._is_mistakable(candidate):
             return False
         if node.is_suspect:
+            if self._has_been_looked_at(candidate):
+                return False
             passed = away > candidate.nearest + _LEFT_BEHIND_M
             enough = self._config.meetpoint_sightings * (1 if passed else 2)
             return candidate.near_sightings >= enough
@@ -97,7 +114,14 @@ class Candidates:
 
     def _is_mistakable(self, candidate: Candidate) -> bool:
         late = candidate.seen_at - _LATE_M
-        return sum(at > late for at in self._mistaken_at(candidate.position)) >= _MISTAKES
+        return sum(one.at > late for one in self._mistaken_at(candidate.position)) >= _MISTAKES
+
+    def _has_been_looked_at(self, candidate: Candidate) -> bool:
+        """Whether nothing was behind these side edges when the robot drove there."""
+        return any(
+            _are_among(candidate.unclear, one.bearings)
+            for one in self._mistaken_at(candidate.position)
+        )
 
     def is_stubborn(self, position: Array) -> bool:
         """Whether what was seen at a place (2,), local frame, came back whenever it was taken out.
@@ -106,10 +130,9 @@ class Candidates:
         """
         return len(self._mistaken_at(position)) >= _STUBBORN
 
-    def _mistaken_at(self, position: Array) -> list[float]:
-        """Metres driven when there were mistakes about a place (2,)."""
-        near = (np.hypot(*(position - place)) < _MISTAKEN_M for place, _ in self._mistakes)
-        return [at for (_, at), is_near in zip(self._mistakes, near, strict=True) if is_near]
+    def _mistaken_at(self, position: Array) -> list[Mistake]:
+        """The mistakes about a place (2,)."""
+        return [one for one in self._mistakes if _is_at(one, position)]
 
     def is_examined(self, candidate: Candidate) -> bool:
         """Whether it has been seen twice as often as needed: enough to tell it from a known one."""
@@ -122,3 +145,12 @@ class Candidates:
     def drop(self, candidate: Candidate) -> None:
         """Forget a candidate, for it is a vertex now."""
         self._all.remove(candidate)
+
+
+def _is_at(mistake: Mistake, position: Array) -> bool:
+    return bool(np.hypot(*(position - mistake.position)) < _MISTAKEN_M)
+
+
+def _are_among(some: tuple[float, ...], others: tuple[float, ...]) -> bool:
+    """Whether each of some bearings is one of the others."""
+    return all(any(abs(wrap_angle(a - b)) < _SAME_RAD for b in others) for a in some)

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from gvgbot.autonomy.association import is_crowded, pair_tracked, sightings_of
-from gvgbot.autonomy.candidates import Candidates
+from gvgbot.autonomy.candidates import Candidates, Mistake
 from gvgbot.autonomy.events import (
     EdgeJoined,
     Event,
@@ -136,8 +136,9 @@ class Mapper(Knowledge):
             known.pair(node, vertex.id)
             self._evidence.pair_departures(view, view.gvg.nodes[node], vertex, known)
         for vertex, reason in self._evidence.refuted(view, known):
-            place = self.in_local_frame(view, vertex.id).position
-            self._unbelieved.note_mistake(place, view.travelled)
+            place = self.in_local_frame(view, vertex.id)
+            bearings = tuple(half.bearing + place.theta for half in vertex.half_edges.values())
+            self._unbelieved.note_mistake(Mistake(place.position, bearings, view.travelled))
             self.remove(view, vertex, reason)
         self._join(view, known)
         return known, self._events

@@ -41,12 +41,16 @@ class RecognitionConfig:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sighting:
-    """A vertex as seen now: position (2,) and bearings in the local frame."""
+    """A vertex as seen now: position (2,) and bearings in the local frame.
+
+    Of the edges that leave at bearings that are `unclear` as well, too little is seen.
+    """
 
     position: Array
     clearance: float
     bearings: tuple[float, ...]
     meetpoint: bool
+    unclear: tuple[float, ...] = ()
 
     @property
     def kind(self) -> Kind:

@@ -1,9 +1,11 @@
 """What is believed of vertices that have been seen, and from how far."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from gvgbot.autonomy.candidates import Candidates, CandidatesConfig
+from gvgbot.autonomy.candidates import Candidates, CandidatesConfig, Mistake
 from gvgbot.autonomy.gvg.local import LocalNode
 from gvgbot.autonomy.slam.recognition import Sighting
 from tests.unit.autonomy.local_graphs import drawn
@@ -18,12 +20,17 @@ SIGHTING = Sighting(PLACE, 1.0, (0.0, 1.57, 3.14), meetpoint=True)
 
 
 def sightings_until_believed(
-    candidates: Candidates, away: float, *, travelled: float
+    candidates: Candidates,
+    away: float,
+    *,
+    travelled: float,
+    what: tuple[Sighting, LocalNode] = (SIGHTING, NODE),
 ) -> int | None:
     """How often it must be seen from so far; None if it is not believed after many times."""
+    sighting, node = what
     for count in range(1, 50):
-        candidate = candidates.note(SIGHTING, away, travelled)
-        if candidates.is_believable(candidate, NODE, away):
+        candidate = candidates.note(sighting, away, travelled)
+        if candidates.is_believable(candidate, node, away):
             candidates.drop(candidate)
             return count
     return None
@@ -39,12 +46,27 @@ def test_what_was_none_twice_is_believed_from_near_only(
 ) -> None:
     candidates = Candidates(CONFIG)
     for _ in range(mistakes):
-        candidates.note_mistake(np.array([5.3, -0.2]), 10.0)
+        candidates.note_mistake(Mistake(np.array([5.3, -0.2]), (), 10.0))
     assert sightings_until_believed(candidates, away, travelled=20.0) == believed_after
 
 
 def test_mistakes_elsewhere_do_not_count() -> None:
     candidates = Candidates(CONFIG)
     for _ in range(5):
-        candidates.note_mistake(np.array([7.0, 0.0]), 10.0)
+        candidates.note_mistake(Mistake(np.array([7.0, 0.0]), (), 10.0))
     assert sightings_until_believed(candidates, 6.0, travelled=20.0) == 3
+
+
+@pytest.mark.parametrize(
+    ("bearing", "believed_after"), [(0.1, None), (-0.8, 6)], ids=["the same one", "another one"]
+)
+def test_a_side_edge_of_which_too_little_is_seen_is_looked_at_once(
+    bearing: float, believed_after: int | None
+) -> None:
+    """It leaves to the east, and so did one half a metre off that led nowhere."""
+    suspect = replace(NODE, weak=frozenset(NODE.branches[:1]))
+    sighting = replace(SIGHTING, unclear=(0.0,))
+    candidates = Candidates(CONFIG)
+    candidates.note_mistake(Mistake(np.array([5.4, 0.3]), (3.1, bearing, 1.7), 10.0))
+    found = sightings_until_believed(candidates, 0.5, travelled=20.0, what=(sighting, suspect))
+    assert found == believed_after
