@@ -4,10 +4,13 @@ import numpy as np
 
 from gvgbot.autonomy.gvg.local import Place
 from gvgbot.autonomy.mapping import Mapper
+from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.autonomy.start_edge import StartEdge, is_at_start
 from gvgbot.autonomy.views import Correspondence, View
 from gvgbot.autonomy.whereabouts import LEAST_LOOP_M, Passage, Whereabouts
 from gvgbot.geometry import Array
+
+_IN_CLEAR_M = 2.0  # from a vertex, it is seen which departures it has
 
 
 class DrivenEdges:
@@ -45,10 +48,17 @@ class DrivenEdges:
             edge.doubted_since = None
             return
         far, near = graph.half_edge(arrived), graph.half_edge(left)
-        if far is None or near is None or not (far.open and near.open):
+        if far is None or near is None or not near.open:
+            return
+        before = graph.edge_at(arrived)
+        if before is not None and before.other(arrived).vertex == left.vertex:
+            graph.remove_half_edge(left)  # it is the one by which that edge is known to leave
+        if not far.open:
             return
         if left in known.branch_of and passage.driven < LEAST_LOOP_M:
             return  # both ends are in sight
+        if _has_gone(left, view, known):
+            return  # what the robot drove on was none, and it has come onto another edge
         self._mapper.join(view, left, arrived, passage.line, passage.narrowest, driven=True)
 
     def _close_ring(self, view: View, where: Whereabouts, clearance: float) -> None:
@@ -85,3 +95,12 @@ class DrivenEdges:
         """Whether the robot has come back to where it came onto its first edge (2,), map frame."""
         driven = where.trail_length > LEAST_LOOP_M
         return driven and is_at_start(self._mapper.belief, start, clearance)
+
+
+def _has_gone(end: HalfEdgeId, view: View, known: Correspondence) -> bool:
+    """Whether the robot stands before a vertex and does not see this departure."""
+    node = known.node_of.get(end.vertex)
+    if node is None or end in known.branch_of:
+        return False
+    away = view.gvg.nodes[node].position - view.local_base.position
+    return float(np.hypot(*away)) < _IN_CLEAR_M

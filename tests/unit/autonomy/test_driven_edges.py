@@ -1,0 +1,90 @@
+"""What a drive from vertex to vertex says of the departures, on graphs drawn by hand."""
+
+import numpy as np
+import pytest
+
+from gvgbot.autonomy.driven_edges import DrivenEdges
+from gvgbot.autonomy.evidence import MappingConfig
+from gvgbot.autonomy.gvg.local import Branch, LocalGvg
+from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
+from gvgbot.autonomy.mapping import Mapper
+from gvgbot.autonomy.slam.graph import HalfEdgeId, Vertex
+from gvgbot.autonomy.slam.recognition import RecognitionConfig
+from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
+from gvgbot.autonomy.views import Correspondence, View
+from gvgbot.autonomy.whereabouts import Whereabouts
+from gvgbot.geometry import Pose
+from tests.unit.autonomy.local_graphs import Point, drawn, resampled
+
+EAST, NORTH, WEST = 0, 1, 2  # keys of the half-edges of each vertex
+
+# A street from west to east with side streets to the north at x = 0 (vertex 1) and 5 (vertex 2).
+STREET = drawn(
+    {1: (0.0, 0.0), 2: (5.0, 0.0), 3: (-4.0, 0.0), 4: (9.0, 0.0), 5: (0.0, 4.0), 6: (5.0, 4.0)},
+    {10: (1, 2, []), 11: (3, 1, []), 12: (2, 4, []), 13: (1, 5, []), 14: (2, 6, [])},
+)
+ALL_SEEN = {
+    Branch(10, forward=True): HalfEdgeId(1, EAST),
+    Branch(10, forward=False): HalfEdgeId(2, WEST),
+    Branch(12, forward=True): HalfEdgeId(2, EAST),
+    Branch(13, forward=True): HalfEdgeId(1, NORTH),
+    Branch(14, forward=True): HalfEdgeId(2, NORTH),
+}
+
+
+class Drive:
+    """A robot that has left vertex 1 by an edge, and where that leads."""
+
+    def __init__(self, left: HalfEdgeId) -> None:
+        self.mapper = Mapper(MappingConfig(), RecognitionConfig(), ScanMatchingConfig())
+        for vertex, x in ((1, 0.0), (2, 5.0)):
+            made = Vertex(vertex, 1.0, Pose(x, 0.0, 0.0), 0.0, 0.0)
+            for bearing in (0.0, np.pi / 2, np.pi):
+                made.add_half_edge(bearing)
+            self.mapper.graph.vertices[vertex] = made
+        self.where = Whereabouts(left, [np.zeros(2)])
+        self._driven = DrivenEdges(self.mapper)
+
+    def along(self, gvg: LocalGvg, seen: dict[Branch, HalfEdgeId], *corners: Point) -> "Drive":
+        known = Correspondence()
+        for branch, end in seen.items():
+            known.pair(end.vertex, end.vertex)
+            known.pair_branch(branch, end)
+        for x, y in resampled(list(corners)):
+            base = Pose(float(x), float(y), 0.0)
+            view = View(0, 0.0, 0.0, base, gvg, LocalMap(LocalMapConfig()))
+            place = gvg.place(base.position)
+            assert place is not None
+            self._driven.learn(view, known, place, self.where)
+        return self
+
+
+def test_a_departure_that_leads_where_another_is_known_to_lead_is_that_one() -> None:
+    """By the way on which the robot arrives, an edge comes from the vertex that it has left."""
+    drive = Drive(HalfEdgeId(1, NORTH))
+    graph = drive.mapper.graph
+    graph.join(
+        HalfEdgeId(1, EAST),
+        HalfEdgeId(2, WEST),
+        np.array([[0.0, 0.0], [5.0, 0.0]]),
+        1.0,
+        driven=True,
+    )
+    beyond = {branch: end for branch, end in ALL_SEEN.items() if end.vertex == 2}
+    drive.along(STREET, beyond, (0.0, 0.5), (2.0, 0.0), (6.0, 0.0))
+    assert sorted(graph.vertices[1].half_edges) == [EAST, WEST]
+    assert len(graph.edges) == 1
+
+
+@pytest.mark.parametrize("is_seen", [True, False], ids=["seen", "gone"])
+def test_what_was_none_leads_nowhere(*, is_seen: bool) -> None:
+    """To the north, where there seemed to be a way, and across to the east, before the vertex."""
+    drive = Drive(HalfEdgeId(1, NORTH))
+    drive.where.trail = list(resampled([(0.0, 0.0), (0.0, 5.0)]))
+    seen = {
+        branch: end
+        for branch, end in ALL_SEEN.items()
+        if end == HalfEdgeId(1, EAST) or (is_seen and end == HalfEdgeId(1, NORTH))
+    }
+    drive.along(STREET, seen, (1.2, 0.0))
+    assert len(drive.mapper.graph.edges) == int(is_seen)
