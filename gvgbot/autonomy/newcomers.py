@@ -2,7 +2,8 @@
 
 They are kept out of the map, and the planner leads round them, until they have stood for so long
 that they must be a part of the building. What depends on them is not believed meanwhile. Even then
-they may go, and the map forgets them as soon as that is seen.
+they may go, and the map forgets them as soon as that is seen. Who is out of sight is kept in mind:
+who is seen again at the same place has stood there all the while.
 """
 
 from collections.abc import Callable
@@ -55,11 +56,17 @@ class Newcomer:
     was_let_in: bool = False  # or it had, for what was seen of it at first
     was_wall: bool = False  # it was in the map: it is a wall, or somebody seen too little of
     evidence: float = 0.0  # that it is round: log-likelihood ratio of the last looks
+    is_lost: bool = False  # out of sight for so long that it may have gone
 
     @property
     def is_round(self) -> bool:
         """Whether so much has been seen of it that the rest is known."""
         return self.evidence > SURE
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether it stands there, and is kept out of the map."""
+        return not self.is_let_in and not self.is_lost
 
     def look(self, island: Island, stamp: float) -> None:
         """See it again."""
@@ -109,7 +116,7 @@ class Newcomers:
                 self._met.append((island.centre, island.radius))
             elif self._is_passing(island, scan.stamp, walls):
                 seen.append((island.centre, island.radius))
-        waiting = [(one.centre, one.radius) for one in self._all if not one.is_let_in]
+        waiting = [(one.centre, one.radius) for one in self._all if one.is_waiting]
         # At times one is seen in parts only, or has moved a little: both discs count.
         return _without(scan, local_base, [*seen, *waiting, *self._met, *self.company])
 
@@ -135,7 +142,7 @@ class Newcomers:
         waiting = [
             (one.centre, one.radius)
             for one in self._all
-            if (one.is_whole or one.is_round or one.came) and not one.is_let_in
+            if (one.is_whole or one.is_round or one.came) and one.is_waiting
         ]
         return waiting + self._met
 
@@ -150,7 +157,8 @@ class Newcomers:
 
     def _is_passing(self, island: Island, stamp: float, walls: "_Walls") -> bool:
         """Whether what is seen has not stood there for long; it is taken down."""
-        one = next((one for one in self._all if _is_at(one, island.centre)), None)
+        here = [one for one in self._all if _is_at(one, island.centre)]
+        one = min(here, key=lambda one: one.is_lost, default=None)
         if one is None:
             is_wall = walls.are_seen(island)
             if is_wall and island.evidence <= 0.0:
@@ -161,12 +169,19 @@ class Newcomers:
             self._all.append(one)
         was_round = one.is_round
         one.look(island, stamp)
+        if one.is_lost:
+            self._find_again(one, island, stamp)
         if one.was_wall and one.is_round and not was_round:
             one.first = stamp
             walls.take_out(one)
         one.is_let_in = stamp - one.first >= self._patience(one)
         one.was_let_in |= one.is_let_in or one.was_wall
         return not one.is_let_in
+
+    def _find_again(self, one: Newcomer, island: Island, stamp: float) -> None:
+        """Take it that it stood there all the while, unless it goes on at once: others pass by."""
+        one.is_lost, one.centre = False, island.centre
+        one.first = max(one.first, stamp - max(self._patience(one) - _GLIMPSE_S, 0.0))
 
     def _patience(self, one: Newcomer) -> float:
         if one.was_wall and not one.is_round:
@@ -178,7 +193,7 @@ class Newcomers:
         return found_after if may_be else min(_GLIMPSE_S, found_after)
 
     def _forget(self, scan: Scan, local_base: Pose, local_map: LocalMap) -> None:
-        """Let those go that have gone, or whom nobody has seen long, or who are far away."""
+        """Let those go that have gone or are far away; who may have gone is in nobody's way."""
         for one in self._all:
             if one.last > scan.stamp:  # kept from a time before the clock began anew
                 one.first, one.last = one.first + scan.stamp - one.last, scan.stamp
@@ -186,16 +201,15 @@ class Newcomers:
         for one in gone:
             if one.was_let_in:
                 local_map.doubt(one.centre, one.radius + _BLUR_M)
-        lost = [one for one in self._all if one not in gone and _is_lost(one, scan.stamp)]
-        for one in lost:  # it may have gone, or stand there still
-            local_map.forget(one.centre, one.radius + _BLUR_M)
         self._all = [
             one
             for one in self._all
-            if one not in gone
-            and one not in lost
-            and (not one.is_let_in or local_map.covers(one.centre))
+            if one not in gone and (one.is_waiting or local_map.covers(one.centre))
         ]
+        for one in self._all:
+            if one.is_waiting and _is_out_of_sight(one, scan.stamp):
+                one.is_lost = True
+                local_map.forget(one.centre, one.radius + _BLUR_M)
 
     @property
     def points(self) -> Array:
@@ -241,9 +255,9 @@ def _is_at(one: Newcomer, centre: Array) -> bool:
     return bool(np.hypot(*(one.centre - centre)) < _MOVED_M)
 
 
-def _is_lost(one: Newcomer, stamp: float) -> bool:
-    """Whether it has been out of sight for so long that nobody knows whether it still stands."""
-    return not one.is_let_in and stamp - one.last >= _LOST_S + one.last - one.first
+def _is_out_of_sight(one: Newcomer, stamp: float) -> bool:
+    """Whether that has been so for so long that nobody knows whether it still stands."""
+    return stamp - one.last >= _LOST_S + one.last - one.first
 
 
 def _without(scan: Scan, local_base: Pose, discs: list[tuple[Array, float]]) -> Scan:

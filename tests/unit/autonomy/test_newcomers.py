@@ -203,6 +203,33 @@ def test_where_somebody_was_last_seen_nobody_knows_the_floor_until_it_is_seen() 
     assert watch.map.is_bare(spot, RADIUS)
 
 
+def test_who_is_seen_again_where_he_stood_has_stood_there_all_the_while() -> None:
+    """A pole that a screen hides for a minute: looked at for eight seconds altogether."""
+    screened = carved([ROOM], [(1.0, -1.0, 1.1, 1.0)])
+    watch = Watch()
+    for second in range(4):
+        assert watch.dropped(EMPTY, second, person=(2.0, 0.0)) > 0
+    for second in range(4, 60):
+        watch.dropped(screened, second)
+    assert len(watch.newcomers.points) == 0
+    for second in range(60, 63):
+        assert watch.dropped(EMPTY, second, person=(2.1, 0.0)) > 0
+    assert watch.dropped(EMPTY, 63.0, person=(2.1, 0.0)) == 0
+    assert watch.inside() > 0
+
+
+def test_who_passes_where_somebody_stood_is_not_taken_for_him() -> None:
+    screened = carved([ROOM], [(1.0, -1.0, 1.1, 1.0)])
+    watch = Watch()
+    for second in range(4):
+        watch.dropped(EMPTY, second, person=(2.0, 0.0))
+    for second in range(4, 60):
+        watch.dropped(screened, second)
+    for second in range(10):
+        assert watch.dropped(EMPTY, 60.0 + second, person=(2.0, 0.4 * second - 1.2)) > 0
+    assert watch.inside() == 0
+
+
 def test_a_post_between_panes_of_glass_stays_where_it_is() -> None:
     """Most beams towards the disc around it go through the panes."""
     watch, post = Watch(), carved([ROOM], [(2.0, -0.07, 2.1, 0.07)])
