@@ -4,11 +4,12 @@ import numpy as np
 
 from gvgbot.autonomy.estimate import scans_at, smoothed_keyframes
 from gvgbot.autonomy.pipeline import Pipeline
-from gvgbot.geometry import Array, resampled
+from gvgbot.geometry import Array, Pose, resampled
 from gvgbot.maps.blanks import blanks
 from gvgbot.maps.gaps import gaps
 from gvgbot.maps.occupancy import occupancy_grid
 from gvgbot.maps.passages import Way, passages
+from gvgbot.maps.spots import spots
 from gvgbot.maps.viewpoints import viewpoints
 
 _INTO_M = 2.0  # off its ways: through a door, and the robot faces what it looks at
@@ -20,11 +21,14 @@ def survey(pipeline: Pipeline) -> Array:
     """Places (N, 2), m, map frame, that are worth another look.
 
     From there the robot could drive onto floor that nobody has seen, or sees some that was seen but
-    that no edge leads to, or where no edge leads through.
+    that no edge leads to, or where no edge leads through; or something stood there that may be a
+    part of the building.
     """
-    grid = occupancy_grid(scans_at(smoothed_keyframes(pipeline), pipeline))
+    keyframes = smoothed_keyframes(pipeline)
+    grid = occupancy_grid(scans_at(keyframes, pipeline))
     here, room = pipeline.map_base.position, pipeline.errands.room_m
-    ways, found = _ways(pipeline), gaps(grid, here, room)
+    stood = spots(grid, *_passed(pipeline, keyframes), here, room)
+    ways, found = _ways(pipeline), np.concatenate([gaps(grid, here, room), stood])
     if not ways:
         return found
     beside = np.concatenate([resampled(way.polyline, _STEP_M) for way in ways])
@@ -32,6 +36,13 @@ def survey(pipeline: Pipeline) -> Array:
     through = passages(grid, ways, here, room, pipeline.open_clearance)
     off = np.repeat([_INTO_M, _TOWARDS_M], [len(found), len(through)])
     return viewpoints(grid, beside, np.concatenate([found, through]), here, room, off)
+
+
+def _passed(pipeline: Pipeline, keyframes: list[Pose]) -> tuple[Array, Array]:
+    """Where something stood that the robot has passed (N, 2), map frame, and the radii (N,), m."""
+    places = [one.place(pipeline.keyframes, keyframes) for one in pipeline.passed]
+    radii = [one.radius for one in pipeline.passed]
+    return np.array(places).reshape(-1, 2), np.array(radii)
 
 
 def _ways(pipeline: Pipeline) -> list[Way]:

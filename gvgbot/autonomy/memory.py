@@ -20,6 +20,7 @@ from gvgbot.autonomy.keyframes import Keyframe, Step
 from gvgbot.autonomy.mission import Mission, Outcome
 from gvgbot.autonomy.newcomers import Newcomer
 from gvgbot.autonomy.odometry_log import OdometryLog
+from gvgbot.autonomy.passed import Passed
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.ekf import Belief
@@ -111,6 +112,7 @@ class Memory:
     hazards: list[Hazard]
     newcomers: list[Newcomer] = field(default_factory=list)
     lasting: int | None = None  # keyframes that are kept for good; None: all
+    passed: list[Passed] = field(default_factory=list)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -144,6 +146,7 @@ def remember(pipeline: Pipeline) -> Memory:
         hazards=pipeline._hazards._all,
         newcomers=pipeline._newcomers._all,
         lasting=pipeline.lasting,
+        passed=pipeline.passed,
     )
 
 
@@ -224,6 +227,7 @@ def recall(pipeline: Pipeline, memory: Memory, past: list[Growth]) -> None:
     pipeline._maps._shared = memory.odds.shared
     pipeline._hazards._all = list(memory.hazards)
     pipeline._newcomers._all = list(memory.newcomers)
+    pipeline.passed = memory.passed
     pipeline.travelled, pipeline._kept = memory.travelled, memory.kept
     _recall_past(pipeline, past[: memory.keyframes])
     if len(past) < memory.keyframes and memory.last is not None:

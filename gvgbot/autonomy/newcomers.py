@@ -84,6 +84,7 @@ class Newcomers:
     def __init__(self, config: NewcomersConfig) -> None:
         self._config = config
         self._all: list[Newcomer] = []
+        self.missed: list[Newcomer] = []  # in the last look, of those found that never moved
         self.in_team = False  # bodies of robots pass by so close that slivers of them are seen
         self.company: list[tuple[Array, float]] = []  # other robots: where they say they are,
         self._met: list[tuple[Array, float]] = []  # and where they are seen
@@ -146,6 +147,16 @@ class Newcomers:
         ]
         return waiting + self._met
 
+    def is_one_standing(self, stamp: float, local_map: LocalMap) -> bool:
+        """Whether somebody in sight has been found who may be let in soon."""
+        return any(
+            one.is_waiting
+            and one.last == stamp
+            and _has_stood(one)
+            and bool(local_map.covers(one.centre))
+            for one in self._all
+        )
+
     @property
     def latest(self) -> list[tuple[Array, float]]:
         """As `discs`, but by the last glance."""
@@ -206,10 +217,11 @@ class Newcomers:
             for one in self._all
             if one not in gone and (one.is_waiting or local_map.covers(one.centre))
         ]
-        for one in self._all:
-            if one.is_waiting and _is_out_of_sight(one, scan.stamp):
-                one.is_lost = True
-                local_map.forget(one.centre, one.radius + _BLUR_M)
+        lost = [one for one in self._all if one.is_waiting and _is_out_of_sight(one, scan.stamp)]
+        for one in lost:
+            one.is_lost = True
+            local_map.forget(one.centre, one.radius + _BLUR_M)
+        self.missed = [one for one in lost if _has_stood(one)]
 
     @property
     def points(self) -> Array:
@@ -253,6 +265,11 @@ class _Walls:
 
 def _is_at(one: Newcomer, centre: Array) -> bool:
     return bool(np.hypot(*(one.centre - centre)) < _MOVED_M)
+
+
+def _has_stood(one: Newcomer) -> bool:
+    """Whether it did not come, and never moved: it may be a part of the building."""
+    return not one.came and one.last - one.first >= _GLIMPSE_S
 
 
 def _is_out_of_sight(one: Newcomer, stamp: float) -> bool:

@@ -32,6 +32,7 @@ from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.mission import Mission
 from gvgbot.autonomy.newcomers import Newcomers
 from gvgbot.autonomy.odometry_log import OdometryLog
+from gvgbot.autonomy.passed import Passed
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
 from gvgbot.autonomy.views import Correspondence, View, touching
 from gvgbot.geometry import STANDSTILL, Array, Pose, Twist, rotated_covariance, wrap_angle
@@ -40,6 +41,7 @@ from gvgbot.hal.messages import Odometry, Scan
 from gvgbot.hal.sweep import free_distance, seen_from
 
 _NOTHING_FELT = Felt()
+_MOST_PASSED = 100  # places, the latest ones
 _LIFTED = np.diag([0.3**2, 0.3**2, 0.1**2])  # how far a robot is carried that is put down again
 _SEEN_SHARE = 0.8  # of the laser's range, and of the map's half width: walls farther off may lack
 _ROOM_BESIDE_EDGES_M = 0.08  # on each side, where no edge leads
@@ -84,6 +86,7 @@ class Pipeline:
         self._reflexes = Reflexes(config.reflexes)
         self._hazards = Hazards(config.hazards)
         self._newcomers = Newcomers(config.newcomers)
+        self.passed: list[Passed] = []
         # other robots as they tell of themselves, map frame; None if there are surely none
         self.company: list[Companion] | None = None
         self.seen: BodiesSeen | None = None  # what may be robots of a team, in the last look
@@ -192,9 +195,16 @@ class Pipeline:
         self.mission.meet(local_base, nearby)
         is_way = partial(self.mapper.is_way, local_base)
         scan = self._newcomers.sift(scan, local_base, self._maps.near, is_way)
+        self._note_passed()
         if self.company is not None:
             self.seen = self._bodies_seen(scan.stamp, local_base)
         return scan
+
+    def _note_passed(self) -> None:
+        """Keep in mind who stood there until he was out of sight."""
+        now = len(self.keyframes)
+        missed = [Passed(now, one.centre, one.radius) for one in self._newcomers.missed]
+        self.passed = (self.passed + missed)[-_MOST_PASSED:]
 
     def _view(self, scan: Scan, local_base: Pose) -> View:
         """What there is to be seen of the GVG, and what of that is doubtful."""
@@ -216,6 +226,7 @@ class Pipeline:
             doubtful,
             touching(self.gvg, doubtful),
             marks,
+            self._newcomers.is_one_standing(scan.stamp, self._maps.near),
         )
 
     def _act(self, view: View, known: Correspondence, scan: Scan) -> list[Event]:
@@ -339,6 +350,7 @@ class Pipeline:
         self.keyframes[self.lasting :] = [last]
         self.steps[self.lasting - 1 :] = [Step(before.map_base.to(last.map_base), _FORGOTTEN)]
         self.mapper.forget_between(self.lasting, newest)
+        self.passed = [one.before(self.lasting) for one in self.passed]
         return [WayForgotten(stamp, self.lasting, newest - self.lasting)]
 
     # -- control, per odometry message -------------------------------------------------------------

@@ -26,6 +26,7 @@ class View:
     doubted: frozenset[int] = frozenset()  # nodes that may be there for a while only
     # nodes that were made where the vertex of a ring should be: there is nothing to be seen of it
     marks: dict[int, Vertex] = field(default_factory=dict)
+    is_somebody_found: bool = False  # who will be let into the map if he stays
 
     def is_doubtful(self, place: Array, within_m: float) -> bool:
         """Whether something that may go stands so near to a place (2,)."""

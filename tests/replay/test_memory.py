@@ -1,8 +1,10 @@
 """A mind that was kept and recalled goes on as one whose devices were silent for a while."""
 
+import numpy as np
 import pytest
 
 from gvgbot.autonomy.memory import Growth, Memory, growth, recall, remember
+from gvgbot.autonomy.passed import Passed
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.clock import run_in_virtual_time
 from gvgbot.config import Config, load_config
@@ -65,6 +67,14 @@ def test_a_restart_is_no_more_than_a_silence(
     recall(restarted, *kept(lived))
     assert everything(fed(restarted, later)) == everything(fed(lived, later))
     assert len(restarted.keyframes) > 50
+
+
+def test_who_was_passed_is_looked_at_again_by_whoever_was_restarted() -> None:
+    config = load_config()
+    lived, restarted = fresh(config), fresh(config)
+    lived.passed = [Passed(7, np.array([1.0, 2.0]), 0.1)]
+    recall(restarted, *kept(lived))
+    assert packed(restarted.passed) == packed(lived.passed)
 
 
 def test_what_the_journal_says_after_the_snapshot_is_lived_again(

@@ -14,7 +14,7 @@ from gvgbot.geometry import STANDSTILL, Array, Pose
 from gvgbot.hal.messages import Odometry
 from gvgbot.live_survey import LiveSurvey
 from gvgbot.survey import survey
-from tests.unit.autonomy.sights import carved, sweep
+from tests.unit.autonomy.sights import LASER_270, carved, sweep
 
 START = Pose(-3.0, 0.0, 0.0)  # in the world; the map begins there
 CORRIDOR, SIDE = (-4.0, -1.0, 4.0, 1.0), (2.0, -1.0, 4.0, 4.0)
@@ -41,6 +41,31 @@ def test_what_lies_in_the_shadow_of_a_corner_is_a_gap_until_the_robot_looks_roun
     (place,) = places_after(building, 3.0)
     assert place == pytest.approx([3.0, 1.5], abs=0.3)
     assert len(places_after(building, 6.0)) == 0
+
+
+def driven_past_a_post(seconds: float) -> Pipeline:
+    """A robot whose drive past a post at (-1.5, 0.6) took so long; now that is out of sight."""
+    world = carved([CORRIDOR, (0.0, -3.0, 1.5, 0.0)], [(-1.6, 0.5, -1.4, 0.7)])
+    config = load_config()
+    pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
+    way = np.arange(0.0, 5.6, 0.25)
+    for stamp, x in zip(np.linspace(0.0, seconds, len(way)).tolist(), way.tolist(), strict=True):
+        odom_base = Pose(x, 0.0, 0.0)
+        pipeline.control(Odometry(stamp, odom_base, STANDSTILL))
+        scan = sweep(world, START.compose(odom_base), field_of_view=LASER_270)
+        pipeline.perceive(replace(scan, stamp=stamp))
+    return pipeline
+
+
+def test_a_post_that_was_passed_before_anybody_knew_that_it_is_one_is_looked_at_again() -> None:
+    """It was in sight for a quarter of the way."""
+    assert not driven_past_a_post(300.0).passed
+    pipeline = driven_past_a_post(15.0)
+    places = set(map(tuple, survey(pipeline).tolist()))
+    assert len(pipeline.passed) == 1
+    pipeline.passed = []
+    (place,) = places - set(map(tuple, survey(pipeline).tolist()))
+    assert START.transform(np.array(place)) == pytest.approx([-1.5, 0.6], abs=2.0)
 
 
 def test_a_daemon_makes_its_survey_off_the_loop_and_forgets_it_when_the_robot_drives_on() -> None:

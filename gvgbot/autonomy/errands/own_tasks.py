@@ -77,7 +77,7 @@ class OwnTasks:
         )
         if self._mission.is_waiting or (self._unseen.is_done and not has_news):
             return None
-        if not self._unseen.is_standing(view.travelled):
+        if not self._unseen.is_standing(view.travelled) or view.is_somebody_found:
             return Stand()
         places = survey()
         if places is None:

@@ -218,6 +218,34 @@ def test_who_is_seen_again_where_he_stood_has_stood_there_all_the_while() -> Non
     assert watch.inside() > 0
 
 
+@pytest.mark.parametrize(
+    ("known", "step", "seconds", "missed"),
+    [
+        (None, 0.0, 5, 1),
+        pytest.param(EMPTY, 0.0, 5, 0, id="came"),
+        pytest.param(None, 0.4, 5, 0, id="walked"),
+        pytest.param(None, 0.0, 30, 0, id="was let in"),
+    ],
+)
+def test_who_stood_until_he_was_out_of_sight_is_missed(
+    known: World | None, step: float, seconds: int, missed: int
+) -> None:
+    """A screen is put before him; whoever came, walked or was let into the map is not missed."""
+    screened = carved([ROOM], [(1.0, -1.0, 1.1, 1.0)])
+    watch = Watch(known)
+    for second in range(seconds):
+        watch.dropped(EMPTY, second, person=(2.0, step * second - 0.8 * (step > 0.0)))
+        is_watched = watch.newcomers.is_one_standing(float(second), watch.map)
+        assert is_watched == (known is None and step == 0.0 and 3 <= second < CONFIG.found_after_s)
+    found = []
+    for second in range(60):
+        watch.dropped(screened, seconds + second)
+        assert not watch.newcomers.is_one_standing(float(seconds + second), watch.map)
+        found += watch.newcomers.missed
+    assert len(found) == missed
+    assert all(np.hypot(*(one.centre - [2.0, 0.0])) < 0.1 for one in found)
+
+
 def test_who_passes_where_somebody_stood_is_not_taken_for_him() -> None:
     screened = carved([ROOM], [(1.0, -1.0, 1.1, 1.0)])
     watch = Watch()

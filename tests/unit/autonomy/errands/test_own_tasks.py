@@ -1,6 +1,7 @@
 """What a robot does unasked: it looks at gaps in its map before it calls all explored."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -23,12 +24,14 @@ class Explorer(Robot):
         self.errands = Errands(self.mission, self.mapper, CONFIG, room_m=0.2)
         self.left = list(surveys)
         self.mission.survey = self._survey
+        self.somebody_until = 0.0  # s, that somebody is found
 
     def _survey(self) -> Array:
         return np.array(self.left.pop(0)).reshape(-1, 2)
 
     def decide(self, view: View, known: Correspondence) -> tuple[Order, list[Event]]:
-        return self.errands.advance(view, known)
+        is_found = view.stamp < self.somebody_until
+        return self.errands.advance(replace(view, is_somebody_found=is_found), known)
 
     def until_it_moves_or_ends(self) -> Order:
         order: Order = Stand()
@@ -65,6 +68,15 @@ def test_who_has_driven_on_since_the_survey_makes_another_one_before_the_end() -
     robot.until_it_moves_or_ends()
     assert robot.mission.outcome is None
     assert robot.errands.errand is not None
+
+
+def test_who_stands_in_sight_is_watched_before_the_survey_is_made() -> None:
+    robot = Explorer([])
+    robot.somebody_until = 20.0
+    while robot.left:
+        robot.look(CLOSED)
+    assert robot.stamp > 20.0
+    assert robot.travelled == 0.0
 
 
 def test_a_gap_that_stays_is_told_of() -> None:
