@@ -3,7 +3,7 @@
 They are kept out of the map, and the planner leads round them, until they have stood for so long
 that they must be a part of the building. What depends on them is not believed meanwhile. Even then
 they may go, and the map forgets them as soon as that is seen. Who is out of sight is kept in mind:
-who is seen again at the same place has stood there all the while.
+who is seen again much later at the same place has stood there all the while.
 """
 
 from collections.abc import Callable
@@ -190,9 +190,13 @@ class Newcomers:
         return not one.is_let_in
 
     def _find_again(self, one: Newcomer, island: Island, stamp: float) -> None:
-        """Take it that it stood there all the while, unless it goes on at once: others pass by."""
+        """Take it that it stood there all the while if nobody would for so long.
+
+        Unless it goes on at once: others pass by.
+        """
         one.is_lost, one.centre = False, island.centre
-        one.first = max(one.first, stamp - max(self._patience(one) - _GLIMPSE_S, 0.0))
+        is_old = stamp - one.first >= self._config.came_after_s
+        one.first = stamp - max(self._patience(one) - _GLIMPSE_S, 0.0) if is_old else stamp
 
     def _patience(self, one: Newcomer) -> float:
         if one.was_wall and not one.is_round:
@@ -215,7 +219,9 @@ class Newcomers:
         self._all = [
             one
             for one in self._all
-            if one not in gone and (one.is_waiting or local_map.covers(one.centre))
+            if one not in gone
+            and (one.is_waiting or local_map.covers(one.centre))
+            and (not one.is_lost or _has_stood(one))
         ]
         lost = [one for one in self._all if one.is_waiting and _is_out_of_sight(one, scan.stamp)]
         for one in lost:
