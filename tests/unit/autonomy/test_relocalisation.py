@@ -155,6 +155,7 @@ def test_it_is_sure_when_it_has_seen_the_branch_and_not_before() -> None:
     assert formed[-1].is_sure
 
 
+@pytest.mark.timeout(60)
 def test_it_is_not_wrong_where_more_places_look_alike_than_it_can_follow() -> None:
     """Along five corridors of 40 m most places are alike; two have a branch near the end."""
     corridors: list[Rectangle] = [(-1.0, 10.0 * k - 1.0, 41.0, 10.0 * k + 1.0) for k in range(5)]
