@@ -10,6 +10,7 @@ from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.whereabouts import Situation
 
 _MOST_NEAR = 2  # vertices to go to, for what no known way leads to
+_BEGAN_M = 0.4  # a trail so short is back where it began
 _AT_VERTEX_M = 0.5  # so near, all that there is to see from a vertex is seen
 
 
@@ -65,7 +66,14 @@ class Scouting:
         return path
 
     def path_on(self, here: Situation) -> tuple[Branch, ...]:
-        """On along the present edge; at the end of sight the robot turns back."""
+        """On along the present edge; at the end of sight the robot turns back.
+
+        If the vertex where its trail began has proved to be none, it drives on past that.
+        """
+        where = here.where
+        is_lost = where.on_edge is None or here.graph.half_edge(where.on_edge) is None
+        if is_lost and self._turned_back and where.trail_length < _BEGAN_M:
+            where.trail, self._turned_back = [], False
         path = here.astern() if self._turned_back else here.ahead()
         if Track.of(*here.gvg.line_from(here.place, path)).length < ARRIVED_M:
             self._turned_back = not self._turned_back

@@ -52,10 +52,11 @@ class Town:
         self.belief = add_vertex(self.belief, vertex.id, vertex.local, np.eye(3) * 1e-4)
         return vertex
 
-    def seen_from(self, x: float) -> Situation:
+    def seen_from(self, x: float, heading: float = 0.0) -> Situation:
         place = STREET.place(np.array([x, 0.0]))
         assert place is not None
-        return Situation(STREET, self.known, self.graph, self.where, Access(place), Pose(x))
+        base = Pose(x, 0.0, heading)
+        return Situation(STREET, self.known, self.graph, self.where, Access(place), base)
 
 
 def end_of(path: tuple[Branch, ...] | None) -> tuple[float, float] | None:
@@ -119,3 +120,18 @@ def test_at_the_end_of_sight_it_turns_back() -> None:
     assert aim(3.9) == (-3.0, 0.0)
     assert aim(-3.0) == (-3.0, 0.0)
     assert aim(-2.9) == (4.0, 0.0)
+
+
+def test_back_from_the_end_of_sight_it_drives_on_past_where_its_edge_began() -> None:
+    """The vertex there has proved to be none: nothing tells that the robot passes it."""
+    town, scouting = Town(), Scouting()
+    town.where = Whereabouts(on_edge=HalfEdgeId(99, 0))
+    scouting.begin(0.0)
+
+    def drive_to(x: float, heading: float) -> tuple[float, float] | None:
+        town.where._extend(np.array([x, 0.0]))
+        return end_of(scouting.path_on(town.seen_from(x, heading)))
+
+    assert {drive_to(x, 0.0) for x in np.arange(0.0, 3.5, 0.2)} == {(4.0, 0.0)}
+    drive_to(3.8, 0.0)
+    assert {drive_to(x, math.pi) for x in np.arange(3.6, -2.0, -0.2)} == {(-3.0, 0.0)}
