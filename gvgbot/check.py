@@ -299,9 +299,8 @@ def _contact(contact: Contact) -> Line:
         "cliff": contact.cliff,
         "wheel drop": contact.wheel_drop,
         "over-current": contact.over_current,
+        "charger cable": contact.charger_cable,
     }
     pressed = ", ".join(name for name, is_felt in felt.items() if is_felt)
-    if contact.charger_cable:
-        return Line("warn", "contact", "the charger's cable is plugged in", "pull it out to drive")
-    remedy = "put the robot on a flat floor, away from walls and stairs"
+    remedy = "put the robot on a flat floor, away from walls and stairs and off the charger's cable"
     return Line("warn" if pressed else "ok", "contact", pressed or "none", remedy)

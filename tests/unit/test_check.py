@@ -45,6 +45,7 @@ ILLS = {
     "few scans": ("twin.laser.bad_checksum_fraction=0.2", "laser rate", "fail", "cable"),
     "silent base": ("twin.base.link.silences_per_h=36000", "base", "fail", "switched on"),
     "lifted robot": ("twin.base.mishaps.wheel_drops_per_h=36000", "contact", "warn", "floor"),
+    "charging by cable": ("twin.base.has_adapter=true", "contact", "warn", "off the charger's"),
 }
 
 
