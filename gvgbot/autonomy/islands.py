@@ -61,6 +61,19 @@ def islands(scan: Scan, local_base: Pose) -> list[Island]:
     return found
 
 
+def slivers(scan: Scan, local_base: Pose) -> Array:
+    """Where beams end (N, 2), local frame, on what too little is seen of to be an island.
+
+    It is narrow and has more room on one side at least.
+    """
+    told = np.flatnonzero(~np.isnan(scan.ranges))
+    if not len(told):
+        return np.empty((0, 2))
+    look = _Look(scan, local_base.compose(scan.base_laser), told)
+    ends = [look.sliver(piece) for piece in _pieces((0, len(told)), look.steps >= _STEP_M)]
+    return np.concatenate([np.empty((0, 2)), *ends])
+
+
 def without_fringes(scan: Scan) -> Scan:
     """The scan without what its first and its last beams show too little of.
 
@@ -104,14 +117,31 @@ class _Look:
         start, stop = piece
         if stop - start < _BEAMS:
             return None
-        depth, beside = self._depth[start:stop], self._beside
-        rims = depth[0] < beside[start], depth[-1] < beside[stop + 1]
+        rims = self._rims(piece)
         is_one = self.steps[start : stop - 1].max(initial=0.0) < self._smooth
         if not any(rims) or not is_one:
             return None
-        ends = beam_ends(self._scan, self._told[start:stop], depth, self._laser)
+        ends = self._ends(piece)
         width = float(np.hypot(*(ends[-1] - ends[0])))
         return self._shaped(ends, width, all(rims)) if _SLIM_M <= width < _WIDE_M else None
+
+    def sliver(self, piece: Piece) -> Array:
+        """Where its beams end (N, 2), local frame, if it is too slim, or has too few of them."""
+        if not any(self._rims(piece)):
+            return np.empty((0, 2))
+        ends = self._ends(piece)
+        is_slim = np.hypot(*(ends[-1] - ends[0])) < _SLIM_M
+        return ends if is_slim or len(ends) < _BEAMS else np.empty((0, 2))
+
+    def _rims(self, piece: Piece) -> tuple[bool, bool]:
+        """Whether there is more room before its first beam, and after its last one."""
+        start, stop = piece
+        first, last = self._depth[start], self._depth[stop - 1]
+        return bool(first < self._beside[start]), bool(last < self._beside[stop + 1])
+
+    def _ends(self, piece: Piece) -> Array:
+        start, stop = piece
+        return beam_ends(self._scan, self._told[start:stop], self._depth[start:stop], self._laser)
 
     def _shaped(self, ends: Array, width: float, is_whole: bool) -> Island | None:
         eye, evidence = self._laser.position, 0.0

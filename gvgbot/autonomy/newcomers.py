@@ -2,8 +2,8 @@
 
 They are kept out of the map, and the planner leads round them, until they have stood for so long
 that they must be a part of the building. What depends on them is not believed meanwhile. Even then
-they may go, and the map forgets them as soon as that is seen. Who is out of sight is kept in mind:
-who is seen again much later at the same place has stood there all the while.
+they may go, and the map forgets them as soon as that is seen. Who is out of sight is kept in mind,
+but stands there anew when seen again at the same place: others pass by.
 """
 
 from collections.abc import Callable
@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.gvg.local_map import LocalMap
-from gvgbot.autonomy.islands import Island, beam_ends, islands, without_fringes
+from gvgbot.autonomy.islands import Island, beam_ends, islands, slivers, without_fringes
 from gvgbot.autonomy.roundness import SURE, with_look
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
@@ -26,6 +26,7 @@ _BLUR_M = 0.1  # beyond its rim, beams may still end on something
 _NEAR_M = 3.0  # who is farther away is not followed from scan to scan
 _GONE_M = 1.0  # between two looks, at most
 _MOVED_M = 0.3  # what stands is found again within this
+_LATELY_S = 2.0  # after which the last that is seen of somebody is no longer his
 _STRAY = 0.1  # of the beams towards a place: so many may end there though nothing is there
 _LOST_S = 3.0  # what is out of sight for so long, beyond the time it stood, may have gone
 _RIM = np.stack([f(np.arange(12) * np.pi / 6) for f in (np.cos, np.sin)], axis=1)
@@ -89,6 +90,7 @@ class Newcomers:
         self.company: list[tuple[Array, float]] = []  # other robots: where they say they are,
         self._met: list[tuple[Array, float]] = []  # and where they are seen
         self.bodies: Array = np.empty((0, 3))  # round ones in the last look: x, y, radius, m
+        self._lately: list[tuple[float, Array]] = []  # when, s, and where somebody was seen
         self._glanced: list[tuple[Array, float]] | None = None  # where those are that move on
 
     def sift(
@@ -117,9 +119,27 @@ class Newcomers:
                 self._met.append((island.centre, island.radius))
             elif self._is_passing(island, scan.stamp, walls):
                 seen.append((island.centre, island.radius))
+        seen += self._rests(scan, local_base, seen)
         waiting = [(one.centre, one.radius) for one in self._all if one.is_waiting]
         # At times one is seen in parts only, or has moved a little: both discs count.
         return _without(scan, local_base, [*seen, *waiting, *self._met, *self.company])
+
+    def _rests(
+        self, scan: Scan, local_base: Pose, seen: list[tuple[Array, float]]
+    ) -> list[tuple[Array, float]]:
+        """What may be the last that is seen of those who go behind something, as discs.
+
+        It is too little to be anybody, but somebody was near by just before.
+        """
+        old = scan.stamp - _LATELY_S
+        self._lately = [one for one in self._lately if old < one[0] <= scan.stamp]
+        self._lately += [(scan.stamp, centre) for centre, _ in seen]
+        places = [place for _, place in self._lately]
+        if not places:
+            return []
+        ends = slivers(scan, local_base)
+        away, _ = cKDTree(places).query(ends, distance_upper_bound=_GONE_M)
+        return [(end, 0.0) for end in ends[np.isfinite(away)]]
 
     def glance(self, scan: Scan, local_base: Pose) -> None:
         """See how those have moved that are near, without learning anything else."""
@@ -181,22 +201,13 @@ class Newcomers:
         was_round = one.is_round
         one.look(island, stamp)
         if one.is_lost:
-            self._find_again(one, island, stamp)
+            one.is_lost, one.centre, one.first = False, island.centre, stamp
         if one.was_wall and one.is_round and not was_round:
             one.first = stamp
             walls.take_out(one)
         one.is_let_in = stamp - one.first >= self._patience(one)
         one.was_let_in |= one.is_let_in or one.was_wall
         return not one.is_let_in
-
-    def _find_again(self, one: Newcomer, island: Island, stamp: float) -> None:
-        """Take it that it stood there all the while if nobody would for so long.
-
-        Unless it goes on at once: others pass by.
-        """
-        one.is_lost, one.centre = False, island.centre
-        is_old = stamp - one.first >= self._config.came_after_s
-        one.first = stamp - max(self._patience(one) - _GLIMPSE_S, 0.0) if is_old else stamp
 
     def _patience(self, one: Newcomer) -> float:
         if one.was_wall and not one.is_round:
