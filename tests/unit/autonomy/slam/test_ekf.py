@@ -228,7 +228,7 @@ def test_a_map_of_many_blocks_is_corrected_as_the_textbook_says() -> None:
     assert np.array_equal(belief.P, before)
     assert np.allclose(after.P, joseph, rtol=0.0, atol=1e-13)
     assert np.array_equal(after.P, after.P.T)
-    assert np.allclose(innovation(belief, 50, foreseen, R)[1], S, rtol=0.0, atol=1e-15)
+    assert np.allclose(innovation(belief, 50, foreseen, R)[1], S, rtol=0.0, atol=1e-13)
 
 
 @given(seeds)
