@@ -30,7 +30,6 @@ from gvgbot.session import Session
 
 _BEAMS = 720  # of a scan, all around
 _MERGE_M = 0.1  # points of walls in one square of this size are one
-_SEEN_SHARE = 0.8  # of the laser's range: walls farther off cannot be relied on
 _MOST_CELLS = 60_000_000  # of a map
 
 
@@ -70,6 +69,7 @@ def _teach(pipeline: Pipeline, path: Path, world: World, known: Mask, config: Co
 def _gvg(path: Path, world: World, known: Mask, config: Config, reach: float) -> LocalGvg:
     """The GVG of the largest part of the map that the robot can drive in."""
     reduction = config.autonomy.reduction
+    sight = min(reach, config.autonomy.local_map.half_width_m)
     room = config.robot.radius_m + config.autonomy.passage_margin_m
     grid = KnownGrid(_walls(world, known), known, world.resolution_m, np.array(world.origin))
     fine = fine_graph(
@@ -77,7 +77,7 @@ def _gvg(path: Path, world: World, known: Mask, config: Config, reach: float) ->
         _somewhere(path, world, known, room),
         min_clearance=room,
         roughness=reduction.roughness_m,
-        open_clearance=min(reduction.open_clearance_m, _SEEN_SHARE * reach),
+        open_clearance=reduction.open_clearance(sight),
     )
     return reduce_graph(fine, reduction)
 

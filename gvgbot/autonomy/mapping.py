@@ -387,7 +387,8 @@ class Mapper(Knowledge):
         line = np.concatenate([here[None], line, here[None]])
         way_out, way_in = line[len(line) // 8] - here, line[-len(line) // 8] - here
         bearings = (math.atan2(way_out[1], way_out[0]), math.atan2(way_in[1], way_in[0]))
-        vertex = self._add(view, Sighting(here, min_clearance, bearings, meetpoint=True))
+        clearance, _ = view.local_map.tree().query(here)
+        vertex = self._add(view, Sighting(here, float(clearance), bearings, meetpoint=True))
         ends = [HalfEdgeId(vertex.id, key) for key in vertex.half_edges]
         self.join(view, ends[0], ends[1], line, min_clearance, driven=True)
 

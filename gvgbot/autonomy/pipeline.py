@@ -43,7 +43,6 @@ from gvgbot.hal.sweep import free_distance, seen_from
 _NOTHING_FELT = Felt()
 _MOST_PASSED = 100  # places, the latest ones
 _LIFTED = np.diag([0.3**2, 0.3**2, 0.1**2])  # how far a robot is carried that is put down again
-_SEEN_SHARE = 0.8  # of the laser's range, and of the map's half width: walls farther off may lack
 _ROOM_BESIDE_EDGES_M = 0.08  # on each side, where no edge leads
 _COMPANY_M = 0.15  # by which another robot may be elsewhere than it says
 _BEHIND_M, _GRAIN_M = 0.2, 0.05  # what must be known to be free, when it backs off
@@ -208,10 +207,8 @@ class Pipeline:
 
     def _view(self, scan: Scan, local_base: Pose) -> View:
         """What there is to be seen of the GVG, and what of that is doubtful."""
-        half_width = self._config.local_map.half_width_m
-        self.open_clearance = min(
-            self._config.reduction.open_clearance_m, _SEEN_SHARE * min(scan.range_max, half_width)
-        )
+        sight = min(scan.range_max, self._config.local_map.half_width_m)
+        self.open_clearance = self._config.reduction.open_clearance(sight)
         self.gvg, marks = self.mapper.marked(self._local_gvg(local_base), local_base)
         doubtful = np.concatenate(
             [self._hazards.doubtful, self._newcomers.points, self._maps.near.suspects()]

@@ -41,6 +41,17 @@ def test_a_hall_whose_walls_are_out_of_sight_at_first_is_left_by_its_corridor() 
     assert_found(run, "endpoint", [(13.2, 0.0)])
 
 
+def test_a_hall_wider_than_sight_is_driven_round_once_along_its_walls() -> None:
+    """Its corners are out of range from the middle, but not from where the way along turns."""
+    length, width = 16.0, 11.0
+    hall: Rectangle = (-length / 2, -width / 2, length / 2, width / 2)
+    run = play(carved([hall]), Pose(0.0, -0.5, 0.5), twin=SHORT_SIGHTED, limit=300.0)
+    assert_explored(run)
+    assert not run.recoveries()
+    off = 5.6 / math.sqrt(2)  # m from the walls, from where a corner is 5.6 m away
+    assert run.pipeline.travelled < 1.5 * 2 * (length + width - 4 * off)
+
+
 def test_a_square_closet_is_explored_without_an_edge() -> None:
     """All corners are as far from its middle: there is nothing to drive along, and no way out."""
     run = play(carved([(-0.6, -0.6, 0.6, 0.6)]), Pose(-0.2, -0.1, 0.0), limit=60.0)

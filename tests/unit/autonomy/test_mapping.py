@@ -386,6 +386,19 @@ def test_strays_are_forgotten_only_beside_a_map_that_holds_together() -> None:
     assert len(seen.mapper.graph.vertices) == 2
 
 
+def test_the_vertex_of_a_ring_has_the_room_that_is_around_it() -> None:
+    """More than where the ring is narrowest; or its walls would seem to have gone."""
+    walls = LocalMap(LocalMapConfig())
+    walls.insert(sweep(carved([(-4.0, -1.5, 4.0, 1.5)]), Pose()), Pose(), 0.0)
+    seen = Seen()
+    view = View(0, 0.0, 9.9, Pose(), TWO_ENDS, walls)
+    seen.mapper.close_ring(view, np.array([(3.0, 0.0), (9.0, 12.0), (-3.0, 0.0)]), 1.0)
+    (vertex,) = seen.mapper.graph.vertices.values()
+    assert vertex.clearance == pytest.approx(1.5, abs=0.03)
+    (edge,) = seen.mapper.graph.edges.values()
+    assert edge.min_clearance == 1.0
+
+
 PERSON = np.array([[3.0, 1.1], [3.2, 1.2], [2.8, 1.2]])  # beside the crossing of TEE
 
 
