@@ -58,9 +58,14 @@ def run(name: str) -> None:
 
 
 def main(names: Sequence[str]) -> int:
-    """Run them; how many failed."""
+    """Run them; how many failed, or 2 if there is no such benchmark."""
+    known = sorted(path.stem for path in FOLDER.glob("bench_*.py"))
+    unknown = [name for name in names if name not in known]
+    if unknown:
+        print(f"there is no {unknown[0]}; there are {', '.join(known)}", file=sys.stderr)
+        return 2
     failed = []
-    for name in names or sorted(path.stem for path in FOLDER.glob("bench_*.py")):
+    for name in names or known:
         print(f"-- {name}", flush=True)
         process = multiprocessing.get_context("spawn").Process(target=run, args=(name,))
         process.start()
