@@ -5,10 +5,13 @@ from dataclasses import dataclass
 import structlog
 
 from gvgbot.autonomy import events
+from gvgbot.hal.messages import Battery
 from gvgbot.topics import State
 from gvgbot.words import counted
 
 PASSING_S = 1.0  # an obstacle that holds the robot for less is part of driving
+SAGGING_S = 10.0  # a voltage that is low for less may be that of a motor that starts
+LOW_BATTERY, EMPTY_BATTERY, CHARGED = 0.2, 0.05, 0.3  # of a full charge
 
 log = structlog.get_logger()
 
@@ -72,6 +75,31 @@ class GuardJournal:
         else:
             log.warning("guard stopped", reason=reason)
         self._said = reason
+
+
+@dataclass(slots=True)
+class BatteryJournal:
+    """Says once that the battery is low, and once that it is empty, until it is charged again."""
+
+    _said: float = 1.0  # the charge below which it was said
+    _since: float | None = None  # stamp; since when it is lower than what was said last
+
+    def note(self, battery: Battery | None, stamp: float) -> None:
+        """Take note of the state of the battery at a stamp, s."""
+        if battery is None:
+            return
+        if battery.charging or battery.fraction > CHARGED:
+            self._said = 1.0
+        level = EMPTY_BATTERY if battery.fraction < EMPTY_BATTERY else LOW_BATTERY
+        if battery.charging or not battery.fraction < level < self._said:
+            self._since = None
+            return
+        self._since = stamp if self._since is None else self._since
+        if stamp - self._since < SAGGING_S:
+            return
+        self._said = level
+        what = "battery empty" if level == EMPTY_BATTERY else "battery low"
+        log.warning(what, volts=round(battery.voltage, 1), remedy="charge it")
 
 
 def status_line(state: State) -> str:

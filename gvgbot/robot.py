@@ -18,7 +18,7 @@ from gvgbot.errors import GvgbotError
 from gvgbot.geometry import Twist
 from gvgbot.hal.guard import Guard, Reason
 from gvgbot.hal.messages import Contact, Odometry, Scan
-from gvgbot.journal import GuardJournal, log_event, status_line
+from gvgbot.journal import BatteryJournal, GuardJournal, log_event, status_line
 from gvgbot.links import Devices, Links
 from gvgbot.live_feed import LiveFeed, Pace
 from gvgbot.live_map import LiveMap, News
@@ -113,7 +113,7 @@ class Robot:
             rate_hz = session.config.telemetry.scan_rate_hz
             self._feed = LiveFeed(network, session.pipeline, rate_hz)
         self._ready = False
-        self._guard = GuardJournal()
+        self._guard, self._battery = GuardJournal(), BatteryJournal()
         self._healths = Pace(HEALTH.rate_hz)
         self._ros: LiveRos | None = None
         self._clock: Clock
@@ -351,6 +351,7 @@ class Robot:
                 self._network.publish(Events(events=tuple(self._latest_events)))
                 self._told = self._happened
         self._notifier.status(status_line(now))
+        self._battery.note(self._devices.base.battery, now.stamp)
         self._devices.base.show(sign(now, is_lost=self._pipeline.is_lost))
         stuck = now.cycle_age is not None and now.cycle_age > STUCK_AFTER
         if not stuck or self._devices.base.away is not None:

@@ -14,7 +14,8 @@ import structlog
 
 from gvgbot.autonomy.events import Decision, Finished, LoopClosed, Recovery, VertexAdded
 from gvgbot.clock import run_in_virtual_time
-from gvgbot.journal import GuardJournal, log_event, status_line
+from gvgbot.hal.messages import Battery
+from gvgbot.journal import BatteryJournal, GuardJournal, log_event, status_line
 from gvgbot.service import Notifier, StopSignals, set_up_logging
 from tests.unit.test_telemetry import EXAMPLE
 
@@ -227,6 +228,40 @@ def test_a_stop_that_flickers_is_said_once() -> None:
     for i in range(10):
         cycles += [(0.4 * i, "cliff"), (0.4 * i + 0.2, None)]
     assert guard_lines(cycles) == [("guard stopped", "cliff")]
+
+
+def battery_lines(charges: list[float], *, charging_from: int | None = None) -> list[str]:
+    """What is said of a charge a second."""
+    journal = BatteryJournal()
+    with structlog.testing.capture_logs() as logs:
+        for stamp, charge in enumerate(charges):
+            charging = charging_from is not None and stamp >= charging_from
+            journal.note(Battery(float(stamp), 13.2, charge, charging), float(stamp))
+    assert all(log["log_level"] == "warning" for log in logs)
+    return [log["event"] for log in logs]
+
+
+def test_a_battery_that_runs_down_is_told_of_twice() -> None:
+    assert battery_lines([1.0 - second / 600 for second in range(601)]) == [
+        "battery low",
+        "battery empty",
+    ]
+
+
+def test_a_battery_that_is_low_while_motors_start_is_no_news() -> None:
+    assert battery_lines(20 * [0.15, 0.15, 0.15, 0.15, 0.25]) == []
+
+
+def test_a_battery_that_was_charged_is_told_of_anew() -> None:
+    low, full = 30 * [0.1], 30 * [0.9]
+    assert battery_lines(low + full + low) == ["battery low", "battery low"]
+    assert battery_lines(low + low, charging_from=30) == ["battery low"]
+
+
+def test_an_unknown_battery_is_no_news() -> None:
+    with structlog.testing.capture_logs() as logs:
+        BatteryJournal().note(None, 1.0)
+    assert logs == []
 
 
 def test_the_status_says_what_counts() -> None:
