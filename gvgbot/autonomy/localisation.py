@@ -1,7 +1,7 @@
 """The base in the local frame: odometry, corrected by laying each scan onto the local map."""
 
 import math
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
@@ -44,6 +44,15 @@ _PER_M = np.diag([0.004**2, 0.004**2, 0.0001**2])  # per metre: what cells do to
 Localisation = Literal["full", "paper"]
 
 
+class _Walls(NamedTuple):
+    """Points (N, 2), the hits (N,) that each is made of, and where it was seen from (N, 2)."""
+
+    points: Array
+    hits: Array
+    sights: Array
+    tree: cKDTree
+
+
 class LocalMaps:
     """The local map that the GVG is drawn from, and a coarse one that reaches farther.
 
@@ -54,6 +63,8 @@ class LocalMaps:
         self, near: LocalMapConfig, far: LocalMapConfig, matching: ScanMatchingConfig
     ) -> None:
         self.near, self._far = LocalMap(near), LocalMap(far)
+        self._due: tuple[Scan, Pose, float] | None = None  # what the far one has yet to learn
+        self._walls: _Walls | None = None  # of both; None: not drawn yet
         self._matching = matching
         self._calibration = Calibration()
         self._shared = 1.0  # scans that the walls in sight are the mean of
@@ -65,11 +76,30 @@ class LocalMaps:
         """Add a scan taken by the base at a pose in the local frame, after so many metres.
 
         `whole` is the scan with those who have been left out of it: up to them there is nothing.
+        The far map learns it when there is time: see `catch_up`.
         """
+        self._teach_far()
         local_laser = local_base.compose(scan.base_laser)
         free = None if whole is None else whole.ranges - _BODY_M
         self.near.insert(scan, local_laser, travelled, free)
-        self._far.insert(scan, local_laser, travelled)
+        self._due, self._walls = (scan, local_laser, travelled), None
+
+    def catch_up(self) -> None:
+        """Do what is due before the next match: between two looks, or when that comes."""
+        self._teach_far()
+        if self._walls is None:
+            self._walls = self._drawn()
+
+    def _teach_far(self) -> None:
+        if self._due is not None:
+            self._far.insert(*self._due)
+        self._due = None
+
+    @property
+    def far(self) -> LocalMap:
+        """The map that is only matched with, as all scans so far have made it."""
+        self._teach_far()
+        return self._far
 
     def match(
         self, scan: Scan, before: Pose, motion: Pose, duration: float, Q: Array
@@ -124,14 +154,16 @@ class LocalMaps:
         best = self._best(scan, priors, clearly, turned, least_known=_SEEN_SHARE)
         return (prior, Q + _LOST) if best is None else (best[0].pose, best[0].covariance)
 
-    def _walls(self) -> tuple[Array, Array, Array]:
-        """Walls (N, 2) of the near map and of the far one around it, their hits and sights."""
+    def _drawn(self) -> _Walls:
+        """The walls of the near map, and of the far one around it."""
         far = self._far.points()
         around = ~self.near.covers(far)
-        return (
-            np.concatenate([self.near.points(), far[around]]),
+        points = np.concatenate([self.near.points(), far[around]])
+        return _Walls(
+            points,
             np.concatenate([self.near.hits(), self._far.hits()[around]]),
             np.concatenate([self.near.sights(), self._far.sights()[around]]),
+            cKDTree(points, balanced_tree=False),
         )
 
     def _best(
@@ -147,14 +179,16 @@ class LocalMaps:
         With `least_known`, what lies where nothing is known yet speaks neither for a place nor
         against it; enough of the rest, which is taken for at least that share, must fit.
         """
-        walls, hits, sights = self._walls()
+        self.catch_up()
+        assert self._walls is not None
+        walls, hits, sights, tree = self._walls
         config = self._matching
         points = sampled(scan, config.points)
         sides = Sides(sights, scan.base_laser.position - points)
         coarse = (config.coarse_pair_m,) if config.coarse_pair_m else ()
         if min(len(walls), len(points)) < _LEAST_POINTS:
             return None
-        tree, best, agreement = cKDTree(walls, balanced_tree=False), None, 0.0
+        best, agreement = None, 0.0
         for prior, Q in priors:
             if agreement + clearly >= 1.0:
                 break  # nothing can be clearly better

@@ -141,7 +141,7 @@ def remember(pipeline: Pipeline) -> Memory:
         candidates=mapper._unbelieved._all,
         intent=_intent(pipeline),
         near=_cells(maps.near),
-        far=_cells(maps._far),
+        far=_cells(maps.far),
         odds=Odds(calibration.x, calibration.P, maps._shared, calibration.noise, calibration.told),
         hazards=pipeline._hazards._all,
         newcomers=pipeline._newcomers._all,
@@ -220,7 +220,7 @@ def recall(pipeline: Pipeline, memory: Memory, past: list[Growth]) -> None:
     pipeline.errands.closures.until = memory.intent.blocked_until
     if _fits(pipeline._maps.near, memory.near) and _fits(pipeline._maps._far, memory.far):
         _recall_cells(pipeline._maps.near, memory.near)
-        _recall_cells(pipeline._maps._far, memory.far)
+        _recall_cells(pipeline._maps.far, memory.far)
     calibration = pipeline._maps._calibration
     calibration.x, calibration.P = memory.odds.x, memory.odds.P
     calibration.noise, calibration.told = memory.odds.noise, memory.odds.told

@@ -162,6 +162,7 @@ class Pipeline:
             return happened
         self._glance(scan, odom_base)
         if not self._worth_a_look(scan, odom_base):
+            self._maps.catch_up()
             return happened
         if self._last is not None:
             self.mission.skip(max(0.0, scan.stamp - self._last.stamp - _LONGEST_GAP_S))

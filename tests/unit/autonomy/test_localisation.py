@@ -51,6 +51,20 @@ def test_noise_does_not_turn_the_scan() -> None:
     assert abs(np.mean(errors)) < 3 * standard_error
 
 
+def test_what_is_done_while_there_is_time_changes_no_match() -> None:
+    found = []
+    for has_time in (False, True):
+        rng, local = np.random.default_rng(4), maps()
+        for x in np.arange(-2.0, 0.0, 0.25):
+            local.insert(room(rng, x), Pose(x, 0.0, 0.0), x + 2.0)
+            if has_time:
+                local.catch_up()
+        assert len(local.far.points()) > 100
+        found.append(local.match(room(rng, 0.0), Pose(-0.25, 0.0), Pose(0.25, 0.0), 1.0, LOOSE))
+    assert found[0][0] == found[1][0]
+    assert np.array_equal(found[0][1], found[1][1])
+
+
 def test_without_walls_the_covariance_is_the_prior_s() -> None:
     nothing = Scan(0.0, np.full(1081, math.inf), float(BEARINGS[0]), math.radians(0.25), 0.1, 30.0)
     pose, covariance = maps().match(nothing, Pose(1.0, 2.0, 3.0), Pose(), 1.0, LOOSE)
