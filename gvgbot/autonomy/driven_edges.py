@@ -48,12 +48,12 @@ class DrivenEdges:
             edge.doubted_since = None
             return
         far, near = graph.half_edge(arrived), graph.half_edge(left)
-        if far is None or near is None or not near.open:
+        if far is None or near is None or near.edge is not None:
             return
         before = graph.edge_at(arrived)
         if before is not None and before.other(arrived).vertex == left.vertex:
             graph.remove_half_edge(left)  # it is the one by which that edge is known to leave
-        if not far.open:
+        if far.edge is not None:
             return
         if left in known.branch_of and passage.driven < LEAST_LOOP_M:
             return  # both ends are in sight
@@ -81,7 +81,7 @@ class DrivenEdges:
         if start is None or on_edge is None or on_edge == start.end:
             return
         ends = (graph.half_edge(on_edge), graph.half_edge(start.end))
-        if any(half is None or not half.open for half in ends):
+        if any(half is None or half.edge is not None for half in ends):
             return
         map_vertex = self._mapper.belief.map_vertex(start.end.vertex)
         if not self._is_round(where, map_vertex.transform(start.line[0]), clearance):

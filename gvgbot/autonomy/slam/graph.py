@@ -147,12 +147,16 @@ class GvgGraph:
     def join(
         self, a: HalfEdgeId, b: HalfEdgeId, polyline: Array, min_clearance: float, *, driven: bool
     ) -> Edge:
-        """Make an edge of two frontiers; polyline (N, 2) from a to b in the frame of a's vertex."""
+        """Make an edge of two departures that had none, given up or not.
+
+        The polyline (N, 2) runs from a to b in the frame of a's vertex.
+        """
         length = float(np.hypot(*np.diff(polyline, axis=0).T).sum())
         edge = Edge(self.next_id(), a, b, polyline, length, min_clearance, driven, int(driven))
         self.edges[edge.id] = edge
         for end in (a, b):
-            self.vertices[end.vertex].half_edges[end.key].edge = edge.id
+            half = self.vertices[end.vertex].half_edges[end.key]
+            half.edge, half.blocked = edge.id, False
         return edge
 
     def unjoin(self, edge: Edge) -> None:

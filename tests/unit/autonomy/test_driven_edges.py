@@ -76,6 +76,19 @@ def test_a_departure_that_leads_where_another_is_known_to_lead_is_that_one() -> 
     assert len(graph.edges) == 1
 
 
+@pytest.mark.parametrize("given_up", [HalfEdgeId(1, EAST), HalfEdgeId(2, WEST)], ids=str)
+def test_a_way_that_was_given_up_and_is_driven_is_an_edge(given_up: HalfEdgeId) -> None:
+    """Somebody stood there, and has gone, or the robot comes from the other side."""
+    drive = Drive(HalfEdgeId(1, EAST))
+    graph = drive.mapper.graph
+    graph.vertices[given_up.vertex].half_edges[given_up.key].blocked = True
+    beyond = {branch: end for branch, end in ALL_SEEN.items() if end.vertex == 2}
+    drive.along(STREET, beyond, (0.5, 0.0), (6.0, 0.0))
+    (edge,) = graph.edges.values()
+    assert {edge.a, edge.b} == {HalfEdgeId(1, EAST), HalfEdgeId(2, WEST)}
+    assert graph.blocked() == []
+
+
 @pytest.mark.parametrize("is_seen", [True, False], ids=["seen", "gone"])
 def test_what_was_none_leads_nowhere(*, is_seen: bool) -> None:
     """To the north, where there seemed to be a way, and across to the east, before the vertex."""
