@@ -25,6 +25,7 @@ from scipy import ndimage
 from benchmarks.faults import LAYER, Fault
 from benchmarks.reference_gvg import reference_gvg
 from benchmarks.small_worlds import one_ring
+from benchmarks.standers import Standers
 from benchmarks.surroundings import Disk, FullDirectory, FullFiles, Hand, Listeners, Manager
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.config import Config, load_config
@@ -51,8 +52,6 @@ STILL_MPS, SPEED_MPS = 0.03, 0.12  # standing; touching something faster than th
 VERTEX_M = 0.6  # from the nearest true one, a vertex is false,
 FELT_M = 1.5  # unless it is so near to something that was felt and is taken for a fact,
 STOOD_M = 2.0  # or to somebody, before whom the way ends,
-STOOD_S = 10.0  # who stands there for so long, or stood, as long as the robot explores
-STIRS_M = 0.5  # who stays within this stands, on one foot or on the other
 PLACE_M = 0.75  # from the true pose, the robot is not where it believes
 SETTLING_S = 10.0  # after a fault in one of
 DISTURBING = {"link", "device", "sensing", "world", "process"}  # it may find its place again
@@ -107,21 +106,6 @@ class Verdict:
         self.violations.setdefault(oracle, how)
 
 
-class Standers:
-    """Takes down who stands about."""
-
-    def __init__(self) -> None:
-        self._stands: dict[int, tuple[Array, float]] = {}  # where, since when (s)
-
-    def look(self, centres: Array, now: float) -> list[Array]:
-        """Places of people (N, 2) who have not gone away for long, of those who are there now."""
-        for number, centre in enumerate(centres):
-            place, _ = self._stands.get(number, (centre, now))
-            if number not in self._stands or np.hypot(*(centre - place)) > STIRS_M:
-                self._stands[number] = centre.copy(), now
-        return [place for place, since in self._stands.values() if now - since > STOOD_S]
-
-
 class Trial:
     """A robot, its world, and what befalls both."""
 
@@ -145,8 +129,7 @@ class Trial:
         self._contacts, self._fastest = 0, 0.0
         self._is_mute, self._rolls_until = False, -math.inf  # s; nobody can tell the base to stop
         self._felt: list[Array] = []  # places where it felt a cliff or a bump (2,), m
-        self._stood: list[Array] = []  # places where somebody stood about (2,), m
-        self._standing: list[Array] = []  # and stands now
+        self._standers = Standers(self._place.world)
 
     async def run(self) -> None:
         """Live until the end, judged all the time."""
@@ -368,7 +351,6 @@ class Trial:
 
     async def _judge(self) -> None:
         last = max((fault.at + fault.lasts for fault in self._timed()), default=0.0)
-        standers = Standers()
         while not self._is_over:
             now = self._clock.now()
             self._world.body.advance(now)
@@ -377,8 +359,7 @@ class Trial:
             self._judge_stops(now)
             self._judge_place(now)
             if self._world.people is not None:
-                self._standing = standers.look(self._world.people.centres, now)
-                self._stood += self._standing
+                self._standers.look(self._world.people.centres, self._world.body.pose, now)
             session = self._session
             is_done = session is not None and session.pipeline.mission.outcome is not None
             if session is not None and (now > END_S or (is_done and now > last + QUIET_S)):
@@ -450,7 +431,9 @@ class Trial:
             return
         world_map, mapper = _world_map(session), session.pipeline.mapper
         is_exploring = self.verdict.outcome is None  # and may come back to look
-        stood = self._stood if is_exploring else self._standing
+        people = self._standers
+        stood = people.standing(self._clock.now()) + people.unseen
+        stood += people.stood if is_exploring else []
         excused = [(place, FELT_M) for place in self._felt] + [(place, STOOD_M) for place in stood]
         of_rings = {vertex.id for vertex in mapper.graph.rings()}
         for vertex in mapper.graph.vertices.keys() - of_rings:
