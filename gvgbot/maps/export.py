@@ -4,7 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from gvgbot.errors import UsageError
-from gvgbot.maps import geojson, graphml
+from gvgbot.maps import graphml, route_server
 from gvgbot.maps.atomic_files import write_files
 from gvgbot.maps.picture_files import PICTURES
 from gvgbot.maps.saved_run import SavedRun
@@ -12,7 +12,7 @@ from gvgbot.maps.show import picture_of
 
 GRAPHS: dict[str, Callable[[SavedRun], bytes]] = {
     ".graphml": lambda run: graphml.encode(run.graph),
-    ".geojson": lambda run: geojson.encode(run.graph).encode(),
+    ".geojson": lambda run: route_server.encode(run.graph).encode(),
 }
 
 

@@ -14,6 +14,7 @@ from PIL import Image, ImageFilter
 from gvgbot.cli import main
 from gvgbot.maps import geojson
 from gvgbot.maps.route_graph import MapEdge
+from tests.unit.maps.route_server import load
 from tests.unit.maps.small_run import GRAPH, write_run
 from tests.unit.maps.test_picture import BLUE, of_colour
 
@@ -127,8 +128,10 @@ def _loop() -> MapEdge:
     return MapEdge(start=2, end=2, polyline=line, length=2.8, min_clearance=0.5)
 
 
-def test_geojson_is_the_file_of_the_run(run: Path) -> None:
-    assert export(run, ".GeoJSON") == (run / "map.geojson").read_bytes()
+def test_geojson_is_for_the_route_server(run: Path) -> None:
+    loaded = load(export(run, ".GeoJSON").decode())
+    assert loaded.nodes == {vertex.id: vertex.position for vertex in GRAPH.vertices}
+    assert len(loaded.edges) == 2 * len(GRAPH.edges)  # all are straight
 
 
 @pytest.mark.parametrize("name", ["map.jpg", "map", "nowhere/map.svg"])

@@ -1,13 +1,18 @@
 """The route server of Nav2 takes every map that a run saves."""
 
 import json
+import math
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import networkx as nx  # type: ignore[import-untyped]
 import numpy as np
 import pytest
 from hypothesis import given
 
+from gvgbot.geometry import Array
+from gvgbot.maps import route_server
 from gvgbot.maps.geojson import encode
 from gvgbot.maps.route_graph import RouteGraph
 from tests.unit.maps.route_server import Malformed, load
@@ -28,6 +33,44 @@ def test_every_graph_is_taken_with_all_its_edges_both_ways(graph: RouteGraph) ->
     there = sorted((edge.start, edge.end) for edge in graph.edges)
     back = [(end, start) for start, end in there]
     assert sorted((start, end) for start, end, _ in loaded.edges.values()) == sorted(there + back)
+
+
+@given(graphs())
+def test_the_straight_ways_of_an_export_run_where_the_edges_do(graph: RouteGraph) -> None:
+    text = route_server.encode(graph)
+    if graph.edges:
+        load(text)
+    features = json.loads(text)["features"]
+    pieces = [f for f in features if f["geometry"]["type"] != "Point"]
+    assert len(pieces) >= 2 * len(graph.edges)
+    for piece in pieces:
+        start, end = piece["properties"]["metadata"]["edge"]
+        lines = [e.polyline for e in graph.edges if (e.start, e.end) == (start, end)]
+        (a, b) = piece["geometry"]["coordinates"][0]
+        for share in np.linspace(0.0, 1.0, 5):
+            point = (1.0 - share) * np.array(a) + share * np.array(b)
+            assert min(away(point, line) for line in lines) < route_server.TOLERANCE_M + 1e-5
+
+
+def away(point: Array, line: Array) -> float:
+    """How far a point is from the nearest piece of a line (N, 2)."""
+    found = []
+    for a, b in pairwise(line):
+        length = math.dist(a, b)
+        along = 0.0 if length == 0.0 else float((point - a) @ (b - a)) / length**2
+        found.append(math.dist(point, a + min(max(along, 0.0), 1.0) * (b - a)))
+    return min(found)
+
+
+def test_a_way_round_a_corner_is_as_long_from_node_to_node() -> None:
+    """As the route server drives it: 2 m ahead and 1 m to the left."""
+    loaded = load(route_server.encode(CORNER))
+    graph = nx.DiGraph()
+    for start, end, _ in loaded.edges.values():
+        graph.add_edge(start, end, metres=math.dist(loaded.nodes[start], loaded.nodes[end]))
+    for way in ((3, 7), (7, 3)):
+        assert nx.shortest_path_length(graph, *way, weight="metres") == pytest.approx(3.0)
+    assert sorted(loaded.nodes.values()) == [(0.0, 0.0), (2.0, 0.0), (2.0, 1.0)]
 
 
 def test_a_saved_run_is_taken(tmp_path: Path) -> None:
