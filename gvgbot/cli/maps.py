@@ -59,8 +59,8 @@ def _add_export(actions: Commands) -> None:
         help="the map in another format",
         description="Write the map of a run in the format that the file's name ends with: "
         ".svg and .pdf to print, .png, .graphml for graph programs, .geojson for the Nav2 route "
-        "server, straight from node to node. With --ros-bag write a recording (MCAP) as a bag of ROS 2: scans, odometry, "
-        "transforms, and the map as it grew.",
+        "server, straight from node to node. With --ros-bag write a recording (MCAP) as a bag of "
+        "ROS 2: scans, odometry, transforms, and the map as it grew.",
         epilog="example: gvgbot map export runs/office-1 office.pdf",
     )
     export.add_argument(
