@@ -69,7 +69,6 @@ def _teach(pipeline: Pipeline, path: Path, world: World, known: Mask, config: Co
 def _gvg(path: Path, world: World, known: Mask, config: Config, reach: float) -> LocalGvg:
     """The GVG of the largest part of the map that the robot can drive in."""
     reduction = config.autonomy.reduction
-    sight = min(reach, config.autonomy.local_map.half_width_m)
     room = config.robot.radius_m + config.autonomy.passage_margin_m
     grid = KnownGrid(_walls(world, known), known, world.resolution_m, np.array(world.origin))
     fine = fine_graph(
@@ -77,7 +76,7 @@ def _gvg(path: Path, world: World, known: Mask, config: Config, reach: float) ->
         _somewhere(path, world, known, room),
         min_clearance=room,
         roughness=reduction.roughness_m,
-        open_clearance=reduction.open_clearance(sight),
+        open_clearance=reduction.open_clearance(reach, config.autonomy.local_map.half_width_m),
     )
     return reduce_graph(fine, reduction)
 

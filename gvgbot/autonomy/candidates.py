@@ -105,7 +105,7 @@ class Candidates:
         if away > _PASSED_M and self._is_mistakable(candidate):
             return False
         if node.is_suspect:
-            if self._has_been_looked_at(candidate):
+            if self.was_looked_at(candidate.position, *candidate.unclear):
                 return False
             passed = away > candidate.nearest + _LEFT_BEHIND_M
             enough = self._config.meetpoint_sightings * (1 if passed else 2)
@@ -116,12 +116,12 @@ class Candidates:
         late = candidate.seen_at - _LATE_M
         return sum(one.at > late for one in self._mistaken_at(candidate.position)) >= _MISTAKES
 
-    def _has_been_looked_at(self, candidate: Candidate) -> bool:
-        """Whether nothing was behind these side edges when the robot drove there."""
-        return any(
-            _are_among(candidate.unclear, one.bearings)
-            for one in self._mistaken_at(candidate.position)
-        )
+    def was_looked_at(self, place: Array, *bearings: float) -> bool:
+        """Whether nothing was behind side edges at a place (2,) when the robot drove there.
+
+        Place and bearings are of the local frame.
+        """
+        return any(_are_among(bearings, one.bearings) for one in self._mistaken_at(place))
 
     def is_stubborn(self, position: Array) -> bool:
         """Whether what was seen at a place (2,), local frame, came back whenever it was taken out.

@@ -92,7 +92,13 @@ class Evidence:
     ) -> None:
         """Pair a node's branches with the half-edges of its vertex; add certain new ones."""
         branches, bearings, matched = self.pair_departures(view, node, vertex, known)
-        new = [i for i in range(len(branches)) if i not in matched]
+        place = vertex.local.position
+        new = [
+            i
+            for i, branch in enumerate(branches)
+            if i not in matched
+            and not (branch in node.weak and self._unbelieved.was_looked_at(place, bearings[i]))
+        ]
         certain = [i for i in new if branches[i] not in node.weak]
         for i in self._believed(view, vertex, new, certain):
             matched[i] = vertex.add_half_edge(bearings[i] - vertex.local.theta)

@@ -139,7 +139,8 @@ class Mapper(Knowledge):
             place = self.in_local_frame(view, vertex.id)
             bearings = tuple(half.bearing + place.theta for half in vertex.half_edges.values())
             self._unbelieved.note_mistake(Mistake(place.position, bearings, view.travelled))
-            self.remove(view, vertex, reason)
+            if not self.graph.leave_ring(vertex):
+                self.remove(view, vertex, reason)
         self._join(view, known)
         return known, self._events
 

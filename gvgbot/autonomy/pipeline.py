@@ -208,8 +208,9 @@ class Pipeline:
 
     def _view(self, scan: Scan, local_base: Pose) -> View:
         """What there is to be seen of the GVG, and what of that is doubtful."""
-        sight = min(scan.range_max, self._config.local_map.half_width_m)
-        self.open_clearance = self._config.reduction.open_clearance(sight)
+        self.open_clearance = self._config.reduction.open_clearance(
+            scan.range_max, self._config.local_map.half_width_m
+        )
         self.gvg, marks = self.mapper.marked(self._local_gvg(local_base), local_base)
         doubtful = np.concatenate(
             [self._hazards.doubtful, self._newcomers.points, self._maps.near.suspects()]

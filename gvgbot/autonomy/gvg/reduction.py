@@ -23,7 +23,10 @@ _SPACING = 0.1  # metres between the points of an edge
 _MERGE_HYSTERESIS = 1.3  # by which factor an edge must differ to overrule what the map says of it
 _REACH_HYSTERESIS = 1.12
 _WIDE_M = 4.0  # from the walls
-_CORNER_IN_SIGHT = 0.7  # a right-angled corner is farther off than its walls: by sqrt(2)
+_SEEN_SHARE = 0.8  # of the laser's range: walls farther off may lack
+_CORNER_SHARE = (
+    0.7  # of the map's reach: a right-angled corner is sqrt(2) times as far as its walls
+)
 _SPECK = 4.0  # so many of the shortest edges around open space are no way round it
 _FALL_IN_CORNER = 0.3  # metres of clearance lost per metre, at least, towards a corner
 _ENDPOINT_M = 0.6  # a point so near to a known endpoint is that endpoint
@@ -64,12 +67,13 @@ class ReductionConfig:
     )
     open_clearance_m: Annotated[float, Range(1.0, 30.0)] = 8.0  # farther off, follow one wall
 
-    def open_clearance(self, sight: float) -> float:
-        """How far off one wall is followed, m, if nothing farther than `sight` m is to be seen.
+    def open_clearance(self, range_m: float, reach_m: float) -> float:
+        """How far off one wall is followed, m, by a laser's range and how far the map reaches.
 
-        Where that way turns, the corner of the room must be in sight, or it may be a way out.
+        Where that way turns, the corner of the room must be in the map: as one that comes and goes
+        with every metre, it would be taken for a way out.
         """
-        return min(self.open_clearance_m, _CORNER_IN_SIGHT * sight)
+        return min(self.open_clearance_m, _SEEN_SHARE * range_m, _CORNER_SHARE * reach_m)
 
 
 @dataclass(slots=True, eq=False)

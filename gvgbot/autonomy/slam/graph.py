@@ -194,6 +194,20 @@ class GvgGraph:
         ends = ((edge.a.vertex, edge.b.vertex) for edge in self.edges.values())
         return [self.vertices[a] for a, b in ends if a == b and self.vertices[a].degree == 2]
 
+    def leave_ring(self, vertex: Vertex) -> bool:
+        """Take out what leads away from a ring's vertex; False if there is more than that, or less.
+
+        Without it nothing would be left of an edge that ends where it began.
+        """
+        away = [key for key, half in vertex.half_edges.items() if half.edge is None]
+        edges = {half.edge for half in vertex.half_edges.values()} - {None}
+        if not away or len(edges) != 1 or vertex.degree - len(away) != 2:
+            return False
+        for key in away:
+            self.remove_half_edge(HalfEdgeId(vertex.id, key))
+        vertex.misses = 0
+        return True
+
     def blocked(self) -> list[HalfEdgeId]:
         """All half-edges that were given up."""
         return [

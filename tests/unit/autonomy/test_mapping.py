@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gvgbot.autonomy.candidates import Mistake
 from gvgbot.autonomy.events import (
     ClosureRevoked,
     DoubtSettled,
@@ -300,6 +301,41 @@ def test_a_departure_that_stays_unclear_from_where_it_leaves_becomes_a_frontier(
     seen.mapper.move(moved, np.zeros((3, 3)))
     seen.look(unclear, CONFIG.candidates.meetpoint_sightings, at=moved)
     assert vertex.degree == 4
+
+
+@pytest.mark.parametrize(("looked_at", "degree"), [(math.pi / 2, 3), (-math.pi / 2, 4)])
+def test_an_unclear_departure_that_was_looked_at_and_was_none_comes_back_no_more(
+    looked_at: float, degree: int
+) -> None:
+    """Where the robot has been to see what is in that direction, or in another one."""
+    lines = {**TEE_LINES, 13: (2, 5, [])}
+    stub = drawn({**TEE_POINTS, 5: (3.0, 0.3)}, lines, unseen={**UNSEEN, 5: math.pi / 2})
+    weak = replace(stub.nodes[2], weak=frozenset({Branch(13, forward=True)}))
+    seen = Seen().look(TEE, 20)
+    seen.mapper._unbelieved.note_mistake(Mistake(np.array([3.0, 0.0]), (looked_at,), 0.0))
+    moved = Pose(2.6, 0.0)
+    seen.mapper.move(moved, np.zeros((3, 3)))
+    seen.look(LocalGvg({**stub.nodes, 2: weak}, stub.edges), 20, at=moved)
+    (vertex,) = (v for v in seen.mapper.graph.vertices.values() if v.kind == "meetpoint")
+    assert vertex.degree == degree
+
+
+def test_of_a_vertex_on_a_ring_that_proves_to_be_none_the_ring_is_left() -> None:
+    """Its third departure was none; the way round is known all the same."""
+    seen = Seen().look(TEE, 20)
+    graph = seen.mapper.graph
+    (vertex,) = (v for v in graph.vertices.values() if v.kind == "meetpoint")
+    psi = seen.mapper.belief.map_vertex(vertex.id).theta
+    keys = {round(math.cos(h.bearing + psi)): key for key, h in vertex.half_edges.items()}
+    east, west = HalfEdgeId(vertex.id, keys[1]), HalfEdgeId(vertex.id, keys[-1])
+    for edge in list(graph.edges.values()):  # that to the dead end
+        graph.unjoin(edge)
+    line = np.array([(3.0, 0.0), (6.0, 0.0), (6.0, 9.0), (-2.0, 9.0), (-2.0, 0.0), (3.0, 0.0)])
+    view = View(99, 99.0, 9.9, Pose(), TEE, NOTHING_SEEN)
+    seen.mapper.join(view, east, west, line, 1.0, driven=True)
+    seen.look_near(PLAIN, CONFIG.misses + 2)
+    assert graph.rings() == [vertex]
+    assert of_type(seen.events, VertexRemoved) == []
 
 
 def test_a_departure_seen_once_between_clear_views_is_not_added() -> None:

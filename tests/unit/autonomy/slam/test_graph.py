@@ -139,6 +139,25 @@ def test_a_self_loop_takes_two_half_edges_of_one_vertex() -> None:
     assert graph.frontiers() == [HalfEdgeId(vertex.id, 1), HalfEdgeId(vertex.id, 2)]
 
 
+def test_a_ring_s_vertex_without_its_other_departures_is_one_of_the_ring_only() -> None:
+    graph = GvgGraph()
+    vertex = add_vertex(graph, 0.0, 2.0, 4.0)
+    assert not graph.leave_ring(vertex)
+    join(graph, HalfEdgeId(vertex.id, 0), HalfEdgeId(vertex.id, 1))
+    assert graph.leave_ring(vertex)
+    assert graph.rings() == [vertex]
+    assert not graph.leave_ring(vertex)  # nothing else is left
+
+
+def test_a_vertex_between_two_edges_is_on_no_ring() -> None:
+    graph = GvgGraph()
+    one, other = add_vertex(graph, 0.0, 2.0, 4.0), add_vertex(graph, 0.0, 2.0)
+    join(graph, HalfEdgeId(one.id, 0), HalfEdgeId(other.id, 0))
+    join(graph, HalfEdgeId(one.id, 1), HalfEdgeId(other.id, 1))
+    assert not graph.leave_ring(one)
+    assert one.degree == 3
+
+
 def test_parallel_edges_stay_apart() -> None:
     graph = GvgGraph()
     one, other = add_vertex(graph, 0.0, 1.0), add_vertex(graph, 2.0, 3.0)
