@@ -10,6 +10,7 @@ from gvgbot.service import StopSignals
 from gvgbot.web.feed import Feed
 from gvgbot.web.server import Web
 from gvgbot.web.viewers import Audience
+from gvgbot.web.wire import Link
 
 _PATIENCE = 1.0  # s for a connection, before it is said that there is none
 
@@ -45,18 +46,51 @@ async def _serve(
     address: tuple[str, int],
     say: Callable[[str], None],
 ) -> None:
-    audience = Audience()
-    feed = Feed(robot, endpoint, zenoh_file, audience)
+    audience, spoken = Audience(), Spoken(say)
+    feed = Feed(robot, endpoint, zenoh_file, audience, on_link=spoken.tell)
     page = Web(*address, audience, feed.fulfil)
     async with await page.open() as server, asyncio.TaskGroup() as tasks:
         trouble = await asyncio.to_thread(_trouble, endpoint, zenoh_file) if robot is None else None
         port = next(iter(server.sockets)).getsockname()[1]  # the one it got, if it asked for any
         say(f"the map is at http://{_shown(address[0])}:{port}/ (Ctrl-C ends)")
         if trouble is not None:
-            say(f"{trouble} (trying again)")
+            spoken.say(f"{trouble} (trying again)")
         watching = tasks.create_task(feed.run())
         await signals.wait()
         watching.cancel()
+
+
+class Spoken:
+    """Says in the terminal how things are with the robot, whenever that has changed."""
+
+    def __init__(self, say: Callable[[str], None]) -> None:
+        self._say, self._last = say, ""
+
+    def tell(self, link: Link) -> None:
+        """Say what there is to know of a link, unless that was said last."""
+        self.say(_words(link))
+
+    def say(self, text: str) -> None:
+        """Say something, unless it was said last."""
+        if text != self._last:
+            self._last = text
+            self._say(text)
+
+
+def _words(link: Link) -> str:
+    match link.word:
+        case "alive":
+            return f"connected to {link.robot}"
+        case "quiet":
+            return f"{link.robot} says nothing: its program hangs"
+        case "gone":
+            return f"{link.robot} has gone (waiting for it)"
+        case "absent":
+            return f"no robot named {link.robot} here; there is {', '.join(link.others) or 'none'}"
+        case "unreachable":
+            return f"{link.trouble} (trying again)"
+        case _:
+            return f"connection to {link.robot} lost (trying again)"
 
 
 def _trouble(endpoint: str, zenoh_file: Path | None) -> str | None:

@@ -3,7 +3,7 @@
 import asyncio
 import math
 from collections import deque
-from collections.abc import AsyncIterable
+from collections.abc import AsyncIterable, Callable
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
@@ -28,10 +28,17 @@ class Feed:
     """Watches one robot, or the only one there is, for an audience."""
 
     def __init__(
-        self, robot: str | None, endpoint: str, zenoh_file: Path | None, audience: Audience
+        self,
+        robot: str | None,
+        endpoint: str,
+        zenoh_file: Path | None,
+        audience: Audience,
+        *,
+        on_link: Callable[[Link], None] = lambda _: None,
     ) -> None:
+        """`on_link` hears how things are with the robot, over and over."""
         self._name, self._endpoint, self._file = robot, endpoint, zenoh_file
-        self._audience = audience
+        self._audience, self._on_link = audience, on_link
         self._robot: Robot | None = None
         self._history = _Histories()
         self._lost_at: float | None = None  # by the loop's clock; None while connected
@@ -71,7 +78,11 @@ class Feed:
             for_s=now - self._lost_at,
             trouble=trouble,
         )
-        self._audience.show("link", said)
+        self._show_link(said)
+
+    def _show_link(self, link: Link) -> None:
+        self._audience.show("link", link)
+        self._on_link(link)
 
     async def _watch(self, robot: Robot) -> None:
         async with asyncio.TaskGroup() as tasks:
@@ -117,7 +128,7 @@ class Feed:
         """Say how things are with the robot, and what has happened."""
         told: Events | None = None
         while True:
-            self._audience.show("link", await self._link(robot))
+            self._show_link(await self._link(robot))
             happened = Events(events=robot.events().latest)
             if happened != told:
                 told = happened

@@ -240,7 +240,16 @@ def web(*arguments: str) -> Iterator[str]:
         process.send_signal(signal.SIGINT)
         rest, _ = process.communicate(timeout=PATIENCE)
         assert process.returncode == 0
-        assert rest == "" or "(trying again)" in rest  # a robot that was not up yet
+        told = (
+            "connected to ",
+            "karl",
+            "near",
+            "no robot ",
+            "nobody ",
+            "connection ",
+            "the robot ",
+        )
+        assert all(line.startswith(told) for line in rest.splitlines()), rest
 
 
 def get(address: str, **fields: str) -> tuple[int, bytes]:
@@ -310,6 +319,22 @@ def test_it_says_that_no_robot_answers_yet() -> None:
         assert process.stdout is not None
         assert "http://" in process.stdout.readline()
         assert "nobody answers" in process.stdout.readline()
+
+
+def test_it_says_once_each_time_that_the_robot_comes_and_goes() -> None:
+    endpoint = free_endpoint()
+    with gvgbot("web", "--port", "0", "--connect", endpoint) as process:
+        assert process.stdout is not None
+        said = [process.stdout.readline() for _ in range(2)]
+        for _ in range(2):
+            with Telemetry(TelemetryConfig(listen=(endpoint,)), "karl") as robot:
+                robot.publish(EXAMPLE)
+                said.append(process.stdout.readline())
+            said.append(process.stdout.readline())
+        process.send_signal(signal.SIGINT)
+        said += process.communicate(timeout=PATIENCE)[0].splitlines()
+    assert "nobody answers" in said[1]
+    assert said[2:] == 2 * ["connected to karl\n", "karl has gone (waiting for it)\n"]
 
 
 def test_a_robot_of_another_version_is_said_to_be_one() -> None:
