@@ -46,7 +46,10 @@ def explore(config: Config, *, out: Path | None, real_time: bool) -> int:
     """
     set_up_logging(sys.stderr, os.environ, "warning")
     place = open_place(config)
-    with RunDirectory.create(out, world=place.world.name) as directory:
+    with (
+        RunDirectory.create(out, world=place.world.name) as directory,
+        directory.told_if_interrupted(_say),
+    ):
         session, progress = Session(config, directory, place), Progress()
         factory = None if real_time else VirtualTimeLoop
         try:
@@ -110,9 +113,13 @@ def _conclude(session: Session) -> int:
         f"{session.pipeline.travelled:.0f} m driven",
         file=sys.stdout if mission.outcome == "explored" else sys.stderr,
     )
-    print(f"map:     {session.directory.path / 'map.geojson'}")
-    print(f"picture: {session.directory.path / 'map.png'}")
+    for line in session.directory.whereabouts:
+        _say(line)
     return 0 if mission.outcome == "explored" else 1
+
+
+def _say(text: str) -> None:
+    print(text, flush=True)
 
 
 def run(config: Config, *, out: Path | None, known: Path | None = None, anew: bool = False) -> int:

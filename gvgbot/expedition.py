@@ -57,6 +57,7 @@ def explore_together(config: Config, count: int, *, out: Path | None, real_time:
     places = _places(config, open_place(config), count)
     with contextlib.ExitStack() as stack:
         directory = stack.enter_context(RunDirectory.create(out, world=places[0].world.name))
+        stack.enter_context(directory.told_if_interrupted(_say))
         robots = [
             _Robot.made(stack, config, number, one, directory.path)
             for number, one in enumerate(places)
@@ -325,10 +326,11 @@ def _conclude(directory: RunDirectory, robots: list[_Robot], joined: list[_Robot
             f"{robot.session.pipeline.travelled:.0f} m driven in {_duration(robot):.0f} s"
         )
     _say(f"maps joined: {len(joined)} of {len(robots)}")
-    _say(f"map:     {directory.path / 'map.geojson'}")
-    _say(f"picture: {directory.path / 'map.png'}")
+    for line in directory.whereabouts:
+        _say(line)
     return 0 if _outcome(robots) == "explored" else 1
 
 
 def _say(text: str) -> None:
     sys.stdout.write(text + "\n")
+    sys.stdout.flush()

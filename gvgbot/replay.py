@@ -50,7 +50,10 @@ def replay(wanted: Wanted, say: Callable[[str], None], *, out: Path | None) -> i
     Raises UsageError for a log or directory that cannot be used, ConfigError.
     """
     log = open_log(wanted)
-    with RunDirectory.create(out, world=log.title) as directory:
+    with (
+        RunDirectory.create(out, world=log.title) as directory,
+        directory.told_if_interrupted(say),
+    ):
         session = Session(log.config, directory, place=None, led=log.led)
         session.title, session.failure = log.title, "interrupted"
         try:
@@ -76,14 +79,13 @@ def take(session: Session, message: Lived) -> None:
 
 def conclusion(session: Session, log: Log) -> list[str]:
     """What came of it, for people."""
-    pipeline, path = session.pipeline, session.directory.path
+    pipeline = session.pipeline
     graph, mission = pipeline.mapper.graph, pipeline.mission
     outcome = f"{mission.outcome}: {mission.reason}; " if mission.outcome else ""
     return [
         f"replayed: {outcome}{counts(graph.vertices, graph.edges)}, {pipeline.travelled:.0f} m",
         *log.flaws(),
-        f"map:     {path / 'map.geojson'}",
-        f"picture: {path / 'map.png'}",
+        *session.directory.whereabouts,
     ]
 
 

@@ -5,7 +5,7 @@ import io
 import json
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from pathlib import Path
@@ -18,7 +18,7 @@ from gvgbot.errors import GvgbotError, UsageError
 from gvgbot.maps.atomic_files import write_files
 
 EVENTS, EVENTS_BEFORE = "events.jsonl", "events-before.jsonl"
-SUMMARY, MAP = "summary.json", "map.geojson"
+SUMMARY, MAP, PICTURE = "summary.json", "map.geojson", "map.png"
 _MOST_EVENTS = 10_000_000  # bytes, of each of these files
 
 
@@ -93,6 +93,22 @@ class RunDirectory:
                 (self.path / EVENTS).replace(self.path / EVENTS_BEFORE)
             self._events = (self.path / EVENTS).open("ab", buffering=0)
             before.close()
+
+    @property
+    def whereabouts(self) -> list[str]:
+        """Where the map is, for people."""
+        return [f"map:     {self.path / MAP}", f"picture: {self.path / PICTURE}"]
+
+    @contextlib.contextmanager
+    def told_if_interrupted(self, say: Callable[[str], None]) -> Iterator[None]:
+        """Say where the map is if Ctrl-C ends the work on it, and a map has been saved."""
+        try:
+            yield
+        except KeyboardInterrupt:
+            if (self.path / MAP).exists():
+                with contextlib.suppress(OSError):  # whoever read it has gone
+                    say("\n".join(self.whereabouts))
+            raise
 
     def close(self) -> None:
         """No more events."""

@@ -141,7 +141,11 @@ def test_a_simulated_exploration_that_is_stopped_leaves_its_map(
         process.send_signal(number)
         log, _ = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130
-    assert log.strip().endswith("gvgbot: interrupted")
+    assert log.splitlines()[-3:] == [
+        "map:     run/map.geojson",
+        "picture: run/map.png",
+        "gvgbot: interrupted",
+    ]
     assert json.loads((events.parent / "map.geojson").read_text())["features"]
 
 
