@@ -1,7 +1,6 @@
 """Plain values (mappings, lists, scalars) into typed, frozen dataclasses, noting every mistake."""
 
 import dataclasses
-import difflib
 import reprlib
 import types
 import typing
@@ -12,6 +11,7 @@ from typing import Annotated, Any, Literal, Union
 
 from gvgbot.errors import GvgbotError
 from gvgbot.ranges import Range
+from gvgbot.words import nearest
 from gvgbot.yaml_text import is_finite
 
 KeyPath = tuple[str, ...]
@@ -167,8 +167,9 @@ def _is_required(field: "dataclasses.Field[Any]") -> bool:
 
 def _unknown(key: Any, value: Any, path: KeyPath, names: list[str]) -> Problem:
     """The mistake of a key that does not exist, with the nearest that does."""
-    near = difflib.get_close_matches(str(key), names, n=1, cutoff=0.6)
-    hint = f"did you mean {'.'.join((*path, *near))}?" if near else f"here are {', '.join(names)}"
+    near = nearest(str(key), names)
+    meant = None if near is None else ".".join((*path, near))
+    hint = f"did you mean {meant}?" if meant else f"here are {', '.join(names)}"
     return Problem((*path, str(key)), value, f"no such key; {hint}")
 
 

@@ -10,6 +10,7 @@ from gvgbot import client
 from gvgbot.client import Asking, Robot
 from gvgbot.errors import UsageError
 from gvgbot.requests import REQUESTS
+from gvgbot.words import nearest
 
 Number = TypeVar("Number", int, float)
 
@@ -34,8 +35,16 @@ def _split(words: Sequence[str]) -> tuple[str | None, str, Sequence[str]]:
     is_named = words[0] not in REQUESTS or (len(words) > 1 and words[1] in REQUESTS)
     name, rest = (words[0], words[1:]) if is_named else (None, words)
     if not rest or rest[0] not in REQUESTS:
-        raise UsageError(f"{(rest or words)[0]!r} is no request: there are {', '.join(REQUESTS)}")
+        raise UsageError(_no_request(words))
     return name, rest[0], rest[1:]
+
+
+def _no_request(words: Sequence[str]) -> str:
+    """What is wrong with words of which neither the first nor the second is a request."""
+    for word in reversed(words[:2]):  # the first one may be a robot
+        if (near := nearest(word, REQUESTS)) is not None:
+            return f"{word!r} is no request: did you mean {near}?"
+    return f"{words[:2][-1]!r} is no request: there are {', '.join(REQUESTS)}"
 
 
 def _asker(request: str, arguments: Sequence[str]) -> Callable[[Robot], Asking]:

@@ -8,6 +8,8 @@ from math import inf, isfinite
 from pathlib import Path
 from typing import Any, NoReturn, TypeAlias, TypeVar
 
+from gvgbot.words import nearest
+
 Number = TypeVar("Number", int, float)
 
 BAD_USAGE = 2
@@ -29,6 +31,15 @@ class Parser(argparse.ArgumentParser):
         if unknown:
             self.error(f"unrecognized arguments: {' '.join(unknown)}")
         return parsed, unknown
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        """Refuse what is no choice, with the one that may have been meant."""
+        if isinstance(value, str) and action.choices is not None and value not in action.choices:
+            near = nearest(value, map(str, action.choices))
+            if near is not None:
+                said = f"there is no {value!r}: did you mean {near}?"
+                raise argparse.ArgumentError(action, said)
+        super()._check_value(action, value)
 
     def error(self, message: str) -> NoReturn:
         """End with the message and the status of wrong usage."""

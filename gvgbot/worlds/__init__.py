@@ -6,6 +6,7 @@ from pathlib import Path
 from gvgbot.drivers.world import World, load_world
 from gvgbot.errors import WorldError
 from gvgbot.geometry import Pose
+from gvgbot.words import nearest
 from gvgbot.worlds.buildings import comb, grid, hall, jittered, office, ring, spiral
 from gvgbot.worlds.cave import cave
 from gvgbot.worlds.clutter import clutter
@@ -65,7 +66,10 @@ def open_world(name_or_path: str, *, unknown_is_wall: bool = False) -> tuple[Wor
 
 
 def _unknown(name: str) -> str:
+    kind, colon, seed = name.partition(":")
+    near = nearest(kind, NAMES)
+    hint = "" if near in (None, kind) else f"did you mean {near}{colon}{seed}? or "
     return (
-        f"unknown world {name!r}: give a map_server YAML file or one of the built-in worlds "
+        f"unknown world {name!r}: {hint}give a map_server YAML file or one of the built-in worlds "
         f"{', '.join(NAMES)} (NAME:SEED draws another one of its kind)"
     )

@@ -21,6 +21,8 @@ def said(captured: Captured) -> list[str]:
 BAD_ARGUMENTS = {
     "no command": ([], "COMMAND"),
     "unknown command": (["dance"], "dance"),
+    "mistyped command": (["eksplore"], "'eksplore': did you mean explore?"),
+    "mistyped action": (["map", "sohw", "."], "'sohw': did you mean show?"),
     "unknown option": (["explore", "--wrold", "office"], "--wrold"),
     "another command's option": (["run", "--config", "a.yaml"], "see gvgbot run --help"),
     "two numbers for a start": (["explore", "--start", "1", "2"], "--start"),
@@ -64,6 +66,7 @@ BAD_CONFIGURATIONS = {
     "unknown key": (["explore", "--set", "robot.nmae=x"], "did you mean robot.name?"),
     "unknown profile": (["explore", "--set", "twin.base.odometry=ideal"], "one of perfect"),
     "a directory for a world": (["explore", "--world", "/"], "/: cannot read the file: Is a dir"),
+    "mistyped world": (["explore", "--world", "flor_plan:7"], "did you mean floor_plan:7?"),
     "no run to show": (["map", "show", "absent"], "absent is no run directory"),
     "no run to tell of": (["map", "info", "absent"], "absent is no run directory"),
     "seed out of range": (["explore", "--seed", str(2**40)], "twin.seed"),

@@ -39,6 +39,9 @@ def test_a_value_is_a_number_or_a_truth_or_text(text: str, value: object) -> Non
     [
         (["dance"], "'dance' is no request"),
         (["sim", "dance"], "'dance' is no request"),
+        (["pasue"], "'pasue' is no request: did you mean pause?"),
+        (["sim", "pasue"], "'pasue' is no request: did you mean pause?"),
+        (["ptrol", "4", "6"], "'ptrol' is no request: did you mean patrol?"),
         (["goto"], "goto needs a vertex, or x and y"),
         (["goto", "seven"], "'seven' must be the id of a vertex"),
         (["goto", "1", "east"], "'east' must be a number"),
