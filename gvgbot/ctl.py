@@ -7,8 +7,8 @@ from typing import TypeVar
 import msgspec
 
 from gvgbot import client
-from gvgbot.client import Asking, Robot
-from gvgbot.errors import UsageError
+from gvgbot.client import Asking, Refused, Robot
+from gvgbot.errors import GvgbotError, UsageError
 from gvgbot.requests import REQUESTS
 from gvgbot.words import nearest
 
@@ -26,8 +26,21 @@ def ctl(
     ask = _asker(request, arguments)
     name = name or client.only_robot(endpoint, zenoh_file=zenoh_file)
     with client.connect(name, endpoint, zenoh_file=zenoh_file) as robot:
-        say(ask(robot).result())
+        say(_answer(robot, ask))
     return 0
+
+
+def _answer(robot: Robot, ask: Callable[[Robot], Asking]) -> str:
+    """What the robot answers. Raises GvgbotError, which names who is there instead of it."""
+    try:
+        return ask(robot).result()
+    except Refused:
+        raise
+    except GvgbotError as error:
+        if robot.presence.word == "absent" and (others := robot.others()):
+            there = f"there is {', '.join(others)}"
+            raise GvgbotError(f"no robot named {robot.name} here; {there}") from error
+        raise
 
 
 def _split(words: Sequence[str]) -> tuple[str | None, str, Sequence[str]]:

@@ -397,6 +397,7 @@ def test_a_person_asks_a_running_robot_from_the_command_line(endpoint: str, tmp_
             resumed = ctl("sim", "resume")
             unknown = ctl("sim", "goto", "999")
             saved = ctl("sim", "save")
+            nobody = ctl("karl", "pause")
         finally:
             process.terminate()
             process.communicate(timeout=30)
@@ -405,6 +406,7 @@ def test_a_person_asks_a_running_robot_from_the_command_line(endpoint: str, tmp_
     assert resumed == (0, "it goes on exploring\n", "")
     assert unknown[0] == 1
     assert "there is no vertex 999" in unknown[2]
+    assert nobody == (1, "", "gvgbot: no robot named karl here; there is sim\n")
     assert saved == (0, f"map saved in {tmp_path / 'run'}\n", "")
     events = (tmp_path / "run" / "events.jsonl").read_text().splitlines()
     requested = [line for line in map(json.loads, events) if line["event"] == "requested"]
