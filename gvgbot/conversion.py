@@ -121,6 +121,10 @@ def _union(kind: Any, value: Any, path: KeyPath, problems: list[Problem]) -> Any
 def _sequence(kind: Any, value: Any, path: KeyPath, problems: list[Problem]) -> Any:
     items = typing.get_args(kind)
     open_ended = typing.get_origin(kind) is list or items[-1:] == (...,)
+    if open_ended and value is not None and _converts(items[0], value):
+        hint = f"write [{value}]" if isinstance(value, str) else f"write [{shorten(value)}]"
+        problems.append(Problem(path, value, f"must be {describe(kind)}: {hint}"))
+        return None
     if not isinstance(value, list | tuple) or not (open_ended or len(value) == len(items)):
         problems.append(Problem(path, value, f"must be {describe(kind)}"))
         return None
@@ -129,6 +133,13 @@ def _sequence(kind: Any, value: Any, path: KeyPath, problems: list[Problem]) -> 
         convert(one, item, (*path, f"[{index}]"), problems)
         for index, (one, item) in enumerate(zip(kinds, value, strict=True))
     )
+
+
+def _converts(kind: Any, value: Any) -> bool:
+    """Whether a value fits without any mistake."""
+    mistakes: list[Problem] = []
+    convert(kind, value, (), mistakes)
+    return not mistakes
 
 
 def _record(kind: Any, value: Any, path: KeyPath, problems: list[Problem]) -> Any:

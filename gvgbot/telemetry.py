@@ -3,7 +3,7 @@
 import asyncio
 import contextlib
 from collections import deque
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from types import TracebackType
 from typing import Self
 
@@ -39,6 +39,7 @@ _WAITING_QUERIES = 32  # more than this are dropped, oldest first; who asked get
 _WAITING_REQUESTS, _WAITING_REFUSALS, _WAITING_STOPS = 8, 100, 200
 _CROWDED = Answer(done=False, text="too many requests wait: ask again")
 _MAX_SESSIONS = 32
+_LAST_PORT = 65535
 _LONGEST_NAME = 80  # bytes of who asks
 _MISSES = zenoh.ext.MissDetectionConfig(heartbeat=HEARTBEAT, sporadic_heartbeat=None)
 _PRIORITIES = {
@@ -66,7 +67,7 @@ class Telemetry:
         self._robot = robot
         settings = _session_config(config, relays=relays)
         self.addresses = ", ".join(addresses(settings, "listen"))  # perhaps those of a file
-        self._session = _open(settings, self.addresses)
+        self._session = _open(settings, addresses(settings, "listen"))
         self._publishers = {topic.payload: (topic, self._publisher(topic)) for topic in TOPICS}
         self._alive = self._session.liveliness().declare_token(alive_key(robot))
 
@@ -271,14 +272,21 @@ def _form(topic: Topic, wanted: str | None) -> tuple[Callable[[Payload], bytes],
     return msgspec.msgpack.encode, zenoh.Encoding(topic.encoding)
 
 
-def _open(config: zenoh.Config, where: str) -> zenoh.Session:
+def _open(config: zenoh.Config, listen: Sequence[str]) -> zenoh.Session:
     try:
         return zenoh.open(config)
     except zenoh.ZError as error:
+        others = ", ".join(map(_next_port, listen))
         raise GvgbotError(
-            f"cannot listen on {where}: {reason(error)}; "
-            "choose another address (telemetry.listen), or set telemetry.enabled=false"
+            f"cannot listen on {', '.join(listen)}: {reason(error)}; choose another address "
+            f"(--set 'telemetry.listen=[{others}]'), or set telemetry.enabled=false"
         ) from error
+
+
+def _next_port(address: str) -> str:
+    """The address one port on, to be proposed; itself if it has no port."""
+    host, colon, port = address.rpartition(":")
+    return f"{host}{colon}{int(port) % _LAST_PORT + 1}" if port.isdecimal() else address
 
 
 def _session_config(config: TelemetryConfig, *, relays: bool) -> zenoh.Config:

@@ -159,7 +159,7 @@ def test_an_address_in_use_is_one_line_and_leaves_nothing(endpoint: str, tmp_pat
     (line,) = log.splitlines()
     assert endpoint in line
     assert "in use" in line
-    assert "telemetry.listen" in line
+    assert f"--set 'telemetry.listen=[tcp/{host}:{int(port) + 1}]'" in line
     assert not list(tmp_path.iterdir())
 
 

@@ -122,7 +122,11 @@ WRONG = {
     "short tuple": ("position: [1]", "position = [1]: must be a list of 2"),
     "text in a tuple": ("position: [1, x]", "position = [1, 'x']: must be a list of 2"),
     "item out of range": ("bites: [1, -2]", "bites[1] = -2: must be a number of at least 0"),
-    "scalar for a list": ("bites: 3", "bites = 3: must be a list, each a number of at least 0"),
+    "scalar for a list": (
+        "bites: 3",
+        "bites = 3: must be a list, each a number of at least 0: write [3]",
+    ),
+    "what no list of it would take": ("bites: -3", "must be a list, each a number of at least 0"),
     "scalar for a section": ("leg: 3", "leg = 3: must be a mapping"),
     "list for a section": ("leg: [3]", "leg = [3]: must be a mapping"),
     "inside an optional section": ("spare: {toes: 0}", "spare.toes = 0: must be a whole number"),
