@@ -95,8 +95,16 @@ def open_log(wanted: Wanted) -> Log:
         with wanted.path.open("rb") as file:
             start = file.read(len(MCAP))
     except OSError as error:
-        raise UsageError(f"cannot read {wanted.path}: {error.strerror}") from error
+        hint = _recordings(wanted.path) if wanted.path.is_dir() else ""
+        raise UsageError(f"cannot read {wanted.path}: {error.strerror}{hint}") from error
     return _recording(wanted) if start == MCAP else _carmen(wanted)
+
+
+def _recordings(path: Path) -> str:
+    """What to say of the recordings in a directory."""
+    if found := sorted(path.glob("*.mcap")):
+        return f"; give {' or '.join(map(str, found))}"
+    return ", with no recording in it: explore or run with --set recording.path=FILE.mcap makes one"
 
 
 def _recording(wanted: Wanted) -> Log:

@@ -21,6 +21,7 @@ from gvgbot.yaml_text import is_finite, read_yaml
 
 OCCUPIED_THRESHOLD = 0.65  # map_server's customary values, for files that leave them out
 FREE_THRESHOLD = 0.196
+OWN_MAP = "map.yaml"  # in the directory of a run
 FREE_GREY, OCCUPIED_GREY, UNKNOWN_GREY = SAVED_GREYS = 254, 0, 205  # what map_saver writes
 OPAQUE = 255
 
@@ -197,14 +198,23 @@ def _read_yaml(path: Path) -> dict[str, Any]:
     except FileNotFoundError:
         raise WorldError(f"{path}: no such file; give the path of a map_server YAML file") from None
     except OSError as error:
-        raise WorldError(f"{path}: cannot read the file: {error.strerror}") from None
+        reason = f"{error.strerror}{_instead(path / OWN_MAP)}"
+        raise WorldError(f"{path}: cannot read the file: {reason}") from None
     except UnicodeDecodeError:
         raise WorldError(f"{path}: cannot be read as text; give a map_server YAML file") from None
     except ValueError as error:
         raise WorldError(f"{path}: not valid YAML ({error})") from None
     if not isinstance(content, dict):
         raise WorldError(f"{path}: not a map_server file; it must hold `key: value` lines")
+    if not content.keys() & {"image", "resolution", "origin"}:
+        instead = _instead(path.parent / OWN_MAP) or "; a world is such a YAML file and its image"
+        raise WorldError(f"{path}: not a map_server file{instead}")
     return content
+
+
+def _instead(path: Path) -> str:
+    """What to say of a file that may have been meant, if it is there."""
+    return f"; give {path}" if path.exists() else ""
 
 
 def _read_grey(path: Path, image: Path, mode: str) -> Array:

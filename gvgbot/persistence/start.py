@@ -8,6 +8,7 @@ import structlog
 
 from gvgbot.config import Config
 from gvgbot.errors import UsageError
+from gvgbot.maps.map_server import DESCRIPTION
 from gvgbot.maps.run_directory import RunDirectory, numbers
 from gvgbot.persistence.mission_files import SNAPSHOT, SNAPSHOT_BEFORE, MissionFiles
 from gvgbot.persistence.mission_state import Saved
@@ -78,9 +79,16 @@ def _known(path: Path) -> Saved:
     except Damaged as error:
         raise UsageError(f"cannot begin with {error}") from error
     if saved is None:
-        remedy = f"gvgbot map import {path}/map.yaml --out ..."
-        raise UsageError(f"cannot begin with {path}: there is no {SNAPSHOT} in it; try {remedy}")
+        raise UsageError(f"cannot begin with {path}: there is no {SNAPSHOT} in it; {_other(path)}")
     return saved
+
+
+def _other(path: Path) -> str:
+    """What may have been meant by a directory without a mission."""
+    if (path / DESCRIPTION).exists():
+        return f"try gvgbot map import {path / DESCRIPTION} --out {path}-imported"
+    runs = sorted(found.parent for found in path.glob(f"*/{SNAPSHOT}"))
+    return f"give the directory of a run{f', such as {runs[-1]}' if runs else ''}"
 
 
 def _newest(state_dir: Path | None) -> Path | None:

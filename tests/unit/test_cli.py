@@ -67,6 +67,7 @@ BAD_CONFIGURATIONS = {
     "unknown profile": (["explore", "--set", "twin.base.odometry=ideal"], "one of perfect"),
     "a directory for a world": (["explore", "--world", "/"], "/: cannot read the file: Is a dir"),
     "mistyped world": (["explore", "--world", "flor_plan:7"], "did you mean floor_plan:7?"),
+    "a directory to replay": (["replay", "."], "with no recording in it: explore or run with"),
     "no run to show": (["map", "show", "absent"], "absent is no run directory"),
     "no run to tell of": (["map", "info", "absent"], "absent is no run directory"),
     "seed out of range": (["explore", "--seed", str(2**40)], "twin.seed"),
@@ -88,6 +89,15 @@ def test_a_bad_configuration_is_one_line_that_names_it_and_exits_2(
     (line,) = said(capsys)
     assert line.startswith("gvgbot: ")
     assert named in line
+
+
+def test_of_a_directory_to_replay_the_recording_in_it_is_named(
+    tmp_path: Path, capsys: Captured
+) -> None:
+    (tmp_path / "run.mcap").touch()
+    assert main(["replay", str(tmp_path)]) == 2
+    (line,) = said(capsys)
+    assert line.endswith(f"; give {tmp_path / 'run.mcap'}")
 
 
 def test_a_team_that_shall_be_recorded_is_refused(tmp_path: Path, capsys: Captured) -> None:

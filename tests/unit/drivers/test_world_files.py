@@ -271,6 +271,16 @@ def test_a_missing_file_and_a_folder_are_named(tmp_path: Path) -> None:
         load_world(tmp_path)
 
 
+def test_of_a_run_its_map_is_proposed(tmp_path: Path) -> None:
+    (tmp_path / "map.geojson").write_text('{"type": "FeatureCollection", "features": []}')
+    with pytest.raises(WorldError, match="not a map_server file; a world is such a YAML file"):
+        load_world(tmp_path / "map.geojson")
+    (tmp_path / "map.yaml").touch()
+    for path in (tmp_path, tmp_path / "map.geojson"):
+        with pytest.raises(WorldError, match=f"; give {tmp_path / 'map.yaml'}$"):
+            load_world(path)
+
+
 def test_a_truncated_image_is_named(tmp_path: Path) -> None:
     path = write(tmp_path, np.random.default_rng(1).integers(0, 255, (60, 60)))
     image = tmp_path / "plan.png"

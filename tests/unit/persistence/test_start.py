@@ -123,6 +123,19 @@ def test_a_mission_that_cannot_be_read_stays_where_it_is(tmp_path: Path) -> None
     assert [log["event"] for log in logs] == ["mission cannot be read, a new one begins"]
 
 
+def test_of_a_directory_without_a_mission_what_may_have_been_meant_is_named(tmp_path: Path) -> None:
+    runs, floor = tmp_path / "runs", tmp_path / "floor"
+    floor.mkdir()
+    with pytest.raises(UsageError, match=r"give the directory of a run$"):
+        begin(Wanted(known=floor), world="office")
+    mission(runs / "office-1")
+    with pytest.raises(UsageError, match=f"such as {runs / 'office-1'}$"):
+        begin(Wanted(known=runs), world="office")
+    (floor / "map.yaml").touch()
+    with pytest.raises(UsageError, match=f"try gvgbot map import {floor}/map.yaml --out"):
+        begin(Wanted(known=floor), world="office")
+
+
 @pytest.mark.parametrize("damage", [None, b"?"])
 def test_a_known_map_that_cannot_be_read_is_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], damage: bytes | None
