@@ -42,8 +42,9 @@ class Fact:
 
 def facts(state: State, plan: Plan | None, health: Health | None) -> Iterator[Fact]:
     """What there is to know of a robot, the most telling first."""
-    phase = state.outcome if state.phase == "finished" else None
-    yield Fact("phase", phase or state.phase, _tone_of_phase(state))
+    yield Fact("phase", state.phase, _tone_of_phase(state))
+    if state.outcome is not None:
+        yield Fact("outcome", state.outcome.replace("_", " "), _tone_of_phase(state))
     yield from _intention(state, plan)
     x, y, theta = state.pose
     yield Fact("pose", f"{x:.2f} {y:.2f} m  {_degrees(theta)}")
@@ -211,7 +212,15 @@ def _alive(robot: str, state: State | None) -> Fact:
         return Fact(robot, "has not said anything yet", "warning")
     if state.cycle_age is not None and state.cycle_age > _STUCK_AFTER and state.base.connected:
         return Fact(robot, "its control loop is stuck", "bad")
-    return Fact(robot, state.reason or "alive", _tone_of_phase(state))
+    return Fact(robot, _doing(state), _tone_of_phase(state))
+
+
+def _doing(state: State) -> str:
+    """What it does, or why it does nothing."""
+    if state.phase == "errand" and state.errand is not None:
+        return state.errand
+    has_reason = state.phase in ("starting", "halted", "finished")
+    return (has_reason and state.reason) or state.phase
 
 
 def _age(seconds: float) -> str:

@@ -174,12 +174,12 @@ def test_the_only_robot_need_not_be_named_and_its_end_is_said(endpoint: str) -> 
         seat.until_shown("nobody answers")
         robot = a_robot(endpoint)
         with robot:
-            seat.until_shown(" karl  alive")
+            seat.until_shown(" karl  exploring")
             seat.until_shown("quiet since")
         text = seat.until_shown("robot gone since")
         assert "driven    31.5 m" in text  # what was known last remains
         with a_robot(endpoint):
-            seat.until_shown(" karl  alive")
+            seat.until_shown(" karl  exploring")
         os.write(seat.terminal, b"q")
         assert seat.left() == 0
 

@@ -618,7 +618,12 @@ def test_a_robot_that_is_stuck_waits_is_silent_or_has_left_and_a_lost_server_are
             play.until("document.querySelector('#banner').hidden")
             headline = "document.querySelector('#headline').innerText"
             there = msgspec.structs.replace(HERE.base, connected=True)
-            waits = msgspec.structs.replace(HERE, reason="", phase="paused", base=there)
+            ended = msgspec.structs.replace(HERE, outcome="explored", reason="no frontier is left")
+            play.state = msgspec.structs.replace(ended, phase="finished")
+            play.until(f"{headline} === 'no frontier is left'")
+            play.state = msgspec.structs.replace(ended, phase="errand", errand="goto 7")
+            play.until(f"{headline} === 'goto 7'")
+            waits = msgspec.structs.replace(ended, phase="paused", base=there)
             play.state = msgspec.structs.replace(waits, cycle_age=5.0)
             play.until(f"{headline} === 'its control loop is stuck'")
             play.state = waits

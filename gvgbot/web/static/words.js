@@ -113,7 +113,14 @@ export function headline(link, state) {
   }
   if (state === null) return ["it has not said anything yet", "warning", false];
   if (state.cycle_age > STUCK && state.base.connected) return ["its control loop is stuck", "bad", false];
-  return [state.reason || (state.outcome ?? state.phase), toneOfPhase(state), false];
+  return [doing(state), toneOfPhase(state), false];
+}
+
+// What it does, or why it does nothing.
+function doing(state) {
+  if (state.phase === "errand" && state.errand) return state.errand;
+  const hasReason = ["starting", "halted", "finished"].includes(state.phase);
+  return (hasReason && state.reason) || state.phase;
 }
 
 const QUIET = new Set(["edge_joined"]);

@@ -69,7 +69,7 @@ def test_who_has_finished_goes_nowhere() -> None:
         EXAMPLE, phase="finished", outcome="explored", reason="no frontier is left"
     )
     lines = {fact.name: fact.text for fact in facts(done, PLAN, None)}
-    assert (lines["phase"], lines["going to"]) == ("explored", "-")
+    assert (lines["phase"], lines["outcome"], lines["going to"]) == ("finished", "explored", "-")
     assert lines["why"] == "no frontier is left"
 
 
@@ -119,13 +119,30 @@ def test_what_needs_a_look_is_toned(changes: dict[str, object], name: str, expec
         ("gone", [], "robot gone since 12 s"),
         ("cut off", [], "connection lost since 12 s, trying again"),
         ("quiet", [], "quiet since 12 s: its program hangs"),
-        ("alive", [], "alive"),
+        ("alive", [], "exploring"),
     ],
 )
 def test_the_headline_says_how_things_are(word: str, others: list[str], text: str) -> None:
     presence = Presence(word, 12.3)  # type: ignore[arg-type]
     state = msgspec.structs.replace(EXAMPLE, reason="")
     assert headline("karl", presence, state, others).text == text
+
+
+@pytest.mark.parametrize(
+    ("phase", "errand", "text"),
+    [
+        ("finished", None, "no frontier is left"),
+        ("errand", "goto 7", "goto 7"),
+        ("waiting", None, "waiting"),
+        ("paused", "goto 7", "paused"),
+    ],
+)
+def test_what_it_does_now_is_said_and_not_how_the_exploration_ended(
+    phase: str, errand: str | None, text: str
+) -> None:
+    ended = {"outcome": "explored", "reason": "no frontier is left"}
+    state = msgspec.structs.replace(EXAMPLE, phase=phase, errand=errand, **ended)
+    assert headline("karl", Presence("alive", 1.0), state, []).text == text
 
 
 def test_before_its_first_word_a_robot_is_connected_to_and_not_lost() -> None:
