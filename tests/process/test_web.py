@@ -566,6 +566,36 @@ def test_walls_the_way_driven_and_the_health_are_shown_as_they_change(page: Page
             )
 
 
+def test_vertices_have_their_numbers_wherever_there_is_room(page: Page) -> None:
+    endpoint = free_endpoint()
+    boxes = [(0, 10), (11, 21), (30, 40), (22, 32)]  # from left to right
+    box = "({ left, right, top: 0, bottom: 10 })"
+    with web("--connect", endpoint) as address:
+        play = Play(endpoint, page)
+        with play.robot:
+            desktop(page, address)
+            play.drawn()
+            page.look(
+                "(() => { const p = CanvasRenderingContext2D.prototype, fill = p.fillText;"
+                "window.said = new Set();"
+                "p.fillText = function (text, ...at) { said.add(`${text}`); "
+                "fill.call(this, text, ...at) } })()"
+            )
+            scale = "parseFloat(document.querySelector('#scale-bar').style.width)"
+            scale += " / parseFloat(document.querySelector('#scale-text').textContent)"
+            while page.look(scale) > 10:
+                page.click("#zoom-out")
+                play.drawn()
+            page.look("said.clear()")
+            play.until("said.has('1')")
+            kept = page.look(
+                f"import('/map.js').then((m) => m.apart({json.dumps(boxes)}"
+                f".map(([left, right]) => {box}), [[100, 110]].map(([left, right]) => {box}))"
+                ".map((one) => one.left))"
+            )
+    assert kept == [0, 30]
+
+
 def test_the_other_robots_of_the_team_are_shown_where_they_are(page: Page) -> None:
     endpoint = free_endpoint()
     anna = Mate(name="anna", pose=(3.0, 4.0, 0.0))  # two metres to the north

@@ -6,6 +6,7 @@ import { axes } from "./words.js";
 
 const SIGMAS = 3;
 const FRONTIER = 26; // pixels from a vertex to the tip of its frontier's arrow
+const DISC = 5, NUMBER_HEIGHT = 10, GAP = 2; // pixels, of a vertex, of its number, and between two numbers
 
 export const LAYERS = [
   ["grid", "walls and floor", "wall", "▇"],
@@ -161,7 +162,7 @@ export class MapPicture {
     for (const vertex of this.known?.vertices ?? []) {
       const [px, py] = this.view.toScreen(...vertex.position);
       c.beginPath();
-      c.arc(px, py, 5, 0, 2 * Math.PI);
+      c.arc(px, py, DISC, 0, 2 * Math.PI);
       c.fillStyle = vertex.kind === "endpoint" ? this.colours.paper : this.colours.vertex;
       c.fill();
       c.strokeStyle = vertex.kind === "endpoint" ? this.colours.vertex : this.colours.paper;
@@ -174,18 +175,41 @@ export class MapPicture {
         c.lineWidth = 2;
         c.stroke();
       }
-      if (this.view.scale > 28) {
-        c.font = "12px system-ui, sans-serif";
-        c.lineWidth = 3;
-        c.strokeStyle = this.colours.paper;
-        const isTaken = vertex.frontiers.some((bearing) => Math.cos(bearing - 0.7) > 0.3);
-        c.textAlign = isTaken ? "right" : "left";
-        const x = px + (isTaken ? -9 : 9);
-        c.strokeText(vertex.id, x, py - 8);
-        c.fillStyle = this.colours.vertex;
-        c.fillText(vertex.id, x, py - 8);
-      }
     }
+    this.drawNumbers();
+  }
+
+  drawNumbers() {
+    const c = this.c;
+    c.font = "12px system-ui, sans-serif";
+    c.lineWidth = 3;
+    c.strokeStyle = this.colours.paper;
+    c.fillStyle = this.colours.vertex;
+    c.textAlign = "left";
+    for (const { id, left, bottom } of apart(this.numbers(), this.discs())) {
+      c.strokeText(id, left, bottom);
+      c.fillText(id, left, bottom);
+    }
+  }
+
+  // The boxes around the vertices.
+  discs() {
+    return (this.known?.vertices ?? []).map(({ position }) => {
+      const [px, py] = this.view.toScreen(...position);
+      return { left: px - DISC, right: px + DISC, top: py - DISC, bottom: py + DISC };
+    });
+  }
+
+  // Where the number of each vertex would stand, that of the selected one first.
+  numbers() {
+    const vertices = [...(this.known?.vertices ?? [])];
+    vertices.sort((a, b) => (b.id === this.selected) - (a.id === this.selected));
+    return vertices.map((vertex) => {
+      const [px, py] = this.view.toScreen(...vertex.position), width = this.c.measureText(vertex.id).width;
+      const isTaken = vertex.frontiers.some((bearing) => Math.cos(bearing - 0.7) > 0.3);
+      const left = px + (isTaken ? -9 - width : 9), bottom = py - 8;
+      return { id: vertex.id, left, bottom, right: left + width, top: bottom - NUMBER_HEIGHT };
+    });
   }
 
   arrow(px, py, bearing, colour, size) {
@@ -285,6 +309,15 @@ export class MapPicture {
     }
     return nearest;
   }
+}
+
+// Those boxes for which there is room beside what is there and those before them.
+export function apart(boxes, there) {
+  const kept = [], isFar = (a, b) => a.left > b.right + GAP || a.right < b.left - GAP || a.top > b.bottom + GAP || a.bottom < b.top - GAP;
+  for (const one of boxes) {
+    if ([...there, ...kept].every((other) => isFar(one, other))) kept.push(one);
+  }
+  return kept;
 }
 
 // Where the beams ended, map frame, m: x, y, x, y and so on.
