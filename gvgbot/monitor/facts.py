@@ -194,15 +194,15 @@ def headline(robot: str, presence: Presence, state: State | None, others: list[s
             there = f"there is {', '.join(others)}" if others else "there is none"
             return Fact(robot, f"no robot named {robot} here; {there}", "bad")
         case "gone":
-            return Fact(robot, f"robot gone since {duration(presence.for_s)}", "bad")
+            return Fact(robot, f"robot gone for {duration(presence.for_s)}", "bad")
         case "cut off":
             if state is None:
                 return Fact(robot, "connecting to the robot", "faint")
             return Fact(
-                robot, f"connection lost since {duration(presence.for_s)}, trying again", "bad"
+                robot, f"connection lost for {duration(presence.for_s)}, trying again", "bad"
             )
         case "quiet":
-            return Fact(robot, f"quiet since {duration(presence.for_s)}: its program hangs", "bad")
+            return Fact(robot, f"quiet for {duration(presence.for_s)}: its program hangs", "bad")
         case "alive":
             return _alive(robot, state)
 

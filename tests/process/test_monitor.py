@@ -175,8 +175,8 @@ def test_the_only_robot_need_not_be_named_and_its_end_is_said(endpoint: str) -> 
         robot = a_robot(endpoint)
         with robot:
             seat.until_shown(" karl  exploring")
-            seat.until_shown("quiet since")
-        text = seat.until_shown("robot gone since")
+            seat.until_shown("quiet for")
+        text = seat.until_shown("robot gone for")
         assert "driven    31.5 m" in text  # what was known last remains
         with a_robot(endpoint):
             seat.until_shown(" karl  exploring")

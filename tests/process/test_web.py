@@ -644,7 +644,7 @@ def test_a_robot_that_is_stuck_waits_is_silent_or_has_left_and_a_lost_server_are
         page.until("document.querySelector('#banner').innerText.includes('nobody answers')")
         play = Play(endpoint, page)
         with play.robot:
-            page.until(f"{banner}.startsWith('quiet since')")  # it has not said anything
+            page.until(f"{banner}.startsWith('quiet for')")  # it has not said anything
             play.until("document.querySelector('#banner').hidden")
             headline = "document.querySelector('#headline').innerText"
             there = msgspec.structs.replace(HERE.base, connected=True)
@@ -658,10 +658,10 @@ def test_a_robot_that_is_stuck_waits_is_silent_or_has_left_and_a_lost_server_are
             play.until(f"{headline} === 'its control loop is stuck'")
             play.state = waits
             play.until(f"{headline} === 'paused'")
-            page.until(f"{banner}.startsWith('quiet since 3 s')")
+            page.until(f"{banner}.startsWith('quiet for 3 s')")
             assert page.look("document.querySelector('[data-request=pause]').disabled")
             play.until("document.querySelector('#banner').hidden")
-        page.until(f"{banner}.startsWith('robot gone since')")
+        page.until(f"{banner}.startsWith('robot gone for')")
         assert "31.5 m" in page.text()  # what was known last remains
     page.until(f"{banner}.startsWith('connection to gvgbot web lost')")
     with web("--connect", endpoint, "--port", port):

@@ -101,15 +101,15 @@ const contacts = (state) => `${state.contacts}${state.slips ? `, ${state.slips} 
 
 // What to say first of a robot: [text, tone]; and whether what is shown may be wrong by now.
 export function headline(link, state) {
-  const since = duration(link.for_s);
+  const span = duration(link.for_s);
   switch (link.word) {
     case "unreachable": return [`${link.trouble} (trying again)`, "bad", true];
     case "absent": return [`no robot named ${link.robot} here; there is ${link.others.join(", ") || "none"}`, "bad", true];
-    case "gone": return [`robot gone since ${since}`, "bad", true];
+    case "gone": return [`robot gone for ${span}`, "bad", true];
     case "cut off":
       if (state === null) return ["connecting to the robot", "faint", false];
-      return [`connection to the robot lost since ${since}, trying again`, "bad", true];
-    case "quiet": return [`quiet since ${since}: its program hangs`, "bad", true];
+      return [`connection to the robot lost for ${span}, trying again`, "bad", true];
+    case "quiet": return [`quiet for ${span}: its program hangs`, "bad", true];
   }
   if (state === null) return ["it has not said anything yet", "warning", false];
   if (state.cycle_age > STUCK && state.base.connected) return ["its control loop is stuck", "bad", false];

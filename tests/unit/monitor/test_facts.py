@@ -116,9 +116,9 @@ def test_what_needs_a_look_is_toned(changes: dict[str, object], name: str, expec
     [
         ("absent", ["a", "b"], "no robot named karl here; there is a, b"),
         ("absent", [], "no robot named karl here; there is none"),
-        ("gone", [], "robot gone since 12 s"),
-        ("cut off", [], "connection lost since 12 s, trying again"),
-        ("quiet", [], "quiet since 12 s: its program hangs"),
+        ("gone", [], "robot gone for 12 s"),
+        ("cut off", [], "connection lost for 12 s, trying again"),
+        ("quiet", [], "quiet for 12 s: its program hangs"),
         ("alive", [], "exploring"),
     ],
 )
