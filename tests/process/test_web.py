@@ -686,6 +686,7 @@ def test_a_button_asks_the_robot_and_its_answer_is_shown(page: Page) -> None:
             "document.querySelector('[data-request=pause]:enabled:not([hidden])')?.id === ''"
         )
         assert page.look("document.querySelector('[data-request=stop]').hidden")  # not announced
+        assert page.look("document.querySelector('[data-request=stop]').title") == "gvgbot ctl stop"
         page.click("[data-request=pause]")
         play.until_read("pause: it stands")
         play.drawn()

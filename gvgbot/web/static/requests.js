@@ -17,7 +17,7 @@ export class Requests {
 
   button(name, label) {
     const button = document.createElement("button");
-    Object.assign(button, { type: "button", textContent: label, hidden: true });
+    Object.assign(button, { type: "button", textContent: label, title: `gvgbot ctl ${name}`, hidden: true });
     button.dataset.request = name;
     button.addEventListener("click", () => {
       const sure = name !== "stop" || confirm("End the exploration? The map is saved.");
