@@ -18,7 +18,9 @@ def add_monitor(commands: Commands) -> None:
     monitor.add_argument(
         "robot", nargs="?", metavar="ROBOT", help="its robot.name (default: the only one there is)"
     )
-    monitor.add_argument("--robot", dest="named", metavar="NAME", help="the same")
+    monitor.add_argument(
+        "--robot", dest="named", metavar="NAME", help="another way to give its robot.name"
+    )
     add_connection(monitor)
     monitor.set_defaults(command=_monitor)
 
@@ -81,7 +83,8 @@ def add_ctl(commands: Commands) -> None:
     ctl = commands.add_parser(
         "ctl",
         help="ask a robot for something",
-        usage="%(prog)s [-h] [--connect ADDRESS] [--zenoh-file FILE] [ROBOT] REQUEST [WORD ...]",
+        usage="%(prog)s [-h] [--connect ADDRESS] [--zenoh-file FILE]\n"
+        "                  [ROBOT] REQUEST [WORD ...]",
         description="Ask a robot to pause, resume, stop (which ends the exploration), drive home, "
         "goto V (a vertex) or goto X Y (metres, map frame), patrol (vertices V V ..., or all, over "
         "and over), coverage (drive all edges), explore, relocalise, save (the map), or set KEY "
@@ -93,7 +96,8 @@ def add_ctl(commands: Commands) -> None:
         "words",
         nargs="+",
         metavar="REQUEST",
-        help="what to do, after the robot's robot.name if there are several",
+        help="what to do, after the robot's robot.name if there are several, and before each WORD "
+        "that the request takes: a vertex, metres, or a key and its value",
     )
     add_connection(ctl)
     ctl.set_defaults(command=_ctl)

@@ -166,6 +166,16 @@ def test_the_exit_status_of_a_command_is_passed_on(status: int) -> None:
     assert status_of(lambda: status) == status
 
 
+def test_the_usage_of_a_command_fits_the_usual_terminal(
+    capsys: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    for command in ("ctl", "monitor", "web"):
+        with pytest.raises(SystemExit):
+            main([command, "--help"])
+        assert max(map(len, capsys.readouterr().out.splitlines())) <= 80
+
+
 @pytest.mark.parametrize(
     "command", ["explore", "run", "map show", "map info", "map export", "map diff", "replay"]
 )
