@@ -124,6 +124,7 @@ class Robot:
         self._grid: Newest[Grid] = Newest()
         self._tiles = Tiles(self._grid, self._ask_for_tiles)
         self._heard: set[Topic] = set()  # that were subscribed to
+        self._speaker: str | None = None  # who sent the last state, by its zenoh id
         self._signs = Signs(0.0)
         self._gate = threading.RLock()  # one of opening and closing at a time
         self._is_closed = False
@@ -297,6 +298,14 @@ class Robot:
         newest.put(partial(decoded, topic, payload, encoding, data))
         if topic is STATE:
             self._signs.heard_at = time.perf_counter()
+            self._note_speaker(None if sample.timestamp is None else str(sample.timestamp.get_id()))
+
+    def _note_speaker(self, speaker: str | None) -> None:
+        """Tell a router from a robot that is one for its team, by who has stamped a state."""
+        if self._session is not None and speaker not in (None, self._speaker):
+            self._speaker = speaker
+            routers = {str(one) for one in self._session.info.routers_zid()}
+            self._signs.via_router = bool(routers) and speaker not in routers
 
     def _on_tiles(self, sample: zenoh.Sample) -> None:
         try:

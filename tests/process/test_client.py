@@ -564,6 +564,18 @@ def test_router_robot_and_watcher_start_in_any_order(endpoint: str, order: list[
         until(lambda: seen.state().latest == numbered(7))
 
 
+def test_a_robot_that_is_a_router_for_its_team_is_gone_when_it_has_left(endpoint: str) -> None:
+    config = TelemetryConfig(listen=(endpoint,))
+    with Telemetry(config, "near", relays=True) as robot:
+        watcher = client.connect("near", endpoint)
+        with watcher:
+            robot.publish(numbered(1))
+            until(lambda: watcher.state().latest is not None)
+            assert watcher.presence.word == "alive"
+            robot.close()
+            until(lambda: watcher.presence.word == "gone")
+
+
 def test_a_router_in_between_may_come_and_go(endpoint: str) -> None:
     config = TelemetryConfig(listen=(free_endpoint(),), connect=(endpoint,))
     with router(endpoint) as first:
