@@ -17,7 +17,7 @@ from gvgbot.drivers.hokuyo.driver import HokuyoLaser
 from gvgbot.drivers.kobuki.driver import KobukiBase
 from gvgbot.errors import DeviceLost, DeviceRefused
 from gvgbot.hal.guard import GuardConfig
-from gvgbot.hal.messages import Battery, Contact, Scan
+from gvgbot.hal.messages import EMPTY_BATTERY, LOW_BATTERY, Battery, Contact, Scan
 from gvgbot.links import Links
 from gvgbot.simulation import Simulation, open_place
 
@@ -25,7 +25,6 @@ PATIENCE = 10.0  # s for a device's first message
 LISTEN = 3.0  # s of messages that are judged
 SETTLE = 1.0  # s at the start that rates are not judged by
 RATE_TOLERANCE = 0.05
-LOW_BATTERY, EMPTY_BATTERY = 14.0, 13.2  # V
 CALM = 0.008  # s: a link that varies by more hands out its bytes late
 BASE_RATE = 50.0  # Hz
 HARMLESS_COUNTS = ("frames", "scans")
@@ -288,7 +287,7 @@ def _timing(subject: str, heard: Heard) -> Line:
 def _battery(battery: Battery) -> Line:
     finding = f"{battery.voltage:.1f} V, {battery.fraction:.0%}"
     finding += ", charging" if battery.charging else ""
-    empty, low = battery.voltage < EMPTY_BATTERY, battery.voltage < LOW_BATTERY
+    empty, low = battery.fraction < EMPTY_BATTERY, battery.fraction < LOW_BATTERY
     verdict: Verdict = "fail" if empty else "warn" if low else "ok"
     return Line(verdict, "battery", finding, "charge it")
 

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, Union
 
 from gvgbot.errors import GvgbotError
 from gvgbot.ranges import Range
-from gvgbot.words import nearest
+from gvgbot.spelling import nearest
 from gvgbot.yaml_text import is_finite
 
 KeyPath = tuple[str, ...]

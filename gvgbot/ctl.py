@@ -10,7 +10,7 @@ from gvgbot import client
 from gvgbot.client import Asking, Refused, Robot
 from gvgbot.errors import GvgbotError, UsageError
 from gvgbot.requests import REQUESTS
-from gvgbot.words import nearest
+from gvgbot.spelling import nearest
 
 Number = TypeVar("Number", int, float)
 

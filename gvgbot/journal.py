@@ -5,13 +5,13 @@ from dataclasses import dataclass
 import structlog
 
 from gvgbot.autonomy import events
-from gvgbot.hal.messages import Battery
+from gvgbot.hal.messages import EMPTY_BATTERY, LOW_BATTERY, Battery
 from gvgbot.topics import State
 from gvgbot.words import counted
 
 PASSING_S = 1.0  # an obstacle that holds the robot for less is part of driving
 SAGGING_S = 10.0  # a voltage that is low for less may be that of a motor that starts
-LOW_BATTERY, EMPTY_BATTERY, CHARGED = 0.2, 0.05, 0.3  # of a full charge
+CHARGED = 0.35  # of a full charge: a battery with more is low no longer
 
 log = structlog.get_logger()
 

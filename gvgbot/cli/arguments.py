@@ -8,7 +8,7 @@ from math import inf, isfinite
 from pathlib import Path
 from typing import Any, NoReturn, TypeAlias, TypeVar
 
-from gvgbot.words import nearest
+from gvgbot.spelling import nearest
 
 Number = TypeVar("Number", int, float)
 

@@ -95,6 +95,9 @@ class Contact:
         return self.wheel_drop_left or self.wheel_drop_right
 
 
+LOW_BATTERY, EMPTY_BATTERY = 0.28, 0.05  # of a full charge: 14.0 and 13.2 V of a Kobuki's
+
+
 @dataclass(frozen=True, slots=True)
 class Battery:
     """State of the battery: volts, charge fraction 0..1, and whether it is being charged."""

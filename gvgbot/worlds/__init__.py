@@ -6,7 +6,7 @@ from pathlib import Path
 from gvgbot.drivers.world import World, load_world
 from gvgbot.errors import WorldError
 from gvgbot.geometry import Pose
-from gvgbot.words import nearest
+from gvgbot.spelling import nearest
 from gvgbot.worlds.buildings import comb, grid, hall, jittered, office, ring, spiral
 from gvgbot.worlds.cave import cave
 from gvgbot.worlds.clutter import clutter

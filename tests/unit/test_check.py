@@ -38,8 +38,8 @@ def test_sound_twins_pass_on_every_point() -> None:
 
 
 ILLS = {
-    "empty battery": ("twin.base.battery_v=12.9", "battery", "fail", "charge it"),
-    "low battery": ("twin.base.battery_v=13.6", "battery", "warn", "charge it"),
+    "empty battery": ("twin.base.battery_v=13.1", "battery", "fail", "charge it"),
+    "low battery": ("twin.base.battery_v=13.9", "battery", "warn", "charge it"),
     "slow converter": ("twin.base.link.jitter_s=0.016", "base clock", "warn", "latency_timer"),
     "damaged bytes": ("twin.base.link.lost_bytes_per_kb=0.3", "base link", "warn", "cable"),
     "few scans": ("twin.laser.bad_checksum_fraction=0.2", "laser rate", "fail", "cable"),

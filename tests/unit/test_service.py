@@ -249,7 +249,7 @@ def test_a_battery_that_runs_down_is_told_of_twice() -> None:
 
 
 def test_a_battery_that_is_low_while_motors_start_is_no_news() -> None:
-    assert battery_lines(20 * [0.15, 0.15, 0.15, 0.15, 0.25]) == []
+    assert battery_lines(20 * [0.15, 0.15, 0.15, 0.15, 0.3]) == []
 
 
 def test_a_battery_that_was_charged_is_told_of_anew() -> None:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from gvgbot.words import counted, nearest
+from gvgbot.words import counted
 
 
 @pytest.mark.parametrize(("count", "says"), [(0, "0 vertices"), (1, "1 vertex"), (2, "2 vertices")])
@@ -12,8 +12,3 @@ def test_things_are_counted_as_people_do(count: int, says: str) -> None:
 
 def test_an_s_is_enough_for_most() -> None:
     assert (counted(1, "edge"), counted(3, "edge")) == ("1 edge", "3 edges")
-
-
-@pytest.mark.parametrize(("typed", "meant"), [("ofice", "office"), ("gird", "grid"), ("x", None)])
-def test_a_mistyped_name_is_taken_for_the_nearest(typed: str, meant: str | None) -> None:
-    assert nearest(typed, ("grid", "office")) == meant

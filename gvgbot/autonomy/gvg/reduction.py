@@ -24,9 +24,7 @@ _MERGE_HYSTERESIS = 1.3  # by which factor an edge must differ to overrule what 
 _REACH_HYSTERESIS = 1.12
 _WIDE_M = 4.0  # from the walls
 _SEEN_SHARE = 0.8  # of the laser's range: walls farther off may lack
-_CORNER_SHARE = (
-    0.7  # of the map's reach: a right-angled corner is sqrt(2) times as far as its walls
-)
+_CORNER_SHARE = 0.7  # of the map's reach: a corner is sqrt(2) times as far as its walls
 _SPECK = 4.0  # so many of the shortest edges around open space are no way round it
 _FALL_IN_CORNER = 0.3  # metres of clearance lost per metre, at least, towards a corner
 _ENDPOINT_M = 0.6  # a point so near to a known endpoint is that endpoint
