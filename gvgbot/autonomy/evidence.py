@@ -6,12 +6,14 @@ from dataclasses import dataclass, field
 from typing import Annotated
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.candidates import Candidates, CandidatesConfig
 from gvgbot.autonomy.gvg.local import Branch, LocalNode
 from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.graph import Edge, HalfEdgeId, Vertex
 from gvgbot.autonomy.slam.recognition import RecognitionConfig, match_bearings
+from gvgbot.autonomy.topology import outwards
 from gvgbot.autonomy.unsettled import Knowledge
 from gvgbot.autonomy.views import Correspondence, View
 from gvgbot.geometry import Array, Pose
@@ -24,6 +26,7 @@ _IN_FULL_VIEW_M = 4.0  # from so near, it would be seen that a vertex is none
 _IN_CLEAR_M = 2.0  # and from so near, that it has no departure where one was seen
 _WELL_KNOWN_M = 0.2  # the uncertainty of its place with which that can be told
 _ON_EDGE_M = 0.3  # so near to a vertex's place, an edge that is seen passes through it
+_ASIDE_M = 2.0  # beyond a vertex's disc: a driven way that leaves by a door is beyond the walls
 _DRIVEN = 5  # times as often must a driven edge be missed
 
 
@@ -199,8 +202,36 @@ class Evidence:
         is_promising = any(half.open for half in vertex.half_edges.values())
         if is_promising and math.dist(place, view.local_base.position) >= _IN_CLEAR_M:
             return None
-        passes = self._passes_through(view, place, known)
+        passes = self._passes_through(view, place, known) and not self._was_left(
+            view, vertex, place
+        )
         return "an edge passes here" if passes and not self._unbelieved.is_stubborn(place) else None
+
+    def _was_left(self, view: View, vertex: Vertex, point: Array) -> bool:
+        """Whether the robot drove between a vertex at a point (2,) and where now walls are seen.
+
+        There is a way, then, such as a door that is hard to see or shut now.
+        """
+        place = view.gvg.place(point)
+        assert place is not None
+        clearance = view.gvg.edges[place.edge].clearance_at(place.station)
+        lines = cKDTree(np.concatenate([edge.polyline for edge in view.gvg.edges.values()]))
+        for way in self._driven_ways(vertex):
+            turned = view.local_base.compose(self._known.belief.map_base.inverse()).transform(way)
+            gaps = np.asarray(lines.query(turned + (point - turned[0]))[0])
+            if gaps.max() > clearance:
+                return True
+        return False
+
+    def _driven_ways(self, vertex: Vertex) -> Iterator[Array]:
+        """The first metres of edges that were driven from or to a vertex (N, 2), map frame."""
+        for key in vertex.half_edges:
+            end = HalfEdgeId(vertex.id, key)
+            edge = self._known.graph.edge_at(end)
+            if edge is not None and self._weight(edge, end) == math.inf:
+                line = outwards(self._known.belief, edge, end)
+                along = np.cumsum(np.hypot(*np.diff(line, axis=0, prepend=line[:1]).T))
+                yield line[along < vertex.clearance + _ASIDE_M]
 
     def _passes_through(self, view: View, point: Array, known: Correspondence) -> bool:
         """Whether an edge is seen where a vertex should be, or another vertex at its end there."""

@@ -7,11 +7,12 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from gvgbot.autonomy.slam.ekf import Belief, apart
-from gvgbot.autonomy.slam.graph import Edge, GvgGraph, HalfEdgeId, Vertex
+from gvgbot.autonomy.slam.graph import Edge, GvgGraph, HalfEdge, HalfEdgeId, Vertex
 from gvgbot.autonomy.slam.recognition import match_bearings
-from gvgbot.geometry import Array, Pose
+from gvgbot.geometry import Array, Pose, wrap_angle
 
 _OUT_M = 1.0  # from a vertex, where the direction of an edge is taken
+_OPPOSITE = math.radians(120)  # departures that differ by more go on as one line
 _STRAYS = 3  # vertices that hang together with nothing else: more are a part of the building
 
 
@@ -63,23 +64,35 @@ def _direction(line: Array) -> float:
 
 
 def take_out(graph: GvgGraph, belief: Belief, vertex: Vertex) -> None:
-    """Remove a vertex from the graph; of two edges that met there one is made."""
+    """Remove a vertex from the graph; of two edges that met there one is made.
+
+    If a third departure had none, they may be a way round a corner that another one goes past: then
+    they must lead in opposite directions, or their other ends become frontiers.
+    """
     meeting = [
         (HalfEdgeId(vertex.id, key), graph.edges[half.edge])
         for key, half in vertex.half_edges.items()
         if half.edge is not None
     ]
+    is_line = vertex.degree == 2 or _are_opposite(
+        [vertex.half_edges[end.key] for end, _ in meeting]
+    )
     graph.remove_vertex(vertex.id)
-    if len(meeting) != 2 or meeting[0][1] is meeting[1][1]:
+    if len(meeting) != 2 or meeting[0][1] is meeting[1][1] or not is_line:
         return
     (one_end, one), (other_end, other) = meeting
     start, end = one.other(one_end), other.other(other_end)
-    inwards, outwards = _outwards(belief, one, one_end)[::-1], _outwards(belief, other, other_end)
-    line = np.concatenate([inwards, outwards[1:]])
+    to_it, onwards = outwards(belief, one, one_end)[::-1], outwards(belief, other, other_end)
+    line = np.concatenate([to_it, onwards[1:]])
     line = belief.map_vertex(start.vertex).inverse().transform(line)
     clearance = min(one.min_clearance, other.min_clearance)
     edge = graph.join(start, end, line, clearance, driven=one.driven and other.driven)
     edge.established = one.established and other.established
+
+
+def _are_opposite(departures: list[HalfEdge]) -> bool:
+    turn = departures[0].bearing - departures[-1].bearing if departures else 0.0
+    return abs(wrap_angle(turn)) > _OPPOSITE
 
 
 def strays(graph: GvgGraph) -> list[Vertex]:
@@ -129,7 +142,7 @@ def loose_ends(
     for end in ends:
         near = end if end in edges or len(edges) != 1 else next(iter(edges))
         if near in edges and edges[near].other(near).vertex != vertex.id:
-            found[end] = edges[near].other(near), _outwards(belief, edges[near], near)[::-1]
+            found[end] = edges[near].other(near), outwards(belief, edges[near], near)[::-1]
     return found
 
 
@@ -163,7 +176,7 @@ def fuse(
     return renamed
 
 
-def _outwards(belief: Belief, edge: Edge, end: HalfEdgeId) -> Array:
+def outwards(belief: Belief, edge: Edge, end: HalfEdgeId) -> Array:
     """Polyline (N, 2) of an edge from one of its ends, map frame."""
     line = belief.map_vertex(edge.a.vertex).transform(edge.polyline)
     return line if edge.a == end else line[::-1]

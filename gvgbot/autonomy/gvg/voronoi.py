@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
+from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import Delaunay, QhullError, cKDTree
 
@@ -55,9 +55,10 @@ def fine_graph(
 
     A ridge counts if the robot (of radius `min_clearance`) fits between its two generators, and if
     they cannot be two bumps of one flat wall: a disc of radius r touches two bumps of height h on a
-    wall if they are less than sqrt(8 h r) apart. `roughness` is that h, m. Farther from all walls
-    than `open_clearance` m, the graph goes along the coast instead. `felt` are obstacles (N, 2)
-    that the map does not show.
+    wall if they are less than sqrt(8 h r) apart. `roughness` is that h, m. Ridges that could be of
+    such bumps count where they lead from some that could not to others: the way from a door into
+    the middle of a room is that of its two posts. Farther from all walls than `open_clearance` m,
+    the graph goes along the coast instead. `felt` are obstacles (N, 2) that the map does not show.
     """
     generators = np.concatenate([local_map.points(), felt])
     triangles = _triangulated(generators)
@@ -126,8 +127,29 @@ def _diagram(triangles: Delaunay, min_clearance: float, roughness: float) -> Dia
     chord = np.hypot(*(p - q).T)
     parts = chord >= 2 * min_clearance
     narrowest = _least_clearance(points, clearance, a[parts], b[parts], p[parts], q[parts])
-    parts[parts] = chord[parts] >= np.sqrt(8 * roughness * narrowest)
+    is_rough = np.zeros(len(parts), bool)
+    is_rough[parts] = chord[parts] < np.sqrt(8 * roughness * narrowest)
+    parts &= ~is_rough
+    whole = np.flatnonzero((parts | is_rough) & (b >= 0))
+    unclear = whole[is_rough[whole]]
+    certain = whole[parts[whole]]
+    touched = np.zeros(len(points), bool)
+    touched[a[certain]] = touched[b[certain]] = True
+    parts[unclear[_bridging(a[unclear], b[unclear], touched)]] = True
     return Diagram(points, clearance, a, b, pair, parts)
+
+
+def _bridging(
+    a: NDArray[np.int64], b: NDArray[np.int64], touched: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """Which links from points a to b (M,) hang together between two that are `touched` (N,)."""
+    ends, numbered = np.unique(np.stack([a, b]), return_inverse=True)
+    numbered = numbered.reshape(2, -1)
+    n = len(ends)
+    links = csr_array((np.ones(len(a)), tuple(numbered)), (n, n))
+    _, piece = connected_components(links, directed=False)
+    is_bridge: NDArray[np.bool_] = np.bincount(piece, touched[ends], n)[piece[numbered[0]]] > 1
+    return is_bridge
 
 
 def _ridges_that_count(

@@ -32,7 +32,7 @@ from gvgbot.autonomy.slam.recognition import RecognitionConfig, Sighting
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
 from gvgbot.autonomy.views import Correspondence, View, touching
 from gvgbot.geometry import Array, Pose
-from tests.unit.autonomy.local_graphs import Point, drawn
+from tests.unit.autonomy.local_graphs import Point, drawn, resampled
 from tests.unit.autonomy.sights import carved, looked, sweep
 
 CONFIG = MappingConfig()
@@ -227,6 +227,38 @@ def test_a_vertex_through_which_a_plain_edge_runs_is_taken_back() -> None:
     assert len(seen.mapper.graph.vertices) == 0
     assert seen.mapper.belief.ids == ()
     assert len(of_type(seen.events, VertexRemoved)) == 1
+
+
+def led_by(seen: Seen, *corners: Point, far: Point) -> None:
+    """Make a driven edge, map frame, of the branch of the tee, to a vertex far off."""
+    graph, belief = seen.mapper.graph, seen.mapper.belief
+    (tee,) = graph.vertices.values()
+    map_tee = belief.map_vertex(tee.id)
+    (key,) = (k for k, h in tee.half_edges.items() if math.sin(h.bearing + map_tee.theta) < -0.5)
+    other = Vertex(graph.next_id(), 1.0, Pose(*far, 0.0), 0.0, 0.0)
+    graph.vertices[other.id] = other
+    ends = HalfEdgeId(tee.id, key), HalfEdgeId(other.id, other.add_half_edge(0.0))
+    line = map_tee.inverse().transform(resampled([(3.0, 0.0), *corners, far]))
+    graph.join(*ends, line, 0.3, driven=True)
+    R = np.diag([1e-4, 1e-4, 1e-4])
+    base_far = belief.map_base.inverse().compose(Pose(*far, 0.0))
+    seen.mapper.belief = ekf.add_vertex(belief, other.id, base_far, R)
+
+
+def test_a_vertex_stays_whose_branch_was_driven_through_what_is_a_wall_now() -> None:
+    """A door that is hard to see from the corridor, or shut behind the robot: it went through."""
+    seen = Seen().look(TEE, CONFIG.candidates.meetpoint_sightings)
+    led_by(seen, far=(3.0, -9.0))
+    seen.look_near(PLAIN, 3 * CONFIG.misses)
+    assert (3.0, 0.0) in [pytest.approx(place, abs=1e-3) for place in seen.places("meetpoint")]
+
+
+def test_a_way_driven_round_somebody_in_a_corridor_keeps_no_vertex() -> None:
+    """It leaves the corridor's middle by less than the walls are off it, and comes back."""
+    seen = Seen().look(TEE, CONFIG.candidates.meetpoint_sightings)
+    led_by(seen, (3.5, -0.7), (4.5, -0.7), far=(5.5, 0.0))
+    seen.look_near(PLAIN, 3 * CONFIG.misses)
+    assert seen.places("meetpoint") == []
 
 
 def test_a_departure_that_a_clear_view_keeps_not_showing_is_dropped() -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex
-from gvgbot.autonomy.topology import fuse, loose_ends, split_edge_at, strays
+from gvgbot.autonomy.topology import fuse, loose_ends, split_edge_at, strays, take_out
 from gvgbot.geometry import Pose
 from tests.unit.autonomy.graphs import STREET, between, streets
 
@@ -129,3 +129,26 @@ def test_a_few_vertices_that_nothing_leads_to_are_strays(size: int, strange: int
     assert {vertex.id for vertex in strays(graph)} == {ids[x, 0] for x in range(strange)}
     graph.vertices[first].half_edges[cut.key].blocked = True
     assert strays(graph) == []
+
+
+@pytest.mark.parametrize(("third", "edges"), [(None, 1), (math.pi / 2, 0), (math.pi, 1)])
+def test_two_edges_of_what_is_none_become_one_unless_a_third_way_goes_straight_on(
+    third: float | None, edges: int
+) -> None:
+    """At the corner of two streets nothing else led on, or it did: past the corner, or not."""
+    graph, ids = streets(2, 2)
+    corner, east, north = ids[0, 0], ids[1, 0], ids[0, 1]
+    far = ids[1, 1]
+    graph.remove_vertex(far)
+    if third == math.pi:  # the edges lead east and west, as if the second street bent elsewhere
+        graph.vertices[corner].half_edges[between(graph, corner, north).key].bearing = math.pi
+        third = math.pi / 2
+    if third is not None:
+        graph.vertices[corner].add_half_edge(third)
+    places = np.array([[0.0, 0.0], [STREET, 0.0], [0.0, STREET]])
+    x = np.hstack([np.zeros(3), np.pad(places, ((0, 0), (0, 1))).ravel()])
+    belief = Belief(x, np.zeros((12, 12)), (corner, east, north))
+    take_out(graph, belief, graph.vertices[corner])
+    assert len(graph.edges) == edges
+    assert len(graph.frontiers()) == 2 * (2 - edges)  # to the far corner, and what was lost
+    assert is_sound(graph)

@@ -4,14 +4,17 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
+from gvgbot.autonomy.gvg.voronoi import fine_graph
 from gvgbot.drivers.world import World
-from gvgbot.geometry import Pose
+from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
+from tests.unit.autonomy.local_graphs import Point, resampled
 from tests.unit.autonomy.sights import RADIUS, Rectangle, carved, fine, looked, sweep
 
 seeds = st.integers(0, 2**32 - 1)
@@ -113,3 +116,34 @@ def test_one_straight_wall_is_no_graph() -> None:
     world = carved([(-9.0, -9.0, 9.0, 9.0)])
     graph = fine(looked(world, [Pose(0.0, 7.0, 1.57)], field_of_view=1.0), (0.0, 7.0))
     assert not len(graph.ridges)
+
+
+class Drawn:
+    """Walls as points (N, 2); all between them is seen."""
+
+    def __init__(self, *walls: tuple[Point, Point]) -> None:
+        self._points = np.concatenate([resampled(list(wall)) for wall in walls])
+
+    def points(self) -> Array:
+        return self._points
+
+    def known(self, points: Array) -> NDArray[np.bool_]:
+        return np.ones(points.shape[:-1], bool)
+
+
+@pytest.mark.parametrize("door", [0.45, 0.6, 0.8])
+def test_a_door_leads_into_a_room_whose_wall_is_uneven_by_millimetres(door: float) -> None:
+    """Far from the door its edges are no longer the nearest: what stands out beside them is."""
+    post, beside, out = door / 2, door / 2 + 0.02, 0.002
+    walls: list[tuple[Point, Point]] = [((-4.0, 7.0), (4.0, 7.0)), ((-4.0, -1.8), (4.0, -1.8))]
+    for side in (-1.0, 1.0):
+        corner = (4.0 * side, 0.0)
+        walls += [
+            ((post * side, 0.0), (post * side, -0.1)),
+            ((post * side, -0.1), (4.0 * side, -0.1)),
+            ((beside * side, out), corner),
+            (corner, (4.0 * side, 7.0)),
+        ]
+    graph = fine_graph(Drawn(*walls), np.array([0.0, -0.9]), min_clearance=RADIUS, roughness=0.03)
+    assert np.hypot(*(graph.points - [0.0, 3.5]).T).min() < 0.1  # the middle of the room
+    assert np.hypot(*(graph.points - [0.0, -0.95]).T).min() < 0.1  # and of the corridor
