@@ -146,7 +146,7 @@ def _bridging(
     ends, numbered = np.unique(np.stack([a, b]), return_inverse=True)
     numbered = numbered.reshape(2, -1)
     n = len(ends)
-    links = csr_array((np.ones(len(a)), tuple(numbered)), (n, n))
+    links = csr_array((np.ones(len(a)), (numbered[0], numbered[1])), (n, n))
     _, piece = connected_components(links, directed=False)
     is_bridge: NDArray[np.bool_] = np.bincount(piece, touched[ends], n)[piece[numbered[0]]] > 1
     return is_bridge
