@@ -1,15 +1,19 @@
 """What the map learns from where the robot drives: edges that it has followed to their ends."""
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.gvg.local import Place
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.autonomy.start_edge import StartEdge, is_at_start
+from gvgbot.autonomy.topology import direction
 from gvgbot.autonomy.views import Correspondence, View
 from gvgbot.autonomy.whereabouts import LEAST_LOOP_M, Passage, Whereabouts
 from gvgbot.geometry import Array
 
+_APART_M, _TOGETHER_M = 0.5, 0.2  # two ways that are farther apart, or no farther
+_FROM_END_M = 1.0  # of an edge: nearer, the departures of its vertex are not told apart
 _IN_CLEAR_M = 2.0  # from a vertex, it is seen which departures it has
 
 
@@ -53,13 +57,39 @@ class DrivenEdges:
         before = graph.edge_at(arrived)
         if before is not None and before.other(arrived).vertex == left.vertex:
             graph.remove_half_edge(left)  # it is the one by which that edge is known to leave
-        if far.edge is not None:
-            return
         if left in known.branch_of and passage.driven < LEAST_LOOP_M:
             return  # both ends are in sight
         if _has_gone(left, view, known):
             return  # what the robot drove on was none, and it has come onto another edge
-        self._mapper.join(view, left, arrived, passage.line, passage.narrowest, driven=True)
+        if far.edge is None:
+            self._mapper.join(view, left, arrived, passage.line, passage.narrowest, driven=True)
+        elif graph.half_edge(left) is not None:
+            self._join_fork(view, left, arrived, passage)
+
+    def _join_fork(
+        self, view: View, left: HalfEdgeId, arrived: HalfEdgeId, passage: Passage
+    ) -> None:
+        """Make a vertex where the robot came onto an edge that it knew from another drive.
+
+        It was missed in passing: in a hall one of its ways may be behind what the laser sees.
+        """
+        mapper = self._mapper
+        edge = mapper.graph.edge_at(arrived)
+        assert edge is not None
+        known_line = mapper.in_local_frame(view, edge.a.vertex).transform(edge.polyline)
+        known_line = known_line if edge.a == arrived else known_line[::-1]
+        at = _fork(passage.line, known_line + (passage.line[-1] - known_line[0]))
+        if at is None:
+            return
+        place = passage.line[at]
+        on = int(np.argmin(np.hypot(*(known_line - place).T)))
+        ways = (known_line[on::-1], known_line[on:], passage.line[at::-1])
+        vertex = mapper.add_driven(view, place, *(direction(way - place) for way in ways))
+        *known_ends, end = (HalfEdgeId(vertex.id, key) for key in vertex.half_edges)
+        if any(mapper.graph.edge_at(known_end) is None for known_end in known_ends):
+            mapper.remove(view, vertex, "it is on no edge")
+            return
+        mapper.join(view, left, end, passage.line[: at + 1], passage.narrowest, driven=True)
 
     def _close_ring(self, view: View, where: Whereabouts, clearance: float) -> None:
         """Give an edge without an end a vertex, when the robot has come round to its start.
@@ -95,6 +125,20 @@ class DrivenEdges:
         """Whether the robot has come back to where it came onto its first edge (2,), map frame."""
         driven = where.trail_length > LEAST_LOOP_M
         return driven and is_at_start(self._mapper.belief, start, clearance)
+
+
+def _fork(line: Array, known_line: Array) -> int | None:
+    """The index of the point of a line (N, 2) where it comes onto another (M, 2).
+
+    The other begins where the line ends. None if it comes onto it only there.
+    """
+    gaps = np.asarray(cKDTree(known_line).query(line)[0])
+    apart = np.flatnonzero(gaps > _APART_M)
+    if not len(apart) or len(line) - apart[-1] < 2:
+        return None
+    at = int(apart[-1] + np.argmax(gaps[apart[-1] :] < _TOGETHER_M))
+    away = min(np.hypot(*(line[at] - end)) for end in (known_line[0], known_line[-1]))
+    return at if gaps[at] < _TOGETHER_M and away > _FROM_END_M else None
 
 
 def _has_gone(end: HalfEdgeId, view: View, known: Correspondence) -> bool:

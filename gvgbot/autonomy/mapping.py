@@ -22,7 +22,7 @@ from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.graph import Edge, HalfEdgeId, Vertex
 from gvgbot.autonomy.slam.recognition import RecognitionConfig, Sighting, detection_covariance
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
-from gvgbot.autonomy.topology import loose_ends, split_edge_at, strays, take_out
+from gvgbot.autonomy.topology import direction, loose_ends, split_edge_at, strays, take_out
 from gvgbot.autonomy.unsettled import Knowledge, Unsettled
 from gvgbot.autonomy.views import Correspondence, Observation, View
 from gvgbot.geometry import Array, Pose
@@ -386,12 +386,15 @@ class Mapper(Knowledge):
         """
         here = view.local_base.position
         line = np.concatenate([here[None], line, here[None]])
-        way_out, way_in = line[len(line) // 8] - here, line[-len(line) // 8] - here
-        bearings = (math.atan2(way_out[1], way_out[0]), math.atan2(way_in[1], way_in[0]))
-        clearance, _ = view.local_map.tree().query(here)
-        vertex = self._add(view, Sighting(here, float(clearance), bearings, meetpoint=True))
+        ways = (line[[at]] - here for at in (len(line) // 8, -len(line) // 8))
+        vertex = self.add_driven(view, here, *map(direction, ways))
         ends = [HalfEdgeId(vertex.id, key) for key in vertex.half_edges]
         self.join(view, ends[0], ends[1], line, min_clearance, driven=True)
+
+    def add_driven(self, view: View, place: Array, *bearings: float) -> Vertex:
+        """Make a vertex of a place (2,) that was driven over, with departures; local frame."""
+        clearance, _ = view.local_map.tree().query(place)
+        return self._add(view, Sighting(place, float(clearance), bearings, meetpoint=True))
 
     def forget_between(self, first: int, last: int) -> None:
         """Drop what was observed at keyframes from one on; the last one takes its number."""

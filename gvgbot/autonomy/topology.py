@@ -34,7 +34,7 @@ def split_edge_at(
         if np.trace(S[0]) > reach**2:
             continue  # it may as well be elsewhere
         known = {key: half.bearing for key, half in vertex.half_edges.items()}
-        matched = match_bearings(tuple(_direction(part) for part in parts), known, angle)
+        matched = match_bearings(tuple(direction(part) for part in parts), known, angle)
         if len(matched) < 2:
             continue
         graph.unjoin(edge)
@@ -56,7 +56,7 @@ def _parted(line: Array, reach: float) -> tuple[Array, Array] | None:
     return line[: at + 1][::-1], line[at:]
 
 
-def _direction(line: Array) -> float:
+def direction(line: Array) -> float:
     """Direction (rad) in which a polyline (N, 2) leaves the origin."""
     away = np.hypot(*line.T)
     x, y = line[int(np.argmax(away > _OUT_M))] if away.max() > _OUT_M else line[-1]

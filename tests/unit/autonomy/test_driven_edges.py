@@ -8,6 +8,7 @@ from gvgbot.autonomy.evidence import MappingConfig
 from gvgbot.autonomy.gvg.local import Branch, LocalGvg
 from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
 from gvgbot.autonomy.mapping import Mapper
+from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.graph import HalfEdgeId, Vertex
 from gvgbot.autonomy.slam.recognition import RecognitionConfig
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
@@ -101,3 +102,44 @@ def test_what_was_none_leads_nowhere(*, is_seen: bool) -> None:
     }
     drive.along(STREET, seen, (1.2, 0.0))
     assert len(drive.mapper.graph.edges) == int(is_seen)
+
+
+def with_north(drive: Drive, key: int, base: Pose) -> None:
+    """Let a departure of vertex 2 lead north, to vertex 3, and the robot be at `base`."""
+    graph, north = drive.mapper.graph, Vertex(3, 1.0, Pose(5.0, 8.0, 0.0), 0.0, 0.0)
+    graph.vertices[3], graph.serial = north, 3
+    ends = HalfEdgeId(2, key), HalfEdgeId(3, north.add_half_edge(-np.pi / 2))
+    graph.join(*ends, resampled([(0.0, 0.0), (0.0, 8.0)]), 1.0, driven=True)
+    for vertex, place in ((1, (0.0, 0.0)), (2, (5.0, 0.0)), (3, (5.0, 8.0))):
+        belief = drive.mapper.belief
+        drive.mapper.belief = ekf.add_vertex(belief, vertex, Pose(*place, 0.0), 1e-4 * np.eye(3))
+    drive.mapper.move(base, np.zeros((3, 3)))
+
+
+@pytest.mark.parametrize("west", [0.0, 2.0])
+def test_where_the_robot_came_onto_a_known_edge_is_a_vertex_that_it_missed(west: float) -> None:
+    """From vertex 1 to the north and east, and down the side street to vertex 2."""
+    drive = Drive(HalfEdgeId(1, NORTH))
+    with_north(drive, NORTH, Pose(5.0, 1.0))
+    drive.where.trail = list(resampled([(0.0, 0.0), (west, 4.0), (5.0, 4.0), (5.0, 1.0)]))
+    beyond = {branch: end for branch, end in ALL_SEEN.items() if end.vertex == 2}
+    drive.along(STREET, beyond, (5.0, 1.0))
+    graph = drive.mapper.graph
+    (missed,) = (vertex for vertex in graph.vertices.values() if vertex.id not in (1, 2, 3))
+    place = drive.mapper.belief.map_vertex(missed.id)
+    assert (place.x, place.y) == pytest.approx((5.0, 4.0), abs=0.3)
+    assert {frozenset((e.a.vertex, e.b.vertex)) for e in graph.edges.values()} == {
+        frozenset((missed.id, neighbour)) for neighbour in (1, 2, 3)
+    }
+    assert graph.edge_at(HalfEdgeId(1, NORTH)) is not None
+
+
+def test_a_way_that_only_ends_at_a_known_edge_is_no_fork_of_it() -> None:
+    """To vertex 2 from the west, where its edge to the north is thought to begin."""
+    drive = Drive(HalfEdgeId(1, NORTH))
+    with_north(drive, WEST, Pose(4.0, 0.0))
+    drive.where.trail = list(resampled([(0.0, 0.0), (0.0, 3.0), (2.5, 0.0), (4.0, 0.0)]))
+    beyond = {branch: end for branch, end in ALL_SEEN.items() if end.vertex == 2}
+    drive.along(STREET, beyond, (4.0, 0.0))
+    assert sorted(drive.mapper.graph.vertices) == [1, 2, 3]
+    assert len(drive.mapper.graph.edges) == 1
