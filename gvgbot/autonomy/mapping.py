@@ -315,15 +315,15 @@ class Mapper(Knowledge):
         return None
 
     def _is_out_of_place(self, view: View, sighting: Sighting, away: float) -> bool:
-        """Whether a vertex is seen `away` metres off, on an edge of the finished map.
+        """Whether a vertex is seen `away` metres off, on an edge that was driven, or finished.
 
-        A dead end is a door that is shut. A meetpoint may be none as long as a part of the walls is
-        out of sight: in passing the robot will see.
+        A dead end on a finished one is a door that is shut. A meetpoint may be none as long as a
+        part of the walls is out of sight: in passing the robot will see, as it has before.
         """
         if sighting.meetpoint and away < self._config.passed_m:
             return False
         for edge in self.graph.edges.values():
-            if edge.established:
+            if edge.established or (sighting.meetpoint and edge.traversals):
                 line = self.in_local_frame(view, edge.a.vertex).transform(edge.polyline)
                 if np.hypot(*(line - sighting.position).T).min() < _ON_EDGE_M:
                     return True
