@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.candidates import Candidates, CandidatesConfig
-from gvgbot.autonomy.gvg.local import Branch, LocalNode
+from gvgbot.autonomy.gvg.local import Branch, LocalNode, Place
 from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.graph import Edge, HalfEdgeId, Vertex
 from gvgbot.autonomy.slam.recognition import RecognitionConfig, match_bearings
@@ -202,19 +202,17 @@ class Evidence:
         is_promising = any(half.open for half in vertex.half_edges.values())
         if is_promising and math.dist(place, view.local_base.position) >= _IN_CLEAR_M:
             return None
-        passes = self._passes_through(view, place, known) and not self._was_left(
-            view, vertex, place
-        )
-        return "an edge passes here" if passes and not self._unbelieved.is_stubborn(place) else None
+        passing = self._passing(view, place, known)
+        if passing is None or self._was_left(view, vertex, place, passing):
+            return None
+        return None if self._unbelieved.is_stubborn(place) else "an edge passes here"
 
-    def _was_left(self, view: View, vertex: Vertex, point: Array) -> bool:
+    def _was_left(self, view: View, vertex: Vertex, point: Array, passing: Place) -> bool:
         """Whether the robot drove between a vertex at a point (2,) and where now walls are seen.
 
         There is a way, then, such as a door that is hard to see or shut now.
         """
-        place = view.gvg.place(point)
-        assert place is not None
-        clearance = view.gvg.edges[place.edge].clearance_at(place.station)
+        clearance = view.gvg.edges[passing.edge].clearance_at(passing.station)
         lines = cKDTree(np.concatenate([edge.polyline for edge in view.gvg.edges.values()]))
         for way in self._driven_ways(vertex):
             turned = view.local_base.compose(self._known.belief.map_base.inverse()).transform(way)
@@ -233,16 +231,16 @@ class Evidence:
                 along = np.cumsum(np.hypot(*np.diff(line, axis=0, prepend=line[:1]).T))
                 yield line[along < vertex.clearance + _ASIDE_M]
 
-    def _passes_through(self, view: View, point: Array, known: Correspondence) -> bool:
-        """Whether an edge is seen where a vertex should be, or another vertex at its end there."""
+    def _passing(self, view: View, point: Array, known: Correspondence) -> Place | None:
+        """Where an edge is seen at the place of a vertex, or at its end there another vertex."""
         place = view.gvg.place(point)
         if place is None or place.distance > _ON_EDGE_M:
-            return False
+            return None
         edge = view.gvg.edges[place.edge]
         reach = self._recognition.same_place_m
         from_end = min(place.station, edge.length - place.station)
         end = edge.a if place.station < edge.length / 2 else edge.b
-        return from_end > reach or end in known.vertex_of
+        return place if from_end > reach or end in known.vertex_of else None
 
     def is_well_known(self, vertex: Vertex) -> bool:
         """Whether it is certain where a vertex stands as seen from the robot."""
