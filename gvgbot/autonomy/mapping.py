@@ -1,6 +1,7 @@
 """From what is seen of the GVG to what is known of it: vertices matched, added and joined."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -106,13 +107,17 @@ class Mapper(Knowledge):
 
     def is_way(self, local_base: Pose, place: Array) -> bool:
         """Whether a known edge passes a place (2,), local frame, nearer than any wall of its."""
+        return any(gap < edge.min_clearance for edge, gap in self._edges_at(local_base, place))
+
+    def _edges_at(self, local_base: Pose, place: Array) -> Iterator[tuple[Edge, float]]:
+        """The edges that may pass a place (2,), local frame, and how near to it they do, m."""
         x, y = self.belief.map_base.transform(local_base.inverse().transform(place))
+        starts = dict(zip(self.belief.ids, self.belief.positions.tolist(), strict=True))
         for edge in self.graph.edges.values():
-            map_vertex = self.belief.map_vertex(edge.a.vertex)
-            gaps = np.hypot(*(map_vertex.transform(edge.polyline) - [x, y]).T)
-            if gaps.min() < edge.min_clearance:
-                return True
-        return False
+            within = edge.length + max(edge.min_clearance, _ON_EDGE_M)
+            if math.dist(starts[edge.a.vertex], (x, y)) < within:
+                line = self.belief.map_vertex(edge.a.vertex).transform(edge.polyline)
+                yield edge, float(np.hypot(*(line - [x, y]).T).min())
 
     def observe(self, view: View) -> tuple[Correspondence, list[Event]]:
         """Match a view with the map and learn from it.
@@ -322,12 +327,10 @@ class Mapper(Knowledge):
         """
         if sighting.meetpoint and away < self._config.passed_m:
             return False
-        for edge in self.graph.edges.values():
-            if edge.established or (sighting.meetpoint and edge.traversals):
-                line = self.in_local_frame(view, edge.a.vertex).transform(edge.polyline)
-                if np.hypot(*(line - sighting.position).T).min() < _ON_EDGE_M:
-                    return True
-        return False
+        return any(
+            gap < _ON_EDGE_M and (edge.established or (sighting.meetpoint and edge.traversals > 0))
+            for edge, gap in self._edges_at(view.local_base, sighting.position)
+        )
 
     # -- what hangs together -----------------------------------------------------------------
 
