@@ -270,7 +270,7 @@ class Pipeline:
             felt=np.concatenate([self._hazards.points, self._newcomers.points]),
         )
         known = self.mapper.known_around(local_base, half_width)
-        return reduce_graph(fine, reduction, known)
+        return reduce_graph(fine, reduction, known).rings_cut_far_from(local_base.position)
 
     def _worth_a_look(self, scan: Scan, odom_base: Pose) -> bool:
         """Whether the robot is about something, and has come on, turned or waited enough."""

@@ -135,6 +135,15 @@ def test_a_ring_without_a_vertex_is_driven_round_once() -> None:
     assert (joined.start, joined.end, joined.driven) == (vertex, vertex, True)
 
 
+def test_a_ring_that_is_in_sight_as_a_whole_is_driven_round_without_a_halt() -> None:
+    """After two sides of a corridor round a block nothing of it is new, and nowhere is its end."""
+    corridor = carved([(-1.0, -1.0, 6.0, 6.0)], [(1.0, 1.0, 4.0, 4.0)])
+    run = play(corridor, Pose(), twin=TwinConfig(seed=3), limit=150.0)
+    assert_explored(run)
+    assert graph_shape(run) == (1, 0, 1)
+    assert run.recoveries() == []
+
+
 def test_a_ring_is_closed_whose_beginning_was_taken_for_another_edge() -> None:
     """A pillar as wide as people: for twenty seconds it may be one, and the room has no ring."""
     canvas = Canvas(8.0, 8.0)

@@ -35,6 +35,23 @@ class LocalEdge:
         """The node at the far end."""
         return self.b if node == self.a else self.a
 
+    def cut_far_from(self, point: Array) -> "LocalEdge":
+        """The same ring, beginning and ending half way round from where it is nearest to a point."""
+        nearest = int(np.hypot(*(self.polyline - point).T).argmin())
+        opposite = (self.stations[nearest] + self.length / 2) % self.length
+        at = int(np.abs(self.stations[:-1] - opposite).argmin())
+        line, clearance, steps = (
+            np.roll(values, -at, axis=0)
+            for values in (self.polyline[:-1], self.clearance[:-1], np.diff(self.stations))
+        )
+        return LocalEdge(
+            self.a,
+            self.b,
+            np.concatenate([line, line[:1]]),
+            np.concatenate([clearance, clearance[:1]]),
+            np.concatenate([[0.0], steps.cumsum()]),
+        )
+
 
 class Branch(NamedTuple):
     """One end of an edge: leaving node `a` of the edge if `forward`, else its node `b`."""
@@ -147,6 +164,20 @@ class LocalGvg:
         ways = (Branch(to_it, False), Branch(onwards, True))
         nodes[node] = LocalNode(line[at], float(clearance[at]), None, ways, frozenset())
         return LocalGvg(nodes, edges), node
+
+    def rings_cut_far_from(self, point: Array) -> "LocalGvg":
+        """The same graph, each edge without an end cut on the far side of its ring from a point.
+
+        Its node means nothing, so it is put where nobody takes it for the end of a way.
+        """
+        nodes, edges = dict(self.nodes), dict(self.edges)
+        for key, edge in self.edges.items():
+            if edge.a == edge.b and self.nodes[edge.a].settled and self.nodes[edge.a].degree == 2:
+                edges[key] = cut = edge.cut_far_from(point)
+                nodes[edge.a] = replace(
+                    nodes[edge.a], position=cut.polyline[0], clearance=float(cut.clearance[0])
+                )
+        return LocalGvg(nodes, edges)
 
     def leaving(self, branch: Branch) -> Array:
         """Polyline (N, 2) along a branch, from its node outwards."""

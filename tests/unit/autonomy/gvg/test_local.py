@@ -145,3 +145,33 @@ def test_a_further_node_on_an_edge_leaves_all_ways_as_long_as_they_were(
     assert {key: value.degree for key, value in divided.nodes.items() if key != node} == {
         key: value.degree for key, value in GVG.nodes.items()
     }
+
+
+@pytest.mark.parametrize(
+    ("point", "cut"),
+    [((2.0, 0.3), (2.0, 4.0)), ((4.1, 2.0), (0.0, 2.0)), ((0.0, 0.0), (4.0, 4.0))],
+)
+def test_a_ring_without_a_vertex_is_cut_on_its_far_side(point: Point, cut: Point) -> None:
+    square: list[Point] = [(4.0, 0.0), (4.0, 4.0), (0.0, 4.0)]
+    ring = drawn({1: (0.0, 0.0)}, {10: (1, 1, square)})
+    edge = ring.rings_cut_far_from(np.array(point)).edges[10]
+    assert edge.polyline[0] == pytest.approx(cut, abs=0.06)
+    assert edge.polyline[-1] == pytest.approx(edge.polyline[0])
+    assert edge.length == pytest.approx(16.0)
+    steps = np.hypot(*np.diff(edge.polyline, axis=0).T)
+    assert np.diff(edge.stations) == pytest.approx(steps)
+
+
+def test_where_a_ring_is_cut_its_node_is_and_the_least_clearance_stays_where_it_was() -> None:
+    square: list[Point] = [(4.0, 0.0), (4.0, 4.0), (0.0, 4.0)]
+    ring = drawn({1: (0.0, 0.0)}, {10: (1, 1, square)})
+    ring.edges[10].clearance[20] = 0.5  # at (2, 0)
+    cut = ring.rings_cut_far_from(np.array([2.0, 0.0]))
+    assert cut.nodes[1].position == pytest.approx((2.0, 4.0), abs=0.06)
+    narrowest = cut.edges[10].clearance.argmin()
+    assert cut.edges[10].polyline[narrowest] == pytest.approx((2.0, 0.0))
+    assert len(cut.edges[10].clearance) == len(cut.edges[10].polyline)
+
+
+def test_an_edge_that_comes_back_to_its_meetpoint_begins_there_wherever_the_robot_is() -> None:
+    assert GVG.rings_cut_far_from(np.array([5.0, 0.0])).edges[14] is GVG.edges[14]
