@@ -34,9 +34,9 @@ from gvgbot.topics import (
 )
 from gvgbot.zenoh_config import addresses, reason, session_config
 
-_WAITING_QUERIES = 32  # more than this are dropped, oldest first; who asked gets nothing
+_WAITING_QUERIES = 1000  # more than this are dropped, oldest first; who asked gets nothing
 # While as many wait, others are refused; then dropped; then even those that stop the robot.
-_WAITING_REQUESTS, _WAITING_REFUSALS, _WAITING_STOPS = 8, 100, 200
+_WAITING_REQUESTS, _WAITING_REFUSALS, _WAITING_STOPS = 8, 1000, 2000
 _CROWDED = Answer(done=False, text="too many requests wait: ask again")
 _MAX_SESSIONS = 32
 _LAST_PORT = 65535
@@ -165,8 +165,12 @@ class Telemetry:
             while True:
                 await arrived.wait()
                 arrived.clear()
-                while waiting:  # a frozen asker can block a reply, so the loop stays out of it
-                    await asyncio.to_thread(self._reply, *waiting.popleft())
+                # a frozen asker can block a reply, so the loop stays out of it
+                await asyncio.to_thread(self._reply_to_all, waiting)
+
+    def _reply_to_all(self, waiting: deque[tuple[Topic, zenoh.Query]]) -> None:
+        while waiting:
+            self._reply(*waiting.popleft())
 
     def _reply(self, topic: Topic, query: zenoh.Query) -> None:
         with query, contextlib.suppress(zenoh.ZError):  # who asked may have gone

@@ -416,6 +416,23 @@ def test_every_topic_answers_who_asks_for_its_newest_sample(endpoint: str) -> No
     assert state == b"there is no state yet"
 
 
+def test_each_of_a_crowd_that_asks_at_once_gets_the_newest_sample(endpoint: str) -> None:
+    async def replies() -> list[zenoh.Reply]:
+        with a_robot(endpoint) as robot, plain_session(endpoint) as session:
+            robot.publish(A_MAP)
+            answering = asyncio.ensure_future(robot.answer())  # noqa: TID251
+            await asyncio.sleep(0)
+            asked = [session.get("gvgbot/near/map", timeout=PATIENCE) for _ in range(300)]
+            time.sleep(0.5)  # noqa: ASYNC251, TID251  # a busy loop
+            got = [reply for each in asked for reply in await asyncio.to_thread(list, each)]
+            answering.cancel()
+            return got
+
+    got = [reply.ok for reply in asyncio.run(replies())]
+    assert len(got) == 300
+    assert all(one is not None and one.payload.to_bytes() == msgspec.msgpack.encode(A_MAP) for one in got)
+
+
 def test_an_address_where_nobody_answers_is_one_error(endpoint: str) -> None:
     with (
         pytest.raises(GvgbotError, match=f"nobody answers at {endpoint}"),
