@@ -148,14 +148,13 @@ class Trail:
 
 def _vertex(vertex: Vertex, pose: Pose, covariance: Array) -> MapVertex:
     (xx, xy), (yx, yy) = covariance.tolist()
-    halves = vertex.half_edges.values()
     return MapVertex(
         id=vertex.id,
         kind=vertex.kind,
         position=(pose.x, pose.y),
         covariance=(xx, xy, yx, yy),
         clearance=vertex.clearance,
-        frontiers=tuple(half.bearing + pose.theta for half in halves if half.edge is None),
+        frontiers=vertex.bearings(pose.theta, open_only=True),
     )
 
 

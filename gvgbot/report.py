@@ -117,17 +117,16 @@ def route_graph(
 
 
 def _map_vertex(vertex: Vertex, pose: Pose, covariance: Array) -> MapVertex:
-    halves = [(h.bearing + pose.theta, h.edge is None) for h in vertex.half_edges.values()]
     (xx, xy), (yx, yy) = covariance.tolist()
     return MapVertex(
         id=vertex.id,
         kind=vertex.kind,
         position=(pose.x, pose.y),
         degree=vertex.degree,
-        bearings=tuple(bearing for bearing, _ in halves),
+        bearings=vertex.bearings(pose.theta),
         clearance=vertex.clearance,
         covariance=(xx, xy, yx, yy),
-        frontiers=tuple(bearing for bearing, open_ in halves if open_),
+        frontiers=vertex.bearings(pose.theta, open_only=True),
         visits=vertex.visits,
     )
 

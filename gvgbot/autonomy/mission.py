@@ -27,7 +27,7 @@ from gvgbot.autonomy.search import NO_EDGE, Search
 from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.autonomy.views import Correspondence, View
 from gvgbot.autonomy.whereabouts import Situation, Whereabouts
-from gvgbot.geometry import Array, Pose
+from gvgbot.geometry import Array, Pose, wrap_angle
 
 _SECOND = 1  # try, in the end, of what was given up: things may have changed
 _FACING_RAD = 1.0  # looking so far past a thing, one would not see it go
@@ -269,7 +269,7 @@ class Mission:
         self._examination.end()
         vertex = self._mapper.graph.vertices[chosen.vertex]
         psi = self._mapper.belief.map_vertex(chosen.vertex).theta
-        bearing = vertex.half_edges[chosen.key].bearing + psi
+        bearing = wrap_angle(vertex.half_edges[chosen.key].bearing + psi)
         self._events.append(Decision(view.stamp, chosen.vertex, bearing, reason))
 
     def _wait_for_a_way(self, view: View, here: Situation) -> Order:

@@ -1,12 +1,16 @@
-"""The corrected trajectory against a drive whose odometry is wrong by a known rate."""
+"""What is saved of a run: its trajectory, whose odometry is wrong by a known rate, and its graph."""
 
+import math
+
+import numpy as np
 import pytest
 
 from gvgbot.autonomy.keyframes import Keyframe
 from gvgbot.autonomy.pipeline import Pipeline
+from gvgbot.autonomy.slam.graph import HalfEdgeId, Vertex
 from gvgbot.config import Config
 from gvgbot.geometry import Pose
-from gvgbot.report import Journey, _corrected
+from gvgbot.report import Journey, _corrected, route_graph
 
 
 def pipeline(keyframes: list[Keyframe]) -> Pipeline:
@@ -37,3 +41,17 @@ def test_a_row_at_the_stamp_of_a_keyframe_that_came_later_is_that_keyframe() -> 
     journey = Journey(stamps=[1.0], keyframes=[0], odom_base=[frames[1].odom_base])
     (pose,) = _corrected(journey, pipeline(frames), true).tolist()
     assert pose == pytest.approx([true[1].x, true[1].y, true[1].theta])
+
+
+def test_directions_in_the_map_are_within_half_a_turn_of_straight_on() -> None:
+    """A vertex that is turned by 3 rad, whose way ahead is known, and one half right is not."""
+    mind = pipeline([])
+    vertex = Vertex(1, 1.0, Pose(), 0.0, 0.0)
+    mind.mapper.graph.vertices[1] = vertex
+    ends = (HalfEdgeId(1, vertex.add_half_edge(0.0)), HalfEdgeId(1, vertex.add_half_edge(1.0)))
+    vertex.add_half_edge(-0.5)
+    vertex.add_half_edge(2.0)
+    mind.mapper.graph.join(*ends, np.array([[0.0, 0.0], [1.0, 0.0]]), 1.0, driven=True)
+    (told,) = route_graph(mind, {1: Pose(0.0, 0.0, 3.0)}, {1: np.eye(2)}).vertices
+    assert told.bearings == pytest.approx((3.0, 4.0 - math.tau, 2.5, 5.0 - math.tau))
+    assert told.frontiers == pytest.approx((2.5, 5.0 - math.tau))

@@ -66,6 +66,17 @@ class Vertex:
         self.half_edges[key] = HalfEdge(wrap_angle(bearing))
         return key
 
+    def bearings(self, theta: float, *, open_only: bool = False) -> tuple[float, ...]:
+        """Where its half-edges leave, rad in (-pi, pi], in a frame that sees the vertex at theta.
+
+        `open_only`: of those only that lead along no edge.
+        """
+        return tuple(
+            wrap_angle(half.bearing + theta)
+            for half in self.half_edges.values()
+            if half.edge is None or not open_only
+        )
+
     def clockwise_from(self, key: int) -> list[int]:
         """All half-edges in clockwise order after one; that one comes last."""
         start = self.half_edges[key].bearing
