@@ -222,6 +222,18 @@ ModelName = Literal[
 ]
 
 
+_NOTHING_OF_FAMILY = {1024: _URG_CODES[0], 1440: _UTM_CODES[0]}  # by steps per turn
+
+
 def find_model(name: str) -> Model | None:
-    """The catalogue's model for the MODL line of a PP reply; None if it is not listed."""
-    return MODELS.get(name.partition("(")[0].strip())
+    """The catalogue's model that the MODL line of a PP reply names; None if it is not listed."""
+    named = [model for model in MODELS if model in name]
+    return MODELS[max(named, key=len)] if named else None
+
+
+def nothing_code(parameters: Parameters) -> int | None:
+    """What a laser sends where nothing is within range; one that is not listed, as its family."""
+    model = find_model(parameters.model)
+    if model is None:
+        return _NOTHING_OF_FAMILY.get(parameters.steps_per_turn)
+    return model.nothing_code

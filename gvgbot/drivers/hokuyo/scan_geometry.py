@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvgbot.drivers.hokuyo.config import Echo, HokuyoConfig
-from gvgbot.drivers.hokuyo.models import Parameters, find_model
+from gvgbot.drivers.hokuyo.models import Parameters, find_model, nothing_code
 from gvgbot.drivers.hokuyo.modes import LONGEST_IN_TWO_CHARACTERS
 from gvgbot.drivers.hokuyo.scip_codec import Values
 from gvgbot.drivers.hokuyo.scip_messages import ScanReply, ScanRequest
@@ -74,7 +74,7 @@ def scan_geometry(
         first_beam_delay=first * parameters.step_time,
         shortest_mm=max(parameters.range_min_mm, round(config.min_range_m * 1000)),
         longest_mm=min(usable_mm, round(config.max_range_m * 1000)),
-        nothing_code=None if model is None else model.nothing_code,
+        nothing_code=nothing_code(parameters),
         is_reversed=config.upside_down,
     )
 

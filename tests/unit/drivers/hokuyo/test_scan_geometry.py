@@ -1,6 +1,7 @@
 """Readings to ranges and bearings, against the tables of the makers."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -41,7 +42,28 @@ def ranges_of(parameters: Parameters, readings: list[int], **config: float) -> A
             id="UTM-30LX",
         ),
         pytest.param(
-            UNLISTED, [0, 19, 20, 30000, 65533], [math.nan] * 2 + [0.02, 30.0, math.inf], id="else"
+            replace(MODELS["URG-04LX"].parameters, model="URG-04LX[Classic](Hokuyo)"),
+            [0, 1, 19, 20],
+            [math.inf] + [math.nan] * 2 + [0.02],
+            id="a URG-04LX by another name",
+        ),
+        pytest.param(
+            UNLISTED,
+            [0, 1, 2, 19, 20, 30000, 65533],
+            [math.nan, math.inf] + [math.nan] * 2 + [0.02, 30.0, math.inf],
+            id="not listed, steps of a UTM",
+        ),
+        pytest.param(
+            replace(UNLISTED, steps_per_turn=1024),
+            [0, 1, 19, 20],
+            [math.inf] + [math.nan] * 2 + [0.02],
+            id="not listed, steps of a URG",
+        ),
+        pytest.param(
+            replace(UNLISTED, steps_per_turn=3600),
+            [0, 1, 19, 20, 65533],
+            [math.nan] * 3 + [0.02, math.inf],
+            id="of no known family",
         ),
     ],
 )
@@ -87,6 +109,18 @@ def test_parameters_come_back_from_their_lines(name: str) -> None:
     known = find_model(parameters.model)
     assert known is not None
     assert known.parameters == parameters
+
+
+@pytest.mark.parametrize(
+    ("told", "meant"),
+    [
+        ("UTM-30LX-EW(Hokuyo Automatic Co.,Ltd.)", "UTM-30LX-EW"),
+        ("SOKUIKI Sensor TOP-URG UTM-30LX(Hokuyo Automatic Co.,Ltd.)", "UTM-30LX"),
+        ("UST-10LX", "UST-10LX"),
+    ],
+)
+def test_a_model_is_known_by_its_name_wherever_that_stands(told: str, meant: str) -> None:
+    assert find_model(told) is MODELS[meant]
 
 
 def test_an_identity_comes_back_from_its_lines() -> None:
