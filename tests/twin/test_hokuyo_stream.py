@@ -27,6 +27,7 @@ from tests.twin.hokuyo_bench import (
     increments,
     on_bench,
     quantised,
+    until_lost,
 )
 
 pytestmark = pytest.mark.twin
@@ -326,6 +327,27 @@ def test_a_laser_without_a_first_scan_is_reset_and_lost(status: str) -> None:
         assert twin.resets == 1
 
     twin = Reports(HokuyoTwin(PERFECT, World(), seed=22), status, 0.0, math.inf)
+    on_bench(twin, scenario)
+
+
+@pytest.mark.parametrize(("lost", "wait"), [(1, 8.0), (2, 18.0), (3, 38.0)])
+@pytest.mark.parametrize("status", ["", "0M", "21"])
+def test_a_motor_that_takes_longer_is_given_twice_the_time_when_opened_again(
+    lost: int, wait: float, status: str
+) -> None:
+    async def scenario(bench: Bench) -> None:
+        link = bench.laser.link
+        await bench.running
+        for _ in range(lost - 1):
+            await until_lost(HokuyoLaser(bench.link, HokuyoConfig(), bench.clock, link))
+        laser = HokuyoLaser(bench.link, HokuyoConfig(), bench.clock, link)
+        running = asyncio.ensure_future(until_lost(laser))  # noqa: TID251
+        await laser.next_scan()
+        assert twin.resets == lost
+        assert link.fruitless == 0
+        running.cancel()
+
+    twin = Reports(HokuyoTwin(PERFECT, World(), seed=26), status, 0.0, wait, after_md=True)
     on_bench(twin, scenario)
 
 

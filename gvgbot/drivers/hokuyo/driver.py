@@ -45,6 +45,7 @@ HALTED = range(21, 50)  # statuses of a laser that looks into a fault, and is si
 RESUMED = "98"  # what it says when there was none
 BROKEN = range(50, 98)  # statuses of hardware trouble
 LONGEST_WITHOUT_SCAN = 5.0  # s, for a motor to reach its speed or a laser to check itself
+MOST_DOUBLINGS = 3  # of that: a laser that needed longer must not be reset for ever
 SIMPLER = {"NE": "ND", "ND": "MD", "ME": "MD"}  # what to ask for when a command is unknown
 
 log = structlog.get_logger()
@@ -284,7 +285,8 @@ class HokuyoLaser:
         config = self._config
         interval = parameters.period * (request.skip + 1)
         silence = max(SHORTEST_SILENCE, config.missed_scans * interval)
-        patience = max(LONGEST_WITHOUT_SCAN, config.reply_timeout_s + silence)
+        longest = LONGEST_WITHOUT_SCAN * 2 ** min(self.link.fruitless, MOST_DOUBLINGS)
+        patience = max(longest, config.reply_timeout_s + silence)
         now = self._dialogue.clock.now()
         return _Stream(
             request,
@@ -305,6 +307,7 @@ class HokuyoLaser:
         while stream.until > self._dialogue.clock.now():
             await self._listen(stream)
         if stream.is_fresh:
+            self.link.fruitless += 1
             self._dialogue.send("RS")
             raise DeviceLost("the laser answers but sends no scans: switch it off and on")
 
@@ -322,6 +325,7 @@ class HokuyoLaser:
             if scan is not None:
                 self._scans.put(scan)
                 self.link.scans += 1
+                self.link.fruitless = 0
                 stream.note_scan(self._dialogue.clock.now())
 
     def _take(self, message: Message, arrival: float, stream: _Stream) -> Scan | None:

@@ -14,6 +14,7 @@ class LinkStatistics:
     repeated_scans: int = 0  # the same stamp again: the laser is frozen
     refused_scans: int = 0  # the laser said that it could not measure, and went on
     unanswered: int = 0  # commands without a reply in time
+    fruitless: int = 0  # streams without a scan since the last one came
     restarts: int = 0  # of a stream that fell silent
     clock_resets: int = 0
     reboots: int = 0
