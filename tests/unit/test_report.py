@@ -1,4 +1,4 @@
-"""What is saved of a run: its trajectory, whose odometry is wrong by a known rate, and its graph."""
+"""What is saved: the trajectory of a drive whose odometry is wrong by a known rate; the graph."""
 
 import math
 

@@ -36,7 +36,7 @@ class LocalEdge:
         return self.b if node == self.a else self.a
 
     def cut_far_from(self, point: Array) -> "LocalEdge":
-        """The same ring, beginning and ending half way round from where it is nearest to a point."""
+        """The same ring, begun half way round from where it is nearest to a point (2,)."""
         nearest = int(np.hypot(*(self.polyline - point).T).argmin())
         opposite = (self.stations[nearest] + self.length / 2) % self.length
         at = int(np.abs(self.stations[:-1] - opposite).argmin())
