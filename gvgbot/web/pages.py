@@ -41,14 +41,14 @@ class Pages:
         return _response(HTTPStatus.OK, _TYPES[name.rpartition(".")[2]], body)
 
 
-def said(status: HTTPStatus, text: str) -> Response:
-    """A line of text."""
-    return _response(status, "text/plain; charset=utf-8", f"{text}\n".encode())
+def said(status: HTTPStatus, text: str, **more: str) -> Response:
+    """A line of text; `more` are further fields of its head."""
+    return _response(status, "text/plain; charset=utf-8", f"{text}\n".encode(), **more)
 
 
-def _response(status: HTTPStatus, kind: str, body: bytes) -> Response:
+def _response(status: HTTPStatus, kind: str, body: bytes, **more: str) -> Response:
     fields = {"Content-Type": kind, "Content-Length": str(len(body)), "Connection": "close"}
-    return Response(status, status.phrase, Headers(fields | _EVERY_TIME), body)
+    return Response(status, status.phrase, Headers(fields | _EVERY_TIME | more), body)
 
 
 def is_foreign(request: Request, own_host: str) -> bool:

@@ -20,6 +20,7 @@ from gvgbot.web.wire import Reply, Wish, frame, wish
 
 _FOREIGN = "open the page by this machine's address, or by the name given with --host"
 LIVE = "/live"  # where the page asks for its WebSocket
+_METHODS = "GET, HEAD"
 _MOST_VIEWERS = 32
 _LONGEST_WISH = 2000  # bytes
 _MOST_WISHES = 4  # of one viewer that have not been answered
@@ -58,8 +59,17 @@ class Web:
 
     def _receive(self, connection: ServerConnection, request: Request) -> Response | None:
         """The answer to a request; None lets it become a WebSocket."""
+        method = getattr(request, "method", "GET")  # older websockets let nothing else through
+        response = self._response(request, method)
+        if response is not None and method == "HEAD":
+            response.body = b""
+        return response
+
+    def _response(self, request: Request, method: str) -> Response | None:
         if is_foreign(request, self._host):
             return said(HTTPStatus.FORBIDDEN, _FOREIGN)
+        if method not in ("GET", "HEAD"):
+            return said(HTTPStatus.METHOD_NOT_ALLOWED, f"there is only {_METHODS}", Allow=_METHODS)
         if request.path != LIVE:
             return self._pages.answer(request.path)
         if "Upgrade" not in request.headers:

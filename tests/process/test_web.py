@@ -8,6 +8,7 @@ import base64
 import json
 import math
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -101,6 +102,38 @@ def test_every_viewer_gets_what_is_known_and_what_comes() -> None:
         await so_many(audience, 0)
 
     run(story)
+
+
+@pytest.mark.parametrize("path", ["/", "/main.js", "/nothing", "/live"])
+def test_who_asks_for_the_head_only_gets_that_of_the_whole(path: str) -> None:
+    async def story(_: Audience, port: int) -> None:
+        whole, body = await asked(port, f"GET {path}")
+        head, nothing = await asked(port, f"HEAD {path}")
+        dated = re.compile(rb"\r\nDate: [^\r]*")
+        assert dated.sub(b"", head) == dated.sub(b"", whole)
+        assert (len(body) > 0, nothing) == (True, b"")
+
+    run(story)
+
+
+@pytest.mark.parametrize("method", ["POST", "PUT", "DELETE", "OPTIONS"])
+@pytest.mark.parametrize("path", ["/", "/live"])
+def test_nothing_can_be_done_to_the_page_but_to_read_it(method: str, path: str) -> None:
+    async def story(_: Audience, port: int) -> None:
+        head, _body = await asked(port, f"{method} {path}")
+        assert head.startswith(b"HTTP/1.1 405 ")
+        assert b"\r\nAllow: GET, HEAD" in head
+
+    run(story)
+
+
+async def asked(port: int, question: str) -> tuple[bytes, bytes]:
+    """Head and body of the answer to a method and a path."""
+    reader, writer = await asyncio.open_connection("127.0.0.1", port)
+    writer.write(f"{question} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\n".encode())
+    head, _, body = (await reader.read()).partition(b"\r\n\r\n")
+    writer.close()
+    return head, body
 
 
 def test_a_wish_is_answered_to_who_had_it() -> None:
