@@ -65,8 +65,8 @@ def _arguments(parser: argparse.ArgumentParser) -> list[argparse.Action]:
 
 def _usage(parser: argparse.ArgumentParser) -> str:
     if parser.usage is not None:
-        words = " ".join((parser.usage % {"prog": parser.prog}).split())
-        return words.replace("[-h] ", "").replace("] ", "]\n    ", 1)
+        usage = " ".join((parser.usage % {"prog": parser.prog}).split())
+        return usage.replace("[-h] ", "").replace("] ", "]\n    ", 1)
     parts = [_form(action).strip("`") for action in _arguments(parser)]
     is_free = [action.required for action in _arguments(parser)]
     words = (part if must else f"[{part}]" for part, must in zip(parts, is_free, strict=True))
