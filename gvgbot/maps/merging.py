@@ -36,9 +36,10 @@ def merged(ours: RouteGraph, theirs: RouteGraph, pose: Pose) -> tuple[RouteGraph
     pose = _fitted(ours, theirs, pose)
     theirs = moved_graph(theirs, pose)
     pairs = _pairs(ours, theirs)
-    wrong_here = _refuted(ours, {ours.vertices[i].id for i, _ in pairs}, theirs)
-    wrong_there = _refuted(theirs, {theirs.vertices[j].id for _, j in pairs}, ours)
-    ours, theirs = _without(ours, wrong_here), _without(theirs, wrong_there)
+    here, there = {ours.vertices[i].id for i, _ in pairs}, {theirs.vertices[j].id for _, j in pairs}
+    # one after the other: what refutes a vertex must not have gone by then
+    theirs = _without(theirs, _refuted(theirs, there, ours))
+    ours = _without(ours, _refuted(ours, here, theirs))
     pairs = _pairs(ours, theirs)
     free_id = max((vertex.id for vertex in ours.vertices), default=-1) + 1
     names = {theirs.vertices[j].id: ours.vertices[i].id for i, j in pairs}

@@ -117,6 +117,37 @@ def test_a_vertex_beside_somebody_who_stood_there_goes_with_both_ways_round_him(
     assert positions(whole) == {PLACES[0], PLACES[2]}
 
 
+def ring(at: float) -> RouteGraph:
+    """A way round 4 m off the origin, whose vertex is at an angle, rad."""
+    angles = at + np.linspace(0.0, math.tau, 100)
+    line = 4.0 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    x, y = line[0].tolist()
+    template = seen({0}).vertices[0]
+    return RouteGraph((replace(template, position=(x, y), frontiers=()),), (way(0, 0, line),))
+
+
+@pytest.mark.parametrize("at", [0.05, 1.0, 3.0, 5.5])
+def test_a_ring_stays_one_wherever_each_has_put_its_vertex(at: float) -> None:
+    whole, _ = merged(ring(0.0), ring(at), Pose())
+    assert len(whole.vertices) == 1
+    (edge,) = whole.edges
+    assert edge.length == pytest.approx(8.0 * math.pi, rel=0.01)
+
+
+def test_a_corridor_stays_though_each_saw_somebody_elsewhere_in_it() -> None:
+    def through(x: float) -> RouteGraph:
+        ends = [replace(v, frontiers=()) for v in seen({0, 2}).vertices]
+        points = {0: PLACES[0], 1: (x, 0.0), 2: PLACES[2]}
+        lines = [np.linspace(points[a], points[b], 30) for a, b in ((0, 1), (1, 2))]
+        ways = (way(0, 1, lines[0]), way(1, 2, lines[1]))
+        return RouteGraph((*ends, replace(ends[0], id=1, position=points[1])), ways)
+
+    for one, other in permutations([through(4.0), through(9.0)]):
+        whole, _ = merged(one, other, Pose())
+        assert {PLACES[0], PLACES[2]} <= positions(whole)
+        assert sum(edge.length for edge in whole.edges) == pytest.approx(13.0)
+
+
 def test_what_nobody_followed_stays_a_frontier() -> None:
     whole, _ = merged(seen({0, 1, 3}), seen({1, 3, 4}, shift=10), Pose())
     at = {v.position: v for v in whole.vertices}
