@@ -13,7 +13,7 @@ from gvgbot.autonomy.whereabouts import LEAST_LOOP_M, Passage, Whereabouts
 from gvgbot.geometry import Array
 
 _APART_M, _TOGETHER_M = 0.5, 0.2  # two ways that are farther apart, or no farther
-_FROM_END_M = 1.0  # of an edge: nearer, the departures of its vertex are not told apart
+_FROM_VERTEX_M = 1.0  # nearer to one there is no second one that was missed
 _IN_CLEAR_M = 2.0  # from a vertex, it is seen which departures it has
 
 
@@ -82,6 +82,9 @@ class DrivenEdges:
         if at is None:
             return
         place = passage.line[at]
+        away = np.hypot(*(mapper.positions_from(view.local_base) - place).T)
+        if away.min() < _FROM_VERTEX_M:
+            return
         on = int(np.argmin(np.hypot(*(known_line - place).T)))
         ways = (known_line[on::-1], known_line[on:], passage.line[at::-1])
         vertex = mapper.add_driven(view, place, *(direction(way - place) for way in ways))
@@ -128,17 +131,16 @@ class DrivenEdges:
 
 
 def _fork(line: Array, known_line: Array) -> int | None:
-    """The index of the point of a line (N, 2) where it comes onto another (M, 2).
+    """The index of the point of a line (N, 2) where it comes onto another (M, 2); None if nowhere.
 
-    The other begins where the line ends. None if it comes onto it only there.
+    The other begins where the line ends.
     """
     gaps = np.asarray(cKDTree(known_line).query(line)[0])
     apart = np.flatnonzero(gaps > _APART_M)
     if not len(apart) or len(line) - apart[-1] < 2:
         return None
     at = int(apart[-1] + np.argmax(gaps[apart[-1] :] < _TOGETHER_M))
-    away = min(np.hypot(*(line[at] - end)) for end in (known_line[0], known_line[-1]))
-    return at if gaps[at] < _TOGETHER_M and away > _FROM_END_M else None
+    return at if gaps[at] < _TOGETHER_M else None
 
 
 def _has_gone(end: HalfEdgeId, view: View, known: Correspondence) -> bool:
