@@ -65,7 +65,7 @@ def fine_graph(
     if triangles is None:
         return EMPTY
     room = _Room(local_map, generators, min_clearance, open_clearance)
-    diagram = _diagram(triangles, min_clearance, roughness)
+    diagram = _diagram(triangles, room, roughness)
     points, clearance, links, endless = _ridges_that_count(diagram, room)
     used = np.zeros(len(points), bool)
     used[links] = used[diagram.a[endless]] = True
@@ -118,37 +118,37 @@ def _triangulated(generators: Array) -> Delaunay | None:
         return None
 
 
-def _diagram(triangles: Delaunay, min_clearance: float, roughness: float) -> Diagram:
-    """The whole Voronoi diagram, and which ridges count, by the two rules of `fine_graph`."""
+def _diagram(triangles: Delaunay, room: _Room, roughness: float) -> Diagram:
+    """The whole Voronoi diagram, and which ridges count, by the rules of `fine_graph`."""
     generators = triangles.points
     points, clearance = _circumcircles(generators, triangles.simplices)
     a, b, pair = _ridges(triangles)
     p, q = generators[pair[:, 0]], generators[pair[:, 1]]
     chord = np.hypot(*(p - q).T)
-    parts = chord >= 2 * min_clearance
+    parts = chord >= 2 * room.min_clearance
     narrowest = _least_clearance(points, clearance, a[parts], b[parts], p[parts], q[parts])
     is_rough = np.zeros(len(parts), bool)
     is_rough[parts] = chord[parts] < np.sqrt(8 * roughness * narrowest)
     parts &= ~is_rough
-    whole = np.flatnonzero((parts | is_rough) & (b >= 0))
-    unclear = whole[is_rough[whole]]
-    certain = whole[parts[whole]]
     touched = np.zeros(len(points), bool)
-    touched[a[certain]] = touched[b[certain]] = True
-    parts[unclear[_bridging(a[unclear], b[unclear], touched)]] = True
+    touched[a[parts]] = touched[b[parts & (b >= 0)]] = True
+    rough = np.flatnonzero(is_rough & (b >= 0))
+    links = np.stack([a[rough], b[rough]])
+    ends = np.unique(links)
+    certain = np.zeros(len(points), bool)
+    certain[ends] = room.is_certain(points[ends], clearance[ends])
+    sure = certain[links].all(axis=0)
+    parts[rough[sure]] = _bridging(links[:, sure], touched)
     return Diagram(points, clearance, a, b, pair, parts)
 
 
-def _bridging(
-    a: NDArray[np.int64], b: NDArray[np.int64], touched: NDArray[np.bool_]
-) -> NDArray[np.bool_]:
-    """Which links from points a to b (M,) hang together between two that are `touched` (N,)."""
-    ends, numbered = np.unique(np.stack([a, b]), return_inverse=True)
-    numbered = numbered.reshape(2, -1)
-    n = len(ends)
-    links = csr_array((np.ones(len(a)), (numbered[0], numbered[1])), (n, n))
-    _, piece = connected_components(links, directed=False)
-    is_bridge: NDArray[np.bool_] = np.bincount(piece, touched[ends], n)[piece[numbered[0]]] > 1
+def _bridging(links: NDArray[np.int64], touched: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Which links (2, M) of points hang together between two points that are `touched` (N,)."""
+    ends, numbered = np.unique(links, return_inverse=True)
+    (i, j), n = numbered.reshape(2, -1), len(ends)
+    graph = csr_array((np.ones(len(i)), (i, j)), (n, n))
+    _, piece = connected_components(graph, directed=False)
+    is_bridge: NDArray[np.bool_] = np.bincount(piece, touched[ends], n)[piece[i]] > 1
     return is_bridge
 
 

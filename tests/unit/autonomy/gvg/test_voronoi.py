@@ -147,3 +147,21 @@ def test_a_door_leads_into_a_room_whose_wall_is_uneven_by_millimetres(door: floa
     graph = fine_graph(Drawn(*walls), np.array([0.0, -0.9]), min_clearance=RADIUS, roughness=0.03)
     assert np.hypot(*(graph.points - [0.0, 3.5]).T).min() < 0.1  # the middle of the room
     assert np.hypot(*(graph.points - [0.0, -0.95]).T).min() < 0.1  # and of the corridor
+
+
+@pytest.mark.parametrize("seed", [15, 25, 26])
+def test_noise_of_a_wall_between_two_doors_is_no_way_into_a_hall(seed: int) -> None:
+    """The ridges of bumps meet far off, where nothing is seen; from there, they are no ways back."""
+    rng = np.random.default_rng(seed)
+    hall, corridor = (0.0, -9.0, 20.0, 9.0), (-2.3, -9.0, -0.3, 9.0)
+    doors = [(-0.4, 2.0, 0.1, 3.2), (-0.4, -2.9, 0.1, -1.4)]
+    world, local_map = carved([hall, corridor, *doors]), LocalMap(LocalMapConfig())
+    for heading in np.linspace(-3.0, 3.0, 6):
+        laser = Pose(1.8, 0.2, float(heading))
+        scan = sweep(world, laser, reach=5.6, field_of_view=4.19, sigma=0.03, rng=rng)
+        local_map.insert(scan, laser, 0.0)
+    robot = np.array([1.8, 0.2])
+    x, y = fine_graph(
+        local_map, robot, min_clearance=0.227, roughness=0.03, open_clearance=4.48
+    ).points.T
+    assert not ((np.abs(y) < 1.0) & (x > 0.5) & (x < 4.2)).any()
