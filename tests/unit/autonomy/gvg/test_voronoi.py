@@ -151,7 +151,7 @@ def test_a_door_leads_into_a_room_whose_wall_is_uneven_by_millimetres(door: floa
 
 @pytest.mark.parametrize("seed", [15, 25, 26])
 def test_noise_of_a_wall_between_two_doors_is_no_way_into_a_hall(seed: int) -> None:
-    """The ridges of bumps meet far off, where nothing is seen; from there, they are no ways back."""
+    """The ridges of bumps meet far off, where nothing is seen; from there they are no ways back."""
     rng = np.random.default_rng(seed)
     hall, corridor = (0.0, -9.0, 20.0, 9.0), (-2.3, -9.0, -0.3, 9.0)
     doors = [(-0.4, 2.0, 0.1, 3.2), (-0.4, -2.9, 0.1, -1.4)]
