@@ -38,6 +38,7 @@ _FRESH_S = 1.0  # a robot that drives is no longer where it was told to be befor
 _SPARSE = 4  # every so manieth point of a track is told
 _RECOGNISE_S = 1.0  # between two attempts to recognise a robot by how it moves
 _SURE_BY_SIGHT = 0.999  # that the robot met is the one that says so
+_MOST_MATES = 64  # that are known at a time
 _TAKES_OVER_M = 2.0  # nearer to a frontier than who claims it, one takes it
 
 
@@ -214,6 +215,8 @@ class Member:
 
     def _learn(self, news: News, stamp: float) -> None:
         mate = self._mates.get(news.robot)
+        if mate is None and not self._has_room():
+            return
         if mate is None or mate.news.life != news.life:
             there = Pose(*news.pose)
             self._mates[news.robot] = _Mate(news, news.chart, stamp, there, there, stamp)
@@ -223,6 +226,14 @@ class Member:
             mate.told_at = mate.map_base
             mate.is_standing = before.distance(mate.map_base) < _STANDING_M
         self._site = None
+
+    def _has_room(self) -> bool:
+        """Whether one more robot can be known; forgets those that were of no use and are lost."""
+        if len(self._mates) >= _MOST_MATES:
+            frames = self.frames
+            for name in [n for n in self._mates if self.is_lost(n) and n not in frames]:
+                del self._mates[name]
+        return len(self._mates) < _MOST_MATES
 
     def look(self, stamp: float) -> None:
         """Try to lay the maps of others onto the own one, where that is due."""

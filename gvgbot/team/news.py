@@ -11,8 +11,13 @@ from gvgbot.geometry import Array
 from gvgbot.team.chart import Chart, ChartEdge, ChartVertex, Departure
 
 _WALL_M = 0.01  # unit of the walls around a vertex, as they travel
+_MOST_BYTES = 2_000_000  # of a message: more than a thousand vertices
+_MOST_M = 1e5  # from the origin of a map
+_MOST_WAY_M = 2e4  # of all edges together
 
-Number = Annotated[float, msgspec.Meta(ge=-1e5, le=1e5)]  # and one: whoever tells may be broken
+# Whoever tells may be broken, or no robot at all.
+Name = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9_-]+\Z")]
+Number = Annotated[float, msgspec.Meta(ge=-_MOST_M, le=_MOST_M)]  # and one
 Radius = Annotated[float, msgspec.Meta(gt=0.0, le=10.0)]
 Triple = tuple[Number, Number, Number]  # a pose: x, y, m, and theta, rad
 
@@ -24,7 +29,10 @@ class TeamVertex(msgspec.Struct, frozen=True, array_like=True):
     position: tuple[Number, Number]  # m, the robot's map frame
     covariance: tuple[Number, Number, Number, Number]  # of the position, 2x2 row-major, m^2
     clearance: Number  # m
-    departures: tuple[tuple[int, Number, int | None, bool], ...]  # key, bearing, edge, blocked
+    # key, bearing, edge, blocked
+    departures: Annotated[
+        tuple[tuple[int, Number, int | None, bool], ...], msgspec.Meta(max_length=64)
+    ]
     walls: bytes  # little-endian int16 pairs x, y, cm, from the vertex
 
 
@@ -52,7 +60,7 @@ class Claim(msgspec.Struct, frozen=True, array_like=True):
 class Frame(msgspec.Struct, frozen=True, array_like=True):
     """Where the map frame of another robot lies in one's own, m and rad."""
 
-    robot: str
+    robot: Name
     life: int  # of that robot, whose map has this frame
     pose: Triple
 
@@ -62,17 +70,19 @@ class ToldLook(msgspec.Struct, frozen=True, array_like=True):
 
     age: Annotated[float, msgspec.Meta(ge=0.0, le=60.0)]  # s, when it is told
     pose: Triple  # map_base
-    bodies: tuple[tuple[Number, Number, Radius], ...]  # x, y, m, map frame, and radius, m
+    # x, y, m, map frame, and radius, m
+    bodies: Annotated[tuple[tuple[Number, Number, Radius], ...], msgspec.Meta(max_length=1000)]
 
 
 class Course(msgspec.Struct, frozen=True, kw_only=True, tag="course"):
     """Where a robot is and what it drives along: told more often than all the rest."""
 
-    robot: str
+    robot: Name
     life: int
     sequence: int  # of the courses
     pose: Triple  # map_base
-    line: bytes  # little-endian float32 pairs x, y, m, map frame
+    # little-endian float32 pairs x, y, m, map frame
+    line: Annotated[bytes, msgspec.Meta(max_length=16_000)]
     look: ToldLook | None = None  # the newest, if it has not been told before
 
     @property
@@ -84,7 +94,7 @@ class Course(msgspec.Struct, frozen=True, kw_only=True, tag="course"):
 class News(msgspec.Struct, frozen=True, kw_only=True, tag="news"):
     """All that a robot tells its team."""
 
-    robot: str
+    robot: Name
     life: int  # another one after a restart: the map frame is a new one
     sequence: int
     pose: Triple  # map_base
@@ -92,8 +102,8 @@ class News(msgspec.Struct, frozen=True, kw_only=True, tag="news"):
     claim: Claim | None
     finished: bool  # it does not drive any more
     frames: tuple[Frame, ...]
-    vertices: tuple[TeamVertex, ...]
-    edges: tuple[TeamEdge, ...]
+    vertices: Annotated[tuple[TeamVertex, ...], msgspec.Meta(max_length=1000)]
+    edges: Annotated[tuple[TeamEdge, ...], msgspec.Meta(max_length=3000)]
 
     @property
     def chart(self) -> Chart:
@@ -111,17 +121,19 @@ def encode(told: News | Course) -> bytes:
 
 def decode(data: bytes) -> News | Course:
     """What `encode` wrote. Raises GvgbotError if it is damaged, or does not hang together."""
+    if len(data) > _MOST_BYTES:
+        raise GvgbotError(f"damaged news of a team: more than {_MOST_BYTES} bytes")
     try:
         told = msgspec.msgpack.decode(data, type=News | Course)
         if isinstance(told, Course):
             return _checked_course(told)
         return _checked(told, told.chart)
-    except (msgspec.MsgspecError, ValueError) as error:
+    except (msgspec.MsgspecError, ValueError, RecursionError) as error:
         raise GvgbotError(f"damaged news of a team: {error}") from error
 
 
 def _checked_course(course: Course) -> Course:
-    if not np.isfinite(course.points).all():
+    if not _is_near(course.points):
         raise ValueError("a course leads nowhere")
     return course
 
@@ -138,7 +150,19 @@ def _checked(news: News, chart: Chart) -> News:
         for departure in vertex.departures
     ):
         raise GvgbotError("damaged news of a team: a departure has an edge that is not told")
+    if sum(_metres(edge.polyline) for edge in chart.edges.values()) > _MOST_WAY_M:
+        raise GvgbotError("damaged news of a team: longer ways than there can be")
     return news
+
+
+def _is_near(points: Array) -> bool:
+    """Whether all points (N, 2) may be on one map; NaN is nowhere."""
+    return bool((np.abs(points) <= _MOST_M).all())
+
+
+def _metres(line: Array) -> float:
+    """The length of a line (N, 2)."""
+    return float(np.hypot(*np.diff(line, axis=0).T).sum())
 
 
 def told_vertices(chart: Chart) -> tuple[TeamVertex, ...]:
@@ -185,7 +209,7 @@ def _vertex(told: TeamVertex) -> ChartVertex:
 
 def _edge(told: TeamEdge) -> ChartEdge:
     line: Array = np.frombuffer(told.points, "<f4").reshape(-1, 2).astype(np.float64)
-    if len(line) < 2 or not np.isfinite(line).all():
+    if len(line) < 2 or not _is_near(line):
         raise ValueError(f"edge {told.id} has no line")
     return ChartEdge(
         told.id,

@@ -16,6 +16,7 @@ from gvgbot.team.member import TeamConfig
 from gvgbot.topics import TeamPart
 
 CONFIG = TeamConfig(enabled=True)
+NESTED = b"\x82\xa4type\xa4news\xa5extra" + b"\x91" * 100_000 + b"\xc0"
 
 
 class Air:
@@ -77,7 +78,7 @@ def test_robots_hear_of_each_other_and_lose_each_other() -> None:
     together(scene)
 
 
-@pytest.mark.parametrize("noise", [b"", b"\xff" * 40, b"\x80"])
+@pytest.mark.parametrize("noise", [b"", b"\xff" * 40, b"\x80", NESTED])
 def test_noise_from_the_network_changes_nothing(noise: bytes) -> None:
     async def scene(air: Air, parts: list[LiveTeam]) -> None:
         air.tell_team("team", noise)

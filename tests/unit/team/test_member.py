@@ -2,6 +2,7 @@ import copy
 from dataclasses import dataclass, replace
 from functools import cache
 
+import msgspec
 import numpy as np
 
 from gvgbot.autonomy.control.company import BodiesSeen
@@ -96,6 +97,18 @@ def test_robots_find_each_others_frames() -> None:
     true = START["one"].to(START["two"])
     assert one.member.frames["two"].distance(true) < 0.05
     assert two.member.frames["one"].distance(true.inverse()) < 0.05
+
+
+def test_a_crowd_of_names_is_not_remembered_for_ever() -> None:
+    one, two = team()
+    stranger = msgspec.structs.replace(two.member.news(2.0, Pose(), finished=False), frames=())
+    for number in range(500):
+        one.member.hear(msgspec.structs.replace(stranger, robot=f"stranger-{number}"), 2.0)
+    later = 2.0 + CONFIG.align_every_s + CONFIG.lost_after_s
+    assert len(one.member.due(later)) < 100
+    assert set(one.member.frames) == {"two"}
+    one.member.hear(msgspec.structs.replace(stranger, robot="new"), later)
+    assert "new" in {comparison.robot for comparison in one.member.due(later)}
 
 
 def test_a_frontier_goes_to_the_robot_that_is_nearer() -> None:

@@ -98,6 +98,34 @@ def test_news_of_an_impossible_robot_are_refused(changes: dict[str, object]) -> 
         decode(encode(msgspec.structs.replace(news(CHART), **changes)))
 
 
+@pytest.mark.parametrize("name", ["", "two words", "one\n", "\x1b[2J", "../one"])
+def test_who_has_no_name_that_a_robot_can_have_is_refused(name: str) -> None:
+    with pytest.raises(GvgbotError, match="damaged"):
+        decode(encode(msgspec.structs.replace(news(CHART), robot=name)))
+
+
+@pytest.mark.parametrize("kind", [b"\xa4news", b"\xa6course"])
+def test_what_is_nested_without_end_is_refused(kind: bytes) -> None:
+    with pytest.raises(GvgbotError, match="damaged"):
+        decode(b"\x82\xa4type" + kind + b"\xa5extra" + b"\x91" * 100_000 + b"\xc0")
+
+
+@pytest.mark.parametrize("line", [[(0, 0), (3e38, 0)], [(0, 0), (0, 1000)] * 20])
+def test_a_way_that_no_robot_can_have_driven_is_refused(line: list[tuple[float, float]]) -> None:
+    told = news(CHART)
+    points = np.array(line, "<f4").tobytes()
+    edge = msgspec.structs.replace(told.edges[0], points=points)
+    with pytest.raises(GvgbotError, match="damaged"):
+        decode(encode(msgspec.structs.replace(told, edges=(edge, *told.edges[1:]))))
+
+
+def test_news_of_more_bytes_than_a_building_needs_are_refused() -> None:
+    told = news(CHART)
+    vertex = msgspec.structs.replace(told.vertices[0], walls=bytes(10_000_000))
+    with pytest.raises(GvgbotError, match="damaged"):
+        decode(encode(msgspec.structs.replace(told, vertices=(vertex, *told.vertices[1:]))))
+
+
 def test_a_course_arrives_as_it_was() -> None:
     line = np.array([[1.0, 2.0], [3.0, -4.5]], "<f4")
     course = Course(robot="one", life=3, sequence=7, pose=(1.0, 2.0, 0.5), line=line.tobytes())
@@ -107,7 +135,16 @@ def test_a_course_arrives_as_it_was() -> None:
     np.testing.assert_array_equal(heard.points, line)
 
 
-@pytest.mark.parametrize("line", [b"\x00" * 7, np.array([np.nan, 0.0], "<f4").tobytes()])
+@pytest.mark.parametrize(
+    "line",
+    [
+        b"\x00" * 7,
+        np.array([np.nan, 0.0], "<f4").tobytes(),
+        np.array([3e38, 0.0], "<f4").tobytes(),
+        bytes(1_000_000),
+    ],
+    ids=["cut", "nowhere", "too far", "too long"],
+)
 def test_a_damaged_course_is_refused(line: bytes) -> None:
     course = Course(robot="one", life=3, sequence=7, pose=(1.0, 2.0, 0.5), line=line)
     with pytest.raises(GvgbotError, match="damaged"):
