@@ -1,6 +1,9 @@
 """Where a run begins: in a new directory, in the one where it ended, or with the map of another."""
 
-from collections.abc import Mapping
+import fcntl
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -63,6 +66,26 @@ def begin(wanted: Wanted, *, world: str) -> Start:
             return Start(RunDirectory(path), files, saved_there)
     directory = _new(wanted, world)
     return Start(directory, MissionFiles(directory.path))
+
+
+@contextmanager
+def held(path: Path) -> Iterator[None]:
+    """Keep other programs from writing a run to this directory meanwhile.
+
+    Raises UsageError if one does so already. The kernel lets go of it whatever ends this program.
+    """
+    directory = os.open(path, os.O_RDONLY)
+    try:
+        fcntl.flock(directory, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        os.close(directory)
+        raise UsageError(f"{path} is in use: another gvgbot run writes to it; stop that") from error
+    except OSError as error:  # not every network file system can do this
+        log.debug("run directory not held", reason=str(error))
+    try:
+        yield
+    finally:
+        os.close(directory)
 
 
 def _new(wanted: Wanted, world: str) -> RunDirectory:

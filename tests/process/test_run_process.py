@@ -7,6 +7,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 import tty
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -90,6 +91,12 @@ def until_driving(samples: "Queue[zenoh.Sample]") -> tuple[str, list[dict[str, A
             return str(sample.encoding), states
 
 
+def until_kept(state: Path) -> None:
+    """Wait for a mission that another program could go on with."""
+    while not list(state.glob("runs/*/snapshot.gvg")):
+        time.sleep(0.1)  # noqa: TID251  # another program is waited for
+
+
 def ask(session: zenoh.Session, selector: str) -> tuple[str, bytes]:
     """The encoding and the payload of the only answer."""
     (reply,) = list(session.get(selector, timeout=PATIENCE))
@@ -161,6 +168,20 @@ def test_an_address_in_use_is_one_line_and_leaves_nothing(endpoint: str, tmp_pat
     assert "in use" in line
     assert f"--set 'telemetry.listen=[tcp/{host}:{int(port) + 1}]'" in line
     assert not list(tmp_path.iterdir())
+
+
+def test_a_mission_that_another_program_goes_on_with_is_left_to_it(tmp_path: Path) -> None:
+    state = f"service.state_dir={tmp_path / 'state'}"
+    arguments = ["run", "--set", state, "--set", "telemetry.enabled=false"]
+    with gvgbot(*arguments, cwd=tmp_path) as first:
+        until_kept(tmp_path / "state")
+        with gvgbot(*arguments, cwd=tmp_path) as second:
+            said, _ = second.communicate(timeout=PATIENCE)
+        assert first.poll() is None
+    assert second.returncode == 2
+    assert said.startswith("gvgbot: ")
+    assert "in use" in said
+    assert len(said.splitlines()) == 1
 
 
 def test_a_missing_port_is_named_and_waited_for(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from gvgbot.cli import main
 from gvgbot.config import Config, ServiceConfig
 from gvgbot.errors import UsageError
 from gvgbot.persistence.mission_files import SNAPSHOT, SNAPSHOT_BEFORE
-from gvgbot.persistence.start import Start, Wanted, begin, state_directory
+from gvgbot.persistence.start import Start, Wanted, begin, held, state_directory
 from tests.unit.persistence.test_mission_files import written
 
 ELSEWHERE = {"STATE_DIRECTORY": "/var/lib/gvgbot:/var/lib/other"}
@@ -110,6 +110,16 @@ def test_a_known_map_begins_a_run_of_its_own(tmp_path: Path) -> None:
     assert start.directory.path == tmp_path / "runs" / "office-1"
     assert not start.files.is_begun
     assert {path.name: path.read_bytes() for path in known.iterdir()} == before
+
+
+def test_one_run_at_a_time_writes_to_a_directory(tmp_path: Path) -> None:
+    with held(tmp_path):
+        with pytest.raises(UsageError, match="in use"), held(tmp_path):
+            pass
+        with pytest.raises(UsageError, match="in use"), held(tmp_path):
+            pass
+    with held(tmp_path):
+        assert list(tmp_path.iterdir()) == []
 
 
 def test_a_mission_that_cannot_be_read_stays_where_it_is(tmp_path: Path) -> None:
