@@ -4,6 +4,7 @@ An operator may do both, a monitor may only read, and strangers are not let in.
 """
 
 import asyncio
+import json
 import shutil
 import subprocess
 from collections.abc import Callable
@@ -246,6 +247,24 @@ def test_robots_of_a_team_hear_each_other(network: Network) -> None:
     ):
         asyncio.run(talk(near, far))
     assert heard == {"near": {b"far"}, "far": {b"near"}}
+
+
+def test_a_robot_that_comes_with_a_password_can_be_reached_itself(tmp_path: Path) -> None:
+    network, own = passwords(tmp_path), free_endpoint()
+    file = tmp_path / "teammate.json5"
+    text = network.client("teammate").read_text()
+    left_out = f'// dictionary_file: "{INSTALLED}/passwords.txt"'
+    assert left_out in text
+    file.write_text(
+        text.replace(left_out, f"dictionary_file: {json.dumps(str(tmp_path / 'passwords.txt'))}")
+    )
+    config = TelemetryConfig(listen=(own,), zenoh_file=file)
+    operator = network.client("operator")
+    with (
+        Telemetry(config, "far", relays=True),
+        client.connect("far", own, zenoh_file=operator, patience_s=5.0) as robot,
+    ):
+        assert robot.presence.word != "absent"
 
 
 def test_a_stranger_is_not_let_in(network: Network) -> None:
