@@ -38,6 +38,7 @@ _ALIKE_SHARE = 0.85  # of the walls around a vertex, on either side, speaks for 
 _UNLIKE_SHARE = 0.6  # and less than this against it; one robot may not have seen all
 _HOPELESS_SHARE = 0.5  # if fewer of them lie twice as near, they need not be laid out further
 _FITS = 5  # rounds of pairing and fitting
+_LAID_AT_A_TIME = 50_000  # vertices, to find out which transforms promise most
 _EXAMINED, _MISFITS = 12, 6  # transforms that are looked at closely, of a chart onto itself
 _APART_M, _APART_RAD = 1.0, 0.25  # transforms nearer to each other are the same
 _ON_EDGE_M = 0.4  # so near to an edge, a vertex should be known on it
@@ -301,7 +302,19 @@ def _suggested(a: Side, b: Side) -> list[Pose]:
 
 
 def _together(a: Side, b: Side, turns: Complex, shifts: Complex) -> Array:
-    """How many vertices each transform brings together, those that coincide counting most."""
+    """How many vertices each transform brings together, those that coincide counting most.
+
+    Some transforms at a time: in a building of equal corridors there are hundreds of thousands.
+    """
+    some = 1 + _LAID_AT_A_TIME // len(b.ids)
+    parts = [
+        _brought_together(a, b, turns[first : first + some], shifts[first : first + some])
+        for first in range(0, len(turns), some)
+    ]
+    return np.concatenate(parts)
+
+
+def _brought_together(a: Side, b: Side, turns: Complex, shifts: Complex) -> Array:
     scores = np.zeros(len(turns))
     for kind in (True, False):
         here, there = a.points[a.is_meetpoint == kind], b.points[b.is_meetpoint == kind]

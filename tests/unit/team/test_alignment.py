@@ -1,4 +1,5 @@
 import math
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -98,3 +99,17 @@ def test_points_that_were_only_moved_lie_on_each_other_also_a_single_one(
     pose, _ = least_squares(moved, there)
     assert pose.transform(there) == pytest.approx(moved)
     assert pose.theta == pytest.approx(0.0)
+
+
+def test_equal_corridors_without_number_do_not_fill_the_memory() -> None:
+    middles = 6.0 * np.arange(5)
+    whole = lattice(middles, middles).chart(set(range(len(middles) ** 2)), Pose())
+    bare = {key: replace(vertex, walls=np.empty((0, 2))) for key, vertex in whole.vertices.items()}
+    chart = replace(whole, vertices=bare)
+    tracemalloc.start()
+    try:
+        assert align(chart, chart) is None
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert peak < 12e6
