@@ -16,6 +16,7 @@ _LEFT_BEHIND_M = 0.3  # the robot has passed a point if it was nearer by this
 _SAME_M = 0.5  # sightings nearer than this are of one candidate
 _MEMORY_M = 12.0  # driven, after which a candidate is forgotten
 _MISTAKEN_M = 1.0  # around a mistake
+_NEAR_M = 6.0  # about a mistake: as far as walls of glass go, or so
 _MISTAKES = 2  # at a place of late, after which a vertex there is only believed from near
 _LATE_M = 100.0  # driven since a mistake
 _STUBBORN = 4  # mistakes at a place, after which what comes back there once more is left alone
@@ -129,6 +130,10 @@ class Candidates:
         Sight at a threshold may go on like that for ever, and the robot with it.
         """
         return len(self._mistaken_at(position)) >= _STUBBORN
+
+    def was_mistaken_near(self, place: Array) -> bool:
+        """Whether anything some metres about a place (2,), local frame, has proved to be none."""
+        return any(np.hypot(*(place - one.position)) < _NEAR_M for one in self._mistakes)
 
     def _mistaken_at(self, position: Array) -> list[Mistake]:
         """The mistakes about a place (2,)."""

@@ -320,16 +320,19 @@ class Mapper(Knowledge):
         return None
 
     def _is_out_of_place(self, view: View, sighting: Sighting, away: float) -> bool:
-        """Whether a vertex is seen `away` metres off, on an edge that was driven, or finished.
+        """Whether a vertex is seen `away` metres off, on an edge that is finished, or was driven.
 
         A dead end on a finished one is a door that is shut. A meetpoint may be none as long as a
-        part of the walls is out of sight: in passing the robot will see, as it has before.
+        part of the walls is out of sight: in passing the robot will see. On an edge that was driven
+        it has seen already, and where it erred before, that counts.
         """
         if sighting.meetpoint and away < self._config.passed_m:
             return False
+        place = sighting.position
+        is_dubious = sighting.meetpoint and self._unbelieved.was_mistaken_near(place)
         return any(
-            gap < _ON_EDGE_M and (edge.established or (sighting.meetpoint and edge.traversals > 0))
-            for edge, gap in self._edges_at(view.local_base, sighting.position)
+            gap < _ON_EDGE_M and (edge.established or (is_dubious and edge.traversals > 0))
+            for edge, gap in self._edges_at(view.local_base, place)
         )
 
     # -- what hangs together -----------------------------------------------------------------
