@@ -212,10 +212,14 @@ class Evidence:
 
         There is a way, then, such as a door that is hard to see or shut now.
         """
+        ways = list(self._driven_ways(vertex))
+        if not ways:
+            return False
         clearance = view.gvg.edges[passing.edge].clearance_at(passing.station)
         lines = cKDTree(np.concatenate([edge.polyline for edge in view.gvg.edges.values()]))
-        for way in self._driven_ways(vertex):
-            turned = view.local_base.compose(self._known.belief.map_base.inverse()).transform(way)
+        local_map = view.local_base.compose(self._known.belief.map_base.inverse())
+        for way in ways:
+            turned = local_map.transform(way)
             gaps = np.asarray(lines.query(turned + (point - turned[0]))[0])
             if gaps.max() > clearance:
                 return True

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, csr_array
+from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import Delaunay, QhullError, cKDTree
 
@@ -145,11 +145,16 @@ def _diagram(triangles: Delaunay, room: _Room, roughness: float) -> Diagram:
 def _bridging(links: NDArray[np.int64], touched: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Which links (2, M) of points hang together between two points that are `touched` (N,)."""
     ends, numbered = np.unique(links, return_inverse=True)
-    (i, j), n = numbered.reshape(2, -1), len(ends)
-    graph = csr_array((np.ones(len(i)), (i, j)), (n, n))
-    _, piece = connected_components(graph, directed=False)
-    is_bridge: NDArray[np.bool_] = np.bincount(piece, touched[ends], n)[piece[i]] > 1
+    i, j = numbered.reshape(2, -1)
+    piece = _pieces(i, j, len(ends))
+    is_bridge: NDArray[np.bool_] = np.bincount(piece, touched[ends], len(ends))[piece[i]] > 1
     return is_bridge
+
+
+def _pieces(i: NDArray[np.int64], j: NDArray[np.int64], count: int) -> NDArray[np.int32]:
+    """The connected piece of each of so many points, by links from i to j (M,)."""
+    links = coo_array((np.ones(len(i)), (i, j)), (count, count))
+    return np.asarray(connected_components(links, directed=False)[1])
 
 
 def _ridges_that_count(
@@ -292,9 +297,7 @@ def _piece_of_robot(
     used[ridges] = True
     nodes = np.flatnonzero(used)
     ridges = (np.cumsum(used) - 1)[ridges]
-    n = len(nodes)
-    links = coo_array((np.ones(len(ridges)), (ridges[:, 0], ridges[:, 1])), (n, n))
-    _, piece = connected_components(links, directed=False)
+    piece = _pieces(ridges[:, 0], ridges[:, 1], len(nodes))
     distance = np.hypot(*(centres[nodes] - robot).T)
     size = np.bincount(piece)
     distance[size[piece] < 4] += 2.0  # crumbs lose against a real piece nearby

@@ -49,6 +49,12 @@ UNSEEN = {1: math.pi, 3: 0.0}
 TEE = drawn(TEE_POINTS, TEE_LINES, unseen=UNSEEN)
 PLAIN = drawn({1: (-2.0, 0.0), 3: (6.0, 0.0)}, {10: (1, 3, [])}, unseen=UNSEEN)
 TWO_ENDS = drawn({1: (-1.0, 0.0), 2: (4.0, 0.0)}, {10: (1, 2, [])})
+# The same way with a side door in its middle.
+TEE_BETWEEN = drawn(
+    {1: (-1.0, 0.0), 2: (4.0, 0.0), 3: (1.5, 0.0), 4: (1.5, -4.0)},
+    {10: (1, 3, []), 11: (3, 2, []), 12: (3, 4, [])},
+    unseen={4: -math.pi / 2},
+)
 NEAR = Pose(2.0, 0.0)
 
 
@@ -593,8 +599,6 @@ def test_on_a_way_of_a_finished_map_or_a_dubious_one_a_meetpoint_must_be_seen_fr
     *, is_finished: bool
 ) -> None:
     """From afar a room may look so as long as some of its walls are out of sight, or of glass."""
-    points = {1: (-1.0, 0.0), 2: (4.0, 0.0), 3: (1.5, 0.0), 4: (1.5, -4.0)}
-    tee = drawn(points, {10: (1, 3, []), 11: (3, 2, []), 12: (3, 4, [])}, unseen={4: -math.pi / 2})
     seen = Seen().look(TWO_ENDS, 30)
     if is_finished:
         seen.mapper.establish()
@@ -602,10 +606,10 @@ def test_on_a_way_of_a_finished_map_or_a_dubious_one_a_meetpoint_must_be_seen_fr
         (edge,) = seen.mapper.graph.edges.values()
         edge.traversals = 1
         seen.mapper._unbelieved.note_mistake(Mistake(np.array([3.5, 0.0]), (), 0.0))
-    assert seen.look(tee, 50).places("meetpoint") == []
+    assert seen.look(TEE_BETWEEN, 50).places("meetpoint") == []
     near = Pose(1.5 - CONFIG.passed_m + 0.1, 0.0)
     seen.mapper.move(near, np.zeros((3, 3)))
-    seen.look(tee, CONFIG.candidates.meetpoint_sightings, at=near)
+    seen.look(TEE_BETWEEN, CONFIG.candidates.meetpoint_sightings, at=near)
     assert seen.places("meetpoint") == [pytest.approx((1.5, 0.0), abs=1e-3)]
     assert [e.established for e in seen.mapper.graph.edges.values()] == 2 * [is_finished]
 
@@ -614,12 +618,10 @@ def test_on_a_driven_way_where_nothing_proved_to_be_none_a_meetpoint_is_believed
     None
 ):
     """Somebody may have stood before a door as the robot passed."""
-    points = {1: (-1.0, 0.0), 2: (4.0, 0.0), 3: (1.5, 0.0), 4: (1.5, -4.0)}
-    tee = drawn(points, {10: (1, 3, []), 11: (3, 2, []), 12: (3, 4, [])}, unseen={4: -math.pi / 2})
     seen = Seen().look(TWO_ENDS, 30)
     (edge,) = seen.mapper.graph.edges.values()
     edge.traversals = 1
-    assert seen.look(tee, 50).places("meetpoint") == [pytest.approx((1.5, 0.0), abs=1e-3)]
+    assert seen.look(TEE_BETWEEN, 50).places("meetpoint") == [pytest.approx((1.5, 0.0), abs=1e-3)]
 
 
 def test_what_stays_away_for_longer_than_a_day_was_walled_up() -> None:
