@@ -4,6 +4,7 @@ import itertools
 import math
 
 import numpy as np
+import pytest
 from scipy.stats import chi2
 
 from gvgbot.autonomy.gvg.local_map import LocalMapConfig
@@ -25,13 +26,13 @@ def maps(matching: ScanMatchingConfig | None = None) -> LocalMaps:
     )
 
 
-def room(rng: np.random.Generator, x: float) -> Scan:
-    """A room of 16 by 3 m, seen from x on its middle line, with a centimetre of noise."""
+def room(rng: np.random.Generator, x: float, sigma: float = 0.01) -> Scan:
+    """A room of 16 by 3 m, seen from x on its middle line, with so many metres of noise."""
     c, s = np.cos(BEARINGS), np.sin(BEARINGS)
     with np.errstate(divide="ignore"):
         to_end = np.where(c > 0, 8.0 - x, 8.0 + x) / np.abs(c)
         to_side = 1.5 / np.abs(s)
-    ranges: Array = np.minimum(to_end, to_side) + rng.normal(0.0, 0.01, len(BEARINGS))
+    ranges: Array = np.minimum(to_end, to_side) + rng.normal(0.0, sigma, len(BEARINGS))
     return Scan(0.0, ranges, float(BEARINGS[0]), math.radians(0.25), 0.1, 30.0)
 
 
@@ -102,6 +103,19 @@ def test_a_robot_that_comes_round_a_corner_unseen_is_found_by_the_walls_it_knew(
     assert found.distance(here) < 0.02
     assert abs(found.theta - here.theta) < 0.01
     assert covariance[0, 0] < 0.05**2
+
+
+@pytest.mark.xfail(strict=True, reason="points at corners are laid onto lines that cut the corner")
+def test_the_corners_of_a_room_do_not_hold_the_robot_back() -> None:
+    """Seen from one side only, lines across them are a few centimetres before the end wall."""
+    rng, local, noise = np.random.default_rng(8), maps(), np.diag([0.01**2, 0.005**2, 0.003**2])
+    believed, odometry = Pose(-4.0, 0.0, 0.0), Pose(0.25, 0.0, 0.0)
+    local.insert(room(rng, -4.0, sigma=1e-6), believed, 0.0)
+    for step in range(1, 21):
+        scan = room(rng, -4.0 + 0.25 * step, sigma=1e-6)
+        believed, _ = local.match(scan, believed, odometry, 1.0, noise)
+        local.insert(scan, believed, 0.25 * step)
+    assert believed.distance(Pose(1.0, 0.0, 0.0)) < 0.006
 
 
 def test_a_drive_errs_about_as_much_as_its_steps_say_together() -> None:
