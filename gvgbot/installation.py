@@ -1,5 +1,6 @@
 """Puts the service and what belongs to it in its place, and says what each file is for."""
 
+import os
 import re
 import shutil
 import subprocess
@@ -39,12 +40,12 @@ def install_service(
     """
     source = packaged("turtlebot2.yaml" if config is None else config)
     _check_paths(source, load_config(source))
-    home, programs = Path.home(), Path(sys.executable).parent
+    programs = Path(sys.executable).parent
     if not user:
         _check_place(Path(sys.executable))
     version = _systemd_version()
     wanted = (
-        user_files(source, home, programs, version)
+        user_files(source, _settings(), programs, version)
         if user
         else system_files(source, Path("/"), programs, version)
     )
@@ -104,14 +105,20 @@ def system_files(source: Path, root: Path, programs: Path, version: int | None) 
     ]
 
 
-def user_files(source: Path, home: Path, programs: Path, version: int | None) -> list[Written]:
-    """The files of a person's own service, below their home."""
-    config = home / ".config/gvgbot/gvgbot.yaml"
+def user_files(source: Path, settings: Path, programs: Path, version: int | None) -> list[Written]:
+    """The files of a person's own service, below the folder of their settings."""
+    config = settings / "gvgbot/gvgbot.yaml"
     unit = _unit("gvgbot-user.service", programs, config, version)
     return [
         Written(config, _text(source), "the configuration, yours to edit", True),
-        Written(home / ".config/systemd/user/gvgbot.service", unit, "the service"),
+        Written(settings / "systemd/user/gvgbot.service", unit, "the service"),
     ]
+
+
+def _settings() -> Path:
+    """Where the person's settings are, as the XDG Base Directory Specification says."""
+    settings = Path(os.environ.get("XDG_CONFIG_HOME", ""))
+    return settings if settings.is_absolute() else Path.home() / ".config"
 
 
 def _unit(name: str, programs: Path, config: Path, version: int | None) -> str:

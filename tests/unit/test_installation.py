@@ -14,6 +14,11 @@ PROGRAMS = Path("/srv/robot/bin")
 SOURCE = packaged("turtlebot2.yaml")
 
 
+@pytest.fixture(autouse=True)
+def _settings_are_at_home(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("XDG_CONFIG_HOME", raising=False)
+
+
 def contents(version: int | None) -> dict[str, str]:
     files = system_files(SOURCE, Path("/"), PROGRAMS, version)
     return {str(file.path): file.content for file in files}
@@ -43,17 +48,17 @@ def test_restarts_are_spaced_out_where_systemd_can(version: int | None, spaced: 
     assert ("RestartMaxDelaySec=60" in unit) == spaced
 
 
-def test_a_person_s_service_stays_below_their_home(tmp_path: Path) -> None:
+def test_a_person_s_service_stays_below_their_settings(tmp_path: Path) -> None:
     files = user_files(SOURCE, tmp_path, PROGRAMS, None)
     assert all(file.path.is_relative_to(tmp_path) for file in files)
-    assert f"run {tmp_path}/.config/gvgbot/gvgbot.yaml" in files[1].content
+    assert f"run {tmp_path}/gvgbot/gvgbot.yaml" in files[1].content
 
 
 def test_a_blank_in_the_name_of_a_home_is_part_of_a_path() -> None:
     home = Path("/srv/my 100% robot")
     unit = user_files(SOURCE, home, home / "bin", None)[1].content.splitlines()
     quoted = '"/srv/my 100%% robot/'
-    config = f'{quoted}.config/gvgbot/gvgbot.yaml"'
+    config = f'{quoted}gvgbot/gvgbot.yaml"'
     assert f'ExecStart={quoted}bin/gvgbot" run {config}' in unit
     assert f'ExecStopPost=-{quoted}bin/python" -m gvgbot.stop_base {config}' in unit
 
@@ -67,6 +72,24 @@ def test_a_dry_run_says_all_and_writes_nothing(
     assert f"would write {tmp_path}/.config/systemd/user/gvgbot.service" in said
     assert "systemctl --user" in said
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("settings", "below"), [("/srv/mine", "/srv/mine"), ("", None), ("x", None)]
+)
+def test_a_person_s_service_is_where_systemd_looks_for_their_settings(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    settings: str,
+    below: str | None,
+) -> None:
+    """XDG Base Directory Specification: by default ~/.config; relative paths are not valid."""
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("XDG_CONFIG_HOME", settings)
+    assert main(["install-service", "--user", "--dry-run"]) == 0
+    folder = below or f"{tmp_path}/.config"
+    assert f"would write {folder}/systemd/user/gvgbot.service" in capsys.readouterr().out
 
 
 def test_a_dry_run_says_what_the_real_run_would_keep(
