@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from benchmarks.figures import drawing
 from benchmarks.figures.findings import Finding
@@ -17,37 +18,15 @@ GATE = 9.0  # squared Mahalanobis distance: three sigma
 def find() -> Finding:
     runs = {"paper": explored(WORLD, "localisation=paper"), "full": explored(WORLD)}
     figure, (left, right) = drawing.stage(1, 2, (11.0, 4.4))
-    paper = runs["paper"]
-    drawing.walls(left, paper.world, color=drawing.PALE)
-    for name, color, label in (
-        ("odometry", drawing.ODOMETRY, "wheels and gyro alone"),
-        ("online", drawing.EDGE, "as believed at the time"),
-        ("truth", drawing.WALL, "truth"),
-    ):
-        points = paper.trajectory(name).poses[:, :2]
-        placed = points if name == "truth" else paper.start.transform(points)
-        left.plot(*placed.T, color=color, lw=1.0, label=label)
-    left.legend(fontsize=7, loc="lower right")
-    drawing.labelled(left, "odometry between vertices (`paper`)")
-    rows = []
+    _draw_ways(left, runs["paper"])
     for (name, run), color in zip(runs.items(), (drawing.ODOMETRY, drawing.EDGE), strict=True):
         metres, u_robot, _ = run.series()
-        errors = _errors(run)
         right.semilogy(metres, 3 * np.sqrt(u_robot), color=color, label=f"{name}: three sigma")
-        right.semilogy(metres, errors, color=color, lw=0.7, ls=":", label=f"{name}: error")
-        inside = float(np.mean(_gaps(run) < GATE))
-        rows.append(
-            (
-                f"`{name}`",
-                f"{math.sqrt(float(u_robot.max())):.2f}",
-                f"{errors.max():.2f}",
-                f"{inside:.1%}",
-                "yes" if _is_inside_at_first_closure(run) else "no",
-            )
-        )
+        right.semilogy(metres, _errors(run), color=color, lw=0.7, ls=":", label=f"{name}: error")
     right.set_ylim(bottom=SHOWN_M)
     right.legend(fontsize=7)
     drawing.labelled(right, "position of the robot", "m driven", "m")
+    rows = [_row(name, run) for name, run in runs.items()]
     return Finding(
         title="Three loops and a long branch",
         claim="Before the first closure the true place lies inside the ellipse; along a branch "
@@ -68,6 +47,32 @@ def find() -> Finding:
             ),
             *rows,
         ),
+    )
+
+
+def _draw_ways(axes: Axes, run: Run) -> None:
+    """Where the robot was, where it believed to be, and where wheels and gyro alone had it."""
+    drawing.walls(axes, run.world, color=drawing.PALE)
+    for name, color, label in (
+        ("odometry", drawing.ODOMETRY, "wheels and gyro alone"),
+        ("online", drawing.EDGE, "as believed at the time"),
+        ("truth", drawing.WALL, "truth"),
+    ):
+        points = run.trajectory(name).poses[:, :2]
+        placed = points if name == "truth" else run.start.transform(points)
+        axes.plot(*placed.T, color=color, lw=1.0, label=label)
+    axes.legend(fontsize=7, loc="lower right")
+    drawing.labelled(axes, "odometry between vertices (`paper`)")
+
+
+def _row(name: str, run: Run) -> tuple[str, ...]:
+    _, u_robot, _ = run.series()
+    return (
+        f"`{name}`",
+        f"{math.sqrt(float(u_robot.max())):.2f}",
+        f"{_errors(run).max():.2f}",
+        f"{float(np.mean(_gaps(run) < GATE)):.1%}",
+        "yes" if _is_inside_at_first_closure(run) else "no",
     )
 
 
