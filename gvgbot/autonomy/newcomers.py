@@ -21,7 +21,8 @@ from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
 from gvgbot.ranges import Range
 
-_GLIMPSE_S = 3.0  # what is half hidden behind something nearer is only kept waiting so long
+# what is half hidden behind something nearer, or has faces and edges, is only kept waiting so long
+_GLIMPSE_S = 3.0
 _BLUR_M = 0.1  # beyond its rim, beams may still end on something
 _NEAR_M = 3.0  # who is farther away is not followed from scan to scan
 _GONE_M = 1.0  # between two looks, at most
@@ -215,7 +216,7 @@ class Newcomers:
         if one.came:
             return self._config.came_after_s
         found_after = self._config.found_after_s
-        may_be = one.is_whole or one.evidence > 0.0
+        may_be = one.evidence > (-SURE if one.is_whole else 0.0)
         return found_after if may_be else min(_GLIMPSE_S, found_after)
 
     def _forget(self, scan: Scan, local_base: Pose, local_map: LocalMap) -> None:
