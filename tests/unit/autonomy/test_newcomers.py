@@ -119,6 +119,16 @@ def test_what_stands_long_enough_is_a_part_of_the_building(
     assert watch.inside() > 0
 
 
+@pytest.mark.parametrize("noise", [0.0, 0.01, 0.03])
+def test_what_surely_has_an_edge_is_a_post_after_a_glimpse(noise: float) -> None:
+    """Else doors beside it are not believed until the robot has passed them."""
+    post = carved([ROOM], [(1.6, 0.6, 2.1, 1.1)])
+    watch = Watch(noise=noise)
+    assert all(watch.dropped(post, float(second)) > 0 for second in range(3))
+    assert watch.dropped(post, 4.0) == 0
+    assert watch.inside() > 0
+
+
 def test_who_stands_in_a_way_that_is_known_came_there() -> None:
     watch = Watch()
     for second in range(math.ceil(CONFIG.came_after_s)):
