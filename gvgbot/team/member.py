@@ -34,6 +34,7 @@ from gvgbot.team.news import (
 from gvgbot.team.site import Frontier, Site
 
 _STANDING_M = 0.1  # moved less from news to news, a robot stands
+_RESTS_S = 30.0  # who stands for so long, and is on its way to nothing, finds no more
 _FRESH_S = 1.0  # a robot that drives is no longer where it was told to be before
 _SPARSE = 4  # every so manieth point of a track is told
 _RECOGNISE_S = 1.0  # between two attempts to recognise a robot by how it moves
@@ -66,14 +67,19 @@ class _Mate:
     map_base: Pose  # in its own map
     told_at: Pose  # the same, by the news
     seen: float  # stamp of that
+    moved: float  # stamp of the news by which it was elsewhere before
     course: Array = field(default_factory=lambda: np.empty((0, 2)))
     courses: int = 0  # the number of the newest
-    is_standing: bool = False  # since the news before
     alignment: Alignment | None = None
     tried: float = float("-inf")  # stamp of the last attempt to align
     sizes: tuple[int, ...] = ()  # of both charts then
     looks: deque[BodiesSeen] = field(default_factory=deque)  # lately; stamps of the own clock
     recognised: float = float("-inf")  # stamp of the last attempt to
+
+    @property
+    def stands(self) -> float:
+        """For how long it has stood, s, when it was last heard."""
+        return self.heard - self.moved
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -124,7 +130,7 @@ class Member:
         self._claimed_end: HalfEdgeId | None = None
         self._stamp = 0.0
         self._sequence = self._courses = 0
-        self._others_claim_all = self._nothing_left = False
+        self._others_claim_all = self._is_idle = self._nothing_left = False
         self._looks: deque[BodiesSeen] = deque()  # lately
         self.met: list[Met] = []  # lately; whoever tells of it takes it out
 
@@ -150,6 +156,7 @@ class Member:
             radius=self._radius,
             claim=self._claim,
             finished=finished,
+            idle=self._is_idle,
             frames=frames,
             vertices=told_vertices(self._chart),
             edges=told_edges(self._chart),
@@ -219,12 +226,13 @@ class Member:
             return
         if mate is None or mate.news.life != news.life:
             there = Pose(*news.pose)
-            self._mates[news.robot] = _Mate(news, news.chart, stamp, there, there, stamp)
+            self._mates[news.robot] = _Mate(news, news.chart, stamp, there, there, stamp, stamp)
         elif news.sequence > mate.news.sequence:
             mate.news, mate.chart, mate.heard = news, news.chart, stamp
             before, mate.map_base, mate.seen = mate.told_at, Pose(*news.pose), stamp
             mate.told_at = mate.map_base
-            mate.is_standing = before.distance(mate.map_base) < _STANDING_M
+            if before.distance(mate.map_base) >= _STANDING_M:
+                mate.moved = stamp
         self._site = None
 
     def _has_room(self) -> bool:
@@ -331,7 +339,7 @@ class Member:
         for name in sorted(self.others()):
             mate = self._mates[name]
             is_fresh = self._stamp - mate.seen <= _FRESH_S
-            if is_fresh or mate.is_standing or mate.news.finished:
+            if is_fresh or mate.stands > 0.0 or mate.news.finished:
                 first, radius = name < self.name, mate.news.radius
                 one = Companion(name, mate.map_base, first, mate.course, radius=radius)
                 found.append(company.moved(one, frames[name]))
@@ -359,7 +367,8 @@ class Member:
             if not self._is_taken(frontier, cost, claims)
         ]
         may_come = any(self._is_busy(name) for name in self.others())
-        self._nothing_left = bool(reached) and not costs and not may_come
+        self._is_idle = bool(reached) and not costs
+        self._nothing_left = self._is_idle and not may_come
         self._others_claim_all = bool(reached) and not mine and (bool(costs) or may_come)
         if not mine:
             self._claim = self._claimed_end = None
@@ -370,9 +379,10 @@ class Member:
         return end, reached[end.vertex]
 
     def _is_busy(self, name: str) -> bool:
-        """Whether another robot goes somewhere, so that it may find more, and does not wait."""
+        """Whether another robot has something to do, so that more may be found."""
         mate = self._mates[name]
-        return not mate.news.finished and not (mate.is_standing and mate.news.claim is None)
+        rests = mate.news.claim is None and mate.stands > _RESTS_S
+        return not (mate.news.finished or mate.news.idle or rests)
 
     def _is_taken(self, frontier: Frontier, cost: float, claims: list[tuple[str, Claim]]) -> bool:
         """Whether another robot is on its way to a frontier, and not much farther from it."""

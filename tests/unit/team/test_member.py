@@ -266,12 +266,26 @@ def given_up(chart: Chart) -> Chart:
 
 def test_two_that_have_given_up_do_not_wait_for_each_other() -> None:
     one, two = team()
-    one.chart = one.member._chart = given_up(one.chart)
+    for part in (one, two):
+        part.chart = part.member._chart = given_up(part.chart)
     one.member._own_chart = lambda: one.chart
+    two.member._own_chart = lambda: two.chart
     two.tell(2.0, one, at=Pose(1.0, 0.0, 0.0))  # it drives, and may find another way
     assert (one.choose(), one.member.is_waiting, one.member.is_done) == (None, True, False)
-    for stamp in (4.0, 6.0):
-        two.tell(stamp, one, at=Pose(1.0, 0.0, 0.0))  # it stands, and is on its way to nothing
+    two.choose()
+    two.tell(4.0, one, at=Pose(1.0, 0.0, 0.0))
+    assert (one.choose(), one.member.is_waiting, one.member.is_done) == (None, False, True)
+
+
+def test_who_only_stops_to_think_is_waited_for_but_not_for_ever() -> None:
+    """It is on its way to nothing for a moment, though there is something left."""
+    one, two = team()
+    one.chart = one.member._chart = given_up(one.chart)
+    one.member._own_chart = lambda: one.chart
+    for stamp in np.arange(2.0, 30.0, 2.0):
+        two.tell(stamp, one)
+        assert (one.choose(), one.member.is_waiting, one.member.is_done) == (None, True, False)
+    two.tell(62.0, one)
     assert (one.choose(), one.member.is_waiting, one.member.is_done) == (None, False, True)
 
 
