@@ -41,6 +41,11 @@ def merged(ours: RouteGraph, theirs: RouteGraph, pose: Pose) -> tuple[RouteGraph
     theirs = _without(theirs, _refuted(theirs, there, ours))
     ours = _without(ours, _refuted(ours, here, theirs))
     pairs = _pairs(ours, theirs)
+    ours, theirs = (
+        _drawn_together(ours, {ours.vertices[i].id: theirs.vertices[j] for i, j in pairs}),
+        _drawn_together(theirs, {theirs.vertices[j].id: ours.vertices[i] for i, j in pairs}),
+    )
+    pairs = _pairs(ours, theirs)
     free_id = max((vertex.id for vertex in ours.vertices), default=-1) + 1
     names = {theirs.vertices[j].id: ours.vertices[i].id for i, j in pairs}
     lone = [vertex for vertex in theirs.vertices if vertex.id not in names]
@@ -133,6 +138,47 @@ def _without(graph: RouteGraph, wrong: set[int]) -> RouteGraph:
     return RouteGraph(
         tuple(vertex for vertex in graph.vertices if vertex.id not in wrong),
         tuple(edge for edge in graph.edges if not {edge.start, edge.end} & wrong),
+    )
+
+
+def _drawn_together(graph: RouteGraph, partners: dict[int, MapVertex]) -> RouteGraph:
+    """The graph with one meetpoint where it has two close ones, and the other map has only one.
+
+    `partners` are the vertices of the other map, by the ids of those that they were paired with.
+    """
+    vertices = {vertex.id: vertex for vertex in graph.vertices}
+    onto: dict[int, int] = {}
+    for edge in graph.edges:
+        for lone, kept in ((edge.start, edge.end), (edge.end, edge.start)):
+            if lone in partners or kept not in partners or vertices[lone].kind == "endpoint":
+                continue
+            if math.dist(vertices[lone].position, partners[kept].position) < _SAME_M:
+                onto[lone] = kept
+    for lone, kept in onto.items():
+        vertices[kept] = _united(vertices[kept], vertices.pop(lone))
+    edges = (
+        replace(e, start=onto.get(e.start, e.start), end=onto.get(e.end, e.end))
+        for e in graph.edges
+    )
+    between = 2 * _SAME_M  # longer ones are ways round something
+    return RouteGraph(
+        tuple(vertices.values()),
+        tuple(edge for edge in edges if edge.start != edge.end or edge.length > between),
+    )
+
+
+def _united(kept: MapVertex, lone: MapVertex) -> MapVertex:
+    """Two vertices of one map as one, without the departures towards each other."""
+    (x0, y0), (x1, y1) = kept.position, lone.position
+    ahead = math.atan2(y1 - y0, x1 - x0)
+    return _fused(_turned_from(kept, ahead), _turned_from(lone, ahead + math.pi))
+
+
+def _turned_from(vertex: MapVertex, bearing: float) -> MapVertex:
+    return replace(
+        vertex,
+        bearings=tuple(b for b in vertex.bearings if not _is_among(b, [bearing])),
+        frontiers=tuple(f for f in vertex.frontiers if not _is_among(f, [bearing])),
     )
 
 
