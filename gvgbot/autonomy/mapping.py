@@ -349,10 +349,27 @@ class Mapper(Knowledge):
                 continue
             if here is None and there is None:
                 self.join(view, a, b, edge.polyline, float(edge.clearance.min()), driven=False)
-            elif here is not there:
+            elif here is not there and not self._is_one_between(known, here, a, there, b):
                 self._dispute(view, known, here, there)
             elif here is not None:
                 here.doubted_since = None
+
+    def _is_one_between(
+        self,
+        known: Correspondence,
+        here: Edge | None,
+        a: HalfEdgeId,
+        there: Edge | None,
+        b: HalfEdgeId,
+    ) -> bool:
+        """Whether the edges of two ends that are seen to be one meet at a vertex out of sight.
+
+        Then that is what is disputed: from near it will be seen whether there is a side door.
+        """
+        if here is None or there is None:
+            return False
+        middle = here.other(a).vertex
+        return middle == there.other(b).vertex and middle not in known.node_of
 
     def _is_far_end(self, view: View, edge: LocalEdge) -> bool:
         """Whether an edge ends in a dead end where the robot is not."""

@@ -397,6 +397,20 @@ def test_a_dead_end_whose_edge_proves_to_end_elsewhere_is_taken_back() -> None:
     assert {end.vertex for end in seen.mapper.graph.frontiers()} == {seen.known.vertex_of[2]}
 
 
+def test_a_side_door_that_is_not_seen_from_afar_still_hangs_on_its_corridor() -> None:
+    seen = Seen().look(TEE_BETWEEN, 20)
+    (edges, frontiers) = (len(seen.mapper.graph.edges), seen.mapper.graph.frontiers())
+    assert (edges, len(frontiers)) == (2, 1)
+    afar = Pose(5.9, 0.0)
+    seen.mapper.move(afar, np.zeros((3, 3)))
+    seen.look(TWO_ENDS, 3 * CONFIG.conflicts, at=afar)
+    assert seen.mapper.graph.frontiers() == frontiers
+    (door,) = frontiers
+    ends = {v.id for v in seen.mapper.graph.vertices.values() if v.kind == "endpoint"}
+    links = {frozenset((e.a.vertex, e.b.vertex)) for e in seen.mapper.graph.edges.values()}
+    assert links == {frozenset((door.vertex, end)) for end in ends}
+
+
 def test_a_fork_in_a_room_that_proves_to_be_its_end_becomes_a_dead_end() -> None:
     """Two short branches into corners are seen first, and none of them later."""
     corners = {**TEE_POINTS, 5: (2.0, -4.6), 6: (4.0, -4.6)}
