@@ -14,7 +14,7 @@ from gvgbot.geometry import STANDSTILL, Array, Pose
 from gvgbot.hal.messages import Odometry
 from gvgbot.live_survey import LiveSurvey
 from gvgbot.survey import survey
-from tests.unit.autonomy.sights import LASER_270, carved, sweep
+from tests.unit.autonomy.sights import CELL, LASER_270, carved, sweep
 
 START = Pose(-3.0, 0.0, 0.0)  # in the world; the map begins there
 CORRIDOR, SIDE = (-4.0, -1.0, 4.0, 1.0), (2.0, -1.0, 4.0, 4.0)
@@ -43,9 +43,17 @@ def test_what_lies_in_the_shadow_of_a_corner_is_a_gap_until_the_robot_looks_roun
     assert len(places_after(building, 6.0)) == 0
 
 
+def with_post(world: World, x: float, y: float, radius: float) -> World:
+    """The world and a round post, as thick as somebody's legs: an edge would tell it from them."""
+    rows, columns = np.indices(world.occupied.shape)
+    x0, y0 = world.origin
+    away = np.hypot(x0 + (columns + 0.5) * CELL - x, y0 + (rows + 0.5) * CELL - y)
+    return World(world.occupied | (away < radius), CELL, world.origin)
+
+
 def driven_past_a_post(seconds: float) -> Pipeline:
     """A robot whose drive past a post at (-1.5, 0.6) took so long; now that is out of sight."""
-    world = carved([CORRIDOR, (0.0, -3.0, 1.5, 0.0)], [(-1.6, 0.5, -1.4, 0.7)])
+    world = with_post(carved([CORRIDOR, (0.0, -3.0, 1.5, 0.0)]), -1.5, 0.6, 0.12)
     config = load_config()
     pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
     way = np.arange(0.0, 5.6, 0.25)
