@@ -56,7 +56,7 @@ def test_a_robot_among_legs_drives_away_from_them_and_does_not_scrape_along(head
     assert "back off" not in run.recoveries()
 
 
-@pytest.mark.parametrize("heading", [0.0, math.pi])
+@pytest.mark.parametrize("heading", [0.0, math.pi, 1.5 * math.pi])
 def test_a_robot_backs_off_only_over_what_it_knows_to_be_free(
     heading: float,
 ) -> None:

@@ -13,6 +13,7 @@ from gvgbot.ranges import Range
 
 _SIDE_RAD = math.radians(55)  # where the middle of the left bumper is
 _GRIP_S = 3.0  # backing off longer than it should take, by this, is given up
+_DEAD_S, _BRAKING_MPS2 = 0.1, 0.5  # until a base obeys, and how it then slows down
 _OFTEN_S = 20.0  # a second overload within this time means that something is in the way
 _TRIES = 3  # to get rid of a contact by backing off
 
@@ -182,9 +183,10 @@ class Reflexes:
         return STANDSTILL, rest.incident
 
     def _back_off(self, now: Moment, room_behind: Callable[[], float]) -> Twist:
-        c = self._config
-        metres = min(c.back_off_m, room_behind())
-        until = now.stamp + metres / c.back_off_speed_mps + _GRIP_S
+        c, speed = self._config, self._config.back_off_speed_mps
+        rolls_on = speed * (_DEAD_S + speed / (2 * _BRAKING_MPS2))
+        metres = min(c.back_off_m, room_behind() - rolls_on)
+        until = now.stamp + metres / speed + _GRIP_S
         self._doing = _BackOff(now.local_base, metres, until)
         self._past.clear()
         return self._go_back(now, self._doing)

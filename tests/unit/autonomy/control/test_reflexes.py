@@ -1,6 +1,7 @@
 """What the robot does at once, cycle by cycle, and how long it takes."""
 
 import math
+from collections import deque
 
 import pytest
 
@@ -86,11 +87,19 @@ def test_a_contact_is_backed_off_from_and_told_with_its_side(
     assert robot.twist == STANDSTILL
 
 
-def test_no_farther_back_than_there_is_room() -> None:
-    robot = Robot(room_behind=0.04)
-    robot.feel(BUMP, CYCLE)
-    robot.feel(NOTHING, 3.0, wish=STANDSTILL)
-    assert robot.x == pytest.approx(-0.04, abs=0.003)
+@pytest.mark.parametrize("room", [0.0, 0.01, 0.04, 0.08])
+def test_no_farther_back_than_there_is_room_for_a_base_that_rolls_on(room: float) -> None:
+    """As a Kobuki: 0.06 s late, and slower by 0.5 m/s in a second."""
+    robot, late = Robot(room_behind=room), deque([0.0] * round(0.06 / CYCLE))
+    speed, contact = 0.0, BUMP
+    for _ in range(round(3.0 / CYCLE)):
+        robot.feel(contact, CYCLE, grip=0.0, wish=STANDSTILL)
+        contact = NOTHING
+        late.append(robot.twist.linear)
+        speed += max(-0.5 * CYCLE, min(late.popleft() - speed, 0.5 * CYCLE))
+        robot.x += CYCLE * speed
+    assert speed == 0.0
+    assert -room <= robot.x <= min(0.0, 0.02 - room)
 
 
 def test_a_bumper_that_stays_pressed_is_backed_off_from_a_few_times_only() -> None:
