@@ -349,23 +349,17 @@ class Mapper(Knowledge):
                 continue
             if here is None and there is None:
                 self.join(view, a, b, edge.polyline, float(edge.clearance.min()), driven=False)
-            elif here is not there and not self._is_one_between(known, here, a, there, b):
+            elif here is not there and not self._is_one_between(known, a, b):
                 self._dispute(view, known, here, there)
             elif here is not None:
                 here.doubted_since = None
 
-    def _is_one_between(
-        self,
-        known: Correspondence,
-        here: Edge | None,
-        a: HalfEdgeId,
-        there: Edge | None,
-        b: HalfEdgeId,
-    ) -> bool:
+    def _is_one_between(self, known: Correspondence, a: HalfEdgeId, b: HalfEdgeId) -> bool:
         """Whether the edges of two ends that are seen to be one meet at a vertex out of sight.
 
         Then that is what is disputed: from near it will be seen whether there is a side door.
         """
+        here, there = self.graph.edge_at(a), self.graph.edge_at(b)
         if here is None or there is None:
             return False
         middle = here.other(a).vertex
