@@ -225,6 +225,7 @@ class Mission:
                 nearest = self.choice.nearest(here.starts())
             if nearest is None:
                 if self.choice.is_left_to_others and not self._obstructions.waiting:
+                    self._forget_strays(view)
                     self._end(view, "explored", "no frontier of the team is left")
                 elif not self.choice.waits_for_others:
                     self._finish(view)

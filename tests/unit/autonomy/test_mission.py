@@ -397,6 +397,33 @@ class Alone:
         pass
 
 
+class Last(Alone):
+    """Has nothing left to go to, nor have the others."""
+
+    is_done = True
+
+    def choose(self, graph: GvgGraph, starts: list[Approach]) -> None:
+        return None
+
+
+def test_a_robot_whose_team_is_done_leaves_no_vertex_that_hangs_on_nothing() -> None:
+    robot = Robot()
+    robot.mission.choice.sharing = Last()
+    graph = robot.mapper.graph
+    stray = Vertex(graph.next_id(), 1.0, Pose(50.0), 0.0, 0.0)
+    stray.add_half_edge(0.0)
+    graph.vertices[stray.id] = stray
+    robot.mapper.belief = add_vertex(
+        robot.mapper.belief, stray.id, stray.local, np.diag([1e-4, 1e-4, 1e-4])
+    )
+    while not graph.edges:
+        robot.mapper.observe(View(0, 0.0, 0.0, Pose(), CLOSED, NOTHING_SEEN))
+    robot.look(CLOSED)
+    assert robot.mission.outcome == "explored"
+    assert {v.kind for v in graph.vertices.values()} == {"endpoint"}
+    assert stray.id not in graph.vertices
+
+
 @pytest.mark.parametrize("is_in_team", [False, True])
 def test_in_a_team_a_way_that_was_closed_is_open_again_before_all_others_are_driven(
     is_in_team: bool,
