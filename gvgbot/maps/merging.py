@@ -42,8 +42,8 @@ def merged(ours: RouteGraph, theirs: RouteGraph, pose: Pose) -> tuple[RouteGraph
     ours = _without(ours, _refuted(ours, here, theirs))
     pairs = _pairs(ours, theirs)
     ours, theirs = (
-        _drawn_together(ours, {ours.vertices[i].id: theirs.vertices[j] for i, j in pairs}),
-        _drawn_together(theirs, {theirs.vertices[j].id: ours.vertices[i] for i, j in pairs}),
+        _drawn_together(ours, {ours.vertices[i].id for i, _ in pairs}),
+        _drawn_together(theirs, {theirs.vertices[j].id for _, j in pairs}),
     )
     pairs = _pairs(ours, theirs)
     free_id = max((vertex.id for vertex in ours.vertices), default=-1) + 1
@@ -141,18 +141,15 @@ def _without(graph: RouteGraph, wrong: set[int]) -> RouteGraph:
     )
 
 
-def _drawn_together(graph: RouteGraph, partners: dict[int, MapVertex]) -> RouteGraph:
-    """The graph with one meetpoint where it has two close ones, and the other map has only one.
-
-    `partners` are the vertices of the other map, by the ids of those that they were paired with.
-    """
+def _drawn_together(graph: RouteGraph, paired: set[int]) -> RouteGraph:
+    """The graph with one meetpoint where it has two close ones, and the other map has only one."""
     vertices = {vertex.id: vertex for vertex in graph.vertices}
     onto: dict[int, int] = {}
     for edge in graph.edges:
         for lone, kept in ((edge.start, edge.end), (edge.end, edge.start)):
-            if lone in partners or kept not in partners or vertices[lone].kind == "endpoint":
+            if lone in paired or kept not in paired or vertices[lone].kind == "endpoint":
                 continue
-            if math.dist(vertices[lone].position, partners[kept].position) < _SAME_M:
+            if math.dist(vertices[lone].position, vertices[kept].position) < _SAME_M:
                 onto[lone] = kept
     for lone, kept in onto.items():
         vertices[kept] = _united(vertices[kept], vertices.pop(lone))
