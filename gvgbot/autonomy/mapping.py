@@ -349,10 +349,11 @@ class Mapper(Knowledge):
                 continue
             if here is None and there is None:
                 self.join(view, a, b, edge.polyline, float(edge.clearance.min()), driven=False)
-            elif here is not there and not self._is_one_between(known, a, b):
+            elif here is there or self._is_one_between(known, a, b):
+                for edge_seen in filter(None, (here, there)):
+                    edge_seen.doubted_since = None
+            else:
                 self._dispute(view, known, here, there)
-            elif here is not None:
-                here.doubted_since = None
 
     def _is_one_between(self, known: Correspondence, a: HalfEdgeId, b: HalfEdgeId) -> bool:
         """Whether the edges of two ends that are seen to be one meet at a vertex out of sight.
