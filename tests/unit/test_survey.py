@@ -14,6 +14,7 @@ from gvgbot.geometry import STANDSTILL, Array, Pose
 from gvgbot.hal.messages import Odometry
 from gvgbot.live_survey import LiveSurvey
 from gvgbot.survey import survey
+from gvgbot.worlds.canvas import Canvas
 from tests.unit.autonomy.sights import CELL, LASER_270, carved, sweep
 
 START = Pose(-3.0, 0.0, 0.0)  # in the world; the map begins there
@@ -43,17 +44,16 @@ def test_what_lies_in_the_shadow_of_a_corner_is_a_gap_until_the_robot_looks_roun
     assert len(places_after(building, 6.0)) == 0
 
 
-def with_post(world: World, x: float, y: float, radius: float) -> World:
-    """The world and a round post, as thick as somebody's legs: an edge would tell it from them."""
-    rows, columns = np.indices(world.occupied.shape)
-    x0, y0 = world.origin
-    away = np.hypot(x0 + (columns + 0.5) * CELL - x, y0 + (rows + 0.5) * CELL - y)
-    return World(world.occupied | (away < radius), CELL, world.origin)
-
-
 def driven_past_a_post(seconds: float) -> Pipeline:
-    """A robot whose drive past a post at (-1.5, 0.6) took so long; now that is out of sight."""
-    world = with_post(carved([CORRIDOR, (0.0, -3.0, 1.5, 0.0)]), -1.5, 0.6, 0.12)
+    """A robot whose drive past a post at (-1.5, 0.6) took so long; now that is out of sight.
+
+    The post is round: edges would tell it from somebody.
+    """
+    canvas = Canvas(10.0, 6.0, CELL)
+    canvas.carve(1.0, 3.0, 9.0, 5.0)
+    canvas.carve(5.0, 1.0, 6.5, 4.0)
+    canvas.build_disc(3.5, 4.6, 0.12)
+    world = replace(canvas.world("post"), origin=(-5.0, -4.0))
     config = load_config()
     pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
     way = np.arange(0.0, 5.6, 0.25)

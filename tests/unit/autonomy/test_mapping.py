@@ -399,8 +399,8 @@ def test_a_dead_end_whose_edge_proves_to_end_elsewhere_is_taken_back() -> None:
 
 def test_a_side_door_that_is_not_seen_from_afar_still_hangs_on_its_corridor() -> None:
     seen = Seen().look(TEE_BETWEEN, 20)
-    (edges, frontiers) = (len(seen.mapper.graph.edges), seen.mapper.graph.frontiers())
-    assert (edges, len(frontiers)) == (2, 1)
+    frontiers = seen.mapper.graph.frontiers()
+    assert (len(seen.mapper.graph.edges), len(frontiers)) == (2, 1)
     afar = Pose(5.9, 0.0)
     seen.mapper.move(afar, np.zeros((3, 3)))
     seen.look(TWO_ENDS, 3 * CONFIG.conflicts, at=afar)
