@@ -41,5 +41,7 @@ class Examination:
     def _may_be_new(self, view: View, here: Situation, node: int) -> bool:
         """Whether a node in sight may prove to be a vertex that the map lacks."""
         seen, known = here.gvg.nodes[node], here.known
+        if here.in_team and node in here.doubted:
+            return False
         is_open = seen.may_be_vertex and node not in known.vertex_of
         return is_open and not self._mapper.explains(view, known, seen.position)

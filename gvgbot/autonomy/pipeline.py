@@ -212,9 +212,9 @@ class Pipeline:
             scan.range_max, self._config.local_map.half_width_m
         )
         self.gvg, marks = self.mapper.marked(self._local_gvg(local_base), local_base)
-        doubtful = np.concatenate(
-            [self._hazards.doubtful, self._newcomers.points, self._maps.near.suspects()]
-        )
+        hazards, suspects = self._hazards.doubtful, self._maps.near.suspects()
+        doubtful = np.concatenate([hazards, self._newcomers.points, suspects])
+        felt = np.concatenate([hazards, self._newcomers.felt(local_base), suspects])
         return View(
             len(self.keyframes),
             scan.stamp,
@@ -223,7 +223,7 @@ class Pipeline:
             self.gvg,
             self._maps.near,
             doubtful,
-            touching(self.gvg, doubtful),
+            touching(self.gvg, felt),
             marks,
             self._newcomers.is_one_standing(scan.stamp, self._maps.near),
         )
@@ -267,7 +267,7 @@ class Pipeline:
             min_clearance=self._radius + self._config.passage_margin_m,
             roughness=reduction.roughness_m,
             open_clearance=self.open_clearance,
-            felt=np.concatenate([self._hazards.points, self._newcomers.points]),
+            felt=np.concatenate([self._hazards.points, self._newcomers.felt(local_base)]),
         )
         known = self.mapper.known_around(local_base, half_width)
         return reduce_graph(fine, reduction, known).rings_cut_far_from(local_base.position)

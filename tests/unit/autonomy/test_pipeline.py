@@ -98,3 +98,26 @@ def speed_before(radius: float) -> float:
 def test_a_large_robot_is_kept_away_from_as_far_as_it_is_large() -> None:
     assert speed_before(radius=0.177) > 0.0  # 0.55 m are free between both bodies
     assert speed_before(radius=0.65) == 0.0  # 0.07 m
+
+
+CORRIDOR = carved([(-10.0, -1.5, 10.0, 1.5)])
+
+
+def offset_beside(away: float, *, in_team: bool) -> float:
+    """How far the GVG is off the middle of a corridor where a robot `away` metres ahead stands."""
+    config = load_config()
+    pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
+    stands = Companion("other", Pose(away, 0.0, 0.0), goes_first=True, radius=0.18)
+    pipeline.company = [stands] if in_team else None
+    scan = sweep(CORRIDOR, Pose(), field_of_view=LASER_270)
+    pipeline.control(Odometry(0.0, Pose(), STANDSTILL))
+    pipeline.perceive(replace(scan, stamp=0.0, time_increment=0.0))
+    assert pipeline.gvg is not None
+    points = np.concatenate([edge.polyline for edge in pipeline.gvg.edges.values()])
+    return float(np.abs(points[np.abs(points[:, 0] - away) < 0.2, 1]).max())
+
+
+def test_the_gvg_leads_round_robots_of_the_team_that_are_near_only() -> None:
+    assert offset_beside(2.0, in_team=True) == pytest.approx((1.5 + 0.18) / 2, abs=0.15)
+    assert offset_beside(5.0, in_team=True) == pytest.approx(offset_beside(5.0, in_team=False))
+    assert offset_beside(5.0, in_team=False) < 0.1
