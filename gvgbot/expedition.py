@@ -256,7 +256,8 @@ def _save(directory: RunDirectory, robots: list[_Robot]) -> list[_Robot]:
     for robot in (other for other in robots if other is not first):
         pose = frames.get(robot.member.name)
         if pose is not None:
-            graph, poses[robot.member.name] = merged(graph, _graph(robot), pose)
+            graph = merged(graph, _graph(robot), pose)
+            poses[robot.member.name] = pose
             joined.append(robot)
     world = _place(first.session).world
     files = world_files(world)

@@ -29,7 +29,7 @@ _GONE_M = 1.0  # between two looks, at most
 _MOVED_M = 0.3  # what stands is found again within this
 _LATELY_S = 2.0  # after which the last that is seen of somebody is no longer his
 _STRAY = 0.1  # of the beams towards a place: so many may end there though nothing is there
-_FELT_M = 3.0  # from the robot, in a team
+_FELT_M = 2.0  # from the robot, in a team
 _LOST_S = 3.0  # what is out of sight for so long, beyond the time it stood, may have gone
 _RIM = np.stack([f(np.arange(12) * np.pi / 6) for f in (np.cos, np.sin)], axis=1)
 

@@ -16,7 +16,6 @@ from scipy.spatial.distance import cdist
 from gvgbot.geometry import Array, Pose, wrap_angle
 from gvgbot.maps.moved import moved_graph
 from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
-from gvgbot.team.alignment import least_squares
 
 _SAME_M = 0.6  # vertices nearer to each other are one
 _SAME_RAD = 0.7  # departures nearer to each other are one
@@ -24,16 +23,14 @@ _ON_EDGE_M = 0.4  # from an edge, a vertex that the edge's own map does not know
 _FROM_ENDS_M = 0.8  # but not so near to its ends
 _BESIDE_M = 1.0  # edges between the same vertices that stay nearer to each other are one
 _AHEAD_M = 0.8  # along an edge, its direction is taken
-_FITS = 5  # rounds of pairing and fitting
 _SHARES = np.linspace(0.02, 0.98, 25)  # of the first covariance in an intersection
 
 
-def merged(ours: RouteGraph, theirs: RouteGraph, pose: Pose) -> tuple[RouteGraph, Pose]:
-    """Both maps as one, in the frame of the first, and where the other's frame lies in it.
+def merged(ours: RouteGraph, theirs: RouteGraph, pose: Pose) -> RouteGraph:
+    """Both maps as one, in the frame of the first; `pose` is where the other's frame lies in it.
 
-    `pose` says where that is about, to less than half a metre all over the map.
+    What is in both maps must then be less than half a metre apart.
     """
-    pose = _fitted(ours, theirs, pose)
     theirs = moved_graph(theirs, pose)
     pairs = _pairs(ours, theirs)
     here, there = {ours.vertices[i].id for i, _ in pairs}, {theirs.vertices[j].id for _, j in pairs}
@@ -66,19 +63,7 @@ def merged(ours: RouteGraph, theirs: RouteGraph, pose: Pose) -> tuple[RouteGraph
     return RouteGraph(
         tuple(_settled(vertex, leaving.get(vertex.id, [])) for vertex in (*vertices, *new)),
         tuple(_anchored(edge, vertices + new) for edge in edges),
-    ), pose
-
-
-def _fitted(ours: RouteGraph, theirs: RouteGraph, pose: Pose) -> Pose:
-    """The pose that lays the vertices that both have on each other best."""
-    for _ in range(_FITS):
-        pairs = _pairs(ours, moved_graph(theirs, pose))
-        if len(pairs) < 2:
-            break
-        here = np.array([ours.vertices[i].position for i, _ in pairs])
-        there = np.array([theirs.vertices[j].position for _, j in pairs])
-        pose, _ = least_squares(here, there)
-    return pose
+    )
 
 
 def _pairs(ours: RouteGraph, theirs: RouteGraph) -> list[tuple[int, int]]:

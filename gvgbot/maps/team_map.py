@@ -16,7 +16,7 @@ def team_files(
     """Files by name. `others` has charts, and where their frames lie in that of the own map."""
     graph = own
     for chart, pose in others.values():
-        graph, _ = merged(graph, route_graph(chart), pose)
+        graph = merged(graph, route_graph(chart), pose)
     return {"team.geojson": geojson.encode(graph), "team.png": draw_map(graph, title=title)}
 
 

@@ -11,7 +11,7 @@ nothing.
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain
 
@@ -21,6 +21,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
 from gvgbot.autonomy.slam.recognition import match_bearings
+from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig, Sides, register_coarsely
 from gvgbot.geometry import Array, Pose, resampled, wrap_angle
 from gvgbot.team.chart import Chart, ChartVertex, thinned
 
@@ -61,6 +62,11 @@ _AGAINST_SHARE = 0.1  # of all vertices that are judged,
 _MISSED_SHARE = 0.3
 _SURE = 0.995
 _MISTAKES = 2  # vertices of either kind do not refute what was sure
+
+_LAYING = ScanMatchingConfig(pair_sigma_m=0.05)  # walls of one chart on those of another
+_LAID_FROM_M = (0.6,)  # farther away, in the beginning
+_LAID_BY_M = 1.5  # at most, where the other robot has been
+_LOOSELY = np.diag([1.0, 1.0, 0.1**2])  # what is known before, where walls tell nothing
 
 Complex = NDArray[np.complex128]
 
@@ -166,6 +172,15 @@ class Side:
         return cKDTree(thinned(np.concatenate([np.empty((0, 2)), *around])))
 
     @cached_property
+    def sights(self) -> Array:
+        """From each of the walls (N, 2) the way to the vertex that tells of it: seen there."""
+        told = [vertex.walls for vertex in self.vertices]
+        teller = np.repeat(np.arange(len(told)), [len(walls) for walls in told])
+        _, nearest = cKDTree(np.concatenate(told)).query(self.walls.data)
+        sights: Array = self.points[teller[nearest]] - self.walls.data
+        return sights
+
+    @cached_property
     def ways(self) -> tuple[Array, Array]:
         """Points (N, 2) along all edges, and how far (N,) there is surely no wall."""
         lines = [
@@ -217,16 +232,40 @@ def align(ours: Chart, theirs: Chart) -> Alignment | None:
     confidence = 1.0 / (1.0 + odds)
     pose, covariance = fitted(a.chart, b.chart, best.pairs)
     result = Alignment(pose, covariance, best.pairs, confidence)
-    return result if result.is_sure else None
+    return _laid_on_walls(a, b, result) if result.is_sure else None
 
 
 def refined(ours: Chart, theirs: Chart, known: Alignment) -> Alignment | None:
     """The same alignment by charts that have grown since; None if they speak against it."""
-    evidence = _examine(Side(ours), Side(theirs), known.pose)
-    if not evidence.is_possible:
-        return None if evidence.is_refuted else known
-    pose, covariance = fitted(ours, theirs, evidence.pairs)
-    return Alignment(pose, covariance, evidence.pairs, known.confidence)
+    a, b = Side(ours), Side(theirs)
+    evidence = _examine(a, b, known.pose)
+    if evidence.is_possible:
+        pose, covariance = fitted(ours, theirs, evidence.pairs)
+        return _laid_on_walls(a, b, Alignment(pose, covariance, evidence.pairs, known.confidence))
+    return None if evidence.is_refuted else _laid_on_walls(a, b, known)
+
+
+def _laid_on_walls(a: Side, b: Side, known: Alignment) -> Alignment:
+    """The same alignment by all walls that both tell of, which say more of the turn than vertices.
+
+    It stays as it was if too few are shared, or if they would move it far.
+    """
+    if min(len(a.walls.data), len(b.walls.data)) < _LAYING.min_pairs:
+        return known
+    found = register_coarsely(
+        b.walls.data,
+        a.walls,
+        a.walls.data,
+        known.pose,
+        _LOOSELY,
+        _LAYING,
+        _LAID_FROM_M,
+        sides=Sides(a.sights, b.sights),
+    )
+    if found is None:
+        return known
+    moved_by = found.pose.transform(b.points) - known.pose.transform(b.points)
+    return replace(known, pose=found.pose) if np.hypot(*moved_by.T).max() < _LAID_BY_M else known
 
 
 def _elsewhere(side: Side, shared: set[int]) -> list[_Evidence]:

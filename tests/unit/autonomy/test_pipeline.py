@@ -118,6 +118,6 @@ def offset_beside(away: float, *, in_team: bool) -> float:
 
 
 def test_the_gvg_leads_round_robots_of_the_team_that_are_near_only() -> None:
-    assert offset_beside(2.0, in_team=True) == pytest.approx((1.5 + 0.18) / 2, abs=0.15)
-    assert offset_beside(5.0, in_team=True) == pytest.approx(offset_beside(5.0, in_team=False))
-    assert offset_beside(5.0, in_team=False) < 0.1
+    assert offset_beside(1.5, in_team=True) == pytest.approx((1.5 + 0.18) / 2, abs=0.15)
+    assert offset_beside(3.0, in_team=True) == pytest.approx(offset_beside(3.0, in_team=False))
+    assert offset_beside(3.0, in_team=False) < 0.1

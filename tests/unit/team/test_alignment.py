@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gvgbot.geometry import Pose, wrap_angle
-from gvgbot.team.alignment import align, least_squares, refined
+from gvgbot.team.alignment import Alignment, align, least_squares, refined
 from tests.unit.team.building import irregular, lattice
 
 STARTS = Pose(3.0, -2.0, 0.7), Pose(11.0, 6.0, -2.4)
@@ -75,6 +75,25 @@ def test_a_vertex_that_one_robot_took_somebody_for_does_not_part_the_maps() -> N
     kept = refined(ours, theirs, found)
     assert kept is not None
     assert kept.pose.distance(found.pose) < 0.1
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("off", [Pose(0.2, -0.1, 0.03), Pose(-0.1, 0.2, -0.03)])
+def test_what_was_known_about_is_known_well_by_the_walls_of_a_few_shared_places(
+    off: Pose, seed: int
+) -> None:
+    building, rng = irregular(seed), np.random.default_rng(seed)
+    ours = building.chart({0, 1, 2, 5, 6, 7}, STARTS[0], rng)
+    theirs = building.chart({2, 3, 4, 7, 8, 9}, STARTS[1], rng)  # two of them
+    true = STARTS[0].to(STARTS[1])
+    shared = true.inverse().transform(ours.vertices[2].position)
+    there = Pose(*shared.tolist(), 0.0)
+    about = true.compose(there).compose(off).compose(there.inverse())
+    found = refined(ours, theirs, Alignment(about, np.eye(3), (), 0.999))
+    assert found is not None
+    places = np.array([vertex.position for vertex in theirs.vertices.values()])
+    assert np.hypot(*(found.pose.transform(places) - true.transform(places)).T).max() < 0.05
+    assert abs(wrap_angle(found.pose.theta - true.theta)) < 0.005
 
 
 def test_the_covariance_of_a_frame_grows_with_how_far_apart_the_charts_stay() -> None:
