@@ -87,7 +87,7 @@ def test_what_was_known_about_is_known_well_by_the_walls_of_a_few_shared_places(
     theirs = building.chart({2, 3, 4, 7, 8, 9}, STARTS[1], rng)  # two of them
     true = STARTS[0].to(STARTS[1])
     shared = true.inverse().transform(ours.vertices[2].position)
-    there = Pose(*shared.tolist(), 0.0)
+    there = Pose(float(shared[0]), float(shared[1]), 0.0)
     about = true.compose(there).compose(off).compose(there.inverse())
     found = refined(ours, theirs, Alignment(about, np.eye(3), (), 0.999))
     assert found is not None
