@@ -97,10 +97,11 @@ class _Scene:
         draw_ground(canvas, view, self._growth.grid(time))
         for edge in edges:
             symbols.draw_edge(canvas, view.pixels(edge.polyline))
-        symbols.draw_estimate(canvas, view.pixels(path[:, :2]))
+        for stretch in path.stretches:
+            symbols.draw_estimate(canvas, view.pixels(stretch))
         for vertex in vertices:
             _draw_vertex(canvas, view, vertex, edges)
-        symbols.draw_robot(canvas, view.pixel(path[-1, :2]), float(path[-1, 2]))
+        symbols.draw_robot(canvas, view.pixel(path.positions[-1]), float(path.poses[-1, 2]))
         canvas.frame(pair(view.corner), pair(view.size))
         return canvas
 
@@ -135,6 +136,6 @@ def _caption(growth: Growth, time: float) -> str:
 
 def _facts(growth: Growth, time: float) -> str:
     vertices, edges = growth.graph(time)
-    steps = np.diff(growth.path(time)[:, :2], axis=0)
+    steps = np.diff(growth.path(time).positions, axis=0)
     driven = float(np.hypot(steps[:, 0], steps[:, 1]).sum())
     return f"{counts(vertices, edges)}, {driven:.0f} m driven"

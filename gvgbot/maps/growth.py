@@ -12,6 +12,7 @@ from gvgbot.maps.edge_history import edges_found
 from gvgbot.maps.occupancy import UNKNOWN, OccupancyGrid
 from gvgbot.maps.route_graph import MapEdge, MapVertex
 from gvgbot.maps.saved_run import SavedRun
+from gvgbot.maps.trajectory import Trajectory
 
 _DEPARTURE_M = 0.5  # how far along an edge its bearing at the vertex shows
 
@@ -40,11 +41,16 @@ class Growth:
         """From the first row of the estimate to the last, s."""
         return float(self.run.estimate.stamps[-1] - self.run.estimate.stamps[0])
 
-    def path(self, time: float) -> Array:
-        """x, y, theta (N, 3) of the way so far; the last row is where the robot is."""
+    def path(self, time: float) -> Trajectory:
+        """The way so far; the last row is where the robot is."""
         estimate = self.run.estimate
-        rows = int(np.searchsorted(estimate.stamps - estimate.stamps[0], time, side="right"))
-        return estimate.poses[: max(1, rows)]
+        rows = max(1, self._rows(estimate.stamps, time))
+        return Trajectory(estimate.stamps[:rows], estimate.poses[:rows])
+
+    def _rows(self, stamps: Array, time: float) -> int:
+        """How many of these stamps there were by then."""
+        begin = self.run.estimate.stamps[0]
+        return int(np.searchsorted(stamps - begin, time, side="right"))
 
     def grid(self, time: float) -> OccupancyGrid:
         """The last grid, as far as it had been seen."""

@@ -60,8 +60,9 @@ def draw_map_on(
     bottom = view.corner[1] + view.size[1]
     canvas = sheet(round(width) + 2 * _MARGIN, round(bottom + signs.height) + _MARGIN)
     draw_ground(canvas, view, grid)
-    symbols.draw_odometry(canvas, view.pixels(raw))
-    _draw_graph(canvas, view, graph, path)
+    for stretch in _stretches(odometry):
+        symbols.draw_odometry(canvas, view.pixels(stretch))
+    _draw_graph(canvas, view, graph, _stretches(estimate))
     if estimate is not None and len(path):
         symbols.draw_start(canvas, view.pixel(path[0]), float(estimate.poses[0, 2]))
     canvas.frame(pair(view.corner), pair(view.size))
@@ -111,11 +112,17 @@ def _shades(grid: OccupancyGrid) -> NDArray[np.uint8]:
     return np.where(grid.cells[::-1] == UNKNOWN, Ink.UNKNOWN, percent).astype(np.uint8)
 
 
-def _draw_graph(canvas: Surface, view: View, graph: RouteGraph, path: Array) -> None:
+def _stretches(trajectory: Trajectory | None) -> list[Array]:
+    """The lines (N, 2), m, that were driven."""
+    return [] if trajectory is None else trajectory.stretches
+
+
+def _draw_graph(canvas: Surface, view: View, graph: RouteGraph, path: list[Array]) -> None:
     """Edges, then the path over them, then the vertices with their ids on top."""
     for edge in graph.edges:
         symbols.draw_edge(canvas, view.pixels(edge.polyline))
-    symbols.draw_estimate(canvas, view.pixels(path))
+    for stretch in path:
+        symbols.draw_estimate(canvas, view.pixels(stretch))
     for vertex in graph.vertices:
         at = view.pixel(vertex.position)
         symbols.draw_ellipse(canvas, at, _half_axes(vertex) * view.scale)

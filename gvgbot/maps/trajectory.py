@@ -4,10 +4,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gvgbot.errors import UsageError
 from gvgbot.geometry import Array, wrap_angles
 
+_HOLE_S = 1.0  # from one row to the next: what was driven in a longer one is not told
 _TUM_LINE = "%.6f %.6f %.6f 0 0 0 %.9f %.9f\n"
 
 
@@ -28,6 +30,20 @@ class Trajectory:
     def positions(self) -> Array:
         """x, y (N, 2) in m."""
         return self.poses[:, :2]
+
+    @property
+    def holes(self) -> NDArray[np.bool_]:
+        """After which rows but the last nothing is told for a while (N - 1,), as in a lost robot's.
+
+        It may have been carried meanwhile, or what it drove was forgotten.
+        """
+        holes: NDArray[np.bool_] = np.diff(self.stamps) > _HOLE_S
+        return holes
+
+    @property
+    def stretches(self) -> list[Array]:
+        """x, y (N, 2) in m, from hole to hole: lines that were driven."""
+        return np.split(self.positions, np.flatnonzero(self.holes) + 1)
 
 
 def encode_tum(trajectory: Trajectory) -> str:

@@ -16,6 +16,7 @@ from gvgbot.maps.saved_run import SavedRun
 from tests.unit.maps.small_run import write_run
 
 BLACK, BLUE, SKY, ORANGE = (20, 20, 20), (0, 90, 150), (86, 180, 233), (230, 159, 0)
+GREEN = (0, 120, 85)
 UNKNOWN, GREY = (238, 238, 238), (120, 120, 120)
 
 Pixels = NDArray[np.uint8]
@@ -62,6 +63,15 @@ def test_the_robot_drives_and_the_map_grows_before_it(growth: Growth) -> None:
     unknown = [len(columns_of(p, UNKNOWN)) for p in pictures]
     assert unknown == sorted(unknown, reverse=True)
     assert unknown[0] > 0.6 * pictures[0].shape[0] * width
+
+
+def test_no_path_leads_to_where_the_robot_was_carried(tmp_path: Path) -> None:
+    directory = write_run(tmp_path / "run")
+    lines = (directory / "estimate.tum").read_text().splitlines(keepends=True)
+    (directory / "estimate.tum").write_text("".join(lines[:31] + lines[71:]))  # of four metres
+    end = frames(gif(Growth.of(SavedRun.read(directory)), 2))[0][-1]
+    columns = np.unique(columns_of(end, GREEN))
+    assert np.diff(columns).max() == pytest.approx(end.shape[1] * 4.0 / 12.5, rel=0.1)
 
 
 def test_graph_and_frontiers_appear_when_they_were_found(growth: Growth) -> None:

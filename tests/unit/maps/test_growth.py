@@ -36,9 +36,9 @@ def test_vertices_and_edges_are_there_from_their_events_on(
 
 def test_the_path_ends_where_the_robot_is(growth: Growth) -> None:
     assert growth.duration == pytest.approx(10.0)
-    assert growth.path(0.0) == pytest.approx(np.zeros((1, 3)))
-    assert growth.path(3.25)[-1] == pytest.approx([3.2, 0.0, 0.0])
-    assert len(growth.path(10.0)) == 101
+    assert growth.path(0.0).poses == pytest.approx(np.zeros((1, 3)))
+    assert growth.path(3.25).poses[-1] == pytest.approx([3.2, 0.0, 0.0])
+    assert len(growth.path(10.0).stamps) == 101
 
 
 def test_the_grid_is_known_as_far_as_it_had_been_seen(growth: Growth) -> None:

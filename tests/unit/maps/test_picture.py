@@ -177,6 +177,20 @@ def path(*corners: list[float]) -> Trajectory:
     return Trajectory(np.linspace(0.0, 50.0, 500), poses)
 
 
+def test_no_path_leads_to_where_the_robot_was_carried() -> None:
+    before, after = path([0, 5], [5, 5]), path([15, 5], [20, 5])
+    carried = Trajectory(
+        np.concatenate([before.stamps, after.stamps + 60.0]),  # ten seconds later
+        np.concatenate([before.poses, after.poses]),
+    )
+    part = map_part(pixels(draw_map(TRIANGLE, estimate=carried, odometry=carried)))
+    drawn = of_colour(part, GREEN).any(axis=0) | of_colour(part, RED).any(axis=0)
+    columns = np.flatnonzero(drawn)
+    gaps = np.diff(columns)
+    assert gaps.max() == pytest.approx(0.5 * np.ptp(columns), rel=0.05)
+    assert (np.sort(gaps)[:-1] < 3).all()
+
+
 def test_odometry_that_went_astray_does_not_shrink_the_map() -> None:
     lost = path([0, 0], [4000, 4000])
     (x3, _), (_, _), (x2, _) = discs(pixels(draw_map(TRIANGLE, odometry=lost)))

@@ -87,3 +87,11 @@ def test_stamps_and_poses_must_be_as_many() -> None:
 def test_no_pose_is_an_empty_file() -> None:
     assert encode_tum(Trajectory(np.empty(0), np.empty((0, 3)))) == ""
     assert decode_tum("").poses.shape == (0, 3)
+
+
+def test_a_stretch_ends_where_nothing_is_told_for_a_while() -> None:
+    stamps = np.array([0.0, 0.1, 0.2, 9.0, 9.1])
+    x = np.arange(5.0)
+    way = Trajectory(stamps, np.column_stack([x, 0.0 * x, 0.0 * x]))
+    assert [stretch[:, 0].tolist() for stretch in way.stretches] == [[0.0, 1.0, 2.0], [3.0, 4.0]]
+    assert way.holes.tolist() == [False, False, True, False]
