@@ -136,6 +136,4 @@ def _caption(growth: Growth, time: float) -> str:
 
 def _facts(growth: Growth, time: float) -> str:
     vertices, edges = growth.graph(time)
-    steps = np.diff(growth.path(time).positions, axis=0)
-    driven = float(np.hypot(steps[:, 0], steps[:, 1]).sum())
-    return f"{counts(vertices, edges)}, {driven:.0f} m driven"
+    return f"{counts(vertices, edges)}, {growth.driven(time):.0f} m driven"

@@ -47,6 +47,22 @@ class Growth:
         rows = max(1, self._rows(estimate.stamps, time))
         return Trajectory(estimate.stamps[:rows], estimate.poses[:rows])
 
+    def driven(self, time: float) -> float:
+        """Metres driven by then, as odometry has it: at the end those of the summary.
+
+        What odometry does not tell was driven in its holes.
+        """
+        odometry, summary = self.run.odometry, self.run.summary
+        steps = np.hypot(*np.diff(odometry.positions, axis=0).T)
+        if summary is not None:
+            spans = np.diff(odometry.stamps) * odometry.holes
+            steps[odometry.holes] = 0.0
+            share = spans if spans.any() else steps
+            untold = summary.distance_m - steps.sum()
+            steps += untold * share / max(1e-9, float(share.sum()))
+        rows = self._rows(odometry.stamps, time)
+        return max(0.0, float(steps[: max(0, rows - 1)].sum()))
+
     def _rows(self, stamps: Array, time: float) -> int:
         """How many of these stamps there were by then."""
         begin = self.run.estimate.stamps[0]

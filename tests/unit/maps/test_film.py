@@ -1,6 +1,7 @@
 """Films are judged by their pixels, in a corridor along which the robot drives to the right."""
 
 import io
+import json
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from PIL import Image
 from scipy import ndimage
 
 from gvgbot.maps.canvas import Canvas
+from gvgbot.maps.drawing import Drawing
 from gvgbot.maps.film import clock, draw_strip, gif
 from gvgbot.maps.growth import Growth
 from gvgbot.maps.saved_run import SavedRun
@@ -81,6 +83,15 @@ def test_graph_and_frontiers_appear_when_they_were_found(growth: Growth) -> None
     assert np.ptp(columns_of(start, ORANGE)) < 0.1 * end.shape[1]  # about the first vertex
     assert np.ptp(columns_of(before, BLUE)) > 0.8 * end.shape[1]  # the first and the last
     assert len(columns_of(before, ORANGE)) > len(columns_of(end, ORANGE)) > 0
+
+
+def test_the_last_frame_says_what_the_summary_says(tmp_path: Path) -> None:
+    directory = write_run(tmp_path / "run")
+    summary = json.loads((directory / "summary.json").read_text())
+    (directory / "summary.json").write_text(json.dumps(summary | {"distance_m": 13.2}))
+    sheet = draw_strip(Drawing, Growth.of(SavedRun.read(directory)), 2)
+    caption = next(words.words for words in sheet.words if "driven" in words.words)
+    assert caption.endswith(", 13 m driven")
 
 
 @pytest.mark.parametrize("moments", [2, 5, 7])

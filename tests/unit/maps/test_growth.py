@@ -1,5 +1,6 @@
 """What was found by when, in a run whose every event is known."""
 
+import json
 import math
 from pathlib import Path
 
@@ -39,6 +40,34 @@ def test_the_path_ends_where_the_robot_is(growth: Growth) -> None:
     assert growth.path(0.0).poses == pytest.approx(np.zeros((1, 3)))
     assert growth.path(3.25).poses[-1] == pytest.approx([3.2, 0.0, 0.0])
     assert len(growth.path(10.0).stamps) == 101
+
+
+def test_the_metres_driven_are_in_the_end_those_of_the_summary(tmp_path: Path) -> None:
+    directory = write_run(tmp_path / "run")
+    summary = json.loads((directory / "summary.json").read_text())
+    (directory / "summary.json").write_text(json.dumps(summary | {"distance_m": 11.0}))
+    growth = Growth.of(SavedRun.read(directory))
+    assert growth.driven(0.0) == 0.0
+    assert growth.driven(5.0) == pytest.approx(5.5)
+    assert growth.driven(growth.duration) == pytest.approx(11.0)
+
+
+def test_metres_that_no_row_tells_were_driven_in_between(tmp_path: Path) -> None:
+    directory = write_run(tmp_path / "run")
+    lines = (directory / "odometry.tum").read_text().splitlines(keepends=True)
+    (directory / "odometry.tum").write_text("".join(lines[:31] + lines[71:]))
+    summary = json.loads((directory / "summary.json").read_text())
+    (directory / "summary.json").write_text(json.dumps(summary | {"distance_m": 500.0}))
+    growth = Growth.of(SavedRun.read(directory))
+    assert growth.driven(2.0) == pytest.approx(2.0)
+    assert growth.driven(9.0) == pytest.approx(499.0)
+    assert growth.driven(10.0) == pytest.approx(500.0)
+
+
+def test_of_a_run_that_was_killed_odometry_tells_the_metres(tmp_path: Path) -> None:
+    directory = write_run(tmp_path / "run")
+    (directory / "summary.json").unlink()
+    assert Growth.of(SavedRun.read(directory)).driven(10.0) == pytest.approx(10.0)
 
 
 def test_the_grid_is_known_as_far_as_it_had_been_seen(growth: Growth) -> None:
