@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 from collections import deque
 from collections.abc import Awaitable, Callable, Sequence
+from pathlib import Path
 from types import TracebackType
 from typing import Self
 
@@ -32,7 +33,7 @@ from gvgbot.topics import (
     alive_key,
     team_key,
 )
-from gvgbot.zenoh_config import addresses, reason, session_config
+from gvgbot.zenoh_config import addresses, opened, reason, session_config
 
 _WAITING_QUERIES = 1000  # more than this are dropped, oldest first; who asked gets nothing
 # While as many wait, others are refused; then dropped; then even those that stop the robot.
@@ -67,7 +68,7 @@ class Telemetry:
         self._robot = robot
         settings = _session_config(config, relays=relays)
         self.addresses = ", ".join(addresses(settings, "listen"))  # perhaps those of a file
-        self._session = _open(settings, addresses(settings, "listen"))
+        self._session = _open(settings, config.zenoh_file, addresses(settings, "listen"))
         self._publishers = {topic.payload: (topic, self._publisher(topic)) for topic in TOPICS}
         self._alive = self._session.liveliness().declare_token(alive_key(robot))
 
@@ -276,9 +277,9 @@ def _form(topic: Topic, wanted: str | None) -> tuple[Callable[[Payload], bytes],
     return msgspec.msgpack.encode, zenoh.Encoding(topic.encoding)
 
 
-def _open(config: zenoh.Config, listen: Sequence[str]) -> zenoh.Session:
+def _open(config: zenoh.Config, file: Path | None, listen: Sequence[str]) -> zenoh.Session:
     try:
-        return zenoh.open(config)
+        return opened(config, file)
     except zenoh.ZError as error:
         others = ", ".join(map(_next_port, listen))
         raise GvgbotError(

@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from importlib.resources import files
 from pathlib import Path
 from typing import Literal
@@ -46,6 +46,49 @@ def addresses(config: zenoh.Config, what: Literal["listen", "connect"]) -> list[
     if isinstance(found, dict):  # for each mode its own
         found = found.get(json.loads(config.get_json("mode")))
     return found or []
+
+
+def opened(config: zenoh.Config, file: Path | None = None) -> zenoh.Session:
+    """A session; `file` is the one that the configuration was read from.
+
+    Raises UsageError for a key or certificate that cannot be read, zenoh.ZError if the session
+    cannot be opened.
+    """
+    for name, path in _files(config):
+        try:
+            Path(path).open("rb").close()
+        except OSError as error:
+            raise UsageError(
+                f"cannot read {path}: {error.strerror}; put it there, or change "
+                f"{name} in {file or 'the configuration of zenoh'}"
+            ) from error
+    return zenoh.open(config)
+
+
+def _files(config: zenoh.Config) -> Iterator[tuple[str, str]]:
+    """The files that a session of a configuration needs, after what names them."""
+    tls = json.loads(config.get_json("transport/link/tls"))
+    listens = json.loads(config.get_json("mode")) != "client" and _has_tls(config, "listen")
+    connects = _has_tls(config, "connect")
+    needed = {
+        "root_ca_certificate": connects or (listens and tls["enable_mtls"]),
+        "listen_private_key": listens,
+        "listen_certificate": listens,
+        "connect_private_key": connects and tls["enable_mtls"],
+        "connect_certificate": connects and tls["enable_mtls"],
+    }
+    yield from ((name, tls[name]) for name, is_needed in needed.items() if is_needed and tls[name])
+    passwords = json.loads(config.get_json("transport/auth/usrpwd/dictionary_file"))
+    if passwords:
+        yield "dictionary_file", passwords
+
+
+def _has_tls(config: zenoh.Config, what: Literal["listen", "connect"]) -> bool:
+    """Whether an address needs the files that are named for all of its kind, and not its own."""
+    return any(
+        address.startswith(("tls/", "quic/")) and "#" not in address
+        for address in addresses(config, what)
+    )
 
 
 def _read(file: Path) -> zenoh.Config:

@@ -47,7 +47,7 @@ from gvgbot.topics import (
     is_endpoint,
     is_robot_name,
 )
-from gvgbot.zenoh_config import reason, session_config
+from gvgbot.zenoh_config import opened, reason, session_config
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 
@@ -480,7 +480,7 @@ def _open(endpoint: str, patience_s: float, file: Path | None) -> zenoh.Session:
     if endpoint != DEFAULT_ENDPOINT:  # somebody wants this one, whatever the file says
         config.insert_json5("connect/endpoints", json.dumps([endpoint]))
     try:
-        return zenoh.open(config)
+        return opened(config, file)
     except zenoh.ZError as error:
         where = ", ".join(json.loads(config.get_json("connect/endpoints")))
         if "Unable to connect" in str(error):

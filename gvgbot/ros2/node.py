@@ -16,7 +16,7 @@ from gvgbot.ros2 import messages
 from gvgbot.ros2.cdr import decode_twist
 from gvgbot.ros2.config import Ros2Config
 from gvgbot.ros2.topics import TOPICS, Node, Topic, attachment, gid
-from gvgbot.zenoh_config import addresses, reason, session_config
+from gvgbot.zenoh_config import addresses, opened, reason, session_config
 
 _HEARTBEAT_S = 0.5  # by which receivers of latched topics find out that they have missed one
 _TWISTS = {"Twist": messages.Twist, "TwistStamped": messages.TwistStamped}
@@ -177,7 +177,7 @@ def _settings(config: Ros2Config) -> zenoh.Config:
 
 def _open(settings: zenoh.Config, config: Ros2Config) -> zenoh.Session:
     try:
-        return zenoh.open(settings)
+        return opened(settings, config.zenoh_file)
     except zenoh.ZError as error:
         raise GvgbotError(
             f"cannot meet ROS 2 from {', '.join(config.listen)}: {reason(error)}; "
