@@ -14,13 +14,14 @@ from gvgbot.drivers.kobuki.driver import KobukiConfig
 from gvgbot.drivers.kobuki.twin import KobukiTwinConfig
 from gvgbot.foxglove.config import FoxgloveConfig
 from gvgbot.hal.guard import GuardConfig
+from gvgbot.names import is_robot_name
 from gvgbot.ranges import Range
 from gvgbot.recording.config import RecordingConfig
 from gvgbot.ros2.config import Ros2Config
 from gvgbot.strict_yaml import load, load_text, packaged
 from gvgbot.team.member import TeamConfig
 from gvgbot.team.troubles import TroublesConfig
-from gvgbot.topics import TelemetryConfig, is_robot_name
+from gvgbot.topics import TelemetryConfig
 
 DEFAULT = "sim.yaml"
 

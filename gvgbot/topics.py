@@ -1,6 +1,5 @@
 """What the robot says on the network: the table of topics, and the types that travel."""
 
-import re
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
@@ -46,11 +45,6 @@ class TelemetryConfig:
                     )
         if self.enabled and not self.listen:
             raise ValueError("listen is empty: give an address, or set enabled: false")
-
-
-def is_robot_name(text: str) -> bool:
-    """Whether the text can be a robot's part of a key."""
-    return re.fullmatch(r"[A-Za-z0-9_-]+", text) is not None
 
 
 def is_endpoint(text: str) -> bool:

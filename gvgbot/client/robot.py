@@ -20,6 +20,7 @@ from gvgbot.client.newest import Newest, decoded
 from gvgbot.client.presence import Presence, Signs
 from gvgbot.client.tiles import Tiles
 from gvgbot.errors import GvgbotError, UsageError
+from gvgbot.names import is_robot_name
 from gvgbot.requests import Arguments, Goto, Nothing, Patrol, RequestName, Set
 from gvgbot.topics import (
     EVENTS,
@@ -45,7 +46,6 @@ from gvgbot.topics import (
     Trajectory,
     alive_key,
     is_endpoint,
-    is_robot_name,
 )
 from gvgbot.zenoh_config import opened, reason, session_config
 

@@ -8,6 +8,7 @@ import numpy as np
 from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.errors import GvgbotError
 from gvgbot.geometry import Array
+from gvgbot.names import ROBOT_NAME
 from gvgbot.team.chart import Chart, ChartEdge, ChartVertex, Departure
 
 _WALL_M = 0.01  # unit of the walls around a vertex, as they travel
@@ -16,7 +17,7 @@ _MOST_M = 1e5  # from the origin of a map
 _MOST_WAY_M = 2e4  # of all edges together
 
 # Whoever tells may be broken, or no robot at all.
-Name = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9_-]+\Z")]
+Name = Annotated[str, msgspec.Meta(pattern=rf"^{ROBOT_NAME}\Z")]
 Number = Annotated[float, msgspec.Meta(ge=-_MOST_M, le=_MOST_M)]  # and one
 Radius = Annotated[float, msgspec.Meta(gt=0.0, le=10.0)]
 Triple = tuple[Number, Number, Number]  # a pose: x, y, m, and theta, rad
