@@ -70,6 +70,7 @@ class _Mate:
     moved: float  # stamp of the news by which it was elsewhere before
     course: Array = field(default_factory=lambda: np.empty((0, 2)))
     courses: int = 0  # the number of the newest
+    steered: float = float("-inf")  # stamp of the own clock when that was heard
     alignment: Alignment | None = None
     tried: float = float("-inf")  # stamp of the last attempt to align
     sizes: tuple[int, ...] = ()  # of both charts then
@@ -198,9 +199,12 @@ class Member:
 
     def _follow(self, course: Course, stamp: float) -> None:
         mate = self._mates.get(course.robot)
-        if mate is None or mate.news.life != course.life or course.sequence <= mate.courses:
+        if mate is None or mate.news.life != course.life:
+            return
+        if course.sequence <= mate.courses and not self._is_long_ago(mate.steered):
             return
         mate.courses, mate.seen = course.sequence, stamp
+        mate.steered = stamp
         mate.map_base, mate.course = Pose(*course.pose), course.points
         if course.look is not None:
             bodies = np.array(course.look.bodies).reshape(-1, 3)
@@ -227,7 +231,7 @@ class Member:
         if mate is None or mate.news.life != news.life:
             there = Pose(*news.pose)
             self._mates[news.robot] = _Mate(news, news.chart, stamp, there, there, stamp, stamp)
-        elif news.sequence > mate.news.sequence:
+        elif news.sequence > mate.news.sequence or self.is_lost(news.robot):
             mate.news, mate.chart, mate.heard = news, news.chart, stamp
             before, mate.map_base, mate.seen = mate.told_at, Pose(*news.pose), stamp
             mate.told_at = mate.map_base
@@ -320,7 +324,14 @@ class Member:
 
     def is_lost(self, name: str) -> bool:
         """Whether nothing has been heard of a robot for long."""
-        return self._stamp - self._mates[name].heard > self._config.lost_after_s
+        return self._is_long_ago(self._mates[name].heard)
+
+    def _is_long_ago(self, heard: float) -> bool:
+        """Whether what was heard then is no measure any more of what is old and what is new.
+
+        So a number that somebody else told in a robot's name silences it for a while only.
+        """
+        return self._stamp - heard > self._config.lost_after_s
 
     def others(self) -> dict[str, Pose]:
         """Where the others are, own map frame, if that is known: who has finished stays there."""

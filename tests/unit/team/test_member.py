@@ -4,6 +4,7 @@ from functools import cache
 
 import msgspec
 import numpy as np
+import pytest
 
 from gvgbot.autonomy.control.company import BodiesSeen
 from gvgbot.autonomy.exploration.paths import Approach
@@ -250,6 +251,24 @@ def test_an_old_course_changes_nothing() -> None:
     there = one.member.company()[0].pose
     one.member.hear(old, 3.3)
     assert one.member.company()[0].pose == there
+
+
+def test_a_huge_number_told_in_its_name_silences_no_robot_for_good() -> None:
+    one, two = team()
+    news = two.member.news(2.0, Pose(), finished=False)
+    one.member.hear(msgspec.structs.replace(news, sequence=2**62), 2.0)
+    course = two.member.course(2.0, Pose(), np.zeros((0, 2)))
+    one.member.hear(msgspec.structs.replace(course, sequence=2**62), 2.0)
+    late = 2.0 + CONFIG.lost_after_s
+    two.tell(late - 0.1, one, at=Pose(2.0, 0.0, 0.0))
+    two.steer(late - 0.1, one, Pose(2.5, 0.0, 0.0), np.zeros((0, 2)))
+    before = one.member.others()["two"]
+    two.tell(late + 0.1, one, at=Pose(3.0, 0.0, 0.0))
+    two.steer(late + 0.2, one, Pose(4.0, 0.0, 0.0), np.zeros((0, 2)))
+    assert not one.member.is_lost("two")
+    assert one.member.others()["two"].distance(before) == pytest.approx(4.0)
+    two.tell(late + 2.0, one, at=Pose(5.0, 0.0, 0.0))
+    assert one.member.others()["two"].distance(before) == pytest.approx(5.0)
 
 
 def given_up(chart: Chart) -> Chart:
