@@ -143,6 +143,7 @@ class ReturningPipeline(Pipeline):
         self.mission.reason = _doubt(opinion)
         if not opinion.is_hopeless and self._goes_on(seeker, scan.stamp):
             return []
+        self.mission.reason = _given_up(opinion)
         self.mission.outcome, self._seeker = "failed", None
         return [Finished(scan.stamp, "failed", self.mission.reason)]
 
@@ -214,6 +215,12 @@ class ReturningPipeline(Pipeline):
         for hazard in seeker._hazards._all:
             hazard.travelled += self.travelled - seeker.travelled
         self._hazards._all += seeker._hazards._all
+
+
+def _given_up(opinion: Opinion) -> str:
+    """How unsure it is when nothing is left to look at, and what to do about it."""
+    doubt = _doubt(opinion).removesuffix(" yet")
+    return f"{doubt}; start it where it stopped, or begin a new map (gvgbot run --new)"
 
 
 def _doubt(opinion: Opinion) -> str:

@@ -120,7 +120,9 @@ def test_in_another_building_it_claims_no_place_and_spoils_no_map(
     last = lives.run([])
     assert last.pipeline.is_lost
     assert summary(tmp_path)["outcome"] == "failed"
-    assert "not sure where it is" in str(summary(tmp_path)["reason"])
+    reason = str(summary(tmp_path)["reason"])
+    assert reason.startswith("not sure where it is: ")
+    assert reason.endswith("; start it where it stopped, or begin a new map (gvgbot run --new)")
     assert vertices(tmp_path) == vertices(whole)
     assert not (tmp_path / SNAPSHOT).exists()
 
