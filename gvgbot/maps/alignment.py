@@ -15,7 +15,7 @@ from scipy.spatial.distance import cdist
 from gvgbot.geometry import Array, Pose, resampled
 from gvgbot.maps.moved import moved_graph
 from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
-from gvgbot.team.alignment import least_squares
+from gvgbot.team.laying import least_squares
 
 _MOST_TRIES = 4000  # the longest edges come first: they give the best angles
 _FITS = 10  # rounds of pairing and fitting, more than were ever needed

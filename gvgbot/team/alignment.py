@@ -12,39 +12,28 @@ nothing.
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from functools import cached_property
 from itertools import chain
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
-from gvgbot.autonomy.slam.recognition import match_bearings
-from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig, Sides, register_coarsely
-from gvgbot.geometry import Array, Pose, resampled, wrap_angle
-from gvgbot.team.chart import Chart, ChartVertex, thinned
+from gvgbot.geometry import Array, Pose, wrap_angle
+from gvgbot.team.chart import Chart
+from gvgbot.team.laying import fitted, laid_on_walls, least_squares
+from gvgbot.team.likeness import UNLIKE_SHARE, as_clear, likeness
+from gvgbot.team.side import SPACING_M, Complex, Side
 
 _SAME_M = 0.7  # vertices nearer to each other may be one
 _LEAST_BASE_M = 1.0  # between two vertices that suggest a transform
 _LENGTH_M, _LENGTH_SHARE = 0.35, 0.03  # by which the same stretch may differ in two charts
-_CLEARANCE_M, _CLEARANCE_SHARE = 0.1, 0.03
-_BEARING_RAD = 0.7
-_BEYOND_M = 1.2  # of a vertex's disc, walls must agree
-_SECTORS, _THICK_M = 90, 0.3  # around a vertex; in each, walls farther behind the first are hidden
-_WALL_M = 0.15  # a point so near to a wall lies on it
-_SHIFT_M, _TURN_RAD = 0.35, 0.1  # by which charts may be bent against each other at a vertex
-_LAID_OUT = 3  # rounds of laying walls on walls
-_ALIKE_SHARE = 0.85  # of the walls around a vertex, on either side, speaks for it,
-_UNLIKE_SHARE = 0.6  # and less than this against it; one robot may not have seen all
-_HOPELESS_SHARE = 0.5  # if fewer of them lie twice as near, they need not be laid out further
+_ALIKE_SHARE = 0.85  # of the walls around a vertex, on either side, speaks for it
 _FITS = 5  # rounds of pairing and fitting
 _LAID_AT_A_TIME = 50_000  # vertices, to find out which transforms promise most
 _EXAMINED, _MISFITS = 12, 6  # transforms that are looked at closely, of a chart onto itself
 _APART_M, _APART_RAD = 1.0, 0.25  # transforms nearer to each other are the same
 _ON_EDGE_M = 0.4  # so near to an edge, a vertex should be known on it
 _OFF_VERTEX_M = 1.0  # but not so near to a vertex of that chart
-_SPACING_M = 0.2  # of points along an edge, where it is tested for walls
 _SPOKEN = 0.55  # share of an edge's clearance that is surely free, whatever the drift
 _CROSSING = 0.02  # share of the edges that walls may seem to cross, by the blur of either chart
 
@@ -62,13 +51,6 @@ _AGAINST_SHARE = 0.1  # of all vertices that are judged,
 _MISSED_SHARE = 0.3
 _SURE = 0.995
 _MISTAKES = 2  # vertices of either kind do not refute what was sure
-
-_LAYING = ScanMatchingConfig(pair_sigma_m=0.05)  # walls of one chart on those of another
-_LAID_FROM_M = (0.6,)  # farther away, in the beginning
-_LAID_BY_M = 1.5  # at most, where the other robot has been
-_LOOSELY = np.diag([1.0, 1.0, 0.1**2])  # what is known before, where walls tell nothing
-
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -155,72 +137,12 @@ class _Chance:
         )
 
 
-class Side:
-    """A chart as alignment needs it; made once, used for many transforms."""
-
-    def __init__(self, chart: Chart) -> None:
-        self.chart = chart
-        self.ids = list(chart.vertices)
-        self.vertices = list(chart.vertices.values())
-        self.points = np.array([v.position for v in self.vertices]).reshape(-1, 2)
-        self.is_meetpoint = np.array([v.is_meetpoint for v in self.vertices], bool)
-
-    @cached_property
-    def walls(self) -> cKDTree:
-        """All walls that are told."""
-        around = [vertex.walls for vertex in self.vertices]
-        return cKDTree(thinned(np.concatenate([np.empty((0, 2)), *around])))
-
-    @cached_property
-    def sights(self) -> Array:
-        """From each of the walls (N, 2) the way to the vertex that tells of it: seen there."""
-        told = [vertex.walls for vertex in self.vertices]
-        teller = np.repeat(np.arange(len(told)), [len(walls) for walls in told])
-        _, nearest = cKDTree(np.concatenate(told)).query(self.walls.data)
-        sights: Array = self.points[teller[nearest]] - self.walls.data
-        return sights
-
-    @cached_property
-    def ways(self) -> tuple[Array, Array]:
-        """Points (N, 2) along all edges, and how far (N,) there is surely no wall."""
-        lines = [
-            (resampled(e.polyline, _SPACING_M), e.min_clearance) for e in self.chart.edges.values()
-        ]
-        points = np.concatenate([np.empty((0, 2)), *(line for line, _ in lines)])
-        free = np.concatenate([np.empty(0), *(np.full(len(line), c) for line, c in lines)])
-        return points, free
-
-    @cached_property
-    def way_tree(self) -> cKDTree:
-        """Points along all edges."""
-        return cKDTree(self.ways[0])
-
-    @cached_property
-    def misfits(self) -> list["_Evidence"]:
-        """What speaks for and against laying the chart onto itself, but not as it is."""
-        return [
-            found for found in _examined(self, self, _MISFITS) if not _is_identity(found.pose, self)
-        ]
-
-    @cached_property
-    def bases(self) -> tuple[NDArray[np.intp], Complex, Array]:
-        """Stretches over one edge or two: vertices (N, 2), their places, metres driven (N,)."""
-        index = {key: i for i, key in enumerate(self.ids)}
-        one = [(index[e.a.vertex], index[e.b.vertex], e.length) for e in self.chart.edges.values()]
-        both = one + [(b, a, metres) for a, b, metres in one]
-        two = [(a, d, m + n) for a, b, m in both for c, d, n in both if b == c and a < d]
-        rows = [(a, b, m) for a, b, m in chain(one, two) if a != b]
-        ends = np.array([(a, b) for a, b, _ in rows], np.intp).reshape(-1, 2)
-        metres = np.array([m for _, _, m in rows], np.float64)
-        return ends, (self.points[:, 0] + 1j * self.points[:, 1])[ends], metres
-
-
 def align(ours: Chart, theirs: Chart) -> Alignment | None:
     """How the other chart lies in ours, if that is beyond doubt."""
     a, b = Side(ours), Side(theirs)
     if min(len(a.ids), len(b.ids)) < _LEAST_PAIRS:
         return None
-    chance = _Chance.of(chain(a.misfits, b.misfits))
+    chance = _Chance.of(chain(_misfits(a), _misfits(b)))
     found = sorted(_examined(a, b), key=chance.weight, reverse=True)
     if not found or not found[0].is_possible:
         return None
@@ -231,8 +153,8 @@ def align(ours: Chart, theirs: Chart) -> Alignment | None:
     odds += math.exp(min(_TRIES - weight, 50.0))
     confidence = 1.0 / (1.0 + odds)
     pose, covariance = fitted(a.chart, b.chart, best.pairs)
-    result = Alignment(pose, covariance, best.pairs, confidence)
-    return _laid_on_walls(a, b, result) if result.is_sure else None
+    result = Alignment(laid_on_walls(a, b, pose), covariance, best.pairs, confidence)
+    return result if result.is_sure else None
 
 
 def refined(ours: Chart, theirs: Chart, known: Alignment) -> Alignment | None:
@@ -241,31 +163,11 @@ def refined(ours: Chart, theirs: Chart, known: Alignment) -> Alignment | None:
     evidence = _examine(a, b, known.pose)
     if evidence.is_possible:
         pose, covariance = fitted(ours, theirs, evidence.pairs)
-        return _laid_on_walls(a, b, Alignment(pose, covariance, evidence.pairs, known.confidence))
-    return None if evidence.is_refuted else _laid_on_walls(a, b, known)
-
-
-def _laid_on_walls(a: Side, b: Side, known: Alignment) -> Alignment:
-    """The same alignment by all walls that both tell of, which say more of the turn than vertices.
-
-    It stays as it was if too few are shared, or if they would move it far.
-    """
-    if min(len(a.walls.data), len(b.walls.data)) < _LAYING.min_pairs:
-        return known
-    found = register_coarsely(
-        b.walls.data,
-        a.walls,
-        a.walls.data,
-        known.pose,
-        _LOOSELY,
-        _LAYING,
-        _LAID_FROM_M,
-        sides=Sides(a.sights, b.sights),
-    )
-    if found is None:
-        return known
-    moved_by = found.pose.transform(b.points) - known.pose.transform(b.points)
-    return replace(known, pose=found.pose) if np.hypot(*moved_by.T).max() < _LAID_BY_M else known
+        pose = laid_on_walls(a, b, pose)
+        return Alignment(pose, covariance, evidence.pairs, known.confidence)
+    if evidence.is_refuted:
+        return None
+    return replace(known, pose=laid_on_walls(a, b, known.pose))
 
 
 def _elsewhere(side: Side, shared: set[int]) -> list[_Evidence]:
@@ -279,6 +181,12 @@ def _elsewhere(side: Side, shared: set[int]) -> list[_Evidence]:
         },
     )
     found = _examined(side, Side(part))
+    return [evidence for evidence in found if not _is_identity(evidence.pose, side)]
+
+
+def _misfits(side: Side) -> list[_Evidence]:
+    """What speaks for and against laying a chart onto itself, but not as it is."""
+    found = _examined(side, side, _MISFITS)
     return [evidence for evidence in found if not _is_identity(evidence.pose, side)]
 
 
@@ -324,9 +232,7 @@ def _suggested(a: Side, b: Side) -> list[Pose]:
             np.array([v.clearance for v in s.vertices])[e[:, end]]
             for s, e in ((a, ends_a), (b, ends_b))
         )
-        alike &= kinds & (
-            np.abs(room_a[:, None] - room_b) < _CLEARANCE_M + _CLEARANCE_SHARE * room_a[:, None]
-        )
+        alike &= kinds & as_clear(room_a[:, None], room_b)
     i, j = np.nonzero(alike)
     if not len(i):
         return []
@@ -374,9 +280,9 @@ def _examine(a: Side, b: Side, pose: Pose) -> _Evidence:
         pose, _ = least_squares(
             a.points[[i for i, _ in partners]], b.points[[j for _, j in partners]]
         )
-    likeness = {(i, j): _likeness(a, b, i, j, pose) for i, j in partners}
-    pairs = [(a.ids[i], b.ids[j]) for (i, j), share in likeness.items() if share >= _ALIKE_SHARE]
-    against = sum(share < _UNLIKE_SHARE for share in likeness.values())
+    alike = {(i, j): likeness(a, b, i, j, pose) for i, j in partners}
+    pairs = [(a.ids[i], b.ids[j]) for (i, j), share in alike.items() if share >= _ALIKE_SHARE]
+    against = sum(share < UNLIKE_SHARE for share in alike.values())
     lone_a = set(range(len(a.ids))) - {i for i, _ in partners}
     lone_b = set(range(len(b.ids))) - {j for _, j in partners}
     missed = _missed(a, b, pose.inverse(), lone_a) + _missed(b, a, pose, lone_b)
@@ -404,56 +310,6 @@ def _partners(a: Side, b: Side, pose: Pose) -> list[tuple[int, int]]:
     away[a.is_meetpoint[:, None] != b.is_meetpoint] = _SAME_M
     rows, columns = linear_sum_assignment(away)
     return [(int(i), int(j)) for i, j in zip(rows, columns, strict=True) if away[i, j] < _SAME_M]
-
-
-def _likeness(a: Side, b: Side, i: int, j: int, pose: Pose) -> float:
-    """How far (0..1) two vertices agree: by their walls, or 0 if their clearances are not the same.
-
-    Departures may be seen in other directions by each: if they differ, that tells nothing.
-    """
-    ours, theirs = a.vertices[i], b.vertices[j]
-    room = _CLEARANCE_M + _CLEARANCE_SHARE * ours.clearance
-    known = {d.key: d.bearing for d in ours.departures}
-    seen = tuple(bearing + pose.theta for bearing in theirs.bearings)
-    paired = match_bearings(seen, known, _BEARING_RAD)
-    if abs(ours.clearance - theirs.clearance) > room:
-        return 0.0
-    agreement = _agreement(a, b, ours, theirs, pose)
-    is_same = abs(len(known) - len(seen)) <= 1 and len(paired) >= min(len(known), len(seen))
-    return agreement if is_same else min(agreement, _UNLIKE_SHARE)
-
-
-def _agreement(a: Side, b: Side, ours: ChartVertex, theirs: ChartVertex, pose: Pose) -> float:
-    """Share of the walls around a vertex that the other chart has as well, the worse of both."""
-    near_a, near_b = _around(ours), _around(theirs)
-    if not len(near_a) or not len(near_b):
-        return 0.0
-    local = pose
-    for _ in range(_LAID_OUT):
-        laid = local.transform(near_b)
-        away, index = a.walls.query(laid, distance_upper_bound=2 * _WALL_M)
-        found = np.isfinite(np.asarray(away))
-        if np.count_nonzero(found) < max(_LEAST_PAIRS, _HOPELESS_SHARE * len(found)):
-            return 0.0
-        local, _ = least_squares(a.walls.data[np.asarray(index)[found]], near_b[found])
-    shift = local.transform(theirs.position) - pose.transform(theirs.position)
-    if np.hypot(*shift) > _SHIFT_M or abs(wrap_angle(local.theta - pose.theta)) > _TURN_RAD:
-        return 0.0
-    of_theirs = np.asarray(a.walls.query(local.transform(near_b))[0]) < _WALL_M
-    of_ours = np.asarray(b.walls.query(local.inverse().transform(near_a))[0]) < _WALL_M
-    return float(min(of_theirs.mean(), of_ours.mean()))
-
-
-def _around(vertex: ChartVertex) -> Array:
-    """The walls so near to a vertex, and not behind others, that whoever comes by sees them."""
-    offsets = vertex.walls - vertex.position
-    away = np.hypot(*offsets.T)
-    sector = ((np.arctan2(offsets[:, 1], offsets[:, 0]) / math.tau) % 1.0 * _SECTORS).astype(int)
-    nearest = np.full(_SECTORS, np.inf)
-    np.minimum.at(nearest, sector % _SECTORS, away)
-    in_sight = away < nearest[sector % _SECTORS] + _THICK_M
-    near: Array = vertex.walls[(away < vertex.clearance + _BEYOND_M) & in_sight]
-    return near
 
 
 def _connected(ours: Chart, theirs: Chart, pairs: list[tuple[int, int]]) -> int:
@@ -509,35 +365,4 @@ def _crossing(side: Side, other: Side, other_side: Pose) -> tuple[float, float]:
     away = np.asarray(other.walls.query(other_side.transform(points))[0])
     judged = away < 2 * free
     crossed = judged & (away < _SPOKEN * free)
-    return _SPACING_M * np.count_nonzero(judged), _SPACING_M * np.count_nonzero(crossed)
-
-
-def fitted(ours: Chart, theirs: Chart, pairs: tuple[tuple[int, int], ...]) -> tuple[Pose, Array]:
-    """The pose of the other's frame in ours that lays pairs on each other, and its covariance.
-
-    The covariance (3, 3) is by how far apart they stay, with none of the belief that all of them
-    err independently: vertices of one chart err together.
-    """
-    a = np.array([ours.vertices[i].position for i, _ in pairs])
-    b = np.array([theirs.vertices[j].position for _, j in pairs])
-    return least_squares(a, b)
-
-
-def least_squares(a: Array, b: Array) -> tuple[Pose, Array]:
-    """The pose for which b's points (N, 2), laid by it, are nearest to a's; its covariance."""
-    u, v = a[:, 0] + 1j * a[:, 1], b[:, 0] + 1j * b[:, 1]
-    turn = np.vdot(v - v.mean(), u - u.mean())
-    turn = turn / abs(turn) if turn else 1.0  # one point says nothing of it
-    shift = u.mean() - v.mean() * turn
-    pose = Pose(float(shift.real), float(shift.imag), float(np.angle(turn)))
-    off = a - pose.transform(b)
-    variance = max(float((off**2).sum() / max(1, 2 * len(a) - 3)), 1e-4)
-    spread = max(float((np.abs(v - v.mean()) ** 2).mean()), 1e-6)
-    middle = pose.transform(b).mean(axis=0)
-    lever = np.array([middle[1] - pose.y, -(middle[0] - pose.x)])  # of the origin by the turn
-    of_turn = variance / spread
-    covariance = np.zeros((3, 3))
-    covariance[:2, :2] = variance * np.eye(2) + of_turn * np.outer(lever, lever)
-    covariance[:2, 2] = covariance[2, :2] = of_turn * lever
-    covariance[2, 2] = of_turn
-    return pose, covariance
+    return SPACING_M * np.count_nonzero(judged), SPACING_M * np.count_nonzero(crossed)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from gvgbot.autonomy.control.company import BodiesSeen
 from gvgbot.geometry import Array, Pose, wrap_angle
-from gvgbot.team.alignment import least_squares
+from gvgbot.team.laying import least_squares
 
 WINDOW_S = 20.0  # what was seen before is not asked: either map may have been bent since
 _RADIUS_M = 0.04  # by which a body may seem wider or slimmer than it is

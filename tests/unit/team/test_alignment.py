@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from gvgbot.geometry import Pose, wrap_angle
-from gvgbot.team.alignment import Alignment, align, least_squares, refined
+from gvgbot.team.alignment import Alignment, align, refined
+from gvgbot.team.laying import least_squares
 from tests.unit.team.building import irregular, lattice
 
 STARTS = Pose(3.0, -2.0, 0.7), Pose(11.0, 6.0, -2.4)

@@ -1,0 +1,68 @@
+"""A chart as it is compared with another one."""
+
+from functools import cached_property
+from itertools import chain
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from gvgbot.geometry import Array, resampled
+from gvgbot.team.chart import Chart, thinned
+
+SPACING_M = 0.2  # of points along an edge, where it is tested for walls
+
+Complex = NDArray[np.complex128]
+
+
+class Side:
+    """A chart as alignment needs it; made once, used for many transforms."""
+
+    def __init__(self, chart: Chart) -> None:
+        self.chart = chart
+        self.ids = list(chart.vertices)
+        self.vertices = list(chart.vertices.values())
+        self.points = np.array([v.position for v in self.vertices]).reshape(-1, 2)
+        self.is_meetpoint = np.array([v.is_meetpoint for v in self.vertices], bool)
+
+    @cached_property
+    def walls(self) -> cKDTree:
+        """All walls that are told."""
+        around = [vertex.walls for vertex in self.vertices]
+        return cKDTree(thinned(np.concatenate([np.empty((0, 2)), *around])))
+
+    @cached_property
+    def sights(self) -> Array:
+        """From each of the walls (N, 2) the way to the vertex that tells of it: seen there."""
+        told = [vertex.walls for vertex in self.vertices]
+        teller = np.repeat(np.arange(len(told)), [len(walls) for walls in told])
+        _, nearest = cKDTree(np.concatenate(told)).query(self.walls.data)
+        sights: Array = self.points[teller[nearest]] - self.walls.data
+        return sights
+
+    @cached_property
+    def ways(self) -> tuple[Array, Array]:
+        """Points (N, 2) along all edges, and how far (N,) there is surely no wall."""
+        lines = [
+            (resampled(e.polyline, SPACING_M), e.min_clearance) for e in self.chart.edges.values()
+        ]
+        points = np.concatenate([np.empty((0, 2)), *(line for line, _ in lines)])
+        free = np.concatenate([np.empty(0), *(np.full(len(line), c) for line, c in lines)])
+        return points, free
+
+    @cached_property
+    def way_tree(self) -> cKDTree:
+        """Points along all edges."""
+        return cKDTree(self.ways[0])
+
+    @cached_property
+    def bases(self) -> tuple[NDArray[np.intp], Complex, Array]:
+        """Stretches over one edge or two: vertices (N, 2), their places, metres driven (N,)."""
+        index = {key: i for i, key in enumerate(self.ids)}
+        one = [(index[e.a.vertex], index[e.b.vertex], e.length) for e in self.chart.edges.values()]
+        both = one + [(b, a, metres) for a, b, metres in one]
+        two = [(a, d, m + n) for a, b, m in both for c, d, n in both if b == c and a < d]
+        rows = [(a, b, m) for a, b, m in chain(one, two) if a != b]
+        ends = np.array([(a, b) for a, b, _ in rows], np.intp).reshape(-1, 2)
+        metres = np.array([m for _, _, m in rows], np.float64)
+        return ends, (self.points[:, 0] + 1j * self.points[:, 1])[ends], metres
