@@ -220,8 +220,8 @@ class Member:
         found = frame_of(self._looks, mate.looks, self._radius, mate.news.radius)
         if found is None:
             return
-        alignment = Alignment(*found, (), _SURE_BY_SIGHT)
-        if refined(self._chart, mate.chart, alignment) is not None:
+        alignment = refined(self._chart, mate.chart, Alignment(*found, (), _SURE_BY_SIGHT))
+        if alignment is not None:
             self._lay(name, mate, alignment)
 
     def _learn(self, news: News, stamp: float) -> None:
