@@ -29,7 +29,8 @@ _GONE_M = 1.0  # between two looks, at most
 _MOVED_M = 0.3  # what stands is found again within this
 _LATELY_S = 2.0  # after which the last that is seen of somebody is no longer his
 _STRAY = 0.1  # of the beams towards a place: so many may end there though nothing is there
-_FELT_M = 2.0  # from the robot, in a team
+_FELT_M = 2.0  # from the robot, in a team,
+_BESIDE_WALLS_M = 1.2  # or from walls: what stands there is in the way as seen from afar, too
 _LOST_S = 3.0  # what is out of sight for so long, beyond the time it stood, may have gone
 _RIM = np.stack([f(np.arange(12) * np.pi / 6) for f in (np.cos, np.sin)], axis=1)
 
@@ -245,19 +246,26 @@ class Newcomers:
     @property
     def points(self) -> Array:
         """The rims (N, 2), local frame, of company and of `discs`."""
-        rims = [centre + radius * _RIM for centre, radius in [*self.discs, *self.company]]
-        return np.concatenate([np.empty((0, 2)), *rims])
+        return _rims([*self.discs, *self.company])
 
-    def felt(self, local_base: Pose) -> Array:
+    def felt(self, local_base: Pose, local_map: LocalMap) -> Array:
         """The `points` that the GVG leads round.
 
-        Where all drive about, who is far away is elsewhere before the robot is there.
+        Where all drive about, who is far away in the open is elsewhere before the robot is there.
         """
-        points = self.points
-        if not self.in_team:
-            return points
-        near: Array = points[np.hypot(*(points - local_base.position).T) < _FELT_M]
-        return near
+        bodies = [*self.discs, *self.company]
+        if not self.in_team or not bodies:
+            return _rims(bodies)
+        centres = np.array([centre for centre, _ in bodies])
+        is_near = np.hypot(*(centres - local_base.position).T) < _FELT_M
+        from_walls, _ = local_map.tree().query(centres)
+        felt = is_near | (np.asarray(from_walls) < _BESIDE_WALLS_M)
+        return _rims([body for body, is_felt in zip(bodies, felt, strict=True) if is_felt])
+
+
+def _rims(bodies: list[tuple[Array, float]]) -> Array:
+    """Points (N, 2) around discs."""
+    return np.concatenate([np.empty((0, 2)), *(c + radius * _RIM for c, radius in bodies)])
 
 
 class _Walls:

@@ -214,7 +214,9 @@ class Pipeline:
         self.gvg, marks = self.mapper.marked(self._local_gvg(local_base), local_base)
         hazards, suspects = self._hazards.doubtful, self._maps.near.suspects()
         doubtful = np.concatenate([hazards, self._newcomers.points, suspects])
-        felt = np.concatenate([hazards, self._newcomers.felt(local_base), suspects])
+        felt = np.concatenate(
+            [hazards, self._newcomers.felt(local_base, self._maps.near), suspects]
+        )
         return View(
             len(self.keyframes),
             scan.stamp,
@@ -267,7 +269,9 @@ class Pipeline:
             min_clearance=self._radius + self._config.passage_margin_m,
             roughness=reduction.roughness_m,
             open_clearance=self.open_clearance,
-            felt=np.concatenate([self._hazards.points, self._newcomers.felt(local_base)]),
+            felt=np.concatenate(
+                [self._hazards.points, self._newcomers.felt(local_base, self._maps.near)]
+            ),
         )
         known = self.mapper.known_around(local_base, half_width)
         return reduce_graph(fine, reduction, known).rings_cut_far_from(local_base.position)

@@ -103,11 +103,11 @@ def test_a_large_robot_is_kept_away_from_as_far_as_it_is_large() -> None:
 CORRIDOR = carved([(-10.0, -1.5, 10.0, 1.5)])
 
 
-def offset_beside(away: float, *, in_team: bool) -> float:
-    """How far the GVG is off the middle of a corridor where a robot `away` metres ahead stands."""
+def offset_beside(away: float, aside: float = 0.0, *, in_team: bool) -> float:
+    """How far the GVG is off the middle of a corridor where a robot stands, `away` m ahead."""
     config = load_config()
     pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
-    stands = Companion("other", Pose(away, 0.0, 0.0), goes_first=True, radius=0.18)
+    stands = Companion("other", Pose(away, aside, 0.0), goes_first=True, radius=0.18)
     pipeline.company = [stands] if in_team else None
     scan = sweep(CORRIDOR, Pose(), field_of_view=LASER_270)
     pipeline.control(Odometry(0.0, Pose(), STANDSTILL))
@@ -117,7 +117,9 @@ def offset_beside(away: float, *, in_team: bool) -> float:
     return float(np.abs(points[np.abs(points[:, 0] - away) < 0.2, 1]).max())
 
 
-def test_the_gvg_leads_round_robots_of_the_team_that_are_near_only() -> None:
+def test_the_gvg_leads_round_robots_of_the_team_that_are_near_or_beside_walls_only() -> None:
     assert offset_beside(1.5, in_team=True) == pytest.approx((1.5 + 0.18) / 2, abs=0.15)
     assert offset_beside(3.0, in_team=True) == pytest.approx(offset_beside(3.0, in_team=False))
     assert offset_beside(3.0, in_team=False) < 0.1
+    beside_the_wall = offset_beside(3.0, aside=0.8, in_team=True)
+    assert beside_the_wall == pytest.approx((1.5 - 0.62) / 2, abs=0.15)
