@@ -86,7 +86,7 @@ def _constraints(pipeline: Pipeline) -> list[Constraint]:
         Constraint(i, i + 1, step.motion, _inverse(step.covariance))
         for i, step in enumerate(pipeline.steps[: len(keyframes) - 1])
     ]
-    if pipeline.led:
+    if pipeline.matches_walls:
         constraints += revisits(_passage(pipeline), pipeline.matching)
     met, recognised = set[int](), set[int]()
     for seen in mapper.observations:

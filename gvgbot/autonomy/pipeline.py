@@ -113,6 +113,11 @@ class Pipeline:
         return self._config.scan_matching
 
     @property
+    def matches_walls(self) -> bool:
+        """Whether walls tell where it is, and not odometry and vertices alone."""
+        return not self._trusts_odometry
+
+    @property
     def is_lost(self) -> bool:
         """Whether it does not know where on its map it is."""
         return False

@@ -34,6 +34,7 @@ _IN_VIEW_M = 1.0  # a point farther from all walls was not seen on the other vis
 _LEAST_IN_VIEW = 0.6  # share of the points
 _LEAST_AGREEMENT = 0.75  # share of the points in view that lie on walls
 _FLOOR = np.diag([0.02**2, 0.02**2, 0.004**2])  # what matching cannot know of itself
+_TELLING_M = 0.03  # sigma of a match by its walls: less certain, they only seem to tell the place
 _NO_NEWS_M = 0.05  # a match that moves the robot less need not be accounted for at once
 _ROUGHLY_M = 5e-3  # so well must be known where places are in which matches are looked for
 _ROW = 1 << 32  # more cells than any building has side by side
@@ -138,17 +139,35 @@ def _match(
     if found is None:
         return None
     off = _array(prior.to(found.pose))
-    if off @ np.linalg.solve(Q, off) > _GATE:
+    if off @ np.linalg.solve(Q, off) > _GATE or not _tells(found.covariance):
         return None
     laid = found.pose.transform(points)
     distance = np.asarray(tree.query(laid, distance_upper_bound=_IN_VIEW_M)[0])
     in_view = np.isfinite(distance)
     if in_view.mean() < _LEAST_IN_VIEW or (distance[in_view] < _WALL_M).mean() < _LEAST_AGREEMENT:
         return None
-    covariance = rotated_covariance(found.covariance + _FLOOR, found.pose.theta)
+    seen = found.covariance + _spread(passage, i) + _FLOOR
+    covariance = rotated_covariance(seen, found.pose.theta) + _spread(passage, j)
     return Constraint(
         j, i, found.pose, np.asarray(np.linalg.inv(covariance), np.float64), doubtful=True
     )
+
+
+def _tells(covariance: Array) -> bool:
+    """Whether walls tell a place: in a round corridor the noise of many feigns a little of it."""
+    return bool(np.linalg.eigvalsh(covariance[:2, :2])[-1] < _TELLING_M**2)
+
+
+def _spread(passage: Passage, i: int) -> Array:
+    """By what the walls of a place may lie apart: the covariance (3, 3) of the way to a keyframe.
+
+    In its frame, from the first look that its place is made of.
+    """
+    at = int(np.searchsorted(passage.looks, i))
+    belief = Belief()
+    for motion, covariance in passage.steps[int(passage.looks[max(0, at - _AROUND)]) : i]:
+        belief = predict(belief, motion, covariance)
+    return rotated_covariance(belief.P, -float(belief.x[2]))
 
 
 def _place(x: Array, passage: Passage, i: int) -> Array:
