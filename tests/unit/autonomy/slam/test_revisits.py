@@ -97,3 +97,38 @@ def test_another_place_that_looks_the_same_is_not_taken_for_it() -> None:
 
 def test_a_run_without_a_second_visit_has_no_matches() -> None:
     assert revisits(run(lap()[:20], walls(), turn=0.001), MATCHING) == []
+
+
+def test_a_round_corridor_tells_no_place() -> None:
+    """Its walls look the same all the way round, but for the noise of the laser."""
+    rng = np.random.default_rng(3)
+    turns = np.arange(0.0, 4.0 * math.pi, STEP_M / 6.0)
+    true = [Pose(6.0 * math.cos(a), 6.0 * math.sin(a), a + math.pi / 2) for a in turns]
+    around = np.arange(0.0, math.tau, 0.005)
+    circle = np.stack([np.cos(around), np.sin(around)], axis=1)
+    passage = run(true, np.concatenate([5.0 * circle, 7.0 * circle]), turn=0.004)
+    for i, points in passage.walls.items():
+        passage.walls[i] = points + rng.normal(0.0, 0.01, points.shape)
+    assert revisits(passage, MATCHING) == []
+
+
+def test_a_match_errs_as_much_as_it_says_where_steps_are_uncertain() -> None:
+    """The walls of a place are of several scans, and lie as wrong as the steps between them."""
+    true, world, distances = lap() + lap(), walls(), list[float]()
+    for seed in range(6):
+        passage = run(true, world, turn=0.0)
+        noise = np.random.default_rng(seed).multivariate_normal(
+            np.zeros(3), STEP_SIGMAS, len(passage.steps)
+        )
+        passage.steps[:] = [
+            (motion.compose(Pose.from_array(off)), STEP_SIGMAS)
+            for (motion, _), off in zip(passage.steps, noise, strict=True)
+        ]
+        for match in revisits(passage, MATCHING):
+            expected = true[match.a].to(true[match.b])
+            off = match.a_b
+            r = np.array([off.x - expected.x, off.y - expected.y, off.theta - expected.theta])
+            r[2] = math.remainder(r[2], math.tau)
+            distances.append(float(r @ match.information @ r))
+    assert len(distances) > 50
+    assert np.mean(distances) < 4.0
