@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.slam.ekf import Belief, predict
-from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig, register_coarsely
+from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig, Sides, register_coarsely
 from gvgbot.autonomy.slam.smoothing import Constraint, PoseGraph
 from gvgbot.geometry import Array, Pose, rotated_covariance, wrap_angle
 
@@ -130,12 +130,22 @@ def _match(
     x: Array, passage: Passage, j: int, i: int, belief: Belief, matching: ScanMatchingConfig
 ) -> Constraint | None:
     """Keyframe i seen from keyframe j, if the walls around both agree."""
-    walls, points = _place(x, passage, j), _place(x, passage, i)
+    walls, of_walls = _place(x, passage, j)
+    points, of_points = _place(x, passage, i)
     tree = cKDTree(walls)
     prior = _pose(x, j).to(_pose(x, i))
     Q = rotated_covariance(belief.P, -float(belief.x[2])) + _SLACK
-    some = points[:: max(1, len(points) // _POINTS)]
-    found = register_coarsely(some, tree, walls, prior, Q, matching, _REACHES_M)
+    some = slice(None, None, max(1, len(points) // _POINTS))
+    found = register_coarsely(
+        points[some],
+        tree,
+        walls,
+        prior,
+        Q,
+        matching,
+        _REACHES_M,
+        sides=Sides(of_walls, of_points[some]),
+    )
     if found is None:
         return None
     off = _array(prior.to(found.pose))
@@ -170,20 +180,21 @@ def _spread(passage: Passage, i: int) -> Array:
     return rotated_covariance(belief.P, -float(belief.x[2]))
 
 
-def _place(x: Array, passage: Passage, i: int) -> Array:
+def _place(x: Array, passage: Passage, i: int) -> tuple[Array, Array]:
     """The walls (K, 2) around a keyframe in its frame, as seen there, just before and just after.
 
-    One point for each cell of a grid.
+    One point for each cell of a grid, and vectors (K, 2) to where they were seen from.
     """
     at, here = int(np.searchsorted(passage.looks, i)), _pose(x, i)
-    points = np.concatenate(
-        [
-            here.to(_pose(x, k)).transform(passage.walls[k])
-            for k in passage.looks[max(0, at - _AROUND) : at + _AROUND + 1].tolist()
-        ]
-    )
+    seen, from_ = list[Array](), list[Array]()
+    for k in passage.looks[max(0, at - _AROUND) : at + _AROUND + 1].tolist():
+        there = here.to(_pose(x, k))
+        seen.append(there.transform(passage.walls[k]))
+        from_.append(there.position - seen[-1])
+    points = np.concatenate(seen)
     cells = np.floor(points / _CELL_M).astype(np.int64) @ (_ROW, 1)
-    return points[np.unique(cells, return_index=True)[1]]
+    kept = np.unique(cells, return_index=True)[1]
+    return points[kept], np.concatenate(from_)[kept]
 
 
 def _residual(x: Array, match: Constraint) -> Array:
