@@ -229,6 +229,7 @@ def _on_cycle(robot: _Robot, air: _Air, devices: Devices, odometry: Odometry) ->
         )
         air.send(course, robot)
         pipeline.company = robot.member.company()
+        pipeline.strangers = robot.member.strangers()
     if odometry.stamp >= robot.told + config.tell_every_s:
         _tell(robot, air, odometry.stamp)
         robot.member.look(odometry.stamp)

@@ -101,6 +101,7 @@ class LiveTeam:
                 course = self.member.course(now, pipeline.map_base, pipeline.track, pipeline.seen)
                 self._network.tell_team("course", encode(course))
                 pipeline.company = self.member.company()
+                pipeline.strangers = self.member.strangers()
             await self._clock.sleep_until(self._clock.now() + self._config.steer_every_s)
 
     async def _compare(self, off_loop: Callable[[Callable[[], None]], Awaitable[None]]) -> None:

@@ -27,6 +27,7 @@ _BLUR_M = 0.1  # beyond its rim, beams may still end on something
 _NEAR_M = 3.0  # who is farther away is not followed from scan to scan
 _GONE_M = 1.0  # between two looks, at most
 _MOVED_M = 0.3  # what stands is found again within this
+_ALIKE_M = 0.05  # by which a robot may seem wider or slimmer than it says it is
 _LATELY_S = 2.0  # after which the last that is seen of somebody is no longer his
 _STRAY = 0.1  # of the beams towards a place: so many may end there though nothing is there
 _FELT_M = 2.0  # from the robot, in a team,
@@ -90,6 +91,7 @@ class Newcomers:
         self._all: list[Newcomer] = []
         self.missed: list[Newcomer] = []  # in the last look, of those found that never moved
         self.in_team = False  # bodies of robots pass by so close that slivers of them are seen
+        self.strangers: list[float] = []  # radii of other robots that may be anywhere, m
         self.company: list[tuple[Array, float]] = []  # other robots: where they say they are,
         self._met: list[tuple[Array, float]] = []  # and where they are seen
         self.bodies: Array = np.empty((0, 3))  # round ones in the last look: x, y, radius, m
@@ -215,11 +217,15 @@ class Newcomers:
     def _patience(self, one: Newcomer) -> float:
         if one.was_wall and not one.is_round:
             return 0.0
-        if one.came:
+        if one.came or self._may_be_stranger(one):
             return self._config.came_after_s
         found_after = self._config.found_after_s
         may_be = one.evidence > (-SURE if one.is_whole else 0.0)
         return found_after if may_be else min(_GLIMPSE_S, found_after)
+
+    def _may_be_stranger(self, one: Newcomer) -> bool:
+        """Whether it may be a robot of the team that waits for something."""
+        return one.is_round and any(abs(one.radius - r) < _ALIKE_M for r in self.strangers)
 
     def _forget(self, scan: Scan, local_base: Pose, local_map: LocalMap) -> None:
         """Let those go that have gone or are far away; who may have gone is in nobody's way."""

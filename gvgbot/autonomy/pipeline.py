@@ -88,6 +88,7 @@ class Pipeline:
         self.passed: list[Passed] = []
         # other robots as they tell of themselves, map frame; None if there are surely none
         self.company: list[Companion] | None = None
+        self.strangers: list[float] = []  # radii of others that may be anywhere, m
         self.seen: BodiesSeen | None = None  # what may be robots of a team, in the last look
         self._incidents: list[tuple[str, str]] = []  # action and reason, since the last scan
         self._was_lifted = self._look_now = False
@@ -196,6 +197,7 @@ class Pipeline:
         """The scan without what may be people or robots; the mission hears of the robots."""
         nearby = self._nearby(local_base)
         self._newcomers.in_team = self.company is not None
+        self._newcomers.strangers = self.strangers
         self._newcomers.company = self._discs(nearby, _COMPANY_M)
         self.mission.meet(local_base, nearby)
         is_way = partial(self.mapper.is_way, local_base)

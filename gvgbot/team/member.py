@@ -356,6 +356,12 @@ class Member:
                 found.append(company.moved(one, frames[name]))
         return found
 
+    def strangers(self) -> list[float]:
+        """The radii, m, of robots that are heard, and may be anywhere."""
+        known = self.frames
+        heard = [mate for name, mate in self._mates.items() if not self.is_lost(name)]
+        return [mate.news.radius for mate in heard if mate.news.robot not in known]
+
     # -- which frontier is whose -------------------------------------------------------------------
 
     def choose(self, graph: GvgGraph, starts: list[Approach]) -> tuple[HalfEdgeId, Approach] | None:

@@ -119,6 +119,17 @@ def test_what_stands_long_enough_is_a_part_of_the_building(
     assert watch.inside() > 0
 
 
+def test_who_may_be_a_robot_of_the_team_that_waits_is_no_pillar_so_soon() -> None:
+    """Where its map lies is not known yet, so it may be anywhere."""
+    slim, as_wide = Watch(), Watch()
+    slim.newcomers.strangers, as_wide.newcomers.strangers = [RADIUS - 0.1], [0.35, RADIUS]
+    for second in range(math.ceil(CONFIG.came_after_s)):
+        slim.dropped(EMPTY, second, person=(2.0, 0.0))
+        assert as_wide.dropped(EMPTY, second, person=(2.0, 0.0)) > 0
+        assert as_wide.inside() == 0
+    assert slim.inside() > 0
+
+
 @pytest.mark.parametrize("noise", [0.0, 0.01, 0.03])
 def test_what_surely_has_an_edge_is_a_post_after_a_glimpse(noise: float) -> None:
     """Else doors beside it are not believed until the robot has passed them."""

@@ -245,6 +245,17 @@ def test_who_drives_and_falls_silent_is_not_believed_to_be_there_for_long() -> N
     assert len(one.member.company()) == 1
 
 
+def test_strangers_are_those_whose_map_lies_nobody_knows_where() -> None:
+    one, two = team()
+    three = robot("three", irregular(1), LEFT, 0)
+    three.tell(2.0, one)
+    assert one.member.strangers() == [RADIUS["three"]]
+    assert three.member.strangers() == []  # it has heard nobody yet
+    one.tell(200.0, three)
+    assert one.member.strangers() == []  # who is not heard any more is no part of the team
+    assert two.member.strangers() == []
+
+
 def test_an_old_course_changes_nothing() -> None:
     one, two = team()
     old = two.member.course(3.0, Pose(5.0, 5.0, 0.0), np.zeros((0, 2)))
