@@ -75,9 +75,10 @@ def slivers(scan: Scan, local_base: Pose) -> Array:
 
 
 def without_fringes(scan: Scan) -> Scan:
-    """The scan without what its first and its last beams show too little of.
+    """The scan without that of which it shows too little to know what it is.
 
-    Something stands free there, and all but a sliver of it is out of sight: that may be a person.
+    Something stands free there, and all but a sliver of it is out of sight, behind a corner or
+    beyond the first or the last beam: that may be a person.
     """
     told = np.flatnonzero(~np.isnan(scan.ranges))
     depth = np.minimum(scan.ranges[told], scan.range_max)
@@ -86,6 +87,10 @@ def without_fringes(scan: Scan) -> Scan:
         return scan
     first, last = ends[0] + 1, ends[-1] + 1
     ranges = scan.ranges.copy()
+    look = _Look(scan, scan.base_laser, told)
+    for piece in pairwise((ends + 1).tolist()):
+        if look.is_half_hidden(piece) and len(look.sliver(piece)):
+            ranges[told[slice(*piece)]] = np.nan
     for fringe, beside in ((slice(first), first), (slice(last, None), last - 1)):
         metres = depth[fringe]
         if metres.max() < depth[beside] and metres.max() * _angle(scan, told[fringe]) < _SLIM_M:
@@ -132,6 +137,10 @@ class _Look:
         ends = self._ends(piece)
         is_slim = np.hypot(*(ends[-1] - ends[0])) < _SLIM_M
         return ends if is_slim or len(ends) < _BEAMS else np.empty((0, 2))
+
+    def is_half_hidden(self, piece: Piece) -> bool:
+        """Whether something nearer cuts it off on one side only."""
+        return self._rims(piece).count(False) == 1
 
     def _rims(self, piece: Piece) -> tuple[bool, bool]:
         """Whether there is more room before its first beam, and after its last one."""

@@ -451,6 +451,20 @@ def test_a_sliver_of_another_robot_at_the_rim_of_sight_is_kept_out_of_the_map(si
     assert watch.inside() == 0
 
 
+def test_a_sliver_of_another_robot_behind_a_corner_is_kept_out_of_the_map() -> None:
+    """A few beams end on it, and nobody was seen there before."""
+    corner = carved([ROOM], [(1.0, 0.0, 1.1, 3.0)])
+    watch, scan = Watch(corner), sweep(corner, HERE)
+    watch.newcomers.in_team = True
+    ranges = np.minimum(scan.ranges, to_disc(scan.bearings, (2.0, 0.18)))
+    assert 1 <= np.count_nonzero(ranges < scan.ranges) <= 4
+    walls = watch.inside()
+    for stamp in (0.0, 1.0):
+        look = replace(scan, ranges=ranges, stamp=stamp)
+        watch.map.insert(watch.newcomers.sift(look, HERE, watch.map), HERE, 0.0)
+    assert watch.inside() == walls
+
+
 def test_a_wall_at_the_rim_of_sight_is_no_sliver() -> None:
     watch, scan = Watch(), sweep(EMPTY, HERE, field_of_view=LASER_270)
     watch.newcomers.in_team = True
