@@ -25,8 +25,9 @@ class Estimate(NamedTuple):
 def smoothed(pipeline: Pipeline) -> Estimate:
     """The best estimate of all keyframes and vertices.
 
-    Where somebody else drove, nobody came close to vertices to know them again for certain: then
-    walls that were passed twice close the loops, and vertices stand where the first visit saw them.
+    Loops are closed by vertices, and by walls wherever they were passed twice. Where somebody else
+    drove, nobody came close to vertices to know them again for certain: they stand where the first
+    visit saw them.
     """
     keyframes, graph, x = _solved(pipeline)
     vertices = range(len(keyframes), len(x))
