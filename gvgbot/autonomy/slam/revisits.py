@@ -1,8 +1,9 @@
 """Places that were passed twice: the walls seen on one visit, laid onto those of an earlier one.
 
 Vertices close loops where lines of the GVG meet, while the robot drives. This closes them anywhere,
-whenever a map is made of what it has seen. A match must lie where the uncertainty since the last one allows it, and explain most
-of what both visits saw; smoothing doubts one that then disagrees with all the others.
+whenever a map is made of what it has seen. A match must lie where the uncertainty since the last
+one allows it, and explain most of what both visits saw; smoothing doubts one that then disagrees
+with all the others.
 """
 
 import math
