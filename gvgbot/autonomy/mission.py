@@ -207,11 +207,25 @@ class Mission:
             return self._wait_for_a_way(view, here)
         if self.target is None and graph.vertices:
             return self._examine(view, here)
+        if self.target is not None and self._company:
+            self._depart_unseen(view, here, self.target)
         path = here.ahead() if self.target is None else here.path_to(self.target)
         if path is None:
             return self._wait_for_a_way(view, here)
         self._scouting.end()
         return self._drive(view, here, path)
+
+    def _depart_unseen(self, view: View, here: Situation, target: HalfEdgeId) -> None:
+        """Note that the robot is past the vertex of its target, where that is not to be seen.
+
+        Another robot that stands in one of its ways takes it out of sight.
+        """
+        if target.vertex in here.known.node_of or self.where.on_edge == target:
+            return
+        place = self._mapper.in_local_frame(view, target.vertex)
+        bearing = self._mapper.graph.vertices[target.vertex].half_edges[target.key].bearing
+        base = view.local_base.position
+        self.where.depart(target, place.position, place.theta + bearing, base)
 
     def _choose(self, view: View, here: Situation) -> HalfEdgeId | None:
         """The next frontier, by the policy."""

@@ -17,6 +17,7 @@ _STEP_M = 1.0  # from view to view, at most
 _LOOP_M = 0.4  # a trail that comes this near to itself has been driven back
 _AWAY_M = 0.7  # nearer to a vertex than this, the trail does not tell its edges apart
 _PAST_M = 0.5  # a vertex: to turn back to it would be in vain
+_LEFT_M, _ASIDE_M = (0.1, 0.8), 0.4  # past a vertex, and beside the way that leaves it
 _BESIDE_M = 0.2, 1.5  # from the edge, the trail goes on beside the robot, on the edge
 _ABREAST_M = 0.15  # along its edge, the robot came from neither side
 _BACK_M = 0.8  # how far back along the trail one looks to tell ahead from behind
@@ -94,6 +95,15 @@ class Whereabouts:
         since = np.append(lengths[::-1].cumsum()[::-1], 0.0)
         found = np.flatnonzero((since > LEAST_LOOP_M) & (away < _LOOP_M))
         return int(found[np.argmin(away[found])]) if len(found) else None
+
+    def depart(self, end: HalfEdgeId, vertex: Array, bearing: float, base: Array) -> None:
+        """Be on the edge that leaves a vertex (2,) in a direction, if the robot is just past that.
+
+        For vertices that are out of sight: those that are in sight are noticed by `follow`.
+        """
+        along, aside = Pose(theta=bearing).inverse().transform(base - vertex)
+        if _LEFT_M[0] < along < _LEFT_M[1] and abs(aside) < _ASIDE_M:
+            self.on_edge, self.trail, self.narrowest = end, [vertex, base], math.inf
 
     def rejoin(self, end: HalfEdgeId, line: Array) -> None:
         """Be on the edge that begins at another end, which a line (N, 2), local frame, comes from.

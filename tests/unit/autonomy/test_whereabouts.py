@@ -68,6 +68,25 @@ def test_a_vertex_that_is_none_is_left_out_of_the_way(onwards: float, length: fl
     assert where.trail_length == pytest.approx(length, abs=0.4)
 
 
+@pytest.mark.parametrize(
+    ("base", "is_on_it"),
+    [((6.4, 0.1), True), ((5.7, 0.0), False), ((6.4, 0.6), False), ((9.0, 0.0), False)],
+)
+def test_past_a_vertex_that_is_out_of_sight_the_robot_is_on_the_edge_that_leaves_it(
+    base: Point, is_on_it: bool
+) -> None:
+    """The vertex is at x = 6, and the edge leaves it to the east."""
+    where = Whereabouts(HalfEdgeId(2, WEST), list(resampled([(6.0, 0.0), (5.0, 0.0)])))
+    where.depart(HalfEdgeId(2, EAST), np.array([6.0, 0.0]), 0.0, np.array(base))
+    assert (where.on_edge == HalfEdgeId(2, EAST)) is is_on_it
+    if is_on_it:
+        place = CORRIDOR.place(np.array(base))
+        assert place is not None
+        known = known_as({}, {})
+        back = where.backwards(CORRIDOR, place, known, Pose(*base, theta=math.pi))
+        assert back == Branch(11, forward=False)
+
+
 def test_passing_a_meetpoint_is_a_passage_from_the_edge_before_it() -> None:
     walk = Walk().along(CORRIDOR, ALL_KNOWN, (1.0, 0.0), (11.0, 0.0))
     first, passed = walk.passages
