@@ -8,7 +8,14 @@ import numpy as np
 
 from gvgbot.autonomy.backtracking import Backtracking
 from gvgbot.autonomy.choice import Choice
-from gvgbot.autonomy.control.company import Companion, free_metres, in_front, patience, refuge
+from gvgbot.autonomy.control.company import (
+    Companion,
+    free_metres,
+    in_front,
+    patience,
+    refuge,
+    wide_place,
+)
 from gvgbot.autonomy.control.edge_follower import Track
 from gvgbot.autonomy.control.orders import ARRIVED_M, Drive, LookAround, Order, Stand
 from gvgbot.autonomy.driven_edges import DrivenEdges
@@ -306,9 +313,11 @@ class Mission:
         return self._drive(view, here, scouting.path_on(here))
 
     def _make_way(self, view: View, here: Situation) -> Order:
-        """Stand, but aside of a robot that is near and may want to pass."""
+        """Stand, but in no door, and aside of a robot that is near and may want to pass."""
         other = self._in_front
-        way = None if other is None else refuge(here.gvg, here.place, other.pose.position)
+        way = wide_place(here.gvg, here.place, self._company)
+        if way is None and other is not None:
+            way = refuge(here.gvg, here.place, other.pose.position)
         return Stand() if way is None else self._drive(view, here, way)
 
     def _drive(self, view: View, here: Situation, path: tuple[Branch, ...]) -> Order:

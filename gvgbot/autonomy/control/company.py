@@ -20,6 +20,7 @@ _ABREAST_M = 0.75  # from a wall on either side: with less, two cannot pass each
 _ONE_WAY_M = 0.5  # from middle to middle: courses so near to each other lead over one place
 _EQUAL_M = 1.0  # who is nearer by less than this is not nearer for sure
 _CLEAR_OF_IT_M = 0.6  # before a narrow place, there is room to come out of it
+_NEAR_M = 4.0  # so far a robot goes that waits, to be in nobody's way
 _ASIDE_M = 0.5  # beyond the disc of a vertex, another robot can pass it
 
 
@@ -153,6 +154,29 @@ def refuge(gvg: LocalGvg, place: Place, other: Array) -> tuple[Branch, ...] | No
             if is_deep and away.min() > away[0] - 2 * _KEPT_M:
                 ways.append((metres, _straightness(gvg, way), way))
     return min(ways)[2] if ways else None
+
+
+def wide_place(gvg: LocalGvg, place: Place, company: list[Companion]) -> tuple[Branch, ...] | None:
+    """The way to the nearest place where two can pass each other, for a robot that waits.
+
+    None if this is one, or none is near that nobody stands before.
+    """
+    if gvg.edges[place.edge].clearance_at(place.station) >= _ABREAST_M:
+        return None
+    ways = []
+    for _, path in gvg.routes(place).values():
+        line, room = gvg.line_from(place, path)
+        way = line[: 1 + int(np.argmax(room >= _ABREAST_M))]
+        metres = float(_stations(way)[-1])
+        is_free = not any(_stands_on(way, one) for one in company)
+        if room.max() >= _ABREAST_M and metres < _NEAR_M and is_free:
+            ways.append((metres, path))
+    return min(ways)[1] if ways else None
+
+
+def _stands_on(line: Array, one: Companion) -> bool:
+    """Whether there is no way past another robot along a line (N, 2)."""
+    return float(np.hypot(*(line - one.pose.position).T).min()) < _ONE_WAY_M
 
 
 def _straightness(gvg: LocalGvg, way: tuple[Branch, ...]) -> float:

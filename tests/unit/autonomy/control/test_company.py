@@ -1,6 +1,7 @@
 """Robots that meet: two discs with brakes on a plane, and junctions drawn by hand."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from gvgbot.autonomy.control.company import (
     in_front,
     patience,
     refuge,
+    wide_place,
 )
 from gvgbot.autonomy.gvg.local import Branch
 from gvgbot.geometry import Array, Pose, Twist
@@ -137,6 +139,27 @@ def test_the_refuge_is_the_side_branch_of_the_next_junction_away_from_the_other(
 
 def test_there_is_no_refuge_beyond_the_other() -> None:
     assert way_out(1.0, 1.9) is None
+
+
+def out_of_the_door(x: float, *others: float) -> tuple[Branch, ...] | None:
+    """From a place in a door, or at a door's side, of a corridor along x with a door at x = 0."""
+    door = drawn({1: (-6.0, 0.0), 2: (6.0, 0.0)}, {10: (1, 2, [])})
+    edge = door.edges[10]
+    room = np.minimum(0.45 + np.abs(edge.polyline[:, 0]), 2.0)
+    gvg = replace(door, edges={10: replace(edge, clearance=room)})
+    place = gvg.place(np.array([x, 0.0]))
+    assert place is not None
+    company = [Companion("other", Pose(y, 0.0, 0.0), True, radius=RADIUS) for y in others]
+    return wide_place(gvg, place, company)
+
+
+def test_who_waits_in_a_door_goes_out_of_it_to_the_nearer_side_where_nobody_stands() -> None:
+    east, west = (Branch(10, forward=True),), (Branch(10, forward=False),)
+    assert out_of_the_door(0.1) == east
+    assert out_of_the_door(-0.1) == west
+    assert out_of_the_door(0.1, 0.7) == west
+    assert out_of_the_door(0.1, 0.7, -0.7) is None
+    assert out_of_the_door(0.5) is None  # two can pass each other there
 
 
 def straight(x0: float, x1: float, y: float = 0.0) -> Array:
