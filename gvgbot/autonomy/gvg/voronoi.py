@@ -9,8 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import Delaunay, QhullError, cKDTree
 
 from gvgbot.autonomy.gvg.coast import Diagram, Space, with_coast
@@ -123,7 +121,7 @@ def _diagram(triangles: Delaunay, room: _Room, roughness: float) -> Diagram:
     generators = triangles.points
     points, clearance = _circumcircles(generators, triangles.simplices)
     a, b, pair = _ridges(triangles)
-    p, q = generators[pair[:, 0]], generators[pair[:, 1]]
+    p, q = (generators.take(pair[:, k], axis=0) for k in (0, 1))
     chord = np.hypot(*(p - q).T)
     parts = chord >= 2 * room.min_clearance
     narrowest = _least_clearance(points, clearance, a[parts], b[parts], p[parts], q[parts])
@@ -134,8 +132,9 @@ def _diagram(triangles: Delaunay, room: _Room, roughness: float) -> Diagram:
     touched[a[parts]] = touched[b[parts & (b >= 0)]] = True
     rough = np.flatnonzero(is_rough & (b >= 0))
     links = np.stack([a[rough], b[rough]])
-    ends = np.unique(links)
     certain = np.zeros(len(points), bool)
+    certain[links] = True
+    ends = np.flatnonzero(certain)
     certain[ends] = room.is_certain(points[ends], clearance[ends])
     sure = certain[links].all(axis=0)
     parts[rough[sure]] = _bridging(links[:, sure], touched)
@@ -144,6 +143,8 @@ def _diagram(triangles: Delaunay, room: _Room, roughness: float) -> Diagram:
 
 def _bridging(links: NDArray[np.int64], touched: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Which links (2, M) of points hang together between two points that are `touched` (N,)."""
+    if not links.size:
+        return np.zeros(0, bool)
     ends, numbered = np.unique(links, return_inverse=True)
     i, j = numbered.reshape(2, -1)
     piece = _pieces(i, j, len(ends))
@@ -151,10 +152,25 @@ def _bridging(links: NDArray[np.int64], touched: NDArray[np.bool_]) -> NDArray[n
     return is_bridge
 
 
-def _pieces(i: NDArray[np.int64], j: NDArray[np.int64], count: int) -> NDArray[np.int32]:
-    """The connected piece of each of so many points, by links from i to j (M,)."""
-    links = coo_array((np.ones(len(i)), (i, j)), (count, count))
-    return np.asarray(connected_components(links, directed=False)[1])
+def _pieces(i: NDArray[np.int64], j: NDArray[np.int64], count: int) -> NDArray[np.intp]:
+    """The first point of the connected piece of each of so many, by links from i to j (M,).
+
+    For some hundred links that is several times faster than scipy's sparse matrices.
+    """
+    before = list(range(count))  # of each point one of its piece, until that is the first
+    for link in zip(i.tolist(), j.tolist(), strict=True):
+        a, b = link
+        while before[a] != a:
+            before[a] = a = before[before[a]]
+        while before[b] != b:
+            before[b] = b = before[before[b]]
+        if a < b:
+            before[b] = a
+        else:
+            before[a] = b
+    for point, other in enumerate(before):
+        before[point] = before[other]
+    return np.array(before, np.intp)
 
 
 def _ridges_that_count(
@@ -208,7 +224,7 @@ def _prolonged(
     places = points[rays.start[long], None] + steps[:, None] * unit[long, None]
     seen = steps < length[long, None]
     radius = np.zeros(seen.shape)
-    radius[seen] = cKDTree(room.generators).query(places[seen])[0]
+    radius[seen] = cKDTree(room.generators, balanced_tree=False).query(places[seen])[0]
     seen[seen] = room.is_certain(places[seen], radius[seen])
     seen = np.logical_and.accumulate(seen, axis=1)
     number = np.full(seen.shape, -1)
@@ -257,8 +273,9 @@ def _disc_is_known(local_map: Space, centres: Array, radii: Array) -> NDArray[np
 
 def _unknown(local_map: Space, centres: Array, radii: Array, places: Array) -> NDArray[np.int64]:
     """How many of the places (K, 2) of a unit disc lie in unknown space, for each disc (N,)."""
-    samples = centres[:, None, :] + radii[:, None, None] * places
-    unknown: NDArray[np.int64] = (~local_map.known(samples)).sum(axis=1)
+    # the discs last, of which there are far more than places, so that NumPy's loops are long
+    x_y = centres.T[:, None, :] + places.T[:, :, None] * radii
+    unknown: NDArray[np.int64] = (~local_map.known(np.moveaxis(x_y, 0, -1))).sum(axis=0)
     return unknown
 
 

@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
-from gvgbot.autonomy.gvg.voronoi import fine_graph
+from gvgbot.autonomy.gvg.voronoi import _pieces, fine_graph
 from gvgbot.drivers.world import World
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
@@ -77,6 +77,17 @@ def test_the_graph_is_in_one_piece(seed: int) -> None:
         i, j = graph.ridges.T
         links = coo_array((np.ones(len(i)), (i, j)), (n, n))
         assert connected_components(links, directed=False)[0] == 1
+
+
+@given(seeds)
+def test_points_are_of_one_piece_where_links_lead_from_one_to_the_other(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(1, 60))
+    i, j = rng.integers(count, size=(2, int(rng.integers(0, 80))))
+    piece = _pieces(i, j, count)
+    links = coo_array((np.ones(len(i)), (i, j)), (count, count))
+    expected = connected_components(links, directed=False)[1]
+    assert ((piece[:, None] == piece) == (expected[:, None] == expected)).all()
 
 
 @settings(max_examples=30)
