@@ -106,10 +106,11 @@ class _Look:
     """A scan without the beams that failed."""
 
     def __init__(self, scan: Scan, local_laser: Pose, told: NDArray[np.intp]) -> None:
-        self._scan, self._laser, self._told = scan, local_laser, told
+        self._laser = local_laser
         self._noise = range_noise(scan.ranges)
         self._smooth = math.hypot(_SMOOTH_M, _NOISE * self._noise)
         self._depth = np.minimum(scan.ranges[told], scan.range_max)
+        self._beam_ends = beam_ends(scan, told, self._depth, local_laser)
         # who is cut off at the first or the last beam is half hidden
         self._beside = np.concatenate([[-np.inf], self._depth, [-np.inf]])
         self.steps = np.abs(np.diff(self._depth))
@@ -123,8 +124,7 @@ class _Look:
         if stop - start < _BEAMS:
             return None
         rims = self._rims(piece)
-        is_one = self.steps[start : stop - 1].max(initial=0.0) < self._smooth
-        if not any(rims) or not is_one:
+        if not any(rims) or self.steps[start : stop - 1].max() >= self._smooth:
             return None
         ends = self._ends(piece)
         width = float(np.hypot(*(ends[-1] - ends[0])))
@@ -149,8 +149,7 @@ class _Look:
         return bool(first < self._beside[start]), bool(last < self._beside[stop + 1])
 
     def _ends(self, piece: Piece) -> Array:
-        start, stop = piece
-        return beam_ends(self._scan, self._told[start:stop], self._depth[start:stop], self._laser)
+        return self._beam_ends[slice(*piece)]
 
     def _shaped(self, ends: Array, width: float, is_whole: bool) -> Island | None:
         eye, evidence = self._laser.position, 0.0
@@ -186,6 +185,4 @@ def _is_flat(ends: Array, width: float) -> bool:
 
 def beam_ends(scan: Scan, beams: NDArray[np.intp], depth: Array, local_laser: Pose) -> Array:
     """Where beams of these depths, m, end (N, 2), local frame."""
-    bearings = scan.angle_min + scan.angle_increment * beams
-    directions = np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
-    return local_laser.transform(depth[:, None] * directions)
+    return local_laser.transform(depth[:, None] * scan.directions[beams])

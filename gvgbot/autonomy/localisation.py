@@ -267,8 +267,7 @@ def sampled(scan: Scan, count: int) -> Array:
     """
     with np.errstate(invalid="ignore"):
         hit = scan.ranges < _RANGE_M
-    r, b = scan.ranges[hit], scan.bearings[hit]
-    points = np.stack([r * np.cos(b), r * np.sin(b)], axis=1)
+    points = scan.ranges[hit, None] * scan.directions[hit]
     if len(points) == 0:
         return points
     way = uniform_filter1d(points, _SMOOTHED, axis=0, mode="nearest")

@@ -1,6 +1,7 @@
 """What crosses the hardware abstraction: frozen values, each with the stamp of when it was true."""
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -38,17 +39,29 @@ class Scan:
     @property
     def bearings(self) -> Array:
         """Beam directions (N,) in the laser frame, rad."""
-        return self.angle_min + self.angle_increment * np.arange(len(self.ranges), dtype=np.float64)
+        return _beams(self.angle_min, self.angle_increment, len(self.ranges))[0]
+
+    @property
+    def directions(self) -> Array:
+        """Beam directions (N, 2) in the laser frame, as vectors one metre long."""
+        return _beams(self.angle_min, self.angle_increment, len(self.ranges))[1]
 
     @property
     def ends(self) -> Array:
         """Where beams hit something (N, 2), m, laser frame, in the order of the beams."""
         hit = np.isfinite(self.ranges)
-        bearings = self.bearings[hit]
-        ends: Array = self.ranges[hit, None] * np.stack(
-            [np.cos(bearings), np.sin(bearings)], axis=1
-        )
+        ends: Array = self.ranges[hit, None] * self.directions[hit]
         return ends
+
+
+@lru_cache(maxsize=8)
+def _beams(first: float, increment: float, count: int) -> tuple[Array, Array]:
+    """Bearings (N,), rad, and directions (N, 2) of beams; read-only, since a laser has the same."""
+    bearings = first + increment * np.arange(count, dtype=np.float64)
+    directions = np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
+    for beams in (bearings, directions):
+        beams.setflags(write=False)
+    return bearings, directions
 
 
 @dataclass(frozen=True, slots=True)
