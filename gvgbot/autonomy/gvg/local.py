@@ -120,6 +120,8 @@ class LocalGvg:
 
     nodes: dict[int, LocalNode] = field(default_factory=dict)
     edges: dict[int, LocalEdge] = field(default_factory=dict)
+    # as far as they have been asked for
+    _bearings: dict[tuple[Branch, float], float] = field(default_factory=dict, init=False)
 
     def place(self, point: Array) -> Place | None:
         """The point of the graph nearest to a point (2,); None on an empty graph."""
@@ -195,19 +197,26 @@ class LocalGvg:
         A point at which nothing certain branches off is no end of it. In a wide disc it is taken so
         near that no other meetpoint lies between: what is seen of one makes no difference.
         """
+        asked = branch, clearance
+        if asked not in self._bearings:
+            self._bearings[asked] = self._bearing(branch, clearance)
+        return self._bearings[asked]
+
+    def _bearing(self, branch: Branch, clearance: float) -> float:
         line = self.leaving(branch)
         wanted = max(_LEAST_M, 0.9 * clearance) if clearance < _WIDE_M else _IN_WIDE_M
-        origin, passed = line[0], {branch.edge}
-        while np.hypot(*(line - origin).T).max() < wanted:
-            onwards = self.onwards(branch)
+        origin, passed, farthest = line[0], {branch.edge}, 0.0
+        while True:
+            away = np.hypot(line[:, 0] - origin[0], line[:, 1] - origin[1])
+            farthest = float(away.max())
+            onwards = None if farthest >= wanted else self.onwards(branch)
             if onwards is None or onwards.edge in passed:
                 break
             branch = onwards
             passed.add(branch.edge)
             line = np.concatenate([line, self.leaving(branch)])
-        away = np.hypot(*(line - origin).T)
-        target = line[int(np.argmax(away >= min(wanted, float(away.max()))))]
-        return float(np.arctan2(target[1] - origin[1], target[0] - origin[0]))
+        x, y = line[int(np.argmax(away >= min(wanted, farthest)))]
+        return float(np.arctan2(y - origin[1], x - origin[0]))
 
     def onwards(self, branch: Branch) -> Branch | None:
         """The one certain way on where a branch arrives; None at a meetpoint or an end."""
