@@ -170,10 +170,12 @@ def _pairs(
     world = pose.transform(points)
     found = tree.query(world, k=_NEIGHBOURS, distance_upper_bound=max(reach, _REACH_M))
     distance, near = np.asarray(found[0]), np.asarray(found[1])
-    is_near = np.isfinite(distance[:, _FEWEST - 1]) & (distance[:, 0] < reach)
-    present, points = np.isfinite(distance[is_near]), points[is_near]
-    near = np.where(present, near[is_near], near[is_near][:, :1])
-    (x, y), weight = walls.T[:, near], present * hits[near]
+    present = np.isfinite(distance)
+    is_near = present[:, _FEWEST - 1] & (distance[:, 0] < reach)
+    present, points, near = present[is_near], points[is_near], near[is_near]
+    near = np.where(present, near, near[:, :1])
+    beside, weight = walls.take(near, axis=0), present * hits[near]
+    x, y = beside[..., 0], beside[..., 1]
     centre, normal, flat = _lines(x, y, weight)
     if sides is not None:
         now = np.einsum("kj,jk->k", sides.of_points[is_near], normal)
@@ -182,7 +184,10 @@ def _pairs(
         weight *= facing
         enough = np.count_nonzero(weight, axis=1) >= _FEWEST
         mixed = np.flatnonzero(enough & (present & ~facing).any(axis=1))
-        centre[:, mixed], normal[:, mixed], flat[mixed] = _lines(x[mixed], y[mixed], weight[mixed])
+        if len(mixed):
+            centre[:, mixed], normal[:, mixed], flat[mixed] = _lines(
+                x[mixed], y[mixed], weight[mixed]
+            )
         flat &= enough
     centre, normal = centre[:, flat], normal[:, flat]
     return _Pairs(points[flat].T, normal, (centre * normal).sum(axis=0))
@@ -206,11 +211,12 @@ def _linear(pairs: _Pairs, pose: Pose, prior: Pose, reach: float) -> tuple[Array
 def _lines(x: Array, y: Array, weight: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Centres (2, K) and normals (2, K) of groups of points (K, G), and which are lines (K,)."""
     weight = weight / weight.sum(axis=1, keepdims=True)
-    centre = np.stack([np.einsum("kg,kg->k", weight, p) for p in (x, y)])
+    centre = np.array([np.einsum("kg,kg->k", weight, p) for p in (x, y)])
     dx, dy = x - centre[0, :, None], y - centre[1, :, None]
     wx, wy = weight * dx, weight * dy
     xx, yy, xy = (np.einsum("kg,kg->k", a, b) for a, b in ((wx, dx), (wy, dy), (wx, dy)))
-    angle = 0.5 * np.arctan2(2 * xy, xx - yy)  # of the wall
-    spread = np.hypot((xx - yy) / 2, xy)
-    large, small = (xx + yy) / 2 + spread, (xx + yy) / 2 - spread
-    return centre, np.stack([-np.sin(angle), np.cos(angle)]), small < _FLATNESS * large
+    more, mean = xx - yy, (xx + yy) / 2
+    angle = 0.5 * np.arctan2(2 * xy, more)  # of the wall
+    spread = np.hypot(more / 2, xy)
+    normal = np.array([-np.sin(angle), np.cos(angle)])
+    return centre, normal, mean - spread < _FLATNESS * (mean + spread)
