@@ -9,6 +9,7 @@ counts from where the branch is no longer in it: what is worth a visit does not 
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -223,7 +224,9 @@ def _contract(fine: FineGraph) -> _Draft:
                 path = _walk(neighbours, stops, key, second)
                 walked.add((path[-1], path[-2]))
                 walked.add((key, second))
-                draft.add(_Chain(key, path[-1], fine.points[path], fine.clearance[path]))
+                on = np.array(path)
+                points, clearance = fine.points.take(on, axis=0), fine.clearance.take(on)
+                draft.add(_Chain(key, path[-1], points, clearance))
     return draft
 
 
@@ -382,14 +385,17 @@ def _known_length(draft: _Draft, chain: _Chain, merge_m: float, known: KnownVert
 
 def _attach(chain: _Chain, point: Array, *, at_start: bool) -> None:
     """Let a chain begin (or end) at a node that has moved."""
-    index = 0 if at_start else len(chain.points)
-    chain.points, chain.known_length = np.insert(chain.points, index, point, axis=0), None
-    edge = chain.clearance[0] if at_start else chain.clearance[-1]
-    chain.clearance = np.insert(chain.clearance, index, edge)
+    points, clearance, chain.known_length = chain.points, chain.clearance, None
+    if at_start:
+        chain.points = np.concatenate([point[None], points])
+        chain.clearance = np.concatenate([clearance[:1], clearance])
+    else:
+        chain.points = np.concatenate([points, point[None]])
+        chain.clearance = np.concatenate([clearance, clearance[-1:]])
 
 
 def _finish(draft: _Draft, min_reach: float) -> LocalGvg:
-    edges = {key: _edge(chain) for key, chain in draft.chains.items()}
+    edges = dict(zip(draft.chains, _edges(list(draft.chains.values())), strict=True))
     nodes = {}
     for node, ends in draft.ends.items():
         branches = tuple(Branch(key, out) for key, out in ends)
@@ -409,23 +415,50 @@ def _is_weak(draft: _Draft, branch: Branch, node: int, min_reach: float) -> bool
     return draft.reach_along(branch.edge, forward=branch.forward) < min_reach
 
 
-def _edge(chain: _Chain) -> LocalEdge:
-    """Resample at even spacing and smooth the zigzag of the Voronoi vertices; ends stay."""
-    along = _stations(chain.points)
+def _edges(chains: list[_Chain]) -> Iterator[LocalEdge]:
+    """Chains at even spacing, with the zigzag of the Voronoi vertices smoothed; ends stay.
+
+    They lie one after another in the same arrays: short ones cost most by the number of calls.
+    """
+    if not chains:
+        return
+    raw, parts = _end_to_end([chain.points for chain in chains])
+    along = _stations(raw, parts)
+    even = [_resampled(chain, along[part]) for chain, part in zip(chains, parts, strict=True)]
+    line, parts = _end_to_end([points for points, _ in even])
+    is_end = np.zeros(len(line), bool)
+    for part in parts:
+        is_end[[part.start, part.stop - 1]] = True
+    inner = np.flatnonzero(~is_end)
+    for _ in range(2):
+        line[inner] = 0.25 * line[inner - 1] + 0.5 * line[inner] + 0.25 * line[inner + 1]
+    along = _stations(line, parts)
+    for chain, (_, clearance), part in zip(chains, even, parts, strict=True):
+        yield LocalEdge(chain.a, chain.b, line[part], clearance, along[part])
+
+
+def _resampled(chain: _Chain, along: Array) -> tuple[Array, Array]:
+    """Points (M, 2) and clearance (M,) of a chain at even spacing, by its stations (N,)."""
     count = max(2, round(along[-1] / _SPACING) + 1)
     at = np.arange(count) * (along[-1] / (count - 1))
     at[-1] = along[-1]
-    line = np.stack([np.interp(at, along, chain.points[:, k]) for k in (0, 1)], axis=1)
-    for _ in range(2):
-        line[1:-1] = 0.25 * line[:-2] + 0.5 * line[1:-1] + 0.25 * line[2:]
-    clearance = np.interp(at, along, chain.clearance)
-    return LocalEdge(chain.a, chain.b, line, clearance, _stations(line))
+    points = np.empty((count, 2))
+    for k in (0, 1):
+        points[:, k] = np.interp(at, along, chain.points[:, k])
+    return points, np.interp(at, along, chain.clearance)
 
 
-def _stations(line: Array) -> Array:
-    """Metres (N,) along a polyline (N, 2)."""
-    along = np.zeros(len(line))
-    np.cumsum(_steps(line), out=along[1:])
+def _end_to_end(lines: list[Array]) -> tuple[Array, list[slice]]:
+    """Polylines as one (N, 2), and which part of that each of them is."""
+    ends = np.cumsum([len(line) for line in lines]).tolist()
+    return np.concatenate(lines), [slice(a, b) for a, b in pairwise([0, *ends])]
+
+
+def _stations(line: Array, parts: list[slice]) -> Array:
+    """Metres (N,) along each of the polylines that are the parts of one (N, 2)."""
+    steps, along = _steps(line), np.zeros(len(line))
+    for part in parts:
+        steps[part.start : part.stop - 1].cumsum(out=along[part.start + 1 : part.stop])
     return along
 
 
