@@ -58,16 +58,18 @@ def _circle(ends: Array, eye: Array) -> tuple[Array, float]:
     """
     middle = ends.mean(axis=0)
     about = ends - middle
-    equations = np.column_stack([2.0 * about, np.ones(len(ends))])
+    equations = np.ones((len(ends), 3))
+    equations[:, :2] = 2.0 * about
     (x, y, rest), *_ = np.linalg.lstsq(equations, (about**2).sum(axis=1))
     centre, radius = np.array([x, y]), _possible(math.sqrt(rest + x**2 + y**2))
     away = (middle - eye) / np.hypot(*(middle - eye))
     if centre @ away <= 0.0 or np.hypot(x, y) > radius:
         centre = radius * away
+    slopes = np.ones((len(ends), 3))
     for _ in range(_STEPS):
         to_centre = about - centre
-        distance = np.hypot(*to_centre.T)
-        slopes = np.column_stack([to_centre / distance[:, None], np.ones(len(ends))])
+        distance = np.hypot(to_centre[:, 0], to_centre[:, 1])
+        slopes[:, :2] = to_centre / distance[:, None]
         step, *_ = np.linalg.lstsq(slopes, distance - radius)
         if _possible(radius + step[2]) != radius + step[2]:
             wider = _possible(radius + step[2]) - radius
@@ -87,13 +89,14 @@ def _possible(radius: float) -> float:
 def _off_two_lines(ends: Array) -> float:
     """Sum of the squared distances, m², of ends (N, 2) to two lines, the first ones to one."""
     x, y = (ends - ends.mean(axis=0)).T
-    moments = np.stack([np.ones(len(x)), x, y, x * x, y * y, x * y], axis=1).cumsum(axis=0)
-    return float((_off_line(moments[:-1]) + _off_line(moments[-1] - moments[:-1])).min())
+    moments = np.array([np.ones(len(x)), x, y, x * x, y * y, x * y]).cumsum(axis=1)
+    ahead, whole = moments[:, :-1], moments[:, -1:]
+    return float((_off_line(ahead) + _off_line(whole - ahead)).min())
 
 
 def _off_line(moments: Array) -> Array:
-    """Squared distances (M,), m², of points to their nearest line, by their moments (M, 6)."""
-    n, x, y, xx, yy, xy = moments.T
+    """Squared distances (M,), m², of points to their nearest line, by their moments (6, M)."""
+    n, x, y, xx, yy, xy = moments
     xx, yy, xy = xx - x * x / n, yy - y * y / n, xy - x * y / n
     off: Array = np.maximum((xx + yy) / 2 - np.hypot((xx - yy) / 2, xy), 0.0)
     return off
