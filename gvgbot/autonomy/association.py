@@ -8,6 +8,7 @@ from gvgbot.autonomy.gvg.local import LocalGvg, LocalNode
 from gvgbot.autonomy.slam.graph import GvgGraph, Vertex
 from gvgbot.autonomy.slam.recognition import RecognitionConfig, Sighting
 from gvgbot.autonomy.views import Correspondence, View
+from gvgbot.geometry import Array
 
 
 def sightings_of(view: View, within_m: float) -> dict[int, Sighting]:
@@ -45,20 +46,27 @@ def pair_tracked(
 
     What was taken for a fork in a room may prove to be its end, and the other way round.
     """
+    vertices, nodes = list(_tracked(graph, view, config)), list(sightings)
+    gaps = _gaps(
+        np.array([vertex.local.position for vertex in vertices]),
+        np.array([sighting.position for sighting in sightings.values()]),
+    )
+    near = [(vertices[i], nodes[j], gaps[i, j]) for i, j in np.argwhere(gaps < config.same_place_m)]
     pairs = sorted(
-        (
-            sighting.kind != vertex.kind,
-            float(np.hypot(*(sighting.position - vertex.local.position))),
-            node,
-            vertex.id,
-        )
-        for vertex in _tracked(graph, view, config)
-        for node, sighting in sightings.items()
+        (sightings[node].kind != vertex.kind, float(metres), node, vertex.id)
+        for vertex, node, metres in near
     )
     for changed, metres, node, vertex_id in pairs:
         reach = config.same_place_m * (0.5 if changed else 1.0)
         if metres < reach and node not in known.vertex_of and vertex_id not in known.node_of:
             known.pair(node, vertex_id)
+
+
+def _gaps(some: Array, others: Array) -> Array:
+    """Metres (N, M) from some points (N, 2) to others (M, 2), of which there may be none."""
+    apart = some.reshape(-1, 1, 2) - others.reshape(-1, 2)
+    gaps: Array = np.hypot(apart[..., 0], apart[..., 1])
+    return gaps
 
 
 def is_crowded(graph: GvgGraph, view: View, sighting: Sighting, config: RecognitionConfig) -> bool:

@@ -40,6 +40,8 @@ class View:
 
 def touching(gvg: LocalGvg, points: Array) -> frozenset[int]:
     """The nodes that would be elsewhere, or not at all, without obstacles (N, 2)."""
+    if not len(points):
+        return frozenset()
     return frozenset(
         key
         for key, node in gvg.nodes.items()

@@ -426,10 +426,9 @@ def _edges(chains: list[_Chain]) -> Iterator[LocalEdge]:
     along = _stations(raw, parts)
     even = [_resampled(chain, along[part]) for chain, part in zip(chains, parts, strict=True)]
     line, parts = _end_to_end([points for points, _ in even])
-    is_end = np.zeros(len(line), bool)
-    for part in parts:
-        is_end[[part.start, part.stop - 1]] = True
-    inner = np.flatnonzero(~is_end)
+    is_inner = np.ones(len(line), bool)
+    is_inner[[end for part in parts for end in (part.start, part.stop - 1)]] = False
+    inner = np.flatnonzero(is_inner)
     for _ in range(2):
         line[inner] = 0.25 * line[inner - 1] + 0.5 * line[inner] + 0.25 * line[inner + 1]
     along = _stations(line, parts)

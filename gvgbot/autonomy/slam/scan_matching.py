@@ -171,15 +171,16 @@ def _pairs(
     found = tree.query(world, k=_NEIGHBOURS, distance_upper_bound=max(reach, _REACH_M))
     distance, near = np.asarray(found[0]), np.asarray(found[1])
     present = np.isfinite(distance)
-    is_near = present[:, _FEWEST - 1] & (distance[:, 0] < reach)
-    present, points, near = present[is_near], points[is_near], near[is_near]
+    paired = np.flatnonzero(present[:, _FEWEST - 1] & (distance[:, 0] < reach))
+    present, points = present.take(paired, axis=0), points.take(paired, axis=0)
+    near = near.take(paired, axis=0)
     near = np.where(present, near, near[:, :1])
     beside, weight = walls.take(near, axis=0), present * hits[near]
     x, y = beside[..., 0], beside[..., 1]
     centre, normal, flat = _lines(x, y, weight)
     if sides is not None:
-        now = np.einsum("kj,jk->k", sides.of_points[is_near], normal)
-        before = np.einsum("jkg,jk->kg", sides.of_walls.T[:, near], normal)
+        now = np.einsum("kj,jk->k", sides.of_points.take(paired, axis=0), normal)
+        before = np.einsum("kgj,jk->kg", sides.of_walls.take(near, axis=0), normal)
         facing = before * now[:, None] >= 0.0
         weight *= facing
         enough = np.count_nonzero(weight, axis=1) >= _FEWEST
@@ -189,8 +190,9 @@ def _pairs(
                 x[mixed], y[mixed], weight[mixed]
             )
         flat &= enough
-    centre, normal = centre[:, flat], normal[:, flat]
-    return _Pairs(points[flat].T, normal, (centre * normal).sum(axis=0))
+    lines = np.flatnonzero(flat)
+    centre, normal = centre.take(lines, axis=1), normal.take(lines, axis=1)
+    return _Pairs(points.take(lines, axis=0).T, normal, (centre * normal).sum(axis=0))
 
 
 def _linear(pairs: _Pairs, pose: Pose, prior: Pose, reach: float) -> tuple[Array, Array]:
@@ -203,14 +205,14 @@ def _linear(pairs: _Pairs, pose: Pose, prior: Pose, reach: float) -> tuple[Array
     u, v = c * x - s * y, s * x + c * y
     residual = (u + pose.x) * nx + (v + pose.y) * ny - pairs.distance
     c, s = math.cos(prior.theta), math.sin(prior.theta)
-    J = np.stack([c * nx + s * ny, c * ny - s * nx, u * ny - v * nx])
+    J = np.array([c * nx + s * ny, c * ny - s * nx, u * ny - v * nx])
     near = np.abs(residual) < reach
     return (residual, J) if near.all() else (residual[near], J[:, near])
 
 
 def _lines(x: Array, y: Array, weight: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Centres (2, K) and normals (2, K) of groups of points (K, G), and which are lines (K,)."""
-    weight = weight / weight.sum(axis=1, keepdims=True)
+    weight = weight / np.einsum("kg->k", weight)[:, None]
     centre = np.array([np.einsum("kg,kg->k", weight, p) for p in (x, y)])
     dx, dy = x - centre[0, :, None], y - centre[1, :, None]
     wx, wy = weight * dx, weight * dy
