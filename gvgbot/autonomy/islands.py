@@ -57,7 +57,8 @@ def islands(scan: Scan, local_base: Pose) -> list[Island]:
             found.append(island)
             continue
         parts = (part for part in _pieces(piece, look.is_gap) if part[1] - part[0] >= _ARC_BEAMS)
-        found += [one for one in map(look.island, parts) if one is not None and one.is_round]
+        islets = (look.island(part, only_round=True) for part in parts)
+        found += [one for one in islets if one is not None]
     return found
 
 
@@ -118,8 +119,11 @@ class _Look:
         least = max(_GAP_M, _NOISE * math.sqrt(2.0) * self._noise)
         self.is_gap = (self.steps >= least) | (is_echo[1:] != is_echo[:-1])
 
-    def island(self, piece: Piece) -> Island | None:
-        """What may be somebody; None if it is too wide, too slim, behind something or in parts."""
+    def island(self, piece: Piece, *, only_round: bool = False) -> Island | None:
+        """What may be somebody; None if it is too wide, too slim, behind something or in parts.
+
+        With `only_round` None as well if this look alone does not show that it is round.
+        """
         start, stop = piece
         if stop - start < _BEAMS:
             return None
@@ -128,7 +132,9 @@ class _Look:
             return None
         ends = self._ends(piece)
         width = float(np.hypot(*(ends[-1] - ends[0])))
-        return self._shaped(ends, width, all(rims)) if _SLIM_M <= width < _WIDE_M else None
+        if not _SLIM_M <= width < _WIDE_M:
+            return None
+        return self._shaped(ends, width, all(rims), only_round=only_round)
 
     def sliver(self, piece: Piece) -> Array:
         """Where its beams end (N, 2), local frame, if it is too slim, or has too few of them."""
@@ -151,12 +157,16 @@ class _Look:
     def _ends(self, piece: Piece) -> Array:
         return self._beam_ends[slice(*piece)]
 
-    def _shaped(self, ends: Array, width: float, is_whole: bool) -> Island | None:
+    def _shaped(
+        self, ends: Array, width: float, is_whole: bool, *, only_round: bool
+    ) -> Island | None:
         eye, evidence = self._laser.position, 0.0
         if len(ends) >= _ARC_BEAMS:
-            evidence, centre, radius = round_evidence(ends, eye, self._noise)
+            evidence, centre, radius = round_evidence(ends, eye, self._noise, only_sure=only_round)
             if evidence > SURE:
                 return Island(ends, centre, radius, is_whole, evidence)
+        if only_round:
+            return None
         if is_whole and evidence <= 0.0 and _is_flat(ends, width):
             return None
         away = ends.mean(axis=0) - eye

@@ -1,7 +1,7 @@
 """From what is seen of the GVG to what is known of it: vertices matched, added and joined."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -107,13 +107,16 @@ class Mapper(Knowledge):
 
     def is_way(self, local_base: Pose, place: Array) -> bool:
         """Whether a known edge passes a place (2,), local frame, nearer than any wall of its."""
-        return any(gap < edge.min_clearance for edge, gap in self._edges_at(local_base, place))
+        edges = self._gaps(self.graph.edges.values(), local_base, place)
+        return any(gap < edge.min_clearance for edge, gap in edges)
 
-    def _edges_at(self, local_base: Pose, place: Array) -> Iterator[tuple[Edge, float]]:
-        """The edges that may pass a place (2,), local frame, and how near to it they do, m."""
+    def _gaps(
+        self, edges: Iterable[Edge], local_base: Pose, place: Array
+    ) -> Iterator[tuple[Edge, float]]:
+        """Those edges that may pass a place (2,), local frame, and how near to it they do, m."""
         x, y = self.belief.map_base.transform(local_base.inverse().transform(place))
         starts = dict(zip(self.belief.ids, self.belief.positions.tolist(), strict=True))
-        for edge in self.graph.edges.values():
+        for edge in edges:
             within = edge.length + max(edge.min_clearance, _ON_EDGE_M)
             if math.dist(starts[edge.a.vertex], (x, y)) < within:
                 line = self.belief.map_vertex(edge.a.vertex).transform(edge.polyline)
@@ -330,10 +333,12 @@ class Mapper(Knowledge):
             return False
         place = sighting.position
         is_dubious = sighting.meetpoint and self._unbelieved.was_mistaken_near(place)
-        return any(
-            gap < _ON_EDGE_M and (edge.established or (is_dubious and edge.traversals > 0))
-            for edge, gap in self._edges_at(view.local_base, place)
-        )
+        edges = [
+            edge
+            for edge in self.graph.edges.values()
+            if edge.established or (is_dubious and edge.traversals > 0)
+        ]
+        return any(gap < _ON_EDGE_M for _, gap in self._gaps(edges, view.local_base, place))
 
     # -- what hangs together -----------------------------------------------------------------
 

@@ -34,19 +34,29 @@ def range_noise(ranges: Array) -> float:
     return median / (_MEDIAN * math.sqrt(6.0))
 
 
-def round_evidence(ends: Array, eye: Array, noise: float) -> tuple[float, Array, float]:
+def round_evidence(
+    ends: Array, eye: Array, noise: float, *, only_sure: bool = False
+) -> tuple[float, Array, float]:
     """Log-likelihood ratio of a circle to two lines; the circle's centre (2,) and radius, m.
 
-    `ends` (N, 2), in the order of their beams, were seen from `eye` (2,) with this noise, m.
+    `ends` (N, 2), in the order of their beams, were seen from `eye` (2,) with this noise, m. With
+    `only_sure` it is 0 where lines explain them so well that even a perfect circle is not SURE.
     """
+    off_lines = _off_two_lines(ends)
+    if only_sure and _likelier(off_lines, noise) <= SURE:
+        return 0.0, ends.mean(axis=0), 0.0
     centre, radius = _circle(ends, eye)
     stray = np.hypot(*(ends - centre).T) - radius
-    gain = _off_two_lines(ends) - float(stray @ stray)
-    variance = noise**2 + _SURFACE_M**2
-    evidence = gain / (2.0 * variance) + _SPARE * noise**2 / variance
+    evidence = _likelier(off_lines - float(stray @ stray), noise)
     if np.std(stray) > math.hypot(_ROUND * radius, noise):  # it is neither
         evidence = min(evidence, 0.0)
     return max(-_MOST, min(evidence, _MOST)), centre, radius
+
+
+def _likelier(gain: float, noise: float) -> float:
+    """How much a circle is likelier, by how much less it leaves of the squared distances, m²."""
+    variance = noise**2 + _SURFACE_M**2
+    return gain / (2.0 * variance) + _SPARE * noise**2 / variance
 
 
 def with_look(evidence: float, look: float) -> float:

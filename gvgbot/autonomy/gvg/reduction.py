@@ -206,7 +206,8 @@ def _contract(fine: FineGraph) -> _Draft:
     """Chains of points with two neighbours become one edge each."""
     neighbours = _Neighbours.of(fine)
     first, everyone = neighbours
-    is_key = (np.diff(first) != 2) | ~np.isnan(fine.lead)
+    degree = np.bincount(fine.ridges.ravel(), minlength=len(fine.points))
+    is_key = (degree != 2) | ~np.isnan(fine.lead)
     if len(is_key) and not is_key.any():
         is_key[0] = True  # a ring without a vertex
     keys = np.flatnonzero(is_key).tolist()

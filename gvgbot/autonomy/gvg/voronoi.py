@@ -16,6 +16,7 @@ from gvgbot.geometry import Array
 
 _RING = np.stack([f(np.arange(16) * np.pi / 8) for f in (np.cos, np.sin)], axis=1)
 _WITHIN = np.concatenate([0.5 * _RING[::2], np.zeros((1, 2))])
+_SIDES = (1, 2, 2, 0, 0, 1)  # corners of a triangle's sides, of which each lies opposite to one
 _RIM_M = 0.2  # of a maximal disc, two cells: its walls may hide that
 _MAX_UNKNOWN = 1  # of the sampled points of a disc
 _INFINITE_M = 1e6  # to the centre of a circle around three points on a line
@@ -124,14 +125,15 @@ def _diagram(triangles: Delaunay, room: _Room, roughness: float) -> Diagram:
     a, b, pair = _ridges(triangles)
     p, q = (generators.take(pair[:, k], axis=0) for k in (0, 1))
     chord = np.hypot(*(p - q).T)
-    parts = chord >= 2 * room.min_clearance
-    narrowest = _least_clearance(points, clearance, a[parts], b[parts], p[parts], q[parts])
-    is_rough = np.zeros(len(parts), bool)
-    is_rough[parts] = chord[parts] < np.sqrt(8 * roughness * narrowest)
-    parts &= ~is_rough
+    wide = np.flatnonzero(chord >= 2 * room.min_clearance)
+    p, q = p.take(wide, axis=0), q.take(wide, axis=0)
+    narrowest = _least_clearance(points, clearance, a.take(wide), b.take(wide), p, q)
+    is_rough = chord.take(wide) < np.sqrt(8 * roughness * narrowest)
+    parts = np.zeros(len(pair), bool)
+    parts[wide[~is_rough]] = True
     touched = np.zeros(len(points), bool)
     touched[a[parts]] = touched[b[parts & (b >= 0)]] = True
-    rough = np.flatnonzero(is_rough & (b >= 0))
+    rough = wide[is_rough & (b.take(wide) >= 0)]
     links = np.stack([a[rough], b[rough]])
     certain = np.zeros(len(points), bool)
     certain[links] = True
@@ -285,10 +287,8 @@ def _ridges(triangles: Delaunay) -> tuple[NDArray[np.int64], NDArray[np.int64], 
     other = triangles.neighbors.ravel()
     own = np.repeat(np.arange(len(triangles.simplices)), 3)
     once = np.flatnonzero((own < other) | (other < 0))
-    corners, side = triangles.simplices.ravel(), once % 3
-    first = once - side  # corner of the triangle; a side lies opposite to its own
-    pair = np.stack([corners[first + (side + 1) % 3], corners[first + (side + 2) % 3]], axis=1)
-    return own[once], other[once].astype(np.int64), pair
+    pair = triangles.simplices.take(_SIDES, axis=1).reshape(-1, 2).take(once, axis=0)
+    return own.take(once), other.take(once).astype(np.int64), pair
 
 
 def _least_clearance(
@@ -298,9 +298,9 @@ def _least_clearance(
 
     A ridge that passes between its generators is a door: it is half their distance wide there.
     """
-    far = np.where((b < 0)[:, None], 2 * p - centres[a], centres[b])
-    middle = (p + q) / 2
-    x, y = ((centres[a] - middle) * (far - middle)).T
+    near, middle = centres.take(a, axis=0), (p + q) / 2
+    far = np.where((b < 0)[:, None], 2 * p - near, centres[b])
+    x, y = ((near - middle) * (far - middle)).T
     between = x + y < 0
     ends = np.minimum(clearance[a], np.where(b < 0, np.inf, clearance[b]))
     return np.where(between, np.hypot(*(p - q).T) / 2, ends)

@@ -183,7 +183,7 @@ def _pairs(
         before = np.einsum("kgj,jk->kg", sides.of_walls.take(near, axis=0), normal)
         facing = before * now[:, None] >= 0.0
         weight *= facing
-        enough = np.count_nonzero(weight, axis=1) >= _FEWEST
+        enough = np.einsum("kg->k", (weight > 0.0).astype(np.int8)) >= _FEWEST
         mixed = np.flatnonzero(enough & (present & ~facing).any(axis=1))
         if len(mixed):
             centre[:, mixed], normal[:, mixed], flat[mixed] = _lines(
