@@ -44,6 +44,9 @@ _PER_M = np.diag([0.004**2, 0.004**2, 0.0001**2])  # per metre: what cells do to
 Localisation = Literal["full", "paper"]
 
 
+_Lesson = tuple[Pose, float, Pose, Array, Array]  # a motion, s, its change, Q and C
+
+
 class _Walls(NamedTuple):
     """Points (N, 2), the hits (N,) that each is made of, and where it was seen from (N, 2)."""
 
@@ -67,6 +70,7 @@ class LocalMaps:
         self._walls: _Walls | None = None  # of both; None: not drawn yet
         self._matching = matching
         self._calibration = Calibration()
+        self._lesson: _Lesson | None = None  # what the calibration has yet to learn
         self._shared = 1.0  # scans that the walls in sight are the mean of
         self.blur = np.zeros((3, 3))  # covariance of the last match, in the frame of the base
 
@@ -87,6 +91,7 @@ class LocalMaps:
     def catch_up(self) -> None:
         """Do what is due before the next match: between two looks, or when that comes."""
         self._teach_far()
+        self._calibrate()
         if self._walls is None:
             self._walls = self._drawn()
 
@@ -94,6 +99,17 @@ class LocalMaps:
         if self._due is not None:
             self._far.insert(*self._due)
         self._due = None
+
+    def _calibrate(self) -> None:
+        if self._lesson is not None:
+            self._calibration.learn(*self._lesson)
+        self._lesson = None
+
+    @property
+    def calibration(self) -> Calibration:
+        """What all matches so far have told about odometry."""
+        self._calibrate()
+        return self._calibration
 
     @property
     def far(self) -> LocalMap:
@@ -109,7 +125,7 @@ class LocalMaps:
         Both covariances are in the frame of the base. Without enough walls it is where odometry
         has it. Wheels may have turned without effect, so it may as well be where it was `before`.
         """
-        motion, Q = self._calibration.corrected(motion, duration), self._calibration.scattered(Q)
+        motion, Q = self.calibration.corrected(motion, duration), self.calibration.scattered(Q)
         prior = before.compose(motion)
         still = Pose(before.x, before.y, prior.theta)
         slipping = [] if self._matching.search_rad else [(still, _SLIPPING * Q)]
@@ -119,7 +135,7 @@ class LocalMaps:
             return prior, Q
         found, used = best
         if used is Q:
-            self._calibration.learn(motion, duration, prior.to(found.pose), Q, found.covariance)
+            self._lesson = motion, duration, prior.to(found.pose), Q, found.covariance
         self.blur = found.covariance
         self._shared = min((1.0 - _renewed(scan, motion)) * self._shared + 1.0, _MOST_SHARED)
         noise = found.rms / self._matching.pair_sigma_m
@@ -148,7 +164,7 @@ class LocalMaps:
         even they are doubted, the place that agrees best is taken. Walls where nothing is known yet
         do not speak against a place.
         """
-        prior = before.compose(self._calibration.corrected(motion, duration))
+        prior = before.compose(self.calibration.corrected(motion, duration))
         clearly, turned = (_AT_ALL, _TURNED_RAD) if is_doubted else (_CLEARLY, 0.0)
         priors = [(p, Q + _LOST) for p in _around(prior)]
         best = self._best(scan, priors, clearly, turned, least_known=_SEEN_SHARE)
@@ -274,5 +290,6 @@ def sampled(scan: Scan, count: int) -> Array:
     gaps = np.hypot(*np.diff(way, axis=0).T)
     along = np.concatenate([[0.0], np.cumsum(np.minimum(gaps, _LONGEST_GAP_M))])
     step = max(float(along[-1]) / count, 1e-6)
-    chosen = np.unique(np.floor(along / step), return_index=True)[1]
-    return scan.base_laser.transform(points[chosen])
+    due = np.floor(along / step)
+    is_next = np.concatenate([[True], due[1:] > due[:-1]])
+    return scan.base_laser.transform(points[is_next])

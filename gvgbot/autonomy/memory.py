@@ -130,7 +130,7 @@ class Growth:
 def remember(pipeline: Pipeline) -> Memory:
     """What there is to remember; it shares its parts with the pipeline, so keep it at once."""
     mapper, maps = pipeline.mapper, pipeline._maps
-    calibration = maps._calibration
+    calibration = maps.calibration
     return Memory(
         keyframes=len(pipeline.keyframes),
         last=None if pipeline._last is None else replace(pipeline._last, scan=None),
@@ -221,7 +221,7 @@ def recall(pipeline: Pipeline, memory: Memory, past: list[Growth]) -> None:
     if _fits(pipeline._maps.near, memory.near) and _fits(pipeline._maps._far, memory.far):
         _recall_cells(pipeline._maps.near, memory.near)
         _recall_cells(pipeline._maps.far, memory.far)
-    calibration = pipeline._maps._calibration
+    calibration = pipeline._maps.calibration
     calibration.x, calibration.P = memory.odds.x, memory.odds.P
     calibration.noise, calibration.told = memory.odds.noise, memory.odds.told
     pipeline._maps._shared = memory.odds.shared

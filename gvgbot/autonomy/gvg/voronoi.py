@@ -227,7 +227,7 @@ def _prolonged(
     places = points[rays.start[long], None] + steps[:, None] * unit[long, None]
     seen = steps < length[long, None]
     radius = np.zeros(seen.shape)
-    radius[seen] = cKDTree(room.generators, balanced_tree=False).query(places[seen])[0]
+    radius[seen] = _quick_tree(room.generators).query(places[seen])[0]
     seen[seen] = room.is_certain(places[seen], radius[seen])
     seen = np.logical_and.accumulate(seen, axis=1)
     number = np.full(seen.shape, -1)
@@ -244,6 +244,11 @@ def _prolonged(
         np.concatenate([links, np.stack([chain[:, :-1][onwards], chain[:, 1:][onwards]], axis=1)]),
         lead,
     )
+
+
+def _quick_tree(points: Array) -> cKDTree:
+    """To find the nearest of points (N, 2) for a few places only: it is made faster than used."""
+    return cKDTree(points, leafsize=64, compact_nodes=False, balanced_tree=False)
 
 
 def _direction(vectors: Array) -> Array:
