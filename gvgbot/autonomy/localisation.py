@@ -92,6 +92,7 @@ class LocalMaps:
         """Do what is due before the next match: between two looks, or when that comes."""
         self._teach_far()
         self._calibrate()
+        self.near.tree()  # which whoever looks for people asks for
         if self._walls is None:
             self._walls = self._drawn()
 

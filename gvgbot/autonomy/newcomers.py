@@ -282,7 +282,7 @@ class _Walls:
 
     @cached_property
     def _tree(self) -> cKDTree:
-        return cKDTree(self._map.firm_points())
+        return cKDTree(self._map.firm_points(), balanced_tree=False)
 
     def are_seen(self, island: Island) -> bool:
         """Whether most of it lies on what was seen before: a person may brush along a wall.

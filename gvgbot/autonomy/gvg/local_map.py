@@ -151,10 +151,9 @@ class LocalMap:
         """Middles (N, 2) of free cells away from walls that send echoes: glass, perhaps."""
         cells = np.flatnonzero((self._echoes > 0) & (self._votes <= 0))
         middles = (np.stack(np.divmod(cells, self._size), axis=1) + self._corner + 0.5) * self._cell
-        walls = self.points()
-        if not len(middles) or not len(walls):
+        if not len(middles) or not len(self.points()):
             return np.asarray(middles)
-        return np.asarray(middles[cKDTree(walls).query(middles)[0] > _BESIDE_WALLS_M])
+        return np.asarray(middles[self.tree().query(middles)[0] > _BESIDE_WALLS_M])
 
     def covers(self, points: Array) -> NDArray[np.bool_]:
         """Whether each point (N, 2) lies in the window."""

@@ -129,11 +129,11 @@ def _diagram(triangles: Delaunay, room: _Room, roughness: float) -> Diagram:
     p, q = p.take(wide, axis=0), q.take(wide, axis=0)
     narrowest = _least_clearance(points, clearance, a.take(wide), b.take(wide), p, q)
     is_rough = chord.take(wide) < np.sqrt(8 * roughness * narrowest)
+    smooth, rough = wide[~is_rough], wide[is_rough & (b.take(wide) >= 0)]
     parts = np.zeros(len(pair), bool)
-    parts[wide[~is_rough]] = True
+    parts[smooth] = True
     touched = np.zeros(len(points), bool)
-    touched[a[parts]] = touched[b[parts & (b >= 0)]] = True
-    rough = wide[is_rough & (b.take(wide) >= 0)]
+    touched[a[smooth]] = touched[b[smooth][b[smooth] >= 0]] = True
     links = np.stack([a[rough], b[rough]])
     certain = np.zeros(len(points), bool)
     certain[links] = True
