@@ -42,7 +42,7 @@ def _at_beams(index: Array, ranges: Array, scan: Scan) -> Array:
     order = np.argsort(index, kind="stable")
     index, ranges = index[order], ranges[order]
     wanted = np.arange(len(ranges))
-    after = np.clip(np.searchsorted(index, wanted), 1, len(index) - 1)
+    after = np.minimum(np.maximum(np.searchsorted(index, wanted), 1), len(index) - 1)
     near, far = ranges[after - 1], ranges[after]
     share = (wanted - index[after - 1]) / np.maximum(index[after] - index[after - 1], 1e-9)
     nearest = after - (share < 0.5)
