@@ -49,6 +49,7 @@ def drive(*, closes: bool = True, led: bool = False) -> Any:
         steps=[Step(motion, noise) for motion in motions],
         mapper=SimpleNamespace(graph=GvgGraph(), belief=belief, observations=seen),
         led=led,
+        matches_walls=False,
     )
 
 
