@@ -218,5 +218,18 @@ def test_a_start_without_room_is_refused_with_its_reason(
     assert "\n" not in str(refusal.value)
 
 
+def test_a_start_in_a_wall_is_answered_with_one_in_the_middle_of_the_largest_closed_space() -> None:
+    """Two rooms of 2 by 3 and 4 by 3 m, in a bitmap that is free around them."""
+    occupied = np.zeros((80, 160), dtype=bool)
+    for first, last in ((20, 60), (60, 140)):
+        occupied[10:71, [first, last]] = occupied[[10, 70], first : last + 1] = True
+    world = World(occupied, 0.05)
+    with pytest.raises(WorldError) as refusal:
+        check_start(world, Pose(3.02, 2.0, 0.0), RADIUS)
+    x, y, theta = map(float, str(refusal.value).rpartition("--start ")[2].split())
+    check_start(world, Pose(x, y, theta), 1.4)
+    assert 3.0 < x < 7.0
+
+
 def test_a_start_that_just_fits_is_accepted() -> None:
     check_start(walled(5.0), Pose(5.0 - RADIUS - 1e-6, 5.0, 0.0), RADIUS)
