@@ -8,14 +8,7 @@ import numpy as np
 
 from gvgbot.autonomy.backtracking import Backtracking
 from gvgbot.autonomy.choice import Choice
-from gvgbot.autonomy.control.company import (
-    Companion,
-    free_metres,
-    in_front,
-    patience,
-    refuge,
-    wide_place,
-)
+from gvgbot.autonomy.control.company import Companion
 from gvgbot.autonomy.control.edge_follower import Track
 from gvgbot.autonomy.control.orders import ARRIVED_M, Drive, LookAround, Order, Stand
 from gvgbot.autonomy.driven_edges import DrivenEdges
@@ -29,6 +22,7 @@ from gvgbot.autonomy.exploration.hindrance import Hindrance
 from gvgbot.autonomy.exploration.obstructions import Obstructions
 from gvgbot.autonomy.gvg.local import Branch, Place
 from gvgbot.autonomy.mapping import Mapper
+from gvgbot.autonomy.neighbours import Neighbours
 from gvgbot.autonomy.scouting import Scouting
 from gvgbot.autonomy.search import NO_EDGE, Search
 from gvgbot.autonomy.slam.graph import HalfEdgeId
@@ -65,9 +59,7 @@ class Mission:
         self._looked_around = 0
         self._obstructions = Obstructions(config.retries, config.retry_after_s)
         self._hindrance = Hindrance()
-        self._patience = 1.0  # share of the usual one, with what is in the way
-        self._company: list[Companion] = []  # local frame
-        self._in_front: Companion | None = None  # that is near
+        self._neighbours = Neighbours()
         self._search, self._scouting, self._backtracking = Search(), Scouting(), Backtracking()
         self._examination = Examination(mapper)
         self._events: list[Event] = []
@@ -169,9 +161,7 @@ class Mission:
 
     def meet(self, local_base: Pose, company: list[Companion]) -> None:
         """Note where other robots are, local frame."""
-        self._patience = patience(local_base, company)
-        self._in_front = in_front(local_base, company)
-        self._company = company
+        self._neighbours.meet(local_base, company)
 
     def hold(self) -> None:
         """Note that the robot cannot go on just now: somebody may be in its way."""
@@ -214,25 +204,13 @@ class Mission:
             return self._wait_for_a_way(view, here)
         if self.target is None and graph.vertices:
             return self._examine(view, here)
-        if self.target is not None and self._company:
-            self._depart_unseen(view, here, self.target)
+        if self.target is not None:
+            self._neighbours.depart_unseen(self._mapper, view, here, self.target)
         path = here.ahead() if self.target is None else here.path_to(self.target)
         if path is None:
             return self._wait_for_a_way(view, here)
         self._scouting.end()
         return self._drive(view, here, path)
-
-    def _depart_unseen(self, view: View, here: Situation, target: HalfEdgeId) -> None:
-        """Note that the robot is past the vertex of its target, where that is not to be seen.
-
-        Another robot that stands in one of its ways takes it out of sight.
-        """
-        if target.vertex in here.known.node_of or self.where.on_edge == target:
-            return
-        place = self._mapper.in_local_frame(view, target.vertex)
-        bearing = self._mapper.graph.vertices[target.vertex].half_edges[target.key].bearing
-        base = view.local_base.position
-        self.where.depart(target, place.position, place.theta + bearing, base)
 
     def _choose(self, view: View, here: Situation) -> HalfEdgeId | None:
         """The next frontier, by the policy."""
@@ -313,16 +291,13 @@ class Mission:
         return self._drive(view, here, scouting.path_on(here))
 
     def _make_way(self, view: View, here: Situation) -> Order:
-        """Stand, but in no door, and aside of a robot that is near and may want to pass."""
-        other = self._in_front
-        way = wide_place(here.gvg, here.place, self._company)
-        if way is None and other is not None:
-            way = refuge(here.gvg, here.place, other.pose.position)
+        """Stand, where others can pass."""
+        way = self._neighbours.way_aside(here)
         return Stand() if way is None else self._drive(view, here, way)
 
     def _drive(self, view: View, here: Situation, path: tuple[Branch, ...]) -> Order:
         line, room = here.line_along(path)
-        free = self._free_metres(view, line)
+        free = self._neighbours.free_metres(view, line)
         if free < ARRIVED_M:
             self._hindrance.hold()
             return Stand()
@@ -349,18 +324,11 @@ class Mission:
         self._watch_progress(view)
         track = None
         if self.target is not None:
-            track = self._backtracking.track(view, self.where, self._company)
+            track = self._backtracking.track(view, self.where, self._neighbours.company)
         if track is None:
             self._backtracking.end()
             return None
         return Drive(track)
-
-    def _free_metres(self, view: View, line: Array) -> float:
-        """How far to drive before another robot has to come through where two cannot pass."""
-        if not self._company:
-            return math.inf
-        from_walls, _ = view.local_map.tree().query(line)
-        return free_metres(line, np.asarray(from_walls), self._company)
 
     # -- something in the way ----------------------------------------------------------------------
 
@@ -369,7 +337,7 @@ class Mission:
         reason = self._hindrance.reason_to_turn(
             view.stamp,
             has_come_on=self._headway.waited(view.stamp) == 0.0,
-            patience_s=self._patience * self._config.in_the_way_s,
+            patience_s=self._neighbours.patience * self._config.in_the_way_s,
         )
         if reason:
             self._block(view, reason)

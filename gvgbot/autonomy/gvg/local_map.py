@@ -12,6 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from gvgbot.autonomy.gvg.beams import (
+    bridged,
+    end_points,
+    least_of_three,
+    lone,
+    range_towards,
+    without_single_dropouts,
+)
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
 from gvgbot.ranges import Range
@@ -31,7 +39,6 @@ _EMPTY = (
     ("_seen_at", -np.inf),
 )
 _ONE_WALL = 0.4  # of a cell: means of neighbouring cells nearer than this are of one wall
-_LONE_M = 0.3  # an echo nearer than both its neighbours by this is one of dust on glass
 _GLASS_ECHOES = 3.0  # so many about a cell make it glass, which beams pass and robots do not
 _BESIDE_WALLS_M = 0.22  # half a gap that robots go through: nearer, they make no difference
 _DECAY = 0.05  # echoes that one look outweighs which meets nothing
@@ -95,15 +102,15 @@ class LocalMap:
         tells: up to somebody who is left out.
         """
         self._recentre(local_laser)
-        ranges, directions = _without_single_dropouts(scan.ranges), scan.directions
+        ranges, directions = without_single_dropouts(scan.ranges), scan.directions
         passed = ranges if free is None else np.fmax(ranges, free)
         self._carve(scan, passed, directions, local_laser, travelled)
-        points = _bridged(
-            local_laser.transform(_hits(ranges, directions, self._reach)),
+        points = bridged(
+            local_laser.transform(end_points(ranges, directions, self._reach)),
             self._config.bridge_gap_m,
         )
         self._occupy(points, local_laser.position, travelled)
-        echoes = _hits(_lone(scan.ranges), directions, self._reach)
+        echoes = end_points(lone(scan.ranges), directions, self._reach)
         self._note_echoes(local_laser.transform(echoes))
         self._forget(travelled)
         self._renew()
@@ -226,13 +233,13 @@ class LocalMap:
     ) -> None:
         """Mark what the beams passed through as free, and vote against walls they passed."""
         reach = min(self._reach, scan.range_max)  # as far as a beam without an echo is free
-        see = _least_of_three(np.where(np.isnan(ranges), 0.0, np.minimum(ranges, reach)))
+        see = least_of_three(np.where(np.isnan(ranges), 0.0, np.minimum(ranges, reach)))
         ends = local_laser.transform(see[:, None] * directions)
         window = self._window(ends, local_laser.position, reach * scan.angle_increment)
         corner = self._corner * self._cell
         dx = self._offsets_x[window] + np.float32(corner[0] - local_laser.x)
         dy = self._offsets_y[window] + np.float32(corner[1] - local_laser.y)
-        seen_to = _range_towards(scan, see.astype(np.float32), dx, dy, local_laser.theta)
+        seen_to = range_towards(scan, see.astype(np.float32), dx, dy, local_laser.theta)
         distance = np.sqrt(dx * dx + dy * dy)
         passed = distance < seen_to - np.float32(0.8 * self._cell)
         self._free[window] |= passed
@@ -263,7 +270,7 @@ class LocalMap:
 
     def _vote_against(self, i: Index, j: Index, scan: Scan, see: Array, local_laser: Pose) -> None:
         d = self._mean[i, j] - local_laser.position
-        beyond = _range_towards(scan, see, d[:, 0], d[:, 1], local_laser.theta)
+        beyond = range_towards(scan, see, d[:, 0], d[:, 1], local_laser.theta)
         gone = np.hypot(d[:, 0], d[:, 1]) < beyond - 1.5 * self._cell
         gone[gone] = ~self._is_glass(i[gone], j[gone])
         self._votes[i[gone], j[gone]] -= 1
@@ -361,66 +368,3 @@ def _merged(cells: NDArray[np.intp], columns: int, walls: Walls, reach: float) -
         cells = cells.take(kept)
         walls = Walls(*(values.take(kept, axis=0) for values in walls))
     return walls
-
-
-def _without_single_dropouts(ranges: Array) -> Array:
-    """Ranges with each lone NaN between two readings replaced by the nearer of them."""
-    filled = ranges.copy()
-    inner, left, right = ranges[1:-1], ranges[:-2], ranges[2:]
-    lone = np.isnan(inner) & ~np.isnan(left) & ~np.isnan(right)
-    filled[1:-1][lone] = np.minimum(left[lone], right[lone])
-    return filled
-
-
-def _least_of_three(ranges: Array) -> Array:
-    """The least (N,) of each range and its neighbours'."""
-    least = ranges.copy()
-    np.minimum(least[1:], ranges[:-1], out=least[1:])
-    np.minimum(least[:-1], ranges[1:], out=least[:-1])
-    return least
-
-
-def _lone(ranges: Array) -> Array:
-    """The ranges of echoes much nearer than those on either side, NaN for all others."""
-    deep = np.where(np.isnan(ranges), -np.inf, ranges)  # what failed tells nothing
-    inner = deep[1:-1] + _LONE_M
-    lone = np.full(len(ranges), np.nan)
-    found = (inner < deep[:-2]) & (inner < deep[2:])
-    lone[1:-1][found] = ranges[1:-1][found]
-    return lone
-
-
-def _hits(ranges: Array, directions: Array, reach: float) -> Array:
-    """End points (N, 2) of the beams that hit something within reach, laser frame."""
-    with np.errstate(invalid="ignore"):
-        hit = ranges < reach
-    ends: Array = ranges[hit, None] * directions[hit]
-    return ends
-
-
-def _bridged(points: Array, gap: float) -> Array:
-    """The points with intermediate ones wherever neighbours are close enough to be one wall."""
-    step = np.diff(points, axis=0)
-    length = np.hypot(step[:, 0], step[:, 1])
-    near = (length < gap) & (length > gap / 4)
-    start, step = points[:-1][near], step[near]
-    return np.concatenate([points, *(start + f * step for f in (0.25, 0.5, 0.75))])
-
-
-def _range_towards(
-    scan: Scan,
-    see: NDArray[np.floating],
-    dx: NDArray[np.floating],
-    dy: NDArray[np.floating],
-    theta: float,
-) -> NDArray[np.floating]:
-    """How far the scan sees in the direction of each offset; 0 outside its field of view."""
-    turn = np.float32(2 * np.pi)
-    bearing = np.arctan2(dy, dx)
-    bearing -= np.float32(theta + scan.angle_min)
-    bearing -= turn * np.floor(bearing / turn)
-    bearing *= np.float32(1 / scan.angle_increment)
-    bearing += np.float32(0.5)
-    beam = np.minimum(bearing.astype(np.int32), len(see))
-    towards: NDArray[np.floating] = np.append(see, see.dtype.type(0))[beam]
-    return towards

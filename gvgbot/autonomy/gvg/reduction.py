@@ -9,21 +9,20 @@ counts from where the branch is no longer in it: what is worth a visit does not 
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from itertools import pairwise
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gvgbot.autonomy.gvg.local import Branch, LocalEdge, LocalGvg, LocalNode
+from gvgbot.autonomy.gvg.draft import Chain, Draft, contracted
+from gvgbot.autonomy.gvg.edges import smooth_edges
+from gvgbot.autonomy.gvg.local import Branch, LocalGvg, LocalNode
 from gvgbot.autonomy.gvg.voronoi import FineGraph
 from gvgbot.geometry import Array
 from gvgbot.ranges import Range
 
-_SPACING = 0.1  # metres between the points of an edge
 _MERGE_HYSTERESIS = 1.3  # by which factor an edge must differ to overrule what the map says of it
 _REACH_HYSTERESIS = 1.12
-_WIDE_M = 4.0  # from the walls
 _SEEN_SHARE = 0.8  # of the laser's range: walls farther off may lack
 _CORNER_SHARE = 0.7  # of the map's reach: a corner is sqrt(2) times as far as its walls
 _SPECK = 4.0  # so many of the shortest edges around open space are no way round it
@@ -75,108 +74,12 @@ class ReductionConfig:
         return min(self.open_clearance_m, _SEEN_SHARE * range_m, _CORNER_SHARE * reach_m)
 
 
-@dataclass(slots=True, eq=False)
-class _Chain:
-    a: int
-    b: int
-    points: Array
-    clearance: Array
-    known_length: float | None = None  # of these points, if it has been asked for
-
-    def length(self) -> float:
-        if self.known_length is None:
-            self.known_length = float(_steps(self.points).sum())
-        return self.known_length
-
-
-@dataclass(slots=True, eq=False)
-class _Draft:
-    """A multigraph under reduction: nodes, chains by id, and the chain ends at each node."""
-
-    position: dict[int, Array]
-    clearance: dict[int, float]
-    lead: dict[int, float | None]
-    chains: dict[int, _Chain] = field(default_factory=dict)
-    ends: dict[int, list[tuple[int, bool]]] = field(default_factory=dict)  # (chain, leaves its a)
-    serial: int = 0
-
-    def add(self, chain: _Chain) -> None:
-        key, self.serial = self.serial, self.serial + 1
-        self.chains[key] = chain
-        self.ends.setdefault(chain.a, []).append((key, True))
-        self.ends.setdefault(chain.b, []).append((key, False))
-
-    def remove(self, key: int) -> _Chain:
-        chain = self.chains.pop(key)
-        self.ends[chain.a].remove((key, True))
-        self.ends[chain.b].remove((key, False))
-        return chain
-
-    def degree(self, node: int) -> int:
-        return len(self.ends[node]) + self.open(node)
-
-    def open(self, node: int) -> bool:
-        return self.lead[node] is not None
-
-    def reach(self, leaf: int) -> tuple[float, int, int]:
-        """Reach of the branch that ends at a leaf, its base and its chain."""
-        key, out = self.ends[leaf][0]
-        chain = self.chains[key]
-        base = chain.b if out else chain.a
-        return self.reach_along(key, forward=not out), base, key
-
-    def reach_along(self, key: int, *, forward: bool) -> float:
-        """Reach of a chain from its node a to its node b if `forward`, else the other way."""
-        chain = self.chains[key]
-        base, tip = (chain.a, chain.b) if forward else (chain.b, chain.a)
-        room = self.clearance[base]
-        if room <= _WIDE_M:
-            return (chain.length() + self.clearance[tip]) / room
-        clearance = chain.clearance if forward else chain.clearance[::-1]
-        points = chain.points if forward else chain.points[::-1]
-        within, room = _out_of_the_wide(points, clearance)
-        return (chain.length() - within + self.clearance[tip]) / room
-
-    def splice(self, node: int) -> None:
-        """Make one chain of the two that meet at a node."""
-        (first, out_a), (second, out_b) = self.ends[node]
-        if first == second:
-            return
-        one, two = self.remove(first), self.remove(second)
-        points, room = (
-            (one.points[::-1], one.clearance[::-1]) if out_a else (one.points, one.clearance)
-        )
-        start = one.b if out_a else one.a
-        more, wide = (
-            (two.points, two.clearance) if out_b else (two.points[::-1], two.clearance[::-1])
-        )
-        end = two.b if out_b else two.a
-        del self.ends[node]
-        self.add(
-            _Chain(start, end, np.concatenate([points, more[1:]]), np.concatenate([room, wide[1:]]))
-        )
-
-
-def _out_of_the_wide(points: Array, clearance: Array) -> tuple[float, float]:
-    """After how many metres points (N, 2) come out of a wide space, and their clearance there.
-
-    At their beginning, if they do not.
-    """
-    narrow = np.flatnonzero(clearance <= _WIDE_M)
-    if not len(narrow) or narrow[0] == 0:
-        return 0.0, float(clearance[0])
-    last = narrow[0]
-    before, after = clearance[last - 1], clearance[last]
-    steps = _steps(points[: last + 1])
-    return float(steps.sum() - steps[-1] * (_WIDE_M - after) / (before - after)), _WIDE_M
-
-
 def reduce_graph(
     fine: FineGraph, config: ReductionConfig, known: KnownVertices | None = None
 ) -> LocalGvg:
     """The local GVG of a fine graph."""
     known = known or KnownVertices()
-    draft = _contract(fine)
+    draft = contracted(fine)
     _prune(draft, config.min_reach, known.endpoints)
     _merge(draft, config.merge_m, known)
     _prune(draft, config.min_reach, known.endpoints)
@@ -184,67 +87,7 @@ def reduce_graph(
     return _finish(draft, config.min_reach)
 
 
-class _Neighbours(NamedTuple):
-    """Of point i those from `first[i]` to `first[i + 1]` in `all`, in the order of the ridges.
-
-    Two flat lists: thousands of small ones keep the garbage collector busy.
-    """
-
-    first: list[int]
-    all: list[int]
-
-    @classmethod
-    def of(cls, fine: FineGraph) -> "_Neighbours":
-        """The neighbours of every point of a fine graph."""
-        own, other = fine.ridges.ravel(), fine.ridges[:, ::-1].ravel()
-        count = np.bincount(own, minlength=len(fine.points))
-        first = np.concatenate([[0], np.cumsum(count)])
-        return cls(first.tolist(), other[np.argsort(own, kind="stable")].tolist())
-
-
-def _contract(fine: FineGraph) -> _Draft:
-    """Chains of points with two neighbours become one edge each."""
-    neighbours = _Neighbours.of(fine)
-    first, everyone = neighbours
-    degree = np.bincount(fine.ridges.ravel(), minlength=len(fine.points))
-    is_key = (degree != 2) | ~np.isnan(fine.lead)
-    if len(is_key) and not is_key.any():
-        is_key[0] = True  # a ring without a vertex
-    keys = np.flatnonzero(is_key).tolist()
-    draft = _Draft(
-        {i: fine.points[i] for i in keys},
-        {i: float(fine.clearance[i]) for i in keys},
-        {i: None if math.isnan(angle := float(fine.lead[i])) else angle for i in keys},
-        ends={i: [] for i in keys},
-    )
-    stops = is_key.tolist()
-    walked: set[tuple[int, int]] = set()
-    for key in keys:
-        for second in everyone[first[key] : first[key + 1]]:
-            if (key, second) not in walked:
-                path = _walk(neighbours, stops, key, second)
-                walked.add((path[-1], path[-2]))
-                walked.add((key, second))
-                on = np.array(path)
-                points, clearance = fine.points.take(on, axis=0), fine.clearance.take(on)
-                draft.add(_Chain(key, path[-1], points, clearance))
-    return draft
-
-
-def _walk(neighbours: _Neighbours, stops: list[bool], start: int, second: int) -> list[int]:
-    first, everyone = neighbours
-    before, here, path = start, second, [start, second]
-    while not stops[here]:
-        at = first[here]
-        onwards = everyone[at]
-        if onwards == before:
-            onwards = everyone[at + 1]
-        before, here = here, onwards
-        path.append(here)
-    return path
-
-
-def _prune(draft: _Draft, min_reach: float, endpoints: Array) -> None:
+def _prune(draft: Draft, min_reach: float, endpoints: Array) -> None:
     """Drop corner branches in rounds: a dead end keeps the vertex that both its corners hang on."""
     while True:
         doomed: dict[int, list[tuple[int, int]]] = {}  # leaves and their chains, by base
@@ -268,7 +111,7 @@ def _prune(draft: _Draft, min_reach: float, endpoints: Array) -> None:
                 draft.splice(base)
 
 
-def _forks(draft: _Draft, base: int, doomed: dict[int, list[tuple[int, int]]]) -> Iterator[int]:
+def _forks(draft: Draft, base: int, doomed: dict[int, list[tuple[int, int]]]) -> Iterator[int]:
     """Where corner branches of a base fork: all their twigs must go before any of its branches do.
 
     Towards a corner clearance falls by 1 / reach of the way; along a room it hardly does.
@@ -296,7 +139,7 @@ def _is_corner(reach: float, tip: Array, base: Array, endpoints: Array) -> bool:
     return reach < 1.0
 
 
-def _doubt_stumps(draft: _Draft, min_reach: float) -> None:
+def _doubt_stumps(draft: Draft, min_reach: float) -> None:
     """What is seen of a branch from its tip up to where sight ends may be nothing but a corner."""
     for node, ends in draft.ends.items():
         if len(ends) == 1 and not draft.open(node):
@@ -308,7 +151,7 @@ def _doubt_stumps(draft: _Draft, min_reach: float) -> None:
                 draft.lead[node] = math.atan2(inwards[1], inwards[0])
 
 
-def _merge(draft: _Draft, merge_m: float, known: KnownVertices) -> None:
+def _merge(draft: Draft, merge_m: float, known: KnownVertices) -> None:
     """Make one meetpoint of two that are joined by a very short edge."""
     while True:
         short = [
@@ -342,7 +185,7 @@ def _merge(draft: _Draft, merge_m: float, known: KnownVertices) -> None:
             _attach(draft.chains[key], centre, at_start=out)
 
 
-def _speck(draft: _Draft, longest: float) -> int | None:
+def _speck(draft: Draft, longest: float) -> int | None:
     """The longest chain of a loop of one or two that is too short to go round a wall.
 
     What goes round a wall at a clearance c is 2 pi c long, at least, or a little less where
@@ -362,7 +205,7 @@ def _speck(draft: _Draft, longest: float) -> int | None:
     return None
 
 
-def _drop(draft: _Draft, key: int) -> None:
+def _drop(draft: Draft, key: int) -> None:
     """Take a chain out, and the vertices with it that are none without it."""
     chain = draft.remove(key)
     for end in {chain.a, chain.b}:
@@ -370,7 +213,7 @@ def _drop(draft: _Draft, key: int) -> None:
             draft.splice(end)
 
 
-def _known_length(draft: _Draft, chain: _Chain, merge_m: float, known: KnownVertices) -> float:
+def _known_length(draft: Draft, chain: Chain, merge_m: float, known: KnownVertices) -> float:
     """By what the map stretches the length below which a chain's ends are one meetpoint.
 
     One known meetpoint around with all the departures of both: they are one. Two: they are not.
@@ -384,7 +227,7 @@ def _known_length(draft: _Draft, chain: _Chain, merge_m: float, known: KnownVert
     return 1.0 if len(degrees) < 2 else 1 / _MERGE_HYSTERESIS
 
 
-def _attach(chain: _Chain, point: Array, *, at_start: bool) -> None:
+def _attach(chain: Chain, point: Array, *, at_start: bool) -> None:
     """Let a chain begin (or end) at a node that has moved."""
     points, clearance, chain.known_length = chain.points, chain.clearance, None
     if at_start:
@@ -395,8 +238,8 @@ def _attach(chain: _Chain, point: Array, *, at_start: bool) -> None:
         chain.clearance = np.concatenate([clearance, clearance[-1:]])
 
 
-def _finish(draft: _Draft, min_reach: float) -> LocalGvg:
-    edges = dict(zip(draft.chains, _edges(list(draft.chains.values())), strict=True))
+def _finish(draft: Draft, min_reach: float) -> LocalGvg:
+    edges = dict(zip(draft.chains, smooth_edges(list(draft.chains.values())), strict=True))
     nodes = {}
     for node, ends in draft.ends.items():
         branches = tuple(Branch(key, out) for key, out in ends)
@@ -407,62 +250,10 @@ def _finish(draft: _Draft, min_reach: float) -> LocalGvg:
     return LocalGvg(nodes, edges)
 
 
-def _is_weak(draft: _Draft, branch: Branch, node: int, min_reach: float) -> bool:
+def _is_weak(draft: Draft, branch: Branch, node: int, min_reach: float) -> bool:
     """Whether a branch ends where sight does, too soon to be told from a corner."""
     chain = draft.chains[branch.edge]
     tip = chain.b if branch.forward else chain.a
     if tip == node or len(draft.ends[tip]) != 1 or not draft.open(tip) or draft.degree(node) < 3:
         return False
     return draft.reach_along(branch.edge, forward=branch.forward) < min_reach
-
-
-def _edges(chains: list[_Chain]) -> Iterator[LocalEdge]:
-    """Chains at even spacing, with the zigzag of the Voronoi vertices smoothed; ends stay.
-
-    They lie one after another in the same arrays: short ones cost most by the number of calls.
-    """
-    if not chains:
-        return
-    raw, parts = _end_to_end([chain.points for chain in chains])
-    along = _stations(raw, parts)
-    even = [_resampled(chain, along[part]) for chain, part in zip(chains, parts, strict=True)]
-    line, parts = _end_to_end([points for points, _ in even])
-    is_inner = np.ones(len(line), bool)
-    is_inner[[end for part in parts for end in (part.start, part.stop - 1)]] = False
-    inner = np.flatnonzero(is_inner)
-    for _ in range(2):
-        line[inner] = 0.25 * line[inner - 1] + 0.5 * line[inner] + 0.25 * line[inner + 1]
-    along = _stations(line, parts)
-    for chain, (_, clearance), part in zip(chains, even, parts, strict=True):
-        yield LocalEdge(chain.a, chain.b, line[part], clearance, along[part])
-
-
-def _resampled(chain: _Chain, along: Array) -> tuple[Array, Array]:
-    """Points (M, 2) and clearance (M,) of a chain at even spacing, by its stations (N,)."""
-    count = max(2, round(along[-1] / _SPACING) + 1)
-    at = np.arange(count) * (along[-1] / (count - 1))
-    at[-1] = along[-1]
-    points = np.empty((count, 2))
-    for k in (0, 1):
-        points[:, k] = np.interp(at, along, chain.points[:, k])
-    return points, np.interp(at, along, chain.clearance)
-
-
-def _end_to_end(lines: list[Array]) -> tuple[Array, list[slice]]:
-    """Polylines as one (N, 2), and which part of that each of them is."""
-    ends = np.cumsum([len(line) for line in lines]).tolist()
-    return np.concatenate(lines), [slice(a, b) for a, b in pairwise([0, *ends])]
-
-
-def _stations(line: Array, parts: list[slice]) -> Array:
-    """Metres (N,) along each of the polylines that are the parts of one (N, 2)."""
-    steps, along = _steps(line), np.zeros(len(line))
-    for part in parts:
-        steps[part.start : part.stop - 1].cumsum(out=along[part.start + 1 : part.stop])
-    return along
-
-
-def _steps(line: Array) -> Array:
-    """Metres (N - 1,) from point to point of a polyline (N, 2)."""
-    way = line[1:] - line[:-1]
-    return np.hypot(way[:, 0], way[:, 1])

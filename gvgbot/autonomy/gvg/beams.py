@@ -1,0 +1,72 @@
+"""What single beams of a scan say, beside their neighbours: for the local map."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvgbot.geometry import Array
+from gvgbot.hal.messages import Scan
+
+_LONE_M = 0.3  # an echo nearer than both its neighbours by this is one of dust on glass
+
+
+def without_single_dropouts(ranges: Array) -> Array:
+    """Ranges with each lone NaN between two readings replaced by the nearer of them."""
+    filled = ranges.copy()
+    inner, left, right = ranges[1:-1], ranges[:-2], ranges[2:]
+    lone = np.isnan(inner) & ~np.isnan(left) & ~np.isnan(right)
+    filled[1:-1][lone] = np.minimum(left[lone], right[lone])
+    return filled
+
+
+def least_of_three(ranges: Array) -> Array:
+    """The least (N,) of each range and its neighbours'."""
+    least = ranges.copy()
+    np.minimum(least[1:], ranges[:-1], out=least[1:])
+    np.minimum(least[:-1], ranges[1:], out=least[:-1])
+    return least
+
+
+def lone(ranges: Array) -> Array:
+    """The ranges of echoes much nearer than those on either side, NaN for all others."""
+    deep = np.where(np.isnan(ranges), -np.inf, ranges)  # what failed tells nothing
+    inner = deep[1:-1] + _LONE_M
+    lone = np.full(len(ranges), np.nan)
+    found = (inner < deep[:-2]) & (inner < deep[2:])
+    lone[1:-1][found] = ranges[1:-1][found]
+    return lone
+
+
+def end_points(ranges: Array, directions: Array, reach: float) -> Array:
+    """End points (N, 2) of the beams that hit something within reach, laser frame."""
+    with np.errstate(invalid="ignore"):
+        hit = ranges < reach
+    ends: Array = ranges[hit, None] * directions[hit]
+    return ends
+
+
+def bridged(points: Array, gap: float) -> Array:
+    """The points with intermediate ones wherever neighbours are close enough to be one wall."""
+    step = np.diff(points, axis=0)
+    length = np.hypot(step[:, 0], step[:, 1])
+    near = (length < gap) & (length > gap / 4)
+    start, step = points[:-1][near], step[near]
+    return np.concatenate([points, *(start + f * step for f in (0.25, 0.5, 0.75))])
+
+
+def range_towards(
+    scan: Scan,
+    see: NDArray[np.floating],
+    dx: NDArray[np.floating],
+    dy: NDArray[np.floating],
+    theta: float,
+) -> NDArray[np.floating]:
+    """How far the scan sees in the direction of each offset; 0 outside its field of view."""
+    turn = np.float32(2 * np.pi)
+    bearing = np.arctan2(dy, dx)
+    bearing -= np.float32(theta + scan.angle_min)
+    bearing -= turn * np.floor(bearing / turn)
+    bearing *= np.float32(1 / scan.angle_increment)
+    bearing += np.float32(0.5)
+    beam = np.minimum(bearing.astype(np.int32), len(see))
+    towards: NDArray[np.floating] = np.append(see, see.dtype.type(0))[beam]
+    return towards

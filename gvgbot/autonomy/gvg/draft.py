@@ -1,0 +1,181 @@
+"""The multigraph that is reduced: chains of Voronoi points between ends and forks."""
+
+import math
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from gvgbot.autonomy.gvg.voronoi import FineGraph
+from gvgbot.geometry import Array
+
+_WIDE_M = 4.0  # from the walls
+
+
+@dataclass(slots=True, eq=False)
+class Chain:
+    """Points (N, 2), m, from node a to node b, and their clearance (N,)."""
+
+    a: int
+    b: int
+    points: Array
+    clearance: Array
+    known_length: float | None = None  # of these points, if it has been asked for
+
+    def length(self) -> float:
+        """Metres from end to end."""
+        if self.known_length is None:
+            self.known_length = float(steps_of(self.points).sum())
+        return self.known_length
+
+
+@dataclass(slots=True, eq=False)
+class Draft:
+    """A multigraph under reduction: nodes, chains by id, and the chain ends at each node."""
+
+    position: dict[int, Array]
+    clearance: dict[int, float]
+    lead: dict[int, float | None]
+    chains: dict[int, Chain] = field(default_factory=dict)
+    ends: dict[int, list[tuple[int, bool]]] = field(default_factory=dict)  # (chain, leaves its a)
+    serial: int = 0
+
+    def add(self, chain: Chain) -> None:
+        """Put a chain between its two nodes."""
+        key, self.serial = self.serial, self.serial + 1
+        self.chains[key] = chain
+        self.ends.setdefault(chain.a, []).append((key, True))
+        self.ends.setdefault(chain.b, []).append((key, False))
+
+    def remove(self, key: int) -> Chain:
+        """Take a chain out; its nodes stay."""
+        chain = self.chains.pop(key)
+        self.ends[chain.a].remove((key, True))
+        self.ends[chain.b].remove((key, False))
+        return chain
+
+    def degree(self, node: int) -> int:
+        """The number of chain ends at a node, with the way on into the unseen."""
+        return len(self.ends[node]) + self.open(node)
+
+    def open(self, node: int) -> bool:
+        """Whether the diagram goes on from a node into space not yet seen."""
+        return self.lead[node] is not None
+
+    def reach(self, leaf: int) -> tuple[float, int, int]:
+        """Reach of the branch that ends at a leaf, its base and its chain."""
+        key, out = self.ends[leaf][0]
+        chain = self.chains[key]
+        base = chain.b if out else chain.a
+        return self.reach_along(key, forward=not out), base, key
+
+    def reach_along(self, key: int, *, forward: bool) -> float:
+        """Reach of a chain from its node a to its node b if `forward`, else the other way."""
+        chain = self.chains[key]
+        base, tip = (chain.a, chain.b) if forward else (chain.b, chain.a)
+        room = self.clearance[base]
+        if room <= _WIDE_M:
+            return (chain.length() + self.clearance[tip]) / room
+        clearance = chain.clearance if forward else chain.clearance[::-1]
+        points = chain.points if forward else chain.points[::-1]
+        within, room = _out_of_the_wide(points, clearance)
+        return (chain.length() - within + self.clearance[tip]) / room
+
+    def splice(self, node: int) -> None:
+        """Make one chain of the two that meet at a node."""
+        (first, out_a), (second, out_b) = self.ends[node]
+        if first == second:
+            return
+        one, two = self.remove(first), self.remove(second)
+        points, room = (
+            (one.points[::-1], one.clearance[::-1]) if out_a else (one.points, one.clearance)
+        )
+        start = one.b if out_a else one.a
+        more, wide = (
+            (two.points, two.clearance) if out_b else (two.points[::-1], two.clearance[::-1])
+        )
+        end = two.b if out_b else two.a
+        del self.ends[node]
+        self.add(
+            Chain(start, end, np.concatenate([points, more[1:]]), np.concatenate([room, wide[1:]]))
+        )
+
+
+def _out_of_the_wide(points: Array, clearance: Array) -> tuple[float, float]:
+    """After how many metres points (N, 2) come out of a wide space, and their clearance there.
+
+    At their beginning, if they do not.
+    """
+    narrow = np.flatnonzero(clearance <= _WIDE_M)
+    if not len(narrow) or narrow[0] == 0:
+        return 0.0, float(clearance[0])
+    last = narrow[0]
+    before, after = clearance[last - 1], clearance[last]
+    steps = steps_of(points[: last + 1])
+    return float(steps.sum() - steps[-1] * (_WIDE_M - after) / (before - after)), _WIDE_M
+
+
+def contracted(fine: FineGraph) -> Draft:
+    """Chains of points with two neighbours become one edge each."""
+    neighbours = _Neighbours.of(fine)
+    first, everyone = neighbours
+    degree = np.bincount(fine.ridges.ravel(), minlength=len(fine.points))
+    is_key = (degree != 2) | ~np.isnan(fine.lead)
+    if len(is_key) and not is_key.any():
+        is_key[0] = True  # a ring without a vertex
+    keys = np.flatnonzero(is_key).tolist()
+    draft = Draft(
+        {i: fine.points[i] for i in keys},
+        {i: float(fine.clearance[i]) for i in keys},
+        {i: None if math.isnan(angle := float(fine.lead[i])) else angle for i in keys},
+        ends={i: [] for i in keys},
+    )
+    stops = is_key.tolist()
+    walked: set[tuple[int, int]] = set()
+    for key in keys:
+        for second in everyone[first[key] : first[key + 1]]:
+            if (key, second) not in walked:
+                path = _walk(neighbours, stops, key, second)
+                walked.add((path[-1], path[-2]))
+                walked.add((key, second))
+                on = np.array(path)
+                points, clearance = fine.points.take(on, axis=0), fine.clearance.take(on)
+                draft.add(Chain(key, path[-1], points, clearance))
+    return draft
+
+
+class _Neighbours(NamedTuple):
+    """Of point i those from `first[i]` to `first[i + 1]` in `all`, in the order of the ridges.
+
+    Two flat lists: thousands of small ones keep the garbage collector busy.
+    """
+
+    first: list[int]
+    all: list[int]
+
+    @classmethod
+    def of(cls, fine: FineGraph) -> "_Neighbours":
+        """The neighbours of every point of a fine graph."""
+        own, other = fine.ridges.ravel(), fine.ridges[:, ::-1].ravel()
+        count = np.bincount(own, minlength=len(fine.points))
+        first = np.concatenate([[0], np.cumsum(count)])
+        return cls(first.tolist(), other[np.argsort(own, kind="stable")].tolist())
+
+
+def _walk(neighbours: _Neighbours, stops: list[bool], start: int, second: int) -> list[int]:
+    first, everyone = neighbours
+    before, here, path = start, second, [start, second]
+    while not stops[here]:
+        at = first[here]
+        onwards = everyone[at]
+        if onwards == before:
+            onwards = everyone[at + 1]
+        before, here = here, onwards
+        path.append(here)
+    return path
+
+
+def steps_of(line: Array) -> Array:
+    """Metres (N - 1,) from point to point of a polyline (N, 2)."""
+    way = line[1:] - line[:-1]
+    return np.hypot(way[:, 0], way[:, 1])

@@ -1,0 +1,58 @@
+"""The edges of the local GVG: chains of Voronoi points at even spacing, without their zigzag."""
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+
+from gvgbot.autonomy.gvg.draft import Chain, steps_of
+from gvgbot.autonomy.gvg.local import LocalEdge
+from gvgbot.geometry import Array
+
+_SPACING = 0.1  # metres between the points of an edge
+
+
+def smooth_edges(chains: list[Chain]) -> Iterator[LocalEdge]:
+    """Chains at even spacing, with the zigzag of the Voronoi vertices smoothed; ends stay.
+
+    They lie one after another in the same arrays: short ones cost most by the number of calls.
+    """
+    if not chains:
+        return
+    raw, parts = _end_to_end([chain.points for chain in chains])
+    along = _stations(raw, parts)
+    even = [_resampled(chain, along[part]) for chain, part in zip(chains, parts, strict=True)]
+    line, parts = _end_to_end([points for points, _ in even])
+    is_inner = np.ones(len(line), bool)
+    is_inner[[end for part in parts for end in (part.start, part.stop - 1)]] = False
+    inner = np.flatnonzero(is_inner)
+    for _ in range(2):
+        line[inner] = 0.25 * line[inner - 1] + 0.5 * line[inner] + 0.25 * line[inner + 1]
+    along = _stations(line, parts)
+    for chain, (_, clearance), part in zip(chains, even, parts, strict=True):
+        yield LocalEdge(chain.a, chain.b, line[part], clearance, along[part])
+
+
+def _resampled(chain: Chain, along: Array) -> tuple[Array, Array]:
+    """Points (M, 2) and clearance (M,) of a chain at even spacing, by its stations (N,)."""
+    count = max(2, round(along[-1] / _SPACING) + 1)
+    at = np.arange(count) * (along[-1] / (count - 1))
+    at[-1] = along[-1]
+    points = np.empty((count, 2))
+    for k in (0, 1):
+        points[:, k] = np.interp(at, along, chain.points[:, k])
+    return points, np.interp(at, along, chain.clearance)
+
+
+def _end_to_end(lines: list[Array]) -> tuple[Array, list[slice]]:
+    """Polylines as one (N, 2), and which part of that each of them is."""
+    ends = np.cumsum([len(line) for line in lines]).tolist()
+    return np.concatenate(lines), [slice(a, b) for a, b in pairwise([0, *ends])]
+
+
+def _stations(line: Array, parts: list[slice]) -> Array:
+    """Metres (N,) along each of the polylines that are the parts of one (N, 2)."""
+    steps, along = steps_of(line), np.zeros(len(line))
+    for part in parts:
+        steps[part.start : part.stop - 1].cumsum(out=along[part.start + 1 : part.stop])
+    return along
