@@ -43,6 +43,8 @@ class Neighbours:
 
     def way_aside(self, here: Situation) -> tuple[Branch, ...] | None:
         """Where to wait: in no door, and aside of one that is near and may want to pass."""
+        if not self.company:
+            return None
         way = wide_place(here.gvg, here.place, self.company)
         if way is None and self._in_front is not None:
             way = refuge(here.gvg, here.place, self._in_front.pose.position)
