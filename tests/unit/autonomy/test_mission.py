@@ -382,6 +382,23 @@ def test_who_has_nowhere_to_go_but_past_another_robot_makes_way() -> None:
     assert isinstance(robot.look(TEE), Stand)
 
 
+@pytest.mark.parametrize("is_hidden", [False, True])
+def test_a_crossing_that_another_robot_hides_is_left_by_the_way_that_is_wanted(
+    is_hidden: bool,
+) -> None:
+    """It stands in the branch to the south, so that only a corridor is to be seen."""
+    robot = Robot()
+    robot.drive(TEE, (0.0, 0.0), (2.6, 0.0))
+    (vertex,) = robot.mapper.graph.vertices.values()
+    east = next(key for key, half in vertex.half_edges.items() if abs(half.bearing) < 0.1)
+    robot.mission.target = HalfEdgeId(vertex.id, east)
+    company = [Companion("other", Pose(3.0, -1.5, 0.0), goes_first=True, radius=0.2)]
+    robot.mission.meet(robot.pose, company if is_hidden else [])
+    order = robot.drive(PLAIN if is_hidden else TEE, (2.6, 0.0), (3.4, 0.0))
+    assert end_of(order) == pytest.approx((8.0, 0.0))
+    assert robot.mission.where.on_edge == HalfEdgeId(vertex.id, east)
+
+
 class Alone:
     """Shares the frontiers with others of whom nothing has been heard."""
 
