@@ -62,24 +62,26 @@ def islands(scan: Scan, local_base: Pose) -> list[Island]:
     return found
 
 
-def slivers(scan: Scan, local_base: Pose) -> Array:
+def slivers(scan: Scan, local_base: Pose) -> tuple[Array, NDArray[np.bool_]]:
     """Where beams end (N, 2), local frame, on what too little is seen of to be an island.
 
-    It is narrow and has more room on one side at least.
+    It is narrow and has more room on one side at least. And on which of them (N,) something nearer
+    cuts it off on the other side, so that there may be more of it.
     """
     told = np.flatnonzero(~np.isnan(scan.ranges))
     if not len(told):
-        return np.empty((0, 2))
+        return np.empty((0, 2)), np.zeros(0, np.bool_)
     look = _Look(scan, local_base.compose(scan.base_laser), told)
-    ends = [look.sliver(piece) for piece in _pieces((0, len(told)), look.steps >= _STEP_M)]
-    return np.concatenate([np.empty((0, 2)), *ends])
+    pieces = list(_pieces((0, len(told)), look.steps >= _STEP_M))
+    ends = [look.sliver(piece) for piece in pieces]
+    is_cut = [look.is_half_hidden(piece) for piece in pieces]
+    return np.concatenate([np.empty((0, 2)), *ends]), np.repeat(is_cut, list(map(len, ends)))
 
 
 def without_fringes(scan: Scan) -> Scan:
-    """The scan without that of which it shows too little to know what it is.
+    """The scan without what its first and its last beams show too little of.
 
-    Something stands free there, and all but a sliver of it is out of sight, behind a corner or
-    beyond the first or the last beam: that may be a person.
+    Something stands free there, and all but a sliver of it is out of sight: that may be a person.
     """
     told = np.flatnonzero(~np.isnan(scan.ranges))
     depth = np.minimum(scan.ranges[told], scan.range_max)
@@ -88,10 +90,6 @@ def without_fringes(scan: Scan) -> Scan:
         return scan
     first, last = ends[0] + 1, ends[-1] + 1
     ranges = scan.ranges.copy()
-    look = _Look(scan, scan.base_laser, told)
-    for piece in pairwise((ends + 1).tolist()):
-        if look.is_half_hidden(piece) and len(look.sliver(piece)):
-            ranges[told[slice(*piece)]] = np.nan
     for fringe, beside in ((slice(first), first), (slice(last, None), last - 1)):
         metres = depth[fringe]
         if metres.max() < depth[beside] and metres.max() * _angle(scan, told[fringe]) < _SLIM_M:

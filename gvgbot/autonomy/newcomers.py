@@ -124,27 +124,38 @@ class Newcomers:
                 self._met.append((island.centre, island.radius))
             elif self._is_passing(island, scan.stamp, walls):
                 seen.append((island.centre, island.radius))
-        seen += self._rests(scan, local_base, seen)
+        seen += self._rests(scan, local_base, seen, local_map)
         waiting = [(one.centre, one.radius) for one in self._all if one.is_waiting]
         # At times one is seen in parts only, or has moved a little: both discs count.
         return _without(scan, local_base, [*seen, *waiting, *self._met, *self.company])
 
     def _rests(
-        self, scan: Scan, local_base: Pose, seen: list[tuple[Array, float]]
+        self,
+        scan: Scan,
+        local_base: Pose,
+        seen: list[tuple[Array, float]],
+        local_map: LocalMap,
     ) -> list[tuple[Array, float]]:
         """What may be the last that is seen of those who go behind something, as discs.
 
-        It is too little to be anybody, but somebody was near by just before.
+        It is too little to be anybody, but somebody was near by just before. In a team it may be
+        the first as well, where there was nothing but floor.
         """
         old = scan.stamp - _LATELY_S
         self._lately = [one for one in self._lately if old < one[0] <= scan.stamp]
         self._lately += [(scan.stamp, centre) for centre, _ in seen]
         places = [place for _, place in self._lately]
-        if not places:
+        if not places and not self.in_team:
             return []
-        ends = slivers(scan, local_base)
-        away, _ = cKDTree(places).query(ends, distance_upper_bound=_GONE_M)
-        return [(end, 0.0) for end in ends[np.isfinite(away)]]
+        ends, is_cut = slivers(scan, local_base)
+        rests = np.zeros(len(ends), np.bool_)
+        if places:
+            away, _ = cKDTree(places).query(ends, distance_upper_bound=_GONE_M)
+            rests |= np.isfinite(away)
+        if self.in_team:
+            is_new = (local_map.is_bare(end, _BLUR_M) for end in ends)
+            rests |= is_cut & np.fromiter(is_new, np.bool_, len(ends))
+        return [(end, 0.0) for end in ends[rests]]
 
     def glance(self, scan: Scan, local_base: Pose) -> None:
         """See how those have moved that are near, without learning anything else."""

@@ -452,9 +452,10 @@ def test_a_sliver_of_another_robot_at_the_rim_of_sight_is_kept_out_of_the_map(si
 
 
 def test_a_sliver_of_another_robot_behind_a_corner_is_kept_out_of_the_map() -> None:
-    """A few beams end on it, and nobody was seen there before."""
-    corner = carved([ROOM], [(1.0, 0.0, 1.1, 3.0)])
+    """A few beams end on it, where there was nothing but floor."""
+    corner, behind_it = carved([ROOM], [(1.0, 0.0, 1.1, 3.0)]), Pose(2.5, 1.0, math.pi)
     watch, scan = Watch(corner), sweep(corner, HERE)
+    watch.map.insert(sweep(corner, behind_it), behind_it, 0.0)
     watch.newcomers.in_team = True
     ranges = np.minimum(scan.ranges, to_disc(scan.bearings, (2.0, 0.18)))
     assert 1 <= np.count_nonzero(ranges < scan.ranges) <= 4
