@@ -28,6 +28,7 @@ from gvgbot import client
 from gvgbot.autonomy.config import AutonomyConfig
 from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.keyframes import Keyframe, Step
+from gvgbot.autonomy.localisation import Localisation
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.ekf import Belief, OdometryNoise
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex
@@ -69,7 +70,7 @@ class Robot:
 
     def __init__(self, network: Telemetry) -> None:
         known, belief = graph()
-        self.pipeline = _mind(known, belief)
+        self.pipeline = _mind(known, belief, "paper")  # its places follow from no motion
         self.network, self.live_map = network, LiveMap(0.0)
         self.vitals = Vitals(time.perf_counter())
         self.feed = LiveFeed(network, self.pipeline, SCAN_HZ)
@@ -139,9 +140,9 @@ class Robot:
             self.pipeline.keyframes.append(Keyframe(0.0, there, there, there, None))
 
 
-def _mind(known: GvgGraph, belief: Belief) -> Pipeline:
+def _mind(known: GvgGraph, belief: Belief, localisation: Localisation = "full") -> Pipeline:
     """A mind with a map, at its first vertex, that goes to the last."""
-    pipeline = Pipeline(AutonomyConfig(), ExplorationConfig(), 0.177)
+    pipeline = Pipeline(AutonomyConfig(), ExplorationConfig(), 0.177, localisation=localisation)
     pipeline.mapper.graph, pipeline.mapper.belief = known, belief
     pipeline.mission.target = HalfEdgeId(VERTICES - 1, 1)
     pipeline.mission.where.on_edge = HalfEdgeId(0, 0)
