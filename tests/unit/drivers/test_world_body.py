@@ -226,7 +226,7 @@ def test_a_start_in_a_wall_is_answered_with_one_in_the_middle_of_the_largest_clo
     world = World(occupied, 0.05)
     with pytest.raises(WorldError) as refusal:
         check_start(world, Pose(3.02, 2.0, 0.0), RADIUS)
-    x, y, theta = map(float, str(refusal.value).rpartition("--start ")[2].split())
+    x, y, theta = map(float, str(refusal.value).rpartition("such as ")[2].split())
     check_start(world, Pose(x, y, theta), 1.4)
     assert 3.0 < x < 7.0
 
