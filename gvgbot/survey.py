@@ -22,13 +22,16 @@ def survey(pipeline: Pipeline) -> Array:
 
     From there the robot could drive onto floor that nobody has seen, or sees some that was seen but
     that no edge leads to, or where no edge leads through; or something stood there that may be a
-    part of the building.
+    part of the building. Who drives by odometry alone blurs the grid too much to tell.
     """
+    ways = _ways(pipeline)
+    if ways and not pipeline.matches_walls:
+        return np.empty((0, 2))
     keyframes = smoothed_keyframes(pipeline)
     grid = occupancy_grid(scans_at(keyframes, pipeline))
     here, room = pipeline.map_base.position, pipeline.errands.room_m
     stood = spots(grid, *_passed(pipeline, keyframes), here, room)
-    ways, found = _ways(pipeline), np.concatenate([gaps(grid, here, room), stood])
+    found = np.concatenate([gaps(grid, here, room), stood])
     if not ways:
         return found
     beside = np.concatenate([resampled(way.polyline, _STEP_M) for way in ways])

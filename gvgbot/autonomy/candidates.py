@@ -1,12 +1,13 @@
 """Vertices that have been seen, but not yet often enough to be believed."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from gvgbot.autonomy.gvg.local import LocalNode
+from gvgbot.autonomy.recogniser import Recognition
 from gvgbot.autonomy.slam.recognition import Sighting
 from gvgbot.geometry import Array, wrap_angle
 from gvgbot.ranges import Range
@@ -34,7 +35,10 @@ class CandidatesConfig:
 
 @dataclass(slots=True, eq=False)
 class Candidate:
-    """A vertex not yet believed; `nearest` is how near to it the robot has been, m."""
+    """A vertex not yet believed; `nearest` is how near to it the robot has been, m.
+
+    `may_be` is what the latest look found that left more than one reading open.
+    """
 
     position: Array
     meetpoint: bool
@@ -43,6 +47,7 @@ class Candidate:
     unclear: tuple[float, ...] = ()  # bearings of edges of which too little is seen
     sightings: int = 0
     near_sightings: int = 0
+    may_be: Recognition = field(default_factory=Recognition)
 
 
 class Mistake(NamedTuple):

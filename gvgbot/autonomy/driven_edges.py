@@ -71,7 +71,8 @@ class DrivenEdges:
     ) -> None:
         """Make a vertex where the robot came onto an edge that it knew from another drive.
 
-        It was missed in passing: in a hall one of its ways may be behind what the laser sees.
+        It was missed in passing: in a hall one of its ways may be behind what the laser sees. If
+        that edge is all that the robot drove on, it passes the vertex that was left.
         """
         mapper = self._mapper
         edge = mapper.graph.edge_at(arrived)
@@ -80,6 +81,7 @@ class DrivenEdges:
         known_line = known_line if edge.a == arrived else known_line[::-1]
         at = _fork(passage.line, known_line + (passage.line[-1] - known_line[0]))
         if at is None:
+            mapper.part_edge_at(mapper.graph.vertices[left.vertex])
             return
         place = passage.line[at]
         away = np.hypot(*(mapper.positions_from(view.local_base) - place).T)

@@ -7,6 +7,8 @@ import numpy as np
 
 from gvgbot.autonomy.localisation import sampled
 from gvgbot.autonomy.pipeline import Pipeline
+from gvgbot.autonomy.slam import ekf
+from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.slam.revisits import Passage, revisits
 from gvgbot.autonomy.slam.smoothing import Constraint, PoseGraph
 from gvgbot.autonomy.views import Observation
@@ -89,23 +91,33 @@ def _constraints(pipeline: Pipeline) -> list[Constraint]:
     ]
     if pipeline.matches_walls:
         constraints += revisits(_passage(pipeline), pipeline.matching)
-    met, recognised = set[int](), set[int]()
+    met, recognised, headed = set[int](), set[int](), set[int]()
     for seen in mapper.observations:
         if seen.vertex not in ids or seen.keyframe >= len(keyframes):
             continue
         sight = _sight(seen, ids[seen.vertex], again=seen.vertex in met)
         met.add(seen.vertex)
+        if len(seen.R) == 3:
+            headed.add(seen.vertex)
         if sight.doubtful:
             recognised.add(seen.vertex)
         if not (pipeline.led and seen.vertex in recognised):
             constraints.append(sight)
-    return constraints
+    last = len(keyframes) - 1
+    unheaded = [vertex for vertex in ids if vertex not in headed]
+    return constraints + [_believed(mapper.belief, v, last, ids[v]) for v in unheaded]
 
 
 def _passage(pipeline: Pipeline) -> Passage:
     scans = {i: k.scan for i, k in enumerate(pipeline.keyframes) if k.scan is not None}
     walls = {i: sampled(scan, pipeline.matching.points) for i, scan in scans.items()}
     return Passage([(step.motion, step.covariance) for step in pipeline.steps], walls)
+
+
+def _believed(belief: Belief, vertex: int, last: int, number: int) -> Constraint:
+    """A vertex as it is believed to stand: nobody has kept how its heading was seen."""
+    _, S, _ = ekf.innovation(belief, vertex, Pose(), 1e-6 * np.eye(3))
+    return Constraint(last, number, ekf.expected(belief, vertex)[0], _inverse(S))
 
 
 def _sight(seen: Observation, vertex: int, *, again: bool) -> Constraint:

@@ -207,6 +207,7 @@ class Mapper(Knowledge):
             if self._is_out_of_place(view, sighting, away):
                 continue
             candidate = self._unbelieved.note(sighting, away, view.travelled)
+            candidate.may_be = self._rivals.get(node, candidate.may_be)
             if not self._unbelieved.is_believable(candidate, view.gvg.nodes[node], away):
                 continue
             examined = away < CLOSE_M and self._unbelieved.is_examined(candidate)
@@ -218,8 +219,7 @@ class Mapper(Knowledge):
             old = self._back_again(view, sighting, known)
             if old is None:
                 old = self._add(view, sighting)
-                found = self._rivals.get(node, Recognition())
-                self._events += self.unsettled.doubt(old, found, view.stamp)
+                self._events += self.unsettled.doubt(old, candidate.may_be, view.stamp)
             known.pair(node, old.id)
 
     def _may_be_known(self, view: View, sighting: Sighting) -> bool:
@@ -245,6 +245,15 @@ class Mapper(Knowledge):
         self.observations.append(Observation(view.keyframe, vertex.id, base_vertex, R))
         self._picture(view, vertex)
         place = self.belief.map_vertex(vertex.id)
+        self.part_edge_at(vertex)
+        kind, degree = sighting.kind, vertex.degree
+        self._events.append(
+            VertexAdded(view.stamp, vertex.id, kind, place.x, place.y, degree, vertex.clearance)
+        )
+        return vertex
+
+    def part_edge_at(self, vertex: Vertex) -> None:
+        """Make two edges of one that passes a vertex."""
         split_edge_at(
             self.graph,
             self.belief,
@@ -252,11 +261,6 @@ class Mapper(Knowledge):
             reach=self._recognition.same_place_m,
             angle=math.radians(self._recognition.bearing_deg),
         )
-        kind, degree = sighting.kind, vertex.degree
-        self._events.append(
-            VertexAdded(view.stamp, vertex.id, kind, place.x, place.y, degree, vertex.clearance)
-        )
-        return vertex
 
     def _picture(self, view: View, vertex: Vertex) -> None:
         """Keep the walls around a vertex, to know them again."""

@@ -17,10 +17,11 @@ from gvgbot.autonomy.slam.recognition import (
     detection_covariance,
     gate_distances,
     looks_alike,
+    turn_by_bearings,
 )
 from gvgbot.autonomy.slam.scan_matching import Registration, ScanMatchingConfig, Sides, register
 from gvgbot.autonomy.views import View
-from gvgbot.geometry import Array, Pose, rotated_covariance
+from gvgbot.geometry import Array, Pose, rotated_covariance, wrap_angle
 
 CLOSE_M = 1.5  # as near as one needs to be to tell vertices apart
 _WALL_M = 0.15  # a point so near to a wall lies on it
@@ -30,6 +31,7 @@ _RIVALS = 4  # that are kept in mind
 _COMPARED = 12  # vertices elsewhere, to tell how many look like what is seen
 _PLACE_SIGMA_M = 0.15  # of a vertex laid onto what is seen, before its walls are
 _TURN_SIGMA_RAD = 0.02  # and of its turn, beside the robot's own
+_WALLS_M = 2.5  # from a vertex, about: turned by so much that these are missed, none are found
 _REGISTRATION_FLOOR = np.diag([4e-4, 4e-4, 9e-6])  # what registration cannot know of itself
 
 
@@ -185,8 +187,13 @@ class Recogniser:
         foreseen = view.local_base.compose(ekf.expected(belief, vertex.id)[0])
         if not looks_alike(vertex, sighting, foreseen, self._config):
             return None
-        prior = Pose(float(sighting.position[0]), float(sighting.position[1]), foreseen.theta)
-        found, agreement = self._laid_on(belief, view, vertex, prior)
+        turn_sigma = math.sqrt(float(belief.P[2, 2])) + _TURN_SIGMA_RAD
+        turn = 0.0
+        if turn_sigma * _WALLS_M > self._matching.max_pair_m:
+            turn = turn_by_bearings(vertex, sighting, foreseen, self._config)
+        x, y = sighting.position
+        prior = Pose(float(x), float(y), wrap_angle(foreseen.theta + turn))
+        found, agreement = self._laid_on(view, vertex, prior, turn_sigma)
         surprising = metres > self._config.same_place_m
         least = self._min_inliers_far if surprising else self._min_inliers
         if found is not None and agreement >= least:
@@ -203,10 +210,9 @@ class Recogniser:
         return Match(vertex, prior, covariance, agreement, distance, metres)
 
     def _laid_on(
-        self, belief: Belief, view: View, vertex: Vertex, prior: Pose
+        self, view: View, vertex: Vertex, prior: Pose, turn_sigma: float
     ) -> tuple[Registration | None, float]:
         """A vertex's frame laid onto the local map, and the share of its walls found where seen."""
-        turn_sigma = math.sqrt(float(belief.P[2, 2])) + _TURN_SIGMA_RAD
         Q = np.diag([_PLACE_SIGMA_M**2, _PLACE_SIGMA_M**2, turn_sigma**2])
         walls, tree = view.local_map.points(), view.local_map.tree()
         sides = Sides(view.local_map.sights(), vertex.sights)

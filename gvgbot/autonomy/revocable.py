@@ -8,21 +8,19 @@ from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.doubts import Doubt
 from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.slam.graph import GvgGraph
+from gvgbot.autonomy.views import Observation
 from gvgbot.geometry import Array, Pose
 
 
 @dataclass(slots=True, eq=False)
 class Revocable:
-    """A closure at a vertex, what there was before it, and how the robot has moved since.
-
-    `observations` is how many vertices had been observed.
-    """
+    """A closure at a vertex, what there was before it, and how the robot has moved since."""
 
     vertex: int
     belief: Belief
     graph: GvgGraph
     doubts: list[Doubt]
-    observations: int
+    observations: list[Observation]
     moves: list[tuple[Pose, Array]] = field(default_factory=list)
     is_contradicted: bool = False  # by a way that led elsewhere
 
@@ -33,11 +31,11 @@ class Revocable:
         belief: Belief,
         graph: GvgGraph,
         doubts: Sequence[Doubt],
-        observations: int,
+        observations: Sequence[Observation],
     ) -> "Revocable":
         """As things are, just before a closure."""
         own = replace(belief, P=belief.P.copy())
-        return cls(vertex, own, copy.deepcopy(graph), list(doubts), observations)
+        return cls(vertex, own, copy.deepcopy(graph), list(doubts), list(observations))
 
     def relived(self) -> Belief:
         """What would be believed now without the closure, and without what was seen since."""

@@ -1,6 +1,7 @@
 """Changes of the graph where a vertex is found on an edge, proves to be none, or a known one."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -22,7 +23,7 @@ def split_edge_at(
     """Make two edges of one that was joined before a vertex on it was found.
 
     The edge must pass the vertex within `reach` m, where it is known as well as that, and leave it
-    within `angle` rad of two of its half-edges.
+    within `angle` rad of two of its half-edges that have no edge.
     """
     vertex_map = belief.map_vertex(vertex.id).inverse()
     for edge in list(graph.edges.values()):
@@ -33,7 +34,7 @@ def split_edge_at(
         _, S = apart(belief, vertex.id, [edge.a.vertex])
         if np.trace(S[0]) > reach**2:
             continue  # it may as well be elsewhere
-        known = {key: half.bearing for key, half in vertex.half_edges.items()}
+        known = {k: half.bearing for k, half in vertex.half_edges.items() if half.edge is None}
         matched = match_bearings(tuple(direction(part) for part in parts), known, angle)
         if len(matched) < 2:
             continue
@@ -146,13 +147,20 @@ def loose_ends(
     return found
 
 
-def fuse(
-    graph: GvgGraph, kept: Vertex, gone: Vertex, kept_gone: Pose, angle: float
-) -> dict[HalfEdgeId, HalfEdgeId]:
+class Fused(NamedTuple):
+    """What has become of the half-edges of the vertex that is no more, and who may be one as well.
+
+    The same departure led to both vertices of each of the `twins`.
+    """
+
+    renamed: dict[HalfEdgeId, HalfEdgeId]
+    twins: list[tuple[int, int]]
+
+
+def fuse(graph: GvgGraph, kept: Vertex, gone: Vertex, kept_gone: Pose, angle: float) -> Fused:
     """Make one vertex of two, the second of which stands at a pose in the frame of the first.
 
-    Departures within `angle` rad are the same; an edge that both have is kept once. Returns what
-    has become of the second's half-edges.
+    Departures within `angle` rad are the same; an edge that both have is kept once.
     """
     turned = tuple(half.bearing + kept_gone.theta for half in gone.half_edges.values())
     known = {key: half.bearing for key, half in kept.half_edges.items()}
@@ -163,17 +171,22 @@ def fuse(
         )
         for i, key in enumerate(gone.half_edges)
     }
+    twins = []
     for edge in [e for e in graph.edges.values() if gone.id in (e.a.vertex, e.b.vertex)]:
         graph.unjoin(edge)
         a, b = renamed.get(edge.a, edge.a), renamed.get(edge.b, edge.b)
-        if a == b or graph.edge_at(a) is not None or graph.edge_at(b) is not None:
-            continue
         begins_here = edge.a.vertex == gone.id
+        near, far = (a, b) if begins_here else (b, a)
+        before = graph.edge_at(near)
+        if before is not None and before.other(near).vertex != far.vertex != kept.id:
+            twins.append((before.other(near).vertex, far.vertex))
+        if a == b or before is not None or graph.edge_at(far) is not None:
+            continue
         line = kept_gone.transform(edge.polyline) if begins_here else edge.polyline
         joined = graph.join(a, b, line, edge.min_clearance, driven=edge.driven)
         joined.traversals, joined.established = edge.traversals, edge.established
     del graph.vertices[gone.id]
-    return renamed
+    return Fused(renamed, twins)
 
 
 def outwards(belief: Belief, edge: Edge, end: HalfEdgeId) -> Array:

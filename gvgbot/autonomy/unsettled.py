@@ -14,7 +14,7 @@ from gvgbot.autonomy.events import (
 from gvgbot.autonomy.recogniser import Recognition
 from gvgbot.autonomy.revocable import Revocable
 from gvgbot.autonomy.slam import ekf
-from gvgbot.autonomy.slam.doubts import SAME, Doubt, Doubts, habit_density
+from gvgbot.autonomy.slam.doubts import NEW_PER_M2, SAME, Doubt, Doubts, habit_density
 from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.slam.graph import Edge, GvgGraph, HalfEdgeId, Vertex
 from gvgbot.autonomy.topology import fuse
@@ -150,12 +150,16 @@ class Unsettled:
             kept.local = gone.local.compose(Pose(theta=-turn))
             kept.seen_at, kept.updated_at = gone.seen_at, gone.updated_at
         kept.visits += gone.visits
-        self._renamed |= fuse(known.graph, kept, gone, Pose(theta=turn), self._same_bearing)
+        fused = fuse(known.graph, kept, gone, Pose(theta=turn), self._same_bearing)
+        self._renamed |= fused.renamed
         known.observations[:] = [
             replace(seen, vertex=kept.id, R=seen.R[:2, :2]) if seen.vertex == gone.id else seen
             for seen in known.observations
         ]
         self._doubts.forget(gone.id)
+        for twins in fused.twins:
+            older, newer = sorted(twins)
+            self._doubts.note(Doubt(newer, (older,), NEW_PER_M2))
 
     # -- whether a closure was right -----------------------------------------------------------
 
@@ -163,7 +167,7 @@ class Unsettled:
         """Keep what is believed, before it is corrected by a closure at a vertex."""
         known = self._known
         self._revocable = Revocable.before(
-            vertex.id, known.belief, known.graph, self._doubts.recent, len(known.observations)
+            vertex.id, known.belief, known.graph, self._doubts.recent, known.observations
         )
 
     def revoke(self, stamp: float) -> list[Event]:
@@ -174,7 +178,7 @@ class Unsettled:
         added = sorted(known.graph.vertices.keys() - was.graph.vertices.keys())
         was.graph.serial = known.graph.serial
         known.graph, known.belief = was.graph, was.relived()
-        del known.observations[was.observations :]
+        known.observations[:] = was.observations
         self._doubts.recent = was.doubts
         self._doubts.refute(was.vertex)
         self._revocable, self.is_wary = None, True

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from gvgbot.autonomy.pipeline import Pipeline
+from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.config import load_config
 from gvgbot.drivers.world import World
 from gvgbot.geometry import STANDSTILL, Array, Pose
@@ -15,21 +16,27 @@ from gvgbot.hal.messages import Odometry
 from gvgbot.live_survey import LiveSurvey
 from gvgbot.survey import survey
 from gvgbot.worlds.canvas import Canvas
+from tests.unit.autonomy.graphs import streets
 from tests.unit.autonomy.sights import CELL, LASER_270, carved, sweep
 
 START = Pose(-3.0, 0.0, 0.0)  # in the world; the map begins there
 CORRIDOR, SIDE = (-4.0, -1.0, 4.0, 1.0), (2.0, -1.0, 4.0, 4.0)
 
 
-def places_after(world: World, metres: float) -> Array:
-    """What a survey finds (N, 2), world frame, after so long a drive straight on."""
+def driven(world: World, metres: float) -> Pipeline:
+    """A robot after so long a drive straight on."""
     config = load_config()
     pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
     for step, x in enumerate(np.arange(0.0, metres + 0.01, 0.25)):
         odom_base = Pose(float(x), 0.0, 0.0)
         pipeline.control(Odometry(0.1 * step, odom_base, STANDSTILL))
         pipeline.perceive(replace(sweep(world, START.compose(odom_base)), stamp=0.1 * step))
-    return START.transform(survey(pipeline))
+    return pipeline
+
+
+def places_after(world: World, metres: float) -> Array:
+    """What a survey finds (N, 2), world frame, after so long a drive straight on."""
+    return START.transform(survey(driven(world, metres)))
 
 
 def test_nothing_is_missing_of_what_can_be_seen_from_one_end() -> None:
@@ -42,6 +49,16 @@ def test_what_lies_in_the_shadow_of_a_corner_is_a_gap_until_the_robot_looks_roun
     (place,) = places_after(building, 3.0)
     assert place == pytest.approx([3.0, 1.5], abs=0.3)
     assert len(places_after(building, 6.0)) == 0
+
+
+def test_the_blurred_grid_of_who_drives_by_odometry_alone_lacks_nothing() -> None:
+    """A map that has edges is taken as it is; before that, floor that is unseen counts."""
+    pipeline = driven(carved([CORRIDOR, SIDE]), 3.0)
+    pipeline._trusts_odometry = True
+    assert len(survey(pipeline)) > 0
+    pipeline.mapper.graph = streets(2, 1)[0]
+    pipeline.mapper.belief = Belief(np.zeros(9), np.zeros((9, 9)), (1, 2))
+    assert len(survey(pipeline)) == 0
 
 
 def driven_past_a_post(seconds: float) -> Pipeline:

@@ -100,6 +100,10 @@ class Doubts:
 
     def note(self, doubt: Doubt) -> None:
         """Learn of a new vertex; one without a doubt is of interest only after one with."""
+        for old in [old for old in self.recent if old.vertex == doubt.vertex]:
+            rivals = tuple(dict.fromkeys(old.rivals + doubt.rivals))
+            self.recent[self.recent.index(old)] = replace(old, rivals=rivals)
+            return
         if self.recent or doubt.rivals:
             self.recent.append(doubt)
         self._forget_settled()

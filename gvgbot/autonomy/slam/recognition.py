@@ -105,6 +105,21 @@ def looks_alike(
     tolerance = max(config.clearance_m, _CLEARANCE_SHARE * vertex.clearance) + beside
     if abs(vertex.clearance - sighting.clearance) > tolerance:
         return False
+    matched = _turns(vertex, sighting, local_vertex, config)
+    return len(matched) >= min(vertex.degree, len(sighting.bearings))
+
+
+def turn_by_bearings(
+    vertex: Vertex, sighting: Sighting, local_vertex: Pose, config: RecognitionConfig
+) -> float:
+    """By how much its departures are seen turned, rad, the vertex's frame at `local_vertex`."""
+    return float(np.mean(_turns(vertex, sighting, local_vertex, config) or [0.0]))
+
+
+def _turns(
+    vertex: Vertex, sighting: Sighting, local_vertex: Pose, config: RecognitionConfig
+) -> list[float]:
+    """By how much each departure that is found again is seen turned, rad."""
     known = {key: half.bearing + local_vertex.theta for key, half in vertex.half_edges.items()}
     matched = match_bearings(sighting.bearings, known, math.radians(config.bearing_deg))
-    return len(matched) >= min(len(known), len(sighting.bearings))
+    return [wrap_angle(sighting.bearings[i] - known[key]) for i, key in matched.items()]

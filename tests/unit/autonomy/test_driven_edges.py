@@ -143,3 +143,24 @@ def test_a_way_that_only_ends_at_a_known_edge_is_no_fork_of_it() -> None:
     drive.along(STREET, beyond, (4.0, 0.0))
     assert sorted(drive.mapper.graph.vertices) == [1, 2, 3]
     assert len(drive.mapper.graph.edges) == 1
+
+
+def test_a_known_edge_that_passes_the_vertex_that_was_left_has_one_of_its_ends_there() -> None:
+    """From vertex 2 to a vertex in the west it was taken for one edge, past vertex 1."""
+    drive = Drive(HalfEdgeId(1, EAST))
+    graph, west = drive.mapper.graph, Vertex(3, 1.0, Pose(-5.0, 0.0, 0.0), 0.0, 0.0)
+    graph.vertices[3], graph.serial = west, 3
+    ends = HalfEdgeId(2, WEST), HalfEdgeId(3, west.add_half_edge(0.0))
+    graph.join(*ends, resampled([(0.0, 0.0), (-10.0, 0.0)]), 1.0, driven=True)
+    for vertex, x in ((1, 0.0), (2, 5.0), (3, -5.0)):
+        belief = drive.mapper.belief
+        drive.mapper.belief = ekf.add_vertex(belief, vertex, Pose(x, 0.0, 0.0), 1e-4 * np.eye(3))
+    drive.mapper.move(Pose(4.0, 0.0), np.zeros((3, 3)))
+    drive.where.trail = list(resampled([(0.0, 0.0), (4.0, 0.0)]))
+    beyond = {branch: end for branch, end in ALL_SEEN.items() if end.vertex == 2}
+    drive.along(STREET, beyond, (4.0, 0.0))
+    joined = {frozenset((edge.a, edge.b)) for edge in graph.edges.values()}
+    assert joined == {
+        frozenset((HalfEdgeId(1, EAST), HalfEdgeId(2, WEST))),
+        frozenset((HalfEdgeId(1, WEST), HalfEdgeId(3, 0))),
+    }

@@ -732,3 +732,72 @@ def test_a_vertex_in_doubt_becomes_part_of_the_known_one_as_soon_as_that_is_cert
     assert doubt.vertex not in mapper.graph.vertices
     assert seen.known.vertex_of[2] == tee
     assert {s.vertex for s in mapper.observations} <= set(mapper.belief.ids)
+
+
+class Glimpsing(Believing):
+    """As `Believing`, but for a look or two only."""
+
+    def __init__(self, known: int, looks: int) -> None:
+        super().__init__(known, as_rival=True)
+        self._looks = looks
+
+    def find(self, *args: object, **options: object) -> Recognition:
+        found = super().find(*args, **options)  # type: ignore[arg-type]
+        self._looks -= bool(found.rivals)
+        return found if self._looks >= 0 else Recognition()
+
+
+@pytest.mark.parametrize(("looks", "doubts"), [(1, 1), (0, 0)])
+def test_what_one_of_the_looks_has_shown_is_in_doubt_though_the_last_one_did_not(
+    looks: int, doubts: int
+) -> None:
+    seen = Seen().look(TEE, CONFIG.candidates.endpoint_sightings)
+    tee = seen.known.vertex_of[2]
+    seen.mapper._recogniser = Glimpsing(tee, looks)  # type: ignore[assignment]
+    seen.drive_elsewhere(20.0)
+    seen.mapper.move(Pose(4.0, 3.0, 0.0), np.diag([9.0, 9.0, 0.01]))
+    seen.look(TEE, CONFIG.candidates.meetpoint_sightings)
+    assert len(of_type(seen.events, PlaceDoubted)) == doubts
+
+
+def test_who_takes_a_settled_doubt_back_knows_again_what_was_seen_of_both_places() -> None:
+    seen = crossed(as_rival=True)
+    mapper = seen.mapper
+    (doubt,) = of_type(seen.events, PlaceDoubted)
+    assert isinstance(doubt, PlaceDoubted)
+    before = list(mapper.observations)
+    mapper.belief = ekf.update(mapper.belief, doubt.known, Pose(3.0, 0.0), 0.01 * np.eye(3))
+    mapper.unsettled._has_news = True
+    seen.look(TEE)
+    assert len(of_type(seen.events, DoubtSettled)) == 1
+    (edge,) = mapper.graph.edges.values()
+    mapper.unsettled.note_way(edge, arrived=99)  # not at its far end
+    mapper.unsettled.revoke(100.0)
+    assert doubt.vertex in mapper.graph.vertices
+    assert mapper.observations == before
+
+
+def crossing(turn: float) -> LocalGvg:
+    """Two corridors that cross in the origin, in a local frame that is turned."""
+    ways = Pose(theta=turn).transform(4.0 * np.array([[1, 0], [0, 1], [-1, 0], [0, -1]]))
+    points = {1: (0.0, 0.0)} | {2 + i: (float(x), float(y)) for i, (x, y) in enumerate(ways)}
+    lines: dict[int, tuple[int, int, list[Point]]] = {10 + i: (1, i, []) for i in range(2, 6)}
+    unseen = {2 + i: math.atan2(y, x) for i, (x, y) in enumerate(ways)}
+    return drawn(points, lines, unseen=unseen)
+
+
+@pytest.mark.parametrize("turn", [0.05, 0.25, -0.25])
+def test_a_crossing_is_known_again_however_odometry_has_turned(turn: float) -> None:
+    """Walls three metres off are beyond the reach of their pairs then; the ways tell the turn."""
+    world = carved([(-8.0, -1.0, 8.0, 1.0), (-1.0, -8.0, 1.0, 8.0)])
+    seen = Seen().look(
+        crossing(0.0), CONFIG.candidates.meetpoint_sightings, local_map=looked(world, [Pose()])
+    )
+    seen.drive_elsewhere(20.0)
+    seen.mapper.move(Pose(), np.diag([0.04, 0.04, 0.2**2]))
+    turned = looked(world, [Pose()], local_world=Pose(theta=turn))
+    seen.look(crossing(turn), local_map=turned)
+    (closed,) = of_type(seen.events, LoopClosed)
+    assert isinstance(closed, LoopClosed)
+    assert closed.agreement > 0.9
+    assert len(seen.mapper.graph.vertices) == 1

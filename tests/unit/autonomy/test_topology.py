@@ -57,7 +57,7 @@ def test_an_edge_of_the_doubled_vertex_goes_to_the_known_one() -> None:
     again = doubled(graph, 0.0)
     line = STREET * np.array([[0.0, 0.0], [math.cos(-TURN), math.sin(-TURN)]])
     graph.join(HalfEdgeId(again.id, 0), HalfEdgeId(east.id, 0), line, 0.8, driven=True)
-    renamed = fuse(graph, west, again, Pose(theta=TURN), ANGLE)
+    renamed, _ = fuse(graph, west, again, Pose(theta=TURN), ANGLE)
     assert renamed == {HalfEdgeId(again.id, 0): HalfEdgeId(west.id, 0)}
     (edge,) = graph.edges.values()
     assert {edge.a.vertex, edge.b.vertex} == {west.id, east.id}
@@ -79,6 +79,23 @@ def test_an_edge_that_both_have_is_kept_once() -> None:
     assert graph.frontiers() == []
     assert between(graph, west.id, east.id)
     assert len(graph.edges) == 1
+    assert is_sound(graph)
+
+
+def test_vertices_to_which_the_same_departure_leads_may_be_one() -> None:
+    """The street to the east was driven twice, and its end was taken for a new one the second time.
+
+    To the north only the second drive went: that tells nothing.
+    """
+    graph, ids = streets(2, 1)
+    west, east = (graph.vertices[ids[x, 0]] for x in (0, 1))
+    west_again, east_again = doubled(graph, 0.0, math.pi / 2), doubled(graph, math.pi)
+    north = doubled(graph, -math.pi / 2)
+    for key, end in ((0, east_again), (1, north)):
+        ends = HalfEdgeId(west_again.id, key), HalfEdgeId(end.id, 0)
+        graph.join(*ends, np.array([[0.0, 0.0], [STREET, 0.0]]), 1.0, driven=True)
+    _, twins = fuse(graph, west, west_again, Pose(theta=TURN), ANGLE)
+    assert twins == [(east.id, east_again.id)]
     assert is_sound(graph)
 
 
