@@ -1,0 +1,35 @@
+"""The whole run put right, also where little was kept of it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gvgbot.autonomy.estimate import smoothed
+from gvgbot.autonomy.pipeline import Pipeline
+from gvgbot.config import load_config
+from gvgbot.geometry import STANDSTILL, Pose
+from gvgbot.hal.messages import Odometry
+from tests.unit.autonomy.sights import carved, sweep
+
+TOWARDS_A_SIDE_CORRIDOR = np.arange(-3.0, 2.1, 0.25)
+
+
+@pytest.mark.parametrize("kept", ["all", "positions", "nothing"])
+def test_a_vertex_stands_where_it_is_believed_to_whatever_was_kept_of_its_sights(kept: str) -> None:
+    world = carved([(-4.0, -1.0, 6.0, 1.0), (2.0, -1.0, 4.0, 5.0)])
+    config = load_config()
+    pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
+    for step, x in enumerate(TOWARDS_A_SIDE_CORRIDOR.tolist()):
+        pipeline.control(Odometry(0.1 * step, Pose(x, 0.0), STANDSTILL))
+        pipeline.perceive(replace(sweep(world, Pose(x, 0.0)), stamp=0.1 * step))
+    mapper = pipeline.mapper
+    mapper.observations[:] = {
+        "all": mapper.observations,
+        "positions": [replace(seen, R=seen.R[:2, :2]) for seen in mapper.observations],
+        "nothing": [],
+    }[kept]
+    vertices = smoothed(pipeline).vertices
+    assert list(vertices) == list(mapper.belief.ids) != []
+    for vertex, place in vertices.items():
+        assert place.distance(mapper.belief.map_vertex(vertex)) < 0.05
