@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import KDTree, Voronoi
 
-from gvgbot.drivers.world import World, check_start
+from gvgbot.drivers.start import check_start
+from gvgbot.drivers.world import World
 from gvgbot.geometry import Array, Pose
 
 CORNER_REACH = 1.6  # a branch of less is a corner's

@@ -16,8 +16,9 @@ from gvgbot.drivers.kobuki.twin import KobukiTwin
 from gvgbot.drivers.link_faults import FaultyLink
 from gvgbot.drivers.people import People, Walkways
 from gvgbot.drivers.sight import Sight
+from gvgbot.drivers.start import check_start, warn_of_small_space
 from gvgbot.drivers.transport import serve_twin
-from gvgbot.drivers.world import World, check_start
+from gvgbot.drivers.world import World
 from gvgbot.geometry import Array, Pose
 from gvgbot.worlds import open_world
 
@@ -42,6 +43,7 @@ def open_place(config: Config) -> Place:
     world, default = open_world(config.twin.world, unknown_is_wall=config.twin.unknown == "wall")
     start = Pose(*config.twin.start) if config.twin.start is not None else default or Pose()
     check_start(world, start, config.robot.radius_m)
+    warn_of_small_space(world, start, config.robot.radius_m)
     return Place(world, start, Walkways(world, start) if _people_count(config, world) else None)
 
 

@@ -113,48 +113,6 @@ class World:
         return np.maximum(cells * self.resolution_m, 0.0).astype(np.float32)
 
 
-def check_start(world: World, pose: Pose, radius: float) -> None:
-    """Raise WorldError unless a round robot of this radius (m) fits at the pose."""
-    where = f"start ({pose.x:.2f}, {pose.y:.2f}) in world {world.name}"
-    if not world.contains(pose.x, pose.y):
-        x0, y0, x1, y1 = world.extent
-        raise WorldError(
-            f"{where}: outside the map; choose x in {x0:.2f}..{x1:.2f} and y in {y0:.2f}..{y1:.2f}"
-        )
-    gaps = np.hypot(*world.wall_offsets(pose.x, pose.y, radius).T)
-    if gaps.size and gaps.min() == 0.0:
-        raise WorldError(
-            f"{where}: inside a wall; choose a start in free space{_widest(world, radius)}"
-        )
-    if gaps.size and gaps.min() < radius:
-        raise WorldError(
-            f"{where}: a wall is {gaps.min():.3f} m away, but the robot's radius is "
-            f"{radius:.3f} m; choose a start further from walls{_widest(world, radius)}"
-        )
-
-
-def _widest(world: World, radius: float) -> str:
-    """The widest place of the largest space that walls close off, or of the largest one.
-
-    Nothing if a robot of this radius (m) does not fit there either.
-    """
-    spaces, count = ndimage.label(~world.occupied)
-    sizes = np.bincount(spaces.ravel(), minlength=count + 1)
-    sizes[0] = 0
-    rim = np.concatenate([spaces[[0, -1]].ravel(), spaces[:, [0, -1]].ravel()])
-    closed = np.where(np.isin(np.arange(count + 1), rim), 0, sizes)
-    largest = int(np.argmax(closed if closed.any() else sizes))
-    room = np.where(spaces == largest, world.clearance, -1.0)
-    if not sizes[largest] or room.max() < radius:
-        return ""
-    row, column = np.unravel_index(int(np.argmax(room)), room.shape)
-    x, y = (
-        origin + (index + 0.5) * world.resolution_m
-        for origin, index in zip(world.origin, (column, row), strict=True)
-    )
-    return f", such as {x:.2f} {y:.2f} 0"
-
-
 def load_world(path: Path, *, unknown_is_wall: bool = False) -> World:
     """The world that a map_server YAML file describes.
 

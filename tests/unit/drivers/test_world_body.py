@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gvgbot.drivers.body import BodyConfig, RobotBody
-from gvgbot.drivers.world import World, check_start
-from gvgbot.errors import WorldError
+from gvgbot.drivers.world import World
 from gvgbot.geometry import Pose
 
 RADIUS = BodyConfig().radius_m
@@ -202,34 +201,3 @@ def test_a_robot_in_touch_can_turn_and_roll_along_the_wall() -> None:
     body.advance(5.0)
     assert body.pose.y == pytest.approx(3.0 + 0.3 * 5.0 - 0.3**2 / 2)
     assert body.contacts == 0
-
-
-@pytest.mark.parametrize(
-    ("x", "y", "complaint"),
-    [(-1.0, 5.0, "outside the map"), (5.02, 5.0, "inside a wall"), (4.85, 5.0, "0.150 m away")],
-)
-def test_a_start_without_room_is_refused_with_its_reason(
-    x: float, y: float, complaint: str
-) -> None:
-    with pytest.raises(WorldError, match=complaint) as refusal:
-        check_start(walled(5.0), Pose(x, y, 0.0), RADIUS)
-    assert f"({x:.2f}, {y:.2f})" in str(refusal.value)
-    assert "choose" in str(refusal.value)
-    assert "\n" not in str(refusal.value)
-
-
-def test_a_start_in_a_wall_is_answered_with_one_in_the_middle_of_the_largest_closed_space() -> None:
-    """Two rooms of 2 by 3 and 4 by 3 m, in a bitmap that is free around them."""
-    occupied = np.zeros((80, 160), dtype=bool)
-    for first, last in ((20, 60), (60, 140)):
-        occupied[10:71, [first, last]] = occupied[[10, 70], first : last + 1] = True
-    world = World(occupied, 0.05)
-    with pytest.raises(WorldError) as refusal:
-        check_start(world, Pose(3.02, 2.0, 0.0), RADIUS)
-    x, y, theta = map(float, str(refusal.value).rpartition("such as ")[2].split())
-    check_start(world, Pose(x, y, theta), 1.4)
-    assert 3.0 < x < 7.0
-
-
-def test_a_start_that_just_fits_is_accepted() -> None:
-    check_start(walled(5.0), Pose(5.0 - RADIUS - 1e-6, 5.0, 0.0), RADIUS)

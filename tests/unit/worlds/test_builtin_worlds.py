@@ -7,7 +7,8 @@ import pytest
 from scipy import ndimage
 
 from gvgbot.drivers.ray_casting import Mask
-from gvgbot.drivers.world import World, check_start, save_world
+from gvgbot.drivers.start import check_start
+from gvgbot.drivers.world import World, save_world
 from gvgbot.errors import WorldError
 from gvgbot.geometry import Array
 from gvgbot.worlds import NAMES, builtin, open_world
