@@ -17,7 +17,8 @@ GLASS, FILES = (
 )
 SCENARIOS = {  # the situation, and the tests of it
     "No wall within reach": (
-        f"{SHAPES}::test_a_hall_without_a_wall_in_sight_ends_the_run_with_a_reason",
+        f"{SHAPES}::test_a_field_without_a_wall_in_sight_ends_the_run_with_a_reason",
+        f"{SHAPES}::test_a_hall_whose_walls_are_out_of_sight_at_first_is_left_by_its_corridor",
     ),
     "Meetpoints that almost coincide; four ways": (
         f"{SHAPES}::test_a_crossing_is_one_meetpoint_of_four",
