@@ -14,7 +14,7 @@ from gvgbot.geometry import Array, Pose, wrap_angle
 
 _OUT_M = 1.0  # from a vertex, where the direction of an edge is taken
 _OPPOSITE = math.radians(120)  # departures that differ by more go on as one line
-_STRAYS = 3  # vertices that hang together with nothing else: more are a part of the building
+_STRAYS = 3  # vertices that hang together with nothing else, though the robot has driven there
 
 
 def split_edge_at(
@@ -99,19 +99,27 @@ def _are_opposite(departures: list[HalfEdge]) -> bool:
 def strays(graph: GvgGraph) -> list[Vertex]:
     """Vertices from which nothing leads to most of the graph, nor was a way tried in vain.
 
-    One was seen through glass, or a few are what is left of the ways round somebody who has gone:
+    They were seen through glass, or a few are what is left of the ways round somebody who has gone:
     where the robot has driven, all that it drove over hangs together.
     """
     if not graph.edges:
         return []
     rest = _pieces(graph)
-    rest.remove(max(rest, key=len))
+    rest.remove(max(rest, key=lambda piece: (_proved_edges(graph, piece), len(piece))))
     return [
         vertex
         for piece in rest
-        if len(piece) <= _STRAYS and not any(_was_tried(vertex) for vertex in piece)
+        if len(piece) <= _STRAYS or not _proved_edges(graph, piece)
+        if not any(_was_tried(vertex) for vertex in piece)
         for vertex in piece
     ]
+
+
+def _proved_edges(graph: GvgGraph, piece: list[Vertex]) -> int:
+    """How many edges of a piece the robot has driven, or of a map that was finished."""
+    ids = {vertex.id for vertex in piece}
+    edges = (edge for edge in graph.edges.values() if edge.a.vertex in ids)
+    return sum(edge.established or edge.traversals > 0 for edge in edges)
 
 
 def _was_tried(vertex: Vertex) -> bool:

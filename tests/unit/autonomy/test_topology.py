@@ -148,6 +148,21 @@ def test_a_few_vertices_that_nothing_leads_to_are_strays(size: int, strange: int
     assert strays(graph) == []
 
 
+@pytest.mark.parametrize(("size", "driven", "strange"), [(4, 0, 4), (4, 1, 0), (6, 0, 6)])
+def test_what_was_only_seen_is_strange_however_large_it_is(
+    size: int, driven: int, strange: int
+) -> None:
+    """A room behind glass, and what the robot has driven through, which may be the smaller part."""
+    graph, ids = streets(10, 1)
+    edge = graph.edge_at(between(graph, ids[size - 1, 0], ids[size, 0]))
+    assert edge is not None
+    graph.unjoin(edge)
+    seen = [e for e in graph.edges.values() if e.a.vertex in {ids[x, 0] for x in range(size)}]
+    for edge in seen[driven:]:
+        edge.traversals = 0
+    assert {vertex.id for vertex in strays(graph)} == {ids[x, 0] for x in range(strange)}
+
+
 @pytest.mark.parametrize(("third", "edges"), [(None, 1), (math.pi / 2, 0), (math.pi, 1)])
 def test_two_edges_of_what_is_none_become_one_unless_a_third_way_goes_straight_on(
     third: float | None, edges: int
