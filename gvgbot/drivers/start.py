@@ -36,10 +36,11 @@ def check_start(world: World, pose: Pose, radius: float) -> None:
 def warn_of_small_space(world: World, pose: Pose, radius: float) -> None:
     """Say so if walls close the robot in where it starts, and there is a far larger such space."""
     spaces = _Spaces(world)
-    here = spaces.at(pose)
-    if 0 < spaces.closed[here] < _SMALL * spaces.closed.max():
+    if not 0 < spaces.closed[spaces.at(pose)] < _SMALL * spaces.closed.max():
+        return
+    place = spaces.widest(radius)
+    if place:
         start = f"{pose.x:.2f} {pose.y:.2f}"
-        place = spaces.widest(radius)
         log.warning("start is in a small closed space", start=start, larger=f"--start {place}")
 
 
