@@ -7,9 +7,9 @@ The choices are which frontier comes next, and when the robot goes back to what 
 after the other, in this process and in virtual time, each plan with its number as seed. A line for
 each: outcome, metres driven, closures, standard deviation of the robot's position (largest and at
 the end) and of the map's vertices (mean, at the end), and their RMSE against the truth. FILE keeps
-them as lines of JSON; runs that are in there are not run again. Then a table of the means over the
-plans that were explored whatever the choice, and by how much each differs from the first choice,
-with the standard error of that difference.
+them as lines of JSON; runs that are in there are not run again. Then a table of the means of each
+choice over the plans that the first choice has explored as well, and by how much they differ from
+its, with the standard error of that difference.
 """
 
 import argparse
@@ -51,37 +51,44 @@ def line(row: Row) -> str:
     return f"{row['name']:36} {row['outcome'] or '-':10.10} " + "  ".join(values)
 
 
-def explored_by_all(rows: Sequence[Row]) -> dict[str, list[Row]]:
-    """The runs of each choice over the plans that every one has explored, in the same order."""
+def explored_as_well(rows: Sequence[Row]) -> dict[str, tuple[list[Row], list[Row]]]:
+    """The runs of each choice over the plans that the first one has explored as well, and its."""
     done: dict[str, dict[int, Row]] = {row["choice"]: {} for row in rows}
     for row in rows:
         if row["outcome"] == "explored":
             done[row["choice"]][row["plan"]] = row
-    common = sorted(set.intersection(*(set(plans) for plans in done.values())))
-    return {choice: [plans[plan] for plan in common] for choice, plans in done.items()}
+    first = next(iter(done.values()))
+    common = {choice: sorted(plans.keys() & first.keys()) for choice, plans in done.items()}
+    return {
+        choice: ([done[choice][plan] for plan in plans], [first[plan] for plan in plans])
+        for choice, plans in common.items()
+    }
 
 
 def table(rows: Sequence[Row]) -> Iterator[str]:
     """The means as a table in Markdown; in brackets the mean difference to the first choice."""
-    by_choice = explored_by_all(rows)
+    by_choice = explored_as_well(rows)
     first = next(iter(by_choice))
-    yield f"{len(by_choice[first])} plans that were explored whatever the choice."
-    if not by_choice[first]:
-        return
-    yield ""
-    yield "| choice | " + " | ".join(title for _, title, _ in COLUMNS) + " |"
-    yield "|---" * (len(COLUMNS) + 1) + "|"
-    for choice in by_choice:
-        cells = (_cell(by_choice, first, choice, key, form) for key, _, form in COLUMNS)
-        yield f"| {choice} | " + " | ".join(cells) + " |"
+    yield (
+        f"| choice | plans that `{first}` explored as well | "
+        + " | ".join(title for _, title, _ in COLUMNS)
+        + " |"
+    )
+    yield "|---" * (len(COLUMNS) + 2) + "|"
+    for choice, (mine, theirs) in by_choice.items():
+        others = [] if choice == first else theirs
+        cells = (_cell(mine, others, key, form) for key, _, form in COLUMNS)
+        yield f"| {choice} | {len(mine)} | " + " | ".join(cells) + " |"
 
 
-def _cell(by_choice: dict[str, list[Row]], first: str, choice: str, key: str, form: str) -> str:
-    mine, theirs = (np.array([row[key] for row in by_choice[c]]) for c in (choice, first))
-    mean = form.format(mine.mean())
-    if choice == first or len(mine) < 2:
+def _cell(mine: list[Row], theirs: list[Row], key: str, form: str) -> str:
+    if not mine:
+        return "–"
+    values = np.array([row[key] for row in mine])
+    mean = form.format(values.mean())
+    if len(theirs) < 2:
         return mean
-    off = mine - theirs
+    off = values - [row[key] for row in theirs]
     error = off.std(ddof=1) / np.sqrt(len(off))
     return f"{mean} ({form.format(off.mean())} ± {form.format(error)})"
 
