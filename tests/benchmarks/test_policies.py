@@ -7,14 +7,7 @@ from benchmarks.policies import COLUMNS, explored_as_well, table
 
 def row(plan: int, choice: str, value: float, outcome: str = "explored") -> dict[str, Any]:
     values = {key: value for key, _, _ in COLUMNS}
-    return {
-        "name": "",
-        "value": value,
-        "plan": plan,
-        "choice": choice,
-        "outcome": outcome,
-        **values,
-    }
+    return {"name": "", "plan": plan, "choice": choice, "outcome": outcome, **values}
 
 
 ROWS = [
@@ -29,7 +22,7 @@ ROWS = [
 
 def test_a_choice_is_compared_over_the_plans_that_it_and_the_first_have_explored() -> None:
     found = explored_as_well([*ROWS, row(3, "balanced", 31.0)])
-    assert {choice: [r["value"] for r in mine] for choice, (mine, _) in found.items()} == {
+    assert {choice: [r["driven_m"] for r in mine] for choice, (mine, _) in found.items()} == {
         "ears": [10.0, 20.0, 30.0],
         "nearest": [12.0, 26.0],
         "balanced": [31.0],

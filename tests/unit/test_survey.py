@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gvgbot.autonomy.localisation import Localisation
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.config import load_config
@@ -23,10 +24,12 @@ START = Pose(-3.0, 0.0, 0.0)  # in the world; the map begins there
 CORRIDOR, SIDE = (-4.0, -1.0, 4.0, 1.0), (2.0, -1.0, 4.0, 4.0)
 
 
-def driven(world: World, metres: float) -> Pipeline:
+def driven(world: World, metres: float, localisation: Localisation = "full") -> Pipeline:
     """A robot after so long a drive straight on."""
     config = load_config()
-    pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
+    pipeline = Pipeline(
+        config.autonomy, config.exploration, config.robot.radius_m, localisation=localisation
+    )
     for step, x in enumerate(np.arange(0.0, metres + 0.01, 0.25)):
         odom_base = Pose(float(x), 0.0, 0.0)
         pipeline.control(Odometry(0.1 * step, odom_base, STANDSTILL))
@@ -53,8 +56,7 @@ def test_what_lies_in_the_shadow_of_a_corner_is_a_gap_until_the_robot_looks_roun
 
 def test_the_blurred_grid_of_who_drives_by_odometry_alone_lacks_nothing() -> None:
     """A map that has edges is taken as it is; before that, floor that is unseen counts."""
-    pipeline = driven(carved([CORRIDOR, SIDE]), 3.0)
-    pipeline._trusts_odometry = True
+    pipeline = driven(carved([CORRIDOR, SIDE]), 3.0, "paper")
     assert len(survey(pipeline)) > 0
     pipeline.mapper.graph = streets(2, 1)[0]
     pipeline.mapper.belief = Belief(np.zeros(9), np.zeros((9, 9)), (1, 2))

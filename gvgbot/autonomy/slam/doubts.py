@@ -100,11 +100,14 @@ class Doubts:
 
     def note(self, doubt: Doubt) -> None:
         """Learn of a new vertex; one without a doubt is of interest only after one with."""
-        for old in [old for old in self.recent if old.vertex == doubt.vertex]:
-            rivals = tuple(dict.fromkeys(old.rivals + doubt.rivals))
-            self.recent[self.recent.index(old)] = replace(old, rivals=rivals)
-            return
-        if self.recent or doubt.rivals:
+        if any(old.vertex == doubt.vertex for old in self.recent):
+            self.recent = [
+                replace(old, rivals=tuple(dict.fromkeys(old.rivals + doubt.rivals)))
+                if old.vertex == doubt.vertex
+                else old
+                for old in self.recent
+            ]
+        elif self.recent or doubt.rivals:
             self.recent.append(doubt)
         self._forget_settled()
 

@@ -12,15 +12,16 @@ from gvgbot.geometry import STANDSTILL, Pose
 from gvgbot.hal.messages import Odometry
 from tests.unit.autonomy.sights import carved, sweep
 
-TOWARDS_A_SIDE_CORRIDOR = np.arange(-3.0, 2.1, 0.25)
+AWAY_FROM_THE_END = np.arange(-3.0, 2.1, 0.25)
 
 
 @pytest.mark.parametrize("kept", ["all", "positions", "nothing"])
-def test_a_vertex_stands_where_it_is_believed_to_whatever_was_kept_of_its_sights(kept: str) -> None:
-    world = carved([(-4.0, -1.0, 6.0, 1.0), (2.0, -1.0, 4.0, 5.0)])
+def test_a_vertex_stands_where_it_is_whatever_was_kept_of_its_sights(kept: str) -> None:
+    """The corridor, 2 m wide, ends at x = -4, so its dead end is at -3, where the map begins."""
+    world = carved([(-4.0, -1.0, 6.0, 1.0)])
     config = load_config()
     pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
-    for step, x in enumerate(TOWARDS_A_SIDE_CORRIDOR.tolist()):
+    for step, x in enumerate(AWAY_FROM_THE_END.tolist()):
         pipeline.control(Odometry(0.1 * step, Pose(x, 0.0), STANDSTILL))
         pipeline.perceive(replace(sweep(world, Pose(x, 0.0)), stamp=0.1 * step))
     mapper = pipeline.mapper
@@ -30,6 +31,4 @@ def test_a_vertex_stands_where_it_is_believed_to_whatever_was_kept_of_its_sights
         "nothing": [],
     }[kept]
     vertices = smoothed(pipeline).vertices
-    assert list(vertices) == list(mapper.belief.ids) != []
-    for vertex, place in vertices.items():
-        assert place.distance(mapper.belief.map_vertex(vertex)) < 0.05
+    assert min(np.hypot(*place.position) for place in vertices.values()) < 0.05

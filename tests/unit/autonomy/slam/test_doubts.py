@@ -144,3 +144,11 @@ def test_only_vertices_after_a_doubted_one_are_kept() -> None:
     assert [doubt.vertex for doubt in doubts.recent] == [2, 3]
     doubts.believe(2)
     assert doubts.recent == []
+
+
+def test_a_vertex_that_was_in_doubt_before_may_be_one_more() -> None:
+    doubts = Doubts()
+    doubts.note(Doubt(5, (1,), 0.01))
+    doubts.note(Doubt(6, (2,), 0.01))
+    doubts.note(Doubt(5, (3, 1), 0.02))
+    assert [(doubt.vertex, doubt.rivals) for doubt in doubts.recent] == [(5, (1, 3)), (6, (2,))]
