@@ -54,6 +54,7 @@ def access(view: View) -> Access | None:
     return (
         _uphill(view)
         or straight
+        or _between_things(view)
         or next(filter(None, (_straight(view, place, _BETWEEN_M) for place in near)), None)
         or Access(nearest, base[None], np.atleast_1d(view.local_map.tree().query(base)[0]))
     )
@@ -90,6 +91,19 @@ def _uphill(view: View) -> Access | None:
             away = float(np.hypot(*(view.gvg.point(place) - base)))
             return Access(place._replace(distance=away), np.array(line), np.array(rooms))
     return None
+
+
+def _between_things(view: View) -> Access | None:
+    """To the nearest point of any edge to which a straight way is as wide as where it stands."""
+    base = view.local_base.position
+    points = [
+        Place(key, float(station), float(metres))
+        for key, edge in view.gvg.edges.items()
+        for station, metres in zip(edge.stations, np.hypot(*(edge.polyline - base).T), strict=True)
+        if metres <= NEAR_M
+    ]
+    points.sort(key=lambda place: place.distance)
+    return next(filter(None, (_straight(view, place, _TIGHT_M) for place in points)), None)
 
 
 def way_to_edge(view: View) -> tuple[Array, Array] | None:

@@ -75,3 +75,17 @@ def test_who_would_scrape_along_a_post_drives_away_from_it_to_another_edge() -> 
     assert np.degrees(np.arctan2(dy, dx)) == pytest.approx(180.0 - 58.0, abs=20.0)
     assert np.all(np.diff(found.room) > 0.0)
     assert found.room[-1] > 0.7
+
+
+def test_between_two_posts_it_is_not_the_nearest_edge_but_one_that_the_robot_fits_to() -> None:
+    """The nearest edge is behind the right post; straight to the other it would scrape the left."""
+    room = carved(
+        [(-4.0, -4.0, 4.0, 2.0)], [(-0.25, -0.025, -0.2, 0.025), (0.2, -0.025, 0.25, 0.025)]
+    )
+    points = {1: (0.6, -0.5), 2: (0.6, 0.5), 3: (-0.9, 0.3), 4: (-0.25, -1.1)}
+    here = Pose(0.0, -0.1, 0.0)
+    local_map = looked(room, [here, Pose(0.0, 0.4, 0.0)])
+    found = access(View(0, 0.0, 0.0, here, drawn(points, NEAR), local_map))
+    assert found is not None
+    assert found.place.edge == 11
+    assert np.all(found.room > 0.19)  # 0.15 m on the shortest way
