@@ -45,7 +45,7 @@ _MOST_PASSED = 100  # places, the latest ones
 _LIFTED = np.diag([0.3**2, 0.3**2, 0.1**2])  # how far a robot is carried that is put down again
 _ROOM_BESIDE_EDGES_M = 0.08  # on each side, where no edge leads
 _COMPANY_M = 0.15  # by which another robot may be elsewhere than it says
-_BEHIND_M, _GRAIN_M = 0.2, 0.05  # what must be known to be free, when it backs off
+_AWAY_M, _GRAIN_M = 0.2, 0.05  # what must be known to be free, when it gets away
 _LONGEST_GAP_S = 2.0  # between keyframes; a longer one is an outage of a device
 _FORGOTTEN = np.diag([1.0, 1.0, 0.3**2])  # covariance of a way that is not kept
 _OVERLAP_RAD = 0.2  # of what is seen before and after the first turn
@@ -375,7 +375,7 @@ class Pipeline:
             return STANDSTILL
         local_base = self._last.local_base.compose(self._last.odom_base.to(odometry.odom_base))
         moment = Moment(odometry.stamp, local_base, self._wish(local_base), felt)
-        twist, incident = self._reflexes.act(moment, lambda: self._room_behind(local_base))
+        twist, incident = self._reflexes.act(moment, partial(self._room, local_base))
         command = self.errands.command(odometry.stamp)
         if command is not None and not self._reflexes.is_lifted:
             self._turning_to, self._order, twist = None, Stand(), command
@@ -415,14 +415,15 @@ class Pipeline:
             self.errands.hold()
         return careful
 
-    def _room_behind(self, local_base: Pose) -> float:
-        """How far the robot can go straight back over what it knows to be free, m."""
-        behind = local_base.transform(_behind(self._radius))
-        unknown = behind[~self._maps.near.known(behind)]
+    def _room(self, local_base: Pose, bearing: float) -> float:
+        """How far the robot can go straight at a bearing over what it knows to be free, m."""
+        turned = Pose(local_base.x, local_base.y, local_base.theta + bearing)
+        ahead = turned.transform(_ahead(self._radius))
+        unknown = ahead[~self._maps.near.known(ahead)]
         points = [self._maps.near.points(), self._newcomers.points, self._hazards.points, unknown]
-        seen = seen_from(local_base, np.concatenate(points))
+        seen = seen_from(turned, np.concatenate(points))
         margin = self._config.passage_margin_m
-        return free_distance(seen, Twist(-1.0, 0.0), radius=self._radius, margin=margin)
+        return free_distance(seen, Twist(1.0, 0.0), radius=self._radius, margin=margin)
 
     def _take_down(self, incident: Incident, local_base: Pose) -> None:
         """Let the next look, which is due now, take account of an incident."""
@@ -435,8 +436,8 @@ class Pipeline:
                 )
                 if blocks:
                     self.errands.obstruct(f"{cause} again and again")
-            case Held():
-                self._incidents.append(("back off", "something is in the way"))
+            case Held(action=action):
+                self._incidents.append((action, "something is in the way"))
                 self.errands.hold()
             case PutDown():
                 self._incidents.append(("look around", "the robot was lifted"))
@@ -457,9 +458,9 @@ class Pipeline:
 
 
 @cache
-def _behind(radius: float) -> Array:
-    """Points (N, 2) of the base frame that a robot of a radius, m, sweeps when it backs off."""
-    x, y = np.mgrid[-radius - _BEHIND_M : 0.0 : _GRAIN_M, -radius:radius:_GRAIN_M]
+def _ahead(radius: float) -> Array:
+    """Points (N, 2) of the base frame that a robot of a radius, m, sweeps when it gets away."""
+    x, y = -np.mgrid[-radius - _AWAY_M : 0.0 : _GRAIN_M, -radius:radius:_GRAIN_M]
     outside = np.hypot(x, y) > radius
     return np.stack([x[outside], y[outside]], axis=1)
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from gvgbot.geometry import STANDSTILL, Pose, Twist
+from gvgbot.geometry import STANDSTILL, Pose, Twist, wrap_angle
 from gvgbot.hal.guard import Reason
 from gvgbot.hal.messages import Contact
 from gvgbot.ranges import Range
@@ -16,7 +16,13 @@ _GRIP_S = 3.0  # backing off longer than it should take, by this, is given up
 _DEAD_S, _BRAKING_MPS2 = 0.1, 0.5  # until a base obeys, and how it then slows down
 _OFTEN_S = 20.0  # a second overload within this time means that something is in the way
 _TRIES = 3  # to get rid of a contact by backing off
+_AWAY_M = 0.2  # out of a place in which nothing else helps
+_BEARINGS = [
+    math.pi - i * math.pi / 8 for i in (0, 1, -1, 2, -2, 3, -3, 4, -4, 5, -5, 6, -6, 7, -7)
+]
+_TURN_RADPS, _TURN_GAIN, _FACING_RAD = 1.0, 2.0, 0.1
 
+Room = Callable[[float], float]  # how far it can go at a bearing (rad, base frame), m
 Cause = Literal["bumper", "cliff", "over-current", "stuck"]
 
 
@@ -62,6 +68,8 @@ class Hit:
 class Held:
     """The guard has not let the robot go on for a while: it stands too near to something."""
 
+    action: Literal["back off", "turn away"]
+
 
 @dataclass(frozen=True, slots=True)
 class PutDown:
@@ -81,6 +89,16 @@ class _BackOff:
 
 
 @dataclass(frozen=True, slots=True)
+class _TurnAway:
+    """Turn to a heading, rad, local frame, and drive ahead until so far from where it began."""
+
+    begin: Pose
+    heading: float
+    metres: float
+    until: float
+
+
+@dataclass(frozen=True, slots=True)
 class _Rest:
     """Stand until a stamp; then back off if this was not the first time."""
 
@@ -93,7 +111,7 @@ class Reflexes:
 
     def __init__(self, config: ReflexConfig) -> None:
         self._config = config
-        self._doing: _BackOff | _Rest | None = None
+        self._doing: _BackOff | _TurnAway | _Rest | None = None
         self._touching = False
         self._tries = 0
         self._overloaded = -math.inf  # stamp
@@ -104,11 +122,8 @@ class Reflexes:
         """Whether the wheels are, or were a moment ago, off the floor."""
         return isinstance(self._doing, _Rest) and isinstance(self._doing.incident, PutDown)
 
-    def act(self, now: Moment, room_behind: Callable[[], float]) -> tuple[Twist, Incident | None]:
-        """The twist to drive, and what has happened.
-
-        `room_behind` tells how far the robot can go backwards, m.
-        """
+    def act(self, now: Moment, room: Room) -> tuple[Twist, Incident | None]:
+        """The twist to drive, and what has happened."""
         contact = now.felt.contact
         if contact is not None and contact.wheel_drop:
             self._doing = _Rest(now.stamp + self._config.rest_s, PutDown())
@@ -116,19 +131,21 @@ class Reflexes:
             self._rest_from_overload(now)
         match self._doing:
             case _Rest():
-                return self._rest(now, self._doing, room_behind)
+                return self._rest(now, self._doing, room)
             case _BackOff():
                 return self._go_back(now, self._doing), None
+            case _TurnAway():
+                return self._go_away(now, self._doing), None
             case None:
-                return self._go_on(now, room_behind)
+                return self._go_on(now, room)
 
-    def _go_on(
-        self, now: Moment, room_behind: Callable[[], float]
-    ) -> tuple[Twist, Incident | None]:
+    def _go_on(self, now: Moment, room: Room) -> tuple[Twist, Incident | None]:
         incident = self._notice(now)
         if incident is None:
             return now.wish, None
-        return self._back_off(now, room_behind), incident
+        if isinstance(incident, Held):
+            return self._leave(now, room)
+        return self._back_off(now, room), incident
 
     # -- what is felt ------------------------------------------------------------------------------
 
@@ -159,7 +176,7 @@ class Reflexes:
             return None
         held = any(moment.felt.stopped_for is not None for moment in past)
         past.clear()
-        return Held() if held else Hit("stuck", (0.0,))
+        return Held("back off") if held else Hit("stuck", (0.0,))
 
     # -- what is done ------------------------------------------------------------------------------
 
@@ -171,21 +188,41 @@ class Reflexes:
         incident = Hit("over-current", (0.0,)) if again else None
         self._doing = _Rest(now.stamp + self._config.rest_s, incident)
 
-    def _rest(
-        self, now: Moment, rest: _Rest, room_behind: Callable[[], float]
-    ) -> tuple[Twist, Incident | None]:
+    def _rest(self, now: Moment, rest: _Rest, room: Room) -> tuple[Twist, Incident | None]:
         if now.stamp < rest.until:
             return STANDSTILL, None
         self._doing = None
         self._past.clear()
         if isinstance(rest.incident, Hit):
-            return self._back_off(now, room_behind), rest.incident
+            return self._back_off(now, room), rest.incident
         return STANDSTILL, rest.incident
 
-    def _back_off(self, now: Moment, room_behind: Callable[[], float]) -> Twist:
+    def _leave(self, now: Moment, room: Room) -> tuple[Twist, Held]:
+        """Back off; where there is no room behind, turn to where there is most, and go there."""
+        widest = max(_BEARINGS, key=lambda bearing: min(room(bearing), _AWAY_M))
+        metres = min(room(widest), _AWAY_M)
+        if room(math.pi) >= min(metres, self._config.back_off_m):
+            return self._back_off(now, room), Held("back off")
+        until = (
+            now.stamp + math.pi / _TURN_RADPS + metres / self._config.back_off_speed_mps + _GRIP_S
+        )
+        heading = now.local_base.theta + widest
+        self._doing = away = _TurnAway(now.local_base, heading, metres, until)
+        self._past.clear()
+        return self._go_away(now, away), Held("turn away")
+
+    def _go_away(self, now: Moment, away: _TurnAway) -> Twist:
+        if away.begin.distance(now.local_base) >= away.metres or now.stamp > away.until:
+            self._doing = None
+            return STANDSTILL
+        turn = wrap_angle(away.heading - now.local_base.theta)
+        rate = min(max(_TURN_GAIN * turn, -_TURN_RADPS), _TURN_RADPS)
+        return Twist(self._config.back_off_speed_mps if abs(turn) < _FACING_RAD else 0.0, rate)
+
+    def _back_off(self, now: Moment, room: Room) -> Twist:
         c, speed = self._config, self._config.back_off_speed_mps
         rolls_on = speed * (_DEAD_S + speed / (2 * _BRAKING_MPS2))
-        metres = min(c.back_off_m, room_behind() - rolls_on)
+        metres = min(c.back_off_m, room(math.pi) - rolls_on)
         until = now.stamp + metres / speed + _GRIP_S
         self._doing = _BackOff(now.local_base, metres, until)
         self._past.clear()

@@ -15,7 +15,7 @@ from gvgbot.autonomy.control.reflexes import (
     ReflexConfig,
     Reflexes,
 )
-from gvgbot.geometry import STANDSTILL, Pose, Twist
+from gvgbot.geometry import STANDSTILL, Pose, Twist, wrap_angle
 from gvgbot.hal.guard import Reason
 from gvgbot.hal.messages import Contact
 
@@ -48,7 +48,7 @@ class Robot:
         """Go on for a while with something felt; `grip` is the share of the wish that is driven."""
         for _ in range(round(seconds / CYCLE)):
             moment = Moment(self.stamp, Pose(self.x, 0.0, 0.0), wish, Felt(contact, stopped_for))
-            self.twist, incident = self.reflexes.act(moment, lambda: self.room_behind)
+            self.twist, incident = self.reflexes.act(moment, lambda bearing: self.room_behind)
             self.incidents += [] if incident is None else [incident]
             self.stamp += CYCLE
             self.x += grip * CYCLE * self.twist.linear
@@ -159,8 +159,43 @@ def test_a_robot_that_comes_on_slowly_is_not_stuck() -> None:
 def test_a_robot_that_the_guard_holds_tells_so_and_makes_room() -> None:
     robot = Robot()
     robot.feel(NOTHING, 5.1, grip=0.0, stopped_for="obstacle")
-    assert robot.incidents == [Held()]
+    assert robot.incidents == [Held("back off")]
     assert robot.twist.linear < 0.0
+
+
+@pytest.mark.parametrize("opening", [math.radians(135.0), math.radians(-45.0)])
+def test_a_robot_that_is_held_before_and_behind_turns_to_the_opening_and_goes_there(
+    opening: float,
+) -> None:
+    """Between two things it fits at the side only, at 22.5 degrees either way less far."""
+    reflexes, pose, driven = Reflexes(CONFIG), Pose(1.0, 2.0, 3.0), 0.0
+    incidents: list[Incident | None] = []
+
+    def room(bearing: float) -> float:
+        off = abs(wrap_angle(pose.theta + bearing - 3.0 - opening))
+        return 0.5 if off < 0.1 else 0.1 if off < 0.5 else 0.02
+
+    for i in range(round(20.0 / CYCLE)):
+        wish = AHEAD if i < 5.1 / CYCLE else STANDSTILL
+        felt = Felt(NOTHING, "obstacle" if i < 5.1 / CYCLE else None)
+        twist, incident = reflexes.act(Moment(i * CYCLE, pose, wish, felt), room)
+        incidents += [] if incident is None else [incident]
+        if incidents:
+            assert twist.linear >= 0.0
+            driven += CYCLE * twist.linear
+            pose = pose.compose(Pose(CYCLE * twist.linear, 0.0, CYCLE * twist.angular))
+    assert incidents == [Held("turn away")]
+    assert twist == STANDSTILL
+    assert driven == pytest.approx(0.2, abs=0.01)
+    dx, dy = Pose(1.0, 2.0, 3.0).inverse().transform(pose.position)
+    assert math.atan2(dy, dx) == pytest.approx(opening, abs=0.1)
+
+
+def test_a_robot_that_is_held_on_all_sides_stands_until_that_changes() -> None:
+    robot = Robot(room_behind=0.0)
+    robot.feel(NOTHING, 20.0, grip=0.0, stopped_for="obstacle")
+    assert set(robot.incidents) == {Held("back off")}
+    assert robot.x == 0.0
 
 
 def test_a_laser_that_is_silent_is_no_obstacle() -> None:
