@@ -10,7 +10,14 @@ from hypothesis import strategies as st
 
 from gvgbot.geometry import Array, Pose, Twist
 from gvgbot.hal.messages import Odometry, Scan
-from gvgbot.hal.sweep import free_distance, has_sight, obstacle_points, pose_at, seen_from
+from gvgbot.hal.sweep import (
+    evened,
+    free_distance,
+    has_sight,
+    obstacle_points,
+    pose_at,
+    seen_from,
+)
 
 RADIUS = 0.2
 
@@ -152,6 +159,41 @@ def test_near_returns_stand_where_the_beams_point() -> None:
 def test_far_returns_and_beams_without_a_range_are_no_obstacles() -> None:
     points = obstacle_points(a_scan([5.0, math.nan, inf, 0.7]), at_rest(Pose()), reach=1.0)
     assert points == pytest.approx(np.array([[0.0, 0.7]]), abs=1e-12)
+
+
+@pytest.mark.parametrize("step", [math.radians(0.25), math.radians(0.36)])
+def test_a_wall_beside_the_robot_is_where_it_is_in_spite_of_the_noise(step: float) -> None:
+    """0.21 m abeam, sigma 1 cm: the shortest of its beams is 20 to 25 mm too short."""
+    rng = np.random.default_rng(1)
+    bearings = np.arange(-1.2, 1.2, step)
+    exact = 0.21 / np.cos(bearings)
+    raw = exact + rng.normal(0.0, 0.01, (300, len(exact)))
+    raw_gaps = (raw * np.cos(bearings)).min(axis=1)
+    gaps = np.array([(evened(ranges) * np.cos(bearings)).min() for ranges in raw])
+    assert raw_gaps.mean() < 0.21 - 0.018
+    assert gaps.mean() > 0.21 - 0.013
+    assert evened(exact)[2:-2] == pytest.approx(exact[2:-2], rel=1e-3)
+
+
+@pytest.mark.parametrize("beams", [1, 2])
+def test_what_few_beams_show_before_a_wall_stays_where_it_is(beams: int) -> None:
+    ranges = np.full(40, 0.30)
+    ranges[20 : 20 + beams] = 0.24
+    assert evened(ranges) == pytest.approx(ranges)
+
+
+@given(st.lists(st.floats(0.05, 2.0) | st.sampled_from([math.nan, inf]), min_size=1, max_size=30))
+def test_an_evened_range_is_among_those_of_its_neighbours_that_are_near_it(
+    values: list[float],
+) -> None:
+    ranges = np.array(values)
+    found = evened(ranges)
+    for i, (before, after) in enumerate(zip(values, found.tolist(), strict=True)):
+        if not math.isfinite(before):
+            assert after == before or math.isnan(after) == math.isnan(before)
+            continue
+        near = [other for other in values[max(0, i - 2) : i + 3] if abs(other - before) < 0.1]
+        assert min(near) - 1e-9 <= after <= max(near) + 1e-9
 
 
 @given(st.floats(-5, 5), st.floats(-5, 5), st.floats(-3, 3), st.floats(-0.3, 0.3), st.floats(-3, 3))
