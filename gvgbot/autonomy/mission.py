@@ -20,9 +20,11 @@ from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.exploration.headway import Headway
 from gvgbot.autonomy.exploration.hindrance import Hindrance
 from gvgbot.autonomy.exploration.obstructions import Obstructions
+from gvgbot.autonomy.exploration.paths import Approach, shortest_paths
 from gvgbot.autonomy.gvg.local import Branch, Place
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.neighbours import Neighbours
+from gvgbot.autonomy.retracing import Retracing
 from gvgbot.autonomy.scouting import Scouting
 from gvgbot.autonomy.search import NO_EDGE, Search
 from gvgbot.autonomy.slam.graph import HalfEdgeId
@@ -61,6 +63,7 @@ class Mission:
         self._hindrance = Hindrance()
         self._neighbours = Neighbours()
         self._search, self._scouting, self._backtracking = Search(), Scouting(), Backtracking()
+        self._retracing = Retracing()
         self._examination = Examination(mapper)
         self._events: list[Event] = []
 
@@ -73,7 +76,7 @@ class Mission:
         if found is not None and is_beside:
             self._search.end()
             self._learn(view, known, found.place)
-        back = self._go_back(view) if self._backtracking.is_on else None
+        back = self._go_back(view) if self._backtracking.is_on else self._retrace(view, known)
         if back is not None:
             return back, self._events
         if found is None:
@@ -146,6 +149,7 @@ class Mission:
         self._search.end()
         self._scouting.end()
         self._backtracking.end()
+        self._retracing.end()
 
     def configure(self, config: ExplorationConfig) -> None:
         """Use another configuration from now on."""
@@ -194,7 +198,7 @@ class Mission:
             self._frontiers = set(graph.frontiers())
         else:
             self.target = self._reconsidered(view, here, target)
-        if self.outcome is not None:
+        if self.outcome is not None or self._retracing.is_on:
             return Stand()
         if self.target is None and (self._obstructions.waiting or self.choice.waits_for_others):
             self._headway.restart(view.stamp)
@@ -224,8 +228,8 @@ class Mission:
                 nearest = self.choice.nearest(here.starts())
             if nearest is None:
                 if self.choice.is_left_to_others and not self._obstructions.waiting:
-                    self._forget_strays(view)
-                    self._end(view, "explored", "no frontier of the team is left")
+                    if not self._goes_back_or_forgets(view):
+                        self._end(view, "explored", "no frontier of the team is left")
                 elif not self.choice.waits_for_others:
                     self._finish(view)
                 return None
@@ -285,7 +289,8 @@ class Mission:
             return self._drive(view, here, near)
         if scouting.lasted(view.stamp) > self._config.patience_s:
             scouting.end()
-            self._forget_strays(view)
+            if self._goes_back_or_forgets(view):
+                return Stand()
             if self.target is None or self._mapper.graph.half_edge(self.target) is not None:
                 self._give_up(view, "no way leads there")
         return self._drive(view, here, scouting.path_on(here))
@@ -327,6 +332,19 @@ class Mission:
             track = self._backtracking.track(view, self.where, self._neighbours.company)
         if track is None:
             self._backtracking.end()
+            return None
+        return Drive(track)
+
+    def _retrace(self, view: View, known: Correspondence) -> Order | None:
+        """Back to what no known way leads to; None unless the robot is about that."""
+        self._retracing.note(view, known)
+        if not self._retracing.is_on:
+            return None
+        waited = self._headway.note(view.local_base.position, view.stamp)
+        track = self._retracing.track(view, self._neighbours.company)
+        if track is None or waited > self._config.in_the_way_s:
+            self._retracing.end()
+            self._scouting.end()
             return None
         return Drive(track)
 
@@ -391,8 +409,9 @@ class Mission:
         self._looked_around = 0
         half = None if self.target is None else self._mapper.graph.half_edge(self.target)
         if half is None:
-            self._forget_strays(view)
-            if self._mapper.graph.vertices and not self._mapper.graph.frontiers():
+            is_going_back = self._goes_back_or_forgets(view)
+            is_done = self._mapper.graph.vertices and not self._mapper.graph.frontiers()
+            if is_going_back or is_done:
                 return
             is_closed = not self._mapper.graph.vertices and self._sees_all()
             if is_closed:
@@ -413,13 +432,25 @@ class Mission:
         self._obstructions.close(self._mapper.graph, [frontier], view.stamp, retries=retries)
         self._events.append(Recovery(view.stamp, "give up a frontier", reason))
 
-    def _forget_strays(self, view: View) -> None:
-        """Forget what nothing leads to; if there was something, it may be missing now."""
-        vertices = self._mapper.graph.vertices
+    def _goes_back_or_forgets(self, view: View) -> bool:
+        """Go back to what nothing leads to, if the robot has been there, or else forget it.
+
+        If there was something, it may be missing now. Whether it goes back.
+        """
+        vertices, on_edge = self._mapper.graph.vertices, self.where.on_edge
+        if on_edge is not None:
+            led_to = shortest_paths(self._mapper.graph, [Approach(0.0, on_edge)])
+            if self._retracing.begin(vertices.keys() - led_to.keys()):
+                reason = "no known way leads to a part of the map"
+                self._events.append(Recovery(view.stamp, "retrace the way", reason))
+                self._headway.restart(view.stamp)
+                self._headway.restart_stay()
+                return True
         before = len(vertices)
         self._mapper.forget_strays(view)
         if len(vertices) < before:
             self._examination.end()
+        return False
 
     def _sees_all(self) -> bool | None:
         """Whether no floor is unseen that the robot could drive onto: it is in a closed room.
@@ -485,7 +516,8 @@ class Mission:
         """Some frontiers cannot be reached: that is the end, after having looked for a way."""
         if self._scouting.lasted(view.stamp) < self._config.patience_s:
             return
-        self._forget_strays(view)
+        if self._goes_back_or_forgets(view):
+            return
         frontiers = len(self._mapper.graph.frontiers())
         if frontiers:
             reason = f"frontiers that cannot be reached: {frontiers}"

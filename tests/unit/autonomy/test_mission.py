@@ -322,6 +322,28 @@ def test_the_robot_goes_near_what_no_known_way_leads_to_before_it_gives_that_up(
     assert robot.mission.outcome == "explored_with_blocked"
 
 
+def test_what_no_known_way_leads_to_any_more_is_gone_back_to_over_the_way_that_was_driven() -> None:
+    """Through a gap that is hardly wide enough, into a room of which no edge leads back."""
+    room = drawn({5: (3.0, 6.0), 6: (3.0, 9.0)}, {20: (5, 6, [])})
+    robot = Robot()
+    robot.stand(TEE, 30)
+    robot.drive(TEE, (0.0, 0.0), (3.0, 0.0), (3.0, 1.2))
+    robot.drive(room, (3.0, 1.2), (3.0, 7.0))
+    lost = {end.vertex for end in robot.mapper.graph.frontiers()}
+    while not any("retrace" in str(event) for event in robot.said(Recovery)):
+        assert robot.mission.outcome is None
+        robot.drive(room, (robot.pose.x, robot.pose.y), (3.0, 8.5), (3.0, 6.5))
+    order = robot.look(room)
+    while end_of(order)[1] > 2.5:
+        x, y = end_of(order)
+        assert x == pytest.approx(3.0, abs=0.05)
+        order = robot.drive(room, (robot.pose.x, robot.pose.y), (x, y))
+    order = robot.drive(TEE, (robot.pose.x, robot.pose.y), (3.0, 0.5))
+    assert robot.mission.outcome is None
+    assert robot.mission.target is not None
+    assert robot.mission.target.vertex in lost
+
+
 def test_a_robot_that_drives_to_and_fro_gives_up_its_target_after_its_patience() -> None:
     """Between two places a metre apart, which it may do when two ways look equally good."""
     robot = Robot()

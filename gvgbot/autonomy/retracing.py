@@ -1,0 +1,82 @@
+"""Back over the robot's own way to a part of the map that no known way leads to any more.
+
+The robot has come from there, so it can get there; it keeps its way in the local frame, which does
+not leap when a loop closes.
+"""
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from gvgbot.autonomy.control.company import Companion, free_metres
+from gvgbot.autonomy.control.edge_follower import Track
+from gvgbot.autonomy.control.orders import ARRIVED_M
+from gvgbot.autonomy.views import Correspondence, View
+from gvgbot.geometry import Array
+
+_STEP_M = 0.1  # from point to point of the way
+_SHORTCUT_M, _DETOUR_M = 0.25, 0.5  # where it comes so near to itself, after so much, or more
+_AT_M = 2.0  # so near to a vertex that was in sight, its departures are seen again
+_AHEAD_M = 3.0  # of the way is driven before the robot looks again
+
+
+class Retracing:
+    """Once to each vertex. `note` where the robot is and what it sees, at every view."""
+
+    def __init__(self) -> None:
+        self._way: list[Array] = []  # (2,), local frame
+        self._near: list[frozenset[int]] = []  # vertices, beside each point of it
+        self._in_sight = set[int]()  # vertices, in the present view
+        self._been = set[int]()  # where it has gone back to
+        self._back: Array | None = None  # (N, 2), what is driven
+
+    @property
+    def is_on(self) -> bool:
+        """Whether the robot is on its way back."""
+        return self._back is not None
+
+    def note(self, view: View, known: Correspondence) -> None:
+        """The robot has come on."""
+        here = view.local_base.position
+        self._in_sight = set(known.vertex_of.values())
+        if self._way and np.hypot(*(here - self._way[-1])) < _STEP_M:
+            return
+        near = (
+            vertex
+            for node, vertex in known.vertex_of.items()
+            if np.hypot(*(view.gvg.nodes[node].position - here)) < _AT_M
+        )
+        self._way.append(here)
+        self._near.append(frozenset(near))
+
+    def begin(self, lost: set[int]) -> bool:
+        """Go back to where one of these vertices was near last; whether there is such a place."""
+        lost = lost - self._been - self._in_sight
+        at = next((i for i in reversed(range(len(self._way))) if self._near[i] & lost), None)
+        if at is None:
+            return False
+        self._been |= self._near[at] & lost
+        self._back = _without_detours(np.array(self._way[at:][::-1]))
+        return True
+
+    def track(self, view: View, company: list[Companion]) -> Track | None:
+        """What is to be driven next of the way back; None at its end, or if it cannot go on."""
+        assert self._back is not None
+        away = np.hypot(*(self._back - view.local_base.position).T)
+        line = self._back[int(away.argmin()) :][: round(_AHEAD_M / _STEP_M)]
+        room = np.asarray(view.local_map.tree().query(line)[0])
+        track = Track.of(line, room).until(free_metres(line, room, company))
+        return None if track.length < ARRIVED_M else track
+
+    def end(self) -> None:
+        """Go back no farther."""
+        self._back = None
+
+
+def _without_detours(way: Array) -> Array:
+    """The way (N, 2) without its loops."""
+    tree, kept, i = cKDTree(way), [0], 0
+    while i < len(way) - 1:
+        last = max(tree.query_ball_point(way[i], _SHORTCUT_M))
+        i = last if (last - i) * _STEP_M > _DETOUR_M else i + 1
+        kept.append(i)
+    return way[kept]
