@@ -318,11 +318,27 @@ class Mission:
             self._headway.restart(view.stamp)
             self._looked_around += 1
             if self._looked_around > 2 and not self._scouting.is_on:
-                self._give_up(view, "nothing more is to be seen there")
+                if not self._closes_unseen_edge(view, here):
+                    self._give_up(view, "nothing more is to be seen there")
                 return Stand()
             self._events.append(Recovery(view.stamp, "look around", "standing at the end of sight"))
             return LookAround(math.tau)
         return Drive(track)
+
+    def _closes_unseen_edge(self, view: View, here: Situation) -> bool:
+        """Close the edge by which the way goes on here if that is not to be seen; whether it was.
+
+        The target lies beyond it, and there may be another way.
+        """
+        end = None if self.target is None else here.next_departure(self.target)
+        edge = None if end is None else self._mapper.graph.edge_at(end)
+        if edge is None or end in here.known.branch_of:
+            return False
+        self._looked_around, self.target = 0, None
+        self._obstructions.close(self._mapper.graph, [edge.a, edge.b], view.stamp)
+        reason = "the way on is not to be seen"
+        self._events.append(Recovery(view.stamp, "try another way", reason))
+        return True
 
     def _go_back(self, view: View) -> Order | None:
         """Over where the robot came from, until it sees vertices that it knows."""

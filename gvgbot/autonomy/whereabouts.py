@@ -240,6 +240,11 @@ class Situation:
         departures = (*approach.departures, target)
         return self.path_over(departures[0].vertex, departures)
 
+    def next_departure(self, target: HalfEdgeId) -> HalfEdgeId | None:
+        """By which half-edge the way to a frontier leaves its first vertex; None without a way."""
+        approach = shortest_paths(self.graph, self.starts()).get(target.vertex)
+        return None if approach is None else (*approach.departures, target)[0]
+
     def path_over(
         self, first: int, departures: tuple[HalfEdgeId, ...]
     ) -> tuple[Branch, ...] | None:

@@ -240,6 +240,34 @@ def test_the_end_of_sight_is_looked_around_at_twice_before_a_frontier_is_given_u
     assert robot.mission.target.key != east
 
 
+def test_an_edge_that_is_not_to_be_seen_from_its_vertex_is_closed_and_not_what_lies_beyond() -> (
+    None
+):
+    """From the tee another street is said to lead to a frontier in the north-east."""
+    robot = Robot()
+    robot.stand(TEE, 8)
+    graph = robot.mapper.graph
+    (tee,) = graph.vertices.values()
+    beyond, end = (Vertex(graph.next_id(), 1.0, Pose(x, 6.0), 0.0, 0.0) for x in (9.0, 12.0))
+    for vertex in (beyond, end):
+        graph.vertices[vertex.id] = vertex
+        robot.mapper.belief = add_vertex(
+            robot.mapper.belief, vertex.id, vertex.local, np.diag([1e-4, 1e-4, 1e-4])
+        )
+    for (a, out), (b, back) in (((tee, 0.8), (beyond, -2.3)), ((beyond, 0.0), (end, math.pi))):
+        ways = HalfEdgeId(a.id, a.add_half_edge(out)), HalfEdgeId(b.id, b.add_half_edge(back))
+        graph.join(*ways, np.array([[0.0, 0.0], [3.0, 0.0]]), 1.0, driven=True)
+    robot.mission.target = HalfEdgeId(beyond.id, beyond.add_half_edge(0.8))
+    robot.drive(TEE, (0.0, 0.0), (3.0, 0.0))
+    robot.stand(TEE, 40)
+    (tried,) = [e for e in robot.said(Recovery) if isinstance(e, Recovery) and "way" in e.action]
+    assert tried.reason == "the way on is not to be seen"
+    assert [half.blocked for half in tee.half_edges.values()] == [False, False, False, True]
+    assert [half.blocked for half in beyond.half_edges.values()] == [True, False, False]
+    assert robot.mission.target is not None
+    assert robot.mission.target.vertex == tee.id
+
+
 @pytest.mark.parametrize(
     ("unseen", "outcome"),
     [(np.empty((0, 2)), "explored"), (np.array([[2.0, 1.0]]), "failed")],
