@@ -19,6 +19,7 @@ from gvgbot.autonomy.exploration.attempts import Attempts
 from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.exploration.headway import Headway
 from gvgbot.autonomy.exploration.hindrance import Hindrance
+from gvgbot.autonomy.exploration.new_ground import NewGround
 from gvgbot.autonomy.exploration.obstructions import Obstructions
 from gvgbot.autonomy.exploration.paths import Approach, shortest_paths
 from gvgbot.autonomy.gvg.local import Branch, Place
@@ -55,7 +56,7 @@ class Mission:
         self.remark = ""  # on how certain the map is, for the end
         self._budget_m = math.inf  # of `travelled`, for the present target
         self._newest_m = 0.0  # of the target edge that has been driven
-        self._headway, self._attempts = Headway(), Attempts()
+        self._headway, self._attempts, self._ground = Headway(), Attempts(), NewGround()
         self._driven = DrivenEdges(mapper)
         self._frontiers: set[HalfEdgeId] = set()  # that were known at the last view
         self._looked_around = 0
@@ -150,6 +151,7 @@ class Mission:
         self._scouting.end()
         self._backtracking.end()
         self._retracing.end()
+        self._ground.restart()
 
     def configure(self, config: ExplorationConfig) -> None:
         """Use another configuration from now on."""
@@ -162,6 +164,7 @@ class Mission:
         self._scouting.skip(seconds)
         self._hindrance.skip(seconds)
         self._examination.skip(seconds)
+        self._ground.skip(seconds)
 
     def meet(self, local_base: Pose, company: list[Companion]) -> None:
         """Note where other robots are, local frame."""
@@ -189,6 +192,7 @@ class Mission:
         graph = self._mapper.graph
         if self.choice.sharing is not None:  # what was in the way may have been one that drives on
             self._reopen(view, "the way may be free again")
+        self._watch_for_new_ground(view)
         target = self.target
         half = None if target is None else graph.half_edge(target)
         if target is None or half is None or not half.open:
@@ -203,6 +207,8 @@ class Mission:
         if self.target is None and (self._obstructions.waiting or self.choice.waits_for_others):
             self._headway.restart(view.stamp)
             self._headway.restart_stay()
+            if self.choice.waits_for_others:
+                self._ground.restart()
             return self._make_way(view, here)
         if self.target is None and graph.frontiers():
             return self._wait_for_a_way(view, here)
@@ -265,8 +271,7 @@ class Mission:
         self._attempts.begin(self._place_of(chosen))
         starts = here.starts()
         away = max((s.metres for s in starts), default=0.0)
-        total = sum(e.length for e in self._mapper.graph.edges.values())
-        self._budget_m = view.travelled + 2 * (away + total) + self._config.patience_m
+        self._budget_m = view.travelled + 2 * (away + self._known_m) + self._config.patience_m
         self._newest_m = 0.0
         self._looked_around = 0
         self._backtracking.renew()
@@ -397,6 +402,21 @@ class Mission:
         return opened
 
     # -- giving up ---------------------------------------------------------------------------------
+
+    @property
+    def _known_m(self) -> float:
+        """How long all known edges are together, m."""
+        return sum(edge.length for edge in self._mapper.graph.edges.values())
+
+    def _watch_for_new_ground(self, view: View) -> None:
+        """Give all frontiers up if they have not led anywhere new for a long time."""
+        frontiers = self._mapper.graph.frontiers()
+        self._ground.note(self._mapper.belief.map_base.position, view.stamp)
+        if frontiers and self._ground.is_over(self._known_m, view.stamp):
+            self._obstructions.close(self._mapper.graph, frontiers, view.stamp, retries=0)
+            reason = "they have not led anywhere new for a long time"
+            self._events.append(Recovery(view.stamp, "give all frontiers up", reason))
+            self.target = None
 
     def _watch_progress(self, view: View) -> None:
         waited = self._headway.note(view.local_base.position, view.stamp)

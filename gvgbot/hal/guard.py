@@ -1,4 +1,4 @@
-"""The last gate before the motors: limits, staleness, contact, and obstacles on the raw scan."""
+"""The last gate before the motors: limits, staleness, contact, and obstacles on the newest scan."""
 
 from dataclasses import dataclass, field, replace
 from math import copysign, isfinite, sqrt

@@ -5,7 +5,7 @@ import numpy as np
 from gvgbot.geometry import Array
 
 _SAME_M = 1.0  # places nearer than this are one
-_MOST = 20  # frontiers explored at a place: no vertex has so many departures
+_MOST = 10  # frontiers explored at a place: no vertex has so many departures
 
 
 class Attempts:

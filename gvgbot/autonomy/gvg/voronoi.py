@@ -22,7 +22,7 @@ _MAX_UNKNOWN = 1  # of the sampled points of a disc
 _INFINITE_M = 1e6  # to the centre of a circle around three points on a line
 _QHULL = "Qbb Qc Qz Q12 Qx"  # scipy's own, and merge what lies in one plane at the end: faster
 _NOTHING: Array = np.empty((0, 2))
-_AROUND_M = 0.3  # of a place where the robot fitted, it fits through as little
+_AROUND_M = 0.6  # of a place where the robot fitted, it fits through as little
 _LONG_RIDGE_M, _STEP_M, _FARTHEST_M = 1.0, 0.2, 8.0  # of ridges that end in the unknown
 
 

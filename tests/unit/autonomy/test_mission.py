@@ -189,6 +189,27 @@ def test_where_another_frontier_comes_whenever_one_is_explored_it_goes_away_in_t
     assert "whenever it is explored there is another one" in given_up
 
 
+def test_frontiers_that_come_and_go_but_lead_nowhere_new_are_given_up_in_the_end() -> None:
+    """Whenever one is chosen it is another one's turn to be seen, at a place of its own."""
+    robot = Robot()
+    robot.stand(TEE, 8)
+    graph = robot.mapper.graph
+    (tee,) = graph.vertices.values()
+    for i in range(4000):
+        if robot.mission.outcome is not None:
+            break
+        x, y = (-2.0, 2.0)[i // 40 % 2], 0.0
+        robot.drive(TEE, (robot.pose.x, robot.pose.y), (x, y))
+        if robot.mission.target is not None and i % 40 == 0:
+            bearing = tee.half_edges[robot.mission.target.key].bearing
+            graph.remove_half_edge(robot.mission.target)
+            tee.add_half_edge(bearing)
+            robot.mission._attempts._places.clear()
+    assert robot.mission.outcome == "explored_with_blocked"
+    given_up = [e.action for e in robot.said(Recovery) if isinstance(e, Recovery)]
+    assert "give all frontiers up" in given_up
+
+
 def test_who_has_a_map_and_sees_no_edge_any_more_has_not_failed() -> None:
     """Stuck in a narrow door, for instance: what it has mapped is there all the same."""
     robot = Robot()

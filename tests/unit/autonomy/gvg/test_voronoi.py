@@ -180,7 +180,7 @@ def test_noise_of_a_wall_between_two_doors_is_no_way_into_a_hall(seed: int) -> N
 
 @pytest.mark.parametrize(
     ("places", "leads_through"),
-    [([], False), ([(0.0, -0.1)], True), ([(0.0, 0.25)], True), ([(0.0, -0.4), (0.5, 0.0)], False)],
+    [([], False), ([(0.0, -0.1)], True), ([(0.0, 0.5)], True), ([(0.0, -0.7), (0.8, 0.0)], False)],
 )
 def test_a_gap_narrower_than_wanted_leads_through_where_the_robot_has_fitted(
     places: list[Point], leads_through: bool

@@ -1,0 +1,43 @@
+"""When there is no more hope of new ground: after all edges could have been driven twice."""
+
+import numpy as np
+
+from gvgbot.autonomy.exploration.new_ground import NewGround
+
+
+def after(stamps: range, *, step_m: float, edges_m: float = 100.0) -> bool:
+    """Whether it is over when the robot has driven so far from second to second, or stood."""
+    ground = NewGround()
+    for i, stamp in enumerate(stamps):
+        ground.note(np.array([step_m * i, 0.0]), float(stamp))
+    return ground.is_over(edges_m, float(stamps[-1]))
+
+
+def test_whoever_comes_on_has_hope() -> None:
+    assert not after(range(20_000), step_m=0.1)
+
+
+def test_a_way_there_and_back_over_all_edges_at_half_the_speed_is_waited_for() -> None:
+    assert not after(range(600), step_m=0.0)
+    assert not after(range(round(100.0 / 0.3)), step_m=0.0)
+    assert after(range(1200), step_m=0.0)
+    assert not after(range(1200), step_m=0.0, edges_m=400.0)
+
+
+def test_old_ground_is_none() -> None:
+    ground = NewGround()
+    for stamp in range(1200):
+        ground.note(np.array([5.0 * np.sin(0.1 * stamp), 0.0]), float(stamp))
+    assert ground.is_over(100.0, 1200.0)
+
+
+def test_outages_and_other_tasks_do_not_count() -> None:
+    ground = NewGround()
+    ground.note(np.zeros(2), 0.0)
+    ground.skip(5000.0)
+    assert not ground.is_over(100.0, 5900.0)
+    ground.restart()
+    assert not ground.is_over(100.0, 9000.0)
+    ground.note(np.zeros(2), 9000.0)
+    assert not ground.is_over(100.0, 9900.0)
+    assert ground.is_over(100.0, 10_200.0)
