@@ -84,7 +84,7 @@ def _explorations() -> str:
                 r for r in found if r["laser"] == laser and world in (r["world"], "floor plans")
             ]
             rows.append((world, laser, *_common(some)))
-    head = ("world", "laser", "runs", "complete", "recall", "precision", "vertex RMSE, m")
+    head = ("world", "laser", "runs", "complete", "recall", "precision", "vertex RMSE, m", "worst")
     more = ("way by shortest tour", "way by all edges once", "faster than life", "memory, MB")
     return (
         "## Exploration\n\nMeans over runs, but the median of ways. The shortest tour is the open "
@@ -101,6 +101,7 @@ def _common(rows: list[Row]) -> tuple[str, ...]:
         f"{fmean(row[key] for row in scored):.3f}"
         for key in ("recall", "precision", "vertex_rmse_m")
     ]
+    means.append(f"{max(row['vertex_rmse_m'] for row in scored):.3f}")
     ways = median(row["path_ratio"] for row in scored if row["path_ratio"] is not None)
     once = median(row["driven_m"] / row["gvg_m"] for row in scored if row["gvg_m"])
     speed, memory = (fmean(row[key] for row in rows if key in row) for key in SPEED)

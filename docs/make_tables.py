@@ -3,7 +3,7 @@
 What stands between these two lines is written from the file, by the view that is named in brackets
 with its arguments:
 
-    <!-- from: benchmarks/results/worlds.jsonl (runs) -->
+    <!-- from: benchmarks/results/worlds.jsonl (runs 1) -->
     <!-- end -->
 """
 
@@ -57,9 +57,10 @@ def _rows(path: Path) -> list[Row]:
     return found
 
 
-def runs(rows: list[Row]) -> str:
-    """A line for each run."""
-    return _block([explore_table.HEAD, *map(explore_table.line, rows)])
+def runs(rows: list[Row], seed: str) -> str:
+    """A line for each run with a seed."""
+    shown = (row for row in rows if row["seed"] == int(seed))
+    return _block([explore_table.HEAD, *map(explore_table.line, shown)])
 
 
 def summary(rows: list[Row]) -> str:

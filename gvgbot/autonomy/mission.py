@@ -21,7 +21,6 @@ from gvgbot.autonomy.exploration.headway import Headway
 from gvgbot.autonomy.exploration.hindrance import Hindrance
 from gvgbot.autonomy.exploration.new_ground import NewGround
 from gvgbot.autonomy.exploration.obstructions import Obstructions
-from gvgbot.autonomy.exploration.paths import Approach, shortest_paths
 from gvgbot.autonomy.gvg.local import Branch, Place
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.neighbours import Neighbours
@@ -29,6 +28,7 @@ from gvgbot.autonomy.retracing import Retracing
 from gvgbot.autonomy.scouting import Scouting
 from gvgbot.autonomy.search import NO_EDGE, Search
 from gvgbot.autonomy.slam.graph import HalfEdgeId
+from gvgbot.autonomy.topology import piece_of
 from gvgbot.autonomy.views import Correspondence, View
 from gvgbot.autonomy.whereabouts import Situation, Whereabouts
 from gvgbot.geometry import Array, Pose, wrap_angle
@@ -72,12 +72,13 @@ class Mission:
         """The order for the next keyframe interval."""
         self._events = []
         self._backtracking.sees_known = bool(known.vertex_of)
+        self._retracing.note(view, known)
         found = access(view)
         is_beside = found is not None and found.place.distance <= NEAR_M
         if found is not None and is_beside:
             self._search.end()
             self._learn(view, known, found.place)
-        back = self._go_back(view) if self._backtracking.is_on else self._retrace(view, known)
+        back = self._go_back(view) if self._backtracking.is_on else self._retrace(view)
         if back is not None:
             return back, self._events
         if found is None:
@@ -120,6 +121,7 @@ class Mission:
     def witness(self, view: View, known: Correspondence) -> list[Event]:
         """Learn from where somebody else drives the robot."""
         self._events = []
+        self._retracing.note(view, known)
         found = access(view)
         if found is not None and found.place.distance <= NEAR_M:
             self._learn(view, known, found.place)
@@ -356,9 +358,8 @@ class Mission:
             return None
         return Drive(track)
 
-    def _retrace(self, view: View, known: Correspondence) -> Order | None:
+    def _retrace(self, view: View) -> Order | None:
         """Back to what no known way leads to; None unless the robot is about that."""
-        self._retracing.note(view, known)
         if not self._retracing.is_on:
             return None
         waited = self._headway.note(view.local_base.position, view.stamp)
@@ -474,14 +475,13 @@ class Mission:
         If there was something, it may be missing now. Whether it goes back.
         """
         vertices, on_edge = self._mapper.graph.vertices, self.where.on_edge
-        if on_edge is not None:
-            led_to = shortest_paths(self._mapper.graph, [Approach(0.0, on_edge)])
-            if self._retracing.begin(vertices.keys() - led_to.keys()):
-                reason = "no known way leads to a part of the map"
-                self._events.append(Recovery(view.stamp, "retrace the way", reason))
-                self._headway.restart(view.stamp)
-                self._headway.restart_stay()
-                return True
+        here = set() if on_edge is None else piece_of(self._mapper.graph, on_edge.vertex)
+        if here and self._retracing.begin(vertices.keys() - here):
+            reason = "no known way leads to a part of the map"
+            self._events.append(Recovery(view.stamp, "retrace the way", reason))
+            self._headway.restart(view.stamp)
+            self._headway.restart_stay()
+            return True
         before = len(vertices)
         self._mapper.forget_strays(view)
         if len(vertices) < before:

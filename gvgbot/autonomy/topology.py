@@ -115,6 +115,12 @@ def strays(graph: GvgGraph) -> list[Vertex]:
     ]
 
 
+def piece_of(graph: GvgGraph, vertex: int) -> set[int]:
+    """The vertices that hang together with one, itself included; none if it is not in the graph."""
+    pieces = ({one.id for one in piece} for piece in _pieces(graph))
+    return next((ids for ids in pieces if vertex in ids), set())
+
+
 def _proved_edges(graph: GvgGraph, piece: list[Vertex]) -> int:
     """How many edges of a piece the robot has driven, or of a map that was finished."""
     ids = {vertex.id for vertex in piece}
@@ -131,7 +137,7 @@ def _pieces(graph: GvgGraph) -> list[list[Vertex]]:
     ids = list(graph.vertices)
     number = {vertex: i for i, vertex in enumerate(ids)}
     ends = [(number[e.a.vertex], number[e.b.vertex]) for e in graph.edges.values()]
-    rows, columns = zip(*ends, strict=True)
+    rows, columns = np.array(ends, int).reshape(-1, 2).T
     links = coo_array((np.ones(len(ends)), (rows, columns)), (len(ids), len(ids)))
     count, piece = connected_components(links, directed=False)
     return [[graph.vertices[ids[i]] for i in np.flatnonzero(piece == k)] for k in range(count)]

@@ -7,9 +7,15 @@ import pytest
 
 from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex
-from gvgbot.autonomy.topology import fuse, loose_ends, split_edge_at, strays, take_out
+from gvgbot.autonomy.topology import fuse, loose_ends, piece_of, split_edge_at, strays, take_out
 from gvgbot.geometry import Pose
-from tests.unit.autonomy.graphs import STREET, between, streets
+from tests.unit.autonomy.graphs import (
+    STREET,
+    between,
+    networkx_distances,
+    random_multigraph,
+    streets,
+)
 
 TURN = 0.3  # rad, of the doubled vertex' frame
 ANGLE = math.radians(40)
@@ -184,3 +190,13 @@ def test_two_edges_of_what_is_none_become_one_unless_a_third_way_goes_straight_o
     assert len(graph.edges) == edges
     assert len(graph.frontiers()) == 2 * (2 - edges)  # to the far corner, and what was lost
     assert is_sound(graph)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_what_hangs_together_with_a_vertex_is_what_edges_lead_to(seed: int) -> None:
+    graph = random_multigraph(np.random.default_rng(seed))
+    for edge in graph.edges.values():
+        graph.vertices[edge.a.vertex].half_edges[edge.a.key].blocked = seed % 2 == 1
+    for vertex in graph.vertices:
+        assert piece_of(graph, vertex) == {vertex, *networkx_distances(graph, [(vertex, 0.0)])}
+    assert piece_of(graph, 99) == set()
