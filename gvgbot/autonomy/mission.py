@@ -411,8 +411,10 @@ class Mission:
 
     def _watch_for_new_ground(self, view: View) -> None:
         """Give all frontiers up if they have not led anywhere new for a long time."""
-        frontiers = self._mapper.graph.frontiers()
         self._ground.note(self._mapper.belief.map_base.position, view.stamp)
+        if not self._ground.is_over(0.0, view.stamp):
+            return
+        frontiers = self._mapper.graph.frontiers()
         if frontiers and self._ground.is_over(self._known_m, view.stamp):
             self._obstructions.close(self._mapper.graph, frontiers, view.stamp, retries=0)
             reason = "they have not led anywhere new for a long time"
