@@ -158,8 +158,8 @@ def _intent(pipeline: Pipeline) -> Intent:
         mission.target,
         mission.outcome,
         mission.reason,
-        mission._budget_m,
-        mission._newest_m,
+        mission._progress._budget_m,
+        mission._progress._newest_m,
         mission._driven.start,
         mission._frontiers,
         Closed(closed._times, closed._since),
@@ -259,7 +259,8 @@ def _recall_mapper(pipeline: Pipeline, memory: Memory) -> None:
 def _recall_mission(mission: Mission, intent: Intent) -> None:
     mission.where, mission.target = intent.where, intent.target
     mission.outcome, mission.reason = intent.outcome, intent.reason
-    mission._budget_m, mission._newest_m = intent.budget_m, intent.newest_m
+    progress = mission._progress
+    progress._budget_m, progress._newest_m = intent.budget_m, intent.newest_m
     mission._driven.start, mission._frontiers = intent.start_edge, intent.frontiers
     closed: Obstructions = mission._obstructions
     closed._times, closed._since = intent.closed.times, intent.closed.since

@@ -15,15 +15,13 @@ from gvgbot.autonomy.driven_edges import DrivenEdges
 from gvgbot.autonomy.events import Decision, Event, Finished, Recovery
 from gvgbot.autonomy.examination import Examination
 from gvgbot.autonomy.exploration.access import NEAR_M, access, way_to_edge
-from gvgbot.autonomy.exploration.attempts import Attempts
 from gvgbot.autonomy.exploration.config import ExplorationConfig
-from gvgbot.autonomy.exploration.headway import Headway
 from gvgbot.autonomy.exploration.hindrance import Hindrance
-from gvgbot.autonomy.exploration.new_ground import NewGround
 from gvgbot.autonomy.exploration.obstructions import Obstructions
 from gvgbot.autonomy.gvg.local import Branch, Place
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.neighbours import Neighbours
+from gvgbot.autonomy.progress import Progress
 from gvgbot.autonomy.retracing import Retracing
 from gvgbot.autonomy.scouting import Scouting
 from gvgbot.autonomy.search import NO_EDGE, Search
@@ -54,9 +52,7 @@ class Mission:
         self.outcome: Outcome | None = None
         self.reason = ""
         self.remark = ""  # on how certain the map is, for the end
-        self._budget_m = math.inf  # of `travelled`, for the present target
-        self._newest_m = 0.0  # of the target edge that has been driven
-        self._headway, self._attempts, self._ground = Headway(), Attempts(), NewGround()
+        self._progress = Progress(mapper)
         self._driven = DrivenEdges(mapper)
         self._frontiers: set[HalfEdgeId] = set()  # that were known at the last view
         self._looked_around = 0
@@ -145,7 +141,7 @@ class Mission:
     def set_aside(self) -> None:
         """Let the robot do something else; choose anew when it comes back."""
         self.target = None
-        self._headway.restart_stay()
+        self._progress.set_aside(whole=True)
         self._looked_around = 0
         self._examination.end()
         self._hindrance.end()
@@ -153,7 +149,6 @@ class Mission:
         self._scouting.end()
         self._backtracking.end()
         self._retracing.end()
-        self._ground.restart()
 
     def configure(self, config: ExplorationConfig) -> None:
         """Use another configuration from now on."""
@@ -161,12 +156,11 @@ class Mission:
 
     def skip(self, seconds: float) -> None:
         """Let no patience run out by a time in which nothing was to be seen."""
-        self._headway.skip(seconds)
+        self._progress.skip(seconds)
         self._search.skip(seconds)
         self._scouting.skip(seconds)
         self._hindrance.skip(seconds)
         self._examination.skip(seconds)
-        self._ground.skip(seconds)
 
     def meet(self, local_base: Pose, company: list[Companion]) -> None:
         """Note where other robots are, local frame."""
@@ -194,12 +188,13 @@ class Mission:
         graph = self._mapper.graph
         if self.choice.sharing is not None:  # what was in the way may have been one that drives on
             self._reopen(view, "the way may be free again")
-        self._watch_for_new_ground(view)
+        if self._progress.finds_nothing_new(view):
+            self._give_all_up(view)
         target = self.target
         half = None if target is None else graph.half_edge(target)
         if target is None or half is None or not half.open:
             if target is not None:
-                self._attempts.end()
+                self._progress.come_to_an_end()
             self.target = self._choose(view, here)
             self._frontiers = set(graph.frontiers())
         else:
@@ -207,10 +202,9 @@ class Mission:
         if self.outcome is not None or self._retracing.is_on:
             return Stand()
         if self.target is None and (self._obstructions.waiting or self.choice.waits_for_others):
-            self._headway.restart(view.stamp)
-            self._headway.restart_stay()
+            self._progress.wait(view.stamp)
             if self.choice.waits_for_others:
-                self._ground.restart()
+                self._progress.set_aside(whole=True)
             return self._make_way(view, here)
         if self.target is None and graph.frontiers():
             return self._wait_for_a_way(view, here)
@@ -243,15 +237,11 @@ class Mission:
                 return None
             self._scouting.end()
             chosen, reason = nearest[0], "nearest frontier"
-        if self._attempts.are_vain(self._place_of(chosen)):
+        if self._progress.is_vain(chosen):
             self._leave(view, chosen, "whenever it is explored there is another one", retries=0)
             return None
         self._commit(view, here, chosen, reason)
         return chosen
-
-    def _place_of(self, end: HalfEdgeId) -> Array:
-        """Where its vertex stands (2,), m, map frame."""
-        return self._mapper.belief.map_vertex(end.vertex).position
 
     def _reconsidered(self, view: View, here: Situation, target: HalfEdgeId) -> HalfEdgeId | None:
         """The target, or a frontier found just now that is nearer than what is left of the way."""
@@ -264,17 +254,15 @@ class Mission:
         if not self.choice.keeps(target, starts):
             return self._choose(view, here)
         nearer = self.choice.nearer(target, found, starts)
-        if nearer is None or self._attempts.are_vain(self._place_of(nearer)):
+        if nearer is None or self._progress.is_vain(nearer):
             return target
         self._commit(view, here, nearer, "nearer frontier")
         return nearer
 
     def _commit(self, view: View, here: Situation, chosen: HalfEdgeId, reason: str) -> None:
-        self._attempts.begin(self._place_of(chosen))
         starts = here.starts()
         away = max((s.metres for s in starts), default=0.0)
-        self._budget_m = view.travelled + 2 * (away + self._known_m) + self._config.patience_m
-        self._newest_m = 0.0
+        self._progress.set_out(view, chosen, away, self._config)
         self._looked_around = 0
         self._backtracking.renew()
         self._examination.end()
@@ -315,14 +303,14 @@ class Mission:
             return Stand()
         track = Track.of(line, room).until(free)
         end = view.gvg.end_of(path[-1])
-        waited = self._headway.waited(view.stamp)
+        waited = self._progress.headway.waited(view.stamp)
         if track.length < ARRIVED_M and end not in here.known.vertex_of and end in view.doubted:
             self._hindrance.hold()
             away = _turn_to_face(view, path[-1])
             if min(away, math.tau - away) > _FACING_RAD:
                 return LookAround(away)
         elif track.length < ARRIVED_M and waited > self._config.look_around_s:
-            self._headway.restart(view.stamp)
+            self._progress.headway.restart(view.stamp)
             self._looked_around += 1
             if self._looked_around > 2 and not self._scouting.is_on:
                 if not self._closes_unseen_edge(view, here):
@@ -362,7 +350,7 @@ class Mission:
         """Back to what no known way leads to; None unless the robot is about that."""
         if not self._retracing.is_on:
             return None
-        waited = self._headway.note(view.local_base.position, view.stamp)
+        waited = self._progress.headway.note(view.local_base.position, view.stamp)
         track = self._retracing.track(view, self._neighbours.company)
         if track is None or waited > self._config.in_the_way_s:
             self._retracing.end()
@@ -376,7 +364,7 @@ class Mission:
         """Wait a little for what stands in the way, then try another one."""
         reason = self._hindrance.reason_to_turn(
             view.stamp,
-            has_come_on=self._headway.waited(view.stamp) == 0.0,
+            has_come_on=self._progress.headway.waited(view.stamp) == 0.0,
             patience_s=self._neighbours.patience * self._config.in_the_way_s,
         )
         if reason:
@@ -404,36 +392,23 @@ class Mission:
 
     # -- giving up ---------------------------------------------------------------------------------
 
-    @property
-    def _known_m(self) -> float:
-        """How long all known edges are together, m."""
-        return sum(edge.length for edge in self._mapper.graph.edges.values())
-
-    def _watch_for_new_ground(self, view: View) -> None:
-        """Give all frontiers up if they have not led anywhere new for a long time."""
-        self._ground.note(self._mapper.belief.map_base.position, view.stamp)
-        if not self._ground.is_over(0.0, view.stamp):
-            return
+    def _give_all_up(self, view: View) -> None:
+        """Close all frontiers: they have not led anywhere new for a long time."""
         frontiers = self._mapper.graph.frontiers()
-        if frontiers and self._ground.is_over(self._known_m, view.stamp):
+        if frontiers:
             self._obstructions.close(self._mapper.graph, frontiers, view.stamp, retries=0)
             reason = "they have not led anywhere new for a long time"
             self._events.append(Recovery(view.stamp, "give all frontiers up", reason))
             self.target = None
 
     def _watch_progress(self, view: View) -> None:
-        waited = self._headway.note(view.local_base.position, view.stamp)
-        if self.where.on_edge == self.target and self.where.trail_length > self._newest_m + 0.5:
-            self._newest_m = self.where.trail_length  # new ground: as long as there is more, go on
-            self._budget_m = max(self._budget_m, view.travelled + self._config.patience_m)
-        if self.target is not None and view.travelled > self._budget_m:
-            self._give_up(view, "driven too far without reaching it")
-        elif waited > self._config.patience_s:
-            self._headway.restart(view.stamp)
-            self._headway.restart_stay()
-            if self.target is None or self._mapper.graph.half_edge(self.target) is None:
-                self.target = self._frontier_beside(view)  # one that comes and goes
-            self._give_up(view, "no progress")
+        driven_m = self.where.trail_length if self.where.on_edge == self.target else 0.0
+        reason = self._progress.trouble(view, self.target, driven_m, self._config)
+        if reason is None:
+            return
+        if self.target is None or self._mapper.graph.half_edge(self.target) is None:
+            self.target = self._frontier_beside(view)  # one that comes and goes
+        self._give_up(view, reason)
 
     def _frontier_beside(self, view: View) -> HalfEdgeId | None:
         """The frontier nearest to the robot as the crow flies."""
@@ -481,8 +456,7 @@ class Mission:
         if here and self._retracing.begin(vertices.keys() - here):
             reason = "no known way leads to a part of the map"
             self._events.append(Recovery(view.stamp, "retrace the way", reason))
-            self._headway.restart(view.stamp)
-            self._headway.restart_stay()
+            self._progress.wait(view.stamp)
             return True
         before = len(vertices)
         self._mapper.forget_strays(view)
@@ -513,7 +487,7 @@ class Mission:
         """No edge in sight: look around, here and where there is more room, and then give up."""
         if self._search.is_driving:
             self._watch_progress(view)
-        order, done = self._search.advance(view, self._headway, self._config)
+        order, done = self._search.advance(view, self._progress.headway, self._config)
         self._events += done
         if isinstance(order, Stand):
             reason = f"{NO_EDGE}: there are no walls within range, or no way out"

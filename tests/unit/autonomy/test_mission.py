@@ -204,7 +204,7 @@ def test_frontiers_that_come_and_go_but_lead_nowhere_new_are_given_up_in_the_end
             bearing = tee.half_edges[robot.mission.target.key].bearing
             graph.remove_half_edge(robot.mission.target)
             tee.add_half_edge(bearing)
-            robot.mission._attempts._places.clear()
+            robot.mission._progress._attempts._places.clear()
     assert robot.mission.outcome == "explored_with_blocked"
     given_up = [e.action for e in robot.said(Recovery) if isinstance(e, Recovery)]
     assert "give all frontiers up" in given_up
