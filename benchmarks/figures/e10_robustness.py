@@ -38,6 +38,10 @@ SCENARIOS = {  # the situation, and the tests of it
         f"{GLASS}::test_a_room_behind_glass_is_entered_by_its_door",
         f"{CONTACTS}::test_a_pane_of_glass_across_a_corridor_ends_it_after_a_few_touches",
     ),
+    "Legs of chairs and tables": (
+        f"{GLASS}::test_the_legs_of_a_chair_are_led_round_without_hesitation",
+        f"{GLASS}::test_a_robot_between_two_legs_leaves_without_hesitation",
+    ),
     "People": (
         f"{PEOPLE}::test_a_person_who_steps_aside_soon_is_waited_for",
         f"{PEOPLE}::test_a_person_who_jumps_into_the_way_is_not_touched",
