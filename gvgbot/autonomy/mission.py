@@ -230,7 +230,7 @@ class Mission:
                 nearest = self.choice.nearest(here.starts())
             if nearest is None:
                 if self.choice.is_left_to_others and not self._obstructions.waiting:
-                    if not self._goes_back_or_forgets(view):
+                    if not self._goes_back(view):
                         self._end(view, "explored", "no frontier of the team is left")
                 elif not self.choice.waits_for_others:
                     self._finish(view)
@@ -284,7 +284,7 @@ class Mission:
             return self._drive(view, here, near)
         if scouting.lasted(view.stamp) > self._config.patience_s:
             scouting.end()
-            if self._goes_back_or_forgets(view):
+            if self._goes_back(view):
                 return Stand()
             if self.target is None or self._mapper.graph.half_edge(self.target) is not None:
                 self._give_up(view, "no way leads there")
@@ -423,7 +423,7 @@ class Mission:
         self._looked_around = 0
         half = None if self.target is None else self._mapper.graph.half_edge(self.target)
         if half is None:
-            is_going_back = self._goes_back_or_forgets(view)
+            is_going_back = self._goes_back(view)
             is_done = self._mapper.graph.vertices and not self._mapper.graph.frontiers()
             if is_going_back or is_done:
                 return
@@ -446,23 +446,23 @@ class Mission:
         self._obstructions.close(self._mapper.graph, [frontier], view.stamp, retries=retries)
         self._events.append(Recovery(view.stamp, "give up a frontier", reason))
 
-    def _goes_back_or_forgets(self, view: View) -> bool:
-        """Go back to what nothing leads to, if the robot has been there, or else forget it.
+    def _goes_back(self, view: View) -> bool:
+        """Forget what nothing leads to, or go back there if the robot has driven there.
 
-        If there was something, it may be missing now. Whether it goes back.
+        If something was forgotten, it may be missing now. Whether it goes back.
         """
         vertices, on_edge = self._mapper.graph.vertices, self.where.on_edge
         here = set() if on_edge is None else piece_of(self._mapper.graph, on_edge.vertex)
-        if here and self._retracing.begin(vertices.keys() - here):
-            reason = "no known way leads to a part of the map"
-            self._events.append(Recovery(view.stamp, "retrace the way", reason))
-            self._progress.wait(view.stamp)
-            return True
         before = len(vertices)
         self._mapper.forget_strays(view)
         if len(vertices) < before:
             self._examination.end()
-        return False
+        if not here or not self._retracing.begin(vertices.keys() - here):
+            return False
+        reason = "no known way leads to a part of the map"
+        self._events.append(Recovery(view.stamp, "retrace the way", reason))
+        self._progress.wait(view.stamp)
+        return True
 
     def _sees_all(self) -> bool | None:
         """Whether no floor is unseen that the robot could drive onto: it is in a closed room.
@@ -528,7 +528,7 @@ class Mission:
         """Some frontiers cannot be reached: that is the end, after having looked for a way."""
         if self._scouting.lasted(view.stamp) < self._config.patience_s:
             return
-        if self._goes_back_or_forgets(view):
+        if self._goes_back(view):
             return
         frontiers = len(self._mapper.graph.frontiers())
         if frontiers:

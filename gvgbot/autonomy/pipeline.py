@@ -34,7 +34,6 @@ from gvgbot.autonomy.newcomers import Newcomers
 from gvgbot.autonomy.odometry_log import OdometryLog
 from gvgbot.autonomy.passed import Passed
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
-from gvgbot.autonomy.tight_places import TightPlaces
 from gvgbot.autonomy.views import Correspondence, View, touching
 from gvgbot.geometry import STANDSTILL, Array, Pose, Twist, rotated_covariance, wrap_angle
 from gvgbot.hal.deskew import deskewed
@@ -86,7 +85,6 @@ class Pipeline:
         self._reflexes = Reflexes(config.reflexes)
         self._hazards = Hazards(config.hazards)
         self._newcomers = Newcomers(config.newcomers)
-        self._tight_places = TightPlaces(robot_radius, config.passage_margin_m)
         self.passed: list[Passed] = []
         # other robots as they tell of themselves, map frame; None if there are surely none
         self.company: list[Companion] | None = None
@@ -272,7 +270,6 @@ class Pipeline:
     def _local_gvg(self, local_base: Pose) -> LocalGvg:
         """The GVG around the base, by what the local map shows and the map holds."""
         reduction, half_width = self._config.reduction, self._config.local_map.half_width_m
-        self._tight_places.fit(local_base.position, self._maps.near.points(), self.travelled)
         fine = fine_graph(
             self._maps.near,
             local_base.position,
@@ -282,7 +279,6 @@ class Pipeline:
             felt=np.concatenate(
                 [self._hazards.points, self._newcomers.felt(local_base, self._maps.near)]
             ),
-            tight=self._tight_places.known,
         )
         known = self.mapper.known_around(local_base, half_width)
         return reduce_graph(fine, reduction, known).rings_cut_far_from(local_base.position)
@@ -442,7 +438,6 @@ class Pipeline:
                     self.errands.obstruct(f"{cause} again and again")
             case Held(action=action):
                 self._incidents.append((action, "something is in the way"))
-                self._tight_places.get_stuck(local_base.position, self.travelled)
                 self.errands.hold()
             case PutDown():
                 self._incidents.append(("look around", "the robot was lifted"))

@@ -22,18 +22,7 @@ _MAX_UNKNOWN = 1  # of the sampled points of a disc
 _INFINITE_M = 1e6  # to the centre of a circle around three points on a line
 _QHULL = "Qbb Qc Qz Q12 Qx"  # scipy's own, and merge what lies in one plane at the end: faster
 _NOTHING: Array = np.empty((0, 2))
-_AROUND_M = 0.6  # of a place where the robot fitted, it fits through as little
 _LONG_RIDGE_M, _STEP_M, _FARTHEST_M = 1.0, 0.2, 8.0  # of ridges that end in the unknown
-
-
-class Tight(NamedTuple):
-    """Places (N, 2) around which the robot fits with less clearance, m, than it wants elsewhere."""
-
-    places: Array = _NOTHING
-    clearance: float = np.inf
-
-
-_NOWHERE = Tight()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,7 +50,6 @@ def fine_graph(
     roughness: float,
     open_clearance: float = np.inf,
     felt: Array = _NOTHING,
-    tight: Tight = _NOWHERE,
 ) -> FineGraph:
     """The certain Voronoi graph around the robot (2,); EMPTY where there is none.
 
@@ -71,13 +59,12 @@ def fine_graph(
     such bumps count where they lead from some that could not to others: the way from a door into
     the middle of a room is that of its two posts. Farther from all walls than `open_clearance` m,
     the graph goes along the coast instead. `felt` are obstacles (N, 2) that the map does not show.
-    Around `tight` places it fits through less.
     """
     generators = np.concatenate([local_map.points(), felt])
     triangles = _triangulated(generators)
     if triangles is None:
         return EMPTY
-    room = _Room(local_map, generators, min_clearance, open_clearance, tight)
+    room = _Room(local_map, generators, min_clearance, open_clearance)
     diagram = _diagram(triangles, room, roughness)
     points, clearance, links, endless = _ridges_that_count(diagram, room)
     used = np.zeros(len(points), bool)
@@ -86,7 +73,7 @@ def fine_graph(
     certain[used] = room.is_certain(points[used], clearance[used])
     here, there = certain[links.T]
     rim = np.concatenate([links[here & ~there], links[there & ~here, ::-1]])
-    rim = rim[room.fits(points[rim[:, 1]], clearance[rim[:, 1]])]
+    rim = rim[clearance[rim[:, 1]] >= min_clearance]
     endless = endless[certain[diagram.a[endless]]]
     away = _FARTHEST_M * _outwards(triangles, diagram, endless)
     rays = _Rays(
@@ -99,31 +86,17 @@ def fine_graph(
 class _Room(NamedTuple):
     """What is known around the generators (N, 2), and how much room the robot wants.
 
-    Its discs are those in which it fits, with a radius, m, up to `open_clearance`.
+    Its discs are those with a radius, m, from `min_clearance` to `open_clearance`.
     """
 
     local_map: Space
     generators: Array
     min_clearance: float
     open_clearance: float
-    tight: Tight
-
-    @property
-    def narrowest(self) -> float:
-        """The least clearance, m, that may do anywhere."""
-        return min(self.min_clearance, self.tight.clearance)
-
-    def fits(self, centres: Array, clearance: Array) -> NDArray[np.bool_]:
-        """In which discs, by centres (N, 2) and radii (N,), the robot fits."""
-        fits: NDArray[np.bool_] = clearance >= self.min_clearance
-        for place in self.tight.places:
-            is_near = np.hypot(*(centres - place).T) < _AROUND_M
-            fits |= is_near & (clearance >= self.tight.clearance)
-        return fits
 
     def is_certain(self, centres: Array, clearance: Array) -> NDArray[np.bool_]:
         """Which maximal discs, by centres (N, 2) and radii (N,), are such and surely there."""
-        fits = self.fits(centres, clearance) & (clearance <= self.open_clearance)
+        fits = (clearance >= self.min_clearance) & (clearance <= self.open_clearance)
         fits[fits] = _disc_is_known(self.local_map, centres[fits], clearance[fits])
         return fits
 
@@ -151,11 +124,8 @@ def _diagram(triangles: Delaunay, room: _Room, roughness: float) -> Diagram:
     points, clearance = _circumcircles(generators, triangles.simplices)
     a, b, pair = _ridges(triangles)
     p, q = (generators.take(pair[:, k], axis=0) for k in (0, 1))
-    wide = _far_apart(p, q, 2 * room.narrowest)
+    wide = _far_apart(p, q, 2 * room.min_clearance)
     p, q = p.take(wide, axis=0), q.take(wide, axis=0)
-    if room.narrowest < room.min_clearance:
-        fits = room.fits((p + q) / 2, np.hypot(*(p - q).T) / 2)
-        wide, p, q = wide[fits], p[fits], q[fits]
     narrowest = _least_clearance(points, clearance, a.take(wide), b.take(wide), p, q)
     is_rough = np.hypot(*(p - q).T) < np.sqrt(8 * roughness * narrowest)
     smooth, rough = wide[~is_rough], wide[is_rough & (b.take(wide) >= 0)]

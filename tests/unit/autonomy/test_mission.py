@@ -371,23 +371,35 @@ def test_the_robot_goes_near_what_no_known_way_leads_to_before_it_gives_that_up(
     assert robot.mission.outcome == "explored_with_blocked"
 
 
+ALL_WAYS: dict[int, tuple[int, int, list[Point]]] = {
+    **{10: (1, 2, []), 11: (2, 3, []), 12: (3, 4, []), 13: (4, 5, [])},
+    **{14: (2, 6, []), 15: (3, 7, []), 16: (4, 8, [])},
+}
+STREET = drawn(  # with three side streets to the south, which go on unseen, as its ends do
+    {1: (-8.0, 0.0), 2: (-4.0, 0.0), 3: (0.0, 0.0), 4: (4.0, 0.0), 5: (8.0, 0.0)}
+    | {6: (-4.0, -4.0), 7: (0.0, -4.0), 8: (4.0, -4.0)},
+    ALL_WAYS,
+    unseen={1: math.pi, 5: 0.0} | dict.fromkeys((6, 7, 8), -math.pi / 2),
+)
+
+
 def test_what_no_known_way_leads_to_any_more_is_gone_back_to_over_the_way_that_was_driven() -> None:
     """Through a gap that is hardly wide enough, into a room of which no edge leads back."""
-    room = drawn({5: (3.0, 6.0), 6: (3.0, 9.0)}, {20: (5, 6, [])})
+    room = drawn({5: (4.0, 6.0), 6: (4.0, 9.0)}, {20: (5, 6, [])})
     robot = Robot()
-    robot.stand(TEE, 30)
-    robot.drive(TEE, (0.0, 0.0), (3.0, 0.0), (3.0, 1.2))
-    robot.drive(room, (3.0, 1.2), (3.0, 7.0))
+    robot.stand(STREET, 20)
+    robot.drive(STREET, (0.0, 0.0), (-5.0, 0.0), (4.0, 0.0), (4.0, 1.2))
+    robot.drive(room, (4.0, 1.2), (4.0, 7.0))
     lost = {end.vertex for end in robot.mapper.graph.frontiers()}
     while not any("retrace" in str(event) for event in robot.said(Recovery)):
         assert robot.mission.outcome is None
-        robot.drive(room, (robot.pose.x, robot.pose.y), (3.0, 8.5), (3.0, 6.5))
+        robot.drive(room, (robot.pose.x, robot.pose.y), (4.0, 8.5), (4.0, 6.5))
     order = robot.look(room)
-    while end_of(order)[1] > 2.5:
+    while end_of(order)[1] > 1.0:
         x, y = end_of(order)
-        assert x == pytest.approx(3.0, abs=0.05)
+        assert x == pytest.approx(4.0, abs=0.05)
         order = robot.drive(room, (robot.pose.x, robot.pose.y), (x, y))
-    order = robot.drive(TEE, (robot.pose.x, robot.pose.y), (3.0, 0.5))
+    order = robot.drive(STREET, (robot.pose.x, robot.pose.y), (4.0, 0.5))
     assert robot.mission.outcome is None
     assert robot.mission.target is not None
     assert robot.mission.target.vertex in lost

@@ -37,7 +37,7 @@ def rest(retracing: Retracing, x: float, y: float) -> Track | None:
 
 
 def test_it_leads_over_the_way_to_where_the_vertex_was_near() -> None:
-    """The corner of the way is 3 m from the vertex, and the robot was within 2 m of it before."""
+    """The corner of the way is 3 m from the vertex, and the robot was at it before that."""
     retracing = driven((0.0, 0.0), (3.0, 0.0), (3.0, 4.0))
     assert retracing.begin({7, 8})
     ahead = rest(retracing, 3.0, 4.0)
@@ -46,8 +46,8 @@ def test_it_leads_over_the_way_to_where_the_vertex_was_near() -> None:
     assert ahead.polyline[:, 0] == pytest.approx(3.0)
     last = rest(retracing, 3.0, 0.0)
     assert last is not None
-    assert last.polyline[-1] == pytest.approx((2.0, 0.0), abs=0.11)
-    assert rest(retracing, 2.1, 0.0) is None
+    assert last.polyline[-1] == pytest.approx((0.7, 0.0), abs=0.11)
+    assert rest(retracing, 0.8, 0.0) is None
 
 
 def test_detours_are_left_out() -> None:

@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
-from gvgbot.autonomy.gvg.voronoi import Tight, _pieces, fine_graph
+from gvgbot.autonomy.gvg.voronoi import _pieces, fine_graph
 from gvgbot.drivers.world import World
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
@@ -176,22 +176,3 @@ def test_noise_of_a_wall_between_two_doors_is_no_way_into_a_hall(seed: int) -> N
         local_map, robot, min_clearance=0.227, roughness=0.03, open_clearance=4.48
     ).points.T
     assert not ((np.abs(y) < 1.0) & (x > 0.5) & (x < 4.2)).any()
-
-
-@pytest.mark.parametrize(
-    ("places", "leads_through"),
-    [([], False), ([(0.0, -0.1)], True), ([(0.0, 0.5)], True), ([(0.0, -0.7), (0.8, 0.0)], False)],
-)
-def test_a_gap_narrower_than_wanted_leads_through_where_the_robot_has_fitted(
-    places: list[Point], leads_through: bool
-) -> None:
-    """A gap of 0.42 m between two rooms, for a robot that wants 0.46 m."""
-    walls: list[tuple[Point, Point]] = [((-3.0, y), (3.0, y)) for y in (-2.0, 2.0)]
-    walls += [((side * 3.0, -2.0), (side * 3.0, 2.0)) for side in (-1.0, 1.0)]
-    walls += [((side * 0.21, 0.0), (side * 3.0, 0.0)) for side in (-1.0, 1.0)]
-    tight = Tight(np.array(places).reshape(-1, 2), 0.2)
-    graph = fine_graph(
-        Drawn(*walls), np.array([0.0, -1.0]), min_clearance=0.23, roughness=0.03, tight=tight
-    )
-    assert (graph.points[:, 1] < -0.5).any()
-    assert (graph.points[:, 1] > 0.5).any() == leads_through
