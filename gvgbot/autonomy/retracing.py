@@ -15,7 +15,7 @@ from gvgbot.geometry import Array
 
 _STEP_M = 0.1  # from point to point of the way
 _SHORTCUT_M, _DETOUR_M = 0.25, 0.5  # where it comes so near to itself, after so much, or more
-_AT_M = 0.7  # so near to a vertex, it is there, and not behind something
+_AT_M = 0.35  # so near to a vertex, it is there, and not behind something
 _AHEAD_M = 3.0  # of the way is driven before the robot looks again
 
 
