@@ -350,9 +350,11 @@ class Mission:
         """Back to what no known way leads to; None unless the robot is about that."""
         if not self._retracing.is_on:
             return None
-        waited = self._progress.headway.note(view.local_base.position, view.stamp)
-        track = self._retracing.track(view, self._neighbours.company)
-        if track is None or waited > self._config.in_the_way_s:
+        headway, track = self._progress.headway, None
+        headway.note(view.local_base.position, view.stamp)
+        if headway.waited(view.stamp) < self._config.in_the_way_s:
+            track = self._retracing.track(view, self._neighbours.company)
+        if track is None:
             self._retracing.end()
             self._scouting.end()
             return None

@@ -9,13 +9,14 @@ from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.control.company import Companion, free_metres
 from gvgbot.autonomy.control.edge_follower import Track
-from gvgbot.autonomy.control.orders import ARRIVED_M
 from gvgbot.autonomy.views import Correspondence, View
 from gvgbot.geometry import Array
 
 _STEP_M = 0.1  # from point to point of the way
 _SHORTCUT_M, _DETOUR_M = 0.25, 0.5  # where it comes so near to itself, after so much, or more
 _AT_M = 0.35  # so near to a vertex, it is there, and not behind something
+_BEYOND = 4  # points of the way: there it was before it came to the vertex
+_THERE_M = 0.15  # from the end of the way
 _AHEAD_M = 3.0  # of the way is driven before the robot looks again
 
 
@@ -55,7 +56,7 @@ class Retracing:
         if at is None:
             return False
         self._been |= self._near[at] & lost
-        self._back = _without_detours(np.array(self._way[at:][::-1]))
+        self._back = _without_detours(np.array(self._way[max(0, at - _BEYOND) :][::-1]))
         return True
 
     def track(self, view: View, company: list[Companion]) -> Track | None:
@@ -65,7 +66,7 @@ class Retracing:
         line = self._back[int(away.argmin()) :][: round(_AHEAD_M / _STEP_M)]
         room = np.asarray(view.local_map.tree().query(line)[0])
         track = Track.of(line, room).until(free_metres(line, room, company))
-        return None if track.length < ARRIVED_M else track
+        return None if track.length < _THERE_M else track
 
     def end(self) -> None:
         """Go back no farther."""

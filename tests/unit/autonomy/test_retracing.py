@@ -46,8 +46,8 @@ def test_it_leads_over_the_way_to_where_the_vertex_was_near() -> None:
     assert ahead.polyline[:, 0] == pytest.approx(3.0)
     last = rest(retracing, 3.0, 0.0)
     assert last is not None
-    assert last.polyline[-1] == pytest.approx((0.35, 0.0), abs=0.11)
-    assert rest(retracing, 0.5, 0.0) is None
+    assert last.polyline[-1] == pytest.approx((0.0, 0.0), abs=0.11)
+    assert rest(retracing, 0.1, 0.0) is None
 
 
 def test_detours_are_left_out() -> None:
