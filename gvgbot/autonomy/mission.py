@@ -141,7 +141,7 @@ class Mission:
     def set_aside(self) -> None:
         """Let the robot do something else; choose anew when it comes back."""
         self.target = None
-        self._progress.set_aside(whole=True)
+        self._progress.set_aside()
         self._looked_around = 0
         self._examination.end()
         self._hindrance.end()
@@ -204,7 +204,7 @@ class Mission:
         if self.target is None and (self._obstructions.waiting or self.choice.waits_for_others):
             self._progress.wait(view.stamp)
             if self.choice.waits_for_others:
-                self._progress.set_aside(whole=True)
+                self._progress.set_aside()
             return self._make_way(view, here)
         if self.target is None and graph.frontiers():
             return self._wait_for_a_way(view, here)

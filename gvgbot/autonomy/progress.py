@@ -45,11 +45,10 @@ class Progress:
         self.headway.restart(stamp)
         self.headway.restart_stay()
 
-    def set_aside(self, *, whole: bool) -> None:
-        """Count anew with the next target; or `whole`, also how long nothing new was found."""
+    def set_aside(self) -> None:
+        """Count anew later: there is something else to do, or to wait for others."""
         self.headway.restart_stay()
-        if whole:
-            self._ground.restart()
+        self._ground.restart()
 
     def skip(self, seconds: float) -> None:
         """Let no patience run out by a time in which nothing was to be seen."""

@@ -4,6 +4,8 @@ The robot has come from there, so it can get there; it keeps its way in the loca
 not leap when a loop closes.
 """
 
+from collections import deque
+
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -16,6 +18,7 @@ _STEP_M = 0.1  # from point to point of the way
 _SHORTCUT_M, _DETOUR_M = 0.25, 0.5  # where it comes so near to itself, after so much, or more
 _AT_M = 0.35  # so near to a vertex, it is there, and not behind something
 _BEYOND = 4  # points of the way: there it was before it came to the vertex
+_MOST = 5000  # points that are kept
 _THERE_M = 0.15  # from the end of the way
 _AHEAD_M = 3.0  # of the way is driven before the robot looks again
 
@@ -24,8 +27,8 @@ class Retracing:
     """Once to each vertex. `note` where the robot is and what it sees, at every view."""
 
     def __init__(self) -> None:
-        self._way: list[Array] = []  # (2,), local frame
-        self._near: list[frozenset[int]] = []  # vertices, beside each point of it
+        # where it was (2,), local frame, and the vertices that it was at there
+        self._way: deque[tuple[Array, frozenset[int]]] = deque(maxlen=_MOST)
         self._in_sight = set[int]()  # vertices, in the present view
         self._been = set[int]()  # where it has gone back to
         self._back: Array | None = None  # (N, 2), what is driven
@@ -39,24 +42,24 @@ class Retracing:
         """The robot has come on."""
         here = view.local_base.position
         self._in_sight = set(known.vertex_of.values())
-        if self._way and np.hypot(*(here - self._way[-1])) < _STEP_M:
+        if self._way and np.hypot(*(here - self._way[-1][0])) < _STEP_M:
             return
         near = (
             vertex
             for node, vertex in known.vertex_of.items()
             if np.hypot(*(view.gvg.nodes[node].position - here)) < _AT_M
         )
-        self._way.append(here)
-        self._near.append(frozenset(near))
+        self._way.append((here, frozenset(near)))
 
     def begin(self, lost: set[int]) -> bool:
         """Go back to where one of these vertices was near last; whether there is such a place."""
         lost = lost - self._been - self._in_sight
-        at = next((i for i in reversed(range(len(self._way))) if self._near[i] & lost), None)
+        way = list(self._way)[::-1]
+        at = next((i for i, (_, near) in enumerate(way) if near & lost), None)
         if at is None:
             return False
-        self._been |= self._near[at] & lost
-        self._back = _without_detours(np.array(self._way[max(0, at - _BEYOND) :][::-1]))
+        self._been |= way[at][1] & lost
+        self._back = _without_detours(np.array([place for place, _ in way[: at + 1 + _BEYOND]]))
         return True
 
     def track(self, view: View, company: list[Companion]) -> Track | None:

@@ -68,5 +68,11 @@ def test_to_each_vertex_it_goes_back_once_and_to_none_that_was_never_near() -> N
     assert not retracing.begin({7})
 
 
+def test_what_was_long_ago_is_forgotten() -> None:
+    """Two kilometres to and fro."""
+    retracing = driven((0.0, 0.0), *[(5.0, 0.0), (9.0, 0.0)] * 250)
+    assert not retracing.begin({7})
+
+
 def test_to_what_is_in_sight_it_does_not_go_back() -> None:
     assert not driven((0.0, 0.0), (5.0, 0.0), (2.9, 0.0)).begin({7})
