@@ -168,7 +168,7 @@ def test_a_robot_that_is_held_before_and_behind_turns_to_the_opening_and_goes_th
     opening: float,
 ) -> None:
     """Between two things it fits at the side only, at 22.5 degrees either way less far."""
-    reflexes, pose, driven = Reflexes(CONFIG), Pose(1.0, 2.0, 3.0), 0.0
+    reflexes, pose, driven, twist = Reflexes(CONFIG), Pose(1.0, 2.0, 3.0), 0.0, STANDSTILL
     incidents: list[Incident | None] = []
 
     def room(bearing: float) -> float:
