@@ -230,7 +230,7 @@ class Mission:
                 nearest = self.choice.nearest(here.starts())
             if nearest is None:
                 if self.choice.is_left_to_others and not self._obstructions.waiting:
-                    if not self._goes_back(view):
+                    if not self._begins_to_retrace(view):
                         self._end(view, "explored", "no frontier of the team is left")
                 elif not self.choice.waits_for_others:
                     self._finish(view)
@@ -284,7 +284,7 @@ class Mission:
             return self._drive(view, here, near)
         if scouting.lasted(view.stamp) > self._config.patience_s:
             scouting.end()
-            if self._goes_back(view):
+            if self._begins_to_retrace(view):
                 return Stand()
             if self.target is None or self._mapper.graph.half_edge(self.target) is not None:
                 self._give_up(view, "no way leads there")
@@ -325,9 +325,9 @@ class Mission:
 
         The target lies beyond it, and there may be another way.
         """
-        end = None if self.target is None else here.next_departure(self.target)
-        edge = None if end is None else self._mapper.graph.edge_at(end)
-        if edge is None or end in here.known.branch_of:
+        departures = None if self.target is None else here.departures_to(self.target)
+        edge = None if departures is None else self._mapper.graph.edge_at(departures[0])
+        if departures is None or edge is None or departures[0] in here.known.branch_of:
             return False
         self._looked_around, self.target = 0, None
         self._obstructions.close(self._mapper.graph, [edge.a, edge.b], view.stamp)
@@ -425,7 +425,7 @@ class Mission:
         self._looked_around = 0
         half = None if self.target is None else self._mapper.graph.half_edge(self.target)
         if half is None:
-            is_going_back = self._goes_back(view)
+            is_going_back = self._begins_to_retrace(view)
             is_done = self._mapper.graph.vertices and not self._mapper.graph.frontiers()
             if is_going_back or is_done:
                 return
@@ -448,10 +448,10 @@ class Mission:
         self._obstructions.close(self._mapper.graph, [frontier], view.stamp, retries=retries)
         self._events.append(Recovery(view.stamp, "give up a frontier", reason))
 
-    def _goes_back(self, view: View) -> bool:
-        """Forget what nothing leads to, or go back there if the robot has driven there.
+    def _begins_to_retrace(self, view: View) -> bool:
+        """Forget what was only seen and nothing leads to; whether it goes back to what was driven.
 
-        If something was forgotten, it may be missing now. Whether it goes back.
+        If something was forgotten, it may be missing now.
         """
         vertices, on_edge = self._mapper.graph.vertices, self.where.on_edge
         here = set() if on_edge is None else piece_of(self._mapper.graph, on_edge.vertex)
@@ -530,7 +530,7 @@ class Mission:
         """Some frontiers cannot be reached: that is the end, after having looked for a way."""
         if self._scouting.lasted(view.stamp) < self._config.patience_s:
             return
-        if self._goes_back(view):
+        if self._begins_to_retrace(view):
             return
         frontiers = len(self._mapper.graph.frontiers())
         if frontiers:

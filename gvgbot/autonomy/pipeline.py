@@ -11,6 +11,7 @@ from gvgbot.autonomy.control.company import BodiesSeen, Companion
 from gvgbot.autonomy.control.edge_follower import follow
 from gvgbot.autonomy.control.orders import Drive, LookAround, Order, Stand
 from gvgbot.autonomy.control.reflexes import (
+    AWAY_M,
     Felt,
     Held,
     Hit,
@@ -45,7 +46,7 @@ _MOST_PASSED = 100  # places, the latest ones
 _LIFTED = np.diag([0.3**2, 0.3**2, 0.1**2])  # how far a robot is carried that is put down again
 _ROOM_BESIDE_EDGES_M = 0.08  # on each side, where no edge leads
 _COMPANY_M = 0.15  # by which another robot may be elsewhere than it says
-_AWAY_M, _GRAIN_M = 0.2, 0.05  # what must be known to be free, when it gets away
+_GRAIN_M = 0.05  # of what must be known to be free, when it gets away
 _LONGEST_GAP_S = 2.0  # between keyframes; a longer one is an outage of a device
 _FORGOTTEN = np.diag([1.0, 1.0, 0.3**2])  # covariance of a way that is not kept
 _OVERLAP_RAD = 0.2  # of what is seen before and after the first turn
@@ -418,7 +419,8 @@ class Pipeline:
     def _room(self, local_base: Pose, bearing: float) -> float:
         """How far the robot can go straight at a bearing over what it knows to be free, m."""
         turned = Pose(local_base.x, local_base.y, local_base.theta + bearing)
-        ahead = turned.transform(_ahead(self._radius))
+        farthest = max(AWAY_M, self._config.reflexes.back_off_m)
+        ahead = turned.transform(_ahead(self._radius, farthest))
         unknown = ahead[~self._maps.near.known(ahead)]
         points = [self._maps.near.points(), self._newcomers.points, self._hazards.points, unknown]
         seen = seen_from(turned, np.concatenate(points))
@@ -458,9 +460,9 @@ class Pipeline:
 
 
 @cache
-def _ahead(radius: float) -> Array:
-    """Points (N, 2) of the base frame that a robot of a radius, m, sweeps when it gets away."""
-    x, y = -np.mgrid[-radius - _AWAY_M : 0.0 : _GRAIN_M, -radius:radius:_GRAIN_M]
+def _ahead(radius: float, metres: float) -> Array:
+    """Points (N, 2) of the base frame that a robot of a radius, m, sweeps on so many metres."""
+    x, y = -np.mgrid[-radius - metres : 0.0 : _GRAIN_M, -radius:radius:_GRAIN_M]
     outside = np.hypot(x, y) > radius
     return np.stack([x[outside], y[outside]], axis=1)
 

@@ -234,16 +234,13 @@ class Situation:
         """Branches to drive, as far as they are in sight, towards and into a frontier."""
         if self.where.on_edge == target:
             return self._extended((self._away_from(target),))
-        approach = shortest_paths(self.graph, self.starts()).get(target.vertex)
-        if approach is None:
-            return None
-        departures = (*approach.departures, target)
-        return self.path_over(departures[0].vertex, departures)
+        departures = self.departures_to(target)
+        return None if departures is None else self.path_over(departures[0].vertex, departures)
 
-    def next_departure(self, target: HalfEdgeId) -> HalfEdgeId | None:
-        """By which half-edge the way to a frontier leaves its first vertex; None without a way."""
+    def departures_to(self, target: HalfEdgeId) -> tuple[HalfEdgeId, ...] | None:
+        """By which half-edges a frontier is reached, from the first vertex on; None without a way."""
         approach = shortest_paths(self.graph, self.starts()).get(target.vertex)
-        return None if approach is None else (*approach.departures, target)[0]
+        return None if approach is None else (*approach.departures, target)
 
     def path_over(
         self, first: int, departures: tuple[HalfEdgeId, ...]

@@ -49,12 +49,13 @@ def evened(ranges: Array) -> Array:
     total, count = ranges.copy(), np.ones(len(ranges))
     with np.errstate(invalid="ignore"):  # of beams without an echo
         is_same = np.abs(np.diff(ranges)) < SAME_M
+    are_same = is_same[:-1] & is_same[1:]
     near, far = slice(None, -1), slice(1, None)
     for beams, others, same in (
         (near, far, is_same),
         (far, near, is_same),
-        (slice(None, -2), slice(2, None), is_same[:-1] & is_same[1:]),
-        (slice(2, None), slice(None, -2), is_same[:-1] & is_same[1:]),
+        (slice(None, -2), slice(2, None), are_same),
+        (slice(2, None), slice(None, -2), are_same),
     ):
         total[beams] += np.where(same, ranges[others], 0.0)
         count[beams] += same

@@ -16,10 +16,8 @@ _GRIP_S = 3.0  # backing off longer than it should take, by this, is given up
 _DEAD_S, _BRAKING_MPS2 = 0.1, 0.5  # until a base obeys, and how it then slows down
 _OFTEN_S = 20.0  # a second overload within this time means that something is in the way
 _TRIES = 3  # to get rid of a contact by backing off
-_AWAY_M = 0.2  # out of a place in which nothing else helps
-_BEARINGS = [
-    math.pi - i * math.pi / 8 for i in (0, 1, -1, 2, -2, 3, -3, 4, -4, 5, -5, 6, -6, 7, -7)
-]
+AWAY_M = 0.2  # out of a place in which nothing else helps
+_BEARINGS = [math.pi + side * i * math.pi / 8 for i in range(8) for side in (-1, 1)]
 _TURN_RADPS, _TURN_GAIN, _FACING_RAD = 1.0, 2.0, 0.1
 
 Room = Callable[[float], float]  # how far it can go at a bearing (rad, base frame), m
@@ -129,6 +127,8 @@ class Reflexes:
             self._doing = _Rest(now.stamp + self._config.rest_s, PutDown())
         elif contact is not None and contact.over_current and not self.is_lifted:
             self._rest_from_overload(now)
+        if isinstance(self._doing, _TurnAway) and _is_touching(contact):
+            self._doing = None
         match self._doing:
             case _Rest():
                 return self._rest(now, self._doing, room)
@@ -151,7 +151,7 @@ class Reflexes:
 
     def _notice(self, now: Moment) -> Incident | None:
         contact = now.felt.contact
-        touching = contact is not None and (contact.bumper or contact.cliff)
+        touching = _is_touching(contact)
         before, self._touching = self._touching, touching
         if contact is None or not touching:
             self._tries = 0
@@ -199,8 +199,8 @@ class Reflexes:
 
     def _leave(self, now: Moment, room: Room) -> tuple[Twist, Held]:
         """Back off; where there is no room behind, turn to where there is most, and go there."""
-        widest = max(_BEARINGS, key=lambda bearing: min(room(bearing), _AWAY_M))
-        metres = min(room(widest), _AWAY_M)
+        widest = max(_BEARINGS, key=lambda bearing: min(room(bearing), AWAY_M))
+        metres = min(room(widest), AWAY_M)
         if room(math.pi) >= min(metres, self._config.back_off_m):
             return self._back_off(now, room), Held("back off")
         until = (
@@ -244,6 +244,11 @@ _OTHER_STOPS: tuple[Reason, ...] = (
     "bumper",
     "cliff",
 )
+
+
+def _is_touching(contact: Contact | None) -> bool:
+    """Whether it has run into something, or stands where there is no floor ahead."""
+    return contact is not None and (contact.bumper or contact.cliff)
 
 
 def _bearings(contact: Contact) -> tuple[float, ...]:

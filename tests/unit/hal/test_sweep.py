@@ -190,7 +190,7 @@ def test_an_evened_range_is_among_those_of_its_neighbours_that_are_near_it(
     found = evened(ranges)
     for i, (before, after) in enumerate(zip(values, found.tolist(), strict=True)):
         if not math.isfinite(before):
-            assert after == before or math.isnan(after) == math.isnan(before)
+            assert after == before or (math.isnan(after) and math.isnan(before))
             continue
         near = [other for other in values[max(0, i - 2) : i + 3] if abs(other - before) < 0.1]
         assert min(near) - 1e-9 <= after <= max(near) + 1e-9

@@ -191,6 +191,24 @@ def test_a_robot_that_is_held_before_and_behind_turns_to_the_opening_and_goes_th
     assert math.atan2(dy, dx) == pytest.approx(opening, abs=0.1)
 
 
+def test_who_runs_into_something_on_the_way_out_backs_off_from_it() -> None:
+    reflexes, stamp = Reflexes(CONFIG), 0.0
+
+    def act(contact: Contact, stopped_for: Reason | None = None) -> tuple[Twist, Incident | None]:
+        moment = Moment(stamp, Pose(), AHEAD, Felt(contact, stopped_for))
+        return reflexes.act(moment, lambda bearing: 0.5 if abs(bearing) < 1.6 else 0.02)
+
+    incident: Incident | None = None
+    while incident is None:
+        stamp += CYCLE
+        _, incident = act(NOTHING, "obstacle")
+    assert incident == Held("turn away")
+    stamp += CYCLE
+    twist, incident = act(BUMP)
+    assert isinstance(incident, Hit)
+    assert twist.linear <= 0.0
+
+
 def test_a_robot_that_is_held_on_all_sides_stands_until_that_changes() -> None:
     robot = Robot(room_behind=0.0)
     robot.feel(NOTHING, 20.0, grip=0.0, stopped_for="obstacle")

@@ -18,8 +18,7 @@ def test_whoever_comes_on_has_hope() -> None:
 
 
 def test_a_way_there_and_back_over_all_edges_at_half_the_speed_is_waited_for() -> None:
-    assert not after(range(600), step_m=0.0)
-    assert not after(range(round(100.0 / 0.3)), step_m=0.0)
+    assert not after(range(round(2 * 100.0 / 0.25)), step_m=0.0)
     assert after(range(1200), step_m=0.0)
     assert not after(range(1200), step_m=0.0, edges_m=400.0)
 
