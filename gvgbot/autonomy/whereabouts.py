@@ -238,7 +238,7 @@ class Situation:
         return None if departures is None else self.path_over(departures[0].vertex, departures)
 
     def departures_to(self, target: HalfEdgeId) -> tuple[HalfEdgeId, ...] | None:
-        """By which half-edges a frontier is reached, from the first vertex on; None if not at all."""
+        """By which half-edges a frontier is reached, first vertex first; None without a way."""
         approach = shortest_paths(self.graph, self.starts()).get(target.vertex)
         return None if approach is None else (*approach.departures, target)
 
