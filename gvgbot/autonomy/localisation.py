@@ -36,7 +36,6 @@ _SLIPPING = 25.0  # times the covariance of odometry, when the wheels slip
 _LOST = np.diag([0.5**2, 0.5**2, 0.05**2])  # of a base that nobody heard for a while
 _SEEN_SHARE = 0.3  # of the walls must be known to a robot that comes round a corner unseen
 _MOST_SHARED = 100.0  # scans that a wall can be the mean of
-_BODY_M = 2.0  # before somebody: what looks like a body may be a piece of a wall, or of glass
 _PER_M = np.diag([0.004**2, 0.004**2, 0.0001**2])  # per metre: what cells do to walls
 
 # full: scans are matched, and vertices are poses. paper: odometry alone between vertices, and a
@@ -75,16 +74,15 @@ class LocalMaps:
         self.blur = np.zeros((3, 3))  # covariance of the last match, in the frame of the base
 
     def insert(
-        self, scan: Scan, local_base: Pose, travelled: float, whole: Scan | None = None
+        self, scan: Scan, local_base: Pose, travelled: float, free: Array | None = None
     ) -> None:
         """Add a scan taken by the base at a pose in the local frame, after so many metres.
 
-        `whole` is the scan with those who have been left out of it: up to them there is nothing.
+        `free` (N,) is how far, m, there was nothing on each beam, if that is more than its range.
         The far map learns it when there is time: see `catch_up`.
         """
         self._teach_far()
         local_laser = local_base.compose(scan.base_laser)
-        free = None if whole is None else whole.ranges - _BODY_M
         self.near.insert(scan, local_laser, travelled, free)
         self._due, self._walls = (scan, local_laser, travelled), None
 

@@ -247,12 +247,14 @@ class Mission:
         """The target, or a frontier found just now that is nearer than what is left of the way."""
         frontiers = set(self._mapper.graph.frontiers())
         found, self._frontiers = frontiers - self._frontiers, frontiers
-        if self.where.on_edge == target:
+        is_on_it = self.where.on_edge == target
+        if is_on_it:
             self.choice.enter()
-            return target
         starts = here.starts()
         if not self.choice.keeps(target, starts):
             return self._choose(view, here)
+        if is_on_it:
+            return target
         nearer = self.choice.nearer(target, found, starts)
         if nearer is None or self._progress.is_vain(nearer):
             return target

@@ -12,6 +12,7 @@ from functools import cached_property
 from typing import Annotated
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.gvg.local_map import LocalMap
@@ -24,14 +25,13 @@ from gvgbot.ranges import Range
 # what is half hidden behind something nearer, or has faces and edges, is only kept waiting so long
 _GLIMPSE_S = 3.0
 _BLUR_M = 0.1  # beyond its rim, beams may still end on something
+_SHORT_M = 2.0  # of somebody, nothing is certain any more
 _NEAR_M = 3.0  # who is farther away is not followed from scan to scan
 _GONE_M = 1.0  # between two looks, at most
 _MOVED_M = 0.3  # what stands is found again within this
 _ALIKE_M = 0.05  # by which a robot may seem wider or slimmer than it says it is
 _LATELY_S = 2.0  # after which the last that is seen of somebody is no longer his
 _STRAY = 0.1  # of the beams towards a place: so many may end there though nothing is there
-_FELT_M = 2.0  # from the robot, in a team,
-_BESIDE_WALLS_M = 1.2  # or from walls: what stands there is in the way as seen from afar, too
 _LOST_S = 3.0  # what is out of sight for so long, beyond the time it stood, may have gone
 _RIM = np.stack([f(np.arange(12) * np.pi / 6) for f in (np.cos, np.sin)], axis=1)
 
@@ -128,6 +128,16 @@ class Newcomers:
         waiting = [(one.centre, one.radius) for one in self._all if one.is_waiting]
         # At times one is seen in parts only, or has moved a little: both discs count.
         return _without(scan, local_base, [*seen, *waiting, *self._met, *self.company])
+
+    def free(self, scan: Scan, local_base: Pose) -> Array:
+        """How far, m, there is surely nothing on each beam (N,), those on people among them.
+
+        What looks like a body may be a piece of a wall, or of glass, but not where a robot says
+        that it is.
+        """
+        on_robots = _end_in(scan, local_base, self.company)
+        free: Array = np.where(on_robots, scan.ranges, scan.ranges - _SHORT_M)
+        return free
 
     def _rests(
         self,
@@ -265,20 +275,6 @@ class Newcomers:
         """The rims (N, 2), local frame, of company and of `discs`."""
         return _rims([*self.discs, *self.company])
 
-    def felt(self, local_base: Pose, local_map: LocalMap) -> Array:
-        """The `points` that the GVG leads round.
-
-        Where all drive about, who is far away in the open is elsewhere before the robot is there.
-        """
-        bodies = [*self.discs, *self.company]
-        if not self.in_team or not bodies:
-            return _rims(bodies)
-        centres = np.array([centre for centre, _ in bodies])
-        is_near = np.hypot(*(centres - local_base.position).T) < _FELT_M
-        from_walls, _ = local_map.tree().query(centres)
-        felt = is_near | (np.asarray(from_walls) < _BESIDE_WALLS_M)
-        return _rims([body for body, is_felt in zip(bodies, felt, strict=True) if is_felt])
-
 
 def _rims(bodies: list[tuple[Array, float]]) -> Array:
     """Points (N, 2) around discs."""
@@ -334,16 +330,20 @@ def _is_out_of_sight(one: Newcomer, stamp: float) -> bool:
 
 def _without(scan: Scan, local_base: Pose, discs: list[tuple[Array, float]]) -> Scan:
     """The scan without the beams that end in discs, by centre (2,), local frame, and radius."""
-    beams = np.flatnonzero(np.isfinite(scan.ranges))
-    ends = beam_ends(scan, beams, scan.ranges[beams], local_base.compose(scan.base_laser))
-    inside = np.zeros(len(beams), np.bool_)
-    for centre, radius in discs:
-        inside |= np.hypot(*(ends - centre).T) < radius + _BLUR_M
+    inside = _end_in(scan, local_base, discs)
     if not inside.any():
         return scan
-    ranges = scan.ranges.copy()
-    ranges[beams[inside]] = np.nan
-    return replace(scan, ranges=ranges)
+    return replace(scan, ranges=np.where(inside, np.nan, scan.ranges))
+
+
+def _end_in(scan: Scan, local_base: Pose, discs: list[tuple[Array, float]]) -> NDArray[np.bool_]:
+    """Which beams (N,) end in discs."""
+    beams = np.flatnonzero(np.isfinite(scan.ranges))
+    ends = beam_ends(scan, beams, scan.ranges[beams], local_base.compose(scan.base_laser))
+    inside = np.zeros(len(scan.ranges), np.bool_)
+    for centre, radius in discs:
+        inside[beams] |= np.hypot(*(ends - centre).T) < radius + _BLUR_M
+    return inside
 
 
 def _is_seen_through(scan: Scan, local_base: Pose, one: Newcomer) -> bool:

@@ -8,7 +8,8 @@ import numpy as np
 from gvgbot.autonomy.config import AutonomyConfig
 from gvgbot.autonomy.control import company
 from gvgbot.autonomy.control.company import BodiesSeen, Companion
-from gvgbot.autonomy.control.edge_follower import follow
+from gvgbot.autonomy.control.detour import detour, peek
+from gvgbot.autonomy.control.edge_follower import Track, follow
 from gvgbot.autonomy.control.orders import Drive, LookAround, Order, Stand
 from gvgbot.autonomy.control.reflexes import (
     AWAY_M,
@@ -45,6 +46,7 @@ _NOTHING_FELT = Felt()
 _MOST_PASSED = 100  # places, the latest ones
 _LIFTED = np.diag([0.3**2, 0.3**2, 0.1**2])  # how far a robot is carried that is put down again
 _ROOM_BESIDE_EDGES_M = 0.08  # on each side, where no edge leads
+_ROUND_M = 2.5  # a body farther away is elsewhere when the robot is there
 _COMPANY_M = 0.15  # by which another robot may be elsewhere than it says
 _GRAIN_M = 0.05  # of what must be known to be free, when it gets away
 _LONGEST_GAP_S = 2.0  # between keyframes; a longer one is an outage of a device
@@ -108,6 +110,10 @@ class Pipeline:
         self.travelled = 0.0
 
     # -- state -----------------------------------------------------------------------------------
+
+    @property
+    def _is_in_team(self) -> bool:
+        return self.company is not None
 
     @property
     def matching(self) -> ScanMatchingConfig:
@@ -176,7 +182,10 @@ class Pipeline:
         scan = deskewed(scan, self._odometry.motion_during(scan))
         local_base = self._localise(scan, odom_base)
         whole, scan = scan, self._sift(scan, local_base)
-        self._maps.insert(scan, local_base, self.travelled, whole)
+        free = self._newcomers.free(whole, local_base)
+        for one in self._nearby(local_base):
+            self._maps.near.stand_on(one.pose.position, one.radius, self.travelled)
+        self._maps.insert(scan, local_base, self.travelled, free)
         self._hazards.forget(self.travelled)
         if self.led and not self._worth_a_gvg(local_base):
             self._keep(scan, odom_base, local_base)
@@ -190,21 +199,21 @@ class Pipeline:
 
     def _glance(self, scan: Scan, odom_base: Pose) -> None:
         """Look out for other robots in every scan: they move."""
-        if self.company is not None and self._last is not None:
+        if self._is_in_team and self._last is not None:
             local_base = self._last.local_base.compose(self._last.odom_base.to(odom_base))
             self._newcomers.glance(scan, local_base)
 
     def _sift(self, scan: Scan, local_base: Pose) -> Scan:
         """The scan without what may be people or robots; the mission hears of the robots."""
         nearby = self._nearby(local_base)
-        self._newcomers.in_team = self.company is not None
+        self._newcomers.in_team = self._is_in_team
         self._newcomers.strangers = self.strangers
         self._newcomers.company = self._discs(nearby, _COMPANY_M)
         self.mission.meet(local_base, nearby)
         is_way = partial(self.mapper.is_way, local_base)
         scan = self._newcomers.sift(scan, local_base, self._maps.near, is_way)
         self._note_passed()
-        if self.company is not None:
+        if self._is_in_team:
             self.seen = self._bodies_seen(scan.stamp, local_base)
         return scan
 
@@ -221,10 +230,11 @@ class Pipeline:
         )
         self.gvg, marks = self.mapper.marked(self._local_gvg(local_base), local_base)
         hazards, suspects = self._hazards.doubtful, self._maps.near.suspects()
-        doubtful = np.concatenate([hazards, self._newcomers.points, suspects])
-        felt = np.concatenate(
-            [hazards, self._newcomers.felt(local_base, self._maps.near), suspects]
-        )
+        bodies = self._newcomers.points
+        doubted = touching(self.gvg, np.concatenate([hazards, suspects, *self._standing()]))
+        if self._is_in_team:  # bodies lead the GVG nowhere, but hide how it goes on
+            ends = (key for key, node in self.gvg.nodes.items() if node.degree == 1)
+            doubted |= touching(self.gvg, bodies) & frozenset(ends)
         return View(
             len(self.keyframes),
             scan.stamp,
@@ -232,8 +242,8 @@ class Pipeline:
             local_base,
             self.gvg,
             self._maps.near,
-            doubtful,
-            touching(self.gvg, felt),
+            np.concatenate([hazards, bodies, suspects]),
+            doubted,
             marks,
             self._newcomers.is_one_standing(scan.stamp, self._maps.near),
         )
@@ -248,6 +258,8 @@ class Pipeline:
             self._turn(_blind_angle(scan))
             return []
         order, done = self.errands.advance(view, known)
+        if isinstance(order, Drive) and self._is_in_team:
+            order = Drive(self._round_bodies(order.track, view))
         self._obey(order)
         return done
 
@@ -277,12 +289,39 @@ class Pipeline:
             min_clearance=self._radius + self._config.passage_margin_m,
             roughness=reduction.roughness_m,
             open_clearance=self.open_clearance,
-            felt=np.concatenate(
-                [self._hazards.points, self._newcomers.felt(local_base, self._maps.near)]
-            ),
+            felt=np.concatenate([self._hazards.points, *self._standing()]),
         )
         known = self.mapper.known_around(local_base, half_width)
         return reduce_graph(fine, reduction, known).rings_cut_far_from(local_base.position)
+
+    def _standing(self) -> list[Array]:
+        """Rims (N, 2) of who stands in the way for a while; in a team all drive about."""
+        return [] if self._is_in_team else [self._newcomers.points]
+
+    def _round_bodies(self, track: Track, view: View) -> Track:
+        """The track led round bodies near by, or to where one sees how it goes on behind them."""
+        seen = self._newcomers.discs
+        told = [
+            (centre, radius)
+            for centre, radius in self._discs(self._nearby(view.local_base), 0.0)
+            if not any(math.dist(centre, c) < r + _COMPANY_M for c, r in seen)
+        ]
+        base = view.local_base.position
+        bodies = [one for one in seen + told if math.dist(one[0], base) < _ROUND_M]
+        if not bodies:
+            return track
+        near, least = self._maps.near, self._radius + self._config.passage_margin_m
+
+        def is_free(way: Array) -> bool:
+            room = np.asarray(near.tree().query(way)[0])
+            return bool((room >= min(least, float(room[0]))).all() and near.known(way).all())
+
+        line = detour(track.polyline, bodies, self._radius, is_free)
+        if view.is_end_doubted(line[-1]):
+            line = peek(line, bodies, self._radius, is_free)
+        if line is track.polyline:
+            return track
+        return Track.of(line, np.asarray(near.tree().query(line)[0]))
 
     def _worth_a_look(self, scan: Scan, odom_base: Pose) -> bool:
         """Whether the robot is about something, and has come on, turned or waited enough."""
@@ -405,7 +444,7 @@ class Pipeline:
 
     def _careful(self, twist: Twist, local_base: Pose) -> Twist:
         """The twist, slow enough to stop with room for somebody ahead who comes as fast."""
-        if self.company is None or self._last is None:
+        if not self._is_in_team or self._last is None:
             return twist
         base_local = local_base.inverse()
         others = self._discs(self._nearby(self._last.local_base), 0.0) + self._newcomers.latest

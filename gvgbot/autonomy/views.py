@@ -1,5 +1,6 @@
 """What one keyframe shows, and which part of it is which part of the map."""
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -9,6 +10,7 @@ from gvgbot.autonomy.gvg.local_map import LocalMap
 from gvgbot.autonomy.slam.graph import HalfEdgeId, Vertex
 from gvgbot.geometry import Array, Pose
 
+_AT_M = 0.2  # from a node, a line ends there
 _RIM_M = 0.25  # a point so near to a node's disc may shape it
 
 
@@ -31,6 +33,11 @@ class View:
     def is_doubtful(self, place: Array, within_m: float) -> bool:
         """Whether something that may go stands so near to a place (2,)."""
         return bool((np.hypot(*(self.doubtful - place).T) < within_m).any())
+
+    def is_end_doubted(self, place: Array) -> bool:
+        """Whether the GVG ends at a place (2,) only because something that may go is there."""
+        ends = (self.gvg.nodes[key] for key in self.doubted)
+        return any(node.degree == 1 and math.dist(node.position, place) < _AT_M for node in ends)
 
     def stands_free(self, place: Array, within_m: float) -> bool:
         """Whether it is certain that neither wall nor glass is so near to a place (2,)."""

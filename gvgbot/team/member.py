@@ -435,8 +435,8 @@ class Member:
         frontier = next(
             (f for many in site.open.values() for f in many if self._is_claimed(f)), None
         )
-        if frontier is None:
-            return False
+        if frontier is None or claim.metres == 0.0:  # somebody has followed it; or it is there
+            return frontier is not None
         metres = {vertex: way.metres for vertex, way in shortest_paths(graph, starts).items()}
         cost, _ = site.costs(metres).get(frontier, (claim.metres, target))
         self._claim = Claim(claim.x, claim.y, claim.bearing, cost)

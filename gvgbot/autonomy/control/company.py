@@ -11,6 +11,7 @@ from gvgbot.hal.sweep import free_distance
 
 _KEPT_M = 0.12  # between two bodies, always,
 _BLUR_M = 0.09  # and so much more where there is room
+_AT_LEAST_M, _SLACK_M = 0.14, 0.01  # where there is less, and by which it may become less
 _ROOM_FOR_BOTH_M = 0.3  # between two robots, before either has to be slow
 _BOTH_BRAKE_MPS2 = 0.5  # of each, so that two that come towards each other stop
 _CREEP_MPS = 0.02  # slower than this is a stop
@@ -79,8 +80,12 @@ def _safe_speed(twist: Twist, centre: Array, touch: float, least_speed: float) -
     x, y = centre[:1], centre[1:]
     if x[0] <= 0.0:
         return math.inf
-    free = free_distance((x, y), twist, radius=touch + _KEPT_M, margin=_BLUR_M)
-    gap = float(np.hypot(*centre)) - touch - _ROOM_FOR_BOTH_M
+    away = float(np.hypot(*centre))
+    wanted = touch + _KEPT_M + _BLUR_M
+    if away < wanted:  # it may pass, but hardly come nearer than it is
+        wanted = max(touch + _AT_LEAST_M, away - _SLACK_M)
+    free = free_distance((x, y), twist, radius=wanted, margin=0.0)
+    gap = away - touch - _ROOM_FOR_BOTH_M
     slow = max(math.sqrt(_BOTH_BRAKE_MPS2 * max(0.0, gap)), least_speed)
     return min(slow, math.sqrt(_BOTH_BRAKE_MPS2 * free))
 

@@ -205,6 +205,11 @@ class LocalMap:
         """Know no floor in a disc, local frame, from the next scan on, but what that sees."""
         self._free[self._disc(centre, radius)] = False
 
+    def stand_on(self, centre: Array, radius: float, travelled: float) -> None:
+        """Know a disc, local frame, to be floor, from the next scan on: somebody stands on it."""
+        disc = self._disc(centre, radius)
+        self._free[disc], self._seen_at[disc] = True, travelled
+
     def _disc(self, centre: Array, radius: float) -> tuple[Index, Index]:
         """Rows and columns of the cells whose middles lie in a disc, local frame."""
         reach = math.ceil(radius / self._cell)

@@ -103,23 +103,28 @@ def test_a_large_robot_is_kept_away_from_as_far_as_it_is_large() -> None:
 CORRIDOR = carved([(-10.0, -1.5, 10.0, 1.5)])
 
 
-def offset_beside(away: float, aside: float = 0.0, *, in_team: bool) -> float:
-    """How far the GVG is off the middle of a corridor where a robot stands, `away` m ahead."""
+def between_two(*, in_team: bool) -> Pipeline:
+    """A robot in the middle of a corridor where others stand, 1.5 m away on either side."""
     config = load_config()
     pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
-    stands = Companion("other", Pose(away, aside, 0.0), goes_first=True, radius=0.18)
-    pipeline.company = [stands] if in_team else None
-    scan = sweep(CORRIDOR, Pose(), field_of_view=LASER_270)
-    pipeline.control(Odometry(0.0, Pose(), STANDSTILL))
-    pipeline.perceive(replace(scan, stamp=0.0, time_increment=0.0))
-    assert pipeline.gvg is not None
-    points = np.concatenate([edge.polyline for edge in pipeline.gvg.edges.values()])
-    return float(np.abs(points[np.abs(points[:, 0] - away) < 0.2, 1]).max())
+    others = [
+        Companion(str(x), Pose(x, 0.0, 0.0), goes_first=True, radius=0.18) for x in (-1.5, 1.5)
+    ]
+    pipeline.company = others if in_team else None
+    theta, stamp = 0.0, 0.0
+    while not len(pipeline.track):
+        scan = sweep(CORRIDOR, Pose(0.0, 0.0, theta), field_of_view=LASER_270)
+        twist = pipeline.control(Odometry(stamp, Pose(0.0, 0.0, theta), STANDSTILL))
+        pipeline.perceive(replace(scan, stamp=stamp, time_increment=0.0))
+        theta, stamp = theta + 0.1 * twist.angular, stamp + 0.1
+    return pipeline
 
 
-def test_the_gvg_leads_round_robots_of_the_team_that_are_near_or_beside_walls_only() -> None:
-    assert offset_beside(1.5, in_team=True) == pytest.approx((1.5 + 0.18) / 2, abs=0.15)
-    assert offset_beside(3.0, in_team=True) == pytest.approx(offset_beside(3.0, in_team=False))
-    assert offset_beside(3.0, in_team=False) < 0.1
-    beside_the_wall = offset_beside(3.0, aside=0.8, in_team=True)
-    assert beside_the_wall == pytest.approx((1.5 - 0.62) / 2, abs=0.15)
+def test_a_robot_of_the_team_is_driven_round_and_shapes_no_edge() -> None:
+    pipeline = between_two(in_team=True)
+    edges = np.concatenate([edge.polyline for edge in pipeline.gvg.edges.values()])
+    assert np.abs(edges[np.abs(edges[:, 0]) < 3.0, 1]).max() < 0.1
+    x, y = pipeline.track.T
+    assert np.hypot(np.abs(x) - 1.5, y).min() > 2 * 0.18 + 0.2
+    assert np.abs(x).max() > 3.0
+    assert np.abs(between_two(in_team=False).track[:, 1]).max() < 0.1

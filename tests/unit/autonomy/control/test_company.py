@@ -70,6 +70,15 @@ def test_two_whose_ways_cross_keep_apart(bearing: float) -> None:
     assert least_gap(Disc(Pose()), two, told_every=10) >= LEAST_GAP
 
 
+@pytest.mark.parametrize(("gap", "drives"), [(0.15, True), (0.13, False)])
+def test_who_stands_beside_another_one_drives_on_unless_it_is_too_near(
+    gap: float, drives: bool
+) -> None:
+    beside = np.array([0.05, 2 * RADIUS + gap])
+    twist = careful(Twist(FULL, 0.0), [(beside, RADIUS)], RADIUS, SLOW)
+    assert (twist.linear > 0.0) == drives
+
+
 def test_two_with_room_between_them_pass_each_other_slowly() -> None:
     one, two = Disc(Pose(0.0, 0.0, 0.0)), Disc(Pose(6.0, 2 * RADIUS + 0.25, math.pi))
     speeds = []

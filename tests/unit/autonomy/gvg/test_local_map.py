@@ -58,6 +58,16 @@ def test_what_a_pillar_hides_is_unknown() -> None:
     assert local_map.known(cells_of(1.5, 1.2, 2.7, 1.7)).all()
 
 
+def test_where_somebody_stands_there_is_floor_and_a_wall_stays_a_wall() -> None:
+    local_map = looked(ROOM, [ORIGIN])
+    local_map.stand_on(np.array([0.0, 4.0]), 0.2, 0.0)
+    local_map.stand_on(np.array([3.0, 0.0]), 0.3, 0.0)
+    local_map.insert(sweep(ROOM, ORIGIN), ORIGIN, 0.0)
+    assert local_map.known(np.array([0.0, 4.0]))
+    assert not local_map.known(np.array([0.5, 4.0]))
+    assert wall_points_near(local_map, 3.0, 0.0) > 3
+
+
 def test_what_is_out_of_the_window_is_unknown() -> None:
     local_map = looked(ROOM, [ORIGIN], config=LocalMapConfig(half_width_m=3.0))
     assert not local_map.known(np.array([[50.0, 0.0], [0.0, -50.0], [1e6, 1e6]])).any()
