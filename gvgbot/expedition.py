@@ -17,7 +17,7 @@ from gvgbot.clock import LoopClock, VirtualTimeLoop
 from gvgbot.config import Config
 from gvgbot.drivers.people import Walkways
 from gvgbot.errors import UsageError, WorldError
-from gvgbot.geometry import Pose
+from gvgbot.geometry import Array, Pose
 from gvgbot.hal.guard import Guard
 from gvgbot.hal.messages import Odometry
 from gvgbot.links import Devices, Links
@@ -27,6 +27,7 @@ from gvgbot.maps.map_server import encode_map_server, read_map_server
 from gvgbot.maps.merging import merged
 from gvgbot.maps.occupancy import OccupancyGrid
 from gvgbot.maps.picture import draw_map
+from gvgbot.maps.pieced import pieced
 from gvgbot.maps.route_graph import RouteGraph
 from gvgbot.maps.run_directory import RunDirectory
 from gvgbot.report import world_files
@@ -128,7 +129,7 @@ class _Robot:
         member = Member(
             name,
             config.team,
-            lambda: chart_of(mapper.graph, mapper.belief),
+            lambda: chart_of(mapper.graph, mapper.belief, session.pipeline.mission.parts()),
             radius=config.robot.radius_m,
         )
         session.pipeline.mission.choice.sharing = member
@@ -260,6 +261,7 @@ def _save(directory: RunDirectory, robots: list[_Robot]) -> list[_Robot]:
             graph = merged(graph, _graph(robot), pose)
             poses[robot.member.name] = pose
             joined.append(robot)
+    graph = pieced(graph, [way for robot in joined for way in _ways(robot, poses)])
     world = _place(first.session).world
     files = world_files(world)
     files["map.geojson"] = geojson.encode(graph)
@@ -269,6 +271,13 @@ def _save(directory: RunDirectory, robots: list[_Robot]) -> list[_Robot]:
     directory.write(files)
     directory.write_summary(_summary(robots, joined, poses, graph))
     return joined
+
+
+def _ways(robot: _Robot, poses: dict[str, Pose]) -> list[tuple[Array, float]]:
+    """The parts of edges that a robot has driven, in the joined map."""
+    pose = poses[robot.member.name]
+    parts = robot.session.pipeline.mission.parts()
+    return [(pose.transform(line), clearance) for line, clearance in parts]
 
 
 def _graph(robot: _Robot) -> RouteGraph:

@@ -47,7 +47,7 @@ class LiveTeam:
         self.member = Member(
             robot.name,
             config,
-            lambda: chart_of(mapper.graph, mapper.belief),
+            lambda: chart_of(mapper.graph, mapper.belief, pipeline.mission.parts()),
             radius=robot.radius_m,
             life=life,
         )

@@ -15,7 +15,7 @@ from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.config import Config
 from gvgbot.drivers.tapped import Tap
 from gvgbot.errors import GvgbotError
-from gvgbot.geometry import Pose
+from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Contact, Odometry
 from gvgbot.maps import geojson
 from gvgbot.maps.run_directory import MAP, RunDirectory, record_of
@@ -161,19 +161,21 @@ class Session:
         """
         summary = self._summary(unfinished)
         others = None if self.member is None else self.member.charts
+        parts = self.pipeline.mission.parts()
         pipeline, journey = still(self.pipeline), still_journey(self.journey)
-        return partial(self._write, pipeline, journey, others, summary)
+        return partial(self._write, pipeline, journey, parts, others, summary)
 
     def _write(
         self,
         pipeline: Pipeline,
         journey: Journey,
+        parts: list[tuple[Array, float]],
         others: dict[str, tuple[Chart, Pose]] | None,
         summary: dict[str, object],
     ) -> None:
         files = map_files(pipeline, journey, self.title)
         if others is not None:
-            files |= team_files(geojson.decode(str(files[MAP])), others, self.title)
+            files |= team_files(geojson.decode(str(files[MAP])), parts, others, self.title)
             summary["frames"] = {name: (p.x, p.y, p.theta) for name, (_, p) in others.items()}
         if self.place is not None:
             files |= world_files(self.place.world)

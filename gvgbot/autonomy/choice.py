@@ -55,11 +55,6 @@ class Choice:
         """Whether a target is still this robot's own."""
         return self.sharing is None or self.sharing.keeps(target, self._mapper.graph, starts)
 
-    def enter(self) -> None:
-        """Note that the robot has come to its target, and follows it."""
-        if self.sharing is not None:
-            self.sharing.enter()
-
     def nearer(
         self, target: HalfEdgeId, found: set[HalfEdgeId], starts: list[Approach]
     ) -> HalfEdgeId | None:

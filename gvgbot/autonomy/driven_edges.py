@@ -1,5 +1,7 @@
 """What the map learns from where the robot drives: edges that it has followed to their ends."""
 
+from dataclasses import dataclass, field
+
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -17,12 +19,25 @@ _FROM_VERTEX_M = 1.0  # nearer to one there is no second one that was missed
 _IN_CLEAR_M = 2.0  # from a vertex, it is seen which departures it has
 
 
+@dataclass(slots=True, eq=False)
+class _Part:
+    """Of an edge, as far as it was driven: lines (N, 2), m, in the frame of its vertex, and map."""
+
+    line: Array
+    narrowest: float
+    map_line: Array = field(default_factory=lambda: np.empty((0, 2)))
+
+
 class DrivenEdges:
     """Counts traversals, and joins the two ends of an edge that was driven out of sight."""
 
     def __init__(self, mapper: Mapper) -> None:
         self._mapper = mapper
         self.start: StartEdge | None = None
+        self._parts: dict[HalfEdgeId, _Part] = {}  # by the half-edge that they leave by
+        # from no vertex, now, and from vertices that were none: map frame, and least clearance
+        self._loose: tuple[Array, float] | None = None
+        self._strays: list[tuple[Array, float]] = []
 
     def learn(self, view: View, known: Correspondence, place: Place, where: Whereabouts) -> None:
         """Account for the robot's present place, `where` included."""
@@ -36,6 +51,35 @@ class DrivenEdges:
         if passage is not None:
             self._account_for(view, known, passage)
         self._close_start_edge(view, where, clearance)
+        self._note_part(view, where)
+
+    def parts(self) -> list[tuple[Array, float]]:
+        """Parts of edges that were driven: lines (N, 2), m, map frame, and least clearances, m."""
+        found = [(part.map_line, part.narrowest) for part in self._parts.values()] + self._strays
+        return found if self._loose is None else [*found, self._loose]
+
+    def _note_part(self, view: View, where: Whereabouts) -> None:
+        """Keep what has been driven of the present edge, as long as it is none of the graph."""
+        graph, belief, end = self._mapper.graph, self._mapper.belief, where.on_edge
+        half = None if end is None else graph.half_edge(end)
+        self._loose = None
+        if len(where.trail) > 1:
+            line = np.array(where.trail)
+            if end is None:
+                map_local = belief.map_base.compose(view.local_base.inverse())
+                self._loose = map_local.transform(line), where.narrowest
+            elif half is not None:
+                line = graph.vertices[end.vertex].local.inverse().transform(line)
+                if end not in self._parts or _length(self._parts[end].line) < _length(line):
+                    self._parts[end] = _Part(line, where.narrowest)
+        for end, part in list(self._parts.items()):
+            half = graph.half_edge(end)
+            if half is None:  # its vertex was none
+                self._strays.append((part.map_line, part.narrowest))
+            if half is None or half.edge is not None:
+                del self._parts[end]
+            else:
+                part.map_line = belief.map_vertex(end.vertex).transform(part.line)
 
     def _account_for(self, view: View, known: Correspondence, passage: Passage) -> None:
         """Count a traversal, or close the edge that was driven from a vertex now out of sight."""
@@ -43,6 +87,7 @@ class DrivenEdges:
         if left is None and arrived is not None and self.start is None:
             line = graph.vertices[arrived.vertex].local.inverse().transform(passage.line)
             self.start = StartEdge(arrived, line, passage.narrowest)
+            self._parts[arrived] = _Part(line, passage.narrowest)
         if left is None or arrived is None or left == arrived:
             return
         edge = graph.edge_at(left)
@@ -130,6 +175,10 @@ class DrivenEdges:
         """Whether the robot has come back to where it came onto its first edge (2,), map frame."""
         driven = where.trail_length > LEAST_LOOP_M
         return driven and is_at_start(self._mapper.belief, start, clearance)
+
+
+def _length(line: Array) -> float:
+    return float(np.hypot(*np.diff(line, axis=0).T).sum())
 
 
 def _fork(line: Array, known_line: Array) -> int | None:

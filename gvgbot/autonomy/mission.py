@@ -18,6 +18,7 @@ from gvgbot.autonomy.exploration.access import NEAR_M, access, way_to_edge
 from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.exploration.hindrance import Hindrance
 from gvgbot.autonomy.exploration.obstructions import Obstructions
+from gvgbot.autonomy.exploration.paths import Approach
 from gvgbot.autonomy.gvg.local import Branch, Place
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.neighbours import Neighbours
@@ -96,6 +97,10 @@ class Mission:
         self._watch_the_way(view)
         order = Stand() if self.outcome is not None else self._decide(view, here)
         return order, self._events
+
+    def parts(self) -> list[tuple[Array, float]]:
+        """Parts of edges that were driven: lines (N, 2), m, map frame, and least clearances, m."""
+        return self._driven.parts()
 
     @property
     def is_choosing(self) -> bool:
@@ -248,9 +253,8 @@ class Mission:
         frontiers = set(self._mapper.graph.frontiers())
         found, self._frontiers = frontiers - self._frontiers, frontiers
         is_on_it = self.where.on_edge == target
-        if is_on_it:
-            self.choice.enter()
-        starts = here.starts()
+        come = Approach(-self.where.trail_length, target)  # so far past its vertex
+        starts = [come] if is_on_it else here.starts()
         if not self.choice.keeps(target, starts):
             return self._choose(view, here)
         if is_on_it:

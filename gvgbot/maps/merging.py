@@ -6,7 +6,7 @@ intersection: never surer than it may be, whatever the two have in common.
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -52,17 +52,25 @@ def merged(ours: RouteGraph, theirs: RouteGraph, pose: Pose) -> RouteGraph:
     edges = list(_split(ours.edges, new))
     others = [replace(e, start=names[e.start], end=names[e.end]) for e in theirs.edges]
     for edge in _split(others, [v for v in ours.vertices if v.id not in known]):
-        if not any(_is_same(edge, other) for other in edges):
+        if not any(is_same(edge, other) for other in edges):
             edges.append(edge)
     partner = {ours.vertices[i].id: theirs.vertices[j] for i, j in pairs}
     vertices = [
         _fused(vertex, partner[vertex.id]) if vertex.id in partner else vertex
         for vertex in ours.vertices
     ]
-    leaving = _directions(edges)
+    return settled((*vertices, *new), edges)
+
+
+def settled(vertices: Sequence[MapVertex], edges: Sequence[MapEdge]) -> RouteGraph:
+    """The map of vertices and edges, where these end on those, and are no frontiers any more."""
+    leaving: dict[int, list[float]] = {}
+    for edge in edges:
+        leaving.setdefault(edge.start, []).append(direction(edge.polyline))
+        leaving.setdefault(edge.end, []).append(direction(edge.polyline[::-1]))
     return RouteGraph(
-        tuple(_settled(vertex, leaving.get(vertex.id, [])) for vertex in (*vertices, *new)),
-        tuple(_anchored(edge, vertices + new) for edge in edges),
+        tuple(_settled(vertex, leaving.get(vertex.id, [])) for vertex in vertices),
+        tuple(_anchored(edge, vertices) for edge in edges),
     )
 
 
@@ -159,8 +167,8 @@ def _united(kept: MapVertex, lone: MapVertex) -> MapVertex:
 def _turned_from(vertex: MapVertex, bearing: float) -> MapVertex:
     return replace(
         vertex,
-        bearings=tuple(b for b in vertex.bearings if not _is_among(b, [bearing])),
-        frontiers=tuple(f for f in vertex.frontiers if not _is_among(f, [bearing])),
+        bearings=tuple(b for b in vertex.bearings if not is_among(b, [bearing])),
+        frontiers=tuple(f for f in vertex.frontiers if not is_among(f, [bearing])),
     )
 
 
@@ -170,10 +178,10 @@ def _fused(ours: MapVertex, theirs: MapVertex) -> MapVertex:
         np.array(ours.position), _matrix(ours), np.array(theirs.position), _matrix(theirs)
     )
     bearings = list(ours.bearings)
-    bearings += [b for b in theirs.bearings if not _is_among(b, ours.bearings)]
+    bearings += [b for b in theirs.bearings if not is_among(b, ours.bearings)]
     frontiers = [
         *(f for f in ours.frontiers if not _is_followed(f, theirs)),
-        *(f for f in theirs.frontiers if not _is_among(f, ours.bearings)),
+        *(f for f in theirs.frontiers if not is_among(f, ours.bearings)),
     ]
     x, y = position.tolist()
     xx, xy, yx, yy = covariance.ravel().tolist()
@@ -210,13 +218,14 @@ def _matrix(vertex: MapVertex) -> Array:
     return np.array(vertex.covariance).reshape(2, 2)
 
 
-def _is_among(bearing: float, bearings: Iterable[float]) -> bool:
+def is_among(bearing: float, bearings: Iterable[float]) -> bool:
+    """Whether one of the bearings, rad, is this one."""
     return any(abs(wrap_angle(bearing - other)) < _SAME_RAD for other in bearings)
 
 
 def _is_followed(bearing: float, vertex: MapVertex) -> bool:
     """Whether a vertex has an edge in a direction."""
-    return _is_among(bearing, [b for b in vertex.bearings if b not in vertex.frontiers])
+    return is_among(bearing, [b for b in vertex.bearings if b not in vertex.frontiers])
 
 
 def _split(edges: Iterable[MapEdge], vertices: list[MapVertex]) -> Iterable[MapEdge]:
@@ -247,7 +256,7 @@ def _piece(edge: MapEdge, start: int, end: int, first: int, last: int, along: Ar
     return replace(edge, start=start, end=end, polyline=line, length=share * edge.length)
 
 
-def _is_same(edge: MapEdge, other: MapEdge) -> bool:
+def is_same(edge: MapEdge, other: MapEdge) -> bool:
     """Whether two edges join the same vertices by the same way."""
     if {edge.start, edge.end} != {other.start, other.end}:
         return False
@@ -255,22 +264,18 @@ def _is_same(edge: MapEdge, other: MapEdge) -> bool:
     return float(max(away.min(axis=0).max(), away.min(axis=1).max())) < _BESIDE_M
 
 
-def _directions(edges: list[MapEdge]) -> dict[int, list[float]]:
-    """The bearings by which edges leave each vertex."""
-    found: dict[int, list[float]] = {}
-    for edge in edges:
-        for vertex, line in ((edge.start, edge.polyline), (edge.end, edge.polyline[::-1])):
-            along = np.concatenate([[0.0], np.hypot(*np.diff(line, axis=0).T).cumsum()])
-            i = min(int(np.searchsorted(along, _AHEAD_M)), len(line) - 1)
-            dx, dy = line[max(i, 1)] - line[0]
-            found.setdefault(vertex, []).append(math.atan2(dy, dx))
-    return found
+def direction(line: Array) -> float:
+    """In which an edge with this line (N, 2) leaves its first vertex, rad."""
+    along = np.concatenate([[0.0], np.hypot(*np.diff(line, axis=0).T).cumsum()])
+    i = min(int(np.searchsorted(along, _AHEAD_M)), len(line) - 1)
+    dx, dy = line[max(i, 1)] - line[0]
+    return math.atan2(dy, dx)
 
 
 def _settled(vertex: MapVertex, leaving: list[float]) -> MapVertex:
     """A vertex whose frontiers are those that no edge of either map follows."""
-    frontiers = tuple(f for f in vertex.frontiers if not _is_among(f, leaving))
-    bearings = vertex.bearings + tuple(d for d in leaving if not _is_among(d, vertex.bearings))
+    frontiers = tuple(f for f in vertex.frontiers if not is_among(f, leaving))
+    bearings = vertex.bearings + tuple(d for d in leaving if not is_among(d, vertex.bearings))
     return replace(
         vertex,
         frontiers=frontiers,
@@ -280,7 +285,7 @@ def _settled(vertex: MapVertex, leaving: list[float]) -> MapVertex:
     )
 
 
-def _anchored(edge: MapEdge, vertices: list[MapVertex]) -> MapEdge:
+def _anchored(edge: MapEdge, vertices: Sequence[MapVertex]) -> MapEdge:
     """The edge, bent so that it ends on its vertices."""
     places = {vertex.id: np.array(vertex.position) for vertex in vertices}
     line = edge.polyline

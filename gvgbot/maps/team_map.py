@@ -1,22 +1,31 @@
 """The map of a team as one robot knows it: its own, with the charts of others laid on it."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
-from gvgbot.geometry import Pose
+from gvgbot.geometry import Array, Pose
 from gvgbot.maps import geojson
 from gvgbot.maps.merging import merged
 from gvgbot.maps.picture import draw_map
+from gvgbot.maps.pieced import pieced
 from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
 from gvgbot.team.chart import Chart, ChartEdge, ChartVertex
 
 
 def team_files(
-    own: RouteGraph, others: Mapping[str, tuple[Chart, Pose]], title: str
+    own: RouteGraph,
+    parts: Iterable[tuple[Array, float]],
+    others: Mapping[str, tuple[Chart, Pose]],
+    title: str,
 ) -> dict[str, bytes | str]:
-    """Files by name. `others` has charts, and where their frames lie in that of the own map."""
-    graph = own
+    """Files by name. `others` has charts, and where their frames lie in that of the own map.
+
+    `parts` of edges that this robot has driven are lines (N, 2) and least clearances, m.
+    """
+    graph, ways = own, list(parts)
     for chart, pose in others.values():
         graph = merged(graph, route_graph(chart), pose)
+        ways += [(pose.transform(way.polyline), way.min_clearance) for way in chart.ways]
+    graph = pieced(graph, ways)
     return {"team.geojson": geojson.encode(graph), "team.png": draw_map(graph, title=title)}
 
 

@@ -4,6 +4,7 @@ Only what the robot has measured itself is in its chart, never what it heard fro
 of different robots are independent, and nothing is counted twice however they are put together.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -70,15 +71,24 @@ class ChartEdge:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class ChartWay:
+    """A part of an edge that was driven: polyline (N, 2), map frame, and least clearance, m."""
+
+    polyline: Array
+    min_clearance: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Chart:
-    """Vertices and edges by id."""
+    """Vertices and edges by id, and the ways that are parts of edges."""
 
     vertices: dict[int, ChartVertex] = field(default_factory=dict)
     edges: dict[int, ChartEdge] = field(default_factory=dict)
+    ways: tuple[ChartWay, ...] = ()
 
 
-def chart_of(graph: GvgGraph, belief: Belief) -> Chart:
-    """What a robot knows of the building."""
+def chart_of(graph: GvgGraph, belief: Belief, parts: Iterable[tuple[Array, float]] = ()) -> Chart:
+    """What a robot knows of the building; `parts` of edges are lines (N, 2) and clearances, m."""
     vertices = {vertex.id: _vertex(vertex, belief) for vertex in graph.vertices.values()}
     edges = {
         edge.id: ChartEdge(
@@ -92,7 +102,7 @@ def chart_of(graph: GvgGraph, belief: Belief) -> Chart:
         )
         for edge in graph.edges.values()
     }
-    return Chart(vertices, edges)
+    return Chart(vertices, edges, tuple(ChartWay(line, clearance) for line, clearance in parts))
 
 
 def _vertex(vertex: Vertex, belief: Belief) -> ChartVertex:
@@ -130,7 +140,8 @@ def moved(chart: Chart, pose: Pose) -> Chart:
         key: replace(edge, polyline=pose.transform(edge.polyline))
         for key, edge in chart.edges.items()
     }
-    return Chart(vertices, edges)
+    ways = (replace(way, polyline=pose.transform(way.polyline)) for way in chart.ways)
+    return Chart(vertices, edges, tuple(ways))
 
 
 def thinned(points: Array) -> Array:

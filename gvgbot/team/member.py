@@ -30,6 +30,7 @@ from gvgbot.team.news import (
     ToldLook,
     told_edges,
     told_vertices,
+    told_ways,
 )
 from gvgbot.team.site import Frontier, Site
 
@@ -161,6 +162,7 @@ class Member:
             frames=frames,
             vertices=told_vertices(self._chart),
             edges=told_edges(self._chart),
+            ways=told_ways(self._chart),
         )
 
     def course(
@@ -435,17 +437,12 @@ class Member:
         frontier = next(
             (f for many in site.open.values() for f in many if self._is_claimed(f)), None
         )
-        if frontier is None or claim.metres == 0.0:  # somebody has followed it; or it is there
-            return frontier is not None
+        if frontier is None:
+            return False
         metres = {vertex: way.metres for vertex, way in shortest_paths(graph, starts).items()}
         cost, _ = site.costs(metres).get(frontier, (claim.metres, target))
-        self._claim = Claim(claim.x, claim.y, claim.bearing, cost)
+        self._claim = Claim(claim.x, claim.y, claim.bearing, max(0.0, cost))
         return not self._is_taken(frontier, cost, self._claims())
-
-    def enter(self) -> None:
-        """Note that the robot is on the edge that it claims: nobody is nearer."""
-        if self._claim is not None:
-            self._claim = Claim(self._claim.x, self._claim.y, self._claim.bearing, 0.0)
 
     @property
     def is_waiting(self) -> bool:

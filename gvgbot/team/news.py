@@ -7,11 +7,12 @@ import numpy as np
 
 from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.errors import GvgbotError
-from gvgbot.geometry import Array
+from gvgbot.geometry import Array, resampled
 from gvgbot.names import ROBOT_NAME
-from gvgbot.team.chart import Chart, ChartEdge, ChartVertex, Departure
+from gvgbot.team.chart import Chart, ChartEdge, ChartVertex, ChartWay, Departure
 
 _WALL_M = 0.01  # unit of the walls around a vertex, as they travel
+_WAY_M = 0.2  # from point to point of a way, as it travels
 _MOST_BYTES = 2_000_000  # of a message: more than a thousand vertices
 _MOST_M = 1e5  # from the origin of a map
 _MOST_WAY_M = 2e4  # of all edges together
@@ -47,6 +48,13 @@ class TeamEdge(msgspec.Struct, frozen=True, array_like=True):
     min_clearance: Number  # m
     points: bytes  # little-endian float32 pairs x, y, m, map frame
     traversed: bool = False
+
+
+class TeamWay(msgspec.Struct, frozen=True, array_like=True):
+    """A part of an edge that was driven."""
+
+    min_clearance: Number  # m
+    points: bytes  # little-endian float32 pairs x, y, m, map frame
 
 
 class Claim(msgspec.Struct, frozen=True, array_like=True):
@@ -106,6 +114,7 @@ class News(msgspec.Struct, frozen=True, kw_only=True, tag="news"):
     frames: tuple[Frame, ...]
     vertices: Annotated[tuple[TeamVertex, ...], msgspec.Meta(max_length=1000)]
     edges: Annotated[tuple[TeamEdge, ...], msgspec.Meta(max_length=3000)]
+    ways: Annotated[tuple[TeamWay, ...], msgspec.Meta(max_length=1000)] = ()
 
     @property
     def chart(self) -> Chart:
@@ -113,6 +122,7 @@ class News(msgspec.Struct, frozen=True, kw_only=True, tag="news"):
         return Chart(
             {vertex.id: _vertex(vertex) for vertex in self.vertices},
             {edge.id: _edge(edge) for edge in self.edges},
+            tuple(ChartWay(_line(way.points, "way"), way.min_clearance) for way in self.ways),
         )
 
 
@@ -152,7 +162,8 @@ def _checked(news: News, chart: Chart) -> News:
         for departure in vertex.departures
     ):
         raise GvgbotError("damaged news of a team: a departure has an edge that is not told")
-    if sum(_metres(edge.polyline) for edge in chart.edges.values()) > _MOST_WAY_M:
+    lines = [e.polyline for e in chart.edges.values()] + [way.polyline for way in chart.ways]
+    if sum(_metres(line) for line in lines) > _MOST_WAY_M:
         raise GvgbotError("damaged news of a team: longer ways than there can be")
     return news
 
@@ -188,6 +199,14 @@ def told_edges(chart: Chart) -> tuple[TeamEdge, ...]:
     )
 
 
+def told_ways(chart: Chart) -> tuple[TeamWay, ...]:
+    """The ways of a chart as they travel."""
+    return tuple(
+        TeamWay(way.min_clearance, resampled(way.polyline, _WAY_M).astype("<f4").tobytes())
+        for way in chart.ways
+    )
+
+
 def _told_vertex(vertex: ChartVertex) -> TeamVertex:
     x, y = vertex.position.tolist()
     xx, xy, yx, yy = vertex.covariance.ravel().tolist()
@@ -210,9 +229,7 @@ def _vertex(told: TeamVertex) -> ChartVertex:
 
 
 def _edge(told: TeamEdge) -> ChartEdge:
-    line: Array = np.frombuffer(told.points, "<f4").reshape(-1, 2).astype(np.float64)
-    if len(line) < 2 or not _is_near(line):
-        raise ValueError(f"edge {told.id} has no line")
+    line = _line(told.points, f"edge {told.id}")
     return ChartEdge(
         told.id,
         HalfEdgeId(*told.a),
@@ -222,3 +239,11 @@ def _edge(told: TeamEdge) -> ChartEdge:
         line,
         told.traversed,
     )
+
+
+def _line(points: bytes, what: str) -> Array:
+    """A line (N, 2) as it has travelled. Raises ValueError if it is none."""
+    line: Array = np.frombuffer(points, "<f4").reshape(-1, 2).astype(np.float64)
+    if len(line) < 2 or not _is_near(line):
+        raise ValueError(f"{what} has no line")
+    return line

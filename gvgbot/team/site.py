@@ -14,11 +14,13 @@ from scipy.spatial.distance import cdist
 from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.geometry import Array, wrap_angle
 from gvgbot.team.chart import Chart, Departure
+from gvgbot.team.ways import Ways
 
 _SAME_M = 0.6  # vertices nearer to each other are one
 _SAME_RAD = 0.7  # departures nearer to each other are one
 _ON_EDGE_M = 0.45  # from an edge, a vertex of another chart lies on it
 _AHEAD_M = 0.8  # along an edge, its direction is taken
+_WELL_ON_M = 3.0  # beyond a vertex, who did not see it is as right as who did
 
 End = tuple[int, HalfEdgeId]  # a chart's index and a half-edge of it
 
@@ -61,6 +63,7 @@ class Site:
                 a, b = (self._place[number, end.vertex] for end in (edge.a, edge.b))
                 self._links.setdefault(a, []).append((b, edge.length))
                 self._links.setdefault(b, []).append((a, edge.length))
+        self._ways = self._driven_in_parts()
         self.open: dict[int, list[Frontier]] = {}  # by place
         self.onward: dict[HalfEdgeId, Onward] = {}  # behind own departures, by what others know
         self.own: dict[HalfEdgeId, Frontier] = {}  # own departures that nobody has followed
@@ -89,6 +92,14 @@ class Site:
                 self._points.append(point)
                 self._members.append({number: i})
 
+    def _driven_in_parts(self) -> Ways | None:
+        """All lines of all charts, if there are such as are no edges of one chart."""
+        if not any(chart.ways for chart in self._charts):
+            return None
+        lines = [(way.polyline, way.min_clearance) for c in self._charts for way in c.ways]
+        lines += [(e.polyline, e.min_clearance) for c in self._charts for e in c.edges.values()]
+        return Ways(lines, np.array(self._points).reshape(-1, 2))
+
     def _judge(self, number: int, end: HalfEdgeId, departure: Departure) -> None:
         """Find out whether a departure without an edge has one in another chart."""
         place = self._place[number, end.vertex]
@@ -114,15 +125,19 @@ class Site:
         place, own = self._place[number, vertex], self._charts[number].edges.values()
         if any(edge.traversed and vertex in (edge.a.vertex, edge.b.vertex) for edge in own):
             return False
-        return any(
-            edge.traversed and _passes(edge.polyline, self._points[place])
-            for other, chart in enumerate(self._charts)
-            if other != number and other not in self._members[place]
-            for edge in chart.edges.values()
-        )
+        point, holders = self._points[place], self._members[place]
+        others = [
+            c for other, c in enumerate(self._charts) if other != number and other not in holders
+        ]
+        if any(
+            e.traversed and _passes(e.polyline, point) for c in others for e in c.edges.values()
+        ):
+            return True
+        passers = sum(any(_passes(w.polyline, point, _WELL_ON_M) for w in c.ways) for c in others)
+        return passers >= len(holders)
 
     def _followed(self, number: int, vertex: int, bearing: float) -> Onward | None:
-        """What another chart has behind a departure."""
+        """What another chart has behind a departure, or several have together."""
         place = self._place[number, vertex]
         for other, chart in enumerate(self._charts):
             if other == number:
@@ -134,7 +149,8 @@ class Site:
                 found = self._along(other, chart, self._points[place], bearing)
             if found is not None:
                 return found
-        return None
+        walk = None if self._ways is None else self._ways.behind(place, bearing)
+        return None if walk is None else Onward(walk.place, walk.length)
 
     def _behind(self, number: int, vertex: int, bearing: float) -> Onward | None:
         """Behind the departure of a chart's vertex that leaves in a direction."""
@@ -194,10 +210,10 @@ class Site:
         return best
 
 
-def _passes(polyline: Array, point: Array) -> bool:
-    """Whether a line leads over a point and well on, to both sides."""
+def _passes(polyline: Array, point: Array, on_m: float = _AHEAD_M) -> bool:
+    """Whether a line leads over a point and on, to both sides."""
     away = np.hypot(*(polyline - point).T)
-    return bool(away.min() < _ON_EDGE_M and away[[0, -1]].min() > _AHEAD_M)
+    return bool(away.min() < _ON_EDGE_M and away[[0, -1]].min() > on_m)
 
 
 def _improve(

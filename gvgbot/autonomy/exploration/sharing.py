@@ -13,10 +13,10 @@ class Sharing(Protocol):
         """The frontier that is worth most to this robot, and the way there; None: not one."""
 
     def keeps(self, target: HalfEdgeId, graph: GvgGraph, starts: list[Approach]) -> bool:
-        """Whether a frontier is still worth a drive of this robot."""
+        """Whether a frontier is still worth a drive of this robot.
 
-    def enter(self) -> None:
-        """Note that the robot has come to the frontier, and follows it."""
+        Who follows it starts from its vertex, with less than no metres.
+        """
 
     @property
     def is_waiting(self) -> bool:

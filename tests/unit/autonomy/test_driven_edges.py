@@ -14,7 +14,7 @@ from gvgbot.autonomy.slam.recognition import RecognitionConfig
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
 from gvgbot.autonomy.views import Correspondence, View
 from gvgbot.autonomy.whereabouts import Whereabouts
-from gvgbot.geometry import Pose
+from gvgbot.geometry import Array, Pose
 from tests.unit.autonomy.local_graphs import Point, drawn, resampled
 
 EAST, NORTH, WEST = 0, 1, 2  # keys of the half-edges of each vertex
@@ -43,8 +43,14 @@ class Drive:
             for bearing in (0.0, np.pi / 2, np.pi):
                 made.add_half_edge(bearing)
             self.mapper.graph.vertices[vertex] = made
+            belief, certain = self.mapper.belief, np.diag([1e-6] * 3)
+            self.mapper.belief = ekf.add_vertex(belief, vertex, made.local, certain)
         self.where = Whereabouts(left, [np.zeros(2)])
         self._driven = DrivenEdges(self.mapper)
+
+    @property
+    def parts(self) -> list[tuple[Array, float]]:
+        return self._driven.parts()
 
     def along(self, gvg: LocalGvg, seen: dict[Branch, HalfEdgeId], *corners: Point) -> "Drive":
         known = Correspondence()
@@ -110,9 +116,7 @@ def with_north(drive: Drive, key: int, base: Pose) -> None:
     graph.vertices[3], graph.serial = north, 3
     ends = HalfEdgeId(2, key), HalfEdgeId(3, north.add_half_edge(-np.pi / 2))
     graph.join(*ends, resampled([(0.0, 0.0), (0.0, 8.0)]), 1.0, driven=True)
-    for vertex, place in ((1, (0.0, 0.0)), (2, (5.0, 0.0)), (3, (5.0, 8.0))):
-        belief = drive.mapper.belief
-        drive.mapper.belief = ekf.add_vertex(belief, vertex, Pose(*place, 0.0), 1e-4 * np.eye(3))
+    drive.mapper.belief = ekf.add_vertex(drive.mapper.belief, 3, north.local, 1e-4 * np.eye(3))
     drive.mapper.move(base, np.zeros((3, 3)))
 
 
@@ -152,9 +156,7 @@ def test_a_known_edge_that_passes_the_vertex_that_was_left_has_one_of_its_ends_t
     graph.vertices[3], graph.serial = west, 3
     ends = HalfEdgeId(2, WEST), HalfEdgeId(3, west.add_half_edge(0.0))
     graph.join(*ends, resampled([(0.0, 0.0), (-10.0, 0.0)]), 1.0, driven=True)
-    for vertex, x in ((1, 0.0), (2, 5.0), (3, -5.0)):
-        belief = drive.mapper.belief
-        drive.mapper.belief = ekf.add_vertex(belief, vertex, Pose(x, 0.0, 0.0), 1e-4 * np.eye(3))
+    drive.mapper.belief = ekf.add_vertex(drive.mapper.belief, 3, west.local, 1e-4 * np.eye(3))
     drive.mapper.move(Pose(4.0, 0.0), np.zeros((3, 3)))
     drive.where.trail = list(resampled([(0.0, 0.0), (4.0, 0.0)]))
     beyond = {branch: end for branch, end in ALL_SEEN.items() if end.vertex == 2}
@@ -164,3 +166,25 @@ def test_a_known_edge_that_passes_the_vertex_that_was_left_has_one_of_its_ends_t
         frozenset((HalfEdgeId(1, EAST), HalfEdgeId(2, WEST))),
         frozenset((HalfEdgeId(1, WEST), HalfEdgeId(3, 0))),
     }
+
+
+def test_a_part_of_an_edge_is_kept_until_all_of_it_is_driven() -> None:
+    drive = Drive(HalfEdgeId(1, EAST))
+    assert drive.parts == []
+    drive.along(STREET, {}, (0.0, 0.0), (3.0, 0.0), (1.0, 0.0))  # to and fro
+    ((line, _),) = drive.parts
+    assert np.ptp(line[:, 0]) == pytest.approx(3.0, abs=0.2)
+    assert np.abs(line[:, 1]).max() < 0.01
+    drive.along(STREET, ALL_SEEN, (3.0, 0.0), (6.0, 0.0))
+    assert len(drive.mapper.graph.edges) == 1
+    assert all(np.ptp(line[:, 0]) < 1.5 for line, _ in drive.parts)  # the edge beyond vertex 2
+
+
+def test_what_was_driven_from_a_vertex_that_was_none_was_driven_all_the_same() -> None:
+    drive = Drive(HalfEdgeId(1, EAST)).along(STREET, {}, (0.0, 0.0), (3.0, 0.0))
+    before = drive.parts
+    del drive.mapper.graph.vertices[1]
+    drive.along(STREET, {}, (3.0, 0.0), (3.1, 0.0))
+    (line, clearance), (known, before_clearance) = drive.parts[0], before[0]
+    np.testing.assert_array_equal(line, known)
+    assert clearance == before_clearance

@@ -493,9 +493,6 @@ class Alone:
     def keeps(self, target: HalfEdgeId, graph: GvgGraph, starts: list[Approach]) -> bool:
         return True
 
-    def enter(self) -> None:
-        pass
-
 
 class Last(Alone):
     """Has nothing left to go to, nor have the others."""

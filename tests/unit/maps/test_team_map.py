@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,8 @@ from gvgbot.maps import geojson
 from gvgbot.maps.run_directory import RunDirectory
 from gvgbot.maps.team_map import route_graph, team_files
 from gvgbot.session import Session
-from tests.unit.team.building import irregular
+from gvgbot.team.chart import ChartWay
+from tests.unit.team.building import Building, irregular
 from tests.unit.team.test_member import START, team
 
 BUILDING = irregular(1)
@@ -24,7 +26,7 @@ LEFT, RIGHT = {0, 1, 2, 5, 6, 7, 10, 11, 12}, {2, 3, 4, 7, 8, 9, 12, 13, 14}
 def test_what_two_know_is_one_map_in_the_frame_of_the_first() -> None:
     own = route_graph(BUILDING.chart(LEFT, HERE))
     others = {"two": (BUILDING.chart(RIGHT, THERE), HERE.to(THERE))}
-    files = team_files(own, others, "a building")
+    files = team_files(own, [], others, "a building")
     joined = geojson.decode(str(files["team.geojson"]))
     true = HERE.inverse().transform(BUILDING.places[sorted(LEFT | RIGHT)])
     found = np.array([vertex.position for vertex in joined.vertices])
@@ -39,9 +41,26 @@ def test_what_two_know_is_one_map_in_the_frame_of_the_first() -> None:
     assert picture.startswith(b"\x89PNG")
 
 
+def test_what_two_have_driven_from_both_ends_is_an_edge_of_the_team() -> None:
+    places = np.array([(0.0, 0.0), (10.0, 0.0), (0.0, 6.0), (10.0, 6.0)])
+    building = Building(places, ((0, 1), (0, 2), (1, 3)))
+
+    def part(start: float, end: float) -> np.ndarray:
+        return np.stack([np.linspace(start, end, 40), np.zeros(40)], axis=1)
+
+    own = route_graph(building.chart({0, 2}, HERE))
+    theirs = building.chart({1, 3}, THERE)
+    theirs = replace(theirs, ways=(ChartWay(THERE.inverse().transform(part(10.0, 5.4)), 0.5),))
+    parts = [(HERE.inverse().transform(part(0.0, 4.8)), 0.6)]
+    files = team_files(own, parts, {"two": (theirs, HERE.to(THERE))}, "a building")
+    joined = geojson.decode(str(files["team.geojson"]))
+    assert sorted(edge.length for edge in joined.edges) == pytest.approx([6.0, 6.0, 10.0], abs=0.1)
+    assert not any(vertex.frontiers for vertex in joined.vertices)
+
+
 def test_who_is_alone_leaves_its_own_map() -> None:
     own = route_graph(BUILDING.chart(LEFT, HERE))
-    joined = geojson.decode(str(team_files(own, {}, "a building")["team.geojson"]))
+    joined = geojson.decode(str(team_files(own, [], {}, "a building")["team.geojson"]))
     assert {v.id: v.position for v in joined.vertices} == {
         v.id: pytest.approx(v.position) for v in own.vertices
     }

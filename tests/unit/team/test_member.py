@@ -11,8 +11,9 @@ from gvgbot.autonomy.control.company import BodiesSeen
 from gvgbot.autonomy.exploration.paths import Approach
 from gvgbot.autonomy.slam.graph import Edge, GvgGraph, HalfEdge, HalfEdgeId, Vertex
 from gvgbot.geometry import Array, Pose
-from gvgbot.team.chart import Chart
-from gvgbot.team.member import Member, TeamConfig
+from gvgbot.team.alignment import Alignment
+from gvgbot.team.chart import Chart, ChartWay
+from gvgbot.team.member import Comparison, Member, TeamConfig
 from gvgbot.team.news import decode, encode
 from tests.unit.team.building import Building, irregular, lattice
 
@@ -68,8 +69,9 @@ def graph_of(chart: Chart) -> GvgGraph:
 
 
 def robot(name: str, building: Building, seen: set[int], at: int) -> Robot:
-    chart = building.chart(seen, START[name])
-    return Robot(Member(name, CONFIG, lambda: chart, radius=RADIUS[name]), chart, at)
+    made = Robot(Member(name, CONFIG, lambda: made.chart, radius=RADIUS[name]), Chart(), at)
+    made.chart = building.chart(seen, START[name])
+    return made
 
 
 def team() -> tuple[Robot, Robot]:
@@ -87,6 +89,13 @@ def _met() -> tuple[Robot, Robot]:
     one.member.look(1.0)
     two.member.look(1.0)
     return one, two
+
+
+def way_from(building: Building, start: int, end: int, metres: float, name: str) -> ChartWay:
+    """Part of a corridor, as a robot has driven it."""
+    a, b = building.places[[start, end]]
+    line = np.linspace(a, a + (b - a) * metres / math.dist(a, b), 40)
+    return ChartWay(START[name].inverse().transform(line), 0.5)
 
 
 def place(which: Robot, end: HalfEdgeId) -> np.ndarray:
@@ -123,6 +132,29 @@ def test_a_frontier_goes_to_the_robot_that_is_nearer() -> None:
     assert np.hypot(*(place(one, mine[0]) - place(two, theirs[0]))) > 1.0
     two.tell(2.0, one)
     assert one.member.keeps(mine[0], graph_of(one.chart), [Approach(0.0, HalfEdgeId(0, -1))])
+
+
+def test_who_follows_its_frontier_keeps_it_until_others_have_driven_it_from_the_far_end() -> None:
+    building = Building(
+        np.array([(0.0, 0.0), (10.0, 0.0), (0.0, 6.0), (10.0, 6.0), (-7.0, 0.0), (17.0, 0.0)]),
+        ((0, 1), (0, 2), (1, 3), (0, 4), (1, 5)),
+    )
+    one, two = robot("one", building, {0, 2, 4}, 0), robot("two", building, {1, 3, 5}, 1)
+    chosen = one.choose()
+    assert chosen is not None
+    on_it = [Approach(-4.5, chosen[0])]
+    for _ in range(2):
+        two.tell(1.0, one)
+        one.member.news(1.0, Pose(), finished=False)
+    one.member.settle(
+        Comparison("two", 0, Chart(), Chart(), None),
+        Alignment(START["one"].to(START["two"]), np.eye(3) * 1e-6, (), 1.0),
+    )
+    assert one.member.keeps(chosen[0], graph_of(one.chart), on_it)
+    one.chart = replace(one.chart, ways=(way_from(building, 0, 1, 4.5, "one"),))
+    two.chart = replace(two.chart, ways=(way_from(building, 1, 0, 5.0, "two"),))
+    two.tell(2.0, one)
+    assert not one.member.keeps(chosen[0], graph_of(one.chart), on_it)
 
 
 def test_what_a_lost_robot_was_about_to_do_is_free_again() -> None:

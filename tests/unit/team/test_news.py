@@ -8,8 +8,19 @@ from hypothesis import strategies as st
 
 from gvgbot.errors import GvgbotError
 from gvgbot.geometry import Pose
-from gvgbot.team.chart import Chart
-from gvgbot.team.news import Claim, Course, Frame, News, decode, encode, told_edges, told_vertices
+from gvgbot.team.chart import Chart, ChartWay
+from gvgbot.team.news import (
+    Claim,
+    Course,
+    Frame,
+    News,
+    TeamWay,
+    decode,
+    encode,
+    told_edges,
+    told_vertices,
+    told_ways,
+)
 from tests.unit.team.building import irregular
 
 CHART = irregular(1).chart({0, 1, 2, 5, 6, 7}, Pose(3.0, -2.0, 0.7))
@@ -46,6 +57,26 @@ def test_a_chart_arrives_as_it_was_to_the_centimetre() -> None:
     for key, edge in CHART.edges.items():
         assert (chart.edges[key].a, chart.edges[key].b) == (edge.a, edge.b)
         np.testing.assert_allclose(chart.edges[key].polyline, edge.polyline, atol=1e-5)
+
+
+def test_parts_of_edges_arrive_as_they_were() -> None:
+    corner = np.array([(0.0, 0.0), (3.0, 0.0), (3.0, 2.0)])
+    told = msgspec.structs.replace(
+        news(CHART), ways=told_ways(Chart(ways=(ChartWay(corner, 0.4),)))
+    )
+    heard = decode(encode(told))
+    assert isinstance(heard, News)
+    (way,) = heard.chart.ways
+    assert way.min_clearance == 0.4
+    np.testing.assert_allclose(way.polyline[[0, -1]], corner[[0, -1]], atol=1e-5)
+    off = np.minimum(np.abs(way.polyline[:, 1]), np.abs(way.polyline[:, 0] - 3.0))
+    assert off.max() < 0.1
+
+
+@pytest.mark.parametrize("points", [b"", b"x", np.zeros((1, 2), "<f4").tobytes(), b"\xff" * 16])
+def test_a_part_of_an_edge_without_a_line_is_refused(points: bytes) -> None:
+    with pytest.raises(GvgbotError, match="damaged"):
+        decode(encode(msgspec.structs.replace(news(CHART), ways=(TeamWay(0.4, points),))))
 
 
 def test_what_older_robots_tell_besides_is_passed_over() -> None:

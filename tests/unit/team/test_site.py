@@ -6,7 +6,8 @@ import networkx as nx  # type: ignore[import-untyped]
 import numpy as np
 import pytest
 
-from gvgbot.geometry import Pose
+from gvgbot.geometry import Pose, resampled
+from gvgbot.team.chart import ChartWay
 from gvgbot.team.site import Site
 from tests.unit.team.building import Building, irregular, lattice
 
@@ -89,3 +90,47 @@ def test_a_vertex_that_a_robot_has_been_at_is_one_though_another_one_drove_past(
     for charts in permutations(both):
         (frontier,) = (f for many in Site(list(charts)).open.values() for f in many)
         assert frontier.bearing == pytest.approx(math.pi / 2)
+
+
+def way(*corners: tuple[float, float]) -> ChartWay:
+    return ChartWay(resampled(np.array(corners), 0.2), 0.5)
+
+
+def test_what_two_have_driven_from_both_ends_is_no_frontier() -> None:
+    places = np.array([(0.0, 0.0), (10.0, 0.0), (0.0, 6.0), (10.0, 6.0)])
+    building = Building(places, ((0, 1), (0, 2), (1, 3)))
+    west, east = building.chart({0, 2}, HERE), building.chart({1, 3}, HERE)
+    assert len(Site([west, east]).own) == 1
+    site = Site(
+        [
+            replace(west, ways=(way((0.0, 0.0), (4.7, 0.0)),)),
+            replace(east, ways=(way((10.0, 0.0), (5.3, 0.0)),)),
+        ]
+    )
+    assert not site.open
+    (onward,) = site.onward.values()
+    assert onward.metres == pytest.approx(10.0, abs=0.1)
+
+
+@pytest.mark.parametrize(("beyond", "is_left"), [(2.0, True), (4.0, False)])
+def test_who_drove_well_past_a_vertex_that_one_robot_alone_has_seen_refutes_it(
+    beyond: float, is_left: bool
+) -> None:
+    places = np.array([(0.0, 0.0), (6.0, 0.0), (12.0, 0.0), (6.0, 5.0)])
+    with_side = Building(places, ((0, 1), (1, 2), (1, 3))).chart({1}, HERE)
+    passing = replace(
+        Building(places, ((0, 2),)).chart({0}, HERE), ways=(way((0.0, 0.0), (6.0 + beyond, 0.0)),)
+    )
+    site = Site([with_side, passing])
+    upwards = [f for many in site.open.values() for f in many if abs(f.bearing - 1.57) < 0.1]
+    assert bool(upwards) == is_left
+
+
+def test_what_two_have_seen_is_not_refuted_by_one() -> None:
+    places = np.array([(0.0, 0.0), (6.0, 0.0), (12.0, 0.0), (6.0, 5.0)])
+    with_side = Building(places, ((0, 1), (1, 2), (1, 3))).chart({1}, HERE)
+    passing = replace(
+        Building(places, ((0, 2),)).chart({0}, HERE), ways=(way((0.0, 0.0), (10.0, 0.0)),)
+    )
+    site = Site([with_side, with_side, passing])
+    assert any(abs(f.bearing - 1.57) < 0.1 for many in site.open.values() for f in many)

@@ -1,0 +1,119 @@
+"""From a vertex along what robots have driven, one over the other's way, to the next vertex.
+
+Two that follow an edge from both ends meet in its middle; a robot that starts on an edge drives one
+half of it. So an edge may be driven by several robots, and by none from end to end.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+from scipy.spatial.distance import cdist
+
+from gvgbot.geometry import Array, resampled, wrap_angle
+
+_BESIDE_M = 0.45  # from a line, a place lies on it
+_GAP_M = 1.0  # between two ways: robots that meet keep so far apart
+_AHEAD_M = 0.8  # along a line, its direction is taken
+_SAME_RAD = 0.7  # directions nearer to each other are one
+_LEAST_M = 0.3  # of a way that is gone on with
+_MOST = 16  # pieces
+_SPACING_M = 0.1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Walk:
+    """Where one arrives (the index of a place) along a line (N, 2), m, with this least clearance.
+
+    `length` is that of the line, m.
+    """
+
+    place: int
+    line: Array
+    min_clearance: float
+    length: float
+
+
+class Ways:
+    """What robots have driven along, in one frame: lines (N, 2), m, and their clearances, m.
+
+    `places` (M, 2) are the vertices that the lines may lead to.
+    """
+
+    def __init__(self, lines: Sequence[tuple[Array, float]], places: Array) -> None:
+        self._lines = [resampled(line, _SPACING_M) for line, _ in lines]
+        self._clearances = [clearance for _, clearance in lines]
+        self._places = places
+        points = np.concatenate([np.empty((0, 2)), *self._lines])
+        self._of = np.repeat(np.arange(len(self._lines)), [len(line) for line in self._lines])
+        self._tree = cKDTree(points)
+
+    def behind(self, place: int, bearing: float) -> Walk | None:
+        """The way from a place in a direction, rad, to the next place; None if it is not known."""
+        here, ahead, metres = self._places[place], bearing, 0.0
+        pieces, used = list[Array](), set[int]()
+        for _ in range(_MOST):
+            found = self._onwards(here, ahead, used, _GAP_M if pieces else _BESIDE_M)
+            if found is None:
+                return None
+            number, piece = found
+            used.add(number)
+            arrived = self._arrival(piece, place if metres < _AHEAD_M else -1)
+            pieces.append(piece if arrived is None else piece[: arrived[1] + 1])
+            metres += _length(pieces[-1])
+            if arrived is not None:
+                line = np.concatenate(pieces)
+                clearance = min(self._clearances[k] for k in used)
+                return Walk(arrived[0], line, clearance, _length(line))
+            here, ahead = piece[-1], _direction(piece[::-1]) + math.pi
+        return None
+
+    def _onwards(
+        self, here: Array, ahead: float, used: set[int], gap: float
+    ) -> tuple[int, Array] | None:
+        """The longest line that goes on from a point (2,) in a direction, and its number."""
+        near = np.unique(self._of[self._tree.query_ball_point(here, math.hypot(gap, _BESIDE_M))])
+        best: tuple[int, Array] | None = None
+        for number in sorted(set(near.tolist()) - used):
+            line = self._lines[number]
+            i = int(np.hypot(*(line - here).T).argmin())
+            dx, dy = line[i] - here
+            along = dx * math.cos(ahead) + dy * math.sin(ahead)
+            aside = dy * math.cos(ahead) - dx * math.sin(ahead)
+            if abs(aside) > _BESIDE_M or not -_BESIDE_M < along < gap:
+                continue
+            for rest in (line[i:], line[i::-1]):
+                least = _LEAST_M if best is None else _length(best[1])
+                turned = abs(wrap_angle(_direction(rest) - ahead)) if len(rest) > 1 else math.pi
+                if _length(rest) > least and turned < _SAME_RAD:
+                    best = number, rest
+        return best
+
+    def _arrival(self, line: Array, start: int) -> tuple[int, int] | None:
+        """The first place that a line leads to, and the index of its point there.
+
+        It leads away from its start first.
+        """
+        away = cdist(line, self._places)
+        if start >= 0:
+            steps = np.hypot(*np.diff(line, axis=0).T)
+            away[: 1 + int(np.searchsorted(steps.cumsum(), _AHEAD_M)), start] = math.inf
+        on = np.flatnonzero((away < _BESIDE_M).any(axis=1))
+        if not len(on):
+            return None
+        place = int(away[on[0]].argmin())
+        there = away[on[0] : on[0] + math.ceil(2 * _BESIDE_M / _SPACING_M), place]
+        return place, int(on[0] + there.argmin())
+
+
+def _length(line: Array) -> float:
+    return float(np.hypot(*np.diff(line, axis=0).T).sum())
+
+
+def _direction(line: Array) -> float:
+    """In which a line of two points or more sets out, rad."""
+    reached = np.flatnonzero(np.hypot(*(line - line[0]).T) >= _AHEAD_M)
+    dx, dy = line[reached[0] if len(reached) else -1] - line[0]
+    return math.atan2(dy, dx)
