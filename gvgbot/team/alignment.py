@@ -57,13 +57,15 @@ _MISTAKES = 2  # vertices of either kind do not refute what was sure
 class Alignment:
     """The pose of another chart's frame in one's own, with covariance (3, 3), and what tells it.
 
-    `pairs` are ids of vertices that are one and the same, ours first.
+    `pairs` are ids of vertices that are one and the same, ours first. What two robots have seen
+    of each other needs no vertices (`by_sight`).
     """
 
     pose: Pose
     covariance: Array
     pairs: tuple[tuple[int, int], ...]
     confidence: float
+    by_sight: bool = False
 
     @property
     def is_sure(self) -> bool:
@@ -158,14 +160,18 @@ def align(ours: Chart, theirs: Chart) -> Alignment | None:
 
 
 def refined(ours: Chart, theirs: Chart, known: Alignment) -> Alignment | None:
-    """The same alignment by charts that have grown since; None if they speak against it."""
+    """The same alignment by charts that have grown since; None if they speak against it.
+
+    They may disagree though they lie right, as where one robot has seen glass that the other has
+    looked through. What was found by sight they do not refute.
+    """
     a, b = Side(ours), Side(theirs)
     evidence = _examine(a, b, known.pose)
     if evidence.is_possible:
         pose, covariance = fitted(ours, theirs, evidence.pairs)
         pose = laid_on_walls(a, b, pose)
-        return Alignment(pose, covariance, evidence.pairs, known.confidence)
-    if evidence.is_refuted:
+        return replace(known, pose=pose, covariance=covariance, pairs=evidence.pairs)
+    if evidence.is_refuted and not known.by_sight:
         return None
     return replace(known, pose=laid_on_walls(a, b, known.pose))
 

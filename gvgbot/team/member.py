@@ -222,9 +222,8 @@ class Member:
         found = frame_of(self._looks, mate.looks, self._radius, mate.news.radius)
         if found is None:
             return
-        alignment = refined(self._chart, mate.chart, Alignment(*found, (), _SURE_BY_SIGHT))
-        if alignment is not None:
-            self._lay(name, mate, alignment)
+        met = Alignment(*found, (), _SURE_BY_SIGHT, by_sight=True)
+        self._lay(name, mate, refined(self._chart, mate.chart, met))
 
     def _learn(self, news: News, stamp: float) -> None:
         mate = self._mates.get(news.robot)

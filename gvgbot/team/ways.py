@@ -65,6 +65,8 @@ class Ways:
             metres += _length(pieces[-1])
             if arrived is not None:
                 line = np.concatenate(pieces)
+                if len(line) < 2:  # two vertices at one place
+                    return None
                 clearance = min(self._clearances[k] for k in used)
                 return Walk(arrived[0], line, clearance, _length(line))
             here, ahead = piece[-1], _direction(piece[::-1]) + math.pi

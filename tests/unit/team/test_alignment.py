@@ -63,6 +63,8 @@ def test_an_alignment_that_the_charts_no_longer_bear_out_is_taken_back() -> None
     assert refined(ours, theirs, found) is not None
     elsewhere = irregular(12).chart(RIGHT, STARTS[1])
     assert refined(ours, elsewhere, found) is None
+    seen = replace(found, by_sight=True)
+    assert refined(ours, elsewhere, seen) is not None
 
 
 def test_a_vertex_that_one_robot_took_somebody_for_does_not_part_the_maps() -> None:

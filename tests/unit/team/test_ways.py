@@ -70,6 +70,11 @@ def test_it_ends_at_the_first_vertex_on_the_way() -> None:
     assert walk.length == pytest.approx(7.0, abs=0.1)
 
 
+def test_from_a_vertex_right_beside_another_one_nothing_is_behind() -> None:
+    places = np.array([(0.0, 0.3), (0.0, 0.0)])
+    assert Ways([FROM_WEST], places).behind(0, EAST) is None
+
+
 def test_a_loop_comes_back_to_its_vertex() -> None:
     angles = np.linspace(0.0, 2 * np.pi, 200)
     ring = 4.0 * np.stack([np.cos(angles) - 1.0, np.sin(angles)], axis=1)
