@@ -57,8 +57,8 @@ _MISTAKES = 2  # vertices of either kind do not refute what was sure
 class Alignment:
     """The pose of another chart's frame in one's own, with covariance (3, 3), and what tells it.
 
-    `pairs` are ids of vertices that are one and the same, ours first. What two robots have seen
-    of each other needs no vertices (`by_sight`).
+    `pairs` are ids of vertices that are one and the same, ours first. `by_sight`: two robots have
+    seen each other pass more than once, and maps do not refute it.
     """
 
     pose: Pose
@@ -162,8 +162,8 @@ def align(ours: Chart, theirs: Chart) -> Alignment | None:
 def refined(ours: Chart, theirs: Chart, known: Alignment) -> Alignment | None:
     """The same alignment by charts that have grown since; None if they speak against it.
 
-    They may disagree though they lie right, as where one robot has seen glass that the other has
-    looked through. What was found by sight they do not refute.
+    They may disagree though they lie right, as where one robot has seen glass that the other one
+    has looked through.
     """
     a, b = Side(ours), Side(theirs)
     evidence = _examine(a, b, known.pose)

@@ -8,16 +8,17 @@ go, and which of its own frontiers leads to where nobody has been.
 import math
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Annotated
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gvgbot.autonomy.control import company
 from gvgbot.autonomy.control.company import BodiesSeen, Companion
 from gvgbot.autonomy.exploration.paths import Approach, shortest_paths
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
-from gvgbot.geometry import Array, Pose
+from gvgbot.geometry import Array, Pose, wrap_angle
 from gvgbot.ranges import Range
 from gvgbot.team.alignment import Alignment, align, refined
 from gvgbot.team.chart import Chart, moved
@@ -40,6 +41,8 @@ _FRESH_S = 1.0  # a robot that drives is no longer where it was told to be befor
 _SPARSE = 4  # every so manieth point of a track is told
 _RECOGNISE_S = 1.0  # between two attempts to recognise a robot by how it moves
 _SURE_BY_SIGHT = 0.999  # that the robot met is the one that says so
+_KNOWN_M = 0.4  # from where a robot says it is, a body is that robot
+_SAME_M, _SAME_RAD = 0.5, 0.1  # frames nearer to each other are the same
 _MOST_MATES = 64  # that are known at a time
 _TAKES_OVER_M = 2.0  # nearer to a frontier than who claims it, one takes it
 
@@ -77,6 +80,8 @@ class _Mate:
     sizes: tuple[int, ...] = ()  # of both charts then
     looks: deque[BodiesSeen] = field(default_factory=deque)  # lately; stamps of the own clock
     recognised: float = float("-inf")  # stamp of the last attempt to
+    # when, and how, its frame seemed to lie by sight, though the maps spoke against it
+    doubted: tuple[float, Pose] | None = None
 
     @property
     def stands(self) -> float:
@@ -177,6 +182,7 @@ class Member:
         look = None
         told = self._looks[-1].stamp if self._looks else -math.inf
         if seen is not None and seen.stamp > max(told, stamp - WINDOW_S):
+            seen = replace(seen, bodies=seen.bodies[~self._are_known(seen.bodies[:, :2])])
             _remember(self._looks, seen)
             pose, bodies = seen.map_base, tuple((x, y, r) for x, y, r in seen.bodies.tolist())
             look = ToldLook(max(0.0, stamp - seen.stamp), (pose.x, pose.y, pose.theta), bodies)
@@ -188,6 +194,13 @@ class Member:
             line=track[::_SPARSE].astype("<f4").tobytes(),
             look=look,
         )
+
+    def _are_known(self, centres: Array) -> NDArray[np.bool_]:
+        """Which bodies, by their centres (N, 2), are robots whose place is known: nobody else."""
+        known = np.zeros(len(centres), np.bool_)
+        for one in self.company():
+            known |= np.hypot(*(centres - one.pose.position).T) < _KNOWN_M
+        return known
 
     def hear(self, told: News | Course, stamp: float) -> None:
         """Take in what another one tells."""
@@ -222,8 +235,20 @@ class Member:
         found = frame_of(self._looks, mate.looks, self._radius, mate.news.radius)
         if found is None:
             return
-        met = Alignment(*found, (), _SURE_BY_SIGHT, by_sight=True)
-        self._lay(name, mate, refined(self._chart, mate.chart, met))
+        met = Alignment(*found, (), _SURE_BY_SIGHT)
+        told = self.frames.get(name)
+        if told is not None and not _is_same(met.pose, told, mate.map_base):
+            return  # it was a third robot that moved in the same way
+        alignment = refined(self._chart, mate.chart, met)
+        before = mate.doubted
+        if alignment is None and before is not None and stamp - before[0] > WINDOW_S:
+            mate.doubted = None
+            if _is_same(met.pose, before[1], mate.map_base):  # chance does not do that twice
+                alignment = replace(met, by_sight=True)
+        if alignment is not None:
+            self._lay(name, mate, alignment)
+        elif mate.doubted is None:
+            mate.doubted = stamp, met.pose
 
     def _learn(self, news: News, stamp: float) -> None:
         mate = self._mates.get(news.robot)
@@ -459,6 +484,12 @@ class Member:
             charts += [moved(self._mates[n].chart, pose) for n, pose in self.frames.items()]
             self._site = Site(charts)
         return self._site
+
+
+def _is_same(pose: Pose, other: Pose, place: Pose) -> bool:
+    """Whether two frames lay a place of the other robot's map at the same place of the own one."""
+    one, two = pose.compose(place), other.compose(place)
+    return one.distance(two) < _SAME_M and abs(wrap_angle(one.theta - two.theta)) < _SAME_RAD
 
 
 def _remember(looks: deque[BodiesSeen], seen: BodiesSeen) -> None:
