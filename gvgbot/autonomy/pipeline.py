@@ -230,11 +230,11 @@ class Pipeline:
         )
         self.gvg, marks = self.mapper.marked(self._local_gvg(local_base), local_base)
         hazards, suspects = self._hazards.doubtful, self._maps.near.suspects()
-        bodies = self._newcomers.points
-        doubted = touching(self.gvg, np.concatenate([hazards, suspects, *self._standing()]))
+        doubtful = np.concatenate([hazards, suspects, *self._standing()])
+        doubted = touching(self.gvg, doubtful)
         if self._is_in_team:  # bodies lead the GVG nowhere, but hide how it goes on
             ends = (key for key, node in self.gvg.nodes.items() if node.degree == 1)
-            doubted |= touching(self.gvg, bodies) & frozenset(ends)
+            doubted |= touching(self.gvg, self._newcomers.points) & frozenset(ends)
         return View(
             len(self.keyframes),
             scan.stamp,
@@ -242,7 +242,7 @@ class Pipeline:
             local_base,
             self.gvg,
             self._maps.near,
-            np.concatenate([hazards, bodies, suspects]),
+            doubtful,
             doubted,
             marks,
             self._newcomers.is_one_standing(scan.stamp, self._maps.near),
