@@ -8,7 +8,7 @@ import numpy as np
 from gvgbot.autonomy.config import AutonomyConfig
 from gvgbot.autonomy.control import company
 from gvgbot.autonomy.control.company import BodiesSeen, Companion
-from gvgbot.autonomy.control.detour import detour, peek
+from gvgbot.autonomy.control.detour import led_round
 from gvgbot.autonomy.control.edge_follower import Track, follow
 from gvgbot.autonomy.control.orders import Drive, LookAround, Order, Stand
 from gvgbot.autonomy.control.reflexes import (
@@ -308,20 +308,9 @@ class Pipeline:
         ]
         base = view.local_base.position
         bodies = [one for one in seen + told if math.dist(one[0], base) < _ROUND_M]
-        if not bodies:
-            return track
-        near, least = self._maps.near, self._radius + self._config.passage_margin_m
-
-        def is_free(way: Array) -> bool:
-            room = np.asarray(near.tree().query(way)[0])
-            return bool((room >= min(least, float(room[0]))).all() and near.known(way).all())
-
-        line = detour(track.polyline, bodies, self._radius, is_free)
-        if view.is_end_doubted(line[-1]):
-            line = peek(line, bodies, self._radius, is_free)
-        if line is track.polyline:
-            return track
-        return Track.of(line, np.asarray(near.tree().query(line)[0]))
+        room = self._radius, self._config.passage_margin_m
+        is_hidden = view.is_end_doubted(track.polyline[-1])
+        return led_round(track, bodies, self._maps.near, *room, is_hidden=is_hidden)
 
     def _worth_a_look(self, scan: Scan, odom_base: Pose) -> bool:
         """Whether the robot is about something, and has come on, turned or waited enough."""

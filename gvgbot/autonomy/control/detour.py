@@ -5,6 +5,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from gvgbot.autonomy.control.edge_follower import Track
+from gvgbot.autonomy.gvg.local_map import LocalMap
 from gvgbot.geometry import Array, resampled
 
 Disc = tuple[Array, float]  # centre (2,) and radius, m
@@ -15,6 +17,35 @@ _KEEP_RIGHT_RAD = 1.0  # so much farther round, one passes on the right all the 
 _WIDENS_RAD = 0.3  # round a body that it is too near to, after which it is far enough
 _BEHIND_M = 1.5  # a body
 _SPACING_M, _ARC_RAD = 0.1, 0.15
+
+
+def led_round(
+    track: Track,
+    bodies: list[Disc],
+    near: LocalMap,
+    radius: float,
+    margin: float,
+    *,
+    is_hidden: bool,
+) -> Track:
+    """The track led round bodies on it where the map shows room, by a robot of a radius, m.
+
+    `is_hidden` if a body hides how it goes on at its end: then to where that is to be seen.
+    """
+    if not bodies:
+        return track
+
+    def is_free(way: Array) -> bool:
+        room = np.asarray(near.tree().query(way)[0])
+        narrow = room < min(radius + margin, float(room[0]))  # where it stands, it may stand close
+        return bool(not narrow.any() and near.known(way).all())
+
+    line = detour(track.polyline, bodies, radius, is_free)
+    if is_hidden:
+        line = peek(line, bodies, radius, is_free)
+    if line is track.polyline:
+        return track
+    return Track.of(line, np.asarray(near.tree().query(line)[0]))
 
 
 def detour(
