@@ -385,6 +385,8 @@ class Mission:
         ends = (self.target,) if edge is None else (edge.a, edge.b)
         closed = [end for end in ends if end is not None]
         if not closed:
+            if self.choice.sharing is not None:  # who is in the way may have driven the rest
+                self.where.turn_round()
             return
         self._obstructions.close(self._mapper.graph, closed, view.stamp)
         self._events.append(Recovery(view.stamp, "try another way", reason))

@@ -6,18 +6,22 @@ import numpy as np
 
 from gvgbot.geometry import Array
 from gvgbot.maps.merging import direction, is_among, is_same, settled
-from gvgbot.maps.route_graph import MapEdge, RouteGraph
+from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
 from gvgbot.team.ways import Ways
+
+_OVER_M, _WELL_ON_M = 0.45, 3.0  # from a vertex, a way leads over it, and goes on
 
 
 def pieced(graph: RouteGraph, ways: Sequence[tuple[Array, float]]) -> RouteGraph:
     """The map, with an edge from frontier to frontier wherever ways lead from one to the other.
 
+    A vertex without any edge over which a way leads is none: who drove there saw nothing.
     `ways` are lines (N, 2) in the map frame and their least clearances, m.
     """
     if not ways:
         return graph
-    vertices = graph.vertices
+    joined = {end for edge in graph.edges for end in (edge.start, edge.end)}
+    vertices = [v for v in graph.vertices if v.id in joined or not _is_passed(v, ways)]
     lines = [*ways, *((edge.polyline, edge.min_clearance) for edge in graph.edges)]
     known = Ways(lines, np.array([vertex.position for vertex in vertices]).reshape(-1, 2))
     edges = list(graph.edges)
@@ -39,3 +43,9 @@ def pieced(graph: RouteGraph, ways: Sequence[tuple[Array, float]]) -> RouteGraph
             if not any(is_same(edge, other) for other in edges):
                 edges.append(edge)
     return settled(vertices, edges)
+
+
+def _is_passed(vertex: MapVertex, ways: Sequence[tuple[Array, float]]) -> bool:
+    """Whether a way leads over a vertex, and well on to both sides."""
+    away = (np.hypot(*(line - vertex.position).T) for line, _ in ways)
+    return any(a.min() < _OVER_M and a[[0, -1]].min() > _WELL_ON_M for a in away)

@@ -11,7 +11,7 @@ from gvgbot.hal.sweep import free_distance
 
 _KEPT_M = 0.12  # between two bodies, always,
 _BLUR_M = 0.09  # and so much more where there is room
-_AT_LEAST_M, _SLACK_M = 0.14, 0.01  # where there is less, and by which it may become less
+_AT_LEAST_M, _SLACK_M = 0.13, 0.01  # where there is less, and by which it may become less
 _ROOM_FOR_BOTH_M = 0.3  # between two robots, before either has to be slow
 _BOTH_BRAKE_MPS2 = 0.5  # of each, so that two that come towards each other stop
 _CREEP_MPS = 0.02  # slower than this is a stop

@@ -368,3 +368,19 @@ def test_who_came_onto_another_edge_has_driven_round_from_there() -> None:
     assert start is not None
     assert walk.where.trail[start] == pytest.approx([0.0, 1.0], abs=0.5)
     assert walk.where.trail_length < 16.0
+
+
+def test_who_knows_no_vertex_and_turns_round_has_behind_it_what_was_ahead() -> None:
+    nothing = Correspondence()
+    where = Walk().along(CORRIDOR, nothing, (2.0, 0.0), (4.0, 0.0)).where
+    place, base = CORRIDOR.place(np.array([4.0, 0.0])), Pose(4.0, 0.0, 0.0)
+    assert place is not None
+    towards_west = where.backwards(CORRIDOR, place, nothing, base)
+    where.turn_round()
+    assert where.backwards(CORRIDOR, place, nothing, base) == Branch(
+        towards_west.edge, not towards_west.forward
+    )
+    where.on_edge = HalfEdgeId(1, EAST)
+    before = list(where.trail)
+    where.turn_round()
+    assert where.trail == before  # on an edge of a vertex it is known where that is

@@ -45,6 +45,15 @@ def test_what_two_have_driven_from_both_ends_is_an_edge_and_no_frontier() -> Non
     assert {v.id: v.frontiers for v in joined.vertices} == {4: (math.pi / 2,), 7: ()}
 
 
+@pytest.mark.parametrize(("x", "is_left"), [(5.0, False), (1.5, True)])
+def test_a_vertex_without_edges_over_which_somebody_drove_on_is_none(
+    x: float, *, is_left: bool
+) -> None:
+    seen = vertex(9, x, 0.0, math.pi / 2, math.pi)
+    joined = pieced(RouteGraph((*GRAPH.vertices, seen)), [(line(0.0, 10.0), 0.8)])
+    assert (9 in {v.id for v in joined.vertices}) == is_left
+
+
 def test_a_way_that_leads_nowhere_changes_nothing() -> None:
     assert pieced(GRAPH, HALVES[:1]).edges == ()
     assert [v.frontiers for v in pieced(GRAPH, HALVES[:1]).vertices] == [

@@ -70,7 +70,7 @@ def test_two_whose_ways_cross_keep_apart(bearing: float) -> None:
     assert least_gap(Disc(Pose()), two, told_every=10) >= LEAST_GAP
 
 
-@pytest.mark.parametrize(("gap", "drives"), [(0.15, True), (0.13, False)])
+@pytest.mark.parametrize(("gap", "drives"), [(0.14, True), (0.12, False)])
 def test_who_stands_beside_another_one_drives_on_unless_it_is_too_near(
     gap: float, drives: bool
 ) -> None:
