@@ -73,6 +73,21 @@ def to_disc(bearings: Array, centre: Point) -> Array:
     return np.where(hit, along - np.sqrt(np.maximum(RADIUS**2 - beside, 0.0)), np.inf)
 
 
+def test_there_is_floor_up_to_a_robot_that_says_where_it_is_and_less_for_sure_up_to_others() -> (
+    None
+):
+    scan = sweep(EMPTY, HERE)
+    person, robot = (3.0, 0.0), (0.0, -2.5)
+    ranges = np.minimum(to_disc(scan.bearings, person), to_disc(scan.bearings, robot))
+    scan = replace(scan, ranges=np.minimum(scan.ranges, ranges))
+    newcomers = Newcomers(CONFIG)
+    newcomers.company = [(np.array(robot), RADIUS)]
+    free = newcomers.free(scan, HERE)
+    ahead, aside = (int(np.abs(scan.bearings - b).argmin()) for b in (0.0, -math.pi / 2))
+    assert free[aside] == pytest.approx(2.5 - RADIUS, abs=0.01)
+    assert free[ahead] < 3.0 - RADIUS - 1.0
+
+
 def test_who_comes_into_an_empty_room_is_kept_out_of_the_map() -> None:
     watch = Watch(EMPTY)
     beams = 2 * math.asin(RADIUS / 2.0) / (math.tau / 1080)  # by the angle of the disc

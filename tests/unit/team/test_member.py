@@ -373,13 +373,14 @@ def test_who_has_nothing_left_waits_while_another_one_drives_and_may_want_to_pas
     assert (one.choose(), one.member.is_waiting, one.member.is_done) == (None, False, True)
 
 
-def passed(one: Robot, two: Robot, off: float = 0.0) -> float:
+def passed(one: Robot, two: Robot, off: float = 0.0, since: float = 0.0) -> float:
     """How far off, m, the frames are of two that pass each other at (13, 6), world frame.
 
-    Each sees the other come, `off` metres to its right, and hears where it says it is.
+    Each sees the other come, `off` metres to its right, and hears where it says it is. KeyError if
+    they do not find out.
     """
-    one.tell(0.0, two)
-    two.tell(0.0, one)
+    one.tell(since, two)
+    two.tell(since, one)
     for t in np.arange(0.0, 12.0, 0.4).tolist():
         places = {"one": Pose(10.0 + 0.4 * t, 5.8, 0.0), "two": Pose(17.0 - 0.4 * t, 6.3, np.pi)}
         for here, there, side in ((one, two, -off), (two, one, off)):
@@ -387,7 +388,8 @@ def passed(one: Robot, two: Robot, off: float = 0.0) -> float:
             x, y = start.inverse().transform(np.add(place, (0.0, side)))
             body = np.array([[x, y, RADIUS[there.member.name]]])
             map_base = start.to(places[here.member.name])
-            here.steer(t + 0.1, there, map_base, np.zeros((0, 2)), BodiesSeen(t, map_base, body))
+            seen = BodiesSeen(since + t, map_base, body)
+            here.steer(since + t + 0.1, there, map_base, np.zeros((0, 2)), seen)
     worst = 0.0
     for here, there in ((one, two), (two, one)):
         found = here.member.frames[there.member.name]
@@ -411,6 +413,26 @@ def test_robots_that_pass_each_other_lay_what_both_know_on_each_other_at_once() 
     grid = lattice(6.0 * np.arange(5), 6.0 * np.arange(4))
     one, two = robot("one", grid, {5, 6, 7}, 5), robot("two", grid, {7, 8, 9}, 9)
     assert passed(one, two, off=0.15) < 0.02
+
+
+def test_where_maps_speak_against_it_robots_have_to_pass_each_other_twice() -> None:
+    """As behind glass, which one of them has looked through."""
+    one, two = robot("one", irregular(1), LEFT, 0), robot("two", irregular(12), RIGHT, 14)
+    with pytest.raises(KeyError):
+        passed(one, two)
+    assert not one.member.frames
+    assert passed(one, two, since=40.0) < 0.02
+
+
+def test_a_body_where_a_robot_says_that_it_is_can_be_nobody_else() -> None:
+    one, two = team()
+    there = Pose(4.0, 1.0, 0.0)
+    two.steer(2.0, one, there, np.zeros((0, 2)))
+    own = one.member.frames["two"].compose(there).position
+    bodies = np.array([[*own, 0.5], [*(own + 1.0), 0.5]])
+    told = one.member.course(2.1, Pose(), np.zeros((0, 2)), BodiesSeen(2.05, Pose(), bodies)).look
+    assert told is not None
+    assert told.bodies == (tuple(bodies[1].tolist()),)
 
 
 def test_what_was_seen_long_ago_is_not_told_and_nothing_twice() -> None:
