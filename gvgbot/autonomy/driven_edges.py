@@ -1,5 +1,6 @@
 """What the map learns from where the robot drives: edges that it has followed to their ends."""
 
+from collections import deque
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -16,6 +17,7 @@ from gvgbot.geometry import Array
 
 _APART_M, _TOGETHER_M = 0.5, 0.2  # two ways that are farther apart, or no farther
 _FROM_VERTEX_M = 1.0  # nearer to one there is no second one that was missed
+_LEAST_PART_M, _MOST_STRAYS = 0.3, 100  # of an edge, that are worth telling
 _IN_CLEAR_M = 2.0  # from a vertex, it is seen which departures it has
 
 
@@ -37,7 +39,7 @@ class DrivenEdges:
         self._parts: dict[HalfEdgeId, _Part] = {}  # by the half-edge that they leave by
         # from no vertex, now, and from vertices that were none: map frame, and least clearance
         self._loose: tuple[Array, float] | None = None
-        self._strays: list[tuple[Array, float]] = []
+        self._strays: deque[tuple[Array, float]] = deque(maxlen=_MOST_STRAYS)
 
     def learn(self, view: View, known: Correspondence, place: Place, where: Whereabouts) -> None:
         """Account for the robot's present place, `where` included."""
@@ -55,8 +57,9 @@ class DrivenEdges:
 
     def parts(self) -> list[tuple[Array, float]]:
         """Parts of edges that were driven: lines (N, 2), m, map frame, and least clearances, m."""
-        found = [(part.map_line, part.narrowest) for part in self._parts.values()] + self._strays
-        return found if self._loose is None else [*found, self._loose]
+        found = [(part.map_line, part.narrowest) for part in self._parts.values()]
+        found += self._strays if self._loose is None else [*self._strays, self._loose]
+        return [(line, narrowest) for line, narrowest in found if _length(line) > _LEAST_PART_M]
 
     def _note_part(self, view: View, where: Whereabouts) -> None:
         """Keep what has been driven of the present edge, as long as it is none of the graph."""
