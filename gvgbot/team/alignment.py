@@ -50,6 +50,7 @@ _LEAST_PAIRS, _LEAST_CONNECTED, _LEAST_MEETPOINTS = 4, 3, 3
 _AGAINST_SHARE = 0.1  # of all vertices that are judged,
 _MISSED_SHARE = 0.3
 _SURE = 0.995
+_LAID_BY_M, _LAID_RAD = 0.2, 0.1  # that walls move what was found, where it was found, and turn it
 _MISTAKES = 2  # vertices of either kind do not refute what was sure
 
 
@@ -66,6 +67,7 @@ class Alignment:
     pairs: tuple[tuple[int, int], ...]
     confidence: float
     by_sight: bool = False
+    found: Pose | None = None  # before it was laid on walls, if that is another pose
 
     @property
     def is_sure(self) -> bool:
@@ -155,7 +157,8 @@ def align(ours: Chart, theirs: Chart) -> Alignment | None:
     odds += math.exp(min(_TRIES - weight, 50.0))
     confidence = 1.0 / (1.0 + odds)
     pose, covariance = fitted(a.chart, b.chart, best.pairs)
-    result = Alignment(laid_on_walls(a, b, pose), covariance, best.pairs, confidence)
+    laid = _laid_on_walls(a, b, pose, covariance)
+    result = Alignment(laid, covariance, best.pairs, confidence, found=pose)
     return result if result.is_sure else None
 
 
@@ -169,11 +172,26 @@ def refined(ours: Chart, theirs: Chart, known: Alignment) -> Alignment | None:
     evidence = _examine(a, b, known.pose)
     if evidence.is_possible:
         pose, covariance = fitted(ours, theirs, evidence.pairs)
-        pose = laid_on_walls(a, b, pose)
-        return replace(known, pose=pose, covariance=covariance, pairs=evidence.pairs)
+        laid = _laid_on_walls(a, b, pose, covariance)
+        return replace(known, pose=laid, covariance=covariance, pairs=evidence.pairs, found=pose)
     if evidence.is_refuted and not known.by_sight:
         return None
-    return replace(known, pose=laid_on_walls(a, b, known.pose))
+    found = known.found or known.pose  # each time from there, or it would creep along the walls
+    return replace(known, pose=_laid_on_walls(a, b, found, known.covariance), found=found)
+
+
+def _laid_on_walls(a: Side, b: Side, found: Pose, covariance: Array) -> Pose:
+    """The pose by all walls that both tell of, if it may be there by what it was found by.
+
+    Of few walls some may be two sides of one, or glass that only one of the robots has seen.
+    """
+    laid = laid_on_walls(a, b, found)
+    lever = covariance[:2, 2] / max(covariance[2, 2], 1e-12)
+    surest = np.array([found.x - lever[1], found.y + lever[0]])  # where it is turned about
+    sigma = math.sqrt(max(0.0, covariance[0, 0] - covariance[2, 2] * lever[0] ** 2))
+    moved = laid.transform(found.inverse().transform(surest)) - surest
+    is_there = np.hypot(*moved) < max(_LAID_BY_M, 2 * sigma)
+    return laid if is_there and abs(wrap_angle(laid.theta - found.theta)) < _LAID_RAD else found
 
 
 def _elsewhere(side: Side, shared: set[int]) -> list[_Evidence]:

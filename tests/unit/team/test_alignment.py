@@ -8,7 +8,7 @@ import pytest
 from gvgbot.geometry import Pose, wrap_angle
 from gvgbot.team.alignment import Alignment, align, refined
 from gvgbot.team.laying import least_squares
-from tests.unit.team.building import irregular, lattice
+from tests.unit.team.building import Building, irregular, lattice
 
 STARTS = Pose(3.0, -2.0, 0.7), Pose(11.0, 6.0, -2.4)
 SHIFTED = np.array([0.0, 0.5])
@@ -97,6 +97,20 @@ def test_what_was_known_about_is_known_well_by_the_walls_of_a_few_shared_places(
     places = np.array([vertex.position for vertex in theirs.vertices.values()])
     assert np.hypot(*(found.pose.transform(places) - true.transform(places)).T).max() < 0.05
     assert abs(wrap_angle(found.pose.theta - true.theta)) < 0.005
+
+
+def test_a_frame_does_not_creep_along_walls_that_are_none_of_both_robots() -> None:
+    """One has seen a pane of glass half a metre from a wall that the other one has seen."""
+    places = np.array([(0.0, 0.0), (8.0, 0.0), (8.0, 6.0)])
+    corridors = ((0, 1), (1, 2))
+    ours = Building(places, corridors).chart({0, 1, 2}, Pose())
+    theirs = Building(places + [0.45, 0.0], corridors).chart({0, 1, 2}, Pose())
+    known = Alignment(Pose(), np.diag([0.02**2, 0.02**2, 0.01**2]), (), 0.999, by_sight=True)
+    for _ in range(10):
+        found = refined(ours, theirs, known)
+        assert found is not None
+        known = found
+    assert np.hypot(known.pose.x, known.pose.y) < 0.25
 
 
 def test_the_covariance_of_a_frame_grows_with_how_far_apart_the_charts_stay() -> None:
