@@ -318,29 +318,36 @@ class Member:
             if mate.alignment is not None
         }
 
-    def _told(self) -> dict[str, Pose]:
-        """The same, by what those robots found."""
-        return {
-            name: Pose(*frame.pose).inverse()
-            for name, mate in self._mates.items()
-            for frame in mate.news.frames
-            if (frame.robot, frame.life) == (self.name, self._life)
-        }
-
     @property
     def frames(self) -> dict[str, Pose]:
-        """Poses of all known frames in the own one: found, or told by one whose frame is known."""
-        known = {self.name: Pose()} | self._told() | self._direct()
-        waiting = sorted(known.keys() - {self.name})
+        """Poses of all known frames in the own one: found, or told by others that are known.
+
+        Either of two robots may have found how their frames lie.
+        """
+        known = {self.name: Pose()} | self._direct()
+        links, waiting = self._links(), list(known)
         while waiting:
-            name = waiting.pop(0)
-            for frame in self._mates[name].news.frames:
-                mate = self._mates.get(frame.robot)
-                if frame.robot not in known and mate is not None and mate.news.life == frame.life:
-                    known[frame.robot] = known[name].compose(Pose(*frame.pose))
-                    waiting.append(frame.robot)
+            here = waiting.pop(0)
+            for one, other, pose in links:
+                if one == here and other not in known:
+                    known[other] = known[one].compose(pose)
+                    waiting.append(other)
+                elif other == here and one not in known:
+                    known[one] = known[other].compose(pose.inverse())
+                    waiting.append(one)
         del known[self.name]
         return known
+
+    def _links(self) -> list[tuple[str, str, Pose]]:
+        """Robots, others whose frame they have found, and its pose in theirs."""
+        lives = {name: mate.news.life for name, mate in self._mates.items()}
+        lives[self.name] = self._life
+        return [
+            (name, frame.robot, Pose(*frame.pose))
+            for name, mate in sorted(self._mates.items())
+            for frame in mate.news.frames
+            if lives.get(frame.robot) == frame.life
+        ]
 
     @property
     def charts(self) -> dict[str, tuple[Chart, Pose]]:

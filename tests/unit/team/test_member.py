@@ -460,6 +460,25 @@ def test_who_hears_that_its_frame_was_found_knows_the_other_ones() -> None:
     assert np.hypot(*(found.transform(middle) - true.transform(middle))) < 0.1
 
 
+def test_frames_are_known_over_others_whichever_of_two_has_found_the_other() -> None:
+    """Two knows one, and three has found two, which has not found it."""
+    three = robot("three", irregular(2), LEFT, 0)
+    one, two = team()
+    two.tell(2.0, three)
+    three.member.settle(
+        Comparison("two", 0, Chart(), Chart(), None),
+        Alignment(START["three"].to(START["two"]), np.eye(3) * 1e-6, (), 1.0),
+    )
+    for _ in range(2):
+        three.tell(2.0, one, two)
+        two.tell(2.0, one, three)
+    for who in (one, two):
+        true = START[who.member.name].to(START["three"])
+        found = who.member.frames["three"]
+        middle = START["three"].inverse().transform(np.array([6.0, 2.0]))
+        assert np.hypot(*(found.transform(middle) - true.transform(middle))) < 0.1
+
+
 def test_where_a_robot_was_before_it_began_anew_says_nothing_of_its_new_map() -> None:
     one, _ = team()
     three = robot("three", irregular(1), LEFT, 0)
