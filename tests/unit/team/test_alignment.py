@@ -104,7 +104,7 @@ def test_a_frame_does_not_creep_along_walls_that_are_none_of_both_robots() -> No
     places = np.array([(0.0, 0.0), (8.0, 0.0), (8.0, 6.0)])
     corridors = ((0, 1), (1, 2))
     ours = Building(places, corridors).chart({0, 1, 2}, Pose())
-    theirs = Building(places + [0.45, 0.0], corridors).chart({0, 1, 2}, Pose())
+    theirs = Building(np.add(places, [0.45, 0.0]), corridors).chart({0, 1, 2}, Pose())
     known = Alignment(Pose(), np.diag([0.02**2, 0.02**2, 0.01**2]), (), 0.999, by_sight=True)
     for _ in range(10):
         found = refined(ours, theirs, known)
