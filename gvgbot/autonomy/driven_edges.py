@@ -18,6 +18,7 @@ from gvgbot.geometry import Array
 _APART_M, _TOGETHER_M = 0.5, 0.2  # two ways that are farther apart, or no farther
 _FROM_VERTEX_M = 1.0  # nearer to one there is no second one that was missed
 _LEAST_PART_M, _MOST_STRAYS = 0.3, 100  # of an edge, that are worth telling
+_LEAST_LOST_M = 1.0  # less than before: it does not only go back over it
 _IN_CLEAR_M = 2.0  # from a vertex, it is seen which departures it has
 
 
@@ -65,12 +66,14 @@ class DrivenEdges:
         """Keep what has been driven of the present edge, as long as it is none of the graph."""
         graph, belief, end = self._mapper.graph, self._mapper.belief, where.on_edge
         half = None if end is None else graph.half_edge(end)
-        self._loose = None
+        before, self._loose = self._loose, None
         if len(where.trail) > 1:
             line = np.array(where.trail)
             if end is None:
                 map_local = belief.map_base.compose(view.local_base.inverse())
                 self._loose = map_local.transform(line), where.narrowest
+                if before is not None and _length(line) < _length(before[0]) - _LEAST_LOST_M:
+                    self._strays.append(before)  # it has turned round, or is on another edge
             elif half is not None:
                 line = graph.vertices[end.vertex].local.inverse().transform(line)
                 if end not in self._parts or _length(self._parts[end].line) < _length(line):

@@ -34,6 +34,7 @@ from gvgbot.geometry import Array, Pose, wrap_angle
 
 _SECOND = 1  # try, in the end, of what was given up: things may have changed
 _FACING_RAD = 1.0  # looking so far past a thing, one would not see it go
+_LED_M = 1.0, 4.0  # ahead: who drives there behind others need not
 _FACING_POINTS = 6  # of a polyline tell where its end points to
 
 Outcome = Literal["explored", "explored_with_blocked", "failed", "stopped"]
@@ -57,6 +58,7 @@ class Mission:
         self._driven = DrivenEdges(mapper)
         self._frontiers: set[HalfEdgeId] = set()  # that were known at the last view
         self._looked_around = 0
+        self._has_turned = False  # where others had driven on
         self._obstructions = Obstructions(config.retries, config.retry_after_s)
         self._hindrance = Hindrance()
         self._neighbours = Neighbours()
@@ -217,11 +219,24 @@ class Mission:
             return self._examine(view, here)
         if self.target is not None:
             self._neighbours.depart_unseen(self._mapper, view, here, self.target)
-        path = here.ahead() if self.target is None else here.path_to(self.target)
+        path = self._ahead(view, here) if self.target is None else here.path_to(self.target)
         if path is None:
             return self._wait_for_a_way(view, here)
         self._scouting.end()
         return self._drive(view, here, path)
+
+    def _ahead(self, view: View, here: Situation) -> tuple[Branch, ...]:
+        """Straight on; before a vertex is known, once back if others have driven what is ahead."""
+        path, sharing = here.ahead(), self.choice.sharing
+        if sharing is None or self._has_turned or self._mapper.graph.vertices:
+            return path
+        line, _ = here.line_along(path)
+        away = np.hypot(*(line - view.local_base.position).T)
+        ahead = line[(away > _LED_M[0]) & (away < _LED_M[1])]
+        map_local = self._mapper.belief.map_base.compose(view.local_base.inverse())
+        if len(ahead) and sharing.has_driven(map_local.transform(ahead)):
+            self._has_turned = self.where.turn_round()
+        return here.ahead()
 
     def _choose(self, view: View, here: Situation) -> HalfEdgeId | None:
         """The next frontier, by the policy."""

@@ -105,13 +105,18 @@ class Whereabouts:
         if _LEFT_M[0] < along < _LEFT_M[1] and abs(aside) < _ASIDE_M:
             self.on_edge, self.trail, self.narrowest = end, [vertex, base], math.inf
 
-    def turn_round(self) -> None:
-        """Let what was ahead be behind, on an edge of which no vertex is known yet."""
-        if self.on_edge is None and len(self.trail) > 1:
-            base = self.trail[-1]
-            away = np.hypot(*(np.array(self.trail) - base).T)
-            came = self.trail[int(np.argmin(np.abs(away - _BACK_M)))]
-            self.trail = [2 * base - came, base]
+    def turn_round(self) -> bool:
+        """Let what was ahead be behind, on an edge of which no vertex is known; whether it is now.
+
+        It takes some way to tell them apart.
+        """
+        if self.on_edge is not None or len(self.trail) < 2:
+            return False
+        base = self.trail[-1]
+        away = np.hypot(*(np.array(self.trail) - base).T)
+        came = self.trail[int(np.argmin(np.abs(away - _BACK_M)))]
+        self.trail = [2 * base - came, base]
+        return True
 
     def rejoin(self, end: HalfEdgeId, line: Array) -> None:
         """Be on the edge that begins at another end, which a line (N, 2), local frame, comes from.

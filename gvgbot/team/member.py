@@ -13,6 +13,7 @@ from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.control import company
 from gvgbot.autonomy.control.company import BodiesSeen, Companion
@@ -43,6 +44,7 @@ _RECOGNISE_S = 1.0  # between two attempts to recognise a robot by how it moves
 _SURE_BY_SIGHT = 0.999  # that the robot met is the one that says so
 _KNOWN_M = 0.4  # from where a robot says it is, a body is that robot
 _SAME_M, _SAME_RAD = 0.5, 0.1  # frames nearer to each other are the same
+_ON_WAY_M = 0.45  # from what others have driven along
 _MOST_MATES = 64  # that are known at a time
 _TAKES_OVER_M = 2.0  # nearer to a frontier than who claims it, one takes it
 
@@ -474,6 +476,17 @@ class Member:
         cost, _ = site.costs(metres).get(frontier, (claim.metres, target))
         self._claim = Claim(claim.x, claim.y, claim.bearing, max(0.0, cost))
         return not self._is_taken(frontier, cost, self._claims())
+
+    def has_driven(self, line: Array) -> bool:
+        """Whether others have driven along a line (N, 2); see `Sharing`."""
+        known: list[Array] = []
+        for chart, pose in self.charts.values():
+            known += (pose.transform(way.polyline) for way in chart.ways)
+            known += (pose.transform(e.polyline) for e in chart.edges.values() if e.traversed)
+        if not known:
+            return False
+        away, _ = cKDTree(np.concatenate(known)).query(line)
+        return bool(np.max(away) < _ON_WAY_M)
 
     @property
     def is_waiting(self) -> bool:

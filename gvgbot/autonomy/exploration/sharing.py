@@ -4,6 +4,7 @@ from typing import Protocol
 
 from gvgbot.autonomy.exploration.paths import Approach
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
+from gvgbot.geometry import Array
 
 
 class Sharing(Protocol):
@@ -17,6 +18,9 @@ class Sharing(Protocol):
 
         Who follows it starts from its vertex, with less than no metres.
         """
+
+    def has_driven(self, line: Array) -> bool:
+        """Whether others have driven along a line (N, 2), m, map frame."""
 
     @property
     def is_waiting(self) -> bool:

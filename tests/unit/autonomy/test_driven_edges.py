@@ -188,3 +188,13 @@ def test_what_was_driven_from_a_vertex_that_was_none_was_driven_all_the_same() -
     (line, clearance), (known, before_clearance) = drive.parts[0], before[0]
     np.testing.assert_array_equal(line, known)
     assert clearance == before_clearance
+
+
+def test_what_was_driven_before_it_turned_round_was_driven() -> None:
+    drive = Drive(HalfEdgeId(1, EAST))
+    drive.where.on_edge, drive.where.trail = None, []
+    drive.along(STREET, {}, (1.0, 0.0), (4.0, 0.0))
+    drive.where.turn_round()
+    drive.along(STREET, {}, (3.8, 0.0), (3.4, 0.0))
+    longest = max(drive.parts, key=lambda part: float(np.ptp(part[0][:, 0])))[0]
+    assert np.ptp(longest[:, 0]) == pytest.approx(3.0, abs=0.2)

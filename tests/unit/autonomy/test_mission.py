@@ -493,6 +493,27 @@ class Alone:
     def keeps(self, target: HalfEdgeId, graph: GvgGraph, starts: list[Approach]) -> bool:
         return True
 
+    def has_driven(self, line: Array) -> bool:
+        return False
+
+
+class Led(Alone):
+    """Others have driven everywhere, from some time on."""
+
+    is_led = False
+
+    def has_driven(self, line: Array) -> bool:
+        return self.is_led
+
+
+def test_who_knows_no_vertex_turns_round_once_where_others_have_driven_on() -> None:
+    robot, others = Robot(), Led()
+    robot.mission.choice.sharing = others
+    assert end_of(robot.drive(PLAIN, (0.0, 0.0), (2.0, 0.0))) == pytest.approx((8.0, 0.0))
+    others.is_led = True
+    assert end_of(robot.look(PLAIN)) == pytest.approx((-3.0, 0.0))
+    assert end_of(robot.drive(PLAIN, (2.0, 0.0), (1.0, 0.0))) == pytest.approx((-3.0, 0.0))
+
 
 class Last(Alone):
     """Has nothing left to go to, nor have the others."""

@@ -376,11 +376,11 @@ def test_who_knows_no_vertex_and_turns_round_has_behind_it_what_was_ahead() -> N
     place, base = CORRIDOR.place(np.array([4.0, 0.0])), Pose(4.0, 0.0, 0.0)
     assert place is not None
     towards_west = where.backwards(CORRIDOR, place, nothing, base)
-    where.turn_round()
+    assert where.turn_round()
     assert where.backwards(CORRIDOR, place, nothing, base) == Branch(
         towards_west.edge, not towards_west.forward
     )
     where.on_edge = HalfEdgeId(1, EAST)
     before = list(where.trail)
-    where.turn_round()
+    assert not where.turn_round()
     assert where.trail == before  # on an edge of a vertex it is known where that is

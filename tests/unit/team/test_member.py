@@ -157,6 +157,18 @@ def test_who_follows_its_frontier_keeps_it_until_others_have_driven_it_from_the_
     assert not one.member.keeps(chosen[0], graph_of(one.chart), on_it)
 
 
+def test_what_others_have_driven_and_what_they_have_not() -> None:
+    one, two = team()
+    edge = next(iter(two.chart.edges.values()))
+    line = START["one"].to(START["two"]).transform(edge.polyline)
+    assert not one.member.has_driven(line)  # it was only seen
+    with_way = replace(two.chart, ways=(ChartWay(edge.polyline, 0.5),))
+    two.member._own_chart = lambda: with_way
+    two.tell(3.0, one)
+    assert one.member.has_driven(line)
+    assert not one.member.has_driven(np.concatenate([line, line[-1:] + 2.0]))
+
+
 def test_what_a_lost_robot_was_about_to_do_is_free_again() -> None:
     one, two = team()
     two.at = one.at = 3
