@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from gvgbot.geometry import Array
 from gvgbot.maps.merging import direction, is_among, is_same, settled
@@ -10,6 +11,7 @@ from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
 from gvgbot.team.ways import Ways
 
 _OVER_M, _WELL_ON_M = 0.45, 3.0  # from a vertex, a way leads over it, and goes on
+_EVENED = 7  # points of a line, 0.1 m apart
 
 
 def pieced(graph: RouteGraph, ways: Sequence[tuple[Array, float]]) -> RouteGraph:
@@ -35,7 +37,7 @@ def pieced(graph: RouteGraph, ways: Sequence[tuple[Array, float]]) -> RouteGraph
             edge = MapEdge(
                 start=vertex.id,
                 end=vertices[walk.place].id,
-                polyline=walk.line,
+                polyline=_evened(walk.line),
                 length=walk.length,
                 min_clearance=walk.min_clearance,
                 traversals=1,
@@ -43,6 +45,13 @@ def pieced(graph: RouteGraph, ways: Sequence[tuple[Array, float]]) -> RouteGraph
             if not any(is_same(edge, other) for other in edges):
                 edges.append(edge)
     return settled(vertices, edges)
+
+
+def _evened(line: Array) -> Array:
+    """The line (N, 2) without the kinks where one way goes on beside the end of another one."""
+    for _ in range(2):
+        line = uniform_filter1d(line, _EVENED, axis=0, mode="nearest")
+    return line
 
 
 def _is_passed(vertex: MapVertex, ways: Sequence[tuple[Array, float]]) -> bool:

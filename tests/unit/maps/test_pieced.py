@@ -39,6 +39,8 @@ def test_what_two_have_driven_from_both_ends_is_an_edge_and_no_frontier() -> Non
     assert edge.length == pytest.approx(10.0, abs=0.1)
     assert edge.min_clearance == 0.5
     assert edge.traversals > 0
+    turns = np.diff(np.unwrap(np.arctan2(*np.diff(edge.polyline, axis=0).T[::-1])))
+    assert np.abs(turns).max() < 0.1  # the two halves are 0.1 m beside each other
     places = {v.id: v.position for v in GRAPH.vertices}
     assert tuple(edge.polyline[0]) == pytest.approx(places[edge.start])
     assert tuple(edge.polyline[-1]) == pytest.approx(places[edge.end])
