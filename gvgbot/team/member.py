@@ -44,7 +44,7 @@ _RECOGNISE_S = 1.0  # between two attempts to recognise a robot by how it moves
 _SURE_BY_SIGHT = 0.999  # that the robot met is the one that says so
 _KNOWN_M = 0.4  # from where a robot says it is, a body is that robot
 _SAME_M, _SAME_RAD = 0.5, 0.1  # frames nearer to each other are the same
-_ON_WAY_M = 0.45  # from what others have driven along
+_ON_WAY_M, _MOSTLY = 0.45, 0.8  # from what others have driven along, the same way
 _MOST_MATES = 64  # that are known at a time
 _TAKES_OVER_M = 2.0  # nearer to a frontier than who claims it, one takes it
 
@@ -478,15 +478,14 @@ class Member:
         return not self._is_taken(frontier, cost, self._claims())
 
     def has_driven(self, line: Array) -> bool:
-        """Whether others have driven along a line (N, 2); see `Sharing`."""
-        known: list[Array] = []
-        for chart, pose in self.charts.values():
-            known += (pose.transform(way.polyline) for way in chart.ways)
-            known += (pose.transform(e.polyline) for e in chart.edges.values() if e.traversed)
-        if not known:
+        """Whether others have driven along a line (N, 2) the same way; see `Sharing`."""
+        ways = [pose.transform(w.polyline) for c, pose in self.charts.values() for w in c.ways]
+        if not ways or len(line) < 2:
             return False
-        away, _ = cKDTree(np.concatenate(known)).query(line)
-        return bool(np.max(away) < _ON_WAY_M)
+        away, nearest = cKDTree(np.concatenate(ways)).query(line)
+        onwards = np.concatenate([np.gradient(way, axis=0) for way in ways])[nearest]
+        is_same_way = (onwards * np.gradient(line, axis=0)).sum(axis=1) > 0.0
+        return bool(np.max(away) < _ON_WAY_M and is_same_way.mean() > _MOSTLY)
 
     @property
     def is_waiting(self) -> bool:

@@ -20,7 +20,7 @@ class Sharing(Protocol):
         """
 
     def has_driven(self, line: Array) -> bool:
-        """Whether others have driven along a line (N, 2), m, map frame."""
+        """Whether others have driven along a line (N, 2), m, map frame, in its direction."""
 
     @property
     def is_waiting(self) -> bool:

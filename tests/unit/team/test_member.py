@@ -166,6 +166,7 @@ def test_what_others_have_driven_and_what_they_have_not() -> None:
     two.member._own_chart = lambda: with_way
     two.tell(3.0, one)
     assert one.member.has_driven(line)
+    assert not one.member.has_driven(line[::-1])
     assert not one.member.has_driven(np.concatenate([line, line[-1:] + 2.0]))
 
 
