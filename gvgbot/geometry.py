@@ -113,6 +113,11 @@ def rotated_covariance(covariance: Array, angle: float) -> Array:
     return rotated
 
 
+def length_of(line: Array) -> float:
+    """The length of a line (N, 2), in its unit; 0 for less than two points."""
+    return float(np.hypot(*np.diff(line, axis=0).T).sum())
+
+
 def resampled(line: Array, spacing: float) -> Array:
     """Points (M, 2) along a line (N, 2), its ends among them, not farther apart than `spacing`."""
     along = np.concatenate([[0.0], np.hypot(*np.diff(line, axis=0).T).cumsum()])

@@ -13,7 +13,7 @@ from gvgbot.autonomy.start_edge import StartEdge, is_at_start
 from gvgbot.autonomy.topology import direction
 from gvgbot.autonomy.views import Correspondence, View
 from gvgbot.autonomy.whereabouts import LEAST_LOOP_M, Passage, Whereabouts
-from gvgbot.geometry import Array
+from gvgbot.geometry import Array, length_of
 
 _APART_M, _TOGETHER_M = 0.5, 0.2  # two ways that are farther apart, or no farther
 _FROM_VERTEX_M = 1.0  # nearer to one there is no second one that was missed
@@ -60,7 +60,7 @@ class DrivenEdges:
         """Parts of edges that were driven: lines (N, 2), m, map frame, and least clearances, m."""
         found = [(part.map_line, part.narrowest) for part in self._parts.values()]
         found += self._strays if self._loose is None else [*self._strays, self._loose]
-        return [(line, narrowest) for line, narrowest in found if _length(line) > _LEAST_PART_M]
+        return [(line, narrowest) for line, narrowest in found if length_of(line) > _LEAST_PART_M]
 
     def _note_part(self, view: View, where: Whereabouts) -> None:
         """Keep what has been driven of the present edge, as long as it is none of the graph."""
@@ -72,11 +72,11 @@ class DrivenEdges:
             if end is None:
                 map_local = belief.map_base.compose(view.local_base.inverse())
                 self._loose = map_local.transform(line), where.narrowest
-                if before is not None and _length(line) < _length(before[0]) - _LEAST_LOST_M:
+                if before is not None and length_of(line) < length_of(before[0]) - _LEAST_LOST_M:
                     self._strays.append(before)  # it has turned round, or is on another edge
             elif half is not None:
                 line = graph.vertices[end.vertex].local.inverse().transform(line)
-                if end not in self._parts or _length(self._parts[end].line) < _length(line):
+                if end not in self._parts or length_of(self._parts[end].line) < length_of(line):
                     self._parts[end] = _Part(line, where.narrowest)
         for end, part in list(self._parts.items()):
             half = graph.half_edge(end)
@@ -181,10 +181,6 @@ class DrivenEdges:
         """Whether the robot has come back to where it came onto its first edge (2,), map frame."""
         driven = where.trail_length > LEAST_LOOP_M
         return driven and is_at_start(self._mapper.belief, start, clearance)
-
-
-def _length(line: Array) -> float:
-    return float(np.hypot(*np.diff(line, axis=0).T).sum())
 
 
 def _fork(line: Array, known_line: Array) -> int | None:

@@ -338,9 +338,11 @@ def _without(scan: Scan, local_base: Pose, discs: list[tuple[Array, float]]) -> 
 
 def _end_in(scan: Scan, local_base: Pose, discs: list[tuple[Array, float]]) -> NDArray[np.bool_]:
     """Which beams (N,) end in discs."""
+    inside = np.zeros(len(scan.ranges), np.bool_)
+    if not discs:
+        return inside
     beams = np.flatnonzero(np.isfinite(scan.ranges))
     ends = beam_ends(scan, beams, scan.ranges[beams], local_base.compose(scan.base_laser))
-    inside = np.zeros(len(scan.ranges), np.bool_)
     for centre, radius in discs:
         inside[beams] |= np.hypot(*(ends - centre).T) < radius + _BLUR_M
     return inside

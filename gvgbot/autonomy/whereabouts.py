@@ -10,7 +10,7 @@ from gvgbot.autonomy.exploration.paths import Approach, shortest_paths
 from gvgbot.autonomy.gvg.local import Branch, LocalGvg, LocalNode, Place
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
 from gvgbot.autonomy.views import Correspondence
-from gvgbot.geometry import Array, Pose, wrap_angle
+from gvgbot.geometry import Array, Pose, length_of, wrap_angle
 
 LEAST_LOOP_M = 4.0  # a shorter way is none round anything
 _STEP_M = 1.0  # from view to view, at most
@@ -45,8 +45,7 @@ class Whereabouts:
     @property
     def trail_length(self) -> float:
         """Metres driven along the edge since its vertex."""
-        points = np.array(self.trail)
-        return float(np.hypot(*np.diff(points, axis=0).T).sum()) if len(points) > 1 else 0.0
+        return length_of(np.array(self.trail).reshape(-1, 2))
 
     def way_back(self, base: Array) -> Array:
         """The way (N, 2) back over where the robot came from, from beside it to its vertex."""
@@ -138,7 +137,7 @@ class Whereabouts:
         else:
             towards = Branch(place.edge, forward=node == gvg.edges[place.edge].b)
             rest, rooms = gvg.line_from(place, (towards,))
-        driven = float(np.hypot(*np.diff(trail, axis=0).T).sum())
+        driven = length_of(trail)
         arrived = self._arrival(gvg, place, known, node, trail)
         narrowest = min(self.narrowest, float(rooms.min()))
         return Passage(self.on_edge, arrived, np.concatenate([trail, rest]), driven, narrowest)

@@ -8,9 +8,8 @@ from scipy.ndimage import uniform_filter1d
 from gvgbot.geometry import Array
 from gvgbot.maps.merging import direction, is_among, is_same, settled
 from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
-from gvgbot.team.ways import Ways
+from gvgbot.team.ways import WELL_ON_M, Ways, leads_over
 
-_OVER_M, _WELL_ON_M = 0.45, 3.0  # from a vertex, a way leads over it, and goes on
 _EVENED = 7  # points of a line, 0.1 m apart
 
 
@@ -56,5 +55,4 @@ def _evened(line: Array) -> Array:
 
 def _is_passed(vertex: MapVertex, ways: Sequence[tuple[Array, float]]) -> bool:
     """Whether a way leads over a vertex, and well on to both sides."""
-    away = (np.hypot(*(line - vertex.position).T) for line, _ in ways)
-    return any(a.min() < _OVER_M and a[[0, -1]].min() > _WELL_ON_M for a in away)
+    return any(leads_over(line, np.array(vertex.position), WELL_ON_M) for line, _ in ways)

@@ -10,7 +10,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from gvgbot.geometry import Array
+from gvgbot.geometry import Array, length_of
 from gvgbot.maps import geojson
 from gvgbot.maps.route_graph import MapEdge, RouteGraph
 
@@ -70,7 +70,7 @@ def _waypoint(number: int, place: Array) -> Feature:
 
 
 def _straight(edge: MapEdge, number: int, start: int, end: int, line: Array) -> Feature:
-    length = round(float(np.hypot(*np.diff(line, axis=0).T).sum()), geojson.DECIMALS)
+    length = round(length_of(line), geojson.DECIMALS)
     metadata = {
         "length": length,
         "min_clearance": round(edge.min_clearance, geojson.DECIMALS),

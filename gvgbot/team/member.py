@@ -35,6 +35,7 @@ from gvgbot.team.news import (
     told_ways,
 )
 from gvgbot.team.site import Frontier, Site
+from gvgbot.team.ways import BESIDE_M
 
 _STANDING_M = 0.1  # moved less from news to news, a robot stands
 _RESTS_S = 30.0  # who stands for so long, and is on its way to nothing, finds no more
@@ -44,7 +45,7 @@ _RECOGNISE_S = 1.0  # between two attempts to recognise a robot by how it moves
 _SURE_BY_SIGHT = 0.999  # that the robot met is the one that says so
 _KNOWN_M = 0.4  # from where a robot says it is, a body is that robot
 _SAME_M, _SAME_RAD = 0.5, 0.1  # frames nearer to each other are the same
-_ON_WAY_M, _MOSTLY = 0.45, 0.8  # from what others have driven along, the same way
+_MOSTLY = 0.8  # of a line: what others have driven along the same way
 _MOST_MATES = 64  # that are known at a time
 _TAKES_OVER_M = 2.0  # nearer to a frontier than who claims it, one takes it
 
@@ -485,7 +486,7 @@ class Member:
         away, nearest = cKDTree(np.concatenate(ways)).query(line)
         onwards = np.concatenate([np.gradient(way, axis=0) for way in ways])[nearest]
         is_same_way = (onwards * np.gradient(line, axis=0)).sum(axis=1) > 0.0
-        return bool(np.max(away) < _ON_WAY_M and is_same_way.mean() > _MOSTLY)
+        return bool(np.max(away) < BESIDE_M and is_same_way.mean() > _MOSTLY)
 
     @property
     def is_waiting(self) -> bool:

@@ -7,7 +7,7 @@ import numpy as np
 
 from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.errors import GvgbotError
-from gvgbot.geometry import Array, resampled
+from gvgbot.geometry import Array, length_of, resampled
 from gvgbot.names import ROBOT_NAME
 from gvgbot.team.chart import Chart, ChartEdge, ChartVertex, ChartWay, Departure
 
@@ -163,7 +163,7 @@ def _checked(news: News, chart: Chart) -> News:
     ):
         raise GvgbotError("damaged news of a team: a departure has an edge that is not told")
     lines = [e.polyline for e in chart.edges.values()] + [way.polyline for way in chart.ways]
-    if sum(_metres(line) for line in lines) > _MOST_WAY_M:
+    if sum(length_of(line) for line in lines) > _MOST_WAY_M:
         raise GvgbotError("damaged news of a team: longer ways than there can be")
     return news
 
@@ -171,11 +171,6 @@ def _checked(news: News, chart: Chart) -> News:
 def _is_near(points: Array) -> bool:
     """Whether all points (N, 2) may be on one map; NaN is nowhere."""
     return bool((np.abs(points) <= _MOST_M).all())
-
-
-def _metres(line: Array) -> float:
-    """The length of a line (N, 2)."""
-    return float(np.hypot(*np.diff(line, axis=0).T).sum())
 
 
 def told_vertices(chart: Chart) -> tuple[TeamVertex, ...]:

@@ -14,13 +14,11 @@ from scipy.spatial.distance import cdist
 from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.geometry import Array, wrap_angle
 from gvgbot.team.chart import Chart, Departure
-from gvgbot.team.ways import Ways
+from gvgbot.team.ways import BESIDE_M, WELL_ON_M, Ways, leads_over
 
 _SAME_M = 0.6  # vertices nearer to each other are one
 _SAME_RAD = 0.7  # departures nearer to each other are one
-_ON_EDGE_M = 0.45  # from an edge, a vertex of another chart lies on it
 _AHEAD_M = 0.8  # along an edge, its direction is taken
-_WELL_ON_M = 3.0  # beyond a vertex, who did not see it is as right as who did
 
 End = tuple[int, HalfEdgeId]  # a chart's index and a half-edge of it
 
@@ -129,11 +127,10 @@ class Site:
         others = [
             c for other, c in enumerate(self._charts) if other != number and other not in holders
         ]
-        if any(
-            e.traversed and _passes(e.polyline, point) for c in others for e in c.edges.values()
-        ):
+        driven = (e.polyline for c in others for e in c.edges.values() if e.traversed)
+        if any(leads_over(line, point, _AHEAD_M) for line in driven):
             return True
-        passers = sum(any(_passes(w.polyline, point, _WELL_ON_M) for w in c.ways) for c in others)
+        passers = sum(any(leads_over(w.polyline, point, WELL_ON_M) for w in c.ways) for c in others)
         return passers >= len(holders)
 
     def _followed(self, number: int, vertex: int, bearing: float) -> Onward | None:
@@ -170,7 +167,7 @@ class Site:
         for edge in chart.edges.values():
             away = np.hypot(*(edge.polyline - point).T)
             i = int(np.argmin(away))
-            if away[i] > _ON_EDGE_M:
+            if away[i] > BESIDE_M:
                 continue
             for end, line in ((edge.b, edge.polyline[i:]), (edge.a, edge.polyline[i::-1])):
                 along = np.concatenate([[0.0], np.hypot(*np.diff(line, axis=0).T).cumsum()])
@@ -208,12 +205,6 @@ class Site:
                 if other not in done:
                     heapq.heappush(queue, (metres + length, other, end))
         return best
-
-
-def _passes(polyline: Array, point: Array, on_m: float = _AHEAD_M) -> bool:
-    """Whether a line leads over a point and on, to both sides."""
-    away = np.hypot(*(polyline - point).T)
-    return bool(away.min() < _ON_EDGE_M and away[[0, -1]].min() > on_m)
 
 
 def _improve(

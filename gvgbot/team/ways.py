@@ -12,9 +12,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
-from gvgbot.geometry import Array, resampled, wrap_angle
+from gvgbot.geometry import Array, length_of, resampled, wrap_angle
 
-_BESIDE_M = 0.45  # from a line, a place lies on it
+WELL_ON_M = 3.0  # beyond a vertex, who did not see it is as right as who did
+BESIDE_M = 0.45  # from a line, a place lies on it
 _GAP_M = 1.0  # between two ways: robots that meet keep so far apart
 _AHEAD_M = 0.8  # along a line, its direction is taken
 _SAME_RAD = 0.7  # directions nearer to each other are one
@@ -36,6 +37,12 @@ class Walk:
     length: float
 
 
+def leads_over(line: Array, point: Array, on_m: float) -> bool:
+    """Whether a line (N, 2) leads over a point (2,) and so far on, m, to both sides."""
+    away = np.hypot(*(line - point).T)
+    return bool(away.min() < BESIDE_M and away[[0, -1]].min() > on_m)
+
+
 class Ways:
     """What robots have driven along, in one frame: lines (N, 2), m, and their clearances, m.
 
@@ -55,20 +62,20 @@ class Ways:
         here, ahead, metres = self._places[place], bearing, 0.0
         pieces, used = list[Array](), set[int]()
         for _ in range(_MOST):
-            found = self._onwards(here, ahead, used, _GAP_M if pieces else _BESIDE_M)
+            found = self._onwards(here, ahead, used, _GAP_M if pieces else BESIDE_M)
             if found is None:
                 return None
             number, piece = found
             used.add(number)
             arrived = self._arrival(piece, place if metres < _AHEAD_M else -1)
             pieces.append(piece if arrived is None else piece[: arrived[1] + 1])
-            metres += _length(pieces[-1])
+            metres += length_of(pieces[-1])
             if arrived is not None:
                 line = np.concatenate(pieces)
                 if len(line) < 2:  # two vertices at one place
                     return None
                 clearance = min(self._clearances[k] for k in used)
-                return Walk(arrived[0], line, clearance, _length(line))
+                return Walk(arrived[0], line, clearance, length_of(line))
             here, ahead = piece[-1], _direction(piece[::-1]) + math.pi
         return None
 
@@ -76,7 +83,7 @@ class Ways:
         self, here: Array, ahead: float, used: set[int], gap: float
     ) -> tuple[int, Array] | None:
         """The longest line that goes on from a point (2,) in a direction, and its number."""
-        near = np.unique(self._of[self._tree.query_ball_point(here, math.hypot(gap, _BESIDE_M))])
+        near = np.unique(self._of[self._tree.query_ball_point(here, math.hypot(gap, BESIDE_M))])
         best: tuple[int, Array] | None = None
         for number in sorted(set(near.tolist()) - used):
             line = self._lines[number]
@@ -84,12 +91,12 @@ class Ways:
             dx, dy = line[i] - here
             along = dx * math.cos(ahead) + dy * math.sin(ahead)
             aside = dy * math.cos(ahead) - dx * math.sin(ahead)
-            if abs(aside) > _BESIDE_M or not -_BESIDE_M < along < gap:
+            if abs(aside) > BESIDE_M or not -BESIDE_M < along < gap:
                 continue
             for rest in (line[i:], line[i::-1]):
-                least = _LEAST_M if best is None else _length(best[1])
+                least = _LEAST_M if best is None else length_of(best[1])
                 turned = abs(wrap_angle(_direction(rest) - ahead)) if len(rest) > 1 else math.pi
-                if _length(rest) > least and turned < _SAME_RAD:
+                if length_of(rest) > least and turned < _SAME_RAD:
                     best = number, rest
         return best
 
@@ -102,16 +109,12 @@ class Ways:
         if start >= 0:
             steps = np.hypot(*np.diff(line, axis=0).T)
             away[: 1 + int(np.searchsorted(steps.cumsum(), _AHEAD_M)), start] = math.inf
-        on = np.flatnonzero((away < _BESIDE_M).any(axis=1))
+        on = np.flatnonzero((away < BESIDE_M).any(axis=1))
         if not len(on):
             return None
         place = int(away[on[0]].argmin())
-        there = away[on[0] : on[0] + math.ceil(2 * _BESIDE_M / _SPACING_M), place]
+        there = away[on[0] : on[0] + math.ceil(2 * BESIDE_M / _SPACING_M), place]
         return place, int(on[0] + there.argmin())
-
-
-def _length(line: Array) -> float:
-    return float(np.hypot(*np.diff(line, axis=0).T).sum())
 
 
 def _direction(line: Array) -> float:

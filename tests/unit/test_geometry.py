@@ -13,6 +13,7 @@ from gvgbot.geometry import (
     Pose,
     Twist,
     composed,
+    length_of,
     resampled,
     seen_from,
     wrap_angle,
@@ -159,3 +160,8 @@ def test_a_line_keeps_its_ends_and_its_corner_when_it_is_resampled(spacing: floa
     assert (on_first | on_second).all()
     steps = np.hypot(*np.diff(points, axis=0).T)
     assert steps.max() <= spacing
+
+
+def test_the_length_of_a_line_is_that_of_its_steps() -> None:
+    assert length_of(np.array([(0.0, 0.0), (3.0, 4.0), (3.0, 6.0)])) == 7.0
+    assert length_of(np.array([(3.0, 4.0)])) == length_of(np.empty((0, 2))) == 0.0

@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from gvgbot.geometry import Array, Pose, wrap_angle
+from gvgbot.geometry import Array, Pose, length_of, wrap_angle
 
 Kind = Literal["meetpoint", "endpoint"]
 
@@ -162,7 +162,7 @@ class GvgGraph:
 
         The polyline (N, 2) runs from a to b in the frame of a's vertex.
         """
-        length = float(np.hypot(*np.diff(polyline, axis=0).T).sum())
+        length = length_of(polyline)
         edge = Edge(self.next_id(), a, b, polyline, length, min_clearance, driven, int(driven))
         self.edges[edge.id] = edge
         for end in (a, b):
