@@ -107,6 +107,7 @@ class Site:
         if (
             known is not None
             or (departure.blocked and number > 0)
+            or self._is_denied(number, place, departure.bearing)
             or self._is_refuted(number, end.vertex)
         ):
             return
@@ -118,11 +119,28 @@ class Site:
         if number == 0:
             self.own[end] = same[0] if same else frontier
 
+    def _is_denied(self, number: int, place: int, bearing: float) -> bool:
+        """Whether robots that have been at a place saw no departure in a direction there.
+
+        Most of them; or this one, which cannot take what another one saw: who saw it finds out.
+        """
+        saw, missed = set[int](), set[int]()
+        for other, vertex in self._members[place].items():
+            if self._has_been_at(other, vertex):
+                departures = self._charts[other].vertices[vertex].departures
+                near = any(abs(wrap_angle(d.bearing - bearing)) < _SAME_RAD for d in departures)
+                (saw if near else missed).add(other)
+        return len(missed) > len(saw) or (number > 0 and 0 in missed)
+
+    def _has_been_at(self, number: int, vertex: int) -> bool:
+        edges = self._charts[number].edges.values()
+        return any(e.traversed and vertex in (e.a.vertex, e.b.vertex) for e in edges)
+
     def _is_refuted(self, number: int, vertex: int) -> bool:
         """Whether another robot found no vertex where it drove, and this one has not been there."""
-        place, own = self._place[number, vertex], self._charts[number].edges.values()
-        if any(edge.traversed and vertex in (edge.a.vertex, edge.b.vertex) for edge in own):
+        if self._has_been_at(number, vertex):
             return False
+        place = self._place[number, vertex]
         point, holders = self._points[place], self._members[place]
         others = [
             c for other, c in enumerate(self._charts) if other != number and other not in holders

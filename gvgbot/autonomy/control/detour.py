@@ -55,13 +55,14 @@ def detour(
 
     `is_free` tells whether one can drive along points (M, 2). Who ends beside a body, goes there.
     """
-    for number, (centre, size) in enumerate(bodies):
-        others = bodies[:number] + bodies[number + 1 :]
+    along = sorted(bodies, key=lambda one: int(np.hypot(*(line - one[0]).T).argmin()))
+    for number, (centre, size) in enumerate(along):
+        others = along[:number] + along[number + 1 :]
         for gap in _PASSES_M:
             if not _blocks(line, centre, radius + size + _PASSES_M[-1]):
                 break
             ways = _ways_round(line, centre, radius + size + gap)
-            free = (w for w in ways if is_free(w) and _is_past(w, others, radius))
+            free = (w for w in ways if is_free(w) and _keeps_off(w, others, radius, line))
             line = next(free, line)
     return line
 
@@ -81,7 +82,7 @@ def peek(line: Array, bodies: list[Disc], radius: float, is_free: Callable[[Arra
             is_beside = np.hypot(*(way - centre).T) < radius + size + _PASSES_M[0] + _SPACING_M
             passed = np.flatnonzero(is_beside & ((way - centre) @ onwards > 0.0))
             beside = way[: int(passed[0])] if len(passed) else way[:0]
-            if len(beside) > 1 and is_free(beside) and _is_past(beside, bodies, radius):
+            if len(beside) > 1 and is_free(beside) and _keeps_off(beside, bodies, radius, way[:1]):
                 return beside
     before = np.hypot(*(through - centre).T) < radius + size + _PASSES_M[-1]
     count = int(np.argmax(before))
@@ -95,12 +96,16 @@ def _blocks(line: Array, centre: Array, reach: float) -> bool:
     return bool(away.min() < reach <= away[-1])
 
 
-def _is_past(way: Array, bodies: list[Disc], radius: float) -> bool:
-    """Whether a way keeps off other bodies, or comes no nearer to them than at its beginning."""
+def _keeps_off(way: Array, bodies: list[Disc], radius: float, line: Array) -> bool:
+    """Whether a way blocks no body, or comes no nearer to it than a line (N, 2) does."""
     return not any(
-        _blocks(way, centre, min(radius + size + _PASSES_M[-1], math.dist(way[0], centre)))
+        _blocks(way, centre, min(radius + size + _PASSES_M[-1], _distance(line, centre)))
         for centre, size in bodies
     )
+
+
+def _distance(line: Array, point: Array) -> float:
+    return float(np.hypot(*(line - point).T).min())
 
 
 def _ways_round(line: Array, centre: Array, reach: float) -> list[Array]:

@@ -7,11 +7,16 @@ import numpy as np
 import pytest
 
 from gvgbot.geometry import Pose, resampled
-from gvgbot.team.chart import ChartWay
+from gvgbot.team.chart import Chart, ChartWay
 from gvgbot.team.site import Site
 from tests.unit.team.building import Building, irregular, lattice
 
 HERE = Pose()
+
+
+def driven(chart: Chart) -> Chart:
+    """The chart of a robot that has driven all that it has seen followed."""
+    return replace(chart, edges={k: replace(e, traversed=True) for k, e in chart.edges.items()})
 
 
 def test_what_another_robot_has_followed_is_no_frontier() -> None:
@@ -74,8 +79,7 @@ def test_a_vertex_where_another_robot_drove_and_found_none_is_no_frontier() -> N
     places = np.array([(0.0, 0.0), (6.0, 0.0), (12.0, 0.0), (6.0, 5.0)])
     with_side = Building(places, ((0, 1), (1, 2), (1, 3))).chart({1}, HERE)
     straight = Building(places, ((0, 2),)).chart({0, 2}, HERE)
-    edges = {key: replace(edge, traversed=True) for key, edge in straight.edges.items()}
-    for charts in permutations([with_side, replace(straight, edges=edges)]):
+    for charts in permutations([with_side, driven(straight)]):
         assert not Site(list(charts)).open
 
 
@@ -83,13 +87,32 @@ def test_a_vertex_that_a_robot_has_been_at_is_one_though_another_one_drove_past(
     places = np.array([(0.0, 0.0), (6.0, 0.0), (12.0, 0.0), (6.0, 5.0)])
     with_side = Building(places, ((0, 1), (1, 2), (1, 3))).chart({0, 1}, HERE)
     straight = Building(places, ((0, 2),)).chart({0, 2}, HERE)
-    both = [
-        replace(c, edges={k: replace(e, traversed=True) for k, e in c.edges.items()})
-        for c in (with_side, straight)
-    ]
-    for charts in permutations(both):
+    for charts in permutations([driven(with_side), driven(straight)]):
         (frontier,) = (f for many in Site(list(charts)).open.values() for f in many)
         assert frontier.bearing == pytest.approx(math.pi / 2)
+
+
+def test_a_departure_that_most_who_were_there_did_not_see_is_none() -> None:
+    places = np.array([(0.0, 0.0), (6.0, 0.0), (12.0, 0.0), (6.0, 5.0)])
+    with_side = Building(places, ((0, 1), (1, 2), (1, 3))).chart({0, 1, 2}, HERE)
+    without = driven(Building(places, ((0, 1), (1, 2))).chart({0, 1, 2}, HERE))
+    was_there = driven(with_side)
+    for charts in permutations([with_side, without]):  # one has only seen it from afar
+        assert not Site(list(charts)).open
+    for charts in permutations([was_there, without, without]):
+        assert not Site(list(charts)).open
+    for charts in permutations([was_there, was_there, without]):
+        is_seen = charts[0] is was_there
+        assert bool(Site(list(charts)).own) == bool(Site(list(charts)).open) == is_seen
+
+
+def test_of_two_who_were_there_the_one_that_saw_a_departure_takes_it() -> None:
+    places = np.array([(0.0, 0.0), (6.0, 0.0), (12.0, 0.0), (6.0, 5.0)])
+    with_side = driven(Building(places, ((0, 1), (1, 2), (1, 3))).chart({0, 1, 2}, HERE))
+    without = driven(Building(places, ((0, 1), (1, 2))).chart({0, 1, 2}, HERE))
+    (frontier,) = Site([with_side, without]).own.values()
+    assert frontier.bearing == pytest.approx(math.pi / 2)
+    assert not Site([without, with_side]).open
 
 
 def way(*corners: tuple[float, float]) -> ChartWay:

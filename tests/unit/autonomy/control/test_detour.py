@@ -82,6 +82,15 @@ def test_it_is_not_led_round_one_into_another() -> None:
     assert line[:, 1].max() > TOUCH
 
 
+def test_it_is_led_round_one_after_the_other() -> None:
+    bodies = [disc(3.6, 0.1), disc(2.2, 0.0)]  # so near that the ways round them meet
+    for room in (between(-1.0, 1.0), between(-0.7, 1.0)):
+        line = detour(EAST, bodies, RADIUS, room)
+        assert min(gap(line, 3.6, 0.1), gap(line, 2.2, 0.0)) > LITTLE - 0.02
+        assert length(line) < 6.6
+        assert (line[[0, -1]] == EAST[[0, -1]]).all()
+
+
 def test_who_stands_too_near_to_another_one_gets_away_from_it_at_once() -> None:
     line = detour(EAST, [disc(0.48, 0.0)], RADIUS, anywhere)
     away = np.hypot(*(line - [0.48, 0.0]).T)
