@@ -1,6 +1,6 @@
 """What the map learns from where the robot drives: edges that it has followed to their ends."""
 
-from collections import deque
+from collections import Counter, deque
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -19,6 +19,7 @@ _APART_M, _TOGETHER_M = 0.5, 0.2  # two ways that are farther apart, or no farth
 _FROM_VERTEX_M = 1.0  # nearer to one there is no second one that was missed
 _LEAST_PART_M, _MOST_STRAYS = 0.3, 100  # of an edge, that are worth telling
 _LEAST_LOST_M = 1.0  # less than before: it does not only go back over it
+_TIMES_MISSED = 3  # driven past without being found, a vertex is none
 _IN_CLEAR_M = 2.0  # from a vertex, it is seen which departures it has
 
 
@@ -41,6 +42,7 @@ class DrivenEdges:
         # from no vertex, now, and from vertices that were none: map frame, and least clearance
         self._loose: tuple[Array, float] | None = None
         self._strays: deque[tuple[Array, float]] = deque(maxlen=_MOST_STRAYS)
+        self._missed = Counter[int]()  # how often vertices were driven past as if they were none
 
     def learn(self, view: View, known: Correspondence, place: Place, where: Whereabouts) -> None:
         """Account for the robot's present place, `where` included."""
@@ -101,6 +103,7 @@ class DrivenEdges:
             self._mapper.unsettled.note_way(edge, arrived.vertex)
             edge.traversals += 1
             edge.doubted_since = None
+            self._note_missed(view, known, edge.other(left).vertex, arrived)
             return
         far, near = graph.half_edge(arrived), graph.half_edge(left)
         if far is None or near is None or near.edge is not None:
@@ -116,6 +119,22 @@ class DrivenEdges:
             self._mapper.join(view, left, arrived, passage.line, passage.narrowest, driven=True)
         elif graph.half_edge(left) is not None:
             self._join_fork(view, left, arrived, passage)
+
+    def _note_missed(
+        self, view: View, known: Correspondence, between: int, arrived: HalfEdgeId
+    ) -> None:
+        """Count that the robot found no vertex where the known way has one between its ends.
+
+        Seen from elsewhere, through glass, there was one; who drives there again and again knows.
+        """
+        edge = self._mapper.graph.edge_at(arrived)
+        is_between = edge is not None and edge.other(arrived).vertex == between != arrived.vertex
+        if not is_between or between in known.node_of:
+            return
+        self._missed[between] += 1
+        if self._missed[between] >= _TIMES_MISSED:
+            del self._missed[between]
+            self._mapper.driven_past(view, self._mapper.graph.vertices[between])
 
     def _join_fork(
         self, view: View, left: HalfEdgeId, arrived: HalfEdgeId, passage: Passage

@@ -144,11 +144,7 @@ class Mapper(Knowledge):
             known.pair(node, vertex.id)
             self._evidence.pair_departures(view, view.gvg.nodes[node], vertex, known)
         for vertex, reason in self._evidence.refuted(view, known):
-            place = self.in_local_frame(view, vertex.id)
-            bearings = tuple(half.bearing + place.theta for half in vertex.half_edges.values())
-            self._unbelieved.note_mistake(Mistake(place.position, bearings, view.travelled))
-            if not self.graph.leave_ring(vertex):
-                self.remove(view, vertex, reason)
+            self._refute(view, vertex, reason)
         self._join(view, known)
         return known, self._events
 
@@ -395,6 +391,20 @@ class Mapper(Knowledge):
         """Take out vertices that hang together with nothing, if there is anything to hang on to."""
         for vertex in strays(self.graph):
             self.remove(view, vertex, "nothing leads there")
+
+    def driven_past(self, view: View, vertex: Vertex) -> None:
+        """Take out a vertex over whose place the robot drove and found none."""
+        place = self.in_local_frame(view, vertex.id).position
+        if not vertex.established and not self._unbelieved.is_stubborn(place):
+            self._refute(view, vertex, "it was driven past")
+
+    def _refute(self, view: View, vertex: Vertex, reason: str) -> None:
+        """Take a vertex out for a mistake, which it would be once more if it is seen again."""
+        place = self.in_local_frame(view, vertex.id)
+        bearings = tuple(half.bearing + place.theta for half in vertex.half_edges.values())
+        self._unbelieved.note_mistake(Mistake(place.position, bearings, view.travelled))
+        if not self.graph.leave_ring(vertex):
+            self.remove(view, vertex, reason)
 
     def remove(self, view: View, vertex: Vertex, reason: str) -> None:
         """Take a vertex out of the map; of two edges that met there one is made."""

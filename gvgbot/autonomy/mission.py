@@ -18,7 +18,7 @@ from gvgbot.autonomy.exploration.access import NEAR_M, access, way_to_edge
 from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.exploration.hindrance import Hindrance
 from gvgbot.autonomy.exploration.obstructions import Obstructions
-from gvgbot.autonomy.exploration.paths import Approach
+from gvgbot.autonomy.exploration.paths import Approach, shortest_paths
 from gvgbot.autonomy.gvg.local import Branch, Place
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.neighbours import Neighbours
@@ -281,9 +281,8 @@ class Mission:
         return nearer
 
     def _commit(self, view: View, here: Situation, chosen: HalfEdgeId, reason: str) -> None:
-        starts = here.starts()
-        away = max((s.metres for s in starts), default=0.0)
-        self._progress.set_out(view, chosen, away, self._config)
+        way = shortest_paths(self._mapper.graph, here.starts()).get(chosen.vertex)
+        self._progress.set_out(view, chosen, 0.0 if way is None else way.metres, self._config)
         self._looked_around = 0
         self._backtracking.renew()
         self._examination.end()

@@ -25,12 +25,12 @@ class Progress:
         self._newest_m = 0.0  # of the target edge that has been driven
 
     def set_out(
-        self, view: View, target: HalfEdgeId, away_m: float, config: ExplorationConfig
+        self, view: View, target: HalfEdgeId, way_m: float, config: ExplorationConfig
     ) -> None:
-        """Take a frontier for the target, whose edge is that far at most."""
+        """Take a frontier for the target, to which it is so far."""
         self._attempts.begin(self._place_of(target))
         self._newest_m = 0.0
-        self._budget_m = view.travelled + 2 * (away_m + self._known_m) + config.patience_m
+        self._budget_m = view.travelled + 2 * way_m + config.patience_m
 
     def come_to_an_end(self) -> None:
         """The target is explored, or gone."""

@@ -198,3 +198,26 @@ def test_what_was_driven_before_it_turned_round_was_driven() -> None:
     drive.along(STREET, {}, (3.8, 0.0), (3.4, 0.0))
     longest = max(drive.parts, key=lambda part: float(np.ptp(part[0][:, 0])))[0]
     assert np.ptp(longest[:, 0]) == pytest.approx(3.0, abs=0.2)
+
+
+@pytest.mark.parametrize("established", [False, True])
+def test_a_vertex_that_it_drives_past_again_and_again_is_none(*, established: bool) -> None:
+    """Between vertices 1 and 2 one was seen, with a way to the south; the street leads past it."""
+    drive = Drive(HalfEdgeId(1, EAST))
+    graph, between = drive.mapper.graph, Vertex(3, 1.0, Pose(2.5, -0.7, 0.0), 0.0, 0.0)
+    between.established = established
+    graph.vertices[3], graph.serial = between, 3
+    west, east, _ = (between.add_half_edge(bearing) for bearing in (np.pi, 0.0, -np.pi / 2))
+    drive.mapper.belief = ekf.add_vertex(drive.mapper.belief, 3, between.local, 1e-4 * np.eye(3))
+    halves = (HalfEdgeId(1, EAST), HalfEdgeId(3, west)), (HalfEdgeId(3, east), HalfEdgeId(2, WEST))
+    for ends, half in zip(halves, ([(0, 0), (2.5, -0.7)], [(0, 0), (2.5, 0.7)]), strict=True):
+        graph.join(*ends, resampled(half), 1.0, driven=False)
+    beyond = {branch: end for branch, end in ALL_SEEN.items() if end.vertex == 2}
+    for _ in range(3):
+        assert 3 in graph.vertices
+        drive.where = Whereabouts(HalfEdgeId(1, EAST), [np.zeros(2)])
+        drive.along(STREET, beyond, (0.5, 0.0), (6.0, 0.0))
+    assert (3 in graph.vertices) == established
+    if not established:
+        (edge,) = graph.edges.values()
+        assert {edge.a, edge.b} == {HalfEdgeId(1, EAST), HalfEdgeId(2, WEST)}
