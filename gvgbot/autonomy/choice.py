@@ -27,7 +27,8 @@ class Choice:
     def is_left_to_others(self) -> bool:
         """Whether there are frontiers, but others have followed all of them."""
         is_done = self.sharing is not None and self.sharing.is_done
-        return is_done and bool(self._mapper.graph.frontiers())
+        graph = self._mapper.graph
+        return is_done and bool(graph.frontiers() or not graph.vertices)
 
     def ear(self, explored: HalfEdgeId | None) -> HalfEdgeId | None:
         """By the ear rule, at the end of the edge just explored, if that is the policy."""

@@ -227,21 +227,30 @@ class Mission:
 
     def _ahead(self, view: View, here: Situation) -> tuple[Branch, ...]:
         """Straight on; before a vertex is known, once back if others have driven what is ahead."""
-        path, sharing = here.ahead(), self.choice.sharing
-        if sharing is None or self._has_turned or self._mapper.graph.vertices:
+        path = here.ahead()
+        if self.choice.sharing is None or self._has_turned or self._mapper.graph.vertices:
             return path
+        if self._leads_over_driven(view, here, path, either_way=False):
+            self._has_turned = self.where.turn_round()
+        return here.ahead()
+
+    def _leads_over_driven(
+        self, view: View, here: Situation, path: tuple[Branch, ...], *, either_way: bool
+    ) -> bool:
+        """Whether other robots have driven what is ahead on a path."""
         line, _ = here.line_along(path)
         away = np.hypot(*(line - view.local_base.position).T)
         ahead = line[(away > _LED_M[0]) & (away < _LED_M[1])]
         map_local = self._mapper.belief.map_base.compose(view.local_base.inverse())
-        if len(ahead) and sharing.has_driven(map_local.transform(ahead)):
-            self._has_turned = self.where.turn_round()
-        return here.ahead()
+        line, sharing = map_local.transform(ahead), self.choice.sharing
+        return sharing is not None and sharing.has_driven(line, either_way=either_way)
 
     def _choose(self, view: View, here: Situation) -> HalfEdgeId | None:
         """The next frontier, by the policy."""
         graph = self._mapper.graph
-        if not graph.vertices:
+        if not graph.vertices and not self._leads_over_driven(
+            view, here, here.ahead(), either_way=True
+        ):
             return None
         chosen, reason = self.choice.ear(self.target), "ear"
         if chosen is None:

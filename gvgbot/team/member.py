@@ -420,9 +420,10 @@ class Member:
             if not self._is_taken(frontier, cost, claims)
         ]
         may_come = any(self._is_busy(name) for name in self.others())
-        self._is_idle = bool(reached) and not costs
+        is_placed = bool(reached) or (not graph.vertices and site.is_explored)
+        self._is_idle = is_placed and not costs
         self._nothing_left = self._is_idle and not may_come
-        self._others_claim_all = bool(reached) and not mine and (bool(costs) or may_come)
+        self._others_claim_all = is_placed and not mine and (bool(costs) or may_come)
         if not mine:
             self._claim = self._claimed_end = None
             return None
@@ -478,7 +479,7 @@ class Member:
         self._claim = Claim(claim.x, claim.y, claim.bearing, max(0.0, cost))
         return not self._is_taken(frontier, cost, self._claims())
 
-    def has_driven(self, line: Array) -> bool:
+    def has_driven(self, line: Array, *, either_way: bool = False) -> bool:
         """Whether others have driven along a line (N, 2) the same way; see `Sharing`."""
         ways = [pose.transform(w.polyline) for c, pose in self.charts.values() for w in c.ways]
         if not ways or len(line) < 2:
@@ -486,7 +487,8 @@ class Member:
         away, nearest = cKDTree(np.concatenate(ways)).query(line)
         onwards = np.concatenate([np.gradient(way, axis=0) for way in ways])[nearest]
         is_same_way = (onwards * np.gradient(line, axis=0)).sum(axis=1) > 0.0
-        return bool(np.max(away) < BESIDE_M and is_same_way.mean() > _MOSTLY)
+        is_on_way = np.max(away) < BESIDE_M
+        return bool(is_on_way and (either_way or is_same_way.mean() > _MOSTLY))
 
     @property
     def is_waiting(self) -> bool:

@@ -71,6 +71,11 @@ class Site:
                     if departure.edge is None:
                         self._judge(number, HalfEdgeId(vertex.id, departure.key), departure)
 
+    @property
+    def is_explored(self) -> bool:
+        """Whether there are places, and no departure from any of them is open."""
+        return bool(self._points) and not self.open
+
     def _lay(self, number: int, chart: Chart) -> None:
         """Let vertices of one more chart be at known places, or at new ones."""
         from scipy.optimize import linear_sum_assignment

@@ -22,6 +22,7 @@ _SAME_RAD = 0.7  # directions nearer to each other are one
 _LEAST_M = 0.3  # of a way that is gone on with
 _MOST = 16  # pieces
 _SPACING_M = 0.1
+_ASTRAY, _CUT = 20, 3  # points at the end of a way that may lead astray, cut off so many at a time
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,24 +60,35 @@ class Ways:
 
     def behind(self, place: int, bearing: float) -> Walk | None:
         """The way from a place in a direction, rad, to the next place; None if it is not known."""
-        here, ahead, metres = self._places[place], bearing, 0.0
         pieces, used = list[Array](), set[int]()
-        for _ in range(_MOST):
-            found = self._onwards(here, ahead, used, _GAP_M if pieces else BESIDE_M)
-            if found is None:
-                return None
+        found = self._onwards(self._places[place], bearing, used, BESIDE_M)
+        while found is not None and len(used) < _MOST:
             number, piece = found
             used.add(number)
-            arrived = self._arrival(piece, place if metres < _AHEAD_M else -1)
+            is_near = sum(map(length_of, pieces)) < _AHEAD_M
+            arrived = self._arrival(piece, place if is_near else -1)
             pieces.append(piece if arrived is None else piece[: arrived[1] + 1])
-            metres += length_of(pieces[-1])
             if arrived is not None:
                 line = np.concatenate(pieces)
                 if len(line) < 2:  # two vertices at one place
                     return None
                 clearance = min(self._clearances[k] for k in used)
                 return Walk(arrived[0], line, clearance, length_of(line))
-            here, ahead = piece[-1], _direction(piece[::-1]) + math.pi
+            found = self._beyond(pieces, used)
+        return None
+
+    def _beyond(self, pieces: list[Array], used: set[int]) -> tuple[int, Array] | None:
+        """The line that goes on from the last piece, and its number; see `_onwards`.
+
+        Where robots meet they go round each other: such an end is cut off if nothing goes on there.
+        """
+        last = pieces[-1]
+        for count in range(len(last), max(1, len(last) - _ASTRAY), -_CUT):
+            here = last[count - 1 :: -1]
+            found = self._onwards(here[0], _direction(here) + math.pi, used, _GAP_M)
+            if found is not None:
+                pieces[-1] = last[:count]
+                return found
         return None
 
     def _onwards(
@@ -87,12 +99,13 @@ class Ways:
         best: tuple[int, Array] | None = None
         for number in sorted(set(near.tolist()) - used):
             line = self._lines[number]
-            i = int(np.hypot(*(line - here).T).argmin())
-            dx, dy = line[i] - here
+            dx, dy = (line - here).T
             along = dx * math.cos(ahead) + dy * math.sin(ahead)
             aside = dy * math.cos(ahead) - dx * math.sin(ahead)
-            if abs(aside) > BESIDE_M or not -BESIDE_M < along < gap:
+            is_ahead = (np.abs(aside) <= BESIDE_M) & (along > -BESIDE_M) & (along < gap)
+            if not is_ahead.any():
                 continue
+            i = int(np.where(is_ahead, np.hypot(dx, dy), np.inf).argmin())
             for rest in (line[i:], line[i::-1]):
                 least = _LEAST_M if best is None else length_of(best[1])
                 turned = abs(wrap_angle(_direction(rest) - ahead)) if len(rest) > 1 else math.pi

@@ -11,7 +11,10 @@ class Sharing(Protocol):
     """Shares the frontiers with other robots."""
 
     def choose(self, graph: GvgGraph, starts: list[Approach]) -> tuple[HalfEdgeId, Approach] | None:
-        """The frontier that is worth most to this robot, and the way there; None: not one."""
+        """The frontier that is worth most to this robot, and the way there; None: not one.
+
+        Who asks without a vertex of its own is where others have driven.
+        """
 
     def keeps(self, target: HalfEdgeId, graph: GvgGraph, starts: list[Approach]) -> bool:
         """Whether a frontier is still worth a drive of this robot.
@@ -19,8 +22,11 @@ class Sharing(Protocol):
         Who follows it starts from its vertex, with less than no metres.
         """
 
-    def has_driven(self, line: Array) -> bool:
-        """Whether others have driven along a line (N, 2), m, map frame, in its direction."""
+    def has_driven(self, line: Array, *, either_way: bool = False) -> bool:
+        """Whether others have driven along a line (N, 2), m, map frame, in its direction.
+
+        With `either_way` that may have been against it.
+        """
 
     @property
     def is_waiting(self) -> bool:

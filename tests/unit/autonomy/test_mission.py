@@ -493,7 +493,7 @@ class Alone:
     def keeps(self, target: HalfEdgeId, graph: GvgGraph, starts: list[Approach]) -> bool:
         return True
 
-    def has_driven(self, line: Array) -> bool:
+    def has_driven(self, line: Array, *, either_way: bool = False) -> bool:
         return False
 
 
@@ -502,7 +502,7 @@ class Led(Alone):
 
     is_led = False
 
-    def has_driven(self, line: Array) -> bool:
+    def has_driven(self, line: Array, *, either_way: bool = False) -> bool:
         return self.is_led
 
 
@@ -513,6 +513,31 @@ def test_who_knows_no_vertex_turns_round_once_where_others_have_driven_on() -> N
     others.is_led = True
     assert end_of(robot.look(PLAIN)) == pytest.approx((-3.0, 0.0))
     assert end_of(robot.drive(PLAIN, (2.0, 0.0), (1.0, 0.0))) == pytest.approx((-3.0, 0.0))
+
+
+class Following(Led):
+    """Others have driven everywhere and leave nothing, some of them from some time on."""
+
+    is_led = True
+
+    def choose(self, graph: GvgGraph, starts: list[Approach]) -> None:
+        return None
+
+
+def test_who_knows_no_vertex_where_others_have_driven_all_waits_for_them_and_ends() -> None:
+    robot, others = Robot(), Following()
+    robot.mission.choice.sharing = others
+    assert isinstance(robot.look(PLAIN), Drive)
+    others.is_waiting = True
+    assert isinstance(robot.look(PLAIN), Stand)
+    assert robot.mission.outcome is None
+    others.is_waiting, others.is_done = False, True
+    others.is_led = False  # ahead is what nobody has driven
+    assert isinstance(robot.look(PLAIN), Drive)
+    assert robot.mission.outcome is None
+    others.is_led = True
+    robot.look(PLAIN)
+    assert robot.mission.outcome == "explored"
 
 
 class Last(Alone):

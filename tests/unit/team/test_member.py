@@ -167,7 +167,29 @@ def test_what_others_have_driven_and_what_they_have_not() -> None:
     two.tell(3.0, one)
     assert one.member.has_driven(line)
     assert not one.member.has_driven(line[::-1])
+    assert one.member.has_driven(line[::-1], either_way=True)
     assert not one.member.has_driven(np.concatenate([line, line[-1:] + 2.0]))
+
+
+@pytest.mark.parametrize("is_all_known", [True, False])
+def test_who_has_no_vertex_waits_and_ends_only_if_the_others_know_all(
+    *, is_all_known: bool
+) -> None:
+    building = irregular(1)
+    one = Robot(Member("one", CONFIG, Chart, radius=RADIUS["one"]), Chart(), 0)
+    two = robot("two", building, set(range(len(building.places))) if is_all_known else RIGHT, 14)
+    two.tell(1.0, one)
+    one.member.settle(
+        Comparison("two", 0, Chart(), Chart(), None),
+        Alignment(START["one"].to(START["two"]), np.eye(3) * 1e-6, (), 1.0),
+    )
+    for is_busy in (True, False):
+        assert one.member.choose(GvgGraph(), []) is None
+        assert one.member.is_waiting == (is_all_known and is_busy)
+        assert one.member.is_done == (is_all_known and not is_busy)
+        one.tell(2.0, two)
+        two.choose()
+        two.tell(2.0, one, finished=not is_all_known)
 
 
 def test_what_a_lost_robot_was_about_to_do_is_free_again() -> None:

@@ -45,6 +45,16 @@ def test_who_started_in_the_middle_has_driven_over_where_others_were() -> None:
         assert walk.length == pytest.approx(10.0, abs=0.1)
 
 
+@pytest.mark.parametrize(("start", "bearing"), [(0, EAST), (1, WEST)])
+def test_where_one_went_round_the_other_its_way_does_not_end(start: int, bearing: float) -> None:
+    round_it = straight((0.0, 0.0), (4.6, 0.0), (5.1, 0.6)), 0.7
+    walk = Ways([round_it, FROM_EAST], PLACES).behind(start, bearing)
+    assert walk is not None
+    assert walk.place == 1 - start
+    assert walk.length == pytest.approx(10.0, abs=0.3)
+    assert np.abs(walk.line[:, 1]).max() < 0.4
+
+
 @pytest.mark.parametrize(
     "other",
     [
