@@ -172,9 +172,7 @@ def test_what_others_have_driven_and_what_they_have_not() -> None:
 
 
 @pytest.mark.parametrize("is_all_known", [True, False])
-def test_who_has_no_vertex_waits_and_ends_only_if_the_others_know_all(
-    *, is_all_known: bool
-) -> None:
+def test_who_has_no_vertex_waits_and_ends_if_the_others_know_all(*, is_all_known: bool) -> None:
     building = irregular(1)
     one = Robot(Member("one", CONFIG, Chart, radius=RADIUS["one"]), Chart(), 0)
     two = robot("two", building, set(range(len(building.places))) if is_all_known else RIGHT, 14)
