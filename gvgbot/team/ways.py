@@ -12,6 +12,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
+from gvgbot.autonomy.whereabouts import LEAST_LOOP_M
 from gvgbot.geometry import Array, length_of, resampled, wrap_angle
 
 WELL_ON_M = 3.0  # beyond a vertex, who did not see it is as right as who did
@@ -65,8 +66,7 @@ class Ways:
         while found is not None and len(used) < _MOST:
             number, piece = found
             used.add(number)
-            is_near = sum(map(length_of, pieces)) < _AHEAD_M
-            arrived = self._arrival(piece, place if is_near else -1)
+            arrived = self._arrival(piece, place, sum(map(length_of, pieces)))
             pieces.append(piece if arrived is None else piece[: arrived[1] + 1])
             if arrived is not None:
                 line = np.concatenate(pieces)
@@ -113,15 +113,14 @@ class Ways:
                     best = number, rest
         return best
 
-    def _arrival(self, line: Array, start: int) -> tuple[int, int] | None:
+    def _arrival(self, line: Array, start: int, before: float) -> tuple[int, int] | None:
         """The first place that a line leads to, and the index of its point there.
 
-        It leads away from its start first.
+        To its start it leads only round something, metres `before` it included.
         """
         away = cdist(line, self._places)
-        if start >= 0:
-            steps = np.hypot(*np.diff(line, axis=0).T)
-            away[: 1 + int(np.searchsorted(steps.cumsum(), _AHEAD_M)), start] = math.inf
+        steps = np.hypot(*np.diff(line, axis=0).T)
+        away[: 1 + int(np.searchsorted(steps.cumsum(), LEAST_LOOP_M - before)), start] = math.inf
         on = np.flatnonzero((away < BESIDE_M).any(axis=1))
         if not len(on):
             return None

@@ -93,3 +93,12 @@ def test_a_loop_comes_back_to_its_vertex() -> None:
     assert walk is not None
     assert walk.place == 0
     assert walk.length == pytest.approx(8.0 * math.pi, rel=0.01)
+
+
+def test_who_turned_on_the_spot_has_not_driven_round_anything() -> None:
+    there_and_back = straight((0.0, 0.0), (1.0, 0.0), (1.0, 0.1), (0.0, 0.1)), 0.5
+    assert Ways([there_and_back], PLACES[:1]).behind(0, EAST) is None
+    round_it = straight((0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0), (0.0, 0.0)), 0.5
+    walk = Ways([round_it], PLACES[:1]).behind(0, EAST)
+    assert walk is not None
+    assert (walk.place, walk.length) == (0, pytest.approx(8.0, abs=0.1))
