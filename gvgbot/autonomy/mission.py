@@ -322,14 +322,18 @@ class Mission:
     def _make_way(self, view: View, here: Situation) -> Order:
         """Stand, where others can pass."""
         way = self._neighbours.way_aside(here)
-        return Stand() if way is None else self._drive(view, here, way)
+        if way is None:
+            return Stand()
+        line, room = here.line_along(way)
+        free = self._neighbours.free_metres(view, line)
+        return Stand() if free < ARRIVED_M else Drive(Track.of(line, room).until(free))
 
     def _drive(self, view: View, here: Situation, path: tuple[Branch, ...]) -> Order:
         line, room = here.line_along(path)
         free = self._neighbours.free_metres(view, line)
         if free < ARRIVED_M:
             self._hindrance.hold()
-            return Stand()
+            return self._make_way(view, here)
         track = Track.of(line, room).until(free)
         end = view.gvg.end_of(path[-1])
         waited = self._progress.headway.waited(view.stamp)

@@ -19,9 +19,11 @@ _FACING_M = 1.6  # from middle to middle: who is as near may be held up by the o
 _SOONER, _LATER = 0.3, 2.0  # shares of the usual patience
 _ABREAST_M = 0.75  # from a wall on either side: with less, two cannot pass each other
 _ONE_WAY_M = 0.5  # from middle to middle: courses so near to each other lead over one place
+_OVER = 4  # points of a line, to either side, tell its direction
 _EQUAL_M = 1.0  # who is nearer by less than this is not nearer for sure
 _CLEAR_OF_IT_M = 0.6  # before a narrow place, there is room to come out of it
 _NEAR_M = 4.0  # so far a robot goes that waits, to be in nobody's way
+_ASTRAY_M = 0.05  # a way that leads away from a robot may come so much nearer to it
 _ASIDE_M = 0.5  # beyond the disc of a vertex, another robot can pass it
 
 
@@ -107,7 +109,7 @@ def _end_of_way(line: Array, stations: Array, from_walls: Array, other: Companio
         return math.inf
     away = np.hypot(*(line[:, None] - course[None]).transpose(2, 0, 1))
     nearest = away.argmin(axis=1)
-    opposed = (np.gradient(line, axis=0) * np.gradient(course, axis=0)[nearest]).sum(axis=1) < 0.0
+    opposed = (_directions(line) * np.gradient(course, axis=0)[nearest]).sum(axis=1) < 0.0
     shared = opposed & (from_walls < _ABREAST_M) & (away.min(axis=1) < _ONE_WAY_M)
     if not shared.any():
         return math.inf
@@ -115,6 +117,17 @@ def _end_of_way(line: Array, stations: Array, from_walls: Array, other: Companio
     theirs = float(_stations(course)[nearest[shared]].min())
     is_first = theirs < mine if abs(theirs - mine) > _EQUAL_M else other.goes_first
     return max(0.0, mine - _CLEAR_OF_IT_M) if is_first else math.inf
+
+
+def _directions(line: Array) -> Array:
+    """Which way a line (N, 2) leads at its points, over some of them: where it sets out it jitters.
+
+    As vectors (N, 2) of any length.
+    """
+    ahead = np.minimum(np.arange(len(line)) + _OVER, len(line) - 1)
+    behind = np.maximum(np.arange(len(line)) - _OVER, 0)
+    directions: Array = line[ahead] - line[behind]
+    return directions
 
 
 def _stations(line: Array) -> Array:
@@ -180,8 +193,9 @@ def wide_place(gvg: LocalGvg, place: Place, company: list[Companion]) -> tuple[B
 
 
 def _stands_on(line: Array, one: Companion) -> bool:
-    """Whether there is no way past another robot along a line (N, 2)."""
-    return float(np.hypot(*(line - one.pose.position).T).min()) < _ONE_WAY_M
+    """Whether a line (N, 2) leads towards another robot, and not past it."""
+    away = np.hypot(*(line - one.pose.position).T)
+    return float(away.min()) < min(_ONE_WAY_M, float(away[0]) - _ASTRAY_M)
 
 
 def _straightness(gvg: LocalGvg, way: tuple[Branch, ...]) -> float:

@@ -168,6 +168,8 @@ def test_who_waits_in_a_door_goes_out_of_it_to_the_nearer_side_where_nobody_stan
     assert out_of_the_door(-0.1) == west
     assert out_of_the_door(0.1, 0.7) == west
     assert out_of_the_door(0.1, 0.7, -0.7) is None
+    assert out_of_the_door(0.1, -0.35) == east  # from who stands in the door with it
+    assert out_of_the_door(0.1, 0.55) == west
     assert out_of_the_door(0.5) is None  # two can pass each other there
 
 
@@ -204,6 +206,12 @@ def test_of_two_that_come_to_a_door_exactly_one_waits(mine: float, theirs: float
     stops = min(way - (mine, theirs)[k] for k, way in enumerate(ways))
     if max(mine, theirs) > 1.5:
         assert stops < -0.8  # so far before the door, there is room to come out of it
+
+
+def test_a_step_back_where_one_sets_out_does_not_make_a_way_one_that_is_opposed() -> None:
+    mine = np.concatenate([[[-0.29, 0.0], [-0.295, 0.001]], straight(-0.3, 3.0)])
+    behind = straight(-0.8, 3.0)
+    assert math.isinf(free(mine, behind, goes_first=True))
 
 
 def test_nobody_waits_for_who_goes_the_same_way_or_passes_elsewhere() -> None:
