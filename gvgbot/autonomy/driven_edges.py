@@ -71,12 +71,12 @@ class DrivenEdges:
         before, self._loose = self._loose, None
         if len(where.trail) > 1:
             line = np.array(where.trail)
-            if end is None:
+            if end is None or half is None:  # perhaps its vertex was none
                 map_local = belief.map_base.compose(view.local_base.inverse())
                 self._loose = map_local.transform(line), where.narrowest
                 if before is not None and length_of(line) < length_of(before[0]) - _LEAST_LOST_M:
                     self._strays.append(before)  # it has turned round, or is on another edge
-            elif half is not None:
+            else:
                 line = graph.vertices[end.vertex].local.inverse().transform(line)
                 if end not in self._parts or length_of(self._parts[end].line) < length_of(line):
                     self._parts[end] = _Part(line, where.narrowest)

@@ -188,6 +188,8 @@ def test_what_was_driven_from_a_vertex_that_was_none_was_driven_all_the_same() -
     (line, clearance), (known, before_clearance) = drive.parts[0], before[0]
     np.testing.assert_array_equal(line, known)
     assert clearance == before_clearance
+    drive.along(STREET, {}, (3.1, 0.0), (4.5, 0.0))
+    assert max(np.ptp(line[:, 0]) for line, _ in drive.parts) == pytest.approx(4.5, abs=0.2)
 
 
 def test_what_was_driven_before_it_turned_round_was_driven() -> None:
