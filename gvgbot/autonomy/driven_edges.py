@@ -74,12 +74,13 @@ class DrivenEdges:
             if end is None or half is None:  # perhaps its vertex was none
                 map_local = belief.map_base.compose(view.local_base.inverse())
                 self._loose = map_local.transform(line), where.narrowest
-                if before is not None and length_of(line) < length_of(before[0]) - _LEAST_LOST_M:
-                    self._strays.append(before)  # it has turned round, or is on another edge
             else:
                 line = graph.vertices[end.vertex].local.inverse().transform(line)
                 if end not in self._parts or length_of(self._parts[end].line) < length_of(line):
                     self._parts[end] = _Part(line, where.narrowest)
+        left_m = 0.0 if self._loose is None else length_of(self._loose[0])
+        if before is not None and left_m < length_of(before[0]) - _LEAST_LOST_M:
+            self._strays.append(before)  # it has turned round, or is on another edge
         for end, part in list(self._parts.items()):
             half = graph.half_edge(end)
             if half is None:  # its vertex was none
@@ -96,6 +97,7 @@ class DrivenEdges:
             line = graph.vertices[arrived.vertex].local.inverse().transform(passage.line)
             self.start = StartEdge(arrived, line, passage.narrowest)
             self._parts[arrived] = _Part(line, passage.narrowest)
+            self._loose = None
         if left is None or arrived is None or left == arrived:
             return
         edge = graph.edge_at(left)

@@ -465,18 +465,18 @@ class Member:
 
     def keeps(self, target: HalfEdgeId, graph: GvgGraph, starts: list[Approach]) -> bool:
         """Whether the target is still what it was chosen for; see `Sharing`."""
-        claim = self._claim
-        if target != self._claimed_end or claim is None:
-            return True
-        site = self._current_site()
-        frontier = next(
-            (f for many in site.open.values() for f in many if self._is_claimed(f)), None
-        )
+        site, claim = self._current_site(), self._claim
+        if target == self._claimed_end:
+            frontiers = (f for many in site.open.values() for f in many if self._is_claimed(f))
+            frontier = next(frontiers, None)
+        else:  # the vertex from which that led was none: it is a departure before it
+            frontier = site.own.get(target)
         if frontier is None:
             return False
         metres = {vertex: way.metres for vertex, way in shortest_paths(graph, starts).items()}
-        cost, _ = site.costs(metres).get(frontier, (claim.metres, target))
-        self._claim = Claim(claim.x, claim.y, claim.bearing, max(0.0, cost))
+        cost, _ = site.costs(metres).get(frontier, (0.0 if claim is None else claim.metres, target))
+        self._claim = Claim(frontier.x, frontier.y, frontier.bearing, max(0.0, cost))
+        self._claimed_end = target
         return not self._is_taken(frontier, cost, self._claims())
 
     def has_driven(self, line: Array, *, either_way: bool = False) -> bool:

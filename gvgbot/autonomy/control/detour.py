@@ -12,6 +12,7 @@ from gvgbot.geometry import Array, resampled
 Disc = tuple[Array, float]  # centre (2,) and radius, m
 
 _PASSES_M = (0.32, 0.22, 0.17)  # between two bodies: the more, the more room there is
+_TOO_NEAR_M = 0.14  # between two bodies: one does not pass the other
 _TURNS_ASIDE_M = 0.8  # before a body, and as far behind it, it is on its line
 _KEEP_RIGHT_RAD = 1.0  # so much farther round, one passes on the right all the same
 _WIDENS_RAD = 0.3  # round a body that it is too near to, after which it is far enough
@@ -41,11 +42,32 @@ def led_round(
         return bool(not narrow.any() and near.known(way).all())
 
     line = detour(track.polyline, bodies, radius, is_free)
+    line = stepping_off(line, bodies, radius, is_free)
     if is_hidden:
         line = peek(line, bodies, radius, is_free)
     if line is track.polyline:
         return track
     return Track.of(line, np.asarray(near.tree().query(line)[0]))
+
+
+def stepping_off(
+    line: Array, bodies: list[Disc], radius: float, is_free: Callable[[Array], bool]
+) -> Array:
+    """The line (N, 2), begun by a step away from a body that is too near to pass; see `detour`."""
+    for number, (centre, size) in enumerate(bodies):
+        away = max(math.dist(line[0], centre), 1e-6)
+        if away >= radius + size + _TOO_NEAR_M:
+            continue
+        others = bodies[:number] + bodies[number + 1 :]
+        for gap in _PASSES_M:
+            off = centre + (line[0] - centre) * (radius + size + gap) / away
+            step = resampled(np.stack([line[0], off]), _SPACING_M)
+            if len(step) > 1 and is_free(step) and _keeps_off(step, others, radius, line):
+                beyond = np.hypot(*(line - line[0]).T) > math.dist(off, line[0])
+                return np.concatenate(
+                    [step, line[np.argmax(beyond) :] if beyond.any() else line[:0]]
+                )
+    return line
 
 
 def detour(

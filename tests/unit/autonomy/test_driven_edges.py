@@ -190,6 +190,9 @@ def test_what_was_driven_from_a_vertex_that_was_none_was_driven_all_the_same() -
     assert clearance == before_clearance
     drive.along(STREET, {}, (3.1, 0.0), (4.5, 0.0))
     assert max(np.ptp(line[:, 0]) for line, _ in drive.parts) == pytest.approx(4.5, abs=0.2)
+    drive.where.on_edge, drive.where.trail = HalfEdgeId(2, EAST), [np.array([5.0, 0.0])]
+    drive.along(STREET, {}, (5.2, 0.0), (6.0, 0.0))  # a vertex has been found, and left
+    assert max(np.ptp(line[:, 0]) for line, _ in drive.parts) == pytest.approx(4.5, abs=0.2)
 
 
 def test_what_was_driven_before_it_turned_round_was_driven() -> None:

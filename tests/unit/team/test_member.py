@@ -134,6 +134,20 @@ def test_a_frontier_goes_to_the_robot_that_is_nearer() -> None:
     assert one.member.keeps(mine[0], graph_of(one.chart), [Approach(0.0, HalfEdgeId(0, -1))])
 
 
+def test_who_is_on_another_departure_than_it_chose_keeps_it_only_if_nobody_followed_it() -> None:
+    """The vertex that it went to was none, and the way there goes on from the one before."""
+    one, _ = team()
+    chosen = one.choose()
+    assert chosen is not None
+    graph, start = graph_of(one.chart), [Approach(0.0, HalfEdgeId(0, -1))]
+    corridors = irregular(1).corridors
+    followed = {end for end in graph.frontiers() if {*corridors[end.key]} <= RIGHT}
+    kept = {end for end in graph.frontiers() if one.member.keeps(end, graph, start)}
+    assert followed
+    assert kept
+    assert kept == {*graph.frontiers()} - followed
+
+
 def test_who_follows_its_frontier_keeps_it_until_others_have_driven_it_from_the_far_end() -> None:
     building = Building(
         np.array([(0.0, 0.0), (10.0, 0.0), (0.0, 6.0), (10.0, 6.0), (-7.0, 0.0), (17.0, 0.0)]),
