@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.control.company import Companion
 from gvgbot.autonomy.control.orders import Drive, LookAround, Order, Stand
@@ -28,6 +29,15 @@ from tests.unit.autonomy.local_graphs import Point, drawn
 CONFIG = ExplorationConfig()
 NOTHING_SEEN = LocalMap(LocalMapConfig())
 
+
+class Narrow(LocalMap):
+    """A corridor along x, a metre wide."""
+
+    def tree(self) -> cKDTree:
+        x = np.linspace(-4.0, 9.0, 131)
+        return cKDTree(np.concatenate([np.stack([x, np.full_like(x, y)], 1) for y in (0.5, -0.5)]))
+
+
 # A corridor with a tee at x = 3, its branch to the south; all three arms go on unseen.
 TEE = drawn(
     {1: (-3.0, 0.0), 2: (3.0, 0.0), 3: (8.0, 0.0), 4: (3.0, -4.0)},
@@ -46,12 +56,12 @@ class Robot:
         self.mission = Mission(CONFIG, self.mapper)
         self.events: list[Event] = []
         self.stamp = self.travelled = 0.0
-        self.pose = Pose()
+        self.pose, self.walls = Pose(), NOTHING_SEEN
         self._count = 0
 
     def look(self, gvg: LocalGvg, *, period: float = 0.5) -> Order:
         """The order after one more view from where the robot is."""
-        view = View(self._count, self.stamp, self.travelled, self.pose, gvg, NOTHING_SEEN)
+        view = View(self._count, self.stamp, self.travelled, self.pose, gvg, self.walls)
         known, seen = self.mapper.observe(view)
         order, done = self.decide(view, known)
         self.events += [*seen, *done]
@@ -463,6 +473,21 @@ def test_who_has_nowhere_to_go_but_past_another_robot_makes_way() -> None:
         robot.pose, [Companion("other", Pose(-2.5, 0.0, 0.0), goes_first=True, radius=0.2)]
     )
     assert isinstance(robot.look(TEE), Stand)
+
+
+def test_who_has_to_wait_where_another_one_wants_to_come_through_goes_out_of_its_way() -> None:
+    """In a corridor that both only fit through one by one, before a tee that lies behind it."""
+    robot = Robot()
+    robot.walls = Narrow(LocalMapConfig())
+    robot.drive(TEE, (0.0, 0.0), (2.6, 0.0), (1.0, 0.0))
+    (vertex,) = robot.mapper.graph.vertices.values()
+    west = next(k for k, half in vertex.half_edges.items() if abs(half.bearing) > 3.0)
+    robot.mission.target = HalfEdgeId(vertex.id, west)
+    assert end_of(robot.look(TEE)) == pytest.approx((-3.0, 0.0))
+    course = np.stack([np.linspace(-0.2, 7.0, 73), np.zeros(73)], axis=1)
+    comes = Companion("other", Pose(-0.2, 0.0, 0.0), goes_first=True, course=course, radius=0.2)
+    robot.mission.meet(robot.pose, [comes])
+    assert end_of(robot.look(TEE)) == pytest.approx((3.0, -4.0))
 
 
 @pytest.mark.parametrize("is_hidden", [False, True])
