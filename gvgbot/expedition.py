@@ -132,7 +132,7 @@ class _Robot:
             lambda: chart_of(mapper.graph, mapper.belief, session.pipeline.mission.parts()),
             radius=config.robot.radius_m,
         )
-        session.pipeline.mission.choice.sharing = member
+        session.pipeline.mission.choice.sharing = member.auction
         return cls(session, member)
 
 

@@ -51,7 +51,7 @@ class LiveTeam:
             radius=robot.radius_m,
             life=life,
         )
-        pipeline.mission.choice.sharing = self.member
+        pipeline.mission.choice.sharing = self.member.auction
         pipeline.company = []
 
     async def take_part(

@@ -1,8 +1,7 @@
-"""One robot of a team: what it has heard of the others, and which frontier is its own.
+"""One robot of a team: what it tells the others, what it has heard of them, and where they are.
 
-Every robot decides for itself by what it knows; there is nobody who assigns work. Its filter and
-its graph hold only what it has measured itself. What the others have found tells it where not to
-go, and which of its own frontiers leads to where nobody has been.
+Its filter and its graph hold only what it has measured itself. What the others have found decides
+which frontier is its own: see `auction`.
 """
 
 import math
@@ -13,16 +12,14 @@ from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.control import company
 from gvgbot.autonomy.control.company import BodiesSeen, Companion
-from gvgbot.autonomy.exploration.paths import Approach, shortest_paths
-from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
 from gvgbot.geometry import Array, Pose, wrap_angle
 from gvgbot.ranges import Range
 from gvgbot.team.alignment import Alignment, align, refined
-from gvgbot.team.chart import Chart, moved
+from gvgbot.team.auction import Auction
+from gvgbot.team.chart import Chart
 from gvgbot.team.encounter import WINDOW_S, frame_of
 from gvgbot.team.news import (
     Claim,
@@ -34,8 +31,6 @@ from gvgbot.team.news import (
     told_vertices,
     told_ways,
 )
-from gvgbot.team.site import Frontier, Site
-from gvgbot.team.ways import BESIDE_M
 
 _STANDING_M = 0.1  # moved less from news to news, a robot stands
 _RESTS_S = 30.0  # who stands for so long, and is on its way to nothing, finds no more
@@ -45,9 +40,7 @@ _RECOGNISE_S = 1.0  # between two attempts to recognise a robot by how it moves
 _SURE_BY_SIGHT = 0.999  # that the robot met is the one that says so
 _KNOWN_M = 0.4  # from where a robot says it is, a body is that robot
 _SAME_M, _SAME_RAD = 0.5, 0.1  # frames nearer to each other are the same
-_MOSTLY = 0.8  # of a line: what others have driven along the same way
 _MOST_MATES = 64  # that are known at a time
-_TAKES_OVER_M = 2.0  # nearer to a frontier than who claims it, one takes it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -118,7 +111,7 @@ class Met:
 
 
 class Member:
-    """Takes part in a team; the `Sharing` of a mission."""
+    """Takes part in a team: tells the others, listens to them, and lays their maps on its own."""
 
     def __init__(
         self,
@@ -134,13 +127,9 @@ class Member:
         self._own_chart = tell
         self._chart = Chart()
         self._mates: dict[str, _Mate] = {}
-        self._site: Site | None = None
-        self._frontiers = frozenset[HalfEdgeId]()  # own ones at the last choice
-        self._claim: Claim | None = None
-        self._claimed_end: HalfEdgeId | None = None
+        self.auction = Auction(name, tell, self)
         self._stamp = 0.0
         self._sequence = self._courses = 0
-        self._others_claim_all = self._is_idle = self._nothing_left = False
         self._looks: deque[BodiesSeen] = deque()  # lately
         self.met: list[Met] = []  # lately; whoever tells of it takes it out
 
@@ -150,10 +139,10 @@ class Member:
         """What to tell the others now."""
         self._stamp = stamp
         self._chart = self._own_chart()
-        self._site = None
+        self.auction.renew()
         self._sequence += 1
         if finished:
-            self._claim = None
+            self.auction.withdraw()
         frames = tuple(
             Frame(name, self._mates[name].news.life, (pose.x, pose.y, pose.theta))
             for name, pose in sorted(self._direct().items())
@@ -164,9 +153,9 @@ class Member:
             sequence=self._sequence,
             pose=(map_base.x, map_base.y, map_base.theta),
             radius=self._radius,
-            claim=self._claim,
+            claim=self.auction.claim,
             finished=finished,
-            idle=self._is_idle,
+            idle=self.auction.is_idle,
             frames=frames,
             vertices=told_vertices(self._chart),
             edges=told_edges(self._chart),
@@ -266,7 +255,7 @@ class Member:
             mate.told_at = mate.map_base
             if before.distance(mate.map_base) >= _STANDING_M:
                 mate.moved = stamp
-        self._site = None
+        self.auction.renew()
 
     def _has_room(self) -> bool:
         """Whether one more robot can be known; forgets those that were of no use and are lost."""
@@ -311,7 +300,7 @@ class Member:
         if alignment is not None and mate.alignment is None:
             self.met.append(Met(name, alignment))
         mate.alignment = alignment
-        self._site = None
+        self.auction.renew()
 
     def _direct(self) -> dict[str, Pose]:
         """Poses of the frames that were found, in the own one."""
@@ -351,6 +340,10 @@ class Member:
             for frame in mate.news.frames
             if lives.get(frame.robot) == frame.life
         ]
+
+    def chart(self, name: str) -> Chart:
+        """What another one has told of its map, in its own frame."""
+        return self._mates[name].chart
 
     @property
     def charts(self) -> dict[str, tuple[Chart, Pose]]:
@@ -398,61 +391,9 @@ class Member:
         heard = [mate for name, mate in self._mates.items() if not self.is_lost(name)]
         return [mate.news.radius for mate in heard if mate.news.robot not in known]
 
-    # -- which frontier is whose -------------------------------------------------------------------
+    # -- what the auction of frontiers must know ---------------------------------------------------
 
-    def choose(self, graph: GvgGraph, starts: list[Approach]) -> tuple[HalfEdgeId, Approach] | None:
-        """The frontier that nobody else is nearer to, by the shortest way; see `Sharing`."""
-        reached = shortest_paths(graph, starts)
-        frontiers = frozenset(graph.frontiers())
-        if frontiers != self._frontiers:
-            self._frontiers, self._site = frontiers, None
-        site = self._current_site()
-        metres = {vertex: way.metres for vertex, way in reached.items()}
-        costs = {
-            frontier: (cost, end)
-            for frontier, (cost, end) in site.costs(metres).items()
-            if (half := graph.half_edge(end)) is not None and half.open
-        }
-        claims = self._claims()
-        mine = [
-            (cost, end, frontier)
-            for frontier, (cost, end) in costs.items()
-            if not self._is_taken(frontier, cost, claims)
-        ]
-        may_come = any(self._is_busy(name) for name in self.others())
-        is_placed = bool(reached) or (not graph.vertices and site.is_explored)
-        self._is_idle = is_placed and not costs
-        self._nothing_left = self._is_idle and not may_come
-        self._others_claim_all = is_placed and not mine and (bool(costs) or may_come)
-        if not mine:
-            self._claim = self._claimed_end = None
-            return None
-        cost, end, frontier = min(mine, key=lambda one: (one[0], one[1]))
-        self._claim = Claim(frontier.x, frontier.y, frontier.bearing, cost)
-        self._claimed_end = end
-        return end, reached[end.vertex]
-
-    def _is_busy(self, name: str) -> bool:
-        """Whether another robot has something to do, so that more may be found."""
-        mate = self._mates[name]
-        rests = mate.news.claim is None and mate.stands > _RESTS_S
-        return not (mate.news.finished or mate.news.idle or rests)
-
-    def _is_taken(self, frontier: Frontier, cost: float, claims: list[tuple[str, Claim]]) -> bool:
-        """Whether another robot is on its way to a frontier, and not much farther from it."""
-        for name, claim in claims:
-            if frontier.is_at(claim.x, claim.y, claim.bearing):
-                lead = 0.0 if self._claim is not None and self._is_claimed(frontier) else 1.0
-                mine, theirs = cost + lead * _TAKES_OVER_M, claim.metres
-                if (theirs, name) < (mine, self.name):
-                    return True
-        return False
-
-    def _is_claimed(self, frontier: Frontier) -> bool:
-        claim = self._claim
-        return claim is not None and frontier.is_at(claim.x, claim.y, claim.bearing)
-
-    def _claims(self) -> list[tuple[str, Claim]]:
+    def claims(self) -> list[tuple[str, Claim]]:
         """What others are on their way to, own map frame."""
         found = []
         for name, pose in sorted(self.frames.items()):
@@ -460,52 +401,18 @@ class Member:
             if claim is None or self.is_lost(name):
                 continue
             there = pose.compose(Pose(claim.x, claim.y, claim.bearing))
-            found.append((name, _claim_at(claim, there)))
+            found.append((name, Claim(there.x, there.y, there.theta, claim.metres)))
         return found
 
-    def keeps(self, target: HalfEdgeId, graph: GvgGraph, starts: list[Approach]) -> bool:
-        """Whether the target is still what it was chosen for; see `Sharing`."""
-        site, claim = self._current_site(), self._claim
-        if target == self._claimed_end:
-            frontiers = (f for many in site.open.values() for f in many if self._is_claimed(f))
-            frontier = next(frontiers, None)
-        else:  # the vertex from which that led was none: it is a departure before it
-            frontier = site.own.get(target)
-        if frontier is None:
-            return False
-        metres = {vertex: way.metres for vertex, way in shortest_paths(graph, starts).items()}
-        cost, _ = site.costs(metres).get(frontier, (0.0 if claim is None else claim.metres, target))
-        self._claim = Claim(frontier.x, frontier.y, frontier.bearing, max(0.0, cost))
-        self._claimed_end = target
-        return not self._is_taken(frontier, cost, self._claims())
-
-    def has_driven(self, line: Array, *, either_way: bool = False) -> bool:
-        """Whether others have driven along a line (N, 2) the same way; see `Sharing`."""
-        ways = [pose.transform(w.polyline) for c, pose in self.charts.values() for w in c.ways]
-        if not ways or len(line) < 2:
-            return False
-        away, nearest = cKDTree(np.concatenate(ways)).query(line)
-        onwards = np.concatenate([np.gradient(way, axis=0) for way in ways])[nearest]
-        is_same_way = (onwards * np.gradient(line, axis=0)).sum(axis=1) > 0.0
-        is_on_way = np.max(away) < BESIDE_M
-        return bool(is_on_way and (either_way or is_same_way.mean() > _MOSTLY))
-
     @property
-    def is_waiting(self) -> bool:
-        """Whether others are on their way to all that is left; see `Sharing`."""
-        return self._others_claim_all
+    def may_find_more(self) -> bool:
+        """Whether one of the others has something to do."""
+        return any(self._is_busy(name) for name in self.others())
 
-    @property
-    def is_done(self) -> bool:
-        """Whether nothing is left that this robot could go to; see `Sharing`."""
-        return self._nothing_left
-
-    def _current_site(self) -> Site:
-        if self._site is None:
-            charts = [self._own_chart()]
-            charts += [moved(self._mates[n].chart, pose) for n, pose in self.frames.items()]
-            self._site = Site(charts)
-        return self._site
+    def _is_busy(self, name: str) -> bool:
+        mate = self._mates[name]
+        rests = mate.news.claim is None and mate.stands > _RESTS_S
+        return not (mate.news.finished or mate.news.idle or rests)
 
 
 def _is_same(pose: Pose, other: Pose, place: Pose) -> bool:
@@ -519,8 +426,3 @@ def _remember(looks: deque[BodiesSeen], seen: BodiesSeen) -> None:
     looks.append(seen)
     while looks[0].stamp < seen.stamp - WINDOW_S:
         looks.popleft()
-
-
-def _claim_at(claim: Claim, there: Pose) -> Claim:
-    """The claim at another place."""
-    return Claim(there.x, there.y, there.theta, claim.metres)

@@ -12,6 +12,7 @@ from gvgbot.autonomy.exploration.paths import Approach
 from gvgbot.autonomy.slam.graph import Edge, GvgGraph, HalfEdge, HalfEdgeId, Vertex
 from gvgbot.geometry import Array, Pose
 from gvgbot.team.alignment import Alignment
+from gvgbot.team.auction import Auction
 from gvgbot.team.chart import Chart, ChartWay
 from gvgbot.team.member import Comparison, Member, TeamConfig
 from gvgbot.team.news import decode, encode
@@ -35,9 +36,13 @@ class Robot:
     chart: Chart
     at: int
 
+    @property
+    def auction(self) -> Auction:
+        return self.member.auction
+
     def choose(self) -> tuple[HalfEdgeId, Approach] | None:
         start = Approach(0.0, HalfEdgeId(self.at, -1))
-        return self.member.choose(graph_of(self.chart), [start])
+        return self.auction.choose(graph_of(self.chart), [start])
 
     def tell(
         self, stamp: float, *others: "Robot", finished: bool = False, at: Pose | None = None
@@ -131,7 +136,7 @@ def test_a_frontier_goes_to_the_robot_that_is_nearer() -> None:
     assert theirs is not None
     assert np.hypot(*(place(one, mine[0]) - place(two, theirs[0]))) > 1.0
     two.tell(2.0, one)
-    assert one.member.keeps(mine[0], graph_of(one.chart), [Approach(0.0, HalfEdgeId(0, -1))])
+    assert one.auction.keeps(mine[0], graph_of(one.chart), [Approach(0.0, HalfEdgeId(0, -1))])
 
 
 def test_who_is_on_another_departure_than_it_chose_keeps_it_only_if_nobody_followed_it() -> None:
@@ -142,7 +147,7 @@ def test_who_is_on_another_departure_than_it_chose_keeps_it_only_if_nobody_follo
     graph, start = graph_of(one.chart), [Approach(0.0, HalfEdgeId(0, -1))]
     corridors = irregular(1).corridors
     followed = {end for end in graph.frontiers() if {*corridors[end.key]} <= RIGHT}
-    kept = {end for end in graph.frontiers() if one.member.keeps(end, graph, start)}
+    kept = {end for end in graph.frontiers() if one.auction.keeps(end, graph, start)}
     assert followed
     assert kept
     assert kept == {*graph.frontiers()} - followed
@@ -164,25 +169,25 @@ def test_who_follows_its_frontier_keeps_it_until_others_have_driven_it_from_the_
         Comparison("two", 0, Chart(), Chart(), None),
         Alignment(START["one"].to(START["two"]), np.eye(3) * 1e-6, (), 1.0),
     )
-    assert one.member.keeps(chosen[0], graph_of(one.chart), on_it)
+    assert one.auction.keeps(chosen[0], graph_of(one.chart), on_it)
     one.chart = replace(one.chart, ways=(way_from(building, 0, 1, 4.5, "one"),))
     two.chart = replace(two.chart, ways=(way_from(building, 1, 0, 5.0, "two"),))
     two.tell(2.0, one)
-    assert not one.member.keeps(chosen[0], graph_of(one.chart), on_it)
+    assert not one.auction.keeps(chosen[0], graph_of(one.chart), on_it)
 
 
 def test_what_others_have_driven_and_what_they_have_not() -> None:
     one, two = team()
     edge = next(iter(two.chart.edges.values()))
     line = START["one"].to(START["two"]).transform(edge.polyline)
-    assert not one.member.has_driven(line)  # it was only seen
+    assert not one.auction.has_driven(line)  # it was only seen
     with_way = replace(two.chart, ways=(ChartWay(edge.polyline, 0.5),))
     two.member._own_chart = lambda: with_way
     two.tell(3.0, one)
-    assert one.member.has_driven(line)
-    assert not one.member.has_driven(line[::-1])
-    assert one.member.has_driven(line[::-1], either_way=True)
-    assert not one.member.has_driven(np.concatenate([line, line[-1:] + 2.0]))
+    assert one.auction.has_driven(line)
+    assert not one.auction.has_driven(line[::-1])
+    assert one.auction.has_driven(line[::-1], either_way=True)
+    assert not one.auction.has_driven(np.concatenate([line, line[-1:] + 2.0]))
 
 
 @pytest.mark.parametrize("is_all_known", [True, False])
@@ -196,9 +201,9 @@ def test_who_has_no_vertex_waits_and_ends_if_the_others_know_all(*, is_all_known
         Alignment(START["one"].to(START["two"]), np.eye(3) * 1e-6, (), 1.0),
     )
     for is_busy in (True, False):
-        assert one.member.choose(GvgGraph(), []) is None
-        assert one.member.is_waiting == (is_all_known and is_busy)
-        assert one.member.is_done == (is_all_known and not is_busy)
+        assert one.auction.choose(GvgGraph(), []) is None
+        assert one.auction.is_waiting == (is_all_known and is_busy)
+        assert one.auction.is_done == (is_all_known and not is_busy)
         one.tell(2.0, two)
         two.choose()
         two.tell(2.0, one, finished=not is_all_known)
@@ -223,8 +228,8 @@ def test_alone_a_robot_takes_the_nearest_frontier_of_its_own() -> None:
     one.tell(0.0)
     chosen = one.choose()
     assert chosen is not None
-    assert not one.member.is_waiting
-    assert not one.member.is_done
+    assert not one.auction.is_waiting
+    assert not one.auction.is_done
 
 
 def test_a_frontier_found_since_the_last_news_is_chosen_at_once() -> None:
@@ -239,7 +244,7 @@ def test_a_frontier_found_since_the_last_news_is_chosen_at_once() -> None:
     assert chosen is not None
     half = grown.vertices[chosen[0].vertex].departures
     assert next(d for d in half if d.key == chosen[0].key).edge is None
-    assert not alone.member.is_done
+    assert not alone.auction.is_done
 
 
 def test_old_news_do_not_replace_new_ones_and_a_restart_begins_anew() -> None:
@@ -381,10 +386,18 @@ def test_two_that_have_given_up_do_not_wait_for_each_other() -> None:
     one.member._own_chart = lambda: one.chart
     two.member._own_chart = lambda: two.chart
     two.tell(2.0, one, at=Pose(1.0, 0.0, 0.0))  # it drives, and may find another way
-    assert (one.choose(), one.member.is_waiting, one.member.is_done) == (None, True, False)
+    assert (one.choose(), one.auction.is_waiting, one.auction.is_done) == (
+        None,
+        True,
+        False,
+    )
     two.choose()
     two.tell(4.0, one, at=Pose(1.0, 0.0, 0.0))
-    assert (one.choose(), one.member.is_waiting, one.member.is_done) == (None, False, True)
+    assert (one.choose(), one.auction.is_waiting, one.auction.is_done) == (
+        None,
+        False,
+        True,
+    )
 
 
 def test_who_only_stops_to_think_is_waited_for_but_not_for_ever() -> None:
@@ -394,9 +407,17 @@ def test_who_only_stops_to_think_is_waited_for_but_not_for_ever() -> None:
     one.member._own_chart = lambda: one.chart
     for stamp in np.arange(2.0, 30.0, 2.0):
         two.tell(stamp, one)
-        assert (one.choose(), one.member.is_waiting, one.member.is_done) == (None, True, False)
+        assert (one.choose(), one.auction.is_waiting, one.auction.is_done) == (
+            None,
+            True,
+            False,
+        )
     two.tell(62.0, one)
-    assert (one.choose(), one.member.is_waiting, one.member.is_done) == (None, False, True)
+    assert (one.choose(), one.auction.is_waiting, one.auction.is_done) == (
+        None,
+        False,
+        True,
+    )
 
 
 def all_followed(chart: Chart) -> Chart:
@@ -415,9 +436,17 @@ def test_who_has_nothing_left_waits_while_another_one_drives_and_may_want_to_pas
     one.member._own_chart = lambda: one.chart
     two.member._own_chart = lambda: two.chart
     two.tell(2.0, one, at=Pose(1.0, 0.0, 0.0))
-    assert (one.choose(), one.member.is_waiting, one.member.is_done) == (None, True, False)
+    assert (one.choose(), one.auction.is_waiting, one.auction.is_done) == (
+        None,
+        True,
+        False,
+    )
     two.tell(4.0, one, at=Pose(1.0, 0.0, 0.0), finished=True)
-    assert (one.choose(), one.member.is_waiting, one.member.is_done) == (None, False, True)
+    assert (one.choose(), one.auction.is_waiting, one.auction.is_done) == (
+        None,
+        False,
+        True,
+    )
 
 
 def passed(one: Robot, two: Robot, off: float = 0.0, since: float = 0.0) -> float:
