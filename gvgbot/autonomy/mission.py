@@ -228,7 +228,7 @@ class Mission:
     def _ahead(self, view: View, here: Situation) -> tuple[Branch, ...]:
         """Straight on; before a vertex is known, once back if others have driven what is ahead."""
         path = here.ahead()
-        if self.choice.sharing is None or self._has_turned or self._mapper.graph.vertices:
+        if self._has_turned or self._mapper.graph.vertices:
             return path
         if self._leads_over_driven(view, here, path, either_way=False):
             self._has_turned = self.where.turn_round()
@@ -238,12 +238,14 @@ class Mission:
         self, view: View, here: Situation, path: tuple[Branch, ...], *, either_way: bool
     ) -> bool:
         """Whether other robots have driven what is ahead on a path."""
+        sharing = self.choice.sharing
+        if sharing is None:
+            return False
         line, _ = here.line_along(path)
         away = np.hypot(*(line - view.local_base.position).T)
         ahead = line[(away > _LED_M[0]) & (away < _LED_M[1])]
         map_local = self._mapper.belief.map_base.compose(view.local_base.inverse())
-        line, sharing = map_local.transform(ahead), self.choice.sharing
-        return sharing is not None and sharing.has_driven(line, either_way=either_way)
+        return sharing.has_driven(map_local.transform(ahead), either_way=either_way)
 
     def _choose(self, view: View, here: Situation) -> HalfEdgeId | None:
         """The next frontier, by the policy."""

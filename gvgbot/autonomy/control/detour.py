@@ -63,10 +63,9 @@ def stepping_off(
             off = centre + (line[0] - centre) * (radius + size + gap) / away
             step = resampled(np.stack([line[0], off]), _SPACING_M)
             if len(step) > 1 and is_free(step) and _keeps_off(step, others, radius, line):
-                beyond = np.hypot(*(line - line[0]).T) > math.dist(off, line[0])
-                return np.concatenate(
-                    [step, line[np.argmax(beyond) :] if beyond.any() else line[:0]]
-                )
+                near = np.hypot(*(line - line[0]).T) <= math.dist(off, line[0])
+                rest = line[:0] if near.all() else line[int(np.argmin(near)) :]
+                return np.concatenate([step, rest])
     return line
 
 
