@@ -30,6 +30,11 @@ class Choice:
         graph = self._mapper.graph
         return is_done and bool(graph.frontiers() or not graph.vertices)
 
+    @property
+    def is_all_followed(self) -> bool:
+        """Whether the robots of a team have followed every departure that one of them knows."""
+        return self.sharing is not None and self.sharing.is_explored
+
     def ear(self, explored: HalfEdgeId | None) -> HalfEdgeId | None:
         """By the ear rule, at the end of the edge just explored, if that is the policy."""
         graph = self._mapper.graph

@@ -260,7 +260,9 @@ class Mission:
             if nearest is None and self._reopen(view, "nothing else is left"):
                 nearest = self.choice.nearest(here.starts())
             if nearest is None:
-                if self.choice.is_left_to_others and not self._obstructions.waiting:
+                if self.choice.is_left_to_others and (
+                    self.choice.is_all_followed or not self._obstructions.waiting
+                ):
                     if not self._begins_to_retrace(view):
                         self._end(view, "explored", "no frontier of the team is left")
                 elif not self.choice.waits_for_others:

@@ -131,6 +131,11 @@ class Auction:
         """Whether nothing is left that this robot could go to; see `Sharing`."""
         return self._nothing_left
 
+    @property
+    def is_explored(self) -> bool:
+        """Whether nothing is open anywhere; see `Sharing`."""
+        return self._current_site().is_explored
+
     def _claim(self, frontier: Frontier, cost: float, end: HalfEdgeId) -> None:
         self.claim = Claim(frontier.x, frontier.y, frontier.bearing, cost)
         self._claimed_end = end

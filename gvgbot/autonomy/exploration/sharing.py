@@ -35,3 +35,7 @@ class Sharing(Protocol):
     @property
     def is_done(self) -> bool:
         """Whether every frontier that this robot can reach has been followed by somebody."""
+
+    @property
+    def is_explored(self) -> bool:
+        """Whether no departure that any robot knows of is open, also none that is closed now."""

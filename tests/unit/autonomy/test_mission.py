@@ -510,7 +510,7 @@ def test_a_crossing_that_another_robot_hides_is_left_by_the_way_that_is_wanted(
 class Alone:
     """Shares the frontiers with others of whom nothing has been heard."""
 
-    is_waiting = is_done = False
+    is_waiting = is_done = is_explored = False
 
     def choose(self, graph: GvgGraph, starts: list[Approach]) -> tuple[HalfEdgeId, Approach] | None:
         return nearest_frontier(graph, starts)
@@ -590,6 +590,23 @@ def test_a_robot_whose_team_is_done_leaves_no_vertex_that_hangs_on_nothing() -> 
     assert robot.mission.outcome == "explored"
     assert {v.kind for v in graph.vertices.values()} == {"endpoint"}
     assert stray.id not in graph.vertices
+
+
+@pytest.mark.parametrize("is_explored", [False, True])
+def test_for_a_way_that_was_closed_one_waits_only_if_nobody_has_driven_it(
+    *, is_explored: bool
+) -> None:
+    robot, others = Robot(), Alone()
+    robot.mission.choice.sharing = others
+    robot.stand(TEE, 8)
+    closed = robot.mission.target
+    while robot.mission.target == closed:
+        robot.mission.hold()
+        robot.look(TEE)
+    robot.mission.choice.sharing = last = Last()
+    last.is_explored, robot.mission.target = is_explored, None
+    robot.look(TEE)
+    assert robot.mission.outcome == ("explored" if is_explored else None)
 
 
 @pytest.mark.parametrize("is_in_team", [False, True])
