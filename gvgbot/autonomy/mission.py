@@ -260,12 +260,9 @@ class Mission:
             if nearest is None and self._reopen(view, "nothing else is left"):
                 nearest = self.choice.nearest(here.starts())
             if nearest is None:
-                if self.choice.is_left_to_others and (
-                    self.choice.is_all_followed or not self._obstructions.waiting
-                ):
-                    if not self._begins_to_retrace(view):
-                        self._end(view, "explored", "no frontier of the team is left")
-                elif not self.choice.waits_for_others:
+                if self._team_is_done(view):
+                    self._end(view, "explored", "no frontier of the team is left")
+                elif not (self.choice.waits_for_others or self._retracing.is_on):
                     self._finish(view)
                 return None
             self._scouting.end()
@@ -275,6 +272,15 @@ class Mission:
             return None
         self._commit(view, here, chosen, reason)
         return chosen
+
+    def _team_is_done(self, view: View) -> bool:
+        """Whether all is left to others, and no way is worth a wait, or to be looked for."""
+        if not self.choice.is_left_to_others:
+            return False
+        if self.choice.is_all_followed:
+            self._mapper.forget_strays(view)
+            return True
+        return not self._obstructions.waiting and not self._begins_to_retrace(view)
 
     def _reconsidered(self, view: View, here: Situation, target: HalfEdgeId) -> HalfEdgeId | None:
         """The target, or a frontier found just now that is nearer than what is left of the way."""

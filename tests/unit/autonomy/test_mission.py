@@ -574,9 +574,13 @@ class Last(Alone):
         return None
 
 
-def test_a_robot_whose_team_is_done_leaves_no_vertex_that_hangs_on_nothing() -> None:
+@pytest.mark.parametrize("is_explored", [False, True])
+def test_a_robot_whose_team_is_done_leaves_no_vertex_that_hangs_on_nothing(
+    *, is_explored: bool
+) -> None:
     robot = Robot()
-    robot.mission.choice.sharing = Last()
+    robot.mission.choice.sharing = last = Last()
+    last.is_explored = is_explored
     graph = robot.mapper.graph
     stray = Vertex(graph.next_id(), 1.0, Pose(50.0), 0.0, 0.0)
     stray.add_half_edge(0.0)
