@@ -227,21 +227,17 @@ class Mission:
 
     def _ahead(self, view: View, here: Situation) -> tuple[Branch, ...]:
         """Straight on; before a vertex is known, once back if others have driven what is ahead."""
-        path = here.ahead()
-        if self._has_turned or self._mapper.graph.vertices:
-            return path
-        if self._leads_over_driven(view, here, path, either_way=False):
+        may_turn = not (self._has_turned or self._mapper.graph.vertices)
+        if may_turn and self._is_led(view, here, either_way=False):
             self._has_turned = self.where.turn_round()
         return here.ahead()
 
-    def _leads_over_driven(
-        self, view: View, here: Situation, path: tuple[Branch, ...], *, either_way: bool
-    ) -> bool:
-        """Whether other robots have driven what is ahead on a path."""
+    def _is_led(self, view: View, here: Situation, *, either_way: bool) -> bool:
+        """Whether other robots have driven what is straight ahead."""
         sharing = self.choice.sharing
         if sharing is None:
             return False
-        line, _ = here.line_along(path)
+        line, _ = here.line_along(here.ahead())
         away = np.hypot(*(line - view.local_base.position).T)
         ahead = line[(away > _LED_M[0]) & (away < _LED_M[1])]
         map_local = self._mapper.belief.map_base.compose(view.local_base.inverse())
@@ -250,9 +246,7 @@ class Mission:
     def _choose(self, view: View, here: Situation) -> HalfEdgeId | None:
         """The next frontier, by the policy."""
         graph = self._mapper.graph
-        if not graph.vertices and not self._leads_over_driven(
-            view, here, here.ahead(), either_way=True
-        ):
+        if not graph.vertices and not self._is_led(view, here, either_way=True):
             return None
         chosen, reason = self.choice.ear(self.target), "ear"
         if chosen is None:
