@@ -22,9 +22,9 @@ from gvgbot.hal.guard import Guard
 from gvgbot.hal.messages import Odometry
 from gvgbot.links import Devices, Links
 from gvgbot.maps import geojson
+from gvgbot.maps.joined_graph import joined_graph
 from gvgbot.maps.joined_grid import joined_grid
 from gvgbot.maps.map_server import encode_map_server, read_map_server
-from gvgbot.maps.merging import merged
 from gvgbot.maps.occupancy import OccupancyGrid
 from gvgbot.maps.picture import draw_map
 from gvgbot.maps.pieced import pieced
@@ -252,15 +252,10 @@ def _save(directory: RunDirectory, robots: list[_Robot]) -> list[_Robot]:
     It is the map of who knows most others, and of these the one with most vertices.
     """
     first = max(robots, key=lambda r: (len(r.member.frames), len(_graph(r).vertices)))
-    graph = _graph(first)
-    joined, frames = [first], first.member.frames
-    poses = {first.member.name: Pose()}
-    for robot in (other for other in robots if other is not first):
-        pose = frames.get(robot.member.name)
-        if pose is not None:
-            graph = merged(graph, _graph(robot), pose)
-            poses[robot.member.name] = pose
-            joined.append(robot)
+    poses = {first.member.name: Pose()} | first.member.frames
+    others = [robot for robot in robots if robot is not first and robot.member.name in poses]
+    joined = [first, *others]
+    graph = joined_graph([(_graph(robot), poses[robot.member.name]) for robot in joined])
     graph = pieced(graph, [way for robot in joined for way in _ways(robot, poses)])
     world = _place(first.session).world
     files = world_files(world)

@@ -17,7 +17,7 @@ from gvgbot.geometry import Array, Pose, wrap_angle
 from gvgbot.maps.moved import moved_graph
 from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
 
-_SAME_M = 0.6  # vertices nearer to each other are one
+SAME_M = 0.6  # vertices nearer to each other are one
 _SAME_RAD = 0.7  # departures nearer to each other are one
 _ON_EDGE_M = 0.4  # from an edge, a vertex that the edge's own map does not know splits it
 _FROM_ENDS_M = 0.8  # but not so near to its ends
@@ -79,10 +79,10 @@ def _pairs(ours: RouteGraph, theirs: RouteGraph) -> list[tuple[int, int]]:
     from scipy.optimize import linear_sum_assignment
 
     a, b = (np.array([v.position for v in g.vertices]).reshape(-1, 2) for g in (ours, theirs))
-    away = np.minimum(cdist(a, b), _SAME_M)
+    away = np.minimum(cdist(a, b), SAME_M)
     rows, columns = linear_sum_assignment(away)
     pairs = zip(rows.tolist(), columns.tolist(), strict=True)
-    return [(i, j) for i, j in pairs if away[i, j] < _SAME_M]
+    return [(i, j) for i, j in pairs if away[i, j] < SAME_M]
 
 
 def _refuted(graph: RouteGraph, paired: set[int], other: RouteGraph) -> set[int]:
@@ -142,7 +142,7 @@ def _drawn_together(graph: RouteGraph, paired: set[int]) -> RouteGraph:
         for lone, kept in ((edge.start, edge.end), (edge.end, edge.start)):
             if lone in paired or kept not in paired or vertices[lone].kind == "endpoint":
                 continue
-            if math.dist(vertices[lone].position, vertices[kept].position) < _SAME_M:
+            if math.dist(vertices[lone].position, vertices[kept].position) < SAME_M:
                 onto[lone] = kept
     for lone, kept in onto.items():
         vertices[kept] = _united(vertices[kept], vertices.pop(lone))
@@ -150,7 +150,7 @@ def _drawn_together(graph: RouteGraph, paired: set[int]) -> RouteGraph:
         replace(e, start=onto.get(e.start, e.start), end=onto.get(e.end, e.end))
         for e in graph.edges
     )
-    between = 2 * _SAME_M  # longer ones are ways round something
+    between = 2 * SAME_M  # longer ones are ways round something
     return RouteGraph(
         tuple(vertices.values()),
         tuple(edge for edge in edges if edge.start != edge.end or edge.length > between),

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 
 from gvgbot.geometry import Array, Pose
 from gvgbot.maps import geojson
-from gvgbot.maps.merging import merged
+from gvgbot.maps.joined_graph import joined_graph
 from gvgbot.maps.picture import draw_map
 from gvgbot.maps.pieced import pieced
 from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
@@ -21,16 +21,16 @@ def team_files(
 
     `parts` of edges that this robot has driven are lines (N, 2) and least clearances, m.
     """
-    graph, ways = own, list(parts)
+    ways = list(parts)
     for chart, pose in others.values():
-        graph = merged(graph, route_graph(chart), pose)
         ways += [(pose.transform(way.polyline), way.min_clearance) for way in chart.ways]
-    graph = pieced(graph, ways)
+    charts = [(route_graph(chart), pose) for chart, pose in others.values()]
+    graph = pieced(joined_graph([(own, Pose()), *charts]), ways)
     return {"team.geojson": geojson.encode(graph), "team.png": draw_map(graph, title=title)}
 
 
 def route_graph(chart: Chart) -> RouteGraph:
-    """A chart as a map. Of how often its robot came by, a chart says nothing."""
+    """A chart as a map. Of how often its robot came by, it says only whether it ever did."""
     return RouteGraph(
         tuple(_vertex(vertex) for vertex in chart.vertices.values()),
         tuple(_edge(edge) for edge in chart.edges.values()),
@@ -59,4 +59,5 @@ def _edge(edge: ChartEdge) -> MapEdge:
         polyline=edge.polyline.copy(),
         length=edge.length,
         min_clearance=edge.min_clearance,
+        traversals=int(edge.traversed),
     )

@@ -1,0 +1,55 @@
+"""Route graphs of one building by several robots as one, by the word of all of them."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+from gvgbot.geometry import Pose
+from gvgbot.maps.merging import SAME_M, is_among, merged
+from gvgbot.maps.moved import moved_graph
+from gvgbot.maps.route_graph import MapVertex, RouteGraph
+
+
+def joined_graph(graphs: Sequence[tuple[RouteGraph, Pose]]) -> RouteGraph:
+    """One map of all, each with the pose of its frame in the frame of the result.
+
+    A frontier that most robots at its place did not see is none: somebody may have stood there.
+    """
+    laid = [moved_graph(graph, pose) for graph, pose in graphs]
+    whole, *others = (_agreed(graph, laid) for graph in laid)
+    for other in others:
+        whole = merged(whole, other, Pose())
+    return whole
+
+
+def _agreed(graph: RouteGraph, graphs: Sequence[RouteGraph]) -> RouteGraph:
+    """A map without the frontiers that most of those at their places did not see."""
+    return replace(graph, vertices=tuple(_heard(vertex, graphs) for vertex in graph.vertices))
+
+
+def _heard(vertex: MapVertex, graphs: Sequence[RouteGraph]) -> MapVertex:
+    if not vertex.frontiers:
+        return vertex
+    said = [one.bearings for graph in graphs if (one := _visited(graph, vertex)) is not None]
+    denied = {
+        frontier
+        for frontier in vertex.frontiers
+        if 2 * sum(is_among(frontier, bearings) for bearings in said) < len(said)
+    }
+    bearings = tuple(b for b in vertex.bearings if b not in denied)
+    return replace(
+        vertex,
+        degree=len(bearings),
+        bearings=bearings,
+        frontiers=tuple(f for f in vertex.frontiers if f not in denied),
+    )
+
+
+def _visited(graph: RouteGraph, vertex: MapVertex) -> MapVertex | None:
+    """What a map has at the place of a vertex, if its robot has been there."""
+    driven = {end for e in graph.edges if e.traversals > 0 for end in (e.start, e.end)}
+    here = [one for one in graph.vertices if one.id in driven]
+    nearest = min(here, key=lambda o: math.dist(o.position, vertex.position), default=None)
+    if nearest is None or math.dist(nearest.position, vertex.position) >= SAME_M:
+        return None
+    return nearest
