@@ -19,6 +19,7 @@ from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
 
 SAME_M = 0.6  # vertices nearer to each other are one
 _SAME_RAD = 0.7  # departures nearer to each other are one
+_KINK_RAD = 1.2  # at most, from the bearing of an edge to where it sets out
 _ON_EDGE_M = 0.4  # from an edge, a vertex that the edge's own map does not know splits it
 _FROM_ENDS_M = 0.8  # but not so near to its ends
 _BESIDE_M = 1.0  # edges between the same vertices that stay nearer to each other are one
@@ -274,8 +275,10 @@ def direction(line: Array) -> float:
 
 def _settled(vertex: MapVertex, leaving: list[float]) -> MapVertex:
     """A vertex whose frontiers are those that no edge of either map follows."""
-    frontiers = tuple(f for f in vertex.frontiers if not is_among(f, leaving))
-    bearings = vertex.bearings + tuple(d for d in leaving if not is_among(d, vertex.bearings))
+    followed = [b for b in vertex.bearings if b not in vertex.frontiers]
+    others = _unexplained(leaving, followed)
+    frontiers = tuple(f for f in vertex.frontiers if not is_among(f, others))
+    bearings = vertex.bearings + tuple(d for d in others if not is_among(d, vertex.bearings))
     return replace(
         vertex,
         frontiers=frontiers,
@@ -283,6 +286,23 @@ def _settled(vertex: MapVertex, leaving: list[float]) -> MapVertex:
         degree=len(bearings),
         kind="meetpoint" if len(bearings) > 1 else "endpoint",
     )
+
+
+def _unexplained(leaving: list[float], followed: list[float]) -> list[float]:
+    """The directions of edges, rad, without those of edges that a vertex is known to have.
+
+    An edge may set out a little to the side of the bearing that it was seen at.
+    """
+    from scipy.optimize import linear_sum_assignment
+
+    if not (leaving and followed):
+        return leaving
+    off = np.array([[abs(wrap_angle(d - b)) for b in followed] for d in leaving])
+    rows, columns = linear_sum_assignment(np.minimum(off, _KINK_RAD))
+    explained = {
+        i for i, j in zip(rows.tolist(), columns.tolist(), strict=True) if off[i, j] < _KINK_RAD
+    }
+    return [d for i, d in enumerate(leaving) if i not in explained and off[i].min() > _SAME_RAD / 2]
 
 
 def _anchored(edge: MapEdge, vertices: Sequence[MapVertex]) -> MapEdge:

@@ -1,6 +1,6 @@
 """Edges that several robots of a team have driven in pieces, and none from end to end."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
@@ -27,8 +27,9 @@ def pieced(graph: RouteGraph, ways: Sequence[tuple[Array, float]]) -> RouteGraph
     known = Ways(lines, np.array([vertex.position for vertex in vertices]).reshape(-1, 2))
     edges = list(graph.edges)
     for number, vertex in enumerate(vertices):
+        taken = list(_leaving(graph, vertex)) if vertex.frontiers else []
         for bearing in vertex.frontiers:
-            walk = known.behind(number, bearing)
+            walk = known.behind(number, bearing, taken)
             if walk is None or not is_among(
                 direction(walk.line[::-1]), vertices[walk.place].frontiers
             ):
@@ -44,6 +45,15 @@ def pieced(graph: RouteGraph, ways: Sequence[tuple[Array, float]]) -> RouteGraph
             if not any(is_same(edge, other) for other in edges):
                 edges.append(edge)
     return settled(vertices, edges)
+
+
+def _leaving(graph: RouteGraph, vertex: MapVertex) -> Iterator[Array]:
+    """The lines (N, 2) of the edges of a vertex, from there."""
+    for edge in graph.edges:
+        if edge.start == vertex.id:
+            yield edge.polyline
+        if edge.end == vertex.id:
+            yield edge.polyline[::-1]
 
 
 def _evened(line: Array) -> Array:

@@ -6,6 +6,7 @@ nobody has followed it, or seen where it leads.
 
 import heapq
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -169,8 +170,19 @@ class Site:
                 found = self._along(other, chart, self._points[place], bearing)
             if found is not None:
                 return found
-        walk = None if self._ways is None else self._ways.behind(place, bearing)
+        if self._ways is None:
+            return None
+        walk = self._ways.behind(place, bearing, list(self._edges_at(place)))
         return None if walk is None else Onward(walk.place, walk.length)
+
+    def _edges_at(self, place: int) -> Iterator[Array]:
+        """The lines (N, 2) of all edges that end at a place, from there."""
+        for number, vertex in self._members[place].items():
+            for edge in self._charts[number].edges.values():
+                if edge.a.vertex == vertex:
+                    yield edge.polyline
+                if edge.b.vertex == vertex:
+                    yield edge.polyline[::-1]
 
     def _behind(self, number: int, vertex: int, bearing: float) -> Onward | None:
         """Behind the departure of a chart's vertex that leaves in a direction."""

@@ -19,6 +19,7 @@ WELL_ON_M = 3.0  # beyond a vertex, who did not see it is as right as who did
 BESIDE_M = 0.45  # from a line, a place lies on it
 _GAP_M = 1.0  # between two ways: robots that meet keep so far apart
 _AHEAD_M = 0.8  # along a line, its direction is taken
+_APART_M = 1.5  # from a vertex, two ways that leave it are apart
 _SAME_RAD = 0.7  # directions nearer to each other are one
 _LEAST_M = 0.3  # of a way that is gone on with
 _MOST = 16  # pieces
@@ -59,10 +60,14 @@ class Ways:
         self._of = np.repeat(np.arange(len(self._lines)), [len(line) for line in self._lines])
         self._tree = cKDTree(points)
 
-    def behind(self, place: int, bearing: float) -> Walk | None:
-        """The way from a place in a direction, rad, to the next place; None if it is not known."""
+    def behind(self, place: int, bearing: float, taken: Sequence[Array] = ()) -> Walk | None:
+        """The way from a place in a direction, rad, to the next place; None if it is not known.
+
+        `taken` are lines (N, 2) of edges that leave the place in other directions, as it is known:
+        what begins along one of them is that edge, though it may set out in this direction.
+        """
         pieces, used = list[Array](), set[int]()
-        found = self._onwards(self._places[place], bearing, used, BESIDE_M)
+        found = self._onwards(self._places[place], bearing, used, BESIDE_M, taken)
         while found is not None and len(used) < _MOST:
             number, piece = found
             used.add(number)
@@ -92,7 +97,12 @@ class Ways:
         return None
 
     def _onwards(
-        self, here: Array, ahead: float, used: set[int], gap: float
+        self,
+        here: Array,
+        ahead: float,
+        used: set[int],
+        gap: float,
+        taken: Sequence[Array] = (),
     ) -> tuple[int, Array] | None:
         """The longest line that goes on from a point (2,) in a direction, and its number."""
         near = np.unique(self._of[self._tree.query_ball_point(here, math.hypot(gap, BESIDE_M))])
@@ -109,7 +119,8 @@ class Ways:
             for rest in (line[i:], line[i::-1]):
                 least = _LEAST_M if best is None else length_of(best[1])
                 turned = abs(wrap_angle(_direction(rest) - ahead)) if len(rest) > 1 else math.pi
-                if length_of(rest) > least and turned < _SAME_RAD:
+                is_other = any(_begins_along(rest, other) for other in taken)
+                if length_of(rest) > least and turned < _SAME_RAD and not is_other:
                     best = number, rest
         return best
 
@@ -127,6 +138,13 @@ class Ways:
         place = int(away[on[0]].argmin())
         there = away[on[0] : on[0] + math.ceil(2 * BESIDE_M / _SPACING_M), place]
         return place, int(on[0] + there.argmin())
+
+
+def _begins_along(line: Array, other: Array) -> bool:
+    """Whether a line (N, 2) begins beside another one, which sets out at the same place."""
+    begins = line[: 1 + round(_APART_M / _SPACING_M)]
+    away, _ = cKDTree(resampled(other, _SPACING_M)).query(begins)
+    return bool(np.max(away) < BESIDE_M)
 
 
 def _direction(line: Array) -> float:

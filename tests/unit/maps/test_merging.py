@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gvgbot.geometry import Array, Pose
-from gvgbot.maps.merging import covariance_intersection, merged
+from gvgbot.maps.merging import covariance_intersection, merged, settled
 from gvgbot.maps.moved import moved_graph
 from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
 
@@ -234,3 +234,16 @@ def test_an_intersection_is_consistent_whatever_both_have_in_common(seed: int) -
         + gain_b @ cross.T @ gain_a.T
     )
     assert np.linalg.eigvalsh(covariance - true).min() > -1e-4
+
+
+def test_an_edge_that_sets_out_towards_a_frontier_does_not_follow_it() -> None:
+    """It bends: at a vertex that was seen from afar only, lines begin beside their bearings."""
+    bearings = (math.pi, -math.pi / 4, 0.0)
+    seen_from_afar = replace(
+        seen({0}).vertices[0], bearings=bearings, degree=3, frontiers=bearings[::2]
+    )
+    far = replace(seen({1}).vertices[0], position=(6.0, -6.0), bearings=(2.36,), frontiers=())
+    bent = np.concatenate([np.linspace((0, 0), (1, -0.2), 10), np.linspace((1, -0.2), (6, -6), 50)])
+    graph = settled((seen_from_afar, far), [way(0, 1, bent)])
+    assert graph.vertices[0].frontiers == (math.pi, 0.0)
+    assert graph.vertices[0].bearings == bearings

@@ -135,6 +135,19 @@ def test_what_two_have_driven_from_both_ends_is_no_frontier() -> None:
     assert onward.metres == pytest.approx(10.0, abs=0.1)
 
 
+def test_an_edge_that_sets_out_towards_a_frontier_leads_not_behind_it() -> None:
+    """It bends: at a vertex that was seen from afar only, lines begin beside their bearings."""
+    places = np.array([(0.0, 0.0), (6.0, -6.0), (8.0, 0.0), (-6.0, 0.0)])
+    building = Building(places, ((0, 1), (0, 2), (0, 3)))
+    chart = building.chart({0, 1}, HERE)
+    (known,) = chart.edges.values()
+    bent = replace(known, polyline=way((0.0, 0.0), (1.0, -0.2), (6.0, -6.0)).polyline)
+    west = building.chart({3}, HERE)
+    told = replace(west, ways=(way((-6.0, 0.0), (-0.2, 0.0)),))
+    site = Site([replace(chart, edges={known.id: bent}), told])
+    assert [round(f.bearing, 2) for many in site.open.values() for f in many] == [0.0]
+
+
 @pytest.mark.parametrize(("beyond", "is_left"), [(2.0, True), (4.0, False)])
 def test_who_drove_well_past_a_vertex_that_one_robot_alone_has_seen_refutes_it(
     beyond: float, is_left: bool
