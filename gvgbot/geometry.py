@@ -118,8 +118,23 @@ def length_of(line: Array) -> float:
     return float(np.hypot(*np.diff(line, axis=0).T).sum())
 
 
+def stations_of(line: Array) -> Array:
+    """How far it is along a line (N, 2) to each of its points (N,), in its unit."""
+    return np.concatenate([[0.0], np.hypot(*np.diff(line, axis=0).T).cumsum()])
+
+
+def direction_of(line: Array, over: float) -> float:
+    """In which a line (N, 2) of two points or more sets out, rad.
+
+    Taken to where it is first so far from its start, in its unit, or else to its end.
+    """
+    reached = np.flatnonzero(np.hypot(*(line - line[0]).T) >= over)
+    dx, dy = line[reached[0] if len(reached) else -1] - line[0]
+    return math.atan2(dy, dx)
+
+
 def resampled(line: Array, spacing: float) -> Array:
     """Points (M, 2) along a line (N, 2), its ends among them, not farther apart than `spacing`."""
-    along = np.concatenate([[0.0], np.hypot(*np.diff(line, axis=0).T).cumsum()])
+    along = stations_of(line)
     at = np.linspace(0.0, along[-1], 2 + int(along[-1] / spacing))
     return np.column_stack([np.interp(at, along, values) for values in line.T])

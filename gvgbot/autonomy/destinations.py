@@ -10,7 +10,7 @@ from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.slam.graph import Edge, GvgGraph, HalfEdgeId
 from gvgbot.autonomy.views import View
 from gvgbot.autonomy.whereabouts import Situation
-from gvgbot.geometry import Array
+from gvgbot.geometry import Array, length_of, stations_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,7 +60,7 @@ def foot_of(mapper: Mapper, point: Array) -> Foot | None:
         line = mapper.belief.map_vertex(edge.a.vertex).transform(edge.polyline)
         away = np.hypot(*(line - point).T)
         i = int(np.argmin(away))
-        station = float(np.hypot(*np.diff(line[: i + 1], axis=0).T).sum())
+        station = length_of(line[: i + 1])
         feet.append(Foot(edge, i, station, float(away[i])))
     return min(feet, key=lambda foot: foot.away, default=None)
 
@@ -71,7 +71,7 @@ def foot_at(graph: GvgGraph, end: HalfEdgeId, station: float) -> Foot | None:
     if edge is None:
         return None
     from_a = station if end == edge.a else edge.length - station
-    along = np.concatenate([[0.0], np.hypot(*np.diff(edge.polyline, axis=0).T).cumsum()])
+    along = stations_of(edge.polyline)
     return Foot(edge, int(np.argmin(np.abs(along - from_a))), from_a, 0.0)
 
 

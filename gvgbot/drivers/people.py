@@ -15,7 +15,7 @@ from scipy.spatial import KDTree
 from gvgbot.drivers.discs import cast_on_discs, disc_offsets
 from gvgbot.drivers.world import World
 from gvgbot.errors import WorldError
-from gvgbot.geometry import Array, Pose
+from gvgbot.geometry import Array, Pose, stations_of
 
 RADII = (0.2, 0.25)  # m
 SPEEDS = (0.5, 1.2)  # m/s
@@ -173,8 +173,7 @@ class People:
     def _set_out(self, person: _Person, here: Array) -> None:
         """Choose a way to somewhere."""
         person.way = self._way(here, self._destinations[self._rng.integers(DESTINATIONS)])
-        legs = np.hypot(*np.diff(person.way, axis=0).T)
-        person.marks = np.concatenate(([0.0], np.cumsum(legs)))
+        person.marks = stations_of(person.way)
         person.length = float(person.marks[-1] * self._rng.uniform(*SHARE_WALKED))
         person.along = 0.0
 

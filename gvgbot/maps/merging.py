@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
-from gvgbot.geometry import Array, Pose, wrap_angle
+from gvgbot.geometry import Array, Pose, direction_of, stations_of, wrap_angle
 from gvgbot.maps.moved import moved_graph
 from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
 
@@ -23,7 +23,7 @@ _KINK_RAD = 1.2  # at most, from the bearing of an edge to where it sets out
 _ON_EDGE_M = 0.4  # from an edge, a vertex that the edge's own map does not know splits it
 _FROM_ENDS_M = 0.8  # but not so near to its ends
 _BESIDE_M = 1.0  # edges between the same vertices that stay nearer to each other are one
-_AHEAD_M = 0.8  # along an edge, its direction is taken
+AHEAD_M = 0.8  # along an edge, its direction is taken
 _SHARES = np.linspace(0.02, 0.98, 25)  # of the first covariance in an intersection
 
 
@@ -67,8 +67,8 @@ def settled(vertices: Sequence[MapVertex], edges: Sequence[MapEdge]) -> RouteGra
     """The map of vertices and edges, where these end on those, and are no frontiers any more."""
     leaving: dict[int, list[float]] = {}
     for edge in edges:
-        leaving.setdefault(edge.start, []).append(direction(edge.polyline))
-        leaving.setdefault(edge.end, []).append(direction(edge.polyline[::-1]))
+        leaving.setdefault(edge.start, []).append(direction_of(edge.polyline, AHEAD_M))
+        leaving.setdefault(edge.end, []).append(direction_of(edge.polyline[::-1], AHEAD_M))
     return RouteGraph(
         tuple(_settled(vertex, leaving.get(vertex.id, [])) for vertex in vertices),
         tuple(_anchored(edge, vertices) for edge in edges),
@@ -122,7 +122,7 @@ def _is_inside(vertex: MapVertex, edge: MapEdge) -> bool:
     """Whether a vertex lies on an edge that was driven, away from its ends."""
     line = edge.polyline
     away = np.hypot(*(line - vertex.position).T)
-    along = np.concatenate([[0.0], np.hypot(*np.diff(line, axis=0).T).cumsum()])
+    along = stations_of(line)
     i = int(np.argmin(away))
     from_ends = min(float(along[i]), float(along[-1] - along[i]))
     return edge.traversals > 0 and away[i] < _BESIDE_M and from_ends > _FROM_ENDS_M
@@ -233,7 +233,7 @@ def _split(edges: Iterable[MapEdge], vertices: list[MapVertex]) -> Iterable[MapE
     """The edges, cut where vertices lie on them that their map does not know."""
     for edge in edges:
         line = edge.polyline
-        along = np.concatenate([[0.0], np.hypot(*np.diff(line, axis=0).T).cumsum()])
+        along = stations_of(line)
         cuts = []
         for vertex in vertices:
             away = np.hypot(*(line - vertex.position).T)
@@ -263,14 +263,6 @@ def is_same(edge: MapEdge, other: MapEdge) -> bool:
         return False
     away = cdist(edge.polyline, other.polyline)
     return float(max(away.min(axis=0).max(), away.min(axis=1).max())) < _BESIDE_M
-
-
-def direction(line: Array) -> float:
-    """In which an edge with this line (N, 2) leaves its first vertex, rad."""
-    along = np.concatenate([[0.0], np.hypot(*np.diff(line, axis=0).T).cumsum()])
-    i = min(int(np.searchsorted(along, _AHEAD_M)), len(line) - 1)
-    dx, dy = line[max(i, 1)] - line[0]
-    return math.atan2(dy, dx)
 
 
 def _settled(vertex: MapVertex, leaving: list[float]) -> MapVertex:
@@ -309,7 +301,7 @@ def _anchored(edge: MapEdge, vertices: Sequence[MapVertex]) -> MapEdge:
     """The edge, bent so that it ends on its vertices."""
     places = {vertex.id: np.array(vertex.position) for vertex in vertices}
     line = edge.polyline
-    along = np.concatenate([[0.0], np.hypot(*np.diff(line, axis=0).T).cumsum()])
+    along = stations_of(line)
     share = (along / max(along[-1], 1e-9))[:, None]
     off = (1 - share) * (places[edge.start] - line[0]) + share * (places[edge.end] - line[-1])
     return replace(edge, polyline=line + off)

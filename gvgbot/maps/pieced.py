@@ -5,8 +5,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from gvgbot.geometry import Array
-from gvgbot.maps.merging import direction, is_among, is_same, settled
+from gvgbot.geometry import Array, direction_of
+from gvgbot.maps.merging import AHEAD_M, is_among, is_same, settled
 from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
 from gvgbot.team.ways import WELL_ON_M, Ways, leads_over
 
@@ -31,7 +31,7 @@ def pieced(graph: RouteGraph, ways: Sequence[tuple[Array, float]]) -> RouteGraph
         for bearing in vertex.frontiers:
             walk = known.behind(number, bearing, taken)
             if walk is None or not is_among(
-                direction(walk.line[::-1]), vertices[walk.place].frontiers
+                direction_of(walk.line[::-1], AHEAD_M), vertices[walk.place].frontiers
             ):
                 continue
             edge = MapEdge(

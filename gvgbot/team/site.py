@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial.distance import cdist
 
 from gvgbot.autonomy.slam.graph import HalfEdgeId
-from gvgbot.geometry import Array, wrap_angle
+from gvgbot.geometry import Array, direction_of, length_of, wrap_angle
 from gvgbot.team.chart import Chart, Departure
 from gvgbot.team.ways import BESIDE_M, WELL_ON_M, Ways, leads_over
 
@@ -205,12 +205,11 @@ class Site:
             if away[i] > BESIDE_M:
                 continue
             for end, line in ((edge.b, edge.polyline[i:]), (edge.a, edge.polyline[i::-1])):
-                along = np.concatenate([[0.0], np.hypot(*np.diff(line, axis=0).T).cumsum()])
-                if along[-1] < _AHEAD_M:
+                metres = length_of(line)
+                if metres < _AHEAD_M:
                     continue
-                dx, dy = line[int(np.searchsorted(along, _AHEAD_M))] - line[0]
-                if abs(wrap_angle(math.atan2(dy, dx) - bearing)) < _SAME_RAD:
-                    return Onward(self._place[number, end.vertex], float(along[-1]))
+                if abs(wrap_angle(direction_of(line, _AHEAD_M) - bearing)) < _SAME_RAD:
+                    return Onward(self._place[number, end.vertex], metres)
         return None
 
     def costs(self, reached: dict[int, float]) -> dict[Frontier, tuple[float, HalfEdgeId]]:

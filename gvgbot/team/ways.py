@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
 from gvgbot.autonomy.whereabouts import LEAST_LOOP_M
-from gvgbot.geometry import Array, length_of, resampled, wrap_angle
+from gvgbot.geometry import Array, direction_of, length_of, resampled, stations_of, wrap_angle
 
 WELL_ON_M = 3.0  # beyond a vertex, who did not see it is as right as who did
 BESIDE_M = 0.45  # from a line, a place lies on it
@@ -90,7 +90,7 @@ class Ways:
         last = pieces[-1]
         for count in range(len(last), max(1, len(last) - _ASTRAY), -_CUT):
             here = last[count - 1 :: -1]
-            found = self._onwards(here[0], _direction(here) + math.pi, used, _GAP_M)
+            found = self._onwards(here[0], direction_of(here, _AHEAD_M) + math.pi, used, _GAP_M)
             if found is not None:
                 pieces[-1] = last[:count]
                 return found
@@ -118,9 +118,7 @@ class Ways:
             i = int(np.where(is_ahead, np.hypot(dx, dy), np.inf).argmin())
             for rest in (line[i:], line[i::-1]):
                 least = _LEAST_M if best is None else length_of(best[1])
-                turned = abs(wrap_angle(_direction(rest) - ahead)) if len(rest) > 1 else math.pi
-                is_other = any(_begins_along(rest, other) for other in taken)
-                if length_of(rest) > least and turned < _SAME_RAD and not is_other:
+                if length_of(rest) > least and _leads(rest, ahead, taken):
                     best = number, rest
         return best
 
@@ -130,8 +128,7 @@ class Ways:
         To its start it leads only round something, metres `before` it included.
         """
         away = cdist(line, self._places)
-        steps = np.hypot(*np.diff(line, axis=0).T)
-        away[: 1 + int(np.searchsorted(steps.cumsum(), LEAST_LOOP_M - before)), start] = math.inf
+        away[: np.searchsorted(stations_of(line), LEAST_LOOP_M - before), start] = math.inf
         on = np.flatnonzero((away < BESIDE_M).any(axis=1))
         if not len(on):
             return None
@@ -140,15 +137,14 @@ class Ways:
         return place, int(on[0] + there.argmin())
 
 
+def _leads(line: Array, ahead: float, taken: Sequence[Array]) -> bool:
+    """Whether a line (N, 2) sets out in a direction, rad, and along no other one."""
+    turned = abs(wrap_angle(direction_of(line, _AHEAD_M) - ahead))
+    return turned < _SAME_RAD and not any(_begins_along(line, other) for other in taken)
+
+
 def _begins_along(line: Array, other: Array) -> bool:
     """Whether a line (N, 2) begins beside another one, which sets out at the same place."""
     begins = line[: 1 + round(_APART_M / _SPACING_M)]
     away, _ = cKDTree(resampled(other, _SPACING_M)).query(begins)
     return bool(np.max(away) < BESIDE_M)
-
-
-def _direction(line: Array) -> float:
-    """In which a line of two points or more sets out, rad."""
-    reached = np.flatnonzero(np.hypot(*(line - line[0]).T) >= _AHEAD_M)
-    dx, dy = line[reached[0] if len(reached) else -1] - line[0]
-    return math.atan2(dy, dx)

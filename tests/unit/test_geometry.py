@@ -13,9 +13,11 @@ from gvgbot.geometry import (
     Pose,
     Twist,
     composed,
+    direction_of,
     length_of,
     resampled,
     seen_from,
+    stations_of,
     wrap_angle,
     wrap_angles,
 )
@@ -165,3 +167,17 @@ def test_a_line_keeps_its_ends_and_its_corner_when_it_is_resampled(spacing: floa
 def test_the_length_of_a_line_is_that_of_its_steps() -> None:
     assert length_of(np.array([(0.0, 0.0), (3.0, 4.0), (3.0, 6.0)])) == 7.0
     assert length_of(np.array([(3.0, 4.0)])) == length_of(np.empty((0, 2))) == 0.0
+
+
+def test_stations_along_a_line_are_the_sums_of_its_steps() -> None:
+    line = np.array([(0.0, 0.0), (3.0, 4.0), (3.0, 6.0)])
+    assert stations_of(line).tolist() == [0.0, 5.0, 7.0]
+    assert stations_of(line[:1]).tolist() == [0.0]
+
+
+@pytest.mark.parametrize(("over", "expected"), [(0.5, 0.0), (2.0, math.pi / 4), (9.0, math.pi / 2)])
+def test_a_line_sets_out_towards_where_it_is_so_far_from_its_start(
+    over: float, expected: float
+) -> None:
+    line = np.array([(1.0, 1.0), (2.0, 1.0), (3.0, 3.0), (1.0, 5.0)])
+    assert direction_of(line, over) == pytest.approx(expected)

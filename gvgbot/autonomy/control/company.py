@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from gvgbot.autonomy.gvg.local import Branch, LocalGvg, Place
-from gvgbot.geometry import Array, Pose, Twist
+from gvgbot.geometry import Array, Pose, Twist, length_of, stations_of
 from gvgbot.hal.sweep import free_distance
 
 _KEPT_M = 0.12  # between two bodies, always,
@@ -98,7 +98,7 @@ def free_metres(line: Array, from_walls: Array, company: list[Companion]) -> flo
     `from_walls` (N,) is how far its points are from walls. Where that is little, one robot at a
     time drives: who is nearer, and of two that are equally near, who goes first anyway.
     """
-    stations = _stations(line)
+    stations = stations_of(line)
     ends = (_end_of_way(line, stations, from_walls, one) for one in company)
     return min(ends, default=math.inf)
 
@@ -114,7 +114,7 @@ def _end_of_way(line: Array, stations: Array, from_walls: Array, other: Companio
     if not shared.any():
         return math.inf
     mine = float(stations[shared].min())
-    theirs = float(_stations(course)[nearest[shared]].min())
+    theirs = float(stations_of(course)[nearest[shared]].min())
     is_first = theirs < mine if abs(theirs - mine) > _EQUAL_M else other.goes_first
     return max(0.0, mine - _CLEAR_OF_IT_M) if is_first else math.inf
 
@@ -128,12 +128,6 @@ def _directions(line: Array) -> Array:
     behind = np.maximum(np.arange(len(line)) - _OVER, 0)
     directions: Array = line[ahead] - line[behind]
     return directions
-
-
-def _stations(line: Array) -> Array:
-    """Metres along a line (N, 2) to each of its points."""
-    steps = np.hypot(*np.diff(line, axis=0).T)
-    return np.concatenate([[0.0], np.cumsum(steps)])
 
 
 def patience(local_base: Pose, company: list[Companion]) -> float:
@@ -185,7 +179,7 @@ def wide_place(gvg: LocalGvg, place: Place, company: list[Companion]) -> tuple[B
     for _, path in gvg.routes(place).values():
         line, room = gvg.line_from(place, path)
         way = line[: 1 + int(np.argmax(room >= _ABREAST_M))]
-        metres = float(_stations(way)[-1])
+        metres = length_of(way)
         is_free = not any(_stands_on(way, one) for one in company)
         if room.max() >= _ABREAST_M and metres < _NEAR_M and is_free:
             ways.append((metres, path))

@@ -7,7 +7,7 @@ import numpy as np
 
 from gvgbot.autonomy.control.edge_follower import Track
 from gvgbot.autonomy.gvg.local_map import LocalMap
-from gvgbot.geometry import Array, resampled
+from gvgbot.geometry import Array, resampled, stations_of
 
 Disc = tuple[Array, float]  # centre (2,) and radius, m
 
@@ -135,7 +135,7 @@ def _ways_round(line: Array, centre: Array, reach: float) -> list[Array]:
     inside = np.flatnonzero(away < reach)
     if not len(inside) or inside[-1] == len(line) - 1:
         return []
-    stations = np.concatenate([[0.0], np.hypot(*np.diff(line, axis=0).T).cumsum()])
+    stations = stations_of(line)
     first = int(stations.searchsorted(stations[inside[0]] - _TURNS_ASIDE_M))
     last = int(stations.searchsorted(stations[inside[-1]] + _TURNS_ASIDE_M))
     last = min(last, len(line) - 1)

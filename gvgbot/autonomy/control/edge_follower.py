@@ -6,7 +6,7 @@ from typing import Annotated
 
 import numpy as np
 
-from gvgbot.geometry import STANDSTILL, Array, Pose, Twist, wrap_angle
+from gvgbot.geometry import STANDSTILL, Array, Pose, Twist, stations_of, wrap_angle
 from gvgbot.ranges import Range
 
 _LEAST_LOOK_AHEAD_M = 0.12
@@ -49,8 +49,7 @@ class Track:
     @classmethod
     def of(cls, polyline: Array, clearance: Array) -> "Track":
         """A track from its polyline."""
-        steps = np.hypot(*np.diff(polyline, axis=0).T)
-        return cls(polyline, clearance, np.concatenate([[0.0], np.cumsum(steps)]))
+        return cls(polyline, clearance, stations_of(polyline))
 
     @property
     def length(self) -> float:
