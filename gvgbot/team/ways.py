@@ -79,18 +79,23 @@ class Ways:
                     return None
                 clearance = min(self._clearances[k] for k in used)
                 return Walk(arrived[0], line, clearance, length_of(line))
-            found = self._beyond(pieces, used)
+            found = self._beyond(pieces, used, taken)
         return None
 
-    def _beyond(self, pieces: list[Array], used: set[int]) -> tuple[int, Array] | None:
+    def _beyond(
+        self, pieces: list[Array], used: set[int], taken: Sequence[Array]
+    ) -> tuple[int, Array] | None:
         """The line that goes on from the last piece, and its number; see `_onwards`.
 
-        Where robots meet they go round each other: such an end is cut off if nothing goes on there.
+        Where robots meet they go round each other: such an end is cut off if nothing goes on there,
+        as long as what is left tells the direction.
         """
         last = pieces[-1]
-        for count in range(len(last), max(1, len(last) - _ASTRAY), -_CUT):
+        least = max(len(last) - _ASTRAY, round(_AHEAD_M / _SPACING_M))
+        for count in range(len(last), min(least, len(last) - 1), -_CUT):
             here = last[count - 1 :: -1]
-            found = self._onwards(here[0], direction_of(here, _AHEAD_M) + math.pi, used, _GAP_M)
+            ahead = direction_of(here, _AHEAD_M) + math.pi
+            found = self._onwards(here[0], ahead, used, _GAP_M, taken)
             if found is not None:
                 pieces[-1] = last[:count]
                 return found
@@ -102,7 +107,7 @@ class Ways:
         ahead: float,
         used: set[int],
         gap: float,
-        taken: Sequence[Array] = (),
+        taken: Sequence[Array],
     ) -> tuple[int, Array] | None:
         """The longest line that goes on from a point (2,) in a direction, and its number."""
         near = np.unique(self._of[self._tree.query_ball_point(here, math.hypot(gap, BESIDE_M))])

@@ -103,3 +103,12 @@ def test_who_turned_on_the_spot_has_not_driven_round_anything() -> None:
     assert walk is not None
     assert walk.place == 0
     assert walk.length == pytest.approx(8.0, abs=0.1)
+
+
+def test_who_stepped_aside_has_not_driven_the_way_that_leads_on_past_it() -> None:
+    """A metre into a side way, from a vertex whose other edge leads on to the next vertex."""
+    aside = straight((0.0, 0.0), (0.3, 0.05), (0.6, 1.1)), 0.5
+    edge = straight((0.0, 0.0), (10.0, 0.0)), 0.7
+    ways = Ways([aside, edge], PLACES)
+    assert ways.behind(0, math.radians(60.0), [edge[0]]) is None
+    assert ways.behind(0, math.radians(60.0)) is None
