@@ -226,11 +226,11 @@ def _on_cycle(robot: _Robot, air: _Air, devices: Devices, odometry: Odometry) ->
     if odometry.stamp >= robot.steered + config.steer_every_s:
         robot.steered = odometry.stamp
         course = robot.member.course(
-            odometry.stamp, pipeline.map_base, pipeline.track, pipeline.seen
+            odometry.stamp, pipeline.map_base, pipeline.track, pipeline.traffic.seen
         )
         air.send(course, robot)
-        pipeline.company = robot.member.company()
-        pipeline.strangers = robot.member.strangers()
+        pipeline.traffic.company = robot.member.company()
+        pipeline.traffic.strangers = robot.member.strangers()
     if odometry.stamp >= robot.told + config.tell_every_s:
         _tell(robot, air, odometry.stamp)
         robot.member.look(odometry.stamp)

@@ -52,7 +52,7 @@ class LiveTeam:
             life=life,
         )
         pipeline.mission.choice.sharing = self.member.auction
-        pipeline.company = []
+        pipeline.traffic.company = []
 
     async def take_part(
         self, clock: Clock, off_loop: Callable[[Callable[[], None]], Awaitable[None]]
@@ -98,10 +98,12 @@ class LiveTeam:
         while True:
             if not pipeline.is_lost:
                 now = self._clock.now()
-                course = self.member.course(now, pipeline.map_base, pipeline.track, pipeline.seen)
+                course = self.member.course(
+                    now, pipeline.map_base, pipeline.track, pipeline.traffic.seen
+                )
                 self._network.tell_team("course", encode(course))
-                pipeline.company = self.member.company()
-                pipeline.strangers = self.member.strangers()
+                pipeline.traffic.company = self.member.company()
+                pipeline.traffic.strangers = self.member.strangers()
             await self._clock.sleep_until(self._clock.now() + self._config.steer_every_s)
 
     async def _compare(self, off_loop: Callable[[Callable[[], None]], Awaitable[None]]) -> None:

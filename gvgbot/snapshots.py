@@ -46,7 +46,9 @@ def state(
         reason=mission.reason or away or "",
         errand=pipeline.errands.progress,
         requests=requests,
-        team=tuple(Mate(name=one.name, pose=_triple(one.pose)) for one in pipeline.company or ()),
+        team=tuple(
+            Mate(name=one.name, pose=_triple(one.pose)) for one in pipeline.traffic.company or ()
+        ),
         uptime=uptime,
         pose=(map_base.x, map_base.y, map_base.theta),
         covariance=tuple(pose_covariance(pipeline, odometry, noise).ravel().tolist()),

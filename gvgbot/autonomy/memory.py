@@ -144,9 +144,9 @@ def remember(pipeline: Pipeline) -> Memory:
         far=_cells(maps.far),
         odds=Odds(calibration.x, calibration.P, maps._shared, calibration.noise, calibration.told),
         hazards=pipeline._hazards._all,
-        newcomers=pipeline._newcomers._all,
+        newcomers=pipeline.traffic.newcomers._all,
         lasting=pipeline.lasting,
-        passed=pipeline.passed,
+        passed=pipeline.traffic.passed,
     )
 
 
@@ -226,8 +226,8 @@ def recall(pipeline: Pipeline, memory: Memory, past: list[Growth]) -> None:
     calibration.noise, calibration.told = memory.odds.noise, memory.odds.told
     pipeline._maps._shared = memory.odds.shared
     pipeline._hazards._all = list(memory.hazards)
-    pipeline._newcomers._all = list(memory.newcomers)
-    pipeline.passed = memory.passed
+    pipeline.traffic.newcomers._all = list(memory.newcomers)
+    pipeline.traffic.passed = memory.passed
     pipeline.travelled, pipeline._kept = memory.travelled, memory.kept
     _recall_past(pipeline, past[: memory.keyframes])
     if len(past) < memory.keyframes and memory.last is not None:

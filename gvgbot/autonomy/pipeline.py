@@ -6,10 +6,7 @@ from functools import cache, partial
 import numpy as np
 
 from gvgbot.autonomy.config import AutonomyConfig
-from gvgbot.autonomy.control import company
-from gvgbot.autonomy.control.company import BodiesSeen, Companion
-from gvgbot.autonomy.control.detour import led_round
-from gvgbot.autonomy.control.edge_follower import Track, follow
+from gvgbot.autonomy.control.edge_follower import follow
 from gvgbot.autonomy.control.orders import Drive, LookAround, Order, Stand
 from gvgbot.autonomy.control.reflexes import (
     AWAY_M,
@@ -32,10 +29,9 @@ from gvgbot.autonomy.keyframes import Keyframe, Step
 from gvgbot.autonomy.localisation import Localisation, LocalMaps
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.mission import Mission
-from gvgbot.autonomy.newcomers import Newcomers
 from gvgbot.autonomy.odometry_log import OdometryLog
-from gvgbot.autonomy.passed import Passed
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
+from gvgbot.autonomy.traffic import Traffic
 from gvgbot.autonomy.views import Correspondence, View, touching
 from gvgbot.geometry import STANDSTILL, Array, Pose, Twist, rotated_covariance, wrap_angle
 from gvgbot.hal.deskew import deskewed
@@ -43,11 +39,8 @@ from gvgbot.hal.messages import Odometry, Scan
 from gvgbot.hal.sweep import free_distance, seen_from
 
 _NOTHING_FELT = Felt()
-_MOST_PASSED = 100  # places, the latest ones
 _LIFTED = np.diag([0.3**2, 0.3**2, 0.1**2])  # how far a robot is carried that is put down again
 _ROOM_BESIDE_EDGES_M = 0.08  # on each side, where no edge leads
-_ROUND_M = 2.5  # a body farther away is elsewhere when the robot is there
-_COMPANY_M = 0.15  # by which another robot may be elsewhere than it says
 _GRAIN_M = 0.05  # of what must be known to be free, when it gets away
 _LONGEST_GAP_S = 2.0  # between keyframes; a longer one is an outage of a device
 _FORGOTTEN = np.diag([1.0, 1.0, 0.3**2])  # covariance of a way that is not kept
@@ -87,12 +80,7 @@ class Pipeline:
         self._odometry = OdometryLog()
         self._reflexes = Reflexes(config.reflexes)
         self._hazards = Hazards(config.hazards)
-        self._newcomers = Newcomers(config.newcomers)
-        self.passed: list[Passed] = []
-        # other robots as they tell of themselves, map frame; None if there are surely none
-        self.company: list[Companion] | None = None
-        self.strangers: list[float] = []  # radii of others that may be anywhere, m
-        self.seen: BodiesSeen | None = None  # what may be robots of a team, in the last look
+        self.traffic = Traffic(config.newcomers)
         self._incidents: list[tuple[str, str]] = []  # action and reason, since the last scan
         self._was_lifted = self._look_now = False
         self._last: Keyframe | None = None
@@ -110,10 +98,6 @@ class Pipeline:
         self.travelled = 0.0
 
     # -- state -----------------------------------------------------------------------------------
-
-    @property
-    def _is_in_team(self) -> bool:
-        return self.company is not None
 
     @property
     def matching(self) -> ScanMatchingConfig:
@@ -182,8 +166,8 @@ class Pipeline:
         scan = deskewed(scan, self._odometry.motion_during(scan))
         local_base = self._localise(scan, odom_base)
         whole, scan = scan, self._sift(scan, local_base)
-        free = self._newcomers.free(whole, local_base)
-        for one in self._nearby(local_base):
+        free = self.traffic.newcomers.free(whole, local_base)
+        for one in self.traffic.nearby(self._local_map(local_base)):
             self._maps.near.stand_on(one.pose.position, one.radius, self.travelled)
         self._maps.insert(scan, local_base, self.travelled, free)
         self._hazards.forget(self.travelled)
@@ -199,29 +183,20 @@ class Pipeline:
 
     def _glance(self, scan: Scan, odom_base: Pose) -> None:
         """Look out for other robots in every scan: they move."""
-        if self._is_in_team and self._last is not None:
+        if self._last is not None:
             local_base = self._last.local_base.compose(self._last.odom_base.to(odom_base))
-            self._newcomers.glance(scan, local_base)
+            self.traffic.glance(scan, local_base)
 
     def _sift(self, scan: Scan, local_base: Pose) -> Scan:
         """The scan without what may be people or robots; the mission hears of the robots."""
-        nearby = self._nearby(local_base)
-        self._newcomers.in_team = self._is_in_team
-        self._newcomers.strangers = self.strangers
-        self._newcomers.company = self._discs(nearby, _COMPANY_M)
-        self.mission.meet(local_base, nearby)
-        is_way = partial(self.mapper.is_way, local_base)
-        scan = self._newcomers.sift(scan, local_base, self._maps.near, is_way)
-        self._note_passed()
-        if self._is_in_team:
-            self.seen = self._bodies_seen(scan.stamp, local_base)
-        return scan
+        self.mission.meet(local_base, self.traffic.nearby(self._local_map(local_base)))
+        walls, is_way = self._maps.near, partial(self.mapper.is_way, local_base)
+        map_base, now = self.mapper.belief.map_base, len(self.keyframes)
+        return self.traffic.sift(scan, local_base, map_base, walls, is_way, now)
 
-    def _note_passed(self) -> None:
-        """Keep in mind who stood there until he was out of sight."""
-        now = len(self.keyframes)
-        missed = [Passed(now, one.centre, one.radius) for one in self._newcomers.missed]
-        self.passed = (self.passed + missed)[-_MOST_PASSED:]
+    def _local_map(self, local_base: Pose) -> Pose:
+        """The map frame in the local one; the base of the belief is at a pose there."""
+        return local_base.compose(self.mapper.belief.map_base.inverse())
 
     def _view(self, scan: Scan, local_base: Pose) -> View:
         """What there is to be seen of the GVG, and what of that is doubtful."""
@@ -230,11 +205,11 @@ class Pipeline:
         )
         self.gvg, marks = self.mapper.marked(self._local_gvg(local_base), local_base)
         hazards, suspects = self._hazards.doubtful, self._maps.near.suspects()
-        doubtful = np.concatenate([hazards, suspects, *self._standing()])
+        doubtful = np.concatenate([hazards, suspects, *self.traffic.standing])
         doubted = touching(self.gvg, doubtful)
-        if self._is_in_team:  # bodies lead the GVG nowhere, but hide how it goes on
+        if self.traffic.is_in_team:  # bodies lead the GVG nowhere, but hide how it goes on
             ends = (key for key, node in self.gvg.nodes.items() if node.degree == 1)
-            doubted |= touching(self.gvg, self._newcomers.points) & frozenset(ends)
+            doubted |= touching(self.gvg, self.traffic.newcomers.points) & frozenset(ends)
         return View(
             len(self.keyframes),
             scan.stamp,
@@ -245,7 +220,7 @@ class Pipeline:
             doubtful,
             doubted,
             marks,
-            self._newcomers.is_one_standing(scan.stamp, self._maps.near),
+            self.traffic.newcomers.is_one_standing(scan.stamp, self._maps.near),
         )
 
     def _act(self, view: View, known: Correspondence, scan: Scan) -> list[Event]:
@@ -258,27 +233,12 @@ class Pipeline:
             self._turn(_blind_angle(scan))
             return []
         order, done = self.errands.advance(view, known)
-        if isinstance(order, Drive) and self._is_in_team:
-            order = Drive(self._round_bodies(order.track, view))
+        if isinstance(order, Drive) and self.traffic.is_in_team:
+            room = self._radius, self._config.passage_margin_m
+            local_map = self._local_map(view.local_base)
+            order = Drive(self.traffic.led_round(order.track, view, local_map, *room))
         self._obey(order)
         return done
-
-    def _bodies_seen(self, stamp: float, local_base: Pose) -> BodiesSeen:
-        """The round bodies of the last look, map frame."""
-        map_base, bodies = self.mapper.belief.map_base, self._newcomers.bodies.copy()
-        bodies[:, :2] = map_base.compose(local_base.inverse()).transform(bodies[:, :2])
-        return BodiesSeen(stamp, map_base, bodies)
-
-    def _nearby(self, local_base: Pose) -> list[Companion]:
-        """Other robots in the local frame; the base of the belief is at a pose there."""
-        if not self.company:
-            return []
-        local_map = local_base.compose(self.mapper.belief.map_base.inverse())
-        return [company.moved(one, local_map) for one in self.company]
-
-    def _discs(self, nearby: list[Companion], more: float) -> list[tuple[Array, float]]:
-        """Other robots by centre and radius."""
-        return [(one.pose.position, one.radius + more) for one in nearby]
 
     def _local_gvg(self, local_base: Pose) -> LocalGvg:
         """The GVG around the base, by what the local map shows and the map holds."""
@@ -289,28 +249,10 @@ class Pipeline:
             min_clearance=self._radius + self._config.passage_margin_m,
             roughness=reduction.roughness_m,
             open_clearance=self.open_clearance,
-            felt=np.concatenate([self._hazards.points, *self._standing()]),
+            felt=np.concatenate([self._hazards.points, *self.traffic.standing]),
         )
         known = self.mapper.known_around(local_base, half_width)
         return reduce_graph(fine, reduction, known).rings_cut_far_from(local_base.position)
-
-    def _standing(self) -> list[Array]:
-        """Rims (N, 2) of who stands in the way for a while; in a team all drive about."""
-        return [] if self._is_in_team else [self._newcomers.points]
-
-    def _round_bodies(self, track: Track, view: View) -> Track:
-        """The track led round bodies near by, or to where one sees how it goes on behind them."""
-        seen = self._newcomers.discs
-        told = [
-            (centre, radius)
-            for centre, radius in self._discs(self._nearby(view.local_base), 0.0)
-            if not any(math.dist(centre, c) < r + _COMPANY_M for c, r in seen)
-        ]
-        base = view.local_base.position
-        bodies = [one for one in seen + told if math.dist(one[0], base) < _ROUND_M]
-        room = self._radius, self._config.passage_margin_m
-        is_hidden = view.is_end_doubted(track.polyline[-1])
-        return led_round(track, bodies, self._maps.near, *room, is_hidden=is_hidden)
 
     def _worth_a_look(self, scan: Scan, odom_base: Pose) -> bool:
         """Whether the robot is about something, and has come on, turned or waited enough."""
@@ -389,7 +331,7 @@ class Pipeline:
         self.keyframes[self.lasting :] = [last]
         self.steps[self.lasting - 1 :] = [Step(before.map_base.to(last.map_base), _FORGOTTEN)]
         self.mapper.forget_between(self.lasting, newest)
-        self.passed = [one.before(self.lasting) for one in self.passed]
+        self.traffic.passed = [one.before(self.lasting) for one in self.traffic.passed]
         return [WayForgotten(stamp, self.lasting, newest - self.lasting)]
 
     # -- control, per odometry message -------------------------------------------------------------
@@ -433,13 +375,11 @@ class Pipeline:
 
     def _careful(self, twist: Twist, local_base: Pose) -> Twist:
         """The twist, slow enough to stop with room for somebody ahead who comes as fast."""
-        if not self._is_in_team or self._last is None:
+        if not self.traffic.is_in_team or self._last is None:
             return twist
-        base_local = local_base.inverse()
-        others = self._discs(self._nearby(self._last.local_base), 0.0) + self._newcomers.latest
-        discs = [(base_local.transform(centre), radius) for centre, radius in others]
+        local_map = self._local_map(self._last.local_base)
         slow = self._config.edge_follower.min_speed_mps
-        careful = company.careful(twist, discs, self._radius, slow)
+        careful = self.traffic.careful(twist, local_base, local_map, self._radius, slow)
         if careful.linear == 0.0 < twist.linear:
             self.errands.hold()
         return careful
@@ -450,7 +390,12 @@ class Pipeline:
         farthest = max(AWAY_M, self._config.reflexes.back_off_m)
         ahead = turned.transform(_ahead(self._radius, farthest))
         unknown = ahead[~self._maps.near.known(ahead)]
-        points = [self._maps.near.points(), self._newcomers.points, self._hazards.points, unknown]
+        points = [
+            self._maps.near.points(),
+            self.traffic.newcomers.points,
+            self._hazards.points,
+            unknown,
+        ]
         seen = seen_from(turned, np.concatenate(points))
         margin = self._config.passage_margin_m
         return free_distance(seen, Twist(1.0, 0.0), radius=self._radius, margin=margin)

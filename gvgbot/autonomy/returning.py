@@ -170,7 +170,8 @@ class ReturningPipeline(Pipeline):
         for local_map in (seeker._maps.near, seeker._maps._far):
             local_map._seen_at += np.float32(older)
         self._maps, self._odometry, self.gvg = seeker._maps, seeker._odometry, seeker.gvg
-        self._reflexes, self._newcomers = seeker._reflexes, seeker._newcomers
+        self._reflexes = seeker._reflexes
+        self.traffic.newcomers = seeker.traffic.newcomers
         self._place(map_base)
         motion = self.keyframes[-1].map_base.to(map_base)
         self._last = replace(seeker._last, map_base=map_base)

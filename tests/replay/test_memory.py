@@ -72,9 +72,9 @@ def test_a_restart_is_no_more_than_a_silence(
 def test_who_was_passed_is_looked_at_again_by_whoever_was_restarted() -> None:
     config = load_config()
     lived, restarted = fresh(config), fresh(config)
-    lived.passed = [Passed(7, np.array([1.0, 2.0]), 0.1)]
+    lived.traffic.passed = [Passed(7, np.array([1.0, 2.0]), 0.1)]
     recall(restarted, *kept(lived))
-    assert packed(restarted.passed) == packed(lived.passed)
+    assert packed(restarted.traffic.passed) == packed(lived.traffic.passed)
 
 
 def test_what_the_journal_says_after_the_snapshot_is_lived_again(

@@ -65,11 +65,11 @@ class Explorer:
     def hear(self, other: "Explorer", *, goes_first: bool) -> None:
         """Be told where the other one is and what it drives along, and what it sees."""
         mind = other.pipeline
-        course = other.member.course(other.told, mind.map_base, mind.track, mind.seen)
+        course = other.member.course(other.told, mind.map_base, mind.track, mind.traffic.seen)
         self.member.hear(decode(encode(course)), other.told)
         companion = Companion("other", mind.map_base, goes_first, mind.track, radius=0.177)
         map_map = self.start.inverse().compose(other.here).compose(mind.map_base.inverse())
-        self.pipeline.company = [moved(companion, map_map)]
+        self.pipeline.traffic.company = [moved(companion, map_map)]
 
 
 @cache

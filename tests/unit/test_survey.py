@@ -86,11 +86,11 @@ def driven_past_a_post(seconds: float) -> Pipeline:
 
 def test_a_post_that_was_passed_before_anybody_knew_that_it_is_one_is_looked_at_again() -> None:
     """It was in sight for a quarter of the way."""
-    assert not driven_past_a_post(300.0).passed
+    assert not driven_past_a_post(300.0).traffic.passed
     pipeline = driven_past_a_post(15.0)
     places = set(map(tuple, survey(pipeline).tolist()))
-    assert len(pipeline.passed) == 1
-    pipeline.passed = []
+    assert len(pipeline.traffic.passed) == 1
+    pipeline.traffic.passed = []
     (place,) = places - set(map(tuple, survey(pipeline).tolist()))
     assert START.transform(np.array(place)) == pytest.approx([-1.5, 0.6], abs=2.0)
 

@@ -91,7 +91,7 @@ def speed_before(radius: float) -> float:
         twist = pipeline.control(Odometry(stamp, here, STANDSTILL))
         pipeline.perceive(replace(scan, stamp=stamp, time_increment=0.0))
     ahead = pipeline.map_base.compose(Pose(0.9, 0.0, 0.0))
-    pipeline.company = [Companion("other", ahead, goes_first=True, radius=radius)]
+    pipeline.traffic.company = [Companion("other", ahead, goes_first=True, radius=radius)]
     return pipeline.control(Odometry(stamp + 0.02, here, STANDSTILL)).linear
 
 
@@ -110,7 +110,7 @@ def between_two(*, in_team: bool) -> Pipeline:
     others = [
         Companion(str(x), Pose(x, 0.0, 0.0), goes_first=True, radius=0.18) for x in (-1.5, 1.5)
     ]
-    pipeline.company = others if in_team else None
+    pipeline.traffic.company = others if in_team else None
     theta, stamp = 0.0, 0.0
     while not len(pipeline.track):
         scan = sweep(CORRIDOR, Pose(0.0, 0.0, theta), field_of_view=LASER_270)

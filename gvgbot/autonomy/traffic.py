@@ -1,0 +1,116 @@
+"""Who else is about: people, and the other robots of a team, as they are seen and as they tell.
+
+They are kept out of the map, and given room.
+"""
+
+import math
+from collections.abc import Callable
+
+from gvgbot.autonomy.control import company
+from gvgbot.autonomy.control.company import BodiesSeen, Companion
+from gvgbot.autonomy.control.detour import led_round
+from gvgbot.autonomy.control.edge_follower import Track
+from gvgbot.autonomy.gvg.local_map import LocalMap
+from gvgbot.autonomy.newcomers import Newcomers, NewcomersConfig
+from gvgbot.autonomy.passed import Passed
+from gvgbot.autonomy.views import View
+from gvgbot.geometry import Array, Pose, Twist
+from gvgbot.hal.messages import Scan
+
+_MOST_PASSED = 100  # places, the latest ones
+_ROUND_M = 2.5  # a body farther away is elsewhere when the robot is there
+_ELSEWHERE_M = 0.15  # by which another robot may be elsewhere than it says
+
+Disc = tuple[Array, float]  # centre (2,) and radius, m
+
+
+class Traffic:
+    """People and other robots. `local_map` is the pose of the map frame in the local one."""
+
+    def __init__(self, config: NewcomersConfig) -> None:
+        self.newcomers = Newcomers(config)
+        self.passed: list[Passed] = []
+        # other robots as they tell of themselves, map frame; None if there are surely none
+        self.company: list[Companion] | None = None
+        self.strangers: list[float] = []  # radii of others that may be anywhere, m
+        self.seen: BodiesSeen | None = None  # what may be robots of a team, in the last look
+
+    @property
+    def is_in_team(self) -> bool:
+        """Whether there may be other robots."""
+        return self.company is not None
+
+    @property
+    def standing(self) -> list[Array]:
+        """Rims (N, 2) of who stands in the way for a while; in a team all drive about."""
+        return [] if self.is_in_team else [self.newcomers.points]
+
+    def nearby(self, local_map: Pose) -> list[Companion]:
+        """Other robots, where they say that they are, local frame."""
+        return [company.moved(one, local_map) for one in self.company or ()]
+
+    def glance(self, scan: Scan, local_base: Pose) -> None:
+        """Look out for other robots between two looks: they move."""
+        if self.is_in_team:
+            self.newcomers.glance(scan, local_base)
+
+    def sift(
+        self,
+        scan: Scan,
+        local_base: Pose,
+        map_base: Pose,
+        walls: LocalMap,
+        is_way: Callable[[Array], bool],
+        keyframe: int,
+    ) -> Scan:
+        """The scan without what may be people or robots, which are remembered; see `Newcomers`.
+
+        `keyframe` is the number of the present look.
+        """
+        newcomers, local_map = self.newcomers, local_base.compose(map_base.inverse())
+        newcomers.in_team, newcomers.strangers = self.is_in_team, self.strangers
+        newcomers.company = _discs(self.nearby(local_map), _ELSEWHERE_M)
+        scan = newcomers.sift(scan, local_base, walls, is_way)
+        missed = [Passed(keyframe, one.centre, one.radius) for one in newcomers.missed]
+        self.passed = (self.passed + missed)[-_MOST_PASSED:]
+        if self.is_in_team:
+            self.seen = self._bodies_seen(scan.stamp, local_base, map_base)
+        return scan
+
+    def _bodies_seen(self, stamp: float, local_base: Pose, map_base: Pose) -> BodiesSeen:
+        """The round bodies of the last look, map frame."""
+        bodies = self.newcomers.bodies.copy()
+        bodies[:, :2] = map_base.compose(local_base.inverse()).transform(bodies[:, :2])
+        return BodiesSeen(stamp, map_base, bodies)
+
+    def led_round(
+        self, track: Track, view: View, local_map: Pose, radius: float, margin: float
+    ) -> Track:
+        """The track led round bodies near by, or to where one sees how it goes on behind them."""
+        seen = self.newcomers.discs
+        told = [
+            (centre, wide)
+            for centre, wide in _discs(self.nearby(local_map), 0.0)
+            if not any(math.dist(centre, c) < r + _ELSEWHERE_M for c, r in seen)
+        ]
+        base = view.local_base.position
+        bodies = [one for one in seen + told if math.dist(one[0], base) < _ROUND_M]
+        is_hidden = view.is_end_doubted(track.polyline[-1])
+        return led_round(track, bodies, view.local_map, radius, margin, is_hidden=is_hidden)
+
+    def careful(
+        self, twist: Twist, local_base: Pose, local_map: Pose, radius: float, slow: float
+    ) -> Twist:
+        """The twist, slow enough to stop with room for somebody ahead who comes as fast.
+
+        `local_base` is where the robot is now; slower than `slow`, m/s, it had better stand.
+        """
+        base_local = local_base.inverse()
+        others = _discs(self.nearby(local_map), 0.0) + self.newcomers.latest
+        discs = [(base_local.transform(centre), wide) for centre, wide in others]
+        return company.careful(twist, discs, radius, slow)
+
+
+def _discs(nearby: list[Companion], more: float) -> list[Disc]:
+    """Other robots by centre and radius, so much wider than they are, m."""
+    return [(one.pose.position, one.radius + more) for one in nearby]
