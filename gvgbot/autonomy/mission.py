@@ -58,7 +58,9 @@ class Mission:
         self._driven = DrivenEdges(mapper)
         self._frontiers: set[HalfEdgeId] = set()  # that were known at the last view
         self._looked_around = 0
-        self._has_turned = False  # where others had driven on
+        self._has_turned = (
+            False  # before it knew a vertex: others had driven on, or nothing was there
+        )
         self._obstructions = Obstructions(config.retries, config.retry_after_s)
         self._hindrance = Hindrance()
         self._neighbours = Neighbours()
@@ -350,12 +352,25 @@ class Mission:
             self._progress.headway.restart(view.stamp)
             self._looked_around += 1
             if self._looked_around > 2 and not self._scouting.is_on:
-                if not self._closes_unseen_edge(view, here):
+                if not (self._turns_round(view) or self._closes_unseen_edge(view, here)):
                     self._give_up(view, "nothing more is to be seen there")
                 return Stand()
             self._events.append(Recovery(view.stamp, "look around", "standing at the end of sight"))
             return LookAround(math.tau)
         return Drive(track)
+
+    def _turns_round(self, view: View) -> bool:
+        """Go the other way, once, before a vertex is known; whether it does.
+
+        Who starts in the corner of a room may have gone into that first.
+        """
+        if self._has_turned or self._mapper.graph.vertices:
+            return False
+        self._has_turned = self.where.turn_round(view.local_base.theta)
+        if self._has_turned:
+            self._looked_around = 0
+            self._events.append(Recovery(view.stamp, "turn round", "this way leads nowhere"))
+        return self._has_turned
 
     def _closes_unseen_edge(self, view: View, here: Situation) -> bool:
         """Close the edge by which the way goes on here if that is not to be seen; whether it was.

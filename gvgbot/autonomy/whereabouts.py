@@ -104,16 +104,20 @@ class Whereabouts:
         if _LEFT_M[0] < along < _LEFT_M[1] and abs(aside) < _ASIDE_M:
             self.on_edge, self.trail, self.narrowest = end, [vertex, base], math.inf
 
-    def turn_round(self) -> bool:
+    def turn_round(self, heading: float | None = None) -> bool:
         """Let what was ahead be behind, on an edge of which no vertex is known; whether it is now.
 
-        It takes some way to tell them apart.
+        It takes some way to tell them apart, or a heading, rad, local frame.
         """
-        if self.on_edge is not None or len(self.trail) < 2:
+        if self.on_edge is not None or not self.trail:
             return False
         base = self.trail[-1]
         away = np.hypot(*(np.array(self.trail) - base).T)
         came = self.trail[int(np.argmin(np.abs(away - _BACK_M)))]
+        if len(self.trail) < 2:
+            if heading is None:
+                return False
+            came = base - _BACK_M * np.array([math.cos(heading), math.sin(heading)])
         self.trail = [2 * base - came, base]
         return True
 

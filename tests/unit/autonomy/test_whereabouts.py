@@ -384,3 +384,17 @@ def test_who_knows_no_vertex_and_turns_round_has_behind_it_what_was_ahead() -> N
     before = list(where.trail)
     assert not where.turn_round()
     assert where.trail == before  # on an edge of a vertex it is known where that is
+
+
+@pytest.mark.parametrize("heading", [0.1, 3.0])
+def test_who_has_not_driven_yet_turns_round_by_its_heading(heading: float) -> None:
+    nothing = Correspondence()
+    where = Walk().along(CORRIDOR, nothing, (4.0, 0.0)).where
+    place, base = CORRIDOR.place(np.array([4.0, 0.0])), Pose(4.0, 0.0, heading)
+    assert place is not None
+    behind = where.backwards(CORRIDOR, place, nothing, base)
+    assert not where.turn_round()
+    assert where.turn_round(heading)
+    assert where.backwards(CORRIDOR, place, nothing, base) == Branch(
+        behind.edge, not behind.forward
+    )
