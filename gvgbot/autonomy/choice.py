@@ -17,11 +17,12 @@ class Choice:
     def __init__(self, config: ExplorationConfig, mapper: Mapper) -> None:
         self.config, self._mapper = config, mapper
         self.sharing: Sharing | None = None  # with other robots, if there are any
+        self._has_asked = False  # them, when it last had to choose
 
     @property
     def waits_for_others(self) -> bool:
         """Whether other robots are on their way to every frontier that is left."""
-        return self.sharing is not None and self.sharing.is_waiting
+        return self.sharing is not None and self._has_asked and self.sharing.is_waiting
 
     @property
     def is_left_to_others(self) -> bool:
@@ -34,6 +35,10 @@ class Choice:
     def is_all_followed(self) -> bool:
         """Whether the robots of a team have followed every departure that one of them knows."""
         return self.sharing is not None and self.sharing.is_explored
+
+    def go_ahead(self) -> None:
+        """Choose nothing, and wait for nobody: the robot drives on where nobody has been."""
+        self._has_asked = False
 
     def ear(self, explored: HalfEdgeId | None) -> HalfEdgeId | None:
         """By the ear rule, at the end of the edge just explored, if that is the policy."""
@@ -48,6 +53,7 @@ class Choice:
         """What costs least to reach; None if nothing can be reached, or is left to this robot."""
         graph, belief = self._mapper.graph, self._mapper.belief
         if self.sharing is not None:
+            self._has_asked = True
             return self.sharing.choose(graph, starts)
         if self.config.policy != "balanced":
             return nearest_frontier(graph, starts)

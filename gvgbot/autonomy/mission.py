@@ -249,6 +249,7 @@ class Mission:
         """The next frontier, by the policy."""
         graph = self._mapper.graph
         if not graph.vertices and not self._is_led(view, here, either_way=True):
+            self.choice.go_ahead()
             return None
         chosen, reason = self.choice.ear(self.target), "ear"
         if chosen is None:

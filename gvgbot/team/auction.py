@@ -107,11 +107,14 @@ class Auction:
         return not self._is_taken(frontier, cost, self._team.claims())
 
     def has_driven(self, line: Array, *, either_way: bool = False) -> bool:
-        """Whether others have driven along a line (N, 2) the same way; see `Sharing`."""
+        """Whether others have driven along a line (N, 2) the same way; see `Sharing`.
+
+        A whole edge does not tell in which direction it was driven.
+        """
         ways = [
-            pose.transform(way.polyline)
+            pose.transform(polyline)
             for name, pose in self._team.frames.items()
-            for way in self._team.chart(name).ways
+            for polyline in _driven(self._team.chart(name), edges=either_way)
         ]
         if not ways or len(line) < 2:
             return False
@@ -159,3 +162,9 @@ class Auction:
             charts += [moved(self._team.chart(n), pose) for n, pose in self._team.frames.items()]
             self._site = Site(charts)
         return self._site
+
+
+def _driven(chart: Chart, *, edges: bool) -> list[Array]:
+    """The lines (N, 2) of the parts of edges that a robot has driven, and of whole edges."""
+    whole = [edge.polyline for edge in chart.edges.values() if edges and edge.traversed]
+    return whole + [way.polyline for way in chart.ways]

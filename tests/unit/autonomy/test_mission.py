@@ -556,8 +556,12 @@ def test_who_knows_no_vertex_where_others_have_driven_all_waits_for_them_and_end
     others.is_waiting = True
     assert isinstance(robot.look(PLAIN), Stand)
     assert robot.mission.outcome is None
+    others.is_led = False  # ahead is what nobody has driven, whatever they said before
+    assert isinstance(robot.look(PLAIN), Drive)
+    others.is_led, others.is_waiting = True, True
+    assert isinstance(robot.look(PLAIN), Stand)
     others.is_waiting, others.is_done = False, True
-    others.is_led = False  # ahead is what nobody has driven
+    others.is_led = False
     assert isinstance(robot.look(PLAIN), Drive)
     assert robot.mission.outcome is None
     others.is_led = True

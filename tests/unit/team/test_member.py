@@ -188,6 +188,12 @@ def test_what_others_have_driven_and_what_they_have_not() -> None:
     assert not one.auction.has_driven(line[::-1])
     assert one.auction.has_driven(line[::-1], either_way=True)
     assert not one.auction.has_driven(np.concatenate([line, line[-1:] + 2.0]))
+    driven = {edge.id: replace(edge, traversed=True)}
+    whole = replace(two.chart, edges=two.chart.edges | driven)
+    two.member._own_chart = lambda: whole
+    two.tell(4.0, one)
+    assert one.auction.has_driven(line[::-1], either_way=True)
+    assert not one.auction.has_driven(line)  # an edge does not tell in which direction
 
 
 @pytest.mark.parametrize("is_all_known", [True, False])
