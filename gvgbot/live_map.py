@@ -72,7 +72,7 @@ class LiveMap:
             for vertex in graph.vertices.values()
         )
         edges = [
-            Stretch(edge.a.vertex, edge.b.vertex, edge.length, edge.polyline)
+            Stretch(edge.a.vertex, edge.b.vertex, edge.length, edge.shown)
             for edge in graph.edges.values()
         ]
         return partial(self._drawn, portion or _nothing, vertices, edges, poses, stamp)

@@ -133,7 +133,7 @@ def _map_vertex(vertex: Vertex, pose: Pose, covariance: Array) -> MapVertex:
 
 def _map_edge(edge: Edge, vertices: dict[int, Pose]) -> MapEdge:
     """An edge whose polyline is bent so that it ends on its vertices."""
-    line = vertices[edge.a.vertex].transform(edge.polyline)
+    line = vertices[edge.a.vertex].transform(edge.shown)
     start, end = vertices[edge.a.vertex].position, vertices[edge.b.vertex].position
     steps, along = line[1:] - line[:-1], np.zeros(len(line))
     np.cumsum(np.hypot(steps[:, 0], steps[:, 1]), out=along[1:])

@@ -23,7 +23,14 @@ from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.graph import Edge, HalfEdgeId, Vertex
 from gvgbot.autonomy.slam.recognition import RecognitionConfig, Sighting, detection_covariance
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
-from gvgbot.autonomy.topology import direction, loose_ends, split_edge_at, strays, take_out
+from gvgbot.autonomy.topology import (
+    direction,
+    loose_ends,
+    split_edge_at,
+    strays,
+    take_out,
+    tied_to,
+)
 from gvgbot.autonomy.unsettled import Knowledge, Unsettled
 from gvgbot.autonomy.views import Correspondence, Observation, View
 from gvgbot.geometry import Array, Pose
@@ -459,4 +466,8 @@ class Mapper(Knowledge):
         """Make an edge of two frontiers; polyline (N, 2) from a to b in the local frame."""
         line = self.graph.vertices[a.vertex].local.inverse().transform(local_line)
         edge = self.graph.join(a, b, line, min_clearance, driven=driven)
+        start, end = (self.in_local_frame(view, one.vertex) for one in (a, b))
+        room = self.graph.vertices[a.vertex].clearance, self.graph.vertices[b.vertex].clearance
+        tied = tied_to(local_line, start.position, end.position, room)
+        edge.drawn = start.inverse().transform(tied)
         self._events.append(EdgeJoined(view.stamp, a.vertex, b.vertex, edge.length, driven))

@@ -10,10 +10,11 @@ from scipy.sparse.csgraph import connected_components
 from gvgbot.autonomy.slam.ekf import Belief, apart
 from gvgbot.autonomy.slam.graph import Edge, GvgGraph, HalfEdge, HalfEdgeId, Vertex
 from gvgbot.autonomy.slam.recognition import match_bearings
-from gvgbot.geometry import Array, Pose, wrap_angle
+from gvgbot.geometry import Array, Pose, stations_of, wrap_angle
 
 _OUT_M = 1.0  # from a vertex, where the direction of an edge is taken
 _OPPOSITE = math.radians(120)  # departures that differ by more go on as one line
+_GENTLY = 2.0  # times what it is off, a line is bent over
 _STRAYS = 3  # vertices that hang together with nothing else, though the robot has driven there
 
 
@@ -207,3 +208,21 @@ def outwards(belief: Belief, edge: Edge, end: HalfEdgeId) -> Array:
     """Polyline (N, 2) of an edge from one of its ends, map frame."""
     line = belief.map_vertex(edge.a.vertex).transform(edge.polyline)
     return line if edge.a == end else line[::-1]
+
+
+def tied_to(line: Array, start: Array, end: Array, room: tuple[float, float]) -> Array:
+    """A line (N, 2) that ends at two vertices (2,), m, and is as it was but near to these.
+
+    `room` is how far, m, there is no wall around either. What is between stays where walls were
+    seen beside it: spread over the whole line, a vertex that was seen elsewhere at first would
+    push it out of the middle of a door.
+    """
+    along = stations_of(line)
+    tied = line.copy()
+    for off, away, free in (
+        (start - line[0], along, room[0]),
+        (end - line[-1], along[-1] - along, room[1]),
+    ):
+        reach = min(max(free, _GENTLY * float(np.hypot(*off))), along[-1] / 2)
+        tied += np.maximum(0.0, 1.0 - away / max(reach, 1e-9))[:, None] * off
+    return tied

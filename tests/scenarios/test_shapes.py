@@ -5,11 +5,13 @@ import math
 import numpy as np
 import pytest
 
+from gvgbot.autonomy.estimate import smoothed
 from gvgbot.autonomy.events import EdgeJoined
 from gvgbot.config import TwinConfig
 from gvgbot.drivers.hokuyo.twin_config import HokuyoTwinConfig
 from gvgbot.drivers.kobuki.twin_config import KobukiTwinConfig
 from gvgbot.geometry import Pose
+from gvgbot.report import route_graph
 from gvgbot.worlds.canvas import Canvas
 from tests.scenarios.rig import (
     assert_degrees,
@@ -243,3 +245,19 @@ def test_equal_branches_are_not_taken_for_one_another() -> None:
     run = play(carved(free), Pose(0.0, 0.0, 0.0), twin=twin)
     assert_explored(run)
     assert graph_shape(run) == (4, 6, 9)
+
+
+def test_an_edge_through_a_door_leads_through_its_middle_wherever_its_end_was_seen_first() -> None:
+    """Before the door came into sight the middle of the room was half a metre elsewhere."""
+    rooms = carved([(0.5, 0.5, 5.9, 6.5), (5.9, 3.0, 6.1, 3.6), (6.1, 0.5, 11.5, 6.5)])
+    start = Pose(1.0, 1.0, 0.0)
+    run = play(rooms, start, twin=TwinConfig(seed=1))
+    assert_explored(run)
+    estimate = smoothed(run.pipeline)
+    (edge,) = route_graph(run.pipeline, estimate.vertices, estimate.covariances).edges
+    x, y = start.transform(edge.polyline).T
+    in_door = np.abs(x - 6.0) < 0.15
+    assert in_door.any()
+    assert np.abs(y[in_door] - 3.3).max() < 0.05  # of 0.3 m to either jamb
+    ends = [estimate.vertices[vertex].position for vertex in (edge.start, edge.end)]
+    np.testing.assert_allclose(edge.polyline[[0, -1]], ends, atol=1e-9)

@@ -108,7 +108,11 @@ class Vertex:
 
 @dataclass(slots=True, eq=False)
 class Edge:
-    """A stretch of GVG between half-edges a and b; polyline (N, 2) in the frame of a's vertex."""
+    """A stretch of GVG between half-edges a and b; polyline (N, 2) in the frame of a's vertex.
+
+    Where its vertices stand is the mean of many sights, the oldest from far away, so a line that
+    was found now may end beside them.
+    """
 
     id: int
     a: HalfEdgeId
@@ -121,6 +125,12 @@ class Edge:
     conflicts: int = 0
     established: bool = False  # part of a map that was finished
     doubted_since: float | None = None  # stamp; since when sight speaks against it
+    drawn: Array | None = None  # the polyline from vertex to vertex as these were believed then
+
+    @property
+    def shown(self) -> Array:
+        """The polyline (N, 2) for maps, in the frame of a's vertex."""
+        return self.polyline if self.drawn is None else self.drawn
 
     def other(self, end: HalfEdgeId) -> HalfEdgeId:
         """The half-edge at the far end."""

@@ -7,7 +7,15 @@ import pytest
 
 from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex
-from gvgbot.autonomy.topology import fuse, loose_ends, piece_of, split_edge_at, strays, take_out
+from gvgbot.autonomy.topology import (
+    fuse,
+    loose_ends,
+    piece_of,
+    split_edge_at,
+    strays,
+    take_out,
+    tied_to,
+)
 from gvgbot.geometry import Pose
 from tests.unit.autonomy.graphs import (
     STREET,
@@ -200,3 +208,13 @@ def test_what_hangs_together_with_a_vertex_is_what_edges_lead_to(seed: int) -> N
     for vertex in graph.vertices:
         assert piece_of(graph, vertex) == {vertex, *networkx_distances(graph, [(vertex, 0.0)])}
     assert piece_of(graph, 99) == set()
+
+
+def test_a_line_is_bent_to_its_vertices_only_near_to_them() -> None:
+    line = np.linspace((0.0, 0.0), (10.0, 0.0), 101)
+    tied = tied_to(line, np.array([0.0, 0.4]), np.array([10.2, 0.0]), (1.0, 2.0))
+    assert tied[[0, -1]].tolist() == [[0.0, 0.4], [10.2, 0.0]]
+    assert np.array_equal(tied[11:80], line[11:80])
+    assert np.abs(np.diff(tied[:, 1])).max() <= 0.4 / 10 + 1e-9  # evenly over a metre
+    short = tied_to(line[:5], np.array([0.0, 3.0]), line[4], (1.0, 1.0))
+    assert short[[0, -1]].tolist() == [[0.0, 3.0], line[4].tolist()]
