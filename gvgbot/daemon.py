@@ -52,11 +52,9 @@ def explore(config: Config, *, out: Path | None, real_time: bool) -> int:
     ):
         session, progress = Session(config, directory, place), Progress()
         factory = None if real_time else VirtualTimeLoop
+        recording = recorded(session, patient=not real_time)
         try:
-            with (
-                recorded(session, patient=not real_time),
-                asyncio.Runner(loop_factory=factory) as runner,
-            ):
+            with recording, asyncio.Runner(loop_factory=factory) as runner:
                 runner.run(explore_once(session, progress))
         except Exception as error:
             session.failure = str(error) or type(error).__name__
@@ -154,8 +152,9 @@ def run(config: Config, *, out: Path | None, known: Path | None = None, anew: bo
             driver=ros2,
             team=telemetry if config.team.enabled else None,
         )
+        recording = recorded(session, patient=False)
         try:
-            with recorded(session, patient=False), asyncio.Runner() as runner:
+            with recording, asyncio.Runner() as runner:
                 runner.run(robot.serve(signals.wait()))
         except* GvgbotError as failures:
             session.failure = str(_first(failures))

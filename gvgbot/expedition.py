@@ -87,7 +87,11 @@ def _starts(config: Config, place: Place, count: int) -> list[Pose]:
     Raises WorldError if there is no room.
     """
     rng = np.random.default_rng(np.random.SeedSequence([config.twin.seed, count]))
-    free, starts = Walkways(place.world, place.start).points, [place.start]
+    no_room = WorldError(f"world {place.world.name}: no room for {count} robots; take fewer")
+    try:
+        free, starts = Walkways(place.world, place.start).points, [place.start]
+    except WorldError:
+        raise no_room from None
     for _ in range(_TRIES):
         if len(starts) == count:
             return starts
@@ -95,7 +99,7 @@ def _starts(config: Config, place: Place, count: int) -> list[Pose]:
         start = Pose(x, y, float(rng.uniform(-np.pi, np.pi)))
         if all(start.distance(other) >= _APART_M for other in starts):
             starts.append(start)
-    raise WorldError(f"world {place.world.name}: no room for {count} robots; take fewer")
+    raise no_room
 
 
 @dataclass(slots=True, eq=False)

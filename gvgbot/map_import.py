@@ -49,7 +49,10 @@ def import_map(path: Path, out: Path, config: Config) -> tuple[int, int]:
         _teach(session.pipeline, path, world, known, config)
         graph = session.pipeline.mapper.graph
         if not graph.vertices:
-            raise UsageError(f"{path}: no way in it is wide enough for the robot")
+            raise UsageError(
+                f"{path}: no way in it is wide enough for the robot, or leads from one place to "
+                "another: a closed room alone has no edges"
+            )
         keeper = Keeper(session, MissionFiles(directory.path))
         keeper.finish()
         if keeper.trouble is not None:

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from gvgbot.cli.arguments import Commands, add_overrides, number, positive, say
+from gvgbot.cli.arguments import Commands, add_overrides, positive, say
 from gvgbot.errors import UsageError
 
 NO_ECHO_M = 80.0  # of the lasers that CARMEN logs were made with
@@ -33,7 +33,7 @@ def add_replay(commands: Commands) -> None:
     )
     replay.add_argument(
         "--no-echo",
-        type=number,
+        type=positive,
         default=NO_ECHO_M,
         metavar="M",
         help="ranges of a CARMEN log from here on mean that nothing was hit (default: %(default)s)",

@@ -24,6 +24,7 @@ FREE_THRESHOLD = 0.196
 OWN_MAP = "map.yaml"  # in the directory of a run
 FREE_GREY, OCCUPIED_GREY, UNKNOWN_GREY = SAVED_GREYS = 254, 0, 205  # what map_saver writes
 OPAQUE = 255
+_FARTHEST_M = 1e6  # from the origin of the world to a map of it
 
 log = structlog.get_logger()
 
@@ -268,6 +269,8 @@ class _Entries:
             raise self.error("origin", f"must be three numbers [x, y, yaw], not {value!r}")
         if value[2] != 0:
             raise self.error("origin", f"yaw must be 0, not {value[2]!r}; turn the image instead")
+        if max(abs(value[0]), abs(value[1])) > _FARTHEST_M:
+            raise self.error("origin", f"must be within {_FARTHEST_M:.0f} m, not {value!r}")
         return float(value[0]), float(value[1])
 
     def negate(self) -> bool:

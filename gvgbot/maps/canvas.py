@@ -70,11 +70,13 @@ class Canvas:
     def raster(self, shades: NDArray[np.uint8], corner: Point, size: Point) -> None:
         """Palette indices (rows, columns), first row at the top, stretched over a rectangle."""
         left, top, right, bottom = _flat([corner, (corner[0] + size[0], corner[1] + size[1])])
-        width, tall = round(right) - round(left), (bottom - top) / len(shades)
+        width, tall = max(1, round(right) - round(left)), (bottom - top) / len(shades)
         for first in range(0, len(shades), _STRIP):
             strip = shades[first : first + _STRIP]
             begin = round(top + tall * first)
             end = round(top + tall * (first + len(strip)))
+            if end == begin:  # less than a pixel of a picture of something huge
+                continue
             stretched = Image.fromarray(strip).resize(
                 (width, end - begin), Image.Resampling.NEAREST
             )

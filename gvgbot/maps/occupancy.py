@@ -12,6 +12,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from gvgbot.errors import GvgbotError
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
 
@@ -25,6 +26,7 @@ _HIT, _MISS, _CERTAIN = 18, -15, 60  # log odds in tenths: a vote each way, and 
 _DIRECTIONS = 4096  # per turn, finer than the beams
 _ANGLES = (np.arange(_DIRECTIONS) + 0.5) * (math.tau / _DIRECTIONS) - math.pi
 _TOWARDS = np.column_stack([np.cos(_ANGLES), np.sin(_ANGLES)])
+_MOST_CELLS = 200_000_000  # a gigabyte: half a square kilometre in squares of 5 cm
 _EDGE_M = 0.5  # of unknown cells left around the known ones
 
 
@@ -151,6 +153,11 @@ class _Ballot:
 
     @classmethod
     def _empty(cls, corner: Indices, shape: tuple[int, int]) -> Self:
+        rows, columns = map(int, shape)
+        if rows * columns > _MOST_CELLS:
+            raise GvgbotError(
+                f"a grid of {rows} by {columns} cells is too large: is the odometry damaged?"
+            )
         return cls(np.zeros(shape, np.int8), np.full(shape, np.inf, np.float32), corner)
 
     def grown(self, other: Self) -> Self:

@@ -3,7 +3,9 @@
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from gvgbot import __version__
 from gvgbot.cli import main, status_of
@@ -25,6 +27,7 @@ BAD_ARGUMENTS = {
     "mistyped action": (["map", "sohw", "."], "'sohw': did you mean show?"),
     "unknown option": (["explore", "--wrold", "office"], "--wrold"),
     "another command's option": (["run", "--config", "a.yaml"], "see gvgbot run --help"),
+    "a range below nothing": (["replay", "x.log", "--no-echo", "-1"], "a number above 0"),
     "two numbers for a start": (["explore", "--start", "1", "2"], "--start"),
     "a start that is no number": (
         ["explore", "--start", "1", "2", "north"],
@@ -106,6 +109,28 @@ def test_a_team_that_shall_be_recorded_is_refused(tmp_path: Path, capsys: Captur
     (line,) = said(capsys)
     assert "recording.path: a team is not recorded" in line
     assert not list(tmp_path.iterdir())
+
+
+def test_a_recording_that_cannot_begin_leaves_no_run_in_the_way(
+    tmp_path: Path, capsys: Captured
+) -> None:
+    words = ["explore", "--world", "ring", "--out", str(tmp_path / "run")]
+    assert main([*words, "--set", f"recording.path={tmp_path}/nowhere/x.mcap"]) == 2
+    (line,) = said(capsys)
+    assert "nowhere" in line
+    assert not (tmp_path / "run" / "map.geojson").exists()
+
+
+def test_robots_that_have_no_room_are_too_many(tmp_path: Path, capsys: Captured) -> None:
+    room = np.zeros((32, 32), np.uint8)
+    room[2:-2, 2:-2] = 254  # 1.4 m wide
+    Image.fromarray(room).save(tmp_path / "tiny.png")
+    path = tmp_path / "tiny.yaml"
+    path.write_text("{image: tiny.png, resolution: 0.05, origin: [0, 0, 0]}", encoding="utf-8")
+    words = ["explore", "--robots", "2", "--world", str(path), "--start", "0.8", "0.8", "0"]
+    assert main([*words, "--out", str(tmp_path / "run")]) == 2
+    (line,) = said(capsys)
+    assert line.endswith("no room for 2 robots; take fewer")
 
 
 def test_a_missing_extra_is_one_line_to_copy_whatever_the_shell_knows(capsys: Captured) -> None:

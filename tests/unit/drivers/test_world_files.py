@@ -205,6 +205,7 @@ def test_a_saved_world_is_what_map_server_reads(tmp_path: Path) -> None:
         ("origin", [0.0, 0.0, "north"], "three numbers"),
         ("origin", 0.0, "three numbers"),
         ("origin", [0.0, 0.0, 0.5], "yaw must be 0"),
+        ("origin", [0.0, -1e300, 0.0], "must be within"),
         ("negate", "no", "0 or 1"),
         ("negate", [], "0 or 1"),
         ("occupied_thresh", 65, "from 0 to 1"),

@@ -10,7 +10,7 @@ import yaml
 from numpy.typing import NDArray
 from PIL import Image
 
-from gvgbot.errors import UsageError
+from gvgbot.errors import GvgbotError, UsageError
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
 from gvgbot.maps.atomic_files import write_files
@@ -121,6 +121,12 @@ def test_squares_of_a_growing_grid_are_cut_out_of_it_and_all_changes_lie_around_
                 found[row + y, column + x] = square[y, x]
     assert found == known
     assert all(low[0] <= row < high[0] and low[1] <= column < high[1] for row, column in known)
+
+
+def test_a_way_that_no_memory_holds_a_grid_of_is_refused() -> None:
+    scan = a_scan(Pose())
+    with pytest.raises(GvgbotError, match="too large: is the odometry damaged"):
+        occupancy_grid([(Pose(), scan), (Pose(1e7, 1e7), scan)])
 
 
 def test_a_grid_that_has_not_begun_to_grow_is_unknown() -> None:

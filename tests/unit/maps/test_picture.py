@@ -251,3 +251,11 @@ def test_a_view_keeps_all_of_its_box_inside_and_both_axes_alike() -> None:
     step = view.pixels(points + np.array([1.0, 1.0])) - shown
     assert step == pytest.approx(np.array([[1.0, -1.0], [1.0, -1.0]]) * view.scale)
     assert view.size.max() == pytest.approx(800.0)
+
+
+@pytest.mark.parametrize("far", [(1e5, 0.0), (0.0, 1e5)])
+def test_a_grid_that_is_less_than_a_pixel_beside_a_vertex_far_away_is_no_error(
+    far: tuple[float, float],
+) -> None:
+    grid = OccupancyGrid(np.zeros((200, 150), np.int8), 0.05, (0.0, 0.0))
+    assert pixels(draw_map(RouteGraph((vertex(1, *far),)), grid=grid)).size
