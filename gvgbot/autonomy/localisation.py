@@ -22,7 +22,6 @@ _RANGE_M = 24.0  # of the beams that are matched
 _LONGEST_GAP_M = 0.5  # between two beams, for their even spacing
 _SMOOTHED = 9  # beams, to tell where the next point is due
 _LEAST_POINTS = 50  # fewer say nothing about a pose
-_TURNED_RAD = 0.4  # that a robot may have been turned unnoticed
 _AT_ALL = 0.01  # better agreement, where no place is likelier than another
 # of a fit: what a point counts that lies where nothing is known yet. Of 100 points on known ground
 # 94 fit where the robot is and 40 where it is not: ln(60 / 6) / (ln(60 / 6) + ln(94 / 40)) = 0.73
@@ -155,18 +154,18 @@ class LocalMaps:
         duration: float,
         Q: Array,
         *,
-        is_doubted: bool = False,
+        turned: float | None = None,
     ) -> tuple[Pose, Array]:
         """As `match`, where nobody saw the way that the base took: it is searched for around.
 
         Wheels tell how far it went and how much it turned, but not which of it came first. Where
-        even they are doubted, the place that agrees best is taken. Walls where nothing is known yet
-        do not speak against a place.
+        even they are doubted, and it may be `turned` by so much, rad, the place that agrees best is
+        taken. Walls where nothing is known yet do not speak against a place.
         """
         prior = before.compose(self.calibration.corrected(motion, duration))
-        clearly, turned = (_AT_ALL, _TURNED_RAD) if is_doubted else (_CLEARLY, 0.0)
+        clearly = _CLEARLY if turned is None else _AT_ALL
         priors = [(p, Q + _LOST) for p in _around(prior)]
-        best = self._best(scan, priors, clearly, turned, least_known=_SEEN_SHARE)
+        best = self._best(scan, priors, clearly, turned or 0.0, least_known=_SEEN_SHARE)
         return (prior, Q + _LOST) if best is None else (best[0].pose, best[0].covariance)
 
     def _drawn(self) -> _Walls:

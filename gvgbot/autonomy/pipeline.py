@@ -43,6 +43,7 @@ _LIFTED = np.diag([0.3**2, 0.3**2, 0.1**2])  # how far a robot is carried that i
 _ROOM_BESIDE_EDGES_M = 0.08  # on each side, where no edge leads
 _GRAIN_M = 0.05  # of what must be known to be free, when it gets away
 _LONGEST_GAP_S = 2.0  # between keyframes; a longer one is an outage of a device
+_TURNED_RAD = 0.4  # that a robot may have been turned unnoticed
 _FORGOTTEN = np.diag([1.0, 1.0, 0.3**2])  # covariance of a way that is not kept
 _OVERLAP_RAD = 0.2  # of what is seen before and after the first turn
 _TURN_SHARE = 0.8  # of the fastest turn, to look around
@@ -83,6 +84,7 @@ class Pipeline:
         self.traffic = Traffic(config.newcomers)
         self._incidents: list[tuple[str, str]] = []  # action and reason, since the last scan
         self._was_lifted = self._look_now = False
+        self._breaks = 0  # of odometry, at the last look
         self._last: Keyframe | None = None
         self._kept: Pose | None = None  # local_base of the last scan that was kept
         self._looked: Pose | None = None  # local_base of the last look for the GVG
@@ -283,17 +285,23 @@ class Pipeline:
 
     def _localise(self, scan: Scan, odom_base: Pose) -> Pose:
         """The base in the local frame; the belief moves with it."""
+        newest = self._odometry.newest
+        assert newest is not None, "it tells where the base is"
+        is_broken, self._breaks = newest.breaks != self._breaks, newest.breaks
         if self._last is None:
             return Pose()
         motion = self._last.odom_base.to(odom_base)
         self.travelled += math.hypot(motion.x, motion.y)
         duration = scan.stamp - self._last.stamp
         noise = self._config.odometry_noise.covariance(motion, duration)
-        is_doubted, self.errands.is_lost = self.errands.is_lost, False
+        is_doubted, self.errands.is_lost = self.errands.is_lost or is_broken, False
+        if is_broken:
+            self._incidents.append(("look for its place near by", "the base has started anew"))
         lost = self._was_lifted or self._odometry.has_gap_since(self._last.stamp)
         match = self._maps.trust if self._trusts_odometry else self._maps.match
         if lost or is_doubted:
-            match = partial(self._maps.find, is_doubted=is_doubted)
+            turned = math.pi if is_broken else _TURNED_RAD if is_doubted else None
+            match = partial(self._maps.find, turned=turned)
         if self._was_lifted or is_doubted:
             self._was_lifted, noise = False, noise + _LIFTED
         local_base, covariance = match(

@@ -66,11 +66,16 @@ def _beams(first: float, increment: float, count: int) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, slots=True)
 class Odometry:
-    """Dead reckoning since the driver started: a pose, so a missed message costs nothing."""
+    """Dead reckoning since the driver started: a pose, so a missed message costs nothing.
+
+    `breaks` is how often the base has lost count since: where a pose follows one with another
+    number, the base has not moved between them as far as it knows, but may have been carried.
+    """
 
     stamp: float
     odom_base: Pose
     twist: Twist
+    breaks: int = 0
 
 
 @dataclass(frozen=True, slots=True)

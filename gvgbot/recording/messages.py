@@ -81,6 +81,7 @@ def encode_cycle(cycle: Cycle) -> bytes:
         stamp=odometry.stamp,
         odom_base=_pose(odometry.odom_base),
         measured=_twist(odometry.twist),
+        breaks=odometry.breaks,
         contact=None if felt.contact is None else _contact(felt.contact),
         stopped_for=felt.stopped_for or "",
         wish=_twist(cycle.wish),
@@ -97,7 +98,7 @@ def decode_cycle(data: bytes) -> Cycle:
         felt = {name: getattr(m.contact, name) for name in _BOOLS}
         contact = Contact(m.contact.stamp, **felt)
     return Cycle(
-        Odometry(m.stamp, _to_pose(m.odom_base), _to_twist(m.measured)),
+        Odometry(m.stamp, _to_pose(m.odom_base), _to_twist(m.measured), m.breaks),
         Felt(contact, cast("Reason | None", m.stopped_for or None)),
         _to_twist(m.wish),
         _to_twist(m.permitted),

@@ -76,6 +76,7 @@ TYPES: dict[str, list[_Field]] = {
         (5, "stopped_for", "string"),
         (6, "wish", "gvgbot.Twist"),
         (7, "permitted", "gvgbot.Twist"),
+        (8, "breaks", "uint32"),
     ],
     "gvgbot.Battery": [
         (1, "stamp", "double"),
@@ -88,6 +89,7 @@ _SCALARS = {
     "double": FieldDescriptorProto.TYPE_DOUBLE,
     "string": FieldDescriptorProto.TYPE_STRING,
     "bool": FieldDescriptorProto.TYPE_BOOL,
+    "uint32": FieldDescriptorProto.TYPE_UINT32,
 }
 
 

@@ -117,7 +117,7 @@ class FeedbackReader:
         self._felt: list[tuple[float, CoreSensors]] = []  # what the last frames felt, and when
         self.spoke = -math.inf  # arrival of the last frame, s
         self.heard = -math.inf  # and of the last one that told how far the wheels have turned
-        self.is_unbroken = True  # no motion has been missed since `recall`
+        self._breaks = 0  # times that motion may have been missed since `recall`
 
     def take(self, data: bytes, arrival: float) -> Odometry | None:
         """The newest odometry that these bytes complete, if any.
@@ -160,6 +160,11 @@ class FeedbackReader:
     def slip_rate(self) -> float:
         """Turn rate by the gyro minus by the wheels, smoothed, rad/s."""
         return 0.0 if self._odometry is None else self._odometry.slip_rate
+
+    @property
+    def is_unbroken(self) -> bool:
+        """Whether no motion has been missed since `recall`."""
+        return self._breaks == 0
 
     @property
     def clock_offset(self) -> float | None:
@@ -237,7 +242,7 @@ class FeedbackReader:
         state = self._odometry
         if state is None or is_new or state.implausible >= _JUMPS_BELIEVED:
             self._odometry = start_odometry(reading, None if state is None else state.odom_base)
-            self.is_unbroken = self.is_unbroken and state is None
+            self._breaks += state is not None
             self._odometry_elapsed = clock.elapsed
             return None
         dt = clock.elapsed - self._odometry_elapsed
@@ -250,7 +255,7 @@ class FeedbackReader:
         state = advance_odometry(state, reading, dt, self._heading, self._geometry)
         self._odometry, self._odometry_elapsed = state, clock.elapsed
         self._watch_slip(abs(state.slip_rate))
-        return Odometry(clock.stamp, state.odom_base, state.twist)
+        return Odometry(clock.stamp, state.odom_base, state.twist, self._breaks)
 
     def _watch_slip(self, rate: float) -> None:
         """Count the slips, by how much gyro and wheels disagree (rad/s)."""

@@ -1,5 +1,6 @@
 """Localisation as published, beside the full one; and how often who is led looks for the GVG."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,7 @@ from gvgbot.autonomy.events import Decision, Event
 from gvgbot.autonomy.localisation import Localisation
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.config import load_config
-from gvgbot.geometry import STANDSTILL, Pose, Twist
+from gvgbot.geometry import STANDSTILL, Pose, Twist, wrap_angle
 from gvgbot.hal.messages import Odometry
 from tests.unit.autonomy.sights import LASER_270, carved, sweep
 
@@ -128,3 +129,19 @@ def test_a_robot_of_the_team_is_driven_round_and_shapes_no_edge() -> None:
     assert np.hypot(np.abs(x) - 1.5, y).min() > 2 * 0.18 + 0.2
     assert np.abs(x).max() > 3.0
     assert np.abs(between_two(in_team=False).track[:, 1]).max() < 0.1
+
+
+@pytest.mark.parametrize("turned", [0.0, 0.3, 0.6, -0.6, 1.5, 3.0])
+def test_a_base_that_started_anew_may_have_been_turned_meanwhile(turned: float) -> None:
+    config = load_config()
+    pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
+    for k in range(26):  # once round, so that all walls are known
+        looked(pipeline, 0.1 * k, 0.25 * k)
+    anew = Odometry(6.5, Pose(0.0, 0.0, 6.25), STANDSTILL, breaks=1)
+    for k in range(3):
+        pipeline.control(replace(anew, stamp=6.5 + 0.1 * k))
+        scan = sweep(ROOMS, Pose(-1.5, 0.0, 6.25 + turned), field_of_view=LASER_270)
+        pipeline.perceive(replace(scan, stamp=6.5 + 0.1 * k, time_increment=0.0))
+    there = Pose(0.0, 0.0, 6.25 + turned).to(pipeline.map_base)
+    assert math.hypot(there.x, there.y) < 0.05
+    assert abs(wrap_angle(there.theta)) < 0.03
