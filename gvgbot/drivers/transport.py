@@ -7,6 +7,7 @@ import math
 import os
 import termios
 from collections.abc import Callable
+from pathlib import Path
 from typing import Protocol
 
 import serial
@@ -154,6 +155,8 @@ class SerialStream:
         try:
             self._port.baudrate = baud
         except (serial.SerialException, OSError, ValueError, termios.error) as error:
+            if self._gone or not Path(self._path).exists():
+                raise DeviceLost(f"{self._path} is gone: plug it in again") from error
             raise DeviceLost(f"{self._path} does not take {baud} bit/s") from error
 
     def close(self) -> None:

@@ -1,6 +1,7 @@
 """The driver opens a simulated laser whatever state it finds it in."""
 
 import asyncio
+import math
 
 import pytest
 import structlog
@@ -190,9 +191,17 @@ class HostPort:
 class SerialLine:
     """A laser on a serial line: only where both ends keep the same bit rate do bytes make sense."""
 
-    def __init__(self, device: HokuyoTwin, host: HostPort) -> None:
+    def __init__(self, device: HokuyoTwin, host: HostPort, changes_s: float) -> None:
+        """`changes_s` is how long the laser takes to change its rate after having agreed."""
         self.device, self.host = device, host
         self.next_due = device.next_due
+        self.baud, self.changes_s = device.baud, changes_s
+        self.since = -math.inf  # when the laser agreed to what its rate is now
+
+    def rate(self, now: float) -> int:
+        if self.device.baud != self.baud and now >= self.since + self.changes_s:
+            self.baud = self.device.baud
+        return self.baud
 
     def carried(self, data: bytes, baud: int) -> bytes:
         if baud == self.host.baud:
@@ -200,16 +209,21 @@ class SerialLine:
         return bytes((byte * 5 + 0x93) % 256 | 0x80 for byte in data)
 
     def receive(self, data: bytes, now: float) -> bytes:
-        baud = self.device.baud
-        return self.carried(self.device.receive(self.carried(data, baud), now), baud)
+        baud = self.rate(now)
+        return self.sent(self.device.receive(self.carried(data, baud), now), baud, now)
 
     def advance(self, now: float) -> bytes:
-        baud = self.device.baud
-        return self.carried(self.device.advance(now), baud)
+        baud = self.rate(now)
+        return self.sent(self.device.advance(now), baud, now)
+
+    def sent(self, data: bytes, baud: int, now: float) -> bytes:
+        if self.device.baud == self.baud:
+            self.since = now  # it has not agreed to another one yet
+        return self.carried(data, baud)
 
 
 async def serve_rated(
-    device: HokuyoTwin, wanted: int, lacks: tuple[int, ...] = ()
+    device: HokuyoTwin, wanted: int, lacks: tuple[int, ...] = (), changes_s: float = 0.0
 ) -> tuple[HokuyoLaser, HostPort]:
     """A laser driver that has had three scans over a serial line; the port `lacks` bit rates."""
     here, there = pipe()
@@ -217,7 +231,7 @@ async def serve_rated(
     line = HostPort(here, wanted, lacks)
     laser = HokuyoLaser(line, HokuyoConfig(baud=wanted, link="serial"), clock)
     async with asyncio.TaskGroup() as tasks:
-        served = tasks.create_task(serve_twin(SerialLine(device, line), there, clock))
+        served = tasks.create_task(serve_twin(SerialLine(device, line, changes_s), there, clock))
         running = tasks.create_task(laser.run())
         for _ in range(3):
             await laser.next_scan()
@@ -226,11 +240,13 @@ async def serve_rated(
     return laser, line
 
 
+@pytest.mark.parametrize("changes_s", [0.0, 0.02, 0.1])
 @pytest.mark.parametrize("found", [19200, 57600, 115200, 750000])
-def test_a_laser_at_another_bit_rate_is_found_and_changed(found: int) -> None:
+def test_a_laser_at_another_bit_rate_is_found_and_changed(found: int, changes_s: float) -> None:
     async def main() -> None:
         device = twin_of(World(beams=682), model="URG-04LX", serial_baud=found)
-        laser, line = await serve_rated(device, 115200)
+        laser, line = await serve_rated(device, 115200, changes_s=changes_s)
+        assert laser.link.bad_messages == laser.link.unanswered == 0  # as of a healthy link
         assert device.baud == line.baud == 115200
         assert laser.link.scans == 3
 

@@ -83,8 +83,17 @@ async def tune(dialogue: Dialogue, wanted: int, *, patience: float) -> int:
     """Bring the laser to rest at whatever bit rate it listens to, and set it to the wanted one.
 
     Returns the rate (bit/s) at which both sides are then. A stream that cannot change its rate
-    counts as being at the wanted one. Raises DeviceLost or DeviceRefused.
+    counts as being at the wanted one. What it was in the middle of says nothing of the link.
+    Raises DeviceLost or DeviceRefused.
     """
+    link = dialogue.link
+    bad, unanswered = link.bad_messages, link.unanswered
+    rate = await _tuned(dialogue, wanted, patience)
+    link.bad_messages, link.unanswered = bad, unanswered
+    return rate
+
+
+async def _tuned(dialogue: Dialogue, wanted: int, patience: float) -> int:
     stream = dialogue.stream
     if not isinstance(stream, Tunable):
         await quiet(dialogue, patience=patience)
@@ -140,7 +149,7 @@ async def _set_rate(dialogue: Dialogue, stream: Tunable, found: int, wanted: int
         log.warning("laser keeps its bit rate", baud=found, wanted=wanted)
         return found
     stream.set_baud(wanted)
-    await quiet(dialogue, patience=dialogue.timeout)
+    await quiet(dialogue, patience=2 * dialogue.timeout)  # it changes after its reply
     log.info("laser changed its bit rate", before=found, baud=wanted)
     return wanted
 

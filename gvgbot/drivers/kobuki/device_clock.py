@@ -48,6 +48,7 @@ def advance_clock(clock: DeviceClock, raw_ms: int, arrival: float) -> DeviceCloc
     late_since = _late_since(clock, arrival - elapsed, arrival)
     if (
         elapsed + clock.offset > arrival + _RESET_S
+        or arrival - clock.arrival >= _WRAP_MS / 1000  # nobody knows how often it turned over
         or (step > _NEXT_S and _is_restart(raw_ms, step, silence=arrival - clock.arrival))
         or (late_since is not None and arrival - late_since > _LATE_BELIEVED_S)
     ):

@@ -177,7 +177,7 @@ class FeedbackReader:
         return LinkStatistics(
             frames=self._parser.frames,
             bad_frames=self._parser.bad_frames,
-            skipped_bytes=self._parser.skipped_bytes,
+            skipped_bytes=self._parser.skipped_bytes - self._parser.leading_bytes,
             missed_frames=self._missed,
             malformed=self._malformed,
             unknown_parts=self._unknown,

@@ -43,13 +43,16 @@ class FrameParser:
     """Finds frames in a byte stream cut anywhere, and finds the next good one after noise.
 
     Counts what it has seen: `frames` good, `bad_frames` with a wrong checksum, `skipped_bytes`
-    that belong to no good frame. It holds back less than one frame between calls.
+    that belong to no good frame; of these `leading_bytes` came before the first one, as for
+    everybody who begins to listen in the middle of a frame. It holds back less than one frame
+    between calls.
     """
 
     def __init__(self) -> None:
         self.frames = 0
         self.bad_frames = 0
         self.skipped_bytes = 0
+        self.leading_bytes = 0
         self._buffer = b""
 
     def feed(self, data: bytes) -> list[Frame | BadFrame]:
@@ -65,6 +68,8 @@ class FrameParser:
                 found.append(BadFrame(buffer[start:end]))
                 start = self._seek(buffer, start, skip=1)
             else:
+                if not self.frames:
+                    self.leading_bytes = self.skipped_bytes
                 self.frames += 1
                 found.append(Frame(buffer[start + 3 : end - 1]))
                 start = self._seek(buffer, end)

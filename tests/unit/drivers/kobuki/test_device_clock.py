@@ -80,3 +80,11 @@ def test_a_long_silence_without_a_restart_is_none() -> None:
     for raw_ms in range(0, 65536, 997):
         clock = advance_clock(start_clock(raw_ms, 0.0), (raw_ms + 3000) % 65536, 3.01)
         assert (clock.resets, clock.step) == (0, 3.0)
+
+
+@pytest.mark.parametrize("silence", [65.4, 65.536, 65.54, 65.6, 131.08])
+def test_a_stamp_after_any_silence_is_of_the_moment(silence: float) -> None:
+    raw_ms = (5000 + round(1000 * silence)) % 65536
+    clock = advance_clock(start_clock(5000, 0.0), raw_ms, silence)
+    assert clock.stamp == pytest.approx(silence, abs=0.02)
+    assert clock.resets == (silence >= 65.536)

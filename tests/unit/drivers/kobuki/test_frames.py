@@ -85,3 +85,11 @@ def test_stray_bytes_between_frames_are_skipped() -> None:
     parser = FrameParser()
     assert len(parser.feed(STOP + b"\x00" + STOP + b"\xaa" + STOP)) == 3
     assert parser.skipped_bytes == 2
+
+
+def test_who_begins_to_listen_in_the_middle_of_a_frame_has_lost_nothing() -> None:
+    parser = FrameParser()
+    parser.feed(STOP[3:] + STOP)
+    assert parser.skipped_bytes == parser.leading_bytes == len(STOP) - 3
+    parser.feed(b"\x00" + STOP)
+    assert (parser.skipped_bytes, parser.leading_bytes) == (len(STOP) - 2, len(STOP) - 3)
