@@ -77,6 +77,20 @@ def test_a_port_whose_opening_waits_for_the_loop_is_opened() -> None:
         play(story)
 
 
+def test_a_port_that_is_unplugged_while_its_rate_is_searched_is_gone() -> None:
+    async def story() -> None:
+        device, client = os.openpty()
+        path = os.ttyname(client)
+        stream = await open_serial(path, 115200)
+        os.close(client)
+        os.close(device)
+        with pytest.raises(DeviceLost, match=f"{path} is gone: plug it in again"):
+            stream.set_baud(57600)
+        stream.close()
+
+    asyncio.run(story())
+
+
 class Stuffed(serial.Serial):
     """A port that has bytes left which its device does not take, so that closing it waits."""
 
