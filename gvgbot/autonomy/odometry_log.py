@@ -9,6 +9,7 @@ from gvgbot.hal.messages import Odometry, Scan
 _KEPT = 64  # messages
 _LONGEST_GAP_S = 0.3  # without odometry; nobody knows what the base did in a longer one
 _LEAST_SPAN_S = 0.04  # over which odometry tells a velocity
+_FELT_S = 2.0  # in which a gyro that drifts shows it, in steps of 0.01 degrees
 
 
 class OdometryLog:
@@ -16,9 +17,17 @@ class OdometryLog:
 
     def __init__(self) -> None:
         self._kept: deque[Odometry] = deque(maxlen=_KEPT)
+        self._turned_at = 0.0  # stamp; when the heading was last another one
+        self.unturned_s = 0.0  # in which the heading was the same: no gyro drifts then
 
     def append(self, odometry: Odometry) -> None:
         """Keep a message, and let the oldest go."""
+        before = self.newest
+        if before is None or before.odom_base.theta != odometry.odom_base.theta:
+            self._turned_at = odometry.stamp
+        elif odometry.stamp - self._turned_at > _FELT_S:
+            since = max(before.stamp, self._turned_at + _FELT_S)
+            self.unturned_s += max(0.0, odometry.stamp - since)
         self._kept.append(odometry)
 
     @property

@@ -84,7 +84,7 @@ class Pipeline:
         self.traffic = Traffic(config.newcomers)
         self._incidents: list[tuple[str, str]] = []  # action and reason, since the last scan
         self._was_lifted = self._look_now = False
-        self._breaks = 0  # of odometry, at the last look
+        self._breaks, self._unturned_s = 0, 0.0  # of odometry, at the last look
         self._last: Keyframe | None = None
         self._kept: Pose | None = None  # local_base of the last scan that was kept
         self._looked: Pose | None = None  # local_base of the last look for the GVG
@@ -292,6 +292,7 @@ class Pipeline:
             return Pose()
         motion = self._last.odom_base.to(odom_base)
         self.travelled += math.hypot(motion.x, motion.y)
+        unturned, self._unturned_s = self._unturned_s, self._odometry.unturned_s
         duration = scan.stamp - self._last.stamp
         noise = self._config.odometry_noise.covariance(motion, duration)
         is_doubted, self.errands.is_lost = self.errands.is_lost or is_broken, False
@@ -304,8 +305,9 @@ class Pipeline:
             match = partial(self._maps.find, turned=turned)
         if self._was_lifted or is_doubted:
             self._was_lifted, noise = False, noise + _LIFTED
+        felt_s = max(0.0, duration - (self._unturned_s - unturned))  # in which the gyro may drift
         local_base, covariance = match(
-            scan, self._last.local_base, motion, duration, rotated_covariance(noise, -motion.theta)
+            scan, self._last.local_base, motion, felt_s, rotated_covariance(noise, -motion.theta)
         )
         moved = self._last.local_base.to(local_base)
         step = Step(moved, rotated_covariance(covariance, motion.theta))

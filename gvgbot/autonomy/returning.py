@@ -170,7 +170,7 @@ class ReturningPipeline(Pipeline):
         for local_map in (seeker._maps.near, seeker._maps._far):
             local_map._seen_at += np.float32(older)
         self._maps, self._odometry, self.gvg = seeker._maps, seeker._odometry, seeker.gvg
-        self._breaks = seeker._breaks
+        self._breaks, self._unturned_s = seeker._breaks, seeker._unturned_s
         self._reflexes = seeker._reflexes
         self.traffic.newcomers = seeker.traffic.newcomers
         self._place(map_base)

@@ -145,3 +145,18 @@ def test_a_base_that_started_anew_may_have_been_turned_meanwhile(turned: float) 
     there = Pose(0.0, 0.0, 6.25 + turned).to(pipeline.map_base)
     assert math.hypot(there.x, there.y) < 0.05
     assert abs(wrap_angle(there.theta)) < 0.03
+
+
+@pytest.mark.parametrize("rest_s", [10.0, 3600.0])
+def test_a_gyro_that_feels_nothing_for_an_hour_has_not_drifted(rest_s: float) -> None:
+    config = load_config()
+    pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
+    for k in range(26):
+        looked(pipeline, 0.1 * k, 0.25 * k)
+    pipeline._maps.calibration.x = np.array([0.0, 0.0, 5e-4])  # rad/s, as was learnt in driving
+    pipeline.errands.is_paused = True
+    for stamp in np.arange(2.6, 2.6 + rest_s, 0.25):
+        pipeline.control(Odometry(float(stamp), Pose(0.0, 0.0, 6.25), STANDSTILL))
+    pipeline.errands.is_paused = False
+    looked(pipeline, 2.7 + rest_s, 6.25)
+    assert abs(wrap_angle(pipeline.map_base.theta - 6.25)) < 0.003
