@@ -128,9 +128,10 @@ class LocalMaps:
         still = Pose(before.x, before.y, prior.theta)
         slipping = [] if self._matching.search_rad else [(still, _SLIPPING * Q)]
         best = self._best(scan, [(prior, Q), *slipping])
+        calibration = self._calibration
         if best is None:
             self.blur = np.zeros((3, 3))
-            return prior, Q
+            return prior, Q + calibration.adds_up(motion, duration, np.eye(3))
         found, used = best
         if used is Q:
             self._lesson = motion, duration, prior.to(found.pose), Q, found.covariance
@@ -138,7 +139,9 @@ class LocalMaps:
         self._shared = min((1.0 - _renewed(scan, motion)) * self._shared + 1.0, _MOST_SHARED)
         noise = found.rms / self._matching.pair_sigma_m
         moved = math.hypot(motion.x, motion.y)
-        return found.pose, _drift(found, used, self._shared, noise) + moved * _PER_M
+        drift, left = _drift(found, used, self._shared, noise)
+        drift += moved * _PER_M + calibration.adds_up(motion, duration, left)
+        return found.pose, drift
 
     def trust(
         self, scan: Scan, before: Pose, motion: Pose, duration: float, Q: Array
@@ -237,8 +240,10 @@ def _renewed(scan: Scan, motion: Pose) -> float:
     return min(1.0, moved / (2 * reach) + abs(motion.theta) / field_of_view)
 
 
-def _drift(found: Registration, Q: Array, shared: float, noise: float) -> Array:
+def _drift(found: Registration, Q: Array, shared: float, noise: float) -> tuple[Array, Array]:
     """Covariance (3, 3) of a step that was matched, so that those of many steps add up.
+
+    And the share (3, 3) of an error of odometry that stays for good.
 
     Scans are laid onto walls, and walls drawn by `shared` scans on average, n. A pose errs by
     e = (1 - g) (e' + q) + g (m + v): the gain g weighs odometry with its noise q, from the pose
@@ -250,8 +255,7 @@ def _drift(found: Registration, Q: Array, shared: float, noise: float) -> Array:
     by_walls = g @ found.covariance * min(noise, 1.0) ** 2  # g V g', as V is P g^-1
     new = (np.eye(3) - g) @ Q @ (np.eye(3) - g).T + by_walls
     stays = np.linalg.inv(np.eye(3) + g * (shared - 1.0) / 2)
-    drift = stays @ new @ stays.T
-    return np.asarray((drift + drift.T) / 2, np.float64)
+    return np.asarray(stays @ new @ stays.T), np.asarray(stays @ (np.eye(3) - g))
 
 
 def _turned(points: Array, tree: cKDTree, prior: Pose, reach: float) -> Pose:

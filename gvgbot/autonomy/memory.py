@@ -57,7 +57,8 @@ class Odds:
     """What is known to be wrong with odometry: mean (3,) and covariance (3, 3).
 
     `shared` is how many scans the walls in sight are the mean of, `noise` (2,) how noisy odometry
-    has proved to be, and `told` (2,) how many steps told of that.
+    has proved to be, and `told` (2,) how many steps told of that. `common` (3, 3) is the covariance
+    of the pose with what is wrong.
     """
 
     x: Array
@@ -65,6 +66,7 @@ class Odds:
     shared: float = 1.0
     noise: Array = field(default_factory=lambda: np.ones(2))
     told: Array = field(default_factory=lambda: np.zeros(2))
+    common: Array = field(default_factory=lambda: np.zeros((3, 3)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -142,7 +144,14 @@ def remember(pipeline: Pipeline) -> Memory:
         intent=_intent(pipeline),
         near=_cells(maps.near),
         far=_cells(maps.far),
-        odds=Odds(calibration.x, calibration.P, maps._shared, calibration.noise, calibration.told),
+        odds=Odds(
+            calibration.x,
+            calibration.P,
+            maps._shared,
+            calibration.noise,
+            calibration.told,
+            calibration.shared,
+        ),
         hazards=pipeline._hazards._all,
         newcomers=pipeline.traffic.newcomers._all,
         lasting=pipeline.lasting,
@@ -224,6 +233,7 @@ def recall(pipeline: Pipeline, memory: Memory, past: list[Growth]) -> None:
     calibration = pipeline._maps.calibration
     calibration.x, calibration.P = memory.odds.x, memory.odds.P
     calibration.noise, calibration.told = memory.odds.noise, memory.odds.told
+    calibration.shared = memory.odds.common
     pipeline._maps._shared = memory.odds.shared
     pipeline._hazards._all = list(memory.hazards)
     pipeline.traffic.newcomers._all = list(memory.newcomers)

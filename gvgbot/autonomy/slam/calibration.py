@@ -21,6 +21,9 @@ _LEAST = 1e-10 * np.eye(3)  # variance of a correction where walls say nothing, 
 class Calibration:
     """Belief about the three errors: mean and covariance.
 
+    `shared` (3, 3) is the covariance of the pose, in the frame of the base, with the three: what
+    is wrong with odometry is wrong at every step, so where walls do not tell, errors of steps do
+    not cancel but add up. (Schmidt-Kalman filter: they are considered and not estimated there.)
     `noise` (2,) is the variance of distances and of turns, in units of what is expected, and `told`
     (2,) how many steps told of it.
     """
@@ -28,6 +31,7 @@ class Calibration:
     def __init__(self) -> None:
         self.x = np.zeros(3)
         self.P = np.diag(_SIGMA**2)
+        self.shared = np.zeros((3, 3))
         self.noise, self.told = np.ones(2), np.zeros(2)
 
     def corrected(self, motion: Pose, duration: float) -> Pose:
@@ -44,6 +48,20 @@ class Calibration:
         sigmas = np.sqrt(self.noise[[0, 0, 1]])
         return np.asarray(Q * np.outer(sigmas, sigmas), np.float64)
 
+    def adds_up(self, motion: Pose, duration: float, left: Array) -> Array:
+        """Covariance (3, 3) that the errors of all steps have in common, as of one more step.
+
+        It is added to that of the step itself, in the frame of the base after it. Of what odometry
+        errs in it, walls leave the share `left` (3, 3). What a way back makes good again is left
+        out: a step has no negative covariance, and more may have been learnt on the way.
+        """
+        B = left @ _per_unit(motion, duration)
+        before = _seen_after(motion) @ self.shared
+        added = before @ B.T
+        self.shared = before + B @ self.P
+        values, axes = np.linalg.eigh(added + added.T + B @ self.P @ B.T)
+        return np.asarray(axes * np.maximum(values, 0.0) @ axes.T)
+
     def learn(self, motion: Pose, duration: float, change: Pose, Q: Array, C: Array) -> None:
         """Account for the change that walls made to the pose after a corrected motion.
 
@@ -51,14 +69,7 @@ class Calibration:
         pose before and after, in the same frame: Q - C is that of the change, and 1 - C Q^-1 the
         share of an error that the change makes good.
         """
-        c, s = np.cos(motion.theta), np.sin(motion.theta)
-        J = np.array(
-            [
-                [c * motion.x + s * motion.y, 0.0, 0.0],
-                [c * motion.y - s * motion.x, 0.0, 0.0],
-                [0.0, motion.theta, duration],
-            ]
-        )
+        J = _per_unit(motion, duration)
         H = J - C @ np.linalg.solve(Q, J)
         r = np.array([change.x, change.y, change.theta])
         P = self.P + np.diag(_WANDER**2)
@@ -68,8 +79,9 @@ class Calibration:
             return
         K = np.linalg.solve(S, H @ P).T
         self.x = self.x + K @ r
+        left = np.eye(3) - K @ H
         P -= K @ S @ K.T
-        self.P = (P + P.T) / 2
+        self.P, self.shared = (P + P.T) / 2, self.shared @ left.T
 
     def _learn_noise(self, r: Array, S: Array, Q: Array, C: Array) -> None:
         """Let the noise follow the squares of corrections r (3,) over their variances in S (3, 3).
@@ -82,3 +94,27 @@ class Calibration:
         rate = np.maximum(_RATE, 1.0 / (_FEW + self.told)) * counts
         odd = np.minimum(r[axes] ** 2 / S[axes, axes], _ODDEST)
         self.noise = np.clip(self.noise * np.exp(rate * (odd - 1.0)), *_NOISE)
+
+
+def _per_unit(motion: Pose, duration: float) -> Array:
+    """How the pose after a motion errs with each of the three (3, 3), in the frame of the base."""
+    c, s = np.cos(motion.theta), np.sin(motion.theta)
+    return np.array(
+        [
+            [c * motion.x + s * motion.y, 0.0, 0.0],
+            [c * motion.y - s * motion.x, 0.0, 0.0],
+            [0.0, motion.theta, duration],
+        ]
+    )
+
+
+def _seen_after(motion: Pose) -> Array:
+    """An error (3,) of the pose before a motion, as one of the pose after it: (3, 3)."""
+    c, s = np.cos(motion.theta), np.sin(motion.theta)
+    return np.array(
+        [
+            [c, s, s * motion.x - c * motion.y],
+            [-s, c, c * motion.x + s * motion.y],
+            [0.0, 0.0, 1.0],
+        ]
+    )
