@@ -1,6 +1,7 @@
 """What odometry does wrong all the time is found, as well as the calibration says."""
 
 import numpy as np
+import pytest
 from scipy.stats import chi2
 
 from gvgbot.autonomy.slam.calibration import Calibration
@@ -129,3 +130,51 @@ def test_one_slip_makes_no_noise() -> None:
     change = Pose(-0.25, 0.0, 0.0)
     calibration.learn(Pose(0.25, 0.0, 0.0), 0.5, change, Q, matched(WALLS))
     assert calibration.noise[0] < 1.5
+
+
+def test_what_every_step_errs_adds_up_as_in_drives_by_chance() -> None:
+    """Along two corridors and round a corner between, where walls tell the heading in part."""
+    rng, calibration = np.random.default_rng(7), Calibration()
+    left = np.diag([1.0, 1.0, 0.05])  # what walls leave of an error of a step
+    steps = [Pose(0.2, 0.0, 0.0)] * 150 + [Pose(0.1, 0.0, 0.05)] * 20 + [Pose(0.2, 0.0, 0.0)] * 100
+    errors = rng.multivariate_normal(np.zeros(3), calibration.P, 4000)
+    true, felt = np.zeros((len(errors), 3)), Pose()
+    covariance = np.zeros((3, 3))
+    for step in steps:
+        felt = felt.compose(step)
+        scale, turn, rate = errors.T
+        off = np.stack([step.x * scale, 0.0 * scale, step.theta * turn + rate * 0.4], axis=1)
+        motion = np.array([step.x, step.y, step.theta]) + off @ left
+        c, s = np.cos(true[:, 2]), np.sin(true[:, 2])
+        true += np.stack(
+            [
+                c * motion[:, 0] - s * motion[:, 1],
+                s * motion[:, 0] + c * motion[:, 1],
+                motion[:, 2],
+            ],
+            axis=1,
+        )
+        c1, s1 = np.cos(step.theta), np.sin(step.theta)
+        carried = np.array(  # an error before the step, seen from the pose after it
+            [
+                [c1, s1, s1 * step.x - c1 * step.y],
+                [-s1, c1, c1 * step.x + s1 * step.y],
+                [0.0, 0.0, 1.0],
+            ]
+        )
+        added = calibration.adds_up(step, 0.4, left)
+        covariance = carried @ covariance @ carried.T + added
+    wrong = true - (felt.x, felt.y, felt.theta)
+    claimed = rotated_covariance(covariance, felt.theta)
+    drawn = np.cov(wrong.T)
+    share = np.sqrt(np.diag(claimed) / np.diag(drawn))
+    assert share[0] == pytest.approx(1.0, abs=0.05)  # 2 % of more than thirty metres
+    assert (share > 0.95).all()
+    assert (share < 1.3).all()  # what goes away again is left out
+
+
+def test_on_the_way_back_nothing_more_adds_up() -> None:
+    calibration, there_and_back = Calibration(), [Pose(0.2)] * 50 + [Pose(-0.2)] * 50
+    added = [calibration.adds_up(step, 0.0, np.eye(3))[0, 0] for step in there_and_back]
+    assert sum(added[:50]) == pytest.approx((0.02 * 10.0) ** 2)
+    assert sum(added[50:]) == pytest.approx(0.0, abs=1e-9)
