@@ -43,9 +43,20 @@ def split_edge_at(
         for i, far in enumerate((edge.a, edge.b)):
             part = np.concatenate([np.zeros((1, 2)), parts[i]])
             near = HalfEdgeId(vertex.id, matched[i])
-            part_edge = graph.join(near, far, part, edge.min_clearance, driven=edge.driven)
+            room = clearance_between(part, vertex.clearance, graph.vertices[far.vertex].clearance)
+            clearance = max(edge.min_clearance, room)
+            part_edge = graph.join(near, far, part, clearance, driven=edge.driven)
             part_edge.established = edge.established
         return
+
+
+def clearance_between(line: Array, at_start: float, at_end: float) -> float:
+    """The least clearance, m, that a line (N, 2) can have between places with these clearances.
+
+    From point to point clearance changes by no more than the way between them.
+    """
+    from_start, from_end = (np.hypot(*(line - end).T) for end in (line[0], line[-1]))
+    return float(np.maximum(at_start - from_start, at_end - from_end).min())
 
 
 def _parted(line: Array, reach: float) -> tuple[Array, Array] | None:

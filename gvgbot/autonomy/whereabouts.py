@@ -134,7 +134,8 @@ class Whereabouts:
         centre = gvg.nodes[node].position
         trail = np.array(self.trail).reshape(-1, 2)
         d = np.hypot(*(trail - centre).T)
-        farthest = int(np.argmax(d)) if len(trail) else 0  # a self-loop starts at the node, too
+        is_loop = len(trail) > 0 and d[0] < _AWAY_M  # it starts at the node, too
+        farthest = int(np.argmax(d)) if is_loop else 0
         if len(trail) and d[farthest:].min() < _AWAY_M:  # the robot is past the node already
             trail = trail[: farthest + int(np.argmin(d[farthest:])) + 1]
             rest, rooms = centre[None], np.array([gvg.nodes[node].clearance])

@@ -8,6 +8,7 @@ import pytest
 from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex
 from gvgbot.autonomy.topology import (
+    clearance_between,
     fuse,
     loose_ends,
     piece_of,
@@ -218,3 +219,9 @@ def test_a_line_is_bent_to_its_vertices_only_near_to_them() -> None:
     assert np.abs(np.diff(tied[:, 1])).max() <= 0.4 / 10 + 1e-9  # evenly over a metre
     short = tied_to(line[:5], np.array([0.0, 3.0]), line[4], (1.0, 1.0))
     assert short[[0, -1]].tolist() == [[0.0, 3.0], line[4].tolist()]
+
+
+def test_between_two_wide_places_near_to_each_other_it_is_wide() -> None:
+    line = np.linspace((0.0, 0.0), (1.2, 0.0), 121)
+    assert clearance_between(line, 1.5, 1.3) == pytest.approx(0.8, abs=0.01)
+    assert clearance_between(np.linspace((0.0, 0.0), (9.0, 0.0), 91), 1.5, 1.3) < 0.0

@@ -11,7 +11,7 @@ from gvgbot.autonomy.gvg.local import Branch, LocalGvg
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex
 from gvgbot.autonomy.views import Correspondence
 from gvgbot.autonomy.whereabouts import Passage, Situation, Whereabouts
-from gvgbot.geometry import Pose
+from gvgbot.geometry import Pose, length_of
 from tests.unit.autonomy.local_graphs import Point, drawn, resampled
 
 EAST, WEST = 0, 1  # keys of the half-edges of each vertex along the corridor
@@ -398,3 +398,13 @@ def test_who_has_not_driven_yet_turns_round_by_its_heading(heading: float) -> No
     assert where.backwards(CORRIDOR, place, nothing, base) == Branch(
         behind.edge, not behind.forward
     )
+
+
+def test_a_vertex_that_is_believed_long_after_the_robot_passed_it_ends_the_edge_there() -> None:
+    """It came from x = 4, and is 2.8 m past the meetpoint when that becomes known."""
+    where = Whereabouts(HalfEdgeId(1, EAST), list(resampled([(4.0, 0.0), (8.8, 0.0)])))
+    (passage,) = Walk(where).along(CORRIDOR, ALL_KNOWN, (8.8, 0.0), (8.9, 0.0)).passages
+    assert passage.arrived == HalfEdgeId(2, WEST)
+    assert passage.driven == pytest.approx(2.0, abs=0.3)
+    assert length_of(passage.line) == pytest.approx(2.0, abs=0.3)
+    assert passage.line[-1] == pytest.approx([6.0, 0.0])
