@@ -316,10 +316,15 @@ class Situation:
         if node is not None:
             found = self.gvg.routes(self.place).get(node)
             return None if found is None else found[1]
-        back = self._back()
-        if self.where.on_edge is not None and self.where.on_edge.vertex == vertex:
-            return self._extended((back,))
-        return self._extended((Branch(back.edge, not back.forward),))
+        end = self.where.on_edge
+        if end is not None and end.vertex == vertex and not self._is_round(end):
+            return self.astern()
+        return self.ahead()
+
+    def _is_round(self, end: HalfEdgeId) -> bool:
+        """Whether the robot's edge comes back to its vertex, and that is nearer than going back."""
+        starts = [a for a in self._out_of_sight(set()) if a.arrival.vertex == end.vertex]
+        return min(starts, key=lambda a: a.metres, default=Approach(0.0, end)).arrival != end
 
     def _extended(self, path: tuple[Branch, ...]) -> tuple[Branch, ...]:
         """The path and on through points that are no vertices, to the end of what is in sight."""

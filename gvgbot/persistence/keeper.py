@@ -10,6 +10,7 @@ written later.
 import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Awaitable, Callable
+from dataclasses import replace
 from functools import partial
 
 import structlog
@@ -147,9 +148,9 @@ class Keeper:
         Call each such function before asking for the next.
         """
         pipeline = self._session.pipeline
-        if pipeline.is_seeking:
-            return self._files.fall_behind
-        if not pipeline.keyframes or pipeline.is_lost:
+        if pipeline.is_lost:
+            return self._keeping_wish()
+        if not pipeline.keyframes:
             return _nothing
         after = self._stays(pipeline.lasting) if self._is_cut else len(self._counts)
         before = self._counts[after - 1] if after else Count(0, 0)
@@ -173,6 +174,34 @@ class Keeper:
             self._settled = False
         self._is_cut = False
         return partial(self._write, packed(batch), [*self._counts[:after], count], snapshot, stamp)
+
+    def _keeping_wish(self) -> Callable[[], None]:
+        """A function that keeps what was asked of a robot that does not know its place.
+
+        What it lives through meanwhile is not kept, and that it found no place neither: when it is
+        started again it looks again.
+        """
+        pipeline, saved = self._session.pipeline, self._saved
+        before = self._files.fall_behind if pipeline.is_seeking else _nothing
+        if saved is None or not (self._settled and self._goes_on):
+            return before
+        self._settled = False
+        memory = remember(pipeline)
+        if memory.intent.outcome == "failed":
+            intent = replace(memory.intent, outcome=saved.memory.intent.outcome)
+            memory = replace(memory, intent=intent)
+        snapshot = packed(Snapshot(memory=memory, beat=saved.beat))
+        return partial(self._write_wish, before, snapshot)
+
+    def _write_wish(self, before: Callable[[], None], snapshot: bytes) -> None:
+        before()
+        try:
+            self._files.save(snapshot)
+        except OSError as error:
+            self._settled = True
+            self._complain(error.strerror or str(error))
+        else:
+            self._complain(None)
 
     def _stays(self, lasting: int) -> int:
         """How many batches hold nothing but the first keyframes, of which none was forgotten."""

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gvgbot.autonomy.events import Requested
 from gvgbot.autonomy.returning import ReturningPipeline
 from gvgbot.config import Config, load_config
 from gvgbot.geometry import Pose
@@ -157,3 +158,28 @@ def test_after_a_power_cut_in_half_a_building_it_finds_its_place_and_keeps_it(
     truth = place.start.inverse().compose(lives.world.body.pose)
     assert found[0][1] - at_first[0] < 40.0
     assert session.pipeline.map_base.distance(truth) < 0.5
+
+
+def test_a_robot_that_was_paused_while_it_looked_for_its_place_stays_paused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Killed, and again two seconds after the pause; the computer has started anew each time."""
+    starts = count()
+    monkeypatch.setattr(keeper, "boot_id", lambda: f"start {next(starts)}")
+    config = load_config(None, ["twin.seed=2", "twin.world=floor_plan:5"])
+    asked = list[float]()
+
+    def is_paused_for_long(session: Session, now: float) -> bool:
+        if session.pipeline.is_seeking and not asked:
+            asked.append(now)
+            answer = session.pipeline.errands.pause()
+            lives.keepers[-1].on_event(Requested(now, "pause", "test", True, answer))
+        return bool(asked) and now > asked[0] + 2.0
+
+    def is_over(session: Session) -> bool:
+        return len(lives.sessions) > 2 and session.pipeline.keyframes != []
+
+    lives = Lives(config, open_place(config), tmp_path, over=is_over)
+    last = lives.run([at(40.0), is_paused_for_long])
+    assert last.pipeline.errands.is_paused
+    assert len(last.pipeline.mapper.graph.vertices) > 1

@@ -408,3 +408,24 @@ def test_a_vertex_that_is_believed_long_after_the_robot_passed_it_ends_the_edge_
     assert passage.driven == pytest.approx(2.0, abs=0.3)
     assert length_of(passage.line) == pytest.approx(2.0, abs=0.3)
     assert passage.line[-1] == pytest.approx([6.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("west", "is_ahead"), [(0.0, True), (-8.0, False)], ids=["10 of 24 m", "26 of 40 m"]
+)
+def test_round_an_edge_that_comes_back_to_its_vertex_it_goes_on_if_that_is_nearer(
+    west: float, *, is_ahead: bool
+) -> None:
+    """It has driven fourteen metres from the vertex, which is out of sight both ways."""
+    ring: list[Point] = [(0.0, 0.0), (8.0, 0.0), (8.0, 4.0), (west, 4.0), (west, 0.0), (0.0, 0.0)]
+    graph, vertex = GvgGraph(), Vertex(1, 1.0, Pose(), 0.0, 0.0)
+    graph.vertices[1] = vertex
+    a, b = (HalfEdgeId(1, vertex.add_half_edge(bearing)) for bearing in (0.0, math.pi))
+    graph.join(a, b, np.array(resampled(ring)), 0.8, driven=True)
+    piece = drawn({1: (2.0, 4.0), 2: (8.0, 4.0)}, {10: (1, 2, [])})
+    place = piece.place(np.array([6.0, 4.0]))
+    assert place is not None
+    where = Whereabouts(a, list(resampled([*ring[:3], (6.0, 4.0)])))
+    base = Pose(6.0, 4.0, math.pi)
+    here = Situation(piece, Correspondence(), graph, where, Access(place), base)
+    assert here.path_over(1, ()) == (Branch(10, forward=not is_ahead),)
