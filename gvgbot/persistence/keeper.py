@@ -195,13 +195,8 @@ class Keeper:
 
     def _write_wish(self, before: Callable[[], None], snapshot: bytes) -> None:
         before()
-        try:
-            self._files.save(snapshot)
-        except OSError as error:
+        if not self._is_kept(partial(self._files.save, snapshot)):
             self._settled = True
-            self._complain(error.strerror or str(error))
-        else:
-            self._complain(None)
 
     def _stays(self, lasting: int) -> int:
         """How many batches hold nothing but the first keyframes, of which none was forgotten."""
@@ -216,19 +211,27 @@ class Keeper:
     def _write(
         self, batch: bytes, counts: list[Count], snapshot: bytes | None, stamp: float
     ) -> None:
-        try:
+        def write() -> None:
             self._files.append(batch, sync=snapshot is not None, after=len(counts) - 1)
             self._counts, self._beat_at = counts, stamp
             if snapshot is not None:
                 self._files.save(snapshot)
                 self._snapshot_at, self._snapshot_of = stamp, counts[-1].keyframes
-        except OSError as error:
+
+        if not self._is_kept(write):
             self._settled = self._settled or snapshot is not None
             self._is_cut = self._is_cut or len(counts) <= len(self._counts)
             self._files.fall_behind()
+
+    def _is_kept(self, write: Callable[[], None]) -> bool:
+        """Write, and say so if that cannot be; whether it was written."""
+        try:
+            write()
+        except OSError as error:
             self._complain(error.strerror or str(error))
-        else:
-            self._complain(None)
+            return False
+        self._complain(None)
+        return True
 
     def _complain(self, trouble: str | None) -> None:
         """Say once that nothing can be written, and once that it can again."""
