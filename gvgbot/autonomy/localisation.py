@@ -255,7 +255,8 @@ def _drift(found: Registration, Q: Array, shared: float, noise: float) -> tuple[
     by_walls = g @ found.covariance * min(noise, 1.0) ** 2  # g V g', as V is P g^-1
     new = (np.eye(3) - g) @ Q @ (np.eye(3) - g).T + by_walls
     stays = np.linalg.inv(np.eye(3) + g * (shared - 1.0) / 2)
-    return np.asarray(stays @ new @ stays.T), np.asarray(stays @ (np.eye(3) - g))
+    drift = stays @ new @ stays.T
+    return np.asarray((drift + drift.T) / 2), np.asarray(stays @ (np.eye(3) - g))
 
 
 def _turned(points: Array, tree: cKDTree, prior: Pose, reach: float) -> Pose:
