@@ -39,9 +39,11 @@ class Reference:
 
     Vertices have `position` (2,), `clearance` and `is_required`; edges have `length` and `line`
     (N, 2), which runs either way. What is not required may be missing from a map or be in it.
+    `meetpoints` (N, 2) are those of the whole GVG, with the branches into corners, each by itself.
     """
 
     graph: nx.MultiGraph = field(default_factory=nx.MultiGraph)
+    meetpoints: Array = field(default_factory=lambda: np.zeros((0, 2)))
 
     @property
     def length(self) -> float:
@@ -68,11 +70,12 @@ def reference_gvg(world: World, start: tuple[float, float], radius: float) -> Re
     fine = _fine_graph(world, start, radius)
     if not fine:
         return Reference()
+    meetpoints = [fine.nodes[node]["position"] for node in fine if fine.degree(node) >= 3]
     while corners := _corner_branches(_reduced(fine, start)):
         fine.remove_nodes_from(corners)
     graph = _merged(_reduced(fine, start))
     _mark_required(graph)
-    return Reference(graph)
+    return Reference(graph, np.array(meetpoints).reshape(-1, 2))
 
 
 def _fine_graph(world: World, start: tuple[float, float], radius: float) -> nx.Graph:

@@ -68,6 +68,13 @@ def test_the_clearance_is_the_distance_of_the_centres_of_wall_cells() -> None:
     assert clearances[1] == pytest.approx(1.0 + CELL / 2, abs=1e-3)
 
 
+def test_a_rooms_meetpoints_are_as_far_from_both_ends_as_from_the_sides() -> None:
+    canvas = Canvas(8.0, 6.0)
+    canvas.carve(1.0, 1.0, 7.0, 5.0)
+    meetpoints = gvg(canvas, (4.0, 3.0)).meetpoints
+    assert np.unique(meetpoints.round(1), axis=0).tolist() == [[3.0, 3.0], [5.0, 3.0]]
+
+
 @pytest.mark.parametrize("size", [0.1, 0.2])
 def test_coarse_cells_give_the_same_graph(size: float) -> None:
     world = plus().world("fine")
