@@ -35,7 +35,7 @@ _SLIPPING = 25.0  # times the covariance of odometry, when the wheels slip
 _LOST = np.diag([0.5**2, 0.5**2, 0.05**2])  # of a base that nobody heard for a while
 _SEEN_SHARE = 0.3  # of the walls must be known to a robot that comes round a corner unseen
 _MOST_SHARED = 100.0  # scans that a wall can be the mean of
-_PER_M = np.diag([0.004**2, 0.004**2, 0.0001**2])  # per metre: what cells do to walls
+_PER_M = np.diag([0.002**2, 0.002**2, 0.0001**2])  # per metre: what cells do to walls
 
 # full: scans are matched, and vertices are poses. paper: odometry alone between vertices, and a
 # vertex seen again corrects by its position only, as the method was published
@@ -127,11 +127,11 @@ class LocalMaps:
         prior = before.compose(motion)
         still = Pose(before.x, before.y, prior.theta)
         slipping = [] if self._matching.search_rad else [(still, _SLIPPING * Q)]
-        best = self._best(scan, [(prior, Q), *slipping])
+        best = self._best(scan, [(prior, Q), *slipping], least_known=_SEEN_SHARE)
         calibration = self._calibration
         if best is None:
             self.blur = np.zeros((3, 3))
-            return prior, Q + calibration.adds_up(motion, duration, np.eye(3))
+            return prior, calibration.adds_up(motion, duration, np.eye(3), Q)
         found, used = best
         if used is Q:
             self._lesson = motion, duration, prior.to(found.pose), Q, found.covariance
@@ -140,8 +140,8 @@ class LocalMaps:
         noise = found.rms / self._matching.pair_sigma_m
         moved = math.hypot(motion.x, motion.y)
         drift, left = _drift(found, used, self._shared, noise)
-        drift += moved * _PER_M + calibration.adds_up(motion, duration, left)
-        return found.pose, drift
+        drift += moved * _PER_M
+        return found.pose, calibration.adds_up(motion, duration, left, drift)
 
     def trust(
         self, scan: Scan, before: Pose, motion: Pose, duration: float, Q: Array

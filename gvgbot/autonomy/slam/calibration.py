@@ -15,6 +15,7 @@ _SURPRISING = 16.0  # squared Mahalanobis distance of a correction that tells of
 _NOISE = (0.5, 25.0)  # variance of odometry, least and most, in units of what is expected
 _RATE, _FEW = 0.02, 20.0  # at which it is learnt with each step, and the steps until it is that low
 _ODDEST = 9.0  # a correction says no more than one of three sigmas
+_LEAST_SHARE = 0.1  # of its own covariance, that a step has in every direction
 _LEAST = 1e-10 * np.eye(3)  # variance of a correction where walls say nothing, m^2 and rad^2
 
 
@@ -48,19 +49,23 @@ class Calibration:
         sigmas = np.sqrt(self.noise[[0, 0, 1]])
         return np.asarray(Q * np.outer(sigmas, sigmas), np.float64)
 
-    def adds_up(self, motion: Pose, duration: float, left: Array) -> Array:
-        """Covariance (3, 3) that the errors of all steps have in common, as of one more step.
+    def adds_up(self, motion: Pose, duration: float, left: Array, drift: Array) -> Array:
+        """The covariance `drift` (3, 3) of one more step, with what all steps err in common.
 
-        It is added to that of the step itself, in the frame of the base after it. Of what odometry
-        errs in it, walls leave the share `left` (3, 3). What a way back makes good again is left
-        out: a step has no negative covariance, and more may have been learnt on the way.
+        Both are in the frame of the base after it. Of what odometry errs in it, walls leave the
+        share `left` (3, 3). What a way back makes good again is left out: a step has no negative
+        covariance, and more may have been learnt on the way.
         """
         B = left @ _per_unit(motion, duration)
         before = _seen_after(motion) @ self.shared
         added = before @ B.T
         self.shared = before + B @ self.P
-        values, axes = np.linalg.eigh(added + added.T + B @ self.P @ B.T)
-        return np.asarray(axes * np.maximum(values, 0.0) @ axes.T)
+        added = added + added.T + B @ self.P @ B.T
+        added += np.diag(np.maximum(-np.diag(added), 0.0))
+        L = np.linalg.cholesky(drift)  # in its units, as metres and radians do not compare
+        values, axes = np.linalg.eigh(np.linalg.solve(L, np.linalg.solve(L, added).T))
+        axes = L @ axes
+        return np.asarray(axes * np.maximum(1.0 + values, _LEAST_SHARE) @ axes.T)
 
     def learn(self, motion: Pose, duration: float, change: Pose, Q: Array, C: Array) -> None:
         """Account for the change that walls made to the pose after a corrected motion.
