@@ -67,7 +67,7 @@ class Keeper:
         self._ahead = 0.0  # s, the robot's clock minus the computer's
         self._feedback: FeedbackReader | None = None
         self._counts: list[Count] = []  # of what is in the journal after each batch
-        self._is_cut = False  # some of what is in the journal has been forgotten
+        self._stay = math.inf  # keyframes in the journal, the first: others have been forgotten
         self._beat_at = -math.inf  # stamp of the last batch
         self._snapshot_at = -math.inf  # stamp of the last snapshot
         self._snapshot_of = -1  # keyframes in it
@@ -132,7 +132,8 @@ class Keeper:
     def on_event(self, event: events.Event) -> None:
         """Note what happened: a map that has changed is kept at once, and so is a wish."""
         self._settled = self._settled or isinstance(event, _SETTLED)
-        self._is_cut = self._is_cut or isinstance(event, events.WayForgotten)
+        if isinstance(event, events.WayForgotten):
+            self._stay = min(self._stay, event.kept)
 
     async def keep(
         self, clock: Clock, off_loop: Callable[[Callable[[], None]], Awaitable[None]]
@@ -152,7 +153,7 @@ class Keeper:
             return self._keeping_wish()
         if not pipeline.keyframes:
             return _nothing
-        after = self._stays(pipeline.lasting) if self._is_cut else len(self._counts)
+        after = bisect_right(self._counts, self._stay, key=lambda count: count.keyframes)
         before = self._counts[after - 1] if after else Count(0, 0)
         count = Count(len(pipeline.keyframes), len(self._session.journey.stamps))
         if count == before and not self._settled:
@@ -172,7 +173,7 @@ class Keeper:
         if due and (self._settled or self._snapshot_of < len(pipeline.keyframes)):
             snapshot = packed(Snapshot(memory=remember(pipeline), beat=beat))
             self._settled = False
-        self._is_cut = False
+        self._stay = math.inf
         return partial(self._write, packed(batch), [*self._counts[:after], count], snapshot, stamp)
 
     def _keeping_wish(self) -> Callable[[], None]:
@@ -198,10 +199,6 @@ class Keeper:
         if not self._is_kept(partial(self._files.save, snapshot)):
             self._settled = True
 
-    def _stays(self, lasting: int) -> int:
-        """How many batches hold nothing but the first keyframes, of which none was forgotten."""
-        return bisect_right(self._counts, lasting, key=lambda count: count.keyframes)
-
     def finish(self) -> None:
         """Write all that is new; call when nothing runs any more."""
         self._settled = True
@@ -220,7 +217,7 @@ class Keeper:
 
         if not self._is_kept(write):
             self._settled = self._settled or snapshot is not None
-            self._is_cut = self._is_cut or len(counts) <= len(self._counts)
+            self._stay = min(self._stay, counts[-2].keyframes if len(counts) > 1 else 0)
             self._files.fall_behind()
 
     def _is_kept(self, write: Callable[[], None]) -> bool:

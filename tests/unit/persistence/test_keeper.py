@@ -117,6 +117,28 @@ def test_a_way_that_is_forgotten_leaves_the_journal_whole_and_short(
     assert len(saved.journey.stamps) == explored > 0
 
 
+def test_a_way_is_cut_where_it_was_forgotten_even_if_the_robot_has_explored_on_since(
+    session: Session, tmp_path: Path
+) -> None:
+    pipeline = session.pipeline
+    keyframes, newest = pipeline.keyframes.copy(), len(pipeline.keyframes) - 1
+    kept = newest - 20
+    keeper = Keeper(session, MissionFiles(tmp_path))
+    for count in (kept, newest + 1):
+        pipeline.keyframes[:] = keyframes[:count]
+        keeper.keeping(20.0 + count)()
+    pipeline.keyframes[kept:] = keyframes[-1:] * 22  # the last one, and later ones
+    del pipeline.steps[kept:]
+    pipeline.steps += pipeline.steps[-1:] * 21
+    pipeline.mapper.forget_between(kept, newest)
+    keeper.on_event(WayForgotten(99.0, kept, newest - kept))
+    pipeline.lasting = len(pipeline.keyframes)
+    keeper.keeping(99.0)()
+    saved = MissionFiles(tmp_path).read()
+    assert saved is not None
+    assert packed(saved.past) == packed(growth(pipeline))
+
+
 def test_a_robot_that_saw_nothing_leaves_no_mission(tmp_path: Path) -> None:
     with RunDirectory(tmp_path) as directory:
         keeper = Keeper(Session(load_config(), directory, None), MissionFiles(tmp_path))
