@@ -30,6 +30,7 @@ class LivePast:
     def __init__(self) -> None:
         self._drawn: list[Pose] = []  # map_base of each keyframe
         self._taken = 0  # keyframes
+        self._first: Keyframe | None = None  # of those
         self._is_doubtful = True  # what an earlier life has left may have been corrected since
         self._rests_until = -float("inf")  # stamp
 
@@ -48,21 +49,27 @@ class LivePast:
         if self._taken > len(pipeline.keyframes):  # the latest of a long way was all that stayed
             self._taken = len(pipeline.keyframes)
             self._drawn[self._taken - 1 :] = [pipeline.keyframes[-1].map_base]
+        is_other = self._first is not None and self._first is not pipeline.keyframes[0]
+        self._first = pipeline.keyframes[0]
+        if is_other:  # another map has begun
+            self._taken, self._drawn = 0, []
         new, past = pipeline.keyframes[self._taken :], None
         self._taken += len(new)
         if self._is_doubtful and stamp >= self._rests_until and not pipeline.led:
             self._is_doubtful, past = False, still_past(pipeline)
         if not new and past is None:
             return None
-        return partial(self._portion, new, past, stamp)
+        return partial(self._portion, new, past, stamp, is_other)
 
-    def _portion(self, new: Sequence[Keyframe], past: Pipeline | None, stamp: float) -> Portion:
+    def _portion(
+        self, new: Sequence[Keyframe], past: Pipeline | None, stamp: float, is_all: bool
+    ) -> Portion:
         self._drawn += [keyframe.map_base for keyframe in new]
         if past is None:
-            return Portion(new, is_all=False)
+            return Portion(new, is_all)
         best = smoothed_keyframes(past)
         if _farthest(self._drawn, best) < TOLERANCE_M:
-            return Portion(new, is_all=False)
+            return Portion(new, is_all)
         self._drawn, self._rests_until = best, stamp + _REST_S * len(best)
         moved = zip(past.keyframes, best, strict=True)
         return Portion([replace(old, map_base=pose) for old, pose in moved], is_all=True)

@@ -148,6 +148,7 @@ class WayForgotten:
     """On errands that showed nothing new, the robot keeps only the latest part of its way.
 
     The first `kept` keyframes, by which it knows the map, stay; so many after them are left out.
+    It keeps none where it begins a new map.
     """
 
     stamp: float

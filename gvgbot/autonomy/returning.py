@@ -2,7 +2,8 @@
 
 If the base vouches that it cannot have moved unnoticed, and the scan agrees with the local map as
 it was kept, life goes on there. Otherwise a second mind that knows nothing drives about, and its
-local map is laid onto the known one until a single place is left.
+local map is laid onto the known one until a single place is left. Before the first vertex there is
+hardly a map to find a place on: then a new one begins.
 """
 
 import contextlib
@@ -17,11 +18,11 @@ from gvgbot.autonomy.config import AutonomyConfig
 from gvgbot.autonomy.control.reflexes import Felt
 from gvgbot.autonomy.errands import Declined
 from gvgbot.autonomy.estimate import Estimate, scans_at, smoothed
-from gvgbot.autonomy.events import Event, Finished, Recovery
+from gvgbot.autonomy.events import Event, Finished, Recovery, WayForgotten
 from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.keyframes import Step
 from gvgbot.autonomy.localisation import Localisation
-from gvgbot.autonomy.memory import Growth, Memory, recall
+from gvgbot.autonomy.memory import Growth, Memory, recall, remember
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.relocalisation import Look, Opinion, Relocaliser
 from gvgbot.autonomy.slam.ekf import Belief
@@ -59,6 +60,7 @@ class ReturningPipeline(Pipeline):
         self._is_vouched = is_vouched
         self._matching = config.scan_matching
         self._is_back = not self.keyframes
+        self._is_bare = not self.mapper.graph.vertices and self.mission.outcome is None
         self._seeker: Pipeline | None = None
         self._tour: list[int] | None = None  # vertices of its own that it still drives to
         self._relocaliser: Relocaliser
@@ -88,7 +90,7 @@ class ReturningPipeline(Pipeline):
         if self._is_vouched() and self._agrees(scan, odom_base):
             self._is_back = True
             return super().perceive(scan)
-        return self._begin_to_seek(scan)
+        return self._begin_anew(scan) if self._is_bare else self._begin_to_seek(scan)
 
     def control(self, odometry: Odometry, felt: Felt = _NOTHING_FELT) -> Twist:
         """The twist to drive now."""
@@ -115,6 +117,20 @@ class ReturningPipeline(Pipeline):
             return False
         distance = np.asarray(cKDTree(walls).query(ends)[0])
         return float((distance < _AGREES_M).mean()) >= _AGREEMENT
+
+    def _begin_anew(self, scan: Scan) -> list[Event]:
+        """Forget all, and learn from the scan as from the first one."""
+        why, left_out, fresh = "it knew no vertex yet", len(self.keyframes), self._new_mind()
+        self.errands.give_up(scan.stamp, why)
+        is_waiting = self.errands.is_waiting
+        recall(self, remember(fresh), [])
+        self.errands.is_waiting = is_waiting
+        self._last, self._maps, self._is_back = None, fresh._maps, True
+        happened: list[Event] = [
+            Recovery(scan.stamp, "begin a new map", f"it may have been moved, and {why}"),
+            WayForgotten(scan.stamp, 0, left_out),
+        ]
+        return [*happened, *self.errands.take_events(), *super().perceive(scan)]
 
     # -- lost ------------------------------------------------------------------------------------
 

@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 
 from gvgbot.autonomy.events import Requested
+from gvgbot.autonomy.memory import growth
 from gvgbot.autonomy.returning import ReturningPipeline
 from gvgbot.config import Config, load_config
 from gvgbot.geometry import Pose
 from gvgbot.persistence import keeper
-from gvgbot.persistence.mission_files import JOURNAL, SNAPSHOT
+from gvgbot.persistence.mission_files import JOURNAL, SNAPSHOT, MissionFiles
+from gvgbot.persistence.records import packed
 from gvgbot.session import Session
 from gvgbot.simulation import Place, open_place
 from tests.replay.test_pipeline import LOLLIPOP, START
@@ -158,6 +160,39 @@ def test_after_a_power_cut_in_half_a_building_it_finds_its_place_and_keeps_it(
     truth = place.start.inverse().compose(lives.world.body.pose)
     assert found[0][1] - at_first[0] < 40.0
     assert session.pipeline.map_base.distance(truth) < 0.5
+
+
+def test_a_robot_that_was_moved_before_its_first_vertex_begins_a_new_map(
+    config: Config, whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing vouches for the base; a map of one corridor would tell no place apart."""
+    starts = count()
+    monkeypatch.setattr(keeper, "boot_id", lambda: f"start {next(starts)}")
+    left = list[Pose]()
+
+    def take_up(world: GoingWorld, out: Path) -> None:
+        assert (out / SNAPSHOT).exists()
+        world.body.pose = world.body.pose.compose(Pose(0.1, 0.0, 0.5))
+        left.append(world.body.pose)
+
+    lives = Lives(config, Place(LOLLIPOP, START), tmp_path, between=take_up)
+    last = lives.run([at(3.0)])
+    assert lives.sessions[0].pipeline.mapper.graph.vertices == {}
+    assert summary(tmp_path)["outcome"] == "explored"
+    events = [json.loads(line) for line in (tmp_path / "events.jsonl").read_text().splitlines()]
+    actions = [event["action"] for event in events if event["event"] == "recovery"]
+    assert actions == ["begin a new map"]
+    truth = left[0].inverse().compose(lives.world.body.pose)
+    assert last.pipeline.map_base.distance(truth) < 0.1
+    found, wanted = vertices(tmp_path), vertices(whole)
+    for kind in wanted:
+        assert len(found[kind]) == len(wanted[kind])
+        for x, y in found[kind]:
+            here = START.inverse().transform(left[0].transform(np.array([x, y])))
+            assert min(math.dist(here, other) for other in wanted[kind]) < 0.05
+    saved = MissionFiles(tmp_path).read()
+    assert saved is not None
+    assert packed(saved.past) == packed(growth(last.pipeline))
 
 
 def test_a_robot_that_was_paused_while_it_looked_for_its_place_stays_paused(

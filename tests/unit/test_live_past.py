@@ -161,6 +161,15 @@ def test_the_trajectory_that_is_shown_closes_with_the_loop() -> None:
     assert way == pytest.approx(RADIUS_M, abs=2 * TOLERANCE_M)
 
 
+def test_where_another_map_begins_nothing_is_left_of_the_one_before() -> None:
+    pipeline, live = drive(), LiveMap(began=0.0)
+    shown(live, pipeline, 0.0)
+    here = TRUE[7]
+    pipeline.keyframes = [Keyframe(200.0, here, here, here, None)]
+    pipeline.steps, pipeline.mapper.observations = [], []
+    assert shown(live, pipeline, 200.0) == pytest.approx(np.array([[here.x, here.y]]))
+
+
 def test_before_the_first_keyframe_there_is_nothing_to_draw() -> None:
     pipeline = drive()
     pipeline.keyframes = []

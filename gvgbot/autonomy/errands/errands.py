@@ -292,6 +292,10 @@ class Errands:
         self._is_own = False
         self._plan = self._driving = self._command = None
 
+    def give_up(self, stamp: float, reason: str) -> None:
+        """End the errand, if there is one: it is about a map that is forgotten."""
+        self._end(stamp, "given up", reason)
+
     # -- after a restart ---------------------------------------------------------------------------
 
     def kept(self) -> Kept | None:
