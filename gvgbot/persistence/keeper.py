@@ -72,6 +72,7 @@ class Keeper:
         self._snapshot_at = -math.inf  # stamp of the last snapshot
         self._snapshot_of = -1  # keyframes in it
         self._settled = False  # the map has changed since the last snapshot
+        self._is_asked = False  # for something, in this life
         self._goes_on = files.is_begun  # in the files in which it ended
         self._same_life = False  # the computer and its clock have gone on since
         self.trouble: str | None = None  # why nothing can be written just now
@@ -106,7 +107,9 @@ class Keeper:
 
     def _is_vouched(self) -> bool:
         """Whether the base has counted all the time since, so that it cannot have driven."""
-        return self._goes_on and self._feedback is not None and self._feedback.is_unbroken
+        counted = self._saved is not None and self._saved.beat.odometer is not None
+        heard = self._feedback is not None and self._feedback.is_unbroken
+        return self._goes_on and counted and heard
 
     def clock(self) -> LoopClock:
         """The robot's clock, which goes on from where it ended; on the running loop."""
@@ -132,6 +135,7 @@ class Keeper:
     def on_event(self, event: events.Event) -> None:
         """Note what happened: a map that has changed is kept at once, and so is a wish."""
         self._settled = self._settled or isinstance(event, _SETTLED)
+        self._is_asked |= isinstance(event, events.Requested) and event.done
         if isinstance(event, events.WayForgotten):
             self._stay = min(self._stay, event.kept)
 
@@ -151,7 +155,7 @@ class Keeper:
         pipeline = self._session.pipeline
         if pipeline.is_lost:
             return self._keeping_wish()
-        if not pipeline.keyframes:
+        if not (pipeline.keyframes or self._is_asked):
             return _nothing
         after = bisect_right(self._counts, self._stay, key=lambda count: count.keyframes)
         before = self._counts[after - 1] if after else Count(0, 0)
@@ -171,7 +175,7 @@ class Keeper:
         due = self._settled or stamp - self._snapshot_at >= SNAPSHOT_EVERY
         snapshot = None
         if due and (self._settled or self._snapshot_of < len(pipeline.keyframes)):
-            snapshot = packed(Snapshot(memory=remember(pipeline), beat=beat))
+            snapshot = packed(Snapshot(memory=remember(pipeline), beat=beat, known=self._known))
             self._settled = False
         self._stay = math.inf
         return partial(self._write, packed(batch), [*self._counts[:after], count], snapshot, stamp)
@@ -180,23 +184,33 @@ class Keeper:
         """A function that keeps what was asked of a robot that does not know its place.
 
         What it lives through meanwhile is not kept, and that it found no place neither: when it is
-        started again it looks again.
+        started again it looks again. The map comes along where it is from elsewhere.
         """
         pipeline, saved = self._session.pipeline, self._saved
-        before = self._files.fall_behind if pipeline.is_seeking else _nothing
-        if saved is None or not (self._settled and self._goes_on):
+        is_gone = pipeline.is_seeking or not self._goes_on
+        before = self._files.fall_behind if is_gone else _nothing
+        if saved is None or not (self._settled and (self._goes_on or self._is_asked)):
             return before
         self._settled = False
         memory = remember(pipeline)
         if memory.intent.outcome == "failed":
-            intent = replace(memory.intent, outcome=saved.memory.intent.outcome)
-            memory = replace(memory, intent=intent)
-        snapshot = packed(Snapshot(memory=memory, beat=saved.beat))
-        return partial(self._write_wish, before, snapshot)
+            outcome = saved.memory.intent.outcome if self._goes_on else None
+            memory = replace(memory, intent=replace(memory.intent, outcome=outcome))
+        snapshot = packed(Snapshot(memory=memory, beat=saved.beat, known=self._known))
+        past = None
+        if not self._files.is_begun:
+            journey = rows(self._session.journey, 0)
+            past = packed(Batch(first=0, growth=growth(pipeline), rows=journey, beat=saved.beat))
+        return partial(self._write_wish, past, before, snapshot)
 
-    def _write_wish(self, before: Callable[[], None], snapshot: bytes) -> None:
-        before()
-        if not self._is_kept(partial(self._files.save, snapshot)):
+    def _write_wish(self, past: bytes | None, before: Callable[[], None], snapshot: bytes) -> None:
+        def write() -> None:
+            if past is not None:
+                self._files.append(past, sync=True)
+            before()
+            self._files.save(snapshot)
+
+        if not self._is_kept(write):
             self._settled = True
 
     def finish(self) -> None:
@@ -238,6 +252,10 @@ class Keeper:
         elif trouble is None and self.trouble is not None:
             log.info("mission kept again", path=path)
         self.trouble = trouble
+
+    @property
+    def _known(self) -> str:
+        return "" if self._saved is None else self._saved.known
 
     def _beat(self, stamp: float) -> Beat:
         return Beat(

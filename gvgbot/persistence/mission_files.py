@@ -71,7 +71,8 @@ class MissionFiles:
             newest = max(newest, batch.beat, key=lambda beat: beat.stamp)
         journey = journey_of(parts, len(past))
         memory = _counted(snapshot.memory, past)
-        return Saved(memory, past, journey, newest, counts, self._is_current())
+        is_current, known = self._is_current(), snapshot.known
+        return Saved(memory, past, journey, newest, counts, is_current, known)
 
     def _newest_snapshot(self) -> Snapshot | None:
         trouble: Damaged | None = None

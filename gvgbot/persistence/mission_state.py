@@ -62,6 +62,7 @@ class Snapshot(msgspec.Struct, frozen=True, kw_only=True):
 
     memory: Memory
     beat: Beat
+    known: str = ""  # path of the run whose map it began with
 
 
 class Count(NamedTuple):
@@ -81,6 +82,7 @@ class Saved:
     beat: Beat  # the newest
     counts: list[Count]  # after each batch
     is_current: bool  # nothing was lived through since that could not be kept
+    known: str = ""  # path of the run whose map it began with
 
 
 def boot_id() -> str:

@@ -4,7 +4,7 @@ import fcntl
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import structlog
@@ -48,24 +48,22 @@ def state_directory(config: Config, environment: Mapping[str, str]) -> Path | No
 def begin(wanted: Wanted, *, world: str) -> Start:
     """Where to begin. Raises UsageError if a directory cannot be used or has no map to begin with.
 
-    A mission that cannot be read is left where it is, and a new one begun: nobody may be there to
-    decide.
+    What was begun with a known map goes on when that is asked for again. A mission that cannot be
+    read is left where it is, and a new one begun: nobody may be there to decide.
     """
-    if wanted.known is not None:
-        saved = _known(wanted.known)
-        directory = _new(wanted, world)
-        return Start(directory, MissionFiles(directory.path), saved)
+    known = None if wanted.known is None else _known(wanted.known)
     path = None if wanted.anew or wanted.out is not None else _newest(wanted.state_dir)
     if path is not None:
         files = MissionFiles(path)
         try:
-            saved_there = files.read()
+            saved = files.read()
         except Damaged as error:
             log.warning("mission cannot be read, a new one begins", reason=str(error))
         else:
-            return Start(RunDirectory(path), files, saved_there)
+            if known is None or (saved is not None and saved.known == known.known):
+                return Start(RunDirectory(path), files, saved)
     directory = _new(wanted, world)
-    return Start(directory, MissionFiles(directory.path))
+    return Start(directory, MissionFiles(directory.path), known)
 
 
 @contextmanager
@@ -96,14 +94,14 @@ def _new(wanted: Wanted, world: str) -> RunDirectory:
 
 
 def _known(path: Path) -> Saved:
-    """The mission of a run. Raises UsageError if there is none that can be read."""
+    """The mission of a run, to begin with. Raises UsageError if there is none to be read."""
     try:
         saved = MissionFiles(path).read()
     except Damaged as error:
         raise UsageError(f"cannot begin with {error}") from error
     if saved is None:
         raise UsageError(f"cannot begin with {path}: there is no {SNAPSHOT} in it; {_other(path)}")
-    return saved
+    return replace(saved, known=str(path.resolve()))
 
 
 def _other(path: Path) -> str:

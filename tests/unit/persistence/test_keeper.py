@@ -9,7 +9,7 @@ import msgspec
 import pytest
 import structlog
 
-from gvgbot.autonomy.events import WayForgotten
+from gvgbot.autonomy.events import Requested, WayForgotten
 from gvgbot.autonomy.memory import growth, recall, remember
 from gvgbot.config import load_config
 from gvgbot.maps.run_directory import RunDirectory
@@ -145,6 +145,25 @@ def test_a_robot_that_saw_nothing_leaves_no_mission(tmp_path: Path) -> None:
     keeper.keeping(1.0)()
     keeper.finish()
     assert MissionFiles(tmp_path).read() is None
+
+
+@pytest.mark.parametrize("done", [True, False])
+def test_what_is_asked_of_a_robot_that_saw_nothing_yet_is_kept(tmp_path: Path, done: bool) -> None:
+    """It waits for its laser, say, and is paused; after a kill it must not drive off."""
+    with RunDirectory(tmp_path) as directory:
+        session = Session(load_config(), directory, None)
+    keeper = Keeper(session, MissionFiles(tmp_path))
+    if done:
+        session.pipeline.errands.pause()
+    keeper.on_event(Requested(1.0, "pause", "test", done, ""))
+    keeper.keeping(1.0)()
+    saved = MissionFiles(tmp_path).read()
+    assert (saved is not None) == done
+    with RunDirectory(tmp_path) as directory:
+        again = Session(load_config(), directory, None)
+    Keeper(again, MissionFiles(tmp_path), saved)
+    assert again.pipeline.errands.is_paused == done
+    assert not again.pipeline.is_lost
 
 
 def test_time_goes_on_where_a_map_from_elsewhere_ended(tmp_path: Path) -> None:

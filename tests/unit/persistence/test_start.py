@@ -5,11 +5,15 @@ from pathlib import Path
 import pytest
 import structlog
 
+from gvgbot.autonomy.events import Requested
 from gvgbot.cli import main
-from gvgbot.config import Config, ServiceConfig
+from gvgbot.config import Config, ServiceConfig, load_config
 from gvgbot.errors import UsageError
+from gvgbot.maps.run_directory import RunDirectory
+from gvgbot.persistence.keeper import Keeper
 from gvgbot.persistence.mission_files import SNAPSHOT, SNAPSHOT_BEFORE
 from gvgbot.persistence.start import Start, Wanted, begin, held, state_directory
+from gvgbot.session import Session
 from tests.unit.persistence.test_mission_files import written
 
 ELSEWHERE = {"STATE_DIRECTORY": "/var/lib/gvgbot:/var/lib/other"}
@@ -110,6 +114,30 @@ def test_a_known_map_begins_a_run_of_its_own(tmp_path: Path) -> None:
     assert start.directory.path == tmp_path / "runs" / "office-1"
     assert not start.files.is_begun
     assert {path.name: path.read_bytes() for path in known.iterdir()} == before
+
+
+def test_a_run_begun_with_a_known_map_goes_on_when_it_is_started_with_that_again(
+    tmp_path: Path,
+) -> None:
+    """As a service does whose command has `--map`; what was asked for must outlive it."""
+    known = mission(tmp_path / "known")
+    first = begun(Wanted(known=known, state_dir=tmp_path))
+    with RunDirectory(first.directory.path) as directory:
+        session = Session(load_config(), directory, None)
+        keeper = Keeper(session, first.files, first.saved)
+        session.pipeline.errands.pause()
+        keeper.on_event(Requested(1.0, "pause", "test", True, ""))
+        keeper.finish()
+    again = begun(Wanted(known=known, state_dir=tmp_path))
+    assert again.directory.path == first.directory.path
+    assert again.saved is not None
+    assert again.saved.memory.intent.is_paused
+    assert len(again.saved.past) == 5
+    assert not again.saved.is_current  # nobody vouches for where it is
+    anew = begun(Wanted(known=known, anew=True, state_dir=tmp_path))
+    assert anew.directory.path != first.directory.path
+    other = begun(Wanted(known=first.directory.path, state_dir=tmp_path))
+    assert other.directory.path != first.directory.path
 
 
 def test_one_run_at_a_time_writes_to_a_directory(tmp_path: Path) -> None:
