@@ -142,7 +142,7 @@ class ReturningPipeline(Pipeline):
         self._relocaliser = Relocaliser(scans, self._matching, is_whole=is_whole)
         self._seeker, self._tour = self._new_mind(), None
         self._seeker._odometry = self._odometry
-        self.mission.reason = "not sure where it is"
+        self.mission.reason, self.errands.unplaced = "not sure where it is", ""
         return [Recovery(scan.stamp, "look for its place on the map", "it may have been moved")]
 
     def _seek(self, seeker: Pipeline, scan: Scan) -> list[Event]:
@@ -159,7 +159,7 @@ class ReturningPipeline(Pipeline):
         self.mission.reason = _doubt(opinion)
         if not opinion.is_hopeless and self._goes_on(seeker, scan.stamp):
             return []
-        self.mission.reason = _given_up(opinion)
+        self.mission.reason = self.errands.unplaced = _given_up(opinion)
         self.mission.outcome, self._seeker = "failed", None
         return [Finished(scan.stamp, "failed", self.mission.reason)]
 

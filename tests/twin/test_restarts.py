@@ -2,12 +2,14 @@
 
 import json
 import math
+import re
 from itertools import count
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from gvgbot.autonomy.errands import Declined
 from gvgbot.autonomy.events import Requested
 from gvgbot.autonomy.memory import growth
 from gvgbot.autonomy.returning import ReturningPipeline
@@ -128,6 +130,8 @@ def test_in_another_building_it_claims_no_place_and_spoils_no_map(
     assert reason.endswith("; start it where it stopped, or begin a new map (gvgbot run --new)")
     assert vertices(tmp_path) == vertices(whole)
     assert not (tmp_path / SNAPSHOT).exists()
+    with pytest.raises(Declined, match=f"it has looked for its place, and is {re.escape(reason)}"):
+        last.pipeline.errands.home(0.0)
 
 
 @pytest.mark.parametrize("moment", [40.0, 120.0])

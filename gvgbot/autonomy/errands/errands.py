@@ -51,6 +51,7 @@ class Errands:
         self.closures = self._ground.closures
         self.is_paused = False
         self.is_waiting = False  # after an errand, for what comes next
+        self.unplaced = ""  # why it found no place on its map when it looked for that
         self.is_lost = False  # somebody doubts the pose; whoever takes that into account resets it
         self.happened: list[Event] = []  # because of requests; whoever tells of it takes it out
         self._seen: tuple[View, Correspondence] | None = None
@@ -254,6 +255,9 @@ class Errands:
     def _check_going(self, stamp: float) -> None:
         if self.is_paused:
             raise Declined("it is paused: ask it to resume first")
+        if self._seen is None and self.is_resting and self.unplaced:
+            again = "it looks again when it is asked to explore"
+            raise Declined(f"it has looked for its place, and is {self.unplaced}; {again}")
         if self._seen is None and self.is_resting:
             raise Declined("it has not looked for its place since its start: ask it to explore")
         if self._seen is None:
