@@ -38,6 +38,7 @@ from gvgbot.vitals import Vitals
 
 SAVE_EVERY = 30.0  # s at least between two savings while the map grows
 STUCK_AFTER = 1.0  # s without a control cycle, though the base is there
+_DRIVEN = "it is driven until it is asked for something else"
 # what changes the past as it is known now
 _CORRECTIONS = events.LoopClosed | events.DoubtSettled | events.ClosureRevoked
 
@@ -107,6 +108,7 @@ class Robot:
         self._happened, self._told = 0, 0  # events; and those of them that were published
         self._latest_events: deque[Event] = deque(maxlen=EVENTS_KEPT)
         self._decided = ""  # the reason of the last decision
+        self._not_driven = ""  # why nobody may drive it just now
         self._feed: LiveFeed | None = None
         self._live_map: LiveMap | None = None
         if network is not None:
@@ -207,13 +209,20 @@ class Robot:
                 shown.on_scan(scan)
 
     def _let_drive(self, twist: Twist) -> None:
-        """Let somebody drive, unless the robot is paused or does not know its surroundings yet."""
+        """Let somebody drive, unless the robot is paused or does not know its surroundings yet.
+
+        Why not is told once, however often it is asked.
+        """
         stamp, errands = self._clock.now(), self._pipeline.errands
-        with contextlib.suppress(Declined):
-            if errands.drive(twist, stamp):
-                text = "it is driven until it is asked for something else"
-                asked = events.Requested(stamp, "cmd_vel", "ROS 2", True, text)
-                self._on_events([asked, *errands.take_events()])
+        try:
+            is_new, text = errands.drive(twist, stamp), _DRIVEN
+        except Declined as error:
+            is_new, text = str(error) != self._not_driven, str(error)
+        is_done = text == _DRIVEN
+        self._not_driven = "" if is_done else text
+        if is_new:
+            asked = events.Requested(stamp, "cmd_vel", "ROS 2", is_done, text)
+            self._on_events([asked, *errands.take_events()])
 
     async def _keep_saved(self) -> None:
         """Save now and then while the map grows, and when it is finished."""

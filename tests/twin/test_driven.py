@@ -130,7 +130,9 @@ def test_the_guard_stands_between_a_driver_and_a_wall(daemon: Driven) -> None:
     assert daemon.newest.twist.linear == pytest.approx(0.0, abs=0.02)
 
 
-def test_a_paused_robot_is_not_driven_and_exploring_takes_it_back(daemon: Driven) -> None:
+def test_a_paused_robot_is_not_driven_and_exploring_takes_it_back(
+    daemon: Driven, tmp_path: Path
+) -> None:
     speeds: dict[str, float] = {}
     phases: dict[str, str] = {}
 
@@ -141,7 +143,8 @@ def test_a_paused_robot_is_not_driven_and_exploring_takes_it_back(daemon: Driven
                 await clock.sleep_until(clock.now() + EVERY)
 
         await clock.sleep_until(clock.now() + 1.0)
-        daemon.ros.drive(Twist(0.0, -0.4))  # before it knows its surroundings: not taken
+        for _ in range(3):
+            daemon.ros.drive(Twist(0.0, -0.4))  # before it knows its surroundings: not taken
         await clock.sleep_until(clock.now() + 0.4)
         phases["too early"] = daemon.network.states[-1].phase
         speeds["before"] = daemon.newest.twist.angular
@@ -163,6 +166,14 @@ def test_a_paused_robot_is_not_driven_and_exploring_takes_it_back(daemon: Driven
     assert speeds["paused"] == pytest.approx(0.0, abs=0.01)
     assert speeds["resumed"] == pytest.approx(0.4, abs=0.02)
     assert phases == {"too early": "exploring", "driven": "errand", "after": "exploring"}
+    lines = [json.loads(line) for line in (tmp_path / "events.jsonl").read_text().splitlines()]
+    told = [(line["done"], line["answer"]) for line in lines if line.get("request") == "cmd_vel"]
+    assert told == [
+        (False, "it has not seen enough yet to know where it is"),
+        (True, "it is driven until it is asked for something else"),
+        (False, "it is paused: ask it to resume first"),
+        (True, "it is driven until it is asked for something else"),
+    ]
 
 
 def test_neighbours_are_told_what_is_to_be_seen(daemon: Driven) -> None:
