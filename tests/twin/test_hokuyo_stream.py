@@ -279,15 +279,26 @@ def test_the_laser_is_switched_off_when_the_driver_is_cancelled() -> None:
     on_bench(twin, scenario)
 
 
-def test_a_refused_stream_is_reported_with_its_status() -> None:
+@pytest.mark.parametrize(
+    ("status", "remedy"),
+    [
+        ("0Ll", "if that lasts, switch it off and on"),
+        ("0Mm", "check its power"),
+        ("10Q", "end other programs that use it"),
+    ],
+)
+def test_a_refused_stream_is_reported_with_its_status_and_a_remedy(
+    status: str, remedy: str
+) -> None:
     async def main() -> None:
         here, there = pipe()
         clock = LoopClock()
         command = b"MD0000108001300\n"
-        twin = Scripted({command: command + b"0Ll\n\n"}, HokuyoTwin(PERFECT, World(), seed=14))
+        reply = command + status.encode() + b"\n\n"
+        twin = Scripted({command: reply}, HokuyoTwin(PERFECT, World(), seed=14))
         async with asyncio.TaskGroup() as tasks:
             served = tasks.create_task(serve_twin(twin, there, clock))
-            with pytest.raises(DeviceRefused, match="status 0L"):
+            with pytest.raises(DeviceRefused, match=f"status {status[:2]}: .*{remedy}"):
                 await HokuyoLaser(here, HokuyoConfig(), clock).run()
             served.cancel()
 

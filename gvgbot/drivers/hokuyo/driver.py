@@ -37,13 +37,18 @@ SHORTEST_SILENCE = 0.2  # s; links deliver in bursts
 TIME_SAMPLES = 12  # of the laser's clock
 CONVERTER_BEAT = 0.016  # s; a serial converter's usual latency timer
 GOLDEN = 0.618034  # its multiples spread evenly over a beat
-DENIED = "10"  # of TM0: the laser still measures
+DENIED = "10"  # in this state; of TM0: the laser still measures
 LOST_STOPS = 3  # in a row; a stop that comes as a scan begins can be lost
 UNKNOWN_COMMAND = frozenset({"0C", "0D", "0E", "0F"})  # firmware generations disagree on which
 UNSTABLE = "0M"  # in place of a scan: the motor is not at its speed
 HALTED = range(21, 50)  # statuses of a laser that looks into a fault, and is silent until it knows
 RESUMED = "98"  # what it says when there was none
 BROKEN = range(50, 98)  # statuses of hardware trouble
+OFF_AND_ON = "if that lasts, switch it off and on"
+REMEDIES = {  # against a refusal, by its status
+    UNSTABLE: f"its mirror does not turn as fast as it must; check its power, and {OFF_AND_ON}",
+    DENIED: f"it is busy with something else; end other programs that use it, and {OFF_AND_ON}",
+}
 LONGEST_WITHOUT_SCAN = 5.0  # s, for a motor to reach its speed or a laser to check itself
 MOST_DOUBLINGS = 3  # of that: a laser that needed longer must not be reset for ever
 SIMPLER = {"NE": "ND", "ND": "MD", "ME": "MD"}  # what to ask for when a command is unknown
@@ -175,6 +180,9 @@ class HokuyoLaser:
                 before = stream.clock_map
                 self.link.restarts += 1
                 await quiet(self._dialogue, patience=2 * self._config.reply_timeout_s)
+        except Refusal as refusal:
+            remedy = REMEDIES.get(refusal.status, OFF_AND_ON)
+            raise DeviceRefused(f"{refusal}: {remedy}") from refusal
         finally:
             with contextlib.suppress(DeviceLost):
                 self._dialogue.send("QT")
@@ -344,7 +352,8 @@ class HokuyoLaser:
         """What a status in place of a scan means. Raises DeviceLost if there will be none."""
         self.link.refused_scans += 1
         if status == ABNORMAL or _is_in(status, BROKEN):
-            raise DeviceLost(f"the laser reports a fault of its own, status {status}")
+            trouble = f"the laser reports a fault of its own, status {status}"
+            raise DeviceLost(f"{trouble}: {OFF_AND_ON}")
         stream.note_status(status, self._dialogue.clock.now())
 
     def _timed_scan(self, reply: ScanReply, arrival: float, stream: _Stream) -> Scan | None:
