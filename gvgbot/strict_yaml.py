@@ -24,11 +24,6 @@ class _Override:
     path: KeyPath
     value: Any
 
-    def concerns(self, path: KeyPath) -> bool:
-        """Whether a mistake at this path can come from the override."""
-        common = min(len(path), len(self.path))
-        return path[:common] == self.path[:common]
-
 
 def packaged(path: Path | str) -> Path:
     """The path itself if it exists, else the packaged file of that name if there is one."""
@@ -72,17 +67,23 @@ def _loaded(
     convert(cls, content, (), in_file)
     result = convert(cls, _merged(content, assigned), (), in_all)
     lines += [f"{source}: {one}" for one in in_file if not one.missing or one in in_all]
-    lines += [_blame(one, assigned) for one in in_all if one not in in_file]
-    if lines:
-        raise ConfigError("\n".join(lines))
+    blamed = [_blame(cls, content, one, assigned) for one in in_all if one not in in_file]
+    if lines + blamed:
+        raise ConfigError("\n".join(lines + blamed))
     assert isinstance(result, cls)
     return result
 
 
-def _blame(problem: Problem, assigned: Sequence[_Override]) -> str:
-    """The line for a mistake that the file alone does not have."""
-    culprits = [one.text for one in reversed(assigned) if one.concerns(problem.path)]
-    return f"--set {culprits[0]}: {problem}" if culprits else str(problem)
+def _blame(
+    cls: type, content: dict[Any, Any], problem: Problem, assigned: Sequence[_Override]
+) -> str:
+    """The line for a mistake that the file alone does not have: the last override that made it."""
+    for number in reversed(range(len(assigned))):
+        before: list[Problem] = []
+        convert(cls, _merged(content, assigned[:number]), (), before)
+        if problem not in before:
+            return f"--set {assigned[number].text}: {problem}"
+    return str(problem)
 
 
 def _read(path: Path) -> tuple[dict[Any, Any], list[str]]:

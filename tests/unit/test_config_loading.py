@@ -240,6 +240,14 @@ def test_a_wrong_override_is_named(override: str, expected: str, tmp_path: Path)
     assert expected in line
 
 
+@pytest.mark.parametrize("others", [(), ("name=Rex",), ("name=Rex", "leg.toes=2")])
+def test_a_wrong_combination_is_blamed_on_the_override_that_made_it_wrong(
+    others: tuple[str, ...], tmp_path: Path
+) -> None:
+    (line,) = mistakes("name: Max", tmp_path, *others, "tallest_m=0.5", *others)
+    assert line.startswith("--set tallest_m=0.5: ")
+
+
 def test_a_required_key_that_is_missing_is_asked_for(tmp_path: Path) -> None:
     path = tmp_path / "needy.yaml"
     path.write_text("speed_mps: 0.1", encoding="utf-8")
