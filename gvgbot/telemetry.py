@@ -9,6 +9,7 @@ from types import TracebackType
 from typing import Self
 
 import msgspec
+import structlog
 import zenoh
 import zenoh.ext
 
@@ -24,6 +25,7 @@ from gvgbot.requests import (
 )
 from gvgbot.topics import (
     HEARTBEAT,
+    STATE,
     TEAM_PARTS,
     TOPICS,
     Payload,
@@ -41,6 +43,7 @@ _WAITING_REQUESTS, _WAITING_REFUSALS, _WAITING_STOPS = 8, 1000, 2000
 _CROWDED = Answer(done=False, text="too many requests wait: ask again")
 _MAX_SESSIONS = 32
 _LAST_PORT = 65535
+_STRAYS = 30  # states of another robot by the same name, three seconds, before that is said
 _LONGEST_NAME = 80  # bytes of who asks
 _MISSES = zenoh.ext.MissDetectionConfig(heartbeat=HEARTBEAT, sporadic_heartbeat=None)
 _PRIORITIES = {
@@ -50,6 +53,8 @@ _PRIORITIES = {
     "data_low": zenoh.Priority.DATA_LOW,
 }
 Handle = Callable[[Asked], Awaitable[Answer]]
+
+log = structlog.get_logger()
 
 
 class Telemetry:
@@ -65,7 +70,7 @@ class Telemetry:
         """
         self.failures = 0  # samples that could not be sent
         self._latest: dict[Topic, Payload] = {}
-        self._robot = robot
+        self._robot, self._strays = robot, 0  # states of another robot by this name
         settings = _session_config(config, relays=relays)
         self.addresses = ", ".join(addresses(settings, "listen"))  # perhaps those of a file
         self._session = _open(settings, config.zenoh_file, addresses(settings, "listen"))
@@ -127,6 +132,7 @@ class Telemetry:
         """Hand on what other robots tell, the newest of each, until cancelled."""
         loop, arrived = asyncio.get_running_loop(), asyncio.Event()
         newest: dict[str, bytes] = {}
+        own = {team_key(self._robot, part) for part in TEAM_PARTS}
 
         def take(sample: zenoh.Sample) -> None:
             key = str(sample.key_expr)
@@ -144,10 +150,15 @@ class Telemetry:
                 await arrived.wait()
                 arrived.clear()
                 for key in list(newest):
+                    if key in own:  # that is said by who reads it
+                        self._strays = _STRAYS
                     handle(newest.pop(key))
 
     async def answer(self) -> None:
-        """Answer queries for the newest values until cancelled."""
+        """Answer queries for the newest values until cancelled.
+
+        And say so if somebody else is by the name of this robot.
+        """
         loop, arrived = asyncio.get_running_loop(), asyncio.Event()
         waiting: deque[tuple[Topic, zenoh.Query]] = deque(maxlen=_WAITING_QUERIES)
 
@@ -158,7 +169,17 @@ class Telemetry:
 
             return take
 
+        def meet(_: zenoh.Sample) -> None:
+            if self._strays < _STRAYS:
+                loop.call_soon_threadsafe(self._note_stray)
+
+        remote = zenoh.Locality.REMOTE
         with contextlib.ExitStack() as stack:
+            stack.enter_context(
+                self._session.declare_subscriber(
+                    STATE.key(self._robot), meet, allowed_origin=remote
+                )
+            )
             for topic in TOPICS:
                 if topic.queryable:
                     key = topic.key(self._robot)
@@ -168,6 +189,13 @@ class Telemetry:
                 arrived.clear()
                 # a frozen asker can block a reply, so the loop stays out of it
                 await asyncio.to_thread(self._reply_to_all, waiting)
+
+    def _note_stray(self) -> None:
+        self._strays += 1
+        if self._strays == _STRAYS:
+            log.warning(
+                "another robot has this name; give one another robot.name", name=self._robot
+            )
 
     def _reply_to_all(self, waiting: deque[tuple[Topic, zenoh.Query]]) -> None:
         while waiting:

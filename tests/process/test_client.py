@@ -21,6 +21,7 @@ from threading import Event as Flag
 import msgspec
 import numpy as np
 import pytest
+import structlog
 import zenoh
 
 from gvgbot import client
@@ -590,6 +591,34 @@ def test_a_robot_that_is_a_router_for_its_team_is_gone_when_it_has_left(endpoint
             assert watcher.presence.word == "alive"
             robot.close()
             until(lambda: watcher.presence.word == "gone")
+
+
+@pytest.mark.parametrize("relays", [(False, False), (True, False)])
+def test_two_robots_of_one_name_say_so_once(endpoint: str, relays: tuple[bool, bool]) -> None:
+    """In a team is none of them, or one, as `relays` says; two in a team hear each other."""
+    there = TelemetryConfig(listen=(free_endpoint(),), connect=(endpoint,))
+
+    async def meet(robots: list[Telemetry]) -> None:
+        async with asyncio.TaskGroup() as tasks:
+            serving = [tasks.create_task(robot.answer()) for robot in robots]
+            for _ in range(80):
+                for robot in robots:
+                    robot.publish(numbered(1))
+                await asyncio.sleep(0.02)
+            for task in serving:
+                task.cancel()
+
+    with (
+        structlog.testing.capture_logs() as logs,
+        Telemetry(TelemetryConfig(listen=(endpoint,)), "near", relays=relays[0]) as here,
+        Telemetry(there, "near", relays=relays[1]) as other,
+    ):
+        asyncio.run(meet([here]))
+        assert logs == []
+        asyncio.run(meet([here, other]))
+    assert [log["event"] for log in logs] == [
+        "another robot has this name; give one another robot.name"
+    ] * 2
 
 
 def test_a_router_in_between_may_come_and_go(endpoint: str) -> None:
