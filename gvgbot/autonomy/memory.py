@@ -172,7 +172,7 @@ def _intent(pipeline: Pipeline) -> Intent:
         mission._driven.start,
         mission._frontiers,
         Closed(closed._times, closed._since),
-        errands.is_paused,
+        errands.is_paused and not errands.is_carried,
         errands.is_waiting,
         errands.kept(),
         errands.closures.until,

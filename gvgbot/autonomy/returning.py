@@ -12,7 +12,6 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.config import AutonomyConfig
 from gvgbot.autonomy.control.reflexes import Felt
@@ -30,7 +29,6 @@ from gvgbot.autonomy.whereabouts import Whereabouts
 from gvgbot.geometry import STANDSTILL, Pose, Twist
 from gvgbot.hal.messages import Odometry, Scan
 
-_AGREES_M, _AGREEMENT = 0.15, 0.8  # so near to the walls must be that share of a scan's ends
 _MOVED_M, _MOVED_RAD = 0.5, 0.3  # farther from where odometry has it, something is wrong
 _FOUND = np.diag([0.1**2, 0.1**2, 0.03**2])  # covariance of a place found on the map
 _CARRIED = np.diag([1.0, 1.0, 0.3**2])  # and of the way there, of which nothing is known
@@ -110,13 +108,7 @@ class ReturningPipeline(Pipeline):
         offset = before.compose(motion).to(local_base)
         if np.hypot(offset.x, offset.y) > _MOVED_M or abs(offset.theta) > _MOVED_RAD:
             return False
-        walls = self._maps.near.points()
-        ends = local_base.compose(scan.base_laser).transform(scan.ends)
-        ends = ends[self._maps.near.known(ends)]
-        if not len(walls) or len(ends) < self._matching.min_pairs:
-            return False
-        distance = np.asarray(cKDTree(walls).query(ends)[0])
-        return float((distance < _AGREES_M).mean()) >= _AGREEMENT
+        return self._fits(scan, local_base)
 
     def _begin_anew(self, scan: Scan) -> list[Event]:
         """Forget all, and learn from the scan as from the first one."""

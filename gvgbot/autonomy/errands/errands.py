@@ -50,6 +50,7 @@ class Errands:
         self.room_m, self._ground = room_m, Ground(mission, mapper, room_m)
         self.closures = self._ground.closures
         self.is_paused = False
+        self.is_carried = False  # perhaps: it paused by itself, until it is started anew
         self.is_waiting = False  # after an errand, for what comes next
         self.unplaced = ""  # why it found no place on its map when it looked for that
         self.is_lost = False  # somebody doubts the pose; whoever takes that into account resets it
@@ -98,6 +99,7 @@ class Errands:
 
     def pause(self) -> str:
         """Stand until `resume`."""
+        self.is_carried = False
         if self.is_paused:
             return "it is paused already"
         self.is_paused, self._command = True, None
@@ -107,7 +109,7 @@ class Errands:
         """Go on with what was paused."""
         if not self.is_paused:
             return "it was not paused"
-        self.is_paused = False
+        self.is_paused = self.is_carried = False
         if self._plan is not None:
             return f"it goes on with: {self._plan}"
         if self.is_resting:

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from gvgbot.autonomy.control.company import Companion
-from gvgbot.autonomy.events import Decision, Event
+from gvgbot.autonomy.events import Decision, Event, Recovery
 from gvgbot.autonomy.localisation import Localisation
+from gvgbot.autonomy.memory import remember
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.config import load_config
 from gvgbot.geometry import STANDSTILL, Pose, Twist, wrap_angle
@@ -145,6 +146,32 @@ def test_a_base_that_started_anew_may_have_been_turned_meanwhile(turned: float) 
     there = Pose(0.0, 0.0, 6.25 + turned).to(pipeline.map_base)
     assert math.hypot(there.x, there.y) < 0.05
     assert abs(wrap_angle(there.theta)) < 0.03
+
+
+@pytest.mark.parametrize(("x", "y", "stands"), [(0.0, 0.5, False), (2.0, 3.0, True)])
+def test_a_base_that_was_carried_away_before_it_started_anew_stands_and_says_so(
+    x: float, y: float, stands: bool
+) -> None:
+    """Into the room at the side, of which it has seen little; or half a metre aside."""
+    config = load_config()
+    pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
+    for k in range(26):  # once round, so that all walls are known
+        looked(pipeline, 0.1 * k, 0.25 * k)
+    known, walls = len(pipeline.keyframes), pipeline._maps.near.points().copy()
+    happened: list[Event] = []
+    for k in range(8):
+        stamp = 6.5 + 0.1 * k
+        anew = Odometry(stamp, Pose(0.0, 0.0, 6.25), STANDSTILL, breaks=1)
+        pipeline.control(anew)
+        scan = sweep(ROOMS, Pose(-1.5 + x, y, 0.0), field_of_view=LASER_270)
+        happened += pipeline.perceive(replace(scan, stamp=stamp, time_increment=0.0))
+    told = [event.reason for event in happened if isinstance(event, Recovery)]
+    assert any("restart the program" in reason for reason in told) == stands
+    assert pipeline.errands.is_paused == stands
+    assert not remember(pipeline).intent.is_paused  # when it is started anew, it looks
+    if stands:
+        assert len(pipeline.keyframes) == known  # and spoils no map
+        assert (pipeline._maps.near.points() == walls).all()
 
 
 @pytest.mark.parametrize("rest_s", [10.0, 3600.0])
