@@ -12,6 +12,7 @@ import structlog
 from gvgbot.autonomy import events
 from gvgbot.autonomy.errands import Declined
 from gvgbot.autonomy.loop import Loop
+from gvgbot.autonomy.returning import ReturningPipeline
 from gvgbot.clock import Clock, LoopClock
 from gvgbot.config import Config
 from gvgbot.errors import GvgbotError
@@ -20,6 +21,7 @@ from gvgbot.hal.guard import Guard, Reason
 from gvgbot.hal.messages import Contact, Odometry, Scan
 from gvgbot.journal import BatteryJournal, GuardJournal, log_event, status_line
 from gvgbot.links import Devices, Links
+from gvgbot.live_estimate import LiveEstimate
 from gvgbot.live_feed import LiveFeed, Pace
 from gvgbot.live_map import LiveMap, News
 from gvgbot.live_ros import LiveRos, Neighbour, UnixTime
@@ -103,6 +105,9 @@ class Robot:
         self._saving = asyncio.Lock()  # one at a time
         self._survey = LiveSurvey(session.pipeline)
         self._pipeline.mission.survey = self._survey.places
+        self._estimate = LiveEstimate(session.pipeline)
+        if isinstance(self._pipeline, ReturningPipeline):
+            self._pipeline.smooth = self._estimate.newest
         self._odometry: Odometry | None = None
         self._sequence = 0
         self._happened, self._told = 0, 0  # events; and those of them that were published
@@ -137,6 +142,7 @@ class Robot:
             "beat": self._beat(),
             "save": self._keep_saved(),
             "survey": self._survey.make(self._off_loop),
+            "estimate": self._estimate.make(self._off_loop),
         }
         if self._keeper is not None:
             self._keeper.attach(links.feedback)

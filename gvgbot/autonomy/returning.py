@@ -56,6 +56,9 @@ class ReturningPipeline(Pipeline):
             Pipeline, config, exploration, robot_radius, localisation=localisation
         )
         self._is_vouched = is_vouched
+        # the best estimate of the map; None as long as that takes
+        self.smooth: Callable[[], Estimate | None] = partial(smoothed, self)
+        self._is_doubted = False  # the place where it was: it may have been moved
         self._matching = config.scan_matching
         self._is_back = not self.keyframes
         self._is_bare = not self.mapper.graph.vertices and self.mission.outcome is None
@@ -85,7 +88,7 @@ class ReturningPipeline(Pipeline):
         odom_base = self._odometry.odom_base_at(scan.stamp)
         if odom_base is None:
             return []
-        if self._is_vouched() and self._agrees(scan, odom_base):
+        if not self._is_doubted and self._is_vouched() and self._agrees(scan, odom_base):
             self._is_back = True
             return super().perceive(scan)
         return self._begin_anew(scan) if self._is_bare else self._begin_to_seek(scan)
@@ -127,14 +130,18 @@ class ReturningPipeline(Pipeline):
     # -- lost ------------------------------------------------------------------------------------
 
     def _begin_to_seek(self, scan: Scan) -> list[Event]:
-        self._estimate = smoothed(self)
+        self._is_doubted, self.mission.reason = True, "not sure where it is"
+        estimate = self.smooth()
+        if estimate is None:
+            return []
+        self._estimate, self._is_doubted = estimate, False
         scans = scans_at(self._estimate.keyframes, self)
         graph = self.mapper.graph
         is_whole = bool(graph.edges) and not graph.frontiers()
         self._relocaliser = Relocaliser(scans, self._matching, is_whole=is_whole)
         self._seeker, self._tour = self._new_mind(), None
         self._seeker._odometry = self._odometry
-        self.mission.reason, self.errands.unplaced = "not sure where it is", ""
+        self.errands.unplaced = ""
         return [Recovery(scan.stamp, "look for its place on the map", "it may have been moved")]
 
     def _seek(self, seeker: Pipeline, scan: Scan) -> list[Event]:

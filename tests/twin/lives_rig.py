@@ -1,7 +1,7 @@
 """A robot that is killed and started again while its world goes on."""
 
 import asyncio
-from collections.abc import Callable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -53,6 +53,7 @@ class Lives:
     dead_s: float = 3.0
     between: Callable[[GoingWorld, Path], None] = nothing
     over: Callable[[Session], bool] = explored
+    off_loop: Callable[[Callable[[], None]], Awaitable[None]] = at_once
     sessions: list[Session] = field(default_factory=list)
     keepers: list[Keeper] = field(default_factory=list)
     world: GoingWorld = field(init=False)
@@ -100,7 +101,7 @@ class Lives:
                     break
             return "SIGKILL"
 
-        robot = Robot(session, Notifier(None), None, off_loop=at_once, keeper=keeper)
+        robot = Robot(session, Notifier(None), None, off_loop=self.off_loop, keeper=keeper)
         with directory:
             await robot.serve(ended(), links)
 

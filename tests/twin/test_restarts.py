@@ -1,8 +1,10 @@
 """A robot that is killed at any moment goes on with its map, and finds its place on it."""
 
+import asyncio
 import json
 import math
 import re
+from collections.abc import Callable
 from itertools import count
 from pathlib import Path
 
@@ -197,6 +199,32 @@ def test_a_robot_that_was_moved_before_its_first_vertex_begins_a_new_map(
     saved = MissionFiles(tmp_path).read()
     assert saved is not None
     assert packed(saved.past) == packed(growth(last.pipeline))
+
+
+def test_a_robot_goes_on_controlling_while_its_known_map_is_made_ready(
+    config: Config, whole: Path, tmp_path: Path
+) -> None:
+    """That may take longer than a service may hang; the robot stands meanwhile."""
+    takes_s = 20.0
+    sought, stood = list[float](), list[float]()
+
+    async def slowly(function: Callable[[], None]) -> None:
+        await asyncio.sleep(takes_s)
+        function()
+
+    def is_over(session: Session) -> bool:
+        now = asyncio.get_running_loop().time()
+        if not session.pipeline.is_seeking:
+            stood.append(lives.world.body.distance_m)
+            return False
+        sought.append(now)
+        return True
+
+    place = Place(LOLLIPOP, Pose(8.0, 4.0, -1.2))
+    lives = Lives(config, place, tmp_path, known=whole, over=is_over, off_loop=slowly)
+    lives.run([])
+    assert takes_s < sought[0] < takes_s + 3.0
+    assert max(stood) < 0.01
 
 
 def test_a_robot_that_was_paused_while_it_looked_for_its_place_stays_paused(
