@@ -57,6 +57,7 @@ class DrivenEdges:
             self._account_for(view, known, passage)
         self._close_start_edge(view, where, clearance)
         self._note_part(view, where)
+        self._mapper.driven_parts = [line for line, _ in self.parts()]
 
     def parts(self) -> list[tuple[Array, float]]:
         """Parts of edges that were driven: lines (N, 2), m, map frame, and least clearances, m."""

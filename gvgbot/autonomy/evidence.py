@@ -22,7 +22,7 @@ from gvgbot.ranges import Range
 _MADE_BY_M = 0.15  # beyond its disc: what made a vertex is nearer, wherever exactly that is
 _HIDES_M = 1.0  # what stands so near to a vertex's disc may close a branch
 _FRESH_M = 6.0  # driven since a vertex was seen: the local frame still tells its place
-_IN_FULL_VIEW_M = 4.0  # from so near, it would be seen that a vertex is none
+IN_FULL_VIEW_M = 4.0  # from so near, it would be seen that a vertex is none
 _IN_CLEAR_M = 2.0  # and from so near, that it has no departure where one was seen
 _WELL_KNOWN_M = 0.2  # the uncertainty of its place with which that can be told
 _ON_EDGE_M = 0.3  # so near to a vertex's place, an edge that is seen passes through it
@@ -184,7 +184,7 @@ class Evidence:
             is_fresh = view.travelled - vertex.seen_at < _FRESH_M
             place = vertex.local.position if is_fresh else believed
             away = math.hypot(place[0] - view.local_base.x, place[1] - view.local_base.y)
-            if away <= _IN_FULL_VIEW_M and (is_fresh or self.is_well_known(vertex)):
+            if away <= IN_FULL_VIEW_M and (is_fresh or self.is_well_known(vertex)):
                 found.append((vertex, place))
         return found
 

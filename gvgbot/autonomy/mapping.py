@@ -77,6 +77,8 @@ class Mapper(Knowledge):
         self._rivals: dict[int, Recognition] = {}  # by nodes of this view that may be known ones
         # by half-edges of vertices that this view took out, as `loose_ends`, but in the local frame
         self.came_from: dict[HalfEdgeId, tuple[HalfEdgeId, Array]] = {}
+        # parts of edges, not yet known to their ends, that were driven: lines (N, 2), map frame
+        self.driven_parts: list[Array] = []
         self._events: list[Event] = []
 
     def move(self, motion: Pose, covariance: Array) -> None:
@@ -345,7 +347,11 @@ class Mapper(Knowledge):
             for edge in self.graph.edges.values()
             if edge.established or (is_dubious and edge.traversals > 0)
         ]
-        return any(gap < _ON_EDGE_M for _, gap in self._gaps(edges, view.local_base, place))
+        gaps = [gap for _, gap in self._gaps(edges, view.local_base, place)]
+        if is_dubious:
+            at = self.belief.map_base.transform(view.local_base.inverse().transform(place))
+            gaps += [float(np.hypot(*(line - at).T).min()) for line in self.driven_parts]
+        return any(gap < _ON_EDGE_M for gap in gaps)
 
     # -- what hangs together -----------------------------------------------------------------
 

@@ -5,6 +5,7 @@ import pytest
 from gvgbot.autonomy.evidence import MappingConfig
 from gvgbot.autonomy.examination import Examination
 from gvgbot.autonomy.exploration.access import Access
+from gvgbot.autonomy.gvg.local import LocalGvg
 from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.slam.graph import GvgGraph
@@ -20,6 +21,8 @@ TEE = drawn(
     {1: (0.0, 0.0), 2: (6.0, 0.0), 3: (12.0, 0.0), 4: (6.0, -3.0)},
     {10: (1, 2, []), 11: (2, 3, []), 12: (2, 4, [])},
 )
+PLAIN = drawn({1: (0.0, 0.0), 3: (12.0, 0.0)}, {10: (1, 3, [])})
+CUT_OFF = drawn({1: (0.0, 0.0), 5: (4.5, 0.0)}, {10: (1, 5, [])}, unseen={5: 0.0})
 ENDS = {1: 1, 3: 3, 4: 4}  # are known
 
 
@@ -32,15 +35,47 @@ def test_in_a_team_what_only_bodies_make_is_not_waited_for(
 ) -> None:
     """Two robots that have nothing left would look at each other until their patience ends."""
     mapper = Mapper(MappingConfig(), RecognitionConfig(), ScanMatchingConfig())
-    known, pose = Correspondence(), Pose(1.0, 0.0, 0.0)
+    nodes = frozenset(doubted)
+    assert sees(Examination(mapper), TEE, 1.0, nodes, in_team=in_team) == is_examined
+
+
+def test_what_was_seen_from_near_to_be_none_is_not_driven_to_again_from_afar() -> None:
+    examination = Examination(Mapper(MappingConfig(), RecognitionConfig(), ScanMatchingConfig()))
+    assert sees(examination, TEE, 1.0)
+    assert not sees(examination, PLAIN, 4.0)
+    assert not sees(examination, TEE, 1.0)
+    assert sees(examination, TEE, 5.0)  # nearer than where nothing was to be seen
+    examination.end()
+    assert sees(examination, TEE, 1.0)  # there has been more to explore
+
+
+def test_what_is_out_of_sight_for_a_moment_is_driven_to_nevertheless() -> None:
+    """Far off, or where no edge is in sight at all."""
+    for moment, x in ((PLAIN, 1.0), (CUT_OFF, 4.0)):
+        examination = Examination(
+            Mapper(MappingConfig(), RecognitionConfig(), ScanMatchingConfig())
+        )
+        assert sees(examination, TEE, 1.0)
+        assert not sees(examination, moment, x)
+        assert sees(examination, TEE, 1.0)
+
+
+def sees(
+    examination: Examination,
+    gvg: LocalGvg,
+    x: float,
+    doubted: frozenset[int] = frozenset(),
+    *,
+    in_team: bool = False,
+) -> bool:
+    """Whether there is something to be examined, for a robot in the corridor."""
+    known, pose = Correspondence(), Pose(x, 0.0, 0.0)
     for node, vertex in ENDS.items():
         known.pair(node, vertex)
-    place = TEE.place(pose.position)
+    place = gvg.place(pose.position)
     assert place is not None
-    nodes = frozenset(doubted)
-    view = View(0, 0.0, 0.0, pose, TEE, LocalMap(LocalMapConfig()), doubted=nodes)
+    view = View(0, 0.0, 0.0, pose, gvg, LocalMap(LocalMapConfig()), doubted=doubted)
     here = Situation(
-        TEE, known, GvgGraph(), Whereabouts(), Access(place), pose, nodes, in_team=in_team
+        gvg, known, GvgGraph(), Whereabouts(), Access(place), pose, doubted, in_team=in_team
     )
-    path = Examination(mapper).path(view, here, patience_s=60.0)
-    assert (path is not None) == is_examined
+    return examination.path(view, here, patience_s=60.0) is not None

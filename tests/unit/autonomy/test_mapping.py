@@ -628,6 +628,17 @@ def test_on_a_way_of_a_finished_map_or_a_dubious_one_a_meetpoint_must_be_seen_fr
     assert [e.established for e in seen.mapper.graph.edges.values()] == 2 * [is_finished]
 
 
+@pytest.mark.parametrize("passes", [True, False])
+def test_a_way_that_was_driven_is_dubious_before_its_end_is_known(*, passes: bool) -> None:
+    """Near a mistake, what is seen from afar on it is none; beside it, it may be one."""
+    seen = Seen().look(TWO_ENDS, 30)
+    aside = 0.0 if passes else 2.0
+    way = np.array([(0.0, aside), (1.5, aside), (3.0, aside)])
+    seen.mapper.driven_parts = [way]
+    seen.mapper._unbelieved.note_mistake(Mistake(np.array([3.5, 0.0]), (), 0.0))
+    assert (seen.look(TEE_BETWEEN, 50).places("meetpoint") == []) == passes
+
+
 def test_on_a_driven_way_where_nothing_proved_to_be_none_a_meetpoint_is_believed_from_afar() -> (
     None
 ):
