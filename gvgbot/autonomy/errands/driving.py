@@ -19,7 +19,13 @@ from gvgbot.autonomy.destinations import (
 from gvgbot.autonomy.errands.closures import Closures
 from gvgbot.autonomy.errands.kinds import Home, Look, Past, Rest, Stop, ToPoint, ToVertex
 from gvgbot.autonomy.events import Event, Recovery
-from gvgbot.autonomy.exploration.access import NEAR_M, access, straight_way, way_to_edge
+from gvgbot.autonomy.exploration.access import (
+    NEAR_M,
+    access,
+    bent_way,
+    straight_way,
+    way_to_edge,
+)
 from gvgbot.autonomy.exploration.certainty import robot_sigma
 from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.exploration.paths import Approach
@@ -30,7 +36,7 @@ from gvgbot.autonomy.views import Correspondence, View
 from gvgbot.autonomy.whereabouts import Situation
 from gvgbot.geometry import Array, wrap_angle
 
-DIRECT_M = 4.0  # the longest straight way to a point
+DIRECT_M = 4.0  # off a point, one drives there straight, or with one bend
 _THERE_M = 0.15  # from a destination, one has arrived
 _PAST_M = 0.5  # from a stop at which one does not stop
 _AT_VERTEX_M = 1.0  # from a vertex, what stands in the way stands on the edge beyond it
@@ -256,7 +262,9 @@ class Driving:
         away = float(np.hypot(*(local_goal - view.local_base.position)))
         if away < _THERE_M:
             return Ended("arrived", "")
-        way = straight_way(view, local_goal, self._ground.room_m) if away < DIRECT_M else None
+        way, room_m = None, self._ground.room_m
+        if away < DIRECT_M:
+            way = straight_way(view, local_goal, room_m) or bent_way(view, local_goal, room_m)
         if way is not None and waited < self.config.look_around_s:
             self._heading = self._route = None
             return Drive(Track.of(*way))

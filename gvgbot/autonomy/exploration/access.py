@@ -7,7 +7,7 @@ import numpy as np
 
 from gvgbot.autonomy.gvg.local import Place
 from gvgbot.autonomy.views import View
-from gvgbot.geometry import Array
+from gvgbot.geometry import Array, resampled
 
 NEAR_M = 1.5  # from an edge, one is as good as on it
 _BESIDE_M = 0.15  # farther from its edge than this, the robot goes there first
@@ -17,7 +17,8 @@ _CLIMB_M = 0.05  # steps away from the walls
 _AROUND = np.stack([f(np.arange(16) * np.pi / 8) for f in (np.cos, np.sin)], axis=1)
 _ROOM_M = 0.35  # from the walls, on the way
 _SPACING_M = 0.1
-_BEARINGS, _STEP_M, _FARTHEST_M = 16, 0.5, 4.0  # of places to go to where no edge is in sight
+_BEND_M = 0.2  # between places of an edge where a way may bend
+_BEARINGS, _STEP_M, _FARTHEST_M = 16, 0.5, 4.0  # of places to go to where no edge leads
 _NEAREST_M = 1.0  # of those places
 _ROOM_ENOUGH_M = 5.0  # from the walls: more says nothing
 _SOUGHT_M = 1.5  # so near, one has been
@@ -141,9 +142,33 @@ def straight_way(view: View, goal: Array, least_room: float) -> tuple[Array, Arr
 
     Its points (N, 2), local frame, and their distances (N,) from the walls, m.
     """
+    return _straight_from(view, view.local_base.position, goal, least_room)
+
+
+def bent_way(view: View, goal: Array, least_room: float) -> tuple[Array, Array] | None:
+    """The shortest way to a point (2,), local frame, that bends once, on the local GVG; else None.
+
+    As `straight_way` has it. A door that an edge passes at a slant is entered from before it.
+    """
     base = view.local_base.position
-    distance = float(np.hypot(*(goal - base)))
-    line = np.linspace(base, goal, math.ceil(distance / _SPACING_M) + 1)
+    lines = [resampled(edge.polyline, _BEND_M) for edge in view.gvg.edges.values()]
+    bends = np.concatenate([np.empty((0, 2)), *lines])
+    legs = np.array([np.hypot(*(bends - end).T) for end in (base, goal)])
+    shortest = np.argsort(legs.sum(axis=0), kind="stable")
+    for bend in bends[shortest[legs.max(axis=0)[shortest] < _FARTHEST_M]]:
+        onwards = _straight_from(view, bend, goal, least_room)
+        way = None if onwards is None else straight_way(view, bend, least_room)
+        if way is not None and onwards is not None:
+            (line, room), (rest, rooms) = way, onwards
+            return np.concatenate([line, rest[1:]]), np.concatenate([room, rooms[1:]])
+    return None
+
+
+def _straight_from(
+    view: View, start: Array, goal: Array, least_room: float
+) -> tuple[Array, Array] | None:
+    distance = float(np.hypot(*(goal - start)))
+    line = np.linspace(start, goal, math.ceil(distance / _SPACING_M) + 1)
     room = np.asarray(view.local_map.tree().query(line)[0])
     narrow = room < min(least_room, float(room[0]))  # where it stands, it may stand close
     if narrow.any() or not view.local_map.known(line).all():

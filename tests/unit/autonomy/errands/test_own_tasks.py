@@ -8,9 +8,11 @@ import numpy as np
 from gvgbot.autonomy.control.orders import Drive, Order, Stand
 from gvgbot.autonomy.errands import Errands
 from gvgbot.autonomy.events import Decision, ErrandEnded, Event
+from gvgbot.autonomy.gvg.local import LocalGvg
 from gvgbot.autonomy.views import Correspondence, View
-from gvgbot.geometry import Array
+from gvgbot.geometry import Array, Pose
 from tests.unit.autonomy.local_graphs import drawn
+from tests.unit.autonomy.sights import carved, looked
 from tests.unit.autonomy.test_mission import CLOSED, CONFIG, TEE, Robot
 
 GAP = [2.0, 0.0]
@@ -33,10 +35,10 @@ class Explorer(Robot):
         is_found = view.stamp < self.somebody_until
         return self.errands.advance(replace(view, is_somebody_found=is_found), known)
 
-    def until_it_moves_or_ends(self) -> Order:
+    def until_it_moves_or_ends(self, gvg: LocalGvg = CLOSED) -> Order:
         order: Order = Stand()
         while self.mission.outcome is None and self.stamp < 60.0:
-            order = self.look(CLOSED)
+            order = self.look(gvg)
             if isinstance(order, Drive) and self.errands.errand is not None:
                 break
         return order
@@ -145,3 +147,19 @@ def test_what_was_found_on_an_errand_goes_as_soon_as_it_is_gone() -> None:
     robot.errands.home(robot.stamp)
     robot.stand(CLOSED, 20)
     assert set(robot.mapper.graph.vertices) == known
+
+
+def test_into_a_room_whose_door_lies_aslant_from_the_edge_it_drives_by_way_of_before_it() -> None:
+    """From the point of the edge that is nearest to the gap, a jamb is too near to the way."""
+    hall, room, door = (-4.0, -2.0, 4.0, 2.0), (-4.0, 2.2, 4.0, 6.0), (-0.3, 2.0, 0.3, 2.2)
+    aslant = drawn({1: (-3.0, 0.9), 2: (3.0, -1.5)}, {10: (1, 2, [])})
+    gap, nearest = [0.0, 2.6], Pose(-1.0, 0.1)
+    robot = Explorer([gap], [])
+    robot.walls = looked(carved([hall, room, door]), [Pose(), nearest])
+    robot.pose = nearest
+    robot.mapper.move(nearest, np.zeros((3, 3)))
+    order = robot.until_it_moves_or_ends(aslant)
+    assert isinstance(order, Drive)
+    assert order.track.polyline[-1].tolist() == gap
+    jambs = np.array([(x, y) for x in (-0.3, 0.3) for y in (2.0, 2.2)])
+    assert min(np.hypot(*(jambs - point).T).min() for point in order.track.polyline) > 0.2

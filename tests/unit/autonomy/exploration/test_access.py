@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from gvgbot.autonomy.exploration.access import access, way_to_edge
+from gvgbot.autonomy.exploration.access import access, bent_way, straight_way, way_to_edge
 from gvgbot.autonomy.gvg.local import LocalGvg
 from gvgbot.autonomy.views import View
 from gvgbot.geometry import Pose
 from tests.unit.autonomy.local_graphs import Point, drawn
-from tests.unit.autonomy.sights import carved, looked
+from tests.unit.autonomy.sights import Rectangle, carved, looked
 
 ROOM_AND_CORRIDOR = carved([(-4.0, -2.0, 4.0, 2.0), (-4.0, -4.0, 4.0, -2.2)])
 NEAR: dict[int, tuple[int, int, list[Point]]] = {10: (1, 2, []), 11: (3, 4, [])}
@@ -89,3 +89,23 @@ def test_between_two_posts_it_is_not_the_nearest_edge_but_one_that_the_robot_fit
     assert found is not None
     assert found.place.edge == 11
     assert np.all(found.room > 0.19)  # 0.15 m on the shortest way
+
+
+@pytest.mark.parametrize("gap", [0.6, 0.3])
+def test_a_door_beside_the_robot_is_entered_from_before_it_if_it_is_wide_enough(gap: float) -> None:
+    """The wall is from y = 2 to 2.2; straight on, the way would pass a jamb too close."""
+    rooms: list[Rectangle] = [(-4.0, -2.0, 4.0, 2.0), (-4.0, 2.2, 4.0, 6.0)]
+    world = carved([*rooms, (-gap / 2, 2.0, gap / 2, 2.2)])
+    here, goal, least = Pose(-1.4, 0.5, 0.0), np.array([0.0, 2.6]), 0.24
+    gvg = drawn({1: (-3.0, 0.5), 2: (3.0, 0.5)}, {10: (1, 2, [])})
+    view = View(0, 0.0, 0.0, here, gvg, looked(world, [Pose(), here]))
+    assert straight_way(view, goal, least) is None
+    way = bent_way(view, goal, least)
+    assert (way is not None) == (gap / 2 > least)
+    if way is not None:
+        line, room = way
+        np.testing.assert_allclose(line[[0, -1]], [here.position, goal])
+        assert np.hypot(*np.diff(line, axis=0).T).sum() < 1.4 + 2.1  # at right angles
+        assert room.min() >= least
+        jambs = np.array([(side * gap / 2, y) for side in (-1, 1) for y in (2.0, 2.2)])
+        assert min(np.hypot(*(jambs - point).T).min() for point in line) > least - 0.03
