@@ -6,16 +6,18 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.estimate import scans_at, smoothed
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.graph import Edge, Vertex
 from gvgbot.drivers.world import World, save_world
-from gvgbot.geometry import Array, Pose, composed, seen_from
+from gvgbot.geometry import Array, Pose, composed, resampled, seen_from
 from gvgbot.hal.messages import Odometry
 from gvgbot.maps import geojson
+from gvgbot.maps.gaps import is_wall
 from gvgbot.maps.map_server import encode_map_server
-from gvgbot.maps.occupancy import occupancy_grid
+from gvgbot.maps.occupancy import OccupancyGrid, occupancy_grid
 from gvgbot.maps.picture import draw_map
 from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
 from gvgbot.maps.trajectory import Trajectory, encode_tum
@@ -56,8 +58,8 @@ class Journey:
 def map_files(pipeline: Pipeline, journey: Journey, title: str) -> dict[str, bytes | str]:
     """All files of a run but summary and events, by name."""
     keyframes, vertices, covariances = smoothed(pipeline)
-    graph = route_graph(pipeline, vertices, covariances)
     grid = occupancy_grid(scans_at(keyframes, pipeline))
+    graph = with_room_of(route_graph(pipeline, vertices, covariances), grid)
     estimate = _trajectory(journey, _corrected(journey, pipeline, keyframes))
     start = pipeline.keyframes[0].odom_base if pipeline.keyframes else Pose()
     odometry = _trajectory(journey, seen_from(_rows([start]), _rows(journey.odom_base)))
@@ -147,6 +149,21 @@ def _map_edge(edge: Edge, vertices: dict[int, Pose]) -> MapEdge:
         min_clearance=edge.min_clearance,
         traversals=edge.traversals,
     )
+
+
+def with_room_of(graph: RouteGraph, grid: OccupancyGrid) -> RouteGraph:
+    """The same graph, of which no edge claims more room than there is along it in the grid.
+
+    An edge that was in sight from end to end may have been seen before all that stands beside it.
+    """
+    walls = np.argwhere(is_wall(grid.cells))[:, ::-1]
+    tree = cKDTree(np.array(grid.origin) + (walls + 0.5) * grid.resolution_m)
+
+    def narrowed(edge: MapEdge) -> MapEdge:
+        away = np.asarray(tree.query(resampled(edge.polyline, grid.resolution_m))[0])
+        return replace(edge, min_clearance=min(edge.min_clearance, float(away.min())))
+
+    return replace(graph, edges=tuple(map(narrowed, graph.edges)))
 
 
 def world_files(world: World) -> dict[str, bytes | str]:

@@ -10,7 +10,9 @@ from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.graph import HalfEdgeId, Vertex
 from gvgbot.config import Config
 from gvgbot.geometry import Pose
-from gvgbot.report import Journey, _corrected, route_graph
+from gvgbot.maps.occupancy import UNKNOWN, OccupancyGrid
+from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
+from gvgbot.report import Journey, _corrected, route_graph, with_room_of
 
 
 def pipeline(keyframes: list[Keyframe]) -> Pipeline:
@@ -55,3 +57,42 @@ def test_directions_in_the_map_are_within_half_a_turn_of_straight_on() -> None:
     (told,) = route_graph(mind, {1: Pose(0.0, 0.0, 3.0)}, {1: np.eye(2)}).vertices
     assert told.bearings == pytest.approx((3.0, 4.0 - math.tau, 2.5, 5.0 - math.tau))
     assert told.frontiers == pytest.approx((2.5, 5.0 - math.tau))
+
+
+@pytest.mark.parametrize(("claimed", "told"), [(0.9, 0.5), (0.3, 0.3)])
+def test_no_edge_claims_more_room_than_the_saved_grid_has_along_it(
+    claimed: float, told: float
+) -> None:
+    """A post half a metre beside it, out of sight when the edge was joined; the rest is unseen."""
+    cells = np.full((40, 80), UNKNOWN, np.int8)
+    cells[30, 40] = 100
+    post = -2.0 + 40.5 * 0.05, -1.0 + 30.5 * 0.05
+    grid = OccupancyGrid(cells, 0.05, (-2.0, -1.0))
+    places = {1: (post[0] - 1.0, post[1] - 0.5), 2: (post[0] + 1.0, post[1] - 0.5)}
+    graph = RouteGraph(
+        tuple(
+            MapVertex(
+                id=vertex,
+                kind="endpoint",
+                position=place,
+                degree=1,
+                bearings=(0.0,),
+                clearance=1.0,
+                covariance=(0.0, 0.0, 0.0, 0.0),
+            )
+            for vertex, place in places.items()
+        ),
+        (
+            MapEdge(
+                start=1,
+                end=2,
+                polyline=np.array([places[1], places[2]]),
+                length=2.0,
+                min_clearance=claimed,
+            ),
+        ),
+    )
+    (edge,) = with_room_of(graph, grid).edges
+    assert edge.min_clearance == pytest.approx(told, abs=0.01)
+    empty = OccupancyGrid(np.full((4, 4), UNKNOWN, np.int8), 0.05, (0.0, 0.0))
+    assert with_room_of(graph, empty).edges[0].min_clearance == claimed
