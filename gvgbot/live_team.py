@@ -17,7 +17,8 @@ from gvgbot.team.member import Comparison, Member, TeamConfig
 from gvgbot.team.news import decode, encode
 from gvgbot.topics import TeamPart
 
-_COMPLAINTS = 10  # different ones; then it is known that something is wrong
+_COMPLAINTS = 10  # under one key, different ones; then it is known that something is wrong
+_ALL_COMPLAINTS = 100
 
 log = structlog.get_logger()
 
@@ -28,8 +29,8 @@ class TeamNetwork(Protocol):
     def tell_team(self, part: TeamPart, data: bytes) -> None:
         """Send to all that listen, without waiting; the newest of each part is what counts."""
 
-    async def hear_team(self, handle: Callable[[bytes], None]) -> None:
-        """Hand on what others tell, until cancelled."""
+    async def hear_team(self, handle: Callable[[str, bytes], None]) -> None:
+        """Hand on what others tell, and under which key expression, until cancelled."""
 
 
 class LiveTeam:
@@ -43,7 +44,7 @@ class LiveTeam:
         mapper = pipeline.mapper
         life = secrets.randbits(31)
         self._lives = {life}  # of robots by this name
-        self._complaints: set[str] = set()
+        self._complaints: set[tuple[str, str]] = set()  # under which key, and why
         self.member = Member(
             robot.name,
             config,
@@ -65,22 +66,26 @@ class LiveTeam:
             tasks.create_task(self._tell(), name="tell team")
             tasks.create_task(self._steer(), name="steer clear of team")
 
-    def _hear(self, data: bytes) -> None:
+    def _hear(self, key: str, data: bytes) -> None:
         try:
             told = decode(data)
         except GvgbotError as error:
-            self._complain(str(error))
+            self._complain(key, str(error))
             return
-        if told.robot == self.member.name and told.life not in self._lives:
+        is_namesake = told.robot == self.member.name and told.life not in self._lives
+        if is_namesake and len(self._lives) <= _COMPLAINTS:
             self._lives.add(told.life)
             log.warning("another robot has this name; give one another robot.name", name=told.robot)
         self.member.hear(told, self._clock.now())
 
-    def _complain(self, reason: str) -> None:
+    def _complain(self, key: str, reason: str) -> None:
         """Say once why something is not understood: the same will come several times a second."""
-        if reason not in self._complaints and len(self._complaints) < _COMPLAINTS:
-            self._complaints.add(reason)
-            log.warning("news of a team dropped", reason=reason)
+        of_this = sum(other == key for other, _ in self._complaints)
+        if of_this >= _COMPLAINTS or len(self._complaints) >= _ALL_COMPLAINTS:
+            return
+        if (key, reason) not in self._complaints:
+            self._complaints.add((key, reason))
+            log.warning("news of a team dropped", key=key, reason=reason)
 
     async def _tell(self) -> None:
         pipeline = self._pipeline

@@ -128,8 +128,8 @@ class Telemetry:
         except zenoh.ZError:
             self.failures += 1
 
-    async def hear_team(self, handle: Callable[[bytes], None]) -> None:
-        """Hand on what other robots tell, the newest of each, until cancelled."""
+    async def hear_team(self, handle: Callable[[str, bytes], None]) -> None:
+        """Hand on what other robots tell, the newest of each key expression, until cancelled."""
         loop, arrived = asyncio.get_running_loop(), asyncio.Event()
         newest: dict[str, bytes] = {}
         own = {team_key(self._robot, part) for part in TEAM_PARTS}
@@ -152,7 +152,7 @@ class Telemetry:
                 for key in list(newest):
                     if key in own:  # that is said by who reads it
                         self._strays = _STRAYS
-                    handle(newest.pop(key))
+                    handle(key, newest.pop(key))
 
     async def answer(self) -> None:
         """Answer queries for the newest values until cancelled.

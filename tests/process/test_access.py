@@ -230,8 +230,8 @@ def test_robots_of_a_team_hear_each_other(network: Network) -> None:
     async def talk(near: Telemetry, far: Telemetry) -> None:
         async with asyncio.timeout(30), asyncio.TaskGroup() as tasks:
             hearing = [
-                tasks.create_task(near.hear_team(heard["near"].add)),
-                tasks.create_task(far.hear_team(heard["far"].add)),
+                tasks.create_task(near.hear_team(lambda _, data: heard["near"].add(data))),
+                tasks.create_task(far.hear_team(lambda _, data: heard["far"].add(data))),
             ]
             while not all(heard.values()):
                 near.tell_team("team", b"near")

@@ -6,6 +6,7 @@ import json
 import signal
 import subprocess
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -39,10 +40,14 @@ def test_all_robots_of_a_team_hear_all_others(
     heard: dict[str, set[bytes]] = {name: set() for name in NAMES}
     meeting, endpoints = free_endpoint(), [free_endpoint() for _ in NAMES]
 
+    def hear(name: str, key: str, data: bytes) -> None:
+        assert key == f"gvgbot/{data[5:-1].decode()}/team"
+        heard[name].add(data)
+
     async def talk(team: list[Telemetry]) -> None:
         async with asyncio.timeout(30), asyncio.TaskGroup() as tasks:
             hearing = [
-                tasks.create_task(robot.hear_team(heard[name].add))
+                tasks.create_task(robot.hear_team(partial(hear, name)))
                 for name, robot in zip(NAMES, team, strict=True)
             ]
             while any(len(others) < 2 for others in heard.values()):  # not found each other yet

@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import Awaitable, Callable, Sequence
 
+import msgspec
 import pytest
 import structlog
 
@@ -13,7 +14,7 @@ from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.config import RobotConfig
 from gvgbot.live_team import LiveTeam
 from gvgbot.team.member import TeamConfig
-from gvgbot.topics import TeamPart
+from gvgbot.topics import TeamPart, team_key
 
 CONFIG = TeamConfig(enabled=True)
 NESTED = b"\x82\xa4type\xa4news\xa5extra" + b"\x91" * 100_000 + b"\xc0"
@@ -23,18 +24,18 @@ class Air:
     """Carries what is told to all who listen, unless it is cut."""
 
     def __init__(self) -> None:
-        self.ears: list[asyncio.Queue[bytes]] = []
+        self.ears: list[asyncio.Queue[tuple[str, bytes]]] = []
         self.is_cut = False
 
-    def tell_team(self, part: TeamPart, data: bytes) -> None:
+    def tell_team(self, part: TeamPart, data: bytes, sender: str = "one") -> None:
         for ear in self.ears if not self.is_cut else ():
-            ear.put_nowait(data)
+            ear.put_nowait((team_key(sender, part), data))
 
-    async def hear_team(self, handle: Callable[[bytes], None]) -> None:
-        ear = asyncio.Queue[bytes]()
+    async def hear_team(self, handle: Callable[[str, bytes], None]) -> None:
+        ear = asyncio.Queue[tuple[str, bytes]]()
         self.ears.append(ear)
         while True:
-            handle(await ear.get())
+            handle(*await ear.get())
 
 
 async def at_once(work: Callable[[], None]) -> None:
@@ -117,3 +118,18 @@ def test_what_is_not_understood_is_said_once_for_each_reason() -> None:
         together(scene, ["one"])
     reasons = [line["reason"] for line in lines if line["log_level"] == "warning"]
     assert len(reasons) == len(set(reasons)) == 2
+
+
+def test_it_is_said_who_is_not_understood_whatever_else_is_heard() -> None:
+    async def scene(air: Air, parts: list[LiveTeam]) -> None:
+        for number in range(300):
+            air.tell_team("team", bytes([0xC0 + number % 32]) * (1 + number), "noise")
+            await asyncio.sleep(0.01)
+        air.tell_team("team", msgspec.msgpack.encode({"type": "news2"}), "newer")
+        await asyncio.sleep(0.1)
+
+    with structlog.testing.capture_logs() as lines:
+        together(scene, ["one"])
+    keys = [line["key"] for line in lines if line["log_level"] == "warning"]
+    assert keys[-1] == "gvgbot/newer/team"
+    assert 1 < keys.count("gvgbot/noise/team") <= 10
