@@ -68,7 +68,8 @@ def frame_of(
         best, _ = least_squares(ours[kept], told[kept])
     kept = _borne_out(best, ours, told)
     first = np.arange(len(ours)) < len(a.look)
-    if not _is_sure(best, ours, told, kept & first, kept & ~first, looks):
+    stamps = np.array([look.stamp for look in (*mine, *theirs)])[looks]
+    if not _is_sure(best, ours, told, kept & first, kept & ~first, stamps):
         return None
     return least_squares(ours[kept], told[kept])
 
@@ -125,12 +126,23 @@ def _is_other(pose: Pose, best: Pose, middle: Array) -> bool:
 
 
 def _is_sure(
-    pose: Pose, ours: Array, told: Array, by_us: Mask, by_them: Mask, looks: NDArray[np.intp]
+    pose: Pose, ours: Array, told: Array, by_us: Mask, by_them: Mask, stamps: Array
 ) -> bool:
     """Whether the rows that bear a frame out, by who looked, are enough to believe it."""
-    if min(len(set(looks[by_us])), len(set(looks[by_them]))) < _LEAST_LOOKS:
+    if min(len(set(stamps[by_us])), len(set(stamps[by_them]))) < _LEAST_LOOKS:
         return False
-    way = np.hypot(*np.ptp(told[by_us], axis=0)) + np.hypot(*np.ptp(ours[by_them], axis=0))
+    way = _seen_way(told[by_us], stamps[by_us]) + _seen_way(ours[by_them], stamps[by_them])
     kept = by_us | by_them
     off = np.hypot(*(ours[kept] - pose.transform(told[kept])).T)
     return bool(way > _LEAST_WAY_M and np.sqrt((off**2).mean()) < _RMS_M)
+
+
+def _seen_way(places: Array, stamps: Array) -> float:
+    """How far somebody who was at these places (N, 2) was seen to drive, m.
+
+    Where it was lost from sight in between, it may have been somebody else there; and to and fro on
+    the spot is no way.
+    """
+    steps = np.hypot(*np.diff(places, axis=0).T)
+    extent = np.hypot(*np.ptp(places, axis=0))
+    return float(min(extent, steps[np.diff(stamps) <= _GAP_S].sum()))

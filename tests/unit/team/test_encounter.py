@@ -67,6 +67,28 @@ def test_two_that_stand_before_each_other_may_be_any_two() -> None:
     assert frame(looks(0, here, there), looks(1, there, here)) is None
 
 
+def test_two_that_only_move_to_and_fro_before_each_other_may_be_any_two() -> None:
+    def to_and_fro(t: float) -> Array:
+        return np.array([2.0 + 0.1 * math.sin(3.0 * t), 0.0])
+
+    here = straight(0.0, 0.0, 0.0, 0.0)
+    assert frame(looks(0, here, to_and_fro), looks(1, to_and_fro, here)) is None
+
+
+def test_two_that_stood_on_either_side_of_a_third_are_not_taken_for_it_by_one_look() -> None:
+    """Four robots that had started in a corridor were joined two metres off."""
+    here = straight(0.0, 0.0, 0.0, 0.0)
+
+    def there(t: float) -> Array:
+        return np.array([4.0 + 0.25 * max(0.0, t - 3.0), 0.0])
+
+    def third(t: float) -> Array:  # it is once where the other one would be
+        return there(t) - (2.0, 0.0) if t < 3.0 or 11.9 < t < 12.3 else np.array([50.0, 0.0])
+
+    assert sum(math.dist(third(t), (50.0, 0.0)) > 0.0 for t in np.arange(3.0, 15.0, 0.4)) == 1
+    assert frame(looks(0, here, third), looks(1, there, third)) is None
+
+
 def test_two_that_meet_others_at_the_same_time_are_not_taken_for_each_other() -> None:
     """Both drive along corridors, and somebody comes towards each, who is not the other one."""
     mine, theirs = (
