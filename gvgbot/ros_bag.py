@@ -1,6 +1,7 @@
 """A recording as a bag that ROS 2 programs play: what ROS would have heard of that run."""
 
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import TracebackType
 from typing import Final, Self
 
@@ -32,15 +33,20 @@ def export_bag(recording: Path, out: Path, *, sensors_only: bool) -> list[str]:
     """Write a bag directory, and say what is missing in it.
 
     The robot's mind lives through the recording once more for its map, unless only what the sensors
-    said is wanted. Stamps are those of the robot's clock. Raises UsageError for a recording that
-    cannot be read, or a directory that exists; GvgbotError if it cannot be written.
+    said is wanted. Stamps are those of the robot's clock. One that cannot be finished leaves
+    nothing. Raises UsageError for a recording that cannot be read, or a directory that exists;
+    GvgbotError if it cannot be written.
     """
     if out.exists():
         raise UsageError(f"{out} exists already; name a new directory")
     log = open_log(Wanted(path=recording, config=None, overrides=[], no_echo_m=80.0))
     try:
-        with _Bag(out) as bag:
-            _play(log, bag, sensors_only=sensors_only)
+        out.parent.mkdir(parents=True, exist_ok=True)
+        with TemporaryDirectory(prefix=".", dir=out.parent) as beside:
+            whole = Path(beside) / out.name  # which names the files in it
+            with _Bag(whole) as bag:
+                _play(log, bag, sensors_only=sensors_only)
+            whole.rename(out)
     except OSError as error:
         raise GvgbotError(f"cannot write {out}: {error.strerror}") from error
     return log.flaws()
@@ -113,7 +119,7 @@ class _Bag:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self._writer.close()
+        self._writer.__exit__(kind, error, trace)
 
 
 def _qos(topic: Topic) -> Qos:

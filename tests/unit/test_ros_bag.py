@@ -1,6 +1,7 @@
 """Recordings as bags, read by an independent implementation."""
 
 import math
+import resource
 from pathlib import Path
 from typing import Any
 
@@ -104,6 +105,20 @@ def test_a_bag_replaces_nothing(
     (tmp_path / "bag").mkdir()
     assert main(["map", "export", str(recording), str(tmp_path / "bag"), "--ros-bag"]) == 2
     assert "exists already" in capsys.readouterr().err
+
+
+def test_a_bag_for_which_there_is_no_room_leaves_nothing(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = set(tmp_path.iterdir())
+    _, hard = limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, hard))
+    try:
+        assert main(["map", "export", str(recording), str(tmp_path / "bag"), "--ros-bag"]) == 1
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert "File too large" in capsys.readouterr().err
+    assert set(tmp_path.iterdir()) == before
 
 
 def test_sensors_only_is_about_bags(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
