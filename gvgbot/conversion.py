@@ -75,8 +75,8 @@ def _fits(kind: Any, value: Any) -> bool:
         return any(type(value) is type(one) and value == one for one in typing.get_args(kind))
     if kind is float:
         return type(value) in (int, float) and is_finite(value)
-    if kind is Path:
-        return isinstance(value, str) and value != ""
+    if kind in (str, Path):
+        return isinstance(value, str) and "\0" not in value and (kind is str or value != "")
     if kind in NAMES:
         return type(value) is kind
     raise TypeError(f"a configuration key cannot be a {kind!r}")

@@ -118,6 +118,8 @@ WRONG = {
     "above an optional range": ("leg: {longest_m: 6}", "or null of at most 5"),
     "not a choice": ("diet: fish", "diet = 'fish': must be one of grass, meat, 7"),
     "choice of another type": ("diet: '7'", "diet = '7': must be one of grass, meat, 7"),
+    "no end of text": ('name: "a\\0b"', "must be text"),
+    "no end of a path": ('home: "a\\0b"', "must be a path"),
     "empty path": ("home: ''", "home = '': must be a path"),
     "short tuple": ("position: [1]", "position = [1]: must be a list of 2"),
     "text in a tuple": ("position: [1, x]", "position = [1, 'x']: must be a list of 2"),
