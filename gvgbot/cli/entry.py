@@ -1,5 +1,6 @@
 """The command line: arguments in, exit status out, one clear line for every failure."""
 
+import errno
 import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -62,6 +63,10 @@ def status_of(command: Callable[[], int]) -> int:
         if error.filename is None:
             raise
         return _fail(f"{error.filename}: permission denied: choose another, or sudo", FAILURE)
+    except OSError as error:
+        if error.errno != errno.ENAMETOOLONG:
+            raise
+        return _fail(f"{error.filename}: {error.strerror}: choose a shorter one", BAD_USAGE)
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:

@@ -176,6 +176,12 @@ def test_what_may_not_be_read_or_written_is_named(capsys: Captured) -> None:
     assert "/var/lib/gvgbot/map.geojson: permission denied" in line
 
 
+def test_a_name_longer_than_any_file_may_have_is_wrong(capsys: Captured) -> None:
+    assert main(["map", "info", 300 * "a"]) == 2
+    (line,) = said(capsys)
+    assert line.endswith("File name too long: choose a shorter one")
+
+
 def test_an_interrupted_command_says_so_and_exits_as_shells_expect(capsys: Captured) -> None:
     assert status_of(lambda: raising(KeyboardInterrupt())) == 128 + 2
     assert said(capsys) == ["gvgbot: interrupted"]
