@@ -36,7 +36,8 @@ are listed with their fields under [Topics](../topics.md).
 WIDEST = 100  # of a signature in one line
 INTERNAL = {"put"}  # public for this package only
 CLASSES = (
-    *(client.Robot, client.Asking, client.Refused, client.Presence),
+    *(client.Robot, client.Asking, client.GvgbotError, client.UsageError, client.Refused),
+    client.Presence,
     *(Newest, EventStream, client.Raster),
 )
 

@@ -13,6 +13,7 @@ The same with `async with` and `async for`. What its configuration permits can b
 from gvgbot.client.asking import Asking, Refused
 from gvgbot.client.presence import Presence
 from gvgbot.client.robot import DEFAULT_ENDPOINT, Robot, connect, only_robot, robots
+from gvgbot.errors import GvgbotError, UsageError
 from gvgbot.topics import (
     Event,
     Grid,
@@ -35,6 +36,7 @@ __all__ = [
     "Asking",
     "Event",
     "Grid",
+    "GvgbotError",
     "Health",
     "LinkHealth",
     "Map",
@@ -50,6 +52,7 @@ __all__ = [
     "State",
     "Tile",
     "Trajectory",
+    "UsageError",
     "connect",
     "only_robot",
     "robots",

@@ -122,6 +122,11 @@ def test_every_event_is_on_the_page_with_its_fields() -> None:
     assert listed == fields
 
 
+def test_every_error_that_the_client_is_said_to_raise_can_be_had_from_it() -> None:
+    text = make_client.PAGE.read_text(encoding="utf-8")
+    assert set(re.findall(r"\w+Error", text)) <= set(client.__all__)
+
+
 @pytest.mark.parametrize("name", client.__all__)
 def test_every_name_of_the_client_is_on_the_page(name: str) -> None:
     assert f"`{name}`" in make_client.PAGE.read_text(encoding="utf-8")
