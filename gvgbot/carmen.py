@@ -27,6 +27,7 @@ from gvgbot.recording import Lived
 _GZIP = b"\x1f\x8b"
 _TAIL = 9  # words of a FLASER line after the ranges
 _ODOM_WORDS = 10
+_LARGEST = 1e10  # m, rad or s since 1970; what is beyond comes of a damaged line
 _LONGEST_GAP_S = 0.2  # between messages; logs leave some out
 _LONGEST_PAUSE_S = 300.0  # what is longer comes of a clock that was set, or of a damaged stamp
 
@@ -135,9 +136,9 @@ def _sweep(words: list[str], no_echo_m: float, base_laser: Pose) -> tuple[Scan, 
 
 
 def _numbers(words: list[str]) -> list[float]:
-    """Finite numbers. Raises ValueError."""
+    """Numbers that something can have measured. Raises ValueError."""
     numbers = [float(word) for word in words]
-    if not all(map(math.isfinite, numbers)):
+    if not all(abs(number) <= _LARGEST for number in numbers):
         raise ValueError(words)
     return numbers
 

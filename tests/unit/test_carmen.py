@@ -53,6 +53,7 @@ def test_a_sweep_covers_half_a_circle_from_the_right(
         "ODOM 1 2",
         "ODOM 1 2 x 0 0 0 7 host 3",
         "ODOM 1 2 nan 0 0 0 7 host 3",
+        "ODOM 1 1e300 0 0 0 0 7 host 3",
         "FLASER",
         FLASER.replace("FLASER 4", "FLASER 5"),
         FLASER.replace("1.5", "1.5.5"),
