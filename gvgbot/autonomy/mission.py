@@ -252,6 +252,8 @@ class Mission:
             self.choice.go_ahead()
             return None
         chosen, reason = self.choice.ear(self.target), "ear"
+        if chosen is None and self._is_on_own_frontier():
+            chosen, reason = self.where.on_edge, "nearest frontier"
         if chosen is None:
             nearest = self.choice.nearest(here.starts())
             if nearest is None and self._reopen(view, "nothing else is left"):
@@ -270,6 +272,18 @@ class Mission:
         self._commit(view, here, chosen, reason)
         return chosen
 
+    def _is_on_own_frontier(self) -> bool:
+        """Whether a robot of a team is on an open edge, and nobody else is farther on it."""
+        end = self.where.on_edge
+        half = None if end is None else self._mapper.graph.half_edge(end)
+        if self.choice.sharing is None or end is None or half is None or not half.open:
+            return False
+        return self.choice.keeps(end, self._come(end))
+
+    def _come(self, end: HalfEdgeId) -> list[Approach]:
+        """Where the robot is on the edge that leaves by a half-edge: so far past its vertex."""
+        return [Approach(-self.where.trail_length, end)]
+
     def _team_is_done(self, view: View) -> bool:
         """Whether all is left to others, and no way is worth a wait, or to be looked for."""
         if not self.choice.is_left_to_others:
@@ -284,8 +298,7 @@ class Mission:
         frontiers = set(self._mapper.graph.frontiers())
         found, self._frontiers = frontiers - self._frontiers, frontiers
         is_on_it = self.where.on_edge == target
-        come = Approach(-self.where.trail_length, target)  # so far past its vertex
-        starts = [come] if is_on_it else here.starts()
+        starts = self._come(target) if is_on_it else here.starts()
         if not self.choice.keeps(target, starts):
             return self._choose(view, here)
         if is_on_it:

@@ -103,7 +103,7 @@ class Auction:
             return False
         metres = {vertex: way.metres for vertex, way in shortest_paths(graph, starts).items()}
         cost, _ = site.costs(metres).get(frontier, (0.0 if claim is None else claim.metres, target))
-        self._claim(frontier, max(0.0, cost), target)
+        self._claim(frontier, cost, target)
         return not self._is_taken(frontier, cost, self._team.claims())
 
     def has_driven(self, line: Array, *, either_way: bool = False) -> bool:

@@ -58,7 +58,10 @@ class TeamWay(msgspec.Struct, frozen=True, array_like=True):
 
 
 class Claim(msgspec.Struct, frozen=True, array_like=True):
-    """A frontier that a robot is on its way to, and the metres that are left of the way."""
+    """A frontier that a robot is on its way to, and the metres that are left of the way.
+
+    Less than none: it is so far beyond, on the edge.
+    """
 
     x: Number  # m, the robot's map frame
     y: Number

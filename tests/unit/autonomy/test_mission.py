@@ -522,6 +522,32 @@ class Alone:
         return False
 
 
+class Claimed(Alone):
+    """Another robot follows all that is open, a metre beyond its vertex."""
+
+    is_waiting = True
+
+    def choose(self, graph: GvgGraph, starts: list[Approach]) -> None:
+        return None
+
+    def keeps(self, target: HalfEdgeId, graph: GvgGraph, starts: list[Approach]) -> bool:
+        return starts[0].metres < -1.0
+
+
+@pytest.mark.parametrize(("x", "is_ahead"), [(3.6, False), (5.0, True)])
+def test_who_is_on_an_edge_ahead_of_who_claims_it_goes_on(*, x: float, is_ahead: bool) -> None:
+    robot = Robot()
+    robot.drive(TEE, (0.0, 0.0), (x, 0.0))
+    (vertex,) = robot.mapper.graph.vertices.values()
+    east = next(key for key, half in vertex.half_edges.items() if abs(half.bearing) < 0.1)
+    assert robot.mission.where.on_edge == HalfEdgeId(vertex.id, east)
+    robot.mission.choice.sharing, robot.mission.target = Claimed(), None
+    order = robot.look(TEE)
+    assert robot.mission.target == (HalfEdgeId(vertex.id, east) if is_ahead else None)
+    if is_ahead:
+        assert end_of(order) == pytest.approx((8.0, 0.0))
+
+
 class Led(Alone):
     """Others have driven everywhere, from some time on."""
 

@@ -176,6 +176,30 @@ def test_who_follows_its_frontier_keeps_it_until_others_have_driven_it_from_the_
     assert not one.auction.keeps(chosen[0], graph_of(one.chart), on_it)
 
 
+def test_of_two_on_one_edge_the_one_that_is_ahead_goes_on() -> None:
+    """Nobody can drive through the other one: two stood behind each other for a minute."""
+    building = Building(
+        np.array([(0.0, 0.0), (15.0, 0.0), (0.0, 6.0), (-7.0, 0.0)]), ((0, 1), (0, 2), (0, 3))
+    )
+    behind, ahead = (robot(name, building, {0, 2, 3}, 0) for name in ("one", "two"))
+    for _ in range(2):
+        behind.tell(0.0, ahead)
+        ahead.tell(0.0, behind)
+    for here, there in ((behind, "two"), (ahead, "one")):
+        true = START[here.member.name].to(START[there])
+        alignment = Alignment(true, np.eye(3) * 1e-6, (), 1.0)
+        here.member.settle(Comparison(there, 0, Chart(), Chart(), None), alignment)
+    chosen = behind.choose()
+    assert chosen is not None
+    on_it, graph = [Approach(-2.4, chosen[0])], graph_of(behind.chart)
+    assert behind.auction.keeps(chosen[0], graph, on_it)
+    behind.tell(2.0, ahead)
+    assert ahead.auction.keeps(chosen[0], graph, [Approach(-6.7, chosen[0])])
+    ahead.tell(2.0, behind)
+    assert not behind.auction.keeps(chosen[0], graph, on_it)
+    assert ahead.auction.keeps(chosen[0], graph, [Approach(-7.0, chosen[0])])
+
+
 def test_what_others_have_driven_and_what_they_have_not() -> None:
     one, two = team()
     edge = next(iter(two.chart.edges.values()))
