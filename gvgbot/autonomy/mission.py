@@ -341,12 +341,8 @@ class Mission:
 
     def _make_way(self, view: View, here: Situation) -> Order:
         """Stand, where others can pass."""
-        way = self._neighbours.way_aside(here)
-        if way is None:
-            return Stand()
-        line, room = here.line_along(way)
-        free = self._neighbours.free_metres(view, line)
-        return Stand() if free < ARRIVED_M else Drive(Track.of(line, room).until(free))
+        track = self._neighbours.track_aside(view, here)
+        return Stand() if track is None else Drive(track)
 
     def _drive(self, view: View, here: Situation, path: tuple[Branch, ...]) -> Order:
         line, room = here.line_along(path)

@@ -12,7 +12,8 @@ from gvgbot.autonomy.control.company import (
     refuge,
     wide_place,
 )
-from gvgbot.autonomy.gvg.local import Branch
+from gvgbot.autonomy.control.edge_follower import Track
+from gvgbot.autonomy.control.orders import ARRIVED_M
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.autonomy.views import View
@@ -36,19 +37,23 @@ class Neighbours:
 
     def free_metres(self, view: View, line: Array) -> float:
         """How far to drive along a line (N, 2) before one has to come through a narrow place."""
-        if not self.company:
-            return math.inf
-        from_walls, _ = view.local_map.tree().query(line)
-        return free_metres(line, np.asarray(from_walls), self.company)
+        return _free_metres(view, line, self.company)
 
-    def way_aside(self, here: Situation) -> tuple[Branch, ...] | None:
-        """Where to wait: in no door, and aside of one that is near and may want to pass."""
-        if not self.company:
-            return None
-        way = wide_place(here.gvg, here.place, self.company)
+    def track_aside(self, view: View, here: Situation) -> Track | None:
+        """To where to wait: in no door, and aside of one that is near and may want to pass.
+
+        A way that leads away from who goes first is nothing to wait for: to stay is in its way.
+        """
+        others = self.company
+        way = wide_place(here.gvg, here.place, others) if others else None
         if way is None and self._in_front is not None:
             way = refuge(here.gvg, here.place, self._in_front.pose.position)
-        return way
+            others = [one for one in others if one is not self._in_front]
+        if way is None:
+            return None
+        line, room = here.line_along(way)
+        free = _free_metres(view, line, others)
+        return None if free < ARRIVED_M else Track.of(line, room).until(free)
 
     def depart_unseen(
         self, mapper: Mapper, view: View, here: Situation, target: HalfEdgeId
@@ -64,3 +69,10 @@ class Neighbours:
         bearing = mapper.graph.vertices[target.vertex].half_edges[target.key].bearing
         base = view.local_base.position
         here.where.depart(target, place.position, place.theta + bearing, base)
+
+
+def _free_metres(view: View, line: Array, others: list[Companion]) -> float:
+    if not others:
+        return math.inf
+    from_walls, _ = view.local_map.tree().query(line)
+    return free_metres(line, np.asarray(from_walls), others)

@@ -490,6 +490,21 @@ def test_who_has_to_wait_where_another_one_wants_to_come_through_goes_out_of_its
     assert end_of(robot.look(TEE)) == pytest.approx((3.0, -4.0))
 
 
+def test_who_stands_in_a_crossing_leaves_it_for_who_wants_to_come_through() -> None:
+    """From the south to the east; it would like to go west itself, and that is out of the way."""
+    robot = Robot()
+    robot.walls = Narrow(LocalMapConfig())
+    robot.drive(TEE, (0.0, 0.0), (3.3, 0.0))
+    (vertex,) = robot.mapper.graph.vertices.values()
+    west = next(k for k, half in vertex.half_edges.items() if abs(half.bearing) > 3.0)
+    robot.mission.target = HalfEdgeId(vertex.id, west)
+    up, on = np.linspace((3.0, -0.8), (3.0, 0.0), 9), np.linspace((3.0, 0.0), (7.0, 0.0), 41)
+    course = np.concatenate([up, on[1:]])
+    comes = Companion("other", Pose(3.0, -0.8), goes_first=True, course=course, radius=0.2)
+    robot.mission.meet(robot.pose, [comes])
+    assert end_of(robot.look(TEE)) == pytest.approx((-3.0, 0.0))
+
+
 @pytest.mark.parametrize("is_hidden", [False, True])
 def test_a_crossing_that_another_robot_hides_is_left_by_the_way_that_is_wanted(
     is_hidden: bool,
