@@ -325,6 +325,7 @@ class Mission:
         scouting = self._scouting
         if not scouting.is_on:
             scouting.begin(view.stamp)
+            self._looked_around = 0
             self._events.append(Recovery(view.stamp, "drive on", "no way leads to the frontier"))
         near = None
         if self.target is None:
@@ -353,6 +354,8 @@ class Mission:
         track = Track.of(line, room).until(free)
         end = view.gvg.end_of(path[-1])
         waited = self._progress.headway.waited(view.stamp)
+        if waited == 0.0 and self._scouting.is_on:  # it has come on, to where it looks anew
+            self._looked_around = 0
         if track.length < ARRIVED_M and end not in here.known.vertex_of and end in view.doubted:
             self._hindrance.hold()
             away = _turn_to_face(view, path[-1])
@@ -361,13 +364,20 @@ class Mission:
         elif track.length < ARRIVED_M and waited > self._config.look_around_s:
             self._progress.headway.restart(view.stamp)
             self._looked_around += 1
-            if self._looked_around > 2 and not self._scouting.is_on:
-                if not (self._turns_round(view) or self._closes_unseen_edge(view, here)):
-                    self._give_up(view, "nothing more is to be seen there")
+            if self._looked_around > 2:
+                self._see_no_more(view, here)
                 return Stand()
             self._events.append(Recovery(view.stamp, "look around", "standing at the end of sight"))
             return LookAround(math.tau)
         return Drive(track)
+
+    def _see_no_more(self, view: View, here: Situation) -> None:
+        """Go another way, or give up what is ahead: of what no way leads to, what is nearest."""
+        if self._turns_round(view) or self._closes_unseen_edge(view, here):
+            return
+        if self.target is None and self._scouting.is_on:
+            self.target = self._frontier_beside(view)
+        self._give_up(view, "nothing more is to be seen there")
 
     def _turns_round(self, view: View) -> bool:
         """Go the other way, once, before a vertex is known; whether it does.

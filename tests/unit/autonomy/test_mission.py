@@ -360,7 +360,7 @@ def test_what_hangs_together_with_nothing_is_forgotten_and_not_called_blocked() 
     assert robot.mission.target in graph.frontiers()
 
 
-def test_the_robot_goes_near_what_no_known_way_leads_to_before_it_gives_that_up() -> None:
+def far_from_all_that_is_known() -> Robot:
     """Two vertices behind the robot, beyond its corridor, that are joined to each other only."""
     robot = Robot()
     graph = robot.mapper.graph
@@ -373,11 +373,28 @@ def test_the_robot_goes_near_what_no_known_way_leads_to_before_it_gives_that_up(
     ends = [HalfEdgeId(vertex.id, vertex.add_half_edge(math.pi)) for vertex in beyond]
     graph.join(ends[0], ends[1], np.array([[0.0, 0.0], [-2.0, 0.0]]), 1.0, driven=True)
     beyond[1].add_half_edge(math.pi)
+    return robot
+
+
+def test_the_robot_goes_near_what_no_known_way_leads_to_before_it_gives_that_up() -> None:
+    robot = far_from_all_that_is_known()
     robot.stand(CLOSED, 40)
     assert end_of(robot.look(CLOSED)) == pytest.approx((-1.0, 0.0))
     robot.drive(CLOSED, (0.0, 0.0), (-0.9, 0.0))
     while robot.mission.outcome is None and robot.stamp < 5 * CONFIG.patience_s:
         robot.look(CLOSED)
+    assert robot.mission.outcome == "explored_with_blocked"
+
+
+def test_who_looks_for_a_way_where_hardly_anything_is_in_sight_looks_around_twice() -> None:
+    """Then the frontier is given up, and tried once more, as one that a way leads to."""
+    stub = drawn({1: (-0.1, 0.0), 2: (0.1, 0.0)}, {10: (1, 2, [])}, unseen={1: math.pi, 2: 0.0})
+    robot = far_from_all_that_is_known()
+    while robot.mission.outcome is None:
+        robot.look(stub)
+    twice = ["look around", "look around", "give up a frontier"]
+    did = [e.action for e in robot.said(Recovery) if isinstance(e, Recovery)]
+    assert did == ["drive on", *twice, "try again", *twice]
     assert robot.mission.outcome == "explored_with_blocked"
 
 
