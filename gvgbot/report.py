@@ -1,11 +1,14 @@
 """What a run leaves: the map, its picture, the trajectories and the summary, as files by name."""
 
+import math
 import tempfile
 from bisect import bisect_left
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
+from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.estimate import scans_at, smoothed
@@ -15,7 +18,7 @@ from gvgbot.drivers.world import World, save_world
 from gvgbot.geometry import Array, Pose, composed, resampled, seen_from
 from gvgbot.hal.messages import Odometry
 from gvgbot.maps import geojson
-from gvgbot.maps.gaps import is_wall
+from gvgbot.maps.gaps import is_floor, is_wall
 from gvgbot.maps.map_server import encode_map_server
 from gvgbot.maps.occupancy import OccupancyGrid, occupancy_grid
 from gvgbot.maps.picture import draw_map
@@ -59,7 +62,9 @@ def map_files(pipeline: Pipeline, journey: Journey, title: str) -> dict[str, byt
     """All files of a run but summary and events, by name."""
     keyframes, vertices, covariances = smoothed(pipeline)
     grid = occupancy_grid(scans_at(keyframes, pipeline))
-    graph = with_room_of(route_graph(pipeline, vertices, covariances), grid)
+    edges = enumerate(pipeline.mapper.graph.edges.values())
+    parts = {i for i, edge in edges if edge.is_part}
+    graph = with_room_of(route_graph(pipeline, vertices, covariances), grid, parts)
     estimate = _trajectory(journey, _corrected(journey, pipeline, keyframes))
     start = pipeline.keyframes[0].odom_base if pipeline.keyframes else Pose()
     odometry = _trajectory(journey, seen_from(_rows([start]), _rows(journey.odom_base)))
@@ -151,19 +156,36 @@ def _map_edge(edge: Edge, vertices: dict[int, Pose]) -> MapEdge:
     )
 
 
-def with_room_of(graph: RouteGraph, grid: OccupancyGrid) -> RouteGraph:
+def with_room_of(graph: RouteGraph, grid: OccupancyGrid, parts: Collection[int] = ()) -> RouteGraph:
     """The same graph, of which no edge claims more room than there is along it in the grid.
 
     An edge that was in sight from end to end may have been seen before all that stands beside it.
+    `parts` are the places, among the edges, of those whose narrowest place may be in another part
+    of an edge that was parted: they claim the room in which the grid knows the floor to be free.
     """
     walls = np.argwhere(is_wall(grid.cells))[:, ::-1]
     tree = cKDTree(np.array(grid.origin) + (walls + 0.5) * grid.resolution_m)
 
-    def narrowed(edge: MapEdge) -> MapEdge:
-        away = np.asarray(tree.query(resampled(edge.polyline, grid.resolution_m))[0])
-        return replace(edge, min_clearance=min(edge.min_clearance, float(away.min())))
+    def measured(number: int, edge: MapEdge) -> MapEdge:
+        line, claimed = resampled(edge.polyline, grid.resolution_m), edge.min_clearance
+        room = float(np.asarray(tree.query(line)[0]).min())
+        if number in parts and tree.n:
+            claimed = max(claimed, _known_room(grid, line, room))
+        return replace(edge, min_clearance=min(claimed, room))
 
-    return replace(graph, edges=tuple(map(narrowed, graph.edges)))
+    return replace(graph, edges=tuple(measured(i, edge) for i, edge in enumerate(graph.edges)))
+
+
+def _known_room(grid: OccupancyGrid, line: Array, most: float) -> float:
+    """How far all along a line (N, 2), m, map frame, the floor is known to be free, to `most` m."""
+    margin = math.ceil(most / grid.resolution_m) + 1
+    cells = ((line - grid.origin) // grid.resolution_m).astype(np.intp)[:, ::-1]
+    first = np.maximum(cells.min(axis=0) - margin, 0)
+    (top, left), (bottom, right) = first, np.maximum(cells.max(axis=0) + margin + 1, 0)
+    floor = np.pad(is_floor(grid.cells[top:bottom, left:right]), 1)  # beyond, nothing is known
+    free = ndimage.distance_transform_edt(floor) * grid.resolution_m
+    row, column = np.clip(cells - first + 1, 0, np.array(floor.shape) - 1).T
+    return float(free[row, column].min())
 
 
 def world_files(world: World) -> dict[str, bytes | str]:

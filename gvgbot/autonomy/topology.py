@@ -46,7 +46,7 @@ def split_edge_at(
             room = clearance_between(part, vertex.clearance, graph.vertices[far.vertex].clearance)
             clearance = max(edge.min_clearance, room)
             part_edge = graph.join(near, far, part, clearance, driven=edge.driven)
-            part_edge.established = edge.established
+            part_edge.established, part_edge.is_part = edge.established, True
         return
 
 
@@ -101,6 +101,7 @@ def take_out(graph: GvgGraph, belief: Belief, vertex: Vertex) -> None:
     clearance = min(one.min_clearance, other.min_clearance)
     edge = graph.join(start, end, line, clearance, driven=one.driven and other.driven)
     edge.established = one.established and other.established
+    edge.is_part = one.is_part and other.is_part
 
 
 def _are_opposite(departures: list[HalfEdge]) -> bool:
@@ -211,6 +212,7 @@ def fuse(graph: GvgGraph, kept: Vertex, gone: Vertex, kept_gone: Pose, angle: fl
         line = kept_gone.transform(edge.polyline) if begins_here else edge.polyline
         joined = graph.join(a, b, line, edge.min_clearance, driven=edge.driven)
         joined.traversals, joined.established = edge.traversals, edge.established
+        joined.is_part = edge.is_part
     del graph.vertices[gone.id]
     return Fused(renamed, twins)
 

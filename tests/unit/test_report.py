@@ -59,6 +59,25 @@ def test_directions_in_the_map_are_within_half_a_turn_of_straight_on() -> None:
     assert told.frontiers == pytest.approx((2.5, 5.0 - math.tau))
 
 
+def street(claimed: float, start: tuple[float, float], end: tuple[float, float]) -> RouteGraph:
+    """A straight edge that claims so much room."""
+    vertices = tuple(
+        MapVertex(
+            id=vertex,
+            kind="endpoint",
+            position=place,
+            degree=1,
+            bearings=(0.0,),
+            clearance=1.0,
+            covariance=(0.0, 0.0, 0.0, 0.0),
+        )
+        for vertex, place in ((1, start), (2, end))
+    )
+    line, length = np.array([start, end]), math.dist(start, end)
+    edge = MapEdge(start=1, end=2, polyline=line, length=length, min_clearance=claimed)
+    return RouteGraph(vertices, (edge,))
+
+
 @pytest.mark.parametrize(("claimed", "told"), [(0.9, 0.5), (0.3, 0.3)])
 def test_no_edge_claims_more_room_than_the_saved_grid_has_along_it(
     claimed: float, told: float
@@ -68,31 +87,28 @@ def test_no_edge_claims_more_room_than_the_saved_grid_has_along_it(
     cells[30, 40] = 100
     post = -2.0 + 40.5 * 0.05, -1.0 + 30.5 * 0.05
     grid = OccupancyGrid(cells, 0.05, (-2.0, -1.0))
-    places = {1: (post[0] - 1.0, post[1] - 0.5), 2: (post[0] + 1.0, post[1] - 0.5)}
-    graph = RouteGraph(
-        tuple(
-            MapVertex(
-                id=vertex,
-                kind="endpoint",
-                position=place,
-                degree=1,
-                bearings=(0.0,),
-                clearance=1.0,
-                covariance=(0.0, 0.0, 0.0, 0.0),
-            )
-            for vertex, place in places.items()
-        ),
-        (
-            MapEdge(
-                start=1,
-                end=2,
-                polyline=np.array([places[1], places[2]]),
-                length=2.0,
-                min_clearance=claimed,
-            ),
-        ),
-    )
+    graph = street(claimed, (post[0] - 1.0, post[1] - 0.5), (post[0] + 1.0, post[1] - 0.5))
     (edge,) = with_room_of(graph, grid).edges
     assert edge.min_clearance == pytest.approx(told, abs=0.01)
+    (part,) = with_room_of(graph, grid, {0}).edges
+    assert part.min_clearance == edge.min_clearance  # nobody knows what is in the unseen
     empty = OccupancyGrid(np.full((4, 4), UNKNOWN, np.int8), 0.05, (0.0, 0.0))
     assert with_room_of(graph, empty).edges[0].min_clearance == claimed
+
+
+@pytest.mark.parametrize(("beside", "told"), [(100, 0.8), (UNKNOWN, 0.8), (0, 1.5)])
+def test_part_of_an_edge_that_was_narrow_elsewhere_claims_the_room_that_is_known(
+    beside: int, told: float
+) -> None:
+    """In a hall 3 m wide; 0.8 m beside the edge a recess of it is filled, unseen, or free."""
+    cells = np.full((120, 200), UNKNOWN, np.int8)
+    cells[29:91] = 100
+    cells[30:90] = 0
+    cells[30:44, 90:110] = beside
+    grid = OccupancyGrid(cells, 0.05, (0.0, 0.0))
+    graph = street(0.3, (2.0, 3.0), (8.0, 3.0))
+    assert with_room_of(graph, grid).edges[0].min_clearance == 0.3
+    (edge,) = with_room_of(graph, grid, {0}).edges
+    assert edge.min_clearance == pytest.approx(told, abs=0.04)
+    beyond = street(0.3, (2.0, 3.0), (30.0, 3.0))
+    assert with_room_of(beyond, grid, {0}).edges[0].min_clearance == 0.3

@@ -124,6 +124,7 @@ class Edge:
     traversals: int = 0
     conflicts: int = 0
     established: bool = False  # part of a map that was finished
+    is_part: bool = False  # of an edge that was parted: it may have more room than it says
     doubted_since: float | None = None  # stamp; since when sight speaks against it
     drawn: Array | None = None  # the polyline from vertex to vertex as these were believed then
 

@@ -61,6 +61,7 @@ def test_a_vertex_parts_an_edge_only_if_it_surely_stands_there(sigma: float, edg
     belief = Belief(x, P, (ids[0, 0], ids[1, 0], middle.id))
     split_edge_at(graph, belief, middle, reach=0.8, angle=ANGLE)
     assert len(graph.edges) == edges
+    assert [edge.is_part for edge in graph.edges.values()] == [edges == 2] * edges
     assert is_sound(graph)
 
 
