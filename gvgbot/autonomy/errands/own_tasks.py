@@ -97,6 +97,6 @@ class OwnTasks:
 
     def _remark(self) -> str:
         """What there is to say about the map, if that is the end."""
-        doubtful, unseen = self._revisiting.too_uncertain(self._mapper.belief), self._unseen.left
+        doubtful, unseen = self._revisiting.too_uncertain(self._mapper.belief), self._unseen.where
         remark = f"; {len(doubtful)} vertices stay less certain than wanted" if doubtful else ""
-        return remark + (f"; places that may lack something: {unseen}" if unseen else "")
+        return remark + (f"; something may be missing near {unseen}" if unseen else "")

@@ -8,10 +8,12 @@ from collections.abc import Callable
 import numpy as np
 
 from gvgbot.geometry import Array
+from gvgbot.words import counted
 
 _SAME_M = 1.0  # places nearer to each other are one
 _STILL_M = 0.01  # from look to look, at most
 _TRIES = 2  # visits of a place that come to nothing
+_TOLD = 3  # places that are told of one by one
 _MOST = 30  # visits altogether: where walls cannot be seen there is no end of unseen floor
 
 
@@ -22,11 +24,11 @@ class Unseen:
         self._visits: list[Array] = []
         self._stands_at: float | None = None  # `travelled` when it was asked to stand
         self.is_done = False  # there is nothing to be gained
-        self.left = 0  # places that are of no use
+        self.left = np.empty((0, 2))  # places that are of no use, m, map frame
 
     def begin_anew(self) -> None:
         """Note that the robot explores, so that there is more to be seen."""
-        self._stands_at, self.is_done, self.left = None, False, 0
+        self._stands_at, self.is_done, self.left = None, False, np.empty((0, 2))
 
     def is_standing(self, travelled: float) -> bool:
         """Whether the robot has come no further since this was asked last, at the look before.
@@ -48,10 +50,17 @@ class Unseen:
         ]
         self.is_done = not chances
         if not chances:
-            self.left = len(places)
+            self.left = places
             return None
         self._visits.append(np.array(min(chances)[2]))
         return self._visits[-1]
+
+    @property
+    def where(self) -> str:
+        """The places that are of no use, in words."""
+        told = ", ".join(f"({x:z.1f}, {y:z.1f})" for x, y in self.left[:_TOLD].tolist())
+        rest = len(self.left) - _TOLD
+        return told + (f" and {counted(rest, 'more place')}" if rest > 0 else "")
 
     def _tries(self, place: Array) -> int:
         return sum(bool(np.hypot(*(place - visit)) < _SAME_M) for visit in self._visits)

@@ -89,7 +89,7 @@ def test_a_gap_that_stays_is_told_of() -> None:
     robot.until_it_moves_or_ends()
     assert not robot.left
     assert robot.mission.outcome == "explored"
-    assert robot.mission.reason == "no frontier is left; places that may lack something: 1"
+    assert robot.mission.reason == "no frontier is left; something may be missing near (2.0, 0.0)"
 
 
 def test_who_asks_it_to_go_on_gets_another_look_at_every_gap() -> None:

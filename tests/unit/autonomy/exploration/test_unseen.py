@@ -1,6 +1,7 @@
 """Which gap comes next, and when there is nothing more to be gained."""
 
 import numpy as np
+import pytest
 
 from gvgbot.autonomy.exploration.unseen import Unseen
 from gvgbot.geometry import Array
@@ -29,7 +30,7 @@ def test_the_nearest_comes_first_and_each_has_had_its_turn_before_one_is_tried_a
         None,
     ]
     assert unseen.is_done
-    assert unseen.left == 3
+    assert len(unseen.left) == 3
 
 
 def test_a_gap_that_has_moved_a_little_is_the_same() -> None:
@@ -37,7 +38,7 @@ def test_a_gap_that_has_moved_a_little_is_the_same() -> None:
     for _ in range(2):
         assert unseen.next(places(FAR), metres_to) is not None
     assert unseen.next(places([5.3, 0.4]), metres_to) is None
-    assert unseen.left == 1
+    assert len(unseen.left) == 1
 
 
 def test_without_walls_in_sight_it_ends_although_there_are_always_new_ones() -> None:
@@ -49,12 +50,29 @@ def test_without_walls_in_sight_it_ends_although_there_are_always_new_ones() -> 
     assert visits > 10
 
 
+@pytest.mark.parametrize(
+    ("count", "told"),
+    [
+        (0, ""),
+        (1, "(0.0, -0.3)"),
+        (3, "(0.0, -0.3), (-9.0, 0.0), (-18.0, 0.3)"),
+        (4, "(0.0, -0.3), (-9.0, 0.0), (-18.0, 0.3) and 1 more place"),
+        (9, "(0.0, -0.3), (-9.0, 0.0), (-18.0, 0.3) and 6 more places"),
+    ],
+)
+def test_the_first_places_are_told_of_one_by_one(count: int, told: str) -> None:
+    unseen = Unseen()
+    out_of_reach = places(*([-9.0 * i, 0.31 * i - 0.31] for i in range(count)))
+    assert unseen.next(out_of_reach, lambda _: None) is None
+    assert unseen.where == told
+
+
 def test_what_has_been_seen_after_all_is_not_complained_about() -> None:
     unseen = Unseen()
     unseen.next(places(FAR), metres_to)
     assert unseen.next(places(), metres_to) is None
     assert unseen.is_done
-    assert unseen.left == 0
+    assert len(unseen.left) == 0
     unseen.begin_anew()
     assert not unseen.is_done
 
