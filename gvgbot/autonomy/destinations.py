@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvgbot.autonomy.exploration.paths import Approach, shortest_paths
+from gvgbot.autonomy.exploration.paths import Approach, first_arrival, shortest_paths
 from gvgbot.autonomy.gvg.local import Branch
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.slam.graph import Edge, GvgGraph, HalfEdgeId
@@ -31,20 +31,16 @@ class Foot:
 
 @dataclass(frozen=True, slots=True)
 class Route:
-    """A way: to a vertex over these departures and on into the last one, or along one's own edge.
+    """A way: over these departures and on into the last one, or along one's own edge.
 
-    `ahead` tells which way along the own edge; None if the way leads over vertices.
+    `first` is the half-edge of arrival at the first vertex, or at the one that lies beyond the end
+    of the way; `ahead` tells which way along the own edge, None if the way leads over vertices.
     """
 
     metres: float
-    vertex: int
+    first: HalfEdgeId
     departures: tuple[HalfEdgeId, ...]
     ahead: bool | None = None
-
-    @property
-    def first(self) -> int:
-        """The first vertex on the way."""
-        return self.departures[0].vertex if self.departures else self.vertex
 
     def branches(self, here: Situation) -> tuple[Branch, ...] | None:
         """What to drive of it, as far as it is in sight."""
@@ -78,18 +74,29 @@ def foot_at(graph: GvgGraph, end: HalfEdgeId, station: float) -> Foot | None:
 def route_to_vertex(graph: GvgGraph, starts: list[Approach], vertex: int) -> Route | None:
     """The shortest way to a vertex; None if no known way leads there."""
     approach = shortest_paths(graph, starts).get(vertex)
-    return None if approach is None else Route(approach.metres, vertex, approach.departures)
+    if approach is None:
+        return None
+    return Route(approach.metres, first_arrival(starts, approach), approach.departures)
 
 
-def route_to_foot(here: Situation, starts: list[Approach], foot: Foot) -> Route | None:
-    """The shortest way to a point of an edge; None if no known way leads there."""
+def route_to_foot(
+    here: Situation, starts: list[Approach], foot: Foot, closed: HalfEdgeId | None = None
+) -> Route | None:
+    """The shortest way to a point of an edge; None if no known way leads there.
+
+    If something stands between the robot and an end of its edge, `closed`, the way to what lies
+    beyond that is by that end.
+    """
     edge, reached = foot.edge, shortest_paths(here.graph, starts)
     routes = []
     for end, rest in ((edge.a, foot.station), (edge.b, edge.length - foot.station)):
         approach, half = reached.get(end.vertex), here.graph.half_edge(end)
-        if approach is not None and half is not None and not half.blocked:
-            routes.append(Route(approach.metres + rest, end.vertex, (*approach.departures, end)))
+        if approach is not None and half is not None and (end == closed or not half.blocked):
+            first, departures = first_arrival(starts, approach), (*approach.departures, end)
+            routes.append(Route(approach.metres + rest, first, departures))
         if end == here.where.on_edge:
             onwards = rest - here.where.trail_length
-            routes.append(Route(abs(onwards), end.vertex, (), ahead=onwards > 0.0))
+            towards = edge.other(end) if onwards > 0.0 else end
+            if towards != closed:
+                routes.append(Route(abs(onwards), towards, (), ahead=onwards > 0.0))
     return min(routes, key=lambda route: route.metres, default=None)

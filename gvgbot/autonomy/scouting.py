@@ -4,7 +4,7 @@ import numpy as np
 
 from gvgbot.autonomy.control.edge_follower import Track
 from gvgbot.autonomy.control.orders import ARRIVED_M
-from gvgbot.autonomy.exploration.paths import shortest_paths
+from gvgbot.autonomy.exploration.paths import first_arrival, shortest_paths
 from gvgbot.autonomy.gvg.local import Branch
 from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.whereabouts import Situation
@@ -45,7 +45,8 @@ class Scouting:
 
     def path_near(self, here: Situation, belief: Belief, stamp: float) -> tuple[Branch, ...] | None:
         """To the vertices next to a frontier that no known way leads to: one may be seen there."""
-        approaches = shortest_paths(here.graph, here.starts())
+        starts = here.starts()
+        approaches = shortest_paths(here.graph, starts)
         lost = {end.vertex for end in here.graph.frontiers()} - approaches.keys()
         rest = sorted(approaches.keys() - self._gone_near)
         if not lost or not rest or len(self._gone_near) >= _MOST_NEAR:
@@ -59,8 +60,7 @@ class Scouting:
         if approach.metres < _AT_VERTEX_M:
             self._gone_near.add(nearest)
             return None
-        first = approach.departures[0].vertex if approach.departures else nearest
-        path = here.path_over(first, approach.departures)
+        path = here.path_over(first_arrival(starts, approach), approach.departures)
         if path is not None:
             self._since = stamp
         return path

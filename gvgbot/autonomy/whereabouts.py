@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from gvgbot.autonomy.exploration.access import Access
-from gvgbot.autonomy.exploration.paths import Approach, shortest_paths
+from gvgbot.autonomy.exploration.paths import Approach, first_arrival, shortest_paths
 from gvgbot.autonomy.gvg.local import Branch, LocalGvg, LocalNode, Place
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
 from gvgbot.autonomy.views import Correspondence
@@ -220,8 +220,11 @@ class Situation:
         """Where on the local GVG the robot is."""
         return self.access.place
 
-    def starts(self) -> list[Approach]:
-        """The first vertices that the robot can reach along the edge it is on."""
+    def starts(self, closed: HalfEdgeId | None = None) -> list[Approach]:
+        """The first vertices that the robot can reach along the edge it is on.
+
+        Not those that it would arrive at by a half-edge before which something stands.
+        """
         routes = self.gvg.routes(self.place)
         found = []
         for node, vertex in self.known.vertex_of.items():
@@ -232,9 +235,11 @@ class Situation:
             if not passed & self.known.vertex_of.keys():
                 arrival = self.known.half_edge_of.get(Branch(path[-1].edge, not path[-1].forward))
                 found.append(Approach(metres, arrival or HalfEdgeId(vertex, -1)))
-        return found + self._out_of_sight({a.arrival.vertex for a in found})
+        found += self._out_of_sight({a.arrival for a in found}, closed)
+        shut = () if closed is None else (closed, HalfEdgeId(closed.vertex, -1))
+        return [a for a in found if a.arrival not in shut]
 
-    def _out_of_sight(self, in_sight: set[int]) -> list[Approach]:
+    def _out_of_sight(self, in_sight: set[HalfEdgeId], closed: HalfEdgeId | None) -> list[Approach]:
         """The ends of the robot's edge that the local map no longer, or not yet, shows."""
         end = self.where.on_edge
         if end is None or self.graph.half_edge(end) is None:
@@ -243,16 +248,27 @@ class Situation:
         found = [Approach(driven, end)]
         edge = self.graph.edge_at(end)
         half = self.graph.half_edge(end)
-        if edge is not None and half is not None and not half.blocked:
+        if edge is not None and half is not None and (closed == end or not half.blocked):
             found.append(Approach(max(0.0, edge.length - driven), edge.other(end)))
-        return [a for a in found if a.arrival.vertex not in in_sight]
+        if self._loop_ends():
+            return [a for a in found if a.arrival not in in_sight]
+        vertices = {arrival.vertex for arrival in in_sight}
+        return [a for a in found if a.arrival.vertex not in vertices]
+
+    def _loop_ends(self) -> tuple[HalfEdgeId, ...]:
+        """The half-edges of the robot's edge if that comes back to its vertex."""
+        edge = None if self.where.on_edge is None else self.graph.edge_at(self.where.on_edge)
+        return (edge.a, edge.b) if edge is not None and edge.a.vertex == edge.b.vertex else ()
 
     def path_to(self, target: HalfEdgeId) -> tuple[Branch, ...] | None:
         """Branches to drive, as far as they are in sight, towards and into a frontier."""
         if self.where.on_edge == target:
             return self._extended((self._away_from(target),))
-        departures = self.departures_to(target)
-        return None if departures is None else self.path_over(departures[0].vertex, departures)
+        starts = self.starts()
+        approach = shortest_paths(self.graph, starts).get(target.vertex)
+        if approach is None:
+            return None
+        return self.path_over(first_arrival(starts, approach), (*approach.departures, target))
 
     def departures_to(self, target: HalfEdgeId) -> tuple[HalfEdgeId, ...] | None:
         """By which half-edges a frontier is reached, first vertex first; None without a way."""
@@ -260,13 +276,17 @@ class Situation:
         return None if approach is None else (*approach.departures, target)
 
     def path_over(
-        self, first: int, departures: tuple[HalfEdgeId, ...]
+        self, arrival: HalfEdgeId, departures: tuple[HalfEdgeId, ...]
     ) -> tuple[Branch, ...] | None:
-        """Branches to drive, as far as they are in sight, to a vertex and on over departures."""
-        path = self._to_vertex(first)
+        """Branches to drive, as far as they are in sight, to a vertex and on over departures.
+
+        It arrives there by a half-edge.
+        """
+        path = self._to_end(arrival)
         if path is None:
             return None
-        for departure in departures if first in self.known.node_of else ():
+        is_in_sight = self.gvg.end_of(path[-1]) == self.known.node_of.get(arrival.vertex)
+        for departure in departures if is_in_sight else ():
             branch = self.known.branch_of.get(departure)
             if branch is None:
                 break
@@ -311,20 +331,20 @@ class Situation:
         back = self._back()
         return Branch(back.edge, not back.forward)
 
-    def _to_vertex(self, vertex: int) -> tuple[Branch, ...] | None:
-        node = self.known.node_of.get(vertex)
+    def _to_end(self, arrival: HalfEdgeId) -> tuple[Branch, ...] | None:
+        """To a vertex, by its half-edge if both ways along the robot's edge lead there."""
+        node = self.known.node_of.get(arrival.vertex)
         if node is not None:
-            found = self.gvg.routes(self.place).get(node)
-            return None if found is None else found[1]
-        end = self.where.on_edge
-        if end is not None and end.vertex == vertex and not self._is_round(end):
-            return self.astern()
-        return self.ahead()
+            _, path = self.gvg.routes(self.place).get(node, (0.0, ()))
+            end = self._end_of(path)
+            if arrival not in self._loop_ends() or arrival == end:
+                return path or None
+        return self.astern() if arrival == self.where.on_edge else self.ahead()
 
-    def _is_round(self, end: HalfEdgeId) -> bool:
-        """Whether the robot's edge comes back to its vertex, and that is nearer than going back."""
-        starts = [a for a in self._out_of_sight(set()) if a.arrival.vertex == end.vertex]
-        return min(starts, key=lambda a: a.metres, default=Approach(0.0, end)).arrival != end
+    def _end_of(self, path: tuple[Branch, ...]) -> HalfEdgeId | None:
+        """The half-edge that a path arrives by, if that is known."""
+        last = path[-1] if path else None
+        return last and self.known.half_edge_of.get(Branch(last.edge, not last.forward))
 
     def _extended(self, path: tuple[Branch, ...]) -> tuple[Branch, ...]:
         """The path and on through points that are no vertices, to the end of what is in sight."""

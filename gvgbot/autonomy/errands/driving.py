@@ -28,7 +28,6 @@ from gvgbot.autonomy.exploration.access import (
 )
 from gvgbot.autonomy.exploration.certainty import robot_sigma
 from gvgbot.autonomy.exploration.config import ExplorationConfig
-from gvgbot.autonomy.exploration.paths import Approach
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.mission import Mission
 from gvgbot.autonomy.slam.graph import HalfEdgeId
@@ -92,8 +91,7 @@ class Driving:
         self._mapper = ground.mapper
         self.happened: list[Event] = []  # whoever tells of it takes it out
         self._began: float | None = None  # stamp
-        self._avoid: tuple[frozenset[HalfEdgeId], int] | None = None  # not that way on that edge
-        self._heading: int | None = None  # the first vertex on the way
+        self._closed: HalfEdgeId | None = None  # something stands between it and the robot
         self._route: Route | None = None  # that is being driven
         self._nearest_m = math.inf  # that has been left of it
         self._looks = 0
@@ -154,14 +152,16 @@ class Driving:
     def _close_way(self, view: View) -> Ended | None:
         """Something stands in the way: try another one, if there is one."""
         route, on_edge = self._route, self._ground.mission.where.on_edge
-        if route is not None and route.departures and self._ground.is_at(view, route.first):
+        if route is not None and route.departures and self._ground.is_at(view, route.first.vertex):
             end = route.departures[0]
             edge = self._mapper.graph.edge_at(end)
-            return self._close(view, end, None if edge is None else edge.other(end).vertex)
-        return self._close(view, on_edge, self._heading)
+            return self._close(view, end, None if edge is None else edge.other(end))
+        return self._close(view, on_edge, None if route is None else route.first)
 
-    def _close(self, view: View, end: HalfEdgeId | None, heading: int | None) -> Ended | None:
-        """Drive an edge no more, and not to that vertex if the robot is on it."""
+    def _close(
+        self, view: View, end: HalfEdgeId | None, heading: HalfEdgeId | None
+    ) -> Ended | None:
+        """Drive an edge no more, and not to that end of it if the robot is on it."""
         self._is_obstructed, self._progress, self._unseen = False, view.stamp, 0
         self._nearest_m = math.inf
         graph = self._mapper.graph
@@ -170,7 +170,7 @@ class Driving:
         halves = [half for end in ends if (half := graph.half_edge(end)) is not None]
         if heading is None or all(half.blocked for half in halves):
             return Ended("given up", "something stands in the way")
-        self._avoid = frozenset(ends), heading
+        self._closed = heading
         until = view.stamp + self.config.remember_blocked_s
         self._ground.closures.close(graph, ends, until)
         self.happened.append(Recovery(view.stamp, "try another way", "something stands in the way"))
@@ -197,13 +197,6 @@ class Driving:
         bearing = half.bearing + local_vertex.theta
         turns = [abs(wrap_angle(math.atan2(dy, dx) - bearing)) for dx, dy in ways]
         return min(turns) > _THROUGH_RAD
-
-    def _starts(self, here: Situation) -> list[Approach]:
-        """Where ways begin, without the one that something stands in."""
-        starts = here.starts()
-        if self._avoid is None or here.where.on_edge not in self._avoid[0]:
-            return starts
-        return [start for start in starts if start.arrival.vertex != self._avoid[1]]
 
     # -- the kinds of stops ------------------------------------------------------------------------
 
@@ -235,7 +228,7 @@ class Driving:
             return Ended("arrived", f"vertex {vertex}")
         if here is None:
             return self._find_edge(view, waited)
-        route = route_to_vertex(graph, self._starts(here), vertex)
+        route = route_to_vertex(graph, here.starts(self._closed), vertex)
         return self._drive(view, here, route, waited, there if node is None else None)
 
     def _past(
@@ -248,7 +241,7 @@ class Driving:
             return Ended("arrived", "")
         if here is None:
             return self._find_edge(view, waited)
-        route = route_to_foot(here, self._starts(here), foot)
+        route = route_to_foot(here, here.starts(self._closed), foot, self._closed)
         if route is not None and route.metres < _PAST_M:
             return Ended("arrived", "")
         return self._drive(view, here, route, waited)
@@ -266,7 +259,7 @@ class Driving:
         if away < DIRECT_M:
             way = straight_way(view, local_goal, room_m) or bent_way(view, local_goal, room_m)
         if way is not None and waited < self.config.look_around_s:
-            self._heading = self._route = None
+            self._route = None
             return Drive(Track.of(*way))
         foot = foot_of(self._mapper, goal)
         if foot is None:
@@ -279,7 +272,7 @@ class Driving:
             return Ended("given up", f"the way is not free; it stands {short}")
         if here is None:
             return self._find_edge(view, waited)
-        route = route_to_foot(here, self._starts(here), foot)
+        route = route_to_foot(here, here.starts(self._closed), foot, self._closed)
         return self._drive(view, here, route, waited, at_foot)
 
     # -- on the way --------------------------------------------------------------------------------
@@ -295,11 +288,11 @@ class Driving:
         """Along a route, to its end or to a point of it (2,), local frame."""
         if route is None:
             return Ended("given up", "no known way leads there")
-        self._heading, self._route = route.first, route
+        self._route = route
         next_one = next(iter(route.departures), None)
         is_missing = (
             next_one is not None
-            and self._ground.is_at(view, route.first)
+            and self._ground.is_at(view, route.first.vertex)
             and self._is_missing(view, here, next_one)
         )
         self._unseen = self._unseen + 1 if is_missing else 0
@@ -327,7 +320,7 @@ class Driving:
 
     def _find_edge(self, view: View, waited: float) -> Order | Ended:
         """Off the graph: go to the nearest edge, or look around for one."""
-        self._heading = self._route = None
+        self._route = None
         way = way_to_edge(view)
         if way is not None and waited < self.config.look_around_s:
             return Drive(Track.of(*way))

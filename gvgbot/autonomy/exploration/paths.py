@@ -15,6 +15,13 @@ class Approach:
     departures: tuple[HalfEdgeId, ...] = ()
 
 
+def first_arrival(starts: list[Approach], approach: Approach) -> HalfEdgeId:
+    """The half-edge of arrival at the first vertex of the shortest approach from these starts."""
+    first = (*approach.departures, approach.arrival)[0].vertex
+    nearest = min((s for s in starts if s.arrival.vertex == first), key=lambda s: s.metres)
+    return nearest.arrival
+
+
 def shortest_paths(graph: GvgGraph, starts: list[Approach]) -> dict[int, Approach]:
     """The shortest approach to every vertex that can be reached, from one or more first arrivals.
 

@@ -6,7 +6,9 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
+from gvgbot.autonomy.destinations import foot_at, route_to_foot
 from gvgbot.autonomy.exploration.access import Access
+from gvgbot.autonomy.exploration.paths import first_arrival, shortest_paths
 from gvgbot.autonomy.gvg.local import Branch, LocalGvg
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex
 from gvgbot.autonomy.views import Correspondence
@@ -428,4 +430,78 @@ def test_round_an_edge_that_comes_back_to_its_vertex_it_goes_on_if_that_is_neare
     where = Whereabouts(a, list(resampled([*ring[:3], (6.0, 4.0)])))
     base = Pose(6.0, 4.0, math.pi)
     here = Situation(piece, Correspondence(), graph, where, Access(place), base)
-    assert here.path_over(1, ()) == (Branch(10, forward=not is_ahead),)
+    (approach,) = shortest_paths(graph, here.starts()).values()
+    first = first_arrival(here.starts(), approach)
+    assert here.path_over(first, ()) == (Branch(10, forward=not is_ahead),)
+
+
+def blocked_corridor() -> Situation:
+    """Four metres from vertex 1, which is in sight; the edge is closed for a while."""
+    only_first = known_as({Branch(10, forward=True): HalfEdgeId(1, EAST)}, {1: 1})
+    here = situation(4.0, only_first)
+    for end in (HalfEdgeId(1, EAST), HalfEdgeId(2, WEST)):
+        here.graph.vertices[end.vertex].half_edges[end.key].blocked = True
+    return here
+
+
+@pytest.mark.parametrize(
+    ("closed", "left"),
+    [(HalfEdgeId(1, EAST), HalfEdgeId(2, WEST)), (HalfEdgeId(2, WEST), HalfEdgeId(1, EAST))],
+)
+def test_who_meets_something_can_go_to_the_other_end_of_its_edge_in_sight_or_not(
+    closed: HalfEdgeId, left: HalfEdgeId
+) -> None:
+    assert [start.arrival for start in blocked_corridor().starts(closed)] == [left]
+
+
+def on_a_ring(*, is_in_sight: bool) -> Situation:
+    """Three metres past the only vertex of a ring of 28 m, all of which may be in sight."""
+    graph, vertex = GvgGraph(), Vertex(1, 1.0, Pose(), 0.0, 0.0)
+    graph.vertices[1] = vertex
+    a, b = (HalfEdgeId(1, vertex.add_half_edge(bearing)) for bearing in (0.0, math.pi / 2))
+    graph.join(a, b, np.array(resampled(LOOP)), 0.8, driven=True)
+    known = known_as({}, {})
+    if is_in_sight:
+        ends = {Branch(10, forward=True): a, Branch(10, forward=False): b}
+        known = known_as(ends, {1: 1})
+    ring = drawn({1: (0.0, 0.0)}, {10: (1, 1, LOOP[1:-1])})
+    place = ring.place(np.array([3.0, 0.0]))
+    assert place is not None
+    where = Whereabouts(a, list(resampled([(0.0, 0.0), (3.0, 0.0)])))
+    return Situation(ring, known, graph, where, Access(place), Pose(3.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("is_in_sight", [True, False])
+@pytest.mark.parametrize(("key", "metres"), [(0, 3.0), (1, 25.0)])
+def test_round_a_ring_one_comes_to_its_vertex_either_way(
+    key: int, metres: float, *, is_in_sight: bool
+) -> None:
+    here, closed = on_a_ring(is_in_sight=is_in_sight), HalfEdgeId(1, 1 - key)
+    (start,) = here.starts(closed)
+    assert start.arrival == HalfEdgeId(1, key)
+    assert start.metres == pytest.approx(metres, abs=0.2)
+    path = here.path_over(start.arrival, ())
+    assert path is not None
+    line, _ = here.gvg.line_from(here.place, path)
+    assert length_of(line) == pytest.approx(metres, abs=0.2)
+
+
+@pytest.mark.parametrize(("station", "key"), [(1.0, 0), (5.0, 1)])
+def test_the_way_to_a_point_of_a_ring_is_the_shorter_one_and_the_other_one_if_that_is_closed(
+    station: float, key: int
+) -> None:
+    """To a point behind the robot, and to one ahead of it; the way tells where it leads."""
+    here = on_a_ring(is_in_sight=True)
+    foot = foot_at(here.graph, HalfEdgeId(1, 0), station)
+    assert foot is not None
+    towards = HalfEdgeId(1, key)
+    route = route_to_foot(here, here.starts(), foot)
+    assert route is not None
+    assert route.metres == pytest.approx(abs(station - 3.0), abs=0.2)
+    assert route.first == towards
+    for half in here.graph.vertices[1].half_edges.values():
+        half.blocked = True
+    around = route_to_foot(here, here.starts(towards), foot, towards)
+    assert around is not None
+    assert around.metres == pytest.approx(28.0 - abs(station - 3.0), abs=0.2)
+    assert (around.first, around.departures) == (HalfEdgeId(1, 1 - key), (towards,))

@@ -1,0 +1,124 @@
+"""Somebody stands in a corridor that is too narrow to pass, and the robot takes another way."""
+
+import math
+from collections.abc import Awaitable, Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gvgbot.clock import Clock
+from gvgbot.config import TwinConfig
+from gvgbot.drivers.kobuki.twin import KobukiTwinConfig
+from gvgbot.drivers.people import Walkways
+from gvgbot.geometry import Pose
+from gvgbot.simulation import Place
+from gvgbot.worlds.canvas import Canvas
+from tests.twin.run_rig import Daemon
+
+pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(300)]
+
+START = Pose(3.5, 2.1, 0.2)
+RING = [(2.0, 2.0), (9.0, 2.0), (9.0, 7.0), (2.0, 7.0), (2.0, 2.0)]
+SOUTH, NORTH = (5.5, 2.0), (5.5, 7.0)  # the ends of a bar across the ring
+EAST = (9.0, 4.5)
+NEAR = 0.3  # m
+REMEMBERED = 60.0  # s
+
+Point = tuple[float, float]  # m, world frame
+
+
+class Walker:
+    """A robot that has explored, somebody who can be put in its way, and what it has driven."""
+
+    def __init__(self, out: Path, paths: list[list[Point]]) -> None:
+        canvas = Canvas(11.0, 9.0)
+        for path in paths:
+            canvas.carve_path(path, 1.0)
+        world = canvas.world("ring")
+        twin = TwinConfig(people=1, base=KobukiTwinConfig(odometry="perfect"))
+        self.daemon = Daemon(out, Place(world, START, Walkways(world, START)), twin=twin)
+        self.pipeline = self.daemon.session.pipeline
+        exploration = replace(self.daemon.config.exploration, remember_blocked_s=REMEMBERED)
+        self.pipeline.errands.configure(exploration)
+
+    def put_person(self, x: float, y: float) -> None:
+        assert self.daemon.session.simulation is not None
+        people = self.daemon.session.simulation.body._people
+        assert people is not None
+        people._people[0].stands_until = math.inf
+        people.centres[0] = (x, y)
+
+    def tell(self, story: Callable[[Clock], Awaitable[None]]) -> None:
+        """Explore alone, and go on with a story."""
+
+        async def all_of_it(clock: Clock) -> None:
+            await clock.sleep_until(clock.now() + 0.5)
+            self.put_person(1000.0, 1000.0)
+            while self.pipeline.mission.outcome is None:
+                await clock.sleep_until(clock.now() + 0.2)
+            await story(clock)
+
+        with self.daemon.session.directory:
+            self.daemon.run(all_of_it)
+        assert self.daemon.session.simulation is not None
+        assert self.daemon.session.simulation.body.contacts == 0
+
+    async def go(self, clock: Clock, place: Point) -> float:
+        """Drive to the vertex that is there, or to the point; metres driven."""
+        begin, belief = self.pipeline.travelled, self.pipeline.mapper.belief
+        point = START.inverse().transform(np.array(place))
+        off = {v: math.dist(belief.map_vertex(v).position, point) for v in belief.ids}
+        vertex = min(off, key=off.__getitem__)
+        x, y = point.tolist()
+        where = {"vertex": vertex} if off[vertex] < NEAR else {"x": x, "y": y}
+        answer = await self.daemon.network.ask("goto", **where)
+        assert answer.done, answer.text
+        while self.pipeline.errands.errand is not None:
+            await clock.sleep_until(clock.now() + 0.2)
+        await clock.sleep_until(clock.now() + 1.0)
+        here = self.daemon.place
+        assert math.dist((here.x, here.y), place) < NEAR
+        return self.pipeline.travelled - begin
+
+
+def test_who_cannot_go_back_goes_on_to_an_end_of_the_corridor_that_is_out_of_sight(
+    tmp_path: Path,
+) -> None:
+    """From the middle of the east side, 6 m from either end of the bar, which is 5 m long."""
+    walker = Walker(tmp_path / "run", [RING, [SOUTH, NORTH]])
+    driven: list[float] = []
+
+    async def story(clock: Clock) -> None:
+        await walker.go(clock, SOUTH)
+        await walker.go(clock, EAST)
+        walker.put_person(9.0, 2.8)
+        driven.append(await walker.go(clock, SOUTH))
+
+    walker.tell(story)
+    assert 11.0 - 2 * NEAR < driven[0] < 11.0 + 4.0  # and to the person and back
+
+
+def test_on_a_ring_that_comes_back_to_its_only_vertex_the_other_way_round_is_taken(
+    tmp_path: Path,
+) -> None:
+    """24 m around, the vertex is anywhere, and somebody stands on the shorter way."""
+    walker = Walker(tmp_path / "run", [RING])
+    driven: list[float] = []
+
+    async def story(clock: Clock) -> None:
+        belief = walker.pipeline.mapper.belief
+        (vertex,) = belief.ids
+        x, y = START.transform(belief.map_vertex(vertex).position).tolist()
+        assert math.dist((x, y), (4.0, 2.0)) < 1.0
+        await walker.go(clock, (x, y))
+        walker.put_person(6.5, 2.0)
+        driven.append(await walker.go(clock, EAST))
+        await clock.sleep_until(clock.now() + REMEMBERED)
+        walker.put_person(9.0, 2.8)
+        driven.append(await walker.go(clock, (x, y)))
+
+    walker.tell(story)
+    for metres in driven:
+        assert 24.0 - 8.5 < metres < 24.0 - 6.5 + 4.0  # and to the person and back
