@@ -54,7 +54,9 @@ HEAD = """\
 A configuration is a YAML file with any of these keys; what it leaves out has its default, which
 suits a TurtleBot 2. `--set key=value` overrides a key on the command line, and `summary.json` of
 a run has all of them as they were. A key that does not exist, a value of the wrong type or one
-out of range stops the program, which lists all such mistakes at once.
+out of range stops the program, which lists all such mistakes at once. Devices are simulated unless
+`twin.enabled` is `false`; `gvgbot run` warns if the file it is given says nothing about that, as
+one does that a power cut has emptied.
 
 ```yaml
 robot:

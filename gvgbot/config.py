@@ -18,7 +18,7 @@ from gvgbot.names import is_robot_name
 from gvgbot.ranges import Range
 from gvgbot.recording.config import RecordingConfig
 from gvgbot.ros2.config import Ros2Config
-from gvgbot.strict_yaml import load, load_text, packaged
+from gvgbot.strict_yaml import has_section, load, load_text, packaged
 from gvgbot.team.member import TeamConfig
 from gvgbot.team.troubles import TroublesConfig
 from gvgbot.topics import TelemetryConfig
@@ -100,6 +100,16 @@ def load_config(path: Path | None = None, overrides: Sequence[str] = ()) -> Conf
     Raises ConfigError that lists every mistake of the file and of the overrides (`a.b=c`).
     """
     return load(Config, packaged(DEFAULT if path is None else path), overrides)
+
+
+def doubt_of_devices(path: Path | None, overrides: Sequence[str] = ()) -> str:
+    """Why somebody may not have meant the devices to be simulated: a file that tells nothing of it.
+
+    Empty if there is no reason to doubt.
+    """
+    if path is None or has_section("twin", packaged(path), overrides):
+        return ""
+    return f"{path} has no section twin, where enabled: false stands for real devices"
 
 
 def config_in(text: str, source: str, overrides: Sequence[str] = ()) -> Config:

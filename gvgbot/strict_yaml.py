@@ -48,6 +48,12 @@ def load_text(cls: type[T], text: str, source: str, overrides: Sequence[str] = (
     return _loaded(cls, content, lines, source, overrides)
 
 
+def has_section(name: str, path: Path, overrides: Sequence[str] = ()) -> bool:
+    """Whether a file or an override says anything in a section."""
+    content, _ = _read(path)
+    return bool(content.get(name)) or any(one.strip().startswith(f"{name}.") for one in overrides)
+
+
 def _loaded(
     cls: type[T],
     content: dict[Any, Any],

@@ -34,12 +34,13 @@ def add_run(commands: Commands) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from gvgbot.config import load_config
+    from gvgbot.config import doubt_of_devices, load_config
 
     config = load_config(options.config, options.overrides)
+    doubt = doubt_of_devices(options.config, options.overrides)
     from gvgbot import daemon
 
-    return daemon.run(config, out=options.out, known=options.map, anew=options.new)
+    return daemon.run(config, out=options.out, known=options.map, anew=options.new, doubt=doubt)
 
 
 def add_install_service(commands: Commands) -> None:

@@ -136,6 +136,17 @@ def test_a_running_robot_is_watched_asked_and_stopped(
     assert "Traceback" not in log
 
 
+def test_a_configuration_that_was_cut_short_is_said_to_tell_of_no_devices(tmp_path: Path) -> None:
+    """After a power cut, say. A robot that stands is a riddle to who does not know of the twins."""
+    (tmp_path / "robot.yaml").write_text("")
+    with gvgbot("run", "robot.yaml", "--set", "telemetry.enabled=false", cwd=tmp_path) as process:
+        assert process.stdout is not None
+        line = next(line for line in process.stdout if "simulated" in line)
+    assert "warning" in line
+    assert "robot.yaml has no section twin" in line
+    assert "enabled: false" in line
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_simulated_exploration_that_is_stopped_leaves_its_map(
     number: signal.Signals, tmp_path: Path

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from gvgbot.config import Config, load_config
+from gvgbot.config import Config, doubt_of_devices, load_config
 from gvgbot.errors import ConfigError
 from gvgbot.strict_yaml import as_mapping, packaged
 
@@ -87,3 +87,20 @@ def test_the_defaults_are_within_their_own_ranges() -> None:
         text.replace("True", "true").replace("False", "false") for text in settings(mapping)
     ]
     assert as_mapping(load_config(None, overrides))["autonomy"] == mapping["autonomy"]
+
+
+@pytest.mark.parametrize(
+    "text", ["", "# base: {port: /dev/base}\n", "base:\n", "base: {}\ntwin:\n"]
+)
+def test_a_file_that_does_not_tell_twins_from_devices_is_doubted(text: str, tmp_path: Path) -> None:
+    path = tmp_path / "robot.yaml"
+    path.write_text(text)
+    assert load_config(path).twin.enabled
+    assert "robot.yaml" in doubt_of_devices(path)
+    assert doubt_of_devices(path, ["twin.seed=3"]) == ""
+
+
+def test_who_asks_for_twins_or_for_no_file_is_not_doubted(tmp_path: Path) -> None:
+    path = tmp_path / "robot.yaml"
+    path.write_text("twin: {world: ring}")
+    assert [doubt_of_devices(one) for one in (None, path, Path("sim.yaml"))] == [""] * 3
