@@ -47,21 +47,25 @@ class Wanted:
 def replay(wanted: Wanted, say: Callable[[str], None], *, out: Path | None) -> int:
     """Map a log again, say where the map is, and return the exit status.
 
+    An error leaves no run in the way of the next attempt; Ctrl-C leaves what there is by then.
     Raises UsageError for a log or directory that cannot be used, ConfigError.
     """
     log = open_log(wanted)
     with (
         RunDirectory.create(out, world=log.title) as directory,
         directory.told_if_interrupted(say),
+        directory.emptied_by_failure(),
     ):
         session = Session(log.config, directory, place=None, led=log.led)
         session.title, session.failure = log.title, "interrupted"
         try:
             for _, message in log.messages:
                 take(session, message)
-            session.failure = None
-        finally:
+        except KeyboardInterrupt:
             session.save()
+            raise
+        session.failure = None
+        session.save()
     for line in conclusion(session, log):
         say(line)
     return 0

@@ -110,6 +110,21 @@ class RunDirectory:
                     say("\n".join(self.whereabouts))
             raise
 
+    @contextlib.contextmanager
+    def emptied_by_failure(self) -> Iterator[None]:
+        """Remove what was written if an error ends the work on it, and nothing else."""
+        before = set(self.path.iterdir()) - {self.path / EVENTS}
+        try:
+            yield
+        except Exception:
+            self.close()
+            with contextlib.suppress(OSError):  # the first error is the one to tell
+                for path in set(self.path.iterdir()) - before:
+                    path.unlink()
+                if not before:
+                    self.path.rmdir()
+            raise
+
     def close(self) -> None:
         """No more events."""
         self._events.close()

@@ -101,6 +101,23 @@ def test_a_bad_log_is_one_line_and_no_run(
     assert not (tmp_path / "run").exists()
 
 
+def test_a_replay_that_fails_leaves_what_was_there_before_and_nothing_else(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The map cannot be written: something is in the place of its picture."""
+    write_log(tmp_path / "ring.log", drive()[:70])
+    words = ["replay", str(tmp_path / "ring.log"), "--out", str(tmp_path / "run")]
+    (tmp_path / "run" / "map.png" / "mine").mkdir(parents=True)
+    for _ in range(2):
+        assert main(words) == 1
+        (line,) = capsys.readouterr().err.splitlines()
+        assert "map.png" in line
+        assert [path.name for path in (tmp_path / "run").iterdir()] == ["map.png"]
+    (tmp_path / "run" / "map.png" / "mine").rmdir()
+    (tmp_path / "run" / "map.png").rmdir()
+    assert main(words) == 0
+
+
 def test_a_speed_is_for_what_is_served(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["replay", str(tmp_path / "run.mcap"), "--speed", "5"]) == 2
     assert "--serve" in capsys.readouterr().err
