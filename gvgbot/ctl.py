@@ -1,5 +1,6 @@
 """One request to a robot from the command line: what it says, or why it will not."""
 
+import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TypeVar
@@ -67,7 +68,7 @@ def _asker(request: str, arguments: Sequence[str]) -> Callable[[Robot], Asking]:
             number = _number(int, vertex, "the id of a vertex")
             return lambda robot: robot.goto(number)
         case "goto", [x, y]:
-            point = _number(float, x, "a number"), _number(float, y, "a number")
+            point = _number(_metres, x, "a number"), _number(_metres, y, "a number")
             return lambda robot: robot.goto(*point)
         case "patrol", words:
             vertices = [_number(int, word, "the id of a vertex") for word in words]
@@ -93,6 +94,13 @@ def _number(kind: Callable[[str], Number], text: str, allowed: str) -> Number:
         return kind(text)
     except ValueError as error:
         raise UsageError(f"{text!r} must be {allowed}") from error
+
+
+def _metres(text: str) -> float:
+    """Raises ValueError for what is no number; nan is that by its name."""
+    if math.isnan(metres := float(text)):
+        raise ValueError(text)
+    return metres
 
 
 def _value(text: str) -> bool | float | str:

@@ -27,8 +27,6 @@ _LONGEST_KEY = 100  # characters
 _FARTHEST_M = 1e5
 _MOST_VERTICES = 1000
 
-Metres = Annotated[float, msgspec.Meta(ge=-_FARTHEST_M, le=_FARTHEST_M)]
-
 
 class Nothing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """No arguments."""
@@ -40,8 +38,8 @@ class Goto(
     """Where to drive: to a vertex, or to a point; one of both."""
 
     vertex: int | None = None  # its id
-    x: Metres | None = None  # m, map frame
-    y: Metres | None = None  # m, map frame
+    x: float | None = None  # m, map frame
+    y: float | None = None  # m, map frame
 
     def __post_init__(self) -> None:
         """Raises ValueError unless it is one place."""
@@ -125,8 +123,19 @@ def parse(name: str, data: bytes, encoding: str) -> Arguments:
         data, encoding = b"{}", JSON
     decode = msgspec.json.decode if encoding.startswith(JSON) else msgspec.msgpack.decode
     try:
-        return decode(data, type=kind_of(name))
+        arguments = decode(data, type=kind_of(name))
     except (msgspec.MsgspecError, RecursionError) as error:
         is_known = encoding.startswith((JSON, MESSAGEPACK))
         guess = "" if is_known else f", taken for {MESSAGEPACK} (its encoding does not say {JSON})"
         raise ValueError(f"wrong arguments of {name}{guess}: {error}") from error
+    if isinstance(arguments, Goto):
+        _check_near(arguments)
+    return arguments
+
+
+def _check_near(goal: Goto) -> None:
+    """Raises ValueError for a coordinate that is no number, or that of no building."""
+    for axis, metres in (("x", goal.x), ("y", goal.y)):
+        if metres is not None and not abs(metres) <= _FARTHEST_M:  # what is no number is never so
+            allowed = f"a number from {-_FARTHEST_M:.0f} to {_FARTHEST_M:.0f}"
+            raise ValueError(f"wrong arguments of goto: {axis} is {metres:g}, must be {allowed}")

@@ -45,6 +45,7 @@ def test_a_value_is_a_number_or_a_truth_or_text(text: str, value: object) -> Non
         (["goto"], "goto needs a vertex, or x and y"),
         (["goto", "seven"], "'seven' must be the id of a vertex"),
         (["goto", "1", "east"], "'east' must be a number"),
+        (["goto", "1", "nan"], "'nan' must be a number"),
         (["goto", "1", "2", "3"], "goto needs"),
         (["patrol", "1", "east"], "'east' must be the id of a vertex"),
         (["coverage", "1"], "coverage takes no arguments"),

@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import math
 
 import msgspec
 import pytest
@@ -112,6 +113,19 @@ def test_a_point_is_a_number_within_reason(x: float) -> None:
     else:
         with pytest.raises(ValueError, match="wrong arguments"):
             parse("goto", data, MESSAGEPACK)
+
+
+@pytest.mark.parametrize("axis", ["x", "y"])
+@pytest.mark.parametrize(
+    ("metres", "says"), [(math.nan, "nan"), (math.inf, "inf"), (-2e5, "-200000")]
+)
+def test_which_coordinate_is_no_number_is_said_in_words(
+    axis: str, metres: float, says: str
+) -> None:
+    data = msgspec.msgpack.encode({"x": 0.0, "y": 0.0, axis: metres})
+    words = f"wrong arguments of goto: {axis} is {says}, must be a number from -100000 to 100000"
+    with pytest.raises(ValueError, match=f"^{words}$"):
+        parse("goto", data, MESSAGEPACK)
 
 
 @pytest.mark.parametrize(
