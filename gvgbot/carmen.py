@@ -25,6 +25,7 @@ from gvgbot.hal.messages import Odometry, Scan
 from gvgbot.recording import Lived
 
 _GZIP = b"\x1f\x8b"
+_BEGINNING = 64  # bytes, in which what is no text has a zero
 _TAIL = 9  # words of a FLASER line after the ranges
 _ODOM_WORDS = 10
 _LARGEST = 1e10  # m, rad or s since 1970; what is beyond comes of a damaged line
@@ -57,7 +58,7 @@ def read_carmen(path: Path, *, no_echo_m: float, base_laser: Pose) -> CarmenLog:
     odometry, scans, damaged = list[Odometry](), list[Scan](), 0
     for line in _lines(path):
         try:
-            match line.split():
+            match _words(line):
                 case ["ODOM", *words]:
                     odometry.append(_odometry(words))
                 case ["FLASER", *words]:
@@ -99,7 +100,9 @@ def _lines(path: Path) -> Iterator[str]:
         with path.open("rb") as file:
             packed = file.read(len(_GZIP)) == _GZIP
         with gzip.open(path) if packed else path.open("rb") as file:
-            yield from (_text(path, line) for line in file)
+            if b"\0" in file.peek(_BEGINNING)[:_BEGINNING]:
+                raise UsageError(f"{path} is neither a recording (MCAP) nor a CARMEN log")
+            yield from (line.decode(errors="replace") for line in file)
     except EOFError:
         yield "ODOM"
     except (OSError, zlib.error) as error:
@@ -107,10 +110,11 @@ def _lines(path: Path) -> Iterator[str]:
         raise UsageError(f"cannot read {path}: {reason}") from error
 
 
-def _text(path: Path, line: bytes) -> str:
-    if b"\0" in line:
-        raise UsageError(f"{path} is neither a recording (MCAP) nor a CARMEN log")
-    return line.decode(errors="replace")
+def _words(line: str) -> list[str]:
+    """Raises ValueError for a line with a zero in it, as a power cut leaves it."""
+    if "\0" in line:
+        raise ValueError(line)
+    return line.split()
 
 
 def _odometry(words: list[str]) -> Odometry:

@@ -3,6 +3,7 @@
 import gzip
 import itertools
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -63,6 +64,19 @@ def test_a_sweep_covers_half_a_circle_from_the_right(
 def test_a_damaged_line_is_counted_and_passed_over(line: str, tmp_path: Path) -> None:
     log = read(written(tmp_path / "a.log", line, FLASER))
     assert (len(log.scans), len(log.odometry), log.damaged) == (1, 1, 1)
+
+
+@pytest.mark.parametrize("pack", [bytes, gzip.compress], ids=["plain", "packed"])
+@pytest.mark.parametrize(
+    "line", [ODOM.replace("0.5", "0.\0"), ODOM + "\0", "\0\0\0" + ODOM, "\0" * 5000]
+)
+def test_a_line_with_a_zero_in_it_is_one_of_the_damaged(
+    line: str, pack: Callable[[bytes], bytes], tmp_path: Path
+) -> None:
+    """Such as the disk had not written when the power was cut; the rest is as good as ever."""
+    path = tmp_path / "a.log"
+    path.write_bytes(pack("\n".join([FLASER, line, FLASER]).encode()))
+    assert (len(read(path).scans), len(read(path).odometry), read(path).damaged) == (2, 2, 1)
 
 
 def test_lines_that_come_late_are_put_in_order(tmp_path: Path) -> None:
