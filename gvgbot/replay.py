@@ -8,7 +8,7 @@ from pathlib import Path
 from gvgbot.autonomy.loop import Cycle
 from gvgbot.carmen import messages, read_carmen
 from gvgbot.config import Config, config_in, load_config
-from gvgbot.errors import UsageError
+from gvgbot.errors import ConfigError, UsageError
 from gvgbot.geometry import Pose
 from gvgbot.hal.messages import Scan
 from gvgbot.maps.picture import counts
@@ -116,8 +116,7 @@ def _recording(wanted: Wanted) -> Log:
         from gvgbot.recording.reader import Recording
     recording = Recording(wanted.path)
     if wanted.config is None:
-        source = f"the configuration in {wanted.path}"
-        config = config_in(recording.about.config, source, wanted.overrides)
+        config = _recorded_config(recording.about.config, wanted)
     else:
         config = load_config(wanted.config, wanted.overrides)
 
@@ -131,6 +130,18 @@ def _recording(wanted: Wanted) -> Log:
         return [f"but:     {flaw}" for flaw, is_there in found.items() if is_there]
 
     return Log(recording.about.title, config, recording.messages(), False, flaws)
+
+
+def _recorded_config(text: str, wanted: Wanted) -> Config:
+    """Raises ConfigError that says what to do about a recording of which nobody can change it."""
+    source = f"the configuration in {wanted.path}"
+    try:
+        return config_in(text, source, wanted.overrides)
+    except ConfigError as error:
+        if source not in str(error):
+            raise
+        hint = "--config FILE replays it with another one, such as that of the robot"
+        raise ConfigError(f"{error}\n{hint}") from error
 
 
 def _carmen(wanted: Wanted) -> Log:

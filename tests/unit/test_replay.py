@@ -9,6 +9,8 @@ import pytest
 from gvgbot.cli import main
 from gvgbot.geometry import Array, Pose
 from gvgbot.maps.trajectory import decode_tum
+from gvgbot.recording.config import RecordingConfig
+from gvgbot.recording.recorder import Recorder
 
 OUTER = np.array([(-2, -2), (14, -2), (14, 5), (16, 5), (16, 10), (-2, 10), (-2, -2)], float)
 INNER = np.array([(1, 1), (11, 1), (11, 7), (6, 7), (6, 6.2), (1, 6.2), (1, 1)], float)
@@ -116,6 +118,33 @@ def test_a_replay_that_fails_leaves_what_was_there_before_and_nothing_else(
     (tmp_path / "run" / "map.png" / "mine").rmdir()
     (tmp_path / "run" / "map.png").rmdir()
     assert main(words) == 0
+
+
+@pytest.mark.parametrize("text", ["robot: {name: [", "robot: {nmae: a}\nlaser: 7"])
+def test_a_recording_whose_configuration_is_damaged_can_be_replayed_with_another(
+    text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "run.mcap"
+    with Recorder(RecordingConfig(path=path), {"title": "ring", "config": text}):
+        pass
+    words = ["replay", str(path), "--out", str(tmp_path / "run")]
+    assert main(words) == 2
+    *mistakes, hint = capsys.readouterr().err.splitlines()
+    assert all(f"the configuration in {path}" in line for line in mistakes)
+    assert "--config" in hint
+    assert not (tmp_path / "run").exists()
+    assert main([*words, "--config", "sim.yaml"]) == 0
+
+
+def test_who_sets_a_key_that_there_is_not_is_told_of_that_only(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "run.mcap"
+    with Recorder(RecordingConfig(path=path), {"title": "ring", "config": "{}"}):
+        pass
+    assert main(["replay", str(path), "--set", "robot.nmae=frida"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "nmae" in line
 
 
 def test_a_speed_is_for_what_is_served(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
