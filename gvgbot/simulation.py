@@ -120,6 +120,7 @@ class Simulation:
             base_seed,
             self._pull_base,
         )
+        self.laser_twin.company = self.base_twin.company = [self.laser_twin, self.base_twin]
         self.laser, self._laser_end = laser_cable.host, laser_cable.device
         self.base, self._base_end = cable.host, cable.device
 

@@ -4,6 +4,7 @@ import math
 from collections import Counter, deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from operator import itemgetter
 from typing import Annotated, Literal
 
 import numpy as np
@@ -44,7 +45,11 @@ class LinkFaultConfig:
 
 
 class FaultyLink:
-    """A twin behind a bad link: a twin itself, as seen from the host. Same seed, same faults."""
+    """A twin behind a bad link: a twin itself, as seen from the host. Same seed, same faults.
+
+    Twins in one world are in each other's `company`: what a busy computer lets wait is done by all
+    of them in the order in which it was due, each at its time, so that they see the same motion.
+    """
 
     def __init__(
         self,
@@ -67,6 +72,8 @@ class FaultyLink:
         self._under_way: deque[tuple[float, bytes]] = deque()
         self._chip, self._chip_due = b"", math.inf
         self._is_plugged = True
+        self._lived = math.inf  # until when, s; not before it is served
+        self.company: list[FaultyLink] = [self]
 
     @property
     def device(self) -> TwinDevice:
@@ -93,6 +100,7 @@ class FaultyLink:
 
     def receive(self, data: bytes, now: float) -> bytes:
         """Take the host's bytes; those that the device answers at once and that arrive at once."""
+        self._live(now)
         if self._is_plugged:
             late = now + self._config.command_latency_s
             self._commands.put(self._damage.done_to(data), late)
@@ -101,6 +109,26 @@ class FaultyLink:
 
     def advance(self, now: float) -> bytes:
         """What arrives at the host up to now."""
+        if self._lived == math.inf:
+            self.live_until(now)
+        self._live(now)
+        return self._arrived(now)
+
+    def next_due(self) -> float:
+        """When something arrives, or the device or a fault is due."""
+        return min(self._due(), self._under_way[0][0] if self._under_way else math.inf)
+
+    def own_due(self, now: float) -> float:
+        """When the device, the link or a fault next has something to do; inf until it is served.
+
+        What is due for longer than the link has lived was asked for `now`.
+        """
+        due = math.inf if self._lived == math.inf else self._due()
+        return due if due >= self._lived else now
+
+    def live_until(self, now: float) -> None:
+        """Do what is due by then."""
+        self._lived = now
         self._schedule.advance(now)
         if self._is_plugged == self._schedule.is_on("unplug"):
             self._is_plugged = not self._is_plugged
@@ -111,13 +139,24 @@ class FaultyLink:
         self._deliver(now)
         if self._device.next_due() <= now:
             self._post(self._device.advance(now), now)
-        return self._arrived(now)
+        self._convert(now)
+        if self._chip_due <= now:
+            self._send(self._chip, self._chip_due)
+            self._chip, self._chip_due = b"", math.inf
 
-    def next_due(self) -> float:
-        """When something arrives, or the device or a fault is due."""
-        first = self._under_way[0][0] if self._under_way else math.inf
+    def _live(self, now: float) -> None:
+        """Do what has become due here and in the company."""
+        while True:
+            due, first = min(
+                ((link.own_due(now), link) for link in self.company), key=itemgetter(0)
+            )
+            if due > now:
+                return
+            first.live_until(due)
+
+    def _due(self) -> float:
         wires = min(self._commands.next_due(), self._wire.next_due())
-        return min(self._device.next_due(), self._schedule.next_due(), self._chip_due, first, wires)
+        return min(self._device.next_due(), self._schedule.next_due(), self._chip_due, wires)
 
     def _deliver(self, now: float) -> None:
         """Hand the device what has come through to it."""
@@ -157,9 +196,6 @@ class FaultyLink:
 
     def _arrived(self, now: float) -> bytes:
         self._convert(now)
-        if self._chip_due <= now:
-            self._send(self._chip, self._chip_due)
-            self._chip, self._chip_due = b"", math.inf
         arrived = []
         while self._under_way and self._under_way[0][0] <= now:
             arrived.append(self._under_way.popleft()[1])
