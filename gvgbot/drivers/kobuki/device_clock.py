@@ -3,7 +3,8 @@
 A frame can arrive late but never early, so the smallest difference of arrival and counter seen is
 the true one. It is let grow slowly, since the two clocks do not run at quite the same speed. A base
 that starts anew counts from nothing: after a silence, the counter then shows less than its length.
-If that was not seen, all frames come late from then on, for longer than any link stalls.
+If that was not seen, all frames come late from then on, for longer than any link stalls; frames
+that come together say nothing about that, for then it is the host that was late to read them.
 """
 
 from dataclasses import dataclass, replace
@@ -41,11 +42,16 @@ def start_clock(raw_ms: int, arrival: float) -> DeviceClock:
     return DeviceClock(raw_ms, offset=arrival, elapsed=0.0, stamp=arrival, arrival=arrival)
 
 
-def advance_clock(clock: DeviceClock, raw_ms: int, arrival: float) -> DeviceClock:
-    """The clock after a frame with this counter that arrived at `arrival` (s, host)."""
+def advance_clock(
+    clock: DeviceClock, raw_ms: int, arrival: float, *, is_prompt: bool = True
+) -> DeviceClock:
+    """The clock after a frame with this counter that arrived at `arrival` (s, host).
+
+    `is_prompt` unless it came together with others, which had to wait to be read.
+    """
     step = (raw_ms - clock.raw_ms) % _WRAP_MS / 1000
     elapsed = clock.elapsed + step
-    late_since = _late_since(clock, arrival - elapsed, arrival)
+    late_since = _late_since(clock, arrival - elapsed, arrival) if is_prompt else None
     if (
         elapsed + clock.offset > arrival + _RESET_S
         or arrival - clock.arrival >= _WRAP_MS / 1000  # nobody knows how often it turned over

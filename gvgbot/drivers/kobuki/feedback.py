@@ -33,6 +33,7 @@ from gvgbot.geometry import wrap_angle
 from gvgbot.hal.messages import Battery, Contact, DockBeam, Docking, Odometry
 
 FRAME_PERIOD = 0.02  # s, of the base's stream
+_PROMPT = 2  # frames that come together at most if none had to wait to be read
 _FELT_S = 0.1  # so long a touch is told of, however short: frames may come together, or late
 _JUMP_M = 0.25  # a wheel does not go this far between two frames,
 _JUMP_SPEED = 2.0  # m/s, nor this fast over a longer gap
@@ -130,7 +131,8 @@ class FeedbackReader:
         for later, frame in zip(reversed(range(len(frames))), frames, strict=True):
             made_by = arrival - later * FRAME_PERIOD
             parts = decode_feedback(frame.payload, unread=DIAGNOSTICS)
-            newest = self._take_parts(parts, made_by) or newest
+            is_prompt = len(frames) <= _PROMPT
+            newest = self._take_parts(parts, made_by, is_prompt=is_prompt) or newest
         return newest
 
     @property
@@ -186,7 +188,9 @@ class FeedbackReader:
             slips=self._slips,
         )
 
-    def _take_parts(self, parts: list[FeedbackPart], arrival: float) -> Odometry | None:
+    def _take_parts(
+        self, parts: list[FeedbackPart], arrival: float, *, is_prompt: bool
+    ) -> Odometry | None:
         if parts and isinstance(parts[-1], Truncated):
             self._malformed += 1
             return None
@@ -211,18 +215,23 @@ class FeedbackReader:
                     pass
         if core is None:
             return None
-        odometry = self._take_core(core, inertia, arrival)
+        clock = self._clock_at(core.stamp_ms, arrival - self._link_delay, is_prompt=is_prompt)
+        odometry = self._take_core(core, inertia, arrival, clock)
         if dock is not None and self.contact is not None:
             self.docking = _docking(dock, self.contact.stamp)
         return odometry
 
+    def _clock_at(self, raw_ms: int, arrival: float, *, is_prompt: bool) -> DeviceClock:
+        """The base's clock at a frame with this counter that arrived then (s)."""
+        if self._clock is None:
+            return start_clock(raw_ms, arrival)
+        return advance_clock(self._clock, raw_ms, arrival, is_prompt=is_prompt)
+
     def _take_core(
-        self, core: CoreSensors, inertia: Inertia | None, arrival: float
+        self, core: CoreSensors, inertia: Inertia | None, arrival: float, clock: DeviceClock
     ) -> Odometry | None:
         self.spoke = arrival
-        before = self._clock
-        clock = _clock_after(before, core.stamp_ms, arrival - self._link_delay)
-        self._clock = clock
+        before, self._clock = self._clock, clock
         self._missed += max(0, round(clock.step / FRAME_PERIOD) - 1)
         if core.feels:
             self._felt.append((arrival, core))
@@ -270,12 +279,6 @@ class FeedbackReader:
         return max(map(abs, travels)) > max(_JUMP_M, _JUMP_SPEED * dt) or (
             turn > max(_JUMP_TURN, _JUMP_TURN_RATE * dt)
         )
-
-
-def _clock_after(clock: DeviceClock | None, raw_ms: int, arrival: float) -> DeviceClock:
-    if clock is None:
-        return start_clock(raw_ms, arrival)
-    return advance_clock(clock, raw_ms, arrival)
 
 
 def _contact(felt: list[CoreSensors], newest: CoreSensors, stamp: float) -> Contact:
