@@ -14,6 +14,8 @@ from gvgbot.drivers.hokuyo.twin import HokuyoTwinConfig
 from gvgbot.drivers.kobuki.driver import KobukiBase
 from gvgbot.drivers.kobuki.feedback import FeedbackReader
 from gvgbot.drivers.kobuki.twin import KobukiTwinConfig
+from gvgbot.drivers.transport import pipe
+from gvgbot.errors import DeviceLost
 from gvgbot.geometry import Pose, Twist, wrap_angle
 from gvgbot.hal.deskew import deskewed
 from gvgbot.simulation import Place, Simulation
@@ -106,3 +108,34 @@ def test_a_slow_computer_bends_neither_odometry_nor_scans(control_s: float, look
     assert robot.feedback.statistics.resets == 0
     assert len(robot.misfits) > 50
     assert np.max(robot.misfits) < 0.03
+
+
+def test_no_base_is_lost_because_the_computer_hung() -> None:
+    """It hangs for longer than the base may be silent; `live` would raise DeviceLost."""
+
+    async def main() -> Turning:
+        robot = Turning(0.0, 0.0)
+        loop = asyncio.get_running_loop()
+        for at in (3.0, 6.013, 9.509):
+            loop.call_at(at, compute, 1.7)
+        await robot.live()
+        return robot
+
+    robot = run_in_virtual_time(main())
+    assert isinstance(robot, Turning)
+    newest = robot.log.newest
+    assert newest is not None
+    truth = robot.simulation.body.pose.theta - START.theta
+    assert abs(wrap_angle(newest.odom_base.theta - truth)) < math.radians(0.1)
+    assert robot.feedback.statistics.resets == 0
+
+
+def test_a_base_that_is_still_silent_after_a_computer_hung_is_lost() -> None:
+    async def main() -> float:
+        clock, (here, _) = LoopClock(), pipe()
+        asyncio.get_running_loop().call_at(0.9, compute, 3.0)
+        with pytest.raises(DeviceLost):
+            await KobukiBase(here, Config().base, clock).run()
+        return clock.now()
+
+    assert 3.9 < run_in_virtual_time(main()) < 4.2

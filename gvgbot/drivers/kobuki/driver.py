@@ -32,6 +32,7 @@ from gvgbot.hal.messages import Battery, Contact, Docking, Odometry, Sign
 from gvgbot.ranges import Range
 
 _STOP_REPEAT_S = 0.1  # while the base is to stand, it is told so again this often
+_HUNG_S = 0.1  # so late, it was the host that was busy, and not the base that was silent
 _IDENTITY_RETRY_S = 0.5
 _ALL_EXTRAS = Extra.HARDWARE | Extra.FIRMWARE | Extra.UDID
 _STOP = BaseControl(0, 0)
@@ -106,14 +107,17 @@ class KobukiBase:
         self._driven = -math.inf
         self._twist = STANDSTILL
         self._stopped = -math.inf
+        self._is_excused = False  # silent, but perhaps only because nobody listened
 
     async def run(self) -> None:
         """Serve the link until cancelled. Raises DeviceLost when the base is silent or gone."""
         self._started = self._clock.now()
         try:
+            due = self._started
             while True:
-                self._watch()
-                await self._listen(until=self._next_watch())
+                self._watch(due)
+                due = self._next_watch()
+                await self._listen(until=due)
         finally:
             self._send(_STOP)
             self.show("off")
@@ -194,11 +198,16 @@ class KobukiBase:
     def _heard(self) -> float:
         return max(self._started, self._feedback.heard)
 
-    def _watch(self) -> None:
-        """Stop the base if that is due; give up if it has been silent for too long."""
+    def _watch(self, due: float) -> None:
+        """Stop the base if that is due; give up if it has been silent for too long.
+
+        When the host was too busy to watch when it was `due` (s), what has come is read first.
+        """
         now = self._clock.now()
-        if now >= self._lost_due():
+        is_silent = now >= self._lost_due()
+        if is_silent and (self._is_excused or now < due + _HUNG_S):
             raise DeviceLost(self._loss())
+        self._is_excused = is_silent
         if now >= self._stop_due():
             self._stopped, self._twist = now, STANDSTILL
             self._send(_STOP)
@@ -216,7 +225,7 @@ class KobukiBase:
         )
 
     def _next_watch(self) -> float:
-        return min(self._stop_due(), self._lost_due())
+        return self._stop_due() if self._is_excused else min(self._stop_due(), self._lost_due())
 
     def _stop_due(self) -> float:
         deadman = self._driven + self._config.deadman_s
