@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
-from gvgbot.requests import Arguments, RequestName, kind_of
+from gvgbot.requests import Arguments, RequestName, kind_of, within_reason
 from gvgbot.topics import Events, Health, Map, Odometry, Plan, Scan, State, Tile, Trajectory
 
 Known = Literal[
@@ -65,9 +65,10 @@ class Wish(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     def typed(self) -> Arguments:
         """The arguments of the request. Raises ValueError if they do not fit."""
         try:
-            return msgspec.convert(self.arguments, kind_of(self.name))
+            arguments = msgspec.convert(self.arguments, kind_of(self.name))
         except msgspec.MsgspecError as error:
             raise ValueError(f"wrong arguments of {self.name}: {error}") from error
+        return within_reason(arguments)
 
 
 Told = State | Map | Floor | Tile | Trajectory | Plan | Odometry | Scan | Events | Health
