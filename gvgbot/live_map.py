@@ -1,7 +1,7 @@
 """The map so far, as the network gets it: brought up to date from keyframe to keyframe."""
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -86,7 +86,7 @@ class LiveMap:
         stamp: float,
     ) -> list[News]:
         news = [News(Map(stamp=stamp, vertices=vertices, edges=bent(edges, poses)))]
-        new, is_all = find()
+        new, is_all, breaks = find()
         if is_all:
             self._grid.redraw(new)
             self._trail = Trail()
@@ -95,7 +95,7 @@ class LiveMap:
         changed = self._grid.changes(stamp)
         if changed is not None:
             news.append(News(changed, self._grid.whole(stamp)))
-        if self._trail.add(new):
+        if self._trail.add(new, breaks):
             news.append(News(self._trail.told(stamp)))
         return news
 
@@ -111,31 +111,36 @@ class Trail:
         self._step = _STEP_M
         self._stamps: list[float] = []
         self._poses: list[tuple[float, float, float]] = []
+        self._breaks: list[int] = []  # poses before which no way is known
 
-    def add(self, keyframes: Iterable[Keyframe]) -> bool:
-        """Go on along keyframes; whether there is more than before."""
+    def add(self, keyframes: Iterable[Keyframe], breaks: Container[int] = ()) -> bool:
+        """Go on along keyframes, but not to those of these numbers; whether there is more now."""
         has_grown = False
-        for keyframe in keyframes:
+        for number, keyframe in enumerate(keyframes):
             here = keyframe.map_base
-            has_grown |= self._go(keyframe.stamp, (here.x, here.y, here.theta))
+            pose = here.x, here.y, here.theta
+            has_grown |= self._go(keyframe.stamp, pose, is_break=number in breaks)
             while len(self._poses) > TRAJECTORY_POSES:
                 self._thin()
         return has_grown
 
-    def _go(self, stamp: float, pose: tuple[float, float, float]) -> bool:
-        """Keep a pose, if it is far enough from the one before; whether it is."""
-        if self._poses and math.dist(self._poses[-1][:2], pose[:2]) < self._step:
+    def _go(self, stamp: float, pose: tuple[float, float, float], *, is_break: bool) -> bool:
+        """Keep a pose, if it is far enough from the one before, or a break is; whether it is."""
+        is_near = bool(self._poses) and math.dist(self._poses[-1][:2], pose[:2]) < self._step
+        if is_near and not is_break:
             return False
+        if is_break and self._poses:
+            self._breaks.append(len(self._poses))
         self._stamps.append(stamp)
         self._poses.append(pose)
         return True
 
     def _thin(self) -> None:
         self._step *= 2.0
-        before = zip(self._stamps, self._poses, strict=True)
-        self._stamps, self._poses = [], []
-        for stamp, pose in before:
-            self._go(stamp, pose)
+        before, breaks = zip(self._stamps, self._poses, strict=True), set(self._breaks)
+        self._stamps, self._poses, self._breaks = [], [], []
+        for number, (stamp, pose) in enumerate(before):
+            self._go(stamp, pose, is_break=number in breaks)
 
     def told(self, stamp: float) -> Trajectory:
         """As it travels."""
@@ -143,6 +148,7 @@ class Trail:
             stamp=stamp,
             stamps=np.array(self._stamps, "<f8").tobytes(),
             poses=np.array(self._poses, "<f4").tobytes(),
+            breaks=tuple(self._breaks),
         )
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gvgbot.autonomy.estimate import smoothed_keyframes, still_past
-from gvgbot.autonomy.keyframes import Keyframe
+from gvgbot.autonomy.keyframes import Keyframe, Step
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.geometry import Pose, wrap_angles
 
@@ -18,10 +18,14 @@ _REST_S = 0.02  # for each keyframe, between drawing all again and the next time
 
 
 class Portion(NamedTuple):
-    """Keyframes to draw, as they are known now; instead of all before, or after those."""
+    """Keyframes to draw, as they are known now; instead of all before, or after those.
+
+    `breaks` are those of them to which no way leads from the one before.
+    """
 
     keyframes: Sequence[Keyframe]
     is_all: bool
+    breaks: frozenset[int] = frozenset()
 
 
 class LivePast:
@@ -54,25 +58,31 @@ class LivePast:
         if is_other:  # another map has begun
             self._taken, self._drawn = 0, []
         new, past = pipeline.keyframes[self._taken :], None
+        breaks = _breaks(pipeline.steps, self._taken, len(pipeline.keyframes))
         self._taken += len(new)
         if self._is_doubtful and stamp >= self._rests_until and not pipeline.led:
             self._is_doubtful, past = False, still_past(pipeline)
         if not new and past is None:
             return None
-        return partial(self._portion, new, past, stamp, is_other)
+        return partial(self._portion, Portion(new, is_other, breaks), past, stamp)
 
-    def _portion(
-        self, new: Sequence[Keyframe], past: Pipeline | None, stamp: float, is_all: bool
-    ) -> Portion:
-        self._drawn += [keyframe.map_base for keyframe in new]
+    def _portion(self, new: Portion, past: Pipeline | None, stamp: float) -> Portion:
+        self._drawn += [keyframe.map_base for keyframe in new.keyframes]
         if past is None:
-            return Portion(new, is_all)
+            return new
         best = smoothed_keyframes(past)
         if _farthest(self._drawn, best) < TOLERANCE_M:
-            return Portion(new, is_all)
+            return new
         self._drawn, self._rests_until = best, stamp + _REST_S * len(best)
         moved = zip(past.keyframes, best, strict=True)
-        return Portion([replace(old, map_base=pose) for old, pose in moved], is_all=True)
+        keyframes = [replace(old, map_base=pose) for old, pose in moved]
+        return Portion(keyframes, is_all=True, breaks=_breaks(past.steps, 0, len(best)))
+
+
+def _breaks(steps: Sequence[Step], first: int, end: int) -> frozenset[int]:
+    """Which of the keyframes from a first one on, counted from there, no known step leads to."""
+    leading = enumerate(steps[: max(0, end - 1)], start=1)
+    return frozenset(i - first for i, step in leading if i >= first and step.is_unknown)
 
 
 def _farthest(drawn: Sequence[Pose], best: Sequence[Pose]) -> float:

@@ -207,6 +207,7 @@ class Trajectory(msgspec.Struct, frozen=True, kw_only=True):
     stamp: float  # s, the robot's monotonic clock
     stamps: bytes  # little-endian float64, s: when it was there
     poses: bytes  # little-endian float32 triples x, y, theta, m and rad: map_base at these times
+    breaks: tuple[int, ...] = ()  # poses, from 0, to which no way is known: it was carried there
 
     @property
     def times(self) -> NDArray[np.float64]:
@@ -217,6 +218,11 @@ class Trajectory(msgspec.Struct, frozen=True, kw_only=True):
     def map_base(self) -> NDArray[np.float32]:
         """The poses (N, 3): x, y, theta; read-only."""
         return np.frombuffer(self.poses, "<f4").reshape(-1, 3)
+
+    @property
+    def stretches(self) -> list[NDArray[np.float32]]:
+        """The positions (N, 2), m, from break to break: lines that were driven; one at least."""
+        return np.split(self.map_base[:, :2], self.breaks)
 
 
 class Health(msgspec.Struct, frozen=True, kw_only=True):

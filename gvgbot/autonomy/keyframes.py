@@ -7,6 +7,8 @@ from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
 from gvgbot.ranges import Range
 
+_UNKNOWN_M2 = 0.5  # variance of a way that nobody has measured
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KeyframeConfig:
@@ -24,6 +26,11 @@ class Step:
 
     motion: Pose
     covariance: Array
+
+    @property
+    def is_unknown(self) -> bool:
+        """Whether the way is not known: the robot was carried, or what it drove was forgotten."""
+        return bool(self.covariance[0, 0] >= _UNKNOWN_M2)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -113,10 +113,10 @@ async def _watch(robot: Robot, show: Show) -> None:
         await asyncio.sleep(_EVERY)
 
 
-def _way(driven: Trajectory | None, state: State | None) -> Points:
-    """The way driven (N, 2), m, up to a state."""
-    points = np.zeros((0, 2)) if driven is None else driven.map_base[:, :2]
-    return points if state is None else np.concatenate([points, [state.pose[:2]]])
+def _way(driven: Trajectory | None, state: State | None) -> list[Points]:
+    """The way driven, in lines (N, 2), m, up to a state."""
+    *others, line = [np.zeros((0, 2))] if driven is None else driven.stretches
+    return [*others, line if state is None else np.concatenate([line, [state.pose[:2]]])]
 
 
 class _Floor:

@@ -1,7 +1,8 @@
 """The map as characters: walls, edges, way and plan in dots; vertices and the robot as signs."""
 
 import math
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -26,11 +27,11 @@ _MARGIN_M = 0.5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """What is to be drawn, as far as it is known; `trail` (N, 2), m, is the way driven."""
+    """What is to be drawn, as far as it is known; `trail` is the way driven, in lines (N, 2), m."""
 
     graph: Map | None = None
     floor: Raster | None = None
-    trail: Points = field(default_factory=lambda: np.zeros((0, 2)))
+    trail: Sequence[Points] = ()
     plan: Plan | None = None
     pose: tuple[float, float, float] | None = None
     team: tuple[tuple[float, float, float], ...] = ()  # poses of other robots
@@ -61,7 +62,7 @@ def chart(scene: Scene, width: int, height: int) -> Chart:
     if scene.floor is not None:
         canvas.lay("wall", _walls(scene.floor, view))
         floor = _floor(scene.floor, view)
-    canvas.lay("trail", _drawn(view, [scene.trail]))
+    canvas.lay("trail", _drawn(view, scene.trail))
     if scene.graph is not None:
         canvas.lay("edge", _drawn(view, [edge.polyline for edge in scene.graph.edges]))
     if scene.plan is not None:
@@ -104,7 +105,7 @@ class _Canvas:
 
 def _box(scene: Scene) -> tuple[Points, Points]:
     """Corners (2,), m, of all there is to show."""
-    points = [np.zeros((1, 2)), scene.trail]
+    points = [np.zeros((1, 2)), *scene.trail]
     if scene.pose is not None:
         points.append(np.array([scene.pose[:2]]))
     points.append(np.array([pose[:2] for pose in scene.team]).reshape(-1, 2))
@@ -147,7 +148,7 @@ def _floor(floor: Raster, view: View) -> NDArray[np.bool_]:
     return lit(_sampled(floor, floor.cells >= 0, view))
 
 
-def _drawn(view: View, polylines: list[Points]) -> Dots:
+def _drawn(view: View, polylines: Iterable[Points]) -> Dots:
     dots = np.zeros(view.shape, bool)
     for polyline in polylines:
         view.draw(dots, polyline)

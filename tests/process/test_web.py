@@ -599,6 +599,26 @@ def test_walls_the_way_driven_and_the_health_are_shown_as_they_change(page: Page
             )
 
 
+def test_the_way_driven_has_a_gap_where_the_robot_was_carried(page: Page) -> None:
+    """It drove from (1, 4) to (3, 4), and was put down at (8, 4), whence it came to (3, 2)."""
+    poses = np.array([[1.0, 4.0, 0.0], [3.0, 4.0, 0.0], [8.0, 4.0, 0.0]], "<f4")
+    way = msgspec.structs.replace(WAY, stamps=bytes(24), poses=poses.tobytes())
+    endpoint, lengths = free_endpoint(), list[int]()
+    with web("--connect", endpoint) as address:
+        play = Play(endpoint, page)
+        with play.robot:
+            desktop(page, address)
+            for breaks in ((), (2,), (1,)):
+                play.robot.publish(msgspec.structs.replace(way, breaks=breaks))
+                seen = play.until_drawn(
+                    lambda seen: min(abs(seen["trail"][1] - one) for one in [0, *lengths]) > 20,
+                    "trail",
+                )
+                lengths.append(seen["trail"][1])
+    gaps = lengths[0] - lengths[1], lengths[0] - lengths[2]  # of 5 and 2 m
+    assert gaps[0] / gaps[1] == pytest.approx(5.0 / 2.0, rel=0.1)
+
+
 def test_vertices_have_their_numbers_wherever_there_is_room(page: Page) -> None:
     endpoint = free_endpoint()
     boxes = [(0, 10), (11, 21), (30, 40), (22, 32)]  # from left to right

@@ -17,11 +17,13 @@ from gvgbot.autonomy.memory import growth
 from gvgbot.autonomy.returning import ReturningPipeline
 from gvgbot.config import Config, load_config
 from gvgbot.geometry import Pose
+from gvgbot.live_map import LiveMap
 from gvgbot.persistence import keeper
 from gvgbot.persistence.mission_files import JOURNAL, SNAPSHOT, MissionFiles
 from gvgbot.persistence.records import packed
 from gvgbot.session import Session
 from gvgbot.simulation import Place, open_place
+from gvgbot.topics import Trajectory
 from tests.replay.test_pipeline import LOLLIPOP, START
 from tests.twin.lives_rig import GoingWorld, Lives, at
 from tests.unit.autonomy.sights import carved
@@ -117,6 +119,11 @@ def test_on_a_known_map_it_finds_its_place_and_says_nothing_before(
         for one, other in zip(points, before[kind], strict=True):
             assert math.dist(one, other) < 0.05
     assert vertices(whole) == before
+    draw = LiveMap(began=0.0).update(last.pipeline, 0.0)
+    assert draw is not None
+    (way,) = [one.value for one in draw() if isinstance(one.value, Trajectory)]
+    assert len(way.stretches) == 2  # nobody has driven from the end of the run to where it is found
+    assert max(np.hypot(*np.diff(line, axis=0).T).max() for line in way.stretches) < 1.0
 
 
 def test_in_another_building_it_claims_no_place_and_spoils_no_map(

@@ -128,6 +128,17 @@ def test_a_trajectory_keeps_its_ends_and_its_shape_however_long_it_gets() -> Non
     assert math.dist((x[-1], y[-1]), (here.x, here.y)) < 2 * steps.max()
 
 
+def test_where_the_robot_was_carried_the_way_is_broken_however_long_it_gets() -> None:
+    trail, row = Trail(), [Pose(0.25 * i) for i in range(6000)]
+    for there in (Pose(), Pose(0.0, 5.0), Pose(0.0, 10.0)):
+        poses = [there.compose(pose) for pose in row]
+        trail.add([Keyframe(0.0, p, p, p, None) for p in poses], {0} if there.y else ())
+    told = trail.told(0.0)
+    assert len(told.map_base) <= TRAJECTORY_POSES
+    assert [set(line[:, 1].tolist()) for line in told.stretches] == [{0.0}, {5.0}, {10.0}]
+    assert [line[0, 0] for line in told.stretches] == [0.0, 0.0, 0.0]
+
+
 def test_standing_makes_a_trajectory_no_longer() -> None:
     trail, here = Trail(), Pose(1.0, 2.0, 0.5)
     still = Keyframe(1.0, here, here, here, None)

@@ -62,7 +62,7 @@ def taken(past: LivePast, pipeline: Any, stamp: float) -> tuple[list[Pose], bool
     find = past.update(pipeline, stamp)
     if find is None:
         return None
-    keyframes, is_all = find()
+    keyframes, is_all, _ = find()
     return [keyframe.map_base for keyframe in keyframes], is_all
 
 
@@ -159,6 +159,31 @@ def test_the_trajectory_that_is_shown_closes_with_the_loop() -> None:
     way = from_centre(shown(live, pipeline, 2.0))
     assert len(way) > 90
     assert way == pytest.approx(RADIUS_M, abs=2 * TOLERANCE_M)
+
+
+@pytest.mark.parametrize("at", [0, 30])
+@pytest.mark.parametrize("is_corrected", [False, True])
+def test_no_way_leads_to_where_the_robot_was_carried(at: int, *, is_corrected: bool) -> None:
+    """It is put down at the far side of the circle, and drives on from there."""
+    pipeline, live = drive(), LiveMap(began=0.0)
+    keyframes, there = pipeline.keyframes, Pose(20.0, 0.0)
+    pipeline.keyframes = keyframes[:at]
+    if at:
+        live.update(pipeline, 0.0)()  # type: ignore[misc]
+    for i in range(50, COUNT):
+        keyframes[i] = replace(keyframes[i], map_base=there.compose(keyframes[i].map_base))
+    motion = keyframes[49].map_base.to(keyframes[50].map_base)
+    pipeline.steps[49] = Step(motion, np.diag([1.0, 1.0, 0.1]))
+    pipeline.keyframes, pipeline.mapper.observations = keyframes, []
+    if is_corrected:
+        live.doubt()
+    draw = live.update(pipeline, 200.0)
+    assert draw is not None
+    (way,) = [one.value for one in draw() if isinstance(one.value, Trajectory)]
+    assert len(way.breaks) == 1
+    before, after = way.stretches
+    assert before[-1] == pytest.approx(keyframes[49].map_base.position, abs=0.01)
+    assert after[0] == pytest.approx(keyframes[50].map_base.position, abs=0.01)
 
 
 def test_where_another_map_begins_nothing_is_left_of_the_one_before() -> None:

@@ -27,7 +27,7 @@ export class MapPicture {
     this.known = this.plan = this.scan = this.pose = this.covariance = this.selected = this.tapped = null;
     this.floor = null;
     this.team = [];
-    this.trail = []; // x, y and so on
+    this.trail = []; // lines: x, y and so on
     this.way = []; // [stamp, x, y] since the trail was made
   }
 
@@ -50,7 +50,8 @@ export class MapPicture {
   }
 
   setTrajectory(driven) {
-    this.trail = Array.from(poses(driven.poses)).filter((_, i) => i % 3 < 2);
+    const xy = Array.from(poses(driven.poses)).filter((_, i) => i % 3 < 2), ends = [...(driven.breaks ?? []), xy.length / 2];
+    this.trail = ends.map((end, i) => xy.slice(2 * (ends[i - 1] ?? 0), 2 * end));
     this.way = this.way.filter(([stamp]) => stamp > driven.stamp);
   }
 
@@ -136,7 +137,8 @@ export class MapPicture {
   }
 
   drawTrail() {
-    this.line([...this.trail, ...this.way.flatMap(([, x, y]) => [x, y])], this.colours.trail, 1.5);
+    const way = this.way.flatMap(([, x, y]) => [x, y]), last = this.trail.at(-1) ?? [];
+    for (const line of [...this.trail.slice(0, -1), [...last, ...way]]) this.line(line, this.colours.trail, 1.5);
   }
 
   drawEdges() {

@@ -100,7 +100,7 @@ EMPTY = "\n".join(["." * 16] * 16)
 def test_an_edge_is_a_line_without_gaps_and_hides_the_trail_under_it() -> None:
     upright = [(2.0, 2.0), (2.0, 12.0)]
     way = np.array([[2.0, 2.0], [12.0, 2.0]])
-    found = chart(Scene(a_map(lines=(upright,)), a_floor(EMPTY, origin=HALF), way), 8, 4)
+    found = chart(Scene(a_map(lines=(upright,)), a_floor(EMPTY, origin=HALF), [way]), 8, 4)
     expected = np.zeros((16, 16), bool)
     for i in range(2, 13):
         expected[15 - i, 2] = True  # row 0 is the north
@@ -108,6 +108,14 @@ def test_an_edge_is_a_line_without_gaps_and_hides_the_trail_under_it() -> None:
     assert (dots_of(found) == expected).all()
     edge, trail = LAYERS.index("edge"), LAYERS.index("trail")
     assert found.layers[3].tolist() == [0, edge, trail, trail, trail, trail, trail, 0]
+
+
+def test_where_no_way_is_known_no_line_is_drawn() -> None:
+    ways = [np.array([[2.0, y], [6.0, y]]) for y in (2.0, 12.0)]
+    found = chart(Scene(None, a_floor(EMPTY, origin=HALF), ways), 8, 4)
+    expected = np.zeros((16, 16), bool)
+    expected[[13, 3], 2:7] = True
+    assert (dots_of(found) == expected).all()
 
 
 def test_the_plan_is_drawn_from_the_robot_to_where_it_goes() -> None:

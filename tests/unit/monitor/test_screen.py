@@ -20,7 +20,7 @@ ALIVE = Fact("karl", "alive", "good")
 CORRIDOR = Scene(
     a_map((vertex((5.0, 5.0)),)),
     a_floor("\n".join(["#" * 40, *["." * 40] * 8, "#" * 40]), resolution=0.5),
-    np.array([[1.0, -2.0]]),
+    [np.array([[1.0, -2.0]])],
     pose=EXAMPLE.pose,
 )
 EVENTS = tuple(
