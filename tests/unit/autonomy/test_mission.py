@@ -398,6 +398,18 @@ def test_who_looks_for_a_way_where_hardly_anything_is_in_sight_looks_around_twic
     assert robot.mission.outcome == "explored_with_blocked"
 
 
+def test_who_has_come_on_looks_around_twice_again_before_a_frontier_is_given_up() -> None:
+    """It looks for a way at one end of a corridor and then at the other."""
+    robot = far_from_all_that_is_known()
+    robot.drive(CLOSED, (0.0, 0.0), (3.0, 0.0))
+    for x in (3.0, 0.0):
+        ends = {1: (x - 0.1, 0.0), 2: (x + 0.1, 0.0)}
+        robot.stand(drawn(ends, {10: (1, 2, [])}, unseen={1: math.pi, 2: 0.0}), 18)
+        robot.drive(CLOSED, (x, 0.0), (0.0, 0.0))
+    did = [e.action for e in robot.said(Recovery) if isinstance(e, Recovery)]
+    assert did == ["drive on", *["look around"] * 4]
+
+
 ALL_WAYS: dict[int, tuple[int, int, list[Point]]] = {
     **{10: (1, 2, []), 11: (2, 3, []), 12: (3, 4, []), 13: (4, 5, [])},
     **{14: (2, 6, []), 15: (3, 7, []), 16: (4, 8, [])},
