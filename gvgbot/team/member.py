@@ -76,7 +76,7 @@ class _Mate:
     sizes: tuple[int, ...] = ()  # of both charts then
     looks: deque[BodiesSeen] = field(default_factory=deque)  # lately; stamps of the own clock
     recognised: float = float("-inf")  # stamp of the last attempt to
-    # when, and how, its frame seemed to lie by sight, though the maps spoke against it
+    # when, and how, its frame seemed to lie by sight, though maps or a known frame spoke against it
     doubted: tuple[float, Pose] | None = None
 
     @property
@@ -220,27 +220,30 @@ class Member:
             self._recognise(course.robot, mate, stamp)
 
     def _recognise(self, name: str, mate: _Mate, stamp: float) -> None:
-        """Find out whether a body that is seen is another robot whose frame is not known yet."""
-        if mate.alignment is not None or stamp - mate.recognised < _RECOGNISE_S:
+        """Find out whether a body that is seen is another robot, and elsewhere than was believed.
+
+        Whose frame is known right is seen where it is said to be, and is no body to be recognised.
+        """
+        if stamp - mate.recognised < _RECOGNISE_S:
             return
         mate.recognised = stamp
         found = frame_of(self._looks, mate.looks, self._radius, mate.news.radius)
         if found is None:
             return
-        met = Alignment(*found, (), _SURE_BY_SIGHT)
-        told = self.frames.get(name)
-        if told is not None and not _is_same(met.pose, told, mate.map_base):
-            return  # it was a third robot that moved in the same way
+        met, told = Alignment(*found, (), _SURE_BY_SIGHT), self.frames.get(name)
+        is_other = told is not None and not _is_same(met.pose, told, mate.map_base)
+        if mate.alignment is not None and not is_other:
+            return
         alignment = refined(self._chart, mate.chart, met)
-        before = mate.doubted
-        if alignment is None and before is not None and stamp - before[0] > WINDOW_S:
-            mate.doubted = None
-            if _is_same(met.pose, before[1], mate.map_base):  # chance does not do that twice
+        if alignment is None or is_other:
+            if not _is_seen_again(mate, met.pose, stamp):
+                return  # a third robot may have moved in the same way
+            if alignment is None and told is None:
                 alignment = replace(met, by_sight=True)
-        if alignment is not None:
-            self._lay(name, mate, alignment)
-        elif mate.doubted is None:
-            mate.doubted = stamp, met.pose
+            elif alignment is None and (mate.alignment is None or mate.alignment.pairs):
+                return  # maps bear out what was known, or are not known to
+            mate.alignment = None  # either of the two is wrong
+        self._lay(name, mate, alignment)
 
     def _learn(self, news: News, stamp: float) -> None:
         mate = self._mates.get(news.robot)
@@ -419,6 +422,16 @@ def _is_same(pose: Pose, other: Pose, place: Pose) -> bool:
     """Whether two frames lay a place of the other robot's map at the same place of the own one."""
     one, two = pose.compose(place), other.compose(place)
     return one.distance(two) < _SAME_M and abs(wrap_angle(one.theta - two.theta)) < _SAME_RAD
+
+
+def _is_seen_again(mate: _Mate, pose: Pose, stamp: float) -> bool:
+    """Whether sight has laid a frame so before, by other looks: chance does not do that twice."""
+    before = mate.doubted
+    if before is not None and stamp - before[0] <= WINDOW_S:
+        return False
+    is_again = before is not None and _is_same(pose, before[1], mate.map_base)
+    mate.doubted = None if is_again else (stamp, pose)
+    return is_again
 
 
 def _remember(looks: deque[BodiesSeen], seen: BodiesSeen) -> None:

@@ -530,6 +530,42 @@ def test_where_maps_speak_against_it_robots_have_to_pass_each_other_twice() -> N
     assert passed(one, two, since=40.0) < 0.02
 
 
+def misled(one: Robot, two: Robot, pairs: tuple[tuple[int, int], ...] = ()) -> None:
+    """Let either believe that the other's frame lies elsewhere."""
+    for here, there in ((one, two), (two, one)):
+        true = START[here.member.name].to(START[there.member.name])
+        wrong = Alignment(true.compose(Pose(3.0, -2.0, 0.4)), np.eye(3) * 1e-4, pairs, 0.999)
+        here.member._mates[there.member.name].alignment = wrong
+
+
+def test_a_frame_that_two_meetings_contradict_gives_way_to_theirs() -> None:
+    grid = lattice(6.0 * np.arange(5), 6.0 * np.arange(4))
+    one, two = robot("one", grid, {5, 6, 7}, 5), robot("two", grid, {8, 9}, 9)
+    one.tell(0.0, two)
+    two.tell(0.0, one)
+    misled(one, two)
+    wrong = one.member.frames["two"]
+    with pytest.raises(AssertionError):
+        passed(one, two)
+    assert one.member.frames["two"] == wrong, "a third robot may have moved in the same way"
+    assert passed(one, two, since=40.0) < 0.02
+
+
+@pytest.mark.parametrize("pairs", [(), ((0, 0),)])
+def test_meetings_that_maps_speak_against_void_only_what_no_map_bears_out(
+    pairs: tuple[tuple[int, int], ...],
+) -> None:
+    one, two = robot("one", irregular(1), LEFT, 0), robot("two", irregular(12), RIGHT, 14)
+    one.tell(0.0, two)
+    two.tell(0.0, one)
+    misled(one, two, pairs)
+    for since in (0.0, 40.0):
+        with pytest.raises((AssertionError, KeyError)):
+            passed(one, two, since=since)
+    two.tell(60.0, one)
+    assert ("two" in one.member.frames) == bool(pairs)
+
+
 def test_a_body_where_a_robot_says_that_it_is_can_be_nobody_else() -> None:
     one, two = team()
     there = Pose(4.0, 1.0, 0.0)
