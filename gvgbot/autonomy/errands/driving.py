@@ -97,6 +97,7 @@ class Driving:
         self._looks = 0
         self._unseen = 0  # looks at where the route goes on, without seeing that
         self._is_looking = self._is_obstructed = False
+        self._is_off = True  # the graph, and looks for it; else coming nearer is what counts
         self._progress = -math.inf  # stamp
         self._last_view = -math.inf  # stamp
         self._travelled_then = -math.inf
@@ -140,8 +141,7 @@ class Driving:
         """Seconds without progress."""
         outage = view.stamp - self._last_view - _LONGEST_VIEW_S
         since = self._progress + max(0.0, outage)  # lets no patience run out
-        is_off = self._route is None  # the graph; on it, coming nearer is what counts
-        has_moved = is_off and view.travelled > self._travelled_then + _PROGRESS_M
+        has_moved = self._is_off and view.travelled > self._travelled_then + _PROGRESS_M
         if has_moved or self._is_looking:
             self._travelled_then, since = view.travelled, view.stamp
         self._progress, self._last_view, self._is_looking = since, view.stamp, False
@@ -259,8 +259,9 @@ class Driving:
         if away < DIRECT_M:
             way = straight_way(view, local_goal, room_m) or bent_way(view, local_goal, room_m)
         if way is not None and waited < self.config.look_around_s:
-            self._route = None
-            return Drive(Track.of(*way))
+            self._route, track = None, Track.of(*way)
+            self._come_nearer(view, track.length)
+            return Drive(track)
         foot = foot_of(self._mapper, goal)
         if foot is None:
             return Ended("given up", "no edge is known that it could drive on")
@@ -301,8 +302,7 @@ class Driving:
         if self._unseen >= _UNSEEN_LOOKS[0]:  # a door that has opened just now is still a wall
             self._progress = view.stamp
             return Stand()
-        if route.metres < self._nearest_m - _PROGRESS_M:
-            self._nearest_m, self._progress = route.metres, view.stamp
+        self._come_nearer(view, route.metres)
         path = route.branches(here) or here.ahead()
         line, clearance = here.line_along(path)
         if end is not None:
@@ -318,9 +318,15 @@ class Driving:
             return self._close_way(view) or Stand()
         return Drive(track)
 
+    def _come_nearer(self, view: View, metres: float) -> None:
+        """Note how much is left of the way: wheels that spin are no progress."""
+        self._is_off = False
+        if metres < self._nearest_m - _PROGRESS_M:
+            self._nearest_m, self._progress = metres, view.stamp
+
     def _find_edge(self, view: View, waited: float) -> Order | Ended:
         """Off the graph: go to the nearest edge, or look around for one."""
-        self._route = None
+        self._route, self._is_off = None, True
         way = way_to_edge(view)
         if way is not None and waited < self.config.look_around_s:
             return Drive(Track.of(*way))
