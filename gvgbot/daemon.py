@@ -120,19 +120,11 @@ def _say(text: str) -> None:
     print(text, flush=True)
 
 
-def run(
-    config: Config,
-    *,
-    out: Path | None,
-    known: Path | None = None,
-    anew: bool = False,
-    doubt: str = "",
-) -> int:
+def run(config: Config, *, out: Path | None, known: Path | None = None, anew: bool = False) -> int:
     """Be the daemon until a signal ends it; the exit status, 0 whatever was found by then.
 
     With a state directory it goes on with the map that it was making, unless `anew` or `out` say
-    otherwise; `known` is the directory of a run whose map it begins with. `doubt` is why the
-    devices may not be meant to be simulated.
+    otherwise; `known` is the directory of a run whose map it begins with.
 
     Raises UsageError for a world or directory that cannot be used, GvgbotError if the network
     address is taken or the map cannot be written. Devices that are missing are waited for.
@@ -150,8 +142,6 @@ def run(
         keeper = Keeper(session, start.files, start.saved)
         network = "off" if telemetry is None else telemetry.addresses
         _announce(session, network, resumed=start.saved is not None)
-        if doubt:
-            log.warning("the devices are simulated", reason=doubt)
         ros2, foxglove = _ros2(config, stack), _foxglove(config, stack)
         robot = Robot(
             session,

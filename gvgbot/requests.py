@@ -128,15 +128,14 @@ def parse(name: str, data: bytes, encoding: str) -> Arguments:
         is_known = encoding.startswith((JSON, MESSAGEPACK))
         guess = "" if is_known else f", taken for {MESSAGEPACK} (its encoding does not say {JSON})"
         raise ValueError(f"wrong arguments of {name}{guess}: {error}") from error
-    return within_reason(arguments)
+    if isinstance(arguments, Goto):
+        _check_near(arguments)
+    return arguments
 
 
-def within_reason(arguments: Arguments) -> Arguments:
-    """The arguments. Raises ValueError for a point that is no number, or far from any building."""
-    if not isinstance(arguments, Goto):
-        return arguments
-    for axis, metres in (("x", arguments.x), ("y", arguments.y)):
+def _check_near(goal: Goto) -> None:
+    """Raises ValueError for a coordinate that is no number, or far from any building."""
+    for axis, metres in (("x", goal.x), ("y", goal.y)):
         if metres is not None and not abs(metres) <= _FARTHEST_M:  # what is no number is never so
             allowed = f"a number from {-_FARTHEST_M:.0f} to {_FARTHEST_M:.0f}"
             raise ValueError(f"wrong arguments of goto: {axis} is {metres:g}, must be {allowed}")
-    return arguments

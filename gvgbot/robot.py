@@ -11,8 +11,10 @@ import structlog
 
 from gvgbot.autonomy import events
 from gvgbot.autonomy.errands import Declined
+from gvgbot.autonomy.estimate import smoothed
 from gvgbot.autonomy.loop import Loop
 from gvgbot.autonomy.returning import ReturningPipeline
+from gvgbot.beside_loop import BesideLoop
 from gvgbot.clock import Clock, LoopClock
 from gvgbot.config import Config
 from gvgbot.errors import GvgbotError
@@ -21,11 +23,9 @@ from gvgbot.hal.guard import Guard, Reason
 from gvgbot.hal.messages import Contact, Odometry, Scan
 from gvgbot.journal import BatteryJournal, GuardJournal, log_event, status_line
 from gvgbot.links import Devices, Links
-from gvgbot.live_estimate import LiveEstimate
 from gvgbot.live_feed import LiveFeed, Pace
 from gvgbot.live_map import LiveMap, News
 from gvgbot.live_ros import LiveRos, Neighbour, UnixTime
-from gvgbot.live_survey import LiveSurvey
 from gvgbot.live_team import LiveTeam, TeamNetwork
 from gvgbot.maps.run_directory import record_of
 from gvgbot.persistence.keeper import Keeper
@@ -35,6 +35,7 @@ from gvgbot.session import Session
 from gvgbot.simulation import Simulation
 from gvgbot.snapshots import sign, state
 from gvgbot.steering import Steering
+from gvgbot.survey import survey
 from gvgbot.topics import EVENTS_KEPT, HEALTH, MAP, STATE, Event, Events, Health, Payload, State
 from gvgbot.vitals import Vitals
 
@@ -103,9 +104,9 @@ class Robot:
         self._pipeline = session.pipeline
         self._grown, self._finished = asyncio.Event(), asyncio.Event()
         self._saving = asyncio.Lock()  # one at a time
-        self._survey = LiveSurvey(session.pipeline)
-        self._pipeline.mission.survey = self._survey.places
-        self._estimate = LiveEstimate(session.pipeline)
+        self._survey = BesideLoop(session.pipeline, survey)
+        self._pipeline.mission.survey = self._survey.newest
+        self._estimate = BesideLoop(session.pipeline, smoothed)
         if isinstance(self._pipeline, ReturningPipeline):
             self._pipeline.smooth = self._estimate.newest
         self._odometry: Odometry | None = None
@@ -141,8 +142,8 @@ class Robot:
             "explore": self._explore(),
             "beat": self._beat(),
             "save": self._keep_saved(),
-            "survey": self._survey.make(self._off_loop),
-            "estimate": self._estimate.make(self._off_loop),
+            "survey": self._survey.work(self._off_loop),
+            "estimate": self._estimate.work(self._off_loop),
         }
         if self._keeper is not None:
             self._keeper.attach(links.feedback)

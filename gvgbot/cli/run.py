@@ -1,6 +1,7 @@
 """`gvgbot run`, the daemon, and `gvgbot install-service`, which makes it one of a machine."""
 
 import argparse
+import sys
 from pathlib import Path
 
 from gvgbot.cli.arguments import Commands, add_overrides, say
@@ -38,9 +39,11 @@ def _run(options: argparse.Namespace) -> int:
 
     config = load_config(options.config, options.overrides)
     doubt = doubt_of_devices(options.config, options.overrides)
+    if doubt:
+        print(f"gvgbot: warning: the devices are simulated: {doubt}", file=sys.stderr)
     from gvgbot import daemon
 
-    return daemon.run(config, out=options.out, known=options.map, anew=options.new, doubt=doubt)
+    return daemon.run(config, out=options.out, known=options.map, anew=options.new)
 
 
 def add_install_service(commands: Commands) -> None:

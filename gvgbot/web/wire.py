@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
-from gvgbot.requests import Arguments, RequestName, kind_of, within_reason
+from gvgbot.requests import JSON, Arguments, RequestName, parse
 from gvgbot.topics import Events, Health, Map, Odometry, Plan, Scan, State, Tile, Trajectory
 
 Known = Literal[
@@ -64,11 +64,7 @@ class Wish(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     @property
     def typed(self) -> Arguments:
         """The arguments of the request. Raises ValueError if they do not fit."""
-        try:
-            arguments = msgspec.convert(self.arguments, kind_of(self.name))
-        except msgspec.MsgspecError as error:
-            raise ValueError(f"wrong arguments of {self.name}: {error}") from error
-        return within_reason(arguments)
+        return parse(self.name, msgspec.json.encode(self.arguments), JSON)
 
 
 Told = State | Map | Floor | Tile | Trajectory | Plan | Odometry | Scan | Events | Health

@@ -10,11 +10,11 @@ import pytest
 from gvgbot.autonomy.localisation import Localisation
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.ekf import Belief
+from gvgbot.beside_loop import BesideLoop
 from gvgbot.config import load_config
 from gvgbot.drivers.world import World
 from gvgbot.geometry import STANDSTILL, Array, Pose
 from gvgbot.hal.messages import Odometry
-from gvgbot.live_survey import LiveSurvey
 from gvgbot.survey import survey
 from gvgbot.worlds.canvas import Canvas
 from tests.unit.autonomy.graphs import streets
@@ -98,7 +98,7 @@ def test_a_post_that_was_passed_before_anybody_knew_that_it_is_one_is_looked_at_
 def test_a_daemon_makes_its_survey_off_the_loop_and_forgets_it_when_the_robot_drives_on() -> None:
     config = load_config()
     pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
-    in_background = LiveSurvey(pipeline)
+    in_background = BesideLoop(pipeline, survey)
     done: list[float] = []
 
     async def off_loop(function: Callable[[], None]) -> None:
@@ -109,16 +109,16 @@ def test_a_daemon_makes_its_survey_off_the_loop_and_forgets_it_when_the_robot_dr
     async def until_there_is_something() -> Array | None:
         for _ in range(10):
             await asyncio.sleep(0.0)
-        return in_background.places()
+        return in_background.newest()
 
     async def story() -> None:
         async with asyncio.TaskGroup() as tasks:
-            making = tasks.create_task(in_background.make(off_loop))
-            assert in_background.places() is None
+            making = tasks.create_task(in_background.work(off_loop))
+            assert in_background.newest() is None
             found = await until_there_is_something()
             assert found is not None
             assert len(found) == 0
-            assert in_background.places() is None
+            assert in_background.newest() is None
             pipeline.travelled = 5.0
             assert await until_there_is_something() is None  # it was made elsewhere
             assert await until_there_is_something() is not None
