@@ -20,16 +20,16 @@ def matched(walls: Array) -> Array:
 
 def correction(
     change: Pose,
-    C: Array,
+    after: Array,
     *,
     motion: Pose = STEPS[1][0],
     duration: float = 0.5,
     before: Array = Q,
     scattered: Array | None = None,
 ) -> Correction:
-    """What walls made of a motion, whose covariance was `before` and is C (3, 3) now."""
+    """What walls made of a motion, whose covariance (3, 3) was `before` and is `after` now."""
     true = before if scattered is None else scattered
-    return Correction(motion, duration, change, before, true, C, 1.0)
+    return Correction(motion, duration, change, before, true, after, noise=1.0)
 
 
 def driven(errors: Array, walls: Array, seed: int, steps: int = 120) -> Calibration:
