@@ -110,7 +110,8 @@ def register(
         return _pairs(points, pose, tree, walls, counts, config.max_pair_m, turned)
 
     pose, step = prior, np.zeros(3)  # from the prior to the pose
-    A, residual = information, np.empty(0)
+    A, residual, number = information, np.empty(0), np.empty(0, np.intp)
+    J = JW = np.empty((3, 0))
     paired_at, pairs = pose, paired(pose)
     for _ in range(_ITERATIONS):
         if _is_elsewhere(paired_at, pose):
