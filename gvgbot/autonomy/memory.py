@@ -12,12 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvgbot.autonomy.candidates import Candidate
+from gvgbot.autonomy.ending import Outcome
 from gvgbot.autonomy.errands.plans import Kept
 from gvgbot.autonomy.exploration.obstructions import Obstructions
 from gvgbot.autonomy.gvg.local_map import LocalMap
 from gvgbot.autonomy.hazards import Hazard
 from gvgbot.autonomy.keyframes import Keyframe, Step
-from gvgbot.autonomy.mission import Mission, Outcome
+from gvgbot.autonomy.mission import Mission
 from gvgbot.autonomy.newcomers import Newcomer
 from gvgbot.autonomy.odometry_log import OdometryLog
 from gvgbot.autonomy.passed import Passed

@@ -1,8 +1,6 @@
 """What the robot is about: explore every frontier, give up what is out of reach, say why."""
 
 import math
-from collections.abc import Callable
-from typing import Literal
 
 import numpy as np
 
@@ -12,6 +10,7 @@ from gvgbot.autonomy.control.company import Companion
 from gvgbot.autonomy.control.edge_follower import Track
 from gvgbot.autonomy.control.orders import ARRIVED_M, Drive, LookAround, Order, Stand
 from gvgbot.autonomy.driven_edges import DrivenEdges
+from gvgbot.autonomy.ending import Outcome, Survey, all_examined, cut_short, without_target
 from gvgbot.autonomy.events import Decision, Event, Finished, Recovery
 from gvgbot.autonomy.examination import Examination
 from gvgbot.autonomy.exploration.access import NEAR_M, access, way_to_edge
@@ -37,8 +36,6 @@ _FACING_RAD = 1.0  # looking so far past a thing, one would not see it go
 _LED_M = 1.0, 4.0  # ahead: who drives there behind others need not
 _FACING_POINTS = 6  # of a polyline tell where its end points to
 
-Outcome = Literal["explored", "explored_with_blocked", "failed", "stopped"]
-
 
 class Mission:
     """Chooses the frontier to explore, and the order that brings the robot nearer to it."""
@@ -47,9 +44,8 @@ class Mission:
         self._config, self._mapper = config, mapper
         self.where = Whereabouts()
         self.choice = Choice(config, mapper)
-        # finds places (N, 2), m, map frame, that are worth another look when all is explored;
-        # None as long as that takes
-        self.survey: Callable[[], Array | None] | None = None
+        # of what is worth another look when all is explored
+        self.survey: Survey | None = None
         self.target: HalfEdgeId | None = None
         self.outcome: Outcome | None = None
         self.reason = ""
@@ -503,11 +499,9 @@ class Mission:
             is_done = self._mapper.graph.vertices and not self._mapper.graph.frontiers()
             if is_going_back or is_done:
                 return
-            is_closed = not self._mapper.graph.vertices and self._sees_all()
-            if is_closed:
-                self._end(view, "explored", "a space without edges, and no way out")
-            elif is_closed is not None:
-                self._end_early(view, f"no vertex found, perhaps no way out: {reason}", reason)
+            verdict = without_target(self._mapper.graph, self.survey, reason)
+            if verdict is not None:
+                self._end(view, *verdict)
             return
         has_left = self.where.on_edge not in (None, self.target)
         if has_left and self._backtracking.begin():
@@ -540,16 +534,6 @@ class Mission:
         self._progress.wait(view.stamp)
         return True
 
-    def _sees_all(self) -> bool | None:
-        """Whether no floor is unseen that the robot could drive onto: it is in a closed room.
-
-        None as long as the survey takes.
-        """
-        if self.survey is None:
-            return False
-        places = self.survey()
-        return None if places is None else not len(places)
-
     def _access(self, view: View) -> Order:
         """Go to the nearest edge, if the way there is free."""
         way = way_to_edge(view)
@@ -567,17 +551,8 @@ class Mission:
         self._events += done
         if isinstance(order, Stand):
             reason = f"{NO_EDGE}: there are no walls within range, or no way out"
-            self._end_early(view, reason, NO_EDGE)
+            self._end(view, *cut_short(self._mapper.graph, reason, NO_EDGE))
         return order
-
-    def _end_early(self, view: View, without_map: str, reason: str) -> None:
-        """End because nothing more can be done; why, if nothing is mapped, and if something is."""
-        graph = self._mapper.graph
-        if not graph.vertices:
-            self._end(view, "failed", without_map)
-            return
-        left = len(graph.frontiers()) + self._given_up()
-        self._end(view, "explored_with_blocked", f"frontiers left: {left}; {reason}")
 
     def _examine(self, view: View, here: Situation) -> Order:
         """Look at what may be a vertex, give others a chance to know more to do, and end."""
@@ -588,17 +563,8 @@ class Mission:
         if not self._examination.is_over:
             self._examination.is_over = True
             return Stand()
-        blocked = self._given_up()
-        if blocked:
-            self._end(view, "explored_with_blocked", f"frontiers given up: {blocked}{self.remark}")
-        else:
-            self._end(view, "explored", f"no frontier is left{self.remark}")
+        self._end(view, *all_examined(self._mapper.graph, self.remark))
         return Stand()
-
-    def _given_up(self) -> int:
-        """How many frontiers were given up."""
-        graph = self._mapper.graph
-        return sum(graph.edge_at(end) is None for end in graph.blocked())
 
     def _finish(self, view: View) -> None:
         """Some frontiers cannot be reached: that is the end, after having looked for a way."""

@@ -1,0 +1,48 @@
+"""How an exploration ends: its outcome, and why."""
+
+from collections.abc import Callable
+from typing import Literal
+
+from gvgbot.autonomy.slam.graph import GvgGraph
+from gvgbot.geometry import Array
+
+Outcome = Literal["explored", "explored_with_blocked", "failed", "stopped"]
+Survey = Callable[[], Array | None]  # places (N, 2), m, map frame, worth a look; None: not yet told
+
+
+def given_up(graph: GvgGraph) -> int:
+    """How many frontiers were given up."""
+    return sum(graph.edge_at(end) is None for end in graph.blocked())
+
+
+def all_examined(graph: GvgGraph, remark: str) -> tuple[Outcome, str]:
+    """No frontier is left, and nothing in sight may be a vertex."""
+    blocked = given_up(graph)
+    if blocked:
+        return "explored_with_blocked", f"frontiers given up: {blocked}{remark}"
+    return "explored", f"no frontier is left{remark}"
+
+
+def cut_short(graph: GvgGraph, without_map: str, reason: str) -> tuple[Outcome, str]:
+    """Nothing more can be done; why, if nothing is mapped, and if something is."""
+    if not graph.vertices:
+        return "failed", without_map
+    left = len(graph.frontiers()) + given_up(graph)
+    return "explored_with_blocked", f"frontiers left: {left}; {reason}"
+
+
+def without_target(
+    graph: GvgGraph, survey: Survey | None, reason: str
+) -> tuple[Outcome, str] | None:
+    """There is nothing to go for, and no way on; None as long as the survey takes.
+
+    Without a vertex, where no floor is unseen that the robot could drive onto, it is in a closed
+    room, and all is explored.
+    """
+    if not graph.vertices and survey is not None:
+        places = survey()
+        if places is None:
+            return None
+        if not len(places):
+            return "explored", "a space without edges, and no way out"
+    return cut_short(graph, f"no vertex found, perhaps no way out: {reason}", reason)
