@@ -1,4 +1,6 @@
-"""Which frontier to explore next."""
+"""Which frontier to explore next, alone or in a team."""
+
+import numpy as np
 
 from gvgbot.autonomy.exploration.certainty import vertex_sigma
 from gvgbot.autonomy.exploration.config import ExplorationConfig
@@ -7,7 +9,10 @@ from gvgbot.autonomy.exploration.paths import Approach, shortest_paths
 from gvgbot.autonomy.exploration.sharing import Sharing
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.slam.graph import HalfEdgeId
+from gvgbot.autonomy.views import View
+from gvgbot.autonomy.whereabouts import Situation
 
+_LED_M = 1.0, 4.0  # ahead: who drives there behind others need not
 _WORTH_TURNING_M = 1.0  # a new frontier must be so much nearer than the old one
 
 
@@ -40,6 +45,24 @@ class Choice:
         """Choose nothing, and wait for nobody: the robot drives on where nobody has been."""
         self._has_asked = False
 
+    def is_led(self, view: View, here: Situation, *, either_way: bool) -> bool:
+        """Whether other robots have driven what is straight ahead."""
+        if self.sharing is None:
+            return False
+        line, _ = here.line_along(here.ahead())
+        away = np.hypot(*(line - view.local_base.position).T)
+        ahead = line[(away > _LED_M[0]) & (away < _LED_M[1])]
+        map_local = self._mapper.belief.map_base.compose(view.local_base.inverse())
+        return self.sharing.has_driven(map_local.transform(ahead), either_way=either_way)
+
+    def under_way(self, here: Situation) -> HalfEdgeId | None:
+        """The open edge that a robot of a team is on, if nobody else is farther on it."""
+        end = here.where.on_edge
+        half = None if end is None else self._mapper.graph.half_edge(end)
+        if self.sharing is None or end is None or half is None or not half.open:
+            return None
+        return end if self.keeps(end, here) else None
+
     def ear(self, explored: HalfEdgeId | None) -> HalfEdgeId | None:
         """By the ear rule, at the end of the edge just explored, if that is the policy."""
         graph = self._mapper.graph
@@ -63,9 +86,14 @@ class Choice:
 
         return nearest_frontier(graph, starts, handicap)
 
-    def keeps(self, target: HalfEdgeId, starts: list[Approach]) -> bool:
+    def keeps(self, target: HalfEdgeId, here: Situation) -> bool:
         """Whether a target is still this robot's own."""
-        return self.sharing is None or self.sharing.keeps(target, self._mapper.graph, starts)
+        if self.sharing is None:
+            return True
+        is_on_it = here.where.on_edge == target
+        so_far = [Approach(-here.where.trail_length, target)]  # so far past its vertex
+        starts = so_far if is_on_it else here.starts()
+        return self.sharing.keeps(target, self._mapper.graph, starts)
 
     def nearer(
         self, target: HalfEdgeId, found: set[HalfEdgeId], starts: list[Approach]

@@ -17,7 +17,7 @@ from gvgbot.autonomy.exploration.access import NEAR_M, access, way_to_edge
 from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.exploration.hindrance import Hindrance
 from gvgbot.autonomy.exploration.obstructions import Obstructions
-from gvgbot.autonomy.exploration.paths import Approach, shortest_paths
+from gvgbot.autonomy.exploration.paths import shortest_paths
 from gvgbot.autonomy.gvg.local import Branch, Place
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.neighbours import Neighbours
@@ -33,7 +33,6 @@ from gvgbot.geometry import Array, Pose, wrap_angle
 
 _SECOND = 1  # try, in the end, of what was given up: things may have changed
 _FACING_RAD = 1.0  # looking so far past a thing, one would not see it go
-_LED_M = 1.0, 4.0  # ahead: who drives there behind others need not
 _FACING_POINTS = 6  # of a polyline tell where its end points to
 
 
@@ -226,30 +225,19 @@ class Mission:
     def _ahead(self, view: View, here: Situation) -> tuple[Branch, ...]:
         """Straight on; before a vertex is known, once back if others have driven what is ahead."""
         may_turn = not (self._has_turned or self._mapper.graph.vertices)
-        if may_turn and self._is_led(view, here, either_way=False):
+        if may_turn and self.choice.is_led(view, here, either_way=False):
             self._has_turned = self.where.turn_round()
         return here.ahead()
-
-    def _is_led(self, view: View, here: Situation, *, either_way: bool) -> bool:
-        """Whether other robots have driven what is straight ahead."""
-        sharing = self.choice.sharing
-        if sharing is None:
-            return False
-        line, _ = here.line_along(here.ahead())
-        away = np.hypot(*(line - view.local_base.position).T)
-        ahead = line[(away > _LED_M[0]) & (away < _LED_M[1])]
-        map_local = self._mapper.belief.map_base.compose(view.local_base.inverse())
-        return sharing.has_driven(map_local.transform(ahead), either_way=either_way)
 
     def _choose(self, view: View, here: Situation) -> HalfEdgeId | None:
         """The next frontier, by the policy."""
         graph = self._mapper.graph
-        if not graph.vertices and not self._is_led(view, here, either_way=True):
+        if not graph.vertices and not self.choice.is_led(view, here, either_way=True):
             self.choice.go_ahead()
             return None
         chosen, reason = self.choice.ear(self.target), "ear"
-        if chosen is None and self._is_on_own_frontier():
-            chosen, reason = self.where.on_edge, "nearest frontier"
+        if chosen is None:
+            chosen, reason = self.choice.under_way(here), "nearest frontier"
         if chosen is None:
             nearest = self.choice.nearest(here.starts())
             if nearest is None and self._reopen(view, "nothing else is left"):
@@ -261,24 +249,12 @@ class Mission:
                     self._finish(view)
                 return None
             self._scouting.end()
-            chosen, reason = nearest[0], "nearest frontier"
+            chosen = nearest[0]
         if self._progress.is_vain(chosen):
             self._leave(view, chosen, "whenever it is explored there is another one", retries=0)
             return None
         self._commit(view, here, chosen, reason)
         return chosen
-
-    def _is_on_own_frontier(self) -> bool:
-        """Whether a robot of a team is on an open edge, and nobody else is farther on it."""
-        end = self.where.on_edge
-        half = None if end is None else self._mapper.graph.half_edge(end)
-        if self.choice.sharing is None or end is None or half is None or not half.open:
-            return False
-        return self.choice.keeps(end, self._come(end))
-
-    def _come(self, end: HalfEdgeId) -> list[Approach]:
-        """Where the robot is on the edge that leaves by a half-edge: so far past its vertex."""
-        return [Approach(-self.where.trail_length, end)]
 
     def _team_is_done(self, view: View) -> bool:
         """Whether all is left to others, and no way is worth a wait, or to be looked for."""
@@ -293,13 +269,11 @@ class Mission:
         """The target, or a frontier found just now that is nearer than what is left of the way."""
         frontiers = set(self._mapper.graph.frontiers())
         found, self._frontiers = frontiers - self._frontiers, frontiers
-        is_on_it = self.where.on_edge == target
-        starts = self._come(target) if is_on_it else here.starts()
-        if not self.choice.keeps(target, starts):
+        if not self.choice.keeps(target, here):
             return self._choose(view, here)
-        if is_on_it:
+        if self.where.on_edge == target:
             return target
-        nearer = self.choice.nearer(target, found, starts)
+        nearer = self.choice.nearer(target, found, here.starts())
         if nearer is None or self._progress.is_vain(nearer):
             return target
         self._commit(view, here, nearer, "nearer frontier")
