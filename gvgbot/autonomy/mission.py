@@ -1,14 +1,10 @@
 """What the robot is about: explore every frontier, give up what is out of reach, say why."""
 
-import math
-
-import numpy as np
-
 from gvgbot.autonomy.backtracking import Backtracking
 from gvgbot.autonomy.choice import Choice
 from gvgbot.autonomy.control.company import Companion
 from gvgbot.autonomy.control.edge_follower import Track
-from gvgbot.autonomy.control.orders import ARRIVED_M, Drive, LookAround, Order, Stand
+from gvgbot.autonomy.control.orders import Drive, Order, Stand
 from gvgbot.autonomy.driven_edges import DrivenEdges
 from gvgbot.autonomy.ending import Outcome, Survey, all_examined, cut_short, without_target
 from gvgbot.autonomy.events import Decision, Event, Finished, Recovery
@@ -21,6 +17,7 @@ from gvgbot.autonomy.exploration.paths import shortest_paths
 from gvgbot.autonomy.gvg.local import Branch, Place
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.neighbours import Neighbours
+from gvgbot.autonomy.path_following import PathFollowing
 from gvgbot.autonomy.progress import Progress
 from gvgbot.autonomy.retracing import Retracing
 from gvgbot.autonomy.scouting import Scouting
@@ -32,8 +29,6 @@ from gvgbot.autonomy.whereabouts import Situation, Whereabouts
 from gvgbot.geometry import Array, Pose, wrap_angle
 
 _SECOND = 1  # try, in the end, of what was given up: things may have changed
-_FACING_RAD = 1.0  # looking so far past a thing, one would not see it go
-_FACING_POINTS = 6  # of a polyline tell where its end points to
 
 
 class Mission:
@@ -52,7 +47,6 @@ class Mission:
         self._progress = Progress(mapper)
         self._driven = DrivenEdges(mapper)
         self._frontiers: set[HalfEdgeId] = set()  # that were known at the last view
-        self._looked_around = 0
         self._has_turned = (
             False  # before it knew a vertex: others had driven on, or nothing was there
         )
@@ -61,6 +55,9 @@ class Mission:
         self._neighbours = Neighbours()
         self._search, self._scouting, self._backtracking = Search(), Scouting(), Backtracking()
         self._retracing = Retracing()
+        self._path_following = PathFollowing(
+            self._neighbours, self._hindrance, self._progress.headway
+        )
         self._examination = Examination(mapper)
         self._events: list[Event] = []
 
@@ -146,7 +143,7 @@ class Mission:
         """Let the robot do something else; choose anew when it comes back."""
         self.target = None
         self._progress.set_aside()
-        self._looked_around = 0
+        self._path_following.renew()
         self._examination.end()
         self._hindrance.end()
         self._search.end()
@@ -209,7 +206,7 @@ class Mission:
             self._progress.wait(view.stamp)
             if self.choice.waits_for_others:
                 self._progress.set_aside()
-            return self._make_way(view, here)
+            return self._path_following.make_way(view, here)
         if self.target is None and graph.frontiers():
             return self._wait_for_a_way(view, here)
         if self.target is None and graph.vertices:
@@ -282,7 +279,7 @@ class Mission:
     def _commit(self, view: View, here: Situation, chosen: HalfEdgeId, reason: str) -> None:
         way = shortest_paths(self._mapper.graph, here.starts()).get(chosen.vertex)
         self._progress.set_out(view, chosen, 0.0 if way is None else way.metres, self._config)
-        self._looked_around = 0
+        self._path_following.renew()
         self._backtracking.renew()
         self._examination.end()
         vertex = self._mapper.graph.vertices[chosen.vertex]
@@ -295,7 +292,7 @@ class Mission:
         scouting = self._scouting
         if not scouting.is_on:
             scouting.begin(view.stamp)
-            self._looked_around = 0
+            self._path_following.renew()
             self._events.append(Recovery(view.stamp, "drive on", "no way leads to the frontier"))
         near = None
         if self.target is None:
@@ -310,36 +307,15 @@ class Mission:
                 self._give_up(view, "no way leads there")
         return self._drive(view, here, scouting.path_on(here))
 
-    def _make_way(self, view: View, here: Situation) -> Order:
-        """Stand, where others can pass."""
-        track = self._neighbours.track_aside(view, here)
-        return Stand() if track is None else Drive(track)
-
     def _drive(self, view: View, here: Situation, path: tuple[Branch, ...]) -> Order:
-        line, room = here.line_along(path)
-        free = self._neighbours.free_metres(view, line)
-        if free < ARRIVED_M:
-            self._hindrance.hold()
-            return self._make_way(view, here)
-        track = Track.of(line, room).until(free)
-        end = view.gvg.end_of(path[-1])
-        waited = self._progress.headway.waited(view.stamp)
-        if waited == 0.0 and self._scouting.is_on:  # it has come on, to where it looks anew
-            self._looked_around = 0
-        if track.length < ARRIVED_M and end not in here.known.vertex_of and end in view.doubted:
-            self._hindrance.hold()
-            away = _turn_to_face(view, path[-1])
-            if min(away, math.tau - away) > _FACING_RAD:
-                return LookAround(away)
-        elif track.length < ARRIVED_M and waited > self._config.look_around_s:
-            self._progress.headway.restart(view.stamp)
-            self._looked_around += 1
-            if self._looked_around > 2:
-                self._see_no_more(view, here)
-                return Stand()
-            self._events.append(Recovery(view.stamp, "look around", "standing at the end of sight"))
-            return LookAround(math.tau)
-        return Drive(track)
+        order, done = self._path_following.follow(
+            view, here, path, self._config.look_around_s, looks_anew=self._scouting.is_on
+        )
+        self._events += done
+        if order is None:
+            self._see_no_more(view, here)
+            return Stand()
+        return order
 
     def _see_no_more(self, view: View, here: Situation) -> None:
         """Go another way, or give up what is ahead: of what no way leads to, what is nearest."""
@@ -358,7 +334,7 @@ class Mission:
             return False
         self._has_turned = self.where.turn_round(view.local_base.theta)
         if self._has_turned:
-            self._looked_around = 0
+            self._path_following.renew()
             self._events.append(Recovery(view.stamp, "turn round", "this way leads nowhere"))
         return self._has_turned
 
@@ -371,7 +347,8 @@ class Mission:
         edge = None if departures is None else self._mapper.graph.edge_at(departures[0])
         if departures is None or edge is None or departures[0] in here.known.branch_of:
             return False
-        self._looked_around, self.target = 0, None
+        self.target = None
+        self._path_following.renew()
         self._obstructions.close(self._mapper.graph, [edge.a, edge.b], view.stamp)
         reason = "the way on is not to be seen"
         self._events.append(Recovery(view.stamp, "try another way", reason))
@@ -466,7 +443,7 @@ class Mission:
 
     def _give_up(self, view: View, reason: str) -> None:
         """Mark the target as blocked, after having gone back; without one, that is the end."""
-        self._looked_around = 0
+        self._path_following.renew()
         half = None if self.target is None else self._mapper.graph.half_edge(self.target)
         if half is None:
             is_going_back = self._begins_to_retrace(view)
@@ -555,9 +532,3 @@ class Mission:
         self.outcome, self.reason = outcome, reason
         self._mapper.establish()
         self._events.append(Finished(view.stamp, outcome, reason))
-
-
-def _turn_to_face(view: View, branch: Branch) -> float:
-    """How far to turn left until the robot looks along the end of a branch, rad."""
-    dx, dy = np.diff(view.gvg.leaving(branch)[-_FACING_POINTS:][[0, -1]], axis=0)[0]
-    return float((math.atan2(dy, dx) - view.local_base.theta) % math.tau)

@@ -1,0 +1,83 @@
+"""What to do with a path: drive it as far as others leave room, and look around at its end."""
+
+import math
+
+import numpy as np
+
+from gvgbot.autonomy.control.edge_follower import Track
+from gvgbot.autonomy.control.orders import ARRIVED_M, Drive, LookAround, Order, Stand
+from gvgbot.autonomy.events import Event, Recovery
+from gvgbot.autonomy.exploration.headway import Headway
+from gvgbot.autonomy.exploration.hindrance import Hindrance
+from gvgbot.autonomy.gvg.local import Branch
+from gvgbot.autonomy.neighbours import Neighbours
+from gvgbot.autonomy.views import View
+from gvgbot.autonomy.whereabouts import Situation
+
+_MOST_LOOKS = 2  # around, before nothing more is to be seen
+_FACING_RAD = 1.0  # looking so far past a thing, one would not see it go
+_FACING_POINTS = 6  # of a polyline tell where its end points to
+
+
+class PathFollowing:
+    """Of paths on the local GVG, which end where sight ends."""
+
+    def __init__(self, neighbours: Neighbours, hindrance: Hindrance, headway: Headway) -> None:
+        self._neighbours, self._hindrance, self._headway = neighbours, hindrance, headway
+        self._looked_around = 0
+
+    def renew(self) -> None:
+        """Let it look around anew: it goes somewhere else, or has come on."""
+        self._looked_around = 0
+
+    def make_way(self, view: View, here: Situation) -> Order:
+        """Stand, where others can pass."""
+        track = self._neighbours.track_aside(view, here)
+        return Stand() if track is None else Drive(track)
+
+    def follow(
+        self,
+        view: View,
+        here: Situation,
+        path: tuple[Branch, ...],
+        look_around_s: float,
+        *,
+        looks_anew: bool,
+    ) -> tuple[Order | None, list[Event]]:
+        """The order for the next keyframe interval; None where nothing more is to be seen.
+
+        It stands at the end for some seconds before it looks around. `looks_anew` says whether it
+        may do so once more wherever it has come on.
+        """
+        line, room = here.line_along(path)
+        free = self._neighbours.free_metres(view, line)
+        if free < ARRIVED_M:
+            self._hindrance.hold()
+            return self.make_way(view, here), []
+        track = Track.of(line, room).until(free)
+        end = view.gvg.end_of(path[-1])
+        waited = self._headway.waited(view.stamp)
+        if waited == 0.0 and looks_anew:
+            self.renew()
+        if track.length < ARRIVED_M and end not in here.known.vertex_of and end in view.doubted:
+            self._hindrance.hold()
+            away = _turn_to_face(view, path[-1])
+            if min(away, math.tau - away) > _FACING_RAD:
+                return LookAround(away), []
+        elif track.length < ARRIVED_M and waited > look_around_s:
+            return self._look_around(view.stamp)
+        return Drive(track), []
+
+    def _look_around(self, stamp: float) -> tuple[Order | None, list[Event]]:
+        self._headway.restart(stamp)
+        self._looked_around += 1
+        if self._looked_around > _MOST_LOOKS:
+            return None, []
+        event = Recovery(stamp, "look around", "standing at the end of sight")
+        return LookAround(math.tau), [event]
+
+
+def _turn_to_face(view: View, branch: Branch) -> float:
+    """How far to turn left until the robot looks along the end of a branch, rad."""
+    dx, dy = np.diff(view.gvg.leaving(branch)[-_FACING_POINTS:][[0, -1]], axis=0)[0]
+    return float((math.atan2(dy, dx) - view.local_base.theta) % math.tau)
