@@ -15,7 +15,7 @@ from scipy.spatial.distance import cdist
 
 from gvgbot.geometry import Array, Pose, direction_of, stations_of, wrap_angle
 from gvgbot.maps.moved import moved_graph
-from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
+from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph, lines_from
 
 SAME_M = 0.6  # vertices nearer to each other are one
 _SAME_RAD = 0.7  # departures nearer to each other are one
@@ -65,12 +65,8 @@ def merged(ours: RouteGraph, theirs: RouteGraph, pose: Pose) -> RouteGraph:
 
 def settled(vertices: Sequence[MapVertex], edges: Sequence[MapEdge]) -> RouteGraph:
     """The map of vertices and edges, where these end on those, and are no frontiers any more."""
-    leaving: dict[int, list[float]] = {}
-    for edge in edges:
-        leaving.setdefault(edge.start, []).append(direction_of(edge.polyline, AHEAD_M))
-        leaving.setdefault(edge.end, []).append(direction_of(edge.polyline[::-1], AHEAD_M))
     return RouteGraph(
-        tuple(_settled(vertex, leaving.get(vertex.id, [])) for vertex in vertices),
+        tuple(_settled(vertex, edges) for vertex in vertices),
         tuple(_anchored(edge, vertices) for edge in edges),
     )
 
@@ -265,8 +261,9 @@ def is_same(edge: MapEdge, other: MapEdge) -> bool:
     return float(max(away.min(axis=0).max(), away.min(axis=1).max())) < _BESIDE_M
 
 
-def _settled(vertex: MapVertex, leaving: list[float]) -> MapVertex:
+def _settled(vertex: MapVertex, edges: Sequence[MapEdge]) -> MapVertex:
     """A vertex whose frontiers are those that no edge of either map follows."""
+    leaving = [direction_of(line, AHEAD_M) for line in lines_from(vertex.id, edges)]
     followed = [b for b in vertex.bearings if b not in vertex.frontiers]
     others = _unexplained(leaving, followed)
     frontiers = tuple(f for f in vertex.frontiers if not is_among(f, others))

@@ -1,13 +1,13 @@
 """Edges that several robots of a team have driven in pieces, and none from end to end."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from gvgbot.geometry import Array, direction_of
 from gvgbot.maps.merging import AHEAD_M, is_among, is_same, settled
-from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
+from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph, lines_from
 from gvgbot.team.ways import WELL_ON_M, Ways, leads_over
 
 _EVENED = 7  # points of a line, 0.1 m apart
@@ -27,7 +27,7 @@ def pieced(graph: RouteGraph, ways: Sequence[tuple[Array, float]]) -> RouteGraph
     known = Ways(lines, np.array([vertex.position for vertex in vertices]).reshape(-1, 2))
     edges = list(graph.edges)
     for number, vertex in enumerate(vertices):
-        taken = list(_leaving(graph, vertex)) if vertex.frontiers else []
+        taken = list(lines_from(vertex.id, graph.edges)) if vertex.frontiers else []
         for bearing in vertex.frontiers:
             walk = known.behind(number, bearing, taken)
             if walk is None or not is_among(
@@ -45,15 +45,6 @@ def pieced(graph: RouteGraph, ways: Sequence[tuple[Array, float]]) -> RouteGraph
             if not any(is_same(edge, other) for other in edges):
                 edges.append(edge)
     return settled(vertices, edges)
-
-
-def _leaving(graph: RouteGraph, vertex: MapVertex) -> Iterator[Array]:
-    """The lines (N, 2) of the edges of a vertex, from there."""
-    for edge in graph.edges:
-        if edge.start == vertex.id:
-            yield edge.polyline
-        if edge.end == vertex.id:
-            yield edge.polyline[::-1]
 
 
 def _evened(line: Array) -> Array:

@@ -1,6 +1,7 @@
 """The finished map as a graph of routes: what is saved, drawn and handed to other robots."""
 
 from collections import Counter
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Literal
 
@@ -50,6 +51,15 @@ class MapEdge:
         if self.polyline.ndim != 2 or self.polyline.shape[1] != 2 or len(self.polyline) < 2:
             raise ValueError(f"edge from {self.start} to {self.end} needs two points or more")
         self.polyline.setflags(write=False)
+
+
+def lines_from(vertex: int, edges: Iterable[MapEdge]) -> Iterator[Array]:
+    """The polylines (N, 2) of those edges that end at a vertex, from there; a loop's both ways."""
+    for edge in edges:
+        if edge.start == vertex:
+            yield edge.polyline
+        if edge.end == vertex:
+            yield edge.polyline[::-1]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
