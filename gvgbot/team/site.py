@@ -21,8 +21,6 @@ _SAME_M = 0.6  # vertices nearer to each other are one
 _SAME_RAD = 0.7  # departures nearer to each other are one
 _AHEAD_M = 0.8  # along an edge, its direction is taken
 
-End = tuple[int, HalfEdgeId]  # a chart's index and a half-edge of it
-
 
 @dataclass(frozen=True, slots=True)
 class Frontier:
