@@ -24,7 +24,7 @@ def belief_of(vertices: int) -> Belief:
     rng = np.random.default_rng(vertices)
     n = 3 + 3 * vertices
     common = rng.normal(0.0, 0.05, (n, 6))
-    P = common @ common.T  # noqa: N806
+    P = common @ common.T
     P[np.diag_indices(n)] += 1e-3
     return Belief(rng.uniform(-3.0, 3.0, n), P, tuple(range(1, vertices + 1)))
 
@@ -42,7 +42,7 @@ def cpu_ms(do: Callable[[], object]) -> float:
 def bench(vertices: int) -> None:
     """Time one size of map."""
     belief, noise = belief_of(vertices), OdometryNoise()
-    growth, R = noise.covariance(MOTION, 0.5), 0.01 * np.eye(3)  # noqa: N806
+    growth, R = noise.covariance(MOTION, 0.5), 0.01 * np.eye(3)
     seen = belief.map_base.to(belief.map_vertex(1))
     steps: dict[str, Callable[[], object]] = {
         "motion": lambda: advance(belief, MOTION, growth),

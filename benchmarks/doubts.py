@@ -76,7 +76,7 @@ class Doubting(Tour):
             return  # a bend is no vertex
         exact = self.true.to(Pose(BLOCK_M * here[0], BLOCK_M * here[1]))
         x, y, theta = self.rng.normal((exact.x, exact.y, exact.theta), (SEEN_M, SEEN_M, SEEN_RAD))
-        R = np.diag([SEEN_M**2, SEEN_M**2, SEEN_RAD**2])  # noqa: N806
+        R = np.diag([SEEN_M**2, SEEN_M**2, SEEN_RAD**2])
         vertex, doubt = self._recognised(here, np.array([x, y]), R[:2, :2])
         if vertex is not None:
             self.tally[f"closed {'right' if self.place[vertex] == here else 'WRONG'}"] += 1
@@ -93,13 +93,13 @@ class Doubting(Tour):
         self,
         here: Crossing,
         seen: Array,
-        R: Array,  # noqa: N803
+        R: Array,
     ) -> tuple[int | None, Doubt]:
         """The vertex that a crossing is, and if none is certain what it may be."""
         nothing = Doubt(0, (), NEW_PER_M2)
         if not self.belief.ids:
             return None, nothing
-        r, S = ekf.offsets(self.belief, seen, R)  # noqa: N806
+        r, S = ekf.offsets(self.belief, seen, R)
         d2, metres = ekf.distances(self.belief, seen, R)
         alike = np.array([streets(self.place[v]) == streets(here) for v in self.belief.ids])
         near = (d2 < CONFIG.gate) | (metres < CONFIG.same_place_m)
@@ -119,7 +119,7 @@ class Doubting(Tour):
         rivals = tuple(sorted(cost, key=lambda vertex: cost[vertex]))[:MOST_RIVALS]
         return None, Doubt(0, rivals, density)
 
-    def _add(self, here: Crossing, seen: Pose, R: Array, doubt: Doubt) -> int:  # noqa: N803
+    def _add(self, here: Crossing, seen: Pose, R: Array, doubt: Doubt) -> int:
         is_known, vertex = here in self.place.values(), self.count + 1
         self.count = vertex
         what = "doubted" if doubt.rivals else ("ADDED TWICE" if is_known else "added")

@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass, field
 from typing import TypeVar
 
-import networkx as nx  # type: ignore[import-untyped]
+import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage

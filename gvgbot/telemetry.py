@@ -237,7 +237,7 @@ class Telemetry:
                     while waiting:
                         query, key, handler = waiting.popleft()
                         if "*" in key:
-                            query.drop()  # type: ignore[no-untyped-call]
+                            query.drop()
                         else:  # one that takes long must not hold up the next
                             tasks.create_task(self._put(query, key, handler))
 
@@ -248,7 +248,7 @@ class Telemetry:
 
     def close(self) -> None:
         """Leave the network."""
-        self._session.close()  # type: ignore[no-untyped-call]
+        self._session.close()
 
     def __enter__(self) -> Self:
         return self

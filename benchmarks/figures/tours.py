@@ -126,7 +126,7 @@ class Tour:
         return there
 
     def _move(self, motion: Pose, seconds: float) -> None:
-        Q = self.noise**2 * self.model.covariance(motion, seconds)  # noqa: N806
+        Q = self.noise**2 * self.model.covariance(motion, seconds)
         error = np.linalg.cholesky(Q) @ self.rng.normal(size=3)
         felt = Pose(motion.x + error[0], motion.y + error[1], motion.theta + error[2])
         self.true = self.true.compose(motion)
@@ -138,7 +138,7 @@ class Tour:
         error = self.rng.normal(0.0, [SEEN_M, SEEN_M, SEEN_RAD])
         exact = self.true.to(place)
         seen = Pose(exact.x + error[0], exact.y + error[1], exact.theta + error[2])
-        R = np.diag([SEEN_M**2, SEEN_M**2, SEEN_RAD**2])  # noqa: N806
+        R = np.diag([SEEN_M**2, SEEN_M**2, SEEN_RAD**2])
         self._judge(here, seen, R[:2, :2])
         self.sigmas.append(self.sigma)
         if here in self.ids:
@@ -149,7 +149,7 @@ class Tour:
             self.belief = add_vertex(self.belief, self.ids[here], seen, R)
         self._separate()
 
-    def _judge(self, here: Crossing, seen: Pose, R: Array) -> None:  # noqa: N803
+    def _judge(self, here: Crossing, seen: Pose, R: Array) -> None:
         gaps, _ = distances(self.belief, np.array([seen.x, seen.y]), R)
         near = {place for place, key in self.ids.items() if gaps[key - 1] < GATE}
         others = near - {here}

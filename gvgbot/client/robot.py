@@ -265,7 +265,7 @@ class Robot:
         with self._gate:
             self._session = session
             if self._is_closed:  # by somebody who did not want to wait
-                self._session.close()  # type: ignore[no-untyped-call]
+                self._session.close()
                 return
             self._begin(session)
         self._has_been_seen.wait(_SETTLING)
@@ -354,7 +354,7 @@ class Robot:
             self._is_closed = True
             if self._session is not None:
                 with contextlib.suppress(zenoh.ZError):  # the other end is frozen
-                    self._session.close()  # type: ignore[no-untyped-call]
+                    self._session.close()
 
     def __enter__(self) -> Self:
         self.open()

@@ -100,7 +100,7 @@ class McapFiles:
     def finish(self) -> None:
         """End the file with its index. Raises OSError."""
         with self._file:
-            self._writer.finish()  # type: ignore[no-untyped-call]
+            self._writer.finish()
         self._done.append((self.path, self.path.stat().st_size))
 
     def _make_room(self) -> None:

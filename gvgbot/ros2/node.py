@@ -106,7 +106,7 @@ class Ros2Node:
 
     def close(self) -> None:
         """Leave the network."""
-        self._session.close()  # type: ignore[no-untyped-call]
+        self._session.close()
 
     def __enter__(self) -> Self:
         return self

@@ -129,9 +129,7 @@ def test_the_workers_of_a_cluster_run_what_threads_would(tmp_path: Path) -> None
     """Two workers, each a process of its own; a world that does not exist takes them no time."""
     wanted = commands(_options(["--worlds", "nowhere", "--seeds", "1", "2"]))
     with (
-        distributed.LocalCluster(  # type: ignore[no-untyped-call]
-            n_workers=2, threads_per_worker=1, dashboard_address=None
-        ) as two,
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as two,
         executor(1, two.scheduler_address) as pool,
     ):
         rows = [pool.submit(run, c, tmp_path / str(n)).result() for n, c in enumerate(wanted)]

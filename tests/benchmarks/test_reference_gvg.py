@@ -5,7 +5,7 @@ import math
 from dataclasses import replace
 from itertools import count
 
-import networkx as nx  # type: ignore[import-untyped]
+import networkx as nx
 import numpy as np
 import pytest
 

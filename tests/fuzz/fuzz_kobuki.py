@@ -6,7 +6,7 @@ raises, holds back more than a frame, or lets noise hide a good frame that follo
 
 import math
 
-import atheris  # type: ignore[import-not-found,import-untyped,unused-ignore]
+import atheris
 
 from tests.fuzz.harness import chunks, fuzz, vectors
 

@@ -6,7 +6,7 @@ raises, sends anything but good frames at its pace, or does not stand when it is
 
 from collections.abc import Iterable
 
-import atheris  # type: ignore[import-not-found,import-untyped,unused-ignore]
+import atheris
 
 from tests.fuzz.harness import chunks, fuzz, vectors
 

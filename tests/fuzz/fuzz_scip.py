@@ -5,7 +5,7 @@ raises, remembers without bound, reads other numbers than were sent, or lets noi
 message that follows.
 """
 
-import atheris  # type: ignore[import-not-found,import-untyped,unused-ignore]
+import atheris
 
 from tests.fuzz.harness import chunks, fuzz, vectors
 

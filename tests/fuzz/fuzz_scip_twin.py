@@ -6,7 +6,7 @@ raises, works without end, or does not fall silent when it is told to.
 
 import math
 
-import atheris  # type: ignore[import-not-found,import-untyped,unused-ignore]
+import atheris
 
 from tests.fuzz.harness import chunks, fuzz, vectors
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
-import atheris  # type: ignore[import-not-found,import-untyped,unused-ignore]
+import atheris
 
 CHUNK = b"\xfe"  # a first byte that leaves seeds whole
 DATA = Path(__file__).parents[1] / "data"

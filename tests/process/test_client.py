@@ -631,7 +631,7 @@ def test_a_router_in_between_may_come_and_go(endpoint: str) -> None:
             robot.publish(A_MAP)
             until(lambda: seen.presence.word == "alive")
             until(lambda: seen.map().latest == A_MAP)
-            first.close()  # type: ignore[no-untyped-call]
+            first.close()
             until(lambda: seen.presence.word == "cut off")
             later = msgspec.structs.replace(A_MAP, stamp=9.0)
             robot.publish(later)

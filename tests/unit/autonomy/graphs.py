@@ -2,7 +2,7 @@
 
 import math
 
-import networkx as nx  # type: ignore[import-untyped]
+import networkx as nx
 import numpy as np
 
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex

@@ -4,7 +4,7 @@ import io
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
-import networkx as nx  # type: ignore[import-untyped]
+import networkx as nx
 import numpy as np
 import pypdfium2
 import pytest

@@ -1,6 +1,6 @@
 """Which stops a patrol and a coverage make, driven by somebody who takes the shortest ways."""
 
-import networkx as nx  # type: ignore[import-untyped]
+import networkx as nx
 import numpy as np
 import pytest
 from hypothesis import given

@@ -2,7 +2,7 @@
 
 from collections import Counter
 
-import networkx as nx  # type: ignore[import-untyped]
+import networkx as nx
 import numpy as np
 import pytest
 from hypothesis import given
