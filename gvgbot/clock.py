@@ -3,9 +3,12 @@
 import asyncio
 import math
 import selectors
-from typing import Any, Protocol
+from collections.abc import Coroutine
+from typing import Any, Protocol, TypeVar
 
 from gvgbot.errors import Deadlock
+
+_T = TypeVar("_T")
 
 
 class Clock(Protocol):
@@ -68,7 +71,7 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         return now
 
 
-def run_in_virtual_time(main: Any) -> Any:
+def run_in_virtual_time(main: Coroutine[Any, Any, _T]) -> _T:
     """Run a coroutine to its end on a `VirtualTimeLoop`. Raises Deadlock if it can never end."""
     with asyncio.Runner(loop_factory=VirtualTimeLoop) as runner:
         return runner.run(main)

@@ -169,7 +169,8 @@ class Feed:
             case Patrol(vertices=vertices):
                 return robot.patrol(*vertices)
             case _:
-                return getattr(robot, wish.name)()  # type: ignore[no-any-return]
+                ask: Callable[[], Asking] = getattr(robot, wish.name)
+                return ask()
 
 
 class _Histories:

@@ -55,7 +55,8 @@ class Page:
             message = json.loads(self._socket.recv(timeout=PATIENCE))
             if message.get("id") == self._number:
                 assert "error" not in message, message
-                return message["result"]  # type: ignore[no-any-return]
+                result: dict[str, Any] = message["result"]
+                return result
             self._note(message)
 
     def _note(self, message: dict[str, Any]) -> None:

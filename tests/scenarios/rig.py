@@ -127,7 +127,7 @@ def play(
         twin=replace(twin or TwinConfig(seed=3), people=int(with_person)),
         exploration=exploration or ExplorationConfig(),
     )
-    return run_in_virtual_time(_played(config, world, start, story, limit, grip))  # type: ignore[no-any-return]
+    return run_in_virtual_time(_played(config, world, start, story, limit, grip))
 
 
 async def _played(

@@ -3,6 +3,7 @@
 import contextlib
 from collections import deque
 from collections.abc import Awaitable, Callable
+from typing import Any
 
 import numpy as np
 
@@ -148,12 +149,12 @@ def on_rig(
     mishaps: LaserMishapConfig | None = None,
     config: HokuyoConfig | None = None,
     seed: int = 41,
-    **laser: object,
+    **laser: Any,
 ) -> LaserRig:
     """Run the scenario with the laser at work behind the link."""
     quiet = {"range_sigma_m": 0.0, "dropout_fraction": 0.0}
     settings = HokuyoTwinConfig(
-        **{**quiet, **laser},  # type: ignore[arg-type]
+        **{**quiet, **laser},
         mishaps=mishaps or LaserMishapConfig(),
     )
     link, config = link or LinkFaultConfig(), config or HokuyoConfig()

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from gvgbot.drivers.hokuyo.driver import HokuyoConfig
-from gvgbot.drivers.hokuyo.twin import LaserMishapConfig
-from gvgbot.drivers.link_faults import LinkFaultConfig
+from gvgbot.drivers.hokuyo.twin_config import LaserMishap, LaserMishapConfig
+from gvgbot.drivers.link_faults import LinkFault, LinkFaultConfig
 from tests.twin.hokuyo_rig import LaserRig, on_rig
 
 pytestmark = pytest.mark.twin
@@ -24,10 +24,10 @@ pytestmark = pytest.mark.twin
         pytest.param("abnormal", 0.0, 6.0, id="abnormal"),  # needs a reboot to end
     ],
 )
-def test_scans_go_on_after_a_mishap(mishap: str, duration: float, within: float) -> None:
+def test_scans_go_on_after_a_mishap(mishap: LaserMishap, duration: float, within: float) -> None:
     async def scenario(rig: LaserRig) -> None:
         await rig.good_scan(2.0)
-        rig.twin.inject(mishap, duration)  # type: ignore[arg-type]
+        rig.twin.inject(mishap, duration)
         await rig.clock.sleep_until(rig.clock.now() + duration + 0.2)
         await rig.good_scan(within)
         assert rig.wrong == 0
@@ -38,10 +38,12 @@ def test_scans_go_on_after_a_mishap(mishap: str, duration: float, within: float)
 
 @pytest.mark.parametrize("fault", ["silence", "unplug"])
 @pytest.mark.parametrize("duration", [0.3, 2.0, 20.0])
-def test_scans_go_on_within_two_seconds_of_a_links_return(fault: str, duration: float) -> None:
+def test_scans_go_on_within_two_seconds_of_a_links_return(
+    fault: LinkFault, duration: float
+) -> None:
     async def scenario(rig: LaserRig) -> None:
         await rig.good_scan(2.0)
-        rig.link.inject(fault, duration)  # type: ignore[arg-type]
+        rig.link.inject(fault, duration)
         await rig.clock.sleep_until(rig.clock.now() + duration + 0.1)
         await rig.good_scan(2.0)
         assert rig.wrong == 0
@@ -52,10 +54,10 @@ def test_scans_go_on_within_two_seconds_of_a_links_return(fault: str, duration: 
 def test_a_pulled_cable_is_noticed_at_once_and_silence_within_two_seconds() -> None:
     lost: dict[str, float] = {}
 
-    async def scenario(rig: LaserRig, fault: str = "unplug") -> None:
+    async def scenario(rig: LaserRig, fault: LinkFault = "unplug") -> None:
         await rig.good_scan(2.0)
         began = rig.clock.now()
-        rig.link.inject(fault, 30.0)  # type: ignore[arg-type]
+        rig.link.inject(fault, 30.0)
         while not rig.total("restarts") and rig.laser.away is None:
             await rig.clock.sleep_until(rig.clock.now() + 0.01)
         lost[fault] = rig.clock.now() - began

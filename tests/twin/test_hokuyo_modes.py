@@ -2,12 +2,13 @@
 
 import asyncio
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 
 from gvgbot.clock import LoopClock
-from gvgbot.drivers.hokuyo.driver import HokuyoConfig
+from gvgbot.drivers.hokuyo.config import Echo, HokuyoConfig
 from gvgbot.drivers.hokuyo.models import MODELS
 from gvgbot.drivers.hokuyo.twin import HokuyoTwin, HokuyoTwinConfig
 from gvgbot.drivers.transport import ByteStream
@@ -18,9 +19,9 @@ from tests.twin.hokuyo_bench import QUANTISATION, Bench, World, on_bench
 pytestmark = pytest.mark.twin
 
 
-def twin_of(truth: Array | World, seed: int = 31, **config: object) -> HokuyoTwin:
+def twin_of(truth: Array | World, seed: int = 31, **config: Any) -> HokuyoTwin:
     quiet = {"range_sigma_m": 0.0, "dropout_fraction": 0.0, "double_echo_fraction": 0.0}
-    settings = HokuyoTwinConfig(**{**quiet, **config})  # type: ignore[arg-type]
+    settings = HokuyoTwinConfig(**{**quiet, **config})
     sense = truth if isinstance(truth, World) else lambda stamp: truth
     return HokuyoTwin(settings, sense, seed)
 
@@ -47,7 +48,7 @@ def test_every_model_gives_its_scans_at_the_wanted_rate(model: str) -> None:
 
 
 @pytest.mark.parametrize("echo", ["first", "last", "strongest"])
-def test_a_multi_echo_laser_sees_the_pane_or_the_wall_behind_it(echo: str) -> None:
+def test_a_multi_echo_laser_sees_the_pane_or_the_wall_behind_it(echo: Echo) -> None:
     truth = np.full(1081, 4.0)
     seen: list[Scan] = []
 
@@ -57,7 +58,7 @@ def test_a_multi_echo_laser_sees_the_pane_or_the_wall_behind_it(echo: str) -> No
         assert bench.laser.mode.request.command == ("NE" if echo == "strongest" else "ND")
 
     twin = twin_of(truth, model="UTM-30LX-EW", double_echo_fraction=0.25)
-    on_bench(twin, scenario, HokuyoConfig(echo=echo))  # type: ignore[arg-type]
+    on_bench(twin, scenario, HokuyoConfig(echo=echo))
     panes = np.mean([np.isclose(scan.ranges, 2.0, atol=QUANTISATION) for scan in seen])
     walls = np.mean([np.isclose(scan.ranges, 4.0, atol=QUANTISATION) for scan in seen])
     assert panes == pytest.approx(0.25 if echo == "first" else 0.0, abs=0.02)

@@ -2,6 +2,7 @@
 
 import asyncio
 import math
+from typing import Any
 
 import pytest
 import structlog
@@ -16,9 +17,9 @@ from tests.twin.hokuyo_bench import PERFECT, Bench, Scripted, World, on_bench
 pytestmark = pytest.mark.twin
 
 
-def twin_of(world: World | None = None, **config: object) -> HokuyoTwin:
+def twin_of(world: World | None = None, **config: Any) -> HokuyoTwin:
     quiet = {"range_sigma_m": 0.0, "dropout_fraction": 0.0}
-    settings = HokuyoTwinConfig(**{**quiet, **config})  # type: ignore[arg-type]
+    settings = HokuyoTwinConfig(**{**quiet, **config})
     return HokuyoTwin(settings, world or World(), seed=21)
 
 

@@ -1,6 +1,7 @@
 """The simulated base near its dock: what the receivers see, and what the charger says."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -87,13 +88,13 @@ def test_who_turns_the_docks_beam_of_one_side_to_the_other_drives_to_its_middle(
 class Rig:
     """A base in a hall of 10 m with a wall at x = 5 m, and a dock at (2, 2) that faces east."""
 
-    def __init__(self, at: Pose, **config: object) -> None:
+    def __init__(self, at: Pose, **config: Any) -> None:
         occupied = np.zeros((100, 100), bool)
         occupied[:, 50] = True
         world = World(occupied, 0.1)
         self.body = IdealBody()
         self.body.pose = at
-        settings = KobukiTwinConfig(odometry="perfect", dock=(2.0, 2.0, 0.0), **config)  # type: ignore[arg-type]
+        settings = KobukiTwinConfig(odometry="perfect", dock=(2.0, 2.0, 0.0), **config)
         self.twin = KobukiTwin(
             settings,
             self.body,

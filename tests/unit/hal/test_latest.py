@@ -36,7 +36,9 @@ def test_a_reader_waits_for_a_value() -> None:
         asyncio.get_running_loop().call_later(4.0, box.put, "here")
         return await box.next(), LoopClock().now()
 
-    assert run_in_virtual_time(run()) == ("here", pytest.approx(4.0))
+    value, now = run_in_virtual_time(run())
+    assert value == "here"
+    assert now == pytest.approx(4.0)
 
 
 def test_a_slow_reader_sees_fresh_values_not_a_queue() -> None:

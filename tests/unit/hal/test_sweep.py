@@ -2,6 +2,7 @@
 
 import math
 from math import inf, pi
+from typing import Any
 
 import numpy as np
 import pytest
@@ -141,10 +142,10 @@ def test_what_is_within_the_margin_may_come_no_nearer_than_a_third_of_it() -> No
     assert way([(0.15, 0.0)], Twist(0.3, 0.0), margin=0.06) == 0.0
 
 
-def a_scan(ranges: list[float] | Array, **settings: float | Pose) -> Scan:
+def a_scan(ranges: list[float] | Array, **settings: Any) -> Scan:
     array = np.array(ranges, dtype=float)
     facts = {"angle_min": -pi / 2, "angle_increment": pi / (len(array) - 1), **settings}
-    return Scan(stamp=10.0, ranges=array, range_min=0.02, range_max=30.0, **facts)  # type: ignore[arg-type]
+    return Scan(stamp=10.0, ranges=array, range_min=0.02, range_max=30.0, **facts)
 
 
 def at_rest(pose: Pose) -> list[Odometry]:

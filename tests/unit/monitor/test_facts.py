@@ -6,6 +6,7 @@ import msgspec
 import pytest
 
 from gvgbot.client import Event, Health, Plan, Presence
+from gvgbot.client.presence import Word
 from gvgbot.monitor.facts import Fact, duration, facts, headline, told
 from gvgbot.topics import Mate
 from tests.unit.test_telemetry import EXAMPLE
@@ -122,8 +123,8 @@ def test_what_needs_a_look_is_toned(changes: dict[str, object], name: str, expec
         ("alive", [], "exploring"),
     ],
 )
-def test_the_headline_says_how_things_are(word: str, others: list[str], text: str) -> None:
-    presence = Presence(word, 12.3)  # type: ignore[arg-type]
+def test_the_headline_says_how_things_are(word: Word, others: list[str], text: str) -> None:
+    presence = Presence(word, 12.3)
     state = msgspec.structs.replace(EXAMPLE, reason="")
     assert headline("karl", presence, state, others).text == text
 

@@ -1,6 +1,7 @@
 """Which scans are asked for: by configuration, by angle, and by what the link can carry."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -76,9 +77,9 @@ def test_a_configured_skip_beats_the_rate() -> None:
     ],
 )
 def test_a_urg_04lx_is_asked_for_what_its_link_carries(
-    changes: dict[str, float], baud: int | None, expected: tuple[str, int, int]
+    changes: dict[str, Any], baud: int | None, expected: tuple[str, int, int]
 ) -> None:
-    config = HokuyoConfig(**changes)  # type: ignore[arg-type]
+    config = HokuyoConfig(**changes)
     mode = choose_mode(config, URG, baud)
     request = mode.request
     got = (request.command, request.cluster, request.skip)

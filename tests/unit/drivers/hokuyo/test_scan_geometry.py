@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,8 +23,8 @@ def scan_of(parameters: Parameters, readings: list[int], config: HokuyoConfig) -
     return geometry.scan(np.array(readings, np.int32), 1.0)
 
 
-def ranges_of(parameters: Parameters, readings: list[int], **config: float) -> Array:
-    return scan_of(parameters, readings, HokuyoConfig(**config)).ranges  # type: ignore[arg-type]
+def ranges_of(parameters: Parameters, readings: list[int], **config: Any) -> Array:
+    return scan_of(parameters, readings, HokuyoConfig(**config)).ranges
 
 
 @pytest.mark.parametrize(

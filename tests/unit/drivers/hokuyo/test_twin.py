@@ -3,13 +3,14 @@
 import json
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gvgbot.drivers.hokuyo.models import MODELS
+from gvgbot.drivers.hokuyo.models import MODELS, ModelName
 from gvgbot.drivers.hokuyo.scip import ScipParser, decode_time
 from gvgbot.drivers.hokuyo.scip_messages import Message, Reply, ScanReply
 from gvgbot.drivers.hokuyo.twin import HokuyoTwin, HokuyoTwinConfig
@@ -26,9 +27,9 @@ VECTORS = {
 RANGES = np.linspace(0.5, 4.0, 1081)
 
 
-def laser(**config: object) -> HokuyoTwin:
+def laser(**config: Any) -> HokuyoTwin:
     quiet = {"range_sigma_m": 0.0, "dropout_fraction": 0.0, "clock_drift_ppm": 0.0}
-    return HokuyoTwin(HokuyoTwinConfig(**{**quiet, **config}), lambda stamp: RANGES, 0)  # type: ignore[arg-type]
+    return HokuyoTwin(HokuyoTwinConfig(**{**quiet, **config}), lambda stamp: RANGES, 0)
 
 
 def status(twin: HokuyoTwin, command: str, now: float = 0.0) -> str:
@@ -143,9 +144,9 @@ def test_the_clock_counts_milliseconds_in_24_bits_until_reset() -> None:
 @pytest.mark.parametrize(
     ("model", "period", "last"), [("UTM-30LX", 0.025, 1080), ("URG-04LX", 0.1, 725)]
 )
-def test_scans_leave_on_the_grid_of_the_motor(model: str, period: float, last: int) -> None:
+def test_scans_leave_on_the_grid_of_the_motor(model: ModelName, period: float, last: int) -> None:
     ranges = RANGES if model == "UTM-30LX" else RANGES[:682]
-    config = HokuyoTwinConfig(model=model, clock_drift_ppm=0.0)  # type: ignore[arg-type]
+    config = HokuyoTwinConfig(model=model, clock_drift_ppm=0.0)
     twin = HokuyoTwin(config, lambda stamp: ranges, 0)
     first = MODELS[model].parameters.first_step
     assert status(twin, f"MD{first:04}{last:04}01200", 1.01) == "00"

@@ -3,11 +3,12 @@
 import json
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from gvgbot.drivers.hokuyo.models import MODELS
+from gvgbot.drivers.hokuyo.models import MODELS, ModelName
 from gvgbot.drivers.hokuyo.scip import ScipParser
 from gvgbot.drivers.hokuyo.scip_codec import decode_number
 from gvgbot.drivers.hokuyo.scip_messages import Reply, ScanReply
@@ -22,9 +23,9 @@ VECTORS = {
 STREAM = "MD0044072501000"
 
 
-def laser(model: str = "URG-04LX", **config: object) -> HokuyoTwin:
+def laser(model: ModelName = "URG-04LX", **config: Any) -> HokuyoTwin:
     quiet = {"range_sigma_m": 0.0, "dropout_fraction": 0.0, "clock_drift_ppm": 0.0}
-    settings = HokuyoTwinConfig(model=model, **{**quiet, **config})  # type: ignore[arg-type]
+    settings = HokuyoTwinConfig(model=model, **{**quiet, **config})
     return HokuyoTwin(
         settings, lambda stamp: np.full(len(MODELS[model].parameters.bearings), 2.0), 0
     )
@@ -69,7 +70,7 @@ def stamps(twin: HokuyoTwin, until: float) -> list[int]:
         ("UST-10LX", "H1614934", "VV sum is a semicolon"),
     ],
 )
-def test_vv_has_the_form_of_the_model(model: str, serial: str, name: str) -> None:
+def test_vv_has_the_form_of_the_model(model: ModelName, serial: str, name: str) -> None:
     assert laser(model, serial_number=serial).receive(b"VV\n", 0.0) == VECTORS[name].encode()
 
 
@@ -133,7 +134,7 @@ def test_in_time_mode_little_else_is_answered(commands: list[str], statuses: lis
         ("%SL", "URG-04LX", "0E"),
     ],
 )
-def test_each_setting_has_its_statuses(command: str, model: str, expected: str) -> None:
+def test_each_setting_has_its_statuses(command: str, model: ModelName, expected: str) -> None:
     assert status(laser(model), command) == expected
 
 
