@@ -12,8 +12,8 @@ from typing import Any
 import msgspec
 
 from gvgbot import client
+from gvgbot.client.event_stream import EventStream
 from gvgbot.client.newest import Newest
-from gvgbot.client.robot import EventStream
 
 PAGE = Path(__file__).parent / "reference" / "client.md"
 HEAD = """\

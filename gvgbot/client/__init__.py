@@ -11,8 +11,9 @@ The same with `async with` and `async for`. What its configuration permits can b
 """
 
 from gvgbot.client.asking import Asking, Refused
+from gvgbot.client.network import DEFAULT_ENDPOINT, only_robot, robots
 from gvgbot.client.presence import Presence
-from gvgbot.client.robot import DEFAULT_ENDPOINT, Robot, connect, only_robot, robots
+from gvgbot.client.robot import Robot, connect
 from gvgbot.errors import GvgbotError, UsageError
 from gvgbot.topics import (
     Event,

@@ -2,20 +2,27 @@
 
 import asyncio
 import contextlib
-import json
 import operator
 import threading
 import time
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import NoReturn, Self, TypeVar, overload
 
 import zenoh
-import zenoh.ext
 
 from gvgbot.client.asking import PATIENCE_S, Asking, ask
+from gvgbot.client.event_stream import EventStream
+from gvgbot.client.network import (
+    DEFAULT_ENDPOINT,
+    SETTLING,
+    check_endpoint,
+    names_on,
+    open_session,
+    subscribe,
+)
 from gvgbot.client.newest import Newest, decoded
 from gvgbot.client.presence import Presence, Signs
 from gvgbot.client.tiles import Tiles
@@ -32,7 +39,6 @@ from gvgbot.topics import (
     SCAN,
     STATE,
     TRAJECTORY,
-    Event,
     Events,
     Grid,
     Health,
@@ -45,14 +51,9 @@ from gvgbot.topics import (
     Topic,
     Trajectory,
     alive_key,
-    is_endpoint,
 )
-from gvgbot.zenoh_config import opened, reason, session_config
-
-DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 
 _ASK_AGAIN_S = 1.0
-_SETTLING = 1.0  # s after connecting, by when one has heard of all robots on the network
 
 T = TypeVar("T", bound=Payload)
 
@@ -74,34 +75,8 @@ def connect(
     """
     if not is_robot_name(robot):
         raise UsageError(f"no robot can be named {robot!r}: letters, digits, - and _ only")
-    _check_endpoint(endpoint)
+    check_endpoint(endpoint)
     return Robot(robot, endpoint, patience_s, zenoh_file)
-
-
-def robots(
-    endpoint: str = DEFAULT_ENDPOINT, *, patience_s: float = 10.0, zenoh_file: Path | None = None
-) -> list[str]:
-    """The names of all robots that can be reached at an address; blocks.
-
-    Raises GvgbotError if nobody answers, UsageError if it is no address or no file of zenoh.
-    """
-    _check_endpoint(endpoint)
-    with _open(endpoint, patience_s, zenoh_file) as session:
-        threading.Event().wait(_SETTLING)
-        return _names(session)
-
-
-def only_robot(endpoint: str, patience_s: float = 10.0, zenoh_file: Path | None = None) -> str:
-    """The name of the one robot that can be reached at an address; blocks.
-
-    Raises UsageError if there are several, GvgbotError if there is none or nobody answers.
-    """
-    names = robots(endpoint, patience_s=patience_s, zenoh_file=zenoh_file)
-    if len(names) > 1:
-        raise UsageError(f"there are several robots: {', '.join(names)}; name one of them")
-    if not names:
-        raise GvgbotError(f"no robot at {endpoint}: is one running there, or connected to it?")
-    return names[0]
 
 
 class Robot:
@@ -161,7 +136,7 @@ class Robot:
         self._hear(HEALTH, Health, self._health)
         return self._health
 
-    def events(self) -> "EventStream":
+    def events(self) -> EventStream:
         """What happens, one after another; those of the last minutes first."""
         return EventStream(self._events)
 
@@ -188,7 +163,7 @@ class Robot:
         """The names of all robots on this network now. Raises GvgbotError if it is closed."""
         assert self._session is not None, "the robot is not connected: use `with`"
         try:
-            return _names(self._session)
+            return names_on(self._session)
         except zenoh.ZError as error:
             raise GvgbotError("the connection to the robot is closed") from error
 
@@ -261,14 +236,14 @@ class Robot:
 
     def open(self) -> None:
         """Connect, and look for the robot; blocks. Raises GvgbotError if nobody answers."""
-        session = _open(self.endpoint, self._patience_s, self._zenoh_file)
+        session = open_session(self.endpoint, self._patience_s, self._zenoh_file)
         with self._gate:
             self._session = session
             if self._is_closed:  # by somebody who did not want to wait
                 self._session.close()
                 return
             self._begin(session)
-        self._has_been_seen.wait(_SETTLING)
+        self._has_been_seen.wait(SETTLING)
 
     def _begin(self, session: zenoh.Session) -> None:
         via_router = bool(session.info.routers_zid())
@@ -289,7 +264,7 @@ class Robot:
             assert self._session is not None, "the robot is not connected: use `with`"
             if topic not in self._heard and not self._is_closed:
                 self._heard.add(topic)
-                _declare(self._session, topic, topic.key(self.name), on_sample)
+                subscribe(self._session, topic, topic.key(self.name), on_sample)
 
     def _on_sample(
         self, topic: Topic, payload: type[T], newest: Newest[T], sample: zenoh.Sample
@@ -389,54 +364,6 @@ class Robot:
             raise
 
 
-class EventStream:
-    """Each event once, with `for` or `async for`; those that a slow reader missed are left out."""
-
-    def __init__(self, newest: Newest[Events]) -> None:
-        self._newest = newest
-
-    @property
-    def latest(self) -> tuple[Event, ...]:
-        """The latest events, oldest first."""
-        newest = self._newest.latest
-        return () if newest is None else newest.events
-
-    def __iter__(self) -> Iterator[Event]:
-        """Wait for events in this thread."""
-        fresh = _Fresh()
-        for sent in self._newest:
-            yield from fresh.of(sent.events)
-
-    async def __aiter__(self) -> AsyncIterator[Event]:
-        """Wait for events in the running loop."""
-        fresh = _Fresh()
-        async for sent in self._newest:
-            for event in fresh.of(sent.events):
-                yield event
-
-
-class _Fresh:
-    """Tells which events of a message were not in those before it."""
-
-    def __init__(self) -> None:
-        self._last: Event | None = None
-
-    def of(self, events: tuple[Event, ...]) -> tuple[Event, ...]:
-        last, self._last = self._last, events[-1] if events else self._last
-        if last is None or not events:
-            return events
-        same = [event for event in events if event.number == last.number]
-        has_restarted = events[-1].number < last.number or (same and same[0] != last)
-        return tuple(event for event in events if has_restarted or event.number > last.number)
-
-
-def _check_endpoint(endpoint: str) -> None:
-    if not is_endpoint(endpoint):
-        raise UsageError(
-            f"{endpoint!r} is no address: give protocol/address, such as tcp/host:7447"
-        )
-
-
 def _grid_in(sample: zenoh.Sample) -> Grid:
     """Raises GvgbotError if it is of another version, or damaged."""
     return decoded(GRID, Grid, str(sample.encoding), sample.payload.to_bytes())
@@ -444,48 +371,3 @@ def _grid_in(sample: zenoh.Sample) -> Grid:
 
 def _fail(error: GvgbotError) -> NoReturn:
     raise error
-
-
-def _declare(
-    session: zenoh.Session, topic: Topic, key: str, on_sample: Callable[[zenoh.Sample], None]
-) -> None:
-    """Subscribe; what is kept for latecomers is sent first, and what is lost is sent again."""
-    if not topic.history:
-        session.declare_subscriber(key, on_sample)
-        return
-    recovery = zenoh.ext.RecoveryConfig(heartbeat=True, periodic_queries=None)
-    zenoh.ext.declare_advanced_subscriber(
-        session,
-        key,
-        on_sample,
-        history=zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=1),
-        recovery=recovery if topic.on_change else None,
-    )
-
-
-def _names(session: zenoh.Session) -> list[str]:
-    """Of the robots that are on the network now."""
-    found = session.liveliness().get(alive_key("*"), timeout=1.0)
-    keys = [str(reply.ok.key_expr) for reply in found if reply.ok is not None]
-    return sorted(key.split("/")[1] for key in keys)
-
-
-def _open(endpoint: str, patience_s: float, file: Path | None) -> zenoh.Session:
-    settings = {
-        "mode": "client",
-        "connect/endpoints": [endpoint],
-        "connect/timeout_ms": round(1000 * patience_s),
-    }
-    config = session_config(settings, file)
-    if endpoint != DEFAULT_ENDPOINT:  # somebody wants this one, whatever the file says
-        config.insert_json5("connect/endpoints", json.dumps([endpoint]))
-    try:
-        return opened(config, file)
-    except zenoh.ZError as error:
-        where = ", ".join(json.loads(config.get_json("connect/endpoints")))
-        if "Unable to connect" in str(error):
-            why = "is a robot running there?"
-            if file is not None:
-                why = f"no robot is running there, or it does not accept the keys of {file}"
-            raise GvgbotError(f"nobody answers at {where}: {why}") from error
-        raise GvgbotError(f"cannot connect to {where}: {reason(error)}") from error
