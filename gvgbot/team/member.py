@@ -7,7 +7,7 @@ which frontier is its own: see `auction`.
 import math
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
@@ -15,12 +15,13 @@ from numpy.typing import NDArray
 
 from gvgbot.autonomy.control import company
 from gvgbot.autonomy.control.company import BodiesSeen, Companion
-from gvgbot.geometry import Array, Pose, wrap_angle
+from gvgbot.geometry import Array, Pose
 from gvgbot.ranges import Range
 from gvgbot.team.alignment import Alignment, align, refined
 from gvgbot.team.auction import Auction
 from gvgbot.team.chart import Chart
 from gvgbot.team.encounter import WINDOW_S, frame_of
+from gvgbot.team.mate import Mate, is_same_frame, remember
 from gvgbot.team.news import (
     Claim,
     Course,
@@ -32,14 +33,11 @@ from gvgbot.team.news import (
     told_ways,
 )
 
-_STANDING_M = 0.1  # moved less from news to news, a robot stands
-_RESTS_S = 30.0  # who stands for so long, and is on its way to nothing, finds no more
 _FRESH_S = 1.0  # a robot that drives is no longer where it was told to be before
 _SPARSE = 4  # every so manieth point of a track is told
 _RECOGNISE_S = 1.0  # between two attempts to recognise a robot by how it moves
 _SURE_BY_SIGHT = 0.999  # that the robot met is the one that says so
 _KNOWN_M = 0.4  # from where a robot says it is, a body is that robot
-_SAME_M, _SAME_RAD = 0.5, 0.1  # frames nearer to each other are the same
 _MOST_MATES = 64  # that are known at a time
 
 
@@ -55,34 +53,6 @@ class TeamConfig:
     steer_every_s: Annotated[float, Range(0.05, 2.0)] = 0.2  # of where one is and drives
     # silence after which a robot counts as lost; what it was about to do is free for others
     lost_after_s: Annotated[float, Range(1.0, 600.0)] = 10.0
-
-
-@dataclass(slots=True, eq=False)
-class _Mate:
-    """Another robot, as it was last heard."""
-
-    news: News
-    chart: Chart
-    heard: float  # stamp of the own clock
-    map_base: Pose  # in its own map
-    told_at: Pose  # the same, by the news
-    seen: float  # stamp of that
-    moved: float  # stamp of the news by which it was elsewhere before
-    course: Array = field(default_factory=lambda: np.empty((0, 2)))
-    courses: int = 0  # the number of the newest
-    steered: float = float("-inf")  # stamp of the own clock when that was heard
-    alignment: Alignment | None = None
-    tried: float = float("-inf")  # stamp of the last attempt to align
-    sizes: tuple[int, ...] = ()  # of both charts then
-    looks: deque[BodiesSeen] = field(default_factory=deque)  # lately; stamps of the own clock
-    recognised: float = float("-inf")  # stamp of the last attempt to
-    # when, and how, its frame seemed to lie by sight, though maps or a known frame spoke against it
-    doubted: tuple[float, Pose] | None = None
-
-    @property
-    def stands(self) -> float:
-        """For how long it has stood, s, when it was last heard."""
-        return self.heard - self.moved
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -126,7 +96,7 @@ class Member:
         self.name, self._config, self._radius, self._life = name, config, radius, life
         self._own_chart = tell
         self._chart = Chart()
-        self._mates: dict[str, _Mate] = {}
+        self._mates: dict[str, Mate] = {}
         self.auction = Auction(name, tell, self)
         self._stamp = 0.0
         self._sequence = self._courses = 0
@@ -175,7 +145,7 @@ class Member:
         told = self._looks[-1].stamp if self._looks else -math.inf
         if seen is not None and seen.stamp > max(told, stamp - WINDOW_S):
             seen = replace(seen, bodies=seen.bodies[~self._are_known(seen.bodies[:, :2])])
-            _remember(self._looks, seen)
+            remember(self._looks, seen)
             pose, bodies = seen.map_base, tuple((x, y, r) for x, y, r in seen.bodies.tolist())
             look = ToldLook(max(0.0, stamp - seen.stamp), (pose.x, pose.y, pose.theta), bodies)
         return Course(
@@ -210,16 +180,11 @@ class Member:
             return
         if course.sequence <= mate.courses and not self._is_long_ago(mate.steered):
             return
-        mate.courses, mate.seen = course.sequence, stamp
-        mate.steered = stamp
-        mate.map_base, mate.course = Pose(*course.pose), course.points
+        mate.follow(course, stamp)
         if course.look is not None:
-            bodies = np.array(course.look.bodies).reshape(-1, 3)
-            pose = Pose(*course.look.pose)
-            _remember(mate.looks, BodiesSeen(stamp - course.look.age, pose, bodies))
             self._recognise(course.robot, mate, stamp)
 
-    def _recognise(self, name: str, mate: _Mate, stamp: float) -> None:
+    def _recognise(self, name: str, mate: Mate, stamp: float) -> None:
         """Find out whether a body that is seen is another robot, and elsewhere than was believed.
 
         Whose frame is known right is seen where it is said to be, and is no body to be recognised.
@@ -231,12 +196,12 @@ class Member:
         if found is None:
             return
         met, told = Alignment(*found, (), _SURE_BY_SIGHT), self.frames.get(name)
-        is_other = told is not None and not _is_same(met.pose, told, mate.map_base)
+        is_other = told is not None and not is_same_frame(met.pose, told, mate.map_base)
         if mate.alignment is not None and not is_other:
             return
         alignment = refined(self._chart, mate.chart, met)
         if alignment is None or is_other:
-            if not _is_seen_again(mate, met.pose, stamp):
+            if not mate.is_seen_again(met.pose, stamp):
                 return  # a third robot may have moved in the same way
             if alignment is None and told is None:
                 alignment = replace(met, by_sight=True)
@@ -251,13 +216,9 @@ class Member:
             return
         if mate is None or mate.news.life != news.life:
             there = Pose(*news.pose)
-            self._mates[news.robot] = _Mate(news, news.chart, stamp, there, there, stamp, stamp)
+            self._mates[news.robot] = Mate(news, news.chart, stamp, there, there, stamp, stamp)
         elif news.sequence > mate.news.sequence or self.is_lost(news.robot):
-            mate.news, mate.chart, mate.heard = news, news.chart, stamp
-            before, mate.map_base, mate.seen = mate.told_at, Pose(*news.pose), stamp
-            mate.told_at = mate.map_base
-            if before.distance(mate.map_base) >= _STANDING_M:
-                mate.moved = stamp
+            mate.learn(news, stamp)
         self.auction.renew()
 
     def _has_room(self) -> bool:
@@ -299,7 +260,7 @@ class Member:
         ):
             self._lay(comparison.robot, mate, alignment)
 
-    def _lay(self, name: str, mate: _Mate, alignment: Alignment | None) -> None:
+    def _lay(self, name: str, mate: Mate, alignment: Alignment | None) -> None:
         if alignment is not None and mate.alignment is None:
             self.met.append(Met(name, alignment))
         mate.alignment = alignment
@@ -410,32 +371,4 @@ class Member:
     @property
     def may_find_more(self) -> bool:
         """Whether one of the others has something to do."""
-        return any(self._is_busy(name) for name in self.others())
-
-    def _is_busy(self, name: str) -> bool:
-        mate = self._mates[name]
-        rests = mate.news.claim is None and mate.stands > _RESTS_S
-        return not (mate.news.finished or mate.news.idle or rests)
-
-
-def _is_same(pose: Pose, other: Pose, place: Pose) -> bool:
-    """Whether two frames lay a place of the other robot's map at the same place of the own one."""
-    one, two = pose.compose(place), other.compose(place)
-    return one.distance(two) < _SAME_M and abs(wrap_angle(one.theta - two.theta)) < _SAME_RAD
-
-
-def _is_seen_again(mate: _Mate, pose: Pose, stamp: float) -> bool:
-    """Whether sight has laid a frame so before, by other looks: chance does not do that twice."""
-    before = mate.doubted
-    if before is not None and stamp - before[0] <= WINDOW_S:
-        return False
-    is_again = before is not None and _is_same(pose, before[1], mate.map_base)
-    mate.doubted = None if is_again else (stamp, pose)
-    return is_again
-
-
-def _remember(looks: deque[BodiesSeen], seen: BodiesSeen) -> None:
-    """Add a look, and forget those of long before."""
-    looks.append(seen)
-    while looks[0].stamp < seen.stamp - WINDOW_S:
-        looks.popleft()
+        return any(self._mates[name].is_busy for name in self.others())
