@@ -34,6 +34,7 @@ _UNLIKELY_M = 0.07  # nearer to the walls must be what is turned as far as it ma
 _SLIPPING = 25.0  # times the covariance of odometry, when the wheels slip
 _LOST = np.diag([0.5**2, 0.5**2, 0.05**2])  # of a base that nobody heard for a while
 _SEEN_SHARE = 0.3  # of the walls must be known to a robot that comes round a corner unseen
+_FITS_M, _FITTING = 0.15, 0.8  # so near to the walls must be that share of a scan's ends
 _PER_M = np.diag([0.002**2, 0.002**2, 0.0001**2])  # per metre: what cells do to walls
 
 # full: scans are matched, and vertices are poses. paper: odometry alone between vertices, and a
@@ -172,6 +173,15 @@ class LocalMaps:
         priors = [(p, Q + _LOST) for p in _around(prior)]
         best = self._best(scan, priors, clearly, turned or 0.0, least_known=_SEEN_SHARE)
         return (prior, Q + _LOST) if best is None else (best[0].pose, best[0].covariance)
+
+    def fits(self, scan: Scan, local_base: Pose) -> bool:
+        """Whether a scan from a pose in the local frame shows the walls that are known there."""
+        ends = local_base.compose(scan.base_laser).transform(scan.ends)
+        ends = ends[self.near.known(ends)]
+        if not len(self.near.points()) or len(ends) < self._matching.min_pairs:
+            return False
+        distance = np.asarray(self.near.tree().query(ends)[0])
+        return float((distance < _FITS_M).mean()) >= _FITTING
 
     def _drawn(self) -> _Walls:
         """The walls of the near map, and of the far one around it."""

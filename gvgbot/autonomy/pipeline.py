@@ -44,7 +44,6 @@ _ROOM_BESIDE_EDGES_M = 0.08  # on each side, where no edge leads
 _GRAIN_M = 0.05  # of what must be known to be free, when it gets away
 _LONGEST_GAP_S = 2.0  # between keyframes; a longer one is an outage of a device
 _TURNED_RAD = 0.4  # that a robot may have been turned unnoticed
-_FITS_M, _FITTING = 0.15, 0.8  # so near to the walls must be that share of a scan's ends
 _CARRIED = (
     "no walls that it knows are around its base, which has started anew: if it was carried, "
     "restart the program, and it looks for its place on the whole map"
@@ -316,7 +315,7 @@ class Pipeline:
         local_base, covariance = match(
             scan, self._last.local_base, motion, felt_s, rotated_covariance(noise, -motion.theta)
         )
-        if is_broken and self.matches_walls and not self._fits(scan, local_base):
+        if is_broken and self.matches_walls and not self._maps.fits(scan, local_base):
             self.errands.pause()
             self.errands.is_lost = self.errands.is_carried = True
             self._incidents.append(("stand until it is asked to resume", _CARRIED))
@@ -326,15 +325,6 @@ class Pipeline:
         self.steps.append(step)
         self.mapper.move(step.motion, step.covariance)
         return local_base
-
-    def _fits(self, scan: Scan, local_base: Pose) -> bool:
-        """Whether a scan from a pose in the local frame shows the walls that are known there."""
-        ends = local_base.compose(scan.base_laser).transform(scan.ends)
-        ends = ends[self._maps.near.known(ends)]
-        if not len(self._maps.near.points()) or len(ends) < self.matching.min_pairs:
-            return False
-        distance = np.asarray(self._maps.near.tree().query(ends)[0])
-        return float((distance < _FITS_M).mean()) >= _FITTING
 
     def _keep(self, scan: Scan, odom_base: Pose, local_base: Pose) -> None:
         map_base = self.mapper.belief.map_base

@@ -111,7 +111,7 @@ class ReturningPipeline(Pipeline):
         offset = before.compose(motion).to(local_base)
         if np.hypot(offset.x, offset.y) > _MOVED_M or abs(offset.theta) > _MOVED_RAD:
             return False
-        return self._fits(scan, local_base)
+        return self._maps.fits(scan, local_base)
 
     def _begin_anew(self, scan: Scan) -> list[Event]:
         """Forget all, and learn from the scan as from the first one."""
