@@ -1,7 +1,7 @@
 """Every stage from HAL messages to a twist, in the order of the flow. No I/O, clock or chance."""
 
 import math
-from functools import cache, partial
+from functools import partial
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from gvgbot.autonomy.control.reflexes import (
     PutDown,
     Reflexes,
 )
+from gvgbot.autonomy.control.room import room_ahead
 from gvgbot.autonomy.errands import Errands
 from gvgbot.autonomy.events import EdgeJoined, Event, Recovery, VertexAdded, WayForgotten
 from gvgbot.autonomy.exploration.config import ExplorationConfig
@@ -36,12 +37,10 @@ from gvgbot.autonomy.views import Correspondence, View, touching
 from gvgbot.geometry import STANDSTILL, Array, Pose, Twist, rotated_covariance, wrap_angle
 from gvgbot.hal.deskew import deskewed
 from gvgbot.hal.messages import Odometry, Scan
-from gvgbot.hal.sweep import free_distance, seen_from
 
 _NOTHING_FELT = Felt()
 _LIFTED = np.diag([0.3**2, 0.3**2, 0.1**2])  # how far a robot is carried that is put down again
 _ROOM_BESIDE_EDGES_M = 0.08  # on each side, where no edge leads
-_GRAIN_M = 0.05  # of what must be known to be free, when it gets away
 _LONGEST_GAP_S = 2.0  # between keyframes; a longer one is an outage of a device
 _TURNED_RAD = 0.4  # that a robot may have been turned unnoticed
 _CARRIED = (
@@ -409,17 +408,11 @@ class Pipeline:
         """How far the robot can go straight at a bearing over what it knows to be free, m."""
         turned = Pose(local_base.x, local_base.y, local_base.theta + bearing)
         farthest = max(AWAY_M, self._config.reflexes.back_off_m)
-        ahead = turned.transform(_ahead(self._radius, farthest))
-        unknown = ahead[~self._maps.near.known(ahead)]
-        points = [
-            self._maps.near.points(),
-            self.traffic.newcomers.points,
-            self._hazards.points,
-            unknown,
-        ]
-        seen = seen_from(turned, np.concatenate(points))
+        others = np.concatenate([self.traffic.newcomers.points, self._hazards.points])
         margin = self._config.passage_margin_m
-        return free_distance(seen, Twist(1.0, 0.0), radius=self._radius, margin=margin)
+        return room_ahead(
+            self._maps.near, others, turned, farthest, radius=self._radius, margin=margin
+        )
 
     def _take_down(self, incident: Incident, local_base: Pose) -> None:
         """Let the next look, which is due now, take account of an incident."""
@@ -451,14 +444,6 @@ class Pipeline:
         if self._turning_to is not None and self._turned >= self._turning_to:
             self._turning_to = None
         return self._turning_to is not None
-
-
-@cache
-def _ahead(radius: float, metres: float) -> Array:
-    """Points (N, 2) of the base frame that a robot of a radius, m, sweeps on so many metres."""
-    x, y = -np.mgrid[-radius - metres : 0.0 : _GRAIN_M, -radius:radius:_GRAIN_M]
-    outside = np.hypot(x, y) > radius
-    return np.stack([x[outside], y[outside]], axis=1)
 
 
 def _blind_angle(scan: Scan) -> float:
