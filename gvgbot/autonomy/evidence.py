@@ -10,11 +10,11 @@ from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.candidates import Candidates, CandidatesConfig
 from gvgbot.autonomy.gvg.local import Branch, LocalNode, Place
+from gvgbot.autonomy.knowledge import Knowledge
 from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.graph import Edge, HalfEdgeId, Vertex
 from gvgbot.autonomy.slam.recognition import RecognitionConfig, match_bearings
 from gvgbot.autonomy.topology import outwards
-from gvgbot.autonomy.unsettled import Knowledge
 from gvgbot.autonomy.views import Correspondence, View
 from gvgbot.geometry import Array, Pose
 from gvgbot.ranges import Range

@@ -1,7 +1,6 @@
 """From what is seen of the GVG to what is known of it: vertices matched, added and joined."""
 
 import math
-from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -16,8 +15,8 @@ from gvgbot.autonomy.events import (
     VertexRemoved,
 )
 from gvgbot.autonomy.evidence import Evidence, MappingConfig
-from gvgbot.autonomy.gvg.local import Branch, LocalEdge, LocalGvg, LocalNode
-from gvgbot.autonomy.gvg.reduction import KnownVertices
+from gvgbot.autonomy.gvg.local import Branch, LocalEdge, LocalNode
+from gvgbot.autonomy.knowledge import ON_EDGE_M, Knowledge
 from gvgbot.autonomy.recogniser import CLOSE_M, Match, Recogniser, Recognition
 from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.graph import Edge, HalfEdgeId, Vertex
@@ -31,7 +30,7 @@ from gvgbot.autonomy.topology import (
     take_out,
     tied_to,
 )
-from gvgbot.autonomy.unsettled import Knowledge, Unsettled
+from gvgbot.autonomy.unsettled import Unsettled
 from gvgbot.autonomy.views import Correspondence, Observation, View
 from gvgbot.geometry import Array, Pose
 
@@ -39,7 +38,6 @@ _TURN_VARIANCE = 1e-6  # rad^2; a new vertex's frame is turned as the local one 
 _MEAN_OF = 10  # sightings, about, of which the place of a vertex is the mean
 _BESIDE_M = 1.0  # from so near, the walls around a vertex are seen well
 _BEHIND_M = 2.5  # the nearest walls of a vertex, others tell what it looks like
-_ON_EDGE_M = 0.5  # what is nearer to an edge stands on it
 _AT_END_M = 0.5  # so near to the end of a dead end, it has been driven
 
 
@@ -86,50 +84,11 @@ class Mapper(Knowledge):
         self.belief = ekf.advance(self.belief, motion, covariance)
         self.unsettled.note_move(motion, covariance)
 
-    def known_around(self, local_base: Pose, within_m: float) -> KnownVertices:
-        """The vertices around the base, seen lately or not, in the local frame."""
-        positions = self.positions_from(local_base)
-        near = np.hypot(*(positions - local_base.position).T) < within_m
-        degrees = np.array(
-            [self.graph.vertices[self.belief.ids[i]].degree for i in np.flatnonzero(near)], int
-        )
-        return KnownVertices(positions[near], degrees)
-
-    def marked(self, gvg: LocalGvg, local_base: Pose) -> tuple[LocalGvg, dict[int, Vertex]]:
-        """A local GVG with a node where the vertex of a ring should be, and these vertices."""
-        marks = {}
-        for vertex in self.graph.rings():
-            vertex.local = local_base.compose(ekf.expected(self.belief, vertex.id)[0])
-            place = gvg.place(vertex.local.position)
-            if place is None or place.distance > vertex.clearance:
-                continue
-            if len(gvg.edges[place.edge].stations) > 2:
-                gvg, node = gvg.divided(place)
-                marks[node] = vertex
-        return gvg, marks
-
     def explains(self, view: View, known: Correspondence, place: Array) -> bool:
         """Whether a vertex should stand at a place (2,), local frame, and is seen nowhere else."""
         gaps = np.hypot(*(self.positions_from(view.local_base) - place).T)
         near = np.flatnonzero(gaps < self._recognition.same_place_m)
         return any(self.belief.ids[i] not in known.node_of for i in near)
-
-    def is_way(self, local_base: Pose, place: Array) -> bool:
-        """Whether a known edge passes a place (2,), local frame, nearer than any wall of its."""
-        edges = self._gaps(self.graph.edges.values(), local_base, place)
-        return any(gap < edge.min_clearance for edge, gap in edges)
-
-    def _gaps(
-        self, edges: Iterable[Edge], local_base: Pose, place: Array
-    ) -> Iterator[tuple[Edge, float]]:
-        """Those edges that may pass a place (2,), local frame, and how near to it they do, m."""
-        x, y = self.belief.map_base.transform(local_base.inverse().transform(place))
-        starts = dict(zip(self.belief.ids, self.belief.positions.tolist(), strict=True))
-        for edge in edges:
-            within = edge.length + max(edge.min_clearance, _ON_EDGE_M)
-            if math.dist(starts[edge.a.vertex], (x, y)) < within:
-                line = self.belief.map_vertex(edge.a.vertex).transform(edge.polyline)
-                yield edge, float(np.hypot(*(line - [x, y]).T).min())
 
     def observe(self, view: View) -> tuple[Correspondence, list[Event]]:
         """Match a view with the map and learn from it.
@@ -306,16 +265,6 @@ class Mapper(Knowledge):
 
     # -- what was finished once --------------------------------------------------------------
 
-    def establish(self) -> None:
-        """Take the map for the building: what speaks against it must do so for long, from now on.
-
-        Otherwise every door that is shut for an hour would take vertices along.
-        """
-        for vertex in self.graph.vertices.values():
-            vertex.established = True
-        for edge in self.graph.edges.values():
-            edge.established = True
-
     def _back_again(self, view: View, sighting: Sighting, known: Correspondence) -> Vertex | None:
         """The vertex of the finished map that a sighting stands beside: a door was shut there."""
         for vertex in self.graph.vertices.values():
@@ -347,11 +296,11 @@ class Mapper(Knowledge):
             for edge in self.graph.edges.values()
             if edge.established or (is_dubious and edge.traversals > 0)
         ]
-        gaps = [gap for _, gap in self._gaps(edges, view.local_base, place)]
+        gaps = [gap for _, gap in self.edges_near(edges, view.local_base, place)]
         if is_dubious:
             at = self.belief.map_base.transform(view.local_base.inverse().transform(place))
             gaps += [float(np.hypot(*(line - at).T).min()) for line in self.driven_parts]
-        return any(gap < _ON_EDGE_M for gap in gaps)
+        return any(gap < ON_EDGE_M for gap in gaps)
 
     # -- what hangs together -----------------------------------------------------------------
 
@@ -454,10 +403,6 @@ class Mapper(Knowledge):
         ]
         self.observations[:] = before + there
         self.unsettled.take_for_granted()  # what would be revoked counts on all of them
-
-    def in_local_frame(self, view: View, vertex: int) -> Pose:
-        """Where a vertex, seen lately or not, stands in the local frame."""
-        return view.local_base.compose(ekf.expected(self.belief, vertex)[0])
 
     def join(
         self,

@@ -1,6 +1,6 @@
 """What later vertices decide: which new ones are known ones, and whether a closure was right."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,29 +11,14 @@ from gvgbot.autonomy.events import (
     PlaceDoubted,
     VertexRemoved,
 )
+from gvgbot.autonomy.knowledge import Knowledge
 from gvgbot.autonomy.recogniser import Recognition
 from gvgbot.autonomy.revocable import Revocable
 from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.doubts import NEW_PER_M2, SAME, Doubt, Doubts, habit_density
-from gvgbot.autonomy.slam.ekf import Belief
-from gvgbot.autonomy.slam.graph import Edge, GvgGraph, HalfEdgeId, Vertex
+from gvgbot.autonomy.slam.graph import Edge, HalfEdgeId, Vertex
 from gvgbot.autonomy.topology import fuse
-from gvgbot.autonomy.views import Observation
 from gvgbot.geometry import Array, Pose
-
-
-@dataclass(slots=True, eq=False)
-class Knowledge:
-    """What is known: the belief, the graph, and the observations of its vertices."""
-
-    belief: Belief = field(default_factory=Belief)
-    graph: GvgGraph = field(default_factory=GvgGraph)
-    observations: list[Observation] = field(default_factory=list)
-
-    def positions_from(self, local_base: Pose) -> Array:
-        """Where the vertices are (N, 2), local frame, in the order of the belief's ids."""
-        local_map = local_base.compose(self.belief.map_base.inverse())
-        return local_map.transform(self.belief.positions)
 
 
 class Unsettled:

@@ -4,10 +4,11 @@ import math
 
 import numpy as np
 
+from gvgbot.autonomy.knowledge import Knowledge
 from gvgbot.autonomy.recogniser import Recognition
 from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.slam.graph import HalfEdgeId, Vertex
-from gvgbot.autonomy.unsettled import Knowledge, Unsettled
+from gvgbot.autonomy.unsettled import Unsettled
 from gvgbot.geometry import Pose
 from tests.unit.autonomy.graphs import STREET, streets
 
