@@ -1,65 +1,32 @@
-"""What the robot is about: explore every frontier, give up what is out of reach, say why."""
+"""What the robot is about: explore every frontier, one after the other."""
 
-from gvgbot.autonomy.backtracking import Backtracking
-from gvgbot.autonomy.choice import Choice
 from gvgbot.autonomy.control.company import Companion
 from gvgbot.autonomy.control.edge_follower import Track
 from gvgbot.autonomy.control.orders import Drive, Order, Stand
 from gvgbot.autonomy.driven_edges import DrivenEdges
-from gvgbot.autonomy.ending import Outcome, Survey, all_examined, cut_short, without_target
-from gvgbot.autonomy.events import Decision, Event, Finished, Recovery
-from gvgbot.autonomy.examination import Examination
+from gvgbot.autonomy.ending import all_examined, cut_short
+from gvgbot.autonomy.events import Decision, Event, Recovery
 from gvgbot.autonomy.exploration.access import NEAR_M, access, way_to_edge
 from gvgbot.autonomy.exploration.config import ExplorationConfig
-from gvgbot.autonomy.exploration.hindrance import Hindrance
 from gvgbot.autonomy.exploration.obstructions import Obstructions
 from gvgbot.autonomy.exploration.paths import shortest_paths
 from gvgbot.autonomy.gvg.local import Branch, Place
 from gvgbot.autonomy.mapping import Mapper
-from gvgbot.autonomy.neighbours import Neighbours
-from gvgbot.autonomy.path_following import PathFollowing
-from gvgbot.autonomy.progress import Progress
-from gvgbot.autonomy.retracing import Retracing
-from gvgbot.autonomy.scouting import Scouting
+from gvgbot.autonomy.pursuit import Pursuit
 from gvgbot.autonomy.search import NO_EDGE, Search
 from gvgbot.autonomy.slam.graph import HalfEdgeId
-from gvgbot.autonomy.topology import piece_of
 from gvgbot.autonomy.views import Correspondence, View
-from gvgbot.autonomy.whereabouts import Situation, Whereabouts
+from gvgbot.autonomy.whereabouts import Situation
 from gvgbot.geometry import Array, Pose, wrap_angle
 
-_SECOND = 1  # try, in the end, of what was given up: things may have changed
 
-
-class Mission:
+class Mission(Pursuit):
     """Chooses the frontier to explore, and the order that brings the robot nearer to it."""
 
     def __init__(self, config: ExplorationConfig, mapper: Mapper) -> None:
-        self._config, self._mapper = config, mapper
-        self.where = Whereabouts()
-        self.choice = Choice(config, mapper)
-        # of what is worth another look when all is explored
-        self.survey: Survey | None = None
-        self.target: HalfEdgeId | None = None
-        self.outcome: Outcome | None = None
-        self.reason = ""
-        self.remark = ""  # on how certain the map is, for the end
-        self._progress = Progress(mapper)
-        self._driven = DrivenEdges(mapper)
+        super().__init__(config, mapper)
+        self._driven, self._search = DrivenEdges(mapper), Search()
         self._frontiers: set[HalfEdgeId] = set()  # that were known at the last view
-        self._has_turned = (
-            False  # before it knew a vertex: others had driven on, or nothing was there
-        )
-        self._obstructions = Obstructions(config.retries, config.retry_after_s)
-        self._hindrance = Hindrance()
-        self._neighbours = Neighbours()
-        self._search, self._scouting, self._backtracking = Search(), Scouting(), Backtracking()
-        self._retracing = Retracing()
-        self._path_following = PathFollowing(
-            self._neighbours, self._hindrance, self._progress.headway
-        )
-        self._examination = Examination(mapper)
-        self._events: list[Event] = []
 
     def advance(self, view: View, known: Correspondence) -> tuple[Order, list[Event]]:
         """The order for the next keyframe interval."""
@@ -99,21 +66,9 @@ class Mission:
         return self._driven.parts()
 
     @property
-    def is_choosing(self) -> bool:
-        """Whether a task is done, and the next one has to be chosen on the graph."""
-        graph = self._mapper.graph
-        half = None if self.target is None else graph.half_edge(self.target)
-        return self.outcome is None and bool(graph.vertices) and (half is None or not half.open)
-
-    @property
     def is_ending(self) -> bool:
         """Whether there is nothing more to be done but to say so."""
         return self._examination.is_over
-
-    @property
-    def is_waiting(self) -> bool:
-        """Whether ways are closed that will be tried again."""
-        return self._obstructions.waiting
 
     def witness(self, view: View, known: Correspondence) -> list[Event]:
         """Learn from where somebody else drives the robot."""
@@ -123,11 +78,6 @@ class Mission:
         if found is not None and found.place.distance <= NEAR_M:
             self._learn(view, known, found.place)
         return self._events
-
-    def stop(self, stamp: float, reason: str) -> Event:
-        """End the exploration, because somebody wants that."""
-        self.outcome, self.reason = "stopped", reason
-        return Finished(stamp, "stopped", reason)
 
     def reopen(self) -> None:
         """Go on after the end: also to what was given up."""
@@ -317,43 +267,6 @@ class Mission:
             return Stand()
         return order
 
-    def _see_no_more(self, view: View, here: Situation) -> None:
-        """Go another way, or give up what is ahead: of what no way leads to, what is nearest."""
-        if self._turns_round(view) or self._closes_unseen_edge(view, here):
-            return
-        if self.target is None and self._scouting.is_on:
-            self.target = self._frontier_beside(view)
-        self._give_up(view, "nothing more is to be seen there")
-
-    def _turns_round(self, view: View) -> bool:
-        """Go the other way, once, before a vertex is known; whether it does.
-
-        Who starts in the corner of a room may have gone into that first.
-        """
-        if self._has_turned or self._mapper.graph.vertices:
-            return False
-        self._has_turned = self.where.turn_round(view.local_base.theta)
-        if self._has_turned:
-            self._path_following.renew()
-            self._events.append(Recovery(view.stamp, "turn round", "this way leads nowhere"))
-        return self._has_turned
-
-    def _closes_unseen_edge(self, view: View, here: Situation) -> bool:
-        """Close the edge by which the way goes on here if that is not to be seen; whether it was.
-
-        The target lies beyond it, and there may be another way.
-        """
-        departures = None if self.target is None else here.departures_to(self.target)
-        edge = None if departures is None else self._mapper.graph.edge_at(departures[0])
-        if departures is None or edge is None or departures[0] in here.known.branch_of:
-            return False
-        self.target = None
-        self._path_following.renew()
-        self._obstructions.close(self._mapper.graph, [edge.a, edge.b], view.stamp)
-        reason = "the way on is not to be seen"
-        self._events.append(Recovery(view.stamp, "try another way", reason))
-        return True
-
     def _go_back(self, view: View) -> Order | None:
         """Over where the robot came from, until it sees vertices that it knows."""
         self._watch_progress(view)
@@ -378,112 +291,6 @@ class Mission:
             self._scouting.end()
             return None
         return Drive(track)
-
-    # -- something in the way ----------------------------------------------------------------------
-
-    def _watch_the_way(self, view: View) -> None:
-        """Wait a little for what stands in the way, then try another one."""
-        reason = self._hindrance.reason_to_turn(
-            view.stamp,
-            has_come_on=self._progress.headway.waited(view.stamp) == 0.0,
-            patience_s=self._neighbours.patience * self._config.in_the_way_s,
-        )
-        if reason:
-            self._block(view, reason)
-
-    def _block(self, view: View, reason: str) -> None:
-        """Close the edge under the wheels, or else the target, for a while."""
-        end = self.where.on_edge if self.target is not None else None
-        edge = None if end is None else self._mapper.graph.edge_at(end)
-        ends = (self.target,) if edge is None else (edge.a, edge.b)
-        closed = [end for end in ends if end is not None]
-        if not closed:
-            if self.choice.sharing is not None:  # who is in the way may have driven the rest
-                self.where.turn_round()
-            return
-        self._obstructions.close(self._mapper.graph, closed, view.stamp)
-        self._events.append(Recovery(view.stamp, "try another way", reason))
-        self.target = None
-
-    def _reopen(self, view: View, reason: str) -> bool:
-        """Open what was closed long enough ago; whether there was something."""
-        opened = self._obstructions.open(self._mapper.graph, view.stamp)
-        if opened:
-            self._examination.end()
-            self._events.append(Recovery(view.stamp, "try again", reason))
-        return opened
-
-    # -- giving up ---------------------------------------------------------------------------------
-
-    def _give_all_up(self, view: View) -> None:
-        """Close all frontiers: they have not led anywhere new for a long time."""
-        frontiers = self._mapper.graph.frontiers()
-        if frontiers:
-            self._obstructions.close(self._mapper.graph, frontiers, view.stamp, retries=0)
-            reason = "they have not led anywhere new for a long time"
-            self._events.append(Recovery(view.stamp, "give all frontiers up", reason))
-            self.target = None
-
-    def _watch_progress(self, view: View) -> None:
-        driven_m = self.where.trail_length if self.where.on_edge == self.target else 0.0
-        reason = self._progress.trouble(view, self.target, driven_m, self._config)
-        if reason is None:
-            return
-        if self.target is None or self._mapper.graph.half_edge(self.target) is None:
-            self.target = self._frontier_beside(view)  # one that comes and goes
-        self._give_up(view, reason)
-
-    def _frontier_beside(self, view: View) -> HalfEdgeId | None:
-        """The frontier nearest to the robot as the crow flies."""
-
-        def away(end: HalfEdgeId) -> float:
-            return self._mapper.in_local_frame(view, end.vertex).distance(view.local_base)
-
-        return min(self._mapper.graph.frontiers(), key=away, default=None)
-
-    def _give_up(self, view: View, reason: str) -> None:
-        """Mark the target as blocked, after having gone back; without one, that is the end."""
-        self._path_following.renew()
-        half = None if self.target is None else self._mapper.graph.half_edge(self.target)
-        if half is None:
-            is_going_back = self._begins_to_retrace(view)
-            is_done = self._mapper.graph.vertices and not self._mapper.graph.frontiers()
-            if is_going_back or is_done:
-                return
-            verdict = without_target(self._mapper.graph, self.survey, reason)
-            if verdict is not None:
-                self._end(view, *verdict)
-            return
-        has_left = self.where.on_edge not in (None, self.target)
-        if has_left and self._backtracking.begin():
-            self._events.append(Recovery(view.stamp, "go back", reason))
-            return
-        assert self.target is not None, "it has a half-edge"
-        self._leave(view, self.target, reason, retries=_SECOND)
-        self.target = None
-
-    def _leave(self, view: View, frontier: HalfEdgeId, reason: str, *, retries: int) -> None:
-        """Give up a frontier, to be tried again so many times in the end."""
-        self._obstructions.close(self._mapper.graph, [frontier], view.stamp, retries=retries)
-        self._events.append(Recovery(view.stamp, "give up a frontier", reason))
-
-    def _begins_to_retrace(self, view: View) -> bool:
-        """Forget what was only seen and nothing leads to; whether it goes back to what was driven.
-
-        If something was forgotten, it may be missing now.
-        """
-        vertices, on_edge = self._mapper.graph.vertices, self.where.on_edge
-        here = set() if on_edge is None else piece_of(self._mapper.graph, on_edge.vertex)
-        before = len(vertices)
-        self._mapper.forget_strays(view)
-        if len(vertices) < before:
-            self._examination.end()
-        if not here or not self._retracing.begin(vertices.keys() - here):
-            return False
-        reason = "no known way leads to a part of the map"
-        self._events.append(Recovery(view.stamp, "retrace the way", reason))
-        self._progress.wait(view.stamp)
-        return True
 
     def _access(self, view: View) -> Order:
         """Go to the nearest edge, if the way there is free."""
@@ -516,19 +323,3 @@ class Mission:
             return Stand()
         self._end(view, *all_examined(self._mapper.graph, self.remark))
         return Stand()
-
-    def _finish(self, view: View) -> None:
-        """Some frontiers cannot be reached: that is the end, after having looked for a way."""
-        if self._scouting.lasted(view.stamp) < self._config.patience_s:
-            return
-        if self._begins_to_retrace(view):
-            return
-        frontiers = len(self._mapper.graph.frontiers())
-        if frontiers:
-            reason = f"frontiers that cannot be reached: {frontiers}"
-            self._end(view, "explored_with_blocked", reason)
-
-    def _end(self, view: View, outcome: Outcome, reason: str) -> None:
-        self.outcome, self.reason = outcome, reason
-        self._mapper.establish()
-        self._events.append(Finished(view.stamp, outcome, reason))
