@@ -136,6 +136,20 @@ class Mission(Pursuit):
     # -- where next ------------------------------------------------------------------------------
 
     def _decide(self, view: View, here: Situation) -> Order:
+        self._set_target(view, here)
+        if self.outcome is not None or self._retracing.is_on:
+            return Stand()
+        if self.target is None:
+            return self._go_without_target(view, here)
+        self._neighbours.depart_unseen(self._mapper, view, here, self.target)
+        path = here.path_to(self.target)
+        if path is None:
+            return self._wait_for_a_way(view, here)
+        self._scouting.end()
+        return self._drive(view, here, path)
+
+    def _set_target(self, view: View, here: Situation) -> None:
+        """Keep the target as long as there is none better; None if there is nothing to go for."""
         graph = self._mapper.graph
         if self.choice.sharing is not None:  # what was in the way may have been one that drives on
             self._reopen(view, "the way may be free again")
@@ -150,22 +164,20 @@ class Mission(Pursuit):
             self._frontiers = set(graph.frontiers())
         else:
             self.target = self._reconsidered(view, here, target)
-        if self.outcome is not None or self._retracing.is_on:
-            return Stand()
-        if self.target is None and (self._obstructions.waiting or self.choice.waits_for_others):
+
+    def _go_without_target(self, view: View, here: Situation) -> Order:
+        """Wait, look for a way to what is left, or examine what is in sight; at first, go on."""
+        graph = self._mapper.graph
+        if self._obstructions.waiting or self.choice.waits_for_others:
             self._progress.wait(view.stamp)
             if self.choice.waits_for_others:
                 self._progress.set_aside()
             return self._path_following.make_way(view, here)
-        if self.target is None and graph.frontiers():
+        if graph.frontiers():
             return self._wait_for_a_way(view, here)
-        if self.target is None and graph.vertices:
+        if graph.vertices:
             return self._examine(view, here)
-        if self.target is not None:
-            self._neighbours.depart_unseen(self._mapper, view, here, self.target)
-        path = self._ahead(view, here) if self.target is None else here.path_to(self.target)
-        if path is None:
-            return self._wait_for_a_way(view, here)
+        path = self._ahead(view, here)
         self._scouting.end()
         return self._drive(view, here, path)
 
