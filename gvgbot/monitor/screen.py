@@ -68,13 +68,13 @@ class Picture:
             beside = self._facts(middle)
             body = [_joined(a, b) for a, b in zip(self._map(drawn), beside, strict=False)]
             scale = drawn.scale
-        lines = [self._head(width), *body[:middle], _ruled("events, how long ago", width)]
+        lines = [self._head(), *body[:middle], _ruled("events, how long ago", width)]
         lines = [*lines, *self._events(listed), _foot(scale, width)][:height]
         for line in lines:
             line.truncate(width, overflow="ellipsis", pad=True)
         return lines
 
-    def _head(self, width: int) -> Text:
+    def _head(self) -> Text:
         text = Text(f" {self.headline.name} ", "reverse bold")
         return text.append(f" {self.headline.text}", _TONES[self.headline.tone])
 
