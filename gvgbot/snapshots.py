@@ -3,7 +3,7 @@
 import numpy as np
 
 from gvgbot import topics
-from gvgbot.autonomy.exploration.paths import Approach, shortest_paths
+from gvgbot.autonomy.exploration.paths import Approach, shortest_path
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.ekf import Belief, OdometryNoise, predict
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
@@ -175,7 +175,7 @@ def _route(pipeline: Pipeline, target: HalfEdgeId) -> Array:
     if edge is not None:
         ahead = max(0.0, edge.length - where.trail_length)
         starts.append(Approach(ahead, edge.other(where.on_edge)))
-    approach = shortest_paths(graph, starts).get(target.vertex)
+    approach = shortest_path(graph, starts, target.vertex)
     departures = () if approach is None else approach.departures
     return np.concatenate([np.zeros((0, 2)), *(_line(pipeline, graph, end) for end in departures)])
 

@@ -5,7 +5,7 @@ import numpy as np
 from gvgbot.autonomy.exploration.certainty import vertex_sigma
 from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.exploration.ears import ear_next, nearest_frontier
-from gvgbot.autonomy.exploration.paths import Approach, shortest_paths
+from gvgbot.autonomy.exploration.paths import Approach, shortest_path
 from gvgbot.autonomy.exploration.sharing import Sharing
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.slam.graph import HalfEdgeId
@@ -102,7 +102,7 @@ class Choice:
         nearest = self.nearest(starts) if found else None
         if nearest is None or nearest[0].vertex not in {end.vertex for end in found}:
             return None
-        way = shortest_paths(self._mapper.graph, starts).get(target.vertex)
+        way = shortest_path(self._mapper.graph, starts, target.vertex)
         if way is not None and nearest[1].metres > way.metres - _WORTH_TURNING_M:
             return None
         return nearest[0]

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvgbot.autonomy.exploration.paths import Approach, first_arrival, shortest_paths
+from gvgbot.autonomy.exploration.paths import Approach, first_arrival, shortest_path, shortest_paths
 from gvgbot.autonomy.gvg.local import Branch
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.slam.graph import Edge, GvgGraph, HalfEdgeId
@@ -73,7 +73,7 @@ def foot_at(graph: GvgGraph, end: HalfEdgeId, station: float) -> Foot | None:
 
 def route_to_vertex(graph: GvgGraph, starts: list[Approach], vertex: int) -> Route | None:
     """The shortest way to a vertex; None if no known way leads there."""
-    approach = shortest_paths(graph, starts).get(vertex)
+    approach = shortest_path(graph, starts, vertex)
     if approach is None:
         return None
     return Route(approach.metres, first_arrival(starts, approach), approach.departures)

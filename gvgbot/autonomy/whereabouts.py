@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from gvgbot.autonomy.exploration.access import Access
-from gvgbot.autonomy.exploration.paths import Approach, first_arrival, shortest_paths
+from gvgbot.autonomy.exploration.paths import Approach, first_arrival, shortest_path
 from gvgbot.autonomy.gvg.local import Branch, LocalGvg, LocalNode, Place
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
 from gvgbot.autonomy.views import Correspondence
@@ -265,14 +265,14 @@ class Situation:
         if self.where.on_edge == target:
             return self._extended((self._away_from(target),))
         starts = self.starts()
-        approach = shortest_paths(self.graph, starts).get(target.vertex)
+        approach = shortest_path(self.graph, starts, target.vertex)
         if approach is None:
             return None
         return self.path_over(first_arrival(starts, approach), (*approach.departures, target))
 
     def departures_to(self, target: HalfEdgeId) -> tuple[HalfEdgeId, ...] | None:
         """By which half-edges a frontier is reached, first vertex first; None without a way."""
-        approach = shortest_paths(self.graph, self.starts()).get(target.vertex)
+        approach = shortest_path(self.graph, self.starts(), target.vertex)
         return None if approach is None else (*approach.departures, target)
 
     def path_over(

@@ -22,10 +22,18 @@ def first_arrival(starts: list[Approach], approach: Approach) -> HalfEdgeId:
     return nearest.arrival
 
 
-def shortest_paths(graph: GvgGraph, starts: list[Approach]) -> dict[int, Approach]:
+def shortest_path(graph: GvgGraph, starts: list[Approach], vertex: int) -> Approach | None:
+    """As `shortest_paths`, to one vertex only; None if it cannot be reached."""
+    return shortest_paths(graph, starts, vertex).get(vertex)
+
+
+def shortest_paths(
+    graph: GvgGraph, starts: list[Approach], last: int | None = None
+) -> dict[int, Approach]:
     """The shortest approach to every vertex that can be reached, from one or more first arrivals.
 
-    Dijkstra on the multigraph; ties go to the smaller ids, so that equal runs stay equal.
+    Those farther away than the `last` one are left out. Dijkstra on the multigraph; ties go to the
+    smaller ids, so that equal runs stay equal.
     """
     queue = [(s.metres, i, s) for i, s in enumerate(starts)]
     heapq.heapify(queue)
@@ -37,6 +45,8 @@ def shortest_paths(graph: GvgGraph, starts: list[Approach]) -> dict[int, Approac
         if vertex in done or vertex not in graph.vertices:
             continue
         done[vertex] = here
+        if vertex == last:
+            break
         for key, half in graph.vertices[vertex].half_edges.items():
             if half.edge is None or half.blocked:
                 continue

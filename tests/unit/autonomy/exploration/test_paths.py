@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gvgbot.autonomy.exploration.paths import Approach, shortest_paths
+from gvgbot.autonomy.exploration.paths import Approach, shortest_path, shortest_paths
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
 from tests.unit.autonomy.graphs import (
     STREET,
@@ -64,6 +64,16 @@ def test_several_starts_are_a_choice_between_them(seed: int) -> None:
     lengths = networkx_distances(graph, [(s.arrival.vertex, s.metres) for s in starts])
     found = shortest_paths(graph, starts)
     assert {v: approach.metres for v, approach in found.items()} == pytest.approx(lengths)
+
+
+@given(seeds)
+def test_the_path_to_one_vertex_is_as_long_as_that_of_networkx(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    graph = random_multigraph(rng)
+    start, end = (int(vertex) for vertex in rng.choice(list(graph.vertices), 2))
+    found = shortest_path(graph, [Approach(0.0, HalfEdgeId(start, -1))], end)
+    length = networkx_distances(graph, [(start, 0.0)]).get(end)
+    assert (found and found.metres) == (length and pytest.approx(length))
 
 
 def test_of_parallel_edges_the_shorter_one_is_taken() -> None:
