@@ -218,14 +218,16 @@ class LocalMaps:
         coarse = (config.coarse_pair_m,) if config.coarse_pair_m else ()
         if min(len(walls), len(points)) < _LEAST_POINTS:
             return None
-        best, agreement = None, 0.0
+        best: tuple[Registration, Array] | None = None
+        agreement = 0.0
         for prior, Q in priors:
             if agreement + clearly >= 1.0:
                 break  # nothing can be clearly better
             reach = max(config.search_rad, turned)
             near = _turned(points, tree, prior, reach) if reach else prior
+            so_far = None if best is None else best[0].pose
             found = register_coarsely(
-                points, tree, walls, near, Q, config, coarse, hits, sides, looks
+                points, tree, walls, near, Q, config, coarse, hits, sides, looks, so_far
             )
             if found is None:
                 continue

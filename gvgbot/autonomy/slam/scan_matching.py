@@ -94,13 +94,15 @@ def register(
     sides: Sides | None = None,
     within: float = _CONVERGED,
     looks: Array | None = None,
+    found: Pose | None = None,
 ) -> Registration | None:
     """The pose that lays points (N, 2) of its frame onto wall points (M, 2), near a prior.
 
     `hits` (M,) is how much each wall point counts beside its neighbours, by default all the same;
     without `sides` a point may lie on either face of a wall. Of `looks` (M,) each is the mean, by
     default of one. It is found when a step is less than `within`, m and rad.
-    Q (3, 3) is the prior's covariance in its own frame. None when too few points find a wall.
+    Q (3, 3) is the prior's covariance in its own frame. None when too few points find a wall, or
+    when it comes to where another prior has led, which has been `found`: the pairs are the same.
     """
     information = np.linalg.inv(Q)
     counts = np.ones(len(walls)) if hits is None else hits
@@ -114,6 +116,8 @@ def register(
     J = JW = np.empty((3, 0))
     paired_at, pairs = pose, paired(pose)
     for _ in range(_ITERATIONS):
+        if found is not None and not _is_elsewhere(found, pose):
+            return None
         if _is_elsewhere(paired_at, pose):
             paired_at, pairs = pose, paired(pose)
         residual, J, number = _linear(pairs, pose, prior, config.max_pair_m)
@@ -143,6 +147,7 @@ def register_coarsely(
     hits: Array | None = None,
     sides: Sides | None = None,
     looks: Array | None = None,
+    found: Pose | None = None,
 ) -> Registration | None:
     """As `register`, from farther away: pairs first reach as far as each of `reaches`, m.
 
@@ -152,7 +157,7 @@ def register_coarsely(
         far = replace(config, max_pair_m=reach)
         near = register(points, tree, walls, prior, Q, far, hits, sides, _ROUGHLY)
         prior = prior if near is None else near.pose
-    return register(points, tree, walls, prior, Q, config, hits, sides, looks=looks)
+    return register(points, tree, walls, prior, Q, config, hits, sides, looks=looks, found=found)
 
 
 def _weights(residual: Array, config: ScanMatchingConfig) -> Array:

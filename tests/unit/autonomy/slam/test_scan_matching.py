@@ -66,6 +66,20 @@ def test_a_known_offset_is_found_in_a_bend(offset: Pose) -> None:
     assert found.rms < 0.02
 
 
+def test_a_prior_that_leads_to_where_another_one_has_led_tells_nothing_more() -> None:
+    walls, points = looked(CORNER, [Pose()]).points(), hits(CORNER, Pose())
+
+    def led(prior: Pose, found: Pose | None) -> Registration | None:
+        return register(points, cKDTree(walls), walls, prior, Q, CONFIG, found=found)
+
+    first = led(Pose(0.1, 0.0, 0.0), None)
+    assert first is not None
+    assert led(Pose(0.0, 0.1, 0.02), first.pose) is None
+    other = led(Pose(0.0, 0.1, 0.02), Pose(2.0, 0.0, 0.0))
+    assert other is not None
+    assert first.pose.distance(other.pose) < 0.01
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_a_known_offset_is_found_in_an_office_with_a_noisy_laser(seed: int) -> None:
     world, truth = builtin("office")
