@@ -195,9 +195,9 @@ def _speck(draft: Draft, longest: float) -> int | None:
     for key, chain in draft.chains.items():
         between.setdefault(frozenset((chain.a, chain.b)), []).append(key)
     for ends, keys in between.items():
-        loop = sorted(keys, key=lambda key: draft.chains[key].length())[: len(ends)]
-        if len(loop) < len(ends) or any(draft.degree(end) < 3 for end in ends):
+        if len(keys) < len(ends) or any(draft.degree(end) < 3 for end in ends):
             continue
+        loop = sorted(keys, key=lambda key: draft.chains[key].length())[: len(ends)]
         chains = [draft.chains[key] for key in loop]
         shortest = min(longest, *(math.pi * float(chain.clearance.min()) for chain in chains))
         if sum(chain.length() for chain in chains) < shortest:

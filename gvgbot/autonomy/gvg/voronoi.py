@@ -269,7 +269,7 @@ def _direction(vectors: Array) -> Array:
 
 def _circumcircles(generators: Array, triangles: NDArray[np.int32]) -> tuple[Array, Array]:
     """Centres (N, 2) and radii (N,) around triangles (N, 3); infinite for degenerate ones."""
-    x, y = (generators[:, k][triangles.T] for k in (0, 1))
+    x, y = (generators[:, k].take(triangles.T) for k in (0, 1))
     bx, by, cx, cy = x[1] - x[0], y[1] - y[0], x[2] - x[0], y[2] - y[0]
     cross = 2 * (bx * cy - by * cx)
     bb, cc = bx * bx + by * by, cx * cx + cy * cy
