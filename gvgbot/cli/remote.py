@@ -1,6 +1,9 @@
 """`gvgbot monitor`, `web` and `ctl`: a robot seen and asked from elsewhere."""
 
 import argparse
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from gvgbot.cli.arguments import Commands, add_connection, say, tcp_port
 from gvgbot.errors import ExtraMissing
@@ -106,4 +109,20 @@ def add_ctl(commands: Commands) -> None:
 def _ctl(options: argparse.Namespace) -> int:
     from gvgbot.ctl import ctl
 
-    return ctl(options.words, options.connect, options.zenoh_file, say)
+    with _any_stop_at_once():
+        return ctl(options.words, options.connect, options.zenoh_file, say)
+
+
+@contextmanager
+def _any_stop_at_once() -> Iterator[None]:
+    """Let signals end the program: nothing is to be tidied up, and zenoh connects deaf to them."""
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    handlers = {number: signal.getsignal(number) for number in numbers}
+    heeded = {number: handler for number, handler in handlers.items() if callable(handler)}
+    for number in heeded:  # `nohup` has one of them ignored
+        signal.signal(number, signal.SIG_DFL)
+    try:
+        yield
+    finally:
+        for number, handler in heeded.items():
+            signal.signal(number, handler)

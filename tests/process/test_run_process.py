@@ -167,6 +167,18 @@ def test_a_simulated_exploration_that_is_stopped_leaves_its_map(
     assert json.loads((events.parent / "map.geojson").read_text())["features"]
 
 
+def test_a_request_that_nobody_answers_can_be_stopped(tmp_path: Path) -> None:
+    """The library waits for it to connect, and hears of no signal meanwhile."""
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        address = f"tcp/127.0.0.1:{silent.getsockname()[1]}"
+        with gvgbot("ctl", "pause", "--connect", address, cwd=tmp_path) as process:
+            connection, _ = silent.accept()
+            with connection:
+                process.send_signal(signal.SIGINT)
+                process.communicate(timeout=PATIENCE)
+    assert process.returncode == -signal.SIGINT  # ended by it, and not by the end of its patience
+
+
 def test_an_address_in_use_is_one_line_and_leaves_nothing(endpoint: str, tmp_path: Path) -> None:
     host, _, port = endpoint.removeprefix("tcp/").partition(":")
     with socket.create_server((host, int(port))):
