@@ -71,7 +71,8 @@ def _phase(pipeline: Pipeline, away: str | None) -> Phase:
     errands = pipeline.errands
     if errands.is_paused:
         return "paused"
-    if errands.progress is None and pipeline.mission.outcome is not None:
+    is_free = errands.progress is None or errands.is_resting
+    if is_free and pipeline.mission.outcome is not None:
         return "finished"
     if not pipeline.keyframes:
         return "starting"

@@ -23,6 +23,7 @@ from gvgbot.persistence.mission_files import MissionFiles
 from gvgbot.persistence.records import packed
 from gvgbot.session import Session
 from gvgbot.simulation import Place
+from gvgbot.snapshots import _phase
 from gvgbot.worlds.canvas import Canvas
 from tests.twin.lives_rig import Lives, explored
 
@@ -148,6 +149,38 @@ def test_a_robot_that_had_finished_can_be_sent_about_after_a_restart(
     body = lives.world.body
     assert math.dist((body.pose.x, body.pose.y), ARM) < 0.3
     assert body.contacts == 0
+
+
+def cross() -> Place:
+    """Four equal arms: no drive can tell one from another."""
+    canvas = Canvas(9.0, 9.0)
+    canvas.carve_path([(1.5, 4.5), (7.5, 4.5)], 1.4)
+    canvas.carve_path([(4.5, 1.5), (4.5, 7.5)], 1.4)
+    return Place(canvas.world("cross"), Pose(2.5, 4.5, 0.1))
+
+
+def test_a_robot_with_an_errand_stands_where_it_cannot_find_its_place(tmp_path: Path) -> None:
+    """And keeps the errand, for when it is started where it stopped."""
+    owner, failed = Owner(), list[tuple[float, Pose]]()
+
+    def stands_for_a_while(session: Session) -> bool:
+        if len(lives.sessions) == 1 or session.pipeline.mission.outcome != "failed":
+            return False
+        failed.append((lives.world.body.distance_m, lives.world.body.pose))
+        return len(failed) > 300
+
+    config = Config(twin=TWIN, autonomy=AUTONOMY)
+    lives = Lives(config, cross(), tmp_path, dead_s=100.0, over=stands_for_a_while)
+    last = lives.run([owner.sends_it])
+    assert len(owner.ends) == 4
+    assert "looks the same from 4 places" in told(tmp_path, "finished")[-1]["reason"]
+    assert failed[-1] == failed[10]  # it rolls to a stop
+    assert _phase(last.pipeline, None) == "finished"
+    assert last.pipeline.errands.errand == Patrol(tuple(owner.ends))
+    with pytest.raises(Declined, match="asked to explore"):
+        last.pipeline.errands.home(0.0)
+    last.pipeline.errands.explore(0.0)
+    assert not last.pipeline.errands.is_resting
 
 
 def test_a_map_that_is_lent_lends_no_waiting(tmp_path: Path) -> None:

@@ -79,7 +79,7 @@ class Errands:
         """Whether there is nothing to do but to stand."""
         is_free = self._plan is None and self._command is None
         is_over = is_free and (self.is_waiting or self._mission.outcome is not None)
-        return self.is_paused or is_over
+        return self.is_paused or is_over or bool(self.unplaced)
 
     @property
     def is_exploring(self) -> bool:
@@ -110,7 +110,7 @@ class Errands:
         if not self.is_paused:
             return "it was not paused"
         self.is_paused = self.is_carried = False
-        if self._plan is not None:
+        if self._plan is not None and not self.is_resting:
             return f"it goes on with: {self._plan}"
         if self.is_resting:
             return "it is not paused any more, and has nothing to do"
@@ -135,7 +135,7 @@ class Errands:
         if self._plan is None and self._command is None and not self.is_resting:
             return "it is exploring already"
         self._end(stamp, "replaced", "by explore")
-        self.is_waiting = False
+        self.is_waiting, self.unplaced = False, ""
         self.closures.open_all(self._mapper.graph)
         if self._mission.outcome is not None:
             self._mission.reopen()
