@@ -1,10 +1,12 @@
 """The command line: arguments in, exit status out, one clear line for every failure."""
 
 import errno
+import os
 import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from types import FrameType
 
 from gvgbot import __version__
@@ -22,9 +24,17 @@ FAILURE, INTERRUPTED = 1, 130
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status; wrong arguments raise SystemExit(2)."""
+    _fill_streams()
     options = parser().parse_args(arguments)
     with _any_stop_as_by_ctrl_c():
         return status_of(lambda: options.command(options))
+
+
+def _fill_streams() -> None:
+    """Let nothing take the place of a closed stream: what is printed would go into a port."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, Path(os.devnull).open(mode, encoding="utf-8"))  # noqa: SIM115
 
 
 @contextmanager

@@ -167,6 +167,14 @@ def test_a_simulated_exploration_that_is_stopped_leaves_its_map(
     assert json.loads((events.parent / "map.geojson").read_text())["features"]
 
 
+def test_a_robot_without_any_stream_maps_all_the_same(tmp_path: Path) -> None:
+    """As what a program starts that has closed them all."""
+    command = "-m gvgbot explore --world ring --set twin.time_limit_s=2 --out run"
+    closed = f'exec "$0" {command} <&- >&- 2>&-'
+    subprocess.run(["sh", "-c", closed, sys.executable], cwd=tmp_path, check=False)
+    assert {path.name for path in (tmp_path / "run").iterdir()} >= RUN
+
+
 def test_a_request_that_nobody_answers_can_be_stopped(tmp_path: Path) -> None:
     """The library waits for it to connect, and hears of no signal meanwhile."""
     with socket.create_server(("127.0.0.1", 0)) as silent:
