@@ -74,6 +74,8 @@ def status_of(command: Callable[[], int]) -> int:
             raise
         return _fail(f"{error.filename}: permission denied: choose another, or sudo", FAILURE)
     except OSError as error:
+        if error.errno == errno.ENOSPC:
+            return _fail(f"{error.filename or 'output'}: no space left: make room", FAILURE)
         if error.errno != errno.ENAMETOOLONG:
             raise
         return _fail(f"{error.filename}: {error.strerror}: choose a shorter one", BAD_USAGE)

@@ -182,6 +182,18 @@ def test_a_name_longer_than_any_file_may_have_is_wrong(capsys: Captured) -> None
     assert line.endswith("File name too long: choose a shorter one")
 
 
+def test_a_full_disk_to_print_to_is_one_line(capsys: Captured) -> None:
+    """As where `> log` leads."""
+
+    def show() -> int:
+        with Path("/dev/full").open("w") as full:
+            print("a line", file=full, flush=True)
+        return 0
+
+    assert status_of(show) == 1
+    assert said(capsys) == ["gvgbot: output: no space left: make room"]
+
+
 def test_an_interrupted_command_says_so_and_exits_as_shells_expect(capsys: Captured) -> None:
     assert status_of(lambda: raising(KeyboardInterrupt())) == 128 + 2
     assert said(capsys) == ["gvgbot: interrupted"]
