@@ -6,7 +6,7 @@ The robot is told to stand, and nothing else.
 import asyncio
 import contextlib
 from collections.abc import Awaitable, Callable, Coroutine, Iterator
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, astuple, dataclass, field
 from typing import Any, Literal
 
 import numpy as np
@@ -189,8 +189,9 @@ def _laser_lines(
 ) -> Iterator[Line]:
     identity = laser.identity
     if identity is not None:
-        yield Line("ok", "laser", f"{identity.product}, serial {identity.serial}")
-        yield Line("ok", "laser firmware", f"{identity.firmware}, {identity.protocol}")
+        yield Line("ok", "laser", f"{identity.product}, serial {identity.serial or 'not told'}")
+        firmware = ", ".join(filter(None, (identity.firmware, identity.protocol)))
+        yield Line("ok", "laser firmware", firmware or "not told")
     parameters, mode = laser.parameters, laser.mode
     if heard.failure is not None or not heard.arrivals or parameters is None or mode is None:
         yield _absence("laser", heard, "sends no scans")
@@ -216,11 +217,14 @@ def _base_lines(base: KobukiBase, heard: Heard) -> Iterator[Line]:
     if heard.failure is not None or not heard.arrivals:
         yield _absence("base", heard, "sends no odometry")
         return
+    names = ("hardware", "firmware", "UDID")
+    told = zip(names, astuple(identity), strict=True)
+    answered = ", ".join(f"{name} {text}" for name, text in told if text is not None)
     yield Line(
-        "ok" if identity.is_complete else "warn",
+        "ok" if answered else "warn",
         "base",
-        f"hardware {identity.hardware}, firmware {identity.firmware}, UDID {identity.udid}",
-        "the base does not answer: check the wire from the computer to it",
+        answered or "does not answer what it is",
+        "check the wire from the computer to it",
     )
     yield _steadiness("base rate", heard, BASE_RATE)
     yield _link("base link", base.statistics)

@@ -6,13 +6,17 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 import serial
 
-from gvgbot.check import check, examine
+from gvgbot.check import Heard, _base_lines, check, examine
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.config import load_config
+from gvgbot.drivers.kobuki.driver import KobukiBase
+from gvgbot.drivers.kobuki.feedback import Identity, LinkStatistics
 from gvgbot.drivers.transport import _obstacle
 from gvgbot.geometry import Pose
 from gvgbot.simulation import Simulation, open_place
@@ -47,6 +51,22 @@ ILLS = {
     "lifted robot": ("twin.base.mishaps.wheel_drops_per_h=36000", "contact", "warn", "floor"),
     "charging by cable": ("twin.base.has_adapter=true", "contact", "warn", "off the charger's"),
 }
+
+
+@pytest.mark.parametrize(
+    ("identity", "says"),
+    [
+        (Identity("1.0.4", "1.2.0"), "ok    base           hardware 1.0.4, firmware 1.2.0"),
+        (Identity(), "warn  base           does not answer what it is: check the wire"),
+    ],
+)
+def test_a_base_that_answers_in_part_has_a_sound_wire(identity: Identity, says: str) -> None:
+    base = SimpleNamespace(
+        identity=identity, statistics=LinkStatistics(), battery=None, contact=None
+    )
+    heard = Heard([0.0, 0.02], [0.0, 0.02], [0, 1])
+    first = next(_base_lines(cast(KobukiBase, base), heard))
+    assert str(first).startswith(says)
 
 
 @pytest.mark.parametrize(("override", "subject", "verdict", "remedy"), ILLS.values(), ids=ILLS)
