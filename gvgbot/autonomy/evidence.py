@@ -102,6 +102,8 @@ class Evidence:
             if i not in matched
             and not (branch in node.weak and self._unbelieved.was_looked_at(place, bearings[i]))
         ]
+        if new and not view.sees(place):
+            new = []
         certain = [i for i in new if branches[i] not in node.weak]
         for i in self._believed(view, vertex, new, certain):
             matched[i] = vertex.add_half_edge(bearings[i] - vertex.local.theta)
@@ -203,7 +205,9 @@ class Evidence:
         if is_promising and math.dist(place, view.local_base.position) >= _IN_CLEAR_M:
             return None
         passing = self._passing(view, place, known)
-        if passing is None or self._was_left(view, vertex, place, passing):
+        if passing is None or not view.sees(place):
+            return None
+        if self._was_left(view, vertex, place, passing):
             return None
         return None if self._unbelieved.is_stubborn(place) else "an edge passes here"
 

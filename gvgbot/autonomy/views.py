@@ -12,6 +12,7 @@ from gvgbot.geometry import Array, Pose
 
 _AT_M = 0.2  # from a node, a line ends there
 _RIM_M = 0.25  # a point so near to a node's disc may shape it
+_BESIDE_M, _STEP_M = 0.1, 0.05  # from a line of sight, a wall is on it; and from point to point
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,6 +39,16 @@ class View:
         """Whether the GVG ends at a place (2,) only because something that may go is there."""
         ends = (self.gvg.nodes[key] for key in self.doubted)
         return any(node.degree == 1 and math.dist(node.position, place) < _AT_M for node in ends)
+
+    def sees(self, place: Array) -> bool:
+        """Whether no wall is on the line of sight to a place (2,).
+
+        What is known of places out of sight does not grow: only parts of it are forgotten.
+        """
+        base = self.local_base.position
+        line = np.linspace(base, place, math.ceil(math.dist(base, place) / _STEP_M) + 1)
+        gaps, _ = self.local_map.tree().query(line, distance_upper_bound=_BESIDE_M)
+        return bool(np.isinf(gaps).all())
 
     def stands_free(self, place: Array, within_m: float) -> bool:
         """Whether it is certain that neither wall nor glass is so near to a place (2,)."""

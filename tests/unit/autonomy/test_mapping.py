@@ -235,6 +235,20 @@ def test_a_vertex_through_which_a_plain_edge_runs_is_taken_back() -> None:
     assert len(of_type(seen.events, VertexRemoved)) == 1
 
 
+@pytest.mark.parametrize("walled", [True, False])
+def test_what_is_out_of_sight_is_neither_taken_back_nor_gets_a_departure(*, walled: bool) -> None:
+    """Behind a wall, a part of the walls of the other room is forgotten: it looks open there."""
+    more = drawn({**TEE_POINTS, 5: (3.0, 4.0)}, {**TEE_LINES, 13: (2, 5, [])}, unseen=UNSEEN)
+    room = looked(carved([(-2.0, -2.0, 2.5 if walled else 5.0, 2.0)]), [NEAR])
+    for gvg in (PLAIN, more):
+        seen = Seen().look(TEE, CONFIG.candidates.meetpoint_sightings)
+        seen.mapper.move(NEAR, np.zeros((3, 3)))
+        seen.look(gvg, 3 * CONFIG.misses, at=NEAR, local_map=room)
+        tees = [v for v in seen.mapper.graph.vertices.values() if v.kind == "meetpoint"]
+        degrees = [vertex.degree for vertex in tees]
+        assert degrees == ([3] if walled else [] if gvg is PLAIN else [4])
+
+
 def led_by(seen: Seen, *corners: Point, far: Point) -> None:
     """Make a driven edge, map frame, of the branch of the tee, to a vertex far off."""
     graph, belief = seen.mapper.graph, seen.mapper.belief
