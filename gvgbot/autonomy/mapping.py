@@ -164,12 +164,11 @@ class Mapper(Knowledge):
 
     def _consider(self, view: View, sightings: dict[int, Sighting], known: Correspondence) -> None:
         """Count sightings of what is not known yet, and believe what has been seen often enough."""
+        misplaced = self._misplaced(view, sightings, known)
         for node, sighting in sightings.items():
-            if node in known.vertex_of or node in view.doubted:
+            if node in known.vertex_of or node in view.doubted or node in misplaced:
                 continue
             away = float(np.hypot(*(sighting.position - view.local_base.position)))
-            if self._is_out_of_place(view, sighting, away):
-                continue
             candidate = self._unbelieved.note(sighting, away, view.travelled)
             candidate.may_be = self._rivals.get(node, candidate.may_be)
             if not self._unbelieved.is_believable(candidate, view.gvg.nodes[node], away):
@@ -279,6 +278,23 @@ class Mapper(Knowledge):
                 vertex.seen_at = vertex.updated_at = view.travelled
                 return vertex
         return None
+
+    def _misplaced(
+        self, view: View, sightings: dict[int, Sighting], known: Correspondence
+    ) -> set[int]:
+        """Nodes that are out of place, and the dead ends that no way led to without these."""
+        base = view.local_base.position
+        found = {
+            node
+            for node, sighting in sightings.items()
+            if node not in known.vertex_of
+            if self._is_out_of_place(view, sighting, math.dist(sighting.position, base))
+        }
+        for edge in view.gvg.edges.values():
+            ends = {edge.a, edge.b}
+            if ends & found:
+                found |= {end for end in ends if view.gvg.nodes[end].is_endpoint}
+        return found
 
     def _is_out_of_place(self, view: View, sighting: Sighting, away: float) -> bool:
         """Whether a vertex is seen `away` metres off, on an edge that is finished, or was driven.

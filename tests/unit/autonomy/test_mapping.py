@@ -653,6 +653,19 @@ def test_a_way_that_was_driven_is_dubious_before_its_end_is_known(*, passes: boo
     assert (seen.look(TEE_BETWEEN, 50).places("meetpoint") == []) == passes
 
 
+def test_where_a_meetpoint_must_be_seen_from_near_the_dead_end_behind_it_must_too() -> None:
+    """Without the meetpoint no way would lead there."""
+    seen = Seen()
+    seen.mapper.driven_parts = [np.array([(0.0, 0.0), (3.0, 0.0), (6.0, 0.0)])]
+    seen.mapper._unbelieved.note_mistake(Mistake(np.array([3.5, 0.0]), (), 0.0))
+    assert seen.look(TEE, 50).mapper.graph.vertices == {}
+    near = Pose(3.0 - CONFIG.passed_m + 0.1, 0.0)
+    seen.mapper.move(near, np.zeros((3, 3)))
+    seen.look(TEE, CONFIG.candidates.endpoint_sightings, at=near)
+    assert seen.places("meetpoint") == [pytest.approx((3.0, 0.0), abs=1e-3)]
+    assert seen.places("endpoint") == [pytest.approx((3.0, -4.0), abs=1e-3)]
+
+
 def test_on_a_driven_way_where_nothing_proved_to_be_none_a_meetpoint_is_believed_from_afar() -> (
     None
 ):
