@@ -193,6 +193,10 @@ def _laser_lines(
         firmware = ", ".join(filter(None, (identity.firmware, identity.protocol)))
         yield Line("ok", "laser firmware", firmware or "not told")
     parameters, mode = laser.parameters, laser.mode
+    if heard.failure is not None and laser.link.reboots:
+        finding = "was in an abnormal state, for which it has been started anew"
+        yield Line("fail", "laser", finding, "check once more in a few seconds")
+        return
     if heard.failure is not None or not heard.arrivals or parameters is None or mode is None:
         yield _absence("laser", heard, "sends no scans")
         return

@@ -42,6 +42,7 @@ def test_sound_twins_pass_on_every_point() -> None:
 
 
 ILLS = {
+    "abnormal laser": ("twin.laser.starts_abnormal=true", "laser", "fail", "check once more"),
     "empty battery": ("twin.base.battery_v=13.1", "battery", "fail", "charge it"),
     "low battery": ("twin.base.battery_v=13.9", "battery", "warn", "charge it"),
     "slow converter": ("twin.base.link.jitter_s=0.016", "base clock", "warn", "latency_timer"),
