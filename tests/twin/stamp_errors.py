@@ -44,7 +44,6 @@ class RollingBody:
 
     bumper = (False, False, False)
     travel = 0.0
-    now = 0.0
 
     @property
     def left_travel(self) -> float:
@@ -59,7 +58,7 @@ class RollingBody:
         return Pose(self.travel, 0.0, 0.0)
 
     def advance(self, now: float) -> None:
-        self.now, self.travel = now, now * FRAME_WAY / FRAME_PERIOD
+        self.travel = now * FRAME_WAY / FRAME_PERIOD
 
     def command(self, linear: float, angular: float) -> None:
         pass

@@ -177,25 +177,6 @@ def test_a_command_takes_effect_after_the_dead_time() -> None:
     assert at > sent + 0.06 - 1e-9
 
 
-def test_frames_that_had_to_wait_tell_of_a_turn_piece_by_piece() -> None:
-    """As on a computer that is busy for 0.8 s, after which the laser comes first."""
-    rig = Rig()
-    rig.run(0.1)
-    rig.send(BaseControl.from_twist(Twist(0.1, 1.0), 230.0))
-    rig.run(0.1)
-    rig.body.advance(rig.body.now + 0.8)
-    angles: list[float] = []
-
-    def note(parts: Parts) -> None:
-        inertia = parts[Inertia]
-        assert isinstance(inertia, Inertia)
-        angles.append(inertia.angle)
-
-    rig.run(1.0, note)
-    turns = np.diff(angles)
-    assert turns == pytest.approx(np.full(len(turns), 0.02), abs=0.001)
-
-
 def test_without_commands_it_stops_by_itself() -> None:
     rig = Rig()
     rig.run(0.1)

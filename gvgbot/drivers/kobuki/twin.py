@@ -53,10 +53,6 @@ class Body(Protocol):
         """Head for this twist (m/s, rad/s), within the body's own accelerations."""
 
     @property
-    def now(self) -> float:
-        """How far it has moved on, s."""
-
-    @property
     def left_travel(self) -> float:
         """Metres that the left wheel has turned, signed, since the body was made."""
 
@@ -258,7 +254,7 @@ class KobukiTwin:
     def _move(self, now: float) -> None:
         """Let the body move through this cycle and feel what it did, then heed commands."""
         self._body.advance(now)
-        before, self._true = self._true, self._true_at(now)
+        before, self._true = self._true, self._truth()
         left, right = self._true[0] - before[0], self._true[1] - before[1]
         turn = wrap_angle(self._true[2] - before[2])
         left, right, turn = self._sensors.feel(left, right, turn, _PERIOD)
@@ -275,24 +271,6 @@ class KobukiTwin:
         if self._moving and late and self._config.has_command_timeout:
             self._moving = False
             self._body.command(0.0, 0.0)
-
-    def _true_at(self, now: float) -> tuple[float, float, float]:
-        """Where wheels and heading were then.
-
-        The laser may have moved the body on farther, when a busy computer lets both wait: a turn of
-        that time felt in one cycle would be no turn that a base can make.
-        """
-        truth, ahead = self._truth(), self._body.now - now
-        if ahead <= _PERIOD:
-            return truth
-        share = _PERIOD / (_PERIOD + ahead)
-        left, right, theta = self._true
-        turn = wrap_angle(truth[2] - theta)
-        return (
-            left + share * (truth[0] - left),
-            right + share * (truth[1] - right),
-            theta + share * turn,
-        )
 
     def _truth(self) -> tuple[float, float, float]:
         return self._body.left_travel, self._body.right_travel, self._body.pose.theta
