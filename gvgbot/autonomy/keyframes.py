@@ -3,11 +3,13 @@
 from dataclasses import dataclass
 from typing import Annotated
 
+import numpy as np
+
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
 from gvgbot.ranges import Range
 
-_UNKNOWN_M2 = 0.5  # variance of a way that nobody has measured
+UNKNOWN_WAY = np.diag([1.0, 1.0, 0.3**2])  # covariance, where it was carried or way is not kept
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,7 +32,7 @@ class Step:
     @property
     def is_unknown(self) -> bool:
         """Whether the way is not known: the robot was carried, or what it drove was forgotten."""
-        return bool(self.covariance[0, 0] >= _UNKNOWN_M2)
+        return bool(self.covariance[0, 0] >= UNKNOWN_WAY[0, 0] / 2)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

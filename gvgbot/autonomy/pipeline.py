@@ -26,7 +26,7 @@ from gvgbot.autonomy.gvg.local import LocalGvg
 from gvgbot.autonomy.gvg.reduction import reduce_graph
 from gvgbot.autonomy.gvg.voronoi import fine_graph
 from gvgbot.autonomy.hazards import Hazards
-from gvgbot.autonomy.keyframes import Keyframe, Step
+from gvgbot.autonomy.keyframes import UNKNOWN_WAY, Keyframe, Step
 from gvgbot.autonomy.localisation import Localisation, LocalMaps
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.mission import Mission
@@ -47,7 +47,6 @@ _CARRIED = (
     "no walls that it knows are around its base, which has started anew: if it was carried, "
     "restart the program, and it looks for its place on the whole map"
 )
-_FORGOTTEN = np.diag([1.0, 1.0, 0.3**2])  # covariance of a way that is not kept
 _OVERLAP_RAD = 0.2  # of what is seen before and after the first turn
 _TURN_SHARE = 0.8  # of the fastest turn, to look around
 _SCAN_EVERY_M, _SCAN_EVERY_RAD = 0.7, 0.5  # scans that are kept for the occupancy grid
@@ -349,7 +348,7 @@ class Pipeline:
             return []
         before, last = self.keyframes[self.lasting - 1], self.keyframes[newest]
         self.keyframes[self.lasting :] = [last]
-        self.steps[self.lasting - 1 :] = [Step(before.map_base.to(last.map_base), _FORGOTTEN)]
+        self.steps[self.lasting - 1 :] = [Step(before.map_base.to(last.map_base), UNKNOWN_WAY)]
         self.mapper.forget_between(self.lasting, newest)
         self.traffic.passed = [one.before(self.lasting) for one in self.traffic.passed]
         return [WayForgotten(stamp, self.lasting, newest - self.lasting)]

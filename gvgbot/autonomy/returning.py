@@ -19,7 +19,7 @@ from gvgbot.autonomy.errands import Declined
 from gvgbot.autonomy.estimate import Estimate, scans_at, smoothed
 from gvgbot.autonomy.events import Event, Finished, Recovery, WayForgotten
 from gvgbot.autonomy.exploration.config import ExplorationConfig
-from gvgbot.autonomy.keyframes import Step
+from gvgbot.autonomy.keyframes import UNKNOWN_WAY, Step
 from gvgbot.autonomy.localisation import Localisation
 from gvgbot.autonomy.memory import Growth, Memory, recall, remember
 from gvgbot.autonomy.pipeline import Pipeline
@@ -31,7 +31,6 @@ from gvgbot.hal.messages import Odometry, Scan
 
 _MOVED_M, _MOVED_RAD = 0.5, 0.3  # farther from where odometry has it, something is wrong
 _FOUND = np.diag([0.1**2, 0.1**2, 0.03**2])  # covariance of a place found on the map
-_CARRIED = np.diag([1.0, 1.0, 0.3**2])  # and of the way there, of which nothing is known
 _NOTHING_FELT = Felt()
 
 
@@ -192,7 +191,7 @@ class ReturningPipeline(Pipeline):
         motion = self.keyframes[-1].map_base.to(map_base)
         self._last = replace(seeker._last, map_base=map_base)
         self.keyframes.append(self._last)
-        self.steps.append(Step(motion, _CARRIED))
+        self.steps.append(Step(motion, UNKNOWN_WAY))
         self._kept = None
         self._look_now = True
         self._seeker, self._is_back = None, True
