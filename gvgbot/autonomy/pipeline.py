@@ -268,24 +268,16 @@ class Pipeline:
         if self._last is None or self._look_now:
             self._look_now = False
             return True
-        moved, c = self._last.odom_base.to(odom_base), self._config.keyframe
-        return (
-            math.hypot(moved.x, moved.y) >= c.distance_m
-            or abs(moved.theta) >= c.turn_rad
-            or scan.stamp - self._last.stamp >= c.interval_s
-        )
+        c = self._config.keyframe
+        has_waited = scan.stamp - self._last.stamp >= c.interval_s
+        return has_waited or _has_come_on(self._last.odom_base, odom_base, c.distance_m, c.turn_rad)
 
     def _worth_a_gvg(self, local_base: Pose) -> bool:
         """Whether a robot that is led has come on; it is taken down."""
-        moved = None if self._looked is None else self._looked.to(local_base)
-        if (
-            moved is not None
-            and math.hypot(moved.x, moved.y) < _LED_EVERY_M
-            and abs(moved.theta) < _LED_EVERY_RAD
-        ):
-            return False
-        self._looked = local_base
-        return True
+        has_come_on = _has_come_on(self._looked, local_base, _LED_EVERY_M, _LED_EVERY_RAD)
+        if has_come_on:
+            self._looked = local_base
+        return has_come_on
 
     def _localise(self, scan: Scan, odom_base: Pose) -> Pose | None:
         """The base in the local frame; the belief moves with it. None: it may be anywhere."""
@@ -325,17 +317,12 @@ class Pipeline:
         return local_base
 
     def _keep(self, scan: Scan, odom_base: Pose, local_base: Pose) -> None:
-        map_base = self.mapper.belief.map_base
-        moved = self._kept.to(local_base) if self._kept is not None else None
-        if (
-            moved is None
-            or math.hypot(moved.x, moved.y) > _SCAN_EVERY_M
-            or abs(moved.theta) > _SCAN_EVERY_RAD
-        ):
+        """Make a keyframe of a look, with its scan if that was taken far enough from the last."""
+        is_kept = _has_come_on(self._kept, local_base, _SCAN_EVERY_M, _SCAN_EVERY_RAD)
+        if is_kept:
             self._kept = local_base
-            self._last = Keyframe(scan.stamp, odom_base, local_base, map_base, scan)
-        else:
-            self._last = Keyframe(scan.stamp, odom_base, local_base, map_base, None)
+        map_base, kept = self.mapper.belief.map_base, scan if is_kept else None
+        self._last = Keyframe(scan.stamp, odom_base, local_base, map_base, kept)
         self.keyframes.append(self._last)
 
     def _forget(self, stamp: float, happened: list[Event]) -> list[Event]:
@@ -449,3 +436,11 @@ def _blind_angle(scan: Scan) -> float:
     """How far to turn so that every direction has been seen, with some overlap; rad."""
     seen = scan.angle_increment * (len(scan.ranges) - 1)
     return max(0.0, math.tau - seen) + _OVERLAP_RAD
+
+
+def _has_come_on(before: Pose | None, now: Pose, metres: float, turn: float) -> bool:
+    """Whether a pose is so far, m, or so much turned, rad, from one before, or there was none."""
+    if before is None:
+        return True
+    moved = before.to(now)
+    return math.hypot(moved.x, moved.y) >= metres or abs(moved.theta) >= turn
