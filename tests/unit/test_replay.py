@@ -130,6 +130,7 @@ def test_a_recording_whose_configuration_is_damaged_can_be_replayed_with_another
     words = ["replay", str(path), "--out", str(tmp_path / "run")]
     assert main(words) == 2
     *mistakes, hint = capsys.readouterr().err.splitlines()
+    assert mistakes
     assert all(f"the configuration in {path}" in line for line in mistakes)
     assert "--config" in hint
     assert not (tmp_path / "run").exists()

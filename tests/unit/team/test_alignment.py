@@ -27,6 +27,7 @@ def test_two_charts_that_share_enough_of_a_building_are_laid_on_each_other(seed:
     middle = np.array([6.0, 2.0])
     assert np.hypot(*(found.pose.transform(middle) - true.transform(middle))) < 0.1
     assert abs(wrap_angle(found.pose.theta - true.theta)) < 0.01
+    assert found.pairs
     assert all(ours_id == theirs_id for ours_id, theirs_id in found.pairs)
     assert found.confidence >= 0.995
 

@@ -78,7 +78,9 @@ def test_a_second_lap_is_laid_onto_the_first() -> None:
 
 def test_a_match_tells_where_the_earlier_keyframe_saw_the_later_one() -> None:
     true = lap() + lap()
-    for match in revisits(run(true, walls(), turn=0.001), MATCHING):
+    matches = revisits(run(true, walls(), turn=0.001), MATCHING)
+    assert matches
+    for match in matches:
         off = match.a_b.inverse().compose(true[match.a].to(true[match.b]))
         assert math.hypot(off.x, off.y) < 0.05
         assert abs(off.theta) < 0.01
