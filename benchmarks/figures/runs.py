@@ -35,7 +35,6 @@ RUNS = Path("runs/figures")
 TRACE = "trace.json"
 
 Row = dict[str, Any]
-Vertices = dict[str, list[float]]  # by id: x, y, and the covariance xx, xy, yy
 
 
 class Watched(Session):
@@ -88,6 +87,7 @@ def _vertex(belief: Belief, key: int) -> list[float]:
 
 
 def _row(pose: Pose, covariance: Array) -> list[float]:
+    """Its x, y, and their covariance xx, xy, yy, m and m^2."""
     (xx, xy), (_, yy) = covariance.tolist()
     return [pose.x, pose.y, xx, xy, yy]
 
