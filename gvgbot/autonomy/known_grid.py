@@ -40,7 +40,7 @@ class KnownGrid:
     corner: Array
 
     def points(self) -> Array:
-        """The walls."""
+        """The walls (N, 2), map frame."""
         return self.walls
 
     def known(self, points: Array) -> NDArray[np.bool_]:

@@ -55,7 +55,10 @@ class Whereabouts:
     def follow(
         self, gvg: LocalGvg, place: Place, known: Correspondence, base: Array
     ) -> "Passage | None":
-        """Account for the robot's present place; the change of edge, if there was one."""
+        """Account for the robot's present place; the change of edge, if there was one.
+
+        The base (2,) is in the local frame.
+        """
         edge = gvg.edges[place.edge]
         ends = [
             (metres, known.half_edge_of[branch], branch)
@@ -84,7 +87,7 @@ class Whereabouts:
     def round_from(self, base: Array) -> int | None:
         """Which point of the trail the robot is at once more, the way round that it has driven.
 
-        None if it has not come round, or not along the trail.
+        None if it has not come round, or not along the trail. The base (2,) is in the local frame.
         """
         points = np.array(self.trail).reshape(-1, 2)
         away = np.hypot(*(points - base).T)

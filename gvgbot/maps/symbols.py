@@ -1,4 +1,7 @@
-"""The signs that a map is drawn with; the same ones explain it in the legend. Sizes in pixels."""
+"""The signs that a map is drawn with; the same ones explain it in the legend.
+
+Points (N, 2) and sizes are in pixels.
+"""
 
 import math
 

@@ -69,13 +69,13 @@ class View:
         return self.box.size * self.scale
 
     def pixels(self, points: Array) -> Array:
-        """Where points (..., 2) of the map lie in the picture."""
+        """Where points (..., 2), m, map frame, lie in the picture: pixels from its upper left."""
         upper_left = np.array([self.box.low[0], self.box.high[1]])
         flipped: Array = (points - upper_left) * np.array([1.0, -1.0])
         return self.corner + self.scale * flipped
 
     def pixel(self, point: Array | tuple[float, float]) -> tuple[float, float]:
-        """Where one point of the map lies in the picture."""
+        """As `pixels`, of one point."""
         return pair(self.pixels(np.asarray(point)))
 
 

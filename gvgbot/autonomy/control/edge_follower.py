@@ -48,7 +48,7 @@ class Track:
 
     @classmethod
     def of(cls, polyline: Array, clearance: Array) -> "Track":
-        """A track from its polyline."""
+        """A track from its polyline (N, 2), local frame, and the clearance (N,), m, along it."""
         return cls(polyline, clearance, stations_of(polyline))
 
     @property
