@@ -2,7 +2,6 @@
 
 import asyncio
 import contextlib
-from collections import deque
 from collections.abc import Awaitable, Callable, Sequence
 from functools import partial
 from typing import Protocol
@@ -23,11 +22,11 @@ from gvgbot.hal.guard import Guard, Reason
 from gvgbot.hal.messages import Contact, Odometry, Scan
 from gvgbot.journal import BatteryJournal, GuardJournal, log_event, status_line
 from gvgbot.links import Devices, Links
+from gvgbot.live_events import LiveEvents
 from gvgbot.live_feed import LiveFeed, Pace
 from gvgbot.live_map import LiveMap, News
 from gvgbot.live_ros import LiveRos, Neighbour, UnixTime
 from gvgbot.live_team import LiveTeam, TeamNetwork
-from gvgbot.maps.run_directory import record_of
 from gvgbot.persistence.keeper import Keeper
 from gvgbot.requests import Answer, Asked
 from gvgbot.service import Notifier
@@ -36,7 +35,7 @@ from gvgbot.simulation import Simulation
 from gvgbot.snapshots import sign, state
 from gvgbot.steering import Steering
 from gvgbot.survey import survey
-from gvgbot.topics import EVENTS_KEPT, HEALTH, MAP, STATE, Event, Events, Health, Payload, State
+from gvgbot.topics import HEALTH, MAP, STATE, Health, Payload, State
 from gvgbot.vitals import Vitals
 
 SAVE_EVERY = 30.0  # s at least between two savings while the map grows
@@ -111,8 +110,7 @@ class Robot:
             self._pipeline.smooth = self._estimate.newest
         self._odometry: Odometry | None = None
         self._sequence = 0
-        self._happened, self._told = 0, 0  # events; and those of them that were published
-        self._latest_events: deque[Event] = deque(maxlen=EVENTS_KEPT)
+        self._events = LiveEvents()
         self._decided = ""  # the reason of the last decision
         self._not_driven = ""  # why nobody may drive it just now
         self._feed: LiveFeed | None = None
@@ -304,7 +302,7 @@ class Robot:
         self._session.on_events(happened)
         for event in happened:
             log_event(event)
-            self._take_down(event)
+            self._events.note(event)
             if self._keeper is not None:
                 self._keeper.on_event(event)
             if isinstance(event, events.VertexAdded | events.Finished):
@@ -321,15 +319,6 @@ class Robot:
         for shown in (self._live_map, self._ros):
             if shown is not None:
                 shown.doubt()
-
-    def _take_down(self, event: events.Event) -> None:
-        """Keep an event for those who watch."""
-        record = record_of(event)
-        kind, stamp = record.pop("event"), record.pop("stamp")
-        self._latest_events.append(
-            Event(number=self._happened, stamp=stamp, kind=kind, details=record)
-        )
-        self._happened += 1
 
     def _on_cycle(self, odometry: Odometry) -> None:
         self._note(odometry)
@@ -363,9 +352,9 @@ class Robot:
             self._network.publish(now)
             if self._healths.allows(now.stamp):
                 self._network.publish(self._health(self._network, now))
-            if self._told < self._happened:
-                self._network.publish(Events(events=tuple(self._latest_events)))
-                self._told = self._happened
+            happened = self._events.news()
+            if happened is not None:
+                self._network.publish(happened)
         self._notifier.status(status_line(now))
         self._battery.note(self._devices.base.battery, now.stamp)
         self._devices.base.show(sign(now, is_lost=self._pipeline.is_lost))
