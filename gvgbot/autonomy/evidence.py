@@ -93,7 +93,7 @@ class Evidence:
     def weigh_departures(
         self, view: View, node: LocalNode, vertex: Vertex, known: Correspondence
     ) -> None:
-        """Pair a node's branches with the half-edges of its vertex; add certain new ones."""
+        """Pair branches of a node with half-edges of its vertex; add sure new ones in sight."""
         branches, bearings, matched = self.pair_departures(view, node, vertex, known)
         place = vertex.local.position
         new = [
