@@ -69,11 +69,14 @@ class Calibration:
 
         Driving, one gets sideways by turning.
         """
-        return _scaled(Q, self.noise)
+        return _scaled(Q, self.noise[[0, 1, 1]])
 
     def trusted(self, Q: Array) -> Array:
-        """The same, but no less than is good to weigh against walls."""
-        return _scaled(Q, np.maximum(self.noise, _LEAST_TRUSTED))
+        """The same, but no less than is good to weigh against walls.
+
+        In a turn, wheels that slip move the base sideways.
+        """
+        return _scaled(Q, np.maximum(self.noise, _LEAST_TRUSTED)[[0, 0, 1]])
 
     def adds_up(self, motion: Pose, duration: float, left: Array, drift: Array) -> Array:
         """The covariance `drift` (3, 3) of one more step, with what all steps err in common.
@@ -104,9 +107,10 @@ class Calibration:
         H = g @ _per_unit(told.motion, told.duration)
         r = np.array([told.change.x, told.change.y, told.change.theta])
         P = self.P + np.diag(_WANDER**2)
-        S = H @ P @ H.T + g @ told.scattered @ g.T + told.noise * g @ C + _LEAST
-        S = (S + S.T) / 2
-        self._learn_noise(r, S, g)
+        by_errors = H @ P @ H.T + _LEAST
+        truly = g @ told.scattered @ g.T + told.noise * g @ C
+        self._learn_noise(r, by_errors + truly, g)
+        S = by_errors + Q - C  # as odometry was trusted
         if r @ np.linalg.solve(S, r) > _SURPRISING:
             return
         K = np.linalg.solve(S, H @ P).T
@@ -130,8 +134,8 @@ class Calibration:
 
 
 def _scaled(Q: Array, noise: Array) -> Array:
-    """The covariance Q (3, 3) of a motion, with the variance of distances and turns times (2,)."""
-    sigmas = np.sqrt(noise[[0, 1, 1]])
+    """The covariance Q (3, 3) of a motion, with the variance of each axis so many times (3,)."""
+    sigmas = np.sqrt(noise)
     return np.asarray(Q * np.outer(sigmas, sigmas), np.float64)
 
 
