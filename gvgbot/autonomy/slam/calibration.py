@@ -67,16 +67,13 @@ class Calibration:
     def scattered(self, Q: Array) -> Array:
         """The covariance (3, 3) of a motion, which is expected to be Q, as it has proved to be.
 
-        Driving, one gets sideways by turning.
+        Sideways as along the way: wheels that slip in a turn move the base sideways.
         """
-        return _scaled(Q, self.noise[[0, 1, 1]])
+        return _scaled(Q, self.noise)
 
     def trusted(self, Q: Array) -> Array:
-        """The same, but no less than is good to weigh against walls.
-
-        In a turn, wheels that slip move the base sideways.
-        """
-        return _scaled(Q, np.maximum(self.noise, _LEAST_TRUSTED)[[0, 0, 1]])
+        """The same, but no less than is good to weigh against walls."""
+        return _scaled(Q, np.maximum(self.noise, _LEAST_TRUSTED))
 
     def adds_up(self, motion: Pose, duration: float, left: Array, drift: Array) -> Array:
         """The covariance `drift` (3, 3) of one more step, with what all steps err in common.
@@ -134,8 +131,8 @@ class Calibration:
 
 
 def _scaled(Q: Array, noise: Array) -> Array:
-    """The covariance Q (3, 3) of a motion, with the variance of each axis so many times (3,)."""
-    sigmas = np.sqrt(noise)
+    """The covariance Q (3, 3) of a motion, with the variance of distances and turns times (2,)."""
+    sigmas = np.sqrt(noise[[0, 0, 1]])
     return np.asarray(Q * np.outer(sigmas, sigmas), np.float64)
 
 
