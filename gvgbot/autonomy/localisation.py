@@ -8,7 +8,7 @@ from scipy.ndimage import uniform_filter1d
 from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
-from gvgbot.autonomy.slam.calibration import Calibration, Correction
+from gvgbot.autonomy.slam.calibration import Calibration
 from gvgbot.autonomy.slam.scan_matching import (
     Registration,
     ScanMatchingConfig,
@@ -35,6 +35,7 @@ _SLIPPING = 25.0  # times the covariance of odometry, when the wheels slip
 _LOST = np.diag([0.5**2, 0.5**2, 0.05**2])  # of a base that nobody heard for a while
 _SEEN_SHARE = 0.3  # of the walls must be known to a robot that comes round a corner unseen
 _FITS_M, _FITTING = 0.15, 0.8  # so near to the walls must be that share of a scan's ends
+_MOST_SHARED = 100.0  # scans that a wall can be the mean of
 _PER_M = np.diag([0.002**2, 0.002**2, 0.0001**2])  # per metre: what cells do to walls
 
 # full: scans are matched, and vertices are poses. paper: odometry alone between vertices, and a
@@ -42,16 +43,15 @@ _PER_M = np.diag([0.002**2, 0.002**2, 0.0001**2])  # per metre: what cells do to
 Localisation = Literal["full", "paper"]
 
 
-class _Walls(NamedTuple):
-    """Points (N, 2), the hits (N,) that each is made of, and where it was seen from (N, 2).
+_Lesson = tuple[Pose, float, Pose, Array, Array]  # a motion, s, its change, Q and C
 
-    And of how many looks (N,) such as the last one it is the mean.
-    """
+
+class _Walls(NamedTuple):
+    """Points (N, 2), the hits (N,) that each is made of, and where it was seen from (N, 2)."""
 
     points: Array
     hits: Array
     sights: Array
-    looks: Array
     tree: cKDTree
 
 
@@ -69,7 +69,8 @@ class LocalMaps:
         self._walls: _Walls | None = None  # of both; None: not drawn yet
         self._matching = matching
         self._calibration = Calibration()
-        self._correction: Correction | None = None  # what the calibration has yet to learn
+        self._lesson: _Lesson | None = None  # what the calibration has yet to learn
+        self._shared = 1.0  # scans that the walls in sight are the mean of
         self.blur = np.zeros((3, 3))  # covariance of the last match, in the frame of the base
 
     def insert(
@@ -99,9 +100,9 @@ class LocalMaps:
         self._due = None
 
     def _calibrate(self) -> None:
-        if self._correction is not None:
-            self._calibration.learn(self._correction)
-        self._correction = None
+        if self._lesson is not None:
+            self._calibration.learn(*self._lesson)
+        self._lesson = None
 
     @property
     def calibration(self) -> Calibration:
@@ -123,27 +124,24 @@ class LocalMaps:
         Both covariances are in the frame of the base. Without enough walls it is where odometry
         has it. Wheels may have turned without effect, so it may as well be where it was `before`.
         """
-        calibration = self.calibration
-        motion = calibration.corrected(motion, duration)
-        scattered, Q = calibration.scattered(Q), calibration.trusted(Q)
+        motion, Q = self.calibration.corrected(motion, duration), self.calibration.scattered(Q)
         prior = before.compose(motion)
         still = Pose(before.x, before.y, prior.theta)
         slipping = [] if self._matching.search_rad else [(still, _SLIPPING * Q)]
         best = self._best(scan, [(prior, Q), *slipping], least_known=_SEEN_SHARE)
+        calibration = self._calibration
         if best is None:
             self.blur = np.zeros((3, 3))
             return prior, calibration.adds_up(motion, duration, np.eye(3), Q)
         found, used = best
-        noise = min(found.rms / self._matching.pair_sigma_m, 1.0) ** 2
         if used is Q:
-            self._correction = Correction(
-                motion, duration, prior.to(found.pose), Q, scattered, found.covariance, noise
-            )
-        else:
-            scattered = used
+            self._lesson = motion, duration, prior.to(found.pose), Q, found.covariance
         self.blur = found.covariance
-        drift, left = _drift(found, used, scattered, noise)
-        drift += math.hypot(motion.x, motion.y) * _PER_M
+        self._shared = min((1.0 - _renewed(scan, motion)) * self._shared + 1.0, _MOST_SHARED)
+        noise = found.rms / self._matching.pair_sigma_m
+        moved = math.hypot(motion.x, motion.y)
+        drift, left = _drift(found, used, self._shared, noise)
+        drift += moved * _PER_M
         return found.pose, calibration.adds_up(motion, duration, left, drift)
 
     def trust(
@@ -192,7 +190,6 @@ class LocalMaps:
             points,
             np.concatenate([self.near.hits(), self._far.hits()[around]]),
             np.concatenate([self.near.sights(), self._far.sights()[around]]),
-            np.concatenate([self.near.looks(), self._far.looks()[around]]),
             cKDTree(points, balanced_tree=False),
         )
 
@@ -211,7 +208,7 @@ class LocalMaps:
         """
         self.catch_up()
         assert self._walls is not None
-        walls, hits, sights, looks, tree = self._walls
+        walls, hits, sights, tree = self._walls
         config = self._matching
         points = sampled(scan, config.points)
         sides = Sides(sights, scan.base_laser.position - points)
@@ -227,7 +224,7 @@ class LocalMaps:
             near = _turned(points, tree, prior, reach) if reach else prior
             so_far = None if best is None else best[0].pose
             found = register_coarsely(
-                points, tree, walls, near, Q, config, coarse, hits, sides, looks, so_far
+                points, tree, walls, near, Q, config, coarse, hits, sides, so_far
             )
             if found is None:
                 continue
@@ -243,21 +240,35 @@ class LocalMaps:
         return best
 
 
-def _drift(found: Registration, Q: Array, scattered: Array, noise: float) -> tuple[Array, Array]:
+def _renewed(scan: Scan, motion: Pose) -> float:
+    """The share of the walls in sight that come into sight with a step of this motion.
+
+    A wall stays in sight for about twice the mean range, or a turn through the field of view. The
+    mean is over walls, of which a beam shows the more the farther it goes.
+    """
+    with np.errstate(invalid="ignore"):
+        ranges = scan.ranges[scan.ranges < _RANGE_M]
+    reach = float((ranges**2).sum() / ranges.sum())
+    field_of_view = scan.angle_increment * len(scan.ranges)
+    moved = math.hypot(motion.x, motion.y)
+    return min(1.0, moved / (2 * reach) + abs(motion.theta) / field_of_view)
+
+
+def _drift(found: Registration, Q: Array, shared: float, noise: float) -> tuple[Array, Array]:
     """Covariance (3, 3) of a step that was matched, so that those of many steps add up.
 
     And the share (3, 3) of an error of odometry that stays for good.
 
-    Scans are laid onto walls, each drawn by n scans. A pose errs by e = (1 - g) (e' + q) +
-    g (m + v): the gain g weighs odometry, whose q was taken to have covariance Q and has
-    `scattered`, from the pose before, and walls with the mean error m of those scans and the noise
-    v of a match, whose variance is `noise` times what the matcher expects. Of the new in it, the
-    share 1 / (1 + g (n - 1) / 2) stays for good.
+    Scans are laid onto walls, and walls drawn by `shared` scans on average, n. A pose errs by
+    e = (1 - g) (e' + q) + g (m + v): the gain g weighs odometry with its noise q, from the pose
+    before, and walls with the mean error m of those scans and the noise v of a match, which is
+    `noise` times what the matcher expects. Of the new in it, the share 1 / (1 + g (n - 1) / 2)
+    stays for good.
     """
     g = np.eye(3) - found.covariance @ np.linalg.inv(Q)
-    by_walls = noise * g @ found.covariance  # g V g', as V is P g^-1
-    new = (np.eye(3) - g) @ scattered @ (np.eye(3) - g).T + by_walls
-    stays = np.linalg.inv(np.eye(3) + (found.looks - g) / 2)
+    by_walls = g @ found.covariance * min(noise, 1.0) ** 2  # g V g', as V is P g^-1
+    new = (np.eye(3) - g) @ Q @ (np.eye(3) - g).T + by_walls
+    stays = np.linalg.inv(np.eye(3) + g * (shared - 1.0) / 2)
     drift = stays @ new @ stays.T
     return np.asarray((drift + drift.T) / 2), np.asarray(stays @ (np.eye(3) - g))
 

@@ -34,7 +34,6 @@ _EMPTY = (
     ("_votes", 0),
     ("_mean", 0.0),
     ("_hits", 0.0),
-    ("_looks", 0.0),
     ("_sight", 0.0),
     ("_echoes", 0.0),
     ("_seen_at", -np.inf),
@@ -62,15 +61,11 @@ class LocalMapConfig:
 
 
 class Walls(NamedTuple):
-    """Mean hits (N, 2), how many there were (N,), and directions (N, 2) to where they were seen.
-
-    And how many looks (N,) such as the last one there the mean is of.
-    """
+    """Mean hits (N, 2), how many there were (N,), and directions (N, 2) to where they were seen."""
 
     points: Array
     hits: Array
     sights: Array
-    looks: Array
 
 
 class LocalMap:
@@ -89,7 +84,6 @@ class LocalMap:
         self._votes = np.zeros((n, n), np.int16)
         self._mean = np.zeros((n, n, 2))
         self._hits = np.zeros((n, n), np.float32)  # that the mean is made of
-        self._looks = np.zeros((n, n), np.float32)  # such as the last one, that it is the mean of
         self._sight = np.zeros((n, n, 2), np.float32)  # mean direction to where it was seen from
         self._echoes = np.zeros((n, n), np.float32)  # lone ones, of which old ones count less
         self._seen_at = np.full((n, n), -np.inf, np.float32)  # metres driven when last seen
@@ -129,7 +123,6 @@ class LocalMap:
             self._mean.reshape(-1, 2).take(cells, axis=0),
             self._hits.take(cells).astype(np.float64),
             self._sight.reshape(-1, 2).take(cells, axis=0).astype(np.float64),
-            self._looks.take(cells).astype(np.float64),
         )
         self._walls = _merged(cells, self._size, walls, _ONE_WALL * self._cell)
         for drawn in self._walls:
@@ -156,10 +149,6 @@ class LocalMap:
     def hits(self) -> Array:
         """How many hits (N,) each of `points` is the mean of, the oldest forgotten."""
         return self._walls.hits
-
-    def looks(self) -> Array:
-        """How many looks (N,) such as the last one there each of `points` is the mean of."""
-        return self._walls.looks
 
     def sights(self) -> Array:
         """Mean direction (N, 2) from each of `points` to where it was seen from, local frame."""
@@ -335,7 +324,6 @@ class LocalMap:
         self._mean[i, j] = (1 - share) * self._mean[i, j] + share * mean
         self._sight[i, j] = (1 - share) * self._sight[i, j] + share * towards
         self._hits[i, j] = np.minimum(before + count, _MOST_HITS)
-        self._looks[i, j] = 1.0 / share[:, 0]
         self._votes[i, j] = np.minimum(old + _HIT, _MAX_VOTES)
         self._seen_at[i, j] = travelled
 
@@ -367,7 +355,7 @@ def _merged(cells: NDArray[np.intp], columns: int, walls: Walls, reach: float) -
     they are right. With a reach of less than half a cell no mean has two others on one axis.
     """
     for step in (1, columns):
-        points, hits, sights, looks = walls
+        points, hits, sights = walls
         beside = np.minimum(np.searchsorted(cells, cells + step), len(cells) - 1)
         low = np.flatnonzero(cells.take(beside) == cells + step)
         high = beside.take(low)
@@ -379,7 +367,6 @@ def _merged(cells: NDArray[np.intp], columns: int, walls: Walls, reach: float) -
         points[low] += share * (points[high] - points[low])
         sights[low] += share * (sights[high] - sights[low])
         hits[low] += hits[high]
-        looks[low] = np.maximum(looks[low], looks[high])
         is_kept = np.ones(len(cells), bool)
         is_kept[high] = False
         kept = np.flatnonzero(is_kept)

@@ -42,17 +42,12 @@ class ScanMatchingConfig:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Registration:
-    """A pose, its covariance (3, 3) in its own frame, and how well the points lie on the walls.
-
-    `looks` (3, 3) is the share of a pose's error that walls make good, by direction, times the
-    looks that these walls are the mean of.
-    """
+    """A pose, its covariance (3, 3) in its own frame, and how well the points lie on the walls."""
 
     pose: Pose
     covariance: Array
     inliers: float  # share of the points that found a wall
     rms: float  # metres from the walls
-    looks: Array
 
 
 class Sides(NamedTuple):
@@ -73,14 +68,12 @@ class Sides(NamedTuple):
 class _Pairs(NamedTuple):
     """Points (2, K) of the frame that is registered, and the walls they are near to.
 
-    Of a wall its normal (2, K), its distance (K,) from the origin along that, and the number (K,)
-    of a point on it.
+    Of a wall its normal (2, K), and its distance (K,) from the origin along that.
     """
 
     points: Array
     normal: Array
     distance: Array
-    number: NDArray[np.intp]
 
 
 def register(
@@ -93,14 +86,13 @@ def register(
     hits: Array | None = None,
     sides: Sides | None = None,
     within: float = _CONVERGED,
-    looks: Array | None = None,
     found: Pose | None = None,
 ) -> Registration | None:
     """The pose that lays points (N, 2) of its frame onto wall points (M, 2), near a prior.
 
     `hits` (M,) is how much each wall point counts beside its neighbours, by default all the same;
-    without `sides` a point may lie on either face of a wall. Of `looks` (M,) each is the mean, by
-    default of one. It is found when a step is less than `within`, m and rad.
+    without `sides` a point may lie on either face of a wall. It is found when a step is less than
+    `within`, m and rad.
     Q (3, 3) is the prior's covariance in its own frame. None when too few points find a wall, or
     when it comes to where another prior has led, which has been `found`: the pairs are the same.
     """
@@ -112,15 +104,14 @@ def register(
         return _pairs(points, pose, tree, walls, counts, config.max_pair_m, turned)
 
     pose, step = prior, np.zeros(3)  # from the prior to the pose
-    A, residual, number = information, np.empty(0), np.empty(0, np.intp)
-    J = JW = np.empty((3, 0))
+    A, residual = information, np.empty(0)
     paired_at, pairs = pose, paired(pose)
     for _ in range(_ITERATIONS):
         if found is not None and not _is_elsewhere(found, pose):
             return None
         if _is_elsewhere(paired_at, pose):
             paired_at, pairs = pose, paired(pose)
-        residual, J, number = _linear(pairs, pose, prior, config.max_pair_m)
+        residual, J = _linear(pairs, pose, prior, config.max_pair_m)
         if len(residual) < config.min_pairs:
             return None
         JW = J * _weights(residual, config)
@@ -131,9 +122,7 @@ def register(
         if max(map(abs, change.tolist())) < within:
             break
     rms = math.sqrt(float(residual @ residual) / len(residual))
-    C = np.linalg.inv(A)
-    many = 1.0 if looks is None else looks.take(number)
-    return Registration(pose, C, len(residual) / len(points), rms, C @ (JW * many) @ J.T)
+    return Registration(pose, np.linalg.inv(A), len(residual) / len(points), rms)
 
 
 def register_coarsely(
@@ -146,7 +135,6 @@ def register_coarsely(
     reaches: tuple[float, ...],
     hits: Array | None = None,
     sides: Sides | None = None,
-    looks: Array | None = None,
     found: Pose | None = None,
 ) -> Registration | None:
     """As `register`, from farther away: pairs first reach as far as each of `reaches`, m.
@@ -157,7 +145,7 @@ def register_coarsely(
         far = replace(config, max_pair_m=reach)
         near = register(points, tree, walls, prior, Q, far, hits, sides, _ROUGHLY)
         prior = prior if near is None else near.pose
-    return register(points, tree, walls, prior, Q, config, hits, sides, looks=looks, found=found)
+    return register(points, tree, walls, prior, Q, config, hits, sides, found=found)
 
 
 def _weights(residual: Array, config: ScanMatchingConfig) -> Array:
@@ -186,9 +174,9 @@ def _pairs(
     """The points (N, 2) that are near to a wall when laid down at a pose, and its line there."""
     world = pose.transform(points)
     found = tree.query(world, k=_NEIGHBOURS, distance_upper_bound=max(reach, _REACH_M))
-    away, near = np.asarray(found[0]), np.asarray(found[1])
-    present = np.isfinite(away)
-    paired = np.flatnonzero(present[:, _FEWEST - 1] & (away[:, 0] < reach))
+    distance, near = np.asarray(found[0]), np.asarray(found[1])
+    present = np.isfinite(distance)
+    paired = np.flatnonzero(present[:, _FEWEST - 1] & (distance[:, 0] < reach))
     present, points = present.take(paired, axis=0), points.take(paired, axis=0)
     near = near.take(paired, axis=0)
     near = np.where(present, near, near[:, :1])
@@ -209,14 +197,11 @@ def _pairs(
         flat &= enough
     lines = np.flatnonzero(flat)
     centre, normal = centre.take(lines, axis=1), normal.take(lines, axis=1)
-    distance = (centre * normal).sum(axis=0)
-    return _Pairs(points.take(lines, axis=0).T, normal, distance, near[lines, 0])
+    return _Pairs(points.take(lines, axis=0).T, normal, (centre * normal).sum(axis=0))
 
 
-def _linear(
-    pairs: _Pairs, pose: Pose, prior: Pose, reach: float
-) -> tuple[Array, Array, NDArray[np.intp]]:
-    """Signed distances (K,) from the walls within reach, their derivative (3, K), and numbers (K,).
+def _linear(pairs: _Pairs, pose: Pose, prior: Pose, reach: float) -> tuple[Array, Array]:
+    """Signed distances (K,) from the walls within reach, and their derivative (3, K).
 
     That is the derivative by a step of the pose in the prior's frame.
     """
@@ -227,9 +212,7 @@ def _linear(
     c, s = math.cos(prior.theta), math.sin(prior.theta)
     J = np.array([c * nx + s * ny, c * ny - s * nx, u * ny - v * nx])
     near = np.abs(residual) < reach
-    if near.all():
-        return residual, J, pairs.number
-    return residual[near], J[:, near], pairs.number[near]
+    return (residual, J) if near.all() else (residual[near], J[:, near])
 
 
 def _lines(x: Array, y: Array, weight: Array) -> tuple[Array, Array, NDArray[np.bool_]]:

@@ -240,26 +240,6 @@ def test_a_wall_on_the_border_of_two_rows_of_cells_is_where_its_hits_are() -> No
     assert np.abs(x - wall).max() < 0.006
 
 
-def test_of_how_many_looks_a_wall_is_the_mean_is_told_by_the_share_of_the_last_one() -> None:
-    """As many as there were; but few, if all before were from afar, where beams are sparse."""
-    bearings = np.radians(np.linspace(-20.0, 20.0, 161))
-
-    def look(local_map: LocalMap, x: float) -> None:
-        ranges = (6.05 - x) / np.cos(bearings)
-        step = float(bearings[1] - bearings[0])
-        scan = Scan(0.0, ranges, float(bearings[0]), step, 0.1, 30.0)
-        local_map.insert(scan, Pose(x, 0.0, 0.0), 0.0)
-
-    steady, coming = LocalMap(LocalMapConfig()), LocalMap(LocalMapConfig())
-    for _ in range(6):
-        look(steady, 0.0)
-        look(coming, 0.0)
-    assert np.allclose(steady.looks(), 6.0)
-    look(coming, 5.0)  # six times as many beams on each cell
-    ahead = np.abs(coming.points()[:, 1]) < 0.3
-    assert np.allclose(coming.looks()[ahead], 2.0, atol=0.3)
-
-
 # -- glass ----------------------------------------------------------------------------------------
 
 PANE = (1.5, -1.0, 1.0)  # m: its x, and between which y

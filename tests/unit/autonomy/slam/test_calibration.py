@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from gvgbot.autonomy.slam.calibration import Calibration, Correction
+from gvgbot.autonomy.slam.calibration import Calibration
 from gvgbot.geometry import Array, Pose, rotated_covariance
 
 ERRORS = np.array([-0.015, 0.008, 0.0004])  # scale of distances, of turns, rad/s
@@ -16,20 +16,6 @@ STEPS = ((Pose(0.25, 0.02, 0.1), 0.5), (Pose(0.25, 0.0, 0.0), 0.5), (Pose(0.2, -
 def matched(walls: Array) -> Array:
     """Covariance (3, 3) after a match with walls of this information."""
     return np.asarray(np.linalg.inv(np.linalg.inv(Q) + walls), np.float64)
-
-
-def correction(
-    change: Pose,
-    after: Array,
-    *,
-    motion: Pose = STEPS[1][0],
-    duration: float = 0.5,
-    before: Array = Q,
-    scattered: Array | None = None,
-) -> Correction:
-    """What walls made of a motion, whose covariance (3, 3) was `before` and is `after` now."""
-    true = before if scattered is None else scattered
-    return Correction(motion, duration, change, before, true, after, noise=1.0)
 
 
 def driven(errors: Array, walls: Array, seed: int, steps: int = 120) -> Calibration:
@@ -51,7 +37,7 @@ def driven(errors: Array, walls: Array, seed: int, steps: int = 120) -> Calibrat
             z = z + rng.multivariate_normal(np.zeros(3), scatter)
         C = matched(walls)
         change = Pose.from_array(C @ walls @ z)
-        calibration.learn(correction(change, C, motion=corrected, duration=duration))
+        calibration.learn(corrected, duration, change, Q, C)
     return calibration
 
 
@@ -77,7 +63,7 @@ def test_walls_along_which_one_drives_say_nothing_about_distances() -> None:
     C = matched(walls)
     before = calibration.P[0, 0]
     for _ in range(50):
-        calibration.learn(correction(Pose(0.0, 0.001, 0.0001), C))
+        calibration.learn(Pose(0.25, 0.0, 0.0), 0.5, Pose(0.0, 0.001, 0.0001), Q, C)
     assert calibration.x[0] == 0.0
     assert calibration.P[0, 0] >= before
 
@@ -85,7 +71,7 @@ def test_walls_along_which_one_drives_say_nothing_about_distances() -> None:
 def test_a_slip_teaches_nothing() -> None:
     calibration = Calibration()
     C = matched(WALLS)
-    calibration.learn(correction(Pose(-0.25, 0.0, 0.0), C))
+    calibration.learn(Pose(0.25, 0.0, 0.0), 0.5, Pose(-0.25, 0.0, 0.0), Q, C)
     assert not calibration.x.any()
 
 
@@ -101,12 +87,11 @@ def test_the_frame_of_the_step_does_not_matter() -> None:
     turned = Calibration()
     straight = Calibration()
     C = matched(WALLS)
-    straight.learn(correction(Pose(0.004, 0.0, 0.0), C, duration=0.0))
+    straight.learn(Pose(0.25, 0.0, 0.0), 0.0, Pose(0.004, 0.0, 0.0), Q, C)
     angle = 0.6
-    before, after = (rotated_covariance(m, -angle) for m in (Q, C))
+    around = [rotated_covariance(m, -angle) for m in (Q, C)]
     change = Pose(0.004 * np.cos(angle), -0.004 * np.sin(angle), 0.0)
-    motion = Pose(0.25, 0.0, angle)
-    turned.learn(correction(change, after, motion=motion, duration=0.0, before=before))
+    turned.learn(Pose(0.25, 0.0, angle), 0.0, change, around[0], around[1])
     assert np.isclose(turned.x[0], straight.x[0])
 
 
@@ -115,27 +100,17 @@ def noise_found(actual: float, walls: Array, *, seed: int, steps: int = 400) -> 
     rng, calibration = np.random.default_rng(seed), Calibration()
     sigmas = np.where(np.diag(walls) > 0, 1 / np.sqrt(np.maximum(np.diag(walls), 1)), 0.0)
     for _ in range(steps):
-        expected, scattered = calibration.trusted(Q), calibration.scattered(Q)
+        expected = calibration.scattered(Q)
         C = np.asarray(np.linalg.inv(np.linalg.inv(expected) + walls), np.float64)
         off = rng.multivariate_normal(np.zeros(3), actual * Q) + rng.normal(0.0, sigmas)
         change = Pose.from_array(C @ walls @ off)
-        calibration.learn(correction(change, C, before=expected, scattered=scattered))
+        calibration.learn(Pose(0.25, 0.0, 0.0), 0.5, change, expected, C)
     return calibration.noise
 
 
 def test_how_noisy_odometry_is_is_found() -> None:
     found = np.array([noise_found(4.0, WALLS, seed=seed) for seed in range(10)])
     assert np.allclose(found.mean(axis=0), 4.0, rtol=0.25)
-
-
-def test_a_base_that_is_better_than_expected_is_known_to_be_though_it_is_trusted_no_more() -> None:
-    walls = np.diag([1.0 / 0.003**2, 1.0 / 0.002**2, 1.0 / 0.0005**2])
-    found = np.array([noise_found(0.1, walls, seed=seed) for seed in range(10)])
-    assert np.allclose(found.mean(axis=0), 0.1, rtol=0.35)
-    calibration = Calibration()
-    calibration.noise = np.array([0.1, 0.1])
-    assert np.allclose(calibration.scattered(Q), 0.1 * Q)
-    assert np.allclose(calibration.trusted(Q), 0.5 * Q)
 
 
 def test_noise_as_expected_stays() -> None:
@@ -152,7 +127,8 @@ def test_walls_along_which_one_drives_say_nothing_about_the_noise_of_distances()
 
 def test_one_slip_makes_no_noise() -> None:
     calibration = Calibration()
-    calibration.learn(correction(Pose(-0.25, 0.0, 0.0), matched(WALLS)))
+    change = Pose(-0.25, 0.0, 0.0)
+    calibration.learn(Pose(0.25, 0.0, 0.0), 0.5, change, Q, matched(WALLS))
     assert calibration.noise[0] < 1.5
 
 
