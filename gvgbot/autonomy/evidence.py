@@ -205,9 +205,7 @@ class Evidence:
         if is_promising and math.dist(place, view.local_base.position) >= _IN_CLEAR_M:
             return None
         passing = self._passing(view, place, known)
-        if passing is None or not view.sees(place):
-            return None
-        if self._was_left(view, vertex, place, passing):
+        if passing is None or not view.sees(place) or self._was_left(view, vertex, place, passing):
             return None
         return None if self._unbelieved.is_stubborn(place) else "an edge passes here"
 

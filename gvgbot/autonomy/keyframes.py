@@ -9,7 +9,8 @@ from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
 from gvgbot.ranges import Range
 
-UNKNOWN_WAY = np.diag([1.0, 1.0, 0.3**2])  # covariance, where it was carried or way is not kept
+# covariance of a way on which the robot was carried, or that is not kept
+UNKNOWN_WAY = np.diag([1.0, 1.0, 0.3**2])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

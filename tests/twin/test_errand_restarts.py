@@ -179,6 +179,8 @@ def test_a_robot_with_an_errand_stands_where_it_cannot_find_its_place(tmp_path: 
     assert last.pipeline.errands.errand == Patrol(tuple(owner.ends))
     with pytest.raises(Declined, match="asked to explore"):
         last.pipeline.errands.home(0.0)
+    last.pipeline.errands.pause()
+    assert "asked to explore" in last.pipeline.errands.resume()
     last.pipeline.errands.explore(0.0)
     assert not last.pipeline.errands.is_resting
 

@@ -110,7 +110,9 @@ class Errands:
         if not self.is_paused:
             return "it was not paused"
         self.is_paused = self.is_carried = False
-        if self._plan is not None and not self.is_resting:
+        if self.unplaced:
+            return self._unplaced_for()
+        if self._plan is not None:
             return f"it goes on with: {self._plan}"
         if self.is_resting:
             return "it is not paused any more, and has nothing to do"
@@ -254,12 +256,15 @@ class Errands:
             return None
         return route_to_vertex(self._mapper.graph, here.starts(), vertex)
 
+    def _unplaced_for(self) -> str:
+        again = "it looks again when it is asked to explore"
+        return f"it has looked for its place, and is {self.unplaced}; {again}"
+
     def _check_going(self, stamp: float) -> None:
         if self.is_paused:
             raise Declined("it is paused: ask it to resume first")
         if self._seen is None and self.is_resting and self.unplaced:
-            again = "it looks again when it is asked to explore"
-            raise Declined(f"it has looked for its place, and is {self.unplaced}; {again}")
+            raise Declined(self._unplaced_for())
         if self._seen is None and self.is_resting:
             raise Declined("it has not looked for its place since its start: ask it to explore")
         if self._seen is None:
