@@ -335,12 +335,12 @@ class Situation:
         return Branch(back.edge, not back.forward)
 
     def _to_end(self, arrival: HalfEdgeId) -> tuple[Branch, ...] | None:
-        """To a vertex, by its half-edge if both ways along the robot's edge lead there."""
+        """To a vertex by its half-edge, for other ways that are in sight may lead there too."""
         node = self.known.node_of.get(arrival.vertex)
         if node is not None:
             _, path = self.gvg.routes(self.place).get(node, (0.0, ()))
             end = self._end_of(path)
-            if arrival not in self._loop_ends() or arrival == end:
+            if arrival == end or (end is None and arrival not in self._loop_ends()):
                 return path or None
         return self.astern() if arrival == self.where.on_edge else self.ahead()
 

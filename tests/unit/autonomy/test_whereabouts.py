@@ -435,6 +435,31 @@ def test_round_an_edge_that_comes_back_to_its_vertex_it_goes_on_if_that_is_neare
     assert here.path_over(first, ()) == (Branch(10, forward=not is_ahead),)
 
 
+def test_behind_what_hides_the_way_the_vertex_is_not_gone_to_by_another_way_in_sight() -> None:
+    """Between two meetpoints 5 m apart somebody stands; both are in sight, around the side, too."""
+    side: list[Point] = [(0.0, 0.0), (4.0, 0.0), (4.0, 5.0), (0.0, 5.0)]
+    graph = GvgGraph()
+    for name, y in ((1, 0.0), (2, 5.0)):
+        graph.vertices[name] = Vertex(name, 1.0, Pose(0.0, y), 0.0, 0.0)
+    between, around = (
+        [HalfEdgeId(name, graph.vertices[name].add_half_edge(0.0)) for name in (1, 2)]
+        for _ in range(2)
+    )
+    graph.join(between[0], between[1], np.array(resampled([side[0], side[3]])), 0.5, driven=True)
+    graph.join(around[0], around[1], np.array(resampled(side)), 0.5, driven=True)
+    seen = drawn(
+        {1: side[0], 2: side[3], 3: (0.0, 2.3), 4: (0.0, 3.7)},
+        {10: (1, 3, []), 11: (2, 4, []), 12: (1, 2, side[1:3])},
+    )
+    branches = [Branch(edge, forward=True) for edge in (10, 11, 12)] + [Branch(12, forward=False)]
+    known = known_as(dict(zip(branches, between + around, strict=True)), {1: 1, 2: 2})
+    place = seen.place(np.array([0.0, 1.0]))
+    assert place is not None
+    where = Whereabouts(between[0], list(resampled([side[0], (0.0, 1.0)])))
+    here = Situation(seen, known, graph, where, Access(place), Pose(0.0, 1.0, math.pi / 2))
+    assert here.path_over(between[1], ()) == (branches[0],)
+
+
 def blocked_corridor() -> Situation:
     """Four metres from vertex 1, which is in sight; the edge is closed for a while."""
     only_first = known_as({Branch(10, forward=True): HalfEdgeId(1, EAST)}, {1: 1})
