@@ -15,7 +15,7 @@ _SMALL = 0.25  # of the largest closed space: who starts in one that is smaller 
 
 def check_start(world: World, pose: Pose, radius: float) -> None:
     """Raise WorldError unless a round robot of this radius (m) fits at the pose."""
-    where = f"start ({pose.x:.2f}, {pose.y:.2f}) in world {world.name}"
+    where = f"start ({pose.x:.6g}, {pose.y:.6g}) in world {world.name}"
     if not world.contains(pose.x, pose.y):
         x0, y0, x1, y1 = world.extent
         raise WorldError(
