@@ -20,10 +20,9 @@ help:
 explore: .venv/core
 	@$(BIN)/gvgbot explore $(ARGS)
 
-# A file's tests stay together, since they share what is slow to make. Those of processes mostly wait: hence one more.
-WORKERS := $(shell expr $$(nproc 2>/dev/null || echo 2) + 1)
+# A file's tests stay together, since they share what is slow to make.
 test: .venv/dev
-	@$(BIN)/pytest --numprocesses $(WORKERS) --dist loadfile $(ARGS)
+	@$(BIN)/pytest --numprocesses auto --dist loadfile $(ARGS)
 
 quick: .venv/dev
 	@$(BIN)/pytest -m "not slow and not hardware and not bench" $(ARGS)

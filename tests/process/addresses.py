@@ -1,17 +1,23 @@
 """Addresses on this machine that nobody listens on, and routers at them."""
 
 import json
+import secrets
 import socket
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 import zenoh
 
+PORTS = range(20_000, 32_000)  # below those that connections get of the system, meanwhile
+
 
 def free_endpoint() -> str:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    """One that others, who choose one at the same time, hardly choose as well."""
+    while True:
+        port = secrets.choice(PORTS)
+        with socket.socket() as probe, suppress(OSError):
+            probe.bind(("127.0.0.1", port))
+            return f"tcp/127.0.0.1:{port}"
 
 
 @contextmanager

@@ -364,24 +364,27 @@ def test_a_program_that_is_ended_while_it_leaves_ends(endpoint: str) -> None:
         assert subprocess.run(program, check=False, timeout=PATIENCE).returncode == 0
 
 
+def put_an_empty_state(robot: Telemetry, seen: client.Robot, version: str) -> None:
+    """Until that is heard: at first the robot may not know yet who listens."""
+    encoding = zenoh.Encoding(f"application/msgpack;gvgbot.State.{version}")
+
+    def is_heard() -> bool:
+        robot._session.put("gvgbot/near/state", b"\x80", encoding=encoding)
+        return seen.state().age is not None
+
+    until(is_heard)
+
+
 def test_a_state_of_another_version_is_refused_in_words(endpoint: str) -> None:
     with a_robot(endpoint) as robot, client.connect("near", endpoint) as seen:
-        robot._session.put(
-            "gvgbot/near/state",
-            b"\x80",
-            encoding=zenoh.Encoding("application/msgpack;gvgbot.State.v9"),
-        )
+        put_an_empty_state(robot, seen, "v9")
         with pytest.raises(GvgbotError, match=r"State\.v9.*State\.v1"):
             next(iter(seen.state()))
 
 
 def test_a_damaged_state_is_refused_in_words(endpoint: str) -> None:
     with a_robot(endpoint) as robot, client.connect("near", endpoint) as seen:
-        robot._session.put(
-            "gvgbot/near/state",
-            b"\x80",
-            encoding=zenoh.Encoding("application/msgpack;gvgbot.State.v1"),
-        )
+        put_an_empty_state(robot, seen, "v1")
         with pytest.raises(GvgbotError, match="damaged sample of state"):
             next(iter(seen.state()))
 

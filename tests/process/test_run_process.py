@@ -19,6 +19,8 @@ import msgspec
 import pytest
 import zenoh
 
+from tests.process.addresses import free_endpoint
+
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(60)]
 
 RUN = {
@@ -40,10 +42,7 @@ STANDSTILL = bytes.fromhex("aa55 06 01 04 0000 0000 03")
 
 @pytest.fixture
 def endpoint() -> str:
-    """An address on this machine that nobody listens on."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    return free_endpoint()
 
 
 @contextmanager
