@@ -311,8 +311,8 @@ class Driving:
                 i = max(1, int(np.argmin(d)))
                 line, clearance = line[: i + 1], clearance[: i + 1]
         track = Track.of(line, clearance)
-        is_hidden = view.is_end_doubted(line[-1])  # by somebody: looking around shows no more
-        if track.length < _SHORT_M and waited > self.config.look_around_s and not is_hidden:
+        is_at_end = track.length < _SHORT_M and waited > self.config.look_around_s
+        if is_at_end and not view.is_end_doubted(line[-1]):  # else somebody hides the rest
             if self._looks < _LOOKS:
                 return self._look_around(view)
             self._looks = 0
