@@ -13,10 +13,11 @@ from gvgbot.autonomy.start_edge import StartEdge, is_at_start
 from gvgbot.autonomy.topology import direction
 from gvgbot.autonomy.views import Correspondence, View
 from gvgbot.autonomy.whereabouts import LEAST_LOOP_M, Passage, Whereabouts
-from gvgbot.geometry import Array, length_of
+from gvgbot.geometry import Array, length_of, wrap_angle
 
 _APART_M, _TOGETHER_M = 0.5, 0.2  # two ways that are farther apart, or no farther
 _FROM_VERTEX_M = 1.0  # nearer to one there is no second one that was missed
+_SAME_RAD = 0.7  # a departure is the one that the robot left by
 _LEAST_PART_M, _MOST_STRAYS = 0.3, 100  # of an edge, that are worth telling
 _LEAST_LOST_M = 1.0  # less than before: it does not only go back over it
 _TIMES_MISSED = 3  # driven past without being found, a vertex is none
@@ -106,7 +107,9 @@ class DrivenEdges:
             self._mapper.unsettled.note_way(edge, arrived.vertex)
             edge.traversals += 1
             edge.doubted_since = None
-            self._note_missed(view, known, edge.other(left).vertex, arrived)
+            between = edge.other(left).vertex
+            self._note_missed(view, known, between, arrived)
+            self._join_beyond(view, between, arrived, passage)
             return
         far, near = graph.half_edge(arrived), graph.half_edge(left)
         if far is None or near is None or near.edge is not None:
@@ -138,6 +141,31 @@ class DrivenEdges:
         if self._missed[between] >= _TIMES_MISSED:
             del self._missed[between]
             self._mapper.driven_past(view, self._mapper.graph.vertices[between])
+
+    def _join_beyond(self, view: View, between: int, arrived: HalfEdgeId, passage: Passage) -> None:
+        """Close the edge that goes on from a vertex which the robot drove past without finding it.
+
+        Whether there is such a vertex or not: that is the way by which it came.
+        """
+        graph = self._mapper.graph
+        far = graph.half_edge(arrived)
+        if far is None or far.edge is not None or arrived.vertex == between:
+            return
+        vertex = self._mapper.in_local_frame(view, between)
+        away = np.hypot(*(passage.line - vertex.position).T)
+        at = int(np.argmin(away))
+        if away[at] > _FROM_VERTEX_M or at == len(passage.line) - 1:
+            return
+        line = passage.line[at:]
+        bearing = wrap_angle(direction(line - line[0]) - vertex.theta)
+        turns = {
+            HalfEdgeId(between, key): abs(wrap_angle(half.bearing - bearing))
+            for key, half in graph.vertices[between].half_edges.items()
+            if half.edge is None
+        }
+        end = min(turns, key=turns.__getitem__, default=None)
+        if end is not None and turns[end] < _SAME_RAD:
+            self._mapper.join(view, end, arrived, line, passage.narrowest, driven=True)
 
     def _join_fork(
         self, view: View, left: HalfEdgeId, arrived: HalfEdgeId, passage: Passage

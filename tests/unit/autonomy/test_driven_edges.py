@@ -226,3 +226,28 @@ def test_a_vertex_that_it_drives_past_again_and_again_is_none(*, established: bo
     if not established:
         (edge,) = graph.edges.values()
         assert {edge.a, edge.b} == {HalfEdgeId(1, EAST), HalfEdgeId(2, WEST)}
+
+
+@pytest.mark.parametrize("onwards", [0.3, -np.pi / 2], ids=["east", "south"])
+def test_past_a_vertex_that_it_did_not_find_it_came_by_the_way_on_from_there(
+    onwards: float,
+) -> None:
+    """The way from vertex 1 is known to end at vertex 3; the robot drives on to vertex 2."""
+    drive = Drive(HalfEdgeId(1, EAST))
+    graph, between = drive.mapper.graph, Vertex(3, 1.0, Pose(2.0, -0.5, 0.0), 0.0, 0.0)
+    graph.vertices[3], graph.serial = between, 3
+    west, way_on, _ = (between.add_half_edge(bearing) for bearing in (np.pi, onwards, np.pi / 2))
+    drive.mapper.belief = ekf.add_vertex(drive.mapper.belief, 3, between.local, 1e-4 * np.eye(3))
+    to_it = resampled([(0.0, 0.0), (2.0, -0.5)])
+    graph.join(HalfEdgeId(1, EAST), HalfEdgeId(3, west), to_it, 1.0, driven=False)
+    beyond = {branch: end for branch, end in ALL_SEEN.items() if end.vertex == 2}
+    drive.mapper.move(Pose(4.0, 0.0), np.zeros((3, 3)))
+    drive.where.trail = list(resampled([(0.0, 0.0), (4.0, 0.0)]))
+    drive.along(STREET, beyond, (4.0, 0.0))
+    edge = graph.edge_at(HalfEdgeId(2, WEST))
+    if onwards < 0.0:
+        assert edge is None
+    else:
+        assert edge is not None
+        assert edge.other(HalfEdgeId(2, WEST)) == HalfEdgeId(3, way_on)
+        assert edge.length == pytest.approx(3.0, abs=0.3)
