@@ -15,6 +15,7 @@ from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
 from gvgbot.ranges import Range
 
 _WELL_KNOWN = 0.5  # times the robot's own standard deviation
+_GROWN = 1.5  # times what it was at the last time: before, going back again tells little more
 _AROUND_M = 20.0  # a way so long makes a visit e times less worth while
 _DRIFT_M2_PER_M = 1e-4  # variance that a way adds
 _SIGHTING_M2 = 1e-3  # and that seeing a vertex again leaves beyond its own
@@ -44,6 +45,7 @@ class Revisiting:
 
     def __init__(self, config: CertaintyConfig) -> None:
         self._config = config
+        self._worst = 0.0  # standard deviation of the robot for which it has gone back
         self._has_explored = False  # since the last revisit
         self._owed = 0.0  # revisits
         self._tries: dict[int, int] = {}
@@ -70,13 +72,18 @@ class Revisiting:
         return back or (self._towards_goal(belief, ways) if is_over else None)
 
     def _reassurance(self, belief: Belief, ways: dict[int, Approach]) -> Revisit | None:
-        """The nearest well-known vertex, if the robot hardly knows where it is."""
+        """The nearest well-known vertex, if the robot hardly knows where it is.
+
+        Far from the start that is so wherever it goes, and each time it comes there once more it
+        learns less about the way.
+        """
         own = robot_sigma(belief)
-        if own <= self._config.pose_sigma_m:
+        if own <= max(self._config.pose_sigma_m, _GROWN * self._worst):
             return None
         known = [v for v in ways if vertex_sigma(belief, v) < _WELL_KNOWN * own]
         if not known:
             return None
+        self._worst = own
         nearest = min(known, key=lambda v: (ways[v].metres, v))
         return Revisit(nearest, f"the pose is uncertain by {own:.2f} m")
 

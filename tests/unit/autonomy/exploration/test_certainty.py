@@ -60,6 +60,21 @@ def test_a_lost_robot_goes_back_to_the_nearest_place_that_it_knows_well(
     assert again is None  # not before something has been explored
 
 
+def test_a_robot_far_from_all_that_it_knows_well_goes_on_after_having_gone_back() -> None:
+    """Whatever it explores there, it is as uncertain; much worse than that, it goes back again."""
+    graph, ids = town(explored=False)
+    sigmas = dict.fromkeys(ids.values(), 0.55)
+    sigmas[ids[0, 1]] = 0.1
+    revisiting = Revisiting(CertaintyConfig(pose_sigma_m=0.5))
+    starts = [Approach(0.0, HalfEdgeId(ids[0, 0], -1))]
+    went_back = []
+    for robot in (0.6, 0.6, 0.5, 0.7, 0.8, 1.0, 1.1, 1.3, 1.6):
+        revisiting.note_target(FRONTIER)
+        if revisiting.next(graph, believed(robot, sigmas), starts) is not None:
+            went_back.append(robot)
+    assert went_back == [0.6, 1.0, 1.6]
+
+
 @pytest.mark.parametrize("p_explore", [1.0, 0.9, 0.5])
 def test_the_share_of_tasks_that_explore_is_as_configured(p_explore: float) -> None:
     graph, ids = town(explored=False)
