@@ -108,8 +108,10 @@ class DrivenEdges:
             edge.traversals += 1
             edge.doubted_since = None
             between = edge.other(left).vertex
-            self._note_missed(view, known, between, arrived)
-            self._join_beyond(view, between, arrived, passage)
+            if graph.edge_at(arrived) is not None:
+                self._note_missed(view, known, between, arrived)
+            else:
+                self._join_beyond(view, between, arrived, passage)
             return
         far, near = graph.half_edge(arrived), graph.half_edge(left)
         if far is None or near is None or near.edge is not None:
@@ -148,8 +150,7 @@ class DrivenEdges:
         Whether there is such a vertex or not: that is the way by which it came.
         """
         graph = self._mapper.graph
-        far = graph.half_edge(arrived)
-        if far is None or far.edge is not None or arrived.vertex == between:
+        if graph.half_edge(arrived) is None or arrived.vertex == between:
             return
         vertex = self._mapper.in_local_frame(view, between)
         away = np.hypot(*(passage.line - vertex.position).T)
