@@ -238,7 +238,7 @@ def recall(pipeline: Pipeline, memory: Memory, past: list[Growth]) -> None:
     pipeline._maps._shared = memory.odds.shared
     pipeline._hazards._all = list(memory.hazards)
     pipeline.traffic.newcomers._all = list(memory.newcomers)
-    pipeline.traffic.passed = memory.passed
+    pipeline.traffic.passed, pipeline.traffic.lasting = memory.passed, []
     pipeline.travelled, pipeline._kept = memory.travelled, memory.kept
     _recall_past(pipeline, past[: memory.keyframes])
     if len(past) < memory.keyframes and memory.last is not None:

@@ -90,6 +90,8 @@ class Newcomers:
         self._config = config
         self._all: list[Newcomer] = []
         self.missed: list[Newcomer] = []  # in the last look, of those found that never moved
+        self.gone: list[Newcomer] = []  # in the last look
+        self.lasting: Array = np.empty((0, 2))  # where bodies have proved to be of the building
         self.in_team = False  # bodies of robots pass by so close that slivers of them are seen
         self.strangers: list[float] = []  # radii of other robots that may be anywhere, m
         self.company: list[tuple[Array, float]] = []  # other robots: where they say they are,
@@ -204,6 +206,11 @@ class Newcomers:
         )
 
     @property
+    def let_in(self) -> list[Newcomer]:
+        """Bodies that have stood for so long that they are parts of the building."""
+        return [one for one in self._all if one.is_let_in and one.is_round]
+
+    @property
     def latest(self) -> list[tuple[Array, float]]:
         """As `discs`, but by the last glance."""
         return self.discs if self._glanced is None else self._glanced
@@ -223,6 +230,8 @@ class Newcomers:
             came = walls.are_away(island)
             one = Newcomer(island.centre, island.radius, stamp, stamp, came, island.is_whole)
             one.was_wall = is_wall
+            if _is_near(self.lasting, island.centre):
+                one.came, one.first = False, stamp - self._config.came_after_s
             self._all.append(one)
         was_round = one.is_round
         one.look(island, stamp)
@@ -253,14 +262,14 @@ class Newcomers:
         for one in self._all:
             if one.last > scan.stamp:  # kept from a time before the clock began anew
                 one.first, one.last = one.first + scan.stamp - one.last, scan.stamp
-        gone = [one for one in self._all if _is_seen_through(scan, local_base, one)]
-        for one in gone:
+        self.gone = [one for one in self._all if _is_seen_through(scan, local_base, one)]
+        for one in self.gone:
             if one.was_let_in:
                 local_map.doubt(one.centre, one.radius + _BLUR_M)
         self._all = [
             one
             for one in self._all
-            if one not in gone
+            if one not in self.gone
             and (one.is_waiting or local_map.covers(one.centre))
             and (not one.is_lost or _has_stood(one))
         ]
@@ -272,8 +281,12 @@ class Newcomers:
 
     @property
     def points(self) -> Array:
-        """The rims (N, 2), local frame, of company and of `discs`."""
-        return _rims([*self.discs, *self.company])
+        """The rims (N, 2), local frame, of company and of `discs`, and of who never moved.
+
+        That is a part of the building for all that is known, though it is out of sight.
+        """
+        lost = [(o.centre, o.radius) for o in self._all if o.is_lost and (o.is_whole or o.is_round)]
+        return _rims([*self.discs, *self.company, *lost])
 
 
 def _rims(bodies: list[tuple[Array, float]]) -> Array:
@@ -316,6 +329,10 @@ class _Walls:
 
 def _is_at(one: Newcomer, centre: Array) -> bool:
     return bool(np.hypot(*(one.centre - centre)) < _MOVED_M)
+
+
+def _is_near(places: Array, centre: Array) -> bool:
+    return bool((np.hypot(*(places - centre).T) < _MOVED_M).any())
 
 
 def _has_stood(one: Newcomer) -> bool:

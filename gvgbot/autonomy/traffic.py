@@ -6,6 +6,8 @@ They are kept out of the map, and given room.
 import math
 from collections.abc import Callable
 
+import numpy as np
+
 from gvgbot.autonomy.control import company
 from gvgbot.autonomy.control.company import BodiesSeen, Companion
 from gvgbot.autonomy.control.detour import led_round
@@ -18,6 +20,7 @@ from gvgbot.geometry import Array, Pose, Twist
 from gvgbot.hal.messages import Scan
 
 _MOST_PASSED = 100  # places, the latest ones
+_SAME_M = 0.3  # bodies nearer to each other are one
 _ROUND_M = 2.5  # a body farther away is elsewhere when the robot is there
 _ELSEWHERE_M = 0.15  # by which another robot may be elsewhere than it says
 
@@ -30,6 +33,7 @@ class Traffic:
     def __init__(self, config: NewcomersConfig) -> None:
         self.newcomers = Newcomers(config)
         self.passed: list[Passed] = []
+        self.lasting: list[Array] = []  # where bodies proved to be of the building, map frame
         # other robots as they tell of themselves, map frame; None if there are surely none
         self.company: list[Companion] | None = None
         self.strangers: list[float] = []  # radii of others that may be anywhere, m
@@ -70,12 +74,23 @@ class Traffic:
         newcomers, local_map = self.newcomers, local_base.compose(map_base.inverse())
         newcomers.in_team, newcomers.strangers = self.is_in_team, self.strangers
         newcomers.company = _discs(self.nearby(local_map), _ELSEWHERE_M)
+        newcomers.lasting = local_map.transform(np.array(self.lasting).reshape(-1, 2))
         scan = newcomers.sift(scan, local_base, walls, is_way)
+        self._note_lasting(local_map.inverse())
         missed = [Passed(keyframe, one.centre, one.radius) for one in newcomers.missed]
         self.passed = (self.passed + missed)[-_MOST_PASSED:]
         if self.is_in_team:
             self.seen = self._bodies_seen(scan.stamp, local_base, map_base)
         return scan
+
+    def _note_lasting(self, map_local: Pose) -> None:
+        """Keep in mind what has been let in, as long as it is not seen to be gone."""
+        gone = [map_local.transform(one.centre) for one in self.newcomers.gone]
+        self.lasting = [place for place in self.lasting if not _is_near(place, gone)]
+        for one in self.newcomers.let_in:
+            place = map_local.transform(one.centre)
+            if not _is_near(place, self.lasting):
+                self.lasting = [*self.lasting, place][-_MOST_PASSED:]
 
     def _bodies_seen(self, stamp: float, local_base: Pose, map_base: Pose) -> BodiesSeen:
         """The round bodies of the last look, map frame."""
@@ -109,6 +124,10 @@ class Traffic:
         others = _discs(self.nearby(local_map), 0.0) + self.newcomers.latest
         discs = [(base_local.transform(centre), wide) for centre, wide in others]
         return company.careful(twist, discs, radius, slow)
+
+
+def _is_near(place: Array, others: list[Array]) -> bool:
+    return any(math.dist(place, other) < _SAME_M for other in others)
 
 
 def _discs(nearby: list[Companion], more: float) -> list[Disc]:

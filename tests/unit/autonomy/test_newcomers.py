@@ -249,6 +249,30 @@ def test_where_somebody_was_last_seen_nobody_knows_the_floor_until_it_is_seen() 
     assert watch.map.is_bare(spot, RADIUS)
 
 
+def test_who_never_moved_stays_in_the_way_out_of_sight_until_the_place_is_seen() -> None:
+    """He may be a column, behind a screen that is put before him and taken away."""
+    screened = carved([ROOM], [(1.0, -1.0, 1.1, 1.0)])
+    watch = Watch()
+    for second in range(4):
+        watch.dropped(EMPTY, second, person=(2.0, 0.0))
+    for second in range(4, 40):
+        watch.dropped(screened, second)
+    away = np.hypot(*(watch.newcomers.points - [2.0, 0.0]).T)
+    assert away == pytest.approx(np.full(12, RADIUS), abs=0.05)
+    assert watch.newcomers.discs == []  # nobody drives round him
+    watch.dropped(EMPTY, 40)
+    assert len(watch.newcomers.points) == 0
+
+
+@pytest.mark.parametrize(("place", "is_kept_out"), [((2.0, 0.1), False), ((2.0, 0.6), True)])
+def test_where_a_body_proved_to_be_of_the_building_one_is_let_in_at_once(
+    place: Point, *, is_kept_out: bool
+) -> None:
+    watch = Watch(EMPTY)
+    watch.newcomers.lasting = np.array([place])
+    assert (watch.dropped(EMPTY, 0.0, person=(2.0, 0.0)) > 0) == is_kept_out
+
+
 def test_who_is_seen_again_where_he_stood_may_have_come_back() -> None:
     screened = carved([ROOM], [(1.0, -1.0, 1.1, 1.0)])
     watch = Watch()

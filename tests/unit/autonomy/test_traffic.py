@@ -1,0 +1,46 @@
+"""What is remembered of bodies, by looks into a room from one place."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
+from gvgbot.autonomy.newcomers import NewcomersConfig
+from gvgbot.autonomy.traffic import Traffic
+from gvgbot.drivers.world import World
+from gvgbot.geometry import Pose
+from tests.unit.autonomy.sights import Rectangle, carved, sweep
+from tests.unit.autonomy.test_newcomers import to_disc
+
+ROOM: Rectangle = (-4.0, -3.0, 4.0, 3.0)
+EMPTY = carved([ROOM])
+HERE, MAP_BASE = Pose(), Pose(10.0, 5.0, np.pi / 2)  # the base in the local frame, and in the map
+
+
+class Room:
+    """A room with a column or without it, and what is made of it."""
+
+    def __init__(self) -> None:
+        self.traffic = Traffic(NewcomersConfig(found_after_s=20.0))
+        self.map = LocalMap(LocalMapConfig())
+
+    def look(self, world: World, stamp: float, *, column: bool) -> None:
+        scan = replace(sweep(world, HERE), stamp=stamp)
+        if column:
+            ranges = np.minimum(scan.ranges, to_disc(scan.bearings, (2.0, 0.0)))
+            scan = replace(scan, ranges=ranges)
+        sifted = self.traffic.sift(scan, HERE, MAP_BASE, self.map, lambda place: False, 0)
+        self.map.insert(sifted, HERE, 0.0)
+
+
+def test_a_body_that_was_let_in_is_remembered_where_it_is_in_the_map_until_it_has_gone() -> None:
+    room = Room()
+    for second in range(20):
+        room.look(EMPTY, second, column=True)
+    assert room.traffic.lasting == []
+    for second in range(20, 23):
+        room.look(EMPTY, second, column=True)
+    assert np.array(room.traffic.lasting) == pytest.approx(np.array([[10.0, 7.0]]), abs=0.05)
+    room.look(EMPTY, 23, column=False)
+    assert room.traffic.lasting == []
