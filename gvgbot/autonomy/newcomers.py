@@ -111,7 +111,7 @@ class Newcomers:
 
         `is_way` tells of a place (2,), local frame, whether a way is known to lead over it.
         """
-        if not max(self._config.came_after_s, self._config.found_after_s):  # who comes, stays
+        if not self._longest_patience:  # who comes, stays
             return _without(scan, local_base, self.company)
         self._forget(scan, local_base, local_map)
         scan = without_fringes(scan) if self.in_team else scan
@@ -231,7 +231,7 @@ class Newcomers:
             one = Newcomer(island.centre, island.radius, stamp, stamp, came, island.is_whole)
             one.was_wall = is_wall
             if _is_near(self.lasting, island.centre):
-                one.came, one.first = False, stamp - self._config.came_after_s
+                one.came, one.first = False, stamp - self._longest_patience
             self._all.append(one)
         was_round = one.is_round
         one.look(island, stamp)
@@ -252,6 +252,10 @@ class Newcomers:
         found_after = self._config.found_after_s
         may_be = one.evidence > (-SURE if one.is_whole else 0.0)
         return found_after if may_be else min(_GLIMPSE_S, found_after)
+
+    @property
+    def _longest_patience(self) -> float:
+        return max(self._config.came_after_s, self._config.found_after_s)
 
     def _may_be_stranger(self, one: Newcomer) -> bool:
         """Whether it may be a robot of the team that waits for something."""
