@@ -159,13 +159,11 @@ class DrivenEdges:
             return
         line = passage.line[at:]
         bearing = wrap_angle(direction(line - line[0]) - vertex.theta)
-        turns = {
-            HalfEdgeId(between, key): abs(wrap_angle(half.bearing - bearing))
-            for key, half in graph.vertices[between].half_edges.items()
-            if half.edge is None
-        }
-        end = min(turns, key=turns.__getitem__, default=None)
-        if end is not None and turns[end] < _SAME_RAD:
+        half_edges = graph.vertices[between].half_edges
+        turns = {key: abs(wrap_angle(half.bearing - bearing)) for key, half in half_edges.items()}
+        key = min(turns, key=turns.__getitem__, default=None)
+        if key is not None and turns[key] < _SAME_RAD and half_edges[key].edge is None:
+            end = HalfEdgeId(between, key)
             self._mapper.join(view, end, arrived, line, passage.narrowest, driven=True)
 
     def _join_fork(
