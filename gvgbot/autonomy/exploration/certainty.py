@@ -53,6 +53,8 @@ class Revisiting:
 
     def configure(self, config: CertaintyConfig) -> None:
         """Use another configuration from now on."""
+        if config.pose_sigma_m != self._config.pose_sigma_m:
+            self._worst = 0.0
         self._config = config
 
     def note_target(self, target: HalfEdgeId | None) -> None:

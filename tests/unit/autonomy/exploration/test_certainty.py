@@ -73,6 +73,9 @@ def test_a_robot_far_from_all_that_it_knows_well_goes_on_after_having_gone_back(
         if revisiting.next(graph, believed(robot, sigmas), starts) is not None:
             went_back.append(robot)
     assert went_back == [0.6, 1.0, 1.6]
+    revisiting.configure(CertaintyConfig(pose_sigma_m=0.4))  # somebody wants it surer
+    revisiting.note_target(FRONTIER)
+    assert revisiting.next(graph, believed(0.5, sigmas), starts) is not None
 
 
 @pytest.mark.parametrize("p_explore", [1.0, 0.9, 0.5])
