@@ -244,6 +244,7 @@ class Mission(Pursuit):
         self._path_following.renew()
         self._backtracking.renew()
         self._examination.end()
+        self._hindrance.end()
         vertex = self._mapper.graph.vertices[chosen.vertex]
         psi = self._mapper.belief.map_vertex(chosen.vertex).theta
         bearing = wrap_angle(vertex.half_edges[chosen.key].bearing + psi)

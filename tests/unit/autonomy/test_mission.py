@@ -131,6 +131,25 @@ def test_a_target_is_kept_until_it_is_explored() -> None:
     assert len(robot.said(Decision)) == 1
 
 
+def test_what_was_in_the_way_of_one_target_is_not_in_the_way_of_the_next() -> None:
+    """It is held for most of its patience, then goes elsewhere and still stands for a while."""
+    robot, patience_s = Robot(), CONFIG.in_the_way_s
+    robot.stand(TEE, 8)
+    first = robot.mission.target
+    assert first is not None
+    until = robot.stamp + 0.8 * patience_s
+    while robot.stamp < until:
+        robot.mission.hold()
+        robot.look(TEE)
+    half = robot.mapper.graph.half_edge(first)
+    assert half is not None
+    half.blocked = True
+    robot.stand(TEE, math.ceil(0.5 * patience_s / 0.5))
+    assert robot.mission.target != first
+    actions = [event.action for event in robot.events if isinstance(event, Recovery)]
+    assert "try another way" not in actions
+
+
 def test_a_map_without_frontiers_is_explored() -> None:
     robot = Robot()
     order: Order = robot.look(CLOSED)
