@@ -246,9 +246,15 @@ def _fork(line: Array, known_line: Array) -> int | None:
 
 
 def _has_gone(end: HalfEdgeId, view: View, known: Correspondence) -> bool:
-    """Whether the robot stands before a vertex and does not see this departure."""
-    node = known.node_of.get(end.vertex)
-    if node is None or end in known.branch_of:
+    """Whether the robot stands before a vertex, sees all of it, and does not see this departure.
+
+    Who comes back to a vertex on a loop may have forgotten what is behind it.
+    """
+    key = known.node_of.get(end.vertex)
+    if key is None or end in known.branch_of:
         return False
-    away = view.gvg.nodes[node].position - view.local_base.position
+    node = view.gvg.nodes[key]
+    if not node.settled:
+        return False
+    away = node.position - view.local_base.position
     return float(np.hypot(*away)) < _IN_CLEAR_M

@@ -110,6 +110,23 @@ def test_what_was_none_leads_nowhere(*, is_seen: bool) -> None:
     assert len(drive.mapper.graph.edges) == int(is_seen)
 
 
+@pytest.mark.parametrize("all_seen", [False, True])
+def test_who_comes_back_to_a_vertex_round_a_loop_need_not_see_by_where_it_left(
+    *, all_seen: bool
+) -> None:
+    """To the east and round to the north of vertex 1; the laser does not look to the east yet."""
+    ahead = drawn(
+        {1: (0.0, 0.0), 5: (0.0, 4.0)}, {13: (1, 5, [])}, unseen={} if all_seen else {1: 0.0}
+    )
+    drive = Drive(HalfEdgeId(1, EAST))
+    loop = [(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0), (0.0, 1.0)]
+    drive.where.trail = list(resampled(loop))
+    drive.along(ahead, {Branch(13, forward=True): HalfEdgeId(1, NORTH)}, (0.0, 1.0))
+    joined = [{edge.a, edge.b} for edge in drive.mapper.graph.edges.values()]
+    loops = [{HalfEdgeId(1, EAST), HalfEdgeId(1, NORTH)}]
+    assert joined == ([] if all_seen else loops)
+
+
 def with_north(drive: Drive, key: int, base: Pose) -> None:
     """Let a departure of vertex 2 lead north, to vertex 3, and the robot be at `base`."""
     graph, north = drive.mapper.graph, Vertex(3, 1.0, Pose(5.0, 8.0, 0.0), 0.0, 0.0)
