@@ -1,5 +1,6 @@
 """What the map learns from where the robot drives: edges that it has followed to their ends."""
 
+import math
 from collections import Counter, deque
 from dataclasses import dataclass, field
 
@@ -21,6 +22,8 @@ _SAME_RAD = 0.7  # a departure is the one that the robot left by
 _LEAST_PART_M, _MOST_STRAYS = 0.3, 100  # of an edge, that are worth telling
 _LEAST_LOST_M = 1.0  # less than before: it does not only go back over it
 _TIMES_MISSED = 3  # driven past without being found, a vertex is none
+_SHUTTLE_S = 3.0  # more often, it only looks as if it came from one end to the other
+_TIMES_TO_AND_FRO = 4  # an edge is believed that is not seen as one
 _IN_CLEAR_M = 2.0  # from a vertex, it is seen which departures it has
 
 
@@ -44,6 +47,8 @@ class DrivenEdges:
         self._loose: tuple[Array, float] | None = None
         self._strays: deque[tuple[Array, float]] = deque(maxlen=_MOST_STRAYS)
         self._missed = Counter[int]()  # how often vertices were driven past as if they were none
+        # between two ends, how often and when, s, it went to and fro
+        self._shuttles: dict[frozenset[HalfEdgeId], tuple[int, float]] = {}
 
     def learn(self, view: View, known: Correspondence, place: Place, where: Whereabouts) -> None:
         """Account for the robot's present place, `where` included."""
@@ -119,14 +124,24 @@ class DrivenEdges:
         before = graph.edge_at(arrived)
         if before is not None and before.other(arrived).vertex == left.vertex:
             graph.remove_half_edge(left)  # it is the one by which that edge is known to leave
-        if left in known.branch_of and passage.driven < LEAST_LOOP_M:
-            return  # both ends are in sight
+        are_seen = left in known.branch_of and passage.driven < LEAST_LOOP_M
+        if are_seen and not self._goes_to_and_fro(view.stamp, left, arrived):
+            return  # both ends, so that their edge will be, unless something keeps it from that
         if _has_gone(left, view, known):
             return  # what the robot drove on was none, and it has come onto another edge
         if far.edge is None:
             self._mapper.join(view, left, arrived, passage.line, passage.narrowest, driven=True)
         elif graph.half_edge(left) is not None:
             self._join_fork(view, left, arrived, passage)
+
+    def _goes_to_and_fro(self, stamp: float, left: HalfEdgeId, arrived: HalfEdgeId) -> bool:
+        """Whether the robot has come from one end to the other again and again."""
+        ends = frozenset((left, arrived))
+        times, latest = self._shuttles.get(ends, (0, -math.inf))
+        if stamp - latest > _SHUTTLE_S:
+            times += 1
+            self._shuttles[ends] = times, stamp
+        return times >= _TIMES_TO_AND_FRO
 
     def _note_missed(
         self, view: View, known: Correspondence, between: int, arrived: HalfEdgeId

@@ -70,6 +70,7 @@ class PathFollowing:
 
     def _look_around(self, stamp: float) -> tuple[Order | None, list[Event]]:
         self._headway.restart(stamp)
+        self._hindrance.end()
         self._looked_around += 1
         if self._looked_around > _MOST_LOOKS:
             return None, []

@@ -46,6 +46,7 @@ class Drive:
             belief, certain = self.mapper.belief, np.diag([1e-6] * 3)
             self.mapper.belief = ekf.add_vertex(belief, vertex, made.local, certain)
         self.where = Whereabouts(left, [np.zeros(2)])
+        self.stamp = 0.0
         self._driven = DrivenEdges(self.mapper)
 
     @property
@@ -59,7 +60,7 @@ class Drive:
             known.pair_branch(branch, end)
         for x, y in resampled(list(corners)):
             base = Pose(float(x), float(y), 0.0)
-            view = View(0, 0.0, 0.0, base, gvg, LocalMap(LocalMapConfig()))
+            view = View(0, self.stamp, 0.0, base, gvg, LocalMap(LocalMapConfig()))
             place = gvg.place(base.position)
             assert place is not None
             self._driven.learn(view, known, place, self.where)
@@ -108,6 +109,29 @@ def test_what_was_none_leads_nowhere(*, is_seen: bool) -> None:
     }
     drive.along(STREET, seen, (1.2, 0.0))
     assert len(drive.mapper.graph.edges) == int(is_seen)
+
+
+@pytest.mark.parametrize(("period", "is_edge"), [(5.0, True), (1.0, False)])
+def test_who_drives_to_and_fro_between_two_ends_has_driven_an_edge(
+    period: float, *, is_edge: bool
+) -> None:
+    """What seems to be a vertex is between them. Once a second, that it drives so only seems so."""
+    seen_so = drawn(
+        {1: (0.0, 0.0), 7: (1.5, 0.0), 2: (3.0, 0.0), 8: (1.5, 2.0)},
+        {10: (1, 7, []), 11: (7, 2, []), 15: (7, 8, [])},
+    )
+    ends = {
+        Branch(10, forward=True): HalfEdgeId(1, EAST),
+        Branch(11, forward=False): HalfEdgeId(2, WEST),
+    }
+    drive = Drive(HalfEdgeId(1, EAST))
+    for _ in range(4):
+        assert drive.mapper.graph.edges == {}
+        drive.along(seen_so, ends, (0.5, 0.0), (2.5, 0.0))
+        drive.stamp += period
+        drive.where = Whereabouts(HalfEdgeId(1, EAST), [np.zeros(2)])
+    joined = [{edge.a, edge.b} for edge in drive.mapper.graph.edges.values()]
+    assert joined == ([{HalfEdgeId(1, EAST), HalfEdgeId(2, WEST)}] if is_edge else [])
 
 
 @pytest.mark.parametrize("all_seen", [False, True])
