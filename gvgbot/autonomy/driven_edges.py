@@ -125,11 +125,12 @@ class DrivenEdges:
         if before is not None and before.other(arrived).vertex == left.vertex:
             graph.remove_half_edge(left)  # it is the one by which that edge is known to leave
         are_seen = left in known.branch_of and passage.driven < LEAST_LOOP_M
-        if are_seen and not self._goes_to_and_fro(view.stamp, left, arrived):
+        is_known = far.edge is not None
+        if are_seen and (is_known or not self._goes_to_and_fro(view.stamp, left, arrived)):
             return  # both ends, so that their edge will be, unless something keeps it from that
         if _has_gone(left, view, known):
             return  # what the robot drove on was none, and it has come onto another edge
-        if far.edge is None:
+        if not is_known:
             self._mapper.join(view, left, arrived, passage.line, passage.narrowest, driven=True)
         elif graph.half_edge(left) is not None:
             self._join_fork(view, left, arrived, passage)
