@@ -285,12 +285,18 @@ class Newcomers:
 
     @property
     def points(self) -> Array:
-        """The rims (N, 2), local frame, of company and of `discs`, and of who never moved.
+        """The rims (N, 2), local frame, of company and of `discs`."""
+        return _rims([*self.discs, *self.company])
 
-        That is a part of the building for all that is known, though it is out of sight.
+    @property
+    def lost(self) -> Array:
+        """The rims (N, 2), local frame, of bodies that never moved and are out of sight.
+
+        They are of the building for all that is known.
         """
-        lost = [(o.centre, o.radius) for o in self._all if o.is_lost and (o.is_whole or o.is_round)]
-        return _rims([*self.discs, *self.company, *lost])
+        return _rims(
+            [(one.centre, one.radius) for one in self._all if one.is_lost and one.is_round]
+        )
 
 
 def _rims(bodies: list[tuple[Array, float]]) -> Array:

@@ -255,7 +255,7 @@ class Pipeline:
             min_clearance=self._radius + self._config.passage_margin_m,
             roughness=reduction.roughness_m,
             open_clearance=self.open_clearance,
-            felt=np.concatenate([self._hazards.points, *self.traffic.standing]),
+            felt=np.concatenate([self._hazards.points, *self.traffic.in_the_way]),
         )
         known = self.mapper.known_around(local_base, half_width)
         return reduce_graph(fine, reduction, known).rings_cut_far_from(local_base.position)

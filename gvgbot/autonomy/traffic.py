@@ -49,6 +49,11 @@ class Traffic:
         """Rims (N, 2) of who stands in the way for a while; in a team all drive about."""
         return [] if self.is_in_team else [self.newcomers.points]
 
+    @property
+    def in_the_way(self) -> list[Array]:
+        """Rims (N, 2) of what stands in the way, seen or not."""
+        return [*self.standing, self.newcomers.lost]
+
     def nearby(self, local_map: Pose) -> list[Companion]:
         """Other robots, where they say that they are, local frame."""
         return [company.moved(one, local_map) for one in self.company or ()]

@@ -257,11 +257,11 @@ def test_who_never_moved_stays_in_the_way_out_of_sight_until_the_place_is_seen()
         watch.dropped(EMPTY, second, person=(2.0, 0.0))
     for second in range(4, 40):
         watch.dropped(screened, second)
-    away = np.hypot(*(watch.newcomers.points - [2.0, 0.0]).T)
+    away = np.hypot(*(watch.newcomers.lost - [2.0, 0.0]).T)
     assert away == pytest.approx(np.full(12, RADIUS), abs=0.05)
-    assert watch.newcomers.discs == []  # nobody drives round him
+    assert watch.newcomers.discs == []  # nobody drives round him, nor waits for him
     watch.dropped(EMPTY, 40)
-    assert len(watch.newcomers.points) == 0
+    assert len(watch.newcomers.lost) == 0
 
 
 @pytest.mark.parametrize(("place", "is_kept_out"), [((2.0, 0.1), False), ((2.0, 0.6), True)])
