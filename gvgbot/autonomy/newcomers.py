@@ -6,7 +6,8 @@ they may go, and the map forgets them as soon as that is seen. Who is out of sig
 but stands there anew when seen again at the same place: others pass by.
 """
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Annotated
@@ -230,7 +231,7 @@ class Newcomers:
             came = walls.are_away(island)
             one = Newcomer(island.centre, island.radius, stamp, stamp, came, island.is_whole)
             one.was_wall = is_wall
-            if _is_near(self.lasting, island.centre):
+            if is_near(island.centre, self.lasting):
                 one.came, one.first = False, stamp - self._longest_patience
             self._all.append(one)
         was_round = one.is_round
@@ -341,8 +342,9 @@ def _is_at(one: Newcomer, centre: Array) -> bool:
     return bool(np.hypot(*(one.centre - centre)) < _MOVED_M)
 
 
-def _is_near(places: Array, centre: Array) -> bool:
-    return bool((np.hypot(*(places - centre).T) < _MOVED_M).any())
+def is_near(centre: Array, others: Iterable[Array]) -> bool:
+    """Whether a body here (2,), m, may be one of others that stood still."""
+    return any(math.dist(centre, other) < _MOVED_M for other in others)
 
 
 def _has_stood(one: Newcomer) -> bool:

@@ -13,14 +13,13 @@ from gvgbot.autonomy.control.company import BodiesSeen, Companion
 from gvgbot.autonomy.control.detour import led_round
 from gvgbot.autonomy.control.edge_follower import Track
 from gvgbot.autonomy.gvg.local_map import LocalMap
-from gvgbot.autonomy.newcomers import Newcomers, NewcomersConfig
+from gvgbot.autonomy.newcomers import Newcomers, NewcomersConfig, is_near
 from gvgbot.autonomy.passed import Passed
 from gvgbot.autonomy.views import View
 from gvgbot.geometry import Array, Pose, Twist
 from gvgbot.hal.messages import Scan
 
 _MOST_PASSED = 100  # places, the latest ones
-_SAME_M = 0.3  # bodies nearer to each other are one
 _ROUND_M = 2.5  # a body farther away is elsewhere when the robot is there
 _ELSEWHERE_M = 0.15  # by which another robot may be elsewhere than it says
 
@@ -91,10 +90,10 @@ class Traffic:
     def _note_lasting(self, map_local: Pose) -> None:
         """Keep in mind what has been let in, as long as it is not seen to be gone."""
         gone = [map_local.transform(one.centre) for one in self.newcomers.gone]
-        self.lasting = [place for place in self.lasting if not _is_near(place, gone)]
+        self.lasting = [place for place in self.lasting if not is_near(place, gone)]
         for one in self.newcomers.let_in:
             place = map_local.transform(one.centre)
-            if not _is_near(place, self.lasting):
+            if not is_near(place, self.lasting):
                 self.lasting = [*self.lasting, place][-_MOST_PASSED:]
 
     def _bodies_seen(self, stamp: float, local_base: Pose, map_base: Pose) -> BodiesSeen:
@@ -129,10 +128,6 @@ class Traffic:
         others = _discs(self.nearby(local_map), 0.0) + self.newcomers.latest
         discs = [(base_local.transform(centre), wide) for centre, wide in others]
         return company.careful(twist, discs, radius, slow)
-
-
-def _is_near(place: Array, others: list[Array]) -> bool:
-    return any(math.dist(place, other) < _SAME_M for other in others)
 
 
 def _discs(nearby: list[Companion], more: float) -> list[Disc]:

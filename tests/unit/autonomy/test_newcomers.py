@@ -65,6 +65,16 @@ class Watch:
         return int((np.abs(self.map.points()) < [3.9, 2.9]).all(axis=1).sum())
 
 
+def lost_behind_a_screen() -> Watch:
+    """Somebody who stood at (2, 0) from the first look on, and is hidden from second 4 to 39."""
+    watch, screened = Watch(), carved([ROOM], [(1.0, -1.0, 1.1, 1.0)])
+    for second in range(4):
+        watch.dropped(EMPTY, second, person=(2.0, 0.0))
+    for second in range(4, 40):
+        watch.dropped(screened, second)
+    return watch
+
+
 def to_disc(bearings: Array, centre: Point) -> Array:
     """Ranges (N,) from the origin to a person; inf beside."""
     along = np.cos(bearings) * centre[0] + np.sin(bearings) * centre[1]
@@ -251,12 +261,7 @@ def test_where_somebody_was_last_seen_nobody_knows_the_floor_until_it_is_seen() 
 
 def test_who_never_moved_stays_in_the_way_out_of_sight_until_the_place_is_seen() -> None:
     """He may be a column, behind a screen that is put before him and taken away."""
-    screened = carved([ROOM], [(1.0, -1.0, 1.1, 1.0)])
-    watch = Watch()
-    for second in range(4):
-        watch.dropped(EMPTY, second, person=(2.0, 0.0))
-    for second in range(4, 40):
-        watch.dropped(screened, second)
+    watch = lost_behind_a_screen()
     away = np.hypot(*(watch.newcomers.lost - [2.0, 0.0]).T)
     assert away == pytest.approx(np.full(12, RADIUS), abs=0.05)
     assert watch.newcomers.discs == []  # nobody drives round him, nor waits for him
@@ -274,12 +279,7 @@ def test_where_a_body_proved_to_be_of_the_building_one_is_let_in_at_once(
 
 
 def test_who_is_seen_again_where_he_stood_may_have_come_back() -> None:
-    screened = carved([ROOM], [(1.0, -1.0, 1.1, 1.0)])
-    watch = Watch()
-    for second in range(4):
-        watch.dropped(EMPTY, second, person=(2.0, 0.0))
-    for second in range(4, 40):
-        watch.dropped(screened, second)
+    watch = lost_behind_a_screen()
     for second in range(40, 60):
         assert watch.dropped(EMPTY, second, person=(2.0, 0.0)) > 0
 
