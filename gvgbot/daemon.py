@@ -14,7 +14,7 @@ from gvgbot import __version__
 from gvgbot.autonomy.loop import Loop
 from gvgbot.clock import LoopClock, VirtualTimeLoop
 from gvgbot.config import Config
-from gvgbot.errors import ExtraMissing, GvgbotError, UsageError
+from gvgbot.errors import ExtraMissing, GvgbotError, UsageError, reason_of, underlying
 from gvgbot.hal.guard import Guard
 from gvgbot.hal.messages import Odometry
 from gvgbot.links import Devices, Links
@@ -57,7 +57,7 @@ def explore(config: Config, *, out: Path | None, real_time: bool) -> int:
             with recording, asyncio.Runner(loop_factory=factory) as runner:
                 runner.run(explore_once(session, progress))
         except Exception as error:
-            session.failure = str(error) or type(error).__name__
+            session.failure = reason_of(error)
             raise
         finally:
             progress.clear()
@@ -157,8 +157,8 @@ def run(config: Config, *, out: Path | None, known: Path | None = None, anew: bo
             with recording, asyncio.Runner() as runner:
                 runner.run(robot.serve(signals.wait()))
         except* GvgbotError as failures:
-            session.failure = str(_first(failures))
-            raise _first(failures) from None
+            session.failure = reason_of(failures)
+            raise underlying(failures) from None
         finally:
             keeper.finish()
             session.save()
@@ -226,8 +226,3 @@ def _announce(session: Session, network: str, *, resumed: bool) -> None:
         out=str(session.directory.path),
         map="known" if resumed else "new",
     )
-
-
-def _first(failures: BaseExceptionGroup[GvgbotError]) -> GvgbotError:
-    failure = failures.exceptions[0]
-    return _first(failure) if isinstance(failure, BaseExceptionGroup) else failure

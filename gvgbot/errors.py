@@ -37,3 +37,16 @@ class DeviceRefused(GvgbotError):
 
 class Deadlock(GvgbotError):
     """In virtual time every task waits for something that nothing will ever do."""
+
+
+def underlying(error: BaseException) -> BaseException:
+    """What went wrong first, where a group of tasks only says that something did."""
+    while isinstance(error, BaseExceptionGroup):
+        error = error.exceptions[0]
+    return error
+
+
+def reason_of(error: BaseException) -> str:
+    """One line that says what went wrong, whether or not the error itself says anything."""
+    cause = underlying(error)
+    return str(cause) or type(cause).__name__

@@ -16,7 +16,7 @@ from gvgbot.autonomy.loop import Loop
 from gvgbot.clock import LoopClock, VirtualTimeLoop
 from gvgbot.config import Config
 from gvgbot.drivers.people import Walkways
-from gvgbot.errors import UsageError, WorldError
+from gvgbot.errors import UsageError, WorldError, reason_of
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.guard import Guard
 from gvgbot.hal.messages import Odometry
@@ -67,6 +67,10 @@ def explore_together(config: Config, count: int, *, out: Path | None, real_time:
             factory = None if real_time else VirtualTimeLoop
             with asyncio.Runner(loop_factory=factory) as runner:
                 runner.run(_explore(robots, config))
+        except Exception as error:
+            for robot in robots:
+                robot.session.failure = robot.session.failure or reason_of(error)
+            raise
         finally:
             for robot in robots:
                 robot.session.save()

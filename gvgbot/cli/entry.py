@@ -17,7 +17,7 @@ from gvgbot.cli.maps import add_map
 from gvgbot.cli.remote import add_ctl, add_monitor, add_web
 from gvgbot.cli.replay import add_replay
 from gvgbot.cli.run import add_install_service, add_run
-from gvgbot.errors import GvgbotError, UsageError
+from gvgbot.errors import GvgbotError, UsageError, underlying
 
 FAILURE, INTERRUPTED = 1, 130
 
@@ -60,7 +60,7 @@ def status_of(command: Callable[[], int]) -> int:
     The reason goes to stderr; only a mistake of the program leaves a traceback.
     """
     try:
-        return command()
+        return _ungrouped(command)
     except KeyboardInterrupt:
         return _fail("interrupted", INTERRUPTED)
     except UsageError as error:
@@ -79,6 +79,14 @@ def status_of(command: Callable[[], int]) -> int:
         if error.errno != errno.ENAMETOOLONG:
             raise
         return _fail(f"{error.filename}: {error.strerror}: choose a shorter one", BAD_USAGE)
+
+
+def _ungrouped(command: Callable[[], int]) -> int:
+    """Let what one of several tasks met with be told as if the command had met with it itself."""
+    try:
+        return command()
+    except BaseExceptionGroup as errors:
+        raise underlying(errors) from None
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:

@@ -10,7 +10,7 @@ from typing import TypeVar
 
 from gvgbot import client
 from gvgbot.client import Asking, Robot, State
-from gvgbot.errors import GvgbotError, UsageError
+from gvgbot.errors import GvgbotError, UsageError, reason_of
 from gvgbot.requests import Goto, Patrol, Set
 from gvgbot.topics import Events, Grid, Health, Map, Odometry, Plan, Scan, Tile, Trajectory
 from gvgbot.web.viewers import Audience
@@ -54,7 +54,7 @@ class Feed:
             except* UsageError as errors:
                 raise errors.exceptions[0] from None
             except* GvgbotError as errors:
-                self._say_why(str(_first(errors)))
+                self._say_why(reason_of(errors))
             await asyncio.sleep(_BEAT)
 
     async def _connect(self) -> None:
@@ -198,8 +198,3 @@ def sigma(state: State) -> float:
     """The standard deviation of the position, m, in the direction in which it is largest."""
     xx, xy, _, _, yy = state.covariance[:5]
     return math.sqrt(max(0.0, (xx + yy) / 2 + math.hypot((xx - yy) / 2, xy)))
-
-
-def _first(failures: BaseExceptionGroup[GvgbotError]) -> GvgbotError:
-    failure = failures.exceptions[0]
-    return _first(failure) if isinstance(failure, BaseExceptionGroup) else failure

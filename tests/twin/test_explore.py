@@ -1,5 +1,6 @@
 """Whole explorations in virtual time, bytes and all, of worlds whose graph is known by geometry."""
 
+import errno
 import json
 import math
 import os
@@ -21,12 +22,15 @@ from benchmarks.score_run import score_run
 from gvgbot.cli import main
 from gvgbot.drivers.world import World, save_world
 from gvgbot.geometry import Array, Pose
+from gvgbot.hal.messages import Contact, Odometry
+from gvgbot.session import Session
 from tests.unit.autonomy.sights import carved
 
 pytestmark = [pytest.mark.slow, pytest.mark.twin, pytest.mark.timeout(120)]
 
 ROBOT_RADIUS = 0.177  # m
 WALL = 0.2  # m that a map may be off
+FULL = 5.0  # s, when the disk is
 Point = tuple[float, float]
 
 
@@ -337,3 +341,27 @@ def test_a_laser_that_sees_no_farther_than_a_room_finds_all_of_a_building(tmp_pa
     assert main([*arguments, "--out", str(tmp_path / "run")]) == 0
     score = score_run(tmp_path / "run")
     assert score["recall"] == score["precision"] == score["edge_recall"] == 1.0
+
+
+@pytest.mark.parametrize("robots", ["1", "2"])
+def test_an_exploration_that_the_disk_ends_says_so_and_leaves_a_map(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    robots: str,
+) -> None:
+    fill = Session.on_cycle
+
+    def on_cycle(session: Session, odometry: Odometry, contact: Contact | None) -> None:
+        if odometry.stamp > FULL:
+            raise OSError(errno.ENOSPC, "No space left on device", "truth.tum")
+        fill(session, odometry, contact)
+
+    monkeypatch.setattr(Session, "on_cycle", on_cycle)
+    run = explore(tee(), tmp_path, "--robots", robots)
+    assert run.status == 1
+    assert capsys.readouterr().err.splitlines()[-1].endswith("no space left: make room")
+    summary = json.loads((run.path / "summary.json").read_text())
+    assert summary["outcome"] == "failed"
+    assert "No space left on device" in summary["reason"]
+    assert (run.path / "map.geojson").exists()

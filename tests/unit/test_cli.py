@@ -1,5 +1,6 @@
 """The command line says in one line what is wrong, with the right exit status."""
 
+import errno
 import sys
 from pathlib import Path
 
@@ -192,6 +193,15 @@ def test_a_full_disk_to_print_to_is_one_line(capsys: Captured) -> None:
 
     assert status_of(show) == 1
     assert said(capsys) == ["gvgbot: output: no space left: make room"]
+
+
+def test_what_a_task_met_with_is_said_and_not_that_a_task_met_with_something(
+    capsys: Captured,
+) -> None:
+    full = OSError(errno.ENOSPC, "No space left on device", "events.jsonl")
+    tasks = ExceptionGroup("tasks", [ExceptionGroup("more", [full]), ValueError("later")])
+    assert status_of(lambda: raising(tasks)) == 1
+    assert said(capsys) == ["gvgbot: events.jsonl: no space left: make room"]
 
 
 def test_an_interrupted_command_says_so_and_exits_as_shells_expect(capsys: Captured) -> None:
