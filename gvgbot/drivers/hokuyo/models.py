@@ -74,24 +74,36 @@ class Parameters:
     @classmethod
     def from_lines(cls, lines: Mapping[str, str]) -> Self:
         """Read the lines of a PP reply. Raises ValueError when they make no sense."""
-        try:
-            numbers = [int(lines[key]) for key in _NUMBER_KEYS]
-        except KeyError as error:
-            raise ValueError(f"no {error.args[0]} line") from error
-        parameters = cls(lines.get("MODL", ""), *numbers)
-        if not parameters._is_plausible():
-            raise ValueError(f"implausible parameters: {parameters}")
+        parameters = cls(lines.get("MODL", ""), *(_number(lines, key) for key in _NUMBER_KEYS))
+        nonsense = parameters._nonsense()
+        if nonsense is not None:
+            raise ValueError(nonsense)
         return parameters
 
-    def _is_plausible(self) -> bool:
-        steps_rise = 0 <= self.first_step < self.last_step <= 2 * self.steps_per_turn
-        ranges_rise = 0 <= self.range_min_mm < self.range_max_mm
-        return steps_rise and ranges_rise and self.steps_per_turn > 0 and self.rpm > 0
+    def _nonsense(self) -> str | None:
+        """The lines that cannot be true together."""
+        first, last, turn = self.first_step, self.last_step, self.steps_per_turn
+        near, far = self.range_min_mm, self.range_max_mm
+        if not 0 <= first < last <= 2 * turn:
+            return f"steps from AMIN:{first} to AMAX:{last}, with ARES:{turn} in a turn"
+        if not 0 <= near < far:
+            return f"ranges from DMIN:{near} to DMAX:{far}"
+        return f"SCAN:{self.rpm} turns a minute" if self.rpm <= 0 else None
 
     def lines(self) -> dict[str, str]:
         """The lines of the PP reply; the inverse of `from_lines`."""
         model, *numbers = astuple(self)
         return {"MODL": model, **dict(zip(_NUMBER_KEYS, map(str, numbers), strict=True))}
+
+
+def _number(lines: Mapping[str, str], key: str) -> int:
+    """What a line says. Raises ValueError without such a line, or if it says no number."""
+    if key not in lines:
+        raise ValueError(f"no {key} line")
+    try:
+        return int(lines[key])
+    except ValueError:
+        raise ValueError(f"{key}:{lines[key]} is no number") from None
 
 
 @dataclass(frozen=True, slots=True)
