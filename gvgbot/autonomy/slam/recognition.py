@@ -18,6 +18,7 @@ from gvgbot.ranges import Range
 
 _SIGMA_PER_M = 0.015  # of a vertex's place, m per metre from which it is seen
 _CLEARANCE_SHARE = 0.15  # by which two sightings may differ in a wide space
+_DEGREE_SHARE = 0.4  # by which degrees may differ
 _BESIDE_M = 0.4  # where a vertex is known to be, and where it is: as far apart as that may be
 
 
@@ -94,32 +95,35 @@ def looks_alike(
 ) -> bool:
     """Whether kind, degree, clearance and bearings agree, the vertex's frame at `local_vertex`.
 
-    A degree that differs by one passes: of a pair of close meetpoints either may be seen as one.
+    A degree that differs by one passes: of a pair of close meetpoints either may be seen as one. So
+    does more where many edges leave, of which some cannot be seen, and what is unclear may be one.
     Clearance changes at most as much as the place: a vertex found from afar may have lain beside.
     """
     if vertex.kind != sighting.kind:
         return False
-    if abs(vertex.degree - len(sighting.bearings)) > 1:
+    certain, possible = len(sighting.bearings), (*sighting.bearings, *sighting.unclear)
+    differing = max(1.0, _DEGREE_SHARE * min(vertex.degree, certain))
+    if not certain - differing <= vertex.degree <= len(possible) + differing:
         return False
     beside = min(float(np.hypot(*(sighting.position - local_vertex.position))), _BESIDE_M)
     tolerance = max(config.clearance_m, _CLEARANCE_SHARE * vertex.clearance) + beside
     if abs(vertex.clearance - sighting.clearance) > tolerance:
         return False
-    matched = _turns(vertex, sighting, local_vertex, config)
-    return len(matched) >= min(vertex.degree, len(sighting.bearings))
+    matched = _turns(vertex, possible, local_vertex, config)
+    return len(matched) >= min(vertex.degree, certain)
 
 
 def turn_by_bearings(
     vertex: Vertex, sighting: Sighting, local_vertex: Pose, config: RecognitionConfig
 ) -> float:
     """By how much its departures are seen turned, rad, the vertex's frame at `local_vertex`."""
-    return float(np.mean(_turns(vertex, sighting, local_vertex, config) or [0.0]))
+    return float(np.mean(_turns(vertex, sighting.bearings, local_vertex, config) or [0.0]))
 
 
 def _turns(
-    vertex: Vertex, sighting: Sighting, local_vertex: Pose, config: RecognitionConfig
+    vertex: Vertex, seen: tuple[float, ...], local_vertex: Pose, config: RecognitionConfig
 ) -> list[float]:
-    """By how much each departure that is found again is seen turned, rad."""
+    """By how much each departure that is found among those seen is turned, rad."""
     known = {key: half.bearing + local_vertex.theta for key, half in vertex.half_edges.items()}
-    matched = match_bearings(sighting.bearings, known, math.radians(config.bearing_deg))
-    return [wrap_angle(sighting.bearings[i] - known[key]) for i, key in matched.items()]
+    matched = match_bearings(seen, known, math.radians(config.bearing_deg))
+    return [wrap_angle(seen[i] - known[key]) for i, key in matched.items()]

@@ -1,6 +1,7 @@
 """Which known vertex a sighting may be."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -91,6 +92,25 @@ def test_a_vertex_does_not_look_like(seen: Sighting) -> None:
 def test_a_crossing_may_be_seen_as_one_of_a_close_pair_of_tees() -> None:
     assert looks_alike(vertex(*CROSSING), sighting(*TEE), Pose(), CONFIG)
     assert looks_alike(vertex(*TEE), sighting(*CROSSING), Pose(), CONFIG)
+
+
+STAR = tuple(wrap_angle(k * math.pi / 4) for k in range(8))
+
+
+@pytest.mark.parametrize("certain", [(0, 1, 2), (4, 6, 7), (0, 2, 4, 6), (0, 1, 2, 3, 4, 5, 6)])
+def test_a_meetpoint_of_many_edges_is_the_same_whichever_of_them_are_certain(
+    certain: tuple[int, ...],
+) -> None:
+    unclear = tuple(STAR[k] for k in range(8) if k not in certain)
+    seen = replace(sighting(*(STAR[k] for k in certain)), unclear=unclear)
+    assert looks_alike(vertex(*STAR[:5]), seen, Pose(), CONFIG)
+
+
+def test_what_is_certain_must_be_there_though_more_may_be() -> None:
+    """Seven departures for certain, and an eighth perhaps, are no tee, and no half of a star."""
+    seen = replace(sighting(*STAR[:7]), unclear=STAR[7:])
+    assert not looks_alike(vertex(*TEE), seen, Pose(), CONFIG)
+    assert not looks_alike(vertex(*STAR[::2]), seen, Pose(), CONFIG)
 
 
 @pytest.mark.parametrize(("beside", "alike"), [(0.0, False), (0.3, True), (2.0, False)])
