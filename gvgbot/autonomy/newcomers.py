@@ -18,7 +18,7 @@ from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.gvg.local_map import LocalMap
 from gvgbot.autonomy.islands import Island, beam_ends, islands, slivers, without_fringes
-from gvgbot.autonomy.roundness import SURE, with_look
+from gvgbot.autonomy.roundness import SURE, body_of, with_look
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
 from gvgbot.ranges import Range
@@ -97,7 +97,7 @@ class Newcomers:
         self.strangers: list[float] = []  # radii of other robots that may be anywhere, m
         self.company: list[tuple[Array, float]] = []  # other robots: where they say they are,
         self._met: list[tuple[Array, float]] = []  # and where they are seen
-        self.bodies: Array = np.empty((0, 3))  # round ones in the last look: x, y, radius, m
+        self.bodies: Array = np.empty((0, 3))  # in the last look: x, y, radius, m
         self._lately: list[tuple[float, Array]] = []  # when, s, and where somebody was seen
         self._glanced: list[tuple[Array, float]] | None = None  # where those are that move on
 
@@ -119,9 +119,7 @@ class Newcomers:
         walls = _Walls(local_map, self._config.away_from_walls_m, is_way)
         self._met, seen = [], []
         found = islands(scan, local_base)
-        self.bodies = np.array(
-            [(*island.centre, island.radius) for island in found if island.is_round]
-        ).reshape(-1, 3)
+        self.bodies = self._bodies(found, local_base.compose(scan.base_laser).position)
         for island in found:
             if self._is_company(island):
                 self._met.append((island.centre, island.radius))
@@ -131,6 +129,16 @@ class Newcomers:
         waiting = [(one.centre, one.radius) for one in self._all if one.is_waiting]
         # At times one is seen in parts only, or has moved a little: both discs count.
         return _without(scan, local_base, [*seen, *waiting, *self._met, *self.company])
+
+    def _bodies(self, found: list[Island], eye: Array) -> Array:
+        """Bodies (N, 3): round ones, and what is as wide as a robot that may be anywhere."""
+        rows = [(*island.centre, island.radius) for island in found if island.is_round]
+        for island in found:
+            for radius in set(self.strangers) if island.is_whole and not island.is_round else ():
+                centre = body_of(island.ends, eye, radius)
+                if centre is not None:
+                    rows.append((*centre, radius))
+        return np.array(rows).reshape(-1, 3)
 
     def free(self, scan: Scan, local_base: Pose) -> Array:
         """How far, m, there is surely nothing on each beam (N,), those on people among them.

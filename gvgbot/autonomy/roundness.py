@@ -20,6 +20,8 @@ _MOST = 8.0  # that one look can tell: whatever hides a part of somebody is not 
 _FADING = 0.8  # of the evidence is left at the next look: looks from one place err alike
 _STEPS = 5
 _NEGLIGIBLE_M = 1e-4
+_LEAST_BEAMS = 5  # that tell where a body of known radius is
+_LOOSE_M = 0.03  # by which beams that end on such a body stray, and its width
 _MEDIAN = 0.6745  # sigma: half of the errors are smaller
 
 
@@ -51,6 +53,29 @@ def round_evidence(
     if np.std(stray) > math.hypot(_ROUND * radius, noise):  # it is neither
         evidence = min(evidence, 0.0)
     return max(-_MOST, min(evidence, _MOST)), centre, radius
+
+
+def body_of(ends: Array, eye: Array, radius: float) -> Array | None:
+    """The centre (2,) of a body of known radius, m, that is all of what is seen; None if it is not.
+
+    `ends` (N, 2), in the order of their beams, were seen from `eye` (2,). Too few to tell a circle
+    from a wall tell where one is, if they are as far apart as it is wide, but for a beam or two.
+    """
+    if len(ends) < _LEAST_BEAMS:
+        return None
+    width = float(np.hypot(*(ends[-1] - ends[0])))
+    between = width / (len(ends) - 1)
+    if not 2.0 * (radius - between) - _LOOSE_M < width < 2.0 * radius + _LOOSE_M:
+        return None
+    middle = ends.mean(axis=0)
+    centre = middle + radius * (middle - eye) / np.hypot(*(middle - eye))
+    for _ in range(_STEPS):
+        to_centre = ends - centre
+        distance = np.hypot(*to_centre.T)
+        step, *_ = np.linalg.lstsq(to_centre / distance[:, None], distance - radius)
+        centre = centre + step
+    stray = np.hypot(*(ends - centre).T) - radius
+    return centre if float(np.sqrt(np.mean(stray**2))) < _LOOSE_M else None
 
 
 def _likelier(gain: float, noise: float) -> float:

@@ -155,6 +155,19 @@ def test_who_may_be_a_robot_of_the_team_that_waits_is_no_pillar_so_soon() -> Non
     assert slim.inside() > 0
 
 
+def test_who_is_as_wide_as_a_robot_that_may_be_anywhere_may_be_it_from_far_away() -> None:
+    """Too few beams meet it to tell that it is round."""
+    hall, there = carved([(-2.0, -3.0, 24.0, 3.0)]), (14.0, 0.5)
+    anybody, stranger = Watch(hall), Watch(hall)
+    stranger.newcomers.strangers = [RADIUS - 0.1, RADIUS]
+    for watch in (anybody, stranger):
+        watch.dropped(hall, person=there)
+    assert len(anybody.newcomers.bodies) == 0
+    ((x, y, radius),) = stranger.newcomers.bodies
+    assert math.dist((x, y), there) < 0.03
+    assert radius == RADIUS
+
+
 @pytest.mark.parametrize("noise", [0.0, 0.01, 0.03])
 def test_what_surely_has_an_edge_is_a_post_after_a_glimpse(noise: float) -> None:
     """Else doors beside it are not believed until the robot has passed them."""

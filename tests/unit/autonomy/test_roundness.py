@@ -5,13 +5,14 @@ import math
 import numpy as np
 import pytest
 
-from gvgbot.autonomy.roundness import SURE, range_noise, round_evidence, with_look
+from gvgbot.autonomy.roundness import SURE, body_of, range_noise, round_evidence, with_look
 from gvgbot.geometry import Array
 
 EYE = np.zeros(2)
 FINE = math.tau / 1440  # rad from beam to beam
 COARSE = math.tau / 1024
 LOOKS, TRIALS = 8, 50
+ROBOT = 0.177  # m, its radius
 ROOM = (4.0, 2.0)  # m from the laser to its walls, ahead and beside
 
 NOISES = pytest.mark.parametrize("noise", [0.01, 0.03])
@@ -104,6 +105,32 @@ def test_corners_and_ends_of_walls_are_not(
                 evidence = with_look(evidence, round_evidence(points, EYE, noise)[0])
         mistaken += evidence > SURE
     assert mistaken <= 0.04 * TRIALS
+
+
+@pytest.mark.parametrize("away", [4.0, 8.0, 12.0])
+def test_where_a_body_of_known_radius_is_few_beams_tell(away: float) -> None:
+    """At 12 m they are 5 cm apart, and the rim of a robot is seen to within one of them."""
+    rng, found = np.random.default_rng(5), []
+    for _ in range(TRIALS):
+        bearings = sweep(FINE, rng)
+        points = ends(bearings, to_disc(bearings, away, ROBOT), 0.01, rng)
+        found.append(body_of(points, EYE, ROBOT))
+        assert body_of(points, EYE, ROBOT - 0.08) is None
+        assert body_of(points, EYE, ROBOT + 0.08) is None
+    off = np.array([centre - (away, 0.0) for centre in found if centre is not None])
+    assert len(off) >= 0.9 * TRIALS
+    assert np.abs(off.mean(axis=0)).max() < 0.01
+    assert np.hypot(*off.T).max() < 0.05
+
+
+def test_what_goes_back_farther_than_a_body_or_is_hardly_seen_is_none() -> None:
+    bearings = np.arange(-0.2, 0.2, FINE)
+    panel = to_box(bearings, 6.0, (0.6, 0.02), 0.5)  # as wide, as it is seen
+    points = np.stack([panel * np.cos(bearings), panel * np.sin(bearings)], axis=1)
+    assert body_of(points[np.isfinite(panel)], EYE, ROBOT) is None
+    disc = to_disc(bearings, 22.0, ROBOT)
+    points = np.stack([disc * np.cos(bearings), disc * np.sin(bearings)], axis=1)
+    assert body_of(points[np.isfinite(disc)], EYE, ROBOT) is None
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.01, 0.03])
