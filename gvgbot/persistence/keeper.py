@@ -18,6 +18,7 @@ import structlog
 from gvgbot.autonomy import events
 from gvgbot.autonomy.memory import growth, remember
 from gvgbot.autonomy.returning import ReturningPipeline
+from gvgbot.autonomy.views import Observation
 from gvgbot.clock import Clock, LoopClock
 from gvgbot.drivers.kobuki.feedback import FeedbackReader
 from gvgbot.persistence.mission_files import MissionFiles
@@ -68,6 +69,8 @@ class Keeper:
         self._feedback: FeedbackReader | None = None
         self._counts: list[Count] = []  # of what is in the journal after each batch
         self._stay = math.inf  # keyframes in the journal, the first: others have been forgotten
+        self._observed: list[Observation] | None = None  # in the journal, if that is known
+        self._is_retold = False  # some may be others since
         self._beat_at = -math.inf  # stamp of the last batch
         self._snapshot_at = -math.inf  # stamp of the last snapshot
         self._snapshot_of = -1  # keyframes in it
@@ -136,6 +139,7 @@ class Keeper:
         """Note what happened: a map that has changed is kept at once, and so is a wish."""
         self._settled = self._settled or isinstance(event, _SETTLED)
         self._is_asked |= isinstance(event, events.Requested) and event.done
+        self._is_retold |= isinstance(event, events.ClosureRevoked | events.DoubtSettled)
         if isinstance(event, events.WayForgotten):
             self._stay = min(self._stay, event.kept)
 
@@ -157,6 +161,7 @@ class Keeper:
             return self._keeping_wish()
         if not (pipeline.keyframes or self._is_asked):
             return _nothing
+        self._note_retold(pipeline.mapper.observations)
         after = bisect_right(self._counts, self._stay, key=lambda count: count.keyframes)
         before = self._counts[after - 1] if after else Count(0, 0)
         count = Count(len(pipeline.keyframes), len(self._session.journey.stamps))
@@ -177,8 +182,14 @@ class Keeper:
         if due and (self._settled or self._snapshot_of < len(pipeline.keyframes)):
             snapshot = packed(Snapshot(memory=remember(pipeline), beat=beat, known=self._known))
             self._settled = False
-        self._stay = math.inf
+        self._stay, self._observed = math.inf, list(pipeline.mapper.observations)
         return partial(self._write, packed(batch), [*self._counts[:after], count], snapshot, stamp)
+
+    def _note_retold(self, observations: list[Observation]) -> None:
+        """See from where on the journal tells what was not seen after all, or of other vertices."""
+        if self._is_retold and self._observed is not None:
+            self._stay = min(self._stay, _first_changed(self._observed, observations))
+        self._is_retold = False
 
     def _keeping_wish(self) -> Callable[[], None]:
         """A function that keeps what was asked of a robot that does not know its place.
@@ -265,6 +276,14 @@ class Keeper:
             tally=self._session.tally,
             odometer=None if self._feedback is None else self._feedback.memory,
         )
+
+
+def _first_changed(before: list[Observation], now: list[Observation]) -> float:
+    """The keyframe of the first observation that is not what it was; infinity if all are."""
+    for old, new in zip(before, now, strict=False):
+        if old is not new:
+            return min(old.keyframe, new.keyframe)
+    return before[len(now)].keyframe if len(now) < len(before) else math.inf
 
 
 def _nothing() -> None:

@@ -9,7 +9,7 @@ import msgspec
 import pytest
 import structlog
 
-from gvgbot.autonomy.events import Requested, WayForgotten
+from gvgbot.autonomy.events import DoubtSettled, LoopClosed, Requested, WayForgotten
 from gvgbot.autonomy.memory import growth, recall, remember
 from gvgbot.config import load_config
 from gvgbot.maps.run_directory import RunDirectory
@@ -137,6 +137,51 @@ def test_a_way_is_cut_where_it_was_forgotten_even_if_the_robot_has_explored_on_s
     saved = MissionFiles(tmp_path).read()
     assert saved is not None
     assert packed(saved.past) == packed(growth(pipeline))
+
+
+def test_a_closure_that_was_revoked_does_not_come_back(session: Session, tmp_path: Path) -> None:
+    """Nor what was seen by it: smoothing would lay the map by that."""
+    pipeline, keeper = session.pipeline, Keeper(session, MissionFiles(tmp_path))
+    mapper, unsettled = pipeline.mapper, pipeline.mapper.unsettled
+    keyframes, steps = pipeline.keyframes.copy(), pipeline.steps.copy()
+    half = len(keyframes) // 2
+    mapper.observations[:] = [seen for seen in mapper.observations if seen.keyframe < half]
+    pipeline.keyframes[half:], pipeline.steps[half - 1 :] = [], []
+    keeper.keeping(20.0)()
+    right, wrong = mapper.observations.copy(), replace(mapper.observations[-1], keyframe=half)
+    unsettled.note_closure(mapper.graph.vertices[wrong.vertex], is_surprising=True)
+    mapper.observations += [wrong, replace(wrong, keyframe=half + 2)]
+    pipeline.keyframes[:], pipeline.steps[:] = keyframes, steps
+    keeper.on_event(LoopClosed(21.0, wrong.vertex, 9.0, 1.0, 6.0, 0.9))
+    keeper.keeping(21.0)()
+    (edge, *_) = mapper.graph.edges.values()
+    unsettled.note_way(edge, arrived=99)
+    for event in unsettled.revoke(22.0):
+        keeper.on_event(event)
+    with structlog.testing.capture_logs(), full_disk(10):
+        keeper.keeping(22.0)()
+    keeper.keeping(22.5)()
+    saved = MissionFiles(tmp_path).read()
+    assert saved is not None
+    assert mapper.observations == right
+    assert packed(saved.past) == packed(growth(pipeline))
+
+
+def test_what_was_seen_of_a_vertex_that_proved_to_be_another_is_kept_as_that_one_s(
+    session: Session, tmp_path: Path
+) -> None:
+    keeper, mapper = Keeper(session, MissionFiles(tmp_path)), session.pipeline.mapper
+    keeper.keeping(20.0)()
+    one, other = sorted(mapper.graph.vertices)
+    mapper.observations[:] = [
+        replace(seen, vertex=one) if seen.vertex == other else seen for seen in mapper.observations
+    ]
+    keeper.on_event(DoubtSettled(21.0, other, one, 12.0, 0.1))
+    keeper.keeping(21.0)()
+    saved = MissionFiles(tmp_path).read()
+    assert saved is not None
+    assert {seen.vertex for grown in saved.past for seen in grown.observations} == {one}
+    assert packed(saved.past) == packed(growth(session.pipeline))
 
 
 def test_a_robot_that_saw_nothing_leaves_no_mission(tmp_path: Path) -> None:
