@@ -53,8 +53,11 @@ def merged(ours: RouteGraph, theirs: RouteGraph, pose: Pose) -> RouteGraph:
     edges = list(_split(ours.edges, new))
     others = [replace(e, start=names[e.start], end=names[e.end]) for e in theirs.edges]
     for edge in _split(others, [v for v in ours.vertices if v.id not in known]):
-        if not any(is_same(edge, other) for other in edges):
+        twin = next((i for i, other in enumerate(edges) if is_same(edge, other)), None)
+        if twin is None:
             edges.append(edge)
+        else:
+            edges[twin] = _as_driven_by_both(edges[twin], edge)
     partner = {ours.vertices[i].id: theirs.vertices[j] for i, j in pairs}
     vertices = [
         _fused(vertex, partner[vertex.id]) if vertex.id in partner else vertex
@@ -259,6 +262,15 @@ def is_same(edge: MapEdge, other: MapEdge) -> bool:
         return False
     away = cdist(edge.polyline, other.polyline)
     return float(max(away.min(axis=0).max(), away.min(axis=1).max())) < _BESIDE_M
+
+
+def _as_driven_by_both(edge: MapEdge, other: MapEdge) -> MapEdge:
+    """One edge of two that are the same: who has driven along it has felt how narrow it is."""
+    return replace(
+        edge,
+        traversals=edge.traversals + other.traversals,
+        min_clearance=min(edge.min_clearance, other.min_clearance),
+    )
 
 
 def _settled(vertex: MapVertex, edges: Sequence[MapEdge]) -> MapVertex:

@@ -21,14 +21,14 @@ from scipy.spatial.distance import cdist
 from gvgbot.geometry import Array, Pose, wrap_angle
 from gvgbot.team.chart import Chart
 from gvgbot.team.laying import fitted, laid_on_walls, least_squares
-from gvgbot.team.likeness import UNLIKE_SHARE, as_clear, likeness
-from gvgbot.team.side import SPACING_M, Complex, Side
+from gvgbot.team.likeness import UNLIKE_SHARE, likeness
+from gvgbot.team.side import SPACING_M, Side
+from gvgbot.team.stretches import Complex, leeway
 
 _SAME_M = 0.7  # vertices nearer to each other may be one
-_LEAST_BASE_M = 1.0  # between two vertices that suggest a transform
-_LENGTH_M, _LENGTH_SHARE = 0.35, 0.03  # by which the same stretch may differ in two charts
 _ALIKE_SHARE = 0.85  # of the walls around a vertex, on either side, speaks for it
 _FITS = 5  # rounds of pairing and fitting
+_MOST_STRETCHES = 10_000  # in a map of more, another one is not looked for
 _LAID_AT_A_TIME = 50_000  # vertices, to find out which transforms promise most
 _EXAMINED, _MISFITS = 12, 6  # transforms that are looked at closely, of a chart onto itself
 _APART_M, _APART_RAD = 1.0, 0.25  # transforms nearer to each other are the same
@@ -239,30 +239,15 @@ def _is_same(one: Pose, other: Pose, where: Array) -> bool:
 
 def _suggested(a: Side, b: Side) -> list[Pose]:
     """Poses of b's frame in a's by pairs of stretches, those that bring most vertices together."""
-    (ends_a, places_a, metres_a), (ends_b, places_b, metres_b) = a.bases, b.bases
-    if not len(ends_a) or not len(ends_b):
+    here, there = a.stretches, b.stretches.both_ways()
+    if max(len(here.ends), len(there.ends) // 2) > _MOST_STRETCHES:
         return []
-    ends_b, places_b = (np.concatenate([x, x[:, ::-1]]) for x in (ends_b, places_b))
-    metres_b = np.concatenate([metres_b, metres_b])
-    way_a, way_b = (p[:, 1] - p[:, 0] for p in (places_a, places_b))
-    limit = _LENGTH_M + _LENGTH_SHARE * metres_a[:, None]
-    alike = (np.abs(np.abs(way_a)[:, None] - np.abs(way_b)) < limit) & (
-        np.abs(metres_a[:, None] - metres_b) < limit
-    )
-    alike &= (np.abs(way_a)[:, None] > _LEAST_BASE_M) & (np.abs(way_b) > _LEAST_BASE_M)
-    for end in (0, 1):
-        kinds = a.is_meetpoint[ends_a[:, end]][:, None] == b.is_meetpoint[ends_b[:, end]]
-        room_a, room_b = (
-            np.array([v.clearance for v in s.vertices])[e[:, end]]
-            for s, e in ((a, ends_a), (b, ends_b))
-        )
-        alike &= kinds & as_clear(room_a[:, None], room_b)
-    i, j = np.nonzero(alike)
+    i, j = here.alike(there)
     if not len(i):
         return []
-    turns = way_a[i] / way_b[j]
+    turns = here.way[i] / there.way[j]
     turns /= np.abs(turns)
-    shifts = places_a[i].mean(axis=1) - turns * places_b[j].mean(axis=1)
+    shifts = here.places[i].mean(axis=1) - turns * there.places[j].mean(axis=1)
     scores = _together(a, b, turns, shifts)
     return [
         Pose(float(shifts[k].real), float(shifts[k].imag), float(np.angle(turns[k])))
@@ -347,7 +332,7 @@ def _connected(ours: Chart, theirs: Chart, pairs: list[tuple[int, int]]) -> int:
         i, k = edge.a.vertex, edge.b.vertex
         if i not in of or k not in of or i == k:
             continue
-        limit = _LENGTH_M + _LENGTH_SHARE * edge.length
+        limit = leeway(edge.length)
         others = lengths.get(frozenset((of[i], of[k])), [])
         if any(abs(edge.length - other) < 2 * limit for other in others):
             links[i].add(k)

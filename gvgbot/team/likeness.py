@@ -3,15 +3,14 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gvgbot.autonomy.slam.recognition import match_bearings
 from gvgbot.geometry import Array, Pose, wrap_angle
 from gvgbot.team.chart import ChartVertex
 from gvgbot.team.laying import least_squares
 from gvgbot.team.side import Side
+from gvgbot.team.stretches import as_clear
 
-_CLEARANCE_M, _CLEARANCE_SHARE = 0.1, 0.03
 _BEARING_RAD = 0.7
 _BEYOND_M = 1.2  # of a vertex's disc, walls must agree
 _SECTORS, _THICK_M = 90, 0.3  # around a vertex; in each, walls farther behind the first are hidden
@@ -21,12 +20,6 @@ _LAID_OUT = 3  # rounds of laying walls on walls
 _HOPELESS_SHARE = 0.5  # if fewer of them lie twice as near, they need not be laid out further
 _LEAST_POINTS = 4  # of walls, to lay them on others
 UNLIKE_SHARE = 0.6  # of the walls around a vertex: one of both robots may not have seen all
-
-
-def as_clear(ours: Array, theirs: Array) -> NDArray[np.bool_]:
-    """Whether two clearances, m, may be those of one vertex in two charts."""
-    alike: NDArray[np.bool_] = np.abs(ours - theirs) <= _CLEARANCE_M + _CLEARANCE_SHARE * ours
-    return alike
 
 
 def likeness(a: Side, b: Side, i: int, j: int, pose: Pose) -> float:

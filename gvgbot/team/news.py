@@ -16,10 +16,13 @@ _WAY_M = 0.2  # from point to point of a way, as it travels
 _MOST_BYTES = 2_000_000  # of a message: more than a thousand vertices
 _MOST_M = 1e5  # from the origin of a map
 _MOST_WAY_M = 2e4  # of all edges together
+_MOST_OPEN = 1000  # departures without an edge: each is looked for in all other maps
+_ROUNDED = 1e-9  # share of its variances by which a covariance may be
 
 # Whoever tells may be broken, or no robot at all.
 Name = Annotated[str, msgspec.Meta(pattern=rf"^{ROBOT_NAME}\Z")]
 Number = Annotated[float, msgspec.Meta(ge=-_MOST_M, le=_MOST_M)]  # and one
+Length = Annotated[float, msgspec.Meta(ge=0.0, le=_MOST_M)]
 Radius = Annotated[float, msgspec.Meta(gt=0.0, le=10.0)]
 Triple = tuple[Number, Number, Number]  # a pose: x, y, m, and theta, rad
 
@@ -30,10 +33,10 @@ class TeamVertex(msgspec.Struct, frozen=True, array_like=True):
     id: Annotated[int, msgspec.Meta(ge=0)]
     position: tuple[Number, Number]  # m, the robot's map frame
     covariance: tuple[Number, Number, Number, Number]  # of the position, 2x2 row-major, m^2
-    clearance: Number  # m
+    clearance: Length  # m
     # key, bearing, edge, blocked
     departures: Annotated[
-        tuple[tuple[int, Number, int | None, bool], ...], msgspec.Meta(max_length=64)
+        tuple[tuple[int, Number, int | None, bool], ...], msgspec.Meta(max_length=16)
     ]
     walls: bytes  # little-endian int16 pairs x, y, cm, from the vertex
 
@@ -44,8 +47,8 @@ class TeamEdge(msgspec.Struct, frozen=True, array_like=True):
     id: int
     a: tuple[int, int]  # vertex, key
     b: tuple[int, int]
-    length: Number  # m
-    min_clearance: Number  # m
+    length: Length  # m
+    min_clearance: Length  # m
     points: bytes  # little-endian float32 pairs x, y, m, map frame
     traversed: bool = False
 
@@ -53,7 +56,7 @@ class TeamEdge(msgspec.Struct, frozen=True, array_like=True):
 class TeamWay(msgspec.Struct, frozen=True, array_like=True):
     """A part of an edge that was driven."""
 
-    min_clearance: Number  # m
+    min_clearance: Length  # m
     points: bytes  # little-endian float32 pairs x, y, m, map frame
 
 
@@ -154,21 +157,29 @@ def _checked_course(course: Course) -> Course:
 
 
 def _checked(news: News, chart: Chart) -> News:
-    for edge in chart.edges.values():
-        for end in (edge.a, edge.b):
-            vertex = chart.vertices.get(end.vertex)
-            if vertex is None or all(d.key != end.key for d in vertex.departures):
-                raise GvgbotError(f"damaged news of a team: edge {edge.id} ends nowhere")
-    if any(
-        departure.edge is not None and departure.edge not in chart.edges
-        for vertex in chart.vertices.values()
-        for departure in vertex.departures
-    ):
-        raise GvgbotError("damaged news of a team: a departure has an edge that is not told")
+    """The news. Raises ValueError if they are of no map that a robot can have."""
+    ends = [(end, edge.id) for edge in chart.edges.values() for end in (edge.a, edge.b)]
+    departures = [(v, d) for v in chart.vertices.values() for d in v.departures]
+    leaving = {HalfEdgeId(v.id, d.key): d.edge for v, d in departures}
+    followed = {end: edge for end, edge in leaving.items() if edge is not None}
+    if followed != dict(ends) or len(followed) != len(ends):
+        raise ValueError("edges and departures do not belong together")
+    if len(leaving) != len(departures) or len(leaving) - len(followed) > _MOST_OPEN:
+        raise ValueError("more departures than there can be")
+    if not all(_is_covariance(vertex.covariance) for vertex in chart.vertices.values()):
+        raise ValueError("a covariance is none")
     lines = [e.polyline for e in chart.edges.values()] + [way.polyline for way in chart.ways]
     if sum(length_of(line) for line in lines) > _MOST_WAY_M:
-        raise GvgbotError("damaged news of a team: longer ways than there can be")
+        raise ValueError("longer ways than there can be")
     return news
+
+
+def _is_covariance(matrix: Array) -> bool:
+    """Whether it (2, 2) is symmetric and positive semidefinite, but for rounding."""
+    (xx, xy), (yx, yy) = matrix.tolist()
+    slack = _ROUNDED * (abs(xx) + abs(yy))
+    is_symmetric = abs(xy - yx) <= slack
+    return is_symmetric and bool(np.linalg.eigvalsh(matrix)[0] >= -slack)
 
 
 def _is_near(points: Array) -> bool:

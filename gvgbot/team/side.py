@@ -1,18 +1,17 @@
 """A chart as it is compared with another one."""
 
+from collections import defaultdict
 from functools import cached_property
 from itertools import chain
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from gvgbot.geometry import Array, resampled
 from gvgbot.team.chart import Chart, thinned
+from gvgbot.team.stretches import Stretches
 
 SPACING_M = 0.2  # of points along an edge, where it is tested for walls
-
-Complex = NDArray[np.complex128]
 
 
 class Side:
@@ -56,13 +55,22 @@ class Side:
         return cKDTree(self.ways[0])
 
     @cached_property
-    def bases(self) -> tuple[NDArray[np.intp], Complex, Array]:
-        """Stretches over one edge or two: vertices (N, 2), their places, metres driven (N,)."""
+    def stretches(self) -> Stretches:
+        """Those over one edge or two."""
         index = {key: i for i, key in enumerate(self.ids)}
         one = [(index[e.a.vertex], index[e.b.vertex], e.length) for e in self.chart.edges.values()]
         both = one + [(b, a, metres) for a, b, metres in one]
-        two = [(a, d, m + n) for a, b, m in both for c, d, n in both if b == c and a < d]
+        beyond = defaultdict[int, list[tuple[int, float]]](list)
+        for a, b, metres in both:
+            beyond[a].append((b, metres))
+        two = [(a, d, m + n) for a, b, m in both for d, n in beyond[b] if a < d]
         rows = [(a, b, m) for a, b, m in chain(one, two) if a != b]
         ends = np.array([(a, b) for a, b, _ in rows], np.intp).reshape(-1, 2)
-        metres = np.array([m for _, _, m in rows], np.float64)
-        return ends, (self.points[:, 0] + 1j * self.points[:, 1])[ends], metres
+        clearance = np.array([vertex.clearance for vertex in self.vertices])
+        return Stretches(
+            ends,
+            (self.points[:, 0] + 1j * self.points[:, 1])[ends],
+            np.array([m for _, _, m in rows], np.float64),
+            self.is_meetpoint[ends],
+            clearance[ends],
+        )

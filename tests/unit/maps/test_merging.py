@@ -73,6 +73,18 @@ def test_two_halves_that_overlap_make_the_whole(off: Pose, within: float) -> Non
         assert np.hypot(*(places - true).T).min() < within
 
 
+@pytest.mark.parametrize("is_first", [True, False])
+def test_an_edge_of_both_has_been_driven_as_often_as_by_both_and_is_as_narrow_as_either_felt(
+    is_first: bool,
+) -> None:
+    saw, drove = seen({0, 1, 3, 4}), seen({0, 1, 3, 4}, shift=40)
+    edges = (replace(e, traversals=3, min_clearance=0.6) for e in drove.edges)
+    drove = replace(drove, edges=tuple(edges))
+    saw = replace(saw, edges=tuple(replace(e, traversals=1) for e in saw.edges))
+    both = merged(saw, drove, Pose()) if is_first else merged(drove, saw, Pose())
+    assert [(e.traversals, e.min_clearance) for e in both.edges] == 4 * [(4, 0.6)]
+
+
 def positions(graph: RouteGraph) -> set[tuple[float, float]]:
     return {(round(v.position[0], 6), round(v.position[1], 6)) for v in graph.vertices}
 

@@ -14,6 +14,7 @@ from gvgbot.team.news import (
     Course,
     Frame,
     News,
+    TeamVertex,
     TeamWay,
     decode,
     encode,
@@ -104,8 +105,48 @@ def test_an_edge_that_ends_nowhere_is_refused() -> None:
     lost = told.edges[0].a[0]
     others = tuple(vertex for vertex in told.vertices if vertex.id != lost)
     damaged = msgspec.structs.replace(told, vertices=others)
-    with pytest.raises(GvgbotError, match="ends nowhere"):
+    with pytest.raises(GvgbotError, match="do not belong together"):
         decode(encode(damaged))
+
+
+def test_two_edges_that_leave_by_one_departure_are_refused() -> None:
+    told = news(CHART)
+    twice = msgspec.structs.replace(told.edges[0], id=1000)
+    with pytest.raises(GvgbotError, match="do not belong together"):
+        decode(encode(msgspec.structs.replace(told, edges=(*told.edges, twice))))
+
+
+def test_a_departure_that_is_told_twice_is_refused() -> None:
+    told = news(CHART)
+    first, *rest = told.vertices
+    first = msgspec.structs.replace(first, departures=first.departures + first.departures[:1])
+    with pytest.raises(GvgbotError, match="more departures"):
+        decode(encode(msgspec.structs.replace(told, vertices=(first, *rest))))
+
+
+def test_more_open_departures_than_a_building_has_are_refused() -> None:
+    """Each is looked for in the maps of all others, while the robot drives."""
+    hub = tuple((key, 0.3 * key, None, False) for key in range(16))
+    walls = news(CHART).vertices[0].walls
+    star = tuple(
+        TeamVertex(k, (float(k), 0.0), (1.0, 0.0, 0.0, 1.0), 1.0, hub, walls) for k in range(63)
+    )
+    told = msgspec.structs.replace(news(CHART), vertices=star, edges=(), ways=())
+    with pytest.raises(GvgbotError, match="more departures"):
+        decode(encode(told))
+
+
+@pytest.mark.parametrize(
+    "covariance", [(-1e-6, 0.0, 0.0, 1.0), (1.0, 2.0, 2.0, 1.0), (1.0, 0.5, -0.5, 1.0)]
+)
+def test_a_covariance_that_is_none_is_refused(
+    covariance: tuple[float, float, float, float],
+) -> None:
+    """It would be inverted when maps are joined."""
+    told = news(CHART)
+    vertex = msgspec.structs.replace(told.vertices[0], covariance=covariance)
+    with pytest.raises(GvgbotError, match="covariance"):
+        decode(encode(msgspec.structs.replace(told, vertices=(vertex, *told.vertices[1:]))))
 
 
 @pytest.mark.parametrize("number", [math.nan, math.inf, -1e9])
