@@ -19,6 +19,7 @@ from gvgbot.autonomy.topology import piece_of
 from gvgbot.autonomy.views import View
 from gvgbot.autonomy.whereabouts import Situation, Whereabouts
 
+_UNSEEN = "the way on is not to be seen"
 _SECOND = 1  # try, in the end, of what was given up: things may have changed
 
 
@@ -103,7 +104,11 @@ class Pursuit:
 
     def _see_no_more(self, view: View, here: Situation) -> None:
         """Go another way, or give up what is ahead: of what no way leads to, what is nearest."""
-        if self._turns_round(view) or self._closes_unseen_edge(view, here):
+        if (
+            self._turns_round(view)
+            or self._returns_to_vertex(view, here)
+            or self._closes_unseen_edge(view, here)
+        ):
             return
         if self.target is None and self._scouting.is_on:
             self.target = self._frontier_beside(view)
@@ -122,6 +127,17 @@ class Pursuit:
             self._events.append(Recovery(view.stamp, "turn round", "this way leads nowhere"))
         return self._has_turned
 
+    def _returns_to_vertex(self, view: View, here: Situation) -> bool:
+        """Go back to the vertex where the way goes on, once, over where the robot came from there.
+
+        A door that it just fits through may seem too narrow from another side. Whether it does.
+        """
+        departures = None if self.target is None else here.departures_to(self.target)
+        if departures is None or departures[0] == self.where.on_edge:
+            return False
+        self._path_following.renew()
+        return self._retraces(view, {departures[0].vertex}, _UNSEEN)
+
     def _closes_unseen_edge(self, view: View, here: Situation) -> bool:
         """Close the edge by which the way goes on here if that is not to be seen; whether it was.
 
@@ -134,8 +150,7 @@ class Pursuit:
         self.target = None
         self._path_following.renew()
         self._obstructions.close(self._mapper.graph, [edge.a, edge.b], view.stamp)
-        reason = "the way on is not to be seen"
-        self._events.append(Recovery(view.stamp, "try another way", reason))
+        self._events.append(Recovery(view.stamp, "try another way", _UNSEEN))
         return True
 
     def _begins_to_retrace(self, view: View) -> bool:
@@ -149,9 +164,13 @@ class Pursuit:
         self._mapper.forget_strays(view)
         if len(vertices) < before:
             self._examination.end()
-        if not here or not self._retracing.begin(vertices.keys() - here):
-            return False
         reason = "no known way leads to a part of the map"
+        return bool(here) and self._retraces(view, vertices.keys() - here, reason)
+
+    def _retraces(self, view: View, lost: set[int], reason: str) -> bool:
+        """Go back to where one of these vertices was near last; whether it does."""
+        if not self._retracing.begin(lost):
+            return False
         self._events.append(Recovery(view.stamp, "retrace the way", reason))
         self._progress.wait(view.stamp)
         return True

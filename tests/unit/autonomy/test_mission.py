@@ -429,6 +429,33 @@ def test_who_has_come_on_looks_around_twice_again_before_a_frontier_is_given_up(
     assert did == ["drive on", *["look around"] * 4]
 
 
+def test_who_came_in_by_a_gap_that_is_not_to_be_seen_from_inside_goes_back_by_it_at_once() -> None:
+    """A side street that ends, and is narrow where it begins."""
+    ways: dict[int, tuple[int, int, list[Point]]] = {10: (1, 2, []), 11: (2, 3, []), 12: (2, 4, [])}
+    places = {1: (-3.0, 0.0), 2: (3.0, 0.0), 3: (8.0, 0.0), 4: (3.0, -4.0)}
+    tee = drawn(places, ways, unseen={1: math.pi, 3: 0.0})
+    inside = drawn({5: (3.0, -2.5), 4: (3.0, -4.0)}, {12: (5, 4, [])}, unseen={5: math.pi / 2})
+    robot = Robot()
+    robot.stand(tee, 8)
+    robot.drive(tee, (0.0, 0.0), (3.0, 0.0), (3.0, -3.5))
+    begin, order = robot.stamp, robot.look(inside)
+    while not any("retrace" in str(event) for event in robot.said(Recovery)):
+        assert robot.stamp < begin + 60.0
+        if isinstance(order, Drive):
+            robot.drive(inside, (robot.pose.x, robot.pose.y), end_of(order))
+        order = robot.look(inside)
+    order = robot.look(inside)
+    while end_of(order)[1] < -0.5:
+        x, y = end_of(order)
+        assert x == pytest.approx(3.0, abs=0.05)
+        order = robot.drive(inside, (robot.pose.x, robot.pose.y), (x, y))
+    done = [(e.action, e.reason) for e in robot.events if isinstance(e, Recovery)]
+    assert ("retrace the way", "the way on is not to be seen") in done
+    assert {"try another way", "give up a frontier"}.isdisjoint(dict(done))
+    robot.drive(tee, (robot.pose.x, robot.pose.y), (3.0, 0.0), (2.25, 0.0))
+    assert end_of(robot.look(tee)) in {(8.0, 0.0), (-3.0, 0.0)}
+
+
 ALL_WAYS: dict[int, tuple[int, int, list[Point]]] = {
     **{10: (1, 2, []), 11: (2, 3, []), 12: (3, 4, []), 13: (4, 5, [])},
     **{14: (2, 6, []), 15: (3, 7, []), 16: (4, 8, [])},
