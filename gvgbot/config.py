@@ -85,13 +85,28 @@ class Config:
     foxglove: FoxgloveConfig = field(default_factory=FoxgloveConfig)
 
     def __post_init__(self) -> None:
-        """Raises ValueError if the robot would take the address of the router of ROS."""
+        """Raises ValueError for parts that do not go together."""
+        self._leave_the_router_its_address()
+        self._obey_the_guard_at_once()
+
+    def _leave_the_router_its_address(self) -> None:
         taken = set(self.telemetry.listen) & set(self.ros2.connect)
         if self.ros2.enabled and self.telemetry.enabled and taken:
             raise ValueError(
                 f"telemetry.listen and ros2.connect both have {min(taken)}, where rmw_zenohd is: "
                 "set telemetry.listen=[tcp/127.0.0.1:7448], for example"
             )
+
+    def _obey_the_guard_at_once(self) -> None:
+        """The guard has ramped its twists; a gentler base would drive on, or on another arc."""
+        for key in ("max_braking_mps2", "max_angular_acceleration_radps2"):
+            base, planned = getattr(self.base, key), getattr(self.robot.limits, key)
+            if base is not None and base < planned:
+                raise ValueError(
+                    f"base.{key} = {base:g} is less than robot.limits.{key} = {planned:g}, by "
+                    "which the robot keeps clear of obstacles: "
+                    f"set robot.limits.{key} to {base:g} or less"
+                )
 
 
 def load_config(path: Path | None = None, overrides: Sequence[str] = ()) -> Config:

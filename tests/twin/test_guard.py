@@ -21,14 +21,14 @@ DEAD_TIME_S = 0.2  # of a Kobuki's firmware 1.2.0, from a command to the first c
 LONG_ENOUGH_S = 60.0  # to cross the hall
 
 
-async def drive_at_a_wall(model: str, speed: float) -> tuple[float, int]:
+async def drive_at_a_wall(model: str, speed: float, *more: str) -> tuple[float, int]:
     """The room that was left before the wall, m, and how often the robot touched it."""
     settings = {
         "twin.world": "hall",
         "twin.laser.model": model,
         "twin.base.dead_time_s": DEAD_TIME_S,
     }
-    config = load_config(None, [f"{key}={value}" for key, value in settings.items()])
+    config = load_config(None, [f"{key}={value}" for key, value in settings.items()] + list(more))
     clock, place = LoopClock(), open_place(config)
     simulation = Simulation(config, place, clock)
     devices = Devices(Links(config, clock, simulation))
@@ -65,5 +65,12 @@ async def drive_at_a_wall(model: str, speed: float) -> tuple[float, int]:
 @pytest.mark.parametrize("speed", [0.4, 0.7])
 def test_the_robot_stops_before_a_wall_though_the_base_obeys_late(model: str, speed: float) -> None:
     room, contacts = run_in_virtual_time(drive_at_a_wall(model, speed))
+    assert contacts == 0
+    assert 0.0 < room < 0.1
+
+
+def test_the_robot_stops_before_a_wall_though_the_base_brakes_no_harder_than_it_must() -> None:
+    gentle = [f"{part}.max_braking_mps2=0.3" for part in ("robot.limits", "base")]
+    room, contacts = run_in_virtual_time(drive_at_a_wall("UTM-30LX", 0.7, *gentle))
     assert contacts == 0
     assert 0.0 < room < 0.1

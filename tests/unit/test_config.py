@@ -57,6 +57,20 @@ def test_a_name_that_cannot_be_part_of_a_topic_is_refused(name: str) -> None:
         load_config(None, [f"robot.name='{name}'"])
 
 
+@pytest.mark.parametrize("key", ["max_braking_mps2", "max_angular_acceleration_radps2"])
+def test_a_base_that_obeys_the_guard_late_is_refused(key: str) -> None:
+    planned, gentle = getattr(load_config().robot.limits, key), 0.3
+    with pytest.raises(ConfigError) as refused:
+        load_config(None, [f"base.{key}={gentle}"])
+    line = str(refused.value)
+    assert f"base.{key} = {gentle} " in line
+    assert f"robot.limits.{key} = {planned:g}," in line
+    assert f"set robot.limits.{key} to {gentle} or less" in line
+    assert "\n" not in line
+    for overrides in ([f"robot.limits.{key}={gentle}", f"base.{key}={gentle}"], [f"base.{key}=4"]):
+        load_config(None, overrides)
+
+
 def test_an_unknown_odometry_profile_lists_the_known_ones() -> None:
     with pytest.raises(ConfigError, match="must be one of perfect, kobuki, worn, wheels"):
         load_config(None, ["twin.base.odometry=ideal"])

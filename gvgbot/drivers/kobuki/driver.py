@@ -52,8 +52,9 @@ class KobukiConfig:
     # a faster turn is slowed down on its arc
     max_turn_rate_radps: Annotated[float, Range(0.01, math.pi)] = math.pi
     max_acceleration_mps2: Annotated[float, Range(0.05, 100.0)] | None = None  # None: no ramp
-    max_braking_mps2: Annotated[float, Range(0.05, 100.0)] | None = None  # a stop is never put off
-    # None: no ramp
+    # None: no ramp; not below robot.limits.max_braking_mps2, and a stop is never put off
+    max_braking_mps2: Annotated[float, Range(0.05, 100.0)] | None = None
+    # None: no ramp; not below that of robot.limits
     max_angular_acceleration_radps2: Annotated[float, Range(0.1, 1000.0)] | None = None
     deadman_s: Annotated[float, Range(0.05, 2.0)] = 0.5  # without drive(): stop
     silence_stop_s: Annotated[float, Range(0.05, 2.0)] = 0.5  # without feedback: stop

@@ -32,15 +32,15 @@ def slowed(twist: Twist, max_speed: float, max_turn_rate: float, wheel_base: flo
 def ramped(twist: Twist, last: Twist, elapsed: float, limits: Accelerations) -> Twist:
     """As near to the twist as the accelerations allow, `elapsed` seconds after the last one.
 
-    A standstill is never put off.
+    A standstill is never put off; neither is going no further, be it to turn or to go back.
     """
     if twist == STANDSTILL:
         return twist
     elapsed = min(max(elapsed, 0.0), _LONGEST_STEP)
-    is_slower = abs(twist.linear) < abs(last.linear) or twist.linear * last.linear < 0.0
-    change = (limits.fall if is_slower else limits.rise) * elapsed
+    start = last.linear if twist.linear * last.linear > 0.0 else 0.0
+    change = (limits.fall if abs(twist.linear) < abs(start) else limits.rise) * elapsed
     turn = limits.turn * elapsed
     return Twist(
-        min(max(twist.linear, last.linear - change), last.linear + change),
+        min(max(twist.linear, start - change), start + change),
         min(max(twist.angular, last.angular - turn), last.angular + turn),
     )

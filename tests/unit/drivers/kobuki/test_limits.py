@@ -53,6 +53,17 @@ def test_a_standstill_is_never_put_off(last: Twist) -> None:
     assert ramped(STANDSTILL, last, 0.0, LIMITS) == STANDSTILL
 
 
+@given(twists, st.floats(-6.0, 6.0), st.floats(-2.0, 0.0), st.floats(0.0, 1.0))
+def test_going_no_further_is_never_put_off(
+    last: Twist, turn: float, back: float, elapsed: float
+) -> None:
+    ahead = Twist(abs(last.linear), last.angular)
+    assert ramped(Twist(0.0, turn), ahead, elapsed, LIMITS).linear == 0.0
+    assert ramped(Twist(back, turn), ahead, elapsed, LIMITS).linear <= 0.0
+    astern = Twist(-ahead.linear, last.angular)
+    assert ramped(Twist(-back, turn), astern, elapsed, LIMITS).linear >= 0.0
+
+
 @given(twists, twists, st.floats(0.001, 10.0))
 def test_without_limits_every_twist_is_reached_at_once(
     twist: Twist, last: Twist, elapsed: float
@@ -65,6 +76,7 @@ def test_a_ramp_never_overshoots_nor_jumps_after_a_pause(
     twist: Twist, last: Twist, elapsed: float
 ) -> None:
     got = ramped(twist, last, elapsed, LIMITS)
-    if twist != STANDSTILL:
+    if twist.linear * last.linear > 0.0:
         assert abs(got.linear - last.linear) <= 0.06 + 1e-12
+    if twist != STANDSTILL:
         assert min(last.linear, twist.linear) <= got.linear <= max(last.linear, twist.linear)
