@@ -84,7 +84,7 @@ def open_port(path: str, baud: int) -> serial.Serial:
     """
     try:
         return serial.Serial(path, baud, timeout=0, write_timeout=0, exclusive=True)
-    except (serial.SerialException, OSError, ValueError) as error:
+    except (serial.SerialException, OSError, ValueError, termios.error) as error:
         raise DeviceLost(f"cannot open {path}: {_obstacle(error)}") from error
 
 
@@ -186,7 +186,7 @@ def _close(port: serial.Serial) -> None:
 
 def _obstacle(error: Exception) -> str:
     """Why a port does not open, in the words of the system, and what to do about it."""
-    match getattr(error, "errno", None):
+    match _number(error):
         case None:
             return f"{error}: check its name"
         case errno.EAGAIN | errno.EBUSY:
@@ -195,8 +195,18 @@ def _obstacle(error: Exception) -> str:
             return "permission denied: join the group dialout"
         case errno.ENOENT | errno.ENODEV | errno.ENXIO:
             return "there is no such port: plug it in"
+        case errno.EIO:
+            return "it has just gone: plug it in again"
         case number:
             return f"{os.strerror(number)}: check its name"
+
+
+def _number(error: Exception) -> int | None:
+    """The system's number of an error; pyserial passes on that of a terminal as text only."""
+    terminal = error if isinstance(error, termios.error) else error.__context__
+    if isinstance(terminal, termios.error):
+        return int(terminal.args[0])
+    return getattr(error, "errno", None)
 
 
 class TwinDevice(Protocol):

@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import os
+import termios
 import threading
 import tty
 from collections.abc import Awaitable, Callable, Iterator
@@ -89,6 +90,24 @@ def test_a_port_that_is_unplugged_while_its_rate_is_searched_is_gone() -> None:
         stream.close()
 
     asyncio.run(story())
+
+
+@pytest.mark.parametrize("step", ["tcgetattr", "tcsetattr", "tcflush"])
+def test_a_port_that_is_unplugged_while_it_is_opened_has_gone(
+    step: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    device, client = os.openpty()
+    path = os.ttyname(client)
+    os.close(client)
+    real = getattr(termios, step)
+
+    def too_late(*arguments: object) -> object:
+        os.close(device)
+        return real(*arguments)
+
+    monkeypatch.setattr(termios, step, too_late)
+    with pytest.raises(DeviceLost, match=f"cannot open {path}: it has just gone: plug it in"):
+        open_port(path, 115200)
 
 
 class Stuffed(serial.Serial):
