@@ -11,7 +11,7 @@ from gvgbot.drivers.hokuyo.driver import HokuyoLaser, LinkStatistics
 from gvgbot.drivers.kobuki.driver import STANDSTILL_FRAME, KobukiBase
 from gvgbot.drivers.kobuki.feedback import FeedbackReader
 from gvgbot.drivers.tapped import Tap, TappedStream
-from gvgbot.drivers.tcp import SCHEME, TcpStream
+from gvgbot.drivers.tcp import SCHEME, open_tcp
 from gvgbot.drivers.transport import ByteStream, SerialStream, open_serial
 from gvgbot.errors import DeviceLost
 from gvgbot.hal.devices import Base, Laser
@@ -141,7 +141,8 @@ class Devices:
 
 async def _open_port(name: str, port: str, baud: int) -> tuple[ByteStream, Close]:
     try:
-        stream = TcpStream(port) if port.startswith(SCHEME) else await open_serial(port, baud)
+        is_tcp = port.startswith(SCHEME)
+        stream = await open_tcp(port) if is_tcp else await open_serial(port, baud)
     except DeviceLost as error:
         if "Inappropriate ioctl" in str(error):  # what the system says of any other file
             raise DeviceLost(f"{port} is no serial port: set {name}.port") from error

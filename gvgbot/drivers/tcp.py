@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import errno
 import os
+import re
 import socket
 
 from gvgbot.errors import DeviceLost
@@ -12,6 +13,7 @@ SCHEME = "tcp://"
 CONNECT_TIMEOUT = 3.0  # s
 UNSENT_LIMIT = 65536  # bytes; a device that takes no more than this is gone
 _LAST_PORT = 65535
+_NUMBERS = re.compile(r"\[Errno (\d+)\]")  # of what went wrong at each of several addresses
 
 
 def parse_address(port: str) -> tuple[str, int]:
@@ -40,21 +42,45 @@ def _is_number(digits: str) -> bool:
     return digits.isdecimal() and len(digits) <= len(str(_LAST_PORT)) and int(digits) <= _LAST_PORT
 
 
+async def open_tcp(port: str) -> "TcpStream":
+    """A stream on a connection that may take its time to be made. Raises DeviceLost."""
+    stream = TcpStream(port)
+    try:
+        await stream.connect()
+    except BaseException:
+        stream.close()
+        raise
+    return stream
+
+
 class TcpStream:
-    """A connection to a device. The first `read` makes it, or tells why it cannot be made."""
+    """A connection to a device. `connect` or the first `read` makes it, or tells why it cannot."""
 
     def __init__(self, port: str) -> None:
         """`port` is tcp://host:number. Raises DeviceLost for anything else."""
         self._name = port
         self._host, self._number = parse_address(port)
-        self._reader: asyncio.StreamReader | None = None
+        self._connecting: asyncio.Task[asyncio.StreamReader] | None = None
         self._writer: asyncio.StreamWriter | None = None
         self._unsent = bytearray()
         self._closed = False
 
+    async def connect(self) -> asyncio.StreamReader:
+        """Wait for the connection, which is made on when nobody waits. Raises DeviceLost."""
+        if self._closed:
+            raise self._end()
+        if self._connecting is None:
+            self._connecting = asyncio.get_running_loop().create_task(self._connect())
+            self._connecting.add_done_callback(_heed)
+        if not self._connecting.done():
+            await asyncio.wait([self._connecting])
+        if self._connecting.cancelled():
+            raise self._end()
+        return self._connecting.result()
+
     async def read(self) -> bytes:
         """Whatever has arrived. Raises DeviceLost when there is no connection any more."""
-        reader = self._reader or await self._connect()
+        reader = await self.connect()
         try:
             data = await reader.read(65536)
         except OSError as error:
@@ -66,7 +92,7 @@ class TcpStream:
     def write(self, data: bytes) -> None:
         """Send without waiting. Raises DeviceLost when there is no connection any more."""
         if self._closed:
-            raise DeviceLost(f"{self._name}: the connection is closed")
+            raise self._end()
         if self._writer is None:
             self._unsent += data
             return
@@ -77,6 +103,8 @@ class TcpStream:
     def close(self) -> None:
         """End the connection; closing twice is harmless."""
         self._closed = True
+        if self._connecting is not None:
+            self._connecting.cancel()
         if self._writer is not None:
             with contextlib.suppress(OSError, RuntimeError):
                 self._writer.close()
@@ -84,7 +112,7 @@ class TcpStream:
     async def _connect(self) -> asyncio.StreamReader:
         try:
             async with asyncio.timeout(CONNECT_TIMEOUT):
-                self._reader, self._writer = await asyncio.open_connection(self._host, self._number)
+                reader, self._writer = await asyncio.open_connection(self._host, self._number)
         except (OSError, TimeoutError) as error:
             raise self._lost(error) from error
         connection = self._writer.get_extra_info("socket")
@@ -92,19 +120,30 @@ class TcpStream:
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
         self._writer.write(bytes(self._unsent))
         self._unsent.clear()
-        return self._reader
+        return reader
 
-    def _lost(self, error: Exception) -> DeviceLost:
-        number = getattr(error, "errno", None)
-        if isinstance(error, TimeoutError) or number is None:
-            return DeviceLost(f"{self._name} does not answer: check address, cable and power")
-        return DeviceLost(f"{self._name}: {_reason(error, number)}")
+    def _lost(self, error: OSError) -> DeviceLost:
+        return DeviceLost(f"{self._name} {_reason(error)}: check address, cable and power")
+
+    def _end(self) -> DeviceLost:
+        return DeviceLost(f"{self._name}: the connection is closed")
 
 
-def _reason(error: Exception, number: int) -> str:
+def _reason(error: OSError) -> str:
     if isinstance(error, socket.gaierror):  # with numbers of its own
-        return str(error.strerror)
-    return "refuses the connection" if number == errno.ECONNREFUSED else os.strerror(number)
+        return f"is not found: {error.strerror}"
+    numbers = [error.errno] if error.errno else [int(one) for one in _NUMBERS.findall(str(error))]
+    if errno.ECONNREFUSED in numbers:
+        return "refuses the connection"
+    if isinstance(error, TimeoutError) or not numbers:
+        return "does not answer"
+    return f"fails: {os.strerror(numbers[0])}"
+
+
+def _heed(connecting: asyncio.Task[asyncio.StreamReader]) -> None:
+    """Take note of the end, of which a later reader is told, if there is one."""
+    if not connecting.cancelled():
+        connecting.exception()
 
 
 def _waiting(writer: asyncio.StreamWriter) -> int:
