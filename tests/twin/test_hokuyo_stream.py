@@ -164,6 +164,17 @@ def test_a_cut_reply_costs_one_time_out_and_not_two() -> None:
     on_bench(CutsReply(HokuyoTwin(PERFECT, World(), seed=19), b"VV\n"), scenario)
 
 
+def test_a_laser_that_is_in_time_mode_already_is_synchronised() -> None:
+    """It is when its reply to the first TM0 got lost, and then it answers 02 to the second."""
+
+    async def scenario(bench: Bench) -> None:
+        await bench.scans(1)
+        assert bench.laser.link.unanswered == 1
+        assert bench.laser.synchronisation is not None
+
+    on_bench(CutsReply(HokuyoTwin(PERFECT, World(), seed=20), b"TM0\n"), scenario)
+
+
 def test_identity_and_parameters_are_those_of_the_laser() -> None:
     async def scenario(bench: Bench) -> None:
         await bench.scans(1)

@@ -38,6 +38,7 @@ TIME_SAMPLES = 12  # of the laser's clock
 CONVERTER_BEAT = 0.016  # s; a serial converter's usual latency timer
 GOLDEN = 0.618034  # its multiples spread evenly over a beat
 DENIED = "10"  # in this state; of TM0: the laser still measures
+ALREADY_ON = "02"  # what a laser says to TM0 when its reply to an earlier one was lost
 LOST_STOPS = 3  # in a row; a stop that comes as a scan begins can be lost
 UNKNOWN_COMMAND = frozenset({"0C", "0D", "0E", "0F"})  # firmware generations disagree on which
 UNSTABLE = "0M"  # in place of a scan: the motor is not at its speed
@@ -240,6 +241,8 @@ class HokuyoLaser:
             try:
                 await self._dialogue.ask("TM0")
             except Refusal as refusal:
+                if refusal.status == ALREADY_ON:
+                    return
                 if refusal.status != DENIED:
                     raise
                 await quiet(self._dialogue, patience=2 * self._config.reply_timeout_s)
