@@ -27,9 +27,9 @@ from gvgbot.drivers.kobuki.wheel_odometry import (
     advance_odometry,
     doubt,
     start_odometry,
+    turned,
     wheel_travels,
 )
-from gvgbot.geometry import wrap_angle
 from gvgbot.hal.messages import Battery, Contact, DockBeam, Docking, Odometry
 
 FRAME_PERIOD = 0.02  # s, of the base's stream
@@ -275,9 +275,9 @@ class FeedbackReader:
     def _is_absurd(self, before: WheelReading, after: WheelReading, dt: float) -> bool:
         """Whether no base gets from one reading to the other in dt seconds."""
         travels = wheel_travels(before, after, self._geometry.tick)
-        turn = abs(wrap_angle(after.angle - before.angle))
+        turn = turned(before, after, self._heading, self._geometry)
         return max(map(abs, travels)) > max(_JUMP_M, _JUMP_SPEED * dt) or (
-            turn > max(_JUMP_TURN, _JUMP_TURN_RATE * dt)
+            abs(turn) > max(_JUMP_TURN, _JUMP_TURN_RATE * dt)
         )
 
 

@@ -68,8 +68,8 @@ def advance_odometry(
     The heading's change is the gyro's or the wheels', and the way goes along the mean heading.
     """
     left, right = wheel_travels(state.reading, reading, geometry.tick)
-    by_wheels = (right - left) / geometry.wheel_base
-    by_gyro = wrap_angle(reading.angle - state.reading.angle)
+    by_wheels = turned(state.reading, reading, "wheels", geometry)
+    by_gyro = turned(state.reading, reading, "gyro", geometry)
     turn = by_gyro if heading == "gyro" else by_wheels
     travel = (left + right) / 2
     rate = reading.rate if heading == "gyro" else by_wheels / dt
@@ -87,6 +87,16 @@ def wheel_travels(
         tick * _signed(after.left_encoder - before.left_encoder),
         tick * _signed(after.right_encoder - before.right_encoder),
     )
+
+
+def turned(
+    before: WheelReading, after: WheelReading, heading: Heading, geometry: DriveGeometry = KOBUKI
+) -> float:
+    """How far the base has turned, rad: by the gyro, in (-π, π], or by the wheels."""
+    if heading == "gyro":
+        return wrap_angle(after.angle - before.angle)
+    left, right = wheel_travels(before, after, geometry.tick)
+    return (right - left) / geometry.wheel_base
 
 
 def doubt(state: WheelOdometry) -> WheelOdometry:

@@ -293,6 +293,31 @@ def test_a_single_absurd_reading_moves_nothing() -> None:
     assert bench.base.statistics.doubted == 1
 
 
+def test_a_base_that_goes_by_its_wheels_may_have_any_gyro() -> None:
+    async def script(bench: Bench) -> None:
+        for k in range(10):
+            await bench.say(core(k, -60 * k, 60 * k), Inertia(9000 * (k % 4) - 18_000, 0))
+        found.append(await bench.base.next_odometry())
+
+    found: list[Odometry] = []
+    bench = play(script, KobukiConfig(heading="wheels"))
+    assert found[0].odom_base.theta == pytest.approx(9 * 120 / TICKS_PER_M / 0.23)
+    assert (found[0].breaks, bench.base.statistics.doubted) == (0, 0)
+
+
+def test_a_wheel_that_jumps_is_not_believed_to_turn_the_base() -> None:
+    async def script(bench: Bench) -> None:
+        for k in range(10):
+            jump = 1500 if k == 5 else 0  # 0.13 m, by which no base turns within a frame
+            await bench.say(core(k, 60 * k, 60 * k + jump), Inertia(0, 0))
+        found.append(await bench.base.next_odometry())
+
+    found: list[Odometry] = []
+    bench = play(script, KobukiConfig(heading="wheels"))
+    assert found[0].odom_base.theta == pytest.approx(0.0, abs=1e-9)
+    assert bench.base.statistics.doubted == 1
+
+
 def test_encoders_that_start_anew_do_not_move_the_robot_but_count_from_there() -> None:
     """Of the 9 steps after the jump, as many as it takes to believe it may be lost."""
     steps = [core(k, 60 * k, 60 * k) for k in range(10)]
