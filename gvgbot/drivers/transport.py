@@ -3,9 +3,12 @@
 import asyncio
 import contextlib
 import errno
+import fcntl
 import math
 import os
+import sys
 import termios
+from array import array
 from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol
@@ -15,6 +18,10 @@ import serial
 from gvgbot.clock import Clock
 from gvgbot.drivers.deadman import Deadman
 from gvgbot.errors import DeviceLost
+
+_TCGETS2 = 0x802C542A  # linux/termios.h: what termios has no word for, rates in bit/s
+_TERMIOS2_SIZE = 44  # bytes, of which the last four are the rate of sending
+_RATE_TOLERANCE = 0.03  # of a bit rate; 0.05 is half a bit at the last of the ten of a byte
 
 
 class ByteStream(Protocol):
@@ -158,6 +165,11 @@ class SerialStream:
             if self._gone or not Path(self._path).exists():
                 raise DeviceLost(f"{self._path} is gone: plug it in again") from error
             raise DeviceLost(f"{self._path} does not take {baud} bit/s") from error
+        taken = _rate(self._fd)
+        if taken is not None and abs(taken / baud - 1.0) > _RATE_TOLERANCE:
+            raise DeviceLost(
+                f"{self._path} takes {taken} bit/s instead of {baud}: set baud to a rate it has"
+            )
 
     def close(self) -> None:
         """Release the port; one that has bytes still to send is closed when they are sent."""
@@ -171,6 +183,21 @@ class SerialStream:
             self._loop.run_in_executor(None, _close, self._port)
         else:
             _close(self._port)
+
+
+def _rate(fd: int) -> int | None:
+    """The bit rate that a port really has (bit/s); None where the system does not tell.
+
+    A driver takes the nearest rate that its chip has, and says so nowhere else.
+    """
+    if sys.platform != "linux":
+        return None
+    settings = array("I", bytes(_TERMIOS2_SIZE))
+    try:
+        fcntl.ioctl(fd, _TCGETS2, settings)
+    except OSError:
+        return None
+    return settings[-1] or None
 
 
 def _has_unsent(port: serial.Serial) -> bool:

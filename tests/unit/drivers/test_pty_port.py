@@ -8,6 +8,7 @@ import termios
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 import serial
@@ -193,5 +194,32 @@ def test_unplugging_hangs_up_on_clients_and_takes_the_name_away(tmp_path: Path) 
             assert await port.read() == b"?"
         port.close()
         assert not link.is_symlink()
+
+    asyncio.run(main())
+
+
+class OldChip(serial.Serial):
+    """A port of which the driver takes the nearest rate that its chip has, without a word."""
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        super().__setattr__(name, min(value, 115_200) if name == "baudrate" else value)
+
+
+@pytest.mark.parametrize("baud", [19_200, 57_600, 115_200, 250_000, 500_000, 750_000])
+def test_a_rate_that_a_port_has_is_taken_and_another_one_refused(baud: int) -> None:
+    async def main() -> None:
+        port = PtyPort()
+        assert port.path is not None
+        able = SerialStream(port.path, 19_200)
+        able.set_baud(baud)
+        able.close()
+        old = SerialStream(port.path, 19_200, OldChip(port.path, 19_200))
+        if baud > 115_200:
+            with pytest.raises(DeviceLost, match=f"takes 115200 bit/s instead of {baud}: set"):
+                old.set_baud(baud)
+        else:
+            old.set_baud(baud)
+        old.close()
+        port.close()
 
     asyncio.run(main())
