@@ -142,7 +142,7 @@ def run(config: Config, *, out: Path | None, known: Path | None = None, anew: bo
         keeper = Keeper(session, start.files, start.saved)
         network = "off" if telemetry is None else telemetry.addresses
         _announce(session, network, resumed=start.saved is not None)
-        ros2, foxglove = _ros2(config, stack), _foxglove(config, stack)
+        ros2, foxglove = _ros2(config, stack, telemetry), _foxglove(config, stack)
         robot = Robot(
             session,
             Notifier.from_environment(),
@@ -195,10 +195,13 @@ def _telemetry(config: Config, stack: contextlib.ExitStack) -> Telemetry | None:
     return stack.enter_context(Telemetry(config.telemetry, config.robot.name, relays=relays))
 
 
-def _ros2(config: Config, stack: contextlib.ExitStack) -> Ros2Node | None:
+def _ros2(
+    config: Config, stack: contextlib.ExitStack, telemetry: Telemetry | None
+) -> Ros2Node | None:
     if not config.ros2.enabled:
         return None
-    return stack.enter_context(Ros2Node(config.ros2, config.robot.name))
+    own = None if telemetry is None else telemetry.zid
+    return stack.enter_context(Ros2Node(config.ros2, config.robot.name, telemetry=own))
 
 
 def _foxglove(config: Config, stack: contextlib.ExitStack) -> "FoxgloveServer | None":

@@ -77,6 +77,11 @@ class Telemetry:
         self._publishers = {topic.payload: (topic, self._publisher(topic)) for topic in TOPICS}
         self._alive = self._session.liveliness().declare_token(alive_key(robot))
 
+    @property
+    def zid(self) -> str:
+        """The id of the session."""
+        return str(self._session.info.zid())
+
     def _publisher(self, topic: Topic) -> zenoh.Publisher | zenoh.ext.AdvancedPublisher:
         """A publisher that drops rather than waits, and keeps what a latecomer gets."""
         if not topic.history:

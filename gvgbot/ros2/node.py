@@ -10,7 +10,7 @@ import structlog
 import zenoh
 import zenoh.ext
 
-from gvgbot.errors import GvgbotError
+from gvgbot.errors import GvgbotError, UsageError
 from gvgbot.geometry import Twist
 from gvgbot.ros2 import messages
 from gvgbot.ros2.cdr import decode_twist
@@ -31,8 +31,11 @@ class Ros2Node:
     Nothing waits: what cannot be sent is dropped.
     """
 
-    def __init__(self, config: Ros2Config, robot: str) -> None:
-        """Raises GvgbotError if the addresses cannot be used."""
+    def __init__(self, config: Ros2Config, robot: str, *, telemetry: str | None = None) -> None:
+        """`telemetry` is the id of the robot's own session there, which is no router of ROS.
+
+        Raises GvgbotError if the addresses cannot be used, UsageError if that session is there.
+        """
         self._config, self._warned = config, False
         settings = _settings(config)
         self._session = _open(settings, config)
@@ -47,11 +50,19 @@ class Ros2Node:
         self._publishers = {
             topic: self._publisher(number, topic) for number, topic in enumerate(TOPICS, start=1)
         }
-        self._say_whether_met(", ".join(addresses(settings, "connect")))
+        self._say_whether_met(", ".join(addresses(settings, "connect")), telemetry)
 
-    def _say_whether_met(self, router: str) -> None:
+    def _say_whether_met(self, router: str, telemetry: str | None) -> None:
         """Opening the session has tried to connect once; later it tries again."""
-        if self._session.info.routers_zid() or self._session.info.peers_zid():
+        info = self._session.info
+        met = {str(zid) for zid in (*info.routers_zid(), *info.peers_zid())}
+        if telemetry in met:
+            self.close()
+            raise UsageError(
+                f"telemetry listens at {router}, where rmw_zenohd of ROS 2 should: "
+                "set telemetry.listen=[tcp/0.0.0.0:7448], for example"
+            )
+        if met:
             log.info("ROS 2 nodes can see the robot", router=router)
         else:
             log.warning("no ROS 2 router answers, trying again", router=router)

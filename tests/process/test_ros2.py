@@ -15,11 +15,14 @@ import structlog
 import zenoh
 import zenoh.ext
 
+from gvgbot.errors import UsageError
 from gvgbot.ros2.cdr import encode
 from gvgbot.ros2.config import Ros2Config
 from gvgbot.ros2.node import Ros2Node
 from gvgbot.ros2.topics import MAP, SCAN, TF_STATIC
 from gvgbot.ros2.translation import occupancy_grid
+from gvgbot.telemetry import Telemetry
+from gvgbot.topics import TelemetryConfig
 from tests.process.addresses import free_endpoint, plain_session, router
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(180)]
@@ -131,6 +134,18 @@ def test_it_says_once_whether_there_is_a_router(network: str) -> None:
         (line,) = logs
         assert says in line["event"]
         assert line["router"] == address
+
+
+def test_the_robot_s_own_telemetry_is_no_router_of_ros() -> None:
+    """By another name of the machine, as in a file of zenoh, the addresses look different."""
+    here = free_endpoint()
+    anywhere = here.replace("127.0.0.1", "0.0.0.0")
+    config = Ros2Config(enabled=True, connect=(here,), domain=DOMAIN)
+    with (
+        Telemetry(TelemetryConfig(listen=(anywhere,)), "a") as telemetry,
+        pytest.raises(UsageError, match=f"telemetry listens at {here}"),
+    ):
+        Ros2Node(config, "a", telemetry=telemetry.zid)
 
 
 def test_a_latecomer_gets_the_map(network: str, robot: Ros2Node) -> None:
