@@ -109,10 +109,11 @@ class DrivenEdges:
             return
         edge = graph.edge_at(left)
         if edge is not None:
-            self._mapper.unsettled.note_way(edge, arrived.vertex)
+            between = edge.other(left).vertex
+            if not self._leads_past(between, arrived):
+                self._mapper.unsettled.note_way(edge, arrived.vertex)
             edge.traversals += 1
             edge.doubted_since = None
-            between = edge.other(left).vertex
             if graph.edge_at(arrived) is not None:
                 self._note_missed(view, known, between, arrived)
             else:
@@ -144,6 +145,11 @@ class DrivenEdges:
             self._shuttles[ends] = times, stamp
         return times >= _TIMES_TO_AND_FRO
 
+    def _leads_past(self, between: int, arrived: HalfEdgeId) -> bool:
+        """Whether the known way to where the robot has arrived comes from a vertex before that."""
+        edge = self._mapper.graph.edge_at(arrived)
+        return edge is not None and edge.other(arrived).vertex == between != arrived.vertex
+
     def _note_missed(
         self, view: View, known: Correspondence, between: int, arrived: HalfEdgeId
     ) -> None:
@@ -151,9 +157,7 @@ class DrivenEdges:
 
         Seen from elsewhere, through glass, there was one; who drives there again and again knows.
         """
-        edge = self._mapper.graph.edge_at(arrived)
-        is_between = edge is not None and edge.other(arrived).vertex == between != arrived.vertex
-        if not is_between or between in known.node_of:
+        if not self._leads_past(between, arrived) or between in known.node_of:
             return
         self._missed[between] += 1
         if self._missed[between] >= _TIMES_MISSED:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from gvgbot.autonomy.driven_edges import DrivenEdges
+from gvgbot.autonomy.events import ClosureRevoked
 from gvgbot.autonomy.evidence import MappingConfig
 from gvgbot.autonomy.gvg.local import Branch, LocalGvg
 from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
@@ -246,18 +247,25 @@ def test_what_was_driven_before_it_turned_round_was_driven() -> None:
     assert np.ptp(longest[:, 0]) == pytest.approx(3.0, abs=0.2)
 
 
-@pytest.mark.parametrize("established", [False, True])
-def test_a_vertex_that_it_drives_past_again_and_again_is_none(*, established: bool) -> None:
-    """Between vertices 1 and 2 one was seen, with a way to the south; the street leads past it."""
-    drive = Drive(HalfEdgeId(1, EAST))
+def with_one_between(drive: Drive, *, leads_on: bool = True) -> Vertex:
+    """Let a vertex 3 lie between vertices 1 and 2, beside the street; does it lead on to 2?"""
     graph, between = drive.mapper.graph, Vertex(3, 1.0, Pose(2.5, -0.7, 0.0), 0.0, 0.0)
-    between.established = established
     graph.vertices[3], graph.serial = between, 3
     west, east, _ = (between.add_half_edge(bearing) for bearing in (np.pi, 0.0, -np.pi / 2))
     drive.mapper.belief = ekf.add_vertex(drive.mapper.belief, 3, between.local, 1e-4 * np.eye(3))
     halves = (HalfEdgeId(1, EAST), HalfEdgeId(3, west)), (HalfEdgeId(3, east), HalfEdgeId(2, WEST))
-    for ends, half in zip(halves, ([(0, 0), (2.5, -0.7)], [(0, 0), (2.5, 0.7)]), strict=True):
-        graph.join(*ends, resampled(half), 1.0, driven=False)
+    lines = [(0, 0), (2.5, -0.7)], [(0, 0), (2.5, 0.7)]
+    for ends, line in list(zip(halves, lines, strict=True))[: 1 + leads_on]:
+        graph.join(*ends, resampled(line), 1.0, driven=False)
+    return between
+
+
+@pytest.mark.parametrize("established", [False, True])
+def test_a_vertex_that_it_drives_past_again_and_again_is_none(*, established: bool) -> None:
+    """Between vertices 1 and 2 one was seen, with a way to the south; the street leads past it."""
+    drive = Drive(HalfEdgeId(1, EAST))
+    graph = drive.mapper.graph
+    with_one_between(drive).established = established
     beyond = {branch: end for branch, end in ALL_SEEN.items() if end.vertex == 2}
     for _ in range(3):
         assert 3 in graph.vertices
@@ -267,6 +275,25 @@ def test_a_vertex_that_it_drives_past_again_and_again_is_none(*, established: bo
     if not established:
         (edge,) = graph.edges.values()
         assert {edge.a, edge.b} == {HalfEdgeId(1, EAST), HalfEdgeId(2, WEST)}
+
+
+def has_driven_past(drive: Drive) -> Drive:
+    """From vertex 1, where a loop was closed, past vertex 3 towards vertex 2."""
+    vertices = drive.mapper.graph.vertices
+    drive.mapper.unsettled.note_closure(vertices[1], is_surprising=True)
+    beyond = {branch: end for branch, end in ALL_SEEN.items() if end.vertex == 2}
+    return drive.along(STREET, beyond, (0.5, 0.0), (4.0, 0.0))
+
+
+@pytest.mark.parametrize("leads_on", [True, False])
+def test_a_way_that_misses_a_vertex_and_comes_to_the_next_one_does_not_speak_against_a_closure(
+    *, leads_on: bool
+) -> None:
+    """Somebody may have stood there. Where it is not known to lead to the next one, it does."""
+    drive = Drive(HalfEdgeId(1, EAST))
+    with_one_between(drive, leads_on=leads_on)
+    events = has_driven_past(drive).mapper.unsettled.revoke(1.0)
+    assert [type(event) for event in events] == ([] if leads_on else [ClosureRevoked])
 
 
 @pytest.mark.parametrize("onwards", [0.3, -np.pi / 2], ids=["east", "south"])
