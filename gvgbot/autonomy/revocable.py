@@ -23,6 +23,7 @@ class Revocable:
     observations: list[Observation]
     moves: list[tuple[Pose, Array]] = field(default_factory=list)
     is_contradicted: bool = False  # by a way that led elsewhere
+    witnesses: set[int] = field(default_factory=set)  # vertices that contradict it if they are new
 
     @classmethod
     def before(

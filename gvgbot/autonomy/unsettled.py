@@ -52,12 +52,16 @@ class Unsettled:
     def note_way(self, edge: Edge, arrived: int) -> None:
         """Learn to which vertex an edge that was known has led the robot.
 
-        It speaks for the latest closure, or against it if the edge was known before.
+        It speaks for the latest closure, or against it if the edge was known before. What may be
+        an end of the edge speaks only when it proves to be none.
         """
         if self._revocable is None or edge.id not in self._revocable.graph.edges:
             return
-        if arrived in (edge.a.vertex, edge.b.vertex):
+        ends = {edge.a.vertex, edge.b.vertex}
+        if arrived in ends:
             self._revocable = None
+        elif ends & set(self._doubts.rivals(arrived)):
+            self._revocable.witnesses.add(arrived)
         else:
             self._revocable.is_contradicted = True
 
@@ -104,6 +108,8 @@ class Unsettled:
         settled = DoubtSettled(stamp, verdict.vertex, verdict.known, verdict.margin, None)
         if verdict.known is None:
             self._doubts.believe(verdict.vertex)
+            if self._revocable is not None and verdict.vertex in self._revocable.witnesses:
+                self._revocable.is_contradicted = True
             return [settled]
         kept, gone = (graph.vertices[v] for v in (verdict.known, verdict.vertex))
         off = known.belief.map_vertex(kept.id).distance(known.belief.map_vertex(gone.id))

@@ -111,6 +111,10 @@ class Doubts:
             self.recent.append(doubt)
         self._forget_settled()
 
+    def rivals(self, vertex: int) -> tuple[int, ...]:
+        """Which known vertices a vertex may be; none if it is not in doubt."""
+        return next((doubt.rivals for doubt in self.recent if doubt.vertex == vertex), ())
+
     def forget(self, vertex: int) -> None:
         """A vertex is no more."""
         self.recent = [doubt for doubt in self.recent if doubt.vertex != vertex]

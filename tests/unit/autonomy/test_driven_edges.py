@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 from gvgbot.autonomy.driven_edges import DrivenEdges
-from gvgbot.autonomy.events import ClosureRevoked
+from gvgbot.autonomy.events import ClosureRevoked, DoubtSettled
 from gvgbot.autonomy.evidence import MappingConfig
 from gvgbot.autonomy.gvg.local import Branch, LocalGvg
 from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
 from gvgbot.autonomy.mapping import Mapper
+from gvgbot.autonomy.recogniser import Recognition
 from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.graph import HalfEdgeId, Vertex
 from gvgbot.autonomy.slam.recognition import RecognitionConfig
@@ -294,6 +295,20 @@ def test_a_way_that_misses_a_vertex_and_comes_to_the_next_one_does_not_speak_aga
     with_one_between(drive, leads_on=leads_on)
     events = has_driven_past(drive).mapper.unsettled.revoke(1.0)
     assert [type(event) for event in events] == ([] if leads_on else [ClosureRevoked])
+
+
+def test_a_way_to_what_may_be_its_known_end_speaks_against_a_closure_once_that_is_another() -> None:
+    """Vertex 2 may be vertex 3; both are known to centimetres, and stand metres apart."""
+    drive = Drive(HalfEdgeId(1, EAST))
+    with_one_between(drive, leads_on=False)
+    unsettled, arrived = drive.mapper.unsettled, drive.mapper.graph.vertices[2]
+    unsettled.doubt(arrived, Recognition(None, (3,), (5.0,), 0.02, 9.0), 0.0)
+    has_driven_past(drive)
+    assert unsettled.revoke(1.0) == []
+    (settled,) = unsettled.settle(2.0)
+    assert isinstance(settled, DoubtSettled)
+    assert (settled.vertex, settled.known) == (2, None)
+    assert [type(event) for event in unsettled.revoke(3.0)] == [ClosureRevoked]
 
 
 @pytest.mark.parametrize("onwards", [0.3, -np.pi / 2], ids=["east", "south"])
