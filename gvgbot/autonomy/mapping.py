@@ -84,6 +84,11 @@ class Mapper(Knowledge):
         self.belief = ekf.advance(self.belief, motion, covariance)
         self.unsettled.note_move(motion, covariance)
 
+    def establish(self) -> None:
+        """As `Knowledge.establish`; no more of it goes because a closure is taken back."""
+        super().establish()
+        self.unsettled.take_for_granted()
+
     def explains(self, view: View, known: Correspondence, place: Array) -> bool:
         """Whether a vertex should stand at a place (2,), local frame, and is seen nowhere else."""
         gaps = np.hypot(*(self.positions_from(view.local_base) - place).T)

@@ -759,6 +759,18 @@ def test_a_closure_that_leads_on_over_a_known_edge_stays() -> None:
     assert of_type(seen.events, ClosureRevoked) == []
 
 
+def test_a_closure_of_a_finished_map_stays_whatever_a_single_way_says() -> None:
+    """Somebody may stand there; if it is wrong, that will be seen for long."""
+    seen = crossed(as_rival=False)
+    (edge,) = seen.mapper.graph.edges.values()
+    known = set(seen.mapper.graph.vertices)
+    seen.mapper.establish()
+    seen.mapper.unsettled.note_way(edge, arrived=99)  # not at its far end
+    seen.look(TEE)
+    assert of_type(seen.events, ClosureRevoked) == []
+    assert seen.mapper.graph.vertices.keys() == known
+
+
 def test_a_vertex_in_doubt_becomes_part_of_the_known_one_as_soon_as_that_is_certain() -> None:
     seen = crossed(as_rival=True)
     mapper = seen.mapper
