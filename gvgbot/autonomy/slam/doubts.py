@@ -173,20 +173,30 @@ def _around(belief: Belief, doubts: Sequence[Doubt]) -> Belief:
 def _readings(
     reading: Reading, doubt: Doubt, later: set[int], reach: dict[int, float]
 ) -> Iterable[Reading]:
-    """A reading, and what a further vertex may be: new, or one of its rivals."""
-    belief, taken = reading.belief, set(reading.known_as.values())
+    """A reading, and what a further vertex may be: new, or one of its rivals.
+
+    What others were taken for is one of these only if the vertex may be one of the others, too.
+    """
+    belief, known_as = reading.belief, reading.known_as
     older = [v for v in belief.ids if v not in later and v in reach and v != doubt.vertex]
     r, S = ekf.apart(belief, doubt.vertex, older)
     room = room_for_new(r, S + SAME, np.array([reach[v] for v in older]))
     cost = reading.cost + novelty_cost(doubt.density + doubt.habit, room)
-    yield Reading(cost, belief, {**reading.known_as, doubt.vertex: None})
-    for rival in doubt.rivals:
-        if rival in taken or rival not in belief.ids:
+    yield Reading(cost, belief, {**known_as, doubt.vertex: None})
+    for rival in dict.fromkeys(known_as.get(rival) or rival for rival in doubt.rivals):
+        same = {vertex for vertex, known in known_as.items() if known == rival}
+        is_taken = bool(same) and not same & set(doubt.rivals)
+        if is_taken or rival == doubt.vertex or rival not in belief.ids:
             continue
         r, S = ekf.apart(belief, doubt.vertex, [rival])
         cost = reading.cost + match_cost(r[0], S[0] + SAME)
         united = ekf.unite(belief, rival, doubt.vertex, SAME)
-        yield Reading(cost, united, {**reading.known_as, doubt.vertex: rival})
+        yield Reading(cost, united, _renamed(known_as, doubt.vertex, rival))
+
+
+def _renamed(known_as: dict[int, int | None], vertex: int, known: int) -> dict[int, int | None]:
+    """What vertices are taken for if one, and what was taken for that one, is a known one."""
+    return {v: known if k == vertex else k for v, k in known_as.items()} | {vertex: known}
 
 
 def _verdict(vertex: int, readings: list[Reading]) -> Verdict:

@@ -118,6 +118,38 @@ def test_a_place_that_becomes_certain_needs_no_further_vertex() -> None:
     assert tees().go(0.0, 3 * STREET).see(3, 1).weighed() == (3, None)
 
 
+def thrice(sigma: float, again: float, *rivals: int) -> Walk:
+    """At vertex 1; lost for a while, there as 5; at 7, and lost once more; there as 9."""
+    walk = Walk().see(1).go(0.0, 0.0, sigma=sigma).see(5, 1).go(0.0, STREET).see(7)
+    return walk.go(0.0, -STREET, sigma=again).see(9, *rivals)
+
+
+@pytest.mark.parametrize(("sigma", "again"), [(1.0, 0.8), (2.0, 0.5)])
+def test_two_places_in_doubt_may_be_the_same_known_one(sigma: float, again: float) -> None:
+    """So near to each other there is no room for two of them, let alone for three."""
+    assert thrice(sigma, again, 1, 5).weighed() == (5, 1)
+
+
+def test_two_places_that_do_not_look_like_each_other_are_not_both_the_same_known_one() -> None:
+    assert thrice(1.0, 0.8, 1).weighed() is None
+
+
+def test_in_whatever_order_they_came_into_doubt_all_may_be_the_same_known_one() -> None:
+    walk = Walk().see(1).go(0.0, 0.0, sigma=0.5).see(5).go(0.0, 0.0, sigma=0.5).see(7, 5)
+    walk.doubts.note(Doubt(5, (1, 7), NEW_PER_M2 / 2))
+    assert walk.go(0.0, 0.0, sigma=0.5).see(9, 7).weighed() in ((5, 1), (7, 1))
+
+
+@pytest.mark.parametrize("seed", range(50))
+def test_places_that_are_not_one_are_never_taken_for_one(seed: int) -> None:
+    """Streets away from vertex 1 there are 5 and 9, which is 5; odometry errs as it says."""
+    rng = np.random.default_rng(seed)
+    (x, y), (u, v) = rng.normal(0.0, 2.0, 2), rng.normal(0.0, 1.0, 2)
+    walk = Walk().see(1).go(STREET + x, y, sigma=2.0).see(5, 1).go(0.0, STREET).see(7)
+    verdict = walk.go(u, v - STREET, sigma=1.0).see(9, 1, 5).weighed()
+    assert verdict in (None, (5, None), (9, 5))
+
+
 def test_what_is_refuted_is_weighed_no_more() -> None:
     walk = tees().go(-STREET, 0.1).see(3, 1, 2)
     walk.doubts.refute(1)
