@@ -203,8 +203,14 @@ def _verdict(vertex: int, readings: list[Reading]) -> Verdict:
     """What the cheapest reading takes a vertex for, against the cheapest that does not."""
     best = readings[0]
     known = best.known_as[vertex]
-    others = [reading.cost for reading in readings if reading.known_as[vertex] != known]
+    others = [reading.cost for reading in readings if not _agrees(reading.known_as, vertex, known)]
     return Verdict(vertex, known, min([*others, readings[-1].cost]) - best.cost)
+
+
+def _agrees(known_as: dict[int, int | None], vertex: int, known: int | None) -> bool:
+    """Whether a vertex is taken for a known one, or for what that is taken for in turn."""
+    same = known if known is None else known_as.get(known) or known
+    return known_as[vertex] == same
 
 
 def _normal_points() -> Array:

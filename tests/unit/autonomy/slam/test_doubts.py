@@ -130,6 +130,12 @@ def test_two_places_in_doubt_may_be_the_same_known_one(sigma: float, again: floa
     assert thrice(sigma, again, 1, 5).weighed() == (5, 1)
 
 
+def test_a_place_is_surely_another_one_though_that_may_be_a_known_one() -> None:
+    """Four metres off, 5 may be 1, or not; it is a street to 7 and the same one back."""
+    walk = Walk().see(1).go(4.0, 0.0, sigma=3.0).see(5, 1).go(0.0, STREET).see(7)
+    assert walk.go(0.0, -STREET).see(9, 1, 5).weighed() == (9, 5)
+
+
 def test_two_places_that_do_not_look_like_each_other_are_not_both_the_same_known_one() -> None:
     assert thrice(1.0, 0.8, 1).weighed() is None
 
