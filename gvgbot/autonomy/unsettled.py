@@ -147,7 +147,7 @@ class Unsettled:
             replace(seen, vertex=kept.id, R=seen.R[:2, :2]) if seen.vertex == gone.id else seen
             for seen in known.observations
         ]
-        self._doubts.forget(gone.id)
+        self._doubts.unite(kept.id, gone.id)
         for twins in fused.twins:
             older, newer = sorted(twins)
             self._doubts.note(Doubt(newer, (older,), NEW_PER_M2))

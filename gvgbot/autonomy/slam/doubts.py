@@ -120,6 +120,14 @@ class Doubts:
         self.recent = [doubt for doubt in self.recent if doubt.vertex != vertex]
         self.refute(vertex)
 
+    def unite(self, kept: int, gone: int) -> None:
+        """A vertex is no more, since it proved to be another: what may be it may be that one."""
+        self.recent = [
+            replace(doubt, rivals=_with_name(doubt.rivals, gone, kept, but=doubt.vertex))
+            for doubt in self.recent
+        ]
+        self.forget(gone)
+
     def refute(self, known: int) -> None:
         """None of them is a vertex that they may have been."""
         self.recent = [
@@ -158,6 +166,12 @@ class Doubts:
         verdicts = [_verdict(doubt.vertex, readings) for doubt in doubts if doubt.rivals]
         certain = [verdict for verdict in verdicts if verdict.margin > margin]
         return certain[0] if certain else None
+
+
+def _with_name(rivals: tuple[int, ...], old: int, new: int, *, but: int) -> tuple[int, ...]:
+    """Rivals, each once, of which one has got a new name; without the vertex that has them."""
+    named = dict.fromkeys(new if rival == old else rival for rival in rivals)
+    return tuple(rival for rival in named if rival != but)
 
 
 def _around(belief: Belief, doubts: Sequence[Doubt]) -> Belief:

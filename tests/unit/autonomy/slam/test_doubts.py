@@ -190,3 +190,20 @@ def test_a_vertex_that_was_in_doubt_before_may_be_one_more() -> None:
     doubts.note(Doubt(6, (2,), 0.01))
     doubts.note(Doubt(5, (3, 1), 0.02))
     assert [(doubt.vertex, doubt.rivals) for doubt in doubts.recent] == [(5, (1, 3)), (6, (2,))]
+
+
+def test_what_may_be_a_vertex_that_proved_to_be_another_may_be_that_one() -> None:
+    doubts = Doubts()
+    doubts.note(Doubt(5, (1, 2), 0.01))
+    doubts.note(Doubt(8, (5, 1), 0.01))
+    doubts.note(Doubt(9, (3, 5), 0.01))
+    doubts.unite(1, 5)
+    assert [(doubt.vertex, doubt.rivals) for doubt in doubts.recent] == [(8, (1,)), (9, (3, 1))]
+
+
+def test_no_vertex_may_be_itself() -> None:
+    doubts = Doubts()
+    doubts.note(Doubt(5, (1, 9), 0.01))
+    doubts.note(Doubt(9, (5,), 0.01))
+    doubts.unite(5, 9)
+    assert [(doubt.vertex, doubt.rivals) for doubt in doubts.recent] == [(5, (1,))]
