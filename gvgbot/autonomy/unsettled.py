@@ -18,7 +18,7 @@ from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.doubts import NEW_PER_M2, SAME, Doubt, Doubts, habit_density
 from gvgbot.autonomy.slam.graph import Edge, HalfEdgeId, Vertex
 from gvgbot.autonomy.topology import fuse
-from gvgbot.geometry import Array, Pose
+from gvgbot.geometry import Array, Pose, wrap_angle
 
 
 class Unsettled:
@@ -133,10 +133,14 @@ class Unsettled:
         return max((habit_density(way, known) for way in own), default=0.0)
 
     def _unite(self, kept: Vertex, gone: Vertex) -> None:
-        """Make one vertex of two."""
+        """Make one vertex of two.
+
+        That they are one tells how their frames are turned better than anything before.
+        """
         known = self._known
-        turn = known.belief.map_vertex(gone.id).theta - known.belief.map_vertex(kept.id).theta
-        known.belief = ekf.unite(known.belief, kept.id, gone.id, SAME)
+        both = ekf.coincide(known.belief, kept.id, gone.id, SAME)
+        turn = wrap_angle(both.map_vertex(gone.id).theta - both.map_vertex(kept.id).theta)
+        known.belief = ekf.remove_vertex(both, gone.id)
         if gone.seen_at > kept.seen_at:
             kept.local = gone.local.compose(Pose(theta=-turn))
             kept.seen_at, kept.updated_at = gone.seen_at, gone.updated_at

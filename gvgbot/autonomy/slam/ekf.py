@@ -236,14 +236,19 @@ def apart(belief: Belief, vertex: int, others: Sequence[int]) -> tuple[Array, Ar
 
 def unite(belief: Belief, kept: int, gone: int, R: Array) -> Belief:
     """The belief when two vertices are one, whose places were seen with R (2, 2); one id goes."""
-    i, j = (3 + 3 * belief.ids.index(vertex) for vertex in (kept, gone))
+    return remove_vertex(coincide(belief, kept, gone, R), gone)
+
+
+def coincide(belief: Belief, one: int, other: int, R: Array) -> Belief:
+    """The belief when two vertices stand in one place, which was seen with R (2, 2) both times."""
+    i, j = (3 + 3 * belief.ids.index(vertex) for vertex in (one, other))
     H = np.zeros((2, len(belief.x)))
     H[:, i : i + 2], H[:, j : j + 2] = np.eye(2), -np.eye(2)
     S = H @ belief.P @ H.T + R
     K = np.asarray(np.linalg.solve(S, H @ belief.P).T, np.float64)
     x = _wrapped(belief.x + K @ (belief.x[j : j + 2] - belief.x[i : i + 2]))
     P = belief.P - K @ S @ K.T
-    return remove_vertex(Belief(x, (P + P.T) / 2, belief.ids), gone)
+    return Belief(x, (P + P.T) / 2, belief.ids)
 
 
 def part(belief: Belief, vertices: Sequence[int]) -> Belief:

@@ -3,9 +3,11 @@
 import math
 
 import numpy as np
+import pytest
 
 from gvgbot.autonomy.knowledge import Knowledge
 from gvgbot.autonomy.recogniser import Recognition
+from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex
 from gvgbot.autonomy.unsettled import Unsettled
@@ -50,3 +52,36 @@ def test_what_may_be_a_vertex_in_doubt_is_the_known_one_that_this_proves_to_be()
     for stamp in (1.0, 2.0):
         unsettled.settle(stamp)
     assert list(graph.vertices) == list(knowledge.belief.ids) == [known.id]
+
+
+def test_what_leaves_a_vertex_that_proves_to_be_a_known_one_turns_as_its_frame_was_turned() -> None:
+    """A street to the east and back, between which the robot has turned by more than it knows.
+
+    So it believes to be aside of where it began. Its frame is as wrong as that turn, and with it
+    the way to the north that it has found there, and the edge that it has driven that way.
+    """
+    error, graph, sure = 0.1, GvgGraph(), 1e-8 * np.eye(3)
+    west, again, north = (Vertex(graph.next_id(), 1.0, Pose(), 0.0, 0.0) for _ in range(3))
+    graph.vertices |= {vertex.id: vertex for vertex in (west, again, north)}
+    belief = ekf.add_vertex(Belief(), west.id, Pose(), sure)
+    belief = ekf.advance(belief, Pose(STREET), sure)
+    belief = ekf.advance(belief, Pose(theta=math.pi - error), sure + np.diag([0.0, 0.0, error**2]))
+    belief = ekf.advance(belief, Pose(STREET), sure)
+    belief = ekf.add_vertex(belief, again.id, Pose(theta=error - math.pi), sure)
+    seen = math.pi / 2 - error  # where the north is in a frame that is turned by the error
+    way = STREET * np.array([math.cos(seen), math.sin(seen)])
+    map_base = belief.map_base
+    to_north = map_base.to(belief.map_vertex(again.id).compose(Pose(float(way[0]), float(way[1]))))
+    belief = ekf.add_vertex(belief, north.id, to_north, sure)
+    ends = [
+        HalfEdgeId(vertex.id, vertex.add_half_edge(bearing))
+        for vertex, bearing in ((again, seen), (north, seen - math.pi))
+    ]
+    graph.join(ends[0], ends[1], np.array([[0.0, 0.0], way]), 1.0, driven=True)
+    unsettled = Unsettled(Knowledge(belief, graph), margin=2.0, same_bearing=math.radians(40))
+    unsettled.doubt(again, Recognition(None, (west.id,), (1.0,), 1e-4, 9.0), 0.0)
+    assert unsettled.settle(1.0)
+    (edge,) = graph.edges.values()
+    (departure,) = west.half_edges.values()
+    assert departure.bearing == pytest.approx(math.pi / 2, abs=0.02)
+    assert edge.polyline[-1] == pytest.approx((0.0, STREET), abs=0.2)
