@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.doubts import Doubt
 from gvgbot.autonomy.slam.ekf import Belief
-from gvgbot.autonomy.slam.graph import GvgGraph
+from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
 from gvgbot.autonomy.views import Observation
 from gvgbot.geometry import Array, Pose
 
@@ -37,6 +37,21 @@ class Revocable:
         """As things are, just before a closure."""
         own = replace(belief, P=belief.P.copy())
         return cls(vertex, own, copy.deepcopy(graph), list(doubts), list(observations))
+
+    def regained(self, now: GvgGraph) -> GvgGraph:
+        """The graph of then, with what has nothing to do with the closure as it is now.
+
+        That is which ways are closed, of those that are left, and which names have been given.
+        """
+        graph = self.graph
+        graph.serial = now.serial
+        for vertex in graph.vertices.values():
+            if vertex.id in now.vertices:
+                vertex.serial = max(vertex.serial, now.vertices[vertex.id].serial)
+            for key, half in vertex.half_edges.items():
+                present = now.half_edge(HalfEdgeId(vertex.id, key))
+                half.blocked = present is not None and present.blocked
+        return graph
 
     def relived(self) -> Belief:
         """What would be believed now without the closure, and without what was seen since."""

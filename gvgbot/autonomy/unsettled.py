@@ -171,8 +171,7 @@ class Unsettled:
         if was is None or not was.is_contradicted:
             return []
         added = sorted(known.graph.vertices.keys() - was.graph.vertices.keys())
-        was.graph.serial = known.graph.serial
-        known.graph, known.belief = was.graph, was.relived()
+        known.graph, known.belief = was.regained(known.graph), was.relived()
         known.observations[:] = was.observations
         self._doubts.recent = was.doubts
         self._doubts.refute(was.vertex)

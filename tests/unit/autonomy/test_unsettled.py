@@ -5,6 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from gvgbot.autonomy.errands.closures import Closures
+from gvgbot.autonomy.exploration.obstructions import Obstructions
 from gvgbot.autonomy.knowledge import Knowledge
 from gvgbot.autonomy.recogniser import Recognition
 from gvgbot.autonomy.slam import ekf
@@ -12,7 +14,7 @@ from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex
 from gvgbot.autonomy.unsettled import Unsettled
 from gvgbot.geometry import Pose
-from tests.unit.autonomy.graphs import STREET, streets
+from tests.unit.autonomy.graphs import STREET, between, streets
 
 
 def test_with_one_end_of_a_street_that_was_driven_twice_the_other_end_is_known_too() -> None:
@@ -85,3 +87,69 @@ def test_what_leaves_a_vertex_that_proves_to_be_a_known_one_turns_as_its_frame_w
     (departure,) = west.half_edges.values()
     assert departure.bearing == pytest.approx(math.pi / 2, abs=0.02)
     assert edge.polyline[-1] == pytest.approx((0.0, STREET), abs=0.2)
+
+
+class Contradicted:
+    """A town in which the latest closure is about to prove wrong."""
+
+    def __init__(self) -> None:
+        graph, self.ids = streets(2, 1)
+        x = np.zeros(3 + 3 * len(graph.vertices))
+        self.known = Knowledge(Belief(x, np.eye(len(x)), tuple(graph.vertices)), graph)
+        self._unsettled = Unsettled(self.known, margin=2.0, same_bearing=math.radians(40))
+
+    def close_a_loop(self) -> None:
+        west = self.known.graph.vertices[self.ids[0, 0]]
+        self._unsettled.note_closure(west, is_surprising=True)
+
+    def take_it_back(self) -> None:
+        (edge,) = self.known.graph.edges.values()
+        self._unsettled.note_way(edge, arrived=99)  # not at its far end
+        assert self._unsettled.revoke(1.0)
+
+
+@pytest.mark.parametrize("opened", [False, True])
+def test_what_was_closed_before_a_closure_that_is_taken_back_is_opened_when_its_time_comes(
+    *, opened: bool
+) -> None:
+    """Before, or after that; nobody opens it again whose time is over already."""
+    town = Contradicted()
+    places = town.ids[0, 0], town.ids[1, 0]
+    end = between(town.known.graph, *places)
+    obstructions, errands = Obstructions(retries=3, retry_after=20.0), Closures()
+    obstructions.close(town.known.graph, [end], 0.0)
+    errands.close(town.known.graph, [between(town.known.graph, *places[::-1])], until=20.0)
+    town.close_a_loop()
+    if opened:
+        obstructions.open(town.known.graph, 30.0)
+        errands.open_due(town.known.graph, 30.0)
+    town.take_it_back()
+    assert bool(town.known.graph.blocked()) != opened
+    obstructions.open(town.known.graph, 30.0)
+    errands.open_due(town.known.graph, 30.0)
+    assert town.known.graph.blocked() == []
+
+
+def test_what_is_closed_after_a_closure_that_is_taken_back_stays_closed_until_its_time_comes() -> (
+    None
+):
+    town = Contradicted()
+    end = between(town.known.graph, town.ids[0, 0], town.ids[1, 0])
+    town.close_a_loop()
+    obstructions = Obstructions(retries=3, retry_after=20.0)
+    obstructions.close(town.known.graph, [end], 0.0)
+    town.take_it_back()
+    assert town.known.graph.blocked() == [end]
+    obstructions.open(town.known.graph, 30.0)
+    assert town.known.graph.blocked() == []
+
+
+def test_no_departure_gets_the_name_of_one_that_went_with_a_closure() -> None:
+    """Who has closed that, or goes there, would mean the other one."""
+    town = Contradicted()
+    town.close_a_loop()
+    west = town.ids[0, 0]
+    gone = town.known.graph.vertices[west].add_half_edge(1.0)
+    town.take_it_back()
+    assert gone not in town.known.graph.vertices[west].half_edges
+    assert town.known.graph.vertices[west].add_half_edge(2.0) != gone
