@@ -20,6 +20,7 @@ Index = NDArray[np.intp]
 _ITERATIONS = 15
 _DOUBT = 3.0  # squared Mahalanobis distance at which a doubtful constraint counts half
 _CONVERGED = 1e-5  # metres and radians
+_TOGETHER = 8  # poses whose covariances are solved for at a time: the columns are long
 _FIXED = 1e12  # information that holds the first pose in place
 
 
@@ -69,11 +70,8 @@ class PoseGraph:
             return np.empty((0, 3, 3))
         blocks = _Blocks.of(self._a, self._b, len(poses))
         H, _ = self._normal_equations(poses, blocks, trusting=False)
-        rows = 3 * np.array(wanted)[:, None] + np.arange(3)
-        columns = np.zeros((3 * len(poses), rows.size))
-        columns[rows.ravel(), np.arange(rows.size)] = 1.0
-        P = _factors(H).solve(columns).reshape(len(columns), len(wanted), 3)
-        return np.array([P[row, i] for i, row in enumerate(rows)])
+        factors, parts = _factors(H), range(0, len(wanted), _TOGETHER)
+        return np.concatenate([_inverse_blocks(factors, wanted[i : i + _TOGETHER]) for i in parts])
 
     def _normal_equations(
         self, x: Array, blocks: "_Blocks", *, trusting: bool
@@ -129,6 +127,15 @@ def _factors(H: csc_array) -> SuperLU:
     return splu(
         H, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
     )
+
+
+def _inverse_blocks(factors: SuperLU, poses: list[int]) -> Array:
+    """The blocks (K, 3, 3) of some poses on the diagonal of the inverse of what was factored."""
+    rows = 3 * np.array(poses)[:, None] + np.arange(3)
+    columns = np.zeros((factors.shape[0], rows.size))
+    columns[rows.ravel(), np.arange(rows.size)] = 1.0
+    P = factors.solve(columns).reshape(len(columns), len(poses), 3)
+    return np.array([P[row, i] for i, row in enumerate(rows)])
 
 
 def _residuals(x: Array, a: Index, b: Index, z: Array) -> tuple[Array, Array, Array]:

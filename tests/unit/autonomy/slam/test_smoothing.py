@@ -1,6 +1,7 @@
 """The pose graph against exact worlds and a dense least squares solver."""
 
 import math
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares
 from scipy.stats import chi2
 
-from gvgbot.autonomy.slam.smoothing import Constraint, PoseGraph
+from gvgbot.autonomy.slam.smoothing import Constraint, PoseGraph, _Blocks
 from gvgbot.geometry import Array, Pose, wrap_angle
 
 seeds = st.integers(0, 2**32 - 1)
@@ -184,6 +185,35 @@ def test_covariances_are_those_of_a_dense_linearisation() -> None:
     for pose, P in zip((3, 6), graph.covariances(x, [3, 6]), strict=True):
         i = 3 * (pose - 1)
         assert np.allclose(P, dense[i : i + 3, i : i + 3], rtol=1e-4, atol=1e-9)
+
+
+def laps(n: int) -> tuple[PoseGraph, Array]:
+    """Poses (n, 3) round and round a circle, tied to the one before and that of a lap before."""
+    x, W = np.tile(loop(20), (n // 20, 1)), np.diag([1e4, 1e4, 1e5])
+    pairs = [(i - back, i) for back in (1, 20) for i in range(back, n)]
+    return PoseGraph([Constraint(a, b, relative(x, a, b), W) for a, b in pairs]), x
+
+
+def test_covariances_of_many_poses_are_the_blocks_of_a_dense_inverse() -> None:
+    graph, x = laps(60)
+    H, _ = graph._normal_equations(x, _Blocks.of(graph._a, graph._b, len(x)), trusting=False)
+    dense = np.linalg.inv(H.toarray())
+    wanted = np.random.default_rng(6).permutation(60)[:43].tolist()
+    blocks = [dense[3 * i : 3 * i + 3, 3 * i : 3 * i + 3] for i in wanted]
+    np.testing.assert_allclose(graph.covariances(x, wanted), blocks, rtol=1e-9, atol=1e-14)
+
+
+def test_covariances_of_all_poses_take_hardly_more_memory_than_those_of_one() -> None:
+    graph, x = laps(600)
+
+    def peak(*wanted: int) -> int:
+        tracemalloc.start()
+        graph.covariances(x, list(wanted))
+        _, most = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        return most
+
+    assert peak(*range(600)) < 1.5 * peak(599)
 
 
 def relative_array(x: Array, a: int, b: int) -> tuple[float, float, float]:
