@@ -10,6 +10,7 @@ from gvgbot.errors import UsageError
 from gvgbot.maps.alignment import Comparison, Pair, compare
 from gvgbot.maps.atomic_files import write_files
 from gvgbot.maps.diff_picture import Grids, Titles, draw_diff
+from gvgbot.maps.outputs import check_output
 from gvgbot.maps.picture_files import PICTURES, Paint
 from gvgbot.maps.saved_run import SavedRun
 from gvgbot.maps.surface import S
@@ -18,13 +19,13 @@ from gvgbot.maps.surface import S
 def diff(a: Path, b: Path, out: Path | None, *, tolerance: float) -> tuple[bool, list[str]]:
     """Whether two runs left the same map, within the tolerance (m), and how they differ, in lines.
 
-    With `out` a picture of both goes there. Raises UsageError if a run cannot be read or `out` is
-    no picture's name, GvgbotError if it cannot be written.
+    With `out` a picture of both goes there. Raises UsageError if a run cannot be read or no picture
+    can go to `out`, GvgbotError if it cannot be written.
     """
     if out is not None and out.suffix.lower() not in PICTURES:
         raise UsageError(f"{out}: let its name end in {' or '.join(PICTURES)}")
-    if out is not None and not out.parent.is_dir():
-        raise UsageError(f"cannot write {out}: there is no directory {out.parent}")
+    if out is not None:
+        check_output(out)
     runs = (SavedRun.read(a), SavedRun.read(b))
     found = compare(runs[0].graph, runs[1].graph, tolerance)
     verdict = f"{'equal' if found.is_equal else 'different'} within {tolerance:g} m"

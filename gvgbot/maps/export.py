@@ -6,6 +6,7 @@ from pathlib import Path
 from gvgbot.errors import UsageError
 from gvgbot.maps import graphml, route_server
 from gvgbot.maps.atomic_files import write_files
+from gvgbot.maps.outputs import check_output
 from gvgbot.maps.picture_files import PICTURES
 from gvgbot.maps.saved_run import SavedRun
 from gvgbot.maps.show import picture_of
@@ -19,15 +20,14 @@ GRAPHS: dict[str, Callable[[SavedRun], bytes]] = {
 def export(directory: Path, out: Path) -> None:
     """Write the map of a run in the format that the file's name ends with.
 
-    Raises UsageError if there is no such format, or the run cannot be read; GvgbotError if nothing
-    can be written.
+    Raises UsageError if there is no such format, the run cannot be read, or a run needs the file
+    that is there; GvgbotError if nothing can be written.
     """
     suffix = out.suffix.lower()
     if suffix not in PICTURES and suffix not in GRAPHS:
         raise UsageError(f"{out}: let its name end in one of {', '.join((*PICTURES, *GRAPHS))}")
     run = SavedRun.read(directory)
-    if not out.parent.is_dir():
-        raise UsageError(f"cannot write {out}: there is no directory {out.parent}")
+    check_output(out)
     write_files(out.parent, {out.name: _encoded(run, suffix)})
 
 

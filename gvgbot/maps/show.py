@@ -10,6 +10,7 @@ from gvgbot.errors import UsageError
 from gvgbot.maps import film
 from gvgbot.maps.atomic_files import write_files
 from gvgbot.maps.growth import Growth
+from gvgbot.maps.outputs import check_output
 from gvgbot.maps.picture import draw_map_on, known_corners
 from gvgbot.maps.picture_files import PICTURES, Paint
 from gvgbot.maps.route_graph import MapVertex, RouteGraph
@@ -23,7 +24,8 @@ FRAMES = 60  # of a film, if nobody says how many
 def show(directory: Path, out: Path | None, *, animate: bool, frames: int | None) -> Path:
     """Draw a run and return the path of the picture: a film, a strip of moments, or its last map.
 
-    Raises UsageError if the run cannot be read or drawn so, GvgbotError if nothing can be written.
+    Raises UsageError if the run cannot be read or drawn so, or a run needs the file that is there;
+    GvgbotError if nothing can be written.
     """
     name = "film.gif" if animate else "picture.png" if frames is None else "strip.png"
     out = out or directory / name
@@ -32,8 +34,7 @@ def show(directory: Path, out: Path | None, *, animate: bool, frames: int | None
         film_needs = "; a GIF needs --animate" if suffix == ".gif" else ""
         raise UsageError(f"{out}: let its name end in {' or '.join(fit)}{film_needs}")
     run = SavedRun.read(directory)
-    if not out.parent.is_dir():
-        raise UsageError(f"cannot write {out}: there is no directory {out.parent}")
+    check_output(out)
     if animate:
         picture = film.gif(_growth(run), frames or FRAMES)
     else:
