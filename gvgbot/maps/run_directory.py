@@ -16,9 +16,11 @@ import numpy as np
 
 from gvgbot.errors import GvgbotError, UsageError
 from gvgbot.maps.atomic_files import write_files
+from gvgbot.maps.map_server import DESCRIPTION, IMAGE, SEEN
 
 EVENTS, EVENTS_BEFORE = "events.jsonl", "events-before.jsonl"
 SUMMARY, MAP, PICTURE = "summary.json", "map.geojson", "map.png"
+_REPLACED = (MAP, PICTURE, DESCRIPTION, IMAGE, SEEN, "world.yaml", "world.png")  # when it is saved
 _MOST_EVENTS = 10_000_000  # bytes, of each of these files
 
 
@@ -53,10 +55,11 @@ class RunDirectory:
         The number is greater than that of any run of this world, or of any at all if it shall come
         `after_all`.
 
-        Raises UsageError if the directory cannot be written to, or holds an earlier run.
+        Raises UsageError if the directory cannot be written to, or holds an earlier run, or a map
+        of somebody else that this one would replace.
         """
-        if out is not None and _holds_run(out):
-            raise UsageError(f"{out} holds a run already: choose another directory, or remove it")
+        if out is not None:
+            _check_room(out)
         if out is None:
             others = numbers(runs, None if after_all else world)
             out = _next_free(runs, world, 1 + max(others.values(), default=0))
@@ -206,6 +209,15 @@ def _fields(value: Any) -> dict[str, Any]:
 
 def _snake_case(name: str) -> str:
     return re.sub(r"(?<=.)([A-Z])", r"_\1", name).lower()
+
+
+def _check_room(path: Path) -> None:
+    """Raises UsageError if a run would take the place of another, or of a map that is none."""
+    if _holds_run(path):
+        raise UsageError(f"{path} holds a run already: choose another directory, or remove it")
+    for file in (path / name for name in _REPLACED):
+        if file.is_file():
+            raise UsageError(f"a run would replace {file}: choose another directory")
 
 
 def _holds_run(path: Path) -> bool:

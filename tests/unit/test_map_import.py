@@ -119,6 +119,19 @@ def test_a_run_that_is_there_is_not_overwritten(
     assert "holds a run already" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("command", ["map import {} --out {}", "explore --world {} --out {}"])
+def test_a_map_is_not_replaced_by_the_run_that_is_made_of_it(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = painted(tmp_path).rename(tmp_path / "map.yaml")
+    before = {file: file.read_bytes() for file in tmp_path.iterdir()}
+    start = ["--start", "4.5", "4.5", "0"] if "explore" in command else []
+    assert main([*command.format(path, tmp_path).split(), *start]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert str(path) in line
+    assert {file: file.read_bytes() for file in tmp_path.iterdir()} == before
+
+
 def broken(directory: Path, what: str) -> Path:
     """A map with a mistake."""
     path = painted(directory)

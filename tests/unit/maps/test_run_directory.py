@@ -146,6 +146,18 @@ def test_a_directory_with_other_files_will_do(tmp_path: Path) -> None:
     assert names(tmp_path) == {"floor.yaml", "events.jsonl"}
 
 
+@pytest.mark.parametrize(
+    "name", ["map.yaml", "map.pgm", "map.png", "seen.png", "world.yaml", "world.png"]
+)
+def test_a_map_that_is_no_run_s_stays(tmp_path: Path, name: str) -> None:
+    """Such as the one that is to be explored."""
+    (tmp_path / name).write_text("mine\n")
+    with pytest.raises(UsageError, match=rf"would replace .*{name}: choose another directory"):
+        RunDirectory.create(tmp_path, world="office")
+    assert names(tmp_path) == {name}
+    assert (tmp_path / name).read_text() == "mine\n"
+
+
 def test_of_very_many_events_the_latest_stay(tmp_path: Path) -> None:
     """Ten megabytes and the ten before them at most."""
     line = 1_000_000
