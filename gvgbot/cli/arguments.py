@@ -52,7 +52,7 @@ Commands: TypeAlias = "argparse._SubParsersAction[Parser]"  # noqa: SLF001 the o
 def add_config(parser: argparse.ArgumentParser) -> None:
     """Let the command take a configuration, and overrides of its keys."""
     parser.add_argument(
-        "config", nargs="?", type=Path, metavar="CONFIG", help="default: sim.yaml, no hardware"
+        "config", nargs="?", type=path, metavar="CONFIG", help="default: sim.yaml, no hardware"
     )
     add_overrides(parser)
 
@@ -79,7 +79,7 @@ def add_connection(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--zenoh-file",
-        type=Path,
+        type=path,
         metavar="FILE",
         help="keys and passwords, and perhaps an address: a configuration of zenoh in JSON5",
     )
@@ -88,6 +88,13 @@ def add_connection(parser: argparse.ArgumentParser) -> None:
 def say(text: str) -> None:
     """Print a line to a person, at once, even into a pipe."""
     print(text, flush=True)
+
+
+def path(text: str) -> Path:
+    """A path. Raises ArgumentTypeError if there is no text: that would be the working directory."""
+    if not text:
+        raise argparse.ArgumentTypeError("it is empty: give a path")
+    return Path(text)
 
 
 def number(text: str) -> float:

@@ -1,9 +1,8 @@
 """`gvgbot explore`."""
 
 import argparse
-from pathlib import Path
 
-from gvgbot.cli.arguments import Commands, add_overrides, number, seed
+from gvgbot.cli.arguments import Commands, add_overrides, number, path, seed
 
 MOST_ROBOTS = 8
 
@@ -44,10 +43,10 @@ def add_explore(commands: Commands) -> None:
         metavar="N",
         help="so many robots explore together, 1 to 8; the others start anywhere, by the seed",
     )
-    explore.add_argument("--config", type=Path, metavar="C.yaml", help="default: sim.yaml")
+    explore.add_argument("--config", type=path, metavar="C.yaml", help="default: sim.yaml")
     add_overrides(explore)
     explore.add_argument(
-        "--out", type=Path, metavar="DIR", help="run directory (default: a new one in runs/)"
+        "--out", type=path, metavar="DIR", help="run directory (default: a new one in runs/)"
     )
     explore.add_argument(
         "--real-time", action="store_true", help="at the pace of a real robot, not faster"

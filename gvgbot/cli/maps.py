@@ -1,9 +1,8 @@
 """`gvgbot map`: pictures, facts and other formats of saved maps."""
 
 import argparse
-from pathlib import Path
 
-from gvgbot.cli.arguments import Commands, add_overrides, frames, positive, say
+from gvgbot.cli.arguments import Commands, add_overrides, frames, path, positive, say
 from gvgbot.errors import ExtraMissing, UsageError
 from gvgbot.words import counted
 
@@ -29,10 +28,10 @@ def _add_show(actions: Commands) -> None:
         "side; with --animate a film in which everything appears as it was found.",
         epilog="example: gvgbot map show runs/office-1 --animate --out film.gif",
     )
-    show.add_argument("run", type=Path, metavar="RUN_DIR", help="the directory of a run")
+    show.add_argument("run", type=path, metavar="RUN_DIR", help="the directory of a run")
     show.add_argument(
         "--out",
-        type=Path,
+        type=path,
         metavar="FILE",
         help="what to write: .png, .svg or .pdf, .gif with --animate (default: picture.png, "
         "strip.png or film.gif in the run directory)",
@@ -49,7 +48,7 @@ def _add_info(actions: Commands) -> None:
         description="Say in a few lines what a map holds and how well it is known.",
         epilog="example: gvgbot map info runs/office-1",
     )
-    info.add_argument("run", type=Path, metavar="RUN_DIR", help="the directory of a run")
+    info.add_argument("run", type=path, metavar="RUN_DIR", help="the directory of a run")
     info.set_defaults(command=_info)
 
 
@@ -64,9 +63,9 @@ def _add_export(actions: Commands) -> None:
         epilog="example: gvgbot map export runs/office-1 office.pdf",
     )
     export.add_argument(
-        "run", type=Path, metavar="RUN_DIR", help="the directory of a run, or a recording"
+        "run", type=path, metavar="RUN_DIR", help="the directory of a run, or a recording"
     )
-    export.add_argument("file", type=Path, metavar="FILE", help="what to write")
+    export.add_argument("file", type=path, metavar="FILE", help="what to write")
     export.add_argument("--ros-bag", action="store_true", help="FILE is the new directory of a bag")
     export.add_argument(
         "--sensors-only",
@@ -85,12 +84,12 @@ def _add_import(actions: Commands) -> None:
         "frame is that of the file; unknown pixels stay unknown.",
         epilog="example: gvgbot map import floor.yaml --out runs/floor",
     )
-    importing.add_argument("map", type=Path, metavar="MAP.yaml", help="the map")
+    importing.add_argument("map", type=path, metavar="MAP.yaml", help="the map")
     importing.add_argument(
-        "--out", type=Path, metavar="RUN_DIR", required=True, help="the directory of the new run"
+        "--out", type=path, metavar="RUN_DIR", required=True, help="the directory of the new run"
     )
     importing.add_argument(
-        "--config", type=Path, metavar="C.yaml", help="of the robot; default: sim.yaml"
+        "--config", type=path, metavar="C.yaml", help="of the robot; default: sim.yaml"
     )
     add_overrides(importing)
     importing.set_defaults(command=_import)
@@ -115,10 +114,10 @@ def _add_diff(actions: Commands) -> None:
         "them has, and how far apart the others are. Exits 0 if both maps have the same, 1 if not.",
         epilog="example: gvgbot map diff runs/office-1 runs/office-2 --out both.png",
     )
-    diff.add_argument("a", type=Path, metavar="RUN_A", help="the directory of a run")
-    diff.add_argument("b", type=Path, metavar="RUN_B", help="that of another")
+    diff.add_argument("a", type=path, metavar="RUN_A", help="the directory of a run")
+    diff.add_argument("b", type=path, metavar="RUN_B", help="that of another")
     diff.add_argument(
-        "--out", type=Path, metavar="FILE", help="both, side by side: .png, .svg or .pdf"
+        "--out", type=path, metavar="FILE", help="both, side by side: .png, .svg or .pdf"
     )
     diff.add_argument(
         "--tolerance",
@@ -133,8 +132,8 @@ def _add_diff(actions: Commands) -> None:
 def _show(options: argparse.Namespace) -> int:
     from gvgbot.maps.show import show
 
-    path = show(options.run, options.out, animate=options.animate, frames=options.frames)
-    say(f"picture: {path}")
+    picture = show(options.run, options.out, animate=options.animate, frames=options.frames)
+    say(f"picture: {picture}")
     return 0
 
 

@@ -1,9 +1,8 @@
 """`gvgbot replay`."""
 
 import argparse
-from pathlib import Path
 
-from gvgbot.cli.arguments import Commands, add_overrides, positive, say
+from gvgbot.cli.arguments import Commands, add_overrides, path, positive, say
 from gvgbot.errors import UsageError
 
 NO_ECHO_M = 80.0  # of the lasers that CARMEN logs were made with
@@ -20,16 +19,16 @@ def add_replay(commands: Commands) -> None:
         "what the mind does.",
         epilog="example: gvgbot replay run.mcap --out runs/again",
     )
-    replay.add_argument("log", type=Path, metavar="FILE", help="the recording or log")
+    replay.add_argument("log", type=path, metavar="FILE", help="the recording or log")
     replay.add_argument(
         "--config",
-        type=Path,
+        type=path,
         metavar="C.yaml",
         help="default: that of the recorded run; carmen.yaml for a CARMEN log",
     )
     add_overrides(replay)
     replay.add_argument(
-        "--out", type=Path, metavar="DIR", help="run directory (default: a new one in runs/)"
+        "--out", type=path, metavar="DIR", help="run directory (default: a new one in runs/)"
     )
     replay.add_argument(
         "--no-echo",

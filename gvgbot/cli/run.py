@@ -2,9 +2,8 @@
 
 import argparse
 import sys
-from pathlib import Path
 
-from gvgbot.cli.arguments import Commands, add_overrides, say
+from gvgbot.cli.arguments import Commands, add_overrides, path, say
 
 
 def add_run(commands: Commands) -> None:
@@ -18,15 +17,15 @@ def add_run(commands: Commands) -> None:
         epilog="example: gvgbot run turtlebot2.yaml --set service.state_dir=/var/lib/gvgbot",
     )
     run.add_argument(
-        "config", nargs="?", type=Path, metavar="CONFIG", help="default: sim.yaml, no hardware"
+        "config", nargs="?", type=path, metavar="CONFIG", help="default: sim.yaml, no hardware"
     )
     add_overrides(run)
     run.add_argument(
-        "--out", type=Path, metavar="DIR", help="run directory (default: a new one in runs/)"
+        "--out", type=path, metavar="DIR", help="run directory (default: a new one in runs/)"
     )
     known = run.add_mutually_exclusive_group()
     known.add_argument(
-        "--map", type=Path, metavar="RUN_DIR", help="begin with the map of an earlier run"
+        "--map", type=path, metavar="RUN_DIR", help="begin with the map of an earlier run"
     )
     known.add_argument(
         "--new", action="store_true", help="begin a new map, whatever the state directory holds"
@@ -57,7 +56,7 @@ def add_install_service(commands: Commands) -> None:
         epilog="example: sudo /opt/gvgbot/bin/gvgbot install-service turtlebot2.yaml",
     )
     install.add_argument(
-        "config", nargs="?", type=Path, metavar="CONFIG", help="default: turtlebot2.yaml"
+        "config", nargs="?", type=path, metavar="CONFIG", help="default: turtlebot2.yaml"
     )
     install.add_argument(
         "--user", action="store_true", help="a service of your own session, without root"

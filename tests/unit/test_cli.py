@@ -46,6 +46,10 @@ BAD_ARGUMENTS = {
     "one frame": (["map", "show", ".", "--frames", "1"], "from 2 to 200"),
     "too many frames": (["map", "show", ".", "--frames", "100000"], "from 2 to 200"),
     "a tolerance below 0": (["map", "diff", ".", ".", "--tolerance", "-1"], "above 0"),
+    "nowhere to explore to": (["explore", "--out", ""], "--out: it is empty: give a path"),
+    "nowhere to import to": (["map", "import", "a.yaml", "--out", ""], "--out: it is empty"),
+    "nowhere to draw": (["map", "show", ".", "--out", ""], "--out: it is empty"),
+    "no run": (["map", "info", ""], "RUN_DIR: it is empty"),
     "no request": (["ctl"], "REQUEST"),
     "two configurations": (["run", "a.yaml", "b.yaml"], "b.yaml"),
 }
