@@ -96,12 +96,19 @@ def conclusion(session: Session, log: Log) -> list[str]:
 def open_log(wanted: Wanted) -> Log:
     """The log in a file of either kind. Raises UsageError, ConfigError."""
     try:
+        _check_kind(wanted.path)
         with wanted.path.open("rb") as file:
             start = file.read(len(MCAP))
     except OSError as error:
         hint = _recordings(wanted.path) if wanted.path.is_dir() else ""
         raise UsageError(f"cannot read {wanted.path}: {error.strerror}{hint}") from error
     return _recording(wanted) if start == MCAP else _carmen(wanted)
+
+
+def _check_kind(path: Path) -> None:
+    """Raises UsageError for what can be read only once, OSError."""
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise UsageError(f"{path} is a pipe or a device: write what comes of it to a file first")
 
 
 def _recordings(path: Path) -> str:

@@ -1,6 +1,7 @@
 """A log of a drive around a ring of corridors, written from geometry, becomes a true map."""
 
 import math
+import os
 from pathlib import Path
 
 import numpy as np
@@ -101,6 +102,23 @@ def test_a_bad_log_is_one_line_and_no_run(
     (line,) = capsys.readouterr().err.splitlines()
     assert ("recording (MCAP)" in line) == (content is not None)  # the other kind there is
     assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize("command", ["replay {} --out {}", "map export {} {} --ros-bag"])
+def test_what_can_be_read_only_once_is_no_log(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A named pipe, and one as of `replay <(zcat log.gz)`."""
+    os.mkfifo(tmp_path / "log")
+    here, there = os.pipe()
+    for path in (tmp_path / "log", Path(f"/dev/fd/{here}")):
+        assert main(command.format(path, tmp_path / "out").split()) == 2
+        (line,) = capsys.readouterr().err.splitlines()
+        assert line.startswith(f"gvgbot: {path} is a pipe")
+        assert "write what comes of it to a file first" in line
+    os.close(here)
+    os.close(there)
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_replay_that_fails_leaves_what_was_there_before_and_nothing_else(
