@@ -68,6 +68,7 @@ class StopSignals:
         self._asked: str | None = None
         self._tell: Callable[[], object] | None = None
         self._before: dict[signal.Signals, Any] = {}
+        self._blocked: set[signal.Signals | int] = set()
 
     async def wait(self) -> str:
         """The name of the first signal; waits for one."""
@@ -92,6 +93,7 @@ class StopSignals:
             if number is signal.SIGHUP and before is signal.SIG_IGN:
                 continue  # started by nohup: to outlive its terminal
             self._before[number] = signal.signal(number, self._take)
+        self._blocked = signal.pthread_sigmask(signal.SIG_UNBLOCK, self._before)
         return self
 
     def __exit__(
@@ -100,6 +102,7 @@ class StopSignals:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        signal.pthread_sigmask(signal.SIG_SETMASK, self._blocked)
         for number, handler in self._before.items():
             signal.signal(number, handler)
 

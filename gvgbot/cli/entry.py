@@ -26,7 +26,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status; wrong arguments raise SystemExit(2)."""
     _fill_streams()
     options = parser().parse_args(arguments)
-    with _any_stop_as_by_ctrl_c():
+    with _ctrl_c_shut_out_if_ignored(), _any_stop_as_by_ctrl_c():
         return status_of(lambda: options.command(options))
 
 
@@ -35,6 +35,25 @@ def _fill_streams() -> None:
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
             setattr(sys, name, Path(os.devnull).open(mode, encoding="utf-8"))  # noqa: SIM115
+
+
+@contextmanager
+def _ctrl_c_shut_out_if_ignored() -> Iterator[None]:
+    """Let tasks be ended in order though Ctrl-C is ignored, as `&` in a script has it.
+
+    asyncio takes no signal that is ignored, and whatever else ends the program would break into a
+    task. One that is blocked does not come either: threads that begin later have it blocked, too.
+    """
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @contextmanager

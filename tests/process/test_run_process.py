@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 import tty
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from queue import Queue
@@ -45,10 +45,15 @@ def endpoint() -> str:
     return free_endpoint()
 
 
+STOPPED = ["map:     run/map.geojson", "picture: run/map.png", "gvgbot: interrupted"]
+
+
 @contextmanager
-def gvgbot(*arguments: str, cwd: Path) -> Iterator["subprocess.Popen[str]"]:
+def gvgbot(
+    *arguments: str, cwd: Path, python: Sequence[str] = (sys.executable,)
+) -> Iterator["subprocess.Popen[str]"]:
     """A gvgbot process with its log on a pipe; whatever happens, it does not outlive the test."""
-    command = [sys.executable, "-m", "gvgbot", *arguments]
+    command = [*python, "-m", "gvgbot", *arguments]
     environment = {k: v for k, v in os.environ.items() if k not in ("NOTIFY_SOCKET",)}
     with subprocess.Popen(
         command,
@@ -94,6 +99,13 @@ def until_kept(state: Path) -> None:
     """Wait for a mission that another program could go on with."""
     while not list(state.glob("runs/*/snapshot.gvg")):
         time.sleep(0.1)  # noqa: TID251  # another program is waited for
+
+
+def until_joined(events: Path, edges: int, process: "subprocess.Popen[str]") -> None:
+    """Wait until an exploration has found so many edges."""
+    while not (events.exists() and events.read_text().count("edge_joined") >= edges):
+        assert process.poll() is None
+        select.select([], [], [], 0.1)
 
 
 def ask(session: zenoh.Session, selector: str) -> tuple[str, bytes]:
@@ -152,18 +164,33 @@ def test_a_simulated_exploration_that_is_stopped_leaves_its_map(
 ) -> None:
     events = tmp_path / "run" / "events.jsonl"
     with gvgbot("explore", "--out", "run", cwd=tmp_path) as process:
-        while not (events.exists() and "edge_joined" in events.read_text()):
-            assert process.poll() is None
-            select.select([], [], [], 0.1)
+        until_joined(events, 1, process)
         process.send_signal(number)
         log, _ = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130
-    assert log.splitlines()[-3:] == [
-        "map:     run/map.geojson",
-        "picture: run/map.png",
-        "gvgbot: interrupted",
-    ]
+    assert log.splitlines()[-3:] == STOPPED
     assert json.loads((events.parent / "map.geojson").read_text())["features"]
+
+
+@pytest.mark.parametrize("robots", [1, 3])
+def test_an_exploration_that_a_script_left_in_the_background_is_stopped_as_any(
+    robots: int, tmp_path: Path
+) -> None:
+    """There `&` has Ctrl-C ignored, and that it stays."""
+    events = tmp_path / "run" / ("events.jsonl" if robots == 1 else "robot-1/events.jsonl")
+    deaf = ["sh", "-c", 'trap "" INT; exec "$0" "$@"', sys.executable]
+    with gvgbot(
+        "explore", "--out", "run", "--robots", f"{robots}", cwd=tmp_path, python=deaf
+    ) as process:
+        until_joined(events, 1, process)
+        process.send_signal(signal.SIGINT)
+        until_joined(events, 3, process)
+        process.send_signal(signal.SIGTERM)
+        log, _ = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 130
+    assert log.splitlines()[-3:] == STOPPED
+    assert "Traceback" not in log
+    assert json.loads((tmp_path / "run" / "map.geojson").read_text())["features"]
 
 
 def test_a_robot_without_any_stream_maps_all_the_same(tmp_path: Path) -> None:

@@ -121,6 +121,18 @@ def test_signals_are_what_they_were_afterwards() -> None:
     assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
 
 
+def test_a_signal_that_was_blocked_is_heard_and_blocked_again_afterwards() -> None:
+    """As the command line has Ctrl-C of a program that a script left in the background."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        with StopSignals() as signals:
+            signal.raise_signal(signal.SIGINT)
+            assert run_in_virtual_time(signals.wait()) == "SIGINT"
+        assert signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, {})
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def test_a_robot_started_by_nohup_outlives_its_terminal() -> None:
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     try:
