@@ -171,6 +171,10 @@ UNREADABLE = {
     "two documents": ("name: a\n---\nname: b\n", "not valid YAML"),
     "an impossible date": ("name: 2020-13-45\n", "not valid YAML"),
     "a python object": ("name: !!python/object:os.system a\n", "not valid YAML: line 1"),
+    "a tag of another value": ("tame: !!bool x\n", "line 1, column 7: the value is no !!bool"),
+    "a tag of no number": ('leg: [!!float "", 2]\n', "column 7: the value is no !!float"),
+    "a tag of no whole number": ('leg: {toes: !!int "-"}\n', "the value is no !!int"),
+    "a tag of no date": ("name: !!timestamp x\n", "the value is no !!timestamp"),
     "a list for a key": ("[1]: 2\n", "line 1, column 1"),
 }
 
@@ -228,6 +232,7 @@ def test_an_override_does_not_hide_a_mistake_of_the_file(tmp_path: Path) -> None
         ("=3", "must be key=value"),
         ("leg..toes=3", "must be key=value"),
         ("name=[1", "the value is not valid YAML"),
+        ("tame=!!bool x", "the value is not valid YAML: line 1, column 1: the value is no !!bool"),
         ("leg=3", "leg = 3: must be a mapping"),
         ("name.first=Rex", "name: must be text"),
         ("leg.toes=0", "leg.toes = 0: must be a whole number of at least 1"),
