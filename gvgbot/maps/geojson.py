@@ -8,7 +8,7 @@ import math
 from collections import defaultdict
 from collections.abc import Iterable
 from itertools import chain
-from typing import Generic, Literal, TypeVar
+from typing import Annotated, Generic, Literal, TypeVar
 
 import msgspec
 import numpy as np
@@ -19,16 +19,20 @@ from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph, VertexKind
 DECIMALS = 6  # of lengths and angles: micrometres
 COVARIANCE_DECIMALS = 9  # of squares: fewer could make a good fix look singular
 
+_FARTHEST_M = 1e5  # from the origin, in any map
+
 T = TypeVar("T")
-XY = tuple[float, float]
-Matrix = tuple[float, float, float, float]
+Metres = Annotated[float, msgspec.Meta(ge=-_FARTHEST_M, le=_FARTHEST_M)]
+SquareMetres = Annotated[float, msgspec.Meta(ge=-(_FARTHEST_M**2), le=_FARTHEST_M**2)]
+XY = tuple[Metres, Metres]
+Matrix = tuple[SquareMetres, SquareMetres, SquareMetres, SquareMetres]
 
 
 class _VertexMetadata(msgspec.Struct):
     kind: VertexKind
     degree: int
     bearings: tuple[float, ...]
-    clearance: float
+    clearance: Metres
     covariance: Matrix
     frontiers: tuple[float, ...]
     visits: int
@@ -41,8 +45,8 @@ class _VertexProperties(msgspec.Struct):
 
 
 class _EdgeMetadata(msgspec.Struct):
-    length: float
-    min_clearance: float
+    length: Metres
+    min_clearance: Metres
     traversals: int
 
 
@@ -50,7 +54,7 @@ class _EdgeProperties(msgspec.Struct):
     id: int
     startid: int
     endid: int
-    cost: float
+    cost: Metres
     metadata: _EdgeMetadata
 
 

@@ -219,6 +219,11 @@ def test_a_number_that_is_not_finite_is_not_saved() -> None:
         ("[2.0,0.0],", "[2.0,0.5],", "no way back"),
         ("[0.0,0.0],[2.0,0.0],", "[0.0],[2.0,0.0],", "feature 2"),
         ('"frame":"map"', '"frame":"odom"', "feature 0.*frame"),
+        ("[2.0,1.0]", "[2.0,1e6]", r"feature 1.*<= 100000.*coordinates\[1\]"),
+        ("[2.0,0.0],", "[-1e308,0.0],", r"feature 2.*>= -100000.*coordinates"),
+        ("[0.01,", "[1e308,", r"feature 0.*covariance\[0\]"),
+        ('"clearance":1.25', '"clearance":1000000', "feature 0.*clearance"),
+        ('"length":3.0', '"length":1e300', "feature 2.*length"),
     ],
 )
 def test_damage_is_named_in_one_line(old: str, new: str, complaint: str) -> None:
@@ -227,6 +232,14 @@ def test_damage_is_named_in_one_line(old: str, new: str, complaint: str) -> None
     with pytest.raises(UsageError, match=complaint) as refusal:
         decode(text.replace(old, new, 1))
     assert "\n" not in str(refusal.value)
+
+
+def test_the_largest_map_there_can_be_is_read() -> None:
+    far = RouteGraph(
+        (a_vertex(0, 1e5, -1e5, covariance=(1e10, -1e10, -1e10, 1e10)), a_vertex(1)),
+        (an_edge(0, 1, (1e5, -1e5), (0.0, 0.0), length=1e5),),
+    )
+    assert decode(encode(far)).vertices == far.vertices
 
 
 @pytest.mark.parametrize("text", ["", "null", "[1, 2]", "not json", '{"features": 3}', "\0"])
