@@ -1,7 +1,6 @@
 """The simulated world: an occupancy bitmap, and its files in map_server form."""
 
 import math
-import warnings
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -17,6 +16,7 @@ from scipy import ndimage
 from gvgbot.drivers.ray_casting import Mask, RayCaster
 from gvgbot.errors import WorldError
 from gvgbot.geometry import Array, Pose
+from gvgbot.images import opened
 from gvgbot.yaml_text import is_finite, read_yaml
 
 OCCUPIED_THRESHOLD = 0.65  # map_server's customary values, for files that leave them out
@@ -203,10 +203,8 @@ def _instead(path: Path) -> str:
 def _read_grey(path: Path, image: Path, mode: str) -> Array:
     """Brightness 0..255 of each pixel, NaN where it tells nothing; row 0 at the top."""
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-            with Image.open(image) as picture:
-                return _grey(picture, mode)
+        with opened(image) as picture:
+            return _grey(picture, mode)
     except FileNotFoundError:
         raise WorldError(f"{path}: key image: no such file {image}; correct the name") from None
     except UnidentifiedImageError:

@@ -4,7 +4,6 @@ A third file, which map_server does not know, says when each pixel was first see
 """
 
 import io
-import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from gvgbot.errors import UsageError
+from gvgbot.images import opened
 from gvgbot.maps.occupancy import UNKNOWN, OccupancyGrid, Seconds
 from gvgbot.yaml_text import read_yaml
 
@@ -26,13 +26,13 @@ FREE_THRESH = 0.196  # just below the probability that the grey of unknown stand
 WALL, FREE, UNSEEN = 0, 254, 205  # grey levels
 NEVER = 65535  # the level of a pixel in SEEN that no scan saw
 
-_LARGEST = sys.float_info.max
-_Finite = Annotated[float, msgspec.Meta(ge=-_LARGEST, le=_LARGEST)]
+_FARTHEST_M = 1e5  # from the origin to a map
+_Near = Annotated[float, msgspec.Meta(ge=-_FARTHEST_M, le=_FARTHEST_M)]
 
 
 class _Description(msgspec.Struct):
-    resolution: Annotated[float, msgspec.Meta(gt=0.0, le=_LARGEST)]
-    origin: tuple[_Finite, _Finite, _Finite]
+    resolution: Annotated[float, msgspec.Meta(ge=1e-4, le=10.0)]
+    origin: tuple[_Near, _Near, _Near]
 
 
 def encode_map_server(grid: OccupancyGrid) -> dict[str, bytes | str]:
@@ -75,7 +75,7 @@ def _read_seen(directory: Path, shape: tuple[int, ...]) -> Seconds | None:
 def _read_image(path: Path, mode: str) -> NDArray[np.int64]:
     """Levels (rows, columns), first row at the bottom."""
     try:
-        with Image.open(path) as image:
+        with opened(path) as image:
             if image.mode != mode:
                 raise UsageError(f"{path} is not an image that a run writes")
             return np.asarray(image)[::-1].astype(np.int64)

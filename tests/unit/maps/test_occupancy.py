@@ -310,6 +310,16 @@ def test_a_grid_without_a_record_of_what_was_seen_can_be_read(tmp_path: Path) ->
     assert read_map_server(tmp_path).seen_s is None
 
 
+def test_a_grid_as_large_as_pil_warns_of_can_be_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen_s = np.zeros((2, 3), np.float32)
+    grid = OccupancyGrid(np.zeros((2, 3), np.int8), 0.05, (0.0, 0.0), seen_s)
+    write_files(tmp_path, encode_map_server(grid))
+    monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 4)
+    assert read_map_server(tmp_path).cells.shape == (2, 3)
+
+
 def test_powers_of_ten_without_a_point_are_numbers(tmp_path: Path) -> None:
     grid = OccupancyGrid(np.zeros((2, 3), np.int8), 0.05, (0.0, 0.0))
     write_files(tmp_path, encode_map_server(grid))
@@ -327,6 +337,9 @@ def test_powers_of_ten_without_a_point_are_numbers(tmp_path: Path) -> None:
         ("map.yaml", b"resolution: 0.05\norigin: [.nan, 0, 0]"),
         ("map.yaml", b"resolution: " + b"[" * 5000),
         ("map.yaml", b"resolution: -1\norigin: [0, 0, 0]"),
+        ("map.yaml", b"resolution: 1e-300\norigin: [0, 0, 0]"),
+        ("map.yaml", b"resolution: 1e300\norigin: [0, 0, 0]"),
+        ("map.yaml", b"resolution: 0.05\norigin: [0, -1e300, 0]"),
         ("map.yaml", b"[}"),
         ("map.yaml", b"\xff\xfe\x00"),
         ("map.pgm", b"P5\n3 2\n255\n"),
