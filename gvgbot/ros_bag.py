@@ -26,6 +26,7 @@ from gvgbot.ros2.cdr import definition
 from gvgbot.ros2.topics import Topic
 
 _VERSION: Final = 9  # of the format, as Iron and later write it
+_LAST = 2**31 - 1  # s since 1970, as ROS counts
 _FOR_EVER = QosTime(9_223_372_036, 854_775_807)
 
 
@@ -34,8 +35,8 @@ def export_bag(recording: Path, out: Path, *, sensors_only: bool) -> list[str]:
 
     The robot's mind lives through the recording once more for its map, unless only what the sensors
     said is wanted. Stamps are those of the robot's clock. One that cannot be finished leaves
-    nothing. Raises UsageError for a recording that cannot be read, or a directory that exists;
-    GvgbotError if it cannot be written.
+    nothing. Raises UsageError for a recording that cannot be read or has a stamp that ROS has not,
+    or a directory that exists; GvgbotError if it cannot be written.
     """
     if out.exists():
         raise UsageError(f"{out} exists already; name a new directory")
@@ -61,7 +62,7 @@ def _play(log: Log, bag: "_Bag", *, sensors_only: bool) -> None:
         led=log.led,
         localisation=config.localisation,
     )
-    live = LiveRos([bag], pipeline, config.autonomy.odometry_noise, unix=lambda stamp: stamp)
+    live = LiveRos([bag], pipeline, config.autonomy.odometry_noise, unix=_unix)
     at = due = 0.0
     for at, message in log.messages:
         match message:
@@ -77,6 +78,16 @@ def _play(log: Log, bag: "_Bag", *, sensors_only: bool) -> None:
             _draw(live, at)
             due = at + MAP_EVERY
     _draw(live, at)
+
+
+def _unix(stamp: float) -> float:
+    """The stamp itself. Raises UsageError if no message of ROS can have it."""
+    if not 0.0 <= stamp < _LAST:
+        raise UsageError(
+            f"the recording has a message at {stamp:.10g} s, and ROS counts from 0 to {_LAST} s: "
+            "it can only be replayed"
+        )
+    return stamp
 
 
 def _draw(live: LiveRos, at: float) -> None:

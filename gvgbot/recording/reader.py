@@ -67,10 +67,16 @@ class Recording:
         self.requests = 0  # that were granted
 
     def messages(self) -> Iterator[tuple[float, Lived]]:
-        """What the robot was given, each with the time (s) when it was taken down."""
+        """What the robot was given, each with the time (s) when it was taken down.
+
+        Raises UsageError if a file that follows cannot be read.
+        """
         for path in _parts(self._path, self.about.part):
-            with path.open("rb") as file:
-                yield from self._messages(file)
+            try:
+                with path.open("rb") as file:
+                    yield from self._messages(file)
+            except OSError as error:
+                raise UsageError(f"cannot read {path}: {error.strerror}") from error
 
     def _messages(self, file: BinaryIO) -> Iterator[tuple[float, Lived]]:
         topics: dict[int, str] = {}

@@ -33,12 +33,16 @@ def scan(stamp: float, x: float) -> Scan:
 
 @pytest.fixture
 def recording(tmp_path: Path) -> Path:
+    """It begins at 100 s."""
+    return recorded(tmp_path / "run.mcap", 100.0)
+
+
+def recorded(path: Path, start: float) -> Path:
     """Four seconds straight ahead, at a quarter of a metre a second."""
-    path = tmp_path / "run.mcap"
     about = {"title": "room", "config": "{}"}
     with Recorder(RecordingConfig(path=path), about, patient=True) as recorder:
         for k in range(200):
-            stamp = 100.0 + 0.02 * k
+            stamp = start + 0.02 * k
             odometry = Odometry(stamp, Pose(0.005 * k, 0.0, 0.0), Twist(0.25, 0.0))
             recorder.on_cycle(Cycle(odometry, Felt(), STILL, STILL), None)
             if k % 5 == 4:
@@ -97,6 +101,17 @@ def test_programs_that_map_get_what_the_sensors_said_only(recording: Path, tmp_p
     found = messages(bag)
     assert set(found) == {"/scan", "/odom", "/tf", "/tf_static"}
     assert {t.child_frame_id for tf in found["/tf"] for t in tf.transforms} == {"base_link"}
+
+
+@pytest.mark.parametrize("start", [-0.1, 2.0**31, 3e9])
+def test_a_stamp_that_ros_has_not_is_one_line_and_no_bag(
+    start: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = recorded(tmp_path / "run.mcap", start)
+    assert main(["map", "export", str(path), str(tmp_path / "bag"), "--ros-bag"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert f"a message at {start:.10g} s" in line
+    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_a_bag_replaces_nothing(

@@ -221,6 +221,14 @@ def test_files_follow_each_other_and_are_read_as_one(tmp_path: Path) -> None:
     assert_begins_as(later[::-1], lived[::-1])
 
 
+def test_what_follows_and_is_no_file_is_named(tmp_path: Path) -> None:
+    with Recorder(config(tmp_path / "run.mcap"), ABOUT) as to:
+        record(to, 5)
+    (tmp_path / "run.1.mcap").mkdir()
+    with pytest.raises(UsageError, match=r"cannot read .*run\.1\.mcap: Is a directory"):
+        read(tmp_path / "run.mcap")
+
+
 def test_the_oldest_files_go_when_there_are_too_many_bytes(tmp_path: Path) -> None:
     limited = config(tmp_path / "run.mcap", file_mb=0.1, total_mb=0.5)
     with Recorder(limited, ABOUT, patient=True) as to:
