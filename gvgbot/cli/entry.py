@@ -1,6 +1,7 @@
 """The command line: arguments in, exit status out, one clear line for every failure."""
 
 import errno
+import io
 import os
 import signal
 import sys
@@ -31,10 +32,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _fill_streams() -> None:
-    """Let nothing take the place of a closed stream: what is printed would go into a port."""
+    """Let nothing take the place of a closed stream: what is printed would go into a port.
+
+    What a terminal cannot show, such as the name of a file in another encoding, is spelt out.
+    """
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
             setattr(sys, name, Path(os.devnull).open(mode, encoding="utf-8"))  # noqa: SIM115
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")
 
 
 @contextmanager

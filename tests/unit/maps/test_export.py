@@ -1,6 +1,7 @@
 """`gvgbot map export`, read by programs that are not ours."""
 
 import io
+import sys
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -142,6 +143,25 @@ def test_an_unfit_name_is_one_line(
     assert main(["map", "export", str(run), name]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert name.removesuffix("/map.svg") in line
+
+
+@pytest.mark.parametrize(
+    ("name", "encoding", "shown"),
+    [
+        ("plan \u00fc.svg", "ascii", "plan \\xfc.svg"),
+        ("plan \udcff.svg", "utf-8", "plan \\udcff.svg"),
+    ],
+    ids=["of another alphabet", "in another encoding"],
+)
+def test_a_name_that_the_terminal_cannot_show_is_spelt_out(
+    run: Path, name: str, encoding: str, shown: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    terminal = io.BytesIO()
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(terminal, encoding=encoding))
+    monkeypatch.chdir(run)
+    assert main(["map", "export", ".", name]) == 0
+    assert terminal.getvalue().decode() == f"written: {shown}\n"
+    assert (run / name).exists()
 
 
 @pytest.mark.parametrize("suffix", [".png", ".pdf", ".graphml", ".geojson"])
