@@ -112,6 +112,13 @@ def seed(text: str) -> int:
     return _value(int, text, "a whole number from 0 on", lambda value: value >= 0)
 
 
+def host(text: str) -> str:
+    """A name or an address. Raises ArgumentTypeError if there is no text: that would be all."""
+    if not text:
+        raise argparse.ArgumentTypeError("it is empty: 127.0.0.1 is this machine, 0.0.0.0 all")
+    return text
+
+
 def tcp_port(text: str) -> int:
     """A number of a TCP port. Raises ArgumentTypeError that says what there is."""
     if not text.isdecimal() or int(text) > LAST_PORT:

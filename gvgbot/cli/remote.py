@@ -5,7 +5,7 @@ import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from gvgbot.cli.arguments import Commands, add_connection, say, tcp_port
+from gvgbot.cli.arguments import Commands, add_connection, host, say, tcp_port
 from gvgbot.errors import ExtraMissing
 
 
@@ -54,6 +54,7 @@ def add_web(commands: Commands) -> None:
     )
     web.add_argument(
         "--host",
+        type=host,
         default="127.0.0.1",
         metavar="ADDRESS",
         help="where to serve the page; 0.0.0.0 lets everybody in (default: %(default)s)",

@@ -106,6 +106,6 @@ def _trouble(endpoint: str, zenoh_file: Path | None) -> str | None:
 
 def _shown(host: str) -> str:
     """A host as a browser takes it."""
-    if host in ("", "0.0.0.0", "::"):
+    if host in ("0.0.0.0", "::"):
         return "localhost"
     return f"[{host}]" if ":" in host else host

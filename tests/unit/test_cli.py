@@ -50,6 +50,7 @@ BAD_ARGUMENTS = {
     "nowhere to import to": (["map", "import", "a.yaml", "--out", ""], "--out: it is empty"),
     "nowhere to draw": (["map", "show", ".", "--out", ""], "--out: it is empty"),
     "no run": (["map", "info", ""], "RUN_DIR: it is empty"),
+    "no host for the page": (["web", "--host", ""], "--host: it is empty: 127.0.0.1 is this"),
     "no request": (["ctl"], "REQUEST"),
     "two configurations": (["run", "a.yaml", "b.yaml"], "b.yaml"),
 }
