@@ -51,6 +51,13 @@ def test_a_start_pose_has_three_numbers() -> None:
     assert load_config(None, ["twin.start=[0, -8.2, 1]"]).twin.start == (0.0, -8.2, 1.0)
 
 
+@pytest.mark.parametrize("key", ["laser.x_m", "laser.y_m"])
+def test_a_laser_is_on_its_base(key: str) -> None:
+    load_config(None, [f"{key}=-2"])
+    with pytest.raises(ConfigError, match="must be a number from -2 to 2"):
+        load_config(None, [f"{key}=47"])  # centimetres
+
+
 @pytest.mark.parametrize("name", ["a/b", "a b", "*", "", "ä"])
 def test_a_name_that_cannot_be_part_of_a_topic_is_refused(name: str) -> None:
     with pytest.raises(ConfigError, match="letters, digits"):

@@ -27,8 +27,8 @@ class HokuyoConfig:
     echo: Echo = "single"  # which of several returns along a beam; needs a multi-echo laser
     intensities: bool = False  # ask for them beside the ranges
     user_string: str = ""  # marks the scans asked for; up to 16 of A-Z a-z 0-9 . _ + @ and space
-    x_m: float = 0.0  # of the laser on the base
-    y_m: float = 0.0  # likewise, to the left
+    x_m: Annotated[float, Range(-2.0, 2.0)] = 0.0  # of the laser on the base
+    y_m: Annotated[float, Range(-2.0, 2.0)] = 0.0  # likewise, to the left
     yaw_deg: Annotated[float, Range(-180.0, 180.0)] = 0.0  # likewise, anticlockwise
     upside_down: bool = False  # mounted with its top down: angles are mirrored
     first_angle_deg: Annotated[float, Range(-180.0, 180.0)] = -180.0  # of the laser as mounted:
