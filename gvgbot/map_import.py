@@ -36,6 +36,7 @@ _MOST_CELLS = 60_000_000  # of a map
 def import_map(path: Path, out: Path, config: Config) -> tuple[int, int]:
     """Write a run that knows a map_server map; how many vertices and edges it has.
 
+    An error leaves no run in the way of the next attempt.
     Raises UsageError for a map or a directory that cannot be used, GvgbotError if nothing can be
     written.
     """
@@ -43,7 +44,7 @@ def import_map(path: Path, out: Path, config: Config) -> tuple[int, int]:
     world, known = load_map(path)
     if known.size > _MOST_CELLS:
         raise UsageError(f"{path}: {known.size} pixels are too many; at most {_MOST_CELLS} will do")
-    with RunDirectory.create(out, world=world.name) as directory:
+    with RunDirectory.create(out, world=world.name) as directory, directory.emptied_by_failure():
         session = Session(config, directory, None)
         session.title = world.name
         _teach(session.pipeline, path, world, known, config)

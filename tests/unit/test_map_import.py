@@ -186,4 +186,4 @@ def test_what_is_no_map_gets_one_line_and_leaves_nothing(
     shown = capsys.readouterr()
     assert says in shown.err
     assert shown.err.count("\n") == 1
-    assert not (out / "snapshot.gvg").exists()
+    assert not out.exists()
