@@ -28,9 +28,9 @@ _COMMON: Mapping[str, object] = {
 def session_config(settings: Mapping[str, object], file: Path | None = None) -> zenoh.Config:
     """A configuration: addresses are told, not found by shouting, and tried again when lost.
 
-    What a file (JSON5) sets stands, and the settings fill the rest; a name without a folder means
-    the file in the working directory, or else the packaged one. Raises UsageError for a file that
-    cannot be used.
+    What a file (JSON5) sets stands, and the settings fill the rest, as also what it sets to zenoh's
+    default; a name without a folder means the file in the working directory, or else the packaged
+    one. Raises UsageError for a file that cannot be used.
     """
     plain = zenoh.Config()
     config = zenoh.Config() if file is None else _read(file)
