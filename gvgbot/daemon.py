@@ -159,6 +159,9 @@ def run(config: Config, *, out: Path | None, known: Path | None = None, anew: bo
         except* GvgbotError as failures:
             session.failure = reason_of(failures)
             raise underlying(failures) from None
+        except* Exception as failures:
+            session.failure = reason_of(failures)
+            raise
         finally:
             keeper.finish()
             session.save()

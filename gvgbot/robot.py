@@ -103,6 +103,7 @@ class Robot:
         self._pipeline = session.pipeline
         self._grown, self._finished = asyncio.Event(), asyncio.Event()
         self._saving = asyncio.Lock()  # one at a time
+        self._saves_asked = self._saves_done = 0  # of those asked for, done are the first so many
         self._survey = BesideLoop(session.pipeline, survey)
         self._pipeline.mission.survey = self._survey.newest
         self._estimate = BesideLoop(session.pipeline, smoothed)
@@ -249,9 +250,17 @@ class Robot:
             log.warning("map not saved", reason=str(error))
 
     async def _save_as_asked(self) -> str:
-        """Save, and return where. Raises GvgbotError if that cannot be."""
+        """Save, and return where. Raises GvgbotError if that cannot be.
+
+        A saving that begins later than somebody asked is what was asked for.
+        """
+        self._saves_asked += 1
+        asked = self._saves_asked
         async with self._saving:
-            await self._off_loop(self._session.saving(unfinished="still exploring"))
+            if self._saves_done < asked:
+                done = self._saves_asked
+                await self._off_loop(self._session.saving(unfinished="still exploring"))
+                self._saves_done = done
         return str(self._session.directory.path)
 
     def _use(self, config: Config) -> None:

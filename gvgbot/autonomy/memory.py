@@ -174,7 +174,7 @@ def _intent(pipeline: Pipeline) -> Intent:
         mission._frontiers,
         Closed(closed._times, closed._since),
         errands.is_paused and not errands.is_carried,
-        errands.is_waiting,
+        errands.will_wait,
         errands.kept(),
         errands.closures.until,
     )

@@ -144,8 +144,13 @@ class ReturningPipeline(Pipeline):
         return [Recovery(scan.stamp, "look for its place on the map", "it may have been moved")]
 
     def _seek(self, seeker: Pipeline, scan: Scan) -> list[Event]:
-        """Let the second mind drive on; what it finds is of no interest but for the place."""
+        """Let the second mind drive on; what it finds is of no interest but for the place.
+
+        If it is carried meanwhile, all it has seen is of elsewhere.
+        """
         seeker.perceive(scan)
+        if seeker.errands.is_carried:
+            return self._begin_to_seek(scan)
         last = seeker._last
         if last is None or seeker._turning():
             return []

@@ -100,13 +100,13 @@ class Keeper:
                 localisation=config.localisation,
             )
         )
+        if self._goes_on:
+            self._counts = list(saved.counts)
+        else:
+            session.pipeline.mission.outcome, session.pipeline.mission.reason = None, ""
+            session.pipeline.errands.forget()
         if session.config.service.resume == "paused":
             session.pipeline.errands.is_paused = True
-        if not self._goes_on:
-            session.pipeline.mission.outcome, session.pipeline.mission.reason = None, ""
-            session.pipeline.errands.is_waiting = False
-        else:
-            self._counts = list(saved.counts)
 
     def _is_vouched(self) -> bool:
         """Whether the base has counted all the time since, so that it cannot have driven."""

@@ -51,7 +51,7 @@ def begin(wanted: Wanted, *, world: str) -> Start:
     What was begun with a known map goes on when that is asked for again. A mission that cannot be
     read is left where it is, and a new one begun: nobody may be there to decide.
     """
-    known = None if wanted.known is None else _known(wanted.known)
+    begun_with = None if wanted.known is None else str(wanted.known.resolve())
     path = None if wanted.anew or wanted.out is not None else _newest(wanted.state_dir)
     if path is not None:
         files = MissionFiles(path)
@@ -60,8 +60,9 @@ def begin(wanted: Wanted, *, world: str) -> Start:
         except Damaged as error:
             log.warning("mission cannot be read, a new one begins", reason=str(error))
         else:
-            if known is None or (saved is not None and saved.known == known.known):
+            if begun_with is None or (saved is not None and saved.known == begun_with):
                 return Start(RunDirectory(path), files, saved)
+    known = None if wanted.known is None else _known(wanted.known)
     directory = _new(wanted, world)
     return Start(directory, MissionFiles(directory.path), known)
 

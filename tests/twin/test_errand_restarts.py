@@ -1,5 +1,6 @@
 """A robot that is killed while it does what somebody asked for, and goes on with it."""
 
+import contextlib
 import json
 import math
 from dataclasses import dataclass, field
@@ -185,17 +186,52 @@ def test_a_robot_with_an_errand_stands_where_it_cannot_find_its_place(tmp_path: 
     assert not last.pipeline.errands.is_resting
 
 
-def test_a_map_that_is_lent_lends_no_waiting(tmp_path: Path) -> None:
-    """Who begins with the map of a run that ended after an errand explores all the same."""
+@pytest.mark.parametrize("ends", ["after an errand", "on patrol", "paused"])
+def test_a_map_that_is_lent_lends_nothing_that_was_asked_for(tmp_path: Path, ends: str) -> None:
+    """Who begins with the map of a run explores, whatever that run was about when it ended."""
     config = Config(twin=TWIN, autonomy=AUTONOMY)
 
-    def has_been_sent(session: Session) -> bool:
+    def is_over(session: Session) -> bool:
         errands = session.pipeline.errands
         if explored(session) and not errands.is_waiting and errands.errand is None:
-            errands.goto_point(1.0, 0.0, session.pipeline.keyframes[-1].stamp)
-        return errands.is_waiting
+            stamp = session.pipeline.keyframes[-1].stamp
+            if ends == "paused":
+                errands.pause()
+            elif ends == "on patrol":
+                errands.patrol((), stamp)
+            else:
+                errands.goto_point(1.0, 0.0, stamp)
+        is_busy = errands.errand is not None and ends == "on patrol"
+        return errands.is_waiting or errands.is_paused or is_busy
 
-    Lives(config, tee(), tmp_path / "known", over=has_been_sent).run([])
+    Lives(config, tee(), tmp_path / "known", over=is_over).run([])
     last = Lives(config, tee(), tmp_path / "run", known=tmp_path / "known").run([])
     assert last.pipeline.mission.outcome == "explored"
     assert not last.pipeline.is_lost
+
+
+def test_a_robot_that_waits_and_looks_for_its_place_waits_after_a_restart(tmp_path: Path) -> None:
+    """It had been sent back before it had explored all, and was asked to look around there."""
+    asked: list[float] = []  # stamps, of being sent, of standing there, of looking around
+
+    def pulls_the_plug(session: Session, now: float) -> bool:
+        errands = session.pipeline.errands
+        if not asked and session.pipeline.mapper.graph.frontiers():
+            with contextlib.suppress(Declined):  # it has not seen enough yet
+                errands.goto_point(0.0, 0.0, now)
+                asked.append(now)
+        elif len(asked) == 1 and errands.is_waiting:
+            asked.append(now)
+        elif len(asked) == 2 and now > asked[1] + 2 * SNAPSHOT_EVERY:
+            errands.relocalise(now)
+            asked.append(now)
+        return len(asked) == 3 and now > asked[2] + 2.0
+
+    def is_over(session: Session) -> bool:
+        lives = len(robot.sessions)
+        return lives == 2 and session.pipeline.errands.is_resting
+
+    robot = Lives(Config(twin=TWIN, autonomy=AUTONOMY), tee(), tmp_path, over=is_over)
+    last = robot.run([pulls_the_plug])
+    assert last.pipeline.errands.is_waiting
+    assert last.pipeline.mission.outcome is None

@@ -3,7 +3,8 @@
 import asyncio
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -13,11 +14,15 @@ import pytest
 import structlog
 from scipy.spatial import cKDTree
 
+from gvgbot.autonomy.events import Event
+from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.clock import Clock
+from gvgbot.config import load_config
+from gvgbot.daemon import run
 from gvgbot.errors import DeviceLost
 from gvgbot.geometry import Pose, Twist
 from gvgbot.hal.devices import Base, Laser
-from gvgbot.hal.messages import Contact, Odometry, Sign
+from gvgbot.hal.messages import Contact, Odometry, Scan, Sign
 from gvgbot.links import Close, Links
 from gvgbot.topics import Grid
 from tests.twin.run_rig import STOP, Daemon, base_commands
@@ -65,6 +70,41 @@ def test_a_run_that_ended_by_a_fault_says_so_in_its_summary(daemon: Daemon) -> N
     daemon.run(ten_seconds)
     summary = json.loads((daemon.session.directory.path / "summary.json").read_text())
     assert (summary["outcome"], summary["reason"]) == ("failed", "the base does not answer")
+
+
+def test_a_crowd_that_asks_to_save_waits_for_one_more_saving(
+    daemon: Daemon, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The one that is under way may have begun before something was found."""
+    saved: list[float] = []
+
+    async def slowly(work: Callable[[], None]) -> None:
+        work()
+        await asyncio.sleep(1.0)
+
+    monkeypatch.setattr(daemon.robot, "_off_loop", slowly)
+    monkeypatch.setattr(daemon.session, "saving", lambda **_: partial(saved.append, 0.0))
+
+    async def story(clock: Clock) -> None:
+        begin = clock.now()
+        await asyncio.gather(*(daemon.robot._save_as_asked() for _ in range(50)))
+        assert clock.now() - begin < 3.0
+
+    daemon.run(story)
+    assert 2 <= len(saved) <= 3  # one may be the daemon's own
+
+
+def test_a_run_that_a_mistake_of_the_program_ended_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def mistaken(pipeline: Pipeline, scan: Scan) -> list[Event]:
+        raise ValueError("a mistake")
+
+    monkeypatch.setattr(Pipeline, "perceive", mistaken)
+    with pytest.raises(ExceptionGroup):
+        run(load_config(None, ["telemetry.enabled=false"]), out=tmp_path / "run")
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert (summary["outcome"], summary["reason"]) == ("failed", "a mistake")
 
 
 def test_the_state_is_published_ten_times_a_second_with_the_truth_in_it(daemon: Daemon) -> None:

@@ -313,9 +313,23 @@ class Errands:
         """What there is to remember of the errand that somebody asked for."""
         return None if self._plan is None or self._is_own else self._plan.kept()
 
+    @property
+    def will_wait(self) -> bool:
+        """Whether the robot waits for what comes next, or will after a restart.
+
+        What it is about then cannot be kept.
+        """
+        is_asked = self._plan is not None and not self._is_own
+        return self.is_waiting or (is_asked and self.kept() is None)
+
     def recall(self, kept: Kept | None) -> None:
         """Go on with an errand that was remembered."""
         self._plan = None if kept is None else recalled(kept)
+
+    def forget(self) -> None:
+        """Be free to explore: what a robot was asked for is no part of its map."""
+        self.recall(None)
+        self.is_waiting = self.is_paused = False
 
     # -- what is done about it ---------------------------------------------------------------------
 
