@@ -119,9 +119,11 @@ def _centres(world: World, rows: NDArray[np.intp], columns: NDArray[np.intp]) ->
 
 
 def _looker(world: World, known: Mask, reach: float) -> Callable[[Pose], Scan]:
-    """What a laser sees that looks all around; beams into the unknown tell nothing."""
+    """What a laser sees that looks all around; beams into the unknown, or outside, tell nothing."""
     bearings: Array = -math.pi + np.arange(_BEAMS, dtype=np.float64) * (math.tau / _BEAMS)
-    beyond = World(world.occupied | ~known, world.resolution_m, world.origin)
+    unknown = np.pad(world.occupied | ~known, 1, constant_values=True)
+    x, y = np.array(world.origin) - world.resolution_m
+    beyond = World(unknown, world.resolution_m, (float(x), float(y)))
 
     def look(pose: Pose) -> Scan:
         ranges = world.cast(pose, bearings, reach)

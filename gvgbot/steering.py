@@ -12,6 +12,7 @@ from gvgbot.errors import GvgbotError
 from gvgbot.hal.guard import Reason
 from gvgbot.hal.messages import Contact
 from gvgbot.requests import Answer, Arguments, Asked, Goto, Patrol, Set, in_words, parse
+from gvgbot.words import printable
 
 SETTABLE = (
     "robot.limits.max_speed_mps",
@@ -77,7 +78,8 @@ class Steering:
             answer = Answer(done=True, text=await self._do(asked.name, arguments))
         except (Declined, ValueError, GvgbotError) as error:
             answer = Answer(done=False, text=str(error))
-        words = words[:_LONGEST_WORDS]
+        answer = Answer(done=answer.done, text=printable(answer.text))
+        words = printable(words)[:_LONGEST_WORDS]
         happened = Requested(self._now(), words, asked.origin, answer.done, answer.text)
         self._tell([happened, *self._errands.take_events()])
         return answer

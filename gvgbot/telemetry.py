@@ -35,6 +35,7 @@ from gvgbot.topics import (
     alive_key,
     team_key,
 )
+from gvgbot.words import printable
 from gvgbot.zenoh_config import addresses, opened, reason, session_config
 
 _WAITING_QUERIES = 1000  # more than this are dropped, oldest first; who asked gets nothing
@@ -275,20 +276,15 @@ def _asked(query: zenoh.Query, key: str) -> Asked:
     data = b"" if query.payload is None else query.payload.to_bytes()
     encoding = "" if query.encoding is None else str(query.encoding)
     data = data[: LONGEST_ARGUMENTS + 1]  # what is cut is too long still, and will be called so
-    return Asked(_printable(key.rpartition("/")[2]), data, encoding, _origin(query))
+    return Asked(printable(key.rpartition("/")[2]), data, encoding, _origin(query))
 
 
 def _origin(query: zenoh.Query) -> str:
     """Who asks: the name that it gives itself, and its session's id if the network tells it."""
     named = b"" if query.attachment is None else query.attachment.to_bytes()[:_LONGEST_NAME]
-    name = _printable(named.decode(errors="replace")) or "somebody"
+    name = printable(named.decode(errors="replace")) or "somebody"
     source = query.source_info
     return name if source is None else f"{name}, session {source.source_id.zid}"
-
-
-def _printable(text: str) -> str:
-    """The text without what could play tricks on a terminal."""
-    return "".join(c for c in text if c.isprintable())
 
 
 def _tell(query: zenoh.Query, key: str, answer: Answer) -> None:

@@ -9,6 +9,7 @@ from rich.text import Text
 from gvgbot.client import Event, Health, State
 from gvgbot.monitor.chart import LAYERS, Chart, Layer, Scene, chart
 from gvgbot.monitor.facts import Fact, Tone, facts, told
+from gvgbot.words import printable
 
 _FACTS_WIDTH, _NAME_WIDTH = 31, 10
 _LEAST_MAP_WIDTH = 20
@@ -134,7 +135,8 @@ def _joined(left: Text, right: Text) -> Text:
 
 def _line(fact: Fact, *, faint: bool) -> Text:
     tone = "bright_black" if faint else _TONES[fact.tone]
-    return Text.assemble((f"{fact.name:<{_NAME_WIDTH}}", "bright_black"), (fact.text, tone))
+    name = f"{printable(fact.name):<{_NAME_WIDTH}}"  # what a robot tells, whoever it is
+    return Text.assemble((name, "bright_black"), (printable(fact.text), tone))
 
 
 def _coloured(text: str, layers: list[int], floor: list[bool]) -> Text:

@@ -163,6 +163,16 @@ def test_every_request_is_told_of_with_its_origin_whatever_became_of_it() -> Non
     assert max(len(line.request) for line in lines) <= 200
 
 
+def test_what_plays_tricks_on_a_terminal_is_neither_told_nor_answered() -> None:
+    """A sequence that clears the screen, or a line of its own, in the key that shall be set."""
+    rig = Rig()
+    answer = rig.ask("set", key="a\x1b]0;owned\x07\x1b[2J\nX", value="v")
+    (line,) = [event for event in rig.told if isinstance(event, Requested)]
+    assert not answer.done
+    assert all(text.isprintable() for text in (answer.text, line.request, line.answer))
+    assert "owned" in line.request
+
+
 def test_what_the_errands_decline_is_refused_with_their_reason() -> None:
     rig = Rig()
     rig.errands.refuses = True

@@ -72,7 +72,7 @@ function drawMap() {
   if (isFollowing && picture.pose !== null) [view.x, view.y] = picture.pose;
   else if (view.isAutomatic) view.fit(picture.box());
   picture.draw();
-  const metres = [1, 2, 5, 10, 20, 50].find((length) => length * view.scale >= 60) ?? 50;
+  const metres = [1, 2, 5, 10, 20, 50, 100, 200].find((length) => length * view.scale >= 60) ?? 200;
   $("scale-bar").style.width = `${metres * view.scale}px`;
   $("scale-text").textContent = `${metres} m`;
 }

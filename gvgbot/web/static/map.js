@@ -29,6 +29,7 @@ export class MapPicture {
     this.team = [];
     this.trail = []; // lines: x, y and so on
     this.way = []; // [stamp, x, y] since the trail was made
+    this.posed = -Infinity; // stamp of the pose
   }
 
   setColours(styles) {
@@ -61,9 +62,9 @@ export class MapPicture {
   }
 
   setPose(pose, stamp) {
-    this.pose = pose;
+    if (stamp < this.posed) return; // of two topics that tell it, this one came later
+    [this.pose, this.posed] = [pose, stamp];
     const last = this.way.at(-1);
-    if (last !== undefined && stamp < last[0]) this.way = []; // the robot began anew
     if (last === undefined || Math.hypot(pose[0] - last[1], pose[1] - last[2]) > 0.05) {
       this.way.push([stamp, pose[0], pose[1]]);
       if (this.way.length > 2000) this.way.shift();
@@ -74,6 +75,7 @@ export class MapPicture {
     this.known = this.plan = this.scan = this.selected = null;
     this.trail = [];
     this.way = [];
+    this.posed = -Infinity;
   }
 
   // Left, bottom, right, top, m, of all there is.

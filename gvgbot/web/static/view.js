@@ -12,6 +12,7 @@ export class View {
     this.x = 0; // m, the point in the middle
     this.y = 0;
     this.scale = 40; // pixels per metre
+    this.least = LEAST; // or less, where all is so large
     this.isAutomatic = true; // shows all until somebody moves it
     this.fingers = new Map();
     this.listen();
@@ -32,14 +33,15 @@ export class View {
     const [left, bottom, right, top] = box;
     const wide = (this.width - 2 * MARGIN) / Math.max(right - left, 4);
     const high = (this.height - MARGIN - BUTTONS) / Math.max(top - bottom, 4);
-    this.scale = clamp(Math.min(wide, high));
+    this.scale = clamp(Math.min(wide, high), 0);
+    this.least = Math.min(LEAST, this.scale);
     this.x = (left + right) / 2;
     this.y = (bottom + top) / 2 - (BUTTONS - MARGIN) / 2 / this.scale;
   }
 
   zoom(factor, px = this.width / 2, py = this.height / 2) {
     const [x, y] = this.toMap(px, py);
-    this.scale = clamp(this.scale * factor);
+    this.scale = clamp(this.scale * factor, this.least);
     const [nowX, nowY] = this.toMap(px, py);
     this.moved(x - nowX, y - nowY);
   }
@@ -102,4 +104,4 @@ export class View {
 }
 
 const here = (event) => [event.offsetX, event.offsetY];
-const clamp = (scale) => Math.min(MOST, Math.max(LEAST, scale));
+const clamp = (scale, least) => Math.min(MOST, Math.max(least, scale));

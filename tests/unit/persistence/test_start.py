@@ -134,6 +134,11 @@ def test_a_run_begun_with_a_known_map_goes_on_when_it_is_started_with_that_again
     assert again.saved.memory.intent.is_paused
     assert len(again.saved.past) == 5
     assert not again.saved.is_current  # nobody vouches for where it is
+    known.rename(tmp_path / "elsewhere")
+    assert begun(Wanted(known=known, state_dir=tmp_path)).directory.path == first.directory.path
+    with pytest.raises(UsageError, match="cannot begin with"):
+        begun(Wanted(known=known, anew=True, state_dir=tmp_path))
+    (tmp_path / "elsewhere").rename(known)
     anew = begun(Wanted(known=known, anew=True, state_dir=tmp_path))
     assert anew.directory.path != first.directory.path
     other = begun(Wanted(known=first.directory.path, state_dir=tmp_path))
