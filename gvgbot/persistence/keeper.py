@@ -104,6 +104,8 @@ class Keeper:
             self._counts = list(saved.counts)
         else:
             session.pipeline.mission.outcome, session.pipeline.mission.reason = None, ""
+            session.pipeline.errands.is_waiting = False
+        if not self._files.is_read:
             session.pipeline.errands.forget()
         if session.config.service.resume == "paused":
             session.pipeline.errands.is_paused = True

@@ -46,6 +46,11 @@ class MissionFiles:
         """Whether there is a journal that goes on."""
         return bool(self._ends)
 
+    @property
+    def is_read(self) -> bool:
+        """Whether the mission that is here goes on, even if its journal cannot."""
+        return self._is_read
+
     # -- reading -----------------------------------------------------------------------------------
 
     def read(self) -> Saved | None:

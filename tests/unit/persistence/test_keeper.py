@@ -202,13 +202,17 @@ def test_what_is_asked_of_a_robot_that_saw_nothing_yet_is_kept(tmp_path: Path, d
         session.pipeline.errands.pause()
     keeper.on_event(Requested(1.0, "pause", "test", done, ""))
     keeper.keeping(1.0)()
-    saved = MissionFiles(tmp_path).read()
-    assert (saved is not None) == done
-    with RunDirectory(tmp_path) as directory:
-        again = Session(load_config(), directory, None)
-    Keeper(again, MissionFiles(tmp_path), saved)
-    assert again.pipeline.errands.is_paused == done
-    assert not again.pipeline.is_lost
+    for journal in ("whole", "damaged"):
+        if journal == "damaged" and done:
+            (tmp_path / JOURNAL).write_bytes(b"")
+        files = MissionFiles(tmp_path)
+        saved = files.read()
+        assert (saved is not None) == done
+        with RunDirectory(tmp_path) as directory:
+            again = Session(load_config(), directory, None)
+        Keeper(again, files, saved)
+        assert again.pipeline.errands.is_paused == done
+        assert not again.pipeline.is_lost
 
 
 def test_time_goes_on_where_a_map_from_elsewhere_ended(tmp_path: Path) -> None:
