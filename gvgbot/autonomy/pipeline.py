@@ -43,9 +43,10 @@ _LIFTED = np.diag([0.3**2, 0.3**2, 0.1**2])  # how far a robot is carried that i
 _ROOM_BESIDE_EDGES_M = 0.08  # on each side, where no edge leads
 _LONGEST_GAP_S = 2.0  # between keyframes; a longer one is an outage of a device
 _TURNED_RAD = 0.4  # that a robot may have been turned unnoticed
-_CARRIED = (
+STANDS_CARRIED = (
+    "stand until it is asked to resume",
     "no walls that it knows are around its base, which has started anew: if it was carried, "
-    "restart the program, and it looks for its place on the whole map"
+    "restart the program, and it looks for its place on the whole map",
 )
 _OVERLAP_RAD = 0.2  # of what is seen before and after the first turn
 _TURN_SHARE = 0.8  # of the fastest turn, to look around
@@ -308,7 +309,7 @@ class Pipeline:
         if is_broken and self.matches_walls and not self._maps.fits(scan, local_base):
             self.errands.pause()
             self.errands.is_lost = self.errands.is_carried = True
-            self._incidents.append(("stand until it is asked to resume", _CARRIED))
+            self._incidents.append(STANDS_CARRIED)
             return None
         moved = self._last.local_base.to(local_base)
         step = Step(moved, rotated_covariance(covariance, motion.theta))

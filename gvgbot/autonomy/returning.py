@@ -22,7 +22,7 @@ from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.keyframes import UNKNOWN_WAY, Step
 from gvgbot.autonomy.localisation import Localisation
 from gvgbot.autonomy.memory import Growth, Memory, recall, remember
-from gvgbot.autonomy.pipeline import Pipeline
+from gvgbot.autonomy.pipeline import STANDS_CARRIED, Pipeline
 from gvgbot.autonomy.relocalisation import Look, Opinion, Relocaliser
 from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.whereabouts import Whereabouts
@@ -146,11 +146,13 @@ class ReturningPipeline(Pipeline):
     def _seek(self, seeker: Pipeline, scan: Scan) -> list[Event]:
         """Let the second mind drive on; what it finds is of no interest but for the place.
 
-        If it is carried meanwhile, all it has seen is of elsewhere.
+        If it is carried meanwhile it stands, as ever then, and all it has seen is of elsewhere.
         """
         seeker.perceive(scan)
         if seeker.errands.is_carried:
-            return self._begin_to_seek(scan)
+            self.errands.pause()
+            self.errands.is_carried, self._seeker, self._is_doubted = True, None, True
+            return [Recovery(scan.stamp, *STANDS_CARRIED)]
         last = seeker._last
         if last is None or seeker._turning():
             return []

@@ -126,6 +126,37 @@ def test_on_a_known_map_it_finds_its_place_and_says_nothing_before(
     assert max(np.hypot(*np.diff(line, axis=0).T).max() for line in way.stretches) < 1.0
 
 
+def test_who_is_carried_while_it_looks_for_its_place_stands_and_then_looks_anew(
+    config: Config, whole: Path, tmp_path: Path
+) -> None:
+    """Its base was switched off meanwhile, and counts anew."""
+    stood = 0
+
+    def is_over(session: Session) -> bool:
+        nonlocal stood
+        pipeline = session.pipeline
+        assert isinstance(pipeline, ReturningPipeline)
+        seeker = pipeline._seeker
+        if not stood and seeker is not None and len(seeker.keyframes) > 6:
+            lives.world.body.pose = Pose(-5.2, 0.3, 3.1)  # where the stick ends
+            seeker._breaks -= 1
+        stood += pipeline.errands.is_paused
+        if stood == 20:
+            stood += 1
+            assert "it goes on" in pipeline.errands.resume()
+        return stood > 20 and not pipeline.is_lost
+
+    lives = Lives(
+        config, Place(LOLLIPOP, Pose(8.0, 4.0, -1.2)), tmp_path, known=whole, over=is_over
+    )
+    last = lives.run([])
+    assert pose_error(lives, last) < 0.1
+    events = [json.loads(line) for line in (tmp_path / "events.jsonl").read_text().splitlines()]
+    actions = [event["action"] for event in events if event["event"] == "recovery"]
+    assert actions.count("look for its place on the map") == 2
+    assert "stand until it is asked to resume" in actions
+
+
 def test_in_another_building_it_claims_no_place_and_spoils_no_map(
     config: Config, whole: Path, tmp_path: Path
 ) -> None:
