@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 from typing import Annotated
 
 import numpy as np
@@ -133,11 +134,11 @@ class Newcomers:
     def _bodies(self, found: list[Island], eye: Array) -> Array:
         """Bodies (N, 3): round ones, and what is as wide as a robot that may be anywhere."""
         rows = [(*island.centre, island.radius) for island in found if island.is_round]
-        for island in found:
-            for radius in set(self.strangers) if island.is_whole and not island.is_round else ():
-                centre = body_of(island.ends, eye, radius)
-                if centre is not None:
-                    rows.append((*centre, radius))
+        unsure = [island for island in found if island.is_whole and not island.is_round]
+        for island, radius in product(unsure, sorted(set(self.strangers))):
+            centre = body_of(island.ends, eye, radius)
+            if centre is not None:
+                rows.append((*centre, radius))
         return np.array(rows).reshape(-1, 3)
 
     def free(self, scan: Scan, local_base: Pose) -> Array:
