@@ -29,6 +29,7 @@ from gvgbot.live_ros import LiveRos, Neighbour, UnixTime
 from gvgbot.live_team import LiveTeam, TeamNetwork
 from gvgbot.persistence.keeper import Keeper
 from gvgbot.requests import Answer, Asked
+from gvgbot.saving import Saving
 from gvgbot.service import Notifier
 from gvgbot.session import Session
 from gvgbot.simulation import Simulation
@@ -102,15 +103,14 @@ class Robot:
         self._network, self._off_loop, self._keeper = network, off_loop, keeper
         self._pipeline = session.pipeline
         self._grown, self._finished = asyncio.Event(), asyncio.Event()
-        self._saving = asyncio.Lock()  # one at a time
-        self._saves_asked = self._saves_done = 0  # of those asked for, done are the first so many
+        self._saving = Saving(session, off_loop)
         self._survey = BesideLoop(session.pipeline, survey)
         self._pipeline.mission.survey = self._survey.newest
         self._estimate = BesideLoop(session.pipeline, smoothed)
         if isinstance(self._pipeline, ReturningPipeline):
             self._pipeline.smooth = self._estimate.newest
         self._odometry: Odometry | None = None
-        self._sequence = 0
+        self._sequence, self._ready = 0, False
         self._events = LiveEvents()
         self._decided = ""  # the reason of the last decision
         self._not_driven = ""  # why nobody may drive it just now
@@ -119,7 +119,6 @@ class Robot:
         if network is not None:
             rate_hz = session.config.telemetry.scan_rate_hz
             self._feed = LiveFeed(network, session.pipeline, rate_hz)
-        self._ready = False
         self._guard, self._battery = GuardJournal(), BatteryJournal()
         self._healths = Pace(HEALTH.rate_hz)
         self._ros: LiveRos | None = None
@@ -204,7 +203,7 @@ class Robot:
             self._pipeline.errands,
             self,
             now=self._clock.now,
-            save=self._save_as_asked,
+            save=self._saving.save,
             use=self._use,
             tell=self._on_events,
         )
@@ -245,23 +244,9 @@ class Robot:
 
     async def _save(self) -> None:
         try:
-            await self._save_as_asked()
+            await self._saving.save()
         except GvgbotError as error:
             log.warning("map not saved", reason=str(error))
-
-    async def _save_as_asked(self) -> str:
-        """Save, and return where. Raises GvgbotError if that cannot be.
-
-        A saving that begins later than somebody asked is what was asked for.
-        """
-        self._saves_asked += 1
-        asked = self._saves_asked
-        async with self._saving:
-            if self._saves_done < asked:
-                done = self._saves_asked
-                await self._off_loop(self._session.saving(unfinished="still exploring"))
-                self._saves_done = done
-        return str(self._session.directory.path)
 
     def _use(self, config: Config) -> None:
         """Put a configuration into effect, as far as that can be changed."""

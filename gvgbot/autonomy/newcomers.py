@@ -8,17 +8,17 @@ but stands there anew when seen again at the same place: others pass by.
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.gvg.local_map import LocalMap
-from gvgbot.autonomy.islands import Island, beam_ends, islands, slivers, without_fringes
+from gvgbot.autonomy.islands import Island, islands, slivers, without_fringes
+from gvgbot.autonomy.on_bodies import BLUR_M, end_in, is_seen_through, without
 from gvgbot.autonomy.roundness import SURE, body_of, with_look
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
@@ -26,14 +26,12 @@ from gvgbot.ranges import Range
 
 # what is half hidden behind something nearer, or has faces and edges, is only kept waiting so long
 _GLIMPSE_S = 3.0
-_BLUR_M = 0.1  # beyond its rim, beams may still end on something
 _SHORT_M = 2.0  # of somebody, nothing is certain any more
 _NEAR_M = 3.0  # who is farther away is not followed from scan to scan
 _GONE_M = 1.0  # between two looks, at most
 _MOVED_M = 0.3  # what stands is found again within this
 _ALIKE_M = 0.05  # by which a robot may seem wider or slimmer than it says it is
 _LATELY_S = 2.0  # after which the last that is seen of somebody is no longer his
-_STRAY = 0.1  # of the beams towards a place: so many may end there though nothing is there
 _LOST_S = 3.0  # what is out of sight for so long, beyond the time it stood, may have gone
 _RIM = np.stack([f(np.arange(12) * np.pi / 6) for f in (np.cos, np.sin)], axis=1)
 
@@ -114,7 +112,7 @@ class Newcomers:
         `is_way` tells of a place (2,), local frame, whether a way is known to lead over it.
         """
         if not self._longest_patience:  # who comes, stays
-            return _without(scan, local_base, self.company)
+            return without(scan, local_base, self.company)
         self._forget(scan, local_base, local_map)
         scan = without_fringes(scan) if self.in_team else scan
         walls = _Walls(local_map, self._config.away_from_walls_m, is_way)
@@ -129,7 +127,7 @@ class Newcomers:
         seen += self._rests(scan, local_base, seen, local_map)
         waiting = [(one.centre, one.radius) for one in self._all if one.is_waiting]
         # At times one is seen in parts only, or has moved a little: both discs count.
-        return _without(scan, local_base, [*seen, *waiting, *self._met, *self.company])
+        return without(scan, local_base, [*seen, *waiting, *self._met, *self.company])
 
     def _bodies(self, found: list[Island], eye: Array) -> Array:
         """Bodies (N, 3): round ones, and what is as wide as a robot that may be anywhere."""
@@ -147,7 +145,7 @@ class Newcomers:
         What looks like a body may be a piece of a wall, or of glass, but not where a robot says
         that it is.
         """
-        on_robots = _end_in(scan, local_base, self.company)
+        on_robots = end_in(scan, local_base, self.company)
         free: Array = np.where(on_robots, scan.ranges, scan.ranges - _SHORT_M)
         return free
 
@@ -175,7 +173,7 @@ class Newcomers:
             away, _ = cKDTree(places).query(ends, distance_upper_bound=_GONE_M)
             rests |= np.isfinite(away)
         if self.in_team:
-            is_new = (local_map.is_bare(end, _BLUR_M) for end in ends)
+            is_new = (local_map.is_bare(end, BLUR_M) for end in ends)
             rests |= is_cut & np.fromiter(is_new, np.bool_, len(ends))
         return [(end, 0.0) for end in ends[rests]]
 
@@ -276,10 +274,12 @@ class Newcomers:
         for one in self._all:
             if one.last > scan.stamp:  # kept from a time before the clock began anew
                 one.first, one.last = one.first + scan.stamp - one.last, scan.stamp
-        self.gone = [one for one in self._all if _is_seen_through(scan, local_base, one)]
+        self.gone = [
+            one for one in self._all if is_seen_through(scan, local_base, (one.centre, one.radius))
+        ]
         for one in self.gone:
             if one.was_let_in:
-                local_map.doubt(one.centre, one.radius + _BLUR_M)
+                local_map.doubt(one.centre, one.radius + BLUR_M)
         self._all = [
             one
             for one in self._all
@@ -290,7 +290,7 @@ class Newcomers:
         lost = [one for one in self._all if one.is_waiting and _is_out_of_sight(one, scan.stamp)]
         for one in lost:
             one.is_lost = True
-            local_map.forget(one.centre, one.radius + _BLUR_M)
+            local_map.forget(one.centre, one.radius + BLUR_M)
         self.missed = [one for one in lost if _has_stood(one)]
 
     @property
@@ -339,7 +339,7 @@ class _Walls:
 
     def take_out(self, one: Newcomer) -> None:
         """Let the map forget what it took for a wall."""
-        self._map.clear(one.centre, one.radius + _BLUR_M / 2)
+        self._map.clear(one.centre, one.radius + BLUR_M / 2)
 
     def are_away(self, island: Island) -> bool:
         """Whether there was certainly nothing where an island is now."""
@@ -364,44 +364,3 @@ def _has_stood(one: Newcomer) -> bool:
 def _is_out_of_sight(one: Newcomer, stamp: float) -> bool:
     """Whether that has been so for so long that nobody knows whether it still stands."""
     return stamp - one.last >= _LOST_S + one.last - one.first
-
-
-def _without(scan: Scan, local_base: Pose, discs: list[tuple[Array, float]]) -> Scan:
-    """The scan without the beams that end in discs, by centre (2,), local frame, and radius."""
-    inside = _end_in(scan, local_base, discs)
-    if not inside.any():
-        return scan
-    return replace(scan, ranges=np.where(inside, np.nan, scan.ranges))
-
-
-def _end_in(scan: Scan, local_base: Pose, discs: list[tuple[Array, float]]) -> NDArray[np.bool_]:
-    """Which beams (N,) end in discs."""
-    inside = np.zeros(len(scan.ranges), np.bool_)
-    if not discs:
-        return inside
-    beams = np.flatnonzero(np.isfinite(scan.ranges))
-    ends = beam_ends(scan, beams, scan.ranges[beams], local_base.compose(scan.base_laser))
-    for centre, radius in discs:
-        inside[beams] |= np.hypot(*(ends - centre).T) < radius + _BLUR_M
-    return inside
-
-
-def _is_seen_through(scan: Scan, local_base: Pose, one: Newcomer) -> bool:
-    """Whether most beams towards it pass it by, and hardly any ends on it.
-
-    Beside a post between two panes of glass most beams pass as well.
-    """
-    x, y = local_base.compose(scan.base_laser).inverse().transform(one.centre)
-    away = float(np.hypot(x, y))
-    if away < one.radius:
-        return False
-    middle = (np.arctan2(y, x) - scan.angle_min) % (2 * np.pi) / scan.angle_increment
-    half = one.radius / away / scan.angle_increment
-    first, last = round(middle - half), round(middle + half) + 1
-    if first < 0 or last > len(scan.ranges):
-        return False
-    told = scan.ranges[first:last]
-    told = told[~np.isnan(told)]
-    beyond = told > away + one.radius + _BLUR_M
-    ends = ~beyond & (told > away - one.radius - _BLUR_M)
-    return bool(len(told) and np.mean(beyond) > 0.5 and np.mean(ends) < _STRAY)

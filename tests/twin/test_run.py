@@ -3,8 +3,7 @@
 import asyncio
 import json
 import math
-from collections.abc import Callable, Iterator
-from functools import partial
+from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -70,28 +69,6 @@ def test_a_run_that_ended_by_a_fault_says_so_in_its_summary(daemon: Daemon) -> N
     daemon.run(ten_seconds)
     summary = json.loads((daemon.session.directory.path / "summary.json").read_text())
     assert (summary["outcome"], summary["reason"]) == ("failed", "the base does not answer")
-
-
-def test_a_crowd_that_asks_to_save_waits_for_one_more_saving(
-    daemon: Daemon, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The one that is under way may have begun before something was found."""
-    saved: list[float] = []
-
-    async def slowly(work: Callable[[], None]) -> None:
-        work()
-        await asyncio.sleep(1.0)
-
-    monkeypatch.setattr(daemon.robot, "_off_loop", slowly)
-    monkeypatch.setattr(daemon.session, "saving", lambda **_: partial(saved.append, 0.0))
-
-    async def story(clock: Clock) -> None:
-        begin = clock.now()
-        await asyncio.gather(*(daemon.robot._save_as_asked() for _ in range(50)))
-        assert clock.now() - begin < 3.0
-
-    daemon.run(story)
-    assert 2 <= len(saved) <= 3  # one may be the daemon's own
 
 
 def test_a_run_that_a_mistake_of_the_program_ended_says_so(

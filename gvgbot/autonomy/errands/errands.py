@@ -315,10 +315,7 @@ class Errands:
 
     @property
     def will_wait(self) -> bool:
-        """Whether the robot waits for what comes next, or will after a restart.
-
-        What it is about then cannot be kept.
-        """
+        """Whether it waits, or would after a restart: what it is about cannot be kept."""
         is_asked = self._plan is not None and not self._is_own
         return self.is_waiting or (is_asked and self.kept() is None)
 
