@@ -197,10 +197,10 @@ def _cells(local_map: LocalMap) -> Cells:
     )
 
 
-def growth(pipeline: Pipeline, keyframe: int = 0) -> list[Growth]:
-    """What keyframes added from one on, by its number."""
+def growth(pipeline: Pipeline, start: int = 0, end: int | None = None) -> list[Growth]:
+    """What keyframes added from one on, by its number, up to the one before `end`."""
     observations: dict[int, list[Observation]] = {}
-    seen_later = bisect_left(pipeline.mapper.observations, keyframe, key=lambda o: o.keyframe)
+    seen_later = bisect_left(pipeline.mapper.observations, start, key=lambda o: o.keyframe)
     for seen in pipeline.mapper.observations[seen_later:]:
         observations.setdefault(seen.keyframe, []).append(seen)
     return [
@@ -209,7 +209,7 @@ def growth(pipeline: Pipeline, keyframe: int = 0) -> list[Growth]:
             pipeline.steps[i - 1] if i > 0 else None,
             observations.get(i, []),
         )
-        for i in range(keyframe, len(pipeline.keyframes))
+        for i in range(start, len(pipeline.keyframes) if end is None else end)
     ]
 
 

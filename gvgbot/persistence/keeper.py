@@ -4,7 +4,7 @@ The journal gets what is new about every second, and while nothing is, now and t
 by which it is known later that the base has counted all the time. The snapshot is renewed when the
 map has changed or the robot has come on, at most that often; the journal is synchronised with the
 disk before. A disk that is full, read-only or slow holds up nothing: what was not written is
-written later.
+written later, bit by bit, and then the snapshot, which never knows more than the journal.
 """
 
 import math
@@ -35,6 +35,8 @@ from gvgbot.persistence.records import packed
 from gvgbot.session import Session
 
 KEEP_EVERY = 0.5  # s between two batches
+RETRY_WITHIN = 30.0  # s between two attempts, at most, while the disk refuses
+MOST = 500  # keyframes in a batch: it is packed on the loop
 SNAPSHOT_EVERY = 5.0  # s between two snapshots, if nothing but the robot's place has changed
 BEAT_EVERY = 20.0  # s between two signs of life, while nothing is new
 _PAUSE_S = 1.0  # that the robot's clock is said to have stood while the computer was off
@@ -148,15 +150,18 @@ class Keeper:
     async def keep(
         self, clock: Clock, off_loop: Callable[[Callable[[], None]], Awaitable[None]]
     ) -> None:
-        """Keep the mission until cancelled."""
+        """Keep the mission until cancelled; wait longer each time while that cannot be."""
+        pause = KEEP_EVERY
         while True:
-            await clock.sleep_until(clock.now() + KEEP_EVERY)
+            await clock.sleep_until(clock.now() + pause)
             await off_loop(self.keeping(clock.now()))
+            pause = KEEP_EVERY if self.trouble is None else min(2.0 * pause, RETRY_WITHIN)
 
-    def keeping(self, stamp: float) -> Callable[[], None]:
+    def keeping(self, stamp: float, most: int = MOST) -> Callable[[], None]:
         """A function that writes what is new at a stamp, in a thread or later.
 
-        Call each such function before asking for the next.
+        That is `most` keyframes at once, and the others the next time. Call each such function
+        before asking for the next.
         """
         pipeline = self._session.pipeline
         if pipeline.is_lost:
@@ -166,7 +171,7 @@ class Keeper:
         self._note_retold(pipeline.mapper.observations)
         after = bisect_right(self._counts, self._stay, key=lambda count: count.keyframes)
         before = self._counts[after - 1] if after else Count(0, 0)
-        count = Count(len(pipeline.keyframes), len(self._session.journey.stamps))
+        count = self._count(before, most)
         if count == before and not self._settled:
             if stamp < self._beat_at + BEAT_EVERY:
                 return _nothing
@@ -175,17 +180,28 @@ class Keeper:
         beat = self._beat(stamp)
         batch = Batch(
             first=before.keyframes,
-            growth=growth(pipeline, before.keyframes),
-            rows=rows(self._session.journey, before.rows),
+            growth=growth(pipeline, before.keyframes, count.keyframes),
+            rows=rows(self._session.journey, before.rows, count.rows),
             beat=beat,
         )
-        due = self._settled or stamp - self._snapshot_at >= SNAPSHOT_EVERY
+        is_all = count.keyframes == len(pipeline.keyframes)
+        due = is_all and (self._settled or stamp - self._snapshot_at >= SNAPSHOT_EVERY)
         snapshot = None
         if due and (self._settled or self._snapshot_of < len(pipeline.keyframes)):
             snapshot = packed(Snapshot(memory=remember(pipeline), beat=beat, known=self._known))
             self._settled = False
         self._stay, self._observed = math.inf, list(pipeline.mapper.observations)
-        return partial(self._write, packed(batch), [*self._counts[:after], count], snapshot, stamp)
+        counts = [*self._counts[:after], count]
+        return partial(self._write, packed(batch), counts, snapshot, stamp, is_all=is_all)
+
+    def _count(self, before: Count, most: int) -> Count:
+        """How much the journal shall hold after a batch: no less than it held already."""
+        journey, all_there_are = self._session.journey, len(self._session.pipeline.keyframes)
+        held = self._counts[-1].keyframes if self._counts else 0
+        keyframes = max(before.keyframes + most, held)
+        if keyframes >= all_there_are:
+            return Count(all_there_are, len(journey.stamps))
+        return Count(keyframes, bisect_left(journey.keyframes, keyframes))
 
     def _note_retold(self, observations: list[Observation]) -> None:
         """See from where on the journal tells what was not seen after all, or of other vertices."""
@@ -210,16 +226,20 @@ class Keeper:
             outcome = saved.memory.intent.outcome if self._goes_on else None
             memory = replace(memory, intent=replace(memory.intent, outcome=outcome))
         snapshot = packed(Snapshot(memory=memory, beat=saved.beat, known=self._known))
-        past = None
+        past, journey = None, self._session.journey
         if not self._files.is_begun:
-            journey = rows(self._session.journey, 0)
-            past = packed(Batch(first=0, growth=growth(pipeline), rows=journey, beat=saved.beat))
-        return partial(self._write_wish, past, before, snapshot)
+            way = rows(journey, 0)
+            past = packed(Batch(first=0, growth=growth(pipeline), rows=way, beat=saved.beat))
+        count = Count(len(pipeline.keyframes), len(journey.stamps))
+        return partial(self._write_wish, past, count, before, snapshot)
 
-    def _write_wish(self, past: bytes | None, before: Callable[[], None], snapshot: bytes) -> None:
+    def _write_wish(
+        self, past: bytes | None, count: Count, before: Callable[[], None], snapshot: bytes
+    ) -> None:
         def write() -> None:
             if past is not None:
                 self._files.append(past, sync=True)
+                self._counts = [count]
             before()
             self._files.save(snapshot)
 
@@ -230,14 +250,23 @@ class Keeper:
         """Write all that is new; call when nothing runs any more."""
         self._settled = True
         heard = -math.inf if self._feedback is None else self._feedback.heard
-        self.keeping(max(heard, self._session.tally.last_stamp))()
+        stamp = max(heard, self._session.tally.last_stamp)
+        self.keeping(stamp, most=len(self._session.pipeline.keyframes))()
 
     def _write(
-        self, batch: bytes, counts: list[Count], snapshot: bytes | None, stamp: float
+        self,
+        batch: bytes,
+        counts: list[Count],
+        snapshot: bytes | None,
+        stamp: float,
+        *,
+        is_all: bool,
     ) -> None:
         def write() -> None:
             self._files.append(batch, sync=snapshot is not None, after=len(counts) - 1)
             self._counts, self._beat_at = counts, stamp
+            if not is_all:
+                self._files.fall_behind()
             if snapshot is not None:
                 self._files.save(snapshot)
                 self._snapshot_at, self._snapshot_of = stamp, counts[-1].keyframes

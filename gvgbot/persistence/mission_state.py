@@ -93,14 +93,14 @@ def boot_id() -> str:
         return ""
 
 
-def rows(journey: Journey, start: int) -> Rows:
-    """The rows of a journey from one on."""
+def rows(journey: Journey, start: int, end: int | None = None) -> Rows:
+    """The rows of a journey from one on, up to the one before `end`."""
     return Rows(
-        stamps=np.array(journey.stamps[start:], np.float64),
-        keyframes=journey.keyframes[start:],
-        odom_base=_poses(journey.odom_base[start:]),
-        map_base=_poses(journey.map_base[start:]),
-        world_base=_poses(journey.world_base[start:]),
+        stamps=np.array(journey.stamps[start:end], np.float64),
+        keyframes=journey.keyframes[start:end],
+        odom_base=_poses(journey.odom_base[start:end]),
+        map_base=_poses(journey.map_base[start:end]),
+        world_base=_poses(journey.world_base[start:end]),
     )
 
 

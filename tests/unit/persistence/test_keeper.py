@@ -2,6 +2,7 @@
 
 import asyncio
 import copy
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,11 +12,13 @@ import structlog
 
 from gvgbot.autonomy.events import DoubtSettled, LoopClosed, Requested, WayForgotten
 from gvgbot.autonomy.memory import growth, recall, remember
+from gvgbot.autonomy.returning import ReturningPipeline
+from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.config import load_config
 from gvgbot.maps.run_directory import RunDirectory
-from gvgbot.persistence.keeper import BEAT_EVERY, Keeper
-from gvgbot.persistence.mission_files import JOURNAL, MissionFiles
-from gvgbot.persistence.mission_state import boot_id
+from gvgbot.persistence.keeper import BEAT_EVERY, KEEP_EVERY, MOST, RETRY_WITHIN, Keeper
+from gvgbot.persistence.mission_files import JOURNAL, SNAPSHOT, MissionFiles
+from gvgbot.persistence.mission_state import Saved, boot_id
 from gvgbot.persistence.records import packed
 from gvgbot.session import Session
 from tests.unit.persistence.test_mission_files import full_disk
@@ -56,6 +59,111 @@ def test_a_full_disk_is_said_once_and_all_is_kept_when_there_is_room_again(
     assert len(saved.past) == len(session.pipeline.keyframes)
     assert saved.journey.stamps == session.journey.stamps
     assert packed(saved.memory) == packed(remember(session.pipeline))
+
+
+def drive_on(session: Session, keyframes: int) -> None:
+    """Let it have so many keyframes more, a row with each."""
+    pipeline, journey = session.pipeline, session.journey
+    last = pipeline.keyframes[-1]
+    pipeline.keyframes += [replace(last, stamp=last.stamp + i + 1.0) for i in range(keyframes)]
+    pipeline._last = pipeline.keyframes[-1]
+    pipeline.steps += pipeline.steps[-1:] * keyframes
+    for keyframe in range(len(pipeline.keyframes) - keyframes, len(pipeline.keyframes)):
+        journey.stamps.append(journey.stamps[-1] + 1.0)
+        journey.keyframes.append(keyframe)
+        journey.odom_base.append(journey.odom_base[-1])
+        journey.map_base.append(journey.map_base[-1])
+        journey.world_base += journey.world_base[-1:]
+
+
+def found(path: Path) -> Saved:
+    saved = MissionFiles(path).read()
+    assert saved is not None
+    return saved
+
+
+def test_much_that_was_not_kept_is_kept_bit_by_bit(session: Session, tmp_path: Path) -> None:
+    """Until all of it is, the robot that is killed knows that it has lived through more."""
+    keeper, pipeline = Keeper(session, MissionFiles(tmp_path)), session.pipeline
+    keeper.keeping(20.0)()
+    before, snapshot = len(pipeline.keyframes), (tmp_path / SNAPSHOT).read_bytes()
+    drive_on(session, 2 * MOST + 100)
+    keeper.on_event(DoubtSettled(21.0, 99, 98, 1.0, 0.1))
+    with structlog.testing.capture_logs(), full_disk(10):
+        keeper.keeping(21.0)()
+    for part in (1, 2):
+        keeper.keeping(21.0 + part)()
+        killed = found(tmp_path)
+        assert packed(killed.past) == packed(growth(pipeline, 0, before + part * MOST))
+        rows = sum(keyframe < len(killed.past) for keyframe in session.journey.keyframes)
+        assert killed.journey.stamps == session.journey.stamps[:rows]
+        assert not killed.is_current
+        assert (tmp_path / SNAPSHOT).read_bytes() == snapshot
+    keeper.keeping(24.0)()
+    saved = found(tmp_path)
+    assert saved.is_current
+    assert packed(saved.past) == packed(growth(pipeline))
+    assert saved.journey.stamps == session.journey.stamps
+    assert packed(saved.memory) == packed(remember(pipeline))
+
+
+def test_what_the_journal_holds_is_not_taken_from_it_bit_by_bit(
+    session: Session, tmp_path: Path
+) -> None:
+    keeper = Keeper(session, MissionFiles(tmp_path))
+    keeper.keeping(20.0)()
+    drive_on(session, 2 * MOST)
+    for stamp in (21.0, 22.0):
+        keeper.keeping(stamp)()
+    keeper.on_event(DoubtSettled(23.0, 99, 98, 1.0, 0.1))
+    session.pipeline.mapper.observations[0] = replace(session.pipeline.mapper.observations[0])
+    keeper.keeping(23.0)()
+    assert len(found(tmp_path).past) == len(session.pipeline.keyframes)
+
+
+def test_a_known_map_is_kept_whole_when_something_is_asked_of_a_robot_that_is_lost(
+    session: Session, tmp_path: Path
+) -> None:
+    drive_on(session, 2 * MOST)
+    keeper = Keeper(session, MissionFiles(tmp_path / "known"))
+    (tmp_path / "known").mkdir()
+    keeper.finish()
+    with RunDirectory(tmp_path / "run") as directory:
+        again = Session(load_config(), directory, None)
+    keeper = Keeper(again, MissionFiles(tmp_path / "run"), found(tmp_path / "known"))
+    assert again.pipeline.is_lost
+    keeper.on_event(Requested(1.0, "pause", "test", True, ""))
+    keeper.keeping(1.0)()
+    assert isinstance(again.pipeline, ReturningPipeline)
+    again.pipeline._is_back = True
+    keeper.keeping(2.0)()
+    assert len(found(tmp_path / "run").past) == len(session.pipeline.keyframes)
+
+
+def test_a_disk_that_is_full_for_an_hour_is_tried_now_and_then(
+    session: Session, tmp_path: Path
+) -> None:
+    keeper, tries = Keeper(session, MissionFiles(tmp_path)), 0
+
+    async def at_once(work: Callable[[], None]) -> None:
+        nonlocal tries
+        tries += 1
+        work()
+
+    async def hour() -> None:
+        clock = LoopClock()
+        async with asyncio.TaskGroup() as tasks:
+            keeping = tasks.create_task(keeper.keep(clock, at_once))
+            with full_disk(10):
+                await clock.sleep_until(clock.now() + 3600.0)
+            assert tries <= 3600.0 / RETRY_WITHIN + 10
+            drive_on(session, 2 * MOST)
+            await clock.sleep_until(clock.now() + RETRY_WITHIN + 4 * KEEP_EVERY)
+            keeping.cancel()
+
+    with structlog.testing.capture_logs():
+        run_in_virtual_time(hour())
+    assert len(found(tmp_path).past) == len(session.pipeline.keyframes)
 
 
 def test_what_did_not_change_is_not_written_again(session: Session, tmp_path: Path) -> None:
