@@ -273,7 +273,8 @@ class Keeper:
 
         if not self._is_kept(write):
             self._settled = self._settled or snapshot is not None
-            self._stay = min(self._stay, counts[-2].keyframes if len(counts) > 1 else 0)
+            if self._counts is not counts:
+                self._stay = min(self._stay, counts[-2].keyframes if len(counts) > 1 else 0)
             self._files.fall_behind()
 
     def _is_kept(self, write: Callable[[], None]) -> bool:

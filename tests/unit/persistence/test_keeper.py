@@ -2,6 +2,7 @@
 
 import asyncio
 import copy
+import errno
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -164,6 +165,29 @@ def test_a_disk_that_is_full_for_an_hour_is_tried_now_and_then(
     with structlog.testing.capture_logs():
         run_in_virtual_time(hour())
     assert len(found(tmp_path).past) == len(session.pipeline.keyframes)
+
+
+def test_a_disk_with_room_for_the_journal_only_takes_nothing_from_it_when_that_is_gone_too(
+    session: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    files = MissionFiles(tmp_path)
+    keeper = Keeper(session, files)
+    keeper.keeping(20.0)()
+
+    def no_room(snapshot: bytes) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(files, "save", no_room)
+    with structlog.testing.capture_logs():
+        for stamp in (30.0, 31.0):
+            drive_on(session, 5)
+            keeper.keeping(stamp)()
+        held = len(session.pipeline.keyframes)
+        assert len(found(tmp_path).past) == held
+        drive_on(session, 5)
+        with full_disk((tmp_path / JOURNAL).stat().st_size):
+            keeper.keeping(32.0)()
+    assert len(found(tmp_path).past) == held
 
 
 def test_what_did_not_change_is_not_written_again(session: Session, tmp_path: Path) -> None:
