@@ -26,7 +26,8 @@ def write_files(directory: Path, contents: Mapping[str, bytes | str]) -> None:
         raise GvgbotError(f"cannot write {names} to {directory}: {error.strerror}") from error
     finally:
         for temporary in aside.values():
-            temporary.unlink(missing_ok=True)
+            with contextlib.suppress(OSError):  # a disk that is read-only tells so again
+                temporary.unlink(missing_ok=True)
 
 
 def _write_through(path: Path, content: bytes) -> None:

@@ -58,6 +58,20 @@ def test_a_disk_that_does_not_take_a_file_keeps_the_old_ones(
     assert contents(directory) == OLD
 
 
+def test_a_disk_on_which_nothing_can_be_removed_either_is_no_other_failure(
+    directory: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As when the kernel makes a failing card read-only; then a daemon must explore on."""
+
+    def refuse(*_: object) -> None:
+        raise OSError(errno.EROFS, "Read-only file system")
+
+    monkeypatch.setattr(os, "fsync", refuse)
+    monkeypatch.setattr(os, "unlink", refuse)
+    with pytest.raises(GvgbotError, match="Read-only file system"):
+        write_files(directory, NEW)
+
+
 def test_a_filesystem_may_be_unable_to_sync_a_directory(
     directory: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
