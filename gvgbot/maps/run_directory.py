@@ -234,19 +234,23 @@ def _holds_run(path: Path) -> bool:
 
 def _next_free(runs: Path, world: str, number: int) -> Path:
     """The first `<world>-<n>` from a number on that did not exist; making it is what claims it."""
-    while True:
-        path = runs / f"{world}-{number}"
-        try:
-            path.mkdir(parents=True)
-        except FileExistsError:
+    path = runs
+    try:
+        runs.mkdir(parents=True, exist_ok=True)
+        while True:
+            path = runs / f"{world}-{number}"
+            with contextlib.suppress(FileExistsError):
+                path.mkdir()
+                return path
             number += 1
-        except OSError as error:
-            raise _unfit(path, error) from error
-        else:
-            return path
+    except OSError as error:
+        raise _unfit(path, error) from error
 
 
 def _unfit(path: Path, error: OSError) -> UsageError:
-    if isinstance(error, FileExistsError | NotADirectoryError):
-        return UsageError(f"cannot write a run to {path}: it is a file, choose another directory")
-    return UsageError(f"cannot write a run to {path}: {error.strerror}, choose another directory")
+    why, found = error.strerror, Path(error.filename or path)
+    if isinstance(error, FileExistsError) and found.is_symlink():
+        why = f"{found} is a link to {found.readlink()}, which is not there"
+    elif isinstance(error, FileExistsError | NotADirectoryError):
+        why = "it is a file"
+    return UsageError(f"cannot write a run to {path}: {why}, choose another directory")

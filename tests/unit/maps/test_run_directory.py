@@ -60,6 +60,15 @@ def test_a_file_where_the_runs_should_go_is_a_usage_error(tmp_path: Path) -> Non
         RunDirectory.create(world="office", runs=tmp_path / "runs")
 
 
+@pytest.mark.parametrize("below", ["", "runs"])
+def test_a_link_to_a_disk_that_is_not_there_is_a_usage_error(tmp_path: Path, below: str) -> None:
+    link = tmp_path / "link"
+    link.symlink_to("/media/none")
+    for out in (None, link / below):
+        with pytest.raises(UsageError, match="link to /media/none, which is not there"):
+            RunDirectory.create(out, world="office", runs=link / below)
+
+
 def test_a_directory_that_cannot_be_written_is_a_usage_error(tmp_path: Path) -> None:
     (tmp_path / "events.jsonl").mkdir()
     with pytest.raises(UsageError, match="directory"):
