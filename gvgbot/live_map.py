@@ -1,7 +1,7 @@
 """The map so far, as the network gets it: brought up to date from keyframe to keyframe."""
 
 import math
-from collections.abc import Callable, Container, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -86,7 +86,7 @@ class LiveMap:
         stamp: float,
     ) -> list[News]:
         news = [News(Map(stamp=stamp, vertices=vertices, edges=bent(edges, poses)))]
-        new, is_all, breaks = find()
+        new, is_all, breaks, lent = find()
         if is_all:
             self._grid.redraw(new)
             self._trail = Trail()
@@ -95,7 +95,7 @@ class LiveMap:
         changed = self._grid.changes(stamp)
         if changed is not None:
             news.append(News(changed, self._grid.whole(stamp)))
-        if self._trail.add(new, breaks):
+        if self._trail.add(new, breaks, lent):
             news.append(News(self._trail.told(stamp)))
         return news
 
@@ -113,10 +113,12 @@ class Trail:
         self._poses: list[tuple[float, float, float]] = []
         self._breaks: list[int] = []  # poses before which no way is known
 
-    def add(self, keyframes: Iterable[Keyframe], breaks: Container[int] = ()) -> bool:
-        """Go on along keyframes, but not to those of these numbers; whether there is more now."""
+    def add(
+        self, keyframes: Sequence[Keyframe], breaks: Container[int] = (), first: int = 0
+    ) -> bool:
+        """Go on along keyframes from a first one on, but not to `breaks`; whether it has grown."""
         has_grown = False
-        for number, keyframe in enumerate(keyframes):
+        for number, keyframe in enumerate(keyframes[first:], first):
             here = keyframe.map_base
             pose = here.x, here.y, here.theta
             has_grown |= self._go(keyframe.stamp, pose, is_break=number in breaks)

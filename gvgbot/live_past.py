@@ -20,12 +20,14 @@ _REST_S = 0.02  # for each keyframe, between drawing all again and the next time
 class Portion(NamedTuple):
     """Keyframes to draw, as they are known now; instead of all before, or after those.
 
-    `breaks` are those of them to which no way leads from the one before.
+    `breaks` are those of them to which no way leads from the one before; the first `lent` came with
+    another's map, and the robot has not been there.
     """
 
     keyframes: Sequence[Keyframe]
     is_all: bool
     breaks: frozenset[int] = frozenset()
+    lent: int = 0
 
 
 class LivePast:
@@ -59,12 +61,13 @@ class LivePast:
             self._taken, self._drawn = 0, []
         new, past = pipeline.keyframes[self._taken :], None
         breaks = _breaks(pipeline.steps, self._taken, len(pipeline.keyframes))
+        lent = max(0, pipeline.lent - self._taken)
         self._taken += len(new)
         if self._is_doubtful and stamp >= self._rests_until and not pipeline.led:
             self._is_doubtful, past = False, still_past(pipeline)
         if not new and past is None:
             return None
-        return partial(self._portion, Portion(new, is_other, breaks), past, stamp)
+        return partial(self._portion, Portion(new, is_other, breaks, lent), past, stamp)
 
     def _portion(self, new: Portion, past: Pipeline | None, stamp: float) -> Portion:
         self._drawn += [keyframe.map_base for keyframe in new.keyframes]
@@ -76,7 +79,7 @@ class LivePast:
         self._drawn, self._rests_until = best, stamp + _REST_S * len(best)
         moved = zip(past.keyframes, best, strict=True)
         keyframes = [replace(old, map_base=pose) for old, pose in moved]
-        return Portion(keyframes, is_all=True, breaks=_breaks(past.steps, 0, len(best)))
+        return Portion(keyframes, True, _breaks(past.steps, 0, len(best)), past.lent)
 
 
 def _breaks(steps: Sequence[Step], first: int, end: int) -> frozenset[int]:

@@ -153,7 +153,7 @@ class _Drawing:
         self, find: Callable[[], Portion], graph: RouteGraph, stamp: float
     ) -> Mapping[Topic, Message]:
         drawn: dict[Topic, Message] = {topics.MARKERS: markers(graph, stamp)}
-        new, is_all, _ = find()
+        new, is_all, *_ = find()
         if is_all:
             self._grid = GrowingGrid()
         scans = [(keyframe.map_base, keyframe.scan) for keyframe in new if keyframe.scan]

@@ -37,6 +37,11 @@ class Journey:
     map_base: list[Pose] = field(default_factory=list)
     world_base: list[Pose] = field(default_factory=list)  # simulation only
 
+    @property
+    def began(self) -> float | None:
+        """The stamp of the first row, if there is one."""
+        return self.stamps[0] if self.stamps else None
+
     def record(self, odometry: Odometry, pipeline: Pipeline, world_base: Pose | None) -> None:
         """Take down a control cycle, if a row is due."""
         if not pipeline.keyframes or (
@@ -61,13 +66,12 @@ class Journey:
 def map_files(pipeline: Pipeline, journey: Journey, title: str) -> dict[str, bytes | str]:
     """All files of a run but summary and events, by name."""
     keyframes, vertices, covariances = smoothed(pipeline)
-    grid = occupancy_grid(scans_at(keyframes, pipeline))
+    grid = occupancy_grid(scans_at(keyframes, pipeline), began=journey.began)
     edges = enumerate(pipeline.mapper.graph.edges.values())
     parts = {i for i, edge in edges if edge.is_part}
     graph = with_room_of(route_graph(pipeline, vertices, covariances), grid, parts)
     estimate = _trajectory(journey, _corrected(journey, pipeline, keyframes))
-    start = pipeline.keyframes[0].odom_base if pipeline.keyframes else Pose()
-    odometry = _trajectory(journey, seen_from(_rows([start]), _rows(journey.odom_base)))
+    odometry = _trajectory(journey, _by_odometry(journey, pipeline))
     files: dict[str, bytes | str] = {
         "map.geojson": geojson.encode(graph),
         "map.png": draw_map(graph, grid=grid, estimate=estimate, odometry=odometry, title=title),
@@ -87,6 +91,13 @@ def _trajectory(journey: Journey, poses: Array) -> Trajectory:
 def _rows(poses: list[Pose]) -> Array:
     """Poses as rows (N, 3)."""
     return np.array([(p.x, p.y, p.theta) for p in poses], np.float64).reshape(-1, 3)
+
+
+def _by_odometry(journey: Journey, pipeline: Pipeline) -> Array:
+    """The journey by odometry alone (N, 3), from where its own first keyframe was taken on."""
+    own = pipeline.keyframes[pipeline.lent :]
+    start, map_start = (own[0].odom_base, own[0].map_base) if own else (Pose(), Pose())
+    return composed(_rows([map_start]), seen_from(_rows([start]), _rows(journey.odom_base)))
 
 
 def _corrected(journey: Journey, pipeline: Pipeline, keyframes: list[Pose]) -> Array:

@@ -58,7 +58,7 @@ def state(
         vertices=len(graph.vertices),
         edges=len(graph.edges),
         frontiers=len(graph.frontiers()),
-        distance=pipeline.travelled,
+        distance=pipeline.driven,
         guard=guard,
         contacts=contacts,
         slips=slips,

@@ -125,7 +125,7 @@ def _drive_mentally(pipeline: Pipeline, gvg: LocalGvg, look: Look) -> None:
                 motion = pipeline.keyframes[-1].map_base.to(pose)
                 pipeline.steps.append(Step(motion, _STEP))
             pipeline.keyframes.append(Keyframe(0.0, pose, pose, pose, look(pose)))
-    pipeline.lasting = len(pipeline.keyframes)
+    pipeline.lasting = pipeline.lent = len(pipeline.keyframes)
 
 
 def _poses(edge: LocalEdge) -> Iterator[Pose]:

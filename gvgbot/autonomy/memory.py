@@ -116,6 +116,8 @@ class Memory:
     newcomers: list[Newcomer] = field(default_factory=list)
     lasting: int | None = None  # keyframes that are kept for good; None: all
     passed: list[Passed] = field(default_factory=list)
+    lent: int = 0  # keyframes that came with another's map,
+    lent_m: float = 0.0  # and metres driven
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -157,6 +159,8 @@ def remember(pipeline: Pipeline) -> Memory:
         newcomers=pipeline.traffic.newcomers._all,
         lasting=pipeline.lasting,
         passed=pipeline.traffic.passed,
+        lent=pipeline.lent,
+        lent_m=pipeline.lent_m,
     )
 
 
@@ -248,6 +252,8 @@ def recall(pipeline: Pipeline, memory: Memory, past: list[Growth]) -> None:
     pipeline.lasting = len(pipeline.keyframes)
     if memory.lasting is not None and memory.lasting < memory.keyframes:
         pipeline.lasting = min(memory.lasting, pipeline.lasting)
+    pipeline.lent = min(memory.lent, len(pipeline.keyframes))
+    pipeline.lent_m = memory.lent_m
     _tie_vertices(pipeline)
     if pipeline.keyframes:
         _awake(pipeline, pipeline.keyframes[-1])

@@ -100,7 +100,8 @@ class Pipeline:
         self.keyframes: list[Keyframe] = []
         self.steps: list[Step] = []
         self.lasting = 0  # keyframes that are kept for good: the map hangs on them
-        self.travelled = 0.0
+        self.lent = 0  # keyframes that came with another's map: it has not driven there
+        self.travelled = self.lent_m = 0.0  # the latter by who made that map
 
     # -- state -----------------------------------------------------------------------------------
 
@@ -113,6 +114,11 @@ class Pipeline:
     def matches_walls(self) -> bool:
         """Whether walls tell where it is, and not odometry and vertices alone."""
         return not self._trusts_odometry
+
+    @property
+    def driven(self) -> float:
+        """Metres that it has driven itself, whoever made the map that it began with."""
+        return self.travelled - self.lent_m
 
     @property
     def is_lost(self) -> bool:
@@ -338,6 +344,7 @@ class Pipeline:
         self.keyframes[self.lasting :] = [last]
         self.steps[self.lasting - 1 :] = [Step(before.map_base.to(last.map_base), UNKNOWN_WAY)]
         self.mapper.forget_between(self.lasting, newest)
+        self.lent = min(self.lent, self.lasting)
         self.traffic.passed = [one.before(self.lasting) for one in self.traffic.passed]
         return [WayForgotten(stamp, self.lasting, newest - self.lasting)]
 

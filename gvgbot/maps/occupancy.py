@@ -35,8 +35,8 @@ class OccupancyGrid:
     """Occupancy in percent, -1 where unknown: `cells` (rows, columns), row 0 at the bottom.
 
     `origin` is the outer corner of cell [0, 0] (m, map frame), `resolution_m` a cell's side.
-    `seen_s`, shaped like the cells, says how long (s) after the first scan each was first seen,
-    inf for never; it is None where nobody knows. The arrays are read-only.
+    `seen_s`, shaped like the cells, says how long (s) after the beginning each was first seen, inf
+    for never; it is None where nobody knows. The arrays are read-only.
     """
 
     cells: Cells
@@ -51,20 +51,27 @@ class OccupancyGrid:
 
 
 def occupancy_grid(
-    scans: Sequence[tuple[Pose, Scan]], resolution_m: float = 0.05, max_range_m: float = 12.0
+    scans: Sequence[tuple[Pose, Scan]],
+    resolution_m: float = 0.05,
+    max_range_m: float = 12.0,
+    *,
+    began: float | None = None,
 ) -> OccupancyGrid:
     """The grid that scans see from `map_base` poses; what is farther than the range counts not.
 
     A scan counts as taken at one instant, from its one pose. NaN beams say nothing; inf beams
     say that there is nothing up to the laser's range. Scans come in the order of their stamps.
-    Without any scan one unknown cell.
+    `began` is the stamp from which on it counts when a cell was seen, if that is not the first
+    scan's; what was seen before was seen then. Without any scan one unknown cell.
     """
+    if began is None:
+        began = scans[0][1].stamp if scans else 0.0
     lasers = [(map_base.compose(scan.base_laser), scan) for map_base, scan in scans]
     reach = min(max_range_m, max((scan.range_max for _, scan in lasers), default=0.0))
     disc = _Disc.of_radius(reach, resolution_m)
     ballot = _Ballot.around([laser for laser, _ in lasers], disc)
     for map_laser, scan in lasers:
-        _vote(ballot, disc, map_laser, scan, age=scan.stamp - scans[0][1].stamp)
+        _vote(ballot, disc, map_laser, scan, age=max(0.0, scan.stamp - began))
     return _finished(ballot, resolution_m)
 
 

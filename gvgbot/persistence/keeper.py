@@ -13,6 +13,7 @@ from collections.abc import Awaitable, Callable
 from dataclasses import replace
 from functools import partial
 
+import msgspec
 import structlog
 
 from gvgbot.autonomy import events
@@ -88,8 +89,6 @@ class Keeper:
 
     def _revive(self, saved: Saved) -> None:
         session = self._session
-        session.count_on(saved.beat.tally)
-        session.journey = saved.journey
         config = session.config
         session.begin_with(
             ReturningPipeline(
@@ -107,8 +106,15 @@ class Keeper:
         else:
             session.pipeline.mission.outcome, session.pipeline.mission.reason = None, ""
             session.pipeline.errands.is_waiting = False
-        if not self._files.is_read:
-            session.pipeline.errands.forget()
+        if self._files.is_read:
+            session.count_on(saved.beat.tally)
+            session.journey = saved.journey
+        else:  # another has lived so far
+            pipeline = session.pipeline
+            pipeline.lent, pipeline.lent_m = len(pipeline.keyframes), pipeline.travelled
+            pipeline.errands.forget()
+            beat = msgspec.structs.replace(saved.beat, tally=session.tally)
+            self._saved = replace(saved, beat=beat)
         if session.config.service.resume == "paused":
             session.pipeline.errands.is_paused = True
 

@@ -3,13 +3,16 @@
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from gvgbot.config import Config, TwinConfig
 from gvgbot.drivers.kobuki.twin import KobukiTwinConfig
 from gvgbot.drivers.world import save_world
 from gvgbot.geometry import Pose, wrap_angle
 from gvgbot.map_import import import_map
+from gvgbot.maps.map_server import UNSEEN
 from gvgbot.session import Session
 from gvgbot.simulation import Place
 from gvgbot.worlds.canvas import Canvas
@@ -53,3 +56,8 @@ def test_it_finds_its_place_and_drives_where_it_is_asked_to(tmp_path: Path) -> N
     assert ended[1] < 0.05
     assert math.dist((lives.world.body.pose.x, lives.world.body.pose.y), FAR) < 0.3
     assert lives.world.body.contacts == 0
+    estimate = np.loadtxt(tmp_path / "run" / "estimate.tum")
+    seen_s = np.asarray(Image.open(tmp_path / "run" / "seen.png"))
+    known = np.asarray(Image.open(tmp_path / "run" / "map.pgm")) != UNSEEN
+    assert seen_s[known].min() == 0
+    assert 0 < seen_s[known].max() <= estimate[-1, 0] - estimate[0, 0]  # a film shows all of it

@@ -122,8 +122,21 @@ def test_on_a_known_map_it_finds_its_place_and_says_nothing_before(
     draw = LiveMap(began=0.0).update(last.pipeline, 0.0)
     assert draw is not None
     (way,) = [one.value for one in draw() if isinstance(one.value, Trajectory)]
-    assert len(way.stretches) == 2  # nobody has driven from the end of the run to where it is found
-    assert max(np.hypot(*np.diff(line, axis=0).T).max() for line in way.stretches) < 1.0
+    assert_only_its_own_way_is_told(way, tmp_path)
+
+
+def assert_only_its_own_way_is_told(way: Trajectory, out: Path) -> None:
+    """By where it really was once it had found its place: who made the map drove elsewhere."""
+    rows = {name: np.loadtxt(out / f"{name}.tum") for name in ("truth", "estimate", "odometry")}
+    truth, here = rows["truth"], START.transform(way.map_base[:, :2].astype(float))
+    really = [np.interp(way.times, truth[:, 0], truth[:, k]) for k in (1, 2)]
+    assert np.hypot(*(here.T - really)).max() < 0.15
+    for name in ("estimate", "odometry"):
+        assert START.transform(rows[name][:1, 1:3]) == pytest.approx(truth[:1, 1:3], abs=0.15)
+    driven = float(np.hypot(*np.diff(truth[:, 1:3], axis=0).T).sum())
+    assert summary(out)["distance_m"] == pytest.approx(driven, abs=0.5)
+    closed = (out / "events.jsonl").read_text().count('"event": "loop_closed"')
+    assert summary(out)["loop_closures"] == closed
 
 
 def test_who_is_carried_while_it_looks_for_its_place_stands_and_then_looks_anew(

@@ -49,6 +49,7 @@ def drive(*, closes: bool = True, led: bool = False) -> Any:
         steps=[Step(motion, noise) for motion in motions],
         mapper=SimpleNamespace(graph=GvgGraph(), belief=belief, observations=seen),
         led=led,
+        lent=0,
         matches_walls=False,
     )
 
@@ -62,7 +63,7 @@ def taken(past: LivePast, pipeline: Any, stamp: float) -> tuple[list[Pose], bool
     find = past.update(pipeline, stamp)
     if find is None:
         return None
-    keyframes, is_all, _ = find()
+    keyframes, is_all, *_ = find()
     return [keyframe.map_base for keyframe in keyframes], is_all
 
 
@@ -159,6 +160,26 @@ def test_the_trajectory_that_is_shown_closes_with_the_loop() -> None:
     way = from_centre(shown(live, pipeline, 2.0))
     assert len(way) > 90
     assert way == pytest.approx(RADIUS_M, abs=2 * TOLERANCE_M)
+
+
+@pytest.mark.parametrize("at", [0, 30, 60])
+@pytest.mark.parametrize("is_corrected", [False, True])
+def test_where_another_has_been_that_made_the_map_is_no_way_driven(
+    at: int, *, is_corrected: bool
+) -> None:
+    pipeline, live = drive(), LiveMap(began=0.0)
+    keyframes, pipeline.lent = pipeline.keyframes, 50
+    pipeline.keyframes = keyframes[:at]
+    if at:
+        live.update(pipeline, 0.0)()  # type: ignore[misc]
+    pipeline.keyframes = keyframes
+    if is_corrected:
+        live.doubt()
+    draw = live.update(pipeline, 200.0)
+    assert draw is not None
+    (way,) = [one.value for one in draw() if isinstance(one.value, Trajectory)]
+    assert way.times.tolist() == list(range(50, COUNT))
+    assert len(way.stretches) == 1
 
 
 @pytest.mark.parametrize("at", [0, 30])
