@@ -70,6 +70,7 @@ class Canvas:
     def raster(self, shades: NDArray[np.uint8], corner: Point, size: Point) -> None:
         """Palette indices (rows, columns), first row at the top, stretched over a rectangle."""
         left, top, right, bottom = _flat([corner, (corner[0] + size[0], corner[1] + size[1])])
+        shades = _reduced(shades, int(bottom - top), int(right - left))
         width, tall = max(1, round(right) - round(left)), (bottom - top) / len(shades)
         for first in range(0, len(shades), _STRIP):
             strip = shades[first : first + _STRIP]
@@ -136,7 +137,7 @@ class Canvas:
 
     def image(self) -> Image.Image:
         """The finished picture in RGB."""
-        image = self._reduced()
+        image = self._finished()
         for picture, corner in self._pasted:
             image.paste(picture, corner)
         pen = ImageDraw.Draw(image)
@@ -152,7 +153,7 @@ class Canvas:
             )
         return image
 
-    def _reduced(self) -> Image.Image:
+    def _finished(self) -> Image.Image:
         width, height = self._large.size
         image = Image.new("RGB", (width // OVERSAMPLING, height // OVERSAMPLING))
         for top in range(0, image.height, _STRIP):
@@ -160,6 +161,21 @@ class Canvas:
             strip = self._large.crop((0, top * OVERSAMPLING, width, bottom * OVERSAMPLING))
             image.paste(strip.convert("RGB").reduce(OVERSAMPLING), (0, top))
         return image
+
+
+def _reduced(shades: NDArray[np.uint8], rows: int, columns: int) -> NDArray[np.uint8]:
+    """Palette indices of so many pixels at most: each is the darkest of what it covers.
+
+    So a wall stays, however thin. Unknown is what covers nothing else.
+    """
+    least = np.uint8(Ink.UNKNOWN)
+    darkness = shades - least  # of unknown 0, of shades more: they go round
+    for axis, most in enumerate((rows, columns)):
+        count = shades.shape[axis]
+        if count > max(1, most):
+            firsts = np.arange(max(1, most)) * count // max(1, most)
+            darkness = np.maximum.reduceat(darkness, firsts, axis=axis)
+    return darkness + least
 
 
 def png(image: Image.Image) -> bytes:

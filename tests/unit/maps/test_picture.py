@@ -145,6 +145,20 @@ def test_walls_lie_where_the_graph_says() -> None:
     assert part[round(y1 - 5.0 * scale), x].tolist() == [255, 255, 255]
 
 
+def test_of_a_huge_map_no_thin_wall_is_lost() -> None:
+    """Walls of one cell stand across a corridor 300 m long, whatever cells a pixel shows."""
+    walls = np.arange(30, 5970, 97)
+    cells = np.zeros((400, 6000), np.int8)
+    cells[:, walls], cells[:, :10] = 100, -1
+    part = map_part(pixels(draw_map(TRIANGLE, grid=OccupancyGrid(cells, 0.05, (-150.0, -8.0)))))
+    row = part[len(part) // 2 - 20].mean(axis=1)
+    dark = np.flatnonzero(row < 200.0)
+    (firsts,) = np.nonzero(np.diff(dark, prepend=-9) > 2)
+    assert len(firsts) == len(walls)
+    scale = 0.05 * 1344 / (299.5 * 1.04)  # pixels per cell; a fiftieth is left on each side
+    assert np.diff(dark[firsts]) == pytest.approx(97 * scale, abs=2)
+
+
 def test_edges_paths_and_frontiers_are_drawn_in_their_colours() -> None:
     edge = MapEdge(
         start=1, end=2, polyline=np.array([[0.0, 0.0], [20.0, 0.0]]), length=20.0, min_clearance=1.0
