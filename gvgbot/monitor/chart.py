@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -60,8 +61,9 @@ def chart(scene: Scene, width: int, height: int) -> Chart:
     view = View.around(*_box(scene), width, height)
     canvas, floor = _Canvas(view), np.zeros((height, width), bool)
     if scene.floor is not None:
-        canvas.lay("wall", _walls(scene.floor, view))
-        floor = _floor(scene.floor, view)
+        cells = _sampled(scene.floor, view)
+        canvas.lay("wall", _walls(scene.floor, view, cells))
+        floor = lit(cells >= 0)  # or a wall
     canvas.lay("trail", _drawn(view, scene.trail))
     if scene.graph is not None:
         canvas.lay("edge", _drawn(view, [edge.polyline for edge in scene.graph.edges]))
@@ -110,42 +112,47 @@ def _box(scene: Scene) -> tuple[Points, Points]:
         points.append(np.array([scene.pose[:2]]))
     points.append(np.array([pose[:2] for pose in scene.team]).reshape(-1, 2))
     if scene.floor is not None:
-        points.append(_cells(scene.floor, scene.floor.cells >= 0))
+        points.append(_outline(scene.floor)[0])
     if scene.graph is not None:
         points.append(np.array([one.position for one in scene.graph.vertices]).reshape(-1, 2))
     every = np.concatenate(points)
     return every.min(axis=0) - _MARGIN_M, every.max(axis=0) + _MARGIN_M
 
 
-def _cells(floor: Raster, chosen: Dots) -> Points:
-    """Centres (N, 2), m, of cells that are marked in (rows, columns)."""
-    rows, columns = np.nonzero(chosen)
+@lru_cache(maxsize=1)
+def _outline(floor: Raster) -> tuple[Points, Points]:
+    """Two opposite corners (2, 2), m, of what is known, (0, 2) if nothing is; all walls (N, 2).
+
+    Looking at every cell of a large building takes longer than the time between two pictures.
+    """
+    known = floor.cells >= 0
+    rows, columns = np.flatnonzero(known.any(axis=1)), np.flatnonzero(known.any(axis=0))
+    corners = _centres(floor, rows[[0, -1]], columns[[0, -1]]) if len(rows) else np.zeros((0, 2))
+    return corners, _centres(floor, *np.nonzero(floor.cells >= _OCCUPIED))
+
+
+def _centres(floor: Raster, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Points:
+    """The middles (N, 2), m, of cells."""
     centres: Points = np.column_stack([columns + 0.5, rows + 0.5]) * floor.resolution + floor.origin
     return centres
 
 
-def _walls(floor: Raster, view: View) -> Dots:
+def _walls(floor: Raster, view: View, cells: NDArray[np.int8]) -> Dots:
     """Dots within a wall's cell, and those in which a wall's cell has its centre."""
-    occupied = floor.cells >= _OCCUPIED
-    dots = _sampled(floor, occupied, view)
-    view.plot(dots, _cells(floor, occupied))
+    dots: Dots = cells >= _OCCUPIED
+    view.plot(dots, _outline(floor)[1])
     return dots
 
 
-def _sampled(floor: Raster, marked: Dots, view: View) -> Dots:
-    """Which dots have their centre in a cell that is marked in (rows, columns)."""
+def _sampled(floor: Raster, view: View) -> NDArray[np.int8]:
+    """The cell in which each dot (rows, columns) has its centre; -1 outside."""
     x, y = view.centres()
-    high, wide = marked.shape
+    high, wide = floor.cells.shape
     columns = np.floor((x - floor.origin[0]) / floor.resolution).astype(np.int64)
     rows = np.floor((y - floor.origin[1]) / floor.resolution).astype(np.int64)
     inside = ((rows >= 0) & (rows < high))[:, None] & ((columns >= 0) & (columns < wide))
-    sampled: Dots = marked[rows.clip(0, high - 1)[:, None], columns.clip(0, wide - 1)] & inside
-    return sampled
-
-
-def _floor(floor: Raster, view: View) -> NDArray[np.bool_]:
-    """The characters (rows, columns) with some known floor or wall in them."""
-    return lit(_sampled(floor, floor.cells >= 0, view))
+    sampled = floor.cells[rows.clip(0, high - 1)[:, None], columns.clip(0, wide - 1)]
+    return np.where(inside, sampled, np.int8(-1))
 
 
 def _drawn(view: View, polylines: Iterable[Points]) -> Dots:

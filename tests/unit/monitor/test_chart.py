@@ -2,6 +2,7 @@
 
 import math
 import unicodedata
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -76,6 +77,26 @@ def test_where_dots_are_coarser_than_cells_no_wall_is_lost() -> None:
     room = drawn(ROOM, 4, 2)
     blocks = WALLS.reshape(8, 2, 8, 2).any(axis=(1, 3))
     assert (dots_of(room) == blocks).all()
+
+
+class Counted(np.ndarray):
+    """Cells that count how many of them were compared."""
+
+    compared = 0
+
+    def __ge__(self, other: object) -> np.ndarray:
+        Counted.compared += self.size
+        return np.asarray(np.asarray(self) >= other)
+
+
+def test_the_cells_of_a_large_building_are_looked_at_once_and_not_for_each_picture() -> None:
+    floor = a_floor("\n".join(["#" * 500] * 500), resolution=0.4)
+    scene = Scene(floor=replace(floor, cells=floor.cells.view(Counted)))
+    first = chart(scene, 40, 20)
+    looked = Counted.compared
+    assert looked >= floor.cells.size
+    assert (chart(scene, 40, 20).codes == first.codes).all()
+    assert Counted.compared == looked
 
 
 def test_a_wide_terminal_shows_the_map_in_its_middle() -> None:
