@@ -6,13 +6,14 @@ from dataclasses import dataclass
 from typing import Literal
 
 from gvgbot.client import Event, Health, LinkHealth, Plan, Presence, State
+from gvgbot.words import shortened
 
 Tone = Literal["plain", "good", "warning", "bad", "faint"]
 
 _STUCK_AFTER = 1.0  # s without a control cycle
 _LOW_BATTERY = 0.2  # of a full charge
 _GAUGE = 8  # characters
-_LONGEST_NAME = 9  # characters, of another robot
+_MATE = 30  # characters that another robot and its place take
 _QUIET = {"edge_joined"}  # too many of them, and they say little
 _TONES: Mapping[str, Tone] = {
     "recovery": "warning",
@@ -61,7 +62,8 @@ def facts(state: State, plan: Plan | None, health: Health | None) -> Iterator[Fa
     yield Fact("control", *_control(state, health))
     yield Fact("program", *_program(health))
     for mate in state.team:
-        yield Fact(mate.name[:_LONGEST_NAME], f"{mate.pose[0]:.2f} {mate.pose[1]:.2f} m")
+        place = f"{mate.pose[0]:.2f} {mate.pose[1]:.2f} m"
+        yield Fact(shortened(mate.name, _MATE - len(place)), place)
 
 
 def _tone_of_phase(state: State) -> Tone:

@@ -135,7 +135,7 @@ def _joined(left: Text, right: Text) -> Text:
 
 def _line(fact: Fact, *, faint: bool) -> Text:
     tone = "bright_black" if faint else _TONES[fact.tone]
-    name = f"{printable(fact.name):<{_NAME_WIDTH}}"  # what a robot tells, whoever it is
+    name = f"{printable(fact.name):<{_NAME_WIDTH - 1}} "  # what a robot tells, whoever it is
     return Text.assemble((name, "bright_black"), (printable(fact.text), tone))
 
 

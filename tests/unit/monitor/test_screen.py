@@ -13,6 +13,7 @@ from gvgbot.client import Event
 from gvgbot.monitor.chart import Scene
 from gvgbot.monitor.facts import Fact
 from gvgbot.monitor.screen import Picture, Screen
+from gvgbot.topics import Mate
 from tests.unit.monitor.maps import a_floor, a_map, vertex
 from tests.unit.test_telemetry import EXAMPLE
 
@@ -96,6 +97,12 @@ def test_the_usual_terminal_shows_everything() -> None:
         assert any(line[49:].startswith(fact) for line in shown), fact
     assert "try 11: ?" in text
     assert "●" in "".join(line[:48] for line in shown[1:17])
+
+
+def test_the_place_of_a_robot_with_a_long_name_is_there_whole() -> None:
+    team = (Mate(name="a-robot-with-a-very-long-name", pose=(-123.45, -67.89, 0.0)),)
+    picture = replace(PICTURE, state=msgspec.structs.replace(EXAMPLE, team=team))
+    assert any(" -123.45 -67.89 m" in line for line in Terminal(80, 50).show(picture))
 
 
 def test_the_newest_events_are_those_that_are_shown() -> None:
