@@ -2,6 +2,7 @@
 
 import math
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
@@ -208,6 +209,24 @@ def test_different_maps_exit_with_1_and_a_picture_shows_where(
         upper = red[: round(0.85 * image.height)]  # without the legend
         assert upper[:, : image.width // 2].sum() > 500
         assert not upper[:, image.width // 2 :].any()
+
+
+def test_long_paths_over_a_picture_stay_apart_and_whole_at_both_ends(tmp_path: Path) -> None:
+    deep = tmp_path / "/".join(["a-folder-with-a-long-name"] * 5)
+    deep.mkdir(parents=True)
+    one, other = a_run(deep / "monday", town()), a_run(deep / "friday", town())
+    out = tmp_path / "both.svg"
+    assert main(["map", "diff", str(one), str(other), "--out", str(out)]) == 0
+    sheet = ET.parse(out).getroot()
+    texts = [text for text in sheet.iter("{http://www.w3.org/2000/svg}text") if text.text]
+    edges = [0.0]
+    for name in ("monday", "friday"):
+        (words,) = [text for text in texts if (text.text or "").endswith(name)]
+        assert (words.text or "").startswith(str(tmp_path)[:12])
+        half = float(words.attrib["textLength"]) / 2
+        edges += [float(words.attrib["x"]) - half, float(words.attrib["x"]) + half]
+    assert edges == sorted(edges)
+    assert edges[-1] < float(sheet.attrib["width"])
 
 
 @pytest.mark.parametrize(
