@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from gvgbot.geometry import Array
+from gvgbot.words import shortened
 
 OVERSAMPLING = 2
 _STRIP = 64  # rows that are stretched or reduced at a time
@@ -224,6 +225,14 @@ def _blend(one: Colour, other: Colour, share: float) -> Colour:
 def text_width(words: str, size: float) -> float:
     """How wide (pixels) the words are."""
     return float(_font(size).getlength(words))
+
+
+def fitted(words: str, size: float, width: float) -> str:
+    """The words, without their middle if they are wider than that (pixels)."""
+    longest = len(words)
+    while longest > 3 and text_width(shortened(words, longest), size) > width:
+        longest -= 1
+    return shortened(words, longest)
 
 
 def _font(size: float) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:

@@ -6,13 +6,12 @@ import numpy as np
 
 from gvgbot.maps import legend, symbols
 from gvgbot.maps.alignment import Comparison
-from gvgbot.maps.canvas import text_width
+from gvgbot.maps.canvas import fitted
 from gvgbot.maps.moved import moved_grid
 from gvgbot.maps.occupancy import OccupancyGrid
 from gvgbot.maps.picture import draw_ground, draw_vertex, known_corners
 from gvgbot.maps.surface import S, Surface
 from gvgbot.maps.view import View, box_around, pair
-from gvgbot.words import shortened
 
 _SIDE, _NARROWEST = 900, 500  # pixels of a map: the most, and the least it takes in width
 _MARGIN = 28  # pixels around everything
@@ -39,18 +38,10 @@ def draw_diff(
         canvas = sheet(width, height)
         _draw(canvas, view, found, which, grids[which])
         both.paste(canvas, (which * width, _TITLE))
-        words = _fitted(title, width - 2 * _MARGIN)
+        words = fitted(title, _TITLE_SIZE, width - 2 * _MARGIN)
         both.text(((which + 0.5) * width, _TITLE / 2), words, _TITLE_SIZE, anchor="mm")
     signs.draw(both, (_MARGIN, _TITLE + height), 2 * (width - _MARGIN))
     return both
-
-
-def _fitted(title: str, width: float) -> str:
-    """The title, without its middle if it is wider than that (pixels)."""
-    longest = len(title)
-    while longest > 3 and text_width(shortened(title, longest), _TITLE_SIZE) > width:
-        longest -= 1
-    return shortened(title, longest)
 
 
 def _draw(canvas: Surface, view: View, found: Comparison, which: int, grid: OccupancyGrid) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from gvgbot.geometry import Array
 from gvgbot.maps import symbols
-from gvgbot.maps.canvas import Ink, Point, text_width
+from gvgbot.maps.canvas import Ink, Point, fitted, text_width
 from gvgbot.maps.surface import Surface
 
 TEXT_SIZE = 20
@@ -16,6 +16,7 @@ _ROW = 36.0
 _SIGN = 46.0  # width that a sign takes
 _GAP = 30.0  # between an entry and the next
 _LONGEST_BAR = 260.0
+_BAR_GAP = 12.0  # between the bar and its length
 _BAR_SHARE = 0.25  # of the legend's width that the bar may take
 
 
@@ -77,7 +78,8 @@ class Legend:
     def draw(self, canvas: Surface, corner: Point, width: float) -> None:
         """Draw it with its upper left at the corner, the scale bar to the right of the caption."""
         left, top = corner
-        canvas.text((left, top + _ROW / 2), self.caption, TEXT_SIZE)
+        room = width - _GAP - self.bar_width - _BAR_GAP - text_width(self._bar_label, TEXT_SIZE)
+        canvas.text((left, top + _ROW / 2), fitted(self.caption, TEXT_SIZE, room), TEXT_SIZE)
         self._draw_bar(canvas, (left + width, top + _ROW / 2))
         for number, row in enumerate(self.rows, start=1):
             self._draw_row(canvas, row, (left, top + _ROW * (number + 0.5)))
@@ -97,7 +99,11 @@ class Legend:
             ink = Ink.BLACK if number % 2 == 0 else Ink.WHITE
             at = (left + number * field, y - 4.0)
             canvas.box(at, (field, 8.0), fill=ink, outline=Ink.BLACK)
-        canvas.text((left - 12.0, y), f"{self.bar_length_m:g} m", TEXT_SIZE, anchor="rm")
+        canvas.text((left - _BAR_GAP, y), self._bar_label, TEXT_SIZE, anchor="rm")
+
+    @property
+    def _bar_label(self) -> str:
+        return f"{self.bar_length_m:g} m"
 
 
 def arranged(entries: Iterable[Entry], caption: str, *, width: float, scale: float) -> Legend:

@@ -1,5 +1,6 @@
 """Whatever `gvgbot map` draws is the same in every format, as other programs read it."""
 
+import re
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -63,3 +64,21 @@ def test_an_svg_has_the_words_of_the_pdf_at_their_places(arguments: list[str]) -
         )
         assert words.text is not None
         assert words.text in near
+
+
+def test_a_name_that_is_too_long_leaves_room_for_the_scale(arguments: list[str]) -> None:
+    """Nothing is written over anything else in the caption's row, nor over the edge."""
+    name = "a-run-" + "of-which-much-can-be-said-" * 8
+    for run in ("a", "b"):
+        Path(run).rename(f"{run}-{name}")
+    named = [f"{word}-{name}" if word in ("a", "b") else word for word in arguments]
+    tree = ET.parse(drawn(named, ".svg")).getroot()
+    texts = list(tree.iter(f"{SVG}text"))
+    (scale,) = [text for text in texts if re.fullmatch(r"[\d.]+ m", text.text or "")]
+    row = [text for text in texts if text.attrib["y"] == scale.attrib["y"]]
+    assert len(row) == 2
+    caption = next(text for text in row if text is not scale)
+    end = float(caption.attrib["x"]) + float(caption.attrib["textLength"])
+    assert end < float(scale.attrib["x"]) - float(scale.attrib["textLength"])
+    facts = {"show": ("m", "driven"), "diff": ("different within 0.5 m",)}[arguments[0]]
+    assert (caption.text or "").endswith(facts)
