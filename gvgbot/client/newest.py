@@ -41,6 +41,11 @@ class Newest(Generic[T]):
             self._arrived = time.perf_counter()
             self._wake()
 
+    def forget(self) -> None:
+        """Hold no value until the next one is put; from any thread."""
+        with self._changed:
+            self._read = None
+
     def close(self) -> None:
         """End all iterations; from any thread."""
         with self._changed:
@@ -53,7 +58,7 @@ class Newest(Generic[T]):
             wake()
 
     def _has_news(self, seen: int) -> bool:
-        return self._closed or self._count > seen
+        return self._closed or (self._read is not None and self._count > seen)
 
     @property
     def latest(self) -> T | None:
@@ -91,12 +96,13 @@ class Newest(Generic[T]):
             self._wakes.add(wake)
         try:
             while not self._closed:
-                if self._count == seen:
+                with self._changed:
+                    count, read = self._count, self._read
+                if read is None or count == seen:
                     await fresh.wait()
                     fresh.clear()
                     continue
-                seen, read = self._count, self._read
-                assert read is not None
+                seen = count
                 yield read()
         finally:
             with self._changed:

@@ -97,9 +97,14 @@ class Robot:
         self._trajectory: Newest[Trajectory] = Newest()
         self._health: Newest[Health] = Newest()
         self._grid: Newest[Grid] = Newest()
+        self._all = (
+            *(self._state, self._map, self._grid, self._trajectory, self._events, self._plan),
+            *(self._health, self._odometry, self._scan),
+        )
         self._tiles = Tiles(self._grid, self._ask_for_tiles)
         self._heard: set[Topic] = set()  # that were subscribed to
-        self._speaker: str | None = None  # who sent the last state, by its zenoh id
+        self._life: str | None = None
+        self._life_gate = threading.Lock()  # samples come in several threads
         self._signs = Signs(0.0)
         self._gate = threading.RLock()  # one of opening and closing at a time
         self._is_closed = False
@@ -153,6 +158,14 @@ class Robot:
         """What its laser sees; sent from the first call on."""
         self._hear(SCAN, Scan, self._scan)
         return self._scan
+
+    @property
+    def life(self) -> str | None:
+        """Which start of the robot's program speaks: its id on the network, None before a word.
+
+        When it changes, all that an earlier one has said is forgotten.
+        """
+        return self._life
 
     @property
     def presence(self) -> Presence:
@@ -269,20 +282,31 @@ class Robot:
     def _on_sample(
         self, topic: Topic, payload: type[T], newest: Newest[T], sample: zenoh.Sample
     ) -> None:
+        self._note_life(sample)
         encoding, data = str(sample.encoding), sample.payload.to_bytes()
         newest.put(partial(decoded, topic, payload, encoding, data))
         if topic is STATE:
             self._signs.heard_at = time.perf_counter()
-            self._note_speaker(None if sample.timestamp is None else str(sample.timestamp.get_id()))
 
-    def _note_speaker(self, speaker: str | None) -> None:
-        """Tell a router from a robot that is one for its team, by who has stamped a state."""
-        if self._session is not None and speaker not in (None, self._speaker):
-            self._speaker = speaker
+    def _note_life(self, sample: zenoh.Sample) -> None:
+        """Forget what was said before, if another start of the robot's program has sent this.
+
+        And tell a router from a robot that is one for its team.
+        """
+        if self._session is None or sample.timestamp is None:
+            return
+        with self._life_gate:
+            life = str(sample.timestamp.get_id())
+            if life == self._life:
+                return
+            for newest in self._all:
+                newest.forget()
+            self._life = life
             routers = {str(one) for one in self._session.info.routers_zid()}
-            self._signs.via_router = bool(routers) and speaker not in routers
+            self._signs.via_router = bool(routers) and life not in routers
 
     def _on_tiles(self, sample: zenoh.Sample) -> None:
+        self._note_life(sample)
         try:
             self._tiles.take(_grid_in(sample))
         except GvgbotError as error:
@@ -320,10 +344,7 @@ class Robot:
 
     def close(self) -> None:
         """Leave the network, and end all iterations."""
-        for newest in (
-            *(self._state, self._map, self._grid, self._trajectory, self._events, self._plan),
-            *(self._health, self._odometry, self._scan),
-        ):
+        for newest in self._all:
             newest.close()
         with self._gate:
             self._is_closed = True

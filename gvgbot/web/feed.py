@@ -12,7 +12,7 @@ from gvgbot import client
 from gvgbot.client import Asking, Robot, State
 from gvgbot.errors import GvgbotError, UsageError, reason_of
 from gvgbot.requests import Goto, Patrol, Set
-from gvgbot.topics import Events, Grid, Health, Map, Odometry, Plan, Scan, Tile, Trajectory
+from gvgbot.topics import Events, Health, Map, Odometry, Plan, Scan, Tile, Trajectory
 from gvgbot.web.viewers import Audience
 from gvgbot.web.wire import Floor, History, Kind, Link, Reply, Wish
 
@@ -40,6 +40,7 @@ class Feed:
         self._name, self._endpoint, self._file = robot, endpoint, zenoh_file
         self._audience, self._on_link = audience, on_link
         self._robot: Robot | None = None
+        self._life: str | None = None  # of the robot, that the audience knows of
         self._history = _Histories()
         self._lost_at: float | None = None  # by the loop's clock; None while connected
 
@@ -86,29 +87,37 @@ class Feed:
 
     async def _watch(self, robot: Robot) -> None:
         async with asyncio.TaskGroup() as tasks:
-            tasks.create_task(self._pass_on("state", robot.state()))
-            tasks.create_task(self._pass_on("map", robot.map()))
-            tasks.create_task(self._pass_on_tiles(robot.grid()))
-            tasks.create_task(self._pass_on("trajectory", robot.trajectory()))
-            tasks.create_task(self._pass_on("plan", robot.plan()))
-            tasks.create_task(self._pass_on("health", robot.health()))
-            tasks.create_task(self._pass_on("odometry", robot.odometry()))
-            tasks.create_task(self._pass_on("scan", robot.scan()))
+            tasks.create_task(self._pass_on(robot, "state", robot.state()))
+            tasks.create_task(self._pass_on(robot, "map", robot.map()))
+            tasks.create_task(self._pass_on_tiles(robot))
+            tasks.create_task(self._pass_on(robot, "trajectory", robot.trajectory()))
+            tasks.create_task(self._pass_on(robot, "plan", robot.plan()))
+            tasks.create_task(self._pass_on(robot, "health", robot.health()))
+            tasks.create_task(self._pass_on(robot, "odometry", robot.odometry()))
+            tasks.create_task(self._pass_on(robot, "scan", robot.scan()))
             tasks.create_task(self._remember(robot.state()))
             tasks.create_task(self._keep_telling(robot))
 
-    async def _pass_on(self, kind: Kind, values: AsyncIterable[T]) -> None:
+    async def _pass_on(self, robot: Robot, kind: Kind, values: AsyncIterable[T]) -> None:
         async for value in values:
+            self._note_life(robot)
             self._audience.show(kind, value)
             await asyncio.sleep(_PAUSE)
 
-    async def _pass_on_tiles(self, grids: AsyncIterable[Grid]) -> None:
+    def _note_life(self, robot: Robot) -> None:
+        life = robot.life
+        if life is not None and life != self._life:
+            self._life = life
+            self._audience.begin_anew(life)
+
+    async def _pass_on_tiles(self, robot: Robot) -> None:
         """Send of each grid what is new in it."""
-        began: float | None = None
+        known: tuple[str | None, float] | None = None
         shown: dict[tuple[int, int], Tile] = {}
-        async for grid in grids:
-            if grid.began != began:
-                began, shown = grid.began, {}
+        async for grid in robot.grid():
+            self._note_life(robot)
+            if (self._life, grid.began) != known:
+                known, shown = (self._life, grid.began), {}
                 self._audience.forget("tile")
                 self._audience.show("floor", Floor(resolution=grid.resolution, side=grid.side))
             for tile in grid.tiles:
@@ -129,6 +138,7 @@ class Feed:
         told: Events | None = None
         while True:
             self._show_link(await self._link(robot))
+            self._note_life(robot)
             happened = Events(events=robot.events().latest)
             if happened != told:
                 told = happened

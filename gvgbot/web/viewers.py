@@ -7,7 +7,7 @@ import asyncio
 from collections import deque
 from typing import TypeVar
 
-from gvgbot.web.wire import Kind, Value, frame
+from gvgbot.web.wire import KNOWN, Kind, Value, frame
 
 _REPLIES = 16  # that wait to be sent
 
@@ -73,6 +73,12 @@ class Audience:
         self._latest = _without(kind, self._latest)
         for viewer in self._viewers:
             viewer.forget(kind)
+
+    def begin_anew(self, life: str) -> None:
+        """Forget all that a robot has said, and say that another life of it begins."""
+        for kind in KNOWN:
+            self.forget(kind)
+        self.show("life", life)
 
     def keep(self, kind: Kind, value: Value) -> None:
         """Let those who join from now on have a value; the others have it already."""

@@ -2,10 +2,11 @@
 
 To the page: MessagePack, a pair of a kind and a value. State, map, trajectory, plan, odometry,
 scan, events and health are as they travel between robot and client, and so is each tile of the
-grid; the others are below. From the page: a wish, in JSON.
+grid; a life is an id, and what comes before another one is void; the others are below. From the
+page: a wish, in JSON.
 """
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 import msgspec
 
@@ -15,7 +16,8 @@ from gvgbot.topics import Events, Health, Map, Odometry, Plan, Scan, State, Tile
 Known = Literal[
     "state", "map", "floor", "tile", "trajectory", "plan", "odometry", "scan", "events", "health"
 ]
-Kind = Known | Literal["link", "history", "reply"]
+Kind = Known | Literal["life", "link", "history", "reply"]
+KNOWN: tuple[Known, ...] = get_args(Known)
 
 _LARGEST = 2**53 - 1  # id that a browser counts to
 
@@ -68,7 +70,7 @@ class Wish(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
 
 Told = State | Map | Floor | Tile | Trajectory | Plan | Odometry | Scan | Events | Health
-Value = Told | Link | History | Reply
+Value = Told | Link | History | Reply | str
 
 
 def frame(kind: Kind, value: Value) -> bytes:

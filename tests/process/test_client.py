@@ -508,6 +508,31 @@ def test_a_robot_that_was_killed_is_gone_and_back_when_it_starts_again(endpoint:
             until(lambda: (seen.state().age or 9.0) < 1.0)
 
 
+def test_what_a_robot_said_before_it_was_started_again_is_forgotten(endpoint: str) -> None:
+    def known(seen: client.Robot) -> list[bool]:
+        said = (seen.map(), seen.plan(), seen.grid(), seen.trajectory(), seen.health())
+        return [one.latest is not None for one in said] + [bool(seen.events().latest)]
+
+    robot = a_robot(endpoint)
+    with client.connect("near", endpoint) as seen:
+        for value in (numbered(7), A_MAP, A_PLAN, a_grid(" "), A_WAY, A_HEALTH):
+            robot.publish(value)
+        robot.publish(Events(events=(happened(0),)))
+        until(lambda: all(known(seen)))
+        maps = iter(seen.map())
+        assert next(maps) == A_MAP
+        robot.close()
+        until(lambda: seen.presence.word == "gone")
+        assert all(known(seen))
+        with a_robot(endpoint) as again:
+            again.publish(numbered(9))
+            until(lambda: seen.state().latest == numbered(9))
+            assert not any(known(seen))
+            another = msgspec.structs.replace(A_MAP, stamp=9.0)
+            again.publish(another)
+            assert next(maps) == another
+
+
 def test_a_robot_that_is_frozen_is_noticed(endpoint: str) -> None:
     """A stopped process is as silent as one whose cable was pulled."""
     with far_robot(endpoint) as process, client.connect("far", endpoint) as seen:

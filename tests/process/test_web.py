@@ -649,6 +649,23 @@ def test_vertices_have_their_numbers_wherever_there_is_room(page: Page) -> None:
     assert kept == [0, 30]
 
 
+def test_what_a_robot_showed_before_it_was_started_again_is_shown_no_more(page: Page) -> None:
+    endpoint, label = free_endpoint(), "document.querySelector('#map').ariaLabel"
+    with web("karl", "--connect", endpoint) as address:
+        desktop(page, address)
+        play = Play(endpoint, page)
+        with play.robot:
+            play.until_drawn(lambda seen: seen["wall"][1] > 1000, "wall")
+        with Telemetry(TelemetryConfig(listen=(endpoint,)), "karl") as again:
+            play.robot, play.sequence = again, 1000  # as if it had long been there
+            play.until(f"{label} === 'map, nothing known yet'")
+            for _ in range(2):
+                assert stretch(page, "wall")[1] < 1000
+                assert "vertex 1, 0°: ear" not in page.text()
+                desktop(page, address)  # who comes later sees no more
+                play.until_read("31.5 m")
+
+
 def test_the_other_robots_of_the_team_are_shown_where_they_are(page: Page) -> None:
     endpoint = free_endpoint()
     anna = Mate(name="anna", pose=(3.0, 4.0, 0.0))  # two metres to the north

@@ -12,7 +12,7 @@ const GESTURES = "drag to move, wheel or two fingers to zoom";
 const PANEL_EVERY = 150; // ms
 const THEMES = ["system", "dark", "light"];
 
-let state = null, robotLink = null, events = [], healths = [], isConnected = false, isStale = false, isFollowing = false;
+let life = null, state = null, robotLink = null, events = [], healths = [], isConnected = false, isStale = false, isFollowing = false;
 let isMapDue = true, isPanelDue = true, panelAt = 0;
 
 const redraw = () => { isMapDue = true; };
@@ -27,6 +27,7 @@ const requests = new Requests(link);
 
 function take(kind, value) {
   switch (kind) {
+    case "life": if (value !== life) beginAnew(value); break;
     case "link": robotLink = value; break;
     case "history":
       sigmaPlot.set(value.stamps, value.sigmas);
@@ -50,8 +51,17 @@ function take(kind, value) {
   isPanelDue = true;
 }
 
+// The robot's program was started again: what an earlier one said holds no more.
+function beginAnew(value) {
+  life = value;
+  state = null;
+  events = healths = [];
+  picture.forget();
+  $("map").setAttribute("aria-label", "map, nothing known yet");
+  closePlace();
+}
+
 function takeState(value) {
-  if (state !== null && value.sequence < state.sequence) picture.forget(); // it began anew
   state = value;
   picture.covariance = value.covariance;
   picture.team = value.team ?? [];

@@ -24,6 +24,11 @@ export class MapPicture {
     this.canvas = canvas;
     this.view = view;
     this.shown = new Set(LAYERS.map(([name]) => name));
+    this.forget();
+  }
+
+  // Know nothing, as at first.
+  forget() {
     this.known = this.plan = this.scan = this.pose = this.covariance = this.selected = this.tapped = null;
     this.floor = null;
     this.team = [];
@@ -69,13 +74,6 @@ export class MapPicture {
       this.way.push([stamp, pose[0], pose[1]]);
       if (this.way.length > 2000) this.way.shift();
     }
-  }
-
-  forget() {
-    this.known = this.plan = this.scan = this.selected = null;
-    this.trail = [];
-    this.way = [];
-    this.posed = -Infinity;
   }
 
   // Left, bottom, right, top, m, of all there is.
