@@ -718,6 +718,11 @@ def test_a_robot_that_is_stuck_waits_is_silent_or_has_left_and_a_lost_server_are
             play.until("document.querySelector('#banner').hidden")
             headline = "document.querySelector('#headline').innerText"
             there = msgspec.structs.replace(HERE.base, connected=True)
+            halted = msgspec.structs.replace(HERE, phase="halted", reason="no laser: plug it in")
+            play.state = halted  # what the narrow headline cuts off can be read below
+            play.until(
+                "document.querySelector('#facts').innerText.includes('no laser: plug it in')"
+            )
             ended = msgspec.structs.replace(HERE, outcome="explored", reason="no frontier is left")
             play.state = msgspec.structs.replace(ended, phase="finished")
             play.until(f"{headline} === 'no frontier is left'")

@@ -55,7 +55,7 @@ export function facts(state, plan) {
 
 function intention(state, plan) {
   if (state.errand) return [["going to", state.errand, "plain"], ["why", "somebody asked for it", "plain"]];
-  if (state.phase === "finished") return [["why", state.reason, "plain"]];
+  if (hasReason(state)) return [["why", state.reason, "plain"]];
   if (plan === null || plan.vertex === null) return [["going to", "nowhere yet", "faint"]];
   return [["going to", `the edge of vertex ${plan.vertex} at ${degrees(plan.bearing)}`, "plain"], ["why", plan.reason || "not said", "plain"]];
 }
@@ -119,9 +119,10 @@ export function headline(link, state) {
 // What it does, or why it does nothing.
 function doing(state) {
   if (state.phase === "errand" && state.errand) return state.errand;
-  const hasReason = ["starting", "halted", "finished"].includes(state.phase);
-  return (hasReason && state.reason) || state.phase;
+  return hasReason(state) ? state.reason : state.phase;
 }
+
+const hasReason = (state) => ["starting", "halted", "finished"].includes(state.phase) && state.reason !== "";
 
 const QUIET = new Set(["edge_joined"]);
 export const isTold = (event) => !QUIET.has(event.kind);
