@@ -55,6 +55,7 @@ def ask(session: zenoh.Session, robot: str, name: RequestName, arguments: Argume
             encoding=zenoh.Encoding(MESSAGEPACK),
             attachment=_name(),
             timeout=PATIENCE_S,
+            consolidation=zenoh.ConsolidationMode.NONE,  # all who answer are to be noticed
         )
     except zenoh.ZError as error:
         raise GvgbotError("the connection to the robot is closed") from error
@@ -73,6 +74,10 @@ def _text(replies: list[zenoh.Reply], robot: str) -> str:
     if not replies:
         raise GvgbotError(
             f"{robot} does not answer: it is not there, or this program may not ask it for that"
+        )
+    if (namesakes := len({str(reply.replier_id) for reply in replies})) > 1:
+        raise GvgbotError(
+            f"{namesakes} robots are named {robot}, and each was asked: give one another robot.name"
         )
     ok, err = replies[0].ok, replies[0].err
     if ok is not None:

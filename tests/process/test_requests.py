@@ -345,6 +345,30 @@ def test_of_two_robots_only_the_one_that_is_asked_does_something(endpoint: str) 
     assert asked == [("near", "pause"), ("other", "home"), ("near", "resume")]
 
 
+def test_two_robots_of_one_name_are_both_asked_and_that_is_said(endpoint: str) -> None:
+    async def refuse(_: Asked) -> Answer:
+        return Answer(done=False, text="not today")
+
+    async def story(second: Callable[[Asked], Awaitable[Answer]]) -> None:
+        async with (
+            a_robot(free_endpoint(), connect=endpoint),
+            a_robot(free_endpoint(), second, connect=endpoint),
+            client.connect("near", endpoint) as robot,
+        ):
+            async with asyncio.timeout(20.0):
+                while True:  # until the router knows both
+                    try:
+                        await robot.pause()
+                    except GvgbotError as error:
+                        if "2 robots are named near" in str(error):
+                            return
+                    await asyncio.sleep(0.1)
+
+    with router(endpoint):
+        for second in (obliging, refuse):
+            asyncio.run(story(second))
+
+
 def test_a_watcher_that_hangs_holds_up_no_request(endpoint: str) -> None:
     async def story() -> None:
         with Telemetry(TelemetryConfig(listen=(endpoint,)), "near") as robot:

@@ -57,7 +57,7 @@ def test_what_no_message_can_say_is_an_error_in_words(arguments: Arguments) -> N
 def test_an_answer_that_cannot_be_read_is_an_error_in_words(answer: bytes, encoding: str) -> None:
     reply = SimpleNamespace(payload=zenoh.ZBytes(answer), encoding=zenoh.Encoding(encoding))
     with pytest.raises(GvgbotError, match="cannot be read"):
-        asked(SimpleNamespace(ok=reply, err=None)).result(timeout=1.0)
+        asked(SimpleNamespace(ok=reply, err=None, replier_id=None)).result(timeout=1.0)
 
 
 def test_nobody_waits_for_ever_whatever_is_wrong() -> None:
