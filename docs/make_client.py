@@ -34,7 +34,7 @@ and `await` in one that has an event loop. Values that a robot sends (`State`, `
 are listed with their fields under [Topics](../topics.md).
 """
 WIDEST = 100  # of a signature in one line
-INTERNAL = {"put", "forget"}  # public for this package only
+INTERNAL = {"put", "swap"}  # public for this package only
 CLASSES = (
     *(client.Robot, client.Asking, client.GvgbotError, client.UsageError, client.Refused),
     client.Presence,

@@ -41,10 +41,13 @@ class Newest(Generic[T]):
             self._arrived = time.perf_counter()
             self._wake()
 
-    def forget(self) -> None:
-        """Hold no value until the next one is put; from any thread."""
+    def swap(self, read: Callable[[], T] | None) -> Callable[[], T] | None:
+        """Replace what was there, perhaps by nothing, and return it; from any thread."""
         with self._changed:
-            self._read = None
+            before, self._read = self._read, read
+            self._count += 1
+            self._wake()
+        return before
 
     def close(self) -> None:
         """End all iterations; from any thread."""

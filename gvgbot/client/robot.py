@@ -5,11 +5,11 @@ import contextlib
 import operator
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from types import TracebackType
-from typing import NoReturn, Self, TypeVar, overload
+from typing import Any, NoReturn, Self, TypeVar, overload
 
 import zenoh
 
@@ -97,13 +97,14 @@ class Robot:
         self._trajectory: Newest[Trajectory] = Newest()
         self._health: Newest[Health] = Newest()
         self._grid: Newest[Grid] = Newest()
-        self._all = (
+        self._all: tuple[Newest[Any], ...] = (
             *(self._state, self._map, self._grid, self._trajectory, self._events, self._plan),
             *(self._health, self._odometry, self._scan),
         )
         self._tiles = Tiles(self._grid, self._ask_for_tiles)
         self._heard: set[Topic] = set()  # that were subscribed to
         self._life: str | None = None
+        self._earlier: tuple[str | None, Sequence[Callable[[], Any] | None]] = (None, ())
         self._life_gate = threading.Lock()  # samples come in several threads
         self._signs = Signs(0.0)
         self._gate = threading.RLock()  # one of opening and closing at a time
@@ -291,7 +292,8 @@ class Robot:
     def _note_life(self, sample: zenoh.Sample) -> None:
         """Forget what was said before, if another start of the robot's program has sent this.
 
-        And tell a router from a robot that is one for its team.
+        Unless the one before that speaks again, as when two robots have one name. And tell a router
+        from a robot that is one for its team.
         """
         if self._session is None or sample.timestamp is None:
             return
@@ -299,9 +301,10 @@ class Robot:
             life = str(sample.timestamp.get_id())
             if life == self._life:
                 return
-            for newest in self._all:
-                newest.forget()
-            self._life = life
+            earlier, said = self._earlier
+            known = said if life == earlier else [None] * len(self._all)
+            swapped = [box.swap(read) for box, read in zip(self._all, known, strict=True)]
+            self._earlier, self._life = (self._life, swapped), life
             routers = {str(one) for one in self._session.info.routers_zid()}
             self._signs.via_router = bool(routers) and life not in routers
 

@@ -41,6 +41,8 @@ class Feed:
         self._audience, self._on_link = audience, on_link
         self._robot: Robot | None = None
         self._life: str | None = None  # of the robot, that the audience knows of
+        self._began: float | None = None  # of its grid
+        self._tiles: dict[tuple[int, int], Tile] = {}  # of its grid
         self._history = _Histories()
         self._lost_at: float | None = None  # by the loop's clock; None while connected
 
@@ -107,23 +109,21 @@ class Feed:
     def _note_life(self, robot: Robot) -> None:
         life = robot.life
         if life is not None and life != self._life:
-            self._life = life
+            self._life, self._began, self._tiles = life, None, {}
             self._audience.begin_anew(life)
 
     async def _pass_on_tiles(self, robot: Robot) -> None:
         """Send of each grid what is new in it."""
-        known: tuple[str | None, float] | None = None
-        shown: dict[tuple[int, int], Tile] = {}
         async for grid in robot.grid():
             self._note_life(robot)
-            if (self._life, grid.began) != known:
-                known, shown = (self._life, grid.began), {}
+            if grid.began != self._began:
+                self._began, self._tiles = grid.began, {}
                 self._audience.forget("tile")
                 self._audience.show("floor", Floor(resolution=grid.resolution, side=grid.side))
             for tile in grid.tiles:
                 place = tile.row, tile.column
-                if shown.get(place) != tile:
-                    shown[place] = tile
+                if self._tiles.get(place) != tile:
+                    self._tiles[place] = tile
                     self._audience.show("tile", tile, place)
             await asyncio.sleep(_PAUSE)
 

@@ -533,6 +533,22 @@ def test_what_a_robot_said_before_it_was_started_again_is_forgotten(endpoint: st
             assert next(maps) == another
 
 
+def test_of_two_robots_of_one_name_each_is_seen_with_its_own_map(endpoint: str) -> None:
+    there = TelemetryConfig(listen=(free_endpoint(),), connect=(endpoint,))
+    with a_robot(endpoint) as here, client.connect("near", endpoint) as seen:
+        here.publish(numbered(1))
+        here.publish(A_MAP)
+        until(lambda: seen.map().latest == A_MAP)
+        for number in (2, 4):
+            with Telemetry(there, "near") as other:
+                other.publish(numbered(number))
+                until(lambda sent=number: seen.state().latest == numbered(sent))  # type: ignore[misc]
+                assert seen.map().latest is None
+            here.publish(numbered(number + 1))
+            until(lambda sent=number: seen.state().latest == numbered(sent + 1))  # type: ignore[misc]
+            assert seen.map().latest == A_MAP
+
+
 def test_a_robot_that_is_frozen_is_noticed(endpoint: str) -> None:
     """A stopped process is as silent as one whose cable was pulled."""
     with far_robot(endpoint) as process, client.connect("far", endpoint) as seen:

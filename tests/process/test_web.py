@@ -391,6 +391,33 @@ def test_a_robot_of_another_version_is_said_to_be_one() -> None:
             asyncio.run(story(address))
 
 
+def test_a_robot_has_its_walls_again_when_another_one_of_its_name_has_left() -> None:
+    endpoint, audience = free_endpoint(), Audience()
+    there = TelemetryConfig(listen=(free_endpoint(),), connect=(endpoint,))
+
+    def said() -> set[str]:
+        return {kind for kind, _ in audience._latest}
+
+    async def until(robot: Telemetry, *kinds: str) -> None:
+        while not said() >= {"state", "link"} or said() & {"map", "tile"} != set(kinds):
+            robot.publish(EXAMPLE)
+            await asyncio.sleep(0.01)
+
+    async def story() -> None:
+        with Telemetry(TelemetryConfig(listen=(endpoint,)), "karl") as karl:
+            karl.publish(ROOM)
+            karl.publish(GRAPH)
+            async with asyncio.timeout(PATIENCE), asyncio.TaskGroup() as tasks:
+                watching = tasks.create_task(Feed("karl", endpoint, None, audience).run())
+                await until(karl, "map", "tile")
+                with Telemetry(there, "karl") as other:
+                    await until(other)
+                await until(karl, "map", "tile")
+                watching.cancel()
+
+    asyncio.run(story())
+
+
 # -- the page -----------------------------------------------------------------------------------
 
 
