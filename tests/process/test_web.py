@@ -709,6 +709,28 @@ def test_the_other_robots_of_the_team_are_shown_where_they_are(page: Page) -> No
             assert (mate - robot) / scale == pytest.approx([0.0, -2.0], abs=0.4)
 
 
+def test_names_of_other_robots_can_be_read_whatever_their_length_and_what_is_below_them(
+    page: Page,
+) -> None:
+    endpoint, name = free_endpoint(), "the_robot_that_has_the_longest_name_of_all"
+    mate = Mate(name=name, pose=(3.0, 4.0, 0.0))
+    with web("--connect", endpoint) as address:
+        play = Play(endpoint, page, state=msgspec.structs.replace(HERE, team=(mate,)))
+        with play.robot:
+            page.open(address, 390, 844, phone=True, dark=False)
+            page.look(
+                "(() => { const p = CanvasRenderingContext2D.prototype, stroke = p.strokeText;"
+                "window.haloed = new Set();"
+                "p.strokeText = function (text, ...at) { haloed.add(`${text}`); "
+                "stroke.call(this, text, ...at) } })()"
+            )
+            play.until(f"haloed.has('{name}')")
+            play.until_read("3.00, 4.00 m")
+            assert page.look("document.documentElement.scrollWidth") == 390
+            left = "[...document.querySelectorAll('#facts dd')].map((dd) => dd.offsetLeft)"
+            assert len(set(page.look(left))) == 1  # all values in one column
+
+
 def test_two_fingers_zoom_on_a_phone(page: Page) -> None:
     endpoint = free_endpoint()
     with web("--connect", endpoint) as address:

@@ -6,6 +6,7 @@ import { axes } from "./words.js";
 
 const SIGMAS = 3;
 const FRONTIER = 26; // pixels from a vertex to the tip of its frontier's arrow
+const FONT = "12px system-ui, sans-serif";
 const DISC = 5, NUMBER_HEIGHT = 10, GAP = 2; // pixels, of a vertex, of its number, and between two numbers
 
 export const LAYERS = [
@@ -182,16 +183,20 @@ export class MapPicture {
   }
 
   drawNumbers() {
+    this.c.font = FONT;
+    for (const { id, left, bottom } of apart(this.numbers(), this.discs())) this.write(id, left, bottom, this.colours.vertex);
+  }
+
+  // Text that can be read whatever lies under it.
+  write(text, left, bottom, colour) {
     const c = this.c;
-    c.font = "12px system-ui, sans-serif";
+    c.font = FONT;
+    c.textAlign = "left";
     c.lineWidth = 3;
     c.strokeStyle = this.colours.paper;
-    c.fillStyle = this.colours.vertex;
-    c.textAlign = "left";
-    for (const { id, left, bottom } of apart(this.numbers(), this.discs())) {
-      c.strokeText(id, left, bottom);
-      c.fillText(id, left, bottom);
-    }
+    c.strokeText(text, left, bottom);
+    c.fillStyle = colour;
+    c.fillText(text, left, bottom);
   }
 
   // The boxes around the vertices.
@@ -266,12 +271,10 @@ export class MapPicture {
   }
 
   drawTeam() {
-    this.c.font = "12px sans-serif";
-    this.c.fillStyle = this.colours.trail;
     for (const { name, pose } of this.team) {
       this.drawArrow(pose, this.colours.trail);
       const [px, py] = this.view.toScreen(pose[0], pose[1]);
-      this.c.fillText(name, px + 14, py - 10);
+      this.write(name, px + 14, py - 10, this.colours.wall);
     }
   }
 
