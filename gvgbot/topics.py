@@ -82,7 +82,7 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
     cycle_age: float | None  # s since the last one, None before the first
     phase: Phase
     outcome: str | None  # explored, explored_with_blocked, failed, stopped; None before
-    reason: str  # for the outcome, or for being halted
+    reason: str  # for the outcome, or for being halted, or why it is not sure where it is
     errand: str | None = None  # what it was asked to do just now, such as goto 7
     requests: tuple[str, ...] = ()  # what it may be asked for, as its configuration says
     uptime: float = 0.0  # s since the robot's program began

@@ -772,6 +772,11 @@ def test_a_robot_that_is_stuck_waits_is_silent_or_has_left_and_a_lost_server_are
             play.until(
                 "document.querySelector('#facts').innerText.includes('no laser: plug it in')"
             )
+            lost = "not sure where it is: 2 places fit"
+            play.state = msgspec.structs.replace(HERE, phase="exploring", reason=lost)
+            play.until(f"{headline} === '{lost}'")
+            assert page.look("document.querySelector('#headline').dataset.tone") == "warning"
+            play.until(f"document.querySelector('#facts').innerText.includes('{lost}')")
             ended = msgspec.structs.replace(HERE, outcome="explored", reason="no frontier is left")
             play.state = msgspec.structs.replace(ended, phase="finished")
             play.until(f"{headline} === 'no frontier is left'")

@@ -26,8 +26,9 @@ const counted = (count, one, many) => `${count} ${count === 1 ? one : many}`;
 export const size = (vertices, edges) => `${counted(vertices, "vertex", "vertices")}, ${counted(edges, "edge", "edges")}`;
 
 const TONES = { exploring: "good", errand: "good", waiting: "good", finished: "good", paused: "warning", starting: "warning", halted: "bad" };
+const isLost = (state) => state.phase === "exploring" && state.reason !== ""; // it looks for its place on the map
 export const toneOfPhase = (state) =>
-  state.outcome && state.outcome !== "explored" ? "warning" : TONES[state.phase] ?? "plain";
+  (state.outcome && state.outcome !== "explored") || isLost(state) ? "warning" : TONES[state.phase] ?? "plain";
 
 // [name, text, tone] of each line, the most telling first.
 export function facts(state, plan) {
@@ -122,7 +123,7 @@ function doing(state) {
   return hasReason(state) ? state.reason : state.phase;
 }
 
-const hasReason = (state) => ["starting", "halted", "finished"].includes(state.phase) && state.reason !== "";
+const hasReason = (state) => isLost(state) || (["starting", "halted", "finished"].includes(state.phase) && state.reason !== "");
 
 const QUIET = new Set(["edge_joined"]);
 export const isTold = (event) => !QUIET.has(event.kind);
