@@ -25,6 +25,7 @@ from gvgbot.requests import (
 )
 from gvgbot.topics import (
     HEARTBEAT,
+    LAST_PORT,
     STATE,
     TEAM_PARTS,
     TOPICS,
@@ -43,7 +44,6 @@ _WAITING_QUERIES = 1000  # more than this are dropped, oldest first; who asked g
 _WAITING_REQUESTS, _WAITING_REFUSALS, _WAITING_STOPS = 8, 1000, 2000
 _CROWDED = Answer(done=False, text="too many requests wait: ask again")
 _MAX_SESSIONS = 32
-_LAST_PORT = 65535
 _STRAYS = 30  # states of another robot by the same name, three seconds, before that is said
 _LONGEST_NAME = 80  # bytes of who asks
 _MISSES = zenoh.ext.MissDetectionConfig(heartbeat=HEARTBEAT, sporadic_heartbeat=None)
@@ -320,7 +320,7 @@ def _open(config: zenoh.Config, file: Path | None, listen: Sequence[str]) -> zen
 def _next_port(address: str) -> str:
     """The address one port on, to be proposed; itself if it has no port."""
     host, colon, port = address.rpartition(":")
-    return f"{host}{colon}{int(port) % _LAST_PORT + 1}" if port.isdecimal() else address
+    return f"{host}{colon}{int(port) % LAST_PORT + 1}" if port.isdecimal() else address
 
 
 def _session_config(config: TelemetryConfig, *, relays: bool) -> zenoh.Config:

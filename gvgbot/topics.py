@@ -1,5 +1,6 @@
 """What the robot says on the network: the table of topics, and the types that travel."""
 
+import re
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +16,9 @@ from gvgbot.requests import RequestName
 Phase = Literal["starting", "exploring", "errand", "waiting", "paused", "halted", "finished"]
 TeamPart = Literal["team", "course"]  # what robots know; and where each is and drives
 Priority = Literal["interactive_high", "data_high", "data", "data_low"]
+
+LAST_PORT = 65535
+_HAVE_PORTS = ("tcp", "udp", "tls", "quic", "ws")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,15 +45,21 @@ class TelemetryConfig:
             for endpoint in getattr(self, key):
                 if not is_endpoint(endpoint):
                     raise ValueError(
-                        f"{key} = {endpoint!r}: must be protocol/address, such as tcp/0.0.0.0:7447"
+                        f"{key} = {endpoint!r}: must be protocol/host:port, "
+                        "such as tcp/0.0.0.0:7447"
                     )
         if self.enabled and not self.listen:
             raise ValueError("listen is empty: give an address, or set enabled: false")
 
 
 def is_endpoint(text: str) -> bool:
-    """Whether the text has the form of an address: protocol/address."""
-    return len(text.split("/")) == 2 and all(text.split("/"))
+    """Whether the text has the form of an address: protocol/address, or protocol/host:port."""
+    protocol, _, address = text.partition("/")
+    if not protocol or not address or "/" in address:
+        return False
+    host, _, port = re.split("[?#]", address)[0].rpartition(":")
+    has_port = host != "" and re.fullmatch("[0-9]{1,5}", port) and int(port) <= LAST_PORT
+    return protocol not in _HAVE_PORTS or bool(has_port)
 
 
 class LinkHealth(msgspec.Struct, frozen=True, kw_only=True):

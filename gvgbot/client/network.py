@@ -47,7 +47,7 @@ def check_endpoint(endpoint: str) -> None:
     """Raises UsageError if this cannot be an address."""
     if not is_endpoint(endpoint):
         raise UsageError(
-            f"{endpoint!r} is no address: give protocol/address, such as tcp/host:7447"
+            f"{endpoint!r} is no address: give protocol/host:port, such as tcp/host:7447"
         )
 
 

@@ -444,10 +444,35 @@ def test_an_address_where_nobody_answers_is_one_error(endpoint: str) -> None:
         pass
 
 
-@pytest.mark.parametrize(("name", "address"), [("a/b", "tcp/h:1"), ("", "tcp/h:1"), ("a", "h:1")])
+@pytest.mark.parametrize(
+    ("name", "address"),
+    [
+        *(
+            ("a/b", "tcp/h:1"),
+            ("", "tcp/h:1"),
+            ("a", "h:1"),
+            ("a", "tcp/h"),
+            ("a", "tls/h#iface=x:1"),
+        ),
+        *(
+            ("a", "tcp/:1"),
+            ("a", "tcp/h:"),
+            ("a", "tcp/h:x"),
+            ("a", "tcp/h:65536"),
+            ("a", "udp/h:-1"),
+        ),
+    ],
+)
 def test_a_name_or_an_address_that_cannot_be_is_refused(name: str, address: str) -> None:
     with pytest.raises(UsageError):
         client.connect(name, address)
+
+
+@pytest.mark.parametrize(
+    "address", ["tcp/h:65535", "tls/[::1]:7447#iface=lo", "quic/h:1", "unixsock-stream/socket"]
+)
+def test_an_address_that_can_be_is_taken(address: str) -> None:
+    client.connect("a", address)
 
 
 def test_a_robot_of_another_name_is_told_from_none(endpoint: str) -> None:
