@@ -130,6 +130,7 @@ class Mission(Pursuit):
     def _learn(self, view: View, known: Correspondence, place: Place) -> None:
         """Account for what has been driven, and for what the target is called now."""
         target, came_from = self._mapper.unsettled.current(self.target), self._mapper.came_from
+        self._obstructions.rename(self._mapper.unsettled.renamed)
         self.target = came_from[target][0] if target in came_from else target
         self._driven.learn(view, known, place, self.where)
 

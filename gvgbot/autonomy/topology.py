@@ -189,15 +189,7 @@ def fuse(graph: GvgGraph, kept: Vertex, gone: Vertex, kept_gone: Pose, angle: fl
 
     Departures within `angle` rad are the same; an edge that both have is kept once.
     """
-    turned = tuple(half.bearing + kept_gone.theta for half in gone.half_edges.values())
-    known = {key: half.bearing for key, half in kept.half_edges.items()}
-    matched = match_bearings(turned, known, angle)
-    renamed = {
-        HalfEdgeId(gone.id, key): HalfEdgeId(
-            kept.id, matched[i] if i in matched else kept.add_half_edge(turned[i])
-        )
-        for i, key in enumerate(gone.half_edges)
-    }
+    renamed = _with_departures(kept, gone, kept_gone.theta, angle)
     twins = []
     for edge in [e for e in graph.edges.values() if gone.id in (e.a.vertex, e.b.vertex)]:
         graph.unjoin(edge)
@@ -215,6 +207,25 @@ def fuse(graph: GvgGraph, kept: Vertex, gone: Vertex, kept_gone: Pose, angle: fl
         joined.is_part = edge.is_part
     del graph.vertices[gone.id]
     return Fused(renamed, twins)
+
+
+def _with_departures(
+    kept: Vertex, gone: Vertex, turn: float, angle: float
+) -> dict[HalfEdgeId, HalfEdgeId]:
+    """Give one vertex the departures of another, turned: what they are called there.
+
+    One that leads along no edge stays given up if neither of the two knows better.
+    """
+    turned = tuple(half.bearing + turn for half in gone.half_edges.values())
+    known = {key: half.bearing for key, half in kept.half_edges.items()}
+    matched, renamed = match_bearings(turned, known, angle), {}
+    for i, (key, half) in enumerate(gone.half_edges.items()):
+        at = matched[i] if i in matched else kept.add_half_edge(turned[i])
+        same = kept.half_edges[at]
+        if same.edge is None:
+            same.blocked = half.blocked and (i not in matched or same.blocked)
+        renamed[HalfEdgeId(gone.id, key)] = HalfEdgeId(kept.id, at)
+    return renamed
 
 
 def outwards(belief: Belief, edge: Edge, end: HalfEdgeId) -> Array:

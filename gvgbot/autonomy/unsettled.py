@@ -34,7 +34,8 @@ class Unsettled:
         self._has_news = False  # on what is in doubt
         self._revocable: Revocable | None = None
         self.is_wary = False  # no closure without the next vertices
-        self._renamed: dict[HalfEdgeId, HalfEdgeId] = {}  # of vertices that proved to be known ones
+        # what half-edges are called now whose vertices proved to be known ones
+        self.renamed: dict[HalfEdgeId, HalfEdgeId] = {}
 
     # -- what happens meanwhile ----------------------------------------------------------------
 
@@ -84,9 +85,7 @@ class Unsettled:
 
     def current(self, end: HalfEdgeId | None) -> HalfEdgeId | None:
         """What a half-edge is called now: its vertex may have proved to be a known one."""
-        while end is not None and end in self._renamed:
-            end = self._renamed[end]
-        return end
+        return None if end is None else self.renamed.get(end, end)
 
     # -- which of the known ones it is after all -----------------------------------------------
 
@@ -146,7 +145,8 @@ class Unsettled:
             kept.seen_at, kept.updated_at = gone.seen_at, gone.updated_at
         kept.visits += gone.visits
         fused = fuse(known.graph, kept, gone, Pose(theta=turn), self._same_bearing)
-        self._renamed |= fused.renamed
+        before = {old: fused.renamed.get(new, new) for old, new in self.renamed.items()}
+        self.renamed = before | fused.renamed
         known.observations[:] = [
             replace(seen, vertex=kept.id, R=seen.R[:2, :2]) if seen.vertex == gone.id else seen
             for seen in known.observations
@@ -176,6 +176,6 @@ class Unsettled:
         self._doubts.recent = was.doubts
         self._doubts.refute(was.vertex)
         self._revocable, self.is_wary = None, True
-        self._renamed.clear()
+        self.renamed.clear()
         gone = [VertexRemoved(stamp, vertex, "a closure was revoked") for vertex in added]
         return [ClosureRevoked(stamp, was.vertex), *gone]

@@ -1,6 +1,6 @@
 """Ways that something stood in, and when they are worth another try."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
 
@@ -37,6 +37,11 @@ class Obstructions:
             self._times[end] = self._times.get(end, 0) + 1
             if self._times[end] <= most:
                 self._since[end] = stamp
+
+    def rename(self, renamed: Mapping[HalfEdgeId, HalfEdgeId]) -> None:
+        """Take over what half-edges are called now whose vertices proved to be known ones."""
+        self._times = {renamed.get(end, end): times for end, times in self._times.items()}
+        self._since = {renamed.get(end, end): since for end, since in self._since.items()}
 
     def open(self, graph: GvgGraph, stamp: float) -> bool:
         """Unblock what was closed long enough ago; whether there was something."""

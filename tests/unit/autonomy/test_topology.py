@@ -125,6 +125,31 @@ def test_a_departure_that_only_the_doubled_vertex_has_is_a_frontier() -> None:
     assert is_sound(graph)
 
 
+@pytest.mark.parametrize(
+    ("known_is", "doubled_is", "stays"),
+    [
+        ("closed", "closed", True),
+        ("closed", "open", False),
+        ("open", "closed", False),
+        (None, "closed", True),
+        (None, "open", False),
+    ],
+)
+def test_a_departure_stays_given_up_where_no_other_visit_found_it_open(
+    known_is: str | None, doubled_is: str, *, stays: bool
+) -> None:
+    """Known or not, the way to the north had been closed, or not, under either name."""
+    graph, ids = streets(2, 1)
+    west = graph.vertices[ids[0, 0]]
+    if known_is is not None:
+        west.half_edges[west.add_half_edge(math.pi / 2)].blocked = known_is == "closed"
+    again = doubled(graph, 0.0, math.pi / 2)
+    again.half_edges[1].blocked = doubled_is == "closed"
+    renamed, _ = fuse(graph, west, again, Pose(theta=TURN), ANGLE)
+    north = renamed[HalfEdgeId(again.id, 1)]
+    assert (graph.blocked(), graph.frontiers()) == (([north], []) if stays else ([], [north]))
+
+
 def test_who_goes_on_from_a_vertex_that_is_none_came_from_the_one_before() -> None:
     """Turned about the origin, the town has its west corner in the south."""
     graph, ids = streets(2, 1)

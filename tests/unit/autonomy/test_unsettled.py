@@ -89,6 +89,29 @@ def test_what_leaves_a_vertex_that_proves_to_be_a_known_one_turns_as_its_frame_w
     assert edge.polyline[-1] == pytest.approx((0.0, STREET), abs=0.2)
 
 
+def test_what_is_closed_for_a_while_is_opened_again_though_its_vertex_has_another_name() -> None:
+    """The place was entered three times, and the way to the north was closed the third time."""
+    graph, places = GvgGraph(), np.array([[0.0, 0.0], [0.1, 0.1], [0.1, -0.1]])
+    known, second, third = (Vertex(graph.next_id(), 1.0, Pose(), 0.0, 0.0) for _ in places)
+    graph.vertices |= {vertex.id: vertex for vertex in (known, second, third)}
+    closed = HalfEdgeId(third.id, third.add_half_edge(math.pi / 2))
+    obstructions = Obstructions(retries=3, retry_after=20.0)
+    obstructions.close(graph, [closed], 0.0)
+    x = np.concatenate([np.zeros(3), np.pad(places, ((0, 0), (0, 1))).ravel()])
+    knowledge = Knowledge(Belief(x, 0.01 * np.eye(12), tuple(graph.vertices)), graph)
+    unsettled = Unsettled(knowledge, margin=2.0, same_bearing=math.radians(40))
+    for vertex, rival in ((third, second), (second, known)):
+        unsettled.doubt(vertex, Recognition(None, (rival.id,), (1.0,), 0.02, 9.0), 0.0)
+    for stamp in (1.0, 2.0):
+        assert unsettled.settle(stamp)
+    assert list(graph.vertices) == [known.id]
+    (north,) = graph.blocked()
+    assert unsettled.current(closed) == north
+    obstructions.rename(unsettled.renamed)
+    assert obstructions.open(graph, 30.0)
+    assert graph.frontiers() == [north]
+
+
 class Contradicted:
     """A town in which the latest closure is about to prove wrong."""
 
