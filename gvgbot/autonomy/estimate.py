@@ -104,8 +104,11 @@ def _constraints(pipeline: Pipeline) -> list[Constraint]:
         if not (pipeline.led and seen.vertex in recognised):
             constraints.append(sight)
     last = len(keyframes) - 1
-    unheaded = [vertex for vertex in ids if vertex not in headed]
-    return constraints + [_believed(mapper.belief, v, last, ids[v]) for v in unheaded]
+    return constraints + [
+        _believed(mapper.belief, vertex, last, number, is_met=vertex in met)
+        for vertex, number in ids.items()
+        if vertex not in headed
+    ]
 
 
 def _passage(pipeline: Pipeline) -> Passage:
@@ -114,10 +117,14 @@ def _passage(pipeline: Pipeline) -> Passage:
     return Passage([(step.motion, step.covariance) for step in pipeline.steps], walls)
 
 
-def _believed(belief: Belief, vertex: int, last: int, number: int) -> Constraint:
-    """A vertex as it is believed to stand: nobody has kept how its heading was seen."""
+def _believed(belief: Belief, vertex: int, last: int, number: int, *, is_met: bool) -> Constraint:
+    """A vertex as it is believed to stand: nobody has kept how its heading was seen.
+
+    Where it stands is told by its sights, if it is met; the belief has made use of these already.
+    """
     _, S, _ = ekf.innovation(belief, vertex, Pose(), 1e-6 * np.eye(3))
-    return Constraint(last, number, ekf.expected(belief, vertex)[0], _inverse(S))
+    information = np.diag([0.0, 0.0, 1.0 / S[2, 2]]) if is_met else _inverse(S)
+    return Constraint(last, number, ekf.expected(belief, vertex)[0], information)
 
 
 def _sight(seen: Observation, vertex: int, *, again: bool) -> Constraint:
