@@ -155,9 +155,13 @@ class Whereabouts:
     ) -> HalfEdgeId | None:
         """The half-edge by which a trail came to a node, or comes to it if that is ahead.
 
-        It may have come through points that are no vertices (yet).
+        It may have come through points that are no vertices (yet). Who has not been away, or has
+        come back over its way, comes by where it left.
         """
         away = np.hypot(*(trail - gvg.nodes[node].position).T) > _AWAY_M
+        left = self.on_edge
+        if left is not None and left.vertex == known.vertex_of.get(node) and not away.any():
+            return left
         came_over = gvg.place(trail[np.nonzero(away)[0][-1]]) if away.any() else None
         if came_over is None or came_over.distance > _AWAY_M:
             came_over = place

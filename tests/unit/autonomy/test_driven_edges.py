@@ -297,6 +297,37 @@ def test_a_way_that_misses_a_vertex_and_comes_to_the_next_one_does_not_speak_aga
     assert [type(event) for event in events] == ([] if leads_on else [ClosureRevoked])
 
 
+def test_who_comes_back_over_an_edge_has_not_come_to_its_end() -> None:
+    """From vertex 1, where a loop was closed, three metres to the north, back, and to the east.
+
+    The edge to the north is eight metres long: that it is there speaks neither for the closure nor
+    against it, and at its end the robot has not been.
+    """
+    drive = Drive(HalfEdgeId(1, NORTH))
+    vertices, unsettled = drive.mapper.graph.vertices, drive.mapper.unsettled
+    vertices[3] = north = Vertex(3, 1.0, Pose(0.0, 8.0, 0.0), 0.0, 0.0)
+    ends = HalfEdgeId(1, NORTH), HalfEdgeId(3, north.add_half_edge(-np.pi / 2))
+    line = resampled([(0.0, 0.0), (0.0, 8.0)])
+    edge = drive.mapper.graph.join(*ends, line, 1.0, driven=False)
+    unsettled.note_closure(vertices[1], is_surprising=True)
+    drive.along(STREET, ALL_SEEN, (0.0, 0.0), (0.0, 3.0), (0.0, 0.0), (1.5, 0.0))
+    assert edge.traversals == 0
+    assert unsettled.revoke(1.0) == []
+    unsettled.note_way(edge, arrived=99)  # not at its far end
+    assert [type(event) for event in unsettled.revoke(2.0)] == [ClosureRevoked]
+
+
+def test_who_looks_into_two_ways_again_and_again_has_not_driven_from_one_into_the_other() -> None:
+    """To the north and back to vertex 1, to the east and back: these are two frontiers."""
+    drive = Drive(HalfEdgeId(1, NORTH))
+    at_1 = {branch: end for branch, end in ALL_SEEN.items() if end.vertex == 1}
+    for _ in range(5):
+        drive.stamp += 10.0
+        drive.along(STREET, at_1, (0.0, 0.3), (0.0, 2.0), (0.0, 0.3), (0.3, 0.0))
+        drive.along(STREET, at_1, (0.3, 0.0), (2.0, 0.0), (0.3, 0.0), (0.0, 0.3))
+    assert drive.mapper.graph.edges == {}
+
+
 def test_a_way_to_what_may_be_its_known_end_speaks_against_a_closure_once_that_is_another() -> None:
     """Vertex 2 may be vertex 3; both are known to centimetres, and stand metres apart."""
     drive = Drive(HalfEdgeId(1, EAST))
