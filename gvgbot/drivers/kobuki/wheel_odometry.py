@@ -12,6 +12,7 @@ TICK = 0.0000852920904977  # m of travel per encoder count
 WHEEL_BASE = 0.230  # m between the wheels
 TICK_ANGLE = 0.002436916871363930  # rad of a wheel's turn per encoder count
 _WRAP = 65536  # encoder counts
+_ANGLE_SPAN = math.radians(655.36)  # of what 16 bits of a hundredth of a degree can tell
 _SLIP_MEMORY_S = 0.5  # time constant of the reported slip rate
 
 
@@ -94,7 +95,9 @@ def turned(
 ) -> float:
     """How far the base has turned, rad: by the gyro, in (-π, π], or by the wheels."""
     if heading == "gyro":
-        return wrap_angle(after.angle - before.angle)
+        # the angle may be told in one turn, or count on for as long as its bits last
+        change = after.angle - before.angle
+        return min(wrap_angle(change), change - math.copysign(_ANGLE_SPAN, change), key=abs)
     left, right = wheel_travels(before, after, geometry.tick)
     return (right - left) / geometry.wheel_base
 

@@ -13,6 +13,7 @@ from gvgbot.drivers.kobuki.wheel_odometry import (
     WheelReading,
     advance_odometry,
     start_odometry,
+    turned,
     wheel_travels,
 )
 from gvgbot.geometry import Pose, Twist, wrap_angle
@@ -34,6 +35,11 @@ def readings(twist: Twist, seconds: float, start: WheelReading) -> Iterator[Whee
             wrap_angle(start.angle + twist.angular * t),
             twist.angular,
         )
+
+
+def as_16_bits(angle: float) -> float:
+    """An angle (rad) that is told in hundredths of a degree, in two's complement."""
+    return math.radians((round(math.degrees(100 * angle)) + 32768) % 65536 - 32768) / 100
 
 
 def reckon(twist: Twist, seconds: float, start: WheelReading, heading: Heading) -> WheelOdometry:
@@ -75,6 +81,25 @@ def test_where_encoders_and_gyro_begin_does_not_matter(left: int, right: int, at
     origin = reckon(twist, 1.0, WheelReading(0, 0, 0.0, 0.0), "gyro").odom_base
     assert here.distance(origin) < 1e-9
     assert abs(wrap_angle(here.theta - origin.theta)) < 1e-9
+
+
+@pytest.mark.parametrize("rate", [2.0, -2.0])
+@pytest.mark.parametrize("begins_deg", [0.0, 179.0, -327.0])
+def test_a_gyro_that_counts_on_past_half_a_turn_tells_the_same_as_one_that_does_not(
+    rate: float, begins_deg: float
+) -> None:
+    """For five turns either way; at 327.67 degrees it goes on at -327.68."""
+    turned_deg = math.degrees(rate * DT)
+    ticks = round(rate * DT * HALF_BASE * TICKS_PER_M)
+    state = start_odometry(WheelReading(0, 0, as_16_bits(math.radians(begins_deg)), rate))
+    for k in range(1, 1 + round(5 * math.tau / abs(rate * DT))):
+        angle = as_16_bits(math.radians(begins_deg + k * turned_deg))
+        reading = WheelReading(-k * ticks % 65536, k * ticks % 65536, angle, rate)
+        assert abs(turned(state.reading, reading, "gyro")) < 0.05
+        state = advance_odometry(state, reading, DT, "gyro")
+    truth = wrap_angle(k * rate * DT)
+    assert abs(wrap_angle(state.odom_base.theta - truth)) < 1e-3
+    assert abs(state.slip_rate) < 0.02
 
 
 @given(st.integers(0, 65535), st.integers(-32767, 32767))
