@@ -35,9 +35,9 @@ class TappedStream:
         return data
 
     def write(self, data: bytes) -> None:
-        """Send without waiting. Raises DeviceLost when the other end is gone."""
-        self._said(data)
+        """Send without waiting. Raises DeviceLost when the other end is gone, or takes no more."""
         self._inner.write(data)
+        self._said(data)
 
     def close(self) -> None:
         """Give the link up."""

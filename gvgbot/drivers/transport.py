@@ -31,7 +31,7 @@ class ByteStream(Protocol):
         """Whatever has arrived, at least one byte. Raises DeviceLost when the other end is gone."""
 
     def write(self, data: bytes) -> None:
-        """Send without waiting. Raises DeviceLost when the other end is gone."""
+        """Send without waiting. Raises DeviceLost when the other end is gone, or takes no more."""
 
     def close(self) -> None:
         """Give the link up; closing twice is harmless."""
@@ -112,6 +112,7 @@ class SerialStream:
         self._fd = self._port.fileno()
         self._arrived = bytearray()
         self._readable = asyncio.Event()
+        self._rest = b""  # of what the kernel has taken in part
         self._gone = self._is_closed = False
         self._deadman: Deadman | None = None
         self._loop = asyncio.get_running_loop()
@@ -143,15 +144,23 @@ class SerialStream:
         return data
 
     def write(self, data: bytes) -> None:
-        """Hand the bytes to the kernel; what does not fit is dropped, never waited for."""
+        """Hand the bytes to the kernel. Raises DeviceLost when not all of them fit, or it is gone.
+
+        Nothing is waited for; what has begun to go is finished before anything else goes.
+        """
+        before, sent = len(self._rest), 0
         try:
-            os.write(self._fd, data)
+            sent = os.write(self._fd, self._rest + data)
         except BlockingIOError:
-            return
+            pass
         except OSError as error:
             self._gone = True
             self._readable.set()
             raise DeviceLost(f"{self._path} is gone: plug it in again") from error
+        if sent < before + len(data):
+            self._rest = (self._rest + data if sent > before else self._rest)[sent:]
+            raise DeviceLost(f"{self._path} takes no more bytes: switch the device off and on")
+        self._rest = b""
 
     def watch_over(self, last_words: bytes, patience_s: float) -> None:
         """Write the last words while the event loop hangs for longer than that."""

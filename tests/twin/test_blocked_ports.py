@@ -8,6 +8,7 @@ import threading
 import tty
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import closing, contextmanager
+from itertools import takewhile
 from pathlib import Path
 
 import pytest
@@ -15,15 +16,20 @@ import serial
 
 from gvgbot.clock import LoopClock
 from gvgbot.config import load_config
+from gvgbot.drivers.kobuki.commands import BaseControl, decode_commands
+from gvgbot.drivers.kobuki.driver import KobukiBase, KobukiConfig
+from gvgbot.drivers.kobuki.frames import BadFrame, Frame, FrameParser
 from gvgbot.drivers.pty import PtyPort
 from gvgbot.drivers.transport import SerialStream, open_port, open_serial, serve_twin
 from gvgbot.errors import DeviceLost
+from gvgbot.geometry import STANDSTILL, Twist
 from gvgbot.hal.devices import Laser
 from gvgbot.links import Devices, Links
 from gvgbot.simulation import Simulation, open_place
 
 pytestmark = pytest.mark.twin
 BEATS = 100
+SPEEDS = [0.001 * (1 + mm % 600) for mm in range(100_000)]
 
 
 class Heart:
@@ -150,13 +156,63 @@ def test_a_device_that_takes_no_more_bytes_costs_its_own_bytes_only() -> None:
         async def story(heart: Heart) -> None:
             stream = await open_serial(path, 115200)
             for _ in range(2000):
-                stream.write(bytes(1000))  # of which a terminal holds some kilobytes
+                with contextlib.suppress(DeviceLost):
+                    stream.write(bytes(1000))  # of which a terminal holds some kilobytes
             await heart.has_beaten.wait()
             stream.close()
 
         play(story)
         os.set_blocking(device, False)
         assert 0 < len(os.read(device, 1 << 20)) < 100_000
+
+
+def all_read(device: int) -> bytes:
+    """What waits at the other end of a terminal, which does not block."""
+    found = b""
+    with contextlib.suppress(BlockingIOError):
+        while True:
+            found += os.read(device, 1 << 16)
+    return found
+
+
+def test_what_a_base_is_told_comes_whole_and_what_does_not_fit_was_not_told() -> None:
+    """Until nothing more fits, and when somebody has read that."""
+    with terminal() as (device, path):
+        os.set_blocking(device, False)
+
+        async def story() -> None:
+            stream, found = await open_serial(path, 115200), b""
+            base = KobukiBase(stream, KobukiConfig(), Standing())
+            told = list(takewhile(lambda speed: base.drive(Twist(speed)) != STANDSTILL, SPEEDS))
+            assert base.drive(Twist(0.5)) == STANDSTILL
+            for _ in range(2):
+                found += all_read(device)
+                assert base.drive(Twist(0.5)) == Twist(0.5)
+            found += all_read(device)
+            stream.close()
+            parser = FrameParser()
+            heard = [speed_of(frame) for frame in parser.feed(found)]
+            assert parser.skipped_bytes == 0
+            whole = heard[: len(told)], heard[-2:]
+            assert whole == ([round(1000 * speed) for speed in told], [500, 500])
+            assert len(heard) <= len(told) + 3  # one that did not fit may have begun
+
+        asyncio.run(story())
+
+
+class Standing(LoopClock):
+    """A clock by which nothing takes any time."""
+
+    def now(self) -> float:
+        return 0.0
+
+
+def speed_of(frame: Frame | BadFrame) -> int:
+    """The speed, mm/s, that a base is told."""
+    assert isinstance(frame, Frame)
+    (command,) = decode_commands(frame.payload)
+    assert isinstance(command, BaseControl)
+    return command.speed_mmps
 
 
 async def lost(laser: Laser) -> None:
