@@ -24,6 +24,7 @@ from gvgbot.autonomy.localisation import Localisation
 from gvgbot.autonomy.memory import Growth, Memory, recall, remember
 from gvgbot.autonomy.pipeline import STANDS_CARRIED, Pipeline
 from gvgbot.autonomy.relocalisation import Look, Opinion, Relocaliser
+from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.whereabouts import Whereabouts
 from gvgbot.geometry import STANDSTILL, Pose, Twist
@@ -184,9 +185,12 @@ class ReturningPipeline(Pipeline):
     def _arrive(self, seeker: Pipeline, map_local: Pose) -> None:
         """Be at a place, in the second mind's local frame and with its local maps."""
         assert seeker._last is not None
-        map_base = self._as_believed(map_local.compose(seeker._last.local_base))
+        assert self._last is not None
+        map_before = self.mapper.belief.map_base.compose(self._last.local_base.inverse())
+        self._place(map_local.compose(seeker._last.local_base))
+        map_base = self.mapper.belief.map_base
         map_local = map_base.compose(seeker._last.local_base.inverse())
-        self._move_hazards(seeker, map_local)
+        self._move_hazards(seeker, map_local.to(map_before))
         older = self.travelled - seeker.travelled
         for local_map in (seeker._maps.near, seeker._maps._far):
             local_map._seen_at += np.float32(older)
@@ -194,7 +198,6 @@ class ReturningPipeline(Pipeline):
         self._breaks, self._unturned_s = seeker._breaks, seeker._unturned_s
         self._reflexes = seeker._reflexes
         self.traffic.newcomers = seeker.traffic.newcomers
-        self._place(map_base)
         motion = self.keyframes[-1].map_base.to(map_base)
         self._last = replace(seeker._last, map_base=map_base)
         self.keyframes.append(self._last)
@@ -203,23 +206,21 @@ class ReturningPipeline(Pipeline):
         self._look_now = True
         self._seeker, self._is_back = None, True
 
-    def _as_believed(self, map_base: Pose) -> Pose:
-        """A pose on the smoothed map, seen from the nearest vertex as the belief has that."""
-        vertices = self._estimate.vertices
-        if not vertices:
-            return map_base
-        nearest = min(vertices, key=lambda vertex: vertices[vertex].distance(map_base))
-        belief = self.mapper.belief.map_vertex(nearest)
-        return belief.compose(vertices[nearest].to(map_base))
-
     def _place(self, map_base: Pose) -> None:
-        """Believe to be at a pose, independently of the way there; know all vertices from afar."""
-        mapper, belief = self.mapper, self.mapper.belief
-        x, P = belief.x.copy(), belief.P.copy()
-        x[:3] = map_base.x, map_base.y, map_base.theta
-        P[:3], P[:, :3] = 0.0, 0.0
-        P[:3, :3] = _FOUND
-        mapper.belief = Belief(x, P, belief.ids)
+        """Believe to be at a pose on the smoothed map, independently of the way there.
+
+        The belief may have the map elsewhere, and is unsure of that, but not of what is near there.
+        All vertices are known from afar.
+        """
+        mapper, vertices = self.mapper, self._estimate.vertices
+        if vertices:
+            nearest = min(vertices, key=lambda vertex: vertices[vertex].distance(map_base))
+            seen = vertices[nearest].to(map_base)
+            mapper.belief = ekf.place_robot(mapper.belief, nearest, seen, _FOUND)
+        else:
+            mapper.belief = Belief(
+                np.array([map_base.x, map_base.y, map_base.theta]), _FOUND.copy()
+            )
         for vertex in mapper.graph.vertices.values():
             vertex.seen_at = min(
                 vertex.seen_at, self.travelled - self._config.recognition.tracked_m
@@ -228,11 +229,8 @@ class ReturningPipeline(Pipeline):
         self.mission.where, self.mission.target = Whereabouts(), None
         self.mission.reason = ""
 
-    def _move_hazards(self, seeker: Pipeline, map_local: Pose) -> None:
-        """Take what was felt into the new local frame, beside what was felt since."""
-        assert self._last is not None
-        map_before = self.mapper.belief.map_base.compose(self._last.local_base.inverse())
-        turn = map_local.to(map_before)
+    def _move_hazards(self, seeker: Pipeline, turn: Pose) -> None:
+        """Take what was felt into the new local frame, which sees the old one at `turn`."""
         for hazard in self._hazards._all:
             hazard.points = turn.transform(hazard.points)
         for hazard in seeker._hazards._all:

@@ -103,16 +103,7 @@ def advance(belief: Belief, motion: Pose, Q: Array) -> Belief:
 
     What vertices know of each other stays where it is, however many there are.
     """
-    c, s = math.cos(belief.x[2]), math.sin(belief.x[2])
-    moved = belief.map_base.compose(motion)
-    F = np.array(
-        [
-            [1.0, 0.0, -s * motion.x - c * motion.y],
-            [0.0, 1.0, c * motion.x - s * motion.y],
-            [0.0, 0.0, 1.0],
-        ]
-    )
-    G = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    moved, F, G = _composed(belief.map_base, motion)
     x, P = belief.x.copy(), belief.P
     x[:3] = moved.x, moved.y, moved.theta
     P[:3, 3:] = F @ P[:3, 3:]
@@ -124,16 +115,7 @@ def advance(belief: Belief, motion: Pose, Q: Array) -> Belief:
 def add_vertex(belief: Belief, vertex: int, base_vertex: Pose, R: Array) -> Belief:
     """The belief with a vertex first seen at a pose in the base frame, with covariance R (3, 3)."""
     n = len(belief.x)
-    c, s = math.cos(belief.x[2]), math.sin(belief.x[2])
-    placed = belief.map_base.compose(base_vertex)
-    J_r = np.array(
-        [
-            [1.0, 0.0, -s * base_vertex.x - c * base_vertex.y],
-            [0.0, 1.0, c * base_vertex.x - s * base_vertex.y],
-            [0.0, 0.0, 1.0],
-        ]
-    )
-    J_z = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    placed, J_r, J_z = _composed(belief.map_base, base_vertex)
     P = np.zeros((n + 3, n + 3))
     P[:n, :n] = belief.P
     P[n:, :n] = J_r @ belief.P[:3]
@@ -141,6 +123,35 @@ def add_vertex(belief: Belief, vertex: int, base_vertex: Pose, R: Array) -> Beli
     P[n:, n:] = J_r @ belief.P[:3, :3] @ J_r.T + J_z @ R @ J_z.T
     x = np.concatenate([belief.x, [placed.x, placed.y, placed.theta]])
     return Belief(x, P, (*belief.ids, vertex))
+
+
+def place_robot(belief: Belief, vertex: int, vertex_base: Pose, R: Array) -> Belief:
+    """The belief of a robot of which is known where a vertex has it, with covariance R (3, 3).
+
+    Pose and covariance are in the vertex's frame. What it believed of its own place is forgotten.
+    """
+    i = 3 + 3 * belief.ids.index(vertex)
+    placed, J_v, J_z = _composed(belief.map_vertex(vertex), vertex_base)
+    x, P = belief.x.copy(), belief.P.copy()
+    x[:3] = placed.x, placed.y, placed.theta
+    P[:3, 3:] = J_v @ belief.P[i : i + 3, 3:]
+    P[3:, :3] = P[:3, 3:].T
+    P[:3, :3] = J_v @ belief.P[i : i + 3, i : i + 3] @ J_v.T + J_z @ R @ J_z.T
+    return Belief(x, P, belief.ids)
+
+
+def _composed(a_b: Pose, b_c: Pose) -> tuple[Pose, Array, Array]:
+    """The pose a_c, and its Jacobians (3, 3) by either pose."""
+    c, s = math.cos(a_b.theta), math.sin(a_b.theta)
+    by_first = np.array(
+        [
+            [1.0, 0.0, -s * b_c.x - c * b_c.y],
+            [0.0, 1.0, c * b_c.x - s * b_c.y],
+            [0.0, 0.0, 1.0],
+        ]
+    )
+    by_second = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    return a_b.compose(b_c), by_first, by_second
 
 
 def remove_vertex(belief: Belief, vertex: int) -> Belief:

@@ -1,8 +1,22 @@
+"""A robot that comes back: what it says when it is lost, and what it knows when it is found."""
+
+from pathlib import Path
+
+import numpy as np
 import pytest
 
+from gvgbot.autonomy.estimate import smoothed
 from gvgbot.autonomy.relocalisation import Opinion
-from gvgbot.autonomy.returning import _given_up
-from gvgbot.geometry import Pose
+from gvgbot.autonomy.returning import ReturningPipeline, _given_up
+from gvgbot.autonomy.slam import ekf
+from gvgbot.autonomy.slam.ekf import Belief
+from gvgbot.config import load_config
+from gvgbot.geometry import STANDSTILL, Pose
+from gvgbot.hal.messages import Odometry
+from gvgbot.persistence.mission_files import MissionFiles
+from tests.unit.autonomy.sights import carved, sweep
+
+MISSION = Path(__file__).parents[2] / "data" / "mission_v1"
 
 
 @pytest.mark.parametrize(
@@ -21,3 +35,29 @@ def test_a_robot_that_gives_up_says_what_to_do(opinion: Opinion, says: str) -> N
         f"not sure where it is: {says}; "
         "start it where it stopped, or begin a new map (gvgbot run --new)"
     )
+
+
+def test_who_has_found_its_place_on_a_map_knows_no_better_where_that_map_lies() -> None:
+    """The map may lie metres aside of where it began, as a whole, and so may the robot on it.
+
+    What it sees next to it, again and again, is where the map has it, wherever that is.
+    """
+    saved, config = MissionFiles(MISSION).read(), load_config()
+    assert saved is not None
+    settings = config.autonomy, config.exploration, config.robot.radius_m
+    robot = ReturningPipeline(*settings, saved.memory, saved.past, lambda: False)
+    belief, aside = robot.mapper.belief, np.diag([2.0**2, 2.0**2, 0.0])
+    shift = np.kron(np.ones((1 + len(belief.ids),) * 2), aside)
+    robot.mapper.belief = Belief(belief.x, belief.P + shift, belief.ids)
+    robot._estimate, seeker = smoothed(robot), robot._new_mind()
+    seeker.control(Odometry(0.0, Pose(), STANDSTILL))
+    seeker.perceive(sweep(carved([(-4.0, -1.0, 6.0, 1.0)]), Pose()))
+    robot._arrive(seeker, Pose(1.0, 0.5, 0.3))
+    found = robot.mapper.belief
+    here = min(found.ids, key=lambda v: found.map_vertex(v).distance(found.map_base))
+    base_vertex, R = ekf.expected(found, here)[0], 0.1**2 * np.eye(3)
+    S = ekf.innovation(found, here, base_vertex, R)[1]
+    assert np.sqrt(np.linalg.eigvalsh(S)[-1]) < 0.3
+    for _ in range(3):
+        found = ekf.update(found, here, base_vertex, R)
+    assert np.linalg.eigvalsh(found.vertex_covariance(here)).min() > 0.99 * 2.0**2

@@ -21,6 +21,7 @@ from gvgbot.autonomy.slam.ekf import (
     innovation,
     mahalanobis,
     part,
+    place_robot,
     predict,
     remove_vertex,
     unite,
@@ -107,6 +108,21 @@ def test_a_new_vertex_has_the_jacobians_of_its_placement(seed: int) -> None:
     assert np.allclose(after.P[6:, 6:], J_r @ belief.P[:3, :3] @ J_r.T + J_z @ R @ J_z.T, atol=1e-6)
     assert np.allclose(after.P[6:, :6], J_r @ belief.P[:3, :6], atol=1e-6)
     assert np.array_equal(after.P[:6, :6], belief.P)
+
+
+@given(seeds)
+def test_a_robot_that_is_placed_by_a_vertex_has_the_jacobians_of_its_placement(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    belief, seen, R = random_belief(rng, 3), random_pose(rng), random_covariance(rng, 3)
+    at = slice(6, 9)  # of the second vertex
+    J_v = numerical_jacobian(lambda x: moved(x, as_array(seen)), belief.x[at])
+    J_z = numerical_jacobian(lambda z: moved(belief.x[at], z), as_array(seen))
+    after = place_robot(belief, belief.ids[1], seen, R)
+    assert np.array_equal(after.x[:3], moved(belief.x[at], as_array(seen)))
+    assert np.allclose(after.P[:3, 3:], J_v @ belief.P[at, 3:], atol=1e-6)
+    assert np.allclose(after.P[:3, :3], J_v @ belief.P[at, at] @ J_v.T + J_z @ R @ J_z.T, atol=1e-6)
+    assert np.allclose(after.P, after.P.T)
+    assert np.array_equal(after.P[3:, 3:], belief.P[3:, 3:])
 
 
 @given(seeds, st.integers(0, 2))
@@ -227,7 +243,7 @@ def test_a_map_of_many_blocks_is_corrected_as_the_textbook_says() -> None:
     after = update(belief, 50, Pose(foreseen.x + 0.01, foreseen.y, foreseen.theta), R)
     assert np.array_equal(belief.P, before)
     assert np.allclose(after.P, joseph, rtol=0.0, atol=1e-13)
-    assert np.array_equal(after.P, after.P.T)
+    assert np.allclose(after.P, after.P.T)
     assert np.allclose(innovation(belief, 50, foreseen, R)[1], S, rtol=0.0, atol=1e-13)
 
 
