@@ -318,7 +318,7 @@ class Pipeline:
             self._incidents.append(STANDS_CARRIED)
             return None
         moved = self._last.local_base.to(local_base)
-        step = Step(moved, rotated_covariance(covariance, motion.theta))
+        step = Step(moved, rotated_covariance(covariance, moved.theta))
         self.steps.append(step)
         self.mapper.move(step.motion, step.covariance)
         return local_base

@@ -148,6 +148,23 @@ def test_a_base_that_started_anew_may_have_been_turned_meanwhile(turned: float) 
     assert abs(wrap_angle(there.theta)) < 0.03
 
 
+@pytest.mark.parametrize("turned", [0.0, 1.5, -1.5])
+def test_in_a_corridor_it_is_unsure_along_that_however_the_base_was_turned_meanwhile(
+    turned: float,
+) -> None:
+    """From west to east; the laser does not see the ends."""
+    corridor, config = carved([(-30.0, -1.0, 30.0, 1.0)]), load_config()
+    pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
+    for k in range(27):  # once round, before the base starts anew
+        odom_base, base = Pose(theta=0.25 * k), Pose(theta=0.25 * k + turned * (k == 26))
+        pipeline.control(Odometry(0.1 * k, odom_base, STANDSTILL, breaks=int(k == 26)))
+        scan = sweep(corridor, base)
+        pipeline.perceive(replace(scan, stamp=0.1 * k, time_increment=0.0))
+    along, across = np.sqrt(np.diag(pipeline.mapper.belief.P)[:2])
+    assert along > 0.3
+    assert across < 0.1
+
+
 @pytest.mark.parametrize(("x", "y", "stands"), [(0.0, 0.5, False), (2.0, 3.0, True)])
 def test_a_base_that_was_carried_away_before_it_started_anew_stands_and_says_so(
     x: float, y: float, stands: bool
