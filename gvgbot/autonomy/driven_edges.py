@@ -110,7 +110,8 @@ class DrivenEdges:
         edge = graph.edge_at(left)
         if edge is not None:
             between = edge.other(left).vertex
-            if not self._leads_past(between, arrived):
+            comes_back = arrived.vertex == left.vertex != between  # round something, past its end
+            if not (comes_back or self._leads_past(between, arrived)):
                 self._mapper.unsettled.note_way(edge, arrived.vertex)
             edge.traversals += 1
             edge.doubted_since = None

@@ -317,6 +317,25 @@ def test_who_comes_back_over_an_edge_has_not_come_to_its_end() -> None:
     assert [type(event) for event in unsettled.revoke(2.0)] == [ClosureRevoked]
 
 
+def test_who_comes_round_to_where_it_left_has_not_seen_where_the_edge_ends() -> None:
+    """From vertex 1, where a loop was closed, to the east and round to the north of it.
+
+    The edge to the east is known to end at vertex 2, which may have been hidden, or be elsewhere.
+    """
+    drive = Drive(HalfEdgeId(1, EAST))
+    graph, unsettled = drive.mapper.graph, drive.mapper.unsettled
+    ends = HalfEdgeId(1, EAST), HalfEdgeId(2, WEST)
+    edge = graph.join(*ends, resampled([(0.0, 0.0), (5.0, 0.0)]), 1.0, driven=False)
+    unsettled.note_closure(graph.vertices[1], is_surprising=True)
+    loop = [(0.0, 0.0), (7.0, 0.0), (7.0, 4.0), (0.0, 4.0), (0.0, 1.0)]
+    drive.where.trail = list(resampled(loop))
+    drive.along(STREET, {Branch(13, forward=True): HalfEdgeId(1, NORTH)}, (0.0, 1.0))
+    assert drive.where.on_edge == HalfEdgeId(1, NORTH)
+    assert unsettled.revoke(1.0) == []
+    unsettled.note_way(edge, arrived=99)  # not at its far end
+    assert [type(event) for event in unsettled.revoke(2.0)] == [ClosureRevoked]
+
+
 def test_who_looks_into_two_ways_again_and_again_has_not_driven_from_one_into_the_other() -> None:
     """To the north and back to vertex 1, to the east and back: these are two frontiers."""
     drive = Drive(HalfEdgeId(1, NORTH))
