@@ -41,15 +41,19 @@ class TelemetryConfig:
 
     def __post_init__(self) -> None:
         """Raises ValueError for addresses that cannot be listened on."""
-        for key in ("listen", "connect"):
-            for endpoint in getattr(self, key):
-                if not is_endpoint(endpoint):
-                    raise ValueError(
-                        f"{key} = {endpoint!r}: must be protocol/host:port, "
-                        "such as tcp/0.0.0.0:7447"
-                    )
+        check_endpoints("listen", self.listen)
+        check_endpoints("connect", self.connect)
         if self.enabled and not self.listen:
             raise ValueError("listen is empty: give an address, or set enabled: false")
+
+
+def check_endpoints(key: str, endpoints: tuple[str, ...]) -> None:
+    """Raises ValueError if one of a key's addresses cannot be one."""
+    for endpoint in endpoints:
+        if not is_endpoint(endpoint):
+            raise ValueError(
+                f"{key} = {endpoint!r}: must be protocol/host:port, such as tcp/0.0.0.0:7447"
+            )
 
 
 def is_endpoint(text: str) -> bool:

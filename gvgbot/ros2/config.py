@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from gvgbot.ranges import Range
+from gvgbot.topics import check_endpoints
 
 _NAMESPACE = r"(/[A-Za-z_]\w*)*"
 
@@ -24,7 +25,9 @@ class Ros2Config:
     zenoh_file: Path | None = None  # JSON5: keys, passwords, access control; see configs/zenoh
 
     def __post_init__(self) -> None:
-        """Raises ValueError for a namespace that ROS would not take."""
+        """Raises ValueError for no address, and for a namespace that ROS would not take."""
+        check_endpoints("listen", self.listen)
+        check_endpoints("connect", self.connect)
         if re.fullmatch(_NAMESPACE, self.namespace, re.ASCII) is None:
             raise ValueError(
                 f"namespace = {self.namespace!r}: must be names of letters, digits and _, "

@@ -67,3 +67,11 @@ def test_words_that_are_no_request_are_bad_usage(
 def test_a_point_can_have_negative_coordinates(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["ctl", "sim", "goto", "-1.5", "-2", "--zenoh-file", "no such file"]) == 2
     assert "cannot read no such file" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("address", ["127.0.0.1:7447", "tcp/127.0.0.1", "tcp/127.0.0.1:74470"])
+def test_what_is_no_address_with_a_port_is_bad_usage(
+    address: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["ctl", "pause", "--connect", address]) == 2
+    assert f"{address!r} is no address: give protocol/host:port" in capsys.readouterr().err

@@ -158,6 +158,11 @@ def test_by_default_only_this_machine_can_watch() -> None:
     [
         ("telemetry.listen=[nonsense]", "nonsense"),
         ("telemetry.listen=[tcp/]", "tcp/"),
+        ("telemetry.listen=[tcp/127.0.0.1]", "host:port"),
+        ("telemetry.connect=[tcp/127.0.0.1:65536]", "host:port"),
+        ("telemetry.connect=['tls/[::1]']", "host:port"),
+        ("ros2.connect=[localhost]", "localhost"),
+        ("ros2.listen=[tcp/127.0.0.1]", "host:port"),
         ("telemetry.listen=[]", "enabled: false"),
         ("telemetry.listen=tcp/127.0.0.1:7447", "a list"),
         ("telemetry.lease_s=0", "from 0.5 to 60"),
