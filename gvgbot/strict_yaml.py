@@ -11,6 +11,7 @@ import yaml
 
 from gvgbot.conversion import KeyPath, Problem, convert, shorten
 from gvgbot.errors import ConfigError
+from gvgbot.spelling import nearest
 from gvgbot.yaml_text import read_yaml
 
 T = TypeVar("T")
@@ -27,9 +28,13 @@ class _Override:
 
 def packaged(path: Path | str) -> Path:
     """The path itself if it exists, else the packaged file of that name if there is one."""
-    inside = Path(str(files("gvgbot") / "configs")) / Path(path).name
+    inside = _packaged_configs() / Path(path).name
     is_bare_name = Path(path).name == str(path)
     return inside if is_bare_name and not Path(path).exists() and inside.exists() else Path(path)
+
+
+def _packaged_configs() -> Path:
+    return Path(str(files("gvgbot") / "configs"))
 
 
 def load(cls: type[T], path: Path | None, overrides: Sequence[str] = ()) -> T:
@@ -97,7 +102,10 @@ def _read(path: Path) -> tuple[dict[Any, Any], list[str]]:
     try:
         text = path.read_text(encoding="utf-8")
     except OSError as error:
-        return {}, [f"{path}: cannot read the file: {error.strerror}"]
+        names = [file.stem for file in _packaged_configs().glob("*.yaml")]
+        meant = None if path.exists() else nearest(str(path.with_suffix("")), names)
+        hint = f"; did you mean {meant}.yaml?" if meant else ""
+        return {}, [f"{path}: cannot read the file: {error.strerror}{hint}"]
     except UnicodeDecodeError:
         return {}, [f"{path}: not a text file"]
     return _parse(text, str(path))

@@ -57,6 +57,8 @@ class SavedRun:
     @classmethod
     def read(cls, directory: Path) -> Self:
         """The run in a directory. Raises UsageError if a file is missing or damaged."""
+        if directory.is_file():
+            raise UsageError(f"{directory} is a file: give the directory of a run")
         if not (directory / "map.geojson").exists():
             raise UsageError(f"{directory} is no run directory: there is no map.geojson in it")
         if robots := sorted(path.parent for path in directory.glob("*/map.geojson")):

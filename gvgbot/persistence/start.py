@@ -96,6 +96,8 @@ def _new(wanted: Wanted, world: str) -> RunDirectory:
 
 def _known(path: Path) -> Saved:
     """The mission of a run, to begin with. Raises UsageError if there is none to be read."""
+    if path.is_file():
+        raise UsageError(f"cannot begin with {path}: it is a file; {_beside(path)}")
     try:
         saved = MissionFiles(path).read()
     except Damaged as error:
@@ -103,6 +105,13 @@ def _known(path: Path) -> Saved:
     if saved is None:
         raise UsageError(f"cannot begin with {path}: there is no {SNAPSHOT} in it; {_other(path)}")
     return replace(saved, known=str(path.resolve()))
+
+
+def _beside(file: Path) -> str:
+    """What may have been meant by a file."""
+    if (file.parent / SNAPSHOT).exists():
+        return f"give the directory of the run, {file.parent}"
+    return f"if it is the map of a map_server, try gvgbot map import {file} --out {file.stem}"
 
 
 def _other(path: Path) -> str:

@@ -70,6 +70,7 @@ def test_bad_arguments_are_one_line_that_names_them_and_exit_2(
 
 BAD_CONFIGURATIONS = {
     "missing file": (["run", "absent.yaml"], "absent.yaml: cannot read the file"),
+    "mistyped configuration": (["run", "turtelbot2"], "did you mean turtlebot2.yaml?"),
     "missing file to explore": (["explore", "--config", "absent.yaml"], "absent.yaml"),
     "override without value": (["explore", "--set", "robot.name"], "must be key=value"),
     "unknown key": (["explore", "--set", "robot.nmae=x"], "did you mean robot.name?"),
@@ -79,6 +80,7 @@ BAD_CONFIGURATIONS = {
     "a directory to replay": (["replay", "."], "with no recording in it: explore or run with"),
     "no run to show": (["map", "show", "absent"], "absent is no run directory"),
     "no run to tell of": (["map", "info", "absent"], "absent is no run directory"),
+    "a file to show": (["map", "show", "/etc/passwd"], "is a file: give the dir"),
     "seed out of range": (["explore", "--seed", str(2**40)], "twin.seed"),
 }
 

@@ -179,6 +179,16 @@ def test_of_a_directory_without_a_mission_what_may_have_been_meant_is_named(tmp_
         begin(Wanted(known=floor), world="office")
 
 
+def test_of_a_file_for_a_known_map_what_may_have_been_meant_is_named(tmp_path: Path) -> None:
+    picture, floor = mission(tmp_path / "run") / "map.png", tmp_path / "floor.yaml"
+    picture.touch()
+    floor.touch()
+    with pytest.raises(UsageError, match=f"give the directory of the run, {tmp_path / 'run'}$"):
+        begun(Wanted(known=picture))
+    with pytest.raises(UsageError, match=f"try gvgbot map import {floor} --out floor$"):
+        begun(Wanted(known=floor))
+
+
 @pytest.mark.parametrize("damage", [None, b"?"])
 def test_a_known_map_that_cannot_be_read_is_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], damage: bytes | None
