@@ -61,7 +61,8 @@ class SavedRun:
             raise UsageError(f"{directory} is a file: give the directory of a run")
         if not (directory / "map.geojson").exists():
             raise UsageError(f"{directory} is no run directory: there is no map.geojson in it")
-        if robots := sorted(path.parent for path in directory.glob("*/map.geojson")):
+        robots = sorted(path.parent for path in directory.glob("*/map.geojson"))
+        if robots and not (directory / "estimate.tum").exists():
             several = ", ".join(str(robot) for robot in robots)
             raise UsageError(f"{directory} is a run of several robots: name one of {several}")
         return cls(

@@ -1,5 +1,6 @@
 """`gvgbot map` on a run that is known to the last number, and on damaged ones."""
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -141,6 +142,16 @@ def test_a_run_that_never_began_has_a_map_but_no_film(run: Path, capsys: Capture
     capsys.readouterr()
     assert main(["map", "show", str(run), "--animate"]) == 2
     assert "nothing to animate" in capsys.readouterr().err
+
+
+def test_a_run_that_lies_beside_others_is_no_run_of_several_robots(
+    run: Path, tmp_path: Path, capsys: Captured
+) -> None:
+    runs = tmp_path / "all"
+    shutil.copytree(run, runs)
+    shutil.copytree(run, runs / "office-1")
+    assert main(["map", "info", str(runs)]) == 0
+    assert "vertices" in capsys.readouterr().out
 
 
 def test_of_several_robots_one_has_to_be_named(run: Path, capsys: Captured) -> None:
