@@ -14,9 +14,10 @@ HEAD = """\
 
 <!-- Written by docs/make_figures.py from what `make figures` leaves in benchmarks/results. -->
 
-The method was published with experiments (Zhang et al. 2014). They are repeated here, each by a
-script of its own in `benchmarks/figures`. `make figures` runs them all, draws the pictures and
-writes this page; it fails if a verdict is not as it should be.
+Qiwen Zhang, David Whitney, Florian Shkurti and Ioannis Rekleitis published the method with
+experiments: *Ear-based exploration on hybrid metric/topological maps*, IROS 2014. They are repeated
+here, each by a script of its own in `benchmarks/figures`. `make figures` runs them all, draws the
+pictures and writes this page; it fails if a verdict is not as it should be.
 
 """
 
