@@ -1,5 +1,6 @@
 """The live view: what ROS would hear, sent to who has the Foxglove app open."""
 
+import threading
 from types import TracebackType
 from typing import Self
 
@@ -12,6 +13,8 @@ from gvgbot.foxglove import LAYOUT
 from gvgbot.foxglove.config import FoxgloveConfig
 from gvgbot.ros2.cdr import definition
 from gvgbot.ros2.topics import TOPICS, Topic
+
+_PATIENCE_S = 1.0  # with taking leave of those who watch
 
 log = structlog.get_logger()
 
@@ -57,8 +60,12 @@ class FoxgloveServer:
         self._channels[topic].log(data, log_time=unix_ns)
 
     def close(self) -> None:
-        """Stop."""
-        self._server.stop()
+        """Stop, also while somebody is connected who says nothing."""
+        stopping = threading.Thread(  # noqa: TID251  # the library waits for such without end
+            target=self._server.stop, name="foxglove", daemon=True
+        )
+        stopping.start()
+        stopping.join(_PATIENCE_S)
 
     def __enter__(self) -> Self:
         return self

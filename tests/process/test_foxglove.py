@@ -4,6 +4,7 @@ import json
 import struct
 import threading
 from collections.abc import Iterator
+from socket import create_connection
 from typing import Any
 
 import pytest
@@ -106,3 +107,16 @@ def test_what_nobody_watches_is_not_wanted(server: FoxgloveServer, app: App) -> 
 def test_a_port_that_is_taken_is_said_in_a_line(server: FoxgloveServer) -> None:
     with pytest.raises(GvgbotError, match=r"foxglove\.port"):
         FoxgloveServer(FoxgloveConfig(port=server.port), "another")
+
+
+def test_who_connects_and_says_nothing_does_not_hold_up_the_end() -> None:
+    server = FoxgloveServer(FoxgloveConfig(port=0), "tester")
+    protocol = Subprotocol("foxglove.sdk.v1")
+    with (
+        create_connection(("127.0.0.1", server.port)),
+        connect(f"ws://127.0.0.1:{server.port}", subprotocols=[protocol]),  # taken in after it
+    ):
+        closing = threading.Thread(target=server.close, daemon=True)  # noqa: TID251  # may hang
+        closing.start()
+        closing.join(PATIENCE)
+        assert not closing.is_alive()
