@@ -132,7 +132,11 @@ def _recording(wanted: Wanted) -> Log:
             "the run went on with an earlier map, which is not here": recording.about.resumed,
             f"{recording.requests} requests steered the run, and are left out": recording.requests,
             f"{recording.left_out} messages are missing: the disk was slow": recording.left_out,
-            "the recording ends in the middle, as when a program is killed": recording.is_cut,
+            f"damaged pieces that were passed over: {recording.damaged}": recording.damaged,
+            f"{recording.missing} is missing, and what follows it left out": recording.missing,
+        } | {
+            f"{path} ends in the middle, as when a program is killed": True
+            for path in recording.cut
         }
         return [f"but:     {flaw}" for flaw, is_there in found.items() if is_there]
 

@@ -1,6 +1,7 @@
 """What a recording holds, in the order in which it happened, as far as the files go."""
 
 import os
+import re
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -62,7 +63,9 @@ class Recording:
         """Raises UsageError if the file cannot be read, or is no recording."""
         self._path = path
         self.about = _about(path)
-        self.is_cut = False  # whether the last file that was read ends in the middle
+        self.cut: list[Path] = []  # files that end in the middle
+        self.missing: Path | None = None  # a file before others, which are not read therefore
+        self.damaged = 0  # chunks of messages, of a second or so, that were passed over
         self.left_out = 0  # messages that the disk was too slow for
         self.requests = 0  # that were granted
 
@@ -71,24 +74,31 @@ class Recording:
 
         Raises UsageError if a file that follows cannot be read.
         """
-        for path in _parts(self._path, self.about.part):
+        path, number = self._path, self.about.part
+        first = _first(path, number)
+        while path == self._path or path.exists():
             try:
                 with path.open("rb") as file:
-                    yield from self._messages(file)
+                    yield from self._messages(file, path)
             except OSError as error:
                 raise UsageError(f"cannot read {path}: {error.strerror}") from error
+            number += 1
+            path = part_path(first, number)
+        self.missing = path if _goes_on(first, number) else None
 
-    def _messages(self, file: BinaryIO) -> Iterator[tuple[float, Lived]]:
+    def _messages(self, file: BinaryIO, path: Path) -> Iterator[tuple[float, Lived]]:
         topics: dict[int, str] = {}
-        self.is_cut = True
-        try:
-            for opcode, content in _records(file):
-                if opcode == Opcode.CHUNK:
-                    yield from self._of_chunk(content, topics)
-                elif opcode == Opcode.FOOTER:
-                    self.is_cut = False
-        except _DAMAGE:
-            return
+        opcode = None
+        for opcode, content in _records(file):
+            if opcode == Opcode.CHUNK:
+                try:
+                    messages = list(self._of_chunk(content, topics))
+                except _DAMAGE:
+                    self.damaged += 1
+                else:
+                    yield from messages
+        if opcode != Opcode.FOOTER:
+            self.cut.append(path)
 
     def _of_chunk(self, content: bytes, topics: dict[int, str]) -> Iterator[tuple[float, Lived]]:
         """The messages of a chunk, none if a part of it is missing or wrong."""
@@ -144,10 +154,14 @@ def _records(file: BinaryIO) -> Iterator[tuple[int, bytes]]:
         yield opcode, file.read(length)
 
 
-def _parts(path: Path, number: int) -> Iterator[Path]:
-    """A file, and those of the same recording that follow it."""
+def _first(path: Path, number: int) -> Path:
+    """The first file of a recording, of which the path is that of a number."""
     ending = f".{number}{path.suffix}" if number else path.suffix
-    first = path.with_name(path.name.removesuffix(ending) + path.suffix)
-    yield path
-    while (path := part_path(first, number := number + 1)).exists():
-        yield path
+    return path.with_name(path.name.removesuffix(ending) + path.suffix)
+
+
+def _goes_on(first: Path, number: int) -> bool:
+    """Whether there are files of a recording after that of a number."""
+    name = re.compile(rf"{re.escape(first.stem)}\.(\d+){re.escape(first.suffix)}")
+    found = (name.fullmatch(path.name) for path in first.parent.iterdir())
+    return any(int(one[1]) > number for one in found if one is not None)

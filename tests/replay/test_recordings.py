@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections import deque
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -125,6 +126,7 @@ def played(path: Path, out: Path, speed: float, seconds: float) -> Network:
             await robot.serve(told(), Links(log.config, clock, None))
 
         run_in_virtual_time(live())
+    deque(log.messages, maxlen=0)  # a file that is read to its end is closed
     return network
 
 

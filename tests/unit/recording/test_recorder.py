@@ -84,7 +84,7 @@ def test_what_is_recorded_is_read_in_the_same_order(tmp_path: Path) -> None:
     assert recording.about.title == "ring"
     times = [at for at, _ in recording.messages()]
     assert times == sorted(times)
-    assert not recording.is_cut
+    assert (recording.cut, recording.damaged, recording.missing) == ([], 0, None)
 
 
 def test_requests_that_were_granted_are_counted(tmp_path: Path) -> None:
@@ -127,7 +127,7 @@ def test_a_file_cut_at_any_byte_is_read_to_the_cut(tmp_path: Path) -> None:
             assert size < 1000
             continue
         found = [message for _, message in recording.messages()]
-        assert recording.is_cut
+        assert recording.cut == [cut]
         assert_begins_as(found, lived)
         lengths.append(len(found))
     assert lengths == sorted(lengths)
@@ -151,7 +151,7 @@ def test_of_several_files_the_last_may_be_cut_at_any_byte(tmp_path: Path) -> Non
         assert len(found) >= before
 
 
-def test_damage_ends_a_file_and_nothing_worse(tmp_path: Path) -> None:
+def test_damage_costs_a_piece_and_nothing_worse(tmp_path: Path) -> None:
     with Recorder(config(tmp_path / "run.mcap"), ABOUT) as to:
         lived = record(to, 400)
     whole = np.frombuffer((tmp_path / "run.mcap").read_bytes(), np.uint8)
@@ -161,10 +161,13 @@ def test_damage_ends_a_file_and_nothing_worse(tmp_path: Path) -> None:
         damaged[at] ^= 1 << int(rng.integers(8))
         (tmp_path / "bad.mcap").write_bytes(damaged.tobytes())
         try:
-            found = read(tmp_path / "bad.mcap")
+            recording = Recording(tmp_path / "bad.mcap")
         except UsageError:
             continue
-        assert_begins_as(found, lived)
+        found = [message for _, message in recording.messages()]
+        rest = iter(lived)
+        assert all(any(same(one, other) for other in rest) for one in found)  # in their order
+        assert len(found) == len(lived) or recording.damaged or recording.cut
 
 
 @pytest.mark.parametrize(
@@ -189,7 +192,7 @@ def test_a_file_that_says_nonsense_of_itself_is_refused(
         pytest.param(32, 0xFF, id="a size beyond any memory"),
     ],
 )
-def test_a_damaged_first_chunk_ends_a_file(at: int, value: int, tmp_path: Path) -> None:
+def test_without_its_first_chunk_a_file_is_of_no_use(at: int, value: int, tmp_path: Path) -> None:
     with Recorder(config(tmp_path / "run.mcap"), ABOUT, patient=True) as to:
         record(to, 1000)
     whole = bytearray((tmp_path / "run.mcap").read_bytes())
@@ -197,7 +200,42 @@ def test_a_damaged_first_chunk_ends_a_file(at: int, value: int, tmp_path: Path) 
     (tmp_path / "run.mcap").write_bytes(whole)
     recording = Recording(tmp_path / "run.mcap")
     assert list(recording.messages()) == []
-    assert recording.is_cut
+    assert recording.damaged > 1
+
+
+def test_one_wrong_bit_costs_one_piece(tmp_path: Path) -> None:
+    with Recorder(config(tmp_path / "run.mcap"), ABOUT, patient=True) as to:
+        lived = record(to, 1000)
+    whole = bytearray((tmp_path / "run.mcap").read_bytes())
+    with (tmp_path / "run.mcap").open("rb") as file:
+        chunks = make_reader(file).get_summary().chunk_indexes  # type: ignore[union-attr]
+    hit = chunks[len(chunks) // 2]
+    whole[hit.chunk_start_offset + hit.chunk_length // 2] ^= 1
+    (tmp_path / "run.mcap").write_bytes(whole)
+    recording = Recording(tmp_path / "run.mcap")
+    found = [message for _, message in recording.messages()]
+    assert recording.damaged == 1
+    assert recording.cut == []
+    assert same(found[-1], lived[-1])
+    assert 1 - 2 / len(chunks) < len(found) / len(lived) < 1
+
+
+def test_a_file_that_is_cut_or_missing_before_others_is_told(tmp_path: Path) -> None:
+    with Recorder(config(tmp_path / "run.mcap", file_mb=0.3), ABOUT, patient=True) as to:
+        lived = record(to, 2000)
+    whole = len(read(tmp_path / "run.mcap"))
+    assert whole == len(lived)
+    first, second = tmp_path / "run.mcap", tmp_path / "run.1.mcap"
+    second.write_bytes(second.read_bytes()[:100_000])
+    recording = Recording(first)
+    found = [message for _, message in recording.messages()]
+    assert recording.cut == [second]
+    assert same(found[-1], lived[-1])
+    second.unlink()
+    recording = Recording(first)
+    found = [message for _, message in recording.messages()]
+    assert recording.missing == second
+    assert_begins_as(found, lived)
 
 
 def first_chunk(whole: bytes | bytearray) -> int:
