@@ -39,7 +39,7 @@ def install_service(
     if a file cannot be written.
     """
     source = packaged("turtlebot2.yaml" if config is None else config)
-    _check_paths(source, load_config(source))
+    _check_paths(source, load_config(source), user=user)
     programs = Path(sys.executable).parent
     if not user:
         _check_place(Path(sys.executable))
@@ -164,23 +164,39 @@ def _write(file: Written) -> str:
     return "wrote"
 
 
-def _check_paths(source: Path, config: Config) -> None:
+def _check_paths(source: Path, config: Config, *, user: bool) -> None:
     """Raises ConfigError for a file that the service, which runs in a folder of its own, misses."""
-    wanted = {"twin.world": Path(config.twin.world)}
-    if config.telemetry.zenoh_file is not None:
-        wanted["telemetry.zenoh_file"] = config.telemetry.zenoh_file
+    wanted = {
+        "twin.world": Path(config.twin.world),
+        "telemetry.zenoh_file": config.telemetry.zenoh_file,
+        "ros2.zenoh_file": config.ros2.zenoh_file,
+    }
     for key, path in wanted.items():
-        if path.is_file() and not path.is_absolute():
+        if path is None:
+            continue
+        is_here = path.is_file() and not path.is_absolute()
+        hidden = None if user else _hidden(path.resolve() if is_here else path)
+        if hidden is not None:
+            raise ConfigError(
+                f"{source}: {key}: {path}: the service sees nothing of {hidden}: "
+                "put the file elsewhere, for instance into /etc/gvgbot"
+            )
+        if is_here:
             raise ConfigError(
                 f"{source}: {key}: {path}: the service runs in another folder: "
                 f"must be {path.resolve()}, or wherever it shall be"
             )
 
 
+def _hidden(path: Path) -> str | None:
+    """The folder that a service sees nothing of, if the path is in one."""
+    return next((home for home in _HIDDEN if path.is_relative_to(home)), None)
+
+
 def _check_place(executable: Path) -> None:
     """Raises GvgbotError if the service, which sees no home, would not find its program."""
     for path in (executable, executable.resolve()):
-        hidden = next((home for home in _HIDDEN if path.is_relative_to(home)), None)
+        hidden = _hidden(path)
         if hidden is not None:
             raise GvgbotError(
                 f"the service cannot see {path}, for it sees nothing of {hidden}: "

@@ -130,7 +130,11 @@ def test_a_configuration_with_mistakes_is_not_installed(
 
 @pytest.mark.parametrize(
     ("setting", "key"),
-    [("telemetry: {zenoh_file: mine}", "telemetry.zenoh_file"), ("twin: {world: mine}", "world")],
+    [
+        ("telemetry: {zenoh_file: mine}", "telemetry.zenoh_file"),
+        ("ros2: {zenoh_file: mine}", "ros2.zenoh_file"),
+        ("twin: {world: mine}", "world"),
+    ],
 )
 def test_a_configuration_with_files_that_the_service_would_not_find_is_not_installed(
     tmp_path: Path,
@@ -149,6 +153,27 @@ def test_a_configuration_with_files_that_the_service_would_not_find_is_not_insta
     assert f"must be {tmp_path / 'mine'}" in line
     (tmp_path / "robot.yaml").write_text(setting.replace("mine", str(tmp_path / "mine")))
     assert main(["install-service", "--user", "--dry-run", "robot.yaml"]) == 0
+
+
+@pytest.mark.parametrize(
+    "setting", ["telemetry: {zenoh_file: %s}", "ros2: {zenoh_file: %s}", "twin: {world: %s}"]
+)
+def test_a_configuration_with_files_that_the_service_cannot_see_is_not_installed(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    setting: str,
+) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setattr(sys, "executable", "/opt/gvgbot/bin/python")
+    config = tmp_path / "robot.yaml"
+    config.write_text(setting % "/home/me/mine")
+    assert main(["install-service", "--dry-run", str(config)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "sees nothing of /home" in line
+    assert main(["install-service", "--dry-run", "--user", str(config)]) == 0
+    config.write_text(setting % "/etc/gvgbot/mine")
+    assert main(["install-service", "--dry-run", str(config)]) == 0
 
 
 @pytest.mark.parametrize("options", [[], ["--dry-run"]], ids=["real", "dry"])
