@@ -142,9 +142,14 @@ class MissionFiles:
         with self._journal.open("r+b", buffering=0) as journal:
             journal.truncate(end)  # what an earlier attempt may have left
             journal.seek(end)
-            _write_all(journal.fileno(), framed)
-            if sync:
-                os.fsync(journal.fileno())
+            try:
+                _write_all(journal.fileno(), framed)
+                if sync:
+                    os.fsync(journal.fileno())
+            except OSError:
+                with contextlib.suppress(OSError):
+                    journal.truncate(end)  # the map may have room there
+                raise
         self._ends.append(end + len(framed))
 
     def fall_behind(self) -> None:

@@ -174,6 +174,7 @@ def test_a_disk_without_room_for_a_batch_takes_it_later(tmp_path: Path, room: in
     size = (tmp_path / JOURNAL).stat().st_size
     with full_disk(size + room), pytest.raises(OSError, match="too large"):
         files.append(batch(5, 40), sync=True)
+    assert (tmp_path / JOURNAL).stat().st_size == size  # half a batch takes no room from others
     assert places(tmp_path) == [float(i) for i in range(5)]
     with full_disk(size + room):
         files.fall_behind()
