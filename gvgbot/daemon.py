@@ -22,7 +22,7 @@ from gvgbot.maps.picture import counts
 from gvgbot.maps.run_directory import RunDirectory
 from gvgbot.persistence.keeper import Keeper
 from gvgbot.persistence.mission_files import MissionFiles
-from gvgbot.persistence.start import Wanted, begin, held, state_directory
+from gvgbot.persistence.start import Wanted, begin, state_directory
 from gvgbot.progress import Progress
 from gvgbot.recording import extra_needed
 from gvgbot.robot import Robot
@@ -135,9 +135,9 @@ def run(config: Config, *, out: Path | None, known: Path | None = None, anew: bo
     with contextlib.ExitStack() as stack:
         signals = stack.enter_context(StopSignals())
         telemetry = _telemetry(config, stack)
-        start = begin(Wanted(out, known, anew, state_directory(config, os.environ)), world=name)
-        directory = stack.enter_context(start.directory)
-        stack.enter_context(held(directory.path))
+        wanted = Wanted(out, known, anew, state_directory(config, os.environ))
+        start = begin(wanted, world=name, stack=stack)
+        directory = start.directory
         session = Session(config, directory, place)
         keeper = Keeper(session, start.files, start.saved)
         network = "off" if telemetry is None else telemetry.addresses

@@ -3,7 +3,7 @@
 import fcntl
 import os
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -45,26 +45,37 @@ def state_directory(config: Config, environment: Mapping[str, str]) -> Path | No
     return Path(given) if given else None
 
 
-def begin(wanted: Wanted, *, world: str) -> Start:
-    """Where to begin. Raises UsageError if a directory cannot be used or has no map to begin with.
+def begin(wanted: Wanted, *, world: str, stack: ExitStack) -> Start:
+    """Where to begin; until the stack is left, no other program may write to that directory.
 
     What was begun with a known map goes on when that is asked for again. A mission that cannot be
-    read is left where it is, and a new one begun: nobody may be there to decide.
+    read is left where it is, and a new one begun: nobody may be there to decide. Raises UsageError
+    if a directory cannot be used or has no map to begin with.
     """
-    begun_with = None if wanted.known is None else str(wanted.known.resolve())
+    begun_with = None if wanted.known is None else _named(wanted.known)
     path = None if wanted.anew or wanted.out is not None else _newest(wanted.state_dir)
     if path is not None:
-        files = MissionFiles(path)
-        try:
-            saved = files.read()
-        except Damaged as error:
-            log.warning("mission cannot be read, a new one begins", reason=str(error))
-        else:
-            if begun_with is None or (saved is not None and saved.known == begun_with):
-                return Start(RunDirectory(path), files, saved)
+        with ExitStack() as held_here:
+            held_here.enter_context(held(path))  # first: what is read may still grow otherwise
+            files = MissionFiles(path)
+            try:
+                saved = files.read()
+            except Damaged as error:
+                log.warning("mission cannot be read, a new one begins", reason=str(error))
+            else:
+                if begun_with is None or (saved is not None and saved.known == begun_with):
+                    directory = held_here.enter_context(RunDirectory(path))
+                    stack.enter_context(held_here.pop_all())
+                    return Start(directory, files, saved)
     known = None if wanted.known is None else _known(wanted.known)
-    directory = _new(wanted, world)
+    directory = stack.enter_context(_new(wanted, world))
+    stack.enter_context(held(directory.path))
     return Start(directory, MissionFiles(directory.path), known)
+
+
+def _named(path: Path) -> str:
+    """The whole path, whatever leads there; one of links in a ring stays as it is."""
+    return os.path.realpath(path)
 
 
 @contextmanager
@@ -104,7 +115,7 @@ def _known(path: Path) -> Saved:
         raise UsageError(f"cannot begin with {error}") from error
     if saved is None:
         raise UsageError(f"cannot begin with {path}: there is no {SNAPSHOT} in it; {_other(path)}")
-    return replace(saved, known=str(path.resolve()))
+    return replace(saved, known=_named(path))
 
 
 def _beside(file: Path) -> str:

@@ -1,5 +1,6 @@
 """Where a run begins, by what was asked for and what is there."""
 
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -36,9 +37,8 @@ def test_the_state_directory_is_the_configured_one_or_the_service_s(
 
 
 def begun(wanted: Wanted) -> Start:
-    start = begin(wanted, world="office")
-    start.directory.close()
-    return start
+    with ExitStack() as stack:
+        return begin(wanted, world="office", stack=stack)
 
 
 def mission(path: Path) -> Path:
@@ -155,6 +155,26 @@ def test_one_run_at_a_time_writes_to_a_directory(tmp_path: Path) -> None:
         assert list(tmp_path.iterdir()) == []
 
 
+def test_a_mission_is_not_read_while_another_program_writes_to_it(tmp_path: Path) -> None:
+    """It may end the next moment, and what it wrote since would be cut off."""
+    run = mission(tmp_path / "runs" / "office-1")
+    with held(run), pytest.raises(UsageError, match="in use"):
+        begun(Wanted(state_dir=tmp_path))
+    with ExitStack() as stack:
+        start = begin(Wanted(state_dir=tmp_path), world="office", stack=stack)
+        assert start.saved is not None
+        with pytest.raises(UsageError, match="in use"):
+            begun(Wanted(state_dir=tmp_path))
+    with held(run):
+        pass
+
+
+def test_links_in_a_ring_are_no_map(tmp_path: Path) -> None:
+    (tmp_path / "ring").symlink_to(tmp_path / "ring")
+    with pytest.raises(UsageError, match="cannot begin with"):
+        begun(Wanted(known=tmp_path / "ring"))
+
+
 def test_a_mission_that_cannot_be_read_stays_where_it_is(tmp_path: Path) -> None:
     old = mission(tmp_path / "runs" / "office-1")
     for name in (SNAPSHOT, SNAPSHOT_BEFORE):
@@ -170,13 +190,13 @@ def test_of_a_directory_without_a_mission_what_may_have_been_meant_is_named(tmp_
     runs, floor = tmp_path / "runs", tmp_path / "floor"
     floor.mkdir()
     with pytest.raises(UsageError, match=r"give the directory of a run$"):
-        begin(Wanted(known=floor), world="office")
+        begun(Wanted(known=floor))
     mission(runs / "office-1")
     with pytest.raises(UsageError, match=f"such as {runs / 'office-1'}$"):
-        begin(Wanted(known=runs), world="office")
+        begun(Wanted(known=runs))
     (floor / "map.yaml").touch()
     with pytest.raises(UsageError, match=f"try gvgbot map import {floor}/map.yaml --out"):
-        begin(Wanted(known=floor), world="office")
+        begun(Wanted(known=floor))
 
 
 def test_of_a_file_for_a_known_map_what_may_have_been_meant_is_named(tmp_path: Path) -> None:
@@ -196,7 +216,7 @@ def test_a_known_map_that_cannot_be_read_is_one_line(
     if damage is not None:
         (tmp_path / SNAPSHOT).write_bytes(damage)
     with pytest.raises(UsageError):
-        begin(Wanted(known=tmp_path), world="office")
+        begun(Wanted(known=tmp_path))
     arguments = ["--set", "telemetry.enabled=false", "--out", str(tmp_path / "out")]
     assert main(["run", "--map", str(tmp_path), *arguments]) == 2
     (line,) = capsys.readouterr().err.splitlines()
