@@ -7,6 +7,7 @@ from PIL import Image
 
 from gvgbot.maps.canvas import COLOURS, Ink, palette, png, text_width
 from gvgbot.maps.drawing import Drawing, Raster, Stroke, Window, Words
+from gvgbot.words import printable
 
 _ANCHORS = {"lm": "start", "mm": "middle", "rm": "end"}
 _MIDDLE = 0.35  # of a text's size: from its baseline to the middle of its capitals
@@ -81,7 +82,7 @@ def _add_words(parent: ET.Element, words: Words) -> None:
         "stroke-linejoin": "round",
         "paint-order": "stroke",
     }
-    ET.SubElement(parent, "text", attributes).text = words.words
+    ET.SubElement(parent, "text", attributes).text = printable(words.words)
 
 
 def _rectangle(corner: tuple[float, float], size: tuple[float, float]) -> dict[str, str]:

@@ -82,3 +82,13 @@ def test_a_name_that_is_too_long_leaves_room_for_the_scale(arguments: list[str])
     assert end < float(scale.attrib["x"]) - float(scale.attrib["textLength"])
     facts = {"show": ("m", "driven"), "diff": ("different within 0.5 m",)}[arguments[0]]
     assert (caption.text or "").endswith(facts)
+
+
+def test_a_name_that_xml_cannot_say_spoils_no_picture(arguments: list[str]) -> None:
+    """A bell, and a byte of another encoding than that of the file system."""
+    for run in ("a", "b"):
+        Path(run).rename(f"{run}\x07\udce9")
+    named = [f"{word}\x07\udce9" if word in ("a", "b") else word for word in arguments]
+    tree = ET.parse(drawn(named, ".svg")).getroot()
+    words = [text.text or "" for text in tree.iter(f"{SVG}text")]
+    assert any(text == "a" or text.startswith("a: ") for text in words)
