@@ -140,13 +140,15 @@ class Devices:
 
 
 async def _open_port(name: str, port: str, baud: int) -> tuple[ByteStream, Close]:
+    is_tcp = port.startswith(SCHEME)
     try:
-        is_tcp = port.startswith(SCHEME)
         stream = await open_tcp(port) if is_tcp else await open_serial(port, baud)
     except DeviceLost as error:
         if "Inappropriate ioctl" in str(error):  # what the system says of any other file
             raise DeviceLost(f"{port} is no serial port: set {name}.port") from error
-        raise DeviceLost(f"{error}, or set {name}.port") from error
+        is_path = port.startswith("/")
+        form = "" if is_tcp or is_path else f" (on Ethernet it is {SCHEME}host:number)"
+        raise DeviceLost(f"{error}, or set {name}.port{form}") from error
     return stream, stream.close
 
 

@@ -137,6 +137,12 @@ def test_a_port_that_is_not_there_or_none_is_named_with_what_to_do(tmp_path: Pat
         assert f"set {device}.port" in finding
 
 
+def test_an_address_without_its_scheme_is_told_how_it_is_written() -> None:
+    found = at_ports("192.168.0.10:10940", "/dev/nothing")
+    assert found["laser"][1].endswith("set laser.port (on Ethernet it is tcp://host:number)")
+    assert found["base"][1].endswith("set base.port")
+
+
 def test_a_file_that_is_no_port_is_called_so(tmp_path: Path) -> None:
     file = tmp_path / "ttyUSB0"
     file.touch()
