@@ -39,12 +39,15 @@ class Summary(msgspec.Struct, frozen=True):
     reason: str
     distance_m: float
     duration_s: float
-    loop_closures: int
+    loop_closures: int | None = None  # of several robots that is not told
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SavedRun:
-    """What a run left, in the map frame; `summary` is None if it was killed before it wrote one."""
+    """What a run left, in the map frame; `summary` is None if it was killed before it wrote one.
+
+    Of several robots it is their joined map: the ways of each are in its own directory in that.
+    """
 
     name: str
     graph: RouteGraph
@@ -61,19 +64,25 @@ class SavedRun:
             raise UsageError(f"{directory} is a file: give the directory of a run")
         if not (directory / "map.geojson").exists():
             raise UsageError(f"{directory} is no run directory: there is no map.geojson in it")
-        robots = sorted(path.parent for path in directory.glob("*/map.geojson"))
-        if robots and not (directory / "estimate.tum").exists():
-            several = ", ".join(str(robot) for robot in robots)
-            raise UsageError(f"{directory} is a run of several robots: name one of {several}")
+        is_joined = bool(robots_in(directory)) and not (directory / "estimate.tum").exists()
+        estimate, odometry = (
+            decode_tum("") if is_joined else _decoded(directory / name, decode_tum)
+            for name in ("estimate.tum", "odometry.tum")
+        )
         return cls(
             name=directory.resolve().name,
             graph=_decoded(directory / "map.geojson", geojson.decode),
             grid=read_map_server(directory),
-            estimate=_decoded(directory / "estimate.tum", decode_tum),
-            odometry=_decoded(directory / "odometry.tum", decode_tum),
+            estimate=estimate,
+            odometry=odometry,
             events=_events(directory / EVENTS),
             summary=_summary(directory / SUMMARY),
         )
+
+
+def robots_in(directory: Path) -> list[Path]:
+    """The directories of the robots of a run of several, in order."""
+    return sorted(path.parent for path in directory.glob("*/map.geojson"))
 
 
 def _text(path: Path, errors: str = "strict") -> str:

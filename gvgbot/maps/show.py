@@ -14,7 +14,7 @@ from gvgbot.maps.outputs import check_output
 from gvgbot.maps.picture import draw_map_on, known_corners
 from gvgbot.maps.picture_files import PICTURES, Paint
 from gvgbot.maps.route_graph import MapVertex, RouteGraph
-from gvgbot.maps.saved_run import SavedRun
+from gvgbot.maps.saved_run import SavedRun, robots_in
 from gvgbot.maps.surface import S
 from gvgbot.words import counted
 
@@ -36,9 +36,11 @@ def show(directory: Path, out: Path | None, *, animate: bool, frames: int | None
     run = SavedRun.read(directory)
     check_output(out)
     if animate:
-        picture = film.gif(_growth(run), frames or FRAMES)
+        picture = film.gif(_growth(run, directory), frames or FRAMES)
+    elif frames is not None:
+        picture = PICTURES[suffix](_strip(_growth(run, directory), frames))
     else:
-        picture = PICTURES[suffix](picture_of(run) if frames is None else _strip(run, frames))
+        picture = PICTURES[suffix](picture_of(run))
     write_files(out.parent, {out.name: picture})
     return out
 
@@ -59,19 +61,19 @@ def picture_of(run: SavedRun) -> Paint:
     return paint
 
 
-def _strip(run: SavedRun, moments: int) -> Paint:
-    growth = _growth(run)
-
+def _strip(growth: Growth, moments: int) -> Paint:
     def paint(sheet: Callable[[int, int], S], /) -> S:
         return film.draw_strip(sheet, growth, moments)
 
     return paint
 
 
-def _growth(run: SavedRun) -> Growth:
-    if not len(run.estimate.stamps):
-        raise UsageError(f"{run.name} has nothing to animate: the robot never got going")
-    return Growth.of(run)
+def _growth(run: SavedRun, directory: Path) -> Growth:
+    if len(run.estimate.stamps):
+        return Growth.of(run)
+    if several := ", ".join(map(str, robots_in(directory))):
+        raise UsageError(f"{directory} is a run of several robots: name one of {several}")
+    raise UsageError(f"{run.name} has nothing to animate: the robot never got going")
 
 
 def facts(run: SavedRun) -> Iterator[str]:
@@ -80,7 +82,8 @@ def facts(run: SavedRun) -> Iterator[str]:
     if run.summary is not None:
         yield f"outcome    {run.summary.outcome}: {run.summary.reason}"
         yield f"driven     {run.summary.distance_m:.1f} m in {film.clock(run.summary.duration_s)}"
-        yield f"closures   {run.summary.loop_closures}"
+        if run.summary.loop_closures is not None:
+            yield f"closures   {run.summary.loop_closures}"
     yield (
         f"vertices   {len(graph.vertices)}: {counted(kinds['meetpoint'], 'meetpoint')}, "
         f"{counted(kinds['endpoint'], 'endpoint')}"

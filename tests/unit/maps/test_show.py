@@ -1,8 +1,10 @@
 """`gvgbot map` on a run that is known to the last number, and on damaged ones."""
 
+import json
 import shutil
 from pathlib import Path
 
+import networkx as nx
 import pytest
 import structlog
 from PIL import Image
@@ -154,10 +156,33 @@ def test_a_run_that_lies_beside_others_is_no_run_of_several_robots(
     assert "vertices" in capsys.readouterr().out
 
 
-def test_of_several_robots_one_has_to_be_named(run: Path, capsys: Captured) -> None:
-    """The joined map has no grid and no trajectory of its own."""
-    (run.parent / "map.geojson").write_bytes((run / "map.geojson").read_bytes())
-    assert main(["map", "show", str(run.parent)]) == 2
+@pytest.fixture
+def team(run: Path) -> Path:
+    """What `explore --robots` leaves: the joined map, and beside it the directories of robots."""
+    whole = run.parent
+    for name in ("map.geojson", "map.yaml", "map.pgm", "events.jsonl"):
+        shutil.copy(run / name, whole)
+    summary = {"outcome": "explored", "reason": "all", "distance_m": 20.0, "duration_s": 10.0}
+    (whole / "summary.json").write_text(json.dumps({**summary, "robots": ["robot-1", "robot-2"]}))
+    return whole
+
+
+def test_the_joined_map_of_several_robots_is_a_map(team: Path, run: Path, capsys: Captured) -> None:
+    assert main(["map", "show", str(team)]) == 0
+    assert main(["map", "export", str(team), str(team / "all.graphml")]) == 0
+    assert len(nx.read_graphml(team / "all.graphml")) == 4
+    assert main(["map", "diff", str(team), str(run)]) == 0
+    capsys.readouterr()
+    assert main(["map", "info", str(team)]) == 0
+    told = [line.split()[0] for line in capsys.readouterr().out.splitlines()]
+    assert told[:3] == ["outcome", "driven", "vertices"]  # closures are of one robot
+
+
+@pytest.mark.parametrize("how", [["--animate"], ["--frames", "3"]])
+def test_of_several_robots_one_has_to_be_named_to_see_how_its_map_grew(
+    team: Path, run: Path, how: list[str], capsys: Captured
+) -> None:
+    assert main(["map", "show", str(team), *how]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert line.endswith(f"is a run of several robots: name one of {run}")
-    assert main(["map", "show", str(run)]) == 0
+    assert main(["map", "show", str(run), *how]) == 0
