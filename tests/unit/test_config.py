@@ -58,6 +58,14 @@ def test_a_laser_is_on_its_base(key: str) -> None:
         load_config(None, [f"{key}=47"])  # centimetres
 
 
+@pytest.mark.parametrize("max_range_m", [0.5, 1.0])
+def test_a_laser_that_could_see_nothing_is_refused(max_range_m: float) -> None:
+    overrides = ["laser.min_range_m=1.0", f"laser.max_range_m={max_range_m}"]
+    with pytest.raises(ConfigError, match=r"max_range_m = .*greater than min_range_m = 1"):
+        load_config(None, overrides)
+    load_config(None, [overrides[0], "laser.max_range_m=1.1"])
+
+
 @pytest.mark.parametrize("name", ["a/b", "a b", "*", "", "ä"])
 def test_a_name_that_cannot_be_part_of_a_topic_is_refused(name: str) -> None:
     with pytest.raises(ConfigError, match="letters, digits"):

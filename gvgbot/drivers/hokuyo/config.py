@@ -42,9 +42,14 @@ class HokuyoConfig:
     missed_scans: Annotated[int, Range(1, 100)] = 3  # before the stream is started again
 
     def __post_init__(self) -> None:
-        """Raise ValueError for angles in the wrong order, or a string that no laser accepts."""
+        """Raise ValueError for limits in the wrong order, or a string that no laser accepts."""
         if self.last_angle_deg <= self.first_angle_deg:
             raise ValueError("last_angle_deg must be greater than first_angle_deg")
+        if self.max_range_m <= self.min_range_m:
+            raise ValueError(
+                f"max_range_m = {self.max_range_m:g}: must be greater than "
+                f"min_range_m = {self.min_range_m:g}, or nothing is ever seen"
+            )
         if self.user_string and not re.fullmatch(USER_STRING, self.user_string):
             raise ValueError(
                 f"user_string = {self.user_string!r}: "
