@@ -11,21 +11,18 @@ import math
 import os
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from dataclasses import replace
 from pathlib import Path
 from typing import cast
 
 import msgspec
 import numpy as np
-from scipy import ndimage
 
-from benchmarks.faults import LAYER, Fault
-from benchmarks.reference_gvg import reference_gvg
+from benchmarks.faults import Fault
+from benchmarks.judge import ABANDONED_S, ASKED_S, Judge, Verdict, clearance, timed
 from benchmarks.small_worlds import one_ring
-from benchmarks.standers import Standers
 from benchmarks.surroundings import Disk, FullDirectory, FullFiles, Hand, Listeners, Manager
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.config import Config, load_config
@@ -34,7 +31,7 @@ from gvgbot.drivers.kobuki.twin import KobukiTwin
 from gvgbot.drivers.link_faults import FaultyLink, LinkFaultConfig
 from gvgbot.drivers.people import Walkways
 from gvgbot.errors import GvgbotError
-from gvgbot.geometry import STANDSTILL, Array, Pose, Twist
+from gvgbot.geometry import STANDSTILL, Pose, Twist
 from gvgbot.maps import geojson
 from gvgbot.persistence.keeper import Keeper
 from gvgbot.persistence.mission_files import JOURNAL, SNAPSHOT, SNAPSHOT_BEFORE, MissionFiles
@@ -48,13 +45,6 @@ from tests.twin.run_rig import Cable, CabledLinks, at_once
 
 LOOK_S = 0.05  # between two looks at the truth
 END_S, QUIET_S = 60.0, 5.0  # it ends then, or so long after the last fault when all is explored
-STILL_MPS, SPEED_MPS = 0.03, 0.12  # standing; touching something faster than this is a collision
-VERTEX_M = 0.6  # from the nearest true one, a vertex is false,
-FELT_M = 1.5  # unless it is so near to something that was felt and is taken for a fact,
-STOOD_M = 2.0  # or to somebody, before whom the way ends,
-PLACE_M = 0.75  # from the true pose, the robot is not where it believes
-SETTLING_S = 10.0  # after a fault in one of
-DISTURBING = {"link", "device", "sensing", "world", "process"}  # it may find its place again
 PATIENCE_S = 1.0  # before the robot is asked once more for what it refused
 HAND_S, STEADY_S = 0.1, 3.0  # who drives by hand says so as often, and changes his mind
 WATCHDOG_S = 5.0  # without a sign of life, a service manager would restart the daemon
@@ -69,41 +59,6 @@ NOISE = LinkFaultConfig(
     inserted_bytes_per_kb=1.0,
     cut_messages_per_k=50.0,
 )
-# How long the robot may take to stand when it cannot see, is not heard, or shall not move, s:
-# what the guard, the driver or the base wait, plus braking from full speed and the base's delay.
-BLIND_S, MUTE_S, ABANDONED_S, FELT_S, ASKED_S = 2.0, 2.5, 3.0, 1.5, 2.0
-STOPS = {
-    "laser silence": BLIND_S,
-    "laser unplug": BLIND_S,
-    "laser stalled": BLIND_S,
-    "laser unstable": BLIND_S,
-    "laser frozen": BLIND_S,
-    "laser blind": BLIND_S,
-    "base silence": MUTE_S,
-    "base unplug": ABANDONED_S,
-    "base wheel drop": FELT_S,
-    "base over-current": FELT_S,
-    "carried": FELT_S,
-}
-MUTING = {"base silence", "base unplug"}  # nobody drives a base then that is driven by sight
-BACKS_OFF = {"base bump": FELT_S, "base cliff": FELT_S}  # it may go back then, but not on
-
-
-@dataclass
-class Verdict:
-    """What a trial was like. `violations` are the oracles that were hurt, each once."""
-
-    violations: dict[str, str] = field(default_factory=dict)
-    outcome: str | None = None
-    lives: int = 0
-    vertices: int = 0
-    driven_m: float = 0.0
-    contacts: int = 0
-    duration_s: float = 0.0
-    kept: int = 0  # blocks of memory that are allocated after it, and were not before
-
-    def hurt(self, oracle: str, how: str) -> None:
-        self.violations.setdefault(oracle, how)
 
 
 class Trial:
@@ -125,18 +80,15 @@ class Trial:
         self._is_over = False
         self._damage = ""
         self._dead_s = 0.0
-        self._shall_stand_from = math.inf  # s; a while after it was asked to, or ended
-        self._contacts, self._fastest = 0, 0.0
-        self._is_mute, self._rolls_until = False, -math.inf  # s; nobody can tell the base to stop
-        self._felt: list[Array] = []  # places where it felt a cliff or a bump (2,), m
-        self._standers = Standers(self._place.world)
+        self._judge: Judge
 
     async def run(self) -> None:
         """Live until the end, judged all the time."""
         self._clock = LoopClock()
         self._world = GoingWorld(self._config, self._place, self._clock)
+        self._judge = Judge(self.verdict, self._faults, self._world, self._place)
         async with asyncio.TaskGroup() as tasks:
-            work = [tasks.create_task(self._world.go_on()), tasks.create_task(self._judge())]
+            work = [tasks.create_task(self._world.go_on()), tasks.create_task(self._look_on())]
             work += [tasks.create_task(self._befall(fault)) for fault in self._faults]
             while not self._is_over:
                 await self._live()
@@ -164,7 +116,8 @@ class Trial:
             links = CabledLinks(self._config, clock, self._world)
             links.cable = self._cable = Cable(self._world.base)
             self._session, self._ends = session, ""
-            self._shall_stand_from = math.inf  # the robot may have forgotten what it was asked
+            # the robot may have forgotten what it was asked
+            self._judge.shall_stand_from = math.inf
             manager = Manager(clock.now)
             robot = Robot(
                 session,
@@ -179,7 +132,7 @@ class Trial:
                     await robot.serve(self._ended(patience), links)
             except TimeoutError:
                 self.verdict.hurt("does not end", f"after {self._ends} for {ENDS_S:g} s")
-            self._session, self._shall_stand_from = None, clock.now() + ABANDONED_S
+            self._session, self._judge.shall_stand_from = None, clock.now() + ABANDONED_S
             if manager.longest > WATCHDOG_S:
                 self.verdict.hurt("cycles late", f"no sign of life for {manager.longest:.1f} s")
             if self._ends == "SIGTERM":
@@ -221,7 +174,7 @@ class Trial:
         self.verdict.vertices = len(session.pipeline.mapper.graph.vertices)
         self.verdict.contacts = self._world.body.contacts
         self.verdict.driven_m = self._world.body.distance_m
-        self._judge_map(session)
+        self._judge.look_at_map(session, self._clock.now())
         self._disk.is_full = False
         session.save()
         try:
@@ -292,7 +245,7 @@ class Trial:
         body.advance(self._clock.now())
         x, y = self._rng.uniform(-0.2, 0.2, 2).tolist()
         there = body.pose.compose(Pose(x, y, float(self._rng.uniform(-0.3, 0.3))))
-        if _clearance(self._place, there) > self._config.robot.radius_m + 0.03:
+        if clearance(self._place, there) > self._config.robot.radius_m + 0.03:
             body.pose = there
 
     async def _ask(self, fault: Fault) -> None:
@@ -316,7 +269,7 @@ class Trial:
                 linear, angular = self._rng.uniform((0.1, -0.5), (0.7, 0.5)).tolist()
                 twist, turns_at = Twist(linear, angular), now + STEADY_S
             if self._session is not None and not self._session.pipeline.errands.is_paused:
-                self._shall_stand_from = math.inf
+                self._judge.shall_stand_from = math.inf
             self._hand.drive(twist)
             await self._clock.sleep_until(now + HAND_S)
         await self._insist("explore")
@@ -333,9 +286,9 @@ class Trial:
     async def _say(self, name: str, data: bytes) -> bool:
         is_done = await self._network.ask(name, data)
         if is_done and name in ("pause", "stop"):
-            self._shall_stand_from = min(self._shall_stand_from, self._clock.now() + ASKED_S)
+            self._judge.shall_stand_by(self._clock.now() + ASKED_S)
         elif is_done and name not in ("save", "set"):
-            self._shall_stand_from = math.inf
+            self._judge.shall_stand_from = math.inf
         return is_done
 
     async def _talk_nonsense(self, fault: Fault) -> None:
@@ -347,100 +300,16 @@ class Trial:
         await self._insist("resume")
         await self._insist("explore")
 
-    # -- oracles -----------------------------------------------------------------------------------
-
-    async def _judge(self) -> None:
-        last = max((fault.at + fault.lasts for fault in self._timed()), default=0.0)
+    async def _look_on(self) -> None:
+        """Judge all the time, and end the trial when there is nothing more to come."""
+        last = max((fault.at + fault.lasts for fault in timed(self._faults)), default=0.0)
         while not self._is_over:
-            now = self._clock.now()
-            self._world.body.advance(now)
-            self._note_mute(now)
-            self._judge_contact(now)
-            self._judge_stops(now)
-            self._judge_place(now)
-            if self._world.people is not None:
-                self._standers.look(self._world.people.centres, self._world.body.pose, now)
-            session = self._session
+            now, session = self._clock.now(), self._session
+            self._judge.look(session, now)
             is_done = session is not None and session.pipeline.mission.outcome is not None
             if session is not None and (now > END_S or (is_done and now > last + QUIET_S)):
                 self._is_over, self._ends = True, "SIGTERM"
             await self._clock.sleep_until(now + LOOK_S)
-
-    def _note_mute(self, now: float) -> None:
-        """Note from when on nobody tells the base what to do: it rolls on until it stops itself."""
-        was_mute = self._is_mute
-        self._is_mute = self._session is None or any(
-            fault.name in MUTING and fault.at <= now < fault.at + fault.lasts
-            for fault in self._faults
-        )
-        if self._is_mute and not was_mute:
-            self._rolls_until = now + ABANDONED_S
-
-    def _judge_contact(self, now: float) -> None:
-        body = self._world.body
-        fastest = max(self._fastest, abs(body.linear))
-        is_collision = fastest > SPEED_MPS and now > self._rolls_until
-        if body.contacts > self._contacts and is_collision:
-            self.verdict.hurt("contact at speed", f"{fastest:.2f} m/s at {now:.1f} s")
-        self._contacts, self._fastest = body.contacts, abs(body.linear)
-
-    def _judge_stops(self, now: float) -> None:
-        speed = self._world.body.linear
-        if now > self._shall_stand_from and abs(speed) > STILL_MPS:
-            self._does_not_stop(now, "it was asked to stand, or has ended")
-        for fault in self._faults:
-            if not fault.at <= now < fault.at + fault.lasts:
-                continue
-            if fault.name in BACKS_OFF:
-                self._felt.append(self._world.body.pose.position)
-            if fault.name in STOPS and now > max(fault.at + STOPS[fault.name], self._rolls_until):
-                moves = abs(speed) > STILL_MPS
-            else:
-                backs_off = fault.name in BACKS_OFF and now > fault.at + BACKS_OFF[fault.name]
-                moves = backs_off and speed > STILL_MPS
-            if moves:
-                self._does_not_stop(now, str(fault))
-
-    def _does_not_stop(self, now: float, why: str) -> None:
-        speed = self._world.body.linear
-        self.verdict.hurt("does not stop", f"{speed:.2f} m/s at {now:.1f} s, though {why}")
-
-    def _judge_place(self, now: float) -> None:
-        session = self._session
-        if session is None or session.pipeline.is_lost or not session.journey.world_base:
-            return
-        disturbing = (fault for fault in self._timed() if LAYER[fault.name] in DISTURBING)
-        if any(fault.at <= now < fault.at + fault.lasts + SETTLING_S for fault in disturbing):
-            return
-        truth = _world_map(session).inverse().compose(self._world.body.pose)
-        off = truth.distance(session.pipeline.map_base)
-        if off > PLACE_M:
-            closures = session.tally.closures
-            oracle = "wrong closure" if closures else "wrong place"
-            self.verdict.hurt(oracle, f"{off:.2f} m off at {now:.1f} s")
-
-    def _timed(self) -> Iterator[Fault]:
-        return (fault for fault in self._faults if fault.lasts < math.inf)
-
-    def _judge_map(self, session: Session) -> None:
-        """Every vertex must be where there is one in truth.
-
-        But for that of a ring, which stands for no meetpoint: somebody may have hidden the branch.
-        """
-        if not session.journey.world_base:
-            return
-        world_map, mapper = _world_map(session), session.pipeline.mapper
-        is_exploring = self.verdict.outcome is None  # and may come back to look
-        people = self._standers
-        stood = people.standing(self._clock.now()) + people.unseen
-        stood += people.stood if is_exploring else []
-        excused = [(place, FELT_M) for place in self._felt] + [(place, STOOD_M) for place in stood]
-        of_rings = {vertex.id for vertex in mapper.graph.rings()}
-        for vertex in mapper.graph.vertices.keys() - of_rings:
-            place = world_map.transform(mapper.belief.map_vertex(vertex).position)
-            off = float(np.hypot(*(_true_vertices() - place).T).min())
-            if off > VERTEX_M and all(math.dist(place, by) > near for by, near in excused):
-                self.verdict.hurt("false vertex", f"vertex {vertex}, {off:.2f} m from any")
 
 
 def _set_up(seed: int, faults: list[Fault], overrides: Sequence[str]) -> tuple[Config, Place]:
@@ -452,32 +321,6 @@ def _set_up(seed: int, faults: list[Fault], overrides: Sequence[str]) -> tuple[C
     settings = [f"twin.seed={seed}", f"twin.people={people}", f"twin.laser.model={laser}"]
     config = load_config(None, [*settings, *overrides])
     return config, place
-
-
-def _world_map(session: Session) -> Pose:
-    """The map's frame in the world."""
-    journey = session.journey
-    return journey.world_base[0].compose(journey.map_base[0].inverse())
-
-
-@lru_cache
-def _true_vertices() -> Array:
-    """Where the world's GVG has vertices (N, 2), m."""
-    place = one_ring()
-    start = place.start.x, place.start.y
-    graph = reference_gvg(place.world, start, load_config(None, []).robot.radius_m).graph
-    return np.array([graph.nodes[node]["position"] for node in graph]).reshape(-1, 2)
-
-
-@lru_cache
-def _distances() -> Array:
-    world = one_ring().world
-    return np.asarray(ndimage.distance_transform_edt(~world.occupied)) * world.resolution_m
-
-
-def _clearance(place: Place, pose: Pose) -> float:
-    res, (x0, y0) = place.world.resolution_m, place.world.origin
-    return float(_distances()[int((pose.y - y0) / res), int((pose.x - x0) / res)])
 
 
 def trial(seed: int, faults: list[Fault], overrides: Sequence[str] = ()) -> Verdict:
