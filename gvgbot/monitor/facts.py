@@ -67,7 +67,20 @@ def facts(state: State, plan: Plan | None, health: Health | None) -> Iterator[Fa
 
 
 def _tone_of_phase(state: State) -> Tone:
-    return "warning" if state.outcome not in (None, "explored") else _PHASES[state.phase]
+    if state.outcome not in (None, "explored") or _is_lost(state):
+        return "warning"
+    return _PHASES[state.phase]
+
+
+def _is_lost(state: State) -> bool:
+    """Whether it looks for its place on the map."""
+    return state.phase == "exploring" and state.reason != ""
+
+
+def _has_reason(state: State) -> bool:
+    return _is_lost(state) or (
+        state.phase in ("starting", "halted", "finished") and state.reason != ""
+    )
 
 
 def _intention(state: State, plan: Plan | None) -> Iterator[Fact]:
@@ -76,9 +89,12 @@ def _intention(state: State, plan: Plan | None) -> Iterator[Fact]:
         yield Fact("going to", state.errand)
         yield Fact("why", "somebody asked for it")
         return
-    if plan is None or plan.vertex is None or plan.bearing is None or state.phase == "finished":
+    if _has_reason(state):
+        yield Fact("why", state.reason)
+        return
+    if plan is None or plan.vertex is None or plan.bearing is None:
         yield Fact("going to", "-", "faint")
-        yield Fact("why", state.reason or "-", "plain" if state.reason else "faint")
+        yield Fact("why", "-", "faint")
         return
     yield Fact("going to", f"vertex {plan.vertex}, {_degrees(plan.bearing)}")
     yield Fact("why", plan.reason or "-")
@@ -221,8 +237,7 @@ def _doing(state: State) -> str:
     """What it does, or why it does nothing."""
     if state.phase == "errand" and state.errand is not None:
         return state.errand
-    has_reason = state.phase in ("starting", "halted", "finished")
-    return (has_reason and state.reason) or state.phase
+    return state.reason if _has_reason(state) else state.phase
 
 
 def _age(seconds: float) -> str:

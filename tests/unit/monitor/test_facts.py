@@ -70,8 +70,19 @@ def test_who_has_finished_goes_nowhere() -> None:
         EXAMPLE, phase="finished", outcome="explored", reason="no frontier is left"
     )
     lines = {fact.name: fact.text for fact in facts(done, PLAN, None)}
-    assert (lines["phase"], lines["outcome"], lines["going to"]) == ("finished", "explored", "-")
+    assert (lines["phase"], lines["outcome"]) == ("finished", "explored")
+    assert "going to" not in lines
     assert lines["why"] == "no frontier is left"
+
+
+def test_who_does_not_know_its_place_says_so_and_goes_to_no_vertex() -> None:
+    doubt = "not sure where it is: 2 places fit, 0.71 for the best"
+    lost = msgspec.structs.replace(EXAMPLE, phase="exploring", reason=doubt)
+    lines = {fact.name: fact for fact in facts(lost, PLAN, None)}
+    assert lines["phase"] == Fact("phase", "exploring", "warning")
+    assert "going to" not in lines
+    assert lines["why"].text == doubt
+    assert headline("karl", Presence("alive", 1.0), lost, []) == Fact("karl", doubt, "warning")
 
 
 def test_the_health_of_the_program_is_said() -> None:
