@@ -42,28 +42,28 @@ class Fact:
 
 
 def facts(state: State, plan: Plan | None, health: Health | None) -> Iterator[Fact]:
-    """What there is to know of a robot, the most telling first."""
+    """What there is to know of a robot; the most telling first, for a terminal may be small."""
     yield Fact("phase", state.phase, _tone_of_phase(state))
     if state.outcome is not None:
         yield Fact("outcome", state.outcome.replace("_", " "), _tone_of_phase(state))
     yield from _intention(state, plan)
+    yield Fact("frontiers", f"{state.frontiers} left")
+    yield Fact("battery", *_battery(state))
+    yield Fact("guard", *((state.guard, "warning") if state.guard else ("free", "plain")))
     x, y, theta = state.pose
     yield Fact("pose", f"{x:.2f} {y:.2f} m  {_degrees(theta)}")
     yield Fact("sigma", _sigma(state))
-    yield Fact("speed", f"{state.twist[0]:.2f} m/s  {math.degrees(state.twist[1]):+.0f}°/s")
+    for mate in state.team:
+        place = f"{mate.pose[0]:.2f} {mate.pose[1]:.2f} m"
+        yield Fact(shortened(mate.name, _MATE - len(place)), place)
     yield Fact("driven", f"{state.distance:.1f} m")
-    yield Fact("vertices", f"{state.vertices}, {state.frontiers} frontiers left")
-    yield Fact("edges", f"{state.edges}")
-    yield Fact("guard", *((state.guard, "warning") if state.guard else ("free", "plain")))
-    yield Fact("contacts", *_contacts(state))
-    yield Fact("battery", *_battery(state))
     yield Fact("laser", *_link(state.laser))
     yield Fact("base", *_link(state.base))
     yield Fact("control", *_control(state, health))
     yield Fact("program", *_program(health))
-    for mate in state.team:
-        place = f"{mate.pose[0]:.2f} {mate.pose[1]:.2f} m"
-        yield Fact(shortened(mate.name, _MATE - len(place)), place)
+    yield Fact("contacts", *_contacts(state))
+    yield Fact("speed", f"{state.twist[0]:.2f} m/s  {math.degrees(state.twist[1]):+.0f}°/s")
+    yield Fact("vertices", f"{state.vertices}, {state.edges} edges")
 
 
 def _tone_of_phase(state: State) -> Tone:

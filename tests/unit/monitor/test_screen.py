@@ -99,6 +99,20 @@ def test_the_usual_terminal_shows_everything() -> None:
     assert "●" in "".join(line[:48] for line in shown[1:17])
 
 
+def test_the_usual_terminal_shows_where_the_others_of_a_team_are() -> None:
+    team = tuple(Mate(name=name, pose=(3.0, -4.0, 0.0)) for name in ("anna", "bert", "carl"))
+    ended = msgspec.structs.replace(EXAMPLE, team=team, phase="finished", outcome="explored")
+    shown = Terminal(80, 24).show(replace(PICTURE, state=ended))
+    for fact in ("outcome", "frontiers", "anna", "bert", "carl", "laser", "base", "control"):
+        assert any(line[49:].startswith(fact) for line in shown), fact
+
+
+def test_a_small_terminal_shows_what_matters_most() -> None:
+    shown = Terminal(40, 12).show(PICTURE)
+    for fact in ("phase", "going to", "why", "frontiers", "battery", "guard"):
+        assert any(line.startswith(fact) for line in shown), fact
+
+
 def test_the_place_of_a_robot_with_a_long_name_is_there_whole() -> None:
     team = (Mate(name="a-robot-with-a-very-long-name", pose=(-123.45, -67.89, 0.0)),)
     picture = replace(PICTURE, state=msgspec.structs.replace(EXAMPLE, team=team))
