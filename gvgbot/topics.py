@@ -107,7 +107,7 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
     battery_fraction: float | None  # of a full charge, 0..1
     vertices: int
     edges: int
-    frontiers: int
+    frontiers: int  # of its own map; those of a team that has explored all were followed by others
     distance: float  # m driven
     guard: str | None  # why the guard changes what autonomy wants; None while it does not
     contacts: int  # times that a bumper was pressed

@@ -47,7 +47,7 @@ def facts(state: State, plan: Plan | None, health: Health | None) -> Iterator[Fa
     if state.outcome is not None:
         yield Fact("outcome", state.outcome.replace("_", " "), _tone_of_phase(state))
     yield from _intention(state, plan)
-    yield Fact("frontiers", f"{state.frontiers} left")
+    yield Fact("frontiers", _frontiers(state))
     yield Fact("battery", *_battery(state))
     yield Fact("guard", *((state.guard, "warning") if state.guard else ("free", "plain")))
     x, y, theta = state.pose
@@ -98,6 +98,12 @@ def _intention(state: State, plan: Plan | None) -> Iterator[Fact]:
         return
     yield Fact("going to", f"vertex {plan.vertex}, {_degrees(plan.bearing)}")
     yield Fact("why", plan.reason or "-")
+
+
+def _frontiers(state: State) -> str:
+    """How many are left; none is of a team that has explored all, whatever its maps lack."""
+    is_done = state.outcome == "explored" and state.team and state.frontiers > 0
+    return f"{state.frontiers} {'followed by others' if is_done else 'left'}"
 
 
 def _towards(decision: Event) -> str:

@@ -777,9 +777,11 @@ def test_a_robot_that_is_stuck_waits_is_silent_or_has_left_and_a_lost_server_are
             play.until(f"{headline} === '{lost}'")
             assert page.look("document.querySelector('#headline').dataset.tone") == "warning"
             play.until(f"document.querySelector('#facts').innerText.includes('{lost}')")
-            ended = msgspec.structs.replace(HERE, outcome="explored", reason="no frontier is left")
+            reason, team = "no frontier is left", (Mate(name="anna", pose=(3.0, 2.0, 0.0)),)
+            ended = msgspec.structs.replace(HERE, outcome="explored", reason=reason, team=team)
             play.state = msgspec.structs.replace(ended, phase="finished")
             play.until(f"{headline} === 'no frontier is left'")
+            assert "4 followed by others" in page.look("document.querySelector('#facts').innerText")
             play.state = msgspec.structs.replace(ended, phase="errand", errand="goto 7")
             play.until(f"{headline} === 'goto 7'")
             waits = msgspec.structs.replace(ended, phase="paused", base=there)

@@ -43,7 +43,7 @@ export function facts(state, plan) {
     ["speed", `${state.twist[0].toFixed(2)} m/s, ${degrees(state.twist[1])}/s`, "plain"],
     ["driven", `${state.distance.toFixed(1)} m`, "plain"],
     ["map", size(state.vertices, state.edges), "plain"],
-    ["frontiers", `${state.frontiers} left`, "plain"],
+    ["frontiers", frontiers(state), "plain"],
     ["battery", ...battery(state)],
     ["laser", ...device(state.laser)],
     ["base", ...device(state.base)],
@@ -52,6 +52,12 @@ export function facts(state, plan) {
     ["contacts", contacts(state), state.contacts || state.slips ? "warning" : "plain"],
     ...(state.team ?? []).map(({ name, pose }) => [name, `${pose[0].toFixed(2)}, ${pose[1].toFixed(2)} m`, "plain"]),
   ];
+}
+
+// How many are left; none is of a team that has explored all, whatever its maps lack.
+function frontiers(state) {
+  const isDone = state.outcome === "explored" && (state.team ?? []).length > 0 && state.frontiers > 0;
+  return `${state.frontiers} ${isDone ? "followed by others" : "left"}`;
 }
 
 function intention(state, plan) {

@@ -75,6 +75,14 @@ def test_who_has_finished_goes_nowhere() -> None:
     assert lines["why"] == "no frontier is left"
 
 
+def test_no_frontier_is_left_of_a_team_that_has_explored_all() -> None:
+    assert said(frontiers=8)["frontiers"].text == "8 left"
+    team = (Mate(name="karl", pose=(3.0, -4.0, 0.0)),)
+    ended = {"phase": "finished", "outcome": "explored", "team": team}
+    assert said(frontiers=8, **ended)["frontiers"].text == "8 followed by others"
+    assert said(frontiers=0, **ended)["frontiers"].text == "0 left"
+
+
 def test_who_does_not_know_its_place_says_so_and_goes_to_no_vertex() -> None:
     doubt = "not sure where it is: 2 places fit, 0.71 for the best"
     lost = msgspec.structs.replace(EXAMPLE, phase="exploring", reason=doubt)
