@@ -88,16 +88,17 @@ def _intention(state: State, plan: Plan | None) -> Iterator[Fact]:
     if state.errand is not None:
         yield Fact("going to", state.errand)
         yield Fact("why", "somebody asked for it")
-        return
-    if _has_reason(state):
+    elif _has_reason(state):
         yield Fact("why", state.reason)
-        return
-    if plan is None or plan.vertex is None or plan.bearing is None:
+    elif plan is not None and plan.vertex is not None and plan.bearing is not None:
+        yield Fact("going to", f"vertex {plan.vertex}, {_degrees(plan.bearing)}")
+        yield Fact("why", plan.reason or "-")
+    elif plan is not None and plan.track and state.vertices == 0:
+        yield Fact("going to", "end of its first edge")
+        yield Fact("why", "no vertex is known")
+    else:
         yield Fact("going to", "-", "faint")
         yield Fact("why", "-", "faint")
-        return
-    yield Fact("going to", f"vertex {plan.vertex}, {_degrees(plan.bearing)}")
-    yield Fact("why", plan.reason or "-")
 
 
 def _frontiers(state: State) -> str:

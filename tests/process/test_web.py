@@ -33,7 +33,17 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from gvgbot import client
 from gvgbot.requests import REQUESTS, Answer, Asked, Goto, parse
 from gvgbot.telemetry import Telemetry
-from gvgbot.topics import Event, Events, Health, Mate, State, TelemetryConfig, Trajectory
+from gvgbot.topics import (
+    Event,
+    Events,
+    Health,
+    Mate,
+    Plan,
+    State,
+    TelemetryConfig,
+    Trajectory,
+    packed,
+)
 from gvgbot.web.feed import Feed
 from gvgbot.web.server import Web
 from gvgbot.web.viewers import Audience
@@ -772,6 +782,11 @@ def test_a_robot_that_is_stuck_waits_is_silent_or_has_left_and_a_lost_server_are
             play.until(
                 "document.querySelector('#facts').innerText.includes('no laser: plug it in')"
             )
+            track = packed(np.array([[3.0, 2.0], [4.0, 2.0]]))
+            first = Plan(stamp=1.0, vertex=None, bearing=None, reason="", track=track, route=b"")
+            play.robot.publish(first)
+            play.state = msgspec.structs.replace(HERE, vertices=0)
+            play.until_read("the end of its first edge")
             lost = "not sure where it is: 2 places fit"
             play.state = msgspec.structs.replace(HERE, phase="exploring", reason=lost)
             play.until(f"{headline} === '{lost}'")

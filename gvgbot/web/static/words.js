@@ -63,6 +63,8 @@ function frontiers(state) {
 function intention(state, plan) {
   if (state.errand) return [["going to", state.errand, "plain"], ["why", "somebody asked for it", "plain"]];
   if (hasReason(state)) return [["why", state.reason, "plain"]];
+  if (plan?.track.length && state.vertices === 0)
+    return [["going to", "the end of its first edge", "plain"], ["why", "no vertex is known", "plain"]];
   if (plan === null || plan.vertex === null) return [["going to", "nowhere yet", "faint"]];
   return [["going to", `the edge of vertex ${plan.vertex} at ${degrees(plan.bearing)}`, "plain"], ["why", plan.reason || "not said", "plain"]];
 }

@@ -3,12 +3,13 @@
 import math
 
 import msgspec
+import numpy as np
 import pytest
 
 from gvgbot.client import Event, Health, Plan, Presence
 from gvgbot.client.presence import Word
 from gvgbot.monitor.facts import Fact, duration, facts, headline, told
-from gvgbot.topics import Mate
+from gvgbot.topics import Mate, packed
 from tests.unit.test_telemetry import EXAMPLE
 
 DECISION = Event(
@@ -63,6 +64,17 @@ def test_what_is_next_and_why_is_said() -> None:
     lines = {fact.name: fact.text for fact in facts(EXAMPLE, PLAN, None)}
     assert lines["going to"] == "vertex 7, 90°"
     assert lines["why"] == "nearest frontier"
+
+
+def test_who_knows_no_vertex_yet_drives_along_its_first_edge() -> None:
+    track = packed(np.array([[0.0, 0.0], [1.0, 0.0]]))
+    plan = Plan(stamp=1.0, vertex=None, bearing=None, reason="", track=track, route=b"")
+    begun = msgspec.structs.replace(EXAMPLE, vertices=0, edges=0, frontiers=0)
+    lines = {fact.name: fact.text for fact in facts(begun, plan, None)}
+    assert (lines["going to"], lines["why"]) == ("end of its first edge", "no vertex is known")
+    looking_round = msgspec.structs.replace(plan, track=b"")
+    lines = {fact.name: fact.text for fact in facts(begun, looking_round, None)}
+    assert lines["going to"] == "-"
 
 
 def test_who_has_finished_goes_nowhere() -> None:
