@@ -31,6 +31,7 @@ _ODOM_WORDS = 10
 _LARGEST = 1e10  # m, rad or s since 1970; what is beyond comes of a damaged line
 _LONGEST_GAP_S = 0.2  # between messages; logs leave some out
 _LONGEST_PAUSE_S = 300.0  # what is longer comes of a clock that was set, or of a damaged stamp
+_JUMP_M, _JUMP_MPS = 10.0, 10.0  # from one pose to the next; what is beyond both is no motion
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,12 +78,15 @@ def read_carmen(path: Path, *, no_echo_m: float, base_laser: Pose) -> CarmenLog:
 
 def _in_order(odometry: list[Odometry], scans: list[Scan], damaged: int) -> CarmenLog:
     """A log in the order of its stamps, without those that must be damaged."""
-    strays = _strays(sorted(one.stamp for one in odometry))
     by_stamp = attrgetter("stamp")
+    strays = _strays(sorted(one.stamp for one in odometry))
+    timely = sorted((one for one in odometry if one.stamp not in strays), key=by_stamp)
+    within_reach = _within_reach(timely)
+    kept = {one.stamp for one in within_reach}
     return CarmenLog(
-        sorted((one for one in odometry if one.stamp not in strays), key=by_stamp),
-        sorted((scan for scan in scans if scan.stamp not in strays), key=by_stamp),
-        damaged + len(strays),
+        within_reach,
+        sorted((scan for scan in scans if scan.stamp in kept), key=by_stamp),
+        damaged + len(strays) + len(timely) - len(within_reach),
     )
 
 
@@ -92,6 +96,31 @@ def _strays(stamps: list[float]) -> set[float]:
     nearest = map(min, pairwise(gaps))
     found = {s for s, gap in zip(stamps, nearest, strict=False) if gap > _LONGEST_PAUSE_S}
     return found if len(found) < len(stamps) else set()
+
+
+def _within_reach(odometry: list[Odometry]) -> list[Odometry]:
+    """Those to which a base can have driven, on and back from the longest way without a jump."""
+    pairs = enumerate(pairwise(odometry), start=1)
+    jumps = [k for k, (earlier, later) in pairs if not _can_reach(earlier, later)]
+    stretches = pairwise([0, *jumps, len(odometry)])
+    end = max(stretches, key=lambda stretch: stretch[1] - stretch[0])[1]
+    return [*_reached(odometry[:end][::-1])[::-1], *_reached(odometry[end - 1 :])[1:]]
+
+
+def _reached(odometry: list[Odometry]) -> list[Odometry]:
+    """Those that can be reached from the one before that can be, as the first is."""
+    reached = odometry[:1]
+    for one in odometry[1:]:
+        if _can_reach(reached[-1], one):
+            reached.append(one)
+    return reached
+
+
+def _can_reach(one: Odometry, other: Odometry) -> bool:
+    a, b = one.odom_base, other.odom_base
+    return math.hypot(b.x - a.x, b.y - a.y) <= max(
+        _JUMP_M, _JUMP_MPS * abs(other.stamp - one.stamp)
+    )
 
 
 def _lines(path: Path) -> Iterator[str]:

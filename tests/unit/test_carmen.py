@@ -99,6 +99,22 @@ def test_a_line_with_a_damaged_stamp_is_one_of_the_damaged(stray: float, tmp_pat
     assert (log.damaged, log.pauses) == (1, 0)
 
 
+@pytest.mark.parametrize("first", [0, 24, 47])
+@pytest.mark.parametrize("off", [-40.0, 1e3, 1e6, 1e9])
+def test_lines_whose_pose_no_robot_reaches_are_among_the_damaged(
+    off: float, first: int, tmp_path: Path
+) -> None:
+    """Three in a row, 1 s apart, in a log of a robot that drives on at 1 m/s."""
+    lines = [at(7.5 + k).replace("1.1 2.1", f"{k:.1f} 2.1") for k in range(50)]
+    for k in range(first, first + 3):
+        lines[k] = lines[k].replace(f"{k:.1f} 2.1", f"{off} 2.1")
+    log = read(written(tmp_path / "a.log", *lines))
+    kept = [float(k) for k in range(50) if not first <= k < first + 3]
+    assert [one.odom_base.x for one in log.odometry] == kept
+    assert [scan.stamp - 7.5 for scan in log.scans] == kept
+    assert log.damaged == 3
+
+
 def test_a_clock_that_was_set_makes_no_messages(tmp_path: Path) -> None:
     stamps = [5.0, 5.1, 976052857.0, 976052857.1]
     log = read(written(tmp_path / "a.log", *map(at, stamps)))
