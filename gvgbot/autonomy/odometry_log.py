@@ -21,8 +21,11 @@ class OdometryLog:
         self.unturned_s = 0.0  # in which the heading was the same: no gyro drifts then
 
     def append(self, odometry: Odometry) -> None:
-        """Keep a message, and let the oldest go."""
+        """Keep a message, and let the oldest go; all of them where the clock was set back."""
         before = self.newest
+        if before is not None and odometry.stamp < before.stamp:
+            self._kept.clear()
+            before = None
         if before is None or before.odom_base.theta != odometry.odom_base.theta:
             self._turned_at = odometry.stamp
         elif odometry.stamp - self._turned_at > _FELT_S:

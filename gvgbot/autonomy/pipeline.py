@@ -296,7 +296,7 @@ class Pipeline:
         motion = self._last.odom_base.to(odom_base)
         self.travelled += math.hypot(motion.x, motion.y)
         unturned, self._unturned_s = self._unturned_s, self._odometry.unturned_s
-        duration = scan.stamp - self._last.stamp
+        duration = max(0.0, scan.stamp - self._last.stamp)
         noise = self._config.odometry_noise.covariance(motion, duration)
         is_doubted, self.errands.is_lost = self.errands.is_lost or is_broken, False
         if is_broken:

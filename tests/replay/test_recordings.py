@@ -3,19 +3,24 @@
 import json
 import math
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from gvgbot.autonomy.loop import Cycle
 from gvgbot.cli import main
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.drivers.world import save_world
+from gvgbot.hal.messages import Scan
 from gvgbot.links import Links
 from gvgbot.maps.run_directory import RunDirectory
 from gvgbot.maps.trajectory import decode_tum
 from gvgbot.playback import PlayedRobot
+from gvgbot.recording.config import RecordingConfig
+from gvgbot.recording.reader import Recording
+from gvgbot.recording.recorder import Recorder
 from gvgbot.replay import Wanted, open_log
 from gvgbot.session import Session
 from gvgbot.topics import Grid
@@ -92,6 +97,28 @@ def test_a_replay_with_another_mind_is_another_run(
     config = json.loads((tmp_path / "run" / "summary.json").read_text())["config"]
     assert config["autonomy"]["keyframe"]["distance_m"] == 0.5
     assert config["twin"]["world"].endswith(".yaml")
+
+
+def test_a_clock_that_was_set_back_meanwhile_changes_no_way(
+    recorded: Recorded, tmp_path: Path
+) -> None:
+    """Whoever reads the stamps of a device of his own may have such a recording."""
+    original, path, out = Recording(recorded.recording), tmp_path / "back.mcap", tmp_path / "run"
+    about = {"title": original.about.title, "config": original.about.config}
+    with Recorder(RecordingConfig(path=path), about, patient=True) as to:
+        for at, message in original.messages():
+            back = 1000.0 if at > 20.0 else 0.0
+            match message:
+                case Scan(stamp=stamp):
+                    to.on_scan(replace(message, stamp=stamp - back))
+                case Cycle(odometry=odometry):
+                    told = replace(odometry, stamp=odometry.stamp - back)
+                    to.on_cycle(replace(message, odometry=told), None)
+    assert main(["replay", str(path), "--out", str(out)]) == 0
+    was, now = (json.loads((d / "summary.json").read_text()) for d in (recorded.run, out))
+    assert now["distance_m"] == pytest.approx(was["distance_m"], abs=0.01)
+    for key in ("outcome", "vertices", "edges"):
+        assert now[key] == was[key]
 
 
 @pytest.mark.parametrize("size", [3, 8, 30])

@@ -45,3 +45,9 @@ def test_before_the_first_message_nothing_is_known() -> None:
 @pytest.mark.parametrize(("since", "gap"), [(0.98, True), (1.0, True), (7.99, True), (8.0, False)])
 def test_an_outage_is_known_until_the_base_was_heard_again(since: float, gap: bool) -> None:
     assert driven(0.98, 1.0, 8.0, 8.02).has_gap_since(since) is gap
+
+
+def test_of_the_time_before_the_clock_was_set_back_nothing_is_known() -> None:
+    log = driven(50.0, 50.02, 1.0, 1.02)
+    assert log.odom_base_at(0.99) == Pose(0.5, 0.0, 0.0)
+    assert not log.has_gap_since(0.99)
