@@ -11,12 +11,10 @@ from pathlib import Path
 
 import yaml
 
-from gvgbot.clock import LoopClock
-from gvgbot.drivers.kobuki.driver import KobukiBase, KobukiConfig
+from gvgbot.drivers.kobuki.driver import STANDSTILL_FRAME, KobukiConfig
 from gvgbot.drivers.tcp import SCHEME, TcpStream
 from gvgbot.drivers.transport import SerialStream
 from gvgbot.errors import ConfigError, GvgbotError
-from gvgbot.geometry import STANDSTILL
 from gvgbot.strict_yaml import load_text, packaged
 
 _PATIENCE_S = 1.0  # until a base on the network has said something
@@ -46,13 +44,13 @@ def _real_base(path: Path) -> KobukiConfig | None:
 
 
 async def _write_stop(config: KobukiConfig) -> None:
-    """Raises DeviceLost if the port cannot be opened."""
+    """Raises DeviceLost if the port cannot be opened, or takes no more bytes."""
     if config.port.startswith(SCHEME):
         await _write_to_network(config)
         return
     stream = SerialStream(config.port, config.baud)
     try:
-        KobukiBase(stream, config, LoopClock()).drive(STANDSTILL)
+        stream.write(STANDSTILL_FRAME)
     finally:
         stream.close()
 
@@ -61,7 +59,7 @@ async def _write_to_network(config: KobukiConfig) -> None:
     """The same over TCP: the connection is made by the first read, and what was written, sent."""
     stream = TcpStream(config.port)
     try:
-        KobukiBase(stream, config, LoopClock()).drive(STANDSTILL)
+        stream.write(STANDSTILL_FRAME)
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(_PATIENCE_S):
                 await stream.read()

@@ -10,7 +10,7 @@ import sys
 import time
 import tty
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from queue import Queue
 from typing import Any
@@ -303,6 +303,30 @@ def test_a_base_that_cannot_be_stopped_is_a_line_and_exit_status_1(
     assert done.returncode == 1
     assert named in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_a_port_that_takes_no_bytes_has_not_stopped_the_base(tmp_path: Path) -> None:
+    here, there = os.openpty()
+    tty.setraw(there)
+    os.set_blocking(there, False)
+    while select.select([], [there], [], 0.3)[1]:  # the system makes room for some time
+        with suppress(BlockingIOError):
+            os.write(there, b"x" * 1000)
+    with suppress(BlockingIOError):
+        while True:  # into what is left, too
+            os.write(there, b"x")
+    config = tmp_path / "robot.yaml"
+    config.write_text(f"{{twin: {{enabled: false}}, base: {{port: {os.ttyname(there)}}}}}")
+    command = [sys.executable, "-m", "gvgbot.stop_base", str(config)]
+    try:
+        done = subprocess.run(
+            command, check=False, capture_output=True, text=True, timeout=PATIENCE
+        )
+        assert done.returncode == 1
+        assert os.ttyname(there) in done.stderr
+    finally:
+        os.close(here)
+        os.close(there)
 
 
 def test_what_stops_the_base_loads_nothing_that_takes_long() -> None:
