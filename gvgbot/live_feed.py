@@ -37,7 +37,9 @@ class LiveFeed:
         """Send a scan."""
         if self._scans.allows(scan.stamp) and self._network.is_heard(ScanSent):
             middle = scan.stamp + 0.5 * scan.time_increment * len(scan.ranges)
-            self._network.publish(sweep(scan, self._pipeline.map_base_at(middle)))
+            pipeline = self._pipeline
+            map_base = None if pipeline.is_lost else pipeline.map_base_at(middle)
+            self._network.publish(sweep(scan, map_base))
 
     def on_odometry(self, odometry: Odometry) -> None:
         """Send odometry."""

@@ -9,7 +9,16 @@ from gvgbot.autonomy.slam.ekf import Belief, OdometryNoise, predict
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
 from gvgbot.geometry import STANDSTILL, Array, Pose, wrap_angle
 from gvgbot.hal.messages import Battery, Odometry, Scan, Sign
-from gvgbot.topics import NOTHING_IN_RANGE, NOTHING_TRUSTED, LinkHealth, Mate, Phase, State, packed
+from gvgbot.topics import (
+    NOTHING_IN_RANGE,
+    NOTHING_TRUSTED,
+    UNKNOWN,
+    LinkHealth,
+    Mate,
+    Phase,
+    State,
+    packed,
+)
 
 _NEEDS_SOMEBODY = ("wheel drop", "over-current", "charger cable", "no scan")
 _FARTHEST_MM = NOTHING_IN_RANGE - 1
@@ -98,6 +107,8 @@ def sign(now: State, *, is_lost: bool) -> Sign:
 
 def pose_covariance(pipeline: Pipeline, odometry: Odometry | None, noise: OdometryNoise) -> Array:
     """Covariance (3, 3) of map_base: the belief's, grown by the motion since the last keyframe."""
+    if pipeline.is_lost:
+        return UNKNOWN * np.eye(3)
     belief = pipeline.mapper.belief
     robot = Belief(belief.x[:3], belief.P[:3, :3] + pipeline.blur)
     if odometry is None or not pipeline.keyframes:
@@ -146,7 +157,12 @@ def _triple(pose: Pose) -> tuple[float, float, float]:
 
 
 def plan(pipeline: Pipeline, reason: str, stamp: float) -> topics.Plan:
-    """Where the robot goes; `reason` is the last decision's. An errand has a track only."""
+    """Where the robot goes; `reason` is the last decision's. An errand has a track only.
+
+    Who does not know its place goes nowhere on the map.
+    """
+    if pipeline.is_lost:
+        return topics.Plan(stamp=stamp, vertex=None, bearing=None, reason="", track=b"", route=b"")
     is_exploring, graph = pipeline.errands.errand is None, pipeline.mapper.graph
     target = pipeline.mission.target if is_exploring else None
     half = None if target is None else graph.half_edge(target)

@@ -34,9 +34,7 @@ class TelemetryConfig:
     zenoh_file: Path | None = None  # JSON5: keys, passwords, access control; see configs/zenoh
     listen: tuple[str, ...] = ("tcp/127.0.0.1:7447",)  # addresses that others can reach it at
     connect: tuple[str, ...] = ()  # routers or robots of the team, joined again when they are back
-    lease_s: Annotated[float, Range(0.5, 60.0)] = (
-        2.0  # silence after which the robot counts as gone
-    )
+    lease_s: Annotated[float, Range(0.5, 60.0)] = 2.0  # silence until the robot counts as gone
     scan_rate_hz: Annotated[float, Range(0.1, 40.0)] = 10.0  # at most; with nobody there, none
 
     def __post_init__(self) -> None:
@@ -101,7 +99,7 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
     requests: tuple[str, ...] = ()  # what it may be asked for, as its configuration says
     uptime: float = 0.0  # s since the robot's program began
     pose: tuple[float, float, float]  # map_base: x, y, theta
-    covariance: tuple[float, ...]  # of the pose, 3x3 row-major
+    covariance: tuple[float, ...]  # of the pose, 3x3 row-major; 1e6 on its diagonal: it is unknown
     twist: tuple[float, float]  # as measured: m/s ahead, rad/s anticlockwise
     battery_voltage: float | None
     battery_fraction: float | None  # of a full charge, 0..1
@@ -115,6 +113,11 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
     laser: LinkHealth
     base: LinkHealth
     team: tuple[Mate, ...] = ()  # the other robots, as far as this one knows where they are
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether the robot does not know where it is: its pose means nothing."""
+        return self.covariance[0] >= UNKNOWN
 
 
 def packed(points: NDArray[np.floating]) -> bytes:
@@ -299,7 +302,7 @@ class Odometry(msgspec.Struct, frozen=True, kw_only=True):
     """Where the robot is and how it moves. Sent only while somebody listens."""
 
     stamp: float  # s, the robot's monotonic clock
-    map_base: tuple[float, float, float]  # as believed: x, y, theta
+    map_base: tuple[float, float, float]  # as believed: x, y, theta; see `covariance` of the state
     odom_base: tuple[float, float, float]  # by wheels and gyro alone, since the program began
     twist: tuple[float, float]  # as measured: m/s ahead, rad/s anticlockwise
 
@@ -380,6 +383,7 @@ SCAN = Topic("scan", Scan, 1, 40.0, "data", 0, queryable=False)
 TOPICS = (STATE, MAP, GRID, TRAJECTORY, EVENTS, PLAN, HEALTH, ODOMETRY, SCAN)
 TEAM_PARTS: tuple[TeamPart, ...] = ("team", "course")
 HEARTBEAT = 2.0  # s, how often a topic that is sent on change says which sample was its last
+UNKNOWN = 1e6  # m^2 and rad^2, the variances of a pose that is not known
 EVENTS_KEPT = 64  # in a message
 TRAJECTORY_POSES = 2000  # in a message, at most
 LATE_AFTER = 0.1  # s, the age of odometry from which a control cycle counts as late

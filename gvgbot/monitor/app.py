@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gvgbot import client
-from gvgbot.client import Grid, Raster, Robot, State, Trajectory
+from gvgbot.client import Grid, Raster, Robot, Trajectory
 from gvgbot.errors import GvgbotError, UsageError
 from gvgbot.monitor.chart import Scene
 from gvgbot.monitor.facts import Fact, headline
@@ -93,12 +93,13 @@ async def _watch(robot: Robot, show: Show) -> None:
     while True:
         presence, state = robot.presence, robot.state().latest
         others = await asyncio.to_thread(robot.others) if presence.word == "absent" else []
+        pose = None if state is None or state.is_lost else state.pose
         scene = Scene(
             robot.map().latest,
             floor.of(grid.latest),
-            _way(trajectory.latest, state),
+            _way(trajectory.latest, pose),
             robot.plan().latest,
-            None if state is None else state.pose,
+            pose,
             () if state is None else tuple(mate.pose for mate in state.team),
         )
         picture = Picture(
@@ -113,10 +114,10 @@ async def _watch(robot: Robot, show: Show) -> None:
         await asyncio.sleep(_EVERY)
 
 
-def _way(driven: Trajectory | None, state: State | None) -> list[Points]:
-    """The way driven, in lines (N, 2), m, up to a state."""
+def _way(driven: Trajectory | None, pose: tuple[float, float, float] | None) -> list[Points]:
+    """The way driven, in lines (N, 2), m, up to a pose, if that is known."""
     *others, line = [np.zeros((0, 2))] if driven is None else driven.stretches
-    return [*others, line if state is None else np.concatenate([line, [state.pose[:2]]])]
+    return [*others, line if pose is None else np.concatenate([line, [pose[:2]]])]
 
 
 class _Floor:

@@ -50,9 +50,7 @@ def facts(state: State, plan: Plan | None, health: Health | None) -> Iterator[Fa
     yield Fact("frontiers", _frontiers(state))
     yield Fact("battery", *_battery(state))
     yield Fact("guard", *((state.guard, "warning") if state.guard else ("free", "plain")))
-    x, y, theta = state.pose
-    yield Fact("pose", f"{x:.2f} {y:.2f} m  {_degrees(theta)}")
-    yield Fact("sigma", _sigma(state))
+    yield from _place(state)
     for mate in state.team:
         place = f"{mate.pose[0]:.2f} {mate.pose[1]:.2f} m"
         yield Fact(shortened(mate.name, _MATE - len(place)), place)
@@ -67,25 +65,25 @@ def facts(state: State, plan: Plan | None, health: Health | None) -> Iterator[Fa
 
 
 def _tone_of_phase(state: State) -> Tone:
-    if state.outcome not in (None, "explored") or _is_lost(state):
+    if state.outcome not in (None, "explored") or _is_searching(state):
         return "warning"
     return _PHASES[state.phase]
 
 
-def _is_lost(state: State) -> bool:
-    """Whether it looks for its place on the map."""
-    return state.phase == "exploring" and state.reason != ""
+def _is_searching(state: State) -> bool:
+    """Whether it looks for its place on the map, and says why."""
+    return state.is_lost and state.phase in ("exploring", "errand") and state.reason != ""
 
 
 def _has_reason(state: State) -> bool:
-    return _is_lost(state) or (
+    return _is_searching(state) or (
         state.phase in ("starting", "halted", "finished") and state.reason != ""
     )
 
 
 def _intention(state: State, plan: Plan | None) -> Iterator[Fact]:
     """Where the robot goes, and why."""
-    if state.errand is not None:
+    if state.errand is not None and not _is_searching(state):
         yield Fact("going to", state.errand)
         yield Fact("why", "somebody asked for it")
     elif _has_reason(state):
@@ -99,6 +97,16 @@ def _intention(state: State, plan: Plan | None) -> Iterator[Fact]:
     else:
         yield Fact("going to", "-", "faint")
         yield Fact("why", "-", "faint")
+
+
+def _place(state: State) -> Iterator[Fact]:
+    """Where the robot is, and how sure it is of that."""
+    if state.is_lost:
+        yield Fact("pose", "not known", "warning")
+        return
+    x, y, theta = state.pose
+    yield Fact("pose", f"{x:.2f} {y:.2f} m  {_degrees(theta)}")
+    yield Fact("sigma", _sigma(state))
 
 
 def _frontiers(state: State) -> str:
@@ -242,9 +250,11 @@ def _alive(robot: str, state: State | None) -> Fact:
 
 def _doing(state: State) -> str:
     """What it does, or why it does nothing."""
+    if _has_reason(state):
+        return state.reason
     if state.phase == "errand" and state.errand is not None:
         return state.errand
-    return state.reason if _has_reason(state) else state.phase
+    return state.phase
 
 
 def _age(seconds: float) -> str:

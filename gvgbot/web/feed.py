@@ -187,7 +187,7 @@ class _Histories:
     """The last half hour of a robot's state, thinned."""
 
     def __init__(self) -> None:
-        self._samples: deque[tuple[float, float, float | None]] = deque(maxlen=_SAMPLES)
+        self._samples: deque[tuple[float, float | None, float | None]] = deque(maxlen=_SAMPLES)
 
     def add(self, state: State) -> bool:
         """Take a state, if it is time for the next; whether it was."""
@@ -204,7 +204,12 @@ class _Histories:
         return History(stamps=stamps, sigmas=sigmas, batteries=batteries)
 
 
-def sigma(state: State) -> float:
-    """The standard deviation of the position, m, in the direction in which it is largest."""
+def sigma(state: State) -> float | None:
+    """The standard deviation of the position, m, in the direction in which it is largest.
+
+    None while the position is not known.
+    """
+    if state.is_lost:
+        return None
     xx, xy, _, _, yy = state.covariance[:5]
     return math.sqrt(max(0.0, (xx + yy) / 2 + math.hypot((xx - yy) / 2, xy)))

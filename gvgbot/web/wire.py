@@ -37,7 +37,7 @@ class History(msgspec.Struct, frozen=True, kw_only=True):
     """How some values went, for the plots; columns of equal length."""
 
     stamps: tuple[float, ...]  # s, the robot's monotonic clock
-    sigmas: tuple[float, ...]  # m, of the position
+    sigmas: tuple[float | None, ...]  # m, of the position; None where that is not known
     batteries: tuple[float | None, ...]  # of a full charge, 0..1
 
 

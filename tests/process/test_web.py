@@ -52,7 +52,7 @@ from tests.process.addresses import free_endpoint, plain_session, router
 from tests.process.browser import Page, browser, chromium
 from tests.process.test_requests import a_robot
 from tests.unit.monitor.maps import a_grid, a_map, vertex
-from tests.unit.test_telemetry import EXAMPLE
+from tests.unit.test_telemetry import EXAMPLE, NOWHERE
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(180)]
 
@@ -788,10 +788,18 @@ def test_a_robot_that_is_stuck_waits_is_silent_or_has_left_and_a_lost_server_are
             play.state = msgspec.structs.replace(HERE, vertices=0)
             play.until_read("the end of its first edge")
             lost = "not sure where it is: 2 places fit"
-            play.state = msgspec.structs.replace(HERE, phase="exploring", reason=lost)
+            nowhere = msgspec.structs.replace(HERE, covariance=NOWHERE, reason=lost)
+            play.state = nowhere
             play.until(f"{headline} === '{lost}'")
             assert page.look("document.querySelector('#headline').dataset.tone") == "warning"
             play.until(f"document.querySelector('#facts').innerText.includes('{lost}')")
+            assert "not known" in page.look("document.querySelector('#facts').innerText")
+            assert page.look("document.querySelector('#sigma-now').innerText") == "unknown"
+            play.until_drawn(lambda found: found["robot"][1] == 0, "robot")
+            play.state = HERE
+            play.until_drawn(lambda found: found["robot"][1] > 50, "robot")
+            play.state = msgspec.structs.replace(nowhere, phase="errand", errand="goto 7")
+            play.until(f"{headline} === '{lost}'")
             reason, team = "no frontier is left", (Mate(name="anna", pose=(3.0, 2.0, 0.0)),)
             ended = msgspec.structs.replace(HERE, outcome="explored", reason=reason, team=team)
             play.state = msgspec.structs.replace(ended, phase="finished")

@@ -57,6 +57,7 @@ def crossing() -> Any:
             graph=graph, belief=SimpleNamespace(map_vertex=lambda number: poses[number])
         ),
         errands=SimpleNamespace(errand=None),
+        is_lost=False,
         track=np.array([[1.0, 0.0], [4.0, 0.0]]),
         map_base=Pose(1.0, 0.0, 0.0),
         map_base_at=lambda stamp: Pose(stamp, 0.0, 0.0),
@@ -120,6 +121,16 @@ def test_on_an_errand_the_frontier_is_not_where_the_robot_goes() -> None:
     sent = plan(sent_away, "ear", 9.0)
     assert (sent.vertex, sent.reason, sent.route) == (None, "", b"")
     assert len(sent.ahead) == 2
+
+
+def test_who_does_not_know_its_place_goes_nowhere_on_the_map_and_sees_nothing_there() -> None:
+    network, lost = Listeners(Scan), crossing()
+    lost.is_lost = True
+    sent = plan(lost, "ear", 9.0)
+    assert (sent.vertex, sent.bearing, sent.reason) == (None, None, "")
+    assert (sent.track, sent.route) == (b"", b"")
+    LiveFeed(network, lost, 10.0).on_scan(scan(3.0, [1.0] * 100))
+    assert [seen.map_base for seen in network.got if isinstance(seen, Scan)] == [None]
 
 
 def test_a_plan_is_sent_when_it_has_changed() -> None:

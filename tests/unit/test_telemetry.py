@@ -15,7 +15,7 @@ from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.ekf import Belief, OdometryNoise
 from gvgbot.config import load_config
 from gvgbot.errors import ConfigError
-from gvgbot.geometry import STANDSTILL, Pose
+from gvgbot.geometry import STANDSTILL, Array, Pose
 from gvgbot.hal.messages import Odometry
 from gvgbot.snapshots import pose_covariance
 from gvgbot.telemetry import _session_config
@@ -51,6 +51,7 @@ EXAMPLE = State(
         connected=False, messages=500, damaged=0, lost=9, reconnects=2, clock_offset=None
     ),
 )
+NOWHERE = (1e6, 0.0, 0.0, 0.0, 1e6, 0.0, 0.0, 0.0, 1e6)  # the covariance of an unknown pose
 PLAIN = {
     "stamp": 12.5,
     "sequence": 7,
@@ -187,13 +188,28 @@ def mind(belief: Belief, keyframe: Pose | None) -> Pipeline:
     """As much of a pipeline as its covariance needs."""
     seen: list[Any] = [] if keyframe is None else [SimpleNamespace(odom_base=keyframe, stamp=1.0)]
     mapper = SimpleNamespace(belief=belief)
-    return cast(Pipeline, SimpleNamespace(mapper=mapper, keyframes=seen, blur=np.zeros((3, 3))))
+    blur = np.zeros((3, 3))
+    return cast(Pipeline, SimpleNamespace(mapper=mapper, keyframes=seen, blur=blur, is_lost=False))
 
 
 def test_without_a_keyframe_the_covariance_is_the_belief_s() -> None:
     now = Odometry(1.5, Pose(2.0, 0.0, 0.0), STANDSTILL)
     assert pose_covariance(mind(BELIEF, None), now, NOISELESS) == pytest.approx(BELIEF.P)
     assert pose_covariance(mind(BELIEF, Pose()), None, NOISELESS) == pytest.approx(BELIEF.P)
+
+
+def test_of_a_robot_that_does_not_know_its_place_the_pose_says_nothing() -> None:
+    """Wherever in a building it is, that is within one sigma of the pose."""
+    here, kilometre = mind(BELIEF, Pose()), 1e3
+    assert not state_with(pose_covariance(here, None, NOISELESS)).is_lost
+    lost = cast(Pipeline, SimpleNamespace(mapper=here.mapper, is_lost=True))
+    covariance = pose_covariance(lost, None, NOISELESS)
+    assert np.sqrt(np.linalg.eigvalsh(covariance)[0]) == pytest.approx(kilometre)
+    assert state_with(covariance).is_lost
+
+
+def state_with(covariance: Array) -> State:
+    return msgspec.structs.replace(EXAMPLE, covariance=tuple(covariance.ravel().tolist()))
 
 
 def test_a_wrong_heading_puts_the_robot_to_the_side_as_it_goes_on() -> None:

@@ -44,7 +44,7 @@ function take(kind, value) {
     case "health": healths = [...healths, value].slice(-2); break;
     case "plan": picture.plan = value; break;
     case "scan": picture.setScan(value); break;
-    case "odometry": picture.setPose(value.map_base, value.stamp); break;
+    case "odometry": if (state === null || !words.isLost(state)) picture.setPose(value.map_base, value.stamp); break;
     case "events": events = value.events.filter(words.isTold); break;
   }
   isMapDue = true;
@@ -63,9 +63,10 @@ function beginAnew(value) {
 
 function takeState(value) {
   state = value;
+  if (words.isLost(value)) picture.pose = null;
+  else picture.setPose(value.pose, value.stamp);
   picture.covariance = value.covariance;
   picture.team = value.team ?? [];
-  picture.setPose(value.pose, value.stamp);
   sigmaPlot.add(value.stamp, words.sigma(value));
   batteryPlot.add(value.stamp, value.battery_fraction);
 }
@@ -99,7 +100,7 @@ function drawPanel() {
   if (state !== null) {
     fill($("facts"), words.facts(state, picture.plan), factLine);
     fill($("health"), words.health(healths.at(-1), healths.at(-2)), factLine);
-    $("sigma-now").textContent = words.length(words.sigma(state));
+    $("sigma-now").textContent = words.isLost(state) ? "unknown" : words.length(words.sigma(state));
     $("battery-now").textContent = state.battery_fraction === null ? "unknown" : words.percent(state.battery_fraction);
   }
   fill($("events"), [...events].reverse(), eventLine);

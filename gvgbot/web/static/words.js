@@ -19,27 +19,26 @@ export function axes(xx, xy, yy) {
   return [root(middle + away), Math.atan2(2 * xy, xx - yy) / 2, root(middle - away)];
 }
 
-export const sigma = (state) => axes(state.covariance[0], state.covariance[1], state.covariance[4])[0];
+export const isLost = (state) => state.covariance[0] >= 1e6; // its pose means nothing
+export const sigma = (state) => (isLost(state) ? null : axes(state.covariance[0], state.covariance[1], state.covariance[4])[0]);
 export const length = (metres) => (metres < 1 ? `${(100 * metres).toFixed(1)} cm` : `${metres.toFixed(2)} m`);
 
 const counted = (count, one, many) => `${count} ${count === 1 ? one : many}`;
 export const size = (vertices, edges) => `${counted(vertices, "vertex", "vertices")}, ${counted(edges, "edge", "edges")}`;
 
 const TONES = { exploring: "good", errand: "good", waiting: "good", finished: "good", paused: "warning", starting: "warning", halted: "bad" };
-const isLost = (state) => state.phase === "exploring" && state.reason !== ""; // it looks for its place on the map
+// Whether it looks for its place on the map, and says why.
+const isSearching = (state) => isLost(state) && ["exploring", "errand"].includes(state.phase) && state.reason !== "";
 export const toneOfPhase = (state) =>
-  (state.outcome && state.outcome !== "explored") || isLost(state) ? "warning" : TONES[state.phase] ?? "plain";
+  (state.outcome && state.outcome !== "explored") || isSearching(state) ? "warning" : TONES[state.phase] ?? "plain";
 
 // [name, text, tone] of each line, the most telling first.
 export function facts(state, plan) {
-  const [x, y, theta] = state.pose;
-  const turn = Math.sqrt(Math.max(0, state.covariance[8]));
   return [
     ["phase", state.phase, toneOfPhase(state)],
     ["outcome", state.outcome?.replaceAll("_", " ") ?? "none yet", state.outcome ? toneOfPhase(state) : "faint"],
     ...intention(state, plan),
-    ["pose", `${x.toFixed(2)}, ${y.toFixed(2)} m, ${degrees(theta)}`, "plain"],
-    ["sigma", `${length(sigma(state))}, ${((turn * 180) / Math.PI).toFixed(1)}°`, "plain"],
+    ...where(state),
     ["speed", `${state.twist[0].toFixed(2)} m/s, ${degrees(state.twist[1])}/s`, "plain"],
     ["driven", `${state.distance.toFixed(1)} m`, "plain"],
     ["map", size(state.vertices, state.edges), "plain"],
@@ -54,6 +53,15 @@ export function facts(state, plan) {
   ];
 }
 
+function where(state) {
+  if (isLost(state)) return [["pose", "not known", "warning"]];
+  const [x, y, theta] = state.pose, turn = Math.sqrt(Math.max(0, state.covariance[8]));
+  return [
+    ["pose", `${x.toFixed(2)}, ${y.toFixed(2)} m, ${degrees(theta)}`, "plain"],
+    ["sigma", `${length(sigma(state))}, ${((turn * 180) / Math.PI).toFixed(1)}°`, "plain"],
+  ];
+}
+
 // How many are left; none is of a team that has explored all, whatever its maps lack.
 function frontiers(state) {
   const isDone = state.outcome === "explored" && (state.team ?? []).length > 0 && state.frontiers > 0;
@@ -61,7 +69,7 @@ function frontiers(state) {
 }
 
 function intention(state, plan) {
-  if (state.errand) return [["going to", state.errand, "plain"], ["why", "somebody asked for it", "plain"]];
+  if (state.errand && !isSearching(state)) return [["going to", state.errand, "plain"], ["why", "somebody asked for it", "plain"]];
   if (hasReason(state)) return [["why", state.reason, "plain"]];
   if (plan?.track.length && state.vertices === 0)
     return [["going to", "the end of its first edge", "plain"], ["why", "no vertex is known", "plain"]];
@@ -127,11 +135,11 @@ export function headline(link, state) {
 
 // What it does, or why it does nothing.
 function doing(state) {
-  if (state.phase === "errand" && state.errand) return state.errand;
-  return hasReason(state) ? state.reason : state.phase;
+  if (hasReason(state)) return state.reason;
+  return state.phase === "errand" && state.errand ? state.errand : state.phase;
 }
 
-const hasReason = (state) => isLost(state) || (["starting", "halted", "finished"].includes(state.phase) && state.reason !== "");
+const hasReason = (state) => isSearching(state) || (["starting", "halted", "finished"].includes(state.phase) && state.reason !== "");
 
 const QUIET = new Set(["edge_joined"]);
 export const isTold = (event) => !QUIET.has(event.kind);

@@ -10,7 +10,7 @@ from gvgbot.client import Event, Health, Plan, Presence
 from gvgbot.client.presence import Word
 from gvgbot.monitor.facts import Fact, duration, facts, headline, told
 from gvgbot.topics import Mate, packed
-from tests.unit.test_telemetry import EXAMPLE
+from tests.unit.test_telemetry import EXAMPLE, NOWHERE
 
 DECISION = Event(
     number=0,
@@ -95,11 +95,17 @@ def test_no_frontier_is_left_of_a_team_that_has_explored_all() -> None:
     assert said(frontiers=0, **ended)["frontiers"].text == "0 left"
 
 
-def test_who_does_not_know_its_place_says_so_and_goes_to_no_vertex() -> None:
+@pytest.mark.parametrize(("phase", "errand"), [("exploring", None), ("errand", "goto 7")])
+def test_who_does_not_know_its_place_says_so_and_goes_to_no_vertex(
+    phase: str, errand: str | None
+) -> None:
     doubt = "not sure where it is: 2 places fit, 0.71 for the best"
-    lost = msgspec.structs.replace(EXAMPLE, phase="exploring", reason=doubt)
+    lost = msgspec.structs.replace(EXAMPLE, phase=phase, reason=doubt, covariance=NOWHERE)
+    lost = msgspec.structs.replace(lost, errand=errand)
     lines = {fact.name: fact for fact in facts(lost, PLAN, None)}
-    assert lines["phase"] == Fact("phase", "exploring", "warning")
+    assert lines["phase"] == Fact("phase", phase, "warning")
+    assert lines["pose"].text == "not known"
+    assert "sigma" not in lines
     assert "going to" not in lines
     assert lines["why"].text == doubt
     assert headline("karl", Presence("alive", 1.0), lost, []) == Fact("karl", doubt, "warning")

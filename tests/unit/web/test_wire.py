@@ -12,7 +12,7 @@ from gvgbot.topics import Events
 from gvgbot.web.feed import _Histories, sigma
 from gvgbot.web.viewers import Audience, Viewer
 from gvgbot.web.wire import Link, Reply, frame, wish
-from tests.unit.test_telemetry import EXAMPLE
+from tests.unit.test_telemetry import EXAMPLE, NOWHERE
 
 A_LINK = Link(robot="karl", endpoint="tcp/h:1", word="alive", for_s=3.0)
 
@@ -123,6 +123,15 @@ def test_a_history_ends_after_half_an_hour() -> None:
         histories.add(msgspec.structs.replace(EXAMPLE, stamp=2.0 * tick))
     stamps = histories.columns().stamps
     assert stamps[-1] - stamps[0] == pytest.approx(1800.0, abs=5.0)
+
+
+def test_a_history_has_no_sigma_of_a_place_that_is_not_known() -> None:
+    histories = _Histories()
+    histories.add(msgspec.structs.replace(EXAMPLE, stamp=0.0, covariance=NOWHERE))
+    histories.add(msgspec.structs.replace(EXAMPLE, stamp=10.0))
+    unknown, known = histories.columns().sigmas
+    assert unknown is None
+    assert known == pytest.approx(math.sqrt(2.0))
 
 
 def test_sigma_is_the_half_axis_of_the_ellipse_whatever_its_direction() -> None:
