@@ -5,16 +5,17 @@ from typing import Literal
 
 QUIET_AFTER = 2.0  # s without a state, though the robot is on the network
 
-Word = Literal["alive", "quiet", "gone", "absent", "cut off"]
+Word = Literal["alive", "doubled", "quiet", "gone", "absent", "cut off"]
 
 
 @dataclass(frozen=True, slots=True)
 class Presence:
     """How things are with the robot, and for how long, s.
 
-    alive: it is on the network and says so; quiet: it is on the network but says nothing, so its
-    program hangs; gone: it was there, and left or died; absent: it was not there since this
-    program connected; cut off: nothing answers at the address any more, so that nobody knows.
+    alive: it is on the network and says so; doubled: it does, and so does another one by its name;
+    quiet: it is on the network but says nothing, so its program hangs; gone: it was there, and left
+    or died; absent: it was not there since this program connected; cut off: nothing answers at the
+    address any more, so that nobody knows.
     """
 
     word: Word
@@ -29,6 +30,7 @@ class Signs:
     token_at: float | None = None  # when the robot joined or left the network
     has_token: bool = False
     heard_at: float | None = None  # the last state
+    doubled_at: float | None = None  # when one and another of this name took turns to speak
     via_router: bool = False  # otherwise the other end of the connection is the robot itself
 
     def presence(self, now: float, *, linked: bool) -> Presence:
@@ -42,4 +44,5 @@ class Signs:
         silence = now - heard_at
         if silence > QUIET_AFTER:
             return Presence("quiet", silence)
-        return Presence("alive", now - self.token_at)
+        is_doubled = self.doubled_at is not None and now - self.doubled_at <= QUIET_AFTER
+        return Presence("doubled" if is_doubled else "alive", now - self.token_at)

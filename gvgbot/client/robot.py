@@ -302,6 +302,8 @@ class Robot:
             if life == self._life:
                 return
             earlier, said = self._earlier
+            if life == earlier:
+                self._signs.doubled_at = time.perf_counter()
             known = said if life == earlier else [None] * len(self._all)
             swapped = [box.swap(read) for box, read in zip(self._all, known, strict=True)]
             self._earlier, self._life = (self._life, swapped), life

@@ -108,7 +108,7 @@ async def _watch(robot: Robot, show: Show) -> None:
             scene,
             robot.events().latest,
             health.latest,
-            is_fresh=presence.word == "alive",
+            is_fresh=presence.word in ("alive", "doubled"),
         )
         show(picture)
         await asyncio.sleep(_EVERY)

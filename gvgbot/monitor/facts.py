@@ -236,6 +236,10 @@ def headline(robot: str, presence: Presence, state: State | None, others: list[s
             )
         case "quiet":
             return Fact(robot, f"quiet for {duration(presence.for_s)}: its program hangs", "bad")
+        case "doubled":
+            return Fact(
+                robot, f"several robots are named {robot}: give one another robot.name", "bad"
+            )
         case "alive":
             return _alive(robot, state)
 

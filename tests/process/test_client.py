@@ -574,6 +574,20 @@ def test_of_two_robots_of_one_name_each_is_seen_with_its_own_map(endpoint: str) 
             assert seen.map().latest == A_MAP
 
 
+def test_two_robots_of_one_name_are_told_from_one_that_was_started_again(endpoint: str) -> None:
+    there = TelemetryConfig(listen=(free_endpoint(),), connect=(endpoint,))
+    with a_robot(endpoint) as here, client.connect("near", endpoint) as seen:
+        here.publish(numbered(1))
+        until(lambda: seen.state().latest == numbered(1))
+        with Telemetry(there, "near") as other:
+            other.publish(numbered(2))
+            until(lambda: seen.state().latest == numbered(2))
+            words = [seen.presence.word]
+            here.publish(numbered(3))
+            until(lambda: seen.state().latest == numbered(3))
+            assert [*words, seen.presence.word] == ["alive", "doubled"]
+
+
 def test_a_robot_that_is_frozen_is_noticed(endpoint: str) -> None:
     """A stopped process is as silent as one whose cable was pulled."""
     with far_robot(endpoint) as process, client.connect("far", endpoint) as seen:

@@ -807,6 +807,12 @@ def test_a_robot_that_is_stuck_waits_is_silent_or_has_left_and_a_lost_server_are
             assert "4 followed by others" in page.look("document.querySelector('#facts').innerText")
             play.state = msgspec.structs.replace(ended, phase="errand", errand="goto 7")
             play.until(f"{headline} === 'goto 7'")
+            two = "several robots are named karl: give one another robot.name"
+            other = TelemetryConfig(listen=(free_endpoint(),), connect=(endpoint,))
+            with Telemetry(other, "karl") as namesake:
+                while page.look(headline) != two:
+                    namesake.publish(play.state)
+                    play.until("true")
             waits = msgspec.structs.replace(ended, phase="paused", base=there)
             play.state = msgspec.structs.replace(waits, cycle_age=5.0)
             play.until(f"{headline} === 'its control loop is stuck'")

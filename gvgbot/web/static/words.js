@@ -128,6 +128,7 @@ export function headline(link, state) {
       return [`connection to the robot lost for ${span}, trying again`, "bad", true];
     case "quiet": return [`quiet for ${span}: its program hangs`, "bad", true];
   }
+  if (link.word === "doubled") return [`several robots are named ${link.robot}: give one another robot.name`, "bad", false];
   if (state === null) return ["it has not said anything yet", "warning", false];
   if (state.cycle_age > STUCK && state.base.connected) return ["its control loop is stuck", "bad", false];
   return [doing(state), toneOfPhase(state), false];

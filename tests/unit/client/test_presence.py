@@ -17,6 +17,19 @@ NOW = 100.0
         pytest.param(Signs(10.0, 50.0, True, 99.5), True, "alive", 50.0, id="heard a moment ago"),
         pytest.param(Signs(10.0, 50.0, True, 80.0), True, "quiet", 20.0, id="silent"),
         pytest.param(Signs(10.0, 99.0, True, 60.0), True, "alive", 1.0, id="back a moment ago"),
+        pytest.param(
+            Signs(10.0, 50.0, True, 99.9, doubled_at=99.5),
+            True,
+            "doubled",
+            50.0,
+            id="two by a name",
+        ),
+        pytest.param(
+            Signs(10.0, 50.0, True, 99.9, doubled_at=90.0), True, "alive", 50.0, id="one has left"
+        ),
+        pytest.param(
+            Signs(10.0, 88.0, False, 87.0, doubled_at=86.9), True, "gone", 12.0, id="both left"
+        ),
         pytest.param(Signs(10.0, 88.0, False, 87.0), True, "gone", 12.0, id="left the router"),
         pytest.param(Signs(10.0, 88.0, False, 87.0), False, "gone", 12.0, id="left, was direct"),
         pytest.param(

@@ -156,6 +156,7 @@ def test_what_needs_a_look_is_toned(changes: dict[str, object], name: str, expec
         ("absent", [], "no robot named karl here; there is none"),
         ("gone", [], "robot gone for 12 s"),
         ("cut off", [], "connection lost for 12 s, trying again"),
+        ("doubled", [], "several robots are named karl: give one another robot.name"),
         ("quiet", [], "quiet for 12 s: its program hangs"),
         ("alive", [], "exploring"),
     ],
