@@ -21,10 +21,9 @@ from typing import Any
 import numpy as np
 
 from gvgbot.carmen import CarmenLog, read_carmen
-from gvgbot.cli.replay import NO_ECHO_M
 from gvgbot.geometry import Array, Pose
 from gvgbot.maps.trajectory import decode_tum
-from gvgbot.replay import Wanted, replay
+from gvgbot.replay import NO_ECHO_M, Wanted, replay
 
 Row = dict[str, Any]
 RESULTS = Path(__file__).parent / "results" / "relations.json"

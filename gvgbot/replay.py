@@ -18,6 +18,7 @@ from gvgbot.session import Session
 
 MCAP = b"\x89MCAP"
 CARMEN_CONFIG = Path("carmen.yaml")
+NO_ECHO_M = 80.0  # of the lasers that CARMEN logs were made with
 
 
 @dataclass(slots=True)
@@ -36,12 +37,15 @@ class Log:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Wanted:
-    """A file to replay, and how: `config` None is the recorded one, or that for CARMEN logs."""
+    """A file to replay, and how: `config` None is the recorded one, or that for CARMEN logs.
+
+    `no_echo_m` is for CARMEN logs alone, and None that of most of them.
+    """
 
     path: Path
     config: Path | None
     overrides: list[str]
-    no_echo_m: float
+    no_echo_m: float | None
 
 
 def replay(wanted: Wanted, say: Callable[[str], None], *, out: Path | None) -> int:
@@ -102,7 +106,11 @@ def open_log(wanted: Wanted) -> Log:
     except OSError as error:
         hint = _recordings(wanted.path) if wanted.path.is_dir() else ""
         raise UsageError(f"cannot read {wanted.path}: {error.strerror}{hint}") from error
-    return _recording(wanted) if start == MCAP else _carmen(wanted)
+    if start != MCAP:
+        return _carmen(wanted)
+    if wanted.no_echo_m is not None:
+        raise UsageError(f"--no-echo is about CARMEN logs, and {wanted.path} is none: leave it out")
+    return _recording(wanted)
 
 
 def _check_kind(path: Path) -> None:
@@ -159,7 +167,7 @@ def _carmen(wanted: Wanted) -> Log:
     config = load_config(wanted.config or CARMEN_CONFIG, wanted.overrides)
     mount = config.laser
     base_laser = Pose(mount.x_m, mount.y_m, math.radians(mount.yaw_deg))
-    log = read_carmen(wanted.path, no_echo_m=wanted.no_echo_m, base_laser=base_laser)
+    log = read_carmen(wanted.path, no_echo_m=wanted.no_echo_m or NO_ECHO_M, base_laser=base_laser)
     found = {
         "damaged lines that were passed over": log.damaged,
         "long pauses, or a clock that was set": log.pauses,

@@ -40,7 +40,7 @@ def export_bag(recording: Path, out: Path, *, sensors_only: bool) -> list[str]:
     """
     if out.exists():
         raise UsageError(f"{out} exists already; name a new directory")
-    log = open_log(Wanted(path=recording, config=None, overrides=[], no_echo_m=80.0))
+    log = open_log(Wanted(path=recording, config=None, overrides=[], no_echo_m=None))
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         with TemporaryDirectory(prefix=".", dir=out.parent) as beside:

@@ -5,8 +5,6 @@ import argparse
 from gvgbot.cli.arguments import Commands, add_overrides, path, positive, say
 from gvgbot.errors import UsageError
 
-NO_ECHO_M = 80.0  # of the lasers that CARMEN logs were made with
-
 
 def add_replay(commands: Commands) -> None:
     """Add `gvgbot replay`."""
@@ -33,9 +31,8 @@ def add_replay(commands: Commands) -> None:
     replay.add_argument(
         "--no-echo",
         type=positive,
-        default=NO_ECHO_M,
         metavar="M",
-        help="ranges of a CARMEN log from here on mean that nothing was hit (default: %(default)s)",
+        help="ranges of a CARMEN log from here on mean that nothing was hit (default: 80.0)",
     )
     replay.add_argument(
         "--serve",

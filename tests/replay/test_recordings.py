@@ -121,6 +121,16 @@ def test_a_clock_that_was_set_back_meanwhile_changes_no_way(
         assert now[key] == was[key]
 
 
+def test_what_is_about_carmen_logs_is_refused_for_a_recording(
+    recorded: Recorded, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["replay", str(recorded.recording), "--no-echo", "5"]
+    assert main([*words, "--out", str(tmp_path / "run")]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "--no-echo is about CARMEN logs" in line
+    assert not (tmp_path / "run").exists()
+
+
 @pytest.mark.parametrize("size", [3, 8, 30])
 def test_a_recording_without_a_beginning_is_one_clear_line(
     size: int, recorded: Recorded, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -134,7 +144,7 @@ def test_a_recording_without_a_beginning_is_one_clear_line(
 
 def played(path: Path, out: Path, speed: float, seconds: float) -> Network:
     """What the network gets while a recording is played for so long."""
-    log = open_log(Wanted(path=path, config=None, overrides=[], no_echo_m=80.0))
+    log = open_log(Wanted(path=path, config=None, overrides=[], no_echo_m=None))
     network = Network()
     with RunDirectory.create(out, world=log.title) as directory:
         session = Session(log.config, directory, place=None)
