@@ -61,7 +61,10 @@ class SavedRun:
     def read(cls, directory: Path) -> Self:
         """The run in a directory. Raises UsageError if a file is missing or damaged."""
         if directory.is_file():
-            raise UsageError(f"{directory} is a file: give the directory of a run")
+            raise UsageError(
+                f"{directory} is a file: give the directory of a run; of a recording, gvgbot "
+                f"replay {directory} makes one"
+            )
         if not (directory / "map.geojson").exists():
             raise UsageError(f"{directory} is no run directory: there is no map.geojson in it")
         is_joined = bool(robots_in(directory)) and not (directory / "estimate.tum").exists()

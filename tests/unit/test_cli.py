@@ -81,6 +81,7 @@ BAD_CONFIGURATIONS = {
     "no run to show": (["map", "show", "absent"], "absent is no run directory"),
     "no run to tell of": (["map", "info", "absent"], "absent is no run directory"),
     "a file to show": (["map", "show", "/etc/passwd"], "is a file: give the dir"),
+    "a recording to show": (["map", "info", __file__], f"gvgbot replay {__file__} makes one"),
     "seed out of range": (["explore", "--seed", str(2**40)], "twin.seed"),
 }
 
