@@ -37,17 +37,20 @@ _MAKERS: dict[str, Callable[[int], tuple[World, Pose]]] = {
     "crowd": crowd,
 }
 NAMES: tuple[str, ...] = tuple(_MAKERS)
+_ALWAYS_THE_SAME = ("office", "grid", "comb", "spiral", "ring", "hall")
 
 
 def builtin(name: str) -> tuple[World, Pose]:
     """A built-in world and a free start pose in it (world frame).
 
     `name` is one of NAMES; a world that is drawn at random takes a seed behind a colon, as in
-    `floor_plan:7`, else 0. Raises WorldError for an unknown name.
+    `floor_plan:7`, else 0. Raises WorldError for an unknown name, and for a seed of another world.
     """
     maker, _, seed = name.partition(":")
     if maker not in _MAKERS or (":" in name and not seed.isdecimal()):
         raise WorldError(_unknown(name))
+    if seed and maker in _ALWAYS_THE_SAME:
+        raise WorldError(f"world {name!r}: {maker} is always the same and takes no seed")
     return _MAKERS[maker](int(seed or 0))
 
 
@@ -68,7 +71,8 @@ def open_world(name_or_path: str, *, unknown_is_wall: bool = False) -> tuple[Wor
 def _unknown(name: str) -> str:
     kind, colon, seed = name.partition(":")
     near = nearest(kind, NAMES)
-    hint = "" if near in (None, kind) else f"did you mean {near}{colon}{seed}? or "
+    meant = near if near in _ALWAYS_THE_SAME else f"{near}{colon}{seed}"
+    hint = "" if near in (None, kind) else f"did you mean {meant}? or "
     return (
         f"unknown world {name!r}: {hint}give a map_server YAML file or one of the built-in worlds "
         f"{', '.join(NAMES)} (NAME:SEED draws another one of its kind)"

@@ -77,6 +77,8 @@ BAD_CONFIGURATIONS = {
     "unknown profile": (["explore", "--set", "twin.base.odometry=ideal"], "one of perfect"),
     "a directory for a world": (["explore", "--world", "/"], "/: cannot read the file: Is a dir"),
     "mistyped world": (["explore", "--world", "flor_plan:7"], "did you mean floor_plan:7?"),
+    "a seed for a world that has none": (["explore", "--world", "office:3"], "takes no seed"),
+    "mistyped world that has no seed": (["explore", "--world", "ofice:3"], "mean office? or"),
     "a directory to replay": (["replay", "."], "with no recording in it: explore or run with"),
     "no run to show": (["map", "show", "absent"], "absent is no run directory"),
     "no run to tell of": (["map", "info", "absent"], "absent is no run directory"),

@@ -11,7 +11,7 @@ from gvgbot.drivers.start import check_start
 from gvgbot.drivers.world import World, save_world
 from gvgbot.errors import WorldError
 from gvgbot.geometry import Array
-from gvgbot.worlds import NAMES, builtin, open_world
+from gvgbot.worlds import _MAKERS, NAMES, builtin, open_world
 
 DRAWN = (
     *("jittered", "rooms", "cave", "floor_plan", "narrow", "doors", "clutter", "slopes"),
@@ -193,6 +193,22 @@ def test_a_name_opens_a_built_in_world_and_a_path_a_file(tmp_path: Path) -> None
     assert isinstance(loaded, World)
     assert np.array_equal(loaded.occupied, world.occupied)
     assert nowhere is None
+
+
+def is_drawn(name: str) -> bool:
+    """Whether any of three seeds makes another world than none, by its maker alone."""
+    plain = builtin(name)[0].occupied
+    others = (_MAKERS[name](seed)[0].occupied for seed in (1, 2, 3))
+    return any(not np.array_equal(plain, other) for other in others)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_only_a_world_that_is_drawn_takes_a_seed(name: str) -> None:
+    if is_drawn(name):
+        builtin(f"{name}:3")
+    else:
+        with pytest.raises(WorldError, match=f"{name} is always the same and takes no seed"):
+            open_world(f"{name}:3")
 
 
 def test_an_unknown_name_is_answered_with_the_names() -> None:
