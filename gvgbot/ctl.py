@@ -56,9 +56,10 @@ def _split(words: Sequence[str]) -> tuple[str | None, str, Sequence[str]]:
 def _no_request(words: Sequence[str]) -> str:
     """What is wrong with words of which neither the first nor the second is a request."""
     for word in reversed(words[:2]):  # the first one may be a robot
-        if (near := nearest(word, REQUESTS)) is not None:
+        if (near := nearest(word.lower(), REQUESTS)) is not None:
             return f"{word!r} is no request: did you mean {near}?"
-    return f"{words[:2][-1]!r} is no request: there are {', '.join(REQUESTS)}"
+    *_, odd = [words[0], *(word for word in words[1:2] if word.isidentifier())]  # no number
+    return f"{odd!r} is no request: there are {', '.join(REQUESTS)}"
 
 
 def _asker(request: str, arguments: Sequence[str]) -> Callable[[Robot], Asking]:

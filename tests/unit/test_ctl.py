@@ -42,6 +42,8 @@ def test_a_value_is_a_number_or_a_truth_or_text(text: str, value: object) -> Non
         (["pasue"], "'pasue' is no request: did you mean pause?"),
         (["sim", "pasue"], "'pasue' is no request: did you mean pause?"),
         (["ptrol", "4", "6"], "'ptrol' is no request: did you mean patrol?"),
+        (["GOTO", "1"], "'GOTO' is no request: did you mean goto?"),
+        (["dance", "1", "2"], "'dance' is no request: there are"),
         (["goto"], "goto needs a vertex, or x and y"),
         (["goto", "seven"], "'seven' must be the id of a vertex"),
         (["goto", "1", "east"], "'east' must be a number"),
