@@ -74,10 +74,12 @@ class MissionFiles:
             rows = counts[-1].rows if counts else 0
             counts.append(Count(len(past), rows + len(batch.rows.stamps)))
             newest = max(newest, batch.beat, key=lambda beat: beat.stamp)
+        is_current = self._is_current()
+        if _begins_after(past, snapshot.memory):
+            past, parts, counts, is_current = [], [], [], False
         journey = journey_of(parts, len(past))
         memory = _counted(snapshot.memory, past)
-        is_current, known = self._is_current(), snapshot.known
-        return Saved(memory, past, journey, newest, counts, is_current, known)
+        return Saved(memory, past, journey, newest, counts, is_current, snapshot.known)
 
     def _newest_snapshot(self) -> Snapshot | None:
         trouble: Damaged | None = None
@@ -170,6 +172,16 @@ class MissionFiles:
         content = record(packed(Header("gvgbot snapshot", VERSION))) + record(snapshot)
         _replace(self._snapshot, content, keep=self._before if self._is_whole else None)
         self._is_whole = True
+
+
+def _begins_after(past: list[Growth], memory: Memory) -> bool:
+    """Whether a journal is that of a map which was begun anew after a snapshot of the one before.
+
+    The snapshot of the new map was damaged, or there was no room for it.
+    """
+    if not past or memory.last is None:
+        return False
+    return past[0].keyframe.stamp > memory.last.stamp
 
 
 def _counted(memory: Memory, past: list[Growth]) -> Memory:

@@ -24,20 +24,20 @@ def beat(stamp: float) -> Beat:
     return Beat(stamp=stamp, boot="b", ahead=0.0, tally=tally, odometer=None)
 
 
-def snapshot(stamp: float) -> bytes:
+def snapshot(stamp: float, last: Keyframe | None = None) -> bytes:
     config = Config()
     pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
-    pipeline.travelled = stamp
+    pipeline.travelled, pipeline._last = stamp, last
     return packed(Snapshot(memory=remember(pipeline), beat=beat(stamp)))
 
 
-def batch(first: int, count: int = 1) -> bytes:
-    """Keyframes a metre apart, a row with each."""
-    places = [Pose(float(i), 0.0, 0.0) for i in range(first, first + count)]
+def batch(first: int, count: int = 1, *, since: float = 0.0) -> bytes:
+    """Keyframes a metre and a second apart, a row with each."""
+    places = [Pose(since + i, 0.0, 0.0) for i in range(first, first + count)]
     growth = [
         Growth(
             Keyframe(place.x, place, place, place, None),
-            Step(Pose(1.0, 0.0, 0.0), np.eye(3)) if place.x > 0 else None,
+            Step(Pose(1.0, 0.0, 0.0), np.eye(3)) if place.x > since else None,
             [],
         )
         for place in places
@@ -50,7 +50,7 @@ def batch(first: int, count: int = 1) -> bytes:
         map_base=poses,
         world_base=np.empty((0, 3)),
     )
-    return packed(Batch(first=first, growth=growth, rows=rows, beat=beat(float(first + count))))
+    return packed(Batch(first=first, growth=growth, rows=rows, beat=beat(since + first + count)))
 
 
 def written(path: Path, batches: int = 5) -> MissionFiles:
@@ -125,6 +125,22 @@ def test_of_a_snapshot_that_was_cut_the_one_before_is_read(tmp_path: Path, size:
     saved = MissionFiles(tmp_path).read()
     assert saved is not None
     assert saved.memory.travelled == 3.0
+
+
+def test_a_snapshot_of_the_map_before_has_no_part_in_a_map_that_was_begun_anew(
+    tmp_path: Path,
+) -> None:
+    """The new map's journal tells of a robot that may have been moved before it began."""
+    files = MissionFiles(tmp_path)
+    files.append(batch(0, since=3.0), sync=False)
+    files.save(snapshot(2.0, Keyframe(2.0, Pose(), Pose(), Pose(), None)))
+    saved = MissionFiles(tmp_path).read()
+    assert saved is not None
+    assert (saved.past, saved.counts, saved.journey.stamps) == ([], [], [])
+    assert not saved.is_current
+    files.append(batch(0, 4), sync=False, after=0)
+    assert places(tmp_path) == [0.0, 1.0, 2.0, 3.0]
+    assert is_current(tmp_path)
 
 
 def test_a_crash_between_the_two_renamings_loses_nothing(tmp_path: Path) -> None:
