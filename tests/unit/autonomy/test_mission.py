@@ -800,17 +800,14 @@ def test_turning_into_the_first_open_street_on_the_left_after_driving_an_edge() 
 
 
 def test_the_passing_of_a_vertex_counts_a_traversal_of_the_edge_driven() -> None:
-    both = drawn(
-        {1: (0.0, 0.0), 2: (5.0, 0.0), 3: (10.0, 0.0), 4: (5.0, -3.0)},
-        {10: (1, 2, []), 11: (2, 3, []), 12: (2, 4, [])},
-        unseen={4: -math.pi / 2},
+    """From the middle of one edge past both ends of the next one: of that only all was driven."""
+    street = drawn(
+        {1: (0.0, 0.0), 2: (5.0, 0.0), 3: (9.0, 0.0), 4: (15.0, 0.0), 5: (5.0, 3.0), 6: (9.0, 2.0)},
+        {10: (1, 2, []), 11: (2, 3, []), 12: (3, 4, []), 13: (2, 5, []), 14: (3, 6, [])},
     )
     robot = Robot()
     robot.pose = Pose(2.5, 0.0, 0.0)
-    robot.stand(both, 8)
-    robot.drive(both, (2.5, 0.0), (7.0, 0.0))
-    traversals = {
-        tuple(sorted((edge.a.vertex, edge.b.vertex))): edge.traversals
-        for edge in robot.mapper.graph.edges.values()
-    }
-    assert sorted(traversals.values()) == [0, 1]
+    robot.stand(street, 8)
+    robot.drive(street, (2.5, 0.0), (11.0, 0.0))
+    driven = {round(edge.length): edge.traversals for edge in robot.mapper.graph.edges.values()}
+    assert driven == {5: 0, 4: 1, 6: 0, 3: 0, 2: 0}
