@@ -6,8 +6,8 @@ from functools import partial
 import numpy as np
 
 from gvgbot.autonomy.config import AutonomyConfig
-from gvgbot.autonomy.control.edge_follower import follow
-from gvgbot.autonomy.control.orders import Drive, LookAround, Order, Stand
+from gvgbot.autonomy.control.execution import Execution
+from gvgbot.autonomy.control.orders import Drive, Stand
 from gvgbot.autonomy.control.reflexes import (
     AWAY_M,
     Felt,
@@ -49,7 +49,6 @@ STANDS_CARRIED = (
     "restart the program, and it looks for its place on the whole map",
 )
 _OVERLAP_RAD = 0.2  # of what is seen before and after the first turn
-_TURN_SHARE = 0.8  # of the fastest turn, to look around
 _SCAN_EVERY_M, _SCAN_EVERY_RAD = 0.7, 0.5  # scans that are kept for the occupancy grid
 _LED_EVERY_M, _LED_EVERY_RAD = 0.4, 2.0  # looks for the GVG, where nobody waits for a way
 
@@ -91,10 +90,7 @@ class Pipeline:
         self._last: Keyframe | None = None
         self._kept: Pose | None = None  # local_base of the last scan that was kept
         self._looked: Pose | None = None  # local_base of the last look for the GVG
-        self._turning_to: float | None = None  # rad, anticlockwise, while it turns in place
-        self._turned = 0.0  # rad, since it began to
-        self._twist = STANDSTILL
-        self._order: Order = Stand()
+        self._execution = Execution(config.edge_follower, robot_radius)
         self.gvg = LocalGvg()
         self.open_clearance = config.reduction.open_clearance_m  # from walls; farther is no edge
         self.keyframes: list[Keyframe] = []
@@ -149,10 +145,11 @@ class Pipeline:
     @property
     def track(self) -> Array:
         """What is being driven along (N, 2), m, map frame; no point while standing or turning."""
-        if self._last is None or not isinstance(self._order, Drive):
+        order = self._execution.order
+        if self._last is None or not isinstance(order, Drive):
             return np.zeros((0, 2))
         map_local = self.mapper.belief.map_base.compose(self._last.local_base.inverse())
-        return map_local.transform(self._order.track.polyline)
+        return map_local.transform(order.track.polyline)
 
     @property
     def blur(self) -> Array:
@@ -240,17 +237,17 @@ class Pipeline:
         """Decide what to do next; what happened by that."""
         if self.led:
             return self.mission.witness(view, known)
-        if self._turning():
+        if self._execution.is_turning:
             return []
         if len(self.keyframes) == 1:
-            self._turn(_blind_angle(scan))
+            self._execution.turn(_blind_angle(scan))
             return []
         order, done = self.errands.advance(view, known)
         if isinstance(order, Drive) and self.traffic.is_in_team:
             room = self._radius, self._config.passage_margin_m
             local_map = self._local_map(view.local_base)
             order = Drive(self.traffic.led_round(order.track, view, local_map, *room))
-        self._obey(order)
+        self._execution.obey(order)
         return done
 
     def _local_gvg(self, local_base: Pose) -> LocalGvg:
@@ -354,7 +351,7 @@ class Pipeline:
         """The twist to drive now."""
         before = self._odometry.newest
         if before is not None:
-            self._turned += wrap_angle(odometry.odom_base.theta - before.odom_base.theta)
+            self._execution.note_turn(wrap_angle(odometry.odom_base.theta - before.odom_base.theta))
         self._odometry.append(odometry)
         if self._last is None or self.led:
             return STANDSTILL
@@ -363,7 +360,8 @@ class Pipeline:
         twist, incident = self._reflexes.act(moment, partial(self._room, local_base))
         command = self.errands.command(odometry.stamp)
         if command is not None and not self._reflexes.is_lifted:
-            self._turning_to, self._order, twist = None, Stand(), command
+            self._execution.stand()
+            twist = command
         if self.errands.is_resting:  # whoever touches it then is no obstacle
             incident, twist = incident if isinstance(incident, PutDown) else None, STANDSTILL
         if incident is not None:
@@ -373,21 +371,11 @@ class Pipeline:
     def _wish(self, local_base: Pose) -> Twist:
         """The twist that carries out the present order."""
         if self.errands.is_resting:
-            self._order = Stand()
+            self._execution.order = Stand()
             return STANDSTILL
-        if self._turning():
-            return Twist(0.0, self._config.edge_follower.max_turn_rate_radps * _TURN_SHARE)
-        match self._order:
-            case Drive(track=track):
-                self._twist = follow(
-                    track, local_base, self._twist.linear, self._radius, self._config.edge_follower
-                )
-                self._twist = self._careful(self._twist, local_base)
-                return self._twist
-            case _:
-                return STANDSTILL
+        return self._execution.wish(local_base, partial(self._careful, local_base))
 
-    def _careful(self, twist: Twist, local_base: Pose) -> Twist:
+    def _careful(self, local_base: Pose, twist: Twist) -> Twist:
         """The twist, slow enough to stop with room for somebody ahead who comes as fast."""
         if not self.traffic.is_in_team or self._last is None:
             return twist
@@ -425,19 +413,6 @@ class Pipeline:
             case PutDown():
                 self._incidents.append(("look around", "the robot was lifted"))
                 self._was_lifted = True
-
-    def _obey(self, order: Order) -> None:
-        if isinstance(order, LookAround):
-            self._turn(order.angle)
-        self._order = order
-
-    def _turn(self, angle: float) -> None:
-        self._turned, self._turning_to = 0.0, angle
-
-    def _turning(self) -> bool:
-        if self._turning_to is not None and self._turned >= self._turning_to:
-            self._turning_to = None
-        return self._turning_to is not None
 
 
 def _blind_angle(scan: Scan) -> float:

@@ -155,7 +155,7 @@ class ReturningPipeline(Pipeline):
             self.errands.is_carried, self._seeker, self._is_doubted = True, None, True
             return [Recovery(scan.stamp, *STANDS_CARRIED)]
         last = seeker._last
-        if last is None or seeker._turning():
+        if last is None or seeker._execution.is_turning:
             return []
         opinion = self._relocaliser.step(Look.around(last.local_base, seeker._maps.near))
         if opinion.map_local is not None and opinion.is_sure:

@@ -1,0 +1,60 @@
+"""Orders are carried out: turns to their end, tracks as carefully as it takes."""
+
+import math
+
+import numpy as np
+import pytest
+
+from gvgbot.autonomy.control.edge_follower import EdgeFollowerConfig, Track
+from gvgbot.autonomy.control.execution import Execution
+from gvgbot.autonomy.control.orders import Drive, LookAround, Stand
+from gvgbot.geometry import STANDSTILL, Pose, Twist
+
+AHEAD = Drive(Track.of(np.array([[0.0, 0.0], [5.0, 0.0]]), np.ones(2)))
+
+
+def as_it_is(twist: Twist) -> Twist:
+    return twist
+
+
+@pytest.fixture
+def execution() -> Execution:
+    return Execution(EdgeFollowerConfig(), 0.2)
+
+
+def test_at_first_it_stands(execution: Execution) -> None:
+    assert execution.wish(Pose(), as_it_is) == STANDSTILL
+
+
+def test_it_turns_on_the_spot_until_the_base_has_turned_so_far(execution: Execution) -> None:
+    execution.obey(LookAround(math.pi))
+    for turned in (2.0, -0.5, 1.0):  # 2.5 rad in all
+        execution.note_turn(turned)
+        twist = execution.wish(Pose(), as_it_is)
+        assert (twist.linear, twist.angular > 0.0) == (0.0, True)
+    execution.note_turn(0.7)
+    assert not execution.is_turning
+    execution.note_turn(-1.0)  # a turn that has ended does not begin again
+    assert execution.wish(Pose(), as_it_is) == STANDSTILL
+
+
+def test_a_track_is_followed_after_the_turn(execution: Execution) -> None:
+    execution.turn(1.0)
+    execution.obey(AHEAD)
+    assert execution.wish(Pose(), as_it_is).linear == 0.0
+    execution.note_turn(1.0)
+    assert execution.wish(Pose(), as_it_is).linear > 0.0
+
+
+def test_whoever_is_careful_slows_it_down_along_a_track(execution: Execution) -> None:
+    execution.obey(AHEAD)
+    assert execution.wish(Pose(), lambda twist: Twist(0.0, twist.angular)).linear == 0.0
+
+
+def test_to_stand_gives_up_the_turn_and_the_track(execution: Execution) -> None:
+    execution.obey(AHEAD)
+    execution.turn(1.0)
+    execution.stand()
+    assert not execution.is_turning
+    assert execution.order == Stand()
+    assert execution.wish(Pose(), as_it_is) == STANDSTILL
