@@ -221,9 +221,9 @@ def _check_room(path: Path) -> None:
 
 
 def _holds_run(path: Path) -> bool:
-    """Whether a run has left anything there: at the end, as it went, or only in its events."""
+    """Whether a run has left anything there: at the end, as it went, or only to go on with."""
     try:
-        if any((path / name).exists() for name in (SUMMARY, MAP)):
+        if any((path / name).exists() for name in (SUMMARY, MAP)) or any(path.glob("*.gvg")):
             return True
         return (path / EVENTS).stat().st_size > 0
     except FileNotFoundError:

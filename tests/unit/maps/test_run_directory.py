@@ -137,7 +137,7 @@ def test_of_a_list_that_ends_in_its_first_event_nothing_is_kept(tmp_path: Path) 
     assert (tmp_path / "events.jsonl").read_bytes() == b""
 
 
-@pytest.mark.parametrize("name", ["events.jsonl", "map.geojson", "summary.json"])
+@pytest.mark.parametrize("name", ["events.jsonl", "map.geojson", "summary.json", "snapshot.gvg"])
 def test_a_run_that_is_there_stays(tmp_path: Path, name: str) -> None:
     """Whether it has ended, was killed after its map was saved, or before."""
     (tmp_path / name).write_text("mine\n")
