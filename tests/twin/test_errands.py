@@ -418,6 +418,23 @@ def test_on_a_ring_without_meetpoints_every_place_is_driven_to_by_the_shorter_wa
     assert "two vertices or more" in tour.answers["patrol"].text
 
 
+def test_before_the_first_vertex_the_robot_comes_home_round_a_corner(tmp_path: Path) -> None:
+    """The way home goes out of sight while it turns round: no edge is known yet to go by."""
+    tour = Tour(Daemon(tmp_path / "run", theta()))
+
+    async def tell(clock: Clock) -> None:
+        story = Story(tour, clock)
+        await until(clock, lambda: story.place[1] > 3.6)
+        assert not story.pipeline.mapper.graph.edges
+        await story.ask("stop", "stop")
+        await story.trip("home", "home")
+
+    with tour.daemon.session.directory:
+        tour.daemon.run(tell)
+    assert tour.trips["home"].outcome == "arrived"
+    assert tour.trips["home"].off(START.x, START.y) < NEAR
+
+
 def test_without_permission_nothing_is_done(tmp_path: Path) -> None:
     """As it comes: who can reach the robot can watch it, and that is all."""
     daemon = Daemon(tmp_path / "run", requests=())

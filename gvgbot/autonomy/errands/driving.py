@@ -264,6 +264,8 @@ class Driving:
             return Drive(track)
         foot = foot_of(self._mapper, goal)
         if foot is None:
+            if self._looks < _LOOKS:  # the way may only be out of sight
+                return self._look_around(view)
             return Ended("given up", "no edge is known that it could drive on")
         at_foot = foot.in_local_frame(self._mapper, view)
         if self._is_there(view, at_foot, waited):
