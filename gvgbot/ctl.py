@@ -58,7 +58,8 @@ def _no_request(words: Sequence[str]) -> str:
     for word in reversed(words[:2]):  # the first one may be a robot
         if (near := nearest(word.lower(), REQUESTS)) is not None:
             return f"{word!r} is no request: did you mean {near}?"
-    *_, odd = [words[0], *(word for word in words[1:2] if word.isidentifier())]  # no number
+    is_robot_first = len(words) > 1 and words[1].isidentifier()  # and no number
+    odd = words[1] if is_robot_first else words[0]
     return f"{odd!r} is no request: there are {', '.join(REQUESTS)}"
 
 
