@@ -4,9 +4,12 @@ import math
 
 import pytest
 
+from gvgbot.config import TwinConfig
+from gvgbot.drivers.hokuyo.models import ModelName
+from gvgbot.drivers.hokuyo.twin_config import HokuyoTwinConfig
 from gvgbot.geometry import Pose
 from gvgbot.worlds.canvas import Canvas
-from tests.scenarios.rig import assert_explored, play
+from tests.scenarios.rig import assert_explored, assert_found, play
 from tests.unit.autonomy.sights import carved
 
 pytestmark = [pytest.mark.slow, pytest.mark.twin, pytest.mark.timeout(120)]
@@ -24,6 +27,19 @@ def test_a_room_behind_glass_is_entered_by_its_door() -> None:
     meetpoints = [run.world(vertex) for vertex in run.vertices("meetpoint")]
     assert min(math.dist(point, (3.7, 1.3)) for point in meetpoints) < 0.4
     assert len(meetpoints) <= 2  # a corner of the pane may not have been seen well enough
+
+
+@pytest.mark.parametrize("model", ["UTM-30LX", "URG-04LX"])
+def test_mixed_pixels_are_no_posts(model: ModelName) -> None:
+    """Half of the beams at an edge end in mid-air; a corridor, and two rooms beside it."""
+    rooms = [(-3.0, 1.0, 1.0, 5.0), (3.0, 1.2, 7.5, 5.0)]
+    doors = [(-1.5, 0.7, -0.5, 1.0), (5.0, 0.7, 6.0, 1.2)]
+    world = carved([(-5.0, -0.7, 9.0, 0.7), *rooms, *doors])
+    laser = HokuyoTwinConfig(model=model, mixed_pixel_fraction=0.5)
+    run = play(world, Pose(-4.0, 0.0, 0.0), twin=TwinConfig(seed=3, laser=laser))
+    assert_explored(run)
+    assert_found(run, "meetpoint", [(-1.0, 0.0), (5.5, 0.0)])
+    assert len(run.vertices("endpoint")) == 4
 
 
 def test_the_legs_of_a_chair_are_led_round_without_hesitation() -> None:

@@ -1,11 +1,14 @@
 """What single beams of a scan say, beside their neighbours: for the local map."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from gvgbot.geometry import Array
 from gvgbot.hal.messages import Scan
 
+_VEIL_M = 0.15  # from what is nearer and from what is farther, and from the lines of both
 _LONE_M = 0.3  # an echo nearer than both its neighbours by this is one of dust on glass
 
 
@@ -16,6 +19,30 @@ def without_single_dropouts(ranges: Array) -> Array:
     lone = np.isnan(inner) & ~np.isnan(left) & ~np.isnan(right)
     filled[1:-1][lone] = np.minimum(left[lone], right[lone])
     return filled
+
+
+def without_veils(scan: Scan) -> Scan:
+    """The scan without what may be mixed pixels: between near and far where a beam meets an edge.
+
+    On a straight wall the reciprocal of the range is linear in small angles, so a reading that is
+    on the line of the two on either side is of a wall seen at a low angle. Beams that failed are
+    passed over.
+    """
+    told = np.flatnonzero(~np.isnan(scan.ranges))
+    if not len(told):
+        return scan
+    depth = np.pad(scan.ranges[told], 2, mode="edge")
+    before, here, after = depth[1:-3], depth[2:-2], depth[3:-1]
+    is_veil = np.minimum(before, after) + _VEIL_M < here
+    is_veil &= here < np.maximum(before, after) - _VEIL_M
+    if not is_veil.any():
+        return scan
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for near, far in ((before, depth[:-4]), (after, depth[4:])):
+            is_veil &= ~(np.abs(1.0 / (2.0 / near - 1.0 / far) - here) < _VEIL_M)
+    ranges = scan.ranges.copy()
+    ranges[told[is_veil]] = np.nan
+    return replace(scan, ranges=ranges)
 
 
 def least_of_three(ranges: Array) -> Array:
