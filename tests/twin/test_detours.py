@@ -68,19 +68,22 @@ class Walker:
     async def go(self, clock: Clock, place: Point) -> float:
         """Drive to the vertex that is there, or to the point; metres driven."""
         begin, belief = self.pipeline.travelled, self.pipeline.mapper.belief
-        point = START.inverse().transform(np.array(place))
+        x, y = point = START.inverse().transform(np.array(place)).tolist()
         off = {v: math.dist(belief.map_vertex(v).position, point) for v in belief.ids}
         vertex = min(off, key=off.__getitem__)
-        x, y = point.tolist()
         where = {"vertex": vertex} if off[vertex] < NEAR else {"x": x, "y": y}
+        await self.try_to_go(clock, **where)
+        here = self.daemon.place
+        assert math.dist((here.x, here.y), place) < NEAR
+        return self.pipeline.travelled - begin
+
+    async def try_to_go(self, clock: Clock, **where: object) -> None:
+        """Drive to a vertex or a point, or as near to it as it comes."""
         answer = await self.daemon.network.ask("goto", **where)
         assert answer.done, answer.text
         while self.pipeline.errands.errand is not None:
             await clock.sleep_until(clock.now() + 0.2)
         await clock.sleep_until(clock.now() + 1.0)
-        here = self.daemon.place
-        assert math.dist((here.x, here.y), place) < NEAR
-        return self.pipeline.travelled - begin
 
 
 def test_who_cannot_go_back_goes_on_to_an_end_of_the_corridor_that_is_out_of_sight(
@@ -122,3 +125,26 @@ def test_on_a_ring_that_comes_back_to_its_only_vertex_the_other_way_round_is_tak
     walker.tell(story)
     for metres in driven:
         assert 24.0 - 8.5 < metres < 24.0 - 6.5 + 4.0  # and to the person and back
+
+
+def test_a_near_point_is_driven_to_when_somebody_asks_again_after_the_way_was_closed(
+    tmp_path: Path,
+) -> None:
+    """Round two corners, where nothing is to be seen from beside the junction, 3.0 m away."""
+    fork, beside, stem, end = (5.5, 2.0), (6.5, 2.0), (5.5, 3.5), (7.0, 5.0)
+    arms: list[Point] = [(2.0, 2.0), (9.0, 2.0)]
+    walker = Walker(tmp_path / "run", [arms, [fork, stem, (7.0, 3.5), end]])
+
+    async def story(clock: Clock) -> None:
+        await walker.go(clock, beside)
+        walker.put_person(5.5, 3.2)
+        x, y = START.inverse().transform(np.array(end)).tolist()
+        await walker.try_to_go(clock, x=x, y=y)
+        walker.put_person(1000.0, 1000.0)
+        await walker.go(clock, beside)
+        assert walker.pipeline.mapper.graph.blocked()
+        await walker.try_to_go(clock, x=x, y=y)
+        here = walker.daemon.place
+        assert math.dist((here.x, here.y), end) < NEAR
+
+    walker.tell(story)

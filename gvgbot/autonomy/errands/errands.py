@@ -229,12 +229,11 @@ class Errands:
             return "it is on its way there already"
         base = self._mapper.belief.map_base
         away = math.hypot(errand.x - base.x, errand.y - base.y)
-        if away > DIRECT_M:
+        trouble = self._trouble_on_the_way(errand)
+        if trouble is not None and self.closures.open_all(self._mapper.graph):
             trouble = self._trouble_on_the_way(errand)
-            if trouble is not None and self.closures.open_all(self._mapper.graph):
-                trouble = self._trouble_on_the_way(errand)
-            if trouble is not None:
-                raise Declined(trouble)
+        if trouble is not None and away > DIRECT_M:
+            raise Declined(trouble)
         self._take(errand, stamp)
         where = "to where it started" if isinstance(errand, Home) else "there"
         return f"it drives {where}, {away:.1f} m away in a straight line"
