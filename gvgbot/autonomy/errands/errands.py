@@ -225,7 +225,7 @@ class Errands:
 
     def _drive_to_point(self, errand: ToPoint | Home, stamp: float) -> str:
         self._check_going(stamp)
-        if self.errand == errand:
+        if self.errand == errand and not self._is_own:
             return "it is on its way there already"
         base = self._mapper.belief.map_base
         away = math.hypot(errand.x - base.x, errand.y - base.y)

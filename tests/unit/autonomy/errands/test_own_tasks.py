@@ -7,6 +7,7 @@ import numpy as np
 
 from gvgbot.autonomy.control.orders import Drive, Order, Stand
 from gvgbot.autonomy.errands import Errands
+from gvgbot.autonomy.errands.plans import Kept
 from gvgbot.autonomy.events import Decision, ErrandEnded, Event
 from gvgbot.autonomy.gvg.local import LocalGvg
 from gvgbot.autonomy.views import Correspondence, View
@@ -59,6 +60,17 @@ def test_it_drives_to_a_gap_before_all_is_explored() -> None:
     assert ended.outcome == "arrived"
     (decision,) = [d for d in robot.said(Decision) if isinstance(d, Decision) and d.vertex is None]
     assert decision.reason == "something may be missing there"
+
+
+def test_who_is_sent_to_where_it_was_driving_unasked_waits_there() -> None:
+    """It would go on by itself, and forget the way there when it is started again."""
+    robot = Explorer([GAP], [])
+    robot.until_it_moves_or_ends()
+    robot.errands.goto_point(*GAP, robot.stamp)
+    assert robot.errands.kept() == Kept("point", x=2.0, y=0.0)
+    robot.drive(CLOSED, (0.0, 0.0), (2.0, 0.0))
+    assert robot.errands.errand is None
+    assert robot.errands.is_waiting
 
 
 def test_who_has_driven_on_since_the_survey_makes_another_one_before_the_end() -> None:
