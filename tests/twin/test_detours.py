@@ -148,3 +148,45 @@ def test_a_near_point_is_driven_to_when_somebody_asks_again_after_the_way_was_cl
         assert math.dist((here.x, here.y), end) < NEAR
 
     walker.tell(story)
+
+
+def test_who_asks_opens_ways_that_were_closed_while_the_robot_explored(tmp_path: Path) -> None:
+    """Somebody stood behind it in an arm whose end is out of sight, and has gone."""
+    west: list[Point] = [(6.5, 2.0), (1.5, 2.0), (1.5, 7.0), (4.0, 7.0)]
+    arm: list[Point] = [(6.5, 2.0), (6.5, 7.0), (9.0, 7.0)]
+    walker = Walker(tmp_path / "run", [[(6.5, 2.0), (9.0, 2.0)], west, arm])
+    ask, pipeline = walker.daemon.network.ask, walker.pipeline
+    covered: list[str] = []
+
+    async def story(clock: Clock) -> None:
+        async def until(is_so: Callable[[], bool]) -> None:
+            end = clock.now() + 300.0
+            while not is_so():
+                assert clock.now() < end, "it did not become so"
+                await clock.sleep_until(clock.now() + 0.2)
+
+        await clock.sleep_until(0.5)
+        walker.put_person(1000.0, 1000.0)
+        await until(lambda: walker.daemon.place.y > 6.5)
+        walker.put_person(6.5, 4.5)
+        await until(lambda: bool(pipeline.mapper.graph.blocked()))
+        walker.put_person(1000.0, 1000.0)
+        await ask("stop")
+        await ask("home")
+        await until(lambda: pipeline.errands.errand is None)
+        assert walker.daemon.place.y < 3.0
+        await ask("patrol")
+        await until(
+            lambda: math.dist((walker.daemon.place.x, walker.daemon.place.y), arm[-1]) < 0.6
+        )
+        await ask("stop")
+        covered.append((await ask("coverage")).text)
+        await until(lambda: pipeline.errands.errand is None)
+        await clock.sleep_until(clock.now() + 1.0)
+        (*_, last) = walker.daemon.network.events[-1].events
+        covered.append(str(last.details["reason"]))
+
+    with walker.daemon.session.directory:
+        walker.daemon.run(story)
+    assert "2 of 2 edges" in covered[0]
+    assert covered[1] == "2 of 2 edges driven"

@@ -25,14 +25,15 @@ class Closures:
             self._open(graph, end)
 
     def open_all(self, graph: GvgGraph) -> bool:
-        """Unblock everything; whether there was something."""
-        were_some = bool(self.until)
-        for end in list(self.until):
+        """Unblock everything, and edges that were closed while exploring; whether there was any."""
+        edges = (end for end in graph.blocked() if graph.edge_at(end) is not None)
+        closed = {*self.until, *edges}
+        for end in closed:
             self._open(graph, end)
-        return were_some
+        return bool(closed)
 
     def _open(self, graph: GvgGraph, end: HalfEdgeId) -> None:
-        del self.until[end]
+        self.until.pop(end, None)
         half = graph.half_edge(end)
         if half is not None:
             half.blocked = False

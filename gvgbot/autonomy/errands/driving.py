@@ -35,6 +35,7 @@ from gvgbot.autonomy.views import Correspondence, View
 from gvgbot.autonomy.whereabouts import Situation
 from gvgbot.geometry import Array, wrap_angle
 
+_OFF_GRAPH_M = 3.0  # a point farther from every edge is out of reach
 DIRECT_M = 4.0  # off a point, one drives there straight, or with one bend
 _THERE_M = 0.15  # from a destination, one has arrived
 _PAST_M = 0.5  # from a stop at which one does not stop
@@ -81,6 +82,17 @@ class Ground:
             return False
         there = self.mapper.in_local_frame(view, vertex).position
         return float(np.hypot(*(there - view.local_base.position))) < _AT_VERTEX_M
+
+    def trouble_to(self, goal: ToPoint | Home, here: Situation | None) -> str | None:
+        """Why no known way leads to a point."""
+        foot = foot_of(self.mapper, np.array([goal.x, goal.y]))
+        if foot is None:
+            return "no edge is known yet that it could drive on"
+        if foot.away > _OFF_GRAPH_M and isinstance(goal, ToPoint):
+            return f"the nearest known way ends {foot.away:.1f} m from there"
+        if here is not None and route_to_foot(here, here.starts(), foot) is None:
+            return "no known way leads there"
+        return None
 
 
 class Driving:

@@ -2,10 +2,8 @@
 
 import math
 
-import numpy as np
-
 from gvgbot.autonomy.control.orders import Order, Stand
-from gvgbot.autonomy.destinations import Route, foot_of, route_to_foot, route_to_vertex
+from gvgbot.autonomy.destinations import Route, route_to_vertex
 from gvgbot.autonomy.errands.driving import DIRECT_M, Driving, Ended, Ground
 from gvgbot.autonomy.errands.kinds import (
     Coverage,
@@ -20,13 +18,13 @@ from gvgbot.autonomy.errands.own_tasks import OwnTasks
 from gvgbot.autonomy.errands.plans import Here, Kept, Plan, plan_for, recalled
 from gvgbot.autonomy.events import ErrandEnded, Event
 from gvgbot.autonomy.exploration.config import ExplorationConfig
+from gvgbot.autonomy.exploration.paths import shortest_paths
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.mission import Mission
 from gvgbot.autonomy.views import Correspondence, View
 from gvgbot.autonomy.whereabouts import Situation
 from gvgbot.geometry import STANDSTILL, Twist
 
-_OFF_GRAPH_M = 3.0  # a point farther from every edge is out of reach
 _MOST_NAMED = 40  # vertices, in an answer
 _MOST_STOPS = 10  # that are passed at once
 _HOLD_S = 0.5  # that a twist of somebody who drives holds; without another one the robot stands
@@ -172,7 +170,8 @@ class Errands:
         if route is None and self.whereabouts() is not None:
             raise Declined(f"no known way leads to vertex {vertex}")
         self._take(ToVertex(vertex), stamp)
-        return f"it drives{_far(route)} to vertex {vertex}"
+        far = "" if route is None else f" {route.metres:.1f} m"
+        return f"it drives{far} to vertex {vertex}"
 
     def patrol(self, vertices: tuple[int, ...], stamp: float) -> str:
         """Drive from vertex to vertex over and over, in this order; to all if none is named."""
@@ -184,6 +183,8 @@ class Errands:
             raise Declined(f"a patrol takes two vertices or more; {self._known_vertices()}")
         if self.errand == Patrol(vertices):
             return f"it does that already: {self._plan}"
+        if not places <= self._in_reach():
+            self.closures.open_all(self._mapper.graph)
         self._take(Patrol(vertices), stamp)
         return f"it patrols {len(places)} vertices until it is asked for something else"
 
@@ -197,9 +198,11 @@ class Errands:
             return f"it does that already: {self._plan}"
         self.closures.open_all(self._mapper.graph)
         self._take(Coverage(), stamp)
-        metres = sum(edge.length for edge in edges)
+        reached = self._in_reach() or self._mapper.graph.vertices.keys()
+        lengths = [edge.length for edge in edges if edge.a.vertex in reached]
         return (
-            f"it drives over all {len(edges)} edges, {metres:.0f} m and what must be driven twice"
+            f"it drives over {len(lengths)} of {len(edges)} edges, {sum(lengths):.0f} m "
+            "and what must be driven twice"
         )
 
     def drive(self, twist: Twist, stamp: float) -> bool:
@@ -229,31 +232,26 @@ class Errands:
             return "it is on its way there already"
         base = self._mapper.belief.map_base
         away = math.hypot(errand.x - base.x, errand.y - base.y)
-        trouble = self._trouble_on_the_way(errand)
+        here = self.whereabouts()
+        trouble = self._ground.trouble_to(errand, here)
         if trouble is not None and self.closures.open_all(self._mapper.graph):
-            trouble = self._trouble_on_the_way(errand)
+            trouble = self._ground.trouble_to(errand, here)
         if trouble is not None and away > DIRECT_M:
             raise Declined(trouble)
         self._take(errand, stamp)
         where = "to where it started" if isinstance(errand, Home) else "there"
         return f"it drives {where}, {away:.1f} m away in a straight line"
 
-    def _trouble_on_the_way(self, errand: ToPoint | Home) -> str | None:
-        """Why no known way leads to a point."""
-        foot, here = foot_of(self._mapper, np.array([errand.x, errand.y])), self.whereabouts()
-        if foot is None:
-            return "no edge is known yet that it could drive on"
-        if foot.away > _OFF_GRAPH_M and isinstance(errand, ToPoint):
-            return f"the nearest known way ends {foot.away:.1f} m from there"
-        if here is not None and route_to_foot(here, here.starts(), foot) is None:
-            return "no known way leads there"
-        return None
-
     def _way_to_vertex(self, vertex: int) -> Route | None:
         here = self.whereabouts()
         if here is None:
             return None
         return route_to_vertex(self._mapper.graph, here.starts(), vertex)
+
+    def _in_reach(self) -> set[int]:
+        """The vertices that known ways lead to."""
+        here = self.whereabouts()
+        return set() if here is None else set(shortest_paths(self._mapper.graph, here.starts()))
 
     def _unplaced_for(self) -> str:
         again = "it looks again when it is asked to explore"
@@ -298,7 +296,7 @@ class Errands:
             self.happened.append(ErrandEnded(stamp, str(self._plan.errand), how, reason))
             self.is_waiting = not self._is_own
         if self._is_own:
-            self.closures.open_all(self._mapper.graph)
+            self.closures.open_due(self._mapper.graph, math.inf)
         self._is_own = False
         self._plan = self._driving = self._command = None
 
@@ -397,7 +395,3 @@ class Errands:
         here = self.whereabouts()
         starts = [] if here is None else here.starts()
         return Here(view.stamp, self._mapper.graph, starts, view.travelled)
-
-
-def _far(route: Route | None) -> str:
-    return "" if route is None else f" {route.metres:.1f} m"

@@ -1,0 +1,23 @@
+"""What is answered to who asks for an errand."""
+
+import numpy as np
+
+from gvgbot.autonomy.slam.graph import HalfEdgeId, Vertex
+from gvgbot.geometry import Pose
+from tests.unit.autonomy.errands.test_own_tasks import Explorer
+from tests.unit.autonomy.test_mission import CLOSED
+
+
+def test_a_coverage_promises_no_edge_that_no_known_way_leads_to() -> None:
+    """The ways between two pieces of a map may be unknown."""
+    robot = Explorer()
+    graph = robot.mapper.graph
+    while not graph.edges:
+        robot.look(CLOSED)
+    (edge,) = graph.edges.values()
+    away = [Vertex(graph.next_id() + i, 1.0, Pose(), 0.0, 0.0) for i in range(2)]
+    graph.vertices |= {vertex.id: vertex for vertex in away}
+    a, b = (HalfEdgeId(vertex.id, vertex.add_half_edge(0.0)) for vertex in away)
+    graph.join(a, b, np.array([[0.0, 0.0], [100.0, 0.0]]), 1.0, driven=True)
+    answer = robot.errands.coverage(robot.stamp)
+    assert f"over 1 of 2 edges, {edge.length:.0f} m" in answer
