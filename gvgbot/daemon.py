@@ -176,15 +176,16 @@ def recorded(session: Session, *, patient: bool) -> AbstractContextManager[objec
     """
     if session.config.recording.path is None:
         return contextlib.nullcontext()
-    with extra_needed():
-        from gvgbot.recording.recorder import Recorder
     about = {
         "title": session.title,
         "version": __version__,
         "config": dump(session.config),
         "resumed": "yes" if session.pipeline.keyframes else "no",
     }
-    session.recorder = Recorder(session.config.recording, about, patient=patient)
+    with session.directory.emptied_by_failure(), extra_needed():
+        from gvgbot.recording.recorder import Recorder
+
+        session.recorder = Recorder(session.config.recording, about, patient=patient)
     session.recorder.map_base = lambda: session.pipeline.map_base
     return session.recorder
 

@@ -116,7 +116,9 @@ class RunDirectory:
     @contextlib.contextmanager
     def emptied_by_failure(self) -> Iterator[None]:
         """Remove what was written if an error ends the work on it, and nothing else."""
-        before = set(self.path.iterdir()) - {self.path / EVENTS}
+        before = set(self.path.iterdir())
+        if not self._events.tell():
+            before.discard(self.path / EVENTS)
         try:
             yield
         except Exception:

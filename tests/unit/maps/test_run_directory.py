@@ -119,6 +119,15 @@ def test_an_opened_run_goes_on(tmp_path: Path) -> None:
     assert (tmp_path / "summary.json").exists()
 
 
+def test_a_run_that_cannot_go_on_keeps_its_events(tmp_path: Path) -> None:
+    with RunDirectory(tmp_path / "run") as run:
+        run.append_event(LoopClosed(1.0, 2, 0.5))
+    run = RunDirectory(tmp_path / "run")
+    with pytest.raises(UsageError), run.emptied_by_failure():
+        raise UsageError("its recording cannot begin")
+    assert len((tmp_path / "run" / "events.jsonl").read_text().splitlines()) == 1
+
+
 @pytest.mark.parametrize("rest", [b'{"event": "loop_cl', b"\0" * 700, b'{"event": "l\0\0\0', b""])
 def test_what_a_power_cut_has_left_of_an_event_is_cut_off(tmp_path: Path, rest: bytes) -> None:
     with RunDirectory(tmp_path) as run:
