@@ -115,6 +115,8 @@ class Session:
         """Take down a control cycle."""
         if self._first_stamp is None:
             self._first_stamp = odometry.stamp
+        elif odometry.stamp < self._last_stamp:  # the clock was set back: what was before counts on
+            self._first_stamp += odometry.stamp - self._last_stamp
         self._last_stamp = odometry.stamp
         touching = contact is not None and contact.bumper
         self.contacts += touching and not self._in_contact
