@@ -47,13 +47,13 @@ class Links:
 
     async def open_laser(self) -> tuple[Laser, Close]:
         """A laser to be run, and what closes its link. Raises DeviceLost."""
-        config = self.config.laser
+        config, longest_s = self.config.laser, self.config.robot.limits.max_scan_age_s
         if self.simulation is None:
             stream, close = await _open_port("laser", config.port, config.baud)
         else:
             stream, close = self.simulation.laser, _leave_open
         stream = self._tapped("laser", stream)
-        self._laser = HokuyoLaser(stream, config, self.clock, self._laser_link)
+        self._laser = HokuyoLaser(stream, config, self.clock, self._laser_link, longest_s)
         return self._laser, close
 
     async def open_base(self) -> tuple[Base, Close]:

@@ -11,6 +11,7 @@ from typing import cast
 
 import pytest
 import serial
+import structlog
 
 from gvgbot.check import Heard, _base_lines, check, examine
 from gvgbot.clock import LoopClock, run_in_virtual_time
@@ -104,6 +105,21 @@ def test_a_laser_whose_scans_are_too_rare_to_drive_by_is_not_ready(setting: str)
 def test_a_laser_whose_scans_are_just_in_time_is_ready() -> None:
     status, points = said("twin.laser.model=URG-04LX", "laser.skip=3")
     assert (status, points["laser rate"][0]) == (0, "ok")
+
+
+@pytest.mark.parametrize(
+    ("skip", "limit_s", "is_told"), [(9, 0.5, True), (3, 0.5, False), (0, 0.09, True)]
+)
+def test_whoever_drives_by_scans_that_are_too_rare_is_told(
+    skip: int, limit_s: float, is_told: bool
+) -> None:
+    """A URG-04LX turns ten times a second."""
+    with structlog.testing.capture_logs() as logs:
+        limit = f"robot.limits.max_scan_age_s={limit_s}"
+        said("twin.laser.model=URG-04LX", f"laser.skip={skip}", limit)
+    told = [line["remedy"] for line in logs if line["event"] == "scans are too rare to drive by"]
+    assert len(told) == is_told
+    assert all("robot.limits.max_scan_age_s" in remedy for remedy in told)
 
 
 @contextmanager

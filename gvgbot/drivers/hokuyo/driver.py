@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -105,9 +106,10 @@ class HokuyoLaser:
         config: HokuyoConfig,
         clock: Clock,
         link: LinkStatistics | None = None,
+        longest_s: float = math.inf,
     ) -> None:
-        """With the `link` of a driver that was lost, its counters go on."""
-        self._config = config
+        """A lost driver's `link` counts on; by scans more than `longest_s` apart nobody drives."""
+        self._config, self._longest_s = config, longest_s
         link = link or LinkStatistics()
         self._dialogue = Dialogue(stream, clock, config.reply_timeout_s, link)
         self._reboots_before = link.reboots
@@ -202,6 +204,10 @@ class HokuyoLaser:
         self._mode = self._choose(self._parameters)
         if self._mode.adapted is not None:
             log.warning("laser mode fitted to its link", change=self._mode.adapted)
+        interval = self._parameters.period * (self._mode.request.skip + 1)
+        if interval > self._longest_s:
+            remedy = "raise robot.limits.max_scan_age_s or laser.rate_hz, or lower laser.skip"
+            log.warning("scans are too rare to drive by", every_s=round(interval, 3), remedy=remedy)
         return self._parameters
 
     def _choose(self, parameters: Parameters) -> Mode:
