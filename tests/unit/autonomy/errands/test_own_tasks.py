@@ -66,7 +66,7 @@ def test_who_is_sent_to_where_it_was_driving_unasked_waits_there() -> None:
     """It would go on by itself, and forget the way there when it is started again."""
     robot = Explorer([GAP], [])
     robot.until_it_moves_or_ends()
-    robot.errands.goto_point(*GAP, robot.stamp)
+    robot.errands.goto_point(GAP[0], GAP[1], robot.stamp)
     assert robot.errands.kept() == Kept("point", x=2.0, y=0.0)
     robot.drive(CLOSED, (0.0, 0.0), (2.0, 0.0))
     assert robot.errands.errand is None
