@@ -184,10 +184,12 @@ class Recogniser:
         Walls that have changed cannot hide a vertex that stands where it should and looks alike.
         """
         distance, metres, vertex = candidate
-        foreseen = view.local_base.compose(ekf.expected(belief, vertex.id)[0])
+        base_vertex = ekf.expected(belief, vertex.id)[0]
+        foreseen = view.local_base.compose(base_vertex)
         if not looks_alike(vertex, sighting, foreseen, self._config):
             return None
-        turn_sigma = math.sqrt(float(belief.P[2, 2])) + _TURN_SIGMA_RAD
+        S = ekf.innovation(belief, vertex.id, base_vertex, np.zeros((3, 3)))[1]
+        turn_sigma = math.sqrt(float(S[2, 2])) + _TURN_SIGMA_RAD
         turn = 0.0
         if turn_sigma * _WALLS_M > self._matching.max_pair_m:
             turn = turn_by_bearings(vertex, sighting, foreseen, self._config)
