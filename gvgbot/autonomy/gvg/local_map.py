@@ -102,11 +102,11 @@ class LocalMap:
         tells: up to somebody who is left out.
         """
         self._recentre(local_laser)
-        ranges, directions = without_single_dropouts(scan.ranges), scan.directions
-        passed = ranges if free is None else np.fmax(ranges, free)
+        directions, passed = scan.directions, without_single_dropouts(scan.ranges)
+        passed = passed if free is None else np.fmax(passed, free)
         self._carve(scan, passed, directions, local_laser, travelled)
         points = bridged(
-            local_laser.transform(end_points(ranges, directions, self._reach)),
+            local_laser.transform(end_points(scan.ranges, directions, self._reach)),
             self._config.bridge_gap_m,
         )
         self._occupy(points, local_laser.position, travelled)

@@ -113,6 +113,16 @@ def test_a_single_dropout_hides_nothing() -> None:
     assert off_the_walls(faulty.points()).max() < 0.1
 
 
+def test_a_dropout_beside_an_edge_makes_what_is_nearer_no_wider() -> None:
+    """A block 7 m ahead and up to 0.4 m aside; past it a beam fails, where it would be 0.41 m."""
+    block = carved([(-3.0, -2.0, 9.0, 2.0)], [(7.0, -0.4, 7.2, 0.4)])
+    scan = sweep(block, ORIGIN)
+    beside = int(np.flatnonzero(np.isclose(scan.ranges * scan.directions[:, 0], 7.0))[-1]) + 1
+    points = after(with_faults(scan, [beside], math.nan)).points()
+    aside = np.abs(points[np.abs(points[:, 0] - 7.0) < 0.1, 1])
+    assert aside[aside < 1.0].max() < 0.4
+
+
 def test_a_block_of_lost_beams_is_unknown_rather_than_free() -> None:
     lost = after(with_faults(sweep(ROOM, ORIGIN), list(range(480, 601)), math.nan))
     assert not lost.known(cells_of(1.0, -0.2, 2.8, 0.2)).any()
