@@ -38,12 +38,14 @@ class Space(Protocol):
 class Diagram:
     """Points (N, 2) with clearance (N,), linked by ridges from `a` to `b` (M,).
 
+    `certain` (N,) is whether the robot surely fits there, of those where a ridge that counts ends.
     `b` is -1 where a ridge goes on without end. `generators` (M, 2) are the two that a ridge lies
     between, `parts` (M,) whether the robot can tell them apart and fits between.
     """
 
     points: Array
     clearance: Array
+    certain: NDArray[np.bool_]
     a: Indices
     b: Indices
     generators: NDArray[np.int32]

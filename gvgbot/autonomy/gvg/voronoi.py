@@ -67,10 +67,9 @@ def fine_graph(
     room = _Room(local_map, generators, min_clearance, open_clearance)
     diagram = _diagram(triangles, room, roughness)
     points, clearance, links, endless = _ridges_that_count(diagram, room)
-    used = np.zeros(len(points), bool)
-    used[links] = used[diagram.a[endless]] = True
-    certain = np.zeros(len(points), bool)
-    certain[used] = room.is_certain(points[used], clearance[used])
+    certain, new = diagram.certain, slice(len(diagram.certain), None)  # those of the coast
+    if len(points[new]):
+        certain = np.concatenate([certain, room.is_certain(points[new], clearance[new])])
     here, there = certain[links.T]
     rim = np.concatenate([links[here & ~there], links[there & ~here, ::-1]])
     rim = rim[clearance[rim[:, 1]] >= min_clearance]
@@ -133,14 +132,14 @@ def _diagram(triangles: Delaunay, room: _Room, roughness: float) -> Diagram:
     parts[smooth] = True
     touched = np.zeros(len(points), bool)
     touched[a[smooth]] = touched[b[smooth][b[smooth] >= 0]] = True
+    certain = touched.copy()
     links = np.stack([a[rough], b[rough]])
-    certain = np.zeros(len(points), bool)
     certain[links] = True
     ends = np.flatnonzero(certain)
     certain[ends] = room.is_certain(points[ends], clearance[ends])
     sure = certain[links].all(axis=0)
     parts[rough[sure]] = _bridging(links[:, sure], touched)
-    return Diagram(points, clearance, a, b, pair, parts)
+    return Diagram(points, clearance, certain, a, b, pair, parts)
 
 
 def _far_apart(p: Array, q: Array, least: float) -> NDArray[np.intp]:

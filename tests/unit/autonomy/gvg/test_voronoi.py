@@ -142,9 +142,29 @@ class Drawn:
         return np.ones(points.shape[:-1], bool)
 
 
-@pytest.mark.parametrize("door", [0.45, 0.6, 0.8])
-def test_a_door_leads_into_a_room_whose_wall_is_uneven_by_millimetres(door: float) -> None:
-    """Far from the door its edges are no longer the nearest: what stands out beside them is."""
+def test_no_place_is_asked_for_twice_to_draw_one_graph() -> None:
+    """The ridges of a door's rough posts are asked for first, and then all that lead on."""
+
+    class Asked(Drawn):
+        places: Array = np.empty((0, 2))
+
+        def points(self) -> Array:
+            walls = super().points()  # scattered, so that no two discs of the diagram are the same
+            return walls + np.random.default_rng(1).normal(0.0, 1e-4, walls.shape)
+
+        def known(self, points: Array) -> NDArray[np.bool_]:
+            self.places = np.concatenate([self.places, points.reshape(-1, 2)])
+            return super().known(points)
+
+    space = Asked(*_uneven_room(0.6))
+    assert len(
+        fine_graph(space, np.array([0.0, -0.9]), min_clearance=RADIUS, roughness=0.03).points
+    )
+    assert len(np.unique(space.places, axis=0)) == len(space.places)
+
+
+def _uneven_room(door: float) -> list[tuple[Point, Point]]:
+    """A room whose wall stands out by millimetres beside its door, and a corridor."""
     post, beside, out = door / 2, door / 2 + 0.02, 0.002
     walls: list[tuple[Point, Point]] = [((-4.0, 7.0), (4.0, 7.0)), ((-4.0, -1.8), (4.0, -1.8))]
     for side in (-1.0, 1.0):
@@ -155,6 +175,13 @@ def test_a_door_leads_into_a_room_whose_wall_is_uneven_by_millimetres(door: floa
             ((beside * side, out), corner),
             (corner, (4.0 * side, 7.0)),
         ]
+    return walls
+
+
+@pytest.mark.parametrize("door", [0.45, 0.6, 0.8])
+def test_a_door_leads_into_a_room_whose_wall_is_uneven_by_millimetres(door: float) -> None:
+    """Far from the door its edges are no longer the nearest: what stands out beside them is."""
+    walls = _uneven_room(door)
     graph = fine_graph(Drawn(*walls), np.array([0.0, -0.9]), min_clearance=RADIUS, roughness=0.03)
     assert np.hypot(*(graph.points - [0.0, 3.5]).T).min() < 0.1  # the middle of the room
     assert np.hypot(*(graph.points - [0.0, -0.95]).T).min() < 0.1  # and of the corridor
