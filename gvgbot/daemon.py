@@ -27,7 +27,12 @@ from gvgbot.progress import Progress
 from gvgbot.recording import extra_needed
 from gvgbot.robot import Robot
 from gvgbot.ros2.node import Ros2Node
-from gvgbot.service import Notifier, StopSignals, set_up_logging
+from gvgbot.service import (
+    Notifier,
+    StopSignals,
+    set_up_logging,
+    start_left_out_of_collections,
+)
 from gvgbot.session import Session
 from gvgbot.simulation import Simulation, open_place
 from gvgbot.strict_yaml import dump
@@ -154,7 +159,7 @@ def run(config: Config, *, out: Path | None, known: Path | None = None, anew: bo
         )
         recording = recorded(session, patient=False)
         try:
-            with recording, asyncio.Runner() as runner:
+            with recording, start_left_out_of_collections(), asyncio.Runner() as runner:
                 runner.run(robot.serve(signals.wait()))
         except* GvgbotError as failures:
             session.failure = reason_of(failures)

@@ -2,10 +2,11 @@
 
 import asyncio
 import contextlib
+import gc
 import os
 import signal
 import socket
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from types import TracebackType
 from typing import Any, Literal, Self, TextIO, cast
@@ -121,6 +122,20 @@ class _Unbreakable:
     def flush(self) -> None:
         with contextlib.suppress(OSError):
             self._stream.flush()
+
+
+@contextlib.contextmanager
+def start_left_out_of_collections() -> Iterator[None]:
+    """Let the garbage collector pass over all that is there by now, most of which stays.
+
+    To go through it takes longer than a control cycle.
+    """
+    gc.collect()
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
 
 
 def set_up_logging(

@@ -1,6 +1,7 @@
 """The daemon in virtual time: how it starts, goes on without a device, ends, and what it leaves."""
 
 import asyncio
+import gc
 import json
 import math
 from collections.abc import Iterator
@@ -82,6 +83,22 @@ def test_a_run_that_a_mistake_of_the_program_ended_says_so(
         run(load_config(None, ["telemetry.enabled=false"]), out=tmp_path / "run")
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert (summary["outcome"], summary["reason"]) == ("failed", "a mistake")
+
+
+def test_a_collection_of_garbage_while_it_runs_passes_over_what_the_program_was_at_its_start(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gone_through: list[bool] = []
+
+    def looking(pipeline: Pipeline, scan: Scan) -> list[Event]:
+        gone_through.append(any(each is vars(np) for each in gc.get_objects()))
+        raise ValueError("seen enough")
+
+    monkeypatch.setattr(Pipeline, "perceive", looking)
+    with pytest.raises(ExceptionGroup):
+        run(load_config(None, ["telemetry.enabled=false"]), out=tmp_path / "run")
+    assert gone_through == [False]
+    assert any(each is vars(np) for each in gc.get_objects())  # as before
 
 
 def test_the_state_is_published_ten_times_a_second_with_the_truth_in_it(daemon: Daemon) -> None:
