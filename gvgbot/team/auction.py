@@ -101,6 +101,8 @@ class Auction:
             frontier = site.own.get(target)
         if frontier is None:
             return False
+        if frontier in site.own_at(target.vertex) and site.own.get(target) != frontier:
+            return False  # it leaves from the same vertex, as this robot sees now
         metres = {vertex: way.metres for vertex, way in shortest_paths(graph, starts).items()}
         cost, _ = site.costs(metres).get(frontier, (0.0 if claim is None else claim.metres, target))
         self._claim(frontier, cost, target)

@@ -75,6 +75,10 @@ class Site:
         """Whether there are places, and no departure from any of them is open."""
         return bool(self._points) and not self.open
 
+    def own_at(self, vertex: int) -> list[Frontier]:
+        """What is open of the departures of an own vertex."""
+        return [frontier for end, frontier in self.own.items() if end.vertex == vertex]
+
     def _lay(self, number: int, chart: Chart) -> None:
         """Let vertices of one more chart be at known places, or at new ones."""
         from scipy.optimize import linear_sum_assignment
@@ -214,7 +218,8 @@ class Site:
         """The way to every open frontier, m, and the own departure to take for it.
 
         `reached` has the ways to own vertices. From a departure that others have followed it goes
-        on over the edges of all.
+        on over the edges of all. What others alone have seen to leave from an own vertex is looked
+        for there.
         """
         best: dict[Frontier, tuple[float, HalfEdgeId]] = {}
         queue: list[tuple[float, int, HalfEdgeId]] = []
@@ -224,6 +229,10 @@ class Site:
         for end, onward in self.onward.items():
             if end.vertex in reached:
                 queue.append((reached[end.vertex] + onward.metres, onward.place, end))
+        for end in (*self.own, *self.onward):
+            if end.vertex in reached:
+                for frontier in self._seen_by_others(end.vertex):
+                    _improve(best, frontier, reached[end.vertex], end)
         heapq.heapify(queue)
         done: set[int] = set()
         while queue:
@@ -237,6 +246,11 @@ class Site:
                 if other not in done:
                     heapq.heappush(queue, (metres + length, other, end))
         return best
+
+    def _seen_by_others(self, vertex: int) -> list[Frontier]:
+        """What is open at an own vertex, and no departure of it in the own chart."""
+        own = self.own_at(vertex)
+        return [f for f in self.open.get(self._place[0, vertex], []) if f not in own]
 
 
 def _improve(

@@ -153,6 +153,32 @@ def test_who_is_on_another_departure_than_it_chose_keeps_it_only_if_nobody_follo
     assert kept == {*graph.frontiers()} - followed
 
 
+def test_who_comes_to_see_what_another_one_has_seen_leaves_a_vertex_by_that() -> None:
+    """From afar it saw two ways only, the way that it came and one that leads to a dead end."""
+    places = np.array([(0.0, 0.0), (6.0, 0.0), (12.0, 0.0), (6.0, 5.0)])
+    corridors = ((0, 1), (1, 3), (1, 2))
+    whole, partly = Building(places, corridors), Building(places, corridors[:2])
+    one, two = robot("one", partly, {0, 1}, 1), robot("two", whole, {1, 3}, 3)
+    for _ in range(2):
+        two.tell(1.0, one)
+        one.member.news(1.0, Pose(), finished=False)
+    one.member.settle(
+        Comparison("two", 0, Chart(), Chart(), None),
+        Alignment(START["one"].to(START["two"]), np.eye(3) * 1e-6, (), 1.0),
+    )
+    chosen = one.choose()
+    assert chosen is not None
+    assert chosen[0] == HalfEdgeId(1, 1)  # the only open one that it knows
+    at_vertex = [Approach(0.0, HalfEdgeId(1, -1))]
+    assert one.auction.keeps(chosen[0], graph_of(one.chart), at_vertex)
+    one.chart = whole.chart({0, 1}, START["one"])
+    one.member.news(2.0, Pose(), finished=False)
+    assert not one.auction.keeps(chosen[0], graph_of(one.chart), at_vertex)
+    seen = one.choose()
+    assert seen is not None
+    assert seen[0] == HalfEdgeId(1, 2)
+
+
 def test_who_follows_its_frontier_keeps_it_until_others_have_driven_it_from_the_far_end() -> None:
     building = Building(
         np.array([(0.0, 0.0), (10.0, 0.0), (0.0, 6.0), (10.0, 6.0), (-7.0, 0.0), (17.0, 0.0)]),

@@ -61,6 +61,19 @@ def test_ways_to_frontiers_are_shortest_over_what_all_know(seed: int) -> None:
                 assert frontier not in costs
 
 
+@pytest.mark.parametrize("followed", [{1, 3}, {1}])
+def test_what_others_have_seen_to_leave_from_an_own_vertex_is_as_far_as_that(
+    followed: set[int],
+) -> None:
+    """From afar only two ways were to be seen there; the other one is no dead end and back away."""
+    places = np.array([(0.0, 0.0), (6.0, 0.0), (12.0, 0.0), (6.0, 5.0)])
+    ours = Building(places, ((0, 1), (1, 3))).chart({0, 1}, HERE)
+    theirs = Building(places, ((0, 1), (1, 2), (1, 3))).chart(followed, HERE)
+    costs = Site([ours, theirs]).costs({0: 4.0, 1: 2.0})
+    ((metres, end),) = (cost for frontier, cost in costs.items() if abs(frontier.bearing) < 0.1)
+    assert (metres, end.vertex) == (2.0, 1)
+
+
 def test_a_vertex_that_only_one_robot_knows_lies_on_the_edge_of_the_other() -> None:
     """One has seen a side way in the middle of what the other knows as one corridor."""
     places = np.array([(0.0, 0.0), (6.0, 0.0), (12.0, 0.0), (6.0, 5.0)])
