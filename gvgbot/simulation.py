@@ -23,7 +23,7 @@ from gvgbot.geometry import Array, Pose
 from gvgbot.worlds import open_world
 
 _DOCK_IN_SIGHT = 6.0  # m; a dock's beams end before
-_SECTORS = 6  # of a sweep, each seen from one pose
+_SECTORS = 6  # of a sweep on the way, each seen from one pose
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +66,8 @@ class _Eye:
         self.body.advance(stamp)
         parameters, seen = self.model.parameters, []
         bearings = parameters.bearings
-        for beams in np.array_split(np.arange(len(bearings)), _SECTORS):
+        stands = self.body.linear == self.body.angular == 0.0
+        for beams in np.array_split(np.arange(len(bearings)), 1 if stands else _SECTORS):
             late = (parameters.first_step + float(beams.mean())) * parameters.step_time
             moved = Pose(self.body.linear * late, 0.0, self.body.angular * late)
             world_laser = self.body.pose.compose(moved).compose(self.base_laser)

@@ -72,6 +72,11 @@ class FaultSchedule:
         """Whether a fault was on at the last `advance`."""
         return name in self._ends
 
+    @property
+    def any_is_on(self) -> bool:
+        """Whether any fault was on at the last `advance`."""
+        return bool(self._ends)
+
     def next_due(self) -> float:
         """When the next fault begins or ends, s; inf if never."""
         return self._due

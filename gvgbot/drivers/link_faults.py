@@ -4,7 +4,6 @@ import math
 from collections import Counter, deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from operator import itemgetter
 from typing import Annotated, Literal
 
 import numpy as np
@@ -147,16 +146,23 @@ class FaultyLink:
     def _live(self, now: float) -> None:
         """Do what has become due here and in the company."""
         while True:
-            due, first = min(
-                ((link.own_due(now), link) for link in self.company), key=itemgetter(0)
-            )
+            first, due = self, math.inf
+            for link in self.company:
+                own = link.own_due(now)
+                if own < due:
+                    first, due = link, own
             if due > now:
                 return
             first.live_until(due)
 
     def _due(self) -> float:
-        wires = min(self._commands.next_due(), self._wire.next_due())
-        return min(self._device.next_due(), self._schedule.next_due(), self._chip_due, wires)
+        return min(
+            self._device.next_due(),
+            self._schedule.next_due(),
+            self._chip_due,
+            self._commands.next_due(),
+            self._wire.next_due(),
+        )
 
     def _deliver(self, now: float) -> None:
         """Hand the device what has come through to it."""

@@ -97,6 +97,8 @@ class Mishaps:
 
     def spoil(self, parts: list[FeedbackPart]) -> list[FeedbackPart]:
         """The parts of a frame as the base sends them in its present state."""
+        if not self._schedule.any_is_on:
+            return parts
         parts = [self._felt(part) for part in parts]
         if self.is_on("unknown part"):
             parts.append(_UNKNOWN_PART)
