@@ -298,21 +298,24 @@ def test_events_tell_the_story_in_order(run: Run) -> None:
 REPEATED = ("map.geojson", "events.jsonl", "map.pgm", "map.png", "estimate.tum", "truth.tum")
 
 
-def test_the_same_seed_leaves_the_same_bytes_and_another_one_does_not(tmp_path: Path) -> None:
-    one, again, other = (
-        explore(tee(), tmp_path / name, "--seed", seed)
-        for name, seed in (("one", "5"), ("again", "5"), ("other", "6"))
-    )
+@pytest.fixture(scope="module")
+def one(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    return explore(tee(), tmp_path_factory.mktemp("one"), "--seed", "5")
+
+
+def test_the_same_seed_leaves_the_same_bytes_and_another_one_does_not(
+    one: Run, tmp_path: Path
+) -> None:
+    again = explore(tee(), tmp_path / "again", "--seed", "5")
+    other = explore(tee(), tmp_path / "other", "--seed", "6")
     for name in REPEATED:
         assert (one.path / name).read_bytes() == (again.path / name).read_bytes()
     assert (one.path / "map.geojson").read_bytes() != (other.path / "map.geojson").read_bytes()
 
 
-def test_another_process_with_other_hashes_leaves_the_same_bytes(tmp_path: Path) -> None:
-    case = tee()
-    here = explore(case, tmp_path / "here", "--seed", "5")
-    world = tmp_path / "here" / "building.yaml"
-    start = [str(value) for value in (case.start.x, case.start.y, case.start.theta)]
+def test_another_process_with_other_hashes_leaves_the_same_bytes(one: Run, tmp_path: Path) -> None:
+    world, at = one.path.parent / "building.yaml", one.case.start
+    start = [str(value) for value in (at.x, at.y, at.theta)]
     command = [sys.executable, "-m", "gvgbot", "explore", "--world", str(world), "--seed", "5"]
     there = tmp_path / "there"
     subprocess.run(
@@ -323,7 +326,7 @@ def test_another_process_with_other_hashes_leaves_the_same_bytes(tmp_path: Path)
         timeout=60,
     )
     for name in REPEATED:
-        assert (here.path / name).read_bytes() == (there / name).read_bytes()
+        assert (one.path / name).read_bytes() == (there / name).read_bytes()
 
 
 def test_the_edge_of_the_start_is_not_driven_twice(tmp_path: Path) -> None:
