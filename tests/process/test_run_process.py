@@ -163,7 +163,7 @@ def test_a_simulated_exploration_that_is_stopped_leaves_its_map(
     number: signal.Signals, tmp_path: Path
 ) -> None:
     events = tmp_path / "run" / "events.jsonl"
-    with gvgbot("explore", "--out", "run", cwd=tmp_path) as process:
+    with gvgbot("explore", "--world", "narrow", "--out", "run", cwd=tmp_path) as process:
         until_joined(events, 1, process)
         process.send_signal(number)
         log, _ = process.communicate(timeout=PATIENCE)
@@ -179,9 +179,8 @@ def test_an_exploration_that_a_script_left_in_the_background_is_stopped_as_any(
     """There `&` has Ctrl-C ignored, and that it stays."""
     events = tmp_path / "run" / ("events.jsonl" if robots == 1 else "robot-1/events.jsonl")
     deaf = ["sh", "-c", 'trap "" INT; exec "$0" "$@"', sys.executable]
-    with gvgbot(
-        "explore", "--out", "run", "--robots", f"{robots}", cwd=tmp_path, python=deaf
-    ) as process:
+    arguments = ["explore", "--world", "narrow", "--out", "run", "--robots", f"{robots}"]
+    with gvgbot(*arguments, cwd=tmp_path, python=deaf) as process:
         until_joined(events, 1, process)
         process.send_signal(signal.SIGINT)
         until_joined(events, 3, process)
