@@ -22,7 +22,7 @@ from gvgbot.autonomy.control.room import room_ahead
 from gvgbot.autonomy.errands import Errands
 from gvgbot.autonomy.events import EdgeJoined, Event, Recovery, VertexAdded, WayForgotten
 from gvgbot.autonomy.exploration.config import ExplorationConfig
-from gvgbot.autonomy.gvg.beams import without_veils
+from gvgbot.autonomy.gvg.beams import without_mixed_pixels
 from gvgbot.autonomy.gvg.local import LocalGvg
 from gvgbot.autonomy.gvg.reduction import reduce_graph
 from gvgbot.autonomy.gvg.voronoi import fine_graph
@@ -172,7 +172,7 @@ class Pipeline:
             return happened
         if self._last is not None:
             self.mission.skip(max(0.0, scan.stamp - self._last.stamp - _LONGEST_GAP_S))
-        scan = deskewed(without_veils(scan), self._odometry.motion_during(scan))
+        scan = deskewed(without_mixed_pixels(scan), self._odometry.motion_during(scan))
         local_base = self._localise(scan, odom_base)
         if local_base is None:
             return happened

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from gvgbot.geometry import Array
 from gvgbot.hal.messages import Scan
 
-_VEIL_M = 0.15  # from what is nearer and from what is farther, and from the lines of both
+_MIXED_M = 0.15  # from what is nearer and from what is farther, and from the lines of both
 _LONE_M = 0.3  # an echo nearer than both its neighbours by this is one of dust on glass
 
 
@@ -21,7 +21,7 @@ def without_single_dropouts(ranges: Array) -> Array:
     return filled
 
 
-def without_veils(scan: Scan) -> Scan:
+def without_mixed_pixels(scan: Scan) -> Scan:
     """The scan without what may be mixed pixels: between near and far where a beam meets an edge.
 
     On a straight wall the reciprocal of the range is linear in small angles, so a reading that is
@@ -33,15 +33,15 @@ def without_veils(scan: Scan) -> Scan:
         return scan
     depth = np.pad(scan.ranges[told], 2, mode="edge")
     before, here, after = depth[1:-3], depth[2:-2], depth[3:-1]
-    is_veil = np.minimum(before, after) + _VEIL_M < here
-    is_veil &= here < np.maximum(before, after) - _VEIL_M
-    if not is_veil.any():
+    is_mixed = np.minimum(before, after) + _MIXED_M < here
+    is_mixed &= here < np.maximum(before, after) - _MIXED_M
+    if not is_mixed.any():
         return scan
     with np.errstate(divide="ignore", invalid="ignore"):
         for near, far in ((before, depth[:-4]), (after, depth[4:])):
-            is_veil &= ~(np.abs(1.0 / (2.0 / near - 1.0 / far) - here) < _VEIL_M)
+            is_mixed &= ~(np.abs(1.0 / (2.0 / near - 1.0 / far) - here) < _MIXED_M)
     ranges = scan.ranges.copy()
-    ranges[told[is_veil]] = np.nan
+    ranges[told[is_mixed]] = np.nan
     return replace(scan, ranges=ranges)
 
 

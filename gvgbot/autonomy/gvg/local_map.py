@@ -103,7 +103,8 @@ class LocalMap:
         """
         self._recentre(local_laser)
         directions, passed = scan.directions, without_single_dropouts(scan.ranges)
-        passed = passed if free is None else np.fmax(passed, free)
+        if free is not None:
+            passed = np.fmax(passed, free)
         self._carve(scan, passed, directions, local_laser, travelled)
         points = bridged(
             local_laser.transform(end_points(scan.ranges, directions, self._reach)),

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from gvgbot.autonomy.gvg.beams import without_veils
+from gvgbot.autonomy.gvg.beams import without_mixed_pixels
 from gvgbot.drivers.hokuyo.twin_readings import with_mixed_pixels
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
@@ -38,7 +38,7 @@ def test_what_floats_between_near_and_far_is_left_out_and_no_wall() -> None:
         true = sweep(ROOM_BY_CORRIDOR, Pose(*place, 0.0))
         noise = 0.01 * rng.standard_normal(len(true.ranges))
         scan = replace(true, ranges=with_mixed_pixels(true.ranges, 0.3, rng) + noise)
-        left, off = without_veils(scan), off_the_walls(scan, true)
+        left, off = without_mixed_pixels(scan), off_the_walls(scan, true)
         floating += int((off > 0.2).sum())
         left_over += int((off_the_walls(left, true) > 0.2).sum())
         lost += int((np.isnan(left.ranges) & (off < 0.05)).sum())
@@ -58,7 +58,7 @@ def test_a_wall_seen_at_a_low_angle_is_no_mixed_pixel(sigma: float, increment: f
     left_out = 0
     for _ in range(50):
         noisy = scan.ranges + sigma * rng.standard_normal(len(angles))
-        left_out += int(np.isnan(without_veils(replace(scan, ranges=noisy)).ranges).sum())
+        left_out += int(np.isnan(without_mixed_pixels(replace(scan, ranges=noisy)).ranges).sum())
     assert left_out <= 0.002 * 50 * len(angles)
 
 
@@ -84,4 +84,4 @@ def test_a_wall_seen_at_a_low_angle_is_no_mixed_pixel(sigma: float, increment: f
     ],
 )
 def test_single_beams(ranges: tuple[float, ...], expected: tuple[float, ...]) -> None:
-    np.testing.assert_array_equal(without_veils(scan_of(*ranges)).ranges, expected)
+    np.testing.assert_array_equal(without_mixed_pixels(scan_of(*ranges)).ranges, expected)
