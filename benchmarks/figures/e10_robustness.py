@@ -38,6 +38,7 @@ SCENARIOS = {  # the situation, and the tests of it
         f"{GLASS}::test_a_room_behind_glass_is_entered_by_its_door",
         f"{CONTACTS}::test_a_pane_of_glass_across_a_corridor_ends_it_after_a_few_touches",
     ),
+    "Mixed pixels": (f"{GLASS}::test_mixed_pixels_are_no_posts",),
     "Legs of chairs and tables": (
         f"{GLASS}::test_the_legs_of_a_chair_are_led_round_without_hesitation",
         f"{GLASS}::test_a_robot_between_two_legs_leaves_without_hesitation",
