@@ -21,9 +21,10 @@ explore: .venv/core
 	@$(BIN)/gvgbot explore $(ARGS)
 
 # A file's tests stay together, since they share what is slow to make. Those of whole processes wait a lot: one worker
-# more than there are cores. The files are taken as they are listed, so that the last ones are short.
+# more than there are cores. The files are taken as they are listed, so that the last ones are short. What is compiled
+# is kept, whatever the environment says: some hundred programs are started.
 test: .venv/dev
-	@$(BIN)/pytest --numprocesses $$(($$(getconf _NPROCESSORS_ONLN) + 1)) --dist loadfile --no-loadscope-reorder $(ARGS)
+	@PYTHONDONTWRITEBYTECODE= $(BIN)/pytest --numprocesses $$(($$(getconf _NPROCESSORS_ONLN) + 1)) --dist loadfile --no-loadscope-reorder $(ARGS)
 
 quick: .venv/dev
 	@$(BIN)/pytest -m "not slow and not hardware and not bench" $(ARGS)
