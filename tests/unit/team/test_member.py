@@ -79,6 +79,13 @@ def robot(name: str, building: Building, seen: set[int], at: int) -> Robot:
     return made
 
 
+def settle(here: Robot, there: str) -> None:
+    """Let a robot know for certain how the map of another one lies to its own."""
+    true = START[here.member.name].to(START[there])
+    alignment = Alignment(true, np.eye(3) * 1e-6, (), 1.0)
+    here.member.settle(Comparison(there, 0, Chart(), Chart(), None), alignment)
+
+
 def team() -> tuple[Robot, Robot]:
     """Two robots that have told each other what they know, and laid it on each other."""
     return copy.deepcopy(_met())
@@ -162,10 +169,7 @@ def test_who_comes_to_see_what_another_one_has_seen_leaves_a_vertex_by_that() ->
     for _ in range(2):
         two.tell(1.0, one)
         one.member.news(1.0, Pose(), finished=False)
-    one.member.settle(
-        Comparison("two", 0, Chart(), Chart(), None),
-        Alignment(START["one"].to(START["two"]), np.eye(3) * 1e-6, (), 1.0),
-    )
+    settle(one, "two")
     chosen = one.choose()
     assert chosen is not None
     assert chosen[0] == HalfEdgeId(1, 1)  # the only open one that it knows
@@ -191,10 +195,7 @@ def test_who_follows_its_frontier_keeps_it_until_others_have_driven_it_from_the_
     for _ in range(2):
         two.tell(1.0, one)
         one.member.news(1.0, Pose(), finished=False)
-    one.member.settle(
-        Comparison("two", 0, Chart(), Chart(), None),
-        Alignment(START["one"].to(START["two"]), np.eye(3) * 1e-6, (), 1.0),
-    )
+    settle(one, "two")
     assert one.auction.keeps(chosen[0], graph_of(one.chart), on_it)
     one.chart = replace(one.chart, ways=(way_from(building, 0, 1, 4.5, "one"),))
     two.chart = replace(two.chart, ways=(way_from(building, 1, 0, 5.0, "two"),))
@@ -212,9 +213,7 @@ def test_of_two_on_one_edge_the_one_that_is_ahead_goes_on() -> None:
         behind.tell(0.0, ahead)
         ahead.tell(0.0, behind)
     for here, there in ((behind, "two"), (ahead, "one")):
-        true = START[here.member.name].to(START[there])
-        alignment = Alignment(true, np.eye(3) * 1e-6, (), 1.0)
-        here.member.settle(Comparison(there, 0, Chart(), Chart(), None), alignment)
+        settle(here, there)
     chosen = behind.choose()
     assert chosen is not None
     on_it, graph = [Approach(-2.4, chosen[0])], graph_of(behind.chart)
@@ -252,10 +251,7 @@ def test_who_has_no_vertex_waits_and_ends_if_the_others_know_all(*, is_all_known
     one = Robot(Member("one", CONFIG, Chart, radius=RADIUS["one"]), Chart(), 0)
     two = robot("two", building, set(range(len(building.places))) if is_all_known else RIGHT, 14)
     two.tell(1.0, one)
-    one.member.settle(
-        Comparison("two", 0, Chart(), Chart(), None),
-        Alignment(START["one"].to(START["two"]), np.eye(3) * 1e-6, (), 1.0),
-    )
+    settle(one, "two")
     for is_busy in (True, False):
         assert one.auction.choose(GvgGraph(), []) is None
         assert one.auction.is_waiting == (is_all_known and is_busy)
@@ -633,10 +629,7 @@ def test_frames_are_known_over_others_whichever_of_two_has_found_the_other() -> 
     three = robot("three", irregular(2), LEFT, 0)
     one, two = team()
     two.tell(2.0, three)
-    three.member.settle(
-        Comparison("two", 0, Chart(), Chart(), None),
-        Alignment(START["three"].to(START["two"]), np.eye(3) * 1e-6, (), 1.0),
-    )
+    settle(three, "two")
     for _ in range(2):
         three.tell(2.0, one, two)
         two.tell(2.0, one, three)
