@@ -35,23 +35,26 @@ _SLIPPING = 25.0  # times the covariance of odometry, when the wheels slip
 _LOST = np.diag([0.5**2, 0.5**2, 0.05**2])  # of a base that nobody heard for a while
 _SEEN_SHARE = 0.3  # of the walls must be known to a robot that comes round a corner unseen
 _FITS_M, _FITTING = 0.15, 0.8  # so near to the walls must be that share of a scan's ends
-_MOST_SHARED = 100.0  # scans that a wall can be the mean of
-_PER_M = np.diag([0.002**2, 0.002**2, 0.0001**2])  # per metre: what cells do to walls
+_PER_M = np.diag([0.001**2, 0.001**2, 0.00005**2])  # per metre: what cells do to walls
 
 # full: scans are matched, and vertices are poses. paper: odometry alone between vertices, and a
 # vertex seen again corrects by its position only, as the method was published
 Localisation = Literal["full", "paper"]
 
 
-_Lesson = tuple[Pose, float, Pose, Array, Array]  # a motion, s, its change, Q and C
+_Lesson = tuple[Pose, float, Pose, Array, Array, float]  # as Calibration.learn takes it
 
 
 class _Walls(NamedTuple):
-    """Points (N, 2), the hits (N,) that each is made of, and where it was seen from (N, 2)."""
+    """Points (N, 2), the hits (N,) that each is made of, where it was seen from (N, 2), and when.
+
+    `looks` (N,) are the numbers of the looks at it, on average.
+    """
 
     points: Array
     hits: Array
     sights: Array
+    looks: Array
     tree: cKDTree
 
 
@@ -70,7 +73,6 @@ class LocalMaps:
         self._matching = matching
         self._calibration = Calibration()
         self._lesson: _Lesson | None = None  # what the calibration has yet to learn
-        self._shared = 1.0  # scans that the walls in sight are the mean of
         self.blur = np.zeros((3, 3))  # covariance of the last match, in the frame of the base
 
     def insert(
@@ -134,14 +136,16 @@ class LocalMaps:
             self.blur = np.zeros((3, 3))
             return prior, calibration.adds_up(motion, duration, np.eye(3), Q)
         found, used = best
+        walls = min(1.0, found.rms / self._matching.pair_sigma_m) ** 2
+        felt = used
         if used is Q:
-            self._lesson = motion, duration, prior.to(found.pose), Q, found.covariance
-        self.blur = found.covariance
-        self._shared = min((1.0 - _renewed(scan, motion)) * self._shared + 1.0, _MOST_SHARED)
-        noise = found.rms / self._matching.pair_sigma_m
-        moved = math.hypot(motion.x, motion.y)
-        drift, left = _drift(found, used, self._shared, noise)
-        drift += moved * _PER_M
+            self._lesson = motion, duration, prior.to(found.pose), Q, found.covariance, walls
+            felt = calibration.as_felt(Q)
+        g = np.eye(3) - found.covariance @ np.linalg.inv(used)
+        self.blur = _error(found, g, felt, walls)
+        stays = np.linalg.inv(np.eye(3) + g * self._age(found))
+        drift = stays @ self.blur @ stays.T + math.hypot(motion.x, motion.y) * _PER_M
+        left = np.asarray(stays @ (np.eye(3) - g), np.float64)
         return found.pose, calibration.adds_up(motion, duration, left, drift)
 
     def trust(
@@ -190,8 +194,18 @@ class LocalMaps:
             points,
             np.concatenate([self.near.hits(), self._far.hits()[around]]),
             np.concatenate([self.near.sights(), self._far.sights()[around]]),
+            np.concatenate([self.near.looked_at(), self._far.looked_at()[around]]),
             cKDTree(points, balanced_tree=False),
         )
+
+    def _age(self, found: Registration) -> float:
+        """How many looks before the newest one the walls that were found were seen, on average.
+
+        A pose errs by the share g as the mean of those from which its walls were seen, and else as
+        the one before: of an error the share 1 / (1 + g age) stays for good.
+        """
+        assert self._walls is not None
+        return self.near.looks - float(self._walls.looks[found.walls].mean())
 
     def _best(
         self,
@@ -208,7 +222,7 @@ class LocalMaps:
         """
         self.catch_up()
         assert self._walls is not None
-        walls, hits, sights, tree = self._walls
+        walls, hits, sights, _, tree = self._walls
         config = self._matching
         points = sampled(scan, config.points)
         sides = Sides(sights, scan.base_laser.position - points)
@@ -240,37 +254,16 @@ class LocalMaps:
         return best
 
 
-def _renewed(scan: Scan, motion: Pose) -> float:
-    """The share of the walls in sight that come into sight with a step of this motion.
+def _error(found: Registration, g: Array, felt: Array, walls: float) -> Array:
+    """Covariance (3, 3) of what is new in the error of a match, in the frame of the base.
 
-    A wall stays in sight for about twice the mean range, or a turn through the field of view. The
-    mean is over walls, of which a beam shows the more the farther it goes.
+    Scans are laid onto walls. A pose errs by e = (1 - g) (e' + q) + g (m + v): the gain g weighs
+    odometry with its noise q, which has the covariance `felt`, from the pose before, and walls with
+    the mean error m of the scans that drew them and the noise v of a match, which has `walls` times
+    the variance that the matcher expects. Of that e' and m are not new.
     """
-    with np.errstate(invalid="ignore"):
-        ranges = scan.ranges[scan.ranges < _RANGE_M]
-    reach = float((ranges**2).sum() / ranges.sum())
-    field_of_view = scan.angle_increment * len(scan.ranges)
-    moved = math.hypot(motion.x, motion.y)
-    return min(1.0, moved / (2 * reach) + abs(motion.theta) / field_of_view)
-
-
-def _drift(found: Registration, Q: Array, shared: float, noise: float) -> tuple[Array, Array]:
-    """Covariance (3, 3) of a step that was matched, so that those of many steps add up.
-
-    And the share (3, 3) of an error of odometry that stays for good.
-
-    Scans are laid onto walls, and walls drawn by `shared` scans on average, n. A pose errs by
-    e = (1 - g) (e' + q) + g (m + v): the gain g weighs odometry with its noise q, from the pose
-    before, and walls with the mean error m of those scans and the noise v of a match, which is
-    `noise` times what the matcher expects. Of the new in it, the share 1 / (1 + g (n - 1) / 2)
-    stays for good.
-    """
-    g = np.eye(3) - found.covariance @ np.linalg.inv(Q)
-    by_walls = g @ found.covariance * min(noise, 1.0) ** 2  # g V g', as V is P g^-1
-    new = (np.eye(3) - g) @ Q @ (np.eye(3) - g).T + by_walls
-    stays = np.linalg.inv(np.eye(3) + g * (shared - 1.0) / 2)
-    drift = stays @ new @ stays.T
-    return np.asarray((drift + drift.T) / 2), np.asarray(stays @ (np.eye(3) - g))
+    error = (np.eye(3) - g) @ felt @ (np.eye(3) - g).T + walls * (g @ found.covariance)
+    return np.asarray((error + error.T) / 2, np.float64)
 
 
 def _turned(points: Array, tree: cKDTree, prior: Pose, reach: float) -> Pose:

@@ -20,7 +20,7 @@ from gvgbot.autonomy.knowledge import ON_EDGE_M, Knowledge
 from gvgbot.autonomy.recogniser import CLOSE_M, Match, Recogniser, Recognition
 from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.graph import Edge, HalfEdgeId, Vertex
-from gvgbot.autonomy.slam.recognition import RecognitionConfig, Sighting, detection_covariance
+from gvgbot.autonomy.slam.recognition import RecognitionConfig, Sighting, sight_covariance
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
 from gvgbot.autonomy.topology import (
     direction,
@@ -35,6 +35,7 @@ from gvgbot.autonomy.views import Correspondence, Observation, View
 from gvgbot.geometry import Array, Pose
 
 _TURN_VARIANCE = 1e-6  # rad^2; a new vertex's frame is turned as the local one is
+_ODD = 9.0  # squared Mahalanobis distance, 2 degrees of freedom, of a sight that counts less
 _MEAN_OF = 10  # sightings, about, of which the place of a vertex is the mean
 _BESIDE_M = 1.0  # from so near, the walls around a vertex are seen well
 _BEHIND_M = 2.5  # the nearest walls of a vertex, others tell what it looks like
@@ -205,9 +206,7 @@ class Mapper(Knowledge):
         self.graph.vertices[vertex.id] = vertex
         base_vertex = view.local_base.to(local)
         R = np.zeros((3, 3))
-        R[:2, :2] = detection_covariance(
-            math.hypot(base_vertex.x, base_vertex.y), self._recognition
-        )
+        R[:2, :2] = sight_covariance(math.hypot(base_vertex.x, base_vertex.y), self._recognition)
         R[2, 2] = _TURN_VARIANCE
         self.belief = ekf.add_vertex(self.belief, vertex.id, base_vertex, R)
         self.observations.append(Observation(view.keyframe, vertex.id, base_vertex, R))
@@ -258,9 +257,22 @@ class Mapper(Knowledge):
         self._evidence.weigh_departures(view, node, vertex, known)
         if view.travelled - vertex.updated_at > self._config.update_every_m:
             vertex.updated_at = view.travelled
-            base_vertex = view.local_base.to(vertex.local)
-            R = detection_covariance(math.hypot(base_vertex.x, base_vertex.y), self._recognition)
+            self._look_again(view, vertex, view.local_base.to(vertex.local))
+
+    def _look_again(self, view: View, vertex: Vertex, base_vertex: Pose) -> None:
+        """Correct the belief by a vertex that is still in sight.
+
+        Such sights err alike, and together where more of the room comes into view: they tell of the
+        vertex and, where walls tell where the robot is, not of that. An odd one counts less.
+        """
+        R = sight_covariance(math.hypot(base_vertex.x, base_vertex.y), self._recognition)
+        if self._by_position:
             self._measure(view, vertex, base_vertex, R)
+            return
+        r, S, _ = ekf.innovation(self.belief, vertex.id, base_vertex, R)
+        R *= max(1.0, ekf.mahalanobis(r, S) / _ODD)
+        self.belief = ekf.correct_vertex(self.belief, vertex.id, base_vertex, R)
+        self.observations.append(Observation(view.keyframe, vertex.id, base_vertex, R))
 
     def _measure(self, view: View, vertex: Vertex, base_vertex: Pose, R: Array) -> None:
         """Correct the belief by a vertex seen again."""

@@ -51,22 +51,22 @@ class Cells:
     # (K,) numbers of the cells that sent lone echoes, glass perhaps, and how many
     glass: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
     echoes: NDArray[np.float32] = field(default_factory=lambda: np.empty(0, np.float32))
+    looks: int = 0  # so far, and the mean number of those at each of the walls (M,)
+    look: NDArray[np.float32] = field(default_factory=lambda: np.zeros(1, np.float32))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Odds:
     """What is known to be wrong with odometry: mean (3,) and covariance (3, 3).
 
-    `shared` is how many scans the walls in sight are the mean of, `noise` (2,) how noisy odometry
-    has proved to be, and `told` (2,) how many steps told of that. `common` (3, 3) is the covariance
-    of the pose with what is wrong.
+    `noises` (3,) is how noisy odometry has proved to be, and `told_of` (3,) how many steps told of
+    that. `common` (3, 3) is the covariance of the pose with what is wrong.
     """
 
     x: Array
     P: Array
-    shared: float = 1.0
-    noise: Array = field(default_factory=lambda: np.ones(2))
-    told: Array = field(default_factory=lambda: np.zeros(2))
+    noises: Array = field(default_factory=lambda: np.ones(3))
+    told_of: Array = field(default_factory=lambda: np.zeros(3))
     common: Array = field(default_factory=lambda: np.zeros((3, 3)))
 
 
@@ -150,7 +150,6 @@ def remember(pipeline: Pipeline) -> Memory:
         odds=Odds(
             calibration.x,
             calibration.P,
-            maps._shared,
             calibration.noise,
             calibration.told,
             calibration.shared,
@@ -198,6 +197,8 @@ def _cells(local_map: LocalMap) -> Cells:
         local_map._sight.reshape(-1, 2)[walls],
         glass,
         local_map._echoes.ravel()[glass],
+        local_map.looks,
+        local_map._look.ravel()[walls],
     )
 
 
@@ -237,9 +238,8 @@ def recall(pipeline: Pipeline, memory: Memory, past: list[Growth]) -> None:
         _recall_cells(pipeline._maps.far, memory.far)
     calibration = pipeline._maps.calibration
     calibration.x, calibration.P = memory.odds.x, memory.odds.P
-    calibration.noise, calibration.told = memory.odds.noise, memory.odds.told
+    calibration.noise, calibration.told = memory.odds.noises, memory.odds.told_of
     calibration.shared = memory.odds.common
-    pipeline._maps._shared = memory.odds.shared
     pipeline._hazards._all = list(memory.hazards)
     pipeline.traffic.newcomers._all = list(memory.newcomers)
     pipeline.traffic.passed, pipeline.traffic.lasting = memory.passed, []
@@ -298,6 +298,7 @@ def _recall_cells(local_map: LocalMap, cells: Cells) -> None:
     local_map._hits.ravel()[cells.walls] = cells.hits
     local_map._sight.reshape(-1, 2)[cells.walls] = cells.sight
     local_map._echoes.ravel()[cells.glass] = cells.echoes
+    local_map.looks, local_map._look.ravel()[cells.walls] = cells.looks, cells.look
     local_map._renew()
 
 

@@ -17,6 +17,7 @@ from gvgbot.autonomy.slam.recognition import (
     detection_covariance,
     gate_distances,
     looks_alike,
+    sight_covariance,
     turn_by_bearings,
 )
 from gvgbot.autonomy.slam.scan_matching import Registration, ScanMatchingConfig, Sides, register
@@ -32,7 +33,7 @@ _COMPARED = 12  # vertices elsewhere, to tell how many look like what is seen
 _PLACE_SIGMA_M = 0.15  # of a vertex laid onto what is seen, before its walls are
 _TURN_SIGMA_RAD = 0.02  # and of its turn, beside the robot's own
 _WALLS_M = 2.5  # from a vertex, about: turned by so much that these are missed, none are found
-_REGISTRATION_FLOOR = np.diag([4e-4, 4e-4, 9e-6])  # what registration cannot know of itself
+_REGISTRATION_FLOOR = np.diag([1e-4, 1e-4, 4e-6])  # what registration cannot know of itself
 
 
 class Candidate(NamedTuple):
@@ -208,7 +209,7 @@ class Recogniser:
         away = float(np.hypot(*(sighting.position - view.local_base.position)))
         if away > CLOSE_M or metres > 0.5 * self._config.same_place_m:
             return None
-        covariance = detection_covariance(away, self._config)
+        covariance = sight_covariance(away, self._config)
         return Match(vertex, prior, covariance, agreement, distance, metres)
 
     def _laid_on(

@@ -35,6 +35,7 @@ _EMPTY = (
     ("_mean", 0.0),
     ("_hits", 0.0),
     ("_sight", 0.0),
+    ("_look", 0.0),
     ("_echoes", 0.0),
     ("_seen_at", -np.inf),
 )
@@ -61,11 +62,15 @@ class LocalMapConfig:
 
 
 class Walls(NamedTuple):
-    """Mean hits (N, 2), how many there were (N,), and directions (N, 2) to where they were seen."""
+    """Mean hits (N, 2), how many there were (N,), and directions (N, 2) to where they were seen.
+
+    `looks` (N,) are the numbers of the looks that hit, on average.
+    """
 
     points: Array
     hits: Array
     sights: Array
+    looks: Array
 
 
 class LocalMap:
@@ -85,8 +90,10 @@ class LocalMap:
         self._mean = np.zeros((n, n, 2))
         self._hits = np.zeros((n, n), np.float32)  # that the mean is made of
         self._sight = np.zeros((n, n, 2), np.float32)  # mean direction to where it was seen from
+        self._look = np.zeros((n, n), np.float32)  # mean number of the looks at it
         self._echoes = np.zeros((n, n), np.float32)  # lone ones, of which old ones count less
         self._seen_at = np.full((n, n), -np.inf, np.float32)  # metres driven when last seen
+        self.looks = 0  # so far
         self._known = np.zeros((n + 2, n + 2), bool)  # with a rim for what is not in the window
         self._renew()
         centres = ((np.arange(n) + 0.5) * self._cell).astype(np.float32)
@@ -102,6 +109,7 @@ class LocalMap:
         tells: up to somebody who is left out.
         """
         self._recentre(local_laser)
+        self.looks += 1
         directions, passed = scan.directions, without_single_dropouts(scan.ranges)
         if free is not None:
             passed = np.fmax(passed, free)
@@ -124,6 +132,7 @@ class LocalMap:
             self._mean.reshape(-1, 2).take(cells, axis=0),
             self._hits.take(cells).astype(np.float64),
             self._sight.reshape(-1, 2).take(cells, axis=0).astype(np.float64),
+            self._look.take(cells).astype(np.float64),
         )
         self._walls = _merged(cells, self._size, walls, _ONE_WALL * self._cell)
         for drawn in self._walls:
@@ -154,6 +163,10 @@ class LocalMap:
     def sights(self) -> Array:
         """Mean direction (N, 2) from each of `points` to where it was seen from, local frame."""
         return self._walls.sights
+
+    def looked_at(self) -> Array:
+        """The mean number (N,) of the looks that hit each of `points`: the first look is 1."""
+        return self._walls.looks
 
     def suspects(self) -> Array:
         """Middles (N, 2) of free cells away from walls that send echoes: glass, perhaps."""
@@ -324,6 +337,7 @@ class LocalMap:
         towards /= np.maximum(np.hypot(*towards.T), 1e-6)[:, None]
         self._mean[i, j] = (1 - share) * self._mean[i, j] + share * mean
         self._sight[i, j] = (1 - share) * self._sight[i, j] + share * towards
+        self._look[i, j] += share[:, 0] * (self.looks - self._look[i, j])
         self._hits[i, j] = np.minimum(before + count, _MOST_HITS)
         self._votes[i, j] = np.minimum(old + _HIT, _MAX_VOTES)
         self._seen_at[i, j] = travelled
@@ -356,7 +370,7 @@ def _merged(cells: NDArray[np.intp], columns: int, walls: Walls, reach: float) -
     they are right. With a reach of less than half a cell no mean has two others on one axis.
     """
     for step in (1, columns):
-        points, hits, sights = walls
+        points, hits, sights, looks = walls
         beside = np.minimum(np.searchsorted(cells, cells + step), len(cells) - 1)
         low = np.flatnonzero(cells.take(beside) == cells + step)
         high = beside.take(low)
@@ -367,6 +381,7 @@ def _merged(cells: NDArray[np.intp], columns: int, walls: Walls, reach: float) -
         share = (hits[high] / (hits[low] + hits[high]))[:, None]
         points[low] += share * (points[high] - points[low])
         sights[low] += share * (sights[high] - sights[low])
+        looks[low] += share[:, 0] * (looks[high] - looks[low])
         hits[low] += hits[high]
         is_kept = np.ones(len(cells), bool)
         is_kept[high] = False

@@ -2,7 +2,8 @@
 
 A scale of all distances, a scale of all turns, and a turn rate that is felt while there is none.
 Walls correct each step only in part, so what is left of a constant error would add up. How far the
-corrections scatter tells how noisy odometry is: wheels wear, and no floor is like another.
+corrections scatter tells how noisy odometry is: wheels wear, and no floor is like another. A good
+base is doubted all the same, as the next floor may be another, but errs no more for that.
 """
 
 import numpy as np
@@ -12,7 +13,8 @@ from gvgbot.geometry import Array, Pose
 _SIGMA = np.array([0.02, 0.01, 0.0005])  # before anything is known: 1, 1, rad/s
 _WANDER = np.array([1e-5, 1e-5, 1e-6])  # of each with every step
 _SURPRISING = 16.0  # squared Mahalanobis distance of a correction that tells of a slip
-_NOISE = (0.5, 25.0)  # variance of odometry, least and most, in units of what is expected
+_NOISE = (0.02, 25.0)  # variance of odometry, least and most, in units of what is expected
+_LEAST_DOUBTED = 0.5  # by so much of it motions are doubted, however good: floors have surprises
 _RATE, _FEW = 0.02, 20.0  # at which it is learnt with each step, and the steps until it is that low
 _ODDEST = 9.0  # a correction says no more than one of three sigmas
 _LEAST_SHARE = 0.1  # of its own covariance, that a step has in every direction
@@ -25,15 +27,15 @@ class Calibration:
     `shared` (3, 3) is the covariance of the pose, in the frame of the base, with the three: what
     is wrong with odometry is wrong at every step, so where walls do not tell, errors of steps do
     not cancel but add up. (Schmidt-Kalman filter: they are considered and not estimated there.)
-    `noise` (2,) is the variance of distances and of turns, in units of what is expected, and `told`
-    (2,) how many steps told of it.
+    `noise` (3,) is the variance along the way, sideways and of turns, in units of what is expected,
+    and `told` (3,) how many steps told of it.
     """
 
     def __init__(self) -> None:
         self.x = np.zeros(3)
         self.P = np.diag(_SIGMA**2)
         self.shared = np.zeros((3, 3))
-        self.noise, self.told = np.ones(2), np.zeros(2)
+        self.noise, self.told = np.ones(3), np.zeros(3)
 
     def corrected(self, motion: Pose, duration: float) -> Pose:
         """A motion that odometry felt in some seconds, as it most probably was."""
@@ -45,8 +47,13 @@ class Calibration:
         )
 
     def scattered(self, Q: Array) -> Array:
-        """The covariance (3, 3) of a motion, which is expected to be Q, as it has proved to be."""
-        sigmas = np.sqrt(self.noise[[0, 0, 1]])
+        """The covariance (3, 3) of a motion, expected to be Q, by which it is doubted."""
+        sigmas = np.sqrt(np.maximum(self.noise, _LEAST_DOUBTED))
+        return np.asarray(Q * np.outer(sigmas, sigmas), np.float64)
+
+    def as_felt(self, Q: Array) -> Array:
+        """What a motion that is doubted by Q (3, 3), as `scattered` has it, has proved to err."""
+        sigmas = np.sqrt(np.minimum(self.noise / _LEAST_DOUBTED, 1.0))
         return np.asarray(Q * np.outer(sigmas, sigmas), np.float64)
 
     def adds_up(self, motion: Pose, duration: float, left: Array, drift: Array) -> Array:
@@ -67,19 +74,23 @@ class Calibration:
         axes = L @ axes
         return np.asarray(axes * np.maximum(1.0 + values, _LEAST_SHARE) @ axes.T)
 
-    def learn(self, motion: Pose, duration: float, change: Pose, Q: Array, C: Array) -> None:
+    def learn(
+        self, motion: Pose, duration: float, change: Pose, Q: Array, C: Array, walls: float = 1.0
+    ) -> None:
         """Account for the change that walls made to the pose after a corrected motion.
 
-        The change is in the frame of the base after it. Q and C (3, 3) are the covariances of that
-        pose before and after, in the same frame: Q - C is that of the change, and 1 - C Q^-1 the
-        share of an error that the change makes good.
+        The change is in the frame of the base after it. Q and C (3, 3) are the covariances by which
+        that pose was doubted before and after, in the same frame: 1 - C Q^-1 is the share g of an
+        error that the change makes good. `walls` is the variance of what walls say, in units of
+        what C takes it for.
         """
-        J = _per_unit(motion, duration)
-        H = J - C @ np.linalg.solve(Q, J)
+        g = np.eye(3) - C @ np.linalg.inv(Q)
+        H = g @ _per_unit(motion, duration)
         r = np.array([change.x, change.y, change.theta])
         P = self.P + np.diag(_WANDER**2)
-        S = H @ P @ H.T + Q - C + _LEAST
-        self._learn_noise(r, S, Q, C)
+        felt = g @ self.as_felt(Q) @ g.T
+        S = H @ P @ H.T + felt + walls * (g @ C) + _LEAST  # g V g' = g C
+        self._learn_noise(r, S, felt)
         if r @ np.linalg.solve(S, r) > _SURPRISING:
             return
         K = np.linalg.solve(S, H @ P).T
@@ -88,16 +99,16 @@ class Calibration:
         P -= K @ S @ K.T
         self.P, self.shared = (P + P.T) / 2, self.shared @ left.T
 
-    def _learn_noise(self, r: Array, S: Array, Q: Array, C: Array) -> None:
+    def _learn_noise(self, r: Array, S: Array, felt: Array) -> None:
         """Let the noise follow the squares of corrections r (3,) over their variances in S (3, 3).
 
-        They are 1 on average if it is right; a step counts by how much of an error it makes good.
+        They are 1 on average if it is right; a step counts by the share of what was `felt` in it.
         """
-        axes = [0, 2]  # along the way, and the heading
-        counts = np.maximum(0.0, 1.0 - C[axes, axes] / Q[axes, axes]) ** 2
+        expected = np.diag(S)
+        counts = (np.diag(felt) / expected) ** 2
         self.told = self.told + counts
         rate = np.maximum(_RATE, 1.0 / (_FEW + self.told)) * counts
-        odd = np.minimum(r[axes] ** 2 / S[axes, axes], _ODDEST)
+        odd = np.minimum(r**2 / expected, _ODDEST)
         self.noise = np.clip(self.noise * np.exp(rate * (odd - 1.0)), *_NOISE)
 
 

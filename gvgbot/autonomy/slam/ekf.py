@@ -305,6 +305,28 @@ def correct(belief: Belief, vertex: int, base_vertex: Pose, R: Array) -> Belief:
     return Belief(x, belief.P, belief.ids)
 
 
+def correct_vertex(belief: Belief, vertex: int, base_vertex: Pose, R: Array) -> Belief:
+    """As `correct`, but only the vertex is moved, whatever that would tell of all else.
+
+    Joseph's form is valid for any gain. What it costs grows with the number of vertices.
+    """
+    used = _used(belief, vertex)
+    own = slice(int(used[3]), int(used[5]) + 1)
+    r, H = _residual(belief, vertex, base_vertex, len(R))
+    H = H[:, used]
+    HP = H @ belief.P[used]
+    S = HP[:, used] @ H.T + R
+    K = np.asarray(np.linalg.solve(S, HP[:, own]).T, np.float64)
+    x, P = belief.x.copy(), belief.P
+    x[own] += K @ r
+    # (I - K H) P (I - K H)' + K R K' = P - K HP - P H' K' + K S K'
+    less = K @ HP
+    P[own] -= less
+    P[:, own] -= less.T
+    P[own, own] += K @ S @ K.T
+    return Belief(_wrapped(x), P, belief.ids)
+
+
 def _subtract(P: Array, left: Array, right: Array) -> None:
     """Take a symmetric product (N, K) (K, N) from P, which stays symmetric to the last bit."""
     right = np.ascontiguousarray(right)

@@ -17,6 +17,7 @@ from gvgbot.geometry import Array, Pose, wrap_angle
 from gvgbot.ranges import Range
 
 _SIGMA_PER_M = 0.015  # of a vertex's place, m per metre from which it is seen
+_SIGHT = 0.5  # of that is what a sight errs; on another visit the place may look another
 _CLEARANCE_SHARE = 0.15  # by which two sightings may differ in a wide space
 _DEGREE_SHARE = 0.4  # by which degrees may differ
 _BESIDE_M = 0.4  # where a vertex is known to be, and where it is: as far apart as that may be
@@ -60,8 +61,13 @@ class Sighting:
 
 
 def detection_covariance(distance: float, config: RecognitionConfig) -> Array:
-    """Covariance (2, 2) of a vertex position seen from a distance, m^2."""
+    """Covariance (2, 2) by which a vertex seen from a distance may be a known one, m^2."""
     return np.eye(2) * (config.detection_sigma_m**2 + (_SIGMA_PER_M * distance) ** 2)
+
+
+def sight_covariance(distance: float, config: RecognitionConfig) -> Array:
+    """Covariance (2, 2) of what one visit says of a vertex position from a distance, m^2."""
+    return np.asarray(_SIGHT**2 * detection_covariance(distance, config), np.float64)
 
 
 def match_bearings(

@@ -48,6 +48,7 @@ class Registration:
     covariance: Array
     inliers: float  # share of the points that found a wall
     rms: float  # metres from the walls
+    walls: NDArray[np.intp]  # the nearest wall point of each pair
 
 
 class Sides(NamedTuple):
@@ -74,6 +75,7 @@ class _Pairs(NamedTuple):
     points: Array
     normal: Array
     distance: Array
+    walls: NDArray[np.intp]  # the nearest wall point (K,) of each
 
 
 def register(
@@ -122,7 +124,7 @@ def register(
         if max(map(abs, change.tolist())) < within:
             break
     rms = math.sqrt(float(residual @ residual) / len(residual))
-    return Registration(pose, np.linalg.inv(A), len(residual) / len(points), rms)
+    return Registration(pose, np.linalg.inv(A), len(residual) / len(points), rms, pairs.walls)
 
 
 def register_coarsely(
@@ -197,7 +199,9 @@ def _pairs(
         flat &= enough
     lines = np.flatnonzero(flat)
     centre, normal = centre.take(lines, axis=1), normal.take(lines, axis=1)
-    return _Pairs(points.take(lines, axis=0).T, normal, (centre * normal).sum(axis=0))
+    return _Pairs(
+        points.take(lines, axis=0).T, normal, (centre * normal).sum(axis=0), near[lines, 0]
+    )
 
 
 def _linear(pairs: _Pairs, pose: Pose, prior: Pose, reach: float) -> tuple[Array, Array]:

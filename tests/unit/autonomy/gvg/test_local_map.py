@@ -189,6 +189,22 @@ def test_a_wall_that_appears_is_there_after_one_scan() -> None:
     assert wall_points_near(local_map, 1.0, 0.0) > 3
 
 
+def test_when_walls_were_seen_is_told_by_the_looks_at_them() -> None:
+    """Ten looks to the left, then four all around."""
+    both = sweep(ROOM, ORIGIN)
+    bearings = both.angle_min + both.angle_increment * np.arange(len(both.ranges))
+    left = replace(both, ranges=np.where(bearings > 0.0, both.ranges, math.nan))
+    local_map = LocalMap(LocalMapConfig())
+    for look in range(14):
+        local_map.insert(left if look < 10 else both, ORIGIN, 0.0)
+    looks, x = local_map.looked_at(), local_map.points()
+    assert local_map.looks == 14
+    on_the_right = (x[:, 1] < -1.8) & (np.abs(x[:, 0]) < 1.0)
+    on_the_left = (x[:, 1] > 1.8) & (np.abs(x[:, 0]) < 1.0)
+    assert np.allclose(looks[on_the_right], np.mean(range(11, 15)))
+    assert np.allclose(looks[on_the_left], np.mean(range(1, 15)), rtol=0.02)  # old hits fade
+
+
 def test_standing_walls_survive_a_hundred_noisy_scans_from_all_over_the_room() -> None:
     rng = np.random.default_rng(5)
     poses = [Pose(*rng.uniform((-2.5, -1.5, -3.0), (2.5, 1.5, 3.0))) for _ in range(100)]

@@ -120,9 +120,32 @@ def test_noise_as_expected_stays() -> None:
 
 def test_walls_along_which_one_drives_say_nothing_about_the_noise_of_distances() -> None:
     side_walls = np.diag([0.0, 1.0 / 0.004**2, 1.0 / 0.001**2])
-    along, heading = noise_found(4.0, side_walls, seed=1)
+    along, sideways, heading = noise_found(4.0, side_walls, seed=1)
     assert along == 1.0
-    assert heading > 2.0
+    assert min(sideways, heading) > 2.0
+
+
+def test_a_good_base_errs_less_than_it_is_doubted() -> None:
+    found = np.array([noise_found(0.1, 25 * WALLS, seed=seed, steps=1500) for seed in range(10)])
+    assert np.allclose(found.mean(axis=0), 0.1, rtol=0.5)
+    calibration = Calibration()
+    calibration.noise = found.mean(axis=0)
+    doubted = calibration.scattered(Q)
+    assert np.allclose(doubted, 0.5 * Q)
+    assert np.allclose(np.diag(calibration.as_felt(doubted)), calibration.noise * np.diag(Q))
+
+
+def test_walls_that_are_better_than_they_are_taken_for_hide_no_noise() -> None:
+    """Walls that scatter by a third of what matching expects: what is left is the odometry's."""
+    rng, calibration = np.random.default_rng(3), Calibration()
+    V = 1.0 / np.diag(WALLS)
+    for _ in range(1500):
+        expected = calibration.scattered(Q)
+        C = np.asarray(np.linalg.inv(np.linalg.inv(expected) + WALLS), np.float64)
+        off = rng.multivariate_normal(np.zeros(3), Q) + rng.normal(0.0, np.sqrt(V) / 3)
+        change = Pose.from_array(C @ WALLS @ off)
+        calibration.learn(Pose(0.25, 0.0, 0.0), 0.5, change, expected, C, walls=1 / 9)
+    assert np.allclose(calibration.noise, 1.0, rtol=0.4)
 
 
 def test_one_slip_makes_no_noise() -> None:

@@ -16,6 +16,7 @@ from gvgbot.autonomy.slam.ekf import (
     add_vertex,
     advance,
     apart,
+    correct_vertex,
     distances,
     expected,
     innovation,
@@ -245,6 +246,28 @@ def test_a_map_of_many_blocks_is_corrected_as_the_textbook_says() -> None:
     assert np.allclose(after.P, joseph, rtol=0.0, atol=1e-13)
     assert np.allclose(after.P, after.P.T)
     assert np.allclose(innovation(belief, 50, foreseen, R)[1], S, rtol=0.0, atol=1e-13)
+
+
+@given(seeds, st.integers(2, 3))
+def test_a_vertex_alone_is_corrected_as_with_a_gain_that_is_zero_elsewhere(
+    seed: int, k: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    belief = random_belief(rng, 5)
+    vertex = int(rng.choice(belief.ids))
+    R, own = random_covariance(rng, k), 3 + 3 * belief.ids.index(vertex) + np.arange(3)
+    foreseen, H = expected(belief, vertex)
+    seen, H = foreseen.compose(Pose(0.1, -0.2, 0.05)), H[:k]
+    r = np.array([seen.x - foreseen.x, seen.y - foreseen.y, 0.05])[:k]
+    K = np.zeros((len(belief.x), k))
+    K[own] = (belief.P @ H.T @ np.linalg.inv(H @ belief.P @ H.T + R))[own]
+    rest = np.eye(len(belief.x)) - K @ H
+    joseph, x = rest @ belief.P @ rest.T + K @ R @ K.T, belief.x + K @ r
+    after = correct_vertex(belief, vertex, seen, R)
+    off = after.x - x
+    assert np.allclose(after.P, joseph, rtol=0.0, atol=1e-12)
+    assert np.allclose(after.P, after.P.T, rtol=0.0, atol=1e-15)
+    assert np.allclose([*np.delete(off, np.s_[2::3]), *np.sin(off[2::3])], 0.0, atol=1e-12)
 
 
 @given(seeds)
