@@ -566,6 +566,33 @@ def test_the_robot_s_uncertainty_is_in_the_place_of_a_vertex_seen_later() -> Non
     assert later > first + 0.9  # at least the 0.5 in x and in y
 
 
+def test_a_vertex_that_moves_as_more_of_it_is_seen_takes_the_robot_nowhere() -> None:
+    """Half a metre in the end, as a meetpoint that is seen through a door from ever farther."""
+    seen = Seen().look(TEE, CONFIG.candidates.meetpoint_sightings)
+    seen.mapper.move(Pose(), 0.02**2 * np.eye(3))
+    before, vertex = seen.mapper.belief.x[:3].copy(), seen.known.vertex_of[2]
+    for x in np.arange(3.0, 3.5, 0.02):
+        seen.look(drawn({**TEE_POINTS, 2: (float(x), 0.0), 4: (float(x), -4.0)}, TEE_LINES), 3)
+    belief = seen.mapper.belief
+    assert vertex in belief.ids
+    assert belief.map_vertex(vertex).x > 3.05
+    assert np.array_equal(belief.x[:3], before)
+
+
+def test_an_odd_sight_of_a_vertex_counts_less() -> None:
+    """Seven times as far off, and once: a share of it, that is smaller."""
+    shares = []
+    for off in (0.1, 0.7):
+        seen = Seen().look(TEE, CONFIG.candidates.meetpoint_sightings)
+        vertex = seen.known.vertex_of[2]
+        before = seen.mapper.belief.map_vertex(vertex).x
+        moved = {**TEE_POINTS, 2: (3.0 + off, 0.0), 4: (3.0 + off, -4.0)}
+        seen.look(drawn(moved, TEE_LINES, unseen=UNSEEN), 15)
+        assert vertex in seen.known.node_of
+        shares.append((seen.mapper.belief.map_vertex(vertex).x - before) / off)
+    assert 0.0 < shares[1] < 0.7 * shares[0]
+
+
 SIGHTS = [TEE, PLAIN, TWO_ENDS, LocalGvg()]
 
 
