@@ -1,4 +1,4 @@
-"""Time of the filter's steps with ever more vertices: a motion, a vertex seen again, the gates.
+"""Time of the filter's steps with ever more vertices: a motion, a vertex in sight, a closed loop, the gates.
 
 Run: python benchmarks/bench_filter.py [VERTICES ...]   (default: 100 500 2000)
 """
@@ -10,7 +10,14 @@ from collections.abc import Callable
 import numpy as np
 
 from benchmarks.report import report
-from gvgbot.autonomy.slam.ekf import Belief, OdometryNoise, advance, correct, distances
+from gvgbot.autonomy.slam.ekf import (
+    Belief,
+    OdometryNoise,
+    advance,
+    correct,
+    correct_vertex,
+    distances,
+)
 from gvgbot.geometry import Pose
 
 SIZES = (100, 500, 2000)
@@ -46,7 +53,8 @@ def bench(vertices: int) -> None:
     seen = belief.map_base.to(belief.map_vertex(1))
     steps: dict[str, Callable[[], object]] = {
         "motion": lambda: advance(belief, MOTION, growth),
-        "vertex seen again": lambda: correct(belief, 1, seen, R),
+        "vertex still in sight": lambda: correct_vertex(belief, 1, seen, R[:2, :2]),
+        "loop closed": lambda: correct(belief, 1, seen, R),
         "gates of all vertices": lambda: distances(belief, np.zeros(2), R[:2, :2]),
     }
     for name, do in steps.items():

