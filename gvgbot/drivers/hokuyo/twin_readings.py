@@ -20,15 +20,26 @@ Indices = NDArray[np.intp]
 
 
 def with_mixed_pixels(ranges: Array, fraction: float, rng: np.random.Generator) -> Array:
-    """Ranges (N,) in m of which this fraction, at edges, lie anywhere between near and far.
+    """Ranges (N,) in m with a beam anywhere between near and far at this fraction of the edges.
 
-    A beam at an edge is one whose next neighbour meets something much nearer or farther.
+    It is one of the two beside the edge, as likely on the near side as on the far. On a straight
+    wall, where the reciprocal of the range is linear in small angles, no step is an edge.
     """
     if fraction == 0.0:
         return ranges
-    step = np.diff(np.where(np.isfinite(ranges), ranges, np.nan), append=np.nan)
-    mixed = (np.abs(step) > LEAST_EDGE) & (rng.random(len(ranges)) < fraction)
-    return np.where(mixed, ranges + rng.random(len(ranges)) * step, ranges)
+    finite = np.where(np.isfinite(ranges), ranges, np.nan)
+    padded = np.pad(finite, 1, constant_values=np.nan)
+    before, here, after, beyond = padded[:-3], padded[1:-2], padded[2:-1], padded[3:]
+    step = after - here
+    with np.errstate(divide="ignore", invalid="ignore"):
+        on_wall = np.abs(1.0 / (2.0 / here - 1.0 / before) - after) < LEAST_EDGE
+        on_wall |= np.abs(1.0 / (2.0 / after - 1.0 / beyond) - here) < LEAST_EDGE
+    is_mixed = (np.abs(step) > LEAST_EDGE) & ~on_wall & (rng.random(len(step)) < fraction)
+    edges = np.flatnonzero(is_mixed)
+    mixed = ranges.copy()
+    beside = edges + rng.integers(0, 2, len(edges))
+    mixed[beside] = ranges[edges] + rng.random(len(edges)) * step[edges]
+    return mixed
 
 
 def noisy_readings(
