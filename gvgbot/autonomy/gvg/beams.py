@@ -25,16 +25,18 @@ def without_mixed_pixels(scan: Scan) -> Scan:
     """The scan without what may be mixed pixels: between near and far where a beam meets an edge.
 
     On a straight wall the reciprocal of the range is linear in small angles, so a reading that is
-    on the line of the two on either side is of a wall seen at a low angle. Beams that failed are
-    passed over.
+    on the line of the two on either side is of a wall seen at a low angle. A beam that goes on
+    alone, between two on one wall, may have gone through glass and end in mid-air behind it. Beams
+    that failed are passed over.
     """
     told = np.flatnonzero(~np.isnan(scan.ranges))
     if not len(told):
         return scan
     depth = np.pad(scan.ranges[told], 2, mode="edge")
     before, here, after = depth[1:-3], depth[2:-2], depth[3:-1]
-    is_mixed = np.minimum(before, after) + _MIXED_M < here
-    is_mixed &= here < np.maximum(before, after) - _MIXED_M
+    nearest, farthest = np.minimum(before, after), np.maximum(before, after)
+    is_mixed = (nearest + _MIXED_M < here) & (here < farthest - _MIXED_M)
+    is_mixed |= (farthest < nearest + _MIXED_M) & (farthest + _MIXED_M < here)
     if not is_mixed.any():
         return scan
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -54,12 +56,16 @@ def least_of_three(ranges: Array) -> Array:
 
 
 def lone(ranges: Array) -> Array:
-    """The ranges of echoes much nearer than those on either side, NaN for all others."""
-    deep = np.where(np.isnan(ranges), -np.inf, ranges)  # what failed tells nothing
+    """The ranges of echoes much nearer than those on either side, NaN for all others.
+
+    Beams that failed are passed over.
+    """
+    told = np.flatnonzero(~np.isnan(ranges))
+    deep = ranges[told]
     inner = deep[1:-1] + _LONE_M
     lone = np.full(len(ranges), np.nan)
-    found = (inner < deep[:-2]) & (inner < deep[2:])
-    lone[1:-1][found] = ranges[1:-1][found]
+    found = told[1:-1][(inner < deep[:-2]) & (inner < deep[2:])]
+    lone[found] = ranges[found]
     return lone
 
 

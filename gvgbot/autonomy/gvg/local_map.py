@@ -43,6 +43,7 @@ _ONE_WALL = 0.4  # of a cell: means of neighbouring cells nearer than this are o
 _GLASS_ECHOES = 3.0  # so many about a cell make it glass, which beams pass and robots do not
 _BESIDE_WALLS_M = 0.22  # half a gap that robots go through: nearer, they make no difference
 _DECAY = 0.05  # echoes that one look outweighs which meets nothing
+_GLASS_DECAY = 0.02  # the same of glass, the dust of which gives more from almost anywhere
 _FIRM = 5  # votes: at least three looks
 _MAX_VOTES = 8  # a wall needs this many contrary scans, less the hits, before it is forgotten
 
@@ -114,13 +115,14 @@ class LocalMap:
         if free is not None:
             passed = np.fmax(passed, free)
         self._carve(scan, passed, directions, local_laser, travelled)
-        points = bridged(
-            local_laser.transform(end_points(scan.ranges, directions, self._reach)),
-            self._config.bridge_gap_m,
+        alone = lone(scan.ranges)
+        echoes, firm = (
+            local_laser.transform(end_points(ranges, directions, self._reach))
+            for ranges in (alone, np.where(np.isnan(alone), scan.ranges, np.nan))
         )
+        on_glass = self._note_echoes(echoes)
+        points = np.concatenate([bridged(firm, self._config.bridge_gap_m), on_glass])
         self._occupy(points, local_laser.position, travelled)
-        echoes = end_points(lone(scan.ranges), directions, self._reach)
-        self._note_echoes(local_laser.transform(echoes))
         self._forget(travelled)
         self._renew()
 
@@ -295,16 +297,17 @@ class LocalMap:
         self._votes[i[gone], j[gone]] -= 1
 
     def _doubt_echoes(self, i: Index, j: Index) -> None:
-        """Let what is not yet glass count less where beams have passed."""
-        few = ~self._is_glass(i, j)
-        i, j = i[few], j[few]
-        self._echoes[i, j] = np.maximum(self._echoes[i, j] - _DECAY, 0.0)
+        """Let echoes count less where beams have passed, but slowly where there is glass."""
+        decay = np.where(self._is_glass(i, j), _GLASS_DECAY, _DECAY)
+        self._echoes[i, j] = np.maximum(self._echoes[i, j] - decay, 0.0)
 
-    def _note_echoes(self, points: Array) -> None:
-        """Count lone echoes (N, 2), once for each cell."""
-        cells = np.floor(points / self._cell).astype(np.int64) - self._corner
-        i, j = cells[((cells >= 0) & (cells < self._size)).all(axis=1)].T
+    def _note_echoes(self, points: Array) -> Array:
+        """Count lone echoes (N, 2), once for each cell; those (M, 2) that come from glass."""
+        points = points[self.covers(points)]
+        i, j = (np.floor(points / self._cell).astype(np.int64) - self._corner).T
         self._echoes[i, j] += 1
+        glass: Array = points[self._is_glass(i, j)]
+        return glass
 
     def _is_glass(self, i: Index, j: Index) -> NDArray[np.bool_]:
         """Which cells (N,) have had lone echoes again and again, with their neighbours."""

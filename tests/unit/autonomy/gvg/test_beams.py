@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from gvgbot.autonomy.gvg.beams import without_mixed_pixels
+from gvgbot.autonomy.gvg.beams import lone, without_mixed_pixels
 from gvgbot.drivers.hokuyo.twin_readings import with_mixed_pixels
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
@@ -76,6 +76,12 @@ def test_a_wall_seen_at_a_low_angle_is_no_mixed_pixel(sigma: float, increment: f
             (1.0, 1.0, NAN, math.inf, math.inf),
             id="before nothing",
         ),
+        pytest.param(
+            (1.0, 1.0, 2.0, 1.0, 1.0), (1.0, 1.0, NAN, 1.0, 1.0), id="through glass, ends behind it"
+        ),
+        pytest.param(
+            (1.0, 6.0, 2.0, 6.0, 1.0), (1.0, 6.0, 2.0, 6.0, 1.0), id="beside one that floats"
+        ),
         pytest.param((3.0, 3.0, 1.0, 3.0, 3.0), (3.0, 3.0, 1.0, 3.0, 3.0), id="a post"),
         pytest.param((3.0, 3.0, 1.0, 4.0, 4.0), (3.0, 3.0, 1.0, 4.0, 4.0), id="a post at an edge"),
         pytest.param((1.0, 1.0, 3.0, 3.0), (1.0, 1.0, 3.0, 3.0), id="an edge"),
@@ -85,3 +91,13 @@ def test_a_wall_seen_at_a_low_angle_is_no_mixed_pixel(sigma: float, increment: f
 )
 def test_single_beams(ranges: tuple[float, ...], expected: tuple[float, ...]) -> None:
     np.testing.assert_array_equal(without_mixed_pixels(scan_of(*ranges)).ranges, expected)
+
+
+@pytest.mark.parametrize(
+    "ranges", [(3.0, 1.0, 3.0), (3.0, NAN, 1.0, 3.0), (math.inf, NAN, NAN, 1.0, NAN, 3.0)]
+)
+def test_one_echo_among_beams_that_go_on_is_alone_whatever_failed(
+    ranges: tuple[float, ...],
+) -> None:
+    expected = [at if at == 1.0 else NAN for at in ranges]
+    np.testing.assert_array_equal(lone(np.array(ranges)), expected)

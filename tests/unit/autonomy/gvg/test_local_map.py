@@ -8,10 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gvgbot.autonomy.gvg.beams import without_mixed_pixels
 from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
-from tests.unit.autonomy.sights import carved, line, looked, sweep
+from tests.unit.autonomy.sights import BEAMS, carved, line, looked, sweep
 
 ROOM = carved([(-3.0, -2.0, 3.0, 2.0)])
 ORIGIN = Pose()
@@ -311,6 +312,36 @@ def test_a_few_false_echoes_are_forgiven() -> None:
         local_map.insert(sweep(ROOM, ORIGIN), ORIGIN, 0.0)
     assert len(local_map.suspects()) == 0
     assert wall_points_near(local_map, PANE[0], 0.0, reach=1.0) == 0
+
+
+def test_hardly_anything_floats_behind_a_pane() -> None:
+    """A beam in thirty comes back from the pane, and a third of those from anywhere behind it."""
+    rng, local_map, floating = np.random.default_rng(0), LocalMap(LocalMapConfig()), 0
+    for travelled, y in enumerate(np.repeat(np.linspace(-1.5, 1.5, 31), 3)):
+        pose = Pose(0.5, y)
+        true, scan = sweep(ROOM, pose), through_glass(pose, rng)
+        floats = (scan.ranges < true.ranges) & (rng.random(len(scan.ranges)) < 1 / 3)
+        share = rng.random(len(scan.ranges))
+        mixed = scan.ranges + share * (true.ranges - scan.ranges)
+        scan = replace(scan, ranges=np.where(floats, mixed, scan.ranges))
+        local_map.insert(without_mixed_pixels(scan), pose, 0.03 * travelled)
+        points = local_map.points()
+        off_the_pane = np.abs(points[:, 0] - PANE[0])
+        floating += int((np.minimum(off_the_walls(points), off_the_pane) > 0.35).sum())
+    assert floating < 93  # one in each look
+    assert wall_points_near(local_map, PANE[0], 0.0, reach=0.2) > 0
+
+
+def test_what_was_taken_for_glass_goes_when_it_is_seen_through() -> None:
+    local_map, wall = LocalMap(LocalMapConfig()), sweep(ROOM, ORIGIN)
+    ranges = wall.ranges.copy()
+    ranges[BEAMS // 2] = 1.5  # straight on, halfway to the wall
+    for _ in range(4):
+        local_map.insert(replace(wall, ranges=ranges), ORIGIN, 0.0)
+    assert wall_points_near(local_map, 1.5, 0.0) > 0
+    for _ in range(400):
+        local_map.insert(wall, ORIGIN, 0.0)
+    assert wall_points_near(local_map, 1.5, 0.0) == 0
 
 
 def test_of_a_disc_that_leaves_the_window_nobody_knows_whether_it_is_bare() -> None:
