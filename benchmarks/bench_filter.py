@@ -1,4 +1,4 @@
-"""Time of the filter's steps with ever more vertices: a motion, a vertex in sight, a closed loop, the gates.
+"""Time of the filter with ever more vertices: a motion, one in sight, a closed loop, the gates.
 
 Run: python benchmarks/bench_filter.py [VERTICES ...]   (default: 100 500 2000)
 """

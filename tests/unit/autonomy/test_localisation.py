@@ -144,26 +144,25 @@ def test_a_drive_errs_about_as_much_as_its_steps_say_together() -> None:
 
 
 def test_where_walls_are_old_errors_do_not_add_up() -> None:
-    """To and fro four times: the walls of the first way hold the robot, and its steps say so."""
-    rng, noise = np.random.default_rng(9), np.diag([0.01**2, 0.005**2, 0.003**2])
-    errors, claimed = [], np.zeros((2, 3))  # of the first way, and of the next ones
-    way = [*np.arange(-3.75, 1.01, 0.25), *np.tile([*np.arange(0.75, -2, -0.25)], 1)]
-    way += [*np.arange(-1.5, 1.01, 0.25), *np.arange(0.75, -2, -0.25)] * 2
-    for _ in range(10):
-        local, believed = maps(), Pose(-4.0, 0.0, 0.0)
-        local.insert(room(rng, -4.0), believed, 0.0)
-        before, driven = -4.0, 0.0
-        for step, x in enumerate(way):
+    """To and fro three times: the walls of the first way hold the robot, and its steps say so."""
+    rng, noise, runs = np.random.default_rng(9), np.diag([0.01**2, 0.005**2, 0.003**2]), 10
+    first = np.arange(-3.75, 1.01, 0.25)
+    way = [*first, *np.tile([*np.arange(0.75, -2, -0.25), *np.arange(-1.5, 1.01, 0.25)], 3)]
+    errors, claimed = np.zeros(3), np.zeros((2, 3))  # on the first way, and on all that follow
+    for _ in range(runs):
+        local, believed, before = maps(), Pose(-4.0, 0.0, 0.0), -4.0
+        local.insert(room(rng, before), believed, 0.0)
+        for step, x in enumerate(way, 1):
             slip = Pose.from_array(rng.multivariate_normal([x - before, 0.0, 0.0], noise))
-            scan, driven = room(rng, x), driven + 0.25
+            scan, before = room(rng, x), float(x)
             believed, covariance = local.match(scan, believed, slip, 1.0, noise)
-            claimed[int(step >= 20)] += np.diag(covariance) / 10
-            local.insert(scan, believed, driven)
-            before = float(x)
-        errors.append((believed.x - before, believed.y, believed.theta))
-    share = np.mean(np.square(errors), axis=0) / (claimed.sum(axis=0) + np.diag(local.blur))
-    assert (share[[0, 2]] < chi2.ppf(0.995, 10) / 10).all()
-    assert (claimed[1] < 1.5 * claimed[0]).all()  # on a way that is three times as long
+            claimed[int(step > len(first))] += np.diag(covariance) / runs
+            local.insert(scan, believed, 0.25 * step)
+        claimed[1] += np.diag(local.blur) / runs
+        errors += np.square([believed.x - before, believed.y, believed.theta]) / runs
+    share = errors / claimed.sum(axis=0)
+    assert (share[[0, 2]] < chi2.ppf(0.995, runs) / runs).all()
+    assert (claimed[1] < 1.5 * claimed[0]).all()  # on a way that is more than three times as long
 
 
 def test_a_thin_wall_seen_from_behind_is_not_taken_for_the_face_seen_before() -> None:
