@@ -145,7 +145,7 @@ def test_a_drive_errs_about_as_much_as_its_steps_say_together() -> None:
 
 def test_where_walls_are_old_errors_do_not_add_up() -> None:
     """To and fro three times: the walls of the first way hold the robot, and its steps say so."""
-    rng, noise, runs = np.random.default_rng(9), np.diag([0.01**2, 0.005**2, 0.003**2]), 10
+    rng, noise, runs = np.random.default_rng(9), np.diag([0.01**2, 0.005**2, 0.003**2]), 6
     first = np.arange(-3.75, 1.01, 0.25)
     way = [*first, *np.tile([*np.arange(0.75, -2, -0.25), *np.arange(-1.5, 1.01, 0.25)], 3)]
     errors, claimed = np.zeros(3), np.zeros((2, 3))  # on the first way, and on all that follow
