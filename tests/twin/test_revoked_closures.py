@@ -14,7 +14,7 @@ from gvgbot.cli import main
 
 pytestmark = [pytest.mark.slow, pytest.mark.twin, pytest.mark.timeout(120)]
 
-EVERY, AT_MOST = 40, 3  # keyframes at least between closures that are taken back, and how many are
+EVERY, AT_MOST = 40, 2  # keyframes at least between closures that are taken back, and how many are
 
 
 def test_what_was_found_since_is_found_again(
