@@ -187,7 +187,7 @@ def test_in_another_building_it_claims_no_place_and_spoils_no_map(
         last.pipeline.errands.home(0.0)
 
 
-@pytest.mark.parametrize("moment", [40.0, 120.0])
+@pytest.mark.parametrize("moment", [40.0, 140.0])
 def test_after_a_power_cut_in_half_a_building_it_finds_its_place_and_keeps_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, moment: float
 ) -> None:
