@@ -20,7 +20,12 @@ from gvgbot.autonomy.knowledge import ON_EDGE_M, Knowledge
 from gvgbot.autonomy.recogniser import CLOSE_M, Match, Recogniser, Recognition
 from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.graph import Edge, HalfEdgeId, Vertex
-from gvgbot.autonomy.slam.recognition import RecognitionConfig, Sighting, sight_covariance
+from gvgbot.autonomy.slam.recognition import (
+    RecognitionConfig,
+    Sighting,
+    detection_covariance,
+    sight_covariance,
+)
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
 from gvgbot.autonomy.topology import (
     direction,
@@ -263,16 +268,19 @@ class Mapper(Knowledge):
         """Correct the belief by a vertex that is still in sight.
 
         Such sights err alike, and together where more of the room comes into view: they tell of the
-        vertex and, where walls tell where the robot is, not of that. An odd one counts less.
+        vertex and, where walls tell where the robot is, not of that. Where all is solved at once
+        they move it, too, so each counts less there. So does an odd one everywhere.
         """
-        R = sight_covariance(math.hypot(base_vertex.x, base_vertex.y), self._recognition)
+        away = math.hypot(base_vertex.x, base_vertex.y)
+        R = detection_covariance(away, self._recognition)
         if self._by_position:
             self._measure(view, vertex, base_vertex, R)
             return
-        r, S, _ = ekf.innovation(self.belief, vertex.id, base_vertex, R)
-        R *= max(1.0, ekf.mahalanobis(r, S) / _ODD)
-        self.belief = ekf.correct_vertex(self.belief, vertex.id, base_vertex, R)
-        self.observations.append(Observation(view.keyframe, vertex.id, base_vertex, R))
+        own = sight_covariance(away, self._recognition)
+        r, S, _ = ekf.innovation(self.belief, vertex.id, base_vertex, own)
+        odd = max(1.0, ekf.mahalanobis(r, S) / _ODD)
+        self.belief = ekf.correct_vertex(self.belief, vertex.id, base_vertex, odd * own)
+        self.observations.append(Observation(view.keyframe, vertex.id, base_vertex, odd * R))
 
     def _measure(self, view: View, vertex: Vertex, base_vertex: Pose, R: Array) -> None:
         """Correct the belief by a vertex seen again."""
