@@ -183,7 +183,7 @@ class Errands:
             raise Declined(f"a patrol takes two vertices or more; {self._known_vertices()}")
         if self.errand == Patrol(vertices):
             return f"it does that already: {self._plan}"
-        if not self._can_go_round(places):
+        if not places <= set.intersection(*(self._in_reach() or [set()])):
             self.closures.open_all(self._mapper.graph)
         self._take(Patrol(vertices), stamp)
         return f"it patrols {len(places)} vertices until it is asked for something else"
@@ -198,7 +198,7 @@ class Errands:
             return f"it does that already: {self._plan}"
         self.closures.open_all(self._mapper.graph)
         self._take(Coverage(), stamp)
-        reached = self._in_reach() or self._mapper.graph.vertices.keys()
+        reached = set().union(*self._in_reach()) or self._mapper.graph.vertices.keys()
         lengths = [edge.length for edge in edges if edge.a.vertex in reached]
         return (
             f"it drives over {len(lengths)} of {len(edges)} edges, {sum(lengths):.0f} m "
@@ -248,20 +248,14 @@ class Errands:
             return None
         return route_to_vertex(self._mapper.graph, here.starts(), vertex)
 
-    def _in_reach(self) -> set[int]:
-        """The vertices that known ways lead to."""
-        here = self.whereabouts()
-        return set() if here is None else set(shortest_paths(self._mapper.graph, here.starts()))
+    def _in_reach(self) -> list[set[int]]:
+        """The vertices that known ways lead to from each that the robot may come to first.
 
-    def _can_go_round(self, places: set[int]) -> bool:
-        """Whether known ways lead to all of the vertices from whichever the robot comes to first.
-
-        Both ends of the edge that it is on may be near, and something may stand between them.
+        It may be between two of them, with something in the way behind it or ahead.
         """
         here = self.whereabouts()
         starts = [] if here is None else here.starts()
-        ways = (shortest_paths(self._mapper.graph, [start]) for start in starts)
-        return bool(starts) and all(places <= way.keys() for way in ways)
+        return [set(shortest_paths(self._mapper.graph, [start])) for start in starts]
 
     def _unplaced_for(self) -> str:
         again = "it looks again when it is asked to explore"

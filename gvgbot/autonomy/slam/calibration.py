@@ -75,7 +75,7 @@ class Calibration:
         return np.asarray(axes * np.maximum(1.0 + values, _LEAST_SHARE) @ axes.T)
 
     def learn(
-        self, motion: Pose, duration: float, change: Pose, Q: Array, C: Array, walls: float = 1.0
+        self, motion: Pose, duration: float, change: Pose, Q: Array, C: Array, walls: float
     ) -> None:
         """Account for the change that walls made to the pose after a corrected motion.
 

@@ -37,7 +37,7 @@ def driven(errors: Array, walls: Array, seed: int, steps: int = 120) -> Calibrat
             z = z + rng.multivariate_normal(np.zeros(3), scatter)
         C = matched(walls)
         change = Pose.from_array(C @ walls @ z)
-        calibration.learn(corrected, duration, change, Q, C)
+        calibration.learn(corrected, duration, change, Q, C, 1.0)
     return calibration
 
 
@@ -63,7 +63,7 @@ def test_walls_along_which_one_drives_say_nothing_about_distances() -> None:
     C = matched(walls)
     before = calibration.P[0, 0]
     for _ in range(50):
-        calibration.learn(Pose(0.25, 0.0, 0.0), 0.5, Pose(0.0, 0.001, 0.0001), Q, C)
+        calibration.learn(Pose(0.25, 0.0, 0.0), 0.5, Pose(0.0, 0.001, 0.0001), Q, C, 1.0)
     assert calibration.x[0] == 0.0
     assert calibration.P[0, 0] >= before
 
@@ -71,7 +71,7 @@ def test_walls_along_which_one_drives_say_nothing_about_distances() -> None:
 def test_a_slip_teaches_nothing() -> None:
     calibration = Calibration()
     C = matched(WALLS)
-    calibration.learn(Pose(0.25, 0.0, 0.0), 0.5, Pose(-0.25, 0.0, 0.0), Q, C)
+    calibration.learn(Pose(0.25, 0.0, 0.0), 0.5, Pose(-0.25, 0.0, 0.0), Q, C, 1.0)
     assert not calibration.x.any()
 
 
@@ -87,11 +87,11 @@ def test_the_frame_of_the_step_does_not_matter() -> None:
     turned = Calibration()
     straight = Calibration()
     C = matched(WALLS)
-    straight.learn(Pose(0.25, 0.0, 0.0), 0.0, Pose(0.004, 0.0, 0.0), Q, C)
+    straight.learn(Pose(0.25, 0.0, 0.0), 0.0, Pose(0.004, 0.0, 0.0), Q, C, 1.0)
     angle = 0.6
     around = [rotated_covariance(m, -angle) for m in (Q, C)]
     change = Pose(0.004 * np.cos(angle), -0.004 * np.sin(angle), 0.0)
-    turned.learn(Pose(0.25, 0.0, angle), 0.0, change, around[0], around[1])
+    turned.learn(Pose(0.25, 0.0, angle), 0.0, change, around[0], around[1], 1.0)
     assert np.isclose(turned.x[0], straight.x[0])
 
 
@@ -150,7 +150,7 @@ def test_walls_that_are_better_than_they_are_taken_for_hide_no_noise() -> None:
 def test_one_slip_makes_no_noise() -> None:
     calibration = Calibration()
     change = Pose(-0.25, 0.0, 0.0)
-    calibration.learn(Pose(0.25, 0.0, 0.0), 0.5, change, Q, matched(WALLS))
+    calibration.learn(Pose(0.25, 0.0, 0.0), 0.5, change, Q, matched(WALLS), 1.0)
     assert calibration.noise[0] < 1.5
 
 
