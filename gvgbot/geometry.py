@@ -106,7 +106,7 @@ STANDSTILL = Twist()
 
 
 def rotated_covariance(covariance: Array, angle: float) -> Array:
-    """A pose covariance (3, 3) of a frame, as seen from one against which that frame is turned."""
+    """Pose covariances (..., 3, 3) of a frame, from one against which that frame is turned."""
     c, s = math.cos(angle), math.sin(angle)
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     rotated: Array = turn @ covariance @ turn.T

@@ -35,7 +35,6 @@ _SLIPPING = 25.0  # times the covariance of odometry, when the wheels slip
 _LOST = np.diag([0.5**2, 0.5**2, 0.05**2])  # of a base that nobody heard for a while
 _SEEN_SHARE = 0.3  # of the walls must be known to a robot that comes round a corner unseen
 _FITS_M, _FITTING = 0.15, 0.8  # so near to the walls must be that share of a scan's ends
-_PER_M = np.diag([0.001**2, 0.001**2, 0.00005**2])  # per metre: what cells do to walls
 
 # full: scans are matched, and vertices are poses. paper: odometry alone between vertices, and a
 # vertex seen again corrects by its position only, as the method was published
@@ -119,14 +118,15 @@ class LocalMaps:
         return self._far
 
     def match(
-        self, scan: Scan, before: Pose, motion: Pose, duration: float, Q: Array
+        self, scan: Scan, before: Pose, motion: Pose, duration: float, noise: Array
     ) -> tuple[Pose, Array]:
-        """The pose of the base after a motion with covariance Q (3, 3), and its covariance.
+        """The pose of the base after a motion, and its covariance (3, 3) in the frame of the base.
 
-        Both covariances are in the frame of the base. Without enough walls it is where odometry
-        has it. Wheels may have turned without effect, so it may as well be where it was `before`.
+        There are also the parts (4, 3, 3) of the noise of odometry. Without enough walls the pose
+        is where odometry has it. Wheels may have turned without effect, so it may as well be where
+        it was `before`.
         """
-        motion, Q = self.calibration.corrected(motion, duration), self.calibration.scattered(Q)
+        motion, Q = self.calibration.corrected(motion, duration), self.calibration.scattered(noise)
         prior = before.compose(motion)
         still = Pose(before.x, before.y, prior.theta)
         slipping = [] if self._matching.search_rad else [(still, _SLIPPING * Q)]
@@ -136,23 +136,24 @@ class LocalMaps:
             self.blur = np.zeros((3, 3))
             return prior, calibration.adds_up(motion, duration, np.eye(3), Q)
         found, used = best
-        walls = min(1.0, found.rms / self._matching.pair_sigma_m) ** 2
+        expected = self._matching.pair_sigma_m**2 / self._matching.independent_share
+        walls = min(1.0, found.scatter / expected)
         felt = used
         if used is Q:
-            self._lesson = motion, duration, prior.to(found.pose), Q, found.covariance, walls
-            felt = calibration.as_felt(Q)
+            self._lesson = motion, duration, prior.to(found.pose), noise, found.covariance, walls
+            felt = calibration.as_felt(noise).sum(axis=0)
         g = np.eye(3) - found.covariance @ np.linalg.inv(used)
         self.blur = _error(found, g, felt, walls)
         stays = np.linalg.inv(np.eye(3) + g * self._age(found))
-        drift = stays @ self.blur @ stays.T + math.hypot(motion.x, motion.y) * _PER_M
+        drift = stays @ self.blur @ stays.T
         left = np.asarray(stays @ (np.eye(3) - g), np.float64)
         return found.pose, calibration.adds_up(motion, duration, left, drift)
 
     def trust(
-        self, scan: Scan, before: Pose, motion: Pose, duration: float, Q: Array
+        self, scan: Scan, before: Pose, motion: Pose, duration: float, noise: Array
     ) -> tuple[Pose, Array]:
         """As `match`, but just where odometry has it, whatever the walls say."""
-        return before.compose(motion), Q
+        return before.compose(motion), noise.sum(axis=0)
 
     def find(
         self,
@@ -160,7 +161,7 @@ class LocalMaps:
         before: Pose,
         motion: Pose,
         duration: float,
-        Q: Array,
+        noise: Array,
         *,
         turned: float | None = None,
     ) -> tuple[Pose, Array]:
@@ -172,9 +173,10 @@ class LocalMaps:
         """
         prior = before.compose(self.calibration.corrected(motion, duration))
         clearly = _CLEARLY if turned is None else _AT_ALL
-        priors = [(p, Q + _LOST) for p in _around(prior)]
+        Q = noise.sum(axis=0) + _LOST
+        priors = [(p, Q) for p in _around(prior)]
         best = self._best(scan, priors, clearly, turned or 0.0, least_known=_SEEN_SHARE)
-        return (prior, Q + _LOST) if best is None else (best[0].pose, best[0].covariance)
+        return (prior, Q) if best is None else (best[0].pose, best[0].covariance)
 
     def fits(self, scan: Scan, local_base: Pose) -> bool:
         """Whether a scan from a pose in the local frame shows the walls that are known there."""

@@ -59,14 +59,14 @@ class Cells:
 class Odds:
     """What is known to be wrong with odometry: mean (3,) and covariance (3, 3).
 
-    `noises` (3,) is how noisy odometry has proved to be, and `told_of` (3,) how many steps told of
+    `noises` (4,) is how noisy odometry has proved to be, and `told_of` (4,) how many steps told of
     that. `common` (3, 3) is the covariance of the pose with what is wrong.
     """
 
     x: Array
     P: Array
-    noises: Array = field(default_factory=lambda: np.ones(3))
-    told_of: Array = field(default_factory=lambda: np.zeros(3))
+    noises: Array = field(default_factory=lambda: np.ones(4))
+    told_of: Array = field(default_factory=lambda: np.zeros(4))
     common: Array = field(default_factory=lambda: np.zeros((3, 3)))
 
 
@@ -238,7 +238,8 @@ def recall(pipeline: Pipeline, memory: Memory, past: list[Growth]) -> None:
         _recall_cells(pipeline._maps.far, memory.far)
     calibration = pipeline._maps.calibration
     calibration.x, calibration.P = memory.odds.x, memory.odds.P
-    calibration.noise, calibration.told = memory.odds.noises, memory.odds.told_of
+    if len(memory.odds.noises) == len(calibration.noise):  # else it is of an older version
+        calibration.noise, calibration.told = memory.odds.noises, memory.odds.told_of
     calibration.shared = memory.odds.common
     pipeline._hazards._all = list(memory.hazards)
     pipeline.traffic.newcomers._all = list(memory.newcomers)

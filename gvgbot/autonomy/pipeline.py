@@ -295,7 +295,7 @@ class Pipeline:
         self.travelled += math.hypot(motion.x, motion.y)
         unturned, self._unturned_s = self._unturned_s, self._odometry.unturned_s
         duration = max(0.0, scan.stamp - self._last.stamp)
-        noise = self._config.odometry_noise.covariance(motion, duration)
+        noise = self._config.odometry_noise.parts(motion, duration)
         is_doubted, self.errands.is_lost = self.errands.is_lost or is_broken, False
         if is_broken:
             self._incidents.append(("look for its place near by", "the base has started anew"))
@@ -305,7 +305,7 @@ class Pipeline:
             turned = math.pi if is_broken else _TURNED_RAD if is_doubted else None
             match = partial(self._maps.find, turned=turned)
         if self._was_lifted or is_doubted:
-            self._was_lifted, noise = False, noise + _LIFTED
+            self._was_lifted, noise = False, np.append(noise, [_LIFTED], axis=0)
         felt_s = max(0.0, duration - (self._unturned_s - unturned))  # in which the gyro may drift
         local_base, covariance = match(
             scan, self._last.local_base, motion, felt_s, rotated_covariance(noise, -motion.theta)

@@ -2,8 +2,9 @@
 
 A scale of all distances, a scale of all turns, and a turn rate that is felt while there is none.
 Walls correct each step only in part, so what is left of a constant error would add up. How far the
-corrections scatter tells how noisy odometry is: wheels wear, and no floor is like another. A good
-base is doubted all the same, as the next floor may be another, but errs no more for that.
+corrections scatter tells how noisy odometry is, by driving, by turning and by time: wheels wear,
+gyros differ, and no floor is like another. A good base is doubted all the same, as the next floor
+may be another, but errs no more for that.
 """
 
 import numpy as np
@@ -13,9 +14,10 @@ from gvgbot.geometry import Array, Pose
 _SIGMA = np.array([0.02, 0.01, 0.0005])  # before anything is known: 1, 1, rad/s
 _WANDER = np.array([1e-5, 1e-5, 1e-6])  # of each with every step
 _SURPRISING = 16.0  # squared Mahalanobis distance of a correction that tells of a slip
-_NOISE = (0.02, 25.0)  # variance of odometry, least and most, in units of what is expected
+_NOISE = (0.002, 25.0)  # variances of odometry, least and most, in units of what is expected
 _LEAST_DOUBTED = 0.5  # by so much of it motions are doubted, however good: floors have surprises
-_RATE, _FEW = 0.02, 20.0  # at which it is learnt with each step, and the steps until it is that low
+_RATE = 0.02  # at which they are learnt with each step; faster at first,
+_FEW = 4.0  # as if so many steps had told of what is expected: each base has its own
 _ODDEST = 9.0  # a correction says no more than one of three sigmas
 _LEAST_SHARE = 0.1  # of its own covariance, that a step has in every direction
 _LEAST = 1e-10 * np.eye(3)  # variance of a correction where walls say nothing, m^2 and rad^2
@@ -27,15 +29,15 @@ class Calibration:
     `shared` (3, 3) is the covariance of the pose, in the frame of the base, with the three: what
     is wrong with odometry is wrong at every step, so where walls do not tell, errors of steps do
     not cancel but add up. (Schmidt-Kalman filter: they are considered and not estimated there.)
-    `noise` (3,) is the variance along the way, sideways and of turns, in units of what is expected,
-    and `told` (3,) how many steps told of it.
+    `noise` (4,) are the variances of odometry's parts (`OdometryNoise.parts`), in units of what is
+    expected, and `told` (4,) how many steps told of each.
     """
 
     def __init__(self) -> None:
         self.x = np.zeros(3)
         self.P = np.diag(_SIGMA**2)
         self.shared = np.zeros((3, 3))
-        self.noise, self.told = np.ones(3), np.zeros(3)
+        self.noise, self.told = np.ones(4), np.zeros(4)
 
     def corrected(self, motion: Pose, duration: float) -> Pose:
         """A motion that odometry felt in some seconds, as it most probably was."""
@@ -46,15 +48,14 @@ class Calibration:
             motion.theta * (1.0 + turn) + rate * duration,
         )
 
-    def scattered(self, Q: Array) -> Array:
-        """The covariance (3, 3) of a motion, expected to be Q, by which it is doubted."""
-        sigmas = np.sqrt(np.maximum(self.noise, _LEAST_DOUBTED))
-        return np.asarray(Q * np.outer(sigmas, sigmas), np.float64)
+    def scattered(self, parts: Array) -> Array:
+        """The covariance (3, 3) by which a motion is doubted whose parts (4, 3, 3) are expected."""
+        noise = np.maximum(self.noise, _LEAST_DOUBTED)
+        return np.asarray(np.tensordot(noise, parts, axes=1), np.float64)
 
-    def as_felt(self, Q: Array) -> Array:
-        """What a motion that is doubted by Q (3, 3), as `scattered` has it, has proved to err."""
-        sigmas = np.sqrt(np.minimum(self.noise / _LEAST_DOUBTED, 1.0))
-        return np.asarray(Q * np.outer(sigmas, sigmas), np.float64)
+    def as_felt(self, parts: Array) -> Array:
+        """The parts (4, 3, 3) of its covariance that a motion has proved to err by."""
+        return np.asarray(self.noise[:, None, None] * parts, np.float64)
 
     def adds_up(self, motion: Pose, duration: float, left: Array, drift: Array) -> Array:
         """The covariance `drift` (3, 3) of one more step, with what all steps err in common.
@@ -75,21 +76,27 @@ class Calibration:
         return np.asarray(axes * np.maximum(1.0 + values, _LEAST_SHARE) @ axes.T)
 
     def learn(
-        self, motion: Pose, duration: float, change: Pose, Q: Array, C: Array, walls: float
+        self,
+        motion: Pose,
+        duration: float,
+        change: Pose,
+        parts: Array,
+        C: Array,
+        walls: float,
     ) -> None:
         """Account for the change that walls made to the pose after a corrected motion.
 
-        The change is in the frame of the base after it. Q and C (3, 3) are the covariances by which
-        that pose was doubted before and after, in the same frame: 1 - C Q^-1 is the share g of an
-        error that the change makes good. `walls` is the variance of what walls say, in units of
-        what C takes it for.
+        The change is in the frame of the base after it. In the same frame are the `parts`
+        (4, 3, 3) of the noise that was expected and the covariance C (3, 3) of the pose after it,
+        which was doubted by Q before: 1 - C Q^-1 is the share g of an error that the change makes
+        good. `walls` is the variance of what walls say, in units of what C takes it for.
         """
-        g = np.eye(3) - C @ np.linalg.inv(Q)
+        g = np.eye(3) - C @ np.linalg.inv(self.scattered(parts))
         H = g @ _per_unit(motion, duration)
         r = np.array([change.x, change.y, change.theta])
         P = self.P + np.diag(_WANDER**2)
-        felt = g @ self.as_felt(Q) @ g.T
-        S = H @ P @ H.T + felt + walls * (g @ C) + _LEAST  # g V g' = g C
+        felt = g @ self.as_felt(parts) @ g.T
+        S = H @ P @ H.T + felt.sum(axis=0) + walls * (g @ C) + _LEAST  # g V g' = g C
         self._learn_noise(r, S, felt)
         if r @ np.linalg.solve(S, r) > _SURPRISING:
             return
@@ -102,14 +109,15 @@ class Calibration:
     def _learn_noise(self, r: Array, S: Array, felt: Array) -> None:
         """Let the noise follow the squares of corrections r (3,) over their variances in S (3, 3).
 
-        They are 1 on average if it is right; a step counts by the share of what was `felt` in it.
+        They are 1 on average if it is right. A step counts for each part by the share of that in
+        what was expected, of which `felt` (4, 3, 3) is odometry's.
         """
         expected = np.diag(S)
-        counts = (np.diag(felt) / expected) ** 2
-        self.told = self.told + counts
-        rate = np.maximum(_RATE, 1.0 / (_FEW + self.told)) * counts
+        counts = (np.diagonal(felt, axis1=1, axis2=2) / expected) ** 2
+        self.told = self.told + counts.sum(axis=1)
+        rate = np.maximum(_RATE, 1.0 / (_FEW + self.told))
         odd = np.minimum(r**2 / expected, _ODDEST)
-        self.noise = np.clip(self.noise * np.exp(rate * (odd - 1.0)), *_NOISE)
+        self.noise = np.clip(self.noise * (1.0 + rate * (counts @ (odd - 1.0))), *_NOISE)
 
 
 def _per_unit(motion: Pose, duration: float) -> Array:

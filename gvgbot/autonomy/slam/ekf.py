@@ -35,30 +35,34 @@ class OdometryNoise:
     turn_rad_per_sqrt_s: Annotated[float, Range(0.0, 1.0)] = 0.003  # heading, by time alone
 
     def covariance(self, motion: Pose, duration: float) -> Array:
-        """Covariance (3, 3) of a short motion, in the frame of its start.
+        """Covariance (3, 3) of a short motion, in the frame of its start."""
+        return np.asarray(self.parts(motion, duration).sum(axis=0), np.float64)
 
-        White noise on distance and heading along an almost straight stretch of length d: heading
-        noise that accrues evenly shows up sideways with d^2/3 and correlated with d/2.
+    def parts(self, motion: Pose, duration: float) -> Array:
+        """What that covariance is the sum of (4, 3, 3).
+
+        It is the way by driving, the place by turning, the heading by turning, and the heading by
+        driving and by time. White noise on distance and heading along an almost straight stretch
+        of length d: heading noise that accrues evenly shows up sideways with d^2/3 and correlated
+        with d/2.
         """
         d, turn = math.hypot(motion.x, motion.y), abs(motion.theta)
-        along = self.along_m_per_sqrt_m**2 * d + self.along_m_per_sqrt_rad**2 * turn
-        heading = (
-            self.turn_rad_per_sqrt_rad**2 * turn
-            + self.turn_rad_per_sqrt_m**2 * d
-            + self.turn_rad_per_sqrt_s**2 * duration
-        )
-        sideways = heading * d * d / 3 + self.along_m_per_sqrt_rad**2 * turn
+        along = self.along_m_per_sqrt_m**2 * d + 1e-8
+        beside = self.along_m_per_sqrt_rad**2 * turn
+        by_turning = self.turn_rad_per_sqrt_rad**2 * turn
+        by_driving = self.turn_rad_per_sqrt_m**2 * d + self.turn_rad_per_sqrt_s**2 * duration
         c, s = (motion.x / d, motion.y / d) if d > 0.0 else (1.0, 0.0)
         chord = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        heading = np.array([[0.0, 0.0, 0.0], [0.0, d * d / 3, d / 2], [0.0, d / 2, 1.0]])
         along_chord = np.array(
             [
-                [along + 1e-8, 0.0, 0.0],
-                [0.0, sideways + 1e-8, heading * d / 2],
-                [0.0, heading * d / 2, heading + 1e-10],
+                np.diag([along, 1e-8, 0.0]),
+                np.diag([beside, beside, 0.0]),
+                by_turning * heading,
+                (by_driving + 1e-10) * heading,
             ]
         )
-        rotated: Array = chord @ along_chord @ chord.T
-        return rotated
+        return np.asarray(chord @ along_chord @ chord.T, np.float64)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -21,6 +21,7 @@ _FEWEST = 3  # of them make a line
 _FLATNESS = 0.08  # smallest over largest spread of the neighbours of a point on a wall
 _REACH_M = 0.35  # as far away as neighbours on one wall may be
 _ITERATIONS = 6
+_BATCH = 10  # neighbouring points, of which the mean distance from the walls is taken
 _CONVERGED, _ROUGHLY = 1e-4, 2e-2  # metres and radians
 _SAME_PAIRS_M, _SAME_PAIRS_RAD = 0.02, 0.005  # moved less, points are near to the same walls
 
@@ -48,6 +49,7 @@ class Registration:
     covariance: Array
     inliers: float  # share of the points that found a wall
     rms: float  # metres from the walls
+    scatter: float  # m^2, variance of a point's distance, if each of them erred by itself
     walls: NDArray[np.intp]  # the nearest wall point of each pair
 
 
@@ -124,7 +126,8 @@ def register(
         if max(map(abs, change.tolist())) < within:
             break
     rms = math.sqrt(float(residual @ residual) / len(residual))
-    return Registration(pose, np.linalg.inv(A), len(residual) / len(points), rms, pairs.walls)
+    share = len(residual) / len(points)
+    return Registration(pose, np.linalg.inv(A), share, rms, _scatter(residual), pairs.walls)
 
 
 def register_coarsely(
@@ -148,6 +151,15 @@ def register_coarsely(
         near = register(points, tree, walls, prior, Q, far, hits, sides, _ROUGHLY)
         prior = prior if near is None else near.pose
     return register(points, tree, walls, prior, Q, config, hits, sides, found=found)
+
+
+def _scatter(residual: Array) -> float:
+    """The variance that means of neighbouring residuals (K,) tell of, m^2.
+
+    Neighbours that err together do not cancel (batch means).
+    """
+    means = residual[: len(residual) // _BATCH * _BATCH].reshape(-1, _BATCH).mean(axis=1)
+    return _BATCH * float(means @ means) / len(means)
 
 
 def _weights(residual: Array, config: ScanMatchingConfig) -> Array:

@@ -5,10 +5,12 @@ import pytest
 from scipy.stats import chi2
 
 from gvgbot.autonomy.slam.calibration import Calibration
+from gvgbot.autonomy.slam.ekf import OdometryNoise
 from gvgbot.geometry import Array, Pose, rotated_covariance
 
 ERRORS = np.array([-0.015, 0.008, 0.0004])  # scale of distances, of turns, rad/s
 Q = np.diag([0.015**2, 0.003**2, 0.003**2])
+PARTS = np.array([*(np.diag(row) for row in np.diag(np.diag(Q))), np.zeros((3, 3))])
 WALLS = np.diag([1.0 / 0.01**2, 1.0 / 0.004**2, 1.0 / 0.001**2])  # information
 STEPS = ((Pose(0.25, 0.02, 0.1), 0.5), (Pose(0.25, 0.0, 0.0), 0.5), (Pose(0.2, -0.05, -0.2), 0.5))
 
@@ -37,7 +39,7 @@ def driven(errors: Array, walls: Array, seed: int, steps: int = 120) -> Calibrat
             z = z + rng.multivariate_normal(np.zeros(3), scatter)
         C = matched(walls)
         change = Pose.from_array(C @ walls @ z)
-        calibration.learn(corrected, duration, change, Q, C, 1.0)
+        calibration.learn(corrected, duration, change, PARTS, C, 1.0)
     return calibration
 
 
@@ -63,7 +65,7 @@ def test_walls_along_which_one_drives_say_nothing_about_distances() -> None:
     C = matched(walls)
     before = calibration.P[0, 0]
     for _ in range(50):
-        calibration.learn(Pose(0.25, 0.0, 0.0), 0.5, Pose(0.0, 0.001, 0.0001), Q, C, 1.0)
+        calibration.learn(Pose(0.25, 0.0, 0.0), 0.5, Pose(0.0, 0.001, 0.0001), PARTS, C, 1.0)
     assert calibration.x[0] == 0.0
     assert calibration.P[0, 0] >= before
 
@@ -71,7 +73,7 @@ def test_walls_along_which_one_drives_say_nothing_about_distances() -> None:
 def test_a_slip_teaches_nothing() -> None:
     calibration = Calibration()
     C = matched(WALLS)
-    calibration.learn(Pose(0.25, 0.0, 0.0), 0.5, Pose(-0.25, 0.0, 0.0), Q, C, 1.0)
+    calibration.learn(Pose(0.25, 0.0, 0.0), 0.5, Pose(-0.25, 0.0, 0.0), PARTS, C, 1.0)
     assert not calibration.x.any()
 
 
@@ -83,13 +85,13 @@ def test_a_correction_to_the_known_errors_undoes_them() -> None:
 
 
 def test_the_frame_of_the_step_does_not_matter() -> None:
-    """Q and C, handed over as seen from the end of a step that turns, tell the same."""
+    """The noise and C, handed over as seen from the end of a step that turns, tell the same."""
     turned = Calibration()
     straight = Calibration()
     C = matched(WALLS)
-    straight.learn(Pose(0.25, 0.0, 0.0), 0.0, Pose(0.004, 0.0, 0.0), Q, C, 1.0)
+    straight.learn(Pose(0.25, 0.0, 0.0), 0.0, Pose(0.004, 0.0, 0.0), PARTS, C, 1.0)
     angle = 0.6
-    around = [rotated_covariance(m, -angle) for m in (Q, C)]
+    around = [rotated_covariance(m, -angle) for m in (PARTS, C)]
     change = Pose(0.004 * np.cos(angle), -0.004 * np.sin(angle), 0.0)
     turned.learn(Pose(0.25, 0.0, angle), 0.0, change, around[0], around[1], 1.0)
     assert np.isclose(turned.x[0], straight.x[0])
@@ -105,14 +107,14 @@ def noise_found(
     rng, calibration = np.random.default_rng(seed), Calibration()
     sigmas = np.where(np.diag(walls) > 0, 1 / np.sqrt(np.maximum(np.diag(walls), 1)), 0.0)
     for _ in range(steps):
-        expected = calibration.scattered(Q)
+        expected = calibration.scattered(PARTS)
         C = np.asarray(np.linalg.inv(np.linalg.inv(expected) + walls), np.float64)
         off = rng.multivariate_normal(np.zeros(3), actual * Q) + rng.normal(
             0.0, np.sqrt(scatter) * sigmas
         )
         change = Pose.from_array(C @ walls @ off)
-        calibration.learn(Pose(0.25, 0.0, 0.0), 0.5, change, expected, C, scatter)
-    return calibration.noise
+        calibration.learn(Pose(0.25, 0.0, 0.0), 0.5, change, PARTS, C, scatter)
+    return calibration.noise[:3]
 
 
 def test_how_noisy_odometry_is_is_found() -> None:
@@ -136,10 +138,10 @@ def test_a_good_base_errs_less_than_it_is_doubted() -> None:
     found = np.array([noise_found(0.1, 25 * WALLS, seed=seed, steps=1000) for seed in range(5)])
     assert np.allclose(found.mean(axis=0), 0.1, rtol=0.5)
     calibration = Calibration()
-    calibration.noise = found.mean(axis=0)
-    doubted = calibration.scattered(Q)
-    assert np.allclose(doubted, 0.5 * Q)
-    assert np.allclose(np.diag(calibration.as_felt(doubted)), calibration.noise * np.diag(Q))
+    calibration.noise[:3] = found.mean(axis=0)
+    assert np.allclose(calibration.scattered(PARTS), 0.5 * Q)
+    felt = calibration.as_felt(PARTS).sum(axis=0)
+    assert np.allclose(np.diag(felt), calibration.noise[:3] * np.diag(Q))
 
 
 def test_walls_that_are_better_than_they_are_taken_for_hide_no_noise() -> None:
@@ -148,10 +150,35 @@ def test_walls_that_are_better_than_they_are_taken_for_hide_no_noise() -> None:
 
 
 def test_one_slip_makes_no_noise() -> None:
-    calibration = Calibration()
-    change = Pose(-0.25, 0.0, 0.0)
-    calibration.learn(Pose(0.25, 0.0, 0.0), 0.5, change, Q, matched(WALLS), 1.0)
-    assert calibration.noise[0] < 1.5
+    """Even if it is the very first step."""
+    rng, calibration, slip = np.random.default_rng(4), Calibration(), Pose(-0.25, 0.0, 0.0)
+    for step in range(201):
+        C = np.linalg.inv(np.linalg.inv(calibration.scattered(PARTS)) + WALLS)
+        off = rng.multivariate_normal(np.zeros(3), Q + np.linalg.inv(WALLS))
+        change = slip if step in (0, 200) else Pose.from_array(C @ WALLS @ off)
+        calibration.learn(Pose(0.25, 0.0, 0.0), 0.5, change, PARTS, C, 1.0)
+        if step in (40, 200):
+            assert calibration.noise[0] < 1.5
+
+
+def test_noise_by_turning_is_told_from_noise_by_driving_and_by_time() -> None:
+    """A gyro that wanders with time, and never errs by a turn: what a turn costs is found."""
+    expected, found = OdometryNoise(), []
+    for seed in range(5):
+        rng, calibration = np.random.default_rng(seed), Calibration()
+        for step in range(600):
+            felt = Pose(0.05, 0.0, 0.5) if step % 3 == 0 else Pose(0.25, 0.0, 0.0)
+            parts = expected.parts(felt, 0.5)
+            C = np.linalg.inv(np.linalg.inv(calibration.scattered(parts)) + 25 * WALLS)
+            actual = np.tensordot([0.4, 0.1, 0.0, 0.3], parts, axes=1)
+            off = rng.multivariate_normal(np.zeros(3), actual + np.linalg.inv(25 * WALLS))
+            change = Pose.from_array(C @ (25 * WALLS) @ off)
+            calibration.learn(felt, 0.5, change, parts, C, 1.0)
+        found.append(calibration.noise)
+    along, _, by_turning, by_driving = np.mean(found, axis=0)
+    assert along == pytest.approx(0.4, rel=0.3)
+    assert by_driving == pytest.approx(0.3, rel=0.3)
+    assert by_turning < 0.03
 
 
 OWN = np.diag([0.004**2, 0.002**2, 0.0005**2])  # of a step by itself

@@ -66,6 +66,21 @@ def test_a_known_offset_is_found_in_a_bend(offset: Pose) -> None:
     assert found.rms < 0.02
 
 
+@pytest.mark.parametrize("together", [1, 10])
+def test_how_far_neighbours_err_together_is_told(together: int) -> None:
+    """A mean over n points that err alike is as wrong as one of them: n times the variance."""
+    rng, sigma, scatters = np.random.default_rng(5), 0.01, []
+    along = np.arange(-4.0, 4.0, 0.02)
+    walls = np.stack([np.tile(along, 2), np.repeat([-1.5, 1.5], len(along))], axis=1)
+    for _ in range(40):
+        points = walls.copy()
+        points[:, 1] += rng.normal(0.0, sigma, len(walls) // together).repeat(together)
+        found = register(points, cKDTree(walls), walls, Pose(), Q, CONFIG)
+        assert found is not None
+        scatters.append(found.scatter)
+    assert np.mean(scatters) == pytest.approx(together * sigma**2, rel=0.1)
+
+
 def test_a_prior_that_leads_to_where_another_one_has_led_tells_nothing_more() -> None:
     walls, points = looked(CORNER, [Pose()]).points(), hits(CORNER, Pose())
 
