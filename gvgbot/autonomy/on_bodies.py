@@ -36,9 +36,10 @@ def end_in(scan: Scan, local_base: Pose, discs: list[Disc]) -> NDArray[np.bool_]
 
 
 def is_seen_through(scan: Scan, local_base: Pose, disc: Disc) -> bool:
-    """Whether most beams towards a disc pass it by, and hardly any ends on it.
+    """Whether most beams towards a disc get through it, and hardly any ends on it.
 
-    Beside a post between two panes of glass most beams pass as well.
+    Beside a post between two panes of glass most beams pass as well. What stands there is hit on
+    its near side: a wall close behind it does not hide that it has gone.
     """
     centre, radius = disc
     x, y = local_base.compose(scan.base_laser).inverse().transform(centre)
@@ -46,12 +47,15 @@ def is_seen_through(scan: Scan, local_base: Pose, disc: Disc) -> bool:
     if away < radius:
         return False
     middle = (np.arctan2(y, x) - scan.angle_min) % (2 * np.pi) / scan.angle_increment
-    half = radius / away / scan.angle_increment
+    half = np.arcsin(radius / away) / scan.angle_increment
     first, last = round(middle - half), round(middle + half) + 1
     if first < 0 or last > len(scan.ranges):
         return False
+    off = (np.arange(first, last) - middle) * scan.angle_increment
+    half_chord = np.sqrt(np.maximum(0.0, radius**2 - (away * np.sin(off)) ** 2))
+    nearest = away * np.cos(off)  # to the centre, on each beam
     told = scan.ranges[first:last]
-    told = told[~np.isnan(told)]
-    beyond = told > away + radius + BLUR_M
-    ends = ~beyond & (told > away - radius - BLUR_M)
-    return bool(len(told) and np.mean(beyond) > 0.5 and np.mean(ends) < _STRAY)
+    beyond = told > nearest + half_chord
+    ends = ~beyond & (told > nearest - half_chord - BLUR_M)
+    beyond, ends = (hit[~np.isnan(told)] for hit in (beyond, ends))
+    return bool(len(beyond) and np.mean(beyond) > 0.5 and np.mean(ends) < _STRAY)

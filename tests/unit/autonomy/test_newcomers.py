@@ -256,6 +256,17 @@ def test_who_goes_is_forgotten_as_soon_as_that_is_seen() -> None:
     assert len(watch.newcomers.points) == 0
 
 
+@pytest.mark.parametrize("y", [0.5, 0.7, 2.0])
+def test_who_stood_before_a_wall_and_goes_is_forgotten(y: float) -> None:
+    """Seen from close by, the wall is hardly farther off than he was, or not at all."""
+    room = carved([(-4.0, -3.0, 4.0, y + RADIUS + 0.05)])
+    watch = Watch(room)
+    watch.dropped(room, 0.0, person=(0.0, y))
+    assert len(watch.newcomers.points) > 0
+    watch.dropped(room, 1.0)
+    assert len(watch.newcomers.points) == 0
+
+
 def test_where_somebody_was_last_seen_nobody_knows_the_floor_until_it_is_seen() -> None:
     """A screen is put before him, who stays or goes, and taken away after a minute."""
     watch, spot = Watch(EMPTY), np.array([2.0, 0.0])
