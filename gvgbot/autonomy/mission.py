@@ -146,7 +146,7 @@ class Mission(Pursuit):
         path = here.path_to(self.target)
         if path is None:
             return self._wait_for_a_way(view, here)
-        self._scouting.end()
+        self._scouting.rest(view.stamp)
         return self._drive(view, here, path)
 
     def _set_target(self, view: View, here: Situation) -> None:
@@ -246,6 +246,7 @@ class Mission(Pursuit):
         self._backtracking.renew()
         self._examination.end()
         self._hindrance.end()
+        self._scouting.end()
         vertex = self._mapper.graph.vertices[chosen.vertex]
         psi = self._mapper.belief.map_vertex(chosen.vertex).theta
         bearing = wrap_angle(vertex.half_edges[chosen.key].bearing + psi)
@@ -255,7 +256,7 @@ class Mission(Pursuit):
         """Drive on until a known vertex comes into sight, before a frontier is given up."""
         scouting = self._scouting
         if not scouting.is_on:
-            scouting.begin(view.stamp)
+            scouting.begin(view.stamp, view.local_base.position)
             self._path_following.renew()
             self._events.append(Recovery(view.stamp, "drive on", "no way leads to the frontier"))
         near = None

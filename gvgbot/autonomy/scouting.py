@@ -8,10 +8,12 @@ from gvgbot.autonomy.exploration.paths import first_arrival, shortest_paths
 from gvgbot.autonomy.gvg.local import Branch
 from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.whereabouts import Situation
+from gvgbot.geometry import Array
 
 _MOST_NEAR = 2  # vertices to go to, for what no known way leads to
 _BEGAN_M = 0.4  # a trail so short is back where it began
 _AT_VERTEX_M = 0.5  # so near, all that there is to see from a vertex is seen
+_SAME_M = 3.0  # so near to where it began before, the robot looks for the same way
 
 
 class Scouting:
@@ -19,6 +21,7 @@ class Scouting:
 
     def __init__(self) -> None:
         self._since: float | None = None  # stamp
+        self._before_s, self._began_at = 0.0, np.full(2, np.inf)  # when a way was seen and lost
         self._gone_near = set[int]()  # vertices that the robot has been at since
         self._turned_back = False  # after the end of sight
 
@@ -27,13 +30,20 @@ class Scouting:
         """Whether a way is being looked for."""
         return self._since is not None
 
-    def begin(self, stamp: float) -> None:
-        """Look for a way."""
+    def begin(self, stamp: float, place: Array) -> None:
+        """Look for a way, at a place (2,), local frame."""
         self._since, self._gone_near, self._turned_back = stamp, set(), False
+        if np.hypot(*(place - self._began_at)) > _SAME_M:
+            self._before_s, self._began_at = 0.0, place
+
+    def rest(self, stamp: float) -> None:
+        """There is a way: who loses it again at the same place goes on looking."""
+        self._before_s = self.lasted(stamp)
+        self._since = None
 
     def end(self) -> None:
-        """There is a way, or no hope of one."""
-        self._since = None
+        """There is nothing to look for any more, or no hope."""
+        self._since, self._before_s = None, 0.0
 
     def skip(self, seconds: float) -> None:
         """Do not count a time in which nothing was to be seen."""
@@ -41,7 +51,7 @@ class Scouting:
 
     def lasted(self, stamp: float) -> float:
         """For how many seconds it has looked, since it was last on its way to a vertex."""
-        return 0.0 if self._since is None else stamp - self._since
+        return self._before_s + (0.0 if self._since is None else stamp - self._since)
 
     def path_near(self, here: Situation, belief: Belief, stamp: float) -> tuple[Branch, ...] | None:
         """To the vertices next to a frontier that no known way leads to: one may be seen there."""
@@ -62,7 +72,7 @@ class Scouting:
             return None
         path = here.path_over(first_arrival(starts, approach), approach.departures)
         if path is not None:
-            self._since = stamp
+            self._since, self._before_s = stamp, 0.0
         return path
 
     def path_on(self, here: Situation) -> tuple[Branch, ...]:

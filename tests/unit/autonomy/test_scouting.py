@@ -18,6 +18,9 @@ from tests.unit.autonomy.local_graphs import drawn
 STREET = drawn({1: (-3.0, 0.0), 2: (4.0, 0.0)}, {10: (1, 2, [])}, unseen={1: math.pi, 2: 0.0})
 
 
+HERE = np.zeros(2)
+
+
 class Town:
     """Two vertices at the ends of a street, and perhaps another one that nothing leads to."""
 
@@ -71,7 +74,7 @@ def test_it_goes_to_the_vertex_that_is_nearest_to_what_is_lost_and_then_to_the_n
     lost: float, near: float
 ) -> None:
     town, scouting = Town(lost), Scouting()
-    scouting.begin(0.0)
+    scouting.begin(0.0, HERE)
     assert end_of(scouting.path_near(town.seen_from(0.0), town.belief, 1.0)) == (near, 0.0)
     assert scouting.path_near(town.seen_from(near), town.belief, 2.0) is None
     other = 1.0 - near
@@ -83,7 +86,7 @@ def test_it_goes_to_the_vertex_that_is_nearest_to_what_is_lost_and_then_to_the_n
 def test_it_goes_to_two_vertices_and_to_no_more() -> None:
     town, scouting = Town(-9.0), Scouting()
     town.add_vertex_beyond()
-    scouting.begin(0.0)
+    scouting.begin(0.0, HERE)
     for x in (-3.0, 4.0):
         assert end_of(scouting.path_near(town.seen_from(0.5), town.belief, 1.0)) == (x, 0.0)
         assert scouting.path_near(town.seen_from(x), town.belief, 2.0) is None
@@ -98,7 +101,7 @@ def test_with_nothing_lost_there_is_nothing_to_go_near_to() -> None:
 def test_patience_runs_while_it_is_not_on_its_way_to_a_vertex() -> None:
     town, scouting = Town(12.0), Scouting()
     assert scouting.lasted(100.0) == 0.0
-    scouting.begin(0.0)
+    scouting.begin(0.0, HERE)
     assert scouting.lasted(5.0) == 5.0
     scouting.path_near(town.seen_from(0.0), town.belief, 5.0)
     assert scouting.lasted(8.0) == 3.0
@@ -110,7 +113,7 @@ def test_patience_runs_while_it_is_not_on_its_way_to_a_vertex() -> None:
 
 def test_at_the_end_of_sight_it_turns_back() -> None:
     town, scouting = Town(), Scouting()
-    scouting.begin(0.0)
+    scouting.begin(0.0, HERE)
 
     def aim(x: float) -> tuple[float, float] | None:
         return end_of(scouting.path_on(town.seen_from(x)))
@@ -126,7 +129,7 @@ def test_back_from_the_end_of_sight_it_drives_on_past_where_its_edge_began() -> 
     """The vertex there has proved to be none: nothing tells that the robot passes it."""
     town, scouting = Town(), Scouting()
     town.where = Whereabouts(on_edge=HalfEdgeId(99, 0))
-    scouting.begin(0.0)
+    scouting.begin(0.0, HERE)
 
     def drive_to(x: float, heading: float) -> tuple[float, float] | None:
         town.where._extend(np.array([x, 0.0]))
@@ -135,3 +138,18 @@ def test_back_from_the_end_of_sight_it_drives_on_past_where_its_edge_began() -> 
     assert {drive_to(x, 0.0) for x in np.arange(0.0, 3.5, 0.2)} == {(4.0, 0.0)}
     drive_to(3.8, 0.0)
     assert {drive_to(x, math.pi) for x in np.arange(3.6, -2.0, -0.2)} == {(-3.0, 0.0)}
+
+
+def test_a_way_that_comes_and_goes_in_one_place_is_no_hope() -> None:
+    scouting = Scouting()
+    for start in (0.0, 20.0, 40.0):
+        scouting.begin(start, np.array([0.05 * start, 1.0]))
+        assert scouting.is_on
+        scouting.rest(start + 8.0)
+        assert not scouting.is_on
+    assert scouting.lasted(60.0) == 24.0
+    scouting.begin(60.0, np.array([9.0, 1.0]))  # much farther on
+    assert scouting.lasted(61.0) == 1.0
+    scouting.end()
+    scouting.begin(70.0, np.array([9.0, 1.0]))  # for another frontier
+    assert scouting.lasted(71.0) == 1.0
