@@ -1,4 +1,4 @@
-"""Rows that were kept are those of the same settings, and older ones had none."""
+"""Rows that were kept are those of the same settings, older ones had none, and each counts once."""
 
 import json
 import sys
@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks import errands_table, kidnapping
+from benchmarks.keep_results import RESULTS
 
 SETTINGS = ["robot.radius_m=0.2"]
 
@@ -49,3 +50,20 @@ def test_errands_with_other_settings_are_others(
     errands_table.main()
     heads, values = (line.split() for line in capsys.readouterr().out.splitlines())
     assert values[heads.index("hits")] == str(hits)
+
+
+@pytest.mark.parametrize(
+    ("kind", "case"),
+    [
+        ("consistency", "name"),
+        ("policies", "name"),
+        ("floor_plans", "command"),
+        ("rough_floor_plans", "command"),
+        ("teams", "command"),
+        ("worlds", "command"),
+    ],
+)
+def test_no_run_that_docs_tell_of_is_counted_twice(kind: str, case: str) -> None:
+    lines = (RESULTS / f"{kind}.jsonl").read_text(encoding="utf-8").splitlines()
+    cases = [json.loads(line)[case] for line in lines]
+    assert sorted(set(cases)) == sorted(cases)

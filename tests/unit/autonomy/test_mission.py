@@ -513,6 +513,22 @@ def test_a_robot_that_cannot_move_gives_up_its_target_after_its_patience() -> No
     assert half.blocked
 
 
+def test_a_frontier_to_which_a_way_is_only_ever_seen_for_a_moment_is_given_up() -> None:
+    """To and fro in a corridor, of whose tee nothing is seen for ten seconds each time."""
+    robot = Robot()
+    robot.stand(TEE, 8)
+    begin, limit = robot.stamp, 2 * CONFIG.patience_s
+    while not robot.mapper.graph.blocked() and robot.stamp - begin < limit:
+        for way in (((0.0, 0.0), (-2.5, 0.0)), ((-2.5, 0.0), (0.0, 0.0))):
+            robot.mission.where.on_edge = None
+            robot.drive(PLAIN, *way)
+        robot.look(TEE)
+    (given_up,) = (r for r in robot.said(Recovery) if getattr(r, "action", "") != "drive on")
+    assert isinstance(given_up, Recovery)
+    assert given_up.reason == "no way leads there"
+    assert given_up.stamp - begin < 1.3 * CONFIG.patience_s
+
+
 def test_a_target_that_vanishes_when_patience_ends_costs_one_frontier_and_not_all() -> None:
     waiting = Robot()
     waiting.stand(TEE, 8)
