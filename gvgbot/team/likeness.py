@@ -31,7 +31,8 @@ def likeness(a: Side, b: Side, i: int, j: int, pose: Pose) -> float:
     known = {d.key: d.bearing for d in ours.departures}
     seen = tuple(bearing + pose.theta for bearing in theirs.bearings)
     paired = match_bearings(seen, known, _BEARING_RAD)
-    if not as_clear(np.array(ours.clearance), np.array(theirs.clearance)):
+    apart = math.hypot(*(pose.transform(theirs.position) - ours.position))
+    if not as_clear(np.array(ours.clearance), np.array(theirs.clearance), apart):
         return 0.0
     agreement = _agreement(a, b, ours, theirs, pose)
     is_same = abs(len(known) - len(seen)) <= 1 and len(paired) >= min(len(known), len(seen))

@@ -74,7 +74,11 @@ def leeway(metres: Metres) -> Metres:
     return _LENGTH_M + _LENGTH_SHARE * metres
 
 
-def as_clear(ours: Array, theirs: Array) -> NDArray[np.bool_]:
-    """Whether two clearances, m, may be those of one vertex in two charts."""
-    alike: NDArray[np.bool_] = np.abs(ours - theirs) <= _CLEARANCE_M + _CLEARANCE_SHARE * ours
+def as_clear(ours: Array, theirs: Array, apart: float = 0.0) -> NDArray[np.bool_]:
+    """Whether two clearances, m, may be those of one vertex in two charts, `apart` m if laid.
+
+    The distance to the nearest wall changes by no more than one moves: it is Lipschitz by 1.
+    """
+    limit = _CLEARANCE_M + _CLEARANCE_SHARE * ours + apart
+    alike: NDArray[np.bool_] = np.abs(ours - theirs) <= limit
     return alike

@@ -8,6 +8,8 @@ import pytest
 from gvgbot.geometry import Pose, wrap_angle
 from gvgbot.team.alignment import Alignment, align, refined
 from gvgbot.team.laying import least_squares
+from gvgbot.team.likeness import likeness
+from gvgbot.team.side import Side
 from tests.unit.team.building import Building, irregular, lattice
 
 STARTS = Pose(3.0, -2.0, 0.7), Pose(11.0, 6.0, -2.4)
@@ -79,6 +81,21 @@ def test_a_vertex_that_one_robot_took_somebody_for_does_not_part_the_maps() -> N
     kept = refined(ours, theirs, found)
     assert kept is not None
     assert kept.pose.distance(found.pose) < 0.1
+
+
+@pytest.mark.parametrize(("apart", "alike"), [(0.25, True), (0.0, False)])
+def test_a_vertex_placed_elsewhere_by_another_robot_may_have_as_much_other_clearance(
+    apart: float, *, alike: bool
+) -> None:
+    """Nothing comes nearer to a wall by more than it is moved; their chart has it 0.25 m off."""
+    chart = irregular(1).chart(LEFT, Pose())
+    vertex = chart.vertices[1]
+    position = vertex.position + np.array([0.0, apart])
+    elsewhere = replace(vertex, position=position, clearance=vertex.clearance - 0.25)
+    moved = replace(chart, vertices=chart.vertices | {1: elsewhere})
+    a, b = Side(chart), Side(moved)
+    at = a.ids.index(1)
+    assert (likeness(a, b, at, at, Pose()) > 0.9) == alike
 
 
 @pytest.mark.parametrize("seed", [1, 2])
