@@ -145,19 +145,26 @@ class Site:
         return any(e.traversed and vertex in (e.a.vertex, e.b.vertex) for e in edges)
 
     def _is_refuted(self, number: int, vertex: int) -> bool:
-        """Whether another robot found no vertex where it drove, and this one has not been there."""
-        if self._has_been_at(number, vertex):
-            return False
+        """Whether another robot found no vertex where it drove, and this one has not been there.
+
+        If it has, the other one does not go there again: who saw a departure finds out.
+        """
         place = self._place[number, vertex]
         point, holders = self._points[place], self._members[place]
-        others = [
-            c for other, c in enumerate(self._charts) if other != number and other not in holders
-        ]
-        driven = (e.polyline for c in others for e in c.edges.values() if e.traversed)
-        if any(leads_over(line, point, _AHEAD_M) for line in driven):
-            return True
-        passers = sum(any(leads_over(w.polyline, point, WELL_ON_M) for w in c.ways) for c in others)
-        return passers >= len(holders)
+        others = [n for n in range(len(self._charts)) if n != number and n not in holders]
+        drivers = [n for n in others if self._has_an_edge_over(n, point)]
+        passers = [n for n in others if self._has_driven_over(n, point)]
+        if self._has_been_at(number, vertex):
+            return 0 in (*drivers, *passers)
+        return bool(drivers) or len(passers) >= len(holders)
+
+    def _has_an_edge_over(self, number: int, point: Array) -> bool:
+        edges = self._charts[number].edges.values()
+        return any(e.traversed and leads_over(e.polyline, point, _AHEAD_M) for e in edges)
+
+    def _has_driven_over(self, number: int, point: Array) -> bool:
+        ways = self._charts[number].ways
+        return any(leads_over(way.polyline, point, WELL_ON_M) for way in ways)
 
     def _followed(self, number: int, vertex: int, bearing: float) -> Onward | None:
         """What another chart has behind a departure, or several have together."""
