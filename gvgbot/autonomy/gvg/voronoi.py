@@ -9,9 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import Delaunay, QhullError, cKDTree
+from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.gvg.coast import Diagram, Space, with_coast
+from gvgbot.autonomy.gvg.triangulation import Triangulation, delaunay
 from gvgbot.geometry import Array
 
 _RING = np.stack([f(np.arange(16) * np.pi / 8) for f in (np.cos, np.sin)], axis=1)
@@ -20,7 +21,6 @@ _SIDES = (1, 2, 2, 0, 0, 1)  # corners of a triangle's sides, of which each lies
 _RIM_M = 0.2  # of a maximal disc, two cells: its walls may hide that
 _MAX_UNKNOWN = 1  # of the sampled points of a disc
 _INFINITE_M = 1e6  # to the centre of a circle around three points on a line
-_QHULL = "Qbb Qc Qz Q12 Qx"  # scipy's own, and merge what lies in one plane at the end: faster
 _NOTHING: Array = np.empty((0, 2))
 _LONG_RIDGE_M, _STEP_M, _FARTHEST_M = 1.0, 0.2, 8.0  # of ridges that end in the unknown
 
@@ -60,12 +60,11 @@ def fine_graph(
     the middle of a room is that of its two posts. Farther from all walls than `open_clearance` m,
     the graph goes along the coast instead. `felt` are obstacles (N, 2) that the map does not show.
     """
-    generators = np.concatenate([local_map.points(), felt])
-    triangles = _triangulated(generators)
-    if triangles is None:
+    triangulation = delaunay(np.concatenate([local_map.points(), felt]))
+    if triangulation is None:
         return EMPTY
-    room = _Room(local_map, generators, min_clearance, open_clearance)
-    diagram = _diagram(triangles, room, roughness)
+    room = _Room(local_map, triangulation.points, min_clearance, open_clearance)
+    diagram = _diagram(triangulation, room, roughness)
     points, clearance, links, endless = _ridges_that_count(diagram, room)
     certain, new = diagram.certain, slice(len(diagram.certain), None)  # those of the coast
     if len(points[new]):
@@ -74,7 +73,7 @@ def fine_graph(
     rim = np.concatenate([links[here & ~there], links[there & ~here, ::-1]])
     rim = rim[clearance[rim[:, 1]] >= min_clearance]
     endless = endless[certain[diagram.a[endless]]]
-    away = _FARTHEST_M * _outwards(triangles, diagram, endless)
+    away = _FARTHEST_M * _outwards(triangulation, diagram, endless)
     rays = _Rays(
         np.concatenate([rim[:, 0], diagram.a[endless]]),
         np.concatenate([points[rim[:, 1]] - points[rim[:, 0]], away]),
@@ -107,21 +106,11 @@ class _Rays(NamedTuple):
     way: Array
 
 
-def _triangulated(generators: Array) -> Delaunay | None:
-    """The Delaunay triangulation of points (N, 2); None if they are too few, or on one line."""
-    if len(generators) < 4:
-        return None
-    try:
-        return Delaunay(generators, qhull_options=_QHULL)
-    except QhullError:
-        return None
-
-
-def _diagram(triangles: Delaunay, room: _Room, roughness: float) -> Diagram:
+def _diagram(triangulation: Triangulation, room: _Room, roughness: float) -> Diagram:
     """The whole Voronoi diagram, and which ridges count, by the rules of `fine_graph`."""
-    generators = triangles.points
-    points, clearance = _circumcircles(generators, triangles.simplices)
-    a, b, pair = _ridges(triangles)
+    generators = triangulation.points
+    points, clearance = _circumcircles(generators, triangulation.triangles)
+    a, b, pair = _ridges(triangulation)
     p, q = (generators.take(pair[:, k], axis=0) for k in (0, 1))
     wide = _far_apart(p, q, 2 * room.min_clearance)
     p, q = p.take(wide, axis=0), q.take(wide, axis=0)
@@ -203,13 +192,14 @@ def _ridges_that_count(
     return diagram.points, diagram.clearance, links, endless
 
 
-def _outwards(triangles: Delaunay, diagram: Diagram, endless: NDArray[np.int64]) -> Array:
+def _outwards(triangulation: Triangulation, diagram: Diagram, endless: NDArray[np.int64]) -> Array:
     """Directions (N, 2) of ridges (N,) without end, square to the hull and away from it."""
-    p, q = (triangles.points[diagram.generators[endless, k]] for k in (0, 1))
+    p, q = (triangulation.points[diagram.generators[endless, k]] for k in (0, 1))
     along = q - p
     normal = np.stack([-along[:, 1], along[:, 0]], axis=1)
     normal /= np.hypot(*normal.T)[:, None]
-    inner = triangles.points[triangles.simplices[diagram.a[endless]]].mean(axis=1)
+    corners = triangulation.triangles[diagram.a[endless]]
+    inner = triangulation.points[corners].mean(axis=1)
     normal[((inner - p) * normal).sum(axis=1) > 0] *= -1
     return normal
 
@@ -296,12 +286,15 @@ def _unknown(local_map: Space, centres: Array, radii: Array, places: Array) -> N
     return unknown
 
 
-def _ridges(triangles: Delaunay) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int32]]:
+def _ridges(
+    triangulation: Triangulation,
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int32]]:
     """Triangles (a, b) that share an edge, b = -1 at the hull, and the edge's two generators."""
-    other = triangles.neighbors.ravel()
-    own = np.repeat(np.arange(len(triangles.simplices)), 3)
+    triangles = triangulation.triangles
+    other = triangulation.neighbours.ravel()
+    own = np.repeat(np.arange(len(triangles)), 3)
     once = np.flatnonzero((own < other) | (other < 0))
-    pair = triangles.simplices.take(_SIDES, axis=1).reshape(-1, 2).take(once, axis=0)
+    pair = triangles.take(_SIDES, axis=1).reshape(-1, 2).take(once, axis=0)
     return own.take(once), other.take(once).astype(np.int64), pair
 
 

@@ -1,0 +1,45 @@
+"""The Delaunay triangulation of points in the plane."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import pythoncdt
+from numpy.typing import NDArray
+
+from gvgbot.geometry import Array
+
+_ORDER = pythoncdt.VertexInsertionOrder.AUTO
+_EDGES = pythoncdt.IntersectingConstraintEdges.NOT_ALLOWED  # there are none
+
+
+class Triangulation(NamedTuple):
+    """Points (N, 2), and triangles (T, 3) of them, counterclockwise.
+
+    `neighbours` (T, 3) are the triangles opposite to each corner, -1 beyond the hull.
+    """
+
+    points: Array
+    triangles: NDArray[np.int32]
+    neighbours: NDArray[np.int32]
+
+
+def delaunay(points: Array) -> Triangulation | None:
+    """The triangulation of finite points (N, 2), each taken once; None if they lie on one line."""
+    try:
+        cdt = _inserted(points)
+    except RuntimeError:  # a point is there twice
+        points = np.unique(points, axis=0)
+        cdt = _inserted(points)
+    cdt.erase_super_triangle()
+    found = cdt.triangles_array()
+    if not len(found):
+        return None
+    corners, beyond = (found[part].view(np.int32) for part in ("vertices", "neighbors"))
+    return Triangulation(points, corners, np.roll(beyond, -1, axis=1))
+
+
+def _inserted(points: Array) -> pythoncdt.Triangulation:
+    cdt = pythoncdt.Triangulation(_ORDER, _EDGES, 0.0)
+    buffer: Any = np.ascontiguousarray(points, np.float64)  # typed as one from Python 3.12 on
+    cdt.insert_vertices(buffer)
+    return cdt
