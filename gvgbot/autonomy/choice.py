@@ -56,15 +56,10 @@ class Choice:
         return self.sharing.has_driven(map_local.transform(ahead), either_way=either_way)
 
     def under_way(self, here: Situation) -> HalfEdgeId | None:
-        """The open edge that a robot of a team is on, if nobody else is farther on it.
-
-        Not while it drives towards the vertex: it started on the edge, and came from its far side.
-        """
+        """The open edge that a robot of a team is on, if nobody else is farther on it."""
         end = here.where.on_edge
         half = None if end is None else self._mapper.graph.half_edge(end)
         if self.sharing is None or end is None or half is None or not half.open:
-            return None
-        if here.faces_its_vertex():
             return None
         return end if self.keeps(end, here) else None
 

@@ -10,7 +10,7 @@ from gvgbot.autonomy.exploration.paths import Approach, first_arrival, shortest_
 from gvgbot.autonomy.gvg.local import Branch, LocalGvg, LocalNode, Place
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
 from gvgbot.autonomy.views import Correspondence
-from gvgbot.geometry import Array, Pose, direction_of, length_of, wrap_angle
+from gvgbot.geometry import Array, Pose, length_of, wrap_angle
 
 LEAST_LOOP_M = 4.0  # a shorter way is none round anything
 _STEP_M = 1.0  # from view to view, at most
@@ -313,14 +313,6 @@ class Situation:
         end = self.where.on_edge
         assert end is not None, "no edge to drive along"
         return self._extended((self._away_from(end) if ahead else self._back(),))
-
-    def faces_its_vertex(self) -> bool:
-        """Whether the robot looks back to the vertex that its edge leaves from."""
-        way = self.where.way_back(self.local_base.position)
-        if len(way) < 2:
-            return False
-        turned = wrap_angle(direction_of(way, _BACK_M) - self.local_base.theta)
-        return abs(turned) < math.pi / 2
 
     def _back(self) -> Branch:
         return self.where.backwards(self.gvg, self.place, self.known, self.local_base)

@@ -87,12 +87,7 @@ class Auction:
         if not mine:
             self.claim = self._claimed_end = None
             return None
-
-        def order(one: tuple[float, HalfEdgeId, Frontier]) -> tuple[float, bool, HalfEdgeId]:
-            cost, end, _ = one
-            return cost, end == reached[end.vertex].arrival, end  # nobody turns back without need
-
-        cost, end, frontier = min(mine, key=order)
+        cost, end, frontier = min(mine, key=lambda one: (one[0], one[1]))
         self._claim(frontier, cost, end)
         return end, reached[end.vertex]
 

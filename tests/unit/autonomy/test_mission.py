@@ -654,15 +654,6 @@ def test_who_is_on_an_edge_ahead_of_who_claims_it_goes_on(*, x: float, is_ahead:
         assert end_of(order) == pytest.approx((8.0, 0.0))
 
 
-def test_who_starts_on_an_edge_does_not_turn_back_to_it_at_its_first_vertex() -> None:
-    """It comes from the west: who turned there would drive twice over where it has just been."""
-    robot = Robot()
-    robot.mission.choice.sharing = Alone()
-    order = robot.drive(TEE, (0.0, 0.0), (2.5, 0.0))
-    assert robot.mission.target is not None
-    assert end_of(order) in (pytest.approx((8.0, 0.0)), pytest.approx((3.0, -4.0)))
-
-
 class Led(Alone):
     """Others have driven everywhere, from some time on."""
 

@@ -146,22 +146,6 @@ def test_a_frontier_goes_to_the_robot_that_is_nearer() -> None:
     assert one.auction.keeps(mine[0], graph_of(one.chart), [Approach(0.0, HalfEdgeId(0, -1))])
 
 
-CROSSING = Building(
-    np.array([(0.0, 0.0), (9.0, 0.0), (0.0, 9.0), (-9.0, 0.0)]), ((0, 1), (0, 2), (0, 3))
-)
-
-
-@pytest.mark.parametrize("came_by", [0, 2])
-def test_of_frontiers_that_are_equally_near_one_does_not_take_that_which_one_came_by(
-    came_by: int,
-) -> None:
-    """Half of it has been driven, if a robot started on it."""
-    one = robot("one", CROSSING, {0}, 0)
-    chosen = one.auction.choose(graph_of(one.chart), [Approach(0.0, HalfEdgeId(0, came_by))])
-    assert chosen is not None
-    assert chosen[0].key != came_by
-
-
 def test_who_is_on_another_departure_than_it_chose_keeps_it_only_if_nobody_followed_it() -> None:
     """The vertex that it went to was none, and the way there goes on from the one before."""
     one, _ = team()
