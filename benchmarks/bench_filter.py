@@ -1,4 +1,6 @@
-"""Time of the filter with ever more vertices: a motion, one in sight, a closed loop, the gates.
+"""Time of the filter with ever more vertices: motions, one in sight, a closed loop, the gates.
+
+All but one with old poses of the robot in the state, as when walls tell where it is.
 
 Run: python benchmarks/bench_filter.py [VERTICES ...]   (default: 100 500 2000)
 """
@@ -18,6 +20,7 @@ from gvgbot.autonomy.slam.ekf import (
     correct_vertex,
     distances,
 )
+from gvgbot.autonomy.slam.trail import MOST, Laid, move
 from gvgbot.geometry import Pose
 
 SIZES = (100, 500, 2000)
@@ -36,6 +39,14 @@ def belief_of(vertices: int) -> Belief:
     return Belief(rng.uniform(-3.0, 3.0, n), P, tuple(range(1, vertices + 1)))
 
 
+def laid(look: int) -> Laid:
+    """A look that is laid onto the walls of all looks before, at most forty."""
+    looks = np.arange(max(1, look - 40), look)
+    gains = np.repeat(0.8 / len(looks) * np.eye(3)[None], len(looks), axis=0)
+    noise, some = 1e-6 * np.eye(3), 0.01 * np.eye(3)
+    return Laid(Pose(0.25 * look), look, looks, gains, some, noise, np.eye(3), some)
+
+
 def cpu_ms(do: Callable[[], object]) -> float:
     """Median CPU time of a few goes, ms."""
     spent = []
@@ -51,12 +62,16 @@ def bench(vertices: int) -> None:
     belief, noise = belief_of(vertices), OdometryNoise()
     growth, R = noise.covariance(MOTION, 0.5), 0.01 * np.eye(3)
     seen = belief.map_base.to(belief.map_vertex(1))
+    blind = cpu_ms(lambda: advance(belief, MOTION, growth))
+    for look in range(2, MOST + 2):
+        belief = move(belief, MOTION, growth, laid(look))
     steps: dict[str, Callable[[], object]] = {
-        "motion": lambda: advance(belief, MOTION, growth),
+        "motion": lambda: move(belief, MOTION, growth, laid(MOST + 2)),
         "vertex still in sight": lambda: correct_vertex(belief, 1, seen, R[:2, :2]),
         "loop closed": lambda: correct(belief, 1, seen, R),
         "gates of all vertices": lambda: distances(belief, np.zeros(2), R[:2, :2]),
     }
+    report(f"{vertices} vertices: motion without walls", blind, "ms", at_most=KEYFRAME_MS)
     for name, do in steps.items():
         report(f"{vertices} vertices: {name}", cpu_ms(do), "ms", at_most=KEYFRAME_MS)
 

@@ -71,7 +71,7 @@ class Watched(Pipeline):
         happened = super().perceive(scan)
         if len(self.keyframes) > count:
             belief = self.mapper.belief
-            self.believed.append((belief.map_base, belief.P[:3, :3] + self.blur))
+            self.believed.append((belief.map_base, belief.P[:3, :3].copy()))
         self.closures += [(count, e) for e in happened if isinstance(e, LoopClosed)]
         return happened
 

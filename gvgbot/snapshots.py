@@ -5,7 +5,7 @@ import numpy as np
 from gvgbot import topics
 from gvgbot.autonomy.exploration.paths import Approach, shortest_path
 from gvgbot.autonomy.pipeline import Pipeline
-from gvgbot.autonomy.slam.ekf import Belief, OdometryNoise, predict
+from gvgbot.autonomy.slam.ekf import OdometryNoise, part, predict
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
 from gvgbot.geometry import STANDSTILL, Array, Pose, wrap_angle
 from gvgbot.hal.messages import Battery, Odometry, Scan, Sign
@@ -109,8 +109,7 @@ def pose_covariance(pipeline: Pipeline, odometry: Odometry | None, noise: Odomet
     """Covariance (3, 3) of map_base: the belief's, grown by the motion since the last keyframe."""
     if pipeline.is_lost:
         return UNKNOWN * np.eye(3)
-    belief = pipeline.mapper.belief
-    robot = Belief(belief.x[:3], belief.P[:3, :3] + pipeline.blur)
+    robot = part(pipeline.mapper.belief, ())
     if odometry is None or not pipeline.keyframes:
         return robot.P
     last = pipeline.keyframes[-1]

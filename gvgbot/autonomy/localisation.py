@@ -8,13 +8,14 @@ from scipy.ndimage import uniform_filter1d
 from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
-from gvgbot.autonomy.slam.calibration import Calibration
+from gvgbot.autonomy.slam.calibration import Calibration, per_unit
 from gvgbot.autonomy.slam.scan_matching import (
     Registration,
     ScanMatchingConfig,
     Sides,
     register_coarsely,
 )
+from gvgbot.autonomy.slam.trail import Laid
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
 
@@ -72,7 +73,7 @@ class LocalMaps:
         self._matching = matching
         self._calibration = Calibration()
         self._lesson: _Lesson | None = None  # what the calibration has yet to learn
-        self.blur = np.zeros((3, 3))  # covariance of the last match, in the frame of the base
+        self._left = np.eye(3)  # of odometry's errors, by what it has learnt since the last match
 
     def insert(
         self, scan: Scan, local_base: Pose, travelled: float, free: Array | None = None
@@ -102,7 +103,7 @@ class LocalMaps:
 
     def _calibrate(self) -> None:
         if self._lesson is not None:
-            self._calibration.learn(*self._lesson)
+            self._left = self._calibration.learn(*self._lesson)
         self._lesson = None
 
     @property
@@ -119,22 +120,23 @@ class LocalMaps:
 
     def match(
         self, scan: Scan, before: Pose, motion: Pose, duration: float, noise: Array
-    ) -> tuple[Pose, Array]:
-        """The pose of the base after a motion, and its covariance (3, 3) in the frame of the base.
+    ) -> tuple[Pose, Array, Laid | None]:
+        """The pose of the base after a motion, its covariance (3, 3) in its own frame, and how.
 
-        There are also the parts (4, 3, 3) of the noise of odometry. Without enough walls the pose
-        is where odometry has it. Wheels may have turned without effect, so it may as well be where
-        it was `before`.
+        That covariance is of what the step adds for good to the error of the one before. There are
+        also the parts (4, 3, 3) of the noise of odometry. Without enough walls the pose is where
+        odometry has it. Wheels may have turned without effect, so it may as well be where it was
+        `before`.
         """
         motion, Q = self.calibration.corrected(motion, duration), self.calibration.scattered(noise)
         prior = before.compose(motion)
         still = Pose(before.x, before.y, prior.theta)
         slipping = [] if self._matching.search_rad else [(still, _SLIPPING * Q)]
         best = self._best(scan, [(prior, Q), *slipping], least_known=_SEEN_SHARE)
-        calibration = self._calibration
+        calibration, per_error = self._calibration, per_unit(motion, duration)
         if best is None:
-            self.blur = np.zeros((3, 3))
-            return prior, calibration.adds_up(motion, duration, np.eye(3), Q)
+            laid = self._laid(None, prior, per_error, Q)
+            return prior, calibration.adds_up(motion, duration, np.eye(3), Q), laid
         found, used = best
         expected = self._matching.pair_sigma_m**2 / self._matching.independent_share
         walls = min(1.0, found.scatter / expected)
@@ -143,17 +145,18 @@ class LocalMaps:
             self._lesson = motion, duration, prior.to(found.pose), noise, found.covariance, walls
             felt = calibration.as_felt(noise).sum(axis=0)
         g = np.eye(3) - found.covariance @ np.linalg.inv(used)
-        self.blur = _error(found, g, felt, walls)
+        error = _error(found, g, felt, walls)
+        laid = self._laid(found, found.pose, (np.eye(3) - g) @ per_error, error)
         stays = np.linalg.inv(np.eye(3) + g * self._age(found))
-        drift = stays @ self.blur @ stays.T
+        drift = stays @ error @ stays.T
         left = np.asarray(stays @ (np.eye(3) - g), np.float64)
-        return found.pose, calibration.adds_up(motion, duration, left, drift)
+        return found.pose, calibration.adds_up(motion, duration, left, drift), laid
 
     def trust(
         self, scan: Scan, before: Pose, motion: Pose, duration: float, noise: Array
-    ) -> tuple[Pose, Array]:
+    ) -> tuple[Pose, Array, Laid | None]:
         """As `match`, but just where odometry has it, whatever the walls say."""
-        return before.compose(motion), noise.sum(axis=0)
+        return before.compose(motion), noise.sum(axis=0), None
 
     def find(
         self,
@@ -164,7 +167,7 @@ class LocalMaps:
         noise: Array,
         *,
         turned: float | None = None,
-    ) -> tuple[Pose, Array]:
+    ) -> tuple[Pose, Array, Laid | None]:
         """As `match`, where nobody saw the way that the base took: it is searched for around.
 
         Wheels tell how far it went and how much it turned, but not which of it came first. Where
@@ -176,7 +179,7 @@ class LocalMaps:
         Q = noise.sum(axis=0) + _LOST
         priors = [(p, Q) for p in _around(prior)]
         best = self._best(scan, priors, clearly, turned or 0.0, least_known=_SEEN_SHARE)
-        return (prior, Q) if best is None else (best[0].pose, best[0].covariance)
+        return (prior, Q, None) if best is None else (best[0].pose, best[0].covariance, None)
 
     def fits(self, scan: Scan, local_base: Pose) -> bool:
         """Whether a scan from a pose in the local frame shows the walls that are known there."""
@@ -199,6 +202,26 @@ class LocalMaps:
             np.concatenate([self.near.looked_at(), self._far.looked_at()[around]]),
             cKDTree(points, balanced_tree=False),
         )
+
+    def _laid(
+        self, found: Registration | None, local_base: Pose, by_odometry: Array, noise: Array
+    ) -> Laid:
+        """How the look that comes next was laid onto walls, if they were found.
+
+        The error of a look weighs by what the walls that it drew tell of the pose. Of a wall that
+        several looks have drawn it is the mean one of these.
+        """
+        looks, gains = np.empty(0, np.int64), np.empty((0, 3, 3))
+        if found is not None:
+            assert self._walls is not None
+            numbers = np.rint(self._walls.looks[found.walls]).astype(np.int64)
+            looks, of = np.unique(numbers, return_inverse=True)
+            at_each = (of == np.arange(len(looks))[:, None]).astype(np.float64)
+            told = (at_each @ found.information.reshape(-1, 9)).reshape(-1, 3, 3)
+            gains = found.covariance @ told
+        left, self._left = self._left, np.eye(3)
+        look, P = self.near.looks + 1, self._calibration.P
+        return Laid(local_base, look, looks, gains, by_odometry, noise, left, P)
 
     def _age(self, found: Registration) -> float:
         """How many looks before the newest one the walls that were found were seen, on average.

@@ -18,7 +18,7 @@ from gvgbot.autonomy.evidence import Evidence, MappingConfig
 from gvgbot.autonomy.gvg.local import Branch, LocalEdge, LocalNode
 from gvgbot.autonomy.knowledge import ON_EDGE_M, Knowledge
 from gvgbot.autonomy.recogniser import CLOSE_M, Match, Recogniser, Recognition
-from gvgbot.autonomy.slam import ekf
+from gvgbot.autonomy.slam import ekf, trail
 from gvgbot.autonomy.slam.graph import Edge, HalfEdgeId, Vertex
 from gvgbot.autonomy.slam.recognition import (
     RecognitionConfig,
@@ -27,6 +27,7 @@ from gvgbot.autonomy.slam.recognition import (
     sight_covariance,
 )
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
+from gvgbot.autonomy.slam.trail import Laid
 from gvgbot.autonomy.topology import (
     direction,
     loose_ends,
@@ -85,10 +86,10 @@ class Mapper(Knowledge):
         self.driven_parts: list[Array] = []
         self._events: list[Event] = []
 
-    def move(self, motion: Pose, covariance: Array) -> None:
-        """Account for a motion of the base, with its covariance (3, 3)."""
-        self.belief = ekf.advance(self.belief, motion, covariance)
-        self.unsettled.note_move(motion, covariance)
+    def move(self, motion: Pose, covariance: Array, laid: Laid | None = None) -> None:
+        """Account for a motion of the base, with its covariance (3, 3), and how walls told it."""
+        self.belief = trail.move(self.belief, motion, covariance, laid)
+        self.unsettled.note_move(motion, covariance, laid)
 
     def establish(self) -> None:
         """As `Knowledge.establish`; no more of it goes because a closure is taken back."""

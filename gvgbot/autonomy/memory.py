@@ -141,7 +141,7 @@ def remember(pipeline: Pipeline) -> Memory:
         last=None if pipeline._last is None else replace(pipeline._last, scan=None),
         travelled=pipeline.travelled,
         kept=pipeline._kept,
-        belief=mapper.belief,
+        belief=ekf.without_trail(mapper.belief),
         graph=mapper.graph,
         candidates=mapper._unbelieved._all,
         intent=_intent(pipeline),

@@ -152,11 +152,6 @@ class Pipeline:
         map_local = self.mapper.belief.map_base.compose(self._last.local_base.inverse())
         return map_local.transform(order.track.polyline)
 
-    @property
-    def blur(self) -> Array:
-        """What the newest match errs beside the belief's drift: covariance (3, 3), map frame."""
-        return rotated_covariance(self._maps.blur, self.mapper.belief.map_base.theta)
-
     # -- perception, per scan --------------------------------------------------------------------
 
     def perceive(self, scan: Scan) -> list[Event]:
@@ -307,7 +302,7 @@ class Pipeline:
         if self._was_lifted or is_doubted:
             self._was_lifted, noise = False, np.append(noise, [_LIFTED], axis=0)
         felt_s = max(0.0, duration - (self._unturned_s - unturned))  # in which the gyro may drift
-        local_base, covariance = match(
+        local_base, covariance, laid = match(
             scan, self._last.local_base, motion, felt_s, rotated_covariance(noise, -motion.theta)
         )
         if is_broken and self.matches_walls and not self._maps.fits(scan, local_base):
@@ -318,7 +313,7 @@ class Pipeline:
         moved = self._last.local_base.to(local_base)
         step = Step(moved, rotated_covariance(covariance, moved.theta))
         self.steps.append(step)
-        self.mapper.move(step.motion, step.covariance)
+        self.mapper.move(step.motion, step.covariance, laid)
         return local_base
 
     def _keep(self, scan: Scan, odom_base: Pose, local_base: Pose) -> None:

@@ -107,7 +107,7 @@ class ReturningPipeline(Pipeline):
         before, motion = self._last.local_base, self._last.odom_base.to(odom_base)
         duration = scan.stamp - self._last.stamp
         noise = self._config.odometry_noise.parts(motion, duration)
-        local_base, _ = self._maps.find(scan, before, motion, duration, noise)
+        local_base, *_ = self._maps.find(scan, before, motion, duration, noise)
         offset = before.compose(motion).to(local_base)
         if np.hypot(offset.x, offset.y) > _MOVED_M or abs(offset.theta) > _MOVED_RAD:
             return False

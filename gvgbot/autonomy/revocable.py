@@ -4,24 +4,24 @@ import copy
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from gvgbot.autonomy.slam import ekf
+from gvgbot.autonomy.slam import trail
 from gvgbot.autonomy.slam.doubts import Doubt
 from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
+from gvgbot.autonomy.slam.trail import Laid
 from gvgbot.autonomy.views import Observation
 from gvgbot.geometry import Array, Pose
 
 
 @dataclass(slots=True, eq=False)
 class Revocable:
-    """A closure at a vertex, what there was before it, and how the robot has moved since."""
+    """A closure at a vertex, and what there was before it; the belief moves on with the robot."""
 
     vertex: int
     belief: Belief
     graph: GvgGraph
     doubts: list[Doubt]
     observations: list[Observation]
-    moves: list[tuple[Pose, Array]] = field(default_factory=list)
     is_contradicted: bool = False  # by a way that led elsewhere
     witnesses: set[int] = field(default_factory=set)  # vertices that contradict it if they are new
 
@@ -38,6 +38,10 @@ class Revocable:
         own = replace(belief, P=belief.P.copy())
         return cls(vertex, own, copy.deepcopy(graph), list(doubts), list(observations))
 
+    def move(self, motion: Pose, covariance: Array, laid: Laid | None) -> None:
+        """Believe what would be believed without the closure, and without what is seen since."""
+        self.belief = trail.move(self.belief, motion, covariance, laid)
+
     def regained(self, now: GvgGraph) -> GvgGraph:
         """The graph of then, with what has nothing to do with the closure as it is now.
 
@@ -52,10 +56,3 @@ class Revocable:
                 present = now.half_edge(HalfEdgeId(vertex.id, key))
                 half.blocked = present is not None and present.blocked
         return graph
-
-    def relived(self) -> Belief:
-        """What would be believed now without the closure, and without what was seen since."""
-        belief = self.belief
-        for motion, covariance in self.moves:
-            belief = ekf.advance(belief, motion, covariance)
-        return belief

@@ -17,6 +17,7 @@ from gvgbot.autonomy.revocable import Revocable
 from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.doubts import NEW_PER_M2, SAME, Doubt, Doubts, habit_density
 from gvgbot.autonomy.slam.graph import Edge, HalfEdgeId, Vertex
+from gvgbot.autonomy.slam.trail import Laid
 from gvgbot.autonomy.topology import fuse
 from gvgbot.geometry import Array, Pose, wrap_angle
 
@@ -39,10 +40,10 @@ class Unsettled:
 
     # -- what happens meanwhile ----------------------------------------------------------------
 
-    def note_move(self, motion: Pose, covariance: Array) -> None:
-        """Learn of a motion of the base, with its covariance (3, 3)."""
+    def note_move(self, motion: Pose, covariance: Array, laid: Laid | None) -> None:
+        """Learn of a motion of the base, as `trail.move` does."""
         if self._revocable is not None:
-            self._revocable.moves.append((motion, covariance))
+            self._revocable.move(motion, covariance, laid)
 
     def note_closure(self, vertex: Vertex, *, is_surprising: bool) -> None:
         """Learn that a vertex is about to close a loop; it may be revoked if that moves much."""
@@ -171,7 +172,7 @@ class Unsettled:
         if was is None or not was.is_contradicted:
             return []
         added = sorted(known.graph.vertices.keys() - was.graph.vertices.keys())
-        known.graph, known.belief = was.regained(known.graph), was.relived()
+        known.graph, known.belief = was.regained(known.graph), was.belief
         known.observations[:] = was.observations
         self._doubts.recent = was.doubts
         self._doubts.refute(was.vertex)

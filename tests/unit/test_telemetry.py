@@ -188,8 +188,7 @@ def mind(belief: Belief, keyframe: Pose | None) -> Pipeline:
     """As much of a pipeline as its covariance needs."""
     seen: list[Any] = [] if keyframe is None else [SimpleNamespace(odom_base=keyframe, stamp=1.0)]
     mapper = SimpleNamespace(belief=belief)
-    blur = np.zeros((3, 3))
-    return cast(Pipeline, SimpleNamespace(mapper=mapper, keyframes=seen, blur=blur, is_lost=False))
+    return cast(Pipeline, SimpleNamespace(mapper=mapper, keyframes=seen, is_lost=False))
 
 
 def test_without_a_keyframe_the_covariance_is_the_belief_s() -> None:

@@ -64,7 +64,7 @@ class Calibration:
         share `left` (3, 3). What a way back makes good again is left out: a step has no negative
         covariance, and more may have been learnt on the way.
         """
-        B = left @ _per_unit(motion, duration)
+        B = left @ per_unit(motion, duration)
         before = _seen_after(motion) @ self.shared
         added = before @ B.T
         self.shared = before + B @ self.P
@@ -83,8 +83,11 @@ class Calibration:
         parts: Array,
         C: Array,
         walls: float,
-    ) -> None:
+    ) -> Array:
         """Account for the change that walls made to the pose after a corrected motion.
+
+        What is left (3, 3) of the three errors, as whoever knows their covariance with other things
+        must account for it as well.
 
         The change is in the frame of the base after it. In the same frame are the `parts`
         (4, 3, 3) of the noise that was expected and the covariance C (3, 3) of the pose after it,
@@ -92,19 +95,20 @@ class Calibration:
         good. `walls` is the variance of what walls say, in units of what C takes it for.
         """
         g = np.eye(3) - C @ np.linalg.inv(self.scattered(parts))
-        H = g @ _per_unit(motion, duration)
+        H = g @ per_unit(motion, duration)
         r = np.array([change.x, change.y, change.theta])
         P = self.P + np.diag(_WANDER**2)
         felt = g @ self.as_felt(parts) @ g.T
         S = H @ P @ H.T + felt.sum(axis=0) + walls * (g @ C) + _LEAST  # g V g' = g C
         self._learn_noise(r, S, felt)
         if r @ np.linalg.solve(S, r) > _SURPRISING:
-            return
+            return np.eye(3)
         K = np.linalg.solve(S, H @ P).T
         self.x = self.x + K @ r
         left = np.eye(3) - K @ H
         P -= K @ S @ K.T
         self.P, self.shared = (P + P.T) / 2, self.shared @ left.T
+        return left
 
     def _learn_noise(self, r: Array, S: Array, felt: Array) -> None:
         """Let the noise follow the squares of corrections r (3,) over their variances in S (3, 3).
@@ -120,7 +124,7 @@ class Calibration:
         self.noise = np.clip(self.noise * (1.0 + rate * (counts @ (odd - 1.0))), *_NOISE)
 
 
-def _per_unit(motion: Pose, duration: float) -> Array:
+def per_unit(motion: Pose, duration: float) -> Array:
     """How the pose after a motion errs with each of the three (3, 3), in the frame of the base."""
     c, s = np.cos(motion.theta), np.sin(motion.theta)
     return np.array(

@@ -2,14 +2,15 @@
 
 State x = (x, y, theta, then x, y, psi of each vertex), map frame; P its covariance. A vertex's
 frame has its origin on the vertex and the orientation that the local frame had when the vertex was
-first seen, so that bearings and snapshots stored with the vertex turn with it. Letters as in the
+first seen, so that bearings and snapshots stored with the vertex turn with it. Behind the vertices
+may be old poses of the robot (`trail`), which are corrected with all the rest. Letters as in the
 literature: F, G Jacobians, H measurement Jacobian, K gain, S innovation covariance.
 """
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Annotated
+from dataclasses import dataclass, field, replace
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,13 +66,26 @@ class OdometryNoise:
         return np.asarray(chord @ along_chord @ chord.T, np.float64)
 
 
+class Clone(NamedTuple):
+    """An old pose of the robot that is in the state, for so many looks at walls from one on."""
+
+    local_base: Pose  # where the local frame has it
+    first: int  # look, by its number
+    looks: int
+    slot: int  # its place in the trail's part of the state
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Belief:
-    """Mean x (3 + 3n,) and covariance P of the robot and the vertices, in the order of `ids`."""
+    """Mean x (3 + 3n,) and covariance P of the robot and the vertices, in the order of `ids`.
+
+    With a `trail`, oldest pose first, both go on behind the vertices as module `trail` has it.
+    """
 
     x: Array = field(default_factory=lambda: np.zeros(3))
     P: Array = field(default_factory=lambda: np.zeros((3, 3)))
     ids: tuple[int, ...] = ()
+    trail: tuple[Clone, ...] = ()
 
     @property
     def map_base(self) -> Pose:
@@ -81,7 +95,12 @@ class Belief:
     @property
     def positions(self) -> Array:
         """Where the vertices are (N, 2), in the order of `ids`."""
-        return self.x[3:].reshape(-1, 3)[:, :2]
+        return self.x[3 : self.end].reshape(-1, 3)[:, :2]
+
+    @property
+    def end(self) -> int:
+        """The size of the part of the state that is the robot and the vertices."""
+        return 3 + 3 * len(self.ids)
 
     def _at(self, vertex: int) -> int:
         return 3 + 3 * self.ids.index(vertex)
@@ -99,7 +118,7 @@ class Belief:
 
 def predict(belief: Belief, motion: Pose, Q: Array) -> Belief:
     """The belief after a motion (base seen from where it was) with covariance Q (3, 3)."""
-    return advance(Belief(belief.x, belief.P.copy(), belief.ids), motion, Q)
+    return advance(replace(belief, P=belief.P.copy()), motion, Q)
 
 
 def advance(belief: Belief, motion: Pose, Q: Array) -> Belief:
@@ -107,26 +126,34 @@ def advance(belief: Belief, motion: Pose, Q: Array) -> Belief:
 
     What vertices know of each other stays where it is, however many there are.
     """
-    moved, F, G = _composed(belief.map_base, motion)
+    moved, F, G = composed(belief.map_base, motion)
     x, P = belief.x.copy(), belief.P
     x[:3] = moved.x, moved.y, moved.theta
     P[:3, 3:] = F @ P[:3, 3:]
     P[3:, :3] = P[:3, 3:].T
     P[:3, :3] = F @ P[:3, :3] @ F.T + G @ Q @ G.T
-    return Belief(x, P, belief.ids)
+    return replace(belief, x=x, P=P)
+
+
+def without_trail(belief: Belief) -> Belief:
+    """The belief of the robot and the vertices alone; it shares its parts with the other one."""
+    return Belief(belief.x[: belief.end], belief.P[: belief.end, : belief.end], belief.ids)
 
 
 def add_vertex(belief: Belief, vertex: int, base_vertex: Pose, R: Array) -> Belief:
     """The belief with a vertex first seen at a pose in the base frame, with covariance R (3, 3)."""
-    n = len(belief.x)
-    placed, J_r, J_z = _composed(belief.map_base, base_vertex)
-    P = np.zeros((n + 3, n + 3))
-    P[:n, :n] = belief.P
-    P[n:, :n] = J_r @ belief.P[:3]
-    P[:n, n:] = P[n:, :n].T
-    P[n:, n:] = J_r @ belief.P[:3, :3] @ J_r.T + J_z @ R @ J_z.T
-    x = np.concatenate([belief.x, [placed.x, placed.y, placed.theta]])
-    return Belief(x, P, (*belief.ids, vertex))
+    n, end = len(belief.x), belief.end
+    placed, J_r, J_z = composed(belief.map_base, base_vertex)
+    across = J_r @ belief.P[:3]
+    P, own = np.empty((n + 3, n + 3)), slice(end, end + 3)
+    kept = ((slice(end), slice(end)), (slice(end, n), slice(end + 3, n + 3)))
+    for old, new in kept:
+        for other_old, other_new in kept:
+            P[new, other_new] = belief.P[old, other_old]
+        P[own, new], P[new, own] = across[:, old], across[:, old].T
+    P[own, own] = J_r @ belief.P[:3, :3] @ J_r.T + J_z @ R @ J_z.T
+    x = np.insert(belief.x, end, [placed.x, placed.y, placed.theta])
+    return replace(belief, x=x, P=P, ids=(*belief.ids, vertex))
 
 
 def place_robot(belief: Belief, vertex: int, vertex_base: Pose, R: Array) -> Belief:
@@ -134,8 +161,8 @@ def place_robot(belief: Belief, vertex: int, vertex_base: Pose, R: Array) -> Bel
 
     Pose and covariance are in the vertex's frame. What it believed of its own place is forgotten.
     """
-    i = 3 + 3 * belief.ids.index(vertex)
-    placed, J_v, J_z = _composed(belief.map_vertex(vertex), vertex_base)
+    belief, i = without_trail(belief), 3 + 3 * belief.ids.index(vertex)
+    placed, J_v, J_z = composed(belief.map_vertex(vertex), vertex_base)
     x, P = belief.x.copy(), belief.P.copy()
     x[:3] = placed.x, placed.y, placed.theta
     P[:3, 3:] = J_v @ belief.P[i : i + 3, 3:]
@@ -144,7 +171,7 @@ def place_robot(belief: Belief, vertex: int, vertex_base: Pose, R: Array) -> Bel
     return Belief(x, P, belief.ids)
 
 
-def _composed(a_b: Pose, b_c: Pose) -> tuple[Pose, Array, Array]:
+def composed(a_b: Pose, b_c: Pose) -> tuple[Pose, Array, Array]:
     """The pose a_c, and its Jacobians (3, 3) by either pose."""
     c, s = math.cos(a_b.theta), math.sin(a_b.theta)
     by_first = np.array(
@@ -163,7 +190,7 @@ def remove_vertex(belief: Belief, vertex: int) -> Belief:
     i = 3 + 3 * belief.ids.index(vertex)
     keep = np.delete(np.arange(len(belief.x)), slice(i, i + 3))
     ids = tuple(v for v in belief.ids if v != vertex)
-    return Belief(belief.x[keep], belief.P[np.ix_(keep, keep)], ids)
+    return replace(belief, x=belief.x[keep], P=belief.P[np.ix_(keep, keep)], ids=ids)
 
 
 def expected(belief: Belief, vertex: int) -> tuple[Pose, Array]:
@@ -263,7 +290,7 @@ def coincide(belief: Belief, one: int, other: int, R: Array) -> Belief:
     K = np.asarray(np.linalg.solve(S, H @ belief.P).T, np.float64)
     x = _wrapped(belief.x + K @ (belief.x[j : j + 2] - belief.x[i : i + 2]))
     P = belief.P - K @ S @ K.T
-    return Belief(x, (P + P.T) / 2, belief.ids)
+    return replace(belief, x=x, P=(P + P.T) / 2)
 
 
 def part(belief: Belief, vertices: Sequence[int]) -> Belief:
@@ -279,7 +306,7 @@ def update(belief: Belief, vertex: int, base_vertex: Pose, R: Array) -> Belief:
     After a large innovation the Jacobian of where the robot thought to be is not that of where it
     is: it is taken again from there, as Gauss and Newton would (the iterated Kalman filter).
     """
-    return correct(Belief(belief.x, belief.P.copy(), belief.ids), vertex, base_vertex, R)
+    return correct(replace(belief, P=belief.P.copy()), vertex, base_vertex, R)
 
 
 def correct(belief: Belief, vertex: int, base_vertex: Pose, R: Array) -> Belief:
@@ -292,7 +319,7 @@ def correct(belief: Belief, vertex: int, base_vertex: Pose, R: Array) -> Belief:
 
     def corrected(x: Array) -> tuple[Array, Array, Array, Array]:
         """The mean, K, HP and the used part of H, with the Jacobian at x."""
-        r, H = _residual(Belief(x, belief.P, belief.ids), vertex, base_vertex, len(R))
+        r, H = _residual(replace(belief, x=x), vertex, base_vertex, len(R))
         H = H[:, used]
         HP = H @ P_used
         K = np.asarray(np.linalg.solve(HP[:, used] @ H.T + R, HP).T, np.float64)
@@ -306,7 +333,7 @@ def correct(belief: Belief, vertex: int, base_vertex: Pose, R: Array) -> Belief:
     # (I - K H) P (I - K H)' + K R K' = P - K L' - L K'
     L = HP.T - K @ (HP[:, used] @ H.T + R) / 2
     _subtract(belief.P, np.hstack([K, L]), np.hstack([L, K]).T)
-    return Belief(x, belief.P, belief.ids)
+    return replace(belief, x=x)
 
 
 def correct_vertex(belief: Belief, vertex: int, base_vertex: Pose, R: Array) -> Belief:
@@ -328,7 +355,7 @@ def correct_vertex(belief: Belief, vertex: int, base_vertex: Pose, R: Array) -> 
     P[own] -= less
     P[:, own] -= less.T
     P[own, own] += K @ S @ K.T
-    return Belief(_wrapped(x), P, belief.ids)
+    return replace(belief, x=_wrapped(x))
 
 
 def _subtract(P: Array, left: Array, right: Array) -> None:

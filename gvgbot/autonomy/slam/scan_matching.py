@@ -50,7 +50,8 @@ class Registration:
     inliers: float  # share of the points that found a wall
     rms: float  # metres from the walls
     scatter: float  # m^2, variance of a point's distance, if each of them erred by itself
-    walls: NDArray[np.intp]  # the nearest wall point of each pair
+    walls: NDArray[np.intp]  # the nearest wall point (K,) of each pair
+    information: Array  # (K, 3, 3) of the pose that each pair gives: the covariance is by their sum
 
 
 class Sides(NamedTuple):
@@ -108,14 +109,15 @@ def register(
         return _pairs(points, pose, tree, walls, counts, config.max_pair_m, turned)
 
     pose, step = prior, np.zeros(3)  # from the prior to the pose
-    A, residual = information, np.empty(0)
+    A, near, residual = information, np.empty(0, bool), np.empty(0)
+    J = JW = np.empty((3, 0))
     paired_at, pairs = pose, paired(pose)
     for _ in range(_ITERATIONS):
         if found is not None and not _is_elsewhere(found, pose):
             return None
         if _is_elsewhere(paired_at, pose):
             paired_at, pairs = pose, paired(pose)
-        residual, J = _linear(pairs, pose, prior, config.max_pair_m)
+        near, residual, J = _linear(pairs, pose, prior, config.max_pair_m)
         if len(residual) < config.min_pairs:
             return None
         JW = J * _weights(residual, config)
@@ -127,7 +129,15 @@ def register(
             break
     rms = math.sqrt(float(residual @ residual) / len(residual))
     share = len(residual) / len(points)
-    return Registration(pose, np.linalg.inv(A), share, rms, _scatter(residual), pairs.walls)
+    return Registration(
+        pose,
+        np.linalg.inv(A),
+        share,
+        rms,
+        _scatter(residual),
+        pairs.walls[near],
+        JW.T[:, :, None] * J.T[:, None],
+    )
 
 
 def register_coarsely(
@@ -216,8 +226,10 @@ def _pairs(
     )
 
 
-def _linear(pairs: _Pairs, pose: Pose, prior: Pose, reach: float) -> tuple[Array, Array]:
-    """Signed distances (K,) from the walls within reach, and their derivative (3, K).
+def _linear(
+    pairs: _Pairs, pose: Pose, prior: Pose, reach: float
+) -> tuple[NDArray[np.bool_], Array, Array]:
+    """Which walls are within reach, signed distances (K,) from these, and the derivative (3, K).
 
     That is the derivative by a step of the pose in the prior's frame.
     """
@@ -228,7 +240,7 @@ def _linear(pairs: _Pairs, pose: Pose, prior: Pose, reach: float) -> tuple[Array
     c, s = math.cos(prior.theta), math.sin(prior.theta)
     J = np.array([c * nx + s * ny, c * ny - s * nx, u * ny - v * nx])
     near = np.abs(residual) < reach
-    return (residual, J) if near.all() else (residual[near], J[:, near])
+    return (near, residual, J) if near.all() else (near, residual[near], J[:, near])
 
 
 def _lines(x: Array, y: Array, weight: Array) -> tuple[Array, Array, NDArray[np.bool_]]:

@@ -10,7 +10,9 @@ from scipy.stats import chi2
 
 from gvgbot.autonomy.gvg.local_map import LocalMapConfig
 from gvgbot.autonomy.localisation import LocalMaps
+from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
+from gvgbot.autonomy.slam.trail import Laid, move
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
 from tests.unit.autonomy.sights import LASER_270, carved, sweep
@@ -52,7 +54,7 @@ def test_noise_does_not_turn_the_scan() -> None:
         local = maps()
         for x in np.arange(-2.0, 0.0, 0.25):
             local.insert(room(rng, x), Pose(x, 0.0, 0.0), x + 2.0)
-        found, _ = local.match(
+        found, *_ = local.match(
             room(rng, 0.0), Pose(-0.25, 0.0, 0.0), Pose(0.25, 0.0, 0.0), 1.0, LOOSE
         )
         errors.append(found.theta)
@@ -77,10 +79,13 @@ def test_what_is_done_while_there_is_time_changes_no_match() -> None:
 
 def test_without_walls_the_covariance_is_the_prior_s() -> None:
     nothing = Scan(0.0, np.full(1081, math.inf), float(BEARINGS[0]), math.radians(0.25), 0.1, 30.0)
-    pose, covariance = maps().match(nothing, Pose(1.0, 2.0, 3.0), Pose(), 1.0, LOOSE)
+    pose, covariance, laid = maps().match(nothing, Pose(1.0, 2.0, 3.0), Pose(), 1.0, LOOSE)
     assert pose == Pose(1.0, 2.0, 3.0)
     drift = np.diag([0.0, 0.0, 0.0005**2])  # of a gyro in a second, before it is known
     np.testing.assert_allclose(covariance, LOOSE.sum(axis=0) + drift, rtol=1e-9, atol=1e-15)
+    assert laid is not None
+    np.testing.assert_allclose(laid.noise, LOOSE.sum(axis=0))
+    assert len(laid.gains) == 0
 
 
 def test_wheels_that_slipped_in_a_turn_are_found_out_by_a_search() -> None:
@@ -89,7 +94,7 @@ def test_wheels_that_slipped_in_a_turn_are_found_out_by_a_search() -> None:
     for search_rad in (0.0, 0.6):
         local = maps(ScanMatchingConfig(coarse_pair_m=0.5, search_rad=search_rad))
         local.insert(room(rng, -2.0), Pose(-2.0, 0.0, 0.0), 0.0)
-        pose, _ = local.match(
+        pose, *_ = local.match(
             room(rng, -2.0), Pose(-2.0, 0.0, 0.0), Pose(0.0, 0.0, 0.5), 1.0, LOOSE
         )
         found.append(pose)
@@ -101,7 +106,7 @@ def test_wheels_that_slipped_in_a_turn_are_found_out_by_a_search() -> None:
 
 @pytest.mark.parametrize("locate", [LocalMaps.find, LocalMaps.match])
 def test_a_robot_that_comes_round_a_corner_unseen_is_found_by_the_walls_it_knew(
-    locate: Callable[[LocalMaps, Scan, Pose, Pose, float, Array], tuple[Pose, Array]],
+    locate: Callable[[LocalMaps, Scan, Pose, Pose, float, Array], tuple[Pose, Array, Laid | None]],
 ) -> None:
     """Most of what it sees is new, and the wheels are wrong by some centimetres."""
     world = carved([(-4.0, -1.0, 1.0, 1.0), (-1.0, -1.0, 1.0, 9.0)])
@@ -112,7 +117,7 @@ def test_a_robot_that_comes_round_a_corner_unseen_is_found_by_the_walls_it_knew(
         local.insert(seen, Pose(x, 0.0, 0.0), x)
     scan = sweep(world, here, field_of_view=LASER_270, sigma=0.01, rng=rng)
     wheels = before.to(here).compose(Pose(0.08, -0.05, 0.01))
-    found, covariance = locate(local, scan, before, wheels, 4.0, LOOSE)
+    found, covariance, _ = locate(local, scan, before, wheels, 4.0, LOOSE)
     assert found.distance(here) < 0.035  # the wheels are 0.094 m off
     assert abs(found.theta - here.theta) < 0.01
     assert covariance[0, 0] < 0.05**2
@@ -126,7 +131,7 @@ def test_the_corners_of_a_room_do_not_hold_the_robot_back() -> None:
     local.insert(room(rng, -4.0, sigma=1e-6), believed, 0.0)
     for step in range(1, 21):
         scan = room(rng, -4.0 + 0.25 * step, sigma=1e-6)
-        believed, _ = local.match(scan, believed, odometry, 1.0, noise)
+        believed, *_ = local.match(scan, believed, odometry, 1.0, noise)
         local.insert(scan, believed, 0.25 * step)
     assert believed.distance(Pose(1.0, 0.0, 0.0)) < 0.006
 
@@ -136,43 +141,76 @@ def test_a_drive_errs_about_as_much_as_its_steps_say_together() -> None:
     rng, noise = np.random.default_rng(6), noise_of(0.01, 0.005, 0.003)
     errors, summed = [], np.zeros(3)
     for _ in range(15):
-        local, believed = maps(), Pose(-4.0, 0.0, 0.0)
+        local, believed, newest = maps(), Pose(-4.0, 0.0, 0.0), np.zeros(3)
         local.insert(room(rng, -4.0), believed, 0.0)
         for step in range(1, 21):
             slip = Pose.from_array(rng.multivariate_normal([0.25, 0.0, 0.0], noise.sum(axis=0)))
             scan = room(rng, -4.0 + 0.25 * step)
-            believed, covariance = local.match(scan, believed, slip, 1.0, noise)
-            summed += np.diag(covariance) / 15
+            believed, covariance, laid = local.match(scan, believed, slip, 1.0, noise)
+            assert laid is not None
+            summed, newest = summed + np.diag(covariance) / 15, np.diag(laid.noise)
             local.insert(scan, believed, 0.25 * step)
         errors.append((believed.x - 1.0, believed.y, believed.theta))
-        summed += np.diag(local.blur) / 15
+        summed += newest / 15
     share = np.mean(np.square(errors), axis=0)[[0, 2]] / summed[[0, 2]]
     assert (share < chi2.ppf(0.995, 15) / 15).all()
     assert (share > 0.1).all()
 
 
+def test_a_match_tells_what_the_one_before_has_taught_of_odometry() -> None:
+    """A posterior covariance is what is left of an error times the prior one."""
+    rng, local, told = np.random.default_rng(5), maps(), list[Laid]()
+    local.insert(room(rng, -4.0), Pose(-4.0, 0.0, 0.0), 0.0)
+    for x in (-3.75, -3.5):
+        scan = room(rng, x)
+        found, _, laid = local.match(scan, Pose(x - 0.25), Pose(0.25, 0.0, 0.0), 1.0, LOOSE)
+        local.insert(scan, found, x + 4.0)
+        assert laid is not None
+        told.append(laid)
+    first, second = told
+    np.testing.assert_array_equal(first.left, np.eye(3))
+    assert second.P[0, 0] < 0.995 * first.P[0, 0]
+    np.testing.assert_allclose(second.left @ first.P, second.P, rtol=1e-4, atol=1e-11)
+    assert (first.look, second.look) == (2, 3)
+    assert first.looks.tolist() == [1]
+    assert second.looks.tolist() == [1, 2]
+
+
 def test_where_walls_are_old_errors_do_not_add_up() -> None:
-    """To and fro three times: the walls of the first way hold the robot, and its steps say so."""
+    """To and fro three times: the walls of the first way hold the robot, and its steps say so.
+
+    The belief, which knows whose walls they are, is as sure at the end as after the first way.
+    """
     rng, noise, runs = np.random.default_rng(9), noise_of(0.01, 0.005, 0.003), 6
     first = np.arange(-3.75, 1.01, 0.25)
     way = [*first, *np.tile([*np.arange(0.75, -2, -0.25), *np.arange(-1.5, 1.01, 0.25)], 3)]
     errors, claimed = np.zeros(3), np.zeros((2, 3))  # on the first way, and on all that follow
+    sure = np.zeros((2, 3))  # the belief's variances after the first way, and at the end
     for _ in range(runs):
         local, believed, before = maps(), Pose(-4.0, 0.0, 0.0), -4.0
+        belief, newest = Belief(np.array([before, 0.0, 0.0])), np.zeros(3)
         local.insert(room(rng, before), believed, 0.0)
         for step, x in enumerate(way, 1):
             slip = Pose.from_array(
                 rng.multivariate_normal([x - before, 0.0, 0.0], noise.sum(axis=0))
             )
             scan, before = room(rng, x), float(x)
-            believed, covariance = local.match(scan, believed, slip, 1.0, noise)
+            old = believed
+            believed, covariance, laid = local.match(scan, old, slip, 1.0, noise)
+            belief = move(belief, old.to(believed), covariance, laid)
+            assert laid is not None
+            newest = np.diag(laid.noise)
             claimed[int(step > len(first))] += np.diag(covariance) / runs
+            if step in (len(first), len(way)):
+                sure[int(step > len(first))] += np.diag(belief.P)[:3] / runs
             local.insert(scan, believed, 0.25 * step)
-        claimed[1] += np.diag(local.blur) / runs
+        claimed[1] += newest / runs
         errors += np.square([believed.x - before, believed.y, believed.theta]) / runs
     share = errors / claimed.sum(axis=0)
     assert (share[[0, 2]] < chi2.ppf(0.995, runs) / runs).all()
     assert (claimed[1] < 1.5 * claimed[0]).all()  # on a way that is more than three times as long
+    assert (sure[1] < 1.5 * sure[0]).all()
+    assert ((errors / sure[1])[[0, 2]] < chi2.ppf(0.995, runs) / runs).all()
 
 
 def test_a_thin_wall_seen_from_behind_is_not_taken_for_the_face_seen_before() -> None:
@@ -193,7 +231,7 @@ def test_a_thin_wall_seen_from_behind_is_not_taken_for_the_face_seen_before() ->
             Pose.from_array(rng.multivariate_normal(np.zeros(3), noise.sum(axis=0)))
         )
         scan = sweep(world, here, field_of_view=LASER_270, sigma=0.01, rng=rng, reach=5.6)
-        believed, _ = local.match(scan, believed, slip, 0.5, noise)
+        believed, *_ = local.match(scan, believed, slip, 0.5, noise)
         local.insert(scan, believed, 0.3 * len(errors))
         errors.append(abs(believed.y - here.y))
     assert max(errors) < 0.5 * thin
