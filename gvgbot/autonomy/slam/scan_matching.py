@@ -51,7 +51,14 @@ class Registration:
     rms: float  # metres from the walls
     scatter: float  # m^2, variance of a point's distance, if each of them erred by itself
     walls: NDArray[np.intp]  # the nearest wall point (K,) of each pair
-    information: Array  # (K, 3, 3) of the pose that each pair gives: the covariance is by their sum
+    J: Array  # (3, K), of each pair's distance from its wall, by a step in the prior's frame
+    JW: Array  # (3, K), the same times what the pair counts
+
+    @property
+    def information(self) -> Array:
+        """What each pair tells of the pose (K, 3, 3): the covariance is by their sum."""
+        told: Array = self.JW.T[:, :, None] * self.J.T[:, None]
+        return told
 
 
 class Sides(NamedTuple):
@@ -129,15 +136,8 @@ def register(
             break
     rms = math.sqrt(float(residual @ residual) / len(residual))
     share = len(residual) / len(points)
-    return Registration(
-        pose,
-        np.linalg.inv(A),
-        share,
-        rms,
-        _scatter(residual),
-        pairs.walls[near],
-        JW.T[:, :, None] * J.T[:, None],
-    )
+    scatter, nearest = _scatter(residual), pairs.walls[near]
+    return Registration(pose, np.linalg.inv(A), share, rms, scatter, nearest, J, JW)
 
 
 def register_coarsely(
