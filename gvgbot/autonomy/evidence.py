@@ -10,10 +10,10 @@ from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.candidates import Candidates, CandidatesConfig
 from gvgbot.autonomy.gvg.local import Branch, LocalNode, Place
-from gvgbot.autonomy.knowledge import Knowledge
+from gvgbot.autonomy.knowledge import ON_EDGE_M, Knowledge
 from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.graph import Edge, HalfEdgeId, Vertex
-from gvgbot.autonomy.slam.recognition import RecognitionConfig, match_bearings
+from gvgbot.autonomy.slam.recognition import RecognitionConfig, Sighting, match_bearings
 from gvgbot.autonomy.topology import outwards
 from gvgbot.autonomy.views import Correspondence, View
 from gvgbot.geometry import Array, Pose
@@ -25,7 +25,7 @@ _FRESH_M = 6.0  # driven since a vertex was seen: the local frame still tells it
 IN_FULL_VIEW_M = 4.0  # from so near, it would be seen that a vertex is none
 _IN_CLEAR_M = 2.0  # and from so near, that it has no departure where one was seen
 _WELL_KNOWN_M = 0.2  # the uncertainty of its place with which that can be told
-_ON_EDGE_M = 0.3  # so near to a vertex's place, an edge that is seen passes through it
+_PASSES_M = 0.3  # so near to a vertex's place, an edge that is seen passes through it
 _ASIDE_M = 2.0  # beyond a vertex's disc: a driven way that leaves by a door is beyond the walls
 _DRIVEN = 5  # times as often must a driven edge be missed
 
@@ -59,7 +59,7 @@ class MappingConfig:
 
 
 class Evidence:
-    """Adds and drops departures of vertices, and says which vertices and edges are refuted."""
+    """Adds and drops departures of vertices, and says what is refuted and what is out of place."""
 
     def __init__(
         self,
@@ -240,7 +240,7 @@ class Evidence:
     def _passing(self, view: View, point: Array, known: Correspondence) -> Place | None:
         """Where an edge is seen at the place of a vertex, or at its end there another vertex."""
         place = view.gvg.place(point)
-        if place is None or place.distance > _ON_EDGE_M:
+        if place is None or place.distance > _PASSES_M:
             return None
         edge = view.gvg.edges[place.edge]
         reach = self._recognition.same_place_m
@@ -269,3 +269,57 @@ class Evidence:
         if part.doubted_since is None:
             part.doubted_since = stamp
         return stamp - part.doubted_since >= self._config.changed_after_s
+
+    def back_again(self, view: View, sighting: Sighting, known: Correspondence) -> Vertex | None:
+        """The vertex of the finished map that a sighting stands beside: a door was shut there."""
+        for vertex in self._known.graph.vertices.values():
+            is_away = vertex.id not in known.node_of and vertex.doubted_since is not None
+            if not is_away or sighting.kind != vertex.kind:
+                continue
+            place = self._known.in_local_frame(view, vertex.id)
+            off = float(np.hypot(*(place.position - sighting.position)))
+            if off < self._recognition.same_place_m and self.is_well_known(vertex):
+                x, y = sighting.position
+                vertex.local = Pose(float(x), float(y), place.theta)
+                vertex.seen_at = vertex.updated_at = view.travelled
+                return vertex
+        return None
+
+    def misplaced(
+        self, view: View, sightings: dict[int, Sighting], known: Correspondence
+    ) -> set[int]:
+        """Nodes that are out of place, and the dead ends that no way led to without these."""
+        base = view.local_base.position
+        found = {
+            node
+            for node, sighting in sightings.items()
+            if node not in known.vertex_of
+            if self._is_out_of_place(view, sighting, math.dist(sighting.position, base))
+        }
+        for edge in view.gvg.edges.values():
+            ends = {edge.a, edge.b}
+            if ends & found:
+                found |= {end for end in ends if view.gvg.nodes[end].is_endpoint}
+        return found
+
+    def _is_out_of_place(self, view: View, sighting: Sighting, away: float) -> bool:
+        """Whether a vertex is seen `away` metres off, on an edge that is finished, or was driven.
+
+        A dead end on a finished one is a door that is shut. A meetpoint may be none as long as a
+        part of the walls is out of sight: in passing the robot will see. On an edge that was driven
+        it has seen already, and where it erred before, that counts.
+        """
+        if sighting.meetpoint and away < self._config.passed_m:
+            return False
+        place = sighting.position
+        is_dubious = sighting.meetpoint and self._unbelieved.was_mistaken_near(place)
+        edges = [
+            edge
+            for edge in self._known.graph.edges.values()
+            if edge.established or (is_dubious and edge.traversals > 0)
+        ]
+        gaps = [gap for _, gap in self._known.edges_near(edges, view.local_base, place)]
+        if is_dubious:
+            at = self._known.belief.map_base.transform(view.local_base.inverse().transform(place))
+            gaps += [float(np.hypot(*(line - at).T).min()) for line in self._known.driven_parts]
+        return any(gap < ON_EDGE_M for gap in gaps)

@@ -19,11 +19,15 @@ ON_EDGE_M = 0.5  # what is nearer to an edge stands on it
 
 @dataclass(slots=True, eq=False)
 class Knowledge:
-    """What is known: the belief, the graph, and the observations of its vertices."""
+    """What is known: the belief, the graph, and the observations of its vertices.
+
+    `driven_parts` are lines (N, 2), map frame, along edges that were driven, not yet to their ends.
+    """
 
     belief: Belief = field(default_factory=Belief)
     graph: GvgGraph = field(default_factory=GvgGraph)
     observations: list[Observation] = field(default_factory=list)
+    driven_parts: list[Array] = field(default_factory=list)
 
     def positions_from(self, local_base: Pose) -> Array:
         """Where the vertices are (N, 2), local frame, in the order of the belief's ids."""

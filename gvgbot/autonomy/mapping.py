@@ -16,7 +16,7 @@ from gvgbot.autonomy.events import (
 )
 from gvgbot.autonomy.evidence import Evidence, MappingConfig
 from gvgbot.autonomy.gvg.local import Branch, LocalEdge, LocalNode
-from gvgbot.autonomy.knowledge import ON_EDGE_M, Knowledge
+from gvgbot.autonomy.knowledge import Knowledge
 from gvgbot.autonomy.recogniser import CLOSE_M, Match, Recogniser, Recognition
 from gvgbot.autonomy.slam import ekf, trail
 from gvgbot.autonomy.slam.graph import Edge, HalfEdgeId, Vertex
@@ -82,8 +82,6 @@ class Mapper(Knowledge):
         self._rivals: dict[int, Recognition] = {}  # by nodes of this view that may be known ones
         # by half-edges of vertices that this view took out, as `loose_ends`, but in the local frame
         self.came_from: dict[HalfEdgeId, tuple[HalfEdgeId, Array]] = {}
-        # parts of edges, not yet known to their ends, that were driven: lines (N, 2), map frame
-        self.driven_parts: list[Array] = []
         self._events: list[Event] = []
 
     def move(self, motion: Pose, covariance: Array, laid: Laid | None = None) -> None:
@@ -176,7 +174,7 @@ class Mapper(Knowledge):
 
     def _consider(self, view: View, sightings: dict[int, Sighting], known: Correspondence) -> None:
         """Count sightings of what is not known yet, and believe what has been seen often enough."""
-        misplaced = self._misplaced(view, sightings, known)
+        misplaced = self._evidence.misplaced(view, sightings, known)
         for node, sighting in sightings.items():
             if node in known.vertex_of or node in view.doubted or node in misplaced:
                 continue
@@ -191,7 +189,7 @@ class Mapper(Knowledge):
             ):
                 continue  # it may be a known one: look at it from closer
             self._unbelieved.drop(candidate)
-            old = self._back_again(view, sighting, known)
+            old = self._evidence.back_again(view, sighting, known)
             if old is None:
                 old = self._add(view, sighting)
                 self._events += self.unsettled.doubt(old, candidate.may_be, view.stamp)
@@ -287,62 +285,6 @@ class Mapper(Knowledge):
         """Correct the belief by a vertex seen again."""
         self.belief = ekf.correct(self.belief, vertex.id, base_vertex, R)
         self.observations.append(Observation(view.keyframe, vertex.id, base_vertex, R))
-
-    # -- what was finished once --------------------------------------------------------------
-
-    def _back_again(self, view: View, sighting: Sighting, known: Correspondence) -> Vertex | None:
-        """The vertex of the finished map that a sighting stands beside: a door was shut there."""
-        for vertex in self.graph.vertices.values():
-            is_away = vertex.id not in known.node_of and vertex.doubted_since is not None
-            if not is_away or sighting.kind != vertex.kind:
-                continue
-            place = self.in_local_frame(view, vertex.id)
-            off = float(np.hypot(*(place.position - sighting.position)))
-            if off < self._recognition.same_place_m and self._evidence.is_well_known(vertex):
-                x, y = sighting.position
-                vertex.local = Pose(float(x), float(y), place.theta)
-                vertex.seen_at = vertex.updated_at = view.travelled
-                return vertex
-        return None
-
-    def _misplaced(
-        self, view: View, sightings: dict[int, Sighting], known: Correspondence
-    ) -> set[int]:
-        """Nodes that are out of place, and the dead ends that no way led to without these."""
-        base = view.local_base.position
-        found = {
-            node
-            for node, sighting in sightings.items()
-            if node not in known.vertex_of
-            if self._is_out_of_place(view, sighting, math.dist(sighting.position, base))
-        }
-        for edge in view.gvg.edges.values():
-            ends = {edge.a, edge.b}
-            if ends & found:
-                found |= {end for end in ends if view.gvg.nodes[end].is_endpoint}
-        return found
-
-    def _is_out_of_place(self, view: View, sighting: Sighting, away: float) -> bool:
-        """Whether a vertex is seen `away` metres off, on an edge that is finished, or was driven.
-
-        A dead end on a finished one is a door that is shut. A meetpoint may be none as long as a
-        part of the walls is out of sight: in passing the robot will see. On an edge that was driven
-        it has seen already, and where it erred before, that counts.
-        """
-        if sighting.meetpoint and away < self._config.passed_m:
-            return False
-        place = sighting.position
-        is_dubious = sighting.meetpoint and self._unbelieved.was_mistaken_near(place)
-        edges = [
-            edge
-            for edge in self.graph.edges.values()
-            if edge.established or (is_dubious and edge.traversals > 0)
-        ]
-        gaps = [gap for _, gap in self.edges_near(edges, view.local_base, place)]
-        if is_dubious:
-            at = self.belief.map_base.transform(view.local_base.inverse().transform(place))
-            gaps += [float(np.hypot(*(line - at).T).min()) for line in self.driven_parts]
-        return any(gap < ON_EDGE_M for gap in gaps)
 
     # -- what hangs together -----------------------------------------------------------------
 
