@@ -6,8 +6,9 @@
 
 All runs are in this process, one after the other, in virtual time. For each a line is printed:
 NEES of the pose at keyframes (3 degrees of freedom), of the vertices of the map and of the filter
-(2), and of closures against the sight of the vertex before (3); how many closures were wrong, and
-how many vertices were entered twice; end error and vertex RMSE. FILE keeps the numbers as lines of
+(2), and of closures against the sight of the vertex before (3); how many closures were wrong, how
+many vertices were entered twice, and of how many revisits the vertex was recognised; end error and
+vertex RMSE. FILE keeps the numbers as lines of
 JSON; runs that are in there are not run again. Then the means, each with the band in which 95 % of
 such means lie if the errors are as the covariances say. Errors of one run hang together, so a run
 counts as one. --worse makes the errors of wheels and gyro so many times as large as the profile has
@@ -24,12 +25,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import astuple
 from itertools import product
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
-from scipy.stats import chi2
 
+from benchmarks.consistency_report import Row, line, plot, summary
 from benchmarks.reference_gvg import reference_gvg
 from gvgbot.autonomy.estimate import smoothed
 from gvgbot.autonomy.events import Event, LoopClosed
@@ -47,10 +48,9 @@ from gvgbot.simulation import Simulation, open_place
 
 MATCH = 1.5  # m: a vertex farther from the true one is another
 WRONG_M = 1.0  # a closure that lays a vertex this far from where it is is wrong
+AWAY_M, THERE_M = 8.0, 1.0  # who was so far from a vertex and comes so near again revisits it
 TIMES_WORSE = "*"  # between the name of a profile and how many times it is worse
 TIMES = 50  # of the error and the sigma along a run, that are kept for the plot
-
-Row = dict[str, Any]
 
 
 class Watched(Pipeline):
@@ -119,6 +119,7 @@ def run(overrides: Sequence[str]) -> Row:
         **_poses(pipeline, map_base),
         **_vertices(pipeline, places, meetpoints),
         **_closures(pipeline, map_base),
+        **_revisits(pipeline, map_base),
     }
 
 
@@ -226,124 +227,44 @@ def _closures(pipeline: Watched, truth: list[Pose]) -> Row:
     }
 
 
+def _revisits(pipeline: Watched, truth: list[Pose]) -> Row:
+    """How often the robot came back to a vertex of the map, and in how many it was recognised.
+
+    It was if it is seen, by that name, before the robot has been far away from it again.
+    """
+    way, sights = np.array([pose.position for pose in truth]), dict[int, list[int]]()
+    first = dict[int, Array]()
+    for seen in pipeline.mapper.observations:
+        sights.setdefault(seen.vertex, []).append(seen.keyframe)
+        first.setdefault(seen.vertex, truth[seen.keyframe].compose(seen.base_vertex).position)
+    again = [
+        visit
+        for vertex in pipeline.mapper.graph.vertices
+        for visit in revisits(np.hypot(*(way - first[vertex]).T), sights[vertex])
+    ]
+    return {"revisits": len(again), "recognised": sum(again)}
+
+
+def revisits(gaps: Array, sights: Sequence[int]) -> list[bool]:
+    """Of each time that a vertex was come back to after its first sight, whether it was sighted.
+
+    `gaps` (N,) are its distances, m, from the robot at the keyframes, `sights` those of its sights.
+    """
+    away = [*np.flatnonzero(gaps > AWAY_M), len(gaps)]
+    found, since = list[bool](), sights[0]
+    for until in (int(k) for k in away if k > sights[0]):
+        if since > sights[0] and gaps[since:until].min(initial=np.inf) < THERE_M:
+            found.append(any(since <= sight < until for sight in sights))
+        since = until
+    return found
+
+
 def _difference(a: Pose, b: Pose) -> Array:
     return np.array([a.x - b.x, a.y - b.y, wrap_angle(a.theta - b.theta)])
 
 
 def _mean_nees(errors: list[tuple[Array, Array]]) -> float | None:
     return float(np.mean([e @ np.linalg.solve(C, e) for e, C in errors])) if errors else None
-
-
-COLUMNS = (  # key, degrees of freedom
-    ("pose_nees", 3),
-    ("vertex_nees", 2),
-    ("filter_vertex_nees", 2),
-    ("closure_nees", 3),
-)
-
-
-def line(row: Row) -> str:
-    """A run in a line."""
-    nees = " ".join("    -" if row[k] is None else f"{row[k]:5.2f}" for k, _ in COLUMNS)
-    rmse = row["vertex_rmse_m"]
-    return (
-        f"{row['name']:32} {row['outcome'] or '-':10.10} {nees}  end {row['end_error_m']:.3f}  "
-        f"rmse {'-' if rmse is None else f'{rmse:.3f}'}  closed {row['closures']}, "
-        f"wrong {row['wrong']}, twice {row['twice']}  {row['cpu_s']:.0f} s"
-    )
-
-
-def summary(rows: list[Row]) -> list[str]:
-    """Means over the runs of each profile and all, with the bands of 95 %."""
-    lines = []
-    for odometry in [*dict.fromkeys(row["odometry"] for row in rows), "all"]:
-        some = [row for row in rows if odometry in ("all", row["odometry"])]
-        lines.append(f"{odometry}: {len(some)} runs")
-        for key, freedom in COLUMNS:
-            values = [row[key] for row in some if row[key] is not None]
-            if values:
-                band = [chi2.ppf(p, freedom * len(values)) / len(values) for p in (0.025, 0.975)]
-                lines.append(
-                    f"  {key:20} {np.mean(values):5.2f}   band {band[0]:.2f} to {band[1]:.2f}"
-                )
-        closures = sum(row["closures"] for row in some)
-        worst = max(some, key=lambda row: row["vertex_rmse_m"] or 0.0)
-        lines += [
-            f"  closures {closures}, wrong {sum(row['wrong'] for row in some)}, "
-            f"vertices twice {sum(row['twice'] for row in some)}",
-            f"  vertex RMSE: mean {np.mean([r['vertex_rmse_m'] or 0.0 for r in some]):.3f}, "
-            f"worst {worst['vertex_rmse_m']:.3f} m ({worst['name']}); "
-            f"largest end error {max(row['end_error_m'] for row in some):.3f} m",
-        ]
-    return lines
-
-
-def table(rows: list[Row]) -> list[str]:
-    """A line in Markdown for the runs in each kind of world, with each laser and odometry.
-
-    In brackets is the band of the mean NEES in which 95 % of such means would lie.
-    """
-    groups: dict[tuple[str, str, str], list[Row]] = {}
-    for row in rows:
-        world, _, odometry, laser = row["name"].split()
-        groups.setdefault((world.partition(":")[0], laser, odometry), []).append(row)
-    lines = [
-        "| worlds | laser | odometry | runs | NEES pose (3) | vertices (2) | closures (3) "
-        "| closed, wrong | twice | vertex RMSE mean, worst, m | end error, worst, m |",
-        "|---" * 11 + "|",
-    ]
-    for (family, laser, odometry), some in sorted(groups.items()):
-        nees = [_mean_in_band(some, key, n) for key, n in COLUMNS if key != "filter_vertex_nees"]
-        rmse = [row["vertex_rmse_m"] for row in some if row["vertex_rmse_m"] is not None]
-        closed, wrong, twice = (sum(row[k] for row in some) for k in ("closures", "wrong", "twice"))
-        end = max(row["end_error_m"] for row in some)
-        lines.append(
-            f"| `{family}` | {laser} | `{odometry}` | {len(some)} | {' | '.join(nees)} "
-            f"| {closed}, {wrong} | {twice} | {np.mean(rmse):.3f}, {max(rmse):.3f} | {end:.3f} |"
-        )
-    return lines
-
-
-def _mean_in_band(rows: list[Row], key: str, freedom: int) -> str:
-    values = [row[key] for row in rows if row[key] is not None]
-    if not values:
-        return "–"
-    low, high = (chi2.ppf(p, freedom * len(values)) / len(values) for p in (0.025, 0.975))
-    return f"{np.mean(values):.2f} ({low:.1f} to {high:.1f})"
-
-
-def plot(rows: list[Row], directory: Path) -> None:
-    """NEES per run, error and sigma along the runs, vertices and NIS against chi-square."""
-    import matplotlib as mpl  # noqa: PLC0415
-
-    mpl.use("Agg")
-    from matplotlib import pyplot as plt  # noqa: PLC0415
-
-    figure, axes = plt.subplots(1, 4, figsize=(16, 3.8), layout="constrained")
-    nees = sorted(row["pose_nees"] for row in rows)
-    axes[0].plot(nees, np.arange(1, len(nees) + 1) / len(nees), label="pose, 3 degrees of freedom")
-    of_vertices = sorted(row["vertex_nees"] for row in rows if row["vertex_nees"] is not None)
-    shares = np.arange(1, len(of_vertices) + 1) / len(of_vertices)
-    axes[0].plot(of_vertices, shares, label="vertices, 2")
-    axes[0].set(xlabel="mean NEES of a run", ylabel="share of runs", xscale="log")
-    axes[0].legend()
-    share = np.linspace(0, 1, TIMES)
-    rms = np.sqrt(np.mean([np.square(row["along"]) for row in rows], axis=0))
-    sigma = np.sqrt(np.mean([np.square(row["along_sigma"]) for row in rows], axis=0))
-    axes[1].plot(share, rms, label="error, rms over runs")
-    axes[1].plot(share, sigma, label="sigma that the filter gives")
-    axes[1].set(xlabel="share of the run", ylabel="position of the robot, m")
-    axes[1].legend()
-    x = np.linspace(0, 8, 33)
-    for axis, key, what in (
-        (axes[2], "vertex_distances", "vertices of the map (NEES)"),
-        (axes[3], "nis", "innovations of closures (NIS)"),
-    ):
-        axis.hist(np.concatenate([row[key] for row in rows]), x, density=True, label=what)
-        axis.plot(x, chi2.pdf(x, 2), label="chi-square, 2")
-        axis.set(xlabel="squared Mahalanobis distance", ylabel="density")
-        axis.legend()
-    figure.savefig(directory / "consistency.png", dpi=110)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

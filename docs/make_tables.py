@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from benchmarks import (
-    consistency,
+    consistency_report,
     explore_table,
     patrol,
     policies,
@@ -101,7 +101,7 @@ def choices(rows: list[Row]) -> str:
 
 def nees(rows: list[Row]) -> str:
     """How honest the covariances are, by kind of world, laser and odometry."""
-    return "\n".join(consistency.table(rows))
+    return "\n".join(consistency_report.table(rows))
 
 
 def hours(rows: list[Row], every: str) -> str:

@@ -7,15 +7,14 @@ import numpy as np
 import pytest
 
 from benchmarks.consistency import (
-    Row,
     Watched,
     _mean_nees,
     explore,
     known_rows,
     made_worse,
-    summary,
-    table,
+    revisits,
 )
+from benchmarks.consistency_report import Row, summary, table
 from gvgbot.clock import run_in_virtual_time
 from gvgbot.config import load_config
 from gvgbot.drivers.kobuki.odometry_error import PROFILES, ErringSensors
@@ -37,6 +36,15 @@ def drawn(scale: float, size: int) -> float:
 def test_honest_errors_have_as_much_nees_as_degrees_of_freedom(size: int) -> None:
     assert drawn(1.0, size) == pytest.approx(size, rel=0.03)
     assert drawn(3.0, size) == pytest.approx(9 * size, rel=0.03)
+
+
+def test_who_was_far_away_and_comes_back_revisits_and_must_see_the_vertex() -> None:
+    there, passing, away = 0.5, 3.0, 12.0
+    gaps = np.array([5, there, passing, away, away, passing, there, 2, away, passing, away, there])
+    assert revisits(gaps, [1, 2, 7]) == [True, False]  # seen when it was back, not at the end
+    assert revisits(gaps, [1, 2, 5, 11]) == [True, True]
+    assert revisits(gaps, [6, 7]) == [False]  # the first sight is no revisit
+    assert revisits(gaps[:3], [1]) == []
 
 
 def test_nothing_seen_has_no_nees() -> None:
@@ -67,11 +75,13 @@ def test_the_summary_counts_what_all_runs_did_wrong_and_gives_the_band() -> None
 
 def test_the_table_has_a_line_for_each_kind_of_world_laser_and_odometry() -> None:
     grid = ROW | {"name": "grid 1 kobuki URG-04LX", "vertex_rmse_m": 0.3}
-    other = ROW | {"name": "floor_plan:8 8 worn UTM-30LX", "vertex_rmse_m": 0.2}
+    counted = {"revisits": 9, "recognised": 8}  # and not in the other row, which is older
+    other = ROW | counted | {"name": "floor_plan:8 8 worn UTM-30LX", "vertex_rmse_m": 0.2}
     _, _, plans, streets = table([ROW, grid, other])
     assert plans.startswith("| `floor_plan` | UTM-30LX | `worn` | 2 | 3.00 (0.6 to 7.2) | 2.00 (")
-    assert plans.endswith("| – | 6, 2 | 4 | 0.150, 0.200 | 0.200 |")
+    assert plans.endswith("| – | 6, 2 | 4 | 8 of 9 | 0.150, 0.200 | 0.200 |")
     assert streets.startswith("| `grid` | URG-04LX | `kobuki` | 1 |")
+    assert streets.endswith("| 3, 1 | 2 | – | 0.300, 0.300 | 0.200 |")
 
 
 def test_a_run_with_other_settings_is_another_one(tmp_path: Path) -> None:
