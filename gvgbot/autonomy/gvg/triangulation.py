@@ -10,6 +10,8 @@ from gvgbot.geometry import Array
 
 _ORDER = pythoncdt.VertexInsertionOrder.AUTO
 _EDGES = pythoncdt.IntersectingConstraintEdges.NOT_ALLOWED  # there are none
+_AROUND = 3  # corners of a triangle around all points come first; the library is slow to erase it
+_OPPOSITE = (1, 2, 0)  # which of the neighbours that it gives lie opposite to the corners
 
 
 class Triangulation(NamedTuple):
@@ -30,12 +32,16 @@ def delaunay(points: Array) -> Triangulation | None:
     except RuntimeError:  # a point is there twice
         points = np.unique(points, axis=0)
         cdt = _inserted(points)
-    cdt.erase_super_triangle()
     found = cdt.triangles_array()
-    if not len(found):
-        return None
     corners, beyond = (found[part].view(np.int32) for part in ("vertices", "neighbors"))
-    return Triangulation(points, corners, np.roll(beyond, -1, axis=1))
+    a, b, c = corners.T
+    inner = np.flatnonzero(np.minimum(np.minimum(a, b), c) >= _AROUND)
+    if not len(inner):
+        return None
+    number = np.full(len(corners) + 1, -1, np.int32)  # of what is kept; the last is of beyond, -1
+    number[inner] = np.arange(len(inner))
+    opposite = beyond.take(_OPPOSITE, axis=1).take(inner, axis=0)
+    return Triangulation(points, corners.take(inner, axis=0) - _AROUND, number.take(opposite))
 
 
 def _inserted(points: Array) -> pythoncdt.Triangulation:
