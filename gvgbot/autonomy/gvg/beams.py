@@ -32,7 +32,7 @@ def without_mixed_pixels(scan: Scan) -> Scan:
     told = np.flatnonzero(~np.isnan(scan.ranges))
     if not len(told):
         return scan
-    depth = np.pad(scan.ranges[told], 2, mode="edge")
+    depth = scan.ranges.take(told).take(np.arange(-2, len(told) + 2), mode="clip")
     before, here, after = depth[1:-3], depth[2:-2], depth[3:-1]
     nearest, farthest = np.minimum(before, after), np.maximum(before, after)
     is_mixed = (nearest + _MIXED_M < here) & (here < farthest - _MIXED_M)
@@ -72,8 +72,8 @@ def lone(ranges: Array) -> Array:
 def end_points(ranges: Array, directions: Array, reach: float) -> Array:
     """End points (N, 2) of the beams that hit something within reach, laser frame."""
     with np.errstate(invalid="ignore"):
-        hit = ranges < reach
-    ends: Array = ranges[hit, None] * directions[hit]
+        hit = np.flatnonzero(ranges < reach)
+    ends: Array = ranges.take(hit)[:, None] * directions.take(hit, axis=0)
     return ends
 
 
@@ -81,8 +81,8 @@ def bridged(points: Array, gap: float) -> Array:
     """The points with intermediate ones wherever neighbours are close enough to be one wall."""
     step = np.diff(points, axis=0)
     length = np.hypot(step[:, 0], step[:, 1])
-    near = (length < gap) & (length > gap / 4)
-    start, step = points[:-1][near], step[near]
+    near = np.flatnonzero((length < gap) & (length > gap / 4))
+    start, step = points.take(near, axis=0), step.take(near, axis=0)
     return np.concatenate([points, *(start + f * step for f in (0.25, 0.5, 0.75))])
 
 
@@ -100,6 +100,6 @@ def range_towards(
     bearing -= turn * np.floor(bearing / turn)
     bearing *= np.float32(1 / scan.angle_increment)
     bearing += np.float32(0.5)
-    beam = np.minimum(bearing.astype(np.int32), len(see))
-    towards: NDArray[np.floating] = np.append(see, see.dtype.type(0))[beam]
+    beyond_last = np.append(see, see.dtype.type(0))
+    towards: NDArray[np.floating] = beyond_last.take(bearing.astype(np.int32), mode="clip")
     return towards

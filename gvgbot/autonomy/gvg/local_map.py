@@ -97,9 +97,7 @@ class LocalMap:
         self.looks = 0  # so far
         self._known = np.zeros((n + 2, n + 2), bool)  # with a rim for what is not in the window
         self._renew()
-        centres = ((np.arange(n) + 0.5) * self._cell).astype(np.float32)
-        self._offsets_x = np.broadcast_to(centres[:, None], (n, n))
-        self._offsets_y = np.broadcast_to(centres[None, :], (n, n))
+        self._middles = ((np.arange(n) + 0.5) * self._cell).astype(np.float32)  # from the corner, m
 
     def insert(
         self, scan: Scan, local_laser: Pose, travelled: float, free: Array | None = None
@@ -173,8 +171,10 @@ class LocalMap:
     def suspects(self) -> Array:
         """Middles (N, 2) of free cells away from walls that send echoes: glass, perhaps."""
         cells = np.flatnonzero((self._echoes > 0) & (self._votes <= 0))
+        if not len(cells):
+            return np.empty((0, 2))
         middles = (np.stack(np.divmod(cells, self._size), axis=1) + self._corner + 0.5) * self._cell
-        if not len(middles) or not len(self.points()):
+        if not len(self.points()):
             return np.asarray(middles)
         return np.asarray(middles[self.tree().query(middles)[0] > _BESIDE_WALLS_M])
 
@@ -256,32 +256,33 @@ class LocalMap:
         reach = min(self._reach, scan.range_max)  # as far as a beam without an echo is free
         see = least_of_three(np.where(np.isnan(ranges), 0.0, np.minimum(ranges, reach)))
         ends = local_laser.transform(see[:, None] * directions)
-        window = self._window(ends, local_laser.position, reach * scan.angle_increment)
-        corner = self._corner * self._cell
-        dx = self._offsets_x[window] + np.float32(corner[0] - local_laser.x)
-        dy = self._offsets_y[window] + np.float32(corner[1] - local_laser.y)
+        window = self._window(ends, local_laser, reach * scan.angle_increment)
+        x, y = self._corner * self._cell - local_laser.position
+        dx = self._middles[window[0], None] + np.float32(x)
+        dy = self._middles[window[1]] + np.float32(y)
         seen_to = range_towards(scan, see.astype(np.float32), dx, dy, local_laser.theta)
         distance = np.sqrt(dx * dx + dy * dy)
         passed = distance < seen_to - np.float32(0.8 * self._cell)
         self._free[window] |= passed
         self._seen_at[window][passed] = travelled
-        self._doubt_echoes(*self._cells(window, passed & (self._echoes[window] > 0)))
+        i, j = self._cells(window, passed & (self._echoes[window] > 0))
+        if len(i):
+            self._doubt_echoes(i, j)
         i, j = self._cells(window, passed & (self._votes[window] > 0))
         if len(i):
             self._vote_against(i, j, scan, see, local_laser)
 
-    def _window(self, ends: Array, eye: Array, beside: float) -> Window:
+    def _window(self, ends: Array, eye: Pose, beside: float) -> Window:
         """The cells that beams from the eye to their ends (N, 2) pass, or pass `beside` m away."""
-        margin = beside + self._cell
-        x, y = ends.T  # one by one: far faster than along the first axis
-        low = np.minimum([x.min(), y.min()], eye) - margin
-        high = np.maximum([x.max(), y.max()], eye) + margin
-        first = np.floor(low / self._cell).astype(int) - self._corner
-        last = np.ceil(high / self._cell).astype(int) - self._corner
-        rows, columns = (
-            slice(max(a, 0), max(b, 0)) for a, b in zip(first.tolist(), last.tolist(), strict=True)
-        )
-        return rows, columns
+        margin, corner = beside + self._cell, self._corner.tolist()
+
+        def span(metres: Array, own: float, before: int) -> slice:
+            low, high = min(float(metres.min()), own), max(float(metres.max()), own)
+            first = math.floor((low - margin) / self._cell) - before
+            last = math.ceil((high + margin) / self._cell) - before
+            return slice(max(first, 0), max(last, 0))
+
+        return span(ends[:, 0], eye.x, corner[0]), span(ends[:, 1], eye.y, corner[1])
 
     @staticmethod
     def _cells(window: Window, chosen: NDArray[np.bool_]) -> tuple[Index, Index]:
@@ -303,6 +304,8 @@ class LocalMap:
 
     def _note_echoes(self, points: Array) -> Array:
         """Count lone echoes (N, 2), once for each cell; those (M, 2) that come from glass."""
+        if not len(points):
+            return points
         points = points[self.covers(points)]
         i, j = (np.floor(points / self._cell).astype(np.int64) - self._corner).T
         self._echoes[i, j] += 1
@@ -331,19 +334,20 @@ class LocalMap:
         cell = np.flatnonzero(counts > 0)
         count = counts[cell]
         x, y = (np.bincount(flat, points[:, k].take(inside))[cell] / count for k in (0, 1))
-        i, j = np.divmod(cell, self._size)
-        old = np.maximum(self._votes[i, j], 0)
-        before = np.where(old > 0, self._hits[i, j], 0.0)
+        mean, sight = self._mean.reshape(-1, 2), self._sight.reshape(-1, 2)
+        votes, hits, look = (a.reshape(-1) for a in (self._votes, self._hits, self._look))
+        old = np.maximum(votes.take(cell), 0)
+        before = np.where(old > 0, hits.take(cell), 0.0)
         share = (count / (before + count))[:, None]
-        mean = np.stack([x, y], axis=1)
-        towards = eye - mean
+        seen = np.stack([x, y], axis=1)
+        towards = eye - seen
         towards /= np.maximum(np.hypot(*towards.T), 1e-6)[:, None]
-        self._mean[i, j] = (1 - share) * self._mean[i, j] + share * mean
-        self._sight[i, j] = (1 - share) * self._sight[i, j] + share * towards
-        self._look[i, j] += share[:, 0] * (self.looks - self._look[i, j])
-        self._hits[i, j] = np.minimum(before + count, _MOST_HITS)
-        self._votes[i, j] = np.minimum(old + _HIT, _MAX_VOTES)
-        self._seen_at[i, j] = travelled
+        mean[cell] = (1 - share) * mean.take(cell, axis=0) + share * seen
+        sight[cell] = (1 - share) * sight.take(cell, axis=0) + share * towards
+        look[cell] += share[:, 0] * (self.looks - look.take(cell))
+        hits[cell] = np.minimum(before + count, _MOST_HITS)
+        votes[cell] = np.minimum(old + _HIT, _MAX_VOTES)
+        self._seen_at.reshape(-1)[cell] = travelled
 
     def _forget(self, travelled: float) -> None:
         fresh = self._seen_at >= travelled - self._config.memory_m
@@ -382,8 +386,9 @@ def _merged(cells: NDArray[np.intp], columns: int, walls: Walls, reach: float) -
         one = np.flatnonzero((np.hypot(dx, dy) < reach) & (u + v > 0.0))
         low, high = low.take(one), high.take(one)
         share = (hits[high] / (hits[low] + hits[high]))[:, None]
-        points[low] += share * (points[high] - points[low])
-        sights[low] += share * (sights[high] - sights[low])
+        for means in (points, sights):
+            first, second = means.take(low, axis=0), means.take(high, axis=0)
+            means[low] = first + share * (second - first)
         looks[low] += share[:, 0] * (looks[high] - looks[low])
         hits[low] += hits[high]
         is_kept = np.ones(len(cells), bool)
