@@ -27,7 +27,8 @@ def smooth_edges(chains: list[Chain]) -> Iterator[LocalEdge]:
     is_inner[[end for part in parts for end in (part.start, part.stop - 1)]] = False
     inner = np.flatnonzero(is_inner)
     for _ in range(2):
-        line[inner] = 0.25 * line[inner - 1] + 0.5 * line[inner] + 0.25 * line[inner + 1]
+        before, here, after = (line.take(inner + k, axis=0) for k in (-1, 0, 1))
+        line[inner] = 0.25 * before + 0.5 * here + 0.25 * after
     along = _stations(line, parts)
     for chain, (_, clearance), part in zip(chains, even, parts, strict=True):
         yield LocalEdge(chain.a, chain.b, line[part], clearance, along[part])
@@ -35,9 +36,10 @@ def smooth_edges(chains: list[Chain]) -> Iterator[LocalEdge]:
 
 def _resampled(chain: Chain, along: Array) -> tuple[Array, Array]:
     """Points (M, 2) and clearance (M,) of a chain at even spacing, by its stations (N,)."""
-    count = max(2, round(along[-1] / _SPACING) + 1)
-    at = np.arange(count) * (along[-1] / (count - 1))
-    at[-1] = along[-1]
+    length = float(along[-1])
+    count = max(2, round(length / _SPACING) + 1)
+    at = np.arange(count) * (length / (count - 1))
+    at[-1] = length
     points = np.empty((count, 2))
     for k in (0, 1):
         points[:, k] = np.interp(at, along, chain.points[:, k])

@@ -95,7 +95,9 @@ class _Room(NamedTuple):
     def is_certain(self, centres: Array, clearance: Array) -> NDArray[np.bool_]:
         """Which maximal discs, by centres (N, 2) and radii (N,), are such and surely there."""
         fits = (clearance >= self.min_clearance) & (clearance <= self.open_clearance)
-        fits[fits] = _disc_is_known(self.local_map, centres[fits], clearance[fits])
+        discs = np.flatnonzero(fits)
+        centres, radii = centres.take(discs, axis=0), clearance.take(discs)
+        fits[discs] = _disc_is_known(self.local_map, centres, radii)
         return fits
 
 
@@ -125,7 +127,7 @@ def _diagram(triangulation: Triangulation, room: _Room, roughness: float) -> Dia
     links = np.stack([a[rough], b[rough]])
     certain[links] = True
     ends = np.flatnonzero(certain)
-    certain[ends] = room.is_certain(points[ends], clearance[ends])
+    certain[ends] = room.is_certain(points.take(ends, axis=0), clearance.take(ends))
     sure = certain[links].all(axis=0)
     parts[rough[sure]] = _bridging(links[:, sure], touched)
     return Diagram(points, clearance, certain, a, b, pair, parts)
@@ -274,7 +276,8 @@ def _disc_is_known(local_map: Space, centres: Array, radii: Array) -> NDArray[np
     outer = np.maximum(radii - _RIM_M, 0.5 * radii)
     unknown = _unknown(local_map, centres, outer, _WITHIN)
     hopeful = np.flatnonzero(unknown <= _MAX_UNKNOWN)
-    unknown[hopeful] += _unknown(local_map, centres[hopeful], outer[hopeful], _RING)
+    centres, outer = centres.take(hopeful, axis=0), outer.take(hopeful)
+    unknown[hopeful] += _unknown(local_map, centres, outer, _RING)
     return unknown <= _MAX_UNKNOWN
 
 
@@ -306,10 +309,10 @@ def _least_clearance(
     A ridge that passes between its generators is a door: it is half their distance wide there.
     """
     near, middle = centres.take(a, axis=0), (p + q) / 2
-    far = np.where((b < 0)[:, None], 2 * p - near, centres[b])
+    far = np.where((b < 0)[:, None], 2 * p - near, centres.take(b, axis=0))
     x, y = ((near - middle) * (far - middle)).T
     between = x + y < 0
-    ends = np.minimum(clearance[a], np.where(b < 0, np.inf, clearance[b]))
+    ends = np.minimum(clearance.take(a), np.where(b < 0, np.inf, clearance.take(b)))
     return np.where(between, np.hypot(*(p - q).T) / 2, ends)
 
 
@@ -322,17 +325,18 @@ def _piece_of_robot(
     used = np.zeros(len(centres), bool)
     used[ridges] = True
     nodes = np.flatnonzero(used)
-    ridges = (np.cumsum(used) - 1)[ridges]
+    ridges = (np.cumsum(used) - 1).take(ridges)
     piece = _pieces(ridges[:, 0], ridges[:, 1], len(nodes))
-    distance = np.hypot(*(centres[nodes] - robot).T)
+    distance = np.hypot(*(centres.take(nodes, axis=0) - robot).T)
     size = np.bincount(piece)
     distance[size[piece] < 4] += 2.0  # crumbs lose against a real piece nearby
     keep = piece == piece[np.argmin(distance)]
     renumber = np.cumsum(keep) - 1
     inside = keep[ridges[:, 0]]
+    nodes = nodes[keep]
     return FineGraph(
-        centres[nodes[keep]],
-        clearance[nodes[keep]],
-        renumber[ridges[inside]],
-        lead[nodes[keep]],
+        centres.take(nodes, axis=0),
+        clearance.take(nodes),
+        renumber.take(ridges[inside]),
+        lead.take(nodes),
     )
