@@ -193,4 +193,4 @@ def _is_flat(ends: Array, width: float) -> bool:
 
 def beam_ends(scan: Scan, beams: NDArray[np.intp], depth: Array, local_laser: Pose) -> Array:
     """Where beams of these depths, m, end (N, 2), local frame."""
-    return local_laser.transform(depth[:, None] * scan.directions[beams])
+    return local_laser.transform(depth[:, None] * scan.directions.take(beams, axis=0))

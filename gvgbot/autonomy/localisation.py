@@ -215,8 +215,8 @@ class LocalMaps:
         if found is not None:
             assert self._walls is not None
             numbers = np.rint(self._walls.looks[found.walls]).astype(np.int64)
-            looks, of = np.unique(numbers, return_inverse=True)
-            at_each = (of == np.arange(len(looks))[:, None]).astype(np.float64)
+            looks = np.flatnonzero(np.bincount(numbers))
+            at_each = (numbers == looks[:, None]).astype(np.float64)
             told = (at_each @ found.information.reshape(-1, 9)).reshape(-1, 3, 3)
             gains = found.covariance @ told
         left, self._left = self._left, np.eye(3)
@@ -317,8 +317,8 @@ def sampled(scan: Scan, count: int) -> Array:
     which is taken, in the order of the sweep, and turn the walls a little.
     """
     with np.errstate(invalid="ignore"):
-        hit = scan.ranges < _RANGE_M
-    points = scan.ranges[hit, None] * scan.directions[hit]
+        hit = np.flatnonzero(scan.ranges < _RANGE_M)
+    points = scan.ranges.take(hit)[:, None] * scan.directions.take(hit, axis=0)
     if len(points) == 0:
         return points
     way = uniform_filter1d(points, _SMOOTHED, axis=0, mode="nearest")

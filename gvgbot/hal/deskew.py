@@ -20,12 +20,13 @@ def deskewed(scan: Scan, motion: Pose) -> Scan:
         return replace(scan, time_increment=0.0)
     share = np.arange(len(scan.ranges)) / len(scan.ranges)
     turn = share * motion.theta
+    c, s = np.cos(turn), np.sin(turn)
     mount, seen = scan.base_laser, np.isfinite(scan.ranges)
     far = np.where(seen, scan.ranges, 0.0)
     bearings = scan.bearings + mount.theta
     x, y = mount.x + far * np.cos(bearings), mount.y + far * np.sin(bearings)
-    moved_x = share * motion.x + np.cos(turn) * x - np.sin(turn) * y - mount.x
-    moved_y = share * motion.y + np.sin(turn) * x + np.cos(turn) * y - mount.y
+    moved_x = share * motion.x + c * x - s * y - mount.x
+    moved_y = share * motion.y + s * x + c * y - mount.y
     ranges = np.where(seen, np.hypot(moved_x, moved_y), scan.ranges)
     towards = np.where(seen, np.arctan2(moved_y, moved_x), bearings + turn) - mount.theta
     away = np.remainder(towards - scan.bearings + np.pi, 2 * np.pi) - np.pi
