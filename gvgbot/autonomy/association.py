@@ -1,5 +1,6 @@
 """Data association from look to look: what may be a vertex, and which ones are still in sight."""
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -17,7 +18,7 @@ def sightings_of(view: View, within_m: float) -> dict[int, Sighting]:
     return {
         key: _sighting(view.gvg, node)
         for key, node in view.gvg.nodes.items()
-        if node.may_be_vertex and np.hypot(*(node.position - base)) < within_m
+        if node.may_be_vertex and math.dist(node.position, base) < within_m
     }
 
 
@@ -72,7 +73,7 @@ def _gaps(some: Array, others: Array) -> Array:
 def is_crowded(graph: GvgGraph, view: View, sighting: Sighting, config: RecognitionConfig) -> bool:
     """Whether a vertex of the kind of a sighting that is still tracked stands there already."""
     return any(
-        np.hypot(*(vertex.local.position - sighting.position)) < 0.5 * config.same_place_m
+        math.dist(vertex.local.position, sighting.position) < 0.5 * config.same_place_m
         for vertex in _tracked(graph, view, config)
         if vertex.kind == sighting.kind
     )

@@ -122,7 +122,7 @@ class Evidence:
         """
         vertex.surplus = vertex.surplus + 1 if certain else 0
         base = view.local_base.position
-        at_it = np.hypot(*(vertex.local.position - base)) < self._config.passed_m
+        at_it = math.dist(vertex.local.position, base) < self._config.passed_m
         vertex.unclear = vertex.unclear + at_it if new else 0
         if vertex.unclear >= self._config.candidates.meetpoint_sightings * vertex.hesitation:
             believed = new

@@ -134,7 +134,7 @@ class Mapper(Knowledge):
         Two that pass are too many: the next view decides.
         """
         for node, sighting in sightings.items():
-            away = float(np.hypot(*(sighting.position - view.local_base.position)))
+            away = math.dist(sighting.position, view.local_base.position)
             unclear = view.gvg.nodes[node].is_suspect and away > CLOSE_M
             if node in known.vertex_of or unclear or away > self._config.recognise_within_m:
                 continue
@@ -178,7 +178,7 @@ class Mapper(Knowledge):
         for node, sighting in sightings.items():
             if node in known.vertex_of or node in view.doubted or node in misplaced:
                 continue
-            away = float(np.hypot(*(sighting.position - view.local_base.position)))
+            away = math.dist(sighting.position, view.local_base.position)
             candidate = self._unbelieved.note(sighting, away, view.travelled)
             candidate.may_be = self._rivals.get(node, candidate.may_be)
             if not self._unbelieved.is_believable(candidate, view.gvg.nodes[node], away):
@@ -253,7 +253,7 @@ class Mapper(Knowledge):
         vertex.sightings += 1
         vertex.misses, vertex.doubted_since = 0, None
         vertex.seen_at = view.travelled
-        is_beside = np.hypot(*(position - view.local_base.position)) < _BESIDE_M
+        is_beside = math.dist(position, view.local_base.position) < _BESIDE_M
         if node.settled:
             vertex.clearance += share * (sighting.clearance - vertex.clearance)
         if is_beside and vertex.visits == 1 and node.settled:

@@ -348,7 +348,7 @@ class _Walls:
 
 
 def _is_at(one: Newcomer, centre: Array) -> bool:
-    return bool(np.hypot(*(one.centre - centre)) < _MOVED_M)
+    return math.dist(one.centre, centre) < _MOVED_M
 
 
 def is_near(centre: Array, others: Iterable[Array]) -> bool:

@@ -205,18 +205,20 @@ class LocalGvg:
     def _bearing(self, branch: Branch, clearance: float) -> float:
         line = self.leaving(branch)
         wanted = max(_LEAST_M, 0.9 * clearance) if clearance < _WIDE_M else _IN_WIDE_M
-        origin, passed, farthest = line[0], {branch.edge}, 0.0
+        origin, passed = line[0], {branch.edge}
         while True:
             away = np.hypot(line[:, 0] - origin[0], line[:, 1] - origin[1])
-            farthest = float(away.max())
-            onwards = None if farthest >= wanted else self.onwards(branch)
+            at = int((away >= wanted).argmax())
+            onwards = None if away[at] >= wanted else self.onwards(branch)
             if onwards is None or onwards.edge in passed:
                 break
             branch = onwards
             passed.add(branch.edge)
             line = np.concatenate([line, self.leaving(branch)])
-        x, y = line[int(np.argmax(away >= min(wanted, farthest)))]
-        return float(np.arctan2(y - origin[1], x - origin[0]))
+        if away[at] < wanted:
+            at = int(away.argmax())
+        x, y = line[at] - origin
+        return float(np.arctan2(y, x))
 
     def onwards(self, branch: Branch) -> Branch | None:
         """The one certain way on where a branch arrives; None at a meetpoint or an end."""
