@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 
@@ -117,10 +116,8 @@ def _out_of_the_wide(points: Array, clearance: Array) -> tuple[float, float]:
 
 def contracted(fine: FineGraph) -> Draft:
     """Chains of points with two neighbours become one edge each."""
-    neighbours = _Neighbours.of(fine)
-    first, everyone = neighbours
-    degree = np.bincount(fine.ridges.ravel(), minlength=len(fine.points))
-    is_key = (degree != 2) | ~np.isnan(fine.lead)
+    own, other = fine.ridges.ravel(), fine.ridges[:, ::-1].ravel()
+    is_key = (np.bincount(own, minlength=len(fine.points)) != 2) | ~np.isnan(fine.lead)
     if len(is_key) and not is_key.any():
         is_key[0] = True  # a ring without a vertex
     keys = np.flatnonzero(is_key).tolist()
@@ -130,47 +127,29 @@ def contracted(fine: FineGraph) -> Draft:
         {i: None if math.isnan(angle := float(fine.lead[i])) else angle for i in keys},
         ends={i: [] for i in keys},
     )
-    stops = is_key.tolist()
+    leaving = np.flatnonzero(is_key[own])
+    leaving = leaving.take(np.argsort(own.take(leaving), kind="stable"))
+    stops, both = is_key.tolist(), np.bincount(own, other, len(is_key)).astype(int).tolist()
     walked: set[tuple[int, int]] = set()
-    for key in keys:
-        for second in everyone[first[key] : first[key + 1]]:
-            if (key, second) not in walked:
-                path = _walk(neighbours, stops, key, second)
-                walked.add((path[-1], path[-2]))
-                walked.add((key, second))
-                on = np.array(path)
-                points, clearance = fine.points.take(on, axis=0), fine.clearance.take(on)
-                draft.add(Chain(key, path[-1], points, clearance))
+    for key, second in zip(own.take(leaving).tolist(), other.take(leaving).tolist(), strict=True):
+        if (key, second) not in walked:
+            path = _walk(both, stops, key, second)
+            walked.add((path[-1], path[-2]))
+            walked.add((key, second))
+            on = np.array(path)
+            points, clearance = fine.points.take(on, axis=0), fine.clearance.take(on)
+            draft.add(Chain(key, path[-1], points, clearance))
     return draft
 
 
-class _Neighbours(NamedTuple):
-    """Of point i those from `first[i]` to `first[i + 1]` in `all`, in the order of the ridges.
+def _walk(both: list[int], stops: list[bool], start: int, second: int) -> list[int]:
+    """The points from one that is a stop to the next.
 
-    Two flat lists: thousands of small ones keep the garbage collector busy.
+    `both` is the sum of a point's neighbours: where it has two, each of them tells the other one.
     """
-
-    first: list[int]
-    all: list[int]
-
-    @classmethod
-    def of(cls, fine: FineGraph) -> "_Neighbours":
-        """The neighbours of every point of a fine graph."""
-        own, other = fine.ridges.ravel(), fine.ridges[:, ::-1].ravel()
-        count = np.bincount(own, minlength=len(fine.points))
-        first = np.concatenate([[0], np.cumsum(count)])
-        return cls(first.tolist(), other[np.argsort(own, kind="stable")].tolist())
-
-
-def _walk(neighbours: _Neighbours, stops: list[bool], start: int, second: int) -> list[int]:
-    first, everyone = neighbours
     before, here, path = start, second, [start, second]
     while not stops[here]:
-        at = first[here]
-        onwards = everyone[at]
-        if onwards == before:
-            onwards = everyone[at + 1]
-        before, here = here, onwards
+        before, here = here, both[here] - before
         path.append(here)
     return path
 
