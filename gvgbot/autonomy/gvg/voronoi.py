@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
+from scipy.spatial.distance import cdist
 
 from gvgbot.autonomy.gvg.coast import Diagram, Space, with_coast
 from gvgbot.autonomy.gvg.triangulation import Triangulation, delaunay
@@ -228,7 +228,7 @@ def _prolonged(
     places = points[rays.start[long], None] + steps[:, None] * unit[long, None]
     seen = steps < length[long, None]
     radius = np.zeros(seen.shape)
-    radius[seen] = _quick_tree(room.generators).query(places[seen])[0]
+    radius[seen] = _clearance(places[seen], room.generators)
     seen[seen] = room.is_certain(places[seen], radius[seen])
     seen = np.logical_and.accumulate(seen, axis=1)
     number = np.full(seen.shape, -1)
@@ -247,9 +247,10 @@ def _prolonged(
     )
 
 
-def _quick_tree(points: Array) -> cKDTree:
-    """To find the nearest of points (N, 2) for a few places only: it is made faster than used."""
-    return cKDTree(points, leafsize=64, compact_nodes=False, balanced_tree=False)
+def _clearance(places: Array, walls: Array) -> Array:
+    """How far places (N, 2) are from the nearest of walls (M, 2); they are too few for a tree."""
+    clearance: Array = np.sqrt(cdist(places, walls, "sqeuclidean").min(axis=1))
+    return clearance
 
 
 def _direction(vectors: Array) -> Array:
