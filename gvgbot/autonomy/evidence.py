@@ -248,6 +248,19 @@ class Evidence:
         end = edge.a if place.station < edge.length / 2 else edge.b
         return place if from_end > reach or end in known.vertex_of else None
 
+    def passed_along(self, view: View, vertex: Vertex) -> list[HalfEdgeId]:
+        """The half-edges of a vertex along which an edge is seen to pass its place."""
+        pose = self._known.in_local_frame(view, vertex.id)
+        place = view.gvg.place(pose.position)
+        if place is None or place.distance > _PASSES_M or not view.gvg.may_divide(place):
+            return []
+        gvg, node = view.gvg.divided(place)
+        bearings = tuple(gvg.bearing(b, vertex.clearance) for b in gvg.nodes[node].branches)
+        turned = {key: half.bearing + pose.theta for key, half in vertex.half_edges.items()}
+        limit = math.radians(self._recognition.bearing_deg)
+        matched = match_bearings(bearings, turned, limit)
+        return [HalfEdgeId(vertex.id, key) for key in matched.values()]
+
     def is_well_known(self, vertex: Vertex) -> bool:
         """Whether it is certain where a vertex stands as seen from the robot."""
         _, S, _ = ekf.innovation(self._known.belief, vertex.id, Pose(), np.zeros((2, 2)))

@@ -55,7 +55,7 @@ class Knowledge:
             place = gvg.place(vertex.local.position)
             if place is None or place.distance > vertex.clearance:
                 continue
-            if len(gvg.edges[place.edge].stations) > 2:
+            if gvg.may_divide(place):
                 gvg, node = gvg.divided(place)
                 marks[node] = vertex
         return gvg, marks

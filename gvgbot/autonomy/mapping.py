@@ -350,7 +350,16 @@ class Mapper(Knowledge):
         bearings = tuple(half.bearing + place.theta for half in vertex.half_edges.values())
         self._unbelieved.note_mistake(Mistake(place.position, bearings, view.travelled))
         if not self.graph.leave_ring(vertex):
+            self._leave_what_passes(view, vertex)
             self.remove(view, vertex, reason)
+
+    def _leave_what_passes(self, view: View, vertex: Vertex) -> None:
+        """Drop all other departures of a vertex if sight shows that its two edges are one."""
+        ends = {HalfEdgeId(vertex.id, key) for key in vertex.half_edges}
+        followed = {end for end in ends if self.graph.edge_at(end) is not None}
+        if len(followed) == 2 and followed == set(self._evidence.passed_along(view, vertex)):
+            for end in ends - followed:
+                self.graph.remove_half_edge(end)
 
     def remove(self, view: View, vertex: Vertex, reason: str) -> None:
         """Take a vertex out of the map; of two edges that met there one is made."""

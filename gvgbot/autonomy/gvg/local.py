@@ -141,11 +141,12 @@ class LocalGvg:
         edge = self.edges[place.edge]
         return np.asarray(edge.polyline[int(np.abs(edge.stations - place.station).argmin())])
 
-    def divided(self, place: Place) -> "tuple[LocalGvg, int]":
-        """The same graph with one more node, of degree 2, at a place; and that node.
+    def may_divide(self, place: Place) -> bool:
+        """Whether the edge of a place has a point between its ends."""
+        return len(self.edges[place.edge].stations) > 2
 
-        The edge there must have a point between its ends.
-        """
+    def divided(self, place: Place) -> "tuple[LocalGvg, int]":
+        """The same graph with one more node, of degree 2, at a place that `may_divide` its edge."""
         old, node = self.edges[place.edge], max(self.nodes) + 1
         at = int(np.clip(np.abs(old.stations - place.station).argmin(), 1, len(old.stations) - 2))
         to_it, onwards = max(self.edges) + 1, max(self.edges) + 2

@@ -235,6 +235,23 @@ def test_a_vertex_through_which_a_plain_edge_runs_is_taken_back() -> None:
     assert len(of_type(seen.events, VertexRemoved)) == 1
 
 
+@pytest.mark.parametrize(("bend", "driven"), [((3.0, 0.0), [True]), ((3.0, -1.0), [False])])
+def test_of_a_bend_that_looked_like_a_fork_two_edges_are_one_if_sight_shows_it(
+    bend: Point, driven: list[bool]
+) -> None:
+    """The corridor turns north in the end; what was driven stays so if that is seen there."""
+    points = {1: (-1.0, 0.0), 2: (3.0, 0.0), 3: (3.0, 4.0), 4: (5.0, 2.0)}
+    fork = drawn(points, {10: (1, 2, []), 11: (2, 3, []), 12: (2, 4, [])}, unseen={4: math.pi / 4})
+    seen = Seen().look(fork, 20)
+    for edge in seen.mapper.graph.edges.values():
+        edge.driven = True
+    assert len(seen.mapper.graph.edges) == 2
+    plain = drawn({1: points[1], 3: points[3]}, {10: (1, 3, [bend])})
+    seen.look_near(plain, CONFIG.misses + 1)
+    assert seen.places("meetpoint") == []
+    assert [edge.driven for edge in seen.mapper.graph.edges.values()] == driven
+
+
 @pytest.mark.parametrize("walled", [True, False])
 def test_what_is_out_of_sight_is_neither_taken_back_nor_gets_a_departure(*, walled: bool) -> None:
     """Behind a wall, a part of the walls of the other room is forgotten: it looks open there."""
