@@ -54,8 +54,21 @@ class Traffic:
         return [*self.standing, self.newcomers.lost]
 
     def nearby(self, local_map: Pose) -> list[Companion]:
-        """Other robots, where they say that they are, local frame."""
-        return [company.moved(one, local_map) for one in self.company or ()]
+        """Other robots, where they say that they are, or are seen close to that; local frame."""
+        return [self._as_seen(company.moved(one, local_map)) for one in self.company or ()]
+
+    def _as_seen(self, one: Companion) -> Companion:
+        """The companion, and what it drives along, where a body is seen close to it.
+
+        A map that is laid on the own one rightly may be so a third of a metre aside: two robots
+        side by side would be in each other's way for ever, where neither sees anybody.
+        """
+        place = one.pose.position
+        aside = [centre - place for centre, _ in self.newcomers.discs]
+        x, y = min(aside, key=lambda d: float(np.hypot(*d)), default=(math.inf, 0.0))
+        if math.hypot(x, y) > one.radius + _ELSEWHERE_M:
+            return one
+        return company.moved(one, Pose(float(x), float(y)))
 
     def glance(self, scan: Scan, local_base: Pose) -> None:
         """Look out for other robots between two looks: they move."""

@@ -5,13 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gvgbot.autonomy.control.company import Companion
 from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
 from gvgbot.autonomy.newcomers import NewcomersConfig
 from gvgbot.autonomy.traffic import Traffic
 from gvgbot.drivers.world import World
 from gvgbot.geometry import Pose
 from tests.unit.autonomy.sights import Rectangle, carved, sweep
-from tests.unit.autonomy.test_newcomers import to_disc
+from tests.unit.autonomy.test_newcomers import RADIUS, to_disc
 
 ROOM: Rectangle = (-4.0, -3.0, 4.0, 3.0)
 EMPTY = carved([ROOM])
@@ -32,6 +33,21 @@ class Room:
             scan = replace(scan, ranges=ranges)
         sifted = self.traffic.sift(scan, HERE, MAP_BASE, self.map, lambda place: False, 0)
         self.map.insert(sifted, HERE, 0.0)
+
+
+@pytest.mark.parametrize(("aside", "seen"), [(0.25, True), (0.6, False)])
+def test_another_robot_is_where_it_is_seen_and_not_a_little_aside(
+    aside: float, *, seen: bool
+) -> None:
+    room, told = Room(), MAP_BASE.compose(Pose(2.0, aside, np.pi))
+    course = MAP_BASE.transform(np.array([(2.0, aside), (1.0, aside)]))
+    room.traffic.company = [Companion("lisa", told, True, course, radius=RADIUS)]
+    for second in range(3):
+        room.look(EMPTY, second, column=second > 0)
+    (lisa,) = room.traffic.nearby(MAP_BASE.inverse())
+    y = 0.0 if seen else aside
+    assert (lisa.pose.x, lisa.pose.y) == pytest.approx((2.0, y), abs=0.03)
+    assert lisa.course == pytest.approx(np.array([(2.0, y), (1.0, y)]), abs=0.03)
 
 
 def test_a_body_that_was_let_in_is_remembered_where_it_is_in_the_map_until_it_has_gone() -> None:
