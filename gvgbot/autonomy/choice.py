@@ -1,5 +1,7 @@
 """Which frontier to explore next, alone or in a team."""
 
+from collections.abc import Collection
+
 import numpy as np
 
 from gvgbot.autonomy.exploration.certainty import vertex_sigma
@@ -40,6 +42,11 @@ class Choice:
     def is_all_followed(self) -> bool:
         """Whether the robots of a team have followed every departure that one of them knows."""
         return self.sharing is not None and self.sharing.is_explored
+
+    @property
+    def unfollowed(self) -> Collection[HalfEdgeId]:
+        """The departures of the map that no robot of the team has followed."""
+        return () if self.sharing is None else self.sharing.unfollowed
 
     def go_ahead(self) -> None:
         """Choose nothing, and wait for nobody: the robot drives on where nobody has been."""

@@ -1,9 +1,9 @@
 """How an exploration ends: its outcome, and why."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Literal
 
-from gvgbot.autonomy.slam.graph import GvgGraph
+from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
 from gvgbot.geometry import Array
 
 Outcome = Literal["explored", "explored_with_blocked", "failed", "stopped"]
@@ -21,6 +21,14 @@ def all_examined(graph: GvgGraph, remark: str) -> tuple[Outcome, str]:
     if blocked:
         return "explored_with_blocked", f"frontiers given up: {blocked}{remark}"
     return "explored", f"no frontier is left{remark}"
+
+
+def left_to_others(graph: GvgGraph, unfollowed: Collection[HalfEdgeId]) -> tuple[Outcome, str]:
+    """Robots of a team have followed all, but for what this one gave up and nobody followed."""
+    blocked = len(set(graph.blocked()) & set(unfollowed))
+    if blocked:
+        return "explored_with_blocked", f"frontiers given up: {blocked}; no other one is left"
+    return "explored", "no frontier of the team is left"
 
 
 def cut_short(graph: GvgGraph, without_map: str, reason: str) -> tuple[Outcome, str]:

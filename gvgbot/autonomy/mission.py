@@ -4,7 +4,7 @@ from gvgbot.autonomy.control.company import Companion
 from gvgbot.autonomy.control.edge_follower import Track
 from gvgbot.autonomy.control.orders import Drive, Order, Stand
 from gvgbot.autonomy.driven_edges import DrivenEdges
-from gvgbot.autonomy.ending import all_examined, cut_short
+from gvgbot.autonomy.ending import all_examined, cut_short, left_to_others
 from gvgbot.autonomy.events import Decision, Event, Recovery
 from gvgbot.autonomy.exploration.access import NEAR_M, access, way_to_edge
 from gvgbot.autonomy.exploration.config import ExplorationConfig
@@ -204,7 +204,7 @@ class Mission(Pursuit):
                 nearest = self.choice.nearest(here.starts())
             if nearest is None:
                 if self._team_is_done(view):
-                    self._end(view, "explored", "no frontier of the team is left")
+                    self._end(view, *left_to_others(graph, self.choice.unfollowed))
                 elif not (self.choice.waits_for_others or self._retracing.is_on):
                     self._finish(view)
                 return None

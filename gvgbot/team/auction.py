@@ -4,7 +4,7 @@ There is nobody who assigns work. What the others have found tells a robot where
 which of its own frontiers leads to where nobody has been.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Protocol
 
 import numpy as np
@@ -140,6 +140,11 @@ class Auction:
     def is_explored(self) -> bool:
         """Whether nothing is open anywhere; see `Sharing`."""
         return self._current_site().is_explored
+
+    @property
+    def unfollowed(self) -> Collection[HalfEdgeId]:
+        """Own departures that nobody has followed; see `Sharing`."""
+        return self._current_site().own
 
     def _claim(self, frontier: Frontier, cost: float, end: HalfEdgeId) -> None:
         self.claim = Claim(frontier.x, frontier.y, frontier.bearing, cost)

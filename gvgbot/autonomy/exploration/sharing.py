@@ -1,5 +1,6 @@
 """What a mission asks of somebody who knows what other robots do."""
 
+from collections.abc import Collection
 from typing import Protocol
 
 from gvgbot.autonomy.exploration.paths import Approach
@@ -39,3 +40,7 @@ class Sharing(Protocol):
     @property
     def is_explored(self) -> bool:
         """Whether no departure that any robot knows of is open, also none that is closed now."""
+
+    @property
+    def unfollowed(self) -> Collection[HalfEdgeId]:
+        """Departures of this robot's map that nobody has followed, open or closed."""

@@ -1,6 +1,7 @@
 """What the robot decides in small hand-drawn situations, and how each of them ends."""
 
 import math
+from collections.abc import Collection
 from itertools import pairwise
 
 import numpy as np
@@ -617,6 +618,7 @@ class Alone:
     """Shares the frontiers with others of whom nothing has been heard."""
 
     is_waiting = is_done = is_explored = False
+    unfollowed: Collection[HalfEdgeId] = ()
 
     def choose(self, graph: GvgGraph, starts: list[Approach]) -> tuple[HalfEdgeId, Approach] | None:
         return nearest_frontier(graph, starts)
@@ -730,6 +732,24 @@ def test_a_robot_whose_team_is_done_leaves_no_vertex_that_hangs_on_nothing(
     assert robot.mission.outcome == "explored"
     assert {v.kind for v in graph.vertices.values()} == {"endpoint"}
     assert stray.id not in graph.vertices
+
+
+@pytest.mark.parametrize("is_followed", [False, True])
+def test_what_a_robot_of_a_team_gave_up_and_nobody_followed_is_not_explored(
+    *, is_followed: bool
+) -> None:
+    robot, last = Robot(), Last()
+    robot.mission.choice.sharing = Alone()
+    robot.stand(TEE, 8)
+    closed = robot.mission.target
+    assert closed is not None
+    while robot.mission.target == closed:
+        robot.mission.hold()
+        robot.look(TEE)
+    robot.mission.choice.sharing, robot.mission.target = last, None
+    last.is_explored, last.unfollowed = True, () if is_followed else (closed,)
+    robot.look(TEE)
+    assert robot.mission.outcome == ("explored" if is_followed else "explored_with_blocked")
 
 
 @pytest.mark.parametrize("is_explored", [False, True])
