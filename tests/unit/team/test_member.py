@@ -450,6 +450,11 @@ def test_two_that_have_given_up_do_not_wait_for_each_other() -> None:
         False,
         True,
     )
+    nobody_s = one.auction.unfollowed  # nobody knows the edges of these, and all were given up
+    assert nobody_s
+    for end in nobody_s:
+        departures = one.chart.vertices[end.vertex].departures
+        assert [d.blocked for d in departures if d.key == end.key] == [True]
 
 
 def test_who_only_stops_to_think_is_waited_for_but_not_for_ever() -> None:
