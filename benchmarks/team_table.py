@@ -171,23 +171,26 @@ def line(row: Row) -> str:
 
 
 def summary(rows: list[Row]) -> list[str]:
-    """What the runs with each number of robots have in common, and those that failed."""
+    """What runs with as many robots and the same settings have in common, and those that failed."""
     told = []
-    for robots in sorted({row["robots"] for row in rows}):
-        some = [row for row in rows if row["robots"] == robots and "recall" in row]
+    for robots, settings in sorted({(row["robots"], tuple(row["settings"])) for row in rows}):
+        kind = (robots, list(settings))
+        some = [r for r in rows if (r["robots"], r["settings"]) == kind and "recall" in r]
         shares = [row["share"] for row in some if row.get("share") is not None]
+        name = ", ".join([f"{robots} robots", *settings])
         told.append(
-            f"\n{robots} robots, {len(some)} runs: {sum(r['status'] == 0 for r in some)} explored "
+            f"\n{name}, {len(some)} runs: {sum(r['status'] == 0 for r in some)} explored "
             f"all; mean recall {fmean(r['recall'] for r in some):.3f}, precision "
             f"{fmean(r['precision'] for r in some):.3f}; wrong merges "
             f"{sum(r['wrong_merges'] for r in some)}, contacts {sum(r['contacts'] for r in some)}; "
             f"least gap {min(r['closest_m'] for r in some):.2f} m"
             if some
-            else f"\n{robots} robots: no run was scored"
+            else f"\n{name}: no run was scored"
         )
         if shares:
             told.append(
-                f"  of one robot's time: median {median(shares):.2f}, worst {max(shares):.2f}"
+                f"  of one robot's time: mean {fmean(shares):.2f}, median {median(shares):.2f}, "
+                f"worst {max(shares):.2f}"
             )
     failed = [row for row in rows if has_failed(row)]
     told.append(f"  failed: {len(failed)}")

@@ -56,8 +56,11 @@ def test_a_row_has_what_was_set_at_its_end() -> None:
 
 def test_the_summary_counts_and_names_failures() -> None:
     bad = GOOD | {"robots": 4, "contacts": 3, "share": 0.7, "command": "gvgbot explore --robots 4"}
-    told = "\n".join(summary([GOOD, bad]))
+    silent = GOOD | {"settings": ["twin.team.silent_s=60"], "share": 0.9}
+    told = "\n".join(summary([GOOD, bad, silent]))
     assert "2 robots, 1 runs: 1 explored all" in told
+    assert "2 robots, twin.team.silent_s=60, 1 runs: 1 explored all" in told
+    assert "mean 0.90, median 0.90, worst 0.90" in told
     assert "contacts 3" in told
     assert "median 0.70, worst 0.70" in told
     assert told.index("failed: 1") < told.index("gvgbot explore --robots 4")
