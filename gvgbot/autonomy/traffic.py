@@ -64,7 +64,7 @@ class Traffic:
         side by side would be in each other's way for ever, where neither sees anybody.
         """
         place = one.pose.position
-        aside = [centre - place for centre, _ in self.newcomers.discs]
+        aside = [centre - place for centre, _ in self.newcomers.latest]
         x, y = min(aside, key=lambda d: float(np.hypot(*d)), default=(math.inf, 0.0))
         if math.hypot(x, y) > one.radius + _ELSEWHERE_M:
             return one
