@@ -239,7 +239,7 @@ def _revisits(pipeline: Watched, truth: list[Pose]) -> Row:
         first.setdefault(seen.vertex, truth[seen.keyframe].compose(seen.base_vertex).position)
     again = [
         visit
-        for vertex in pipeline.mapper.graph.vertices
+        for vertex in pipeline.mapper.graph.vertices.keys() & first.keys()
         for visit in revisits(np.hypot(*(way - first[vertex]).T), sights[vertex])
     ]
     return {"revisits": len(again), "recognised": sum(again)}

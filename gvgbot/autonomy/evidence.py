@@ -83,12 +83,15 @@ class Evidence:
         """
         branches = sorted(node.branches, key=lambda branch: branch in node.weak)
         bearings = tuple(view.gvg.bearing(b, node.clearance) for b in branches)
-        turned = {k: h.bearing + vertex.local.theta for k, h in vertex.half_edges.items()}
-        limit = math.radians(self._recognition.bearing_deg)
-        matched = match_bearings(bearings, turned, limit)
+        matched = self._matched(bearings, vertex, vertex.local.theta)
         for i, key in matched.items():
             known.pair_branch(branches[i], HalfEdgeId(vertex.id, key))
         return branches, bearings, matched
+
+    def _matched(self, bearings: tuple[float, ...], vertex: Vertex, theta: float) -> dict[int, int]:
+        """By index of a bearing, rad, the key of the half-edge of a vertex turned by theta, rad."""
+        turned = {key: half.bearing + theta for key, half in vertex.half_edges.items()}
+        return match_bearings(bearings, turned, math.radians(self._recognition.bearing_deg))
 
     def weigh_departures(
         self, view: View, node: LocalNode, vertex: Vertex, known: Correspondence
@@ -256,9 +259,7 @@ class Evidence:
             return []
         gvg, node = view.gvg.divided(place)
         bearings = tuple(gvg.bearing(b, vertex.clearance) for b in gvg.nodes[node].branches)
-        turned = {key: half.bearing + pose.theta for key, half in vertex.half_edges.items()}
-        limit = math.radians(self._recognition.bearing_deg)
-        matched = match_bearings(bearings, turned, limit)
+        matched = self._matched(bearings, vertex, pose.theta)
         return [HalfEdgeId(vertex.id, key) for key in matched.values()]
 
     def is_well_known(self, vertex: Vertex) -> bool:
@@ -297,6 +298,8 @@ class Evidence:
                 vertex.seen_at = vertex.updated_at = view.travelled
                 return vertex
         return None
+
+    # -- what is out of place ----------------------------------------------------------------
 
     def misplaced(
         self, view: View, sightings: dict[int, Sighting], known: Correspondence

@@ -15,6 +15,7 @@ from gvgbot.autonomy.evidence import MappingConfig
 from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.exploration.ears import nearest_frontier
 from gvgbot.autonomy.exploration.paths import Approach
+from gvgbot.autonomy.exploration.sharing import Sharing
 from gvgbot.autonomy.gvg.local import LocalGvg
 from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
 from gvgbot.autonomy.mapping import Mapper
@@ -734,18 +735,25 @@ def test_a_robot_whose_team_is_done_leaves_no_vertex_that_hangs_on_nothing(
     assert stray.id not in graph.vertices
 
 
-@pytest.mark.parametrize("is_followed", [False, True])
-def test_what_a_robot_of_a_team_gave_up_and_nobody_followed_is_not_explored(
-    *, is_followed: bool
-) -> None:
-    robot, last = Robot(), Last()
-    robot.mission.choice.sharing = Alone()
+def before_a_closed_way(sharing: Sharing | None) -> tuple[Robot, HalfEdgeId]:
+    """A robot that has waited long enough before its first frontier, and that."""
+    robot = Robot()
+    robot.mission.choice.sharing = sharing
     robot.stand(TEE, 8)
     closed = robot.mission.target
     assert closed is not None
     while robot.mission.target == closed:
         robot.mission.hold()
         robot.look(TEE)
+    return robot, closed
+
+
+@pytest.mark.parametrize("is_followed", [False, True])
+def test_what_a_robot_of_a_team_gave_up_and_nobody_followed_is_not_explored(
+    *, is_followed: bool
+) -> None:
+    last = Last()
+    robot, closed = before_a_closed_way(Alone())
     robot.mission.choice.sharing, robot.mission.target = last, None
     last.is_explored, last.unfollowed = True, () if is_followed else (closed,)
     robot.look(TEE)
@@ -756,13 +764,7 @@ def test_what_a_robot_of_a_team_gave_up_and_nobody_followed_is_not_explored(
 def test_for_a_way_that_was_closed_one_waits_only_if_nobody_has_driven_it(
     *, is_explored: bool
 ) -> None:
-    robot, others = Robot(), Alone()
-    robot.mission.choice.sharing = others
-    robot.stand(TEE, 8)
-    closed = robot.mission.target
-    while robot.mission.target == closed:
-        robot.mission.hold()
-        robot.look(TEE)
+    robot, _ = before_a_closed_way(Alone())
     robot.mission.choice.sharing = last = Last()
     last.is_explored, robot.mission.target = is_explored, None
     robot.look(TEE)
@@ -773,14 +775,7 @@ def test_for_a_way_that_was_closed_one_waits_only_if_nobody_has_driven_it(
 def test_in_a_team_a_way_that_was_closed_is_open_again_before_all_others_are_driven(
     is_in_team: bool,
 ) -> None:
-    robot = Robot()
-    robot.mission.choice.sharing = Alone() if is_in_team else None
-    robot.stand(TEE, 8)
-    closed = robot.mission.target
-    assert closed is not None
-    while robot.mission.target == closed:
-        robot.mission.hold()
-        robot.look(TEE)
+    robot, closed = before_a_closed_way(Alone() if is_in_team else None)
     half = robot.mapper.graph.half_edge(closed)
     assert half is not None
     assert half.blocked

@@ -48,6 +48,9 @@ def test_another_robot_is_where_it_is_seen_and_not_a_little_aside(
     y = 0.0 if seen else aside
     assert (lisa.pose.x, lisa.pose.y) == pytest.approx((2.0, y), abs=0.03)
     assert lisa.course == pytest.approx(np.array([(2.0, y), (1.0, y)]), abs=0.03)
+    room.traffic.glance(sweep(EMPTY, HERE), HERE)  # it is not seen there any more
+    (lisa,) = room.traffic.nearby(MAP_BASE.inverse())
+    assert (lisa.pose.x, lisa.pose.y) == pytest.approx((2.0, aside))
 
 
 def test_a_body_that_was_let_in_is_remembered_where_it_is_in_the_map_until_it_has_gone() -> None:
