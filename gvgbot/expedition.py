@@ -112,9 +112,14 @@ class _Robot:
     member: Member
     told: float = float("-inf")  # stamp of its news
     steered: float = float("-inf")  # stamp of its course
-    is_over: bool = False  # it has done all it can
+    ended: float | None = None  # stamp of its outcome, or of the end of its time
     sent_bytes: int = 0
     is_broken: bool = False  # and cannot even tell of it
+
+    @property
+    def is_over(self) -> bool:
+        """Whether it has done all it can."""
+        return self.ended is not None
 
     @classmethod
     def made(
@@ -209,6 +214,7 @@ async def _live(robot: _Robot, air: _Air, clock: LoopClock) -> None:
         on_events=session.on_events,
         on_cycle=partial(_on_cycle, robot, air, devices),
         log=None,
+        goes_on=lambda: not air.is_quiet,  # and keeps out of the way of who explores
     )
     async with asyncio.TaskGroup() as tasks:
         serving = tasks.create_task(devices.run(), name="devices")
@@ -217,12 +223,14 @@ async def _live(robot: _Robot, air: _Air, clock: LoopClock) -> None:
             async with asyncio.timeout(min(limit, lasts)):
                 await loop.run()
         except TimeoutError:
-            robot.is_broken = lasts < limit
-            session.failure = devices.away or f"not explored after {limit:g} s"
+            if not robot.is_over:
+                robot.is_broken = lasts < limit
+                session.failure = devices.away or f"not explored after {limit:g} s"
             if robot.is_broken:
                 session.failure = f"it broke down after {breaks_down:.0f} s, as configured"
         serving.cancel()
-    robot.is_over = True
+    if not robot.is_over:
+        robot.ended = clock.now()
     while not (air.is_quiet or robot.is_broken):
         _tell(robot, air, clock.now())
         await clock.sleep_until(clock.now() + session.config.team.tell_every_s)
@@ -231,6 +239,8 @@ async def _live(robot: _Robot, air: _Air, clock: LoopClock) -> None:
 def _on_cycle(robot: _Robot, air: _Air, devices: Devices, odometry: Odometry) -> None:
     robot.session.on_cycle(odometry, devices.base.contact)
     pipeline, config = robot.session.pipeline, robot.session.config.team
+    if not robot.is_over and pipeline.mission.outcome is not None:
+        robot.ended = odometry.stamp
     if odometry.stamp >= robot.steered + config.steer_every_s:
         robot.steered = odometry.stamp
         course = robot.member.course(
@@ -327,7 +337,8 @@ def _outcome(robots: list[_Robot]) -> str:
 
 def _duration(robot: _Robot) -> float:
     tally = robot.session.tally
-    return tally.last_stamp - (tally.first_stamp or 0.0)
+    ended = tally.last_stamp if robot.ended is None else robot.ended
+    return ended - (tally.first_stamp or 0.0)
 
 
 def _conclude(directory: RunDirectory, robots: list[_Robot], joined: list[_Robot]) -> int:

@@ -192,7 +192,7 @@ class Robot:
             on_events=self._on_events,
             on_cycle=self._on_cycle,
             log=self._session.recorder,
-            stays=True,
+            goes_on=lambda: True,
         )
         if self._pipeline.mission.outcome is not None:  # before a restart
             self._grown.set()

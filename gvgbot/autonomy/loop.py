@@ -38,7 +38,7 @@ class Log(Protocol):
 class Loop:
     """Perception per scan, control per odometry message, until the mission has an outcome.
 
-    One that `stays` goes on even then, for whatever somebody may ask for.
+    With `goes_on` that tells how long instead: the robot may be of use to somebody even then.
     `on_events` gets what happened after each scan, `on_cycle` the odometry of each control cycle.
     """
 
@@ -52,11 +52,11 @@ class Loop:
         on_events: Callable[[list[Event]], None],
         on_cycle: Callable[[Odometry], None],
         log: Log | None = None,
-        stays: bool = False,
+        goes_on: Callable[[], bool] | None = None,
     ) -> None:
         self._laser, self._base, self._pipeline, self._guard = laser, base, pipeline, guard
         self._on_events, self._on_cycle, self._log = on_events, on_cycle, log
-        self._stays = stays
+        self._goes_on = goes_on or (lambda: pipeline.mission.outcome is None)
         self._scan: Scan | None = None
         self._guard_state = GuardState()
         self.stopped_for: Reason | None = None
@@ -64,10 +64,6 @@ class Loop:
     def guard_by(self, guard: Guard) -> None:
         """Use another guard from now on."""
         self._guard = guard
-
-    @property
-    def _goes_on(self) -> bool:
-        return self._stays or self._pipeline.mission.outcome is None
 
     async def run(self) -> None:
         """Drive until done; the base stands still when this returns or is cancelled."""
@@ -79,7 +75,7 @@ class Loop:
             self._base.drive(STANDSTILL)
 
     async def _perceive(self) -> None:
-        while self._goes_on:
+        while self._goes_on():
             try:
                 scan = await self._laser.next_scan()
             except DeviceLost:
@@ -93,7 +89,7 @@ class Loop:
                 self._on_events(events)
 
     async def _control(self, perceiving: asyncio.Task[None]) -> None:
-        while self._goes_on:
+        while self._goes_on():
             odometry = await self._base.next_odometry()
             contact = self._base.contact
             felt = Felt(contact, self.stopped_for)

@@ -6,7 +6,7 @@ from gvgbot.autonomy.control.orders import Drive, Order, Stand
 from gvgbot.autonomy.driven_edges import DrivenEdges
 from gvgbot.autonomy.ending import all_examined, cut_short, left_to_others
 from gvgbot.autonomy.events import Decision, Event, Recovery
-from gvgbot.autonomy.exploration.access import NEAR_M, access, way_to_edge
+from gvgbot.autonomy.exploration.access import NEAR_M, Access, access, way_to_edge
 from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.exploration.obstructions import Obstructions
 from gvgbot.autonomy.exploration.paths import shortest_paths
@@ -45,21 +45,23 @@ class Mission(Pursuit):
             return self._look_for_an_edge(view), self._events
         if not is_beside:
             return self._access(view), self._events
-        graph = self._mapper.graph
-        here = Situation(
+        here = self._situation(view, known, found)
+        self._watch_progress(view)
+        self._watch_the_way(view)
+        order = Stand() if self.outcome is not None else self._decide(view, here)
+        return order, self._events
+
+    def _situation(self, view: View, known: Correspondence, found: Access) -> Situation:
+        return Situation(
             view.gvg,
             known,
-            graph,
+            self._mapper.graph,
             self.where,
             found,
             view.local_base,
             view.doubted,
             in_team=self.choice.sharing is not None,
         )
-        self._watch_progress(view)
-        self._watch_the_way(view)
-        order = Stand() if self.outcome is not None else self._decide(view, here)
-        return order, self._events
 
     def parts(self) -> list[tuple[Array, float]]:
         """Parts of edges that were driven: lines (N, 2), m, map frame, and least clearances, m."""
@@ -78,6 +80,13 @@ class Mission(Pursuit):
         if found is not None and found.place.distance <= NEAR_M:
             self._learn(view, known, found.place)
         return self._events
+
+    def make_way(self, view: View, known: Correspondence) -> tuple[Order, list[Event]]:
+        """Be in nobody's way, with nothing else to do; the order for the next keyframe interval."""
+        events, found = self.witness(view, known), access(view)
+        if found is None or found.place.distance > NEAR_M:
+            return Stand(), events
+        return self._path_following.stand_by(view, self._situation(view, known, found)), events
 
     def reopen(self) -> None:
         """Go on after the end: also to what was given up."""

@@ -16,6 +16,7 @@ from gvgbot.autonomy.whereabouts import Situation
 
 _MOST_LOOKS = 2  # around, before nothing more is to be seen
 _FACING_RAD = 1.0  # looking so far past a thing, one would not see it go
+_BEHIND_RAD, _AS_NEAR_M = 0.5, 0.3  # a wall that the robot turns its back to, or as good a one
 _FACING_POINTS = 6  # of a polyline tell where its end points to
 
 
@@ -34,6 +35,12 @@ class PathFollowing:
         """Stand, where others can pass."""
         track = self._neighbours.track_aside(view, here)
         return Stand() if track is None else Drive(track)
+
+    def stand_by(self, view: View, here: Situation) -> Order:
+        """Stand where others can pass, with the back to a wall: nobody comes from there unseen."""
+        order = self.make_way(view, here)
+        turn = _turn_of_the_back(view) if isinstance(order, Stand) else 0.0
+        return LookAround(turn) if turn else order
 
     def follow(
         self,
@@ -76,6 +83,19 @@ class PathFollowing:
             return None, []
         event = Recovery(stamp, "look around", "standing at the end of sight")
         return LookAround(math.tau), [event]
+
+
+def _turn_of_the_back(view: View) -> float:
+    """How far to turn left until a wall is behind the robot that no other is nearer than, rad."""
+    away = view.local_map.points() - view.local_base.position
+    if not len(away):
+        return 0.0
+    metres, astern = np.hypot(*away.T), view.local_base.theta + math.pi
+    turns = (np.arctan2(away[:, 1], away[:, 0]) - astern) % math.tau
+    is_behind = np.minimum(turns, math.tau - turns) < _BEHIND_RAD
+    if metres[is_behind].min(initial=math.inf) < metres.min() + _AS_NEAR_M:
+        return 0.0
+    return float(turns[np.argmin(metres)])
 
 
 def _turn_to_face(view: View, branch: Branch) -> float:

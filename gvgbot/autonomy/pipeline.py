@@ -128,6 +128,12 @@ class Pipeline:
         return False
 
     @property
+    def _is_idle(self) -> bool:
+        """Whether it rests, and no other robot of its team may want to pass, or be recognised."""
+        rests, stands_by = self.errands.is_resting, self.errands.stands_by
+        return rests and not (stands_by and self.traffic.is_somebody_about(self.map_base))
+
+    @property
     def map_base(self) -> Pose:
         """The pose as believed now."""
         newest = self._odometry.newest
@@ -262,8 +268,7 @@ class Pipeline:
 
     def _worth_a_look(self, scan: Scan, odom_base: Pose) -> bool:
         """Whether the robot is about something, and has come on, turned or waited enough."""
-        is_idle = self.errands.is_resting and self._last is not None
-        if is_idle or self._reflexes.is_lifted:
+        if (self._is_idle and self._last is not None) or self._reflexes.is_lifted:
             return False
         if self._last is None or self._look_now:
             self._look_now = False
@@ -358,7 +363,7 @@ class Pipeline:
         if command is not None and not self._reflexes.is_lifted:
             self._execution.stand()
             twist = command
-        if self.errands.is_resting:  # whoever touches it then is no obstacle
+        if self._is_idle:  # whoever touches it then is no obstacle
             incident, twist = incident if isinstance(incident, PutDown) else None, STANDSTILL
         if incident is not None:
             self._take_down(incident, local_base)
@@ -366,7 +371,7 @@ class Pipeline:
 
     def _wish(self, local_base: Pose) -> Twist:
         """The twist that carries out the present order."""
-        if self.errands.is_resting:
+        if self._is_idle:
             self._execution.order = Stand()
             return STANDSTILL
         return self._execution.wish(local_base, partial(self._careful, local_base))

@@ -21,6 +21,7 @@ from gvgbot.hal.messages import Scan
 
 _MOST_PASSED = 100  # places, the latest ones
 _ROUND_M = 2.5  # a body farther away is elsewhere when the robot is there
+_ABOUT_M = 3.0  # so near, another robot may soon want to be where this one is
 _ELSEWHERE_M = 0.15  # by which another robot may be elsewhere than it says
 
 Disc = tuple[Array, float]  # centre (2,) and radius, m
@@ -42,6 +43,12 @@ class Traffic:
     def is_in_team(self) -> bool:
         """Whether there may be other robots."""
         return self.company is not None
+
+    def is_somebody_about(self, map_base: Pose) -> bool:
+        """Whether another robot is near to where this one is, or may be."""
+        return bool(self.strangers) or any(
+            one.pose.distance(map_base) < _ABOUT_M for one in self.company or ()
+        )
 
     @property
     def standing(self) -> list[Array]:

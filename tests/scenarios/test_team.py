@@ -28,6 +28,7 @@ CONFIG = Config()
 RADIUS = CONFIG.robot.radius_m
 LEAST_GAP = 0.1  # m between both bodies
 TOLD_EVERY = 0.2  # s
+SOON = 5.0  # s
 WEST, EAST = 4.0, 9.0  # the ends of the narrow corridor, m along x
 STARTS = Pose(2.0, 2.5, 1.57), Pose(11.0, 6.5, -1.57)
 
@@ -102,7 +103,22 @@ def test_two_robots_that_met_know_how_their_maps_lie() -> None:
         assert abs(wrap_angle(frame.theta - true.theta)) < 0.05
 
 
-async def _met() -> tuple[Explorer, Explorer]:
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+def test_a_robot_that_has_finished_lets_another_one_pass() -> None:
+    """It stands in the narrow corridor, where the other one has to come through."""
+    starts = STARTS[0], Pose(6.0, 4.5, np.pi)
+    passer, finished = run_in_virtual_time(_met(starts, has_finished=True))
+    assert passer.has_crossed
+    gaps = [a.distance(b) - 2 * RADIUS for a, b in zip(passer.way, finished.way, strict=True)]
+    assert LEAST_GAP <= min(gaps) < 2.0  # they did meet
+    assert passer.simulation.body.contacts == finished.simulation.body.contacts == 0
+
+
+async def _met(
+    starts: tuple[Pose, Pose] = STARTS, *, has_finished: bool = False
+) -> tuple[Explorer, Explorer]:
+    """Both, until each has crossed; or, if the second one has finished soon, the first one has."""
     clock, world = LoopClock(), twin_tees()
     laser = HokuyoTwinConfig(model="URG-04LX")
     config = replace(CONFIG, twin=replace(CONFIG.twin, laser=laser))
@@ -113,7 +129,7 @@ async def _met() -> tuple[Explorer, Explorer]:
             Pipeline(config.autonomy, config.exploration, RADIUS),
             Member(name, TeamConfig(), Chart, radius=RADIUS),
         )
-        for name, start in zip(("one", "two"), STARTS, strict=True)
+        for name, start in zip(("one", "two"), starts, strict=True)
     ]
     for explorer, other in (both, both[::-1]):
         explorer.member.hear(other.member.news(0.0, Pose(), finished=False), 0.0)
@@ -121,7 +137,10 @@ async def _met() -> tuple[Explorer, Explorer]:
         explorer.simulation.meet([other.simulation])
     async with asyncio.TaskGroup() as tasks:
         lives = [tasks.create_task(_live(k, both, config, clock)) for k in range(2)]
-        while clock.now() < 150.0 and not all(explorer.has_crossed for explorer in both):
+        explorers = both[:1] if has_finished else both
+        while clock.now() < 150.0 and not all(explorer.has_crossed for explorer in explorers):
+            if has_finished and clock.now() > SOON:
+                both[1].pipeline.mission.outcome = "explored"
             await asyncio.sleep(0.1)
             for explorer in both:
                 explorer.way.append(explorer.here)
@@ -147,6 +166,7 @@ async def _live(number: int, both: list[Explorer], config: Config, clock: LoopCl
         guard,
         on_events=lambda happened: None,
         on_cycle=on_cycle,
+        goes_on=lambda: True,
     )
     async with asyncio.TaskGroup() as tasks:
         tasks.create_task(devices.run())

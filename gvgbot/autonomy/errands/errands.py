@@ -80,6 +80,12 @@ class Errands:
         return self.is_paused or is_over or bool(self.unplaced)
 
     @property
+    def stands_by(self) -> bool:
+        """Whether it has explored what it could, and nobody has asked it for anything since."""
+        asked = self.is_paused or self.is_waiting or self.unplaced
+        return self.is_resting and not asked and self._mission.outcome != "stopped"
+
+    @property
     def is_exploring(self) -> bool:
         """Whether it is the robot that decides where to drive."""
         is_own = self._is_own or (self._plan is None and self._command is None)
@@ -337,6 +343,8 @@ class Errands:
         self.closures.open_due(self._mapper.graph, view.stamp)
         if self._command is not None:
             return Stand(), self._mission.witness(view, known) + self.take_events()
+        if self._plan is None and self._mission.outcome is not None:
+            return self._mission.make_way(view, known)
         if self._plan is None:
             task = self.own_tasks.next(view, self.whereabouts)
             if task is None:

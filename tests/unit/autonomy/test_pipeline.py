@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from gvgbot.autonomy.control.company import Companion
+from gvgbot.autonomy.ending import Outcome
 from gvgbot.autonomy.events import Decision, Event, Recovery
 from gvgbot.autonomy.localisation import Localisation
 from gvgbot.autonomy.memory import remember
@@ -205,3 +206,32 @@ def test_a_gyro_that_feels_nothing_for_an_hour_has_not_drifted(rest_s: float) ->
     pipeline.errands.is_paused = False
     looked(pipeline, 2.7 + rest_s, 6.25)
     assert abs(wrap_angle(pipeline.map_base.theta - 6.25)) < 0.003
+
+
+def turned_after_the_end(outcome: Outcome, away_m: float) -> float:
+    """The bearing of somebody who has finished in a corridor, another robot so far east of it."""
+    config = load_config()
+    pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
+    theta, twist = 0.0, STANDSTILL
+    for k in range(140):
+        if k == 60:  # it has been once round
+            theta, twist, pipeline.mission.outcome = 0.0, STANDSTILL, outcome
+            other = Companion("other", Pose(away_m), goes_first=True, radius=0.18)
+            pipeline.traffic.company = [other]
+        theta += 0.1 * twist.angular
+        scan = sweep(CORRIDOR, Pose(0.0, 0.0, theta), field_of_view=LASER_270)
+        twist = pipeline.control(Odometry(0.1 * k, Pose(0.0, 0.0, theta), STANDSTILL))
+        pipeline.perceive(replace(scan, stamp=0.1 * k, time_increment=0.0))
+    return theta
+
+
+@pytest.mark.parametrize(
+    ("outcome", "away_m", "turns"),
+    [("explored", 2.5, True), ("explored", 5.0, False), ("stopped", 2.5, False)],
+)
+def test_who_has_finished_turns_its_back_to_a_wall_when_another_robot_comes_near(
+    outcome: Outcome, away_m: float, *, turns: bool
+) -> None:
+    """And not to a way by which somebody may come; nobody who was told to stop moves."""
+    theta = turned_after_the_end(outcome, away_m)
+    assert abs(math.sin(theta)) > math.cos(0.5) if turns else theta == 0.0
