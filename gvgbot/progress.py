@@ -1,5 +1,6 @@
 """One line on a terminal that says how far an exploration is; silent when nobody watches."""
 
+import os
 import sys
 import time
 
@@ -37,7 +38,8 @@ class Progress:
 
     @staticmethod
     def _write(text: str) -> None:
-        sys.stderr.write(f"\r\x1b[K{text}")
+        columns = os.get_terminal_size(sys.stderr.fileno()).columns or len(text) + 1  # 0: unknown
+        sys.stderr.write(f"\r\x1b[K{text[: columns - 1]}")  # a line that wraps stays for good
         sys.stderr.flush()
 
 
