@@ -741,6 +741,22 @@ def test_names_of_other_robots_can_be_read_whatever_their_length_and_what_is_bel
             assert len(set(page.look(left))) == 1  # all values in one column
 
 
+def test_no_word_of_an_event_sticks_out(page: Page) -> None:
+    endpoint, key = free_endpoint(), "robot.limits.max_angular_acceleration_radps2"
+    details: dict[str, str | int | float | bool | None]
+    details = {"request": f"set {key} 1", "origin": "me", "done": False, "answer": "no"}
+    asked = Event(number=1, stamp=4.0, kind="requested", details=details)
+    with web("--connect", endpoint) as address:
+        play = Play(endpoint, page)
+        with play.robot:
+            play.robot.publish(Events(events=(asked,)))
+            desktop(page, address)
+            play.until_read(f"set {key} 1")
+            widths = "(({clientWidth, scrollWidth}) => [clientWidth, scrollWidth])"
+            inner, needed = page.look(f"{widths}(document.querySelector('aside'))")
+            assert needed == inner  # no bar to scroll sideways
+
+
 def test_two_fingers_zoom_on_a_phone(page: Page) -> None:
     endpoint = free_endpoint()
     with web("--connect", endpoint) as address:
