@@ -69,7 +69,7 @@ def replay(wanted: Wanted, say: Callable[[str], None], *, out: Path | None) -> i
             session.save()
             raise
         session.failure = None
-        session.save()
+        session.save(unfinished="the log ends here")
     for line in conclusion(session, log):
         say(line)
     return 0

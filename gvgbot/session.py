@@ -151,10 +151,10 @@ class Session:
         self.simulation.body.advance(stamp)
         return self.simulation.body.pose
 
-    def save(self) -> None:
+    def save(self, *, unfinished: str = "stopped from outside") -> None:
         """Write the map and the summary. Raises GvgbotError if they cannot be written."""
         self._tell()
-        self.saving(unfinished="stopped from outside")()
+        self.saving(unfinished=unfinished)()
 
     def saving(self, *, unfinished: str) -> Callable[[], None]:
         """A function that writes the map as it is now, even if it is called later or in a thread.

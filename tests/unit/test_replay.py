@@ -1,5 +1,6 @@
 """A log of a drive around a ring of corridors, written from geometry, becomes a true map."""
 
+import json
 import math
 import os
 from pathlib import Path
@@ -86,7 +87,9 @@ def test_a_log_becomes_a_map_that_is_truer_than_its_odometry(
     drift = max(p.distance(q) for p, q in zip(odometry, true, strict=True))
     assert drift > 1.5
     assert error.max() < 0.15
-    for name in ("map.geojson", "map.pgm", "map.png", "online.tum", "summary.json"):
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text(encoding="utf-8"))
+    assert (summary["outcome"], summary["reason"]) == ("stopped", "the log ends here")
+    for name in ("map.geojson", "map.pgm", "map.png", "online.tum"):
         assert (tmp_path / "run" / name).stat().st_size > 0
     assert not (tmp_path / "run" / "truth.tum").exists()
 
