@@ -107,7 +107,7 @@ def _read(path: Path) -> tuple[dict[Any, Any], list[str]]:
         hint = f"; did you mean {meant}.yaml?" if meant else ""
         return {}, [f"{path}: cannot read the file: {error.strerror}{hint}"]
     except UnicodeDecodeError:
-        return {}, [f"{path}: not a text file"]
+        return {}, [f"{path}: not text in UTF-8"]
     return _parse(text, str(path))
 
 

@@ -196,9 +196,10 @@ def test_a_directory_is_no_configuration(tmp_path: Path) -> None:
         load(Animal, tmp_path)
 
 
-def test_a_binary_file_is_no_configuration(tmp_path: Path) -> None:
-    (tmp_path / "a.yaml").write_bytes(b"name: \xff\xfe\x00")
-    with pytest.raises(ConfigError, match=r"a\.yaml: not a text file"):
+@pytest.mark.parametrize("name", [b"\xff\xfe\x00", "Löwe".encode("latin-1")])
+def test_a_file_in_another_encoding_is_no_configuration(name: bytes, tmp_path: Path) -> None:
+    (tmp_path / "a.yaml").write_bytes(b"name: " + name)
+    with pytest.raises(ConfigError, match=r"a\.yaml: not text in UTF-8"):
         load(Animal, tmp_path / "a.yaml")
 
 
