@@ -84,7 +84,11 @@ class PlayedRobot(Robot):
         speed: float,
         off_loop: OffLoop = asyncio.to_thread,
     ) -> None:
+        survey = session.pipeline.mission.survey
         super().__init__(session, Notifier(None), network, off_loop)
+        session.pipeline.mission.survey = (
+            survey  # done at once: after the last scan none asks again
+        )
         self._played, self._speed = played, speed
 
     def _steering(self) -> Steering:

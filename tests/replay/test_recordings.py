@@ -198,3 +198,12 @@ def test_when_a_recording_is_over_the_robot_stands_and_is_still_there(
     cycles = {state.stamp: state.cycles for state in network.states}
     assert [health.cycles == cycles[health.stamp] for health in network.healths[-5:]] == [True] * 5
     assert (tmp_path / "run" / "map.geojson").exists()
+
+
+def test_a_recording_that_is_played_to_its_end_ends_as_the_run_did(
+    recorded: Recorded, tmp_path: Path
+) -> None:
+    last = played(recorded.recording, tmp_path / "run", speed=100.0, seconds=20.0).states[-1]
+    assert (last.phase, last.outcome) == ("finished", "explored")
+    played_once = (tmp_path / "run" / "map.geojson").read_bytes()
+    assert played_once == (recorded.run / "map.geojson").read_bytes()
