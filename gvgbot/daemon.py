@@ -27,14 +27,10 @@ from gvgbot.progress import Progress
 from gvgbot.recording import extra_needed
 from gvgbot.robot import Robot
 from gvgbot.ros2.node import Ros2Node
-from gvgbot.service import (
-    Notifier,
-    StopSignals,
-    set_up_logging,
-    start_left_out_of_collections,
-)
+from gvgbot.service import Notifier, set_up_logging, start_left_out_of_collections
 from gvgbot.session import Session
 from gvgbot.simulation import Simulation, open_place
+from gvgbot.stop_signals import StopSignals
 from gvgbot.strict_yaml import dump
 from gvgbot.telemetry import Telemetry
 
@@ -125,7 +121,14 @@ def _say(text: str) -> None:
     print(text, flush=True)
 
 
-def run(config: Config, *, out: Path | None, known: Path | None = None, anew: bool = False) -> int:
+def run(
+    config: Config,
+    signals: StopSignals,
+    *,
+    out: Path | None,
+    known: Path | None = None,
+    anew: bool = False,
+) -> int:
     """Be the daemon until a signal ends it; the exit status, 0 whatever was found by then.
 
     With a state directory it goes on with the map that it was making, unless `anew` or `out` say
@@ -138,7 +141,6 @@ def run(config: Config, *, out: Path | None, known: Path | None = None, anew: bo
     place = open_place(config) if config.twin.enabled else None
     name = config.robot.name if place is None else place.world.name
     with contextlib.ExitStack() as stack:
-        signals = stack.enter_context(StopSignals())
         telemetry = _telemetry(config, stack)
         wanted = Wanted(out, known, anew, state_directory(config, os.environ))
         start = begin(wanted, world=name, stack=stack)

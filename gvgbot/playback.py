@@ -19,9 +19,10 @@ from gvgbot.maps.run_directory import RunDirectory
 from gvgbot.recording import Lived
 from gvgbot.replay import Log, Wanted, open_log
 from gvgbot.robot import Network, Robot
-from gvgbot.service import Notifier, StopSignals, set_up_logging
+from gvgbot.service import Notifier, set_up_logging
 from gvgbot.session import Session
 from gvgbot.steering import Steering
+from gvgbot.stop_signals import StopSignals
 from gvgbot.telemetry import Telemetry
 
 OffLoop = Callable[[Callable[[], None]], Awaitable[None]]

@@ -1,20 +1,15 @@
-"""Life as a service: what systemd is told, the signals that end it, and the log."""
+"""Life as a service: what systemd is told, the collector of garbage, and the log."""
 
-import asyncio
 import contextlib
 import gc
 import os
-import signal
 import socket
-from collections.abc import Callable, Iterator, Mapping
-from functools import partial
-from types import TracebackType
-from typing import Any, Literal, Self, TextIO, cast
+from collections.abc import Iterator, Mapping
+from typing import Any, Literal, TextIO, cast
 
 import structlog
 from structlog.typing import EventDict, Processor, WrappedLogger
 
-_STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _SEVERITY = {"debug": 7, "info": 6, "warning": 4, "error": 3, "critical": 2}  # as syslog counts
 
 
@@ -57,55 +52,6 @@ class Notifier:
             socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK) as link,
         ):
             link.sendto(message.encode(), self._address)
-
-
-class StopSignals:
-    """Remembers that the process was asked to end; as a context manager it takes those signals.
-
-    Being asked again changes nothing: shells, supervisors and impatient people send signals twice.
-    """
-
-    def __init__(self) -> None:
-        self._asked: str | None = None
-        self._tell: Callable[[], object] | None = None
-        self._before: dict[signal.Signals, Any] = {}
-        self._blocked: set[signal.Signals | int] = set()
-
-    async def wait(self) -> str:
-        """The name of the first signal; waits for one."""
-        loop, asked = asyncio.get_running_loop(), asyncio.Event()
-        self._tell = partial(loop.call_soon_threadsafe, asked.set)
-        try:
-            if self._asked is None:
-                await asked.wait()
-        finally:
-            self._tell = None
-        assert self._asked is not None
-        return self._asked
-
-    def _take(self, number: int, frame: object) -> None:
-        self._asked = self._asked or signal.Signals(number).name
-        if self._tell is not None:
-            self._tell()
-
-    def __enter__(self) -> Self:
-        for number in _STOP_SIGNALS:
-            before = signal.getsignal(number)
-            if number is signal.SIGHUP and before is signal.SIG_IGN:
-                continue  # started by nohup: to outlive its terminal
-            self._before[number] = signal.signal(number, self._take)
-        self._blocked = signal.pthread_sigmask(signal.SIG_UNBLOCK, self._before)
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        signal.pthread_sigmask(signal.SIG_SETMASK, self._blocked)
-        for number, handler in self._before.items():
-            signal.signal(number, handler)
 
 
 class _Unbreakable:

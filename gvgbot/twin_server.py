@@ -12,8 +12,8 @@ from gvgbot.drivers.tcp import SCHEME
 from gvgbot.drivers.tcp_port import TcpPort
 from gvgbot.drivers.transport import serve_twin
 from gvgbot.errors import UsageError
-from gvgbot.service import StopSignals
 from gvgbot.simulation import Place, Simulation, open_place
+from gvgbot.stop_signals import StopSignals
 
 Port = PtyPort | TcpPort
 

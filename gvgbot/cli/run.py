@@ -34,15 +34,20 @@ def add_run(commands: Commands) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from gvgbot.config import doubt_of_devices, load_config
+    try:
+        from gvgbot.stop_signals import StopSignals
+    except KeyboardInterrupt:
+        return 0  # it was stopped before it had begun
+    with StopSignals() as signals:  # what is imported under it might swallow an exception
+        from gvgbot.config import doubt_of_devices, load_config
 
-    config = load_config(options.config, options.overrides)
-    doubt = doubt_of_devices(options.config, options.overrides)
-    if doubt:
-        print(f"gvgbot: warning: the devices are simulated: {doubt}", file=sys.stderr)
-    from gvgbot import daemon
+        config = load_config(options.config, options.overrides)
+        doubt = doubt_of_devices(options.config, options.overrides)
+        if doubt:
+            print(f"gvgbot: warning: the devices are simulated: {doubt}", file=sys.stderr)
+        from gvgbot import daemon
 
-    return daemon.run(config, out=options.out, known=options.map, anew=options.new)
+        return daemon.run(config, signals, out=options.out, known=options.map, anew=options.new)
 
 
 def add_install_service(commands: Commands) -> None:

@@ -209,7 +209,7 @@ def _read_grey(path: Path, image: Path, mode: str) -> Array:
         raise WorldError(f"{path}: key image: no such file {image}; correct the name") from None
     except UnidentifiedImageError:
         raise WorldError(f"{path}: key image: {image} is not an image; use PGM or PNG") from None
-    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+    except (OSError, SyntaxError, ValueError) as error:
         raise WorldError(f"{path}: key image: cannot read {image} ({_line(error)})") from None
 
 

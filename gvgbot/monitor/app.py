@@ -16,7 +16,7 @@ from gvgbot.monitor.facts import Fact, headline
 from gvgbot.monitor.screen import Picture, Screen
 from gvgbot.monitor.terminal import keys, open_console
 from gvgbot.monitor.view import Points
-from gvgbot.service import StopSignals
+from gvgbot.stop_signals import StopSignals
 
 _EVERY = 0.2  # s between pictures
 _PATIENCE = 1.0  # s for a connection, before the screen says that there is none

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from gvgbot import client
 from gvgbot.errors import GvgbotError, UsageError
-from gvgbot.service import StopSignals
+from gvgbot.stop_signals import StopSignals
 from gvgbot.web.feed import Feed
 from gvgbot.web.server import Web
 from gvgbot.web.viewers import Audience

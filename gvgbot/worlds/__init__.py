@@ -63,7 +63,7 @@ def open_world(name_or_path: str, *, unknown_is_wall: bool = False) -> tuple[Wor
     if name_or_path.partition(":")[0] in _MAKERS:
         return builtin(name_or_path)
     path = Path(name_or_path)
-    if not path.exists() and path.suffix not in (".yaml", ".yml"):
+    if not name_or_path or (not path.exists() and path.suffix not in (".yaml", ".yml")):
         raise WorldError(_unknown(name_or_path))
     return load_world(path, unknown_is_wall=unknown_is_wall), None
 

@@ -200,6 +200,34 @@ def test_a_robot_without_any_stream_maps_all_the_same(tmp_path: Path) -> None:
     assert {path.name for path in (tmp_path / "run").iterdir()} >= RUN
 
 
+STOPPED_AS_IT_LOADS = """
+import importlib.abc, signal, sys
+
+class Stop(importlib.abc.MetaPathFinder):
+    def find_spec(self, name, path, target=None):
+        if name == "gvgbot.daemon":
+            signal.raise_signal(signal.SIGTERM)
+
+sys.meta_path.insert(0, Stop())
+from gvgbot.cli import main
+
+sys.exit(main(["run", "--set", "telemetry.enabled=false"]))
+"""
+
+
+def test_a_robot_that_is_stopped_while_it_is_loaded_ends_as_at_any_time(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", STOPPED_AS_IT_LOADS],
+        check=False,
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "map saved" in done.stderr
+
+
 def test_a_request_that_nobody_answers_can_be_stopped(tmp_path: Path) -> None:
     """The library waits for it to connect, and hears of no signal meanwhile."""
     with socket.create_server(("127.0.0.1", 0)) as silent:

@@ -228,6 +228,15 @@ def test_a_bad_value_is_named_with_its_file_and_key(
     assert "\n" not in str(refusal.value)
 
 
+def test_an_image_too_large_to_be_opened_shall_be_made_smaller(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = write(tmp_path, [[0, 255, 255]])
+    monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 1)
+    with pytest.raises(WorldError, match="million pixels: make it smaller"):
+        load_world(path)
+
+
 def test_powers_of_ten_without_a_point_are_numbers_as_they_are_for_ros(tmp_path: Path) -> None:
     path = write(tmp_path, [[0, 255]])
     path.write_text("image: plan.png\nresolution: 5e-2\norigin: [-1e-05, 2E0, 0e0]\n")

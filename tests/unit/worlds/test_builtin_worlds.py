@@ -216,7 +216,9 @@ def test_an_unknown_name_is_answered_with_the_names() -> None:
         builtin("castle")
     with pytest.raises(WorldError, match="castle") as other_refusal:
         open_world("castle")
-    for answer in (str(refusal.value), str(other_refusal.value)):
+    with pytest.raises(WorldError, match="unknown world ''") as no_name_refusal:
+        open_world("")
+    for answer in map(str, (refusal.value, other_refusal.value, no_name_refusal.value)):
         assert all(name in answer for name in NAMES)
 
 
