@@ -2,11 +2,13 @@
 
 import numpy as np
 
+from gvgbot.autonomy.ending import Surveyed
 from gvgbot.autonomy.estimate import scans_at, smoothed_keyframes
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.geometry import Array, Pose, resampled
 from gvgbot.maps.blanks import blanks
 from gvgbot.maps.gaps import gaps
+from gvgbot.maps.narrows import narrows
 from gvgbot.maps.occupancy import occupancy_grid
 from gvgbot.maps.passages import Way, passages
 from gvgbot.maps.spots import spots
@@ -15,30 +17,33 @@ from gvgbot.maps.viewpoints import viewpoints
 _INTO_M = 2.0  # off its ways: through a door, and the robot faces what it looks at
 _TOWARDS_M = 1.0  # what seems to be a passage may be a pane of glass
 _STEP_M = 0.05  # between points of a way: a cell of the grid
+_NONE = np.empty((0, 2))
 
 
-def survey(pipeline: Pipeline) -> Array:
-    """Places (N, 2), m, map frame, that are worth another look.
+def survey(pipeline: Pipeline) -> Surveyed:
+    """What is worth another look, and what is too narrow for the robot.
 
-    From there the robot could drive onto floor that nobody has seen, or sees some that was seen but
-    that no edge leads to, or where no edge leads through; or something stood there that may be a
-    part of the building. Who drives by odometry alone blurs the grid too much to tell.
+    From a place that is worth it the robot could drive onto floor that nobody has seen, or sees
+    some that was seen but that no edge leads to, or where no edge leads through; or something stood
+    there that may be a part of the building. Who drives by odometry alone blurs the grid too much.
     """
     ways = _ways(pipeline)
     if ways and not pipeline.matches_walls:
-        return np.empty((0, 2))
+        return Surveyed(_NONE, _NONE)
     keyframes = smoothed_keyframes(pipeline)
     grid = occupancy_grid(scans_at(keyframes, pipeline))
     here, room = pipeline.map_base.position, pipeline.errands.room_m
     stood = spots(grid, *_passed(pipeline, keyframes), here, room)
     found = np.concatenate([gaps(grid, here, room), stood])
+    beside = np.concatenate([_NONE, *(resampled(way.polyline, _STEP_M) for way in ways)])
+    narrow = narrows(grid, beside, here, pipeline.radius, room)
     if not ways:
-        return found
-    beside = np.concatenate([resampled(way.polyline, _STEP_M) for way in ways])
+        return Surveyed(found, narrow)
     found = np.concatenate([found, blanks(grid, beside, here, room)])
     through = passages(grid, ways, here, room, pipeline.open_clearance)
     off = np.repeat([_INTO_M, _TOWARDS_M], [len(found), len(through)])
-    return viewpoints(grid, beside, np.concatenate([found, through]), here, room, off)
+    places = np.concatenate([found, through])
+    return Surveyed(viewpoints(grid, beside, places, here, room, off), narrow)
 
 
 def _passed(pipeline: Pipeline, keyframes: list[Pose]) -> tuple[Array, Array]:

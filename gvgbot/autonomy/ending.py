@@ -1,13 +1,28 @@
 """How an exploration ends: its outcome, and why."""
 
 from collections.abc import Callable, Collection
-from typing import Literal
+from typing import Literal, NamedTuple
 
+from gvgbot.autonomy.exploration.unseen import places_in_words
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
 from gvgbot.geometry import Array
 
 Outcome = Literal["explored", "explored_with_blocked", "failed", "stopped"]
-Survey = Callable[[], Array | None]  # places (N, 2), m, map frame, worth a look; None: not yet told
+
+
+class Surveyed(NamedTuple):
+    """What the grid of all scans shows in the end, m, map frame."""
+
+    places: Array  # (N, 2), that are worth another look
+    narrows: Array  # (N, 2), ways too narrow for the robot that lead to floor without another
+
+
+Survey = Callable[[], Surveyed | None]  # None: not yet told
+
+
+def too_narrow(narrows: Array) -> str:
+    """What there is to say of ways (N, 2) that the robot leaves alone."""
+    return f"; too narrow for it near {places_in_words(narrows)}" if len(narrows) else ""
 
 
 def given_up(graph: GvgGraph) -> int:
@@ -48,9 +63,10 @@ def without_target(
     room, and all is explored.
     """
     if not graph.vertices and survey is not None:
-        places = survey()
-        if places is None:
+        surveyed = survey()
+        if surveyed is None:
             return None
-        if not len(places):
-            return "explored", "a space without edges, and no way out"
+        if not len(surveyed.places):
+            narrow = too_narrow(surveyed.narrows)
+            return "explored", f"a space without edges, and no way out{narrow}"
     return cut_short(graph, f"no vertex found, perhaps no way out: {reason}", reason)

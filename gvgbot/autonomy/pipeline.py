@@ -67,7 +67,7 @@ class Pipeline:
         localisation: Localisation = "full",
     ) -> None:
         """`led` if somebody else drives: it only learns, and its twists mean nothing."""
-        self._config, self._radius, self.led = config, robot_radius, led
+        self._config, self.radius, self.led = config, robot_radius, led
         self._maps = LocalMaps(config.local_map, config.far_map, config.scan_matching)
         self.mapper = Mapper(
             config.mapping,
@@ -246,7 +246,7 @@ class Pipeline:
             return []
         order, done = self.errands.advance(view, known)
         if isinstance(order, Drive) and self.traffic.is_in_team:
-            room = self._radius, self._config.passage_margin_m
+            room = self.radius, self._config.passage_margin_m
             local_map = self._local_map(view.local_base)
             order = Drive(self.traffic.led_round(order.track, view, local_map, *room))
         self._execution.obey(order)
@@ -258,7 +258,7 @@ class Pipeline:
         fine = fine_graph(
             self._maps.near,
             local_base.position,
-            min_clearance=self._radius + self._config.passage_margin_m,
+            min_clearance=self.radius + self._config.passage_margin_m,
             roughness=reduction.roughness_m,
             open_clearance=self.open_clearance,
             felt=np.concatenate([self._hazards.points, *self.traffic.in_the_way]),
@@ -382,7 +382,7 @@ class Pipeline:
             return twist
         local_map = self._local_map(self._last.local_base)
         slow = self._config.edge_follower.min_speed_mps
-        careful = self.traffic.careful(twist, local_base, local_map, self._radius, slow)
+        careful = self.traffic.careful(twist, local_base, local_map, self.radius, slow)
         if careful.linear == 0.0 < twist.linear:
             self.errands.hold()
         return careful
@@ -394,7 +394,7 @@ class Pipeline:
         others = np.concatenate([self.traffic.newcomers.points, self._hazards.points])
         margin = self._config.passage_margin_m
         return room_ahead(
-            self._maps.near, others, turned, farthest, radius=self._radius, margin=margin
+            self._maps.near, others, turned, farthest, radius=self.radius, margin=margin
         )
 
     def _take_down(self, incident: Incident, local_base: Pose) -> None:
@@ -404,7 +404,7 @@ class Pipeline:
             case Hit(cause=cause, bearings=bearings):
                 self._incidents.append(("back off", cause))
                 blocks = self._hazards.add(
-                    local_base, bearings, self._radius, self.travelled, lasting=cause == "cliff"
+                    local_base, bearings, self.radius, self.travelled, lasting=cause == "cliff"
                 )
                 if blocks:
                     self.errands.obstruct(f"{cause} again and again")

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gvgbot.autonomy.ending import Surveyed
 from gvgbot.autonomy.localisation import Localisation
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.ekf import Belief
@@ -39,7 +40,7 @@ def driven(world: World, metres: float, localisation: Localisation = "full") -> 
 
 def places_after(world: World, metres: float) -> Array:
     """What a survey finds (N, 2), world frame, after so long a drive straight on."""
-    return START.transform(survey(driven(world, metres)))
+    return START.transform(survey(driven(world, metres)).places)
 
 
 def test_nothing_is_missing_of_what_can_be_seen_from_one_end() -> None:
@@ -57,10 +58,18 @@ def test_what_lies_in_the_shadow_of_a_corner_is_a_gap_until_the_robot_looks_roun
 def test_the_blurred_grid_of_who_drives_by_odometry_alone_lacks_nothing() -> None:
     """A map that has edges is taken as it is; before that, floor that is unseen counts."""
     pipeline = driven(carved([CORRIDOR, SIDE]), 3.0, "paper")
-    assert len(survey(pipeline)) > 0
+    assert len(survey(pipeline).places) > 0
     pipeline.mapper.graph = streets(2, 1)[0]
     pipeline.mapper.belief = Belief(np.zeros(9), np.zeros((9, 9)), (1, 2))
-    assert len(survey(pipeline)) == 0
+    assert len(survey(pipeline).places) == 0
+
+
+def test_a_door_that_the_robot_leaves_alone_is_told_of() -> None:
+    """42 cm wide, in the northern wall at x = 1.5; the robot wants 46."""
+    door, room = (1.29, 0.9, 1.71, 1.6), (-1.0, 1.5, 4.0, 4.0)
+    narrow = survey(driven(carved([CORRIDOR, door, room]), 6.0)).narrows
+    assert START.transform(narrow) == pytest.approx(np.array([[1.5, 1.25]]), abs=0.2)
+    assert len(survey(driven(carved([CORRIDOR, room]), 6.0)).narrows) == 0
 
 
 def driven_past_a_post(seconds: float) -> Pipeline:
@@ -88,10 +97,10 @@ def test_a_post_that_was_passed_before_anybody_knew_that_it_is_one_is_looked_at_
     """It was in sight for a quarter of the way."""
     assert not driven_past_a_post(300.0).traffic.passed
     pipeline = driven_past_a_post(15.0)
-    places = set(map(tuple, survey(pipeline).tolist()))
+    places = set(map(tuple, survey(pipeline).places.tolist()))
     assert len(pipeline.traffic.passed) == 1
     pipeline.traffic.passed = []
-    (place,) = places - set(map(tuple, survey(pipeline).tolist()))
+    (place,) = places - set(map(tuple, survey(pipeline).places.tolist()))
     assert START.transform(np.array(place)) == pytest.approx([-1.5, 0.6], abs=2.0)
 
 
@@ -106,7 +115,7 @@ def test_a_daemon_makes_its_survey_off_the_loop_and_forgets_it_when_the_robot_dr
         function()
         done.append(pipeline.travelled)
 
-    async def until_there_is_something() -> Array | None:
+    async def until_there_is_something() -> Surveyed | None:
         for _ in range(10):
             await asyncio.sleep(0.0)
         return in_background.newest()
@@ -117,7 +126,7 @@ def test_a_daemon_makes_its_survey_off_the_loop_and_forgets_it_when_the_robot_dr
             assert in_background.newest() is None
             found = await until_there_is_something()
             assert found is not None
-            assert len(found) == 0
+            assert len(found.places) == 0
             assert in_background.newest() is None
             pipeline.travelled = 5.0
             assert await until_there_is_something() is None  # it was made elsewhere

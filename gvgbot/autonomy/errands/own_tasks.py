@@ -3,8 +3,11 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
+import numpy as np
+
 from gvgbot.autonomy.control.orders import Stand
 from gvgbot.autonomy.destinations import foot_of, route_to_foot
+from gvgbot.autonomy.ending import too_narrow
 from gvgbot.autonomy.errands.kinds import ToPoint, ToVertex
 from gvgbot.autonomy.events import Decision
 from gvgbot.autonomy.exploration.certainty import CertaintyConfig, Revisiting
@@ -33,6 +36,7 @@ class OwnTasks:
         self._revisiting, self._unseen = Revisiting(config), Unseen()
         self._surveyed: set[int] = set()  # edges that there were,
         self._surveyed_m = 0.0  # and `travelled`
+        self._narrows = np.empty((0, 2))  # ways too narrow for the robot
 
     def configure(self, config: CertaintyConfig) -> None:
         """Use another configuration from now on."""
@@ -79,9 +83,10 @@ class OwnTasks:
             return None
         if not self._unseen.is_standing(view.travelled) or view.is_somebody_found:
             return Stand()
-        places = survey()
-        if places is None:
+        surveyed = survey()
+        if surveyed is None:
             return Stand()
+        self._narrows = surveyed.narrows
         self._surveyed, self._surveyed_m, starts = edges, view.travelled, here.starts()
 
         def metres_to(place: Array) -> float | None:
@@ -89,7 +94,7 @@ class OwnTasks:
             route = None if foot is None else route_to_foot(here, starts, foot)
             return None if route is None else route.metres
 
-        place = self._unseen.next(places, metres_to)
+        place = self._unseen.next(surveyed.places, metres_to)
         if place is None:
             return None
         decision = Decision(view.stamp, None, None, "something may be missing there")
@@ -99,4 +104,5 @@ class OwnTasks:
         """What there is to say about the map, if that is the end."""
         doubtful, unseen = self._revisiting.too_uncertain(self._mapper.belief), self._unseen.where
         remark = f"; {len(doubtful)} vertices stay less certain than wanted" if doubtful else ""
-        return remark + (f"; something may be missing near {unseen}" if unseen else "")
+        remark += f"; something may be missing near {unseen}" if unseen else ""
+        return remark + too_narrow(self._narrows)

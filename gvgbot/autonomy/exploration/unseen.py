@@ -58,9 +58,14 @@ class Unseen:
     @property
     def where(self) -> str:
         """The places that are of no use, in words."""
-        told = ", ".join(f"({x:z.1f}, {y:z.1f})" for x, y in self.left[:_TOLD].tolist())
-        rest = len(self.left) - _TOLD
-        return told + (f" and {counted(rest, 'more place')}" if rest > 0 else "")
+        return places_in_words(self.left)
 
     def _tries(self, place: Array) -> int:
         return sum(bool(np.hypot(*(place - visit)) < _SAME_M) for visit in self._visits)
+
+
+def places_in_words(places: Array) -> str:
+    """The first of some places (N, 2), m, and how many more there are."""
+    told = ", ".join(f"({x:z.1f}, {y:z.1f})" for x, y in places[:_TOLD].tolist())
+    rest = len(places) - _TOLD
+    return told + (f" and {counted(rest, 'more place')}" if rest > 0 else "")

@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.control.company import Companion
 from gvgbot.autonomy.control.orders import Drive, LookAround, Order, Stand
+from gvgbot.autonomy.ending import Surveyed
 from gvgbot.autonomy.events import Decision, Event, Finished, Recovery
 from gvgbot.autonomy.evidence import MappingConfig
 from gvgbot.autonomy.exploration.config import ExplorationConfig
@@ -331,7 +332,7 @@ def test_a_room_without_a_vertex_is_explored_when_all_of_it_is_seen(
     """The middle of a round or square room, of which an edge is no longer than an error."""
     middle = drawn({1: (-0.05, 0.0), 2: (0.05, 0.0)}, {10: (1, 2, [])}, unseen={1: 2.0, 2: -1.0})
     robot = Robot()
-    robot.mission.survey = lambda: unseen
+    robot.mission.survey = lambda: Surveyed(unseen, np.empty((0, 2)))
     robot.stand(middle, 100)
     assert not robot.mapper.graph.vertices
     assert robot.mission.outcome == outcome

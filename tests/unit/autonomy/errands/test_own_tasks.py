@@ -6,12 +6,13 @@ from dataclasses import replace
 import numpy as np
 
 from gvgbot.autonomy.control.orders import Drive, Order, Stand
+from gvgbot.autonomy.ending import Surveyed
 from gvgbot.autonomy.errands import Errands
 from gvgbot.autonomy.errands.plans import Kept
 from gvgbot.autonomy.events import Decision, ErrandEnded, Event
 from gvgbot.autonomy.gvg.local import LocalGvg
 from gvgbot.autonomy.views import Correspondence, View
-from gvgbot.geometry import Array, Pose
+from gvgbot.geometry import Pose
 from tests.unit.autonomy.local_graphs import drawn
 from tests.unit.autonomy.sights import carved, looked
 from tests.unit.autonomy.test_mission import CLOSED, CONFIG, TEE, Robot
@@ -27,10 +28,11 @@ class Explorer(Robot):
         self.errands = Errands(self.mission, self.mapper, CONFIG, room_m=0.2)
         self.left = list(surveys)
         self.mission.survey = self._survey
+        self.narrows = np.empty((0, 2))
         self.somebody_until = 0.0  # s, that somebody is found
 
-    def _survey(self) -> Array:
-        return np.array(self.left.pop(0)).reshape(-1, 2)
+    def _survey(self) -> Surveyed:
+        return Surveyed(np.array(self.left.pop(0)).reshape(-1, 2), self.narrows)
 
     def decide(self, view: View, known: Correspondence) -> tuple[Order, list[Event]]:
         is_found = view.stamp < self.somebody_until
@@ -102,6 +104,13 @@ def test_a_gap_that_stays_is_told_of() -> None:
     assert not robot.left
     assert robot.mission.outcome == "explored"
     assert robot.mission.reason == "no frontier is left; something may be missing near (2.0, 0.0)"
+
+
+def test_what_is_too_narrow_is_told_of() -> None:
+    robot = Explorer([])
+    robot.narrows = np.array([[3.04, -1.0]])
+    robot.until_it_moves_or_ends()
+    assert robot.mission.reason == "no frontier is left; too narrow for it near (3.0, -1.0)"
 
 
 def test_who_asks_it_to_go_on_gets_another_look_at_every_gap() -> None:
