@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import math
 import os
 import sys
 from dataclasses import dataclass, replace
@@ -110,8 +111,8 @@ def _starts(config: Config, place: Place, count: int) -> list[Pose]:
 class _Robot:
     session: Session
     member: Member
-    told: float = float("-inf")  # stamp of its news
-    steered: float = float("-inf")  # stamp of its course
+    told: float = -math.inf  # stamp of its news
+    steered: float = -math.inf  # stamp of its course
     ended: float | None = None  # stamp of its outcome, or of the end of its time
     sent_bytes: int = 0
     is_broken: bool = False  # and cannot even tell of it
@@ -240,7 +241,7 @@ def _on_cycle(robot: _Robot, air: _Air, devices: Devices, odometry: Odometry) ->
     robot.session.on_cycle(odometry, devices.base.contact)
     pipeline, config = robot.session.pipeline, robot.session.config.team
     if not robot.is_over and pipeline.mission.outcome is not None:
-        robot.ended = odometry.stamp
+        robot.ended, robot.told = odometry.stamp, -math.inf  # the others shall hear of it now
     if odometry.stamp >= robot.steered + config.steer_every_s:
         robot.steered = odometry.stamp
         course = robot.member.course(
