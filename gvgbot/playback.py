@@ -87,9 +87,8 @@ class PlayedRobot(Robot):
     ) -> None:
         survey = session.pipeline.mission.survey
         super().__init__(session, Notifier(None), network, off_loop)
-        session.pipeline.mission.survey = (
-            survey  # done at once: after the last scan none asks again
-        )
+        # done at once: after the last scan none asks again
+        session.pipeline.mission.survey = survey
         self._played, self._speed = played, speed
 
     def _steering(self) -> Steering:
