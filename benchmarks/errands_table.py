@@ -202,7 +202,7 @@ async def explore_and_visit(config: Config, score: Score, count: int, *, verbose
         Guard(config.robot.limits, config.robot.radius_m),
         on_events=tour.events.extend,
         on_cycle=lambda odometry: None,
-        stays=True,
+        goes_on=lambda: True,
     )
     async with asyncio.TaskGroup() as tasks:
         work = [tasks.create_task(devices.run()), tasks.create_task(loop.run())]

@@ -24,6 +24,7 @@ from gvgbot.geometry import Pose, Twist
 from gvgbot.hal.devices import Base, Laser
 from gvgbot.hal.messages import Contact, Odometry, Scan, Sign
 from gvgbot.links import Close, Links
+from gvgbot.stop_signals import StopSignals
 from gvgbot.topics import Grid
 from tests.twin.run_rig import STOP, Daemon, base_commands
 
@@ -80,7 +81,7 @@ def test_a_run_that_a_mistake_of_the_program_ended_says_so(
 
     monkeypatch.setattr(Pipeline, "perceive", mistaken)
     with pytest.raises(ExceptionGroup):
-        run(load_config(None, ["telemetry.enabled=false"]), out=tmp_path / "run")
+        run(load_config(None, ["telemetry.enabled=false"]), StopSignals(), out=tmp_path / "run")
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert (summary["outcome"], summary["reason"]) == ("failed", "a mistake")
 
@@ -96,7 +97,7 @@ def test_a_collection_of_garbage_while_it_runs_passes_over_what_the_program_was_
 
     monkeypatch.setattr(Pipeline, "perceive", looking)
     with pytest.raises(ExceptionGroup):
-        run(load_config(None, ["telemetry.enabled=false"]), out=tmp_path / "run")
+        run(load_config(None, ["telemetry.enabled=false"]), StopSignals(), out=tmp_path / "run")
     assert gone_through == [False]
     assert any(each is vars(np) for each in gc.get_objects())  # as before
 
