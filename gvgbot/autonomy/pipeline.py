@@ -412,6 +412,7 @@ class Pipeline:
                 self._incidents.append((action, "something is in the way"))
                 self.errands.hold()
             case PutDown():
+                self.errands.note_lifted()
                 self._incidents.append(("look around", "the robot was lifted"))
                 self._was_lifted = True
 

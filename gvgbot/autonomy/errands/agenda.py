@@ -110,6 +110,10 @@ class Agenda:
         self._is_own = False
         self._plan = self._driving = self._command = None
 
+    def note_lifted(self) -> None:
+        """Wait for what comes next: who lifts a robot that has finished wants it somewhere else."""
+        self.is_waiting |= self.stands_by
+
     def give_up(self, stamp: float, reason: str) -> None:
         """End the errand, if there is one: it is about a map that is forgotten."""
         self._end(stamp, "given up", reason)

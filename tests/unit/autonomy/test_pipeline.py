@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from gvgbot.autonomy.control.company import Companion
+from gvgbot.autonomy.control.reflexes import Felt
 from gvgbot.autonomy.ending import Outcome
 from gvgbot.autonomy.events import Decision, Event, Recovery
 from gvgbot.autonomy.localisation import Localisation
@@ -14,7 +15,7 @@ from gvgbot.autonomy.memory import remember
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.config import load_config
 from gvgbot.geometry import STANDSTILL, Pose, Twist, wrap_angle
-from gvgbot.hal.messages import Odometry
+from gvgbot.hal.messages import Contact, Odometry
 from tests.unit.autonomy.sights import LASER_270, carved, sweep
 
 ROOMS = carved([(-4.0, -1.0, 4.0, 1.0), (0.0, -1.0, 2.0, 4.0)])
@@ -208,8 +209,11 @@ def test_a_gyro_that_feels_nothing_for_an_hour_has_not_drifted(rest_s: float) ->
     assert abs(wrap_angle(pipeline.map_base.theta - 6.25)) < 0.003
 
 
-def turned_after_the_end(outcome: Outcome, away_m: float) -> float:
-    """The bearing of somebody who has finished in a corridor, another robot so far east of it."""
+def turned_after_the_end(outcome: Outcome, away_m: float, *, lifted: bool = False) -> float:
+    """The bearing of somebody who has finished in a corridor, another robot so far east of it.
+
+    If it is lifted, that is just after the end.
+    """
     config = load_config()
     pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
     theta, twist = 0.0, STANDSTILL
@@ -220,7 +224,9 @@ def turned_after_the_end(outcome: Outcome, away_m: float) -> float:
             pipeline.traffic.company = [other]
         theta += 0.1 * twist.angular
         scan = sweep(CORRIDOR, Pose(0.0, 0.0, theta), field_of_view=LASER_270)
-        twist = pipeline.control(Odometry(0.1 * k, Pose(0.0, 0.0, theta), STANDSTILL))
+        contact = Contact(0.1 * k, wheel_drop_left=lifted and k == 60)
+        odometry = Odometry(0.1 * k, Pose(0.0, 0.0, theta), STANDSTILL)
+        twist = pipeline.control(odometry, Felt(contact, None))
         pipeline.perceive(replace(scan, stamp=0.1 * k, time_increment=0.0))
     return theta
 
@@ -235,3 +241,7 @@ def test_who_has_finished_turns_its_back_to_a_wall_when_another_robot_comes_near
     """And not to a way by which somebody may come; nobody who was told to stop moves."""
     theta = turned_after_the_end(outcome, away_m)
     assert abs(math.sin(theta)) > math.cos(0.5) if turns else theta == 0.0
+
+
+def test_who_was_lifted_after_the_end_stays_where_it_was_put() -> None:
+    assert turned_after_the_end("explored", 2.5, lifted=True) == 0.0
