@@ -122,12 +122,7 @@ def _say(text: str) -> None:
 
 
 def run(
-    config: Config,
-    signals: StopSignals,
-    *,
-    out: Path | None,
-    known: Path | None = None,
-    anew: bool = False,
+    config: Config, signals: StopSignals, *, out: Path | None, known: Path | None, anew: bool
 ) -> int:
     """Be the daemon until a signal ends it; the exit status, 0 whatever was found by then.
 

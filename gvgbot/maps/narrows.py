@@ -1,16 +1,14 @@
 """Narrow ways of a grid: a robot might just fit through, but leaves them alone."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
 from gvgbot.geometry import Array
-from gvgbot.maps.gaps import is_floor, is_wall, reachable
+from gvgbot.maps.gaps import Mask, is_floor, is_wall, reachable
 from gvgbot.maps.occupancy import OccupancyGrid
+from gvgbot.maps.viewpoints import cells_near
 
 _AREA_M2 = 0.5  # beyond one that is worth telling of, where the middle of the robot could be
-
-Mask = NDArray[np.bool_]
 
 
 def narrows(
@@ -26,19 +24,25 @@ def narrows(
     clearance = ndimage.distance_transform_edt(~is_wall(grid.cells)) * cell
     here = (around - corner)[::-1] / cell
     fits = reachable(is_floor(grid.cells) & (clearance > radius - 2 * cell), here)
-    areas, _ = ndimage.label(fits & (clearance > passage_m))
-    rows, columns = ((ways - corner) / cell).astype(int).T[::-1]
-    reached = {*areas[reachable(areas > 0, here)], *areas[rows, columns]} - {0}
-    sizes = np.bincount(areas.ravel())
-    left = set(np.flatnonzero(sizes * cell**2 >= _AREA_M2)) - reached - {0}
-    known, necks = np.isin(areas, list(reached)), fits & (areas == 0)
-    found = [_between(known, areas == area, necks) for area in left]
+    has_room = fits & (clearance > passage_m)
+    areas, _ = ndimage.label(has_room)
+    reached = np.unique(areas[reachable(has_room, here) | cells_near(ways, grid, has_room)])
+    large = np.flatnonzero(np.bincount(areas.ravel()) * cell**2 >= _AREA_M2)
+    known, necks = has_room & np.isin(areas, reached), fits & ~has_room
+    to_known = _cells_to(known)
+    found = [
+        _nearest(necks, np.maximum(to_known, _cells_to(areas == area)))
+        for area in np.setdiff1d(large, [0, *reached])
+    ]
     return corner + (np.array(found).reshape(-1, 2)[:, ::-1] + 0.5) * cell
 
 
-def _between(one: Mask, other: Mask, necks: Mask) -> Array:
-    """The (row, column) in the middle of the shortest neck from one area to another."""
-    away = np.maximum(*(ndimage.distance_transform_edt(~area) for area in (one, other)))
+def _cells_to(area: Mask) -> Array:
+    return np.asarray(ndimage.distance_transform_edt(~area))
+
+
+def _nearest(necks: Mask, cells_away: Array) -> Array:
+    """The (row, column) of the cell of a neck that is nearest to what these are distances from."""
     places = np.argwhere(necks)
-    nearest: Array = places[np.argmin(away[necks])].astype(np.float64)
+    nearest: Array = places[np.argmin(cells_away[necks])].astype(np.float64)
     return nearest

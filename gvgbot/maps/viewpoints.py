@@ -31,7 +31,7 @@ def viewpoints(
     walls = is_wall(grid.cells)
     has_room = ndimage.distance_transform_edt(~walls) * cell > passage_m
     floor = reachable(is_floor(grid.cells) & has_room, (around - corner)[::-1] / cell)
-    near_ways = _cells_near(ways, grid, floor)
+    near_ways = cells_near(ways, grid, floor)
     floor, near_ways = np.pad(floor, 1), np.pad(near_ways, 1)  # every cell has four neighbours
     found = []
     cells = ((places - corner)[:, ::-1] / cell).astype(np.int64) + 1
@@ -43,7 +43,7 @@ def viewpoints(
     return views
 
 
-def _cells_near(ways: Array, grid: OccupancyGrid, floor: Mask) -> Mask:
+def cells_near(ways: Array, grid: OccupancyGrid, floor: Mask) -> Mask:
     """The cells of the floor beside ways."""
     near = np.zeros(floor.shape, np.bool_)
     rows, columns = ((ways - grid.origin) / grid.resolution_m).astype(np.int64).T[::-1]

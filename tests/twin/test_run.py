@@ -73,6 +73,11 @@ def test_a_run_that_ended_by_a_fault_says_so_in_its_summary(daemon: Daemon) -> N
     assert (summary["outcome"], summary["reason"]) == ("failed", "the base does not answer")
 
 
+def run_alone(out: Path) -> None:
+    config = load_config(None, ["telemetry.enabled=false"])
+    run(config, StopSignals(), out=out, known=None, anew=False)
+
+
 def test_a_run_that_a_mistake_of_the_program_ended_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -81,7 +86,7 @@ def test_a_run_that_a_mistake_of_the_program_ended_says_so(
 
     monkeypatch.setattr(Pipeline, "perceive", mistaken)
     with pytest.raises(ExceptionGroup):
-        run(load_config(None, ["telemetry.enabled=false"]), StopSignals(), out=tmp_path / "run")
+        run_alone(tmp_path / "run")
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert (summary["outcome"], summary["reason"]) == ("failed", "a mistake")
 
@@ -97,7 +102,7 @@ def test_a_collection_of_garbage_while_it_runs_passes_over_what_the_program_was_
 
     monkeypatch.setattr(Pipeline, "perceive", looking)
     with pytest.raises(ExceptionGroup):
-        run(load_config(None, ["telemetry.enabled=false"]), StopSignals(), out=tmp_path / "run")
+        run_alone(tmp_path / "run")
     assert gone_through == [False]
     assert any(each is vars(np) for each in gc.get_objects())  # as before
 

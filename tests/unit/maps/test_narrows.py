@@ -38,5 +38,10 @@ def test_a_room_that_it_has_been_in_has_no_narrow_way_whichever_way_it_came() ->
     assert len(found((2.0, 0.4), (1.0, 0.7))) == 0
 
 
+def test_ways_may_lead_out_of_the_grid() -> None:
+    """Where they end was seen, or believed to be, from afar."""
+    assert len(found((2.0, 0.4), ways=np.array([[1.0, 1.0], [9.0, 1.0], [-5.0, -3.0]]))) == 1
+
+
 def test_a_niche_is_not_worth_telling_of() -> None:
     assert len(found((2.0, 0.4), beyond=0.6)) == 0
