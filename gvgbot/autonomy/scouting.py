@@ -1,5 +1,8 @@
 """What to do while no known way leads to where the robot wants to go."""
 
+import math
+from collections.abc import Set
+
 import numpy as np
 
 from gvgbot.autonomy.control.edge_follower import Track
@@ -10,7 +13,7 @@ from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.whereabouts import Situation
 from gvgbot.geometry import Array
 
-_MOST_NEAR = 2  # vertices to go to, for what no known way leads to
+_MOST_NEAR = 2  # vertices to go to, for each that no known way leads to
 _BEGAN_M = 0.4  # a trail so short is back where it began
 _AT_VERTEX_M = 0.5  # so near, all that there is to see from a vertex is seen
 _SAME_M = 3.0  # so near to where it began before, the robot looks for the same way
@@ -22,7 +25,7 @@ class Scouting:
     def __init__(self) -> None:
         self._since: float | None = None  # stamp
         self._before_s, self._began_at = 0.0, np.full(2, np.inf)  # when a way was seen and lost
-        self._gone_near = set[int]()  # vertices that the robot has been at since
+        self._gone_near = set[tuple[int, int]]()  # what no way leads to, and whence one was sought
         self._turned_back = False  # after the end of sight
 
     @property
@@ -32,7 +35,7 @@ class Scouting:
 
     def begin(self, stamp: float, place: Array) -> None:
         """Look for a way, at a place (2,), local frame."""
-        self._since, self._gone_near, self._turned_back = stamp, set(), False
+        self._since, self._turned_back = stamp, False
         if np.hypot(*(place - self._began_at)) > _SAME_M:
             self._before_s, self._began_at = 0.0, place
 
@@ -54,26 +57,33 @@ class Scouting:
         return self._before_s + (0.0 if self._since is None else stamp - self._since)
 
     def path_near(self, here: Situation, belief: Belief, stamp: float) -> tuple[Branch, ...] | None:
-        """To the vertices next to a frontier that no known way leads to: one may be seen there."""
+        """To a vertex next to a frontier that no known way leads to: one may be seen there."""
         starts = here.starts()
         approaches = shortest_paths(here.graph, starts)
         lost = {end.vertex for end in here.graph.frontiers()} - approaches.keys()
-        rest = sorted(approaches.keys() - self._gone_near)
-        if not lost or not rest or len(self._gone_near) >= _MOST_NEAR:
+        goals = self._next_to(lost, approaches.keys(), belief)
+        if not goals:
             return None
-        places = np.array([belief.map_vertex(vertex).position for vertex in sorted(lost)])
-        nearest = min(
-            rest,
-            key=lambda v: np.hypot(*(places - belief.map_vertex(v).position).T).min(),
-        )
-        approach = approaches[nearest]
+        goal = min(goals.values(), key=lambda vertex: approaches[vertex].metres)
+        approach = approaches[goal]
         if approach.metres < _AT_VERTEX_M:
-            self._gone_near.add(nearest)
+            self._gone_near |= {pair for pair in goals.items() if pair[1] == goal}
             return None
         path = here.path_over(first_arrival(starts, approach), approach.departures)
         if path is not None:
             self._since, self._before_s = stamp, 0.0
         return path
+
+    def _next_to(self, lost: Set[int], reached: Set[int], belief: Belief) -> dict[int, int]:
+        """By vertices that no way leads to, the nearest that is reached and not gone to for it."""
+        found = {}
+        places = {vertex: belief.map_vertex(vertex).position for vertex in lost | reached}
+        for one in sorted(lost):
+            gone = {near for other, near in self._gone_near if other == one}
+            rest = sorted(reached - gone)
+            if rest and len(gone) < _MOST_NEAR:
+                found[one] = min(rest, key=lambda near: math.dist(places[one], places[near]))
+        return found
 
     def path_on(self, here: Situation) -> tuple[Branch, ...]:
         """On along the present edge; at the end of sight the robot turns back.

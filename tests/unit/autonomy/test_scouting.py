@@ -36,7 +36,11 @@ class Town:
         self.known.pair_branch(Branch(10, forward=False), b)
         self.where = Whereabouts(on_edge=a)
         if lost is not None:
-            self._vertex(lost).add_half_edge(0.0)
+            self.lose_vertex(lost)
+
+    def lose_vertex(self, x: float) -> None:
+        """One more, with a frontier, that no known way leads to."""
+        self._vertex(x).add_half_edge(0.0)
 
     def add_vertex_beyond(self) -> None:
         """One more, east of the street, that a known way leads to."""
@@ -91,6 +95,26 @@ def test_it_goes_to_two_vertices_and_to_no_more() -> None:
         assert end_of(scouting.path_near(town.seen_from(0.5), town.belief, 1.0)) == (x, 0.0)
         assert scouting.path_near(town.seen_from(x), town.belief, 2.0) is None
     assert scouting.path_near(town.seen_from(0.5), town.belief, 3.0) is None
+
+
+def test_where_it_has_been_it_does_not_go_again_for_the_same() -> None:
+    town, scouting = Town(-9.0), Scouting()
+    for x in (-3.0, 4.0):
+        scouting.begin(0.0, HERE)
+        assert end_of(scouting.path_near(town.seen_from(0.5), town.belief, 1.0)) == (x, 0.0)
+        assert scouting.path_near(town.seen_from(x), town.belief, 2.0) is None
+        scouting.end()
+    scouting.begin(3.0, HERE)
+    assert scouting.path_near(town.seen_from(0.5), town.belief, 4.0) is None
+    town.lose_vertex(9.0)
+    assert end_of(scouting.path_near(town.seen_from(0.5), town.belief, 5.0)) == (4.0, 0.0)
+
+
+def test_of_what_is_lost_it_begins_with_what_is_nearer_by_the_known_way() -> None:
+    town, scouting = Town(-4.0), Scouting()
+    town.lose_vertex(6.0)  # farther from the street's end, but that is the nearer one
+    scouting.begin(0.0, HERE)
+    assert end_of(scouting.path_near(town.seen_from(2.5), town.belief, 1.0)) == (4.0, 0.0)
 
 
 def test_with_nothing_lost_there_is_nothing_to_go_near_to() -> None:
