@@ -70,12 +70,21 @@ def _gaps(some: Array, others: Array) -> Array:
     return gaps
 
 
-def is_crowded(graph: GvgGraph, view: View, sighting: Sighting, config: RecognitionConfig) -> bool:
-    """Whether a vertex of the kind of a sighting that is still tracked stands there already."""
+def is_crowded(
+    graph: GvgGraph,
+    view: View,
+    sighting: Sighting,
+    known: Correspondence,
+    config: RecognitionConfig,
+) -> bool:
+    """Whether a vertex of the kind of a sighting that is still tracked stands there already.
+
+    Not if both are ends of edges, and seen at once: those may face each other in a gap.
+    """
     return any(
         math.dist(vertex.local.position, sighting.position) < 0.5 * config.same_place_m
         for vertex in _tracked(graph, view, config)
-        if vertex.kind == sighting.kind
+        if vertex.kind == sighting.kind and (sighting.meetpoint or vertex.id not in known.node_of)
     )
 
 

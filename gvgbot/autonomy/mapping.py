@@ -184,7 +184,7 @@ class Mapper(Knowledge):
             if not self._unbelieved.is_believable(candidate, view.gvg.nodes[node], away):
                 continue
             examined = away < CLOSE_M and self._unbelieved.is_examined(candidate)
-            if is_crowded(self.graph, view, sighting, self._recognition) or (
+            if is_crowded(self.graph, view, sighting, known, self._recognition) or (
                 not examined and self._may_be_known(view, sighting)
             ):
                 continue  # it may be a known one: look at it from closer

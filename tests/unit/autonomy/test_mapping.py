@@ -177,6 +177,18 @@ def test_two_dead_ends_in_sight_are_a_whole_map() -> None:
     assert seen.mapper.graph.frontiers() == []
 
 
+def test_two_dead_ends_that_face_each_other_in_a_gap_are_two() -> None:
+    gap = drawn(
+        {1: (-2.0, 0.0), 2: (2.0, 0.0), 3: (2.3, 0.0), 4: (6.0, 0.0)},
+        {10: (1, 2, []), 11: (3, 4, [])},
+        unseen={1: math.pi, 4: 0.0},
+    )
+    assert sorted(Seen().look(gap, 30).places("endpoint")) == [
+        pytest.approx((2.0, 0.0), abs=1e-3),
+        pytest.approx((2.3, 0.0), abs=1e-3),
+    ]
+
+
 def test_the_parts_of_a_view_are_named_after_the_vertices_and_half_edges() -> None:
     seen = Seen().look(TEE, 30)
     vertex = seen.known.vertex_of[2]
