@@ -57,9 +57,13 @@ class ScanGeometry:
 def scan_geometry(
     config: HokuyoConfig, parameters: Parameters, request: ScanRequest
 ) -> ScanGeometry:
-    """The geometry of the requested scans; models outside the catalogue get their own limits."""
-    model = find_model(parameters.model)
-    usable_mm = parameters.range_max_mm if model is None else model.usable_mm
+    """The geometry of the requested scans; what a laser says of its reach holds in any case.
+
+    Old firmware of a listed model may reach less far than its maker says today.
+    """
+    usable_mm = parameters.range_max_mm
+    if (model := find_model(parameters.model)) is not None:
+        usable_mm = min(usable_mm, model.usable_mm)
     if request.width == 2:
         usable_mm = min(usable_mm, LONGEST_IN_TWO_CHARACTERS)
     lowest = request.start + (request.group - 1) / 2

@@ -49,6 +49,12 @@ def ranges_of(parameters: Parameters, readings: list[int], **config: Any) -> Arr
             id="a URG-04LX by another name",
         ),
         pytest.param(
+            replace(MODELS["URG-04LX"].parameters, range_max_mm=4095),
+            [20, 4095, 4096, 5600],
+            [0.02, 4.095] + [math.inf] * 2,
+            id="a URG-04LX with firmware that reaches 4 m",
+        ),
+        pytest.param(
             UNLISTED,
             [0, 1, 2, 19, 20, 30000, 65533],
             [math.nan, math.inf] + [math.nan] * 2 + [0.02, 30.0, math.inf],
@@ -72,6 +78,11 @@ def test_codes_and_ranges_are_told_apart(
     parameters: Parameters, readings: list[int], ranges: list[float]
 ) -> None:
     np.testing.assert_allclose(ranges_of(parameters, readings), ranges)
+
+
+def test_nothing_hit_means_free_no_farther_than_the_laser_itself_reaches() -> None:
+    parameters = replace(MODELS["URG-04LX"].parameters, range_max_mm=4095)
+    assert scan_of(parameters, [0], HokuyoConfig()).range_max == 4.095
 
 
 def test_configured_limits_narrow_those_of_the_laser() -> None:
