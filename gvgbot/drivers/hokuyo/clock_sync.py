@@ -115,9 +115,14 @@ def follow(clock_map: ClockMap, stamp_ms: int, arrival: float) -> ClockMap:
 
 
 def _learnt(clock_map: ClockMap, latest_offset: float) -> ClockMap:
-    """The map that knows more about the link's delay, and trusts it once it knows enough."""
+    """The map that knows more about the link's delay, and trusts it once it knows enough.
+
+    A scan that comes before it was measured proves the synchronisation mistaken.
+    """
     assert clock_map.anchor is not None
     least = min(clock_map.least, latest_offset - clock_map.anchor + MEAN_TRUNCATION)
+    if least < EARLIEST:
+        return replace(clock_map, anchor=None)
     if clock_map.elapsed < LEARNING:
         return replace(clock_map, least=least)
     return replace(clock_map, delay=least, anchor=None, least=least)

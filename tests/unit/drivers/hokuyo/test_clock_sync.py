@@ -133,3 +133,15 @@ def test_a_clock_reset_keeps_what_was_learnt_about_the_link() -> None:
     maps = follow_all(device_ms, truth + 0.030, 0.010, sync)
     assert maps[-1].resets == 1
     assert np.abs(host_stamps(maps) - truth).max() < 0.0015
+
+
+def test_a_scan_that_comes_before_it_was_measured_refutes_the_synchronisation() -> None:
+    # The laser reads its clock at once and answers a second later; its first scan is late, too.
+    sync = synchronise(asked(42.0, np.array([[0.0, 1.0]] * 4)))
+    assert sync is not None
+    truth = 55.0 + PERIOD * np.arange(100)
+    delays = np.full(100, 0.1)
+    delays[0] = 0.8
+    device_ms = np.floor((truth - 42.0) * 1000.0)
+    stamps = host_stamps(follow_all(device_ms, truth + delays, 0.1, sync))
+    assert np.abs(stamps - truth)[1:].max() < 0.0015
