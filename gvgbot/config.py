@@ -86,8 +86,18 @@ class Config:
 
     def __post_init__(self) -> None:
         """Raises ValueError for parts that do not go together."""
+        self._tell_its_ports_apart()
         self._leave_the_router_its_address()
         self._obey_the_guard_at_once()
+
+    def _tell_its_ports_apart(self) -> None:
+        laser, base = self.laser.port, self.base.port
+        if not self.twin.enabled and Path(laser).resolve() == Path(base).resolve():
+            told = laser if laser == base else f"{laser} and {base}"
+            raise ValueError(
+                f"laser.port and base.port are one and the same port, {told}: "
+                "set each to the port that its device is plugged into"
+            )
 
     def _leave_the_router_its_address(self) -> None:
         taken = set(self.telemetry.listen) & set(self.ros2.connect)

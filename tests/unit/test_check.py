@@ -187,6 +187,17 @@ def test_a_port_where_nobody_answers_is_told_from_one_that_is_not_there(tmp_path
     assert "switched on" in finding
 
 
+def test_devices_plugged_into_each_others_ports_are_told_to_be_looked_for_there() -> None:
+    async def main() -> list[str]:
+        simulation = Simulation(CONFIG, open_place(CONFIG), LoopClock())
+        simulation.laser, simulation.base = simulation.base, simulation.laser
+        return [str(line) for line in await examine(CONFIG, simulation)]
+
+    laser, base = run_in_virtual_time(main())
+    assert "laser.port is its port" in laser
+    assert "base.port is its port" in base
+
+
 def test_the_robot_is_not_moved() -> None:
     async def main() -> tuple[int, float, Pose]:
         simulation = Simulation(CONFIG, open_place(CONFIG), LoopClock())

@@ -86,6 +86,19 @@ def test_a_base_that_obeys_the_guard_late_is_refused(key: str) -> None:
         load_config(None, overrides)
 
 
+def test_a_port_can_only_be_that_of_one_device(tmp_path: Path) -> None:
+    link = tmp_path / "laser"
+    link.symlink_to("/dev/ttyUSB0")
+    for laser in ("/dev/ttyUSB0", str(link)):
+        ports = [f"laser.port={laser}", "base.port=/dev/ttyUSB0"]
+        with pytest.raises(
+            ConfigError, match=r"laser\.port and base\.port are one .*/dev/ttyUSB0:"
+        ):
+            load_config(None, [*ports, "twin.enabled=false"])
+        load_config(None, ports)  # twins have none
+    load_config(None, ["laser.port=/dev/ttyUSB1", "base.port=/dev/ttyUSB0", "twin.enabled=false"])
+
+
 def test_an_unknown_odometry_profile_lists_the_known_ones() -> None:
     with pytest.raises(ConfigError, match="must be one of perfect, kobuki, worn, wheels"):
         load_config(None, ["twin.base.odometry=ideal"])

@@ -42,7 +42,8 @@ async def quiet(dialogue: Dialogue, *, patience: float) -> None:
         if status == ACCEPTED:
             return
         if status is None and dialogue.clock.now() >= until:
-            raise DeviceLost("the laser does not answer: check its power and cable")
+            remedy = "check its power and cable, and that laser.port is its port"
+            raise DeviceLost(f"the laser does not answer: {remedy}")
         if status is not None:
             refusals += 1
             await _cure(dialogue, status, refusals)

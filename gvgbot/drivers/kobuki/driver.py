@@ -222,7 +222,8 @@ class KobukiBase:
             )
         return (
             f"no feedback from the base for {config.silence_lost_s:g} s: "
-            f"check that it is switched on and its cable is plugged in ({config.port})"
+            "check that it is switched on, its cable is plugged in, and base.port is its port "
+            f"({config.port})"
         )
 
     def _next_watch(self) -> float:
