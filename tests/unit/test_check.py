@@ -122,6 +122,17 @@ def test_whoever_drives_by_scans_that_are_too_rare_is_told(
     assert all("robot.limits.max_scan_age_s" in remedy for remedy in told)
 
 
+@pytest.mark.parametrize(("baud", "is_told"), [(19200, True), (115200, False)])
+def test_whoever_drives_by_scans_that_a_slow_line_delays_is_told(baud: int, is_told: bool) -> None:
+    """The least of a URG-04LX, every third step, is 733 bytes: 0.38 s at 19200 bit/s."""
+    with structlog.testing.capture_logs() as logs:
+        said("twin.laser.model=URG-04LX", "laser.link=serial", f"laser.baud={baud}")
+    told = [line for line in logs if line["event"] == "scans are too rare to drive by"]
+    assert len(told) == is_told
+    assert all(line["every_s"] == 0.4 for line in told)
+    assert all(line["late_s"] == pytest.approx(0.382 + 0.0755, abs=0.005) for line in told)
+
+
 @contextmanager
 def terminal(*, is_busy: bool) -> Iterator[str]:
     """What to open; a busy one has been opened by another program already."""

@@ -51,6 +51,7 @@ REMEDIES = {  # against a refusal, by its status
     UNSTABLE: f"its mirror does not turn as fast as it must; check its power, and {OFF_AND_ON}",
     DENIED: f"it is busy with something else; end other programs that use it, and {OFF_AND_ON}",
 }
+FASTER = "raise robot.limits.max_scan_age_s, laser.rate_hz or laser.baud, or lower laser.skip"
 LONGEST_WITHOUT_SCAN = 5.0  # s, for a motor to reach its speed or a laser to check itself
 MOST_DOUBLINGS = 3  # of that: a laser that needed longer must not be reset for ever
 SIMPLER = {"NE": "ND", "ND": "MD", "ME": "MD"}  # what to ask for when a command is unknown
@@ -194,20 +195,19 @@ class HokuyoLaser:
 
     async def _open(self) -> Parameters:
         self._identity = Identity.from_lines((await self._dialogue.ask("VV")).fields)
-        reply = await self._dialogue.ask("PP")
         try:
-            self._parameters = Parameters.from_lines(reply.fields)
+            self._parameters = Parameters.from_lines((await self._dialogue.ask("PP")).fields)
         except ValueError as error:
             raise DeviceRefused(f"the laser's PP reply makes no sense: {error}") from error
         with contextlib.suppress(Refusal, Silence):
             self._status = (await self._dialogue.ask("II")).fields
-        self._mode = self._choose(self._parameters)
-        if self._mode.adapted is not None:
-            log.warning("laser mode fitted to its link", change=self._mode.adapted)
-        interval = self._parameters.period * (self._mode.request.skip + 1)
-        if interval > self._longest_s:
-            remedy = "raise robot.limits.max_scan_age_s or laser.rate_hz, or lower laser.skip"
-            log.warning("scans are too rare to drive by", every_s=round(interval, 3), remedy=remedy)
+        self._mode = mode = self._choose(self._parameters)
+        if mode.adapted is not None:
+            log.warning("laser mode fitted to its link", change=mode.adapted)
+        every = round(self._parameters.period * (mode.request.skip + 1), 3)
+        late = round(arrival_delay(self._config, self._parameters, mode.request) + mode.transfer, 3)
+        if every + late > self._longest_s:
+            log.warning("scans are too rare to drive by", every_s=every, late_s=late, remedy=FASTER)
         return self._parameters
 
     def _choose(self, parameters: Parameters) -> Mode:

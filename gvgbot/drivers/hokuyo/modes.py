@@ -17,10 +17,14 @@ WHOLE = 1e-9  # of a step or a scan, so that rounding does not cost one
 
 @dataclass(frozen=True, slots=True)
 class Mode:
-    """The scans that are asked for; `adapted` says what was changed for the link, and why."""
+    """The scans that are asked for; `adapted` says what was changed for the link, and why.
+
+    `transfer` is how long the link is busy with each of them (s).
+    """
 
     request: ScanRequest
     adapted: str | None = None
+    transfer: float = 0.0
 
 
 def configured_request(config: HokuyoConfig, parameters: Parameters) -> ScanRequest:
@@ -71,12 +75,14 @@ def frame_bytes(request: ScanRequest) -> int:
     return echo + status + stamp + characters + 2 * lines + end
 
 
+def transfer_time(request: ScanRequest, baud: int | None) -> float:
+    """How long a link of this rate (bit/s; None: fast enough) is busy with one scan, s."""
+    return 0.0 if baud is None else frame_bytes(request) * BITS_PER_BYTE / baud
+
+
 def fits(request: ScanRequest, parameters: Parameters, baud: int | None) -> bool:
     """Whether a link of this rate (bit/s; None: fast enough) carries the scans as they come."""
-    if baud is None:
-        return True
-    needed = frame_bytes(request) * BITS_PER_BYTE / baud
-    return needed <= parameters.period * (request.skip + 1)
+    return transfer_time(request, baud) <= parameters.period * (request.skip + 1)
 
 
 def choose_mode(config: HokuyoConfig, parameters: Parameters, baud: int | None) -> Mode:
@@ -88,10 +94,11 @@ def choose_mode(config: HokuyoConfig, parameters: Parameters, baud: int | None) 
     """
     wanted = configured_request(config, parameters)
     if not config.adapt or fits(wanted, parameters, baud):
-        return Mode(wanted)
+        return Mode(wanted, transfer=transfer_time(wanted, baud))
     for request in _alternatives(wanted, config, parameters):
         if fits(request, parameters, baud):
-            return Mode(request, _changes(wanted, request, parameters, baud))
+            change = _changes(wanted, request, parameters, baud)
+            return Mode(request, change, transfer_time(request, baud))
     raise ValueError(f"no scans fit into {baud} bit/s: raise laser.baud or narrow the angles")
 
 
