@@ -241,19 +241,18 @@ class Newcomers:
             if is_near(island.centre, self.lasting):
                 one.came, one.first = False, stamp - self._longest_patience
             self._all.append(one)
-        was_round = one.is_round
         one.look(island, stamp)
         if one.is_lost:
             one.is_lost, one.centre, one.first = False, island.centre, stamp
-        if one.was_wall and one.is_round and not was_round:
-            one.first = stamp
+        if one.was_wall and one.is_round:
+            one.first, one.was_wall, one.was_let_in = stamp, False, True
             walls.take_out(one)
         one.is_let_in = stamp - one.first >= self._patience(one)
-        one.was_let_in |= one.is_let_in or one.was_wall
+        one.was_let_in |= one.is_let_in
         return not one.is_let_in
 
     def _patience(self, one: Newcomer) -> float:
-        if one.was_wall and not one.is_round:
+        if one.was_wall:
             return 0.0
         if one.came or self._may_be_stranger(one):
             return self._config.came_after_s

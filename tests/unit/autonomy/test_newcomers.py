@@ -402,6 +402,18 @@ def test_who_looked_like_a_wall_for_long_is_taken_out_when_more_is_seen() -> Non
         assert len(watch.newcomers.points) == 0
 
 
+def test_a_pillar_that_was_taken_for_a_wall_is_let_in_once_and_for_all() -> None:
+    """A third of it is no circle for sure: that it is one is forgotten, until it is seen whole."""
+    watch, spot, patience = Watch(EMPTY), (2.0, 0.0), math.ceil(CONFIG.came_after_s)
+    bearings = sweep(EMPTY, HERE).bearings
+    watch.glimpse(to_disc(bearings, spot), bearings, looks=10)
+    screened = carved([ROOM], [(1.0, -2.0, 1.1, 0.05)])
+    worlds = [EMPTY] * patience + [screened] * 30 + [EMPTY] * 5
+    looks = [watch.dropped(world, 10.0 + k, person=spot) > 0 for k, world in enumerate(worlds)]
+    assert all(looks[:patience])
+    assert not any(looks[patience:])
+
+
 def test_who_stands_beside_a_wall_is_kept_out_by_roundness() -> None:
     """With 0.13 m of air behind the shoulder, seen along a wall and in front of one."""
     for spot in ((2.0, 3.0 - RADIUS - 0.13), (4.0 - RADIUS - 0.13, 0.0)):
