@@ -27,7 +27,8 @@ SETTLE = 1.0  # s at the start that rates are not judged by
 RATE_TOLERANCE = 0.05
 CALM = 0.008  # s: a link that varies by more hands out its bytes late
 BASE_RATE = 50.0  # Hz
-HARMLESS_COUNTS = ("frames", "scans")
+MESSAGE_COUNTS = ("frames", "scans")
+OF_NEWER_FIRMWARE = "unknown_parts"  # checksums were right
 SEEN_SHARE = 0.2  # of the beams; a laser that sees less is covered or dirty
 
 Verdict = Literal["ok", "warn", "fail"]
@@ -270,13 +271,13 @@ def _rareness(heard: Heard, limits: GuardConfig) -> Line:
 
 def _link(subject: str, statistics: Any) -> Line:
     counts = {key: value for key, value in asdict(statistics).items() if isinstance(value, int)}
-    good = sum(counts.pop(key, 0) for key in HARMLESS_COUNTS)
-    damage = {key.replace("_", " "): value for key, value in counts.items() if value}
-    told = ", ".join(f"{value} {key}" for key, value in damage.items()) or "no damage"
+    good = sum(counts.pop(key, 0) for key in MESSAGE_COUNTS)
+    odd = {key: value for key, value in counts.items() if value}
+    told = ", ".join(f"{value} {key.replace('_', ' ')}" for key, value in odd.items())
     return Line(
-        "warn" if damage else "ok",
+        "warn" if odd.keys() - {OF_NEWER_FIRMWARE} else "ok",
         subject,
-        f"{good} messages, {told}",
+        f"{good} messages, {told or 'no damage'}",
         "try another cable or port, away from motors",
     )
 

@@ -71,6 +71,13 @@ def test_a_base_that_answers_in_part_has_a_sound_wire(identity: Identity, says: 
     assert str(first).startswith(says)
 
 
+def test_parts_that_only_newer_firmware_knows_are_no_damage() -> None:
+    status, points = said("twin.base.mishaps.unknown_parts_per_h=36000")
+    verdict, finding = points["base link"]
+    assert (status, verdict) == (0, "ok")
+    assert finding.endswith(" unknown parts")
+
+
 @pytest.mark.parametrize(("override", "subject", "verdict", "remedy"), ILLS.values(), ids=ILLS)
 def test_what_is_wrong_is_named_with_a_remedy(
     override: str, subject: str, verdict: str, remedy: str
