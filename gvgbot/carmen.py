@@ -1,7 +1,9 @@
-"""Logs in the text form of CARMEN: dead reckoning (`ODOM`) and laser sweeps (`FLASER`).
+"""Logs in the text form of CARMEN: dead reckoning (`ODOM`) and laser sweeps.
 
     ODOM x y theta tv rv accel stamp host logger_stamp
     FLASER n r1 .. rn  laser_x laser_y laser_theta  x y theta  stamp host logger_stamp
+    ROBOTLASER1 type start fov resolution max accuracy mode  n r1 .. rn  m remission1 .. m
+        laser_x laser_y laser_theta  x y theta  tv rv forward side axis  stamp host logger_stamp
 
 Metres, radians and seconds. Other lines are passed over.
 """
@@ -20,14 +22,16 @@ import numpy as np
 from gvgbot.autonomy.control.reflexes import Felt
 from gvgbot.autonomy.loop import Cycle
 from gvgbot.errors import UsageError
-from gvgbot.geometry import STANDSTILL, Pose
+from gvgbot.geometry import STANDSTILL, Array, Pose
 from gvgbot.hal.messages import Odometry, Scan
 from gvgbot.recording import Lived
 
 _GZIP = b"\x1f\x8b"
 _BEGINNING = 64  # bytes, in which what is no text has a zero
 _TAIL = 9  # words of a FLASER line after the ranges
+_HEAD, _ROBOT_TAIL = 7, 14  # words of a ROBOTLASER1 line before and after its two lists
 _ODOM_WORDS = 10
+_FULL_TURN = math.tau + 1e-3  # of a sweep, with rounding
 _LARGEST = 1e10  # m, rad or s since 1970; what is beyond comes of a damaged line
 _LONGEST_GAP_S = 0.2  # between messages; logs leave some out
 _LONGEST_PAUSE_S = 300.0  # what is longer comes of a clock that was set, or of a damaged stamp
@@ -52,9 +56,10 @@ class CarmenLog:
 def read_carmen(path: Path, *, no_echo_m: float, base_laser: Pose) -> CarmenLog:
     """The odometry and the scans of a log, plain or gzipped.
 
-    A sweep covers the half-circle ahead. Ranges from `no_echo_m` on mean that nothing was hit. The
-    base's pose at each scan counts as odometry too. Raises UsageError for a file that cannot be
-    read, is no text, or has no sweep in it.
+    A FLASER sweep covers the half-circle ahead. Ranges from `no_echo_m` on, or from the greatest
+    that a ROBOTLASER1 line says it can measure, mean that nothing was hit. The base's pose at each
+    scan counts as odometry too. Raises UsageError for a file that cannot be read, is no text, or
+    has no sweep in it.
     """
     odometry, scans, damaged = list[Odometry](), list[Scan](), 0
     for line in _lines(path):
@@ -66,12 +71,17 @@ def read_carmen(path: Path, *, no_echo_m: float, base_laser: Pose) -> CarmenLog:
                     scan, at = _sweep(words, no_echo_m, base_laser)
                     scans.append(scan)
                     odometry.append(at)
+                case ["ROBOTLASER1", *words]:
+                    scan, at = _robot_sweep(words, no_echo_m, base_laser)
+                    scans.append(scan)
+                    odometry.append(at)
         except ValueError:
             damaged += 1
     log = _in_order(odometry, scans, damaged)
     if not log.scans:
         raise UsageError(
-            f"{path} is no recording (MCAP), and as a CARMEN log it has no FLASER line to read"
+            f"{path} is no recording (MCAP), and as a CARMEN log it has no FLASER or ROBOTLASER1 "
+            "line to read"
         )
     return log
 
@@ -159,13 +169,44 @@ def _sweep(words: list[str], no_echo_m: float, base_laser: Pose) -> tuple[Scan, 
     beams = int(words[0]) if words else 0
     if beams < 2 or len(words) != 1 + beams + _TAIL:
         raise ValueError(words)
-    ranges = np.array(_numbers(words[1 : 1 + beams]))
-    x, y, theta, stamp = _numbers([*words[beams + 4 : beams + 7], words[beams + 7]])
-    ranges[ranges >= no_echo_m] = np.inf
-    ranges[ranges <= 0.0] = np.nan
+    x, y, theta, stamp = _numbers(words[beams + 4 : beams + 8])
     step = math.pi / (beams - beams % 2)  # 180 or 181 beams are a degree apart
+    ranges = _ranges(words[1 : 1 + beams], no_echo_m)
     scan = Scan(stamp, ranges, -math.pi / 2, step, 0.0, no_echo_m, base_laser=base_laser)
     return scan, Odometry(stamp, Pose(x, y, theta), STANDSTILL)
+
+
+def _robot_sweep(words: list[str], no_echo_m: float, base_laser: Pose) -> tuple[Scan, Odometry]:
+    """The same of a line that says itself how the laser looks. Raises ValueError."""
+    head, (found, rest) = words[:_HEAD], _listed(words[_HEAD:])
+    _, tail = _listed(rest)
+    if len(found) < 2 or len(tail) != _ROBOT_TAIL:
+        raise ValueError(words)
+    start, step, range_max = _numbers([head[1], head[3], head[4]])
+    x, y, theta, stamp = _numbers([*tail[3:6], tail[11]])
+    if range_max <= 0.0 or not 0.0 < step * (len(found) - 1) <= _FULL_TURN:
+        raise ValueError(words)
+    range_max = min(range_max, no_echo_m)
+    scan = Scan(
+        stamp, _ranges(found, range_max), start, step, 0.0, range_max, base_laser=base_laser
+    )
+    return scan, Odometry(stamp, Pose(x, y, theta), STANDSTILL)
+
+
+def _listed(words: list[str]) -> tuple[list[str], list[str]]:
+    """A list with its length before it, and what follows. Raises ValueError."""
+    count = int(words[0]) if words else -1
+    if not 0 <= count < len(words):
+        raise ValueError(words)
+    return words[1 : 1 + count], words[1 + count :]
+
+
+def _ranges(words: list[str], range_max: float) -> Array:
+    """Raises ValueError."""
+    ranges = np.array(_numbers(words))
+    ranges[ranges >= range_max] = np.inf
+    ranges[ranges <= 0.0] = np.nan
+    return ranges
 
 
 def _numbers(words: list[str]) -> list[float]:

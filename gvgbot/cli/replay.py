@@ -12,9 +12,9 @@ def add_replay(commands: Commands) -> None:
         "replay",
         help="map a recorded run once more",
         description="Let the robot's mind live through a recording (MCAP) again, or through a "
-        "CARMEN log (ODOM and FLASER lines, plain or gzipped), and write a run directory. A "
-        "recording leaves the map of its run, to the last byte, unless --config or --set change "
-        "what the mind does.",
+        "CARMEN log (lines of ODOM and of FLASER or ROBOTLASER1, plain or gzipped), and write a "
+        "run directory. A recording leaves the map of its run, to the last byte, unless --config "
+        "or --set change what the mind does.",
         epilog="example: gvgbot replay run.mcap --out runs/again",
     )
     replay.add_argument("log", type=path, metavar="FILE", help="the recording or log")

@@ -48,9 +48,32 @@ def test_a_sweep_covers_half_a_circle_from_the_right(
     assert math.degrees(scan.angle_min) == pytest.approx(-90.0)
 
 
+ROBOTLASER = (
+    "ROBOTLASER1 2 -2.0 4.0 1.0 5.6 0.01 1 5 1.5 5.6 0.0 2.5 9.0 2 77 78"
+    " 9.0 9.0 9.0 1.1 2.1 0.6 0.1 0.2 0.3 0.4 1e5 7.5 host 3.25"
+)
+
+
+def test_a_newer_line_says_itself_how_its_laser_looks(tmp_path: Path) -> None:
+    """Type, start, width, step, greatest range, accuracy, mode; readings; remissions; poses."""
+    log = read(written(tmp_path / "a.log", ROBOTLASER))
+    (scan,), (odometry,) = log.scans, log.odometry
+    assert (odometry.stamp, odometry.odom_base) == (7.5, Pose(1.1, 2.1, 0.6))
+    assert (scan.stamp, scan.range_max, log.damaged) == (7.5, 5.6, 0)
+    np.testing.assert_allclose(scan.bearings, [-2.0, -1.0, 0.0, 1.0, 2.0])
+    np.testing.assert_array_equal(scan.ranges, [1.5, math.inf, math.nan, 2.5, math.inf])
+
+
 @pytest.mark.parametrize(
     "line",
     [
+        "ROBOTLASER1",
+        "ROBOTLASER1 2 -2.0 4.0 1.0 5.6 0.01 1",
+        ROBOTLASER.replace(" 5 1.5", " 99 1.5"),
+        ROBOTLASER.replace(" 2 77", " 3 77"),
+        ROBOTLASER.replace(" 2 77", " -1 77"),
+        ROBOTLASER.replace(" 1.0 5.6", " 3.0 5.6"),
+        ROBOTLASER[:90],
         "ODOM 1 2",
         "ODOM 1 2 x 0 0 0 7 host 3",
         "ODOM 1 2 nan 0 0 0 7 host 3",
