@@ -12,7 +12,7 @@ import gzip
 import math
 import zlib
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from operator import attrgetter
 from pathlib import Path
@@ -37,6 +37,9 @@ _LONGEST_GAP_S = 0.2  # between messages; logs leave some out
 _LONGEST_PAUSE_S = 300.0  # what is longer comes of a clock that was set, or of a damaged stamp
 _JUMP_M, _JUMP_MPS = 10.0, 10.0  # from one pose to the next; what is beyond both is no motion
 
+_STEADY, _MOSTLY = 0.01, 0.9  # m and rad; of the sweeps
+_DIGITS = 4  # of a place on the base
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CarmenLog:
@@ -58,7 +61,8 @@ def read_carmen(path: Path, *, no_echo_m: float, base_laser: Pose) -> CarmenLog:
 
     A FLASER sweep covers the half-circle ahead. Ranges from `no_echo_m` on, or from the greatest
     that a ROBOTLASER1 line says it can measure, mean that nothing was hit. The base's pose at each
-    scan counts as odometry too. Raises UsageError for a file that cannot be read, is no text, or
+    scan counts as odometry too. The laser is at `base_laser`, or where the log has it if that is
+    the middle of the base. Raises UsageError for a file that cannot be read, is no text, or
     has no sweep in it.
     """
     odometry, scans, damaged = list[Odometry](), list[Scan](), 0
@@ -68,16 +72,17 @@ def read_carmen(path: Path, *, no_echo_m: float, base_laser: Pose) -> CarmenLog:
                 case ["ODOM", *words]:
                     odometry.append(_odometry(words))
                 case ["FLASER", *words]:
-                    scan, at = _sweep(words, no_echo_m, base_laser)
+                    scan, at = _sweep(words, no_echo_m)
                     scans.append(scan)
                     odometry.append(at)
                 case ["ROBOTLASER1", *words]:
-                    scan, at = _robot_sweep(words, no_echo_m, base_laser)
+                    scan, at = _robot_sweep(words, no_echo_m)
                     scans.append(scan)
                     odometry.append(at)
         except ValueError:
             damaged += 1
     log = _in_order(odometry, scans, damaged)
+    log = replace(log, scans=_mounted(log.scans, base_laser))
     if not log.scans:
         raise UsageError(
             f"{path} is no recording (MCAP), and as a CARMEN log it has no FLASER or ROBOTLASER1 "
@@ -98,6 +103,25 @@ def _in_order(odometry: list[Odometry], scans: list[Scan], damaged: int) -> Carm
         sorted((scan for scan in scans if scan.stamp in kept), key=by_stamp),
         damaged + len(strays) + len(timely) - len(within_reach),
     )
+
+
+def _mounted(scans: list[Scan], base_laser: Pose) -> list[Scan]:
+    """The scans of a laser that does not move on its base."""
+    if base_laser == Pose():
+        base_laser = _steady_place([scan.base_laser for scan in scans])
+    return [replace(scan, base_laser=base_laser) for scan in scans]
+
+
+def _steady_place(places: list[Pose]) -> Pose:
+    """Where a laser is all along; the middle if it moves, as when somebody corrected its poses."""
+    if not places:
+        return Pose()
+    found = np.array([(place.x, place.y, place.theta) for place in places])
+    middle = np.median(found, axis=0)
+    is_there = np.abs(found - middle).max(axis=1) < _STEADY
+    if is_there.mean() <= _MOSTLY:
+        return Pose()
+    return Pose(*middle.round(_DIGITS).tolist())
 
 
 def _strays(stamps: list[float]) -> set[float]:
@@ -164,33 +188,38 @@ def _odometry(words: list[str]) -> Odometry:
     return Odometry(stamp, Pose(x, y, theta), STANDSTILL)
 
 
-def _sweep(words: list[str], no_echo_m: float, base_laser: Pose) -> tuple[Scan, Odometry]:
-    """A scan, and where the base was. Raises ValueError."""
+def _sweep(words: list[str], no_echo_m: float) -> tuple[Scan, Odometry]:
+    """A scan, from where the line has the laser, and where the base was. Raises ValueError."""
     beams = int(words[0]) if words else 0
     if beams < 2 or len(words) != 1 + beams + _TAIL:
         raise ValueError(words)
-    x, y, theta, stamp = _numbers(words[beams + 4 : beams + 8])
+    laser, base, stamp = _poses(words[beams + 1 : beams + 7], words[beams + 7])
     step = math.pi / (beams - beams % 2)  # 180 or 181 beams are a degree apart
     ranges = _ranges(words[1 : 1 + beams], no_echo_m)
-    scan = Scan(stamp, ranges, -math.pi / 2, step, 0.0, no_echo_m, base_laser=base_laser)
-    return scan, Odometry(stamp, Pose(x, y, theta), STANDSTILL)
+    scan = Scan(stamp, ranges, -math.pi / 2, step, 0.0, no_echo_m, base_laser=base.to(laser))
+    return scan, Odometry(stamp, base, STANDSTILL)
 
 
-def _robot_sweep(words: list[str], no_echo_m: float, base_laser: Pose) -> tuple[Scan, Odometry]:
+def _robot_sweep(words: list[str], no_echo_m: float) -> tuple[Scan, Odometry]:
     """The same of a line that says itself how the laser looks. Raises ValueError."""
     head, (found, rest) = words[:_HEAD], _listed(words[_HEAD:])
     _, tail = _listed(rest)
     if len(found) < 2 or len(tail) != _ROBOT_TAIL:
         raise ValueError(words)
     start, step, range_max = _numbers([head[1], head[3], head[4]])
-    x, y, theta, stamp = _numbers([*tail[3:6], tail[11]])
+    laser, base, stamp = _poses(tail[:6], tail[11])
     if range_max <= 0.0 or not 0.0 < step * (len(found) - 1) <= _FULL_TURN:
         raise ValueError(words)
     range_max = min(range_max, no_echo_m)
-    scan = Scan(
-        stamp, _ranges(found, range_max), start, step, 0.0, range_max, base_laser=base_laser
-    )
-    return scan, Odometry(stamp, Pose(x, y, theta), STANDSTILL)
+    ranges = _ranges(found, range_max)
+    scan = Scan(stamp, ranges, start, step, 0.0, range_max, base_laser=base.to(laser))
+    return scan, Odometry(stamp, base, STANDSTILL)
+
+
+def _poses(words: list[str], stamp: str) -> tuple[Pose, Pose, float]:
+    """Of the laser and of the base, with their stamp. Raises ValueError."""
+    x, y, theta, base_x, base_y, base_theta, at = _numbers([*words, stamp])
+    return Pose(x, y, theta), Pose(base_x, base_y, base_theta), at
 
 
 def _listed(words: list[str]) -> tuple[list[str], list[str]]:

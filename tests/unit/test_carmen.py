@@ -102,6 +102,32 @@ def test_a_line_with_a_zero_in_it_is_one_of_the_damaged(
     assert (len(read(path).scans), len(read(path).odometry), read(path).damaged) == (2, 2, 1)
 
 
+def turning(laser_x: float, *, corrected_m: float = 0.0) -> list[str]:
+    """Sweeps of a base that turns where it stands, with the laser so far ahead of its middle.
+
+    If they were corrected the laser's poses are shifted by more and more.
+    """
+    headings = [0.1 * k for k in range(20)]
+    return [
+        f"FLASER 2 1 1 {laser_x * math.cos(a) + corrected_m * a:.6f} {laser_x * math.sin(a):.6f}"
+        f" {a:.6f} 0 0 {a:.6f} {10 * a + 1:.6f} host 0"
+        for a in headings
+    ]
+
+
+@pytest.mark.parametrize(
+    ("told", "corrected_m", "expected"),
+    [(0.0, 0.0, 0.3), (0.1, 0.0, 0.1), (0.0, 0.5, 0.0)],
+    ids=["by the log", "by the configuration", "by neither"],
+)
+def test_the_laser_is_where_it_is_told_to_be(
+    told: float, corrected_m: float, expected: float, tmp_path: Path
+) -> None:
+    path = written(tmp_path / "a.log", *turning(0.3, corrected_m=corrected_m))
+    scans = read_carmen(path, no_echo_m=80.0, base_laser=Pose(told, 0.0, 0.0)).scans
+    assert {scan.base_laser for scan in scans} == {Pose(expected, 0.0, 0.0)}
+
+
 def test_lines_that_come_late_are_put_in_order(tmp_path: Path) -> None:
     late = ODOM.replace("7.25", "7.9")
     log = read(written(tmp_path / "a.log", late, FLASER, ODOM))
