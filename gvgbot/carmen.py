@@ -94,14 +94,14 @@ def read_carmen(path: Path, *, no_echo_m: float, base_laser: Pose) -> CarmenLog:
 def _in_order(odometry: list[Odometry], scans: list[Scan], damaged: int) -> CarmenLog:
     """A log in the order of its stamps, without those that must be damaged."""
     by_stamp = attrgetter("stamp")
-    strays = _strays(sorted(one.stamp for one in odometry))
+    strays = _strays(sorted({one.stamp for one in odometry}))
     timely = sorted((one for one in odometry if one.stamp not in strays), key=by_stamp)
     within_reach = _within_reach(timely)
     kept = {one.stamp for one in within_reach}
     return CarmenLog(
         within_reach,
         sorted((scan for scan in scans if scan.stamp in kept), key=by_stamp),
-        damaged + len(strays) + len(timely) - len(within_reach),
+        damaged + len(odometry) - len(within_reach),
     )
 
 

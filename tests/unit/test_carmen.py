@@ -148,6 +148,13 @@ def test_a_line_with_a_damaged_stamp_is_one_of_the_damaged(stray: float, tmp_pat
     assert (log.damaged, log.pauses) == (1, 0)
 
 
+def test_stamps_of_zero_here_and_there_are_damaged_ones(tmp_path: Path) -> None:
+    stamps = [0.0 if k % 10 == 5 else 976052857.0 + k for k in range(50)]
+    log = read(written(tmp_path / "a.log", *map(at, stamps)))
+    assert [scan.stamp for scan in log.scans] == [stamp for stamp in stamps if stamp]
+    assert (log.damaged, log.pauses) == (5, 0)
+
+
 @pytest.mark.parametrize("first", [0, 24, 47])
 @pytest.mark.parametrize("off", [-40.0, 1e3, 1e6, 1e9])
 def test_lines_whose_pose_no_robot_reaches_are_among_the_damaged(
