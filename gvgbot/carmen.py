@@ -31,6 +31,7 @@ _BEGINNING = 64  # bytes, in which what is no text has a zero
 _TAIL = 9  # words of a FLASER line after the ranges
 _HEAD, _ROBOT_TAIL = 7, 14  # words of a ROBOTLASER1 line before and after its two lists
 _ODOM_WORDS = 10
+_STAMP, _HOST, _LOGGER_STAMP = -3, -2, -1  # the last words of each line
 _FULL_TURN = math.tau + 1e-3  # of a sweep, with rounding
 _LARGEST = 1e10  # m, rad or s since 1970; what is beyond comes of a damaged line
 _LONGEST_GAP_S = 0.2  # between messages; logs leave some out
@@ -55,6 +56,12 @@ class CarmenLog:
         stamps = pairwise(one.stamp for one in self.odometry)
         return sum(later - earlier > _LONGEST_PAUSE_S for earlier, later in stamps)
 
+    @property
+    def is_timeless(self) -> bool:
+        """Whether the base moves while its clock stands still."""
+        stamps = {one.stamp for one in self.odometry}
+        return len(stamps) == 1 and len({one.odom_base for one in self.odometry}) > 1
+
 
 def read_carmen(path: Path, *, no_echo_m: float, base_laser: Pose) -> CarmenLog:
     """The odometry and the scans of a log, plain or gzipped.
@@ -62,13 +69,28 @@ def read_carmen(path: Path, *, no_echo_m: float, base_laser: Pose) -> CarmenLog:
     A FLASER sweep covers the half-circle ahead. Ranges from `no_echo_m` on, or from the greatest
     that a ROBOTLASER1 line says it can measure, mean that nothing was hit. The base's pose at each
     scan counts as odometry too. The laser is at `base_laser`, or where the log has it if that is
-    the middle of the base. Raises UsageError for a file that cannot be read, is no text, or
-    has no sweep in it.
+    the middle of the base. The logger's stamps count where all others are the same. Raises
+    UsageError for a file that cannot be read, is no text, or has no sweep or no times in it.
     """
+    log = _read(path, no_echo_m, by_logger=False)
+    if log.is_timeless:
+        log = _read(path, no_echo_m, by_logger=True)
+    if not log.scans:
+        raise UsageError(
+            f"{path} is no recording (MCAP), and as a CARMEN log it has no FLASER or ROBOTLASER1 "
+            "line to read"
+        )
+    if log.is_timeless:
+        raise UsageError(f"{path}: all its lines have the same stamp; give them their own, in s")
+    return replace(log, scans=_mounted(log.scans, base_laser))
+
+
+def _read(path: Path, no_echo_m: float, *, by_logger: bool) -> CarmenLog:
+    """A log by the stamps of those who sent the messages, or of the logger. Raises UsageError."""
     odometry, scans, damaged = list[Odometry](), list[Scan](), 0
     for line in _lines(path):
         try:
-            match _words(line):
+            match _words(line, by_logger=by_logger):
                 case ["ODOM", *words]:
                     odometry.append(_odometry(words))
                 case ["FLASER", *words]:
@@ -81,14 +103,7 @@ def read_carmen(path: Path, *, no_echo_m: float, base_laser: Pose) -> CarmenLog:
                     odometry.append(at)
         except ValueError:
             damaged += 1
-    log = _in_order(odometry, scans, damaged)
-    log = replace(log, scans=_mounted(log.scans, base_laser))
-    if not log.scans:
-        raise UsageError(
-            f"{path} is no recording (MCAP), and as a CARMEN log it has no FLASER or ROBOTLASER1 "
-            "line to read"
-        )
-    return log
+    return _in_order(odometry, scans, damaged)
 
 
 def _in_order(odometry: list[Odometry], scans: list[Scan], damaged: int) -> CarmenLog:
@@ -173,11 +188,14 @@ def _lines(path: Path) -> Iterator[str]:
         raise UsageError(f"cannot read {path}: {reason}") from error
 
 
-def _words(line: str) -> list[str]:
+def _words(line: str, *, by_logger: bool) -> list[str]:
     """Raises ValueError for a line with a zero in it, as a power cut leaves it."""
     if "\0" in line:
         raise ValueError(line)
-    return line.split()
+    words = line.split()
+    if by_logger:
+        words[_STAMP:_HOST] = words[_LOGGER_STAMP:]
+    return words
 
 
 def _odometry(words: list[str]) -> Odometry:

@@ -155,6 +155,29 @@ def test_stamps_of_zero_here_and_there_are_damaged_ones(tmp_path: Path) -> None:
     assert (log.damaged, log.pauses) == (5, 0)
 
 
+def standing_clock(*logger: float) -> list[str]:
+    """Lines of a robot that drives on, all with the stamp 0; the logger has its own."""
+    return [
+        at(0.0).replace("1.1 2.1", f"{k:.1f} 2.1").replace("3.25", f"{stamp:.2f}")
+        for k, stamp in enumerate(logger)
+    ]
+
+
+def test_the_logger_says_when_it_was_where_nobody_else_does(tmp_path: Path) -> None:
+    log = read(written(tmp_path / "a.log", *standing_clock(1.0, 2.0, 3.5)))
+    assert [scan.stamp for scan in log.scans] == [1.0, 2.0, 3.5]
+    assert [(one.stamp, one.odom_base.x) for one in log.odometry] == [
+        (1.0, 0.0),
+        (2.0, 1.0),
+        (3.5, 2.0),
+    ]
+
+
+def test_a_log_without_times_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="same stamp"):
+        read(written(tmp_path / "a.log", *standing_clock(0.0, 0.0, 0.0)))
+
+
 @pytest.mark.parametrize("first", [0, 24, 47])
 @pytest.mark.parametrize("off", [-40.0, 1e3, 1e6, 1e9])
 def test_lines_whose_pose_no_robot_reaches_are_among_the_damaged(
