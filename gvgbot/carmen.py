@@ -8,11 +8,14 @@
 Metres, radians and seconds. Other lines are passed over.
 """
 
+import bz2
 import gzip
+import lzma
 import math
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from io import BufferedReader
 from itertools import pairwise
 from operator import attrgetter
 from pathlib import Path
@@ -26,7 +29,7 @@ from gvgbot.geometry import STANDSTILL, Array, Pose
 from gvgbot.hal.messages import Odometry, Scan
 from gvgbot.recording import Lived
 
-_GZIP = b"\x1f\x8b"
+_GZIP, _BZIP2, _XZ = b"\x1f\x8b", b"BZh", b"\xfd7zXZ"  # how packed files begin
 _BEGINNING = 64  # bytes, in which what is no text has a zero
 _TAIL = 9  # words of a FLASER line after the ranges
 _HEAD, _ROBOT_TAIL = 7, 14  # words of a ROBOTLASER1 line before and after its two lists
@@ -64,7 +67,7 @@ class CarmenLog:
 
 
 def read_carmen(path: Path, *, no_echo_m: float, base_laser: Pose) -> CarmenLog:
-    """The odometry and the scans of a log, plain or gzipped.
+    """The odometry and the scans of a log, plain or packed with gzip, bzip2 or xz.
 
     A FLASER sweep covers the half-circle ahead. Ranges from `no_echo_m` on, or from the greatest
     that a ROBOTLASER1 line says it can measure, mean that nothing was hit. The base's pose at each
@@ -175,17 +178,31 @@ def _can_reach(one: Odometry, other: Odometry) -> bool:
 def _lines(path: Path) -> Iterator[str]:
     """The lines, as far as the file goes: an archive that was cut ends with a piece of one."""
     try:
-        with path.open("rb") as file:
-            packed = file.read(len(_GZIP)) == _GZIP
-        with gzip.open(path) if packed else path.open("rb") as file:
+        with _opened(path) as file:
             if b"\0" in file.peek(_BEGINNING)[:_BEGINNING]:
-                raise UsageError(f"{path} is neither a recording (MCAP) nor a CARMEN log")
+                raise UsageError(
+                    f"{path} is neither a recording (MCAP) nor a CARMEN log; if it is an archive, "
+                    "give the log that is in it"
+                )
             yield from (line.decode(errors="replace") for line in file)
     except EOFError:
         yield "ODOM"
-    except (OSError, zlib.error) as error:
+    except (OSError, zlib.error, lzma.LZMAError) as error:
         reason = getattr(error, "strerror", None) or error
         raise UsageError(f"cannot read {path}: {reason}") from error
+
+
+def _opened(path: Path) -> gzip.GzipFile | bz2.BZ2File | lzma.LZMAFile | BufferedReader:
+    """A log, unpacked if it is packed. Raises OSError."""
+    with path.open("rb") as file:
+        start = file.read(_BEGINNING)
+    if start.startswith(_GZIP):
+        return gzip.open(path)
+    if start.startswith(_BZIP2):
+        return bz2.open(path)
+    if start.startswith(_XZ):
+        return lzma.open(path)
+    return path.open("rb")
 
 
 def _words(line: str, *, by_logger: bool) -> list[str]:

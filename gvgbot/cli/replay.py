@@ -12,7 +12,7 @@ def add_replay(commands: Commands) -> None:
         "replay",
         help="map a recorded run once more",
         description="Let the robot's mind live through a recording (MCAP) again, or through a "
-        "CARMEN log (lines of ODOM and of FLASER or ROBOTLASER1, plain or gzipped), and write a "
+        "CARMEN log (lines of ODOM and of FLASER or ROBOTLASER1, plain or packed), and write a "
         "run directory. A recording leaves the map of its run, to the last byte, unless --config "
         "or --set change what the mind does.",
         epilog="example: gvgbot replay run.mcap --out runs/again",

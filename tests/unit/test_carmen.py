@@ -1,7 +1,9 @@
 """CARMEN logs: every field where the format has it, damage counted, no file that surprises."""
 
+import bz2
 import gzip
 import itertools
+import lzma
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -202,6 +204,13 @@ def test_a_clock_that_was_set_makes_no_messages(tmp_path: Path) -> None:
     assert (len(lived), log.damaged, log.pauses) == (8, 0, 1)
 
 
+@pytest.mark.parametrize("pack", [gzip.compress, bz2.compress, lzma.compress])
+def test_a_log_may_be_packed(pack: Callable[[bytes], bytes], tmp_path: Path) -> None:
+    path = tmp_path / "a.log"
+    path.write_bytes(pack("\n".join([ODOM, FLASER]).encode()))
+    assert (len(read(path).scans), len(read(path).odometry)) == (1, 2)
+
+
 def test_a_packed_log_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
     whole = gzip.compress("\n".join([FLASER] * 2000).encode(), mtime=0)
     path = tmp_path / "a.log.gz"
@@ -219,6 +228,9 @@ def test_a_packed_log_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
         (ODOM.encode(), "no FLASER"),
         (b"\x7fELF\0\0\1\n", "neither a recording"),
         (b"\x1f\x8bnot gzip at all", "cannot read"),
+        (b"BZhnot bzip2 at all", "cannot read"),
+        (b"\xfd7zXZnot xz at all", "cannot read"),
+        (b"PK\x03\x04\x14\0\0\0\x08\0", "give the log that is in it"),
     ],
 )
 def test_a_file_that_is_no_log_is_refused(content: bytes, said: str, tmp_path: Path) -> None:
