@@ -17,6 +17,7 @@ from gvgbot.recording.schemas import DESCRIPTORS
 
 CHUNK_BYTES = 65_536
 METADATA = "gvgbot"  # the name of the record that says what a file belongs to
+GOES_ON = "gvgbot.goes_on"  # the name of the one that says that another file follows
 SYNC_EVERY_BYTES = 1_000_000  # that a power failure may cost
 _EVENT_SCHEMA = {
     "type": "object",
@@ -92,6 +93,7 @@ class McapFiles:
             os.fsync(self._file.fileno())
             self._synced = size
         if size > self._file_bytes:
+            self._writer.add_metadata(GOES_ON, {})
             self.finish()
             self._make_room()
             self._part += 1

@@ -21,7 +21,7 @@ from mcap.writer import MCAP0_MAGIC
 
 from gvgbot.errors import UsageError
 from gvgbot.recording import Lived
-from gvgbot.recording.files import METADATA, part_path
+from gvgbot.recording.files import GOES_ON, METADATA, part_path
 from gvgbot.recording.messages import (
     BATTERY,
     CYCLE,
@@ -64,10 +64,11 @@ class Recording:
         self._path = path
         self.about = _about(path)
         self.cut: list[Path] = []  # files that end in the middle
-        self.missing: Path | None = None  # a file before others, which are not read therefore
+        self.missing: Path | None = None  # a file that follows, without which none is read
         self.damaged = 0  # chunks of messages, of a second or so, that were passed over
         self.left_out = 0  # messages that the disk was too slow for
         self.requests = 0  # that were granted
+        self._goes_on = False  # as the last file says
 
     def messages(self) -> Iterator[tuple[float, Lived]]:
         """What the robot was given, each with the time (s) when it was taken down.
@@ -84,12 +85,13 @@ class Recording:
                 raise UsageError(f"cannot read {path}: {error.strerror}") from error
             number += 1
             path = part_path(first, number)
-        self.missing = path if _goes_on(first, number) else None
+        self.missing = path if self._goes_on or _goes_on(first, number) else None
 
     def _messages(self, file: BinaryIO, path: Path) -> Iterator[tuple[float, Lived]]:
         topics: dict[int, str] = {}
-        opcode = None
+        opcode, self._goes_on = None, False
         for opcode, content in _records(file):
+            self._goes_on |= opcode == Opcode.METADATA and GOES_ON.encode() in content
             if opcode == Opcode.CHUNK:
                 try:
                     messages = list(self._of_chunk(content, topics))

@@ -238,6 +238,19 @@ def test_a_file_that_is_cut_or_missing_before_others_is_told(tmp_path: Path) -> 
     assert_begins_as(found, lived)
 
 
+def test_a_file_that_is_copied_without_those_that_follow_says_so(tmp_path: Path) -> None:
+    with Recorder(config(tmp_path / "run.mcap", file_mb=0.3), ABOUT, patient=True) as to:
+        record(to, 2000)
+    parts = ["", *(f".{number}" for number in range(1, len(list(tmp_path.iterdir()))))]
+    missing = []
+    for part in parts:
+        (tmp_path / f"run{part}.mcap").rename(tmp_path / f"copy{part}.mcap")
+        recording = Recording(tmp_path / "copy.mcap")
+        assert list(recording.messages())
+        missing.append(recording.missing)
+    assert missing == [*(tmp_path / f"copy{part}.mcap" for part in parts[1:]), None]
+
+
 def first_chunk(whole: bytes | bytearray) -> int:
     """Where its kind is said: a byte, and the length of what follows."""
     at = len(MCAP0_MAGIC)
