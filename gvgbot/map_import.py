@@ -30,6 +30,7 @@ from gvgbot.session import Session
 
 _BEAMS = 720  # of a scan, all around
 _MERGE_M = 0.1  # points of walls in one square of this size are one
+_HOLE = 0.1  # of the space around it
 _MOST_CELLS = 60_000_000  # of a map
 
 
@@ -93,12 +94,26 @@ def _somewhere(path: Path, world: World, known: Mask, room: float) -> Array:
     labels, count = ndimage.label(distance > room)
     if not count:
         raise UsageError(f"{path}: nothing in it is free and wide enough for the robot")
-    largest = 1 + int(np.argmax(np.bincount(labels.ravel())[1:]))
+    largest = _largest_inside(labels, 1 + int(room / world.resolution_m))
     row, column = np.unravel_index(
         int(np.argmax(np.where(labels == largest, distance, 0.0))), free.shape
     )
     middle: Array = _centres(world, np.array([row]), np.array([column]))[0]
     return middle
+
+
+def _largest_inside(labels: NDArray[np.signedinteger], margin: int) -> int:
+    """The largest space, but not that all around a building, as on a plan on white paper.
+
+    This one comes close to all four sides of the image, within so many pixels. It counts if all
+    others are mere holes in it.
+    """
+    sides = labels[:margin], labels[-margin:], labels[:, :margin], labels[:, -margin:]
+    sizes = np.bincount(labels.ravel())
+    sizes[0] = 0
+    inside = sizes.copy()
+    inside[list(set.intersection(*({*np.unique(side).tolist()} for side in sides)))] = 0
+    return int(np.argmax(inside if inside.max() > _HOLE * sizes.max() else sizes))
 
 
 def _walls(world: World, known: Mask) -> Array:

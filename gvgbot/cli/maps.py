@@ -80,8 +80,9 @@ def _add_import(actions: Commands) -> None:
         "import",
         help="a run made of a ROS map, to drive in",
         description="Make a run of a map that somebody else has made (map_server YAML and image): "
-        "the GVG of its largest free space, with the walls to find the robot's place by. The map "
-        "frame is that of the file; unknown pixels stay unknown.",
+        "the GVG of its largest free space, unless that lies around the building, with the walls "
+        "to find the robot's place by. The map frame is that of the file; unknown pixels stay "
+        "unknown.",
         epilog="example: gvgbot map import floor.yaml --out runs/floor",
     )
     importing.add_argument("map", type=path, metavar="MAP.yaml", help="the map")

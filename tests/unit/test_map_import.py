@@ -1,10 +1,12 @@
 """A map that somebody else has made becomes a run, or one line that says why not."""
 
+import itertools
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
+from scipy.ndimage import binary_dilation
 
 from benchmarks.reference_gvg import reference_gvg
 from gvgbot.cli import main
@@ -87,6 +89,33 @@ def test_beyond_the_edge_of_the_image_nothing_is_known(tmp_path: Path) -> None:
     _, columns = np.nonzero(grid.cells == 0)
     x = grid.origin[0] + (columns + 0.5) * grid.resolution_m
     assert -0.1 < x.min() < 0.1  # the file still says that the image begins at 0
+
+
+def test_a_plan_on_white_paper_is_imported_from_inside(tmp_path: Path) -> None:
+    """More of the paper lies around the walls, of 10 cm, than within them."""
+    path = painted(tmp_path)
+    free = ~cross().occupied
+    walls = binary_dilation(free, iterations=2) & ~free
+    Image.fromarray(np.where(walls, 0, 255).astype(np.uint8)[::-1]).save(tmp_path / "cross.png")
+    assert free.mean() < 0.3
+    import_map(path, tmp_path / "run", Config())
+    found = sorted(map(tuple, vertices(tmp_path / "run").round(1).tolist()))
+    kinds = [vertex.kind for vertex in SavedRun.read(tmp_path / "run").graph.vertices]
+    assert (4.5, 4.5) in found
+    assert sorted(kinds) == ["endpoint"] * 4 + ["meetpoint"]
+
+
+def test_streets_are_imported_for_all_the_yards_between_them(tmp_path: Path) -> None:
+    """They leave the image on all sides, and a house of the nine has a yard of two metres."""
+    grey = np.full((260, 260), GREY["free"], np.uint8)
+    for row, column in itertools.product((0, 100, 200), repeat=2):
+        grey[row : row + 60, column : column + 60] = GREY["wall"]
+    grey[110:150, 110:150] = GREY["free"]
+    path = painted(tmp_path)
+    Image.fromarray(grey).save(tmp_path / "cross.png")
+    import_map(path, tmp_path / "run", Config())
+    crossings = {(x, y) for x in (4.0, 9.0) for y in (4.0, 9.0)}
+    assert crossings <= set(map(tuple, vertices(tmp_path / "run").round().tolist()))
 
 
 def test_a_map_of_older_nav2_is_told_apart_in_one_line(
