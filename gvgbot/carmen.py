@@ -43,6 +43,7 @@ _JUMP_M, _JUMP_MPS = 10.0, 10.0  # from one pose to the next; what is beyond bot
 
 _STEADY, _MOSTLY = 0.01, 0.9  # m and rad; of the sweeps
 _DIGITS = 4  # of a place on the base
+_MANY, _OFTEN = 3, 0.01  # beams of a sweep that have the same range; of the sweeps
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,6 +59,14 @@ class CarmenLog:
         """How often it goes on after so long that nothing is known of the time between."""
         stamps = pairwise(one.stamp for one in self.odometry)
         return sum(later - earlier > _LONGEST_PAUSE_S for earlier, later in stamps)
+
+    @property
+    def likely_no_echo_m(self) -> float | None:
+        """The greatest range, if so many beams have it that nothing can have been hit there."""
+        sweeps = [scan.ranges[np.isfinite(scan.ranges)] for scan in self.scans]
+        greatest = max((float(ranges.max(initial=0.0)) for ranges in sweeps), default=0.0)
+        often = sum(int((ranges == greatest).sum()) >= _MANY for ranges in sweeps)
+        return greatest if often > _OFTEN * len(sweeps) else None
 
     @property
     def is_timeless(self) -> bool:

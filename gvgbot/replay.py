@@ -173,5 +173,10 @@ def _carmen(wanted: Wanted) -> Log:
         "long pauses, or a clock that was set": log.pauses,
     }
     flaws = [f"but:     {flaw}: {count}" for flaw, count in found.items() if count]
+    if (range_m := log.likely_no_echo_m) is not None:
+        flaws.append(
+            f"but:     the greatest range, {range_m:g} m, comes again and again: if nothing was "
+            f"hit there, give --no-echo {range_m:g}"
+        )
     title = wanted.path.name.split(".")[0] or "log"
     return Log(title, config, messages(log), True, lambda: flaws)

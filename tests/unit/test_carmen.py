@@ -15,6 +15,7 @@ from gvgbot.carmen import CarmenLog, messages, read_carmen
 from gvgbot.errors import UsageError
 from gvgbot.geometry import Pose
 from gvgbot.hal.messages import Scan
+from gvgbot.replay import Wanted, open_log
 
 ODOM = "ODOM 1.0 2.0 0.5 0.1 0.2 0.0 7.25 host 3.0"
 FLASER = "FLASER 4 1.5 81.83 0.0 2.5 9.0 9.0 9.0 1.1 2.1 0.6 7.5 host 3.25"
@@ -128,6 +129,19 @@ def test_the_laser_is_where_it_is_told_to_be(
     path = written(tmp_path / "a.log", *turning(0.3, corrected_m=corrected_m))
     scans = read_carmen(path, no_echo_m=80.0, base_laser=Pose(told, 0.0, 0.0)).scans
     assert {scan.base_laser for scan in scans} == {Pose(expected, 0.0, 0.0)}
+
+
+@pytest.mark.parametrize(("beyond", "told"), [("8.19", 8.19), ("81.91", None), ("0.0", None)])
+def test_a_laser_that_gives_its_own_greatest_range_for_no_echo_is_told(
+    beyond: str, told: float | None, tmp_path: Path
+) -> None:
+    """Of a hundred beams a twentieth hits nothing."""
+    walls = [f"{2 + 0.05 * k:.2f}" for k in range(95)]
+    line = f"FLASER 100 {' '.join([*walls, *[beyond] * 5])} 0 0 0 0 0 0 1 h 1"
+    path = written(tmp_path / "a.log", line)
+    assert read(path).likely_no_echo_m == told
+    log = open_log(Wanted(path=path, config=None, overrides=[], no_echo_m=None))
+    assert [flaw.endswith(f"give --no-echo {told}") for flaw in log.flaws()] == [True] * bool(told)
 
 
 def test_lines_that_come_late_are_put_in_order(tmp_path: Path) -> None:
