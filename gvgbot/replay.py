@@ -142,11 +142,11 @@ def _recording(wanted: Wanted) -> Log:
             f"{recording.left_out} messages are missing: the disk was slow": recording.left_out,
             f"damaged pieces that were passed over: {recording.damaged}": recording.damaged,
             f"{recording.missing} is missing, and what follows it left out": recording.missing,
-        } | {
-            f"{path} ends in the middle, as when a program is killed": True
-            for path in recording.cut
         }
-        return [f"but:     {flaw}" for flaw, is_there in found.items() if is_there]
+        cut = [f"{path} ends in the middle, as when a program is killed" for path in recording.cut]
+        joined = [f"{path} has another one after its end, left out" for path in recording.joined]
+        flaws = [flaw for flaw, is_there in found.items() if is_there] + cut + joined
+        return [f"but:     {flaw}" for flaw in flaws]
 
     return Log(recording.about.title, config, recording.messages(), False, flaws)
 

@@ -64,6 +64,7 @@ class Recording:
         self._path = path
         self.about = _about(path)
         self.cut: list[Path] = []  # files that end in the middle
+        self.joined: list[Path] = []  # files with more after their end, which is not read
         self.missing: Path | None = None  # a file that follows, without which none is read
         self.damaged = 0  # chunks of messages, of a second or so, that were passed over
         self.left_out = 0  # messages that the disk was too slow for
@@ -101,6 +102,8 @@ class Recording:
                     yield from messages
         if opcode != Opcode.FOOTER:
             self.cut.append(path)
+        elif file.read(1):
+            self.joined.append(path)
 
     def _of_chunk(self, content: bytes, topics: dict[int, str]) -> Iterator[tuple[float, Lived]]:
         """The messages of a chunk, none if a part of it is missing or wrong."""

@@ -251,6 +251,18 @@ def test_a_file_that_is_copied_without_those_that_follow_says_so(tmp_path: Path)
     assert missing == [*(tmp_path / f"copy{part}.mcap" for part in parts[1:]), None]
 
 
+def test_a_recording_behind_another_in_one_file_is_told(tmp_path: Path) -> None:
+    with Recorder(config(tmp_path / "run.mcap"), ABOUT) as to:
+        lived = record(to, 100)
+    whole = (tmp_path / "run.mcap").read_bytes()
+    joined = tmp_path / "joined.mcap"
+    for content, expected in [(whole, []), (whole + whole, [joined])]:
+        joined.write_bytes(content)
+        recording = Recording(joined)
+        assert len(list(recording.messages())) == len(lived)
+        assert (recording.joined, recording.cut) == (expected, [])
+
+
 def first_chunk(whole: bytes | bytearray) -> int:
     """Where its kind is said: a byte, and the length of what follows."""
     at = len(MCAP0_MAGIC)
