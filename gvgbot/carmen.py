@@ -105,12 +105,9 @@ def _read(path: Path, no_echo_m: float, *, by_logger: bool) -> CarmenLog:
             match _words(line, by_logger=by_logger):
                 case ["ODOM", *words]:
                     odometry.append(_odometry(words))
-                case ["FLASER", *words]:
-                    scan, at = _sweep(words, no_echo_m)
-                    scans.append(scan)
-                    odometry.append(at)
-                case ["ROBOTLASER1", *words]:
-                    scan, at = _robot_sweep(words, no_echo_m)
+                case ["FLASER" | "ROBOTLASER1" as kind, *words]:
+                    sweep = _sweep if kind == "FLASER" else _robot_sweep
+                    scan, at = sweep(words, no_echo_m)
                     scans.append(scan)
                     odometry.append(at)
         except ValueError:
