@@ -60,6 +60,7 @@ class Newcomer:
     is_let_in: bool = False  # it has stood for long enough to be in the map
     was_let_in: bool = False  # or it had, for what was seen of it at first
     was_wall: bool = False  # it was in the map: it is a wall, or somebody seen too little of
+    was_round: bool = False  # and then enough: since that first look it is waited for
     evidence: float = 0.0  # that it is round: log-likelihood ratio of the last looks
     is_lost: bool = False  # out of sight for so long that it may have gone
 
@@ -241,18 +242,20 @@ class Newcomers:
             if is_near(island.centre, self.lasting):
                 one.came, one.first = False, stamp - self._longest_patience
             self._all.append(one)
+        round_before = one.is_round
         one.look(island, stamp)
         if one.is_lost:
             one.is_lost, one.centre, one.first = False, island.centre, stamp
-        if one.was_wall and one.is_round:
-            one.first, one.was_wall, one.was_let_in = stamp, False, True
-            walls.take_out(one)
+        if one.was_wall and one.is_round and not one.was_round:
+            one.first, one.was_round = stamp, True
         one.is_let_in = stamp - one.first >= self._patience(one)
-        one.was_let_in |= one.is_let_in
+        if one.was_wall and one.is_waiting and not round_before:
+            walls.take_out(one)
+        one.was_let_in |= one.is_let_in or one.was_wall
         return not one.is_let_in
 
     def _patience(self, one: Newcomer) -> float:
-        if one.was_wall:
+        if one.was_wall and not one.is_round:
             return 0.0
         if one.came or self._may_be_stranger(one):
             return self._config.came_after_s

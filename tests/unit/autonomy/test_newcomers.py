@@ -414,6 +414,19 @@ def test_a_pillar_that_was_taken_for_a_wall_is_let_in_once_and_for_all() -> None
     assert not any(looks[patience:])
 
 
+def test_what_looked_round_for_a_moment_is_the_wall_that_it_was() -> None:
+    """A pane of glass does: it must be in the map again before the robot has passed."""
+    watch, spot = Watch(EMPTY), (2.0, 0.0)
+    bearings = sweep(EMPTY, HERE).bearings
+    watch.glimpse(to_disc(bearings, spot), bearings, looks=10)
+    assert watch.dropped(EMPTY, 10.0, person=spot) > 0
+    screened = carved([ROOM], [(1.0, -2.0, 1.1, 0.06)])
+    for k in range(1, 10):
+        watch.dropped(screened, 10.0 + k, person=spot)
+    assert watch.dropped(screened, 20.0, person=spot) == 0
+    assert len(watch.newcomers.points) == 0
+
+
 def test_who_stands_beside_a_wall_is_kept_out_by_roundness() -> None:
     """With 0.13 m of air behind the shoulder, seen along a wall and in front of one."""
     for spot in ((2.0, 3.0 - RADIUS - 0.13), (4.0 - RADIUS - 0.13, 0.0)):
