@@ -31,7 +31,6 @@ from gvgbot.session import Session
 _BEAMS = 720  # of a scan, all around
 _MERGE_M = 0.1  # points of walls in one square of this size are one
 _HOLE = 0.1  # of the space around it
-_MOST_CELLS = 60_000_000  # of a map
 
 
 def import_map(path: Path, out: Path, config: Config) -> tuple[int, int]:
@@ -43,8 +42,6 @@ def import_map(path: Path, out: Path, config: Config) -> tuple[int, int]:
     """
     set_up_logging(sys.stderr, os.environ, "warning")
     world, known = load_map(path)
-    if known.size > _MOST_CELLS:
-        raise UsageError(f"{path}: {known.size} pixels are too many; at most {_MOST_CELLS} will do")
     with RunDirectory.create(out, world=world.name) as directory, directory.emptied_by_failure():
         session = Session(config, directory, None)
         session.title = world.name

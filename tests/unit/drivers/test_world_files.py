@@ -297,3 +297,10 @@ def test_a_truncated_image_is_named(tmp_path: Path) -> None:
     image.write_bytes(image.read_bytes()[:900])
     with pytest.raises(WorldError, match="key image: cannot read"):
         load_world(path)
+
+
+def test_an_image_that_would_fill_the_memory_is_refused_before_it_is_read(tmp_path: Path) -> None:
+    path = write(tmp_path, CLEAR)
+    Image.new("1", (8000, 8000), 1).save(tmp_path / "plan.png")
+    with pytest.raises(WorldError, match="64000000 pixels, and 60 million at most"):
+        load_world(path)
