@@ -43,12 +43,15 @@ class TimedPipeline(Pipeline):
         self.keyframe_times: list[float] = []
         self.control_times: list[float] = []
         self.stages: dict[str, list[float]] = {}
-        self._localise = self._timed("match", self._localise)  # type: ignore[method-assign]
-        self._maps.insert = self._timed("insert", self._maps.insert)  # type: ignore[method-assign]
-        self._local_gvg = self._timed("local GVG", self._local_gvg)  # type: ignore[method-assign]
-        mapper, errands = self.mapper, self.errands
-        mapper.observe = self._timed("recognise", mapper.observe)  # type: ignore[method-assign]
-        errands.advance = self._timed("decide", errands.advance)  # type: ignore[method-assign]
+        self._time("match", self, "_localise")
+        self._time("insert", self._maps, "insert")
+        self._time("local GVG", self, "_local_gvg")
+        self._time("recognise", self.mapper, "observe")
+        self._time("decide", self.errands, "advance")
+
+    def _time(self, stage: str, owner: object, method: str) -> None:
+        """Take down from now on how long a method takes."""
+        setattr(owner, method, self._timed(stage, getattr(owner, method)))
 
     def _timed(self, stage: str, work: Callable[P, T]) -> Callable[P, T]:
         """The same work, that takes down how long it takes."""

@@ -40,7 +40,6 @@ _LARGEST = 1e10  # m, rad or s since 1970; what is beyond comes of a damaged lin
 _LONGEST_GAP_S = 0.2  # between messages; logs leave some out
 _LONGEST_PAUSE_S = 300.0  # what is longer comes of a clock that was set, or of a damaged stamp
 _JUMP_M, _JUMP_MPS = 10.0, 10.0  # from one pose to the next; what is beyond both is no motion
-
 _STEADY, _MOSTLY = 0.01, 0.9  # m and rad; of the sweeps
 _DIGITS = 4  # of a place on the base
 _MANY, _OFTEN = 3, 0.01  # beams of a sweep that have the same range; of the sweeps

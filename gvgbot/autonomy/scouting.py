@@ -1,6 +1,5 @@
 """What to do while no known way leads to where the robot wants to go."""
 
-import math
 from collections.abc import Set
 
 import numpy as np
@@ -77,12 +76,12 @@ class Scouting:
     def _next_to(self, lost: Set[int], reached: Set[int], belief: Belief) -> dict[int, int]:
         """By vertices that no way leads to, the nearest that is reached and not gone to for it."""
         found = {}
-        places = {vertex: belief.map_vertex(vertex).position for vertex in lost | reached}
         for one in sorted(lost):
             gone = {near for other, near in self._gone_near if other == one}
             rest = sorted(reached - gone)
             if rest and len(gone) < _MOST_NEAR:
-                found[one] = min(rest, key=lambda near: math.dist(places[one], places[near]))
+                place = belief.map_vertex(one)
+                found[one] = min(rest, key=lambda near: place.distance(belief.map_vertex(near)))
         return found
 
     def path_on(self, here: Situation) -> tuple[Branch, ...]:

@@ -24,7 +24,7 @@ FREE_THRESHOLD = 0.196
 OWN_MAP = "map.yaml"  # in the directory of a run
 FREE_GREY, OCCUPIED_GREY, UNKNOWN_GREY = SAVED_GREYS = 254, 0, 205  # what map_saver writes
 OPAQUE = 255
-MOST_PIXELS = 60_000_000  # of a map: a square of 390 m by 5 cm; each takes some 30 bytes to read
+_MOST_PIXELS = 60_000_000  # of a map: a square of 390 m by 5 cm; each takes some 30 bytes to read
 _FARTHEST_M = 1e6  # from the origin of the world to a map of it
 
 log = structlog.get_logger()
@@ -216,8 +216,8 @@ def _read_grey(path: Path, image: Path, mode: str) -> Array:
 
 def _grey(picture: Image.Image, mode: str) -> Array:
     """The same of one that is open, and not read yet. Raises ValueError for one too large."""
-    if (pixels := picture.width * picture.height) > MOST_PIXELS:
-        most = MOST_PIXELS // 1_000_000
+    if (pixels := picture.width * picture.height) > _MOST_PIXELS:
+        most = _MOST_PIXELS // 1_000_000
         raise ValueError(f"{pixels} pixels, and {most} million at most: make it coarser")
     if picture.mode.startswith("I"):
         return np.asarray(picture, dtype=np.float64) / 257.0  # sixteen bits

@@ -493,6 +493,13 @@ def test_what_no_known_way_leads_to_any_more_is_gone_back_to_over_the_way_that_w
     assert robot.mission.target.vertex in lost
 
 
+def test_who_explores_anew_looks_for_ways_also_where_it_has_been() -> None:
+    robot = Robot()
+    robot.mission._scouting._gone_near.add((1, 2))
+    robot.mission.reopen()
+    assert not robot.mission._scouting._gone_near
+
+
 def test_a_robot_that_drives_to_and_fro_gives_up_its_target_after_its_patience() -> None:
     """Between two places a metre apart, which it may do when two ways look equally good."""
     robot = Robot()
