@@ -112,6 +112,21 @@ def test_a_laser_that_goes_dead_while_it_is_asked_for_its_time_is_lost() -> None
     run_in_virtual_time(main())
 
 
+def test_a_laser_that_answers_but_part_of_what_it_is_asked_may_be_slow() -> None:
+    async def main() -> None:
+        here, there = pipe()
+        clock = LoopClock()
+        async with asyncio.TaskGroup() as tasks:
+            served = tasks.create_task(
+                serve_twin(Scripted({b"PP\n": b""}, twin_of()), there, clock)
+            )
+            with pytest.raises(DeviceLost, match=r"PP within 0\.7 s: .*laser\.reply_timeout_s"):
+                await HokuyoLaser(here, HokuyoConfig(reply_timeout_s=0.7), clock).run()
+            served.cancel()
+
+    run_in_virtual_time(main())
+
+
 @pytest.mark.parametrize(
     "reply", [pytest.param(b"", id="none"), pytest.param(b"II\n00P\nMODL:x;x\n\n", id="damaged")]
 )

@@ -26,8 +26,10 @@ class Refusal(DeviceRefused):
 class Silence(DeviceLost):
     """The laser did not answer a command; the link itself may well be alive."""
 
-    def __init__(self, command: str) -> None:
-        super().__init__(f"the laser does not answer {command}")
+    def __init__(self, command: str, within: float) -> None:
+        """`within` so long each time it was asked (s)."""
+        remedy = "check its cable, or raise laser.reply_timeout_s if it is that slow"
+        super().__init__(f"the laser does not answer {command} within {within:g} s: {remedy}")
 
 
 class Dialogue:
@@ -64,7 +66,7 @@ class Dialogue:
             if reply.status != ACCEPTED:
                 raise Refusal(command, reply.status)
             return reply
-        raise Silence(command)
+        raise Silence(command, self.timeout)
 
     async def reply_to(self, command: str, within: float | None = None) -> Reply | None:
         """The next reply that echoes the command; None when none comes `within` s."""
