@@ -53,7 +53,9 @@ def milliseconds(work: Callable[[], object]) -> float:
 
 def main() -> None:
     neighbour, numbers = Neighbour(), count()
-    mind = cast("Pipeline", SimpleNamespace(keyframes=[1], map_base=Pose(), is_lost=False))
+    mind = cast(
+        "Pipeline", SimpleNamespace(past=SimpleNamespace(last=1), map_base=Pose(), is_lost=False)
+    )
     live = LiveRos([neighbour], mind, OdometryNoise(), lambda stamp: stamp)
     ranges = np.random.default_rng(1).uniform(0.1, 30.0, BEAMS)
     scan = Scan(1.0, ranges, -2.35, 0.00436, 0.1, 30.0)

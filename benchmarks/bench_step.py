@@ -67,11 +67,11 @@ class TimedPipeline(Pipeline):
 
     def perceive(self, scan: Scan) -> list[Event]:
         """Time a scan, and once more if it is a keyframe."""
-        count, begin = len(self.keyframes), time.thread_time()
+        count, begin = len(self.past.keyframes), time.thread_time()
         happened = super().perceive(scan)
         spent = time.thread_time() - begin
         self.scan_times.append(spent)
-        if len(self.keyframes) > count:
+        if len(self.past.keyframes) > count:
             self.keyframe_times.append(spent)
         return happened
 
@@ -114,7 +114,7 @@ def bench(world: str, laser: str) -> None:
     begin = time.thread_time()
     robot_time = run_in_virtual_time(explore(config, pipeline))
     spent = time.thread_time() - begin
-    print(f"{world}, {laser}: {pipeline.mission.outcome}, {pipeline.travelled:.0f} m driven")
+    print(f"{world}, {laser}: {pipeline.mission.outcome}, {pipeline.past.travelled:.0f} m driven")
     place, (mean, worst) = f"{world}, {laser}", TARGETS_MS[laser]
     times = 1e3 * np.array(pipeline.scan_times)
     report(f"{place}: a scan, mean", float(np.mean(times)), "ms", at_most=mean)

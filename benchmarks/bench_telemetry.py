@@ -117,7 +117,7 @@ class Robot:
         x, y = self.rng.uniform(0.0, SIDE, 2).tolist()
         stamp = time.perf_counter()
         here = Pose(x, y)
-        self.pipeline.keyframes.append(Keyframe(stamp, here, here, here, self.scan(stamp)))
+        self.pipeline.past.keyframes.append(Keyframe(stamp, here, here, here, self.scan(stamp)))
         draw = self.live_map.update(self.pipeline, stamp)
         assert draw is not None
         for value, latest in draw():  # stamped when ready, so that only the way is measured
@@ -134,10 +134,10 @@ class Robot:
         for x in np.arange(4.0, SIDE, 8.0).tolist():
             for y in np.arange(4.0, SIDE, 8.0).tolist():
                 here = Pose(x, y)
-                self.pipeline.keyframes.append(Keyframe(0.0, here, here, here, self.scan(0.0)))
+                self.pipeline.past.keyframes.append(Keyframe(0.0, here, here, here, self.scan(0.0)))
         for at in np.linspace(0.0, 50.0, 2000).tolist():
             there = Pose(at, at)
-            self.pipeline.keyframes.append(Keyframe(0.0, there, there, there, None))
+            self.pipeline.past.keyframes.append(Keyframe(0.0, there, there, there, None))
 
 
 def _mind(known: GvgGraph, belief: Belief, localisation: Localisation = "full") -> Pipeline:
@@ -217,8 +217,8 @@ def redrawing() -> tuple[float, float]:
     for i, (true, believed) in enumerate(zip(way, far, strict=True)):
         seen = Scan(0.1 * i, rng.uniform(2.0, 12.0, BEAMS), -2.35, step, 0.1, 30.0)
         keyframe = Keyframe(0.1 * i, believed, believed, believed, None if i % 3 else seen)
-        pipeline.keyframes.append(keyframe)
-        pipeline.steps.append(Step(true.to(way[min(i + 1, len(way) - 1)]), noise))
+        pipeline.past.keyframes.append(keyframe)
+        pipeline.past.steps.append(Step(true.to(way[min(i + 1, len(way) - 1)]), noise))
     live_map, begin = LiveMap(0.0), time.perf_counter()
     draw = live_map.update(pipeline, 1.0)
     held, used = time.perf_counter() - begin, cpu()

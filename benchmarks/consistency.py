@@ -67,9 +67,9 @@ class Watched(Pipeline):
         self.closures: list[tuple[int, LoopClosed]] = []  # with their keyframes
 
     def perceive(self, scan: Scan) -> list[Event]:
-        count = len(self.keyframes)
+        count = len(self.past.keyframes)
         happened = super().perceive(scan)
-        if len(self.keyframes) > count:
+        if len(self.past.keyframes) > count:
             belief = self.mapper.belief
             self.believed.append((belief.map_base, belief.P[:3, :3].copy()))
         self.closures += [(count, e) for e in happened if isinstance(e, LoopClosed)]
@@ -114,7 +114,7 @@ def run(overrides: Sequence[str]) -> Row:
     meetpoints = np.concatenate([places, map_world.transform(reference.meetpoints)])
     return {
         "outcome": pipeline.mission.outcome,
-        "driven_m": pipeline.travelled,
+        "driven_m": pipeline.past.travelled,
         "cpu_s": time.process_time() - begin,
         **_poses(pipeline, map_base),
         **_vertices(pipeline, places, meetpoints),
@@ -125,7 +125,7 @@ def run(overrides: Sequence[str]) -> Row:
 
 def _truth(pipeline: Pipeline, track: Array, start: Pose) -> list[Pose]:
     """Where the base truly was at each keyframe, in the map frame."""
-    stamps = [keyframe.stamp for keyframe in pipeline.keyframes]
+    stamps = [keyframe.stamp for keyframe in pipeline.past.keyframes]
     columns = [track[:, 1], track[:, 2], np.unwrap(track[:, 3])]
     world_base = np.stack([np.interp(stamps, track[:, 0], c) for c in columns], axis=1)
     return [start.to(Pose.from_array(row)) for row in world_base]

@@ -109,7 +109,11 @@ class Tour:
 
     async def visit(self, goal: int | Array) -> None:
         """Drive to a vertex or to a point of the map (2,), and count how that went."""
-        errands, begin, start = self.pipeline.errands, self.pipeline.travelled, self.clock.now()
+        errands, begin, start = (
+            self.pipeline.errands,
+            self.pipeline.past.travelled,
+            self.clock.now(),
+        )
         shortest, count = self.shortest(goal), len(self.events)
         try:
             if isinstance(goal, int):
@@ -123,7 +127,7 @@ class Tour:
         await self.resting(LONGEST_S)
         await self.clock.sleep_until(self.clock.now() + 1.0)
         ended = [event for event in self.events[count:] if isinstance(event, ErrandEnded)]
-        driven = self.pipeline.travelled - begin
+        driven = self.pipeline.past.travelled - begin
         way = f"{driven:.1f} m for {shortest:.1f} m in {self.clock.now() - start:.0f} s"
         if not ended:
             self.score.wrong += 1
@@ -167,7 +171,7 @@ class Tour:
         vertices = list(self.pipeline.mapper.graph.vertices)
         walls = np.argwhere(world.occupied)[:, ::-1]
         walls = (walls + 0.5) * world.resolution_m + np.array(world.origin)
-        seen = np.array([k.map_base.position for k in self.pipeline.keyframes])
+        seen = np.array([k.map_base.position for k in self.pipeline.past.keyframes])
         while len(goals) < count:
             if len(goals) % 2 == 0:
                 goals.append(int(rng.choice(vertices)))

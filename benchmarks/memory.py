@@ -69,9 +69,9 @@ async def look_on(session: Session, minutes: int) -> str:
     for minute in range(minutes + 1):
         await clock.sleep_until(20.0 + 60.0 * minute)
         begin = begin or resident_mb()
-        report_fact(f"after {minute} min and {pipeline.travelled:.0f} m", resident_mb(), "MB")
+        report_fact(f"after {minute} min and {pipeline.past.travelled:.0f} m", resident_mb(), "MB")
     grown = resident_mb() - begin
-    report_fact("for each metre driven", 1e3 * grown / pipeline.travelled, "kB")
+    report_fact("for each metre driven", 1e3 * grown / pipeline.past.travelled, "kB")
     return "SIGINT"
 
 

@@ -146,7 +146,7 @@ class Patrol:
             "moved_m": max(float(np.hypot(*(now[v] - self._places[v]))) for v in same),
             "pose_m": off,
             "contacts": body.contacts,
-            "keyframes": len(session.pipeline.keyframes),
+            "keyframes": len(session.pipeline.past.keyframes),
             "bytes": size,
             "objects": len(gc.get_objects()),
             "memory_mb": _memory_mb(),

@@ -29,7 +29,10 @@ class BesideLoop(Generic[Result]):
         if self._wanted.is_set():
             return None
         found, self._found = self._found, None
-        if found is not None and self._pipeline.travelled < self._past.travelled + _DRIVEN_ON_M:
+        if (
+            found is not None
+            and self._pipeline.past.travelled < self._past.past.travelled + _DRIVEN_ON_M
+        ):
             return found
         self._past = still(self._pipeline)
         self._wanted.set()

@@ -109,7 +109,7 @@ def _conclude(session: Session) -> int:
     print(
         f"{mission.outcome or 'failed'}: {mission.reason or session.failure}; "
         f"{counts(graph.vertices, graph.edges)}, "
-        f"{session.pipeline.travelled:.0f} m driven",
+        f"{session.pipeline.past.travelled:.0f} m driven",
         file=sys.stdout if mission.outcome == "explored" else sys.stderr,
     )
     for line in session.directory.whereabouts:
@@ -182,7 +182,7 @@ def recorded(session: Session, *, patient: bool) -> AbstractContextManager[objec
         "title": session.title,
         "version": __version__,
         "config": dump(session.config),
-        "resumed": "yes" if session.pipeline.keyframes else "no",
+        "resumed": "yes" if session.pipeline.past.keyframes else "no",
     }
     with session.directory.emptied_by_failure(), extra_needed():
         from gvgbot.recording.recorder import Recorder

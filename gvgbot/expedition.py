@@ -317,7 +317,7 @@ def _summary(
         "robots": [robot.member.name for robot in robots],
         "joined": [robot.member.name for robot in joined],
         "frames": {name: (pose.x, pose.y, pose.theta) for name, pose in poses.items()},
-        "distance_m": sum(robot.session.pipeline.travelled for robot in robots),
+        "distance_m": sum(robot.session.pipeline.past.travelled for robot in robots),
         "duration_s": max(t.last_stamp for t in tallies)
         - min(t.first_stamp or 0.0 for t in tallies),
         "durations_s": [_duration(robot) for robot in robots],
@@ -349,7 +349,7 @@ def _conclude(directory: RunDirectory, robots: list[_Robot], joined: list[_Robot
         _say(
             f"{robot.member.name}: {mission.outcome or 'failed'}: "
             f"{mission.reason or robot.session.failure}; "
-            f"{robot.session.pipeline.travelled:.0f} m driven in {_duration(robot):.0f} s"
+            f"{robot.session.pipeline.past.travelled:.0f} m driven in {_duration(robot):.0f} s"
         )
     _say(f"maps joined: {len(joined)} of {len(robots)}")
     for line in directory.whereabouts:

@@ -50,30 +50,31 @@ class LivePast:
         Call each such function before asking for the next. Where somebody else drives, only what is
         new is found: the best estimate takes too long there.
         """
-        if not pipeline.keyframes:
+        past, solved = pipeline.past, None
+        if not past.keyframes:
             return None
-        if self._taken > len(pipeline.keyframes):  # the latest of a long way was all that stayed
-            self._taken = len(pipeline.keyframes)
-            self._drawn[self._taken - 1 :] = [pipeline.keyframes[-1].map_base]
-        is_other = self._first is not None and self._first is not pipeline.keyframes[0]
-        self._first = pipeline.keyframes[0]
+        if self._taken > len(past.keyframes):  # the latest of a long way was all that stayed
+            self._taken = len(past.keyframes)
+            self._drawn[self._taken - 1 :] = [past.keyframes[-1].map_base]
+        is_other = self._first is not None and self._first is not past.keyframes[0]
+        self._first = past.keyframes[0]
         if is_other:  # another map has begun
             self._taken, self._drawn = 0, []
-        new, past = pipeline.keyframes[self._taken :], None
-        breaks = _breaks(pipeline.steps, self._taken, len(pipeline.keyframes))
-        lent = max(0, pipeline.lent - self._taken)
+        new = past.keyframes[self._taken :]
+        breaks = _breaks(past.steps, self._taken, len(past.keyframes))
+        lent = max(0, past.lent - self._taken)
         self._taken += len(new)
         if self._is_doubtful and stamp >= self._rests_until and not pipeline.led:
-            self._is_doubtful, past = False, still_past(pipeline)
-        if not new and past is None:
+            self._is_doubtful, solved = False, still_past(pipeline)
+        if not new and solved is None:
             return None
-        return partial(self._portion, Portion(new, is_other, breaks, lent), past, stamp)
+        return partial(self._portion, Portion(new, is_other, breaks, lent), solved, stamp)
 
-    def _portion(self, new: Portion, past: Pipeline | None, stamp: float) -> Portion:
+    def _portion(self, new: Portion, pipeline: Pipeline | None, stamp: float) -> Portion:
         self._drawn += [keyframe.map_base for keyframe in new.keyframes]
-        if past is None:
+        if pipeline is None:
             return new
-        best = smoothed_keyframes(past)
+        best, past = smoothed_keyframes(pipeline), pipeline.past
         if _farthest(self._drawn, best) < TOLERANCE_M:
             return new
         self._drawn, self._rests_until = best, stamp + _REST_S * len(best)

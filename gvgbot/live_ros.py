@@ -94,7 +94,7 @@ class LiveRos:
             self._send(topics.ODOM, translation.odometry(odometry, stamp, pose, twist), stamp)
         if self._is_wanted(topics.TF):
             frames = {(ODOM, BASE): odometry.odom_base}
-            if self._pipeline.keyframes and not self._pipeline.is_lost:
+            if self._pipeline.past.last is not None and not self._pipeline.is_lost:
                 map_odom = self._pipeline.map_base.compose(odometry.odom_base.inverse())
                 frames[MAP, ODOM] = map_odom
             self._send(topics.TF, translation.transforms(stamp, frames), stamp)

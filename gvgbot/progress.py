@@ -51,5 +51,5 @@ def _line(pipeline: Pipeline, simulated: float, wall: float) -> str:
     return (
         f"[{'#' * full}{'.' * (_BAR - full)}] "
         f"{counted(len(graph.vertices), 'vertex', 'vertices')}, {counted(frontiers, 'frontier')}, "
-        f"{pipeline.travelled:.0f} m, {simulated:.0f} s, {simulated / max(wall, 1e-3):.0f}x"
+        f"{pipeline.past.travelled:.0f} m, {simulated:.0f} s, {simulated / max(wall, 1e-3):.0f}x"
     )

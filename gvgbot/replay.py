@@ -90,8 +90,9 @@ def conclusion(session: Session, log: Log) -> list[str]:
     pipeline = session.pipeline
     graph, mission = pipeline.mapper.graph, pipeline.mission
     outcome = f"{mission.outcome}: {mission.reason}; " if mission.outcome else ""
+    found = counts(graph.vertices, graph.edges)
     return [
-        f"replayed: {outcome}{counts(graph.vertices, graph.edges)}, {pipeline.travelled:.0f} m",
+        f"replayed: {outcome}{found}, {pipeline.past.travelled:.0f} m",
         *log.flaws(),
         *session.directory.whereabouts,
     ]

@@ -44,12 +44,12 @@ class Journey:
 
     def record(self, odometry: Odometry, pipeline: Pipeline, world_base: Pose | None) -> None:
         """Take down a control cycle, if a row is due."""
-        if not pipeline.keyframes or (
+        if not pipeline.past.keyframes or (
             self.stamps and odometry.stamp < self.stamps[-1] + self.period - 1e-3
         ):
             return
         self.stamps.append(odometry.stamp)
-        self.keyframes.append(len(pipeline.keyframes) - 1)
+        self.keyframes.append(len(pipeline.past.keyframes) - 1)
         self.odom_base.append(odometry.odom_base)
         self.map_base.append(pipeline.map_base)
         if world_base is not None:
@@ -95,7 +95,7 @@ def _rows(poses: list[Pose]) -> Array:
 
 def _by_odometry(journey: Journey, pipeline: Pipeline) -> Array:
     """The journey by odometry alone (N, 3), from where its own first keyframe was taken on."""
-    own = pipeline.keyframes[pipeline.lent :]
+    own = pipeline.past.keyframes[pipeline.past.lent :]
     start, map_start = (own[0].odom_base, own[0].map_base) if own else (Pose(), Pose())
     return composed(_rows([map_start]), seen_from(_rows([start]), _rows(journey.odom_base)))
 
@@ -105,7 +105,7 @@ def _corrected(journey: Journey, pipeline: Pipeline, keyframes: list[Pose]) -> A
 
     What odometry is wrong by from one keyframe to the next is spread over the time between.
     """
-    taken, last = pipeline.keyframes, len(pipeline.keyframes) - 1
+    taken, last = pipeline.past.keyframes, len(pipeline.past.keyframes) - 1
     stamps, odom_base = np.array(journey.stamps), _rows(journey.odom_base)
     taken_at, felt = np.array([k.stamp for k in taken]), _rows([k.odom_base for k in taken])
     before = np.array(journey.keyframes, np.intp)

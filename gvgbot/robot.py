@@ -318,7 +318,7 @@ class Robot:
         self._note(odometry)
         if not self._pipeline.errands.is_resting:
             self._session.on_cycle(odometry, self._devices.base.contact)
-        if self._pipeline.keyframes or self._pipeline.mission.outcome is not None:
+        if self._pipeline.past.keyframes or self._pipeline.mission.outcome is not None:
             self._be_ready()  # a scan and odometry made the first
         if self._ready:
             self._guard.note(self._loop.stopped_for, odometry.stamp)

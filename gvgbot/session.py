@@ -189,7 +189,7 @@ class Session:
         return {
             "outcome": mission.outcome or ("failed" if self.failure else "stopped"),
             "reason": mission.reason or self.failure or unfinished,
-            "distance_m": self.pipeline.driven,
+            "distance_m": self.pipeline.past.driven,
             "duration_s": self._last_stamp - (self._first_stamp or 0.0),
             "wall_s": time.perf_counter() - self._started,
             "vertices": len(graph.vertices),

@@ -67,7 +67,7 @@ def state(
         vertices=len(graph.vertices),
         edges=len(graph.edges),
         frontiers=len(graph.frontiers()),
-        distance=pipeline.driven,
+        distance=pipeline.past.driven,
         guard=guard,
         contacts=contacts,
         slips=slips,
@@ -83,7 +83,7 @@ def _phase(pipeline: Pipeline, away: str | None) -> Phase:
     is_free = errands.progress is None or errands.is_resting
     if is_free and pipeline.mission.outcome is not None:
         return "finished"
-    if not pipeline.keyframes:
+    if pipeline.past.last is None:
         return "starting"
     if away is not None:
         return "halted"
@@ -110,9 +110,9 @@ def pose_covariance(pipeline: Pipeline, odometry: Odometry | None, noise: Odomet
     if pipeline.is_lost:
         return UNKNOWN * np.eye(3)
     robot = part(pipeline.mapper.belief, ())
-    if odometry is None or not pipeline.keyframes:
+    last = pipeline.past.last
+    if odometry is None or last is None:
         return robot.P
-    last = pipeline.keyframes[-1]
     motion = last.odom_base.to(odometry.odom_base)
     growth = noise.covariance(motion, max(0.0, odometry.stamp - last.stamp))
     return predict(robot, motion, growth).P

@@ -48,7 +48,7 @@ def survey(pipeline: Pipeline) -> Surveyed:
 
 def _passed(pipeline: Pipeline, keyframes: list[Pose]) -> tuple[Array, Array]:
     """Where something stood that the robot has passed (N, 2), map frame, and the radii (N,), m."""
-    places = [one.place(pipeline.keyframes, keyframes) for one in pipeline.traffic.passed]
+    places = [one.place(pipeline.past.keyframes, keyframes) for one in pipeline.traffic.passed]
     radii = [one.radius for one in pipeline.traffic.passed]
     return np.array(places).reshape(-1, 2), np.array(radii)
 

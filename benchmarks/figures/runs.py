@@ -47,16 +47,16 @@ class Watched(Session):
         perceive = self.pipeline.perceive
 
         def watched(scan: Scan) -> list[Event]:
-            count, before = len(self.pipeline.keyframes), self._vertices()
+            count, before = len(self.pipeline.past.keyframes), self._vertices()
             happened = perceive(scan)
-            if len(self.pipeline.keyframes) > count:
+            if len(self.pipeline.past.keyframes) > count:
                 self._note(scan.stamp, before, happened)
             return happened
 
         self.pipeline.perceive = watched  # type: ignore[method-assign]
 
     def _note(self, stamp: float, before: Row, happened: list[Event]) -> None:
-        after, travelled = self._vertices(), self.pipeline.travelled
+        after, travelled = self._vertices(), self.pipeline.past.travelled
         robot, known = after["robot"], after["vertices"].values()
         self.rows.append(
             {

@@ -47,7 +47,7 @@ def smoothed_keyframes(pipeline: Pipeline) -> list[Pose]:
 def still_past(pipeline: Pipeline) -> Pipeline:
     """A copy, for these estimates, whose past does not grow as the pipeline goes on."""
     copied = copy.copy(pipeline)
-    copied.keyframes, copied.steps = pipeline.keyframes.copy(), pipeline.steps.copy()
+    copied.past = pipeline.past.still()
     copied.mapper = copy.copy(pipeline.mapper)
     copied.mapper.observations = pipeline.mapper.observations.copy()
     return copied
@@ -67,14 +67,14 @@ def scans_at(keyframes: list[Pose], pipeline: Pipeline) -> list[tuple[Pose, Scan
     """The scans that were kept, each with where its keyframe is estimated to be (map_base)."""
     return [
         (pose, keyframe.scan)
-        for pose, keyframe in zip(keyframes, pipeline.keyframes, strict=True)
+        for pose, keyframe in zip(keyframes, pipeline.past.keyframes, strict=True)
         if keyframe.scan is not None
     ]
 
 
 def _solved(pipeline: Pipeline) -> tuple[list[Pose], PoseGraph, Array]:
     """The best keyframes; what they were found from, and all poses (N, 3), vertices last."""
-    keyframes, belief = pipeline.keyframes, pipeline.mapper.belief
+    keyframes, belief = pipeline.past.keyframes, pipeline.mapper.belief
     start = [k.map_base for k in keyframes] + [belief.map_vertex(v) for v in belief.ids]
     graph = PoseGraph(_constraints(pipeline))
     x = graph.solve(np.array([(p.x, p.y, p.theta) for p in start]).reshape(-1, 3))
@@ -83,11 +83,11 @@ def _solved(pipeline: Pipeline) -> tuple[list[Pose], PoseGraph, Array]:
 
 def _constraints(pipeline: Pipeline) -> list[Constraint]:
     """Between keyframes, by their number, and vertices, which follow in the belief's order."""
-    keyframes, mapper = pipeline.keyframes, pipeline.mapper
+    keyframes, mapper = pipeline.past.keyframes, pipeline.mapper
     ids = {vertex: len(keyframes) + i for i, vertex in enumerate(mapper.belief.ids)}
     constraints = [
         Constraint(i, i + 1, step.motion, _inverse(step.covariance))
-        for i, step in enumerate(pipeline.steps[: len(keyframes) - 1])
+        for i, step in enumerate(pipeline.past.steps[: len(keyframes) - 1])
     ]
     if pipeline.matches_walls:
         constraints += revisits(_passage(pipeline), pipeline.matching)
@@ -112,9 +112,9 @@ def _constraints(pipeline: Pipeline) -> list[Constraint]:
 
 
 def _passage(pipeline: Pipeline) -> Passage:
-    scans = {i: k.scan for i, k in enumerate(pipeline.keyframes) if k.scan is not None}
+    scans = {i: k.scan for i, k in enumerate(pipeline.past.keyframes) if k.scan is not None}
     walls = {i: sampled(scan, pipeline.matching.points) for i, scan in scans.items()}
-    return Passage([(step.motion, step.covariance) for step in pipeline.steps], walls)
+    return Passage([(step.motion, step.covariance) for step in pipeline.past.steps], walls)
 
 
 def _believed(belief: Belief, vertex: int, last: int, number: int, *, is_met: bool) -> Constraint:

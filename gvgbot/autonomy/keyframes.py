@@ -1,7 +1,9 @@
 """The way of the robot as it is kept: where scans were used, and what lies between."""
 
+import copy
+import math
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Self
 
 import numpy as np
 
@@ -11,6 +13,7 @@ from gvgbot.ranges import Range
 
 # covariance of a way on which the robot was carried, or that is not kept
 UNKNOWN_WAY = np.diag([1.0, 1.0, 0.3**2])
+_SCAN_EVERY_M, _SCAN_EVERY_RAD = 0.7, 0.5  # scans that are kept for the occupancy grid
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,3 +48,60 @@ class Keyframe:
     local_base: Pose
     map_base: Pose
     scan: Scan | None
+
+    def local_base_at(self, odom_base: Pose) -> Pose:
+        """Where odometry has the base now, in the local frame."""
+        return self.local_base.compose(self.odom_base.to(odom_base))
+
+
+class Past:
+    """What the robot has lived through, as far as it is kept: the map hangs on it."""
+
+    def __init__(self) -> None:
+        self.keyframes: list[Keyframe] = []
+        self.steps: list[Step] = []  # from each keyframe to the next
+        self.lasting = 0  # keyframes that are kept for good
+        self.lent = 0  # keyframes that came with another's map: it has not driven there
+        self.travelled = self.lent_m = 0.0  # the latter by who made that map
+        self.with_scan: Pose | None = None  # local_base of the last keyframe that has its scan
+
+    @property
+    def last(self) -> Keyframe | None:
+        """The newest keyframe, if there is one."""
+        return self.keyframes[-1] if self.keyframes else None
+
+    @property
+    def driven(self) -> float:
+        """Metres that the robot has driven itself, whoever made the map that it began with."""
+        return self.travelled - self.lent_m
+
+    def still(self) -> Self:
+        """A copy that does not grow as the robot goes on."""
+        copied = copy.copy(self)
+        copied.keyframes, copied.steps = self.keyframes.copy(), self.steps.copy()
+        return copied
+
+    def keep(self, scan: Scan, odom_base: Pose, local_base: Pose, map_base: Pose) -> None:
+        """Add a keyframe, with its scan if that was taken far enough from the last one kept."""
+        is_kept = has_come_on(self.with_scan, local_base, _SCAN_EVERY_M, _SCAN_EVERY_RAD)
+        if is_kept:
+            self.with_scan = local_base
+        kept = scan if is_kept else None
+        self.keyframes.append(Keyframe(scan.stamp, odom_base, local_base, map_base, kept))
+
+    def leave_out(self) -> int:
+        """Leave out the way after what lasts, but its end; how many keyframes that were."""
+        before, last = self.keyframes[self.lasting - 1], self.keyframes[-1]
+        left_out = len(self.keyframes) - 1 - self.lasting
+        self.keyframes[self.lasting :] = [last]
+        self.steps[self.lasting - 1 :] = [Step(before.map_base.to(last.map_base), UNKNOWN_WAY)]
+        self.lent = min(self.lent, self.lasting)
+        return left_out
+
+
+def has_come_on(before: Pose | None, now: Pose, metres: float, turn: float) -> bool:
+    """Whether a pose is so far, m, or so much turned, rad, from one before, or there was none."""
+    if before is None:
+        return True
+    moved = before.to(now)
+    return math.hypot(moved.x, moved.y) >= metres or abs(moved.theta) >= turn

@@ -119,13 +119,13 @@ def _onwards(gvg: LocalGvg, start: Branch, ends: dict[Branch, HalfEdgeId]) -> It
 
 def _drive_mentally(pipeline: Pipeline, gvg: LocalGvg, look: Look) -> None:
     """Take scans all along the edges, as if the robot had been there, without driving a metre."""
+    past = pipeline.past
     for edge in gvg.edges.values():
         for pose in _poses(edge):
-            if pipeline.keyframes:
-                motion = pipeline.keyframes[-1].map_base.to(pose)
-                pipeline.steps.append(Step(motion, _STEP))
-            pipeline.keyframes.append(Keyframe(0.0, pose, pose, pose, look(pose)))
-    pipeline.lasting = pipeline.lent = len(pipeline.keyframes)
+            if past.last is not None:
+                past.steps.append(Step(past.last.map_base.to(pose), _STEP))
+            past.keyframes.append(Keyframe(0.0, pose, pose, pose, look(pose)))
+    past.lasting = past.lent = len(past.keyframes)
 
 
 def _poses(edge: LocalEdge) -> Iterator[Pose]:
@@ -139,17 +139,17 @@ def _poses(edge: LocalEdge) -> Iterator[Pose]:
 
 def _believe(pipeline: Pipeline) -> None:
     """Be at the last place, and know where every vertex is, each seen once from near by."""
-    mapper = pipeline.mapper
+    mapper, keyframes = pipeline.mapper, pipeline.past.keyframes
     vertices = list(mapper.graph.vertices.values())
-    base = pipeline.keyframes[-1].map_base
+    base = keyframes[-1].map_base
     poses = [base, *(vertex.local for vertex in vertices)]
     x = np.array([(pose.x, pose.y, pose.theta) for pose in poses]).ravel()
     P = np.kron(np.eye(len(poses)), _SIGMA).astype(np.float64)
     mapper.belief = Belief(x, P, tuple(vertex.id for vertex in vertices))
-    places = np.array([keyframe.map_base.position for keyframe in pipeline.keyframes])
+    places = np.array([keyframe.map_base.position for keyframe in keyframes])
     seen = []
     for vertex in vertices:
         nearest = int(np.hypot(*(places - vertex.local.position).T).argmin())
-        base_vertex = pipeline.keyframes[nearest].map_base.to(vertex.local)
+        base_vertex = keyframes[nearest].map_base.to(vertex.local)
         seen.append(Observation(nearest, vertex.id, base_vertex, _SIGMA))
     mapper.observations.extend(sorted(seen, key=lambda observation: observation.keyframe))

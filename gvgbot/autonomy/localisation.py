@@ -42,6 +42,8 @@ _FITS_M, _FITTING = 0.15, 0.8  # so near to the walls must be that share of a sc
 Localisation = Literal["full", "paper"]
 
 
+Match = tuple[Pose, Array, Laid | None]
+"""The base after a step, the covariance (3, 3) of that step, and how walls led to it."""
 _Lesson = tuple[Pose, float, Pose, Array, Array, float]  # as Calibration.learn takes it
 
 
@@ -118,9 +120,7 @@ class LocalMaps:
         self._teach_far()
         return self._far
 
-    def match(
-        self, scan: Scan, before: Pose, motion: Pose, duration: float, noise: Array
-    ) -> tuple[Pose, Array, Laid | None]:
+    def match(self, scan: Scan, before: Pose, motion: Pose, duration: float, noise: Array) -> Match:
         """The pose of the base after a motion, its covariance (3, 3) in its own frame, and how.
 
         That covariance is of what the step adds for good to the error of the one before. There are
@@ -152,9 +152,7 @@ class LocalMaps:
         left = np.asarray(stays @ (np.eye(3) - g), np.float64)
         return found.pose, calibration.adds_up(motion, duration, left, drift), laid
 
-    def trust(
-        self, scan: Scan, before: Pose, motion: Pose, duration: float, noise: Array
-    ) -> tuple[Pose, Array, Laid | None]:
+    def trust(self, scan: Scan, before: Pose, motion: Pose, duration: float, noise: Array) -> Match:
         """As `match`, but just where odometry has it, whatever the walls say."""
         return before.compose(motion), noise.sum(axis=0), None
 
@@ -167,7 +165,7 @@ class LocalMaps:
         noise: Array,
         *,
         turned: float | None = None,
-    ) -> tuple[Pose, Array, Laid | None]:
+    ) -> Match:
         """As `match`, where nobody saw the way that the base took: it is searched for around.
 
         Wheels tell how far it went and how much it turned, but not which of it came first. Where

@@ -134,13 +134,13 @@ class Growth:
 
 def remember(pipeline: Pipeline) -> Memory:
     """What there is to remember; it shares its parts with the pipeline, so keep it at once."""
-    mapper, maps = pipeline.mapper, pipeline._maps
+    past, mapper, maps = pipeline.past, pipeline.mapper, pipeline._maps
     calibration = maps.calibration
     return Memory(
-        keyframes=len(pipeline.keyframes),
-        last=None if pipeline._last is None else replace(pipeline._last, scan=None),
-        travelled=pipeline.travelled,
-        kept=pipeline._kept,
+        keyframes=len(past.keyframes),
+        last=None if past.last is None else replace(past.last, scan=None),
+        travelled=past.travelled,
+        kept=past.with_scan,
         belief=ekf.without_trail(mapper.belief),
         graph=mapper.graph,
         candidates=mapper._unbelieved._all,
@@ -156,10 +156,10 @@ def remember(pipeline: Pipeline) -> Memory:
         ),
         hazards=pipeline._hazards._all,
         newcomers=pipeline.traffic.newcomers._all,
-        lasting=pipeline.lasting,
+        lasting=past.lasting,
         passed=pipeline.traffic.passed,
-        lent=pipeline.lent,
-        lent_m=pipeline.lent_m,
+        lent=past.lent,
+        lent_m=past.lent_m,
     )
 
 
@@ -210,18 +210,18 @@ def growth(pipeline: Pipeline, start: int = 0, end: int | None = None) -> list[G
         observations.setdefault(seen.keyframe, []).append(seen)
     return [
         Growth(
-            pipeline.keyframes[i],
-            pipeline.steps[i - 1] if i > 0 else None,
+            pipeline.past.keyframes[i],
+            pipeline.past.steps[i - 1] if i > 0 else None,
             observations.get(i, []),
         )
-        for i in range(start, len(pipeline.keyframes) if end is None else end)
+        for i in range(start, len(pipeline.past.keyframes) if end is None else end)
     ]
 
 
 # -- recalling -------------------------------------------------------------------------------------
 
 
-def recall(pipeline: Pipeline, memory: Memory, past: list[Growth]) -> None:
+def recall(pipeline: Pipeline, memory: Memory, grown: list[Growth]) -> None:
     """Make the mind that was remembered of this one, and take it through what came after.
 
     Of the past some of the latest may be missing, and some may be younger than the memory. The
@@ -244,25 +244,25 @@ def recall(pipeline: Pipeline, memory: Memory, past: list[Growth]) -> None:
     pipeline._hazards._all = list(memory.hazards)
     pipeline.traffic.newcomers._all = list(memory.newcomers)
     pipeline.traffic.passed, pipeline.traffic.lasting = memory.passed, []
-    pipeline.travelled, pipeline._kept = memory.travelled, memory.kept
-    _recall_past(pipeline, past[: memory.keyframes])
-    if len(past) < memory.keyframes and memory.last is not None:
+    past = pipeline.past
+    past.travelled, past.with_scan = memory.travelled, memory.kept
+    _recall_past(pipeline, grown[: memory.keyframes])
+    if len(grown) < memory.keyframes and memory.last is not None:
         _bridge(pipeline, memory.last)
-    for later in past[memory.keyframes :]:
+    for later in grown[memory.keyframes :]:
         _live_again(pipeline, later)
-    pipeline.lasting = len(pipeline.keyframes)
+    past.lasting = len(past.keyframes)
     if memory.lasting is not None and memory.lasting < memory.keyframes:
-        pipeline.lasting = min(memory.lasting, pipeline.lasting)
-    pipeline.lent = min(memory.lent, len(pipeline.keyframes))
-    pipeline.lent_m = memory.lent_m
+        past.lasting = min(memory.lasting, past.lasting)
+    past.lent = min(memory.lent, len(past.keyframes))
+    past.lent_m = memory.lent_m
     _tie_vertices(pipeline)
-    if pipeline.keyframes:
-        _awake(pipeline, pipeline.keyframes[-1])
+    if past.last is not None:
+        _awake(pipeline, past.last)
 
 
 def _awake(pipeline: Pipeline, last: Keyframe) -> None:
     """Be where the last keyframe was, as after a silence of the base."""
-    pipeline._last = last
     pipeline._odometry = OdometryLog()
     pipeline._odometry.append(Odometry(last.stamp, last.odom_base, STANDSTILL))
     pipeline._look_now = True
@@ -303,24 +303,25 @@ def _recall_cells(local_map: LocalMap, cells: Cells) -> None:
     local_map._renew()
 
 
-def _recall_past(pipeline: Pipeline, past: list[Growth]) -> None:
-    pipeline.keyframes[:] = [grown.keyframe for grown in past]
-    pipeline.steps[:] = [grown.step for grown in past if grown.step is not None]
-    seen = [observation for grown in past for observation in grown.observations]
+def _recall_past(pipeline: Pipeline, grown: list[Growth]) -> None:
+    pipeline.past.keyframes[:] = [one.keyframe for one in grown]
+    pipeline.past.steps[:] = [one.step for one in grown if one.step is not None]
+    seen = [observation for one in grown for observation in one.observations]
     pipeline.mapper.observations[:] = seen
 
 
 def _live_again(pipeline: Pipeline, grown: Growth) -> None:
     """Account for a keyframe that is younger than the memory, but for what it would have found."""
-    mapper, keyframe, step = pipeline.mapper, grown.keyframe, grown.step
-    if step is not None and pipeline.keyframes:
+    past, mapper = pipeline.past, pipeline.mapper
+    keyframe, step = grown.keyframe, grown.step
+    if step is not None and past.last is not None:
         mapper.move(step.motion, step.covariance)
-        pipeline.steps.append(step)
-        pipeline.travelled += pipeline.keyframes[-1].odom_base.distance(keyframe.odom_base)
-    pipeline.keyframes.append(keyframe)
+        past.steps.append(step)
+        past.travelled += past.last.odom_base.distance(keyframe.odom_base)
+    past.keyframes.append(keyframe)
     if keyframe.scan is not None:
-        pipeline._kept = keyframe.local_base
-        pipeline._maps.insert(keyframe.scan, keyframe.local_base, pipeline.travelled)
+        past.with_scan = keyframe.local_base
+        pipeline._maps.insert(keyframe.scan, keyframe.local_base, past.travelled)
     for seen in grown.observations:
         if seen.vertex in mapper.belief.ids:
             mapper.belief = ekf.correct(mapper.belief, seen.vertex, seen.base_vertex, seen.R)
@@ -329,15 +330,16 @@ def _live_again(pipeline: Pipeline, grown: Growth) -> None:
 
 def _bridge(pipeline: Pipeline, last: Keyframe) -> None:
     """Let the last keyframe stand in for all that were lost before it."""
-    if pipeline.keyframes:
-        before = pipeline.keyframes[-1]
+    past = pipeline.past
+    before = past.last
+    if before is not None:
         motion = before.local_base.to(last.local_base)  # which no closure of a loop moves
         as_believed = before.map_base.to(last.map_base)
         if motion.distance(as_believed) > _JUMP_M:  # another local frame, after it was lost
             motion = as_believed
         metres = float(np.hypot(motion.x, motion.y))
-        pipeline.steps.append(Step(motion, _LEAST * (1.0 + metres)))
-    pipeline.keyframes.append(last)
+        past.steps.append(Step(motion, _LEAST * (1.0 + metres)))
+    past.keyframes.append(last)
 
 
 def _tie_vertices(pipeline: Pipeline) -> None:
@@ -345,10 +347,10 @@ def _tie_vertices(pipeline: Pipeline) -> None:
     mapper = pipeline.mapper
     ids = set(mapper.belief.ids)
     mapper.observations[:] = [seen for seen in mapper.observations if seen.vertex in ids]
-    if not pipeline.keyframes:
+    if not pipeline.past.keyframes:
         return
     for vertex in sorted(ids - {seen.vertex for seen in mapper.observations}):
         base_vertex, _ = ekf.expected(mapper.belief, vertex)
         _, R, _ = ekf.innovation(mapper.belief, vertex, base_vertex, _LEAST)
-        number = len(pipeline.keyframes) - 1
+        number = len(pipeline.past.keyframes) - 1
         mapper.observations.append(Observation(number, vertex, base_vertex, R))

@@ -27,8 +27,8 @@ from gvgbot.autonomy.gvg.local import LocalGvg
 from gvgbot.autonomy.gvg.reduction import reduce_graph
 from gvgbot.autonomy.gvg.voronoi import fine_graph
 from gvgbot.autonomy.hazards import Hazards
-from gvgbot.autonomy.keyframes import UNKNOWN_WAY, Keyframe, Step
-from gvgbot.autonomy.localisation import Localisation, LocalMaps
+from gvgbot.autonomy.keyframes import Keyframe, Past, Step, has_come_on
+from gvgbot.autonomy.localisation import Localisation, LocalMaps, Match
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.mission import Mission
 from gvgbot.autonomy.odometry_log import OdometryLog
@@ -50,7 +50,6 @@ STANDS_CARRIED = (
     "restart the program, and it looks for its place on the whole map",
 )
 _OVERLAP_RAD = 0.2  # of what is seen before and after the first turn
-_SCAN_EVERY_M, _SCAN_EVERY_RAD = 0.7, 0.5  # scans that are kept for the occupancy grid
 _LED_EVERY_M, _LED_EVERY_RAD = 0.4, 2.0  # looks for the GVG, where nobody waits for a way
 
 
@@ -88,17 +87,11 @@ class Pipeline:
         self._incidents: list[tuple[str, str]] = []  # action and reason, since the last scan
         self._was_lifted = self._look_now = False
         self._breaks, self._unturned_s = 0, 0.0  # of odometry, at the last look
-        self._last: Keyframe | None = None
-        self._kept: Pose | None = None  # local_base of the last scan that was kept
         self._looked: Pose | None = None  # local_base of the last look for the GVG
         self._execution = Execution(config.edge_follower, robot_radius)
         self.gvg = LocalGvg()
         self.open_clearance = config.reduction.open_clearance_m  # from walls; farther is no edge
-        self.keyframes: list[Keyframe] = []
-        self.steps: list[Step] = []
-        self.lasting = 0  # keyframes that are kept for good: the map hangs on them
-        self.lent = 0  # keyframes that came with another's map: it has not driven there
-        self.travelled = self.lent_m = 0.0  # the latter by who made that map
+        self.past = Past()
 
     # -- state -----------------------------------------------------------------------------------
 
@@ -111,11 +104,6 @@ class Pipeline:
     def matches_walls(self) -> bool:
         """Whether walls tell where it is, and not odometry and vertices alone."""
         return not self._trusts_odometry
-
-    @property
-    def driven(self) -> float:
-        """Metres that it has driven itself, whoever made the map that it began with."""
-        return self.travelled - self.lent_m
 
     @property
     def is_lost(self) -> bool:
@@ -136,26 +124,25 @@ class Pipeline:
     @property
     def map_base(self) -> Pose:
         """The pose as believed now."""
-        newest = self._odometry.newest
-        if self._last is None or newest is None:
+        last, newest = self.past.last, self._odometry.newest
+        if last is None or newest is None:
             return Pose()
-        moved = self._last.odom_base.to(newest.odom_base)
-        return self.mapper.belief.map_base.compose(moved)
+        return self.mapper.belief.map_base.compose(last.odom_base.to(newest.odom_base))
 
     def map_base_at(self, stamp: float) -> Pose | None:
         """The pose as believed now to have been a moment ago; None if odometry does not tell."""
-        odom_base = self._odometry.odom_base_at(stamp)
-        if self._last is None or odom_base is None:
+        last, odom_base = self.past.last, self._odometry.odom_base_at(stamp)
+        if last is None or odom_base is None:
             return None
-        return self.mapper.belief.map_base.compose(self._last.odom_base.to(odom_base))
+        return self.mapper.belief.map_base.compose(last.odom_base.to(odom_base))
 
     @property
     def track(self) -> Array:
         """What is being driven along (N, 2), m, map frame; no point while standing or turning."""
-        order = self._execution.order
-        if self._last is None or not isinstance(order, Drive):
+        last, order = self.past.last, self._execution.order
+        if last is None or not isinstance(order, Drive):
             return np.zeros((0, 2))
-        map_local = self.mapper.belief.map_base.compose(self._last.local_base.inverse())
+        map_local = self.mapper.belief.map_base.compose(last.local_base.inverse())
         return map_local.transform(order.track.polyline)
 
     # -- perception, per scan --------------------------------------------------------------------
@@ -171,8 +158,8 @@ class Pipeline:
         if not self._worth_a_look(scan, odom_base):
             self._maps.catch_up()
             return happened
-        if self._last is not None:
-            self.mission.skip(max(0.0, scan.stamp - self._last.stamp - _LONGEST_GAP_S))
+        if self.past.last is not None:
+            self.mission.skip(max(0.0, scan.stamp - self.past.last.stamp - _LONGEST_GAP_S))
         scan = deskewed(without_mixed_pixels(scan), self._odometry.motion_during(scan))
         local_base = self._localise(scan, odom_base)
         if local_base is None:
@@ -180,30 +167,29 @@ class Pipeline:
         whole, scan = scan, self._sift(scan, local_base)
         free = self.traffic.newcomers.free(whole, local_base)
         for one in self.traffic.nearby(self._local_map(local_base)):
-            self._maps.near.stand_on(one.pose.position, one.radius, self.travelled)
-        self._maps.insert(scan, local_base, self.travelled, free)
-        self._hazards.forget(self.travelled)
+            self._maps.near.stand_on(one.pose.position, one.radius, self.past.travelled)
+        self._maps.insert(scan, local_base, self.past.travelled, free)
+        self._hazards.forget(self.past.travelled)
         if self.led and not self._worth_a_gvg(local_base):
-            self._keep(scan, odom_base, local_base)
+            self.past.keep(scan, odom_base, local_base, self.mapper.belief.map_base)
             return happened
         view = self._view(scan, local_base)
         known, learnt = self.mapper.observe(view)
-        self._keep(scan, odom_base, local_base)
+        self.past.keep(scan, odom_base, local_base, self.mapper.belief.map_base)
         done = self._act(view, known, scan)
         happened += learnt + done  # what was done may have taught the mapper more
         return happened + self._forget(scan.stamp, happened)
 
     def _glance(self, scan: Scan, odom_base: Pose) -> None:
         """Look out for other robots in every scan: they move."""
-        if self._last is not None:
-            local_base = self._last.local_base.compose(self._last.odom_base.to(odom_base))
-            self.traffic.glance(scan, local_base)
+        if self.past.last is not None:
+            self.traffic.glance(scan, self.past.last.local_base_at(odom_base))
 
     def _sift(self, scan: Scan, local_base: Pose) -> Scan:
         """The scan without what may be people or robots; the mission hears of the robots."""
         self.mission.meet(local_base, self.traffic.nearby(self._local_map(local_base)))
         walls, is_way = self._maps.near, partial(self.mapper.is_way, local_base)
-        map_base, now = self.mapper.belief.map_base, len(self.keyframes)
+        map_base, now = self.mapper.belief.map_base, len(self.past.keyframes)
         return self.traffic.sift(scan, local_base, map_base, walls, is_way, now)
 
     def _local_map(self, local_base: Pose) -> Pose:
@@ -223,9 +209,9 @@ class Pipeline:
             ends = (key for key, node in self.gvg.nodes.items() if node.degree == 1)
             doubted |= touching(self.gvg, self.traffic.newcomers.points) & frozenset(ends)
         return View(
-            len(self.keyframes),
+            len(self.past.keyframes),
             scan.stamp,
-            self.travelled,
+            self.past.travelled,
             local_base,
             self.gvg,
             self._maps.near,
@@ -241,7 +227,7 @@ class Pipeline:
             return self.mission.witness(view, known)
         if self._execution.is_turning:
             return []
-        if len(self.keyframes) == 1:
+        if len(self.past.keyframes) == 1:
             self._execution.turn(_blind_angle(scan))
             return []
         order, done = self.errands.advance(view, known)
@@ -268,83 +254,74 @@ class Pipeline:
 
     def _worth_a_look(self, scan: Scan, odom_base: Pose) -> bool:
         """Whether the robot is about something, and has come on, turned or waited enough."""
-        if (self._is_idle and self._last is not None) or self._reflexes.is_lifted:
+        last, c = self.past.last, self._config.keyframe
+        if (self._is_idle and last is not None) or self._reflexes.is_lifted:
             return False
-        if self._last is None or self._look_now:
+        if last is None or self._look_now:
             self._look_now = False
             return True
-        c = self._config.keyframe
-        has_waited = scan.stamp - self._last.stamp >= c.interval_s
-        return has_waited or _has_come_on(self._last.odom_base, odom_base, c.distance_m, c.turn_rad)
+        has_waited = scan.stamp - last.stamp >= c.interval_s
+        return has_waited or has_come_on(last.odom_base, odom_base, c.distance_m, c.turn_rad)
 
     def _worth_a_gvg(self, local_base: Pose) -> bool:
         """Whether a robot that is led has come on; it is taken down."""
-        has_come_on = _has_come_on(self._looked, local_base, _LED_EVERY_M, _LED_EVERY_RAD)
-        if has_come_on:
+        is_worth = has_come_on(self._looked, local_base, _LED_EVERY_M, _LED_EVERY_RAD)
+        if is_worth:
             self._looked = local_base
-        return has_come_on
+        return is_worth
 
     def _localise(self, scan: Scan, odom_base: Pose) -> Pose | None:
         """The base in the local frame; the belief moves with it. None: it may be anywhere."""
-        newest = self._odometry.newest
+        last, newest = self.past.last, self._odometry.newest
         assert newest is not None, "it tells where the base is"
         is_broken, self._breaks = newest.breaks != self._breaks, newest.breaks
-        if self._last is None:
+        if last is None:
             return Pose()
-        motion = self._last.odom_base.to(odom_base)
-        self.travelled += math.hypot(motion.x, motion.y)
+        motion = last.odom_base.to(odom_base)
+        self.past.travelled += math.hypot(motion.x, motion.y)
+        local_base, covariance, laid = self._laid(scan, last, motion, is_broken=is_broken)
+        if is_broken and self.matches_walls and not self._maps.fits(scan, local_base):
+            self.errands.pause()
+            self.errands.is_lost = self.errands.is_carried = True
+            self._incidents.append(STANDS_CARRIED)
+            return None
+        moved = last.local_base.to(local_base)
+        step = Step(moved, rotated_covariance(covariance, moved.theta))
+        self.past.steps.append(step)
+        self.mapper.move(step.motion, step.covariance, laid)
+        return local_base
+
+    def _laid(self, scan: Scan, last: Keyframe, motion: Pose, *, is_broken: bool) -> Match:
+        """A scan on the walls, after a motion by odometry, which has started anew if broken."""
         unturned, self._unturned_s = self._unturned_s, self._odometry.unturned_s
-        duration = max(0.0, scan.stamp - self._last.stamp)
+        duration = max(0.0, scan.stamp - last.stamp)
+        felt_s = max(0.0, duration - (self._unturned_s - unturned))  # in which the gyro may drift
         noise = self._config.odometry_noise.parts(motion, duration)
         is_doubted, self.errands.is_lost = self.errands.is_lost or is_broken, False
         if is_broken:
             self._incidents.append(("look for its place near by", "the base has started anew"))
-        lost = self._was_lifted or self._odometry.has_gap_since(self._last.stamp)
+        lost = self._was_lifted or self._odometry.has_gap_since(last.stamp)
         match = self._maps.trust if self._trusts_odometry else self._maps.match
         if lost or is_doubted:
             turned = math.pi if is_broken else _TURNED_RAD if is_doubted else None
             match = partial(self._maps.find, turned=turned)
         if self._was_lifted or is_doubted:
             self._was_lifted, noise = False, np.append(noise, [_LIFTED], axis=0)
-        felt_s = max(0.0, duration - (self._unturned_s - unturned))  # in which the gyro may drift
-        local_base, covariance, laid = match(
-            scan, self._last.local_base, motion, felt_s, rotated_covariance(noise, -motion.theta)
-        )
-        if is_broken and self.matches_walls and not self._maps.fits(scan, local_base):
-            self.errands.pause()
-            self.errands.is_lost = self.errands.is_carried = True
-            self._incidents.append(STANDS_CARRIED)
-            return None
-        moved = self._last.local_base.to(local_base)
-        step = Step(moved, rotated_covariance(covariance, moved.theta))
-        self.steps.append(step)
-        self.mapper.move(step.motion, step.covariance, laid)
-        return local_base
-
-    def _keep(self, scan: Scan, odom_base: Pose, local_base: Pose) -> None:
-        """Make a keyframe of a look, with its scan if that was taken far enough from the last."""
-        is_kept = _has_come_on(self._kept, local_base, _SCAN_EVERY_M, _SCAN_EVERY_RAD)
-        if is_kept:
-            self._kept = local_base
-        map_base, kept = self.mapper.belief.map_base, scan if is_kept else None
-        self._last = Keyframe(scan.stamp, odom_base, local_base, map_base, kept)
-        self.keyframes.append(self._last)
+        odometry_noise = rotated_covariance(noise, -motion.theta)
+        return match(scan, last.local_base, motion, felt_s, odometry_noise)
 
     def _forget(self, stamp: float, happened: list[Event]) -> list[Event]:
         """Leave out the way but its end, if it has become long and there was nothing to learn."""
+        past = self.past
         is_new = any(isinstance(event, VertexAdded | EdgeJoined) for event in happened)
         if is_new or self.errands.is_exploring:
-            self.lasting = len(self.keyframes)
-        newest = len(self.keyframes) - 1
-        if newest < self.lasting + self._config.keyframe.latest:
+            past.lasting = len(past.keyframes)
+        if len(past.keyframes) <= past.lasting + self._config.keyframe.latest:
             return []
-        before, last = self.keyframes[self.lasting - 1], self.keyframes[newest]
-        self.keyframes[self.lasting :] = [last]
-        self.steps[self.lasting - 1 :] = [Step(before.map_base.to(last.map_base), UNKNOWN_WAY)]
-        self.mapper.forget_between(self.lasting, newest)
-        self.lent = min(self.lent, self.lasting)
-        self.traffic.passed = [one.before(self.lasting) for one in self.traffic.passed]
-        return [WayForgotten(stamp, self.lasting, newest - self.lasting)]
+        left_out = past.leave_out()
+        self.mapper.forget_between(past.lasting, past.lasting + left_out)
+        self.traffic.passed = [one.before(past.lasting) for one in self.traffic.passed]
+        return [WayForgotten(stamp, past.lasting, left_out)]
 
     # -- control, per odometry message -------------------------------------------------------------
 
@@ -354,9 +331,9 @@ class Pipeline:
         if before is not None:
             self._execution.note_turn(wrap_angle(odometry.odom_base.theta - before.odom_base.theta))
         self._odometry.append(odometry)
-        if self._last is None or self.led:
+        if self.past.last is None or self.led:
             return STANDSTILL
-        local_base = self._last.local_base.compose(self._last.odom_base.to(odometry.odom_base))
+        local_base = self.past.last.local_base_at(odometry.odom_base)
         moment = Moment(odometry.stamp, local_base, self._wish(local_base), felt)
         twist, incident = self._reflexes.act(moment, partial(self._room, local_base))
         command = self.errands.command(odometry.stamp)
@@ -378,9 +355,9 @@ class Pipeline:
 
     def _careful(self, local_base: Pose, twist: Twist) -> Twist:
         """The twist, slow enough to stop with room for somebody ahead who comes as fast."""
-        if not self.traffic.is_in_team or self._last is None:
+        if not self.traffic.is_in_team or self.past.last is None:
             return twist
-        local_map = self._local_map(self._last.local_base)
+        local_map = self._local_map(self.past.last.local_base)
         slow = self._config.edge_follower.min_speed_mps
         careful = self.traffic.careful(twist, local_base, local_map, self.radius, slow)
         if careful.linear == 0.0 < twist.linear:
@@ -404,7 +381,7 @@ class Pipeline:
             case Hit(cause=cause, bearings=bearings):
                 self._incidents.append(("back off", cause))
                 blocks = self._hazards.add(
-                    local_base, bearings, self.radius, self.travelled, lasting=cause == "cliff"
+                    local_base, bearings, self.radius, self.past.travelled, lasting=cause == "cliff"
                 )
                 if blocks:
                     self.errands.obstruct(f"{cause} again and again")
@@ -421,11 +398,3 @@ def _blind_angle(scan: Scan) -> float:
     """How far to turn so that every direction has been seen, with some overlap; rad."""
     seen = scan.angle_increment * (len(scan.ranges) - 1)
     return max(0.0, math.tau - seen) + _OVERLAP_RAD
-
-
-def _has_come_on(before: Pose | None, now: Pose, metres: float, turn: float) -> bool:
-    """Whether a pose is so far, m, or so much turned, rad, from one before, or there was none."""
-    if before is None:
-        return True
-    moved = before.to(now)
-    return math.hypot(moved.x, moved.y) >= metres or abs(moved.theta) >= turn

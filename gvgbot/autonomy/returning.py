@@ -60,7 +60,7 @@ class ReturningPipeline(Pipeline):
         self.smooth: Callable[[], Estimate | None] = partial(smoothed, self)
         self._is_doubted = False  # the place where it was: it may have been moved
         self._matching = config.scan_matching
-        self._is_back = not self.keyframes
+        self._is_back = not self.past.keyframes
         self._is_bare = not self.mapper.graph.vertices and self.mission.outcome is None
         self._seeker: Pipeline | None = None
         self._tour: list[int] | None = None  # vertices of its own that it still drives to
@@ -103,9 +103,10 @@ class ReturningPipeline(Pipeline):
 
     def _agrees(self, scan: Scan, odom_base: Pose) -> bool:
         """Whether a scan shows the walls that are known where the robot should be."""
-        assert self._last is not None
-        before, motion = self._last.local_base, self._last.odom_base.to(odom_base)
-        duration = scan.stamp - self._last.stamp
+        last = self.past.last
+        assert last is not None
+        before, motion = last.local_base, last.odom_base.to(odom_base)
+        duration = scan.stamp - last.stamp
         noise = self._config.odometry_noise.parts(motion, duration)
         local_base, *_ = self._maps.find(scan, before, motion, duration, noise)
         offset = before.compose(motion).to(local_base)
@@ -115,12 +116,12 @@ class ReturningPipeline(Pipeline):
 
     def _begin_anew(self, scan: Scan) -> list[Event]:
         """Forget all, and learn from the scan as from the first one."""
-        why, left_out, fresh = "it knew no vertex yet", len(self.keyframes), self._new_mind()
+        why, left_out, fresh = "it knew no vertex yet", len(self.past.keyframes), self._new_mind()
         self.errands.give_up(scan.stamp, why)
         is_waiting = self.errands.is_waiting
         recall(self, remember(fresh), [])
         self.errands.is_waiting = is_waiting
-        self._last, self._maps, self._is_back = None, fresh._maps, True
+        self._maps, self._is_back = fresh._maps, True
         happened: list[Event] = [
             Recovery(scan.stamp, "begin a new map", f"it may have been moved, and {why}"),
             WayForgotten(scan.stamp, 0, left_out),
@@ -154,7 +155,7 @@ class ReturningPipeline(Pipeline):
             self.errands.pause()
             self.errands.is_carried, self._seeker, self._is_doubted = True, None, True
             return [Recovery(scan.stamp, *STANDS_CARRIED)]
-        last = seeker._last
+        last = seeker.past.last
         if last is None or seeker._execution.is_turning:
             return []
         opinion = self._relocaliser.step(Look.around(last.local_base, seeker._maps.near))
@@ -184,25 +185,24 @@ class ReturningPipeline(Pipeline):
 
     def _arrive(self, seeker: Pipeline, map_local: Pose) -> None:
         """Be at a place, in the second mind's local frame and with its local maps."""
-        assert seeker._last is not None
-        assert self._last is not None
-        map_before = self.mapper.belief.map_base.compose(self._last.local_base.inverse())
-        self._place(map_local.compose(seeker._last.local_base))
+        found, last = seeker.past.last, self.past.last
+        assert found is not None
+        assert last is not None
+        map_before = self.mapper.belief.map_base.compose(last.local_base.inverse())
+        self._place(map_local.compose(found.local_base))
         map_base = self.mapper.belief.map_base
-        map_local = map_base.compose(seeker._last.local_base.inverse())
+        map_local = map_base.compose(found.local_base.inverse())
         self._move_hazards(seeker, map_local.to(map_before))
-        older = self.travelled - seeker.travelled
+        older = self.past.travelled - seeker.past.travelled
         for local_map in (seeker._maps.near, seeker._maps._far):
             local_map._seen_at += np.float32(older)
         self._maps, self._odometry, self.gvg = seeker._maps, seeker._odometry, seeker.gvg
         self._breaks, self._unturned_s = seeker._breaks, seeker._unturned_s
         self._reflexes = seeker._reflexes
         self.traffic.newcomers = seeker.traffic.newcomers
-        motion = self.keyframes[-1].map_base.to(map_base)
-        self._last = replace(seeker._last, map_base=map_base)
-        self.keyframes.append(self._last)
-        self.steps.append(Step(motion, UNKNOWN_WAY))
-        self._kept = None
+        self.past.keyframes.append(replace(found, map_base=map_base))
+        self.past.steps.append(Step(last.map_base.to(map_base), UNKNOWN_WAY))
+        self.past.with_scan = None
         self._look_now = True
         self._seeker, self._is_back = None, True
 
@@ -223,7 +223,7 @@ class ReturningPipeline(Pipeline):
             )
         for vertex in mapper.graph.vertices.values():
             vertex.seen_at = min(
-                vertex.seen_at, self.travelled - self._config.recognition.tracked_m
+                vertex.seen_at, self.past.travelled - self._config.recognition.tracked_m
             )
         mapper._unbelieved.forget()
         self.mission.where, self.mission.target = Whereabouts(), None
@@ -234,7 +234,7 @@ class ReturningPipeline(Pipeline):
         for hazard in self._hazards._all:
             hazard.points = turn.transform(hazard.points)
         for hazard in seeker._hazards._all:
-            hazard.travelled += self.travelled - seeker.travelled
+            hazard.travelled += self.past.travelled - seeker.past.travelled
         self._hazards._all += seeker._hazards._all
 
 

@@ -110,9 +110,9 @@ class Keeper:
             session.count_on(saved.beat.tally)
             session.journey = saved.journey
         else:  # another has lived so far
-            pipeline = session.pipeline
-            pipeline.lent, pipeline.lent_m = len(pipeline.keyframes), pipeline.travelled
-            pipeline.errands.forget()
+            past = session.pipeline.past
+            past.lent, past.lent_m = len(past.keyframes), past.travelled
+            session.pipeline.errands.forget()
             beat = msgspec.structs.replace(saved.beat, tally=session.tally)
             self._saved = replace(saved, beat=beat)
         if session.config.service.resume == "paused":
@@ -172,7 +172,7 @@ class Keeper:
         pipeline = self._session.pipeline
         if pipeline.is_lost:
             return self._keeping_wish()
-        if not (pipeline.keyframes or self._is_asked):
+        if not (pipeline.past.keyframes or self._is_asked):
             return _nothing
         self._note_retold(pipeline.mapper.observations)
         after = bisect_right(self._counts, self._stay, key=lambda count: count.keyframes)
@@ -190,10 +190,10 @@ class Keeper:
             rows=rows(self._session.journey, before.rows, count.rows),
             beat=beat,
         )
-        is_all = count.keyframes == len(pipeline.keyframes)
+        is_all = count.keyframes == len(pipeline.past.keyframes)
         due = is_all and (self._settled or stamp - self._snapshot_at >= SNAPSHOT_EVERY)
         snapshot = None
-        if due and (self._settled or self._snapshot_of < len(pipeline.keyframes)):
+        if due and (self._settled or self._snapshot_of < len(pipeline.past.keyframes)):
             snapshot = packed(Snapshot(memory=remember(pipeline), beat=beat, known=self._known))
             self._settled = False
         self._stay, self._observed = math.inf, list(pipeline.mapper.observations)
@@ -202,7 +202,7 @@ class Keeper:
 
     def _count(self, before: Count, most: int) -> Count:
         """How much the journal shall hold after a batch: no less than it held already."""
-        journey, all_there_are = self._session.journey, len(self._session.pipeline.keyframes)
+        journey, all_there_are = self._session.journey, len(self._session.pipeline.past.keyframes)
         held = self._counts[-1].keyframes if self._counts else 0
         keyframes = max(before.keyframes + most, held)
         if keyframes >= all_there_are:
@@ -236,7 +236,7 @@ class Keeper:
         if not self._files.is_begun:
             way = rows(journey, 0)
             past = packed(Batch(first=0, growth=growth(pipeline), rows=way, beat=saved.beat))
-        count = Count(len(pipeline.keyframes), len(journey.stamps))
+        count = Count(len(pipeline.past.keyframes), len(journey.stamps))
         return partial(self._write_wish, past, count, before, snapshot)
 
     def _write_wish(
@@ -257,7 +257,7 @@ class Keeper:
         self._settled = True
         heard = -math.inf if self._feedback is None else self._feedback.heard
         stamp = max(heard, self._session.tally.last_stamp)
-        self.keeping(stamp, most=len(self._session.pipeline.keyframes))()
+        self.keeping(stamp, most=len(self._session.pipeline.past.keyframes))()
 
     def _write(
         self,

@@ -99,7 +99,7 @@ def driven(*settings: str) -> list[Pose]:
     config = load_config(None, [*usual, "twin.base.odometry=wheels", *settings])
     pipeline = Watched(config)
     run_in_virtual_time(explore(config, pipeline, []))
-    return [keyframe.odom_base for keyframe in pipeline.keyframes]
+    return [keyframe.odom_base for keyframe in pipeline.past.keyframes]
 
 
 def test_a_base_without_a_gyro_is_measured_by_its_wheels() -> None:

@@ -67,7 +67,7 @@ def test_a_restart_is_no_more_than_a_silence(
     restarted = fresh(config)
     recall(restarted, *kept(lived))
     assert everything(fed(restarted, later)) == everything(fed(lived, later))
-    assert len(restarted.keyframes) > 50
+    assert len(restarted.past.keyframes) > 50
 
 
 def test_who_was_passed_is_looked_at_again_by_whoever_was_restarted() -> None:
@@ -101,8 +101,8 @@ def test_what_the_journal_says_after_the_snapshot_is_lived_again(
     fed(lived, messages[at : next(i for i, s in enumerate(stamps) if s > stamps[at] + 4.0)])
     restarted = fresh(config)
     recall(restarted, memory, kept(lived)[1])
-    assert len(restarted.keyframes) == len(lived.keyframes) > memory.keyframes
-    assert restarted.travelled == pytest.approx(lived.travelled, abs=0.05)
+    assert len(restarted.past.keyframes) == len(lived.past.keyframes) > memory.keyframes
+    assert restarted.past.travelled == pytest.approx(lived.past.travelled, abs=0.05)
     one, other = restarted.mapper.belief, without_trail(lived.mapper.belief)
     assert one.ids == other.ids
     assert one.x == pytest.approx(other.x, abs=1e-9)
@@ -126,11 +126,11 @@ def test_without_its_latest_past_a_mind_still_knows_its_map_and_its_place(
     assert restarted.mapper.belief.P.tobytes() == believed.P.tobytes()
     assert restarted.mapper.belief.trail == ()
     assert restarted.map_base.distance(lived.mapper.belief.map_base) < 1e-9
-    assert restarted._last is not None
-    assert lived._last is not None
-    assert restarted._last.local_base == lived._last.local_base
-    assert len(restarted.steps) == len(restarted.keyframes) - 1
+    assert restarted.past.last is not None
+    assert lived.past.last is not None
+    assert restarted.past.last.local_base == lived.past.last.local_base
+    assert len(restarted.past.steps) == len(restarted.past.keyframes) - 1
     seen = {observation.vertex for observation in restarted.mapper.observations}
     assert seen == set(lived.mapper.belief.ids)
     numbers = [observation.keyframe for observation in restarted.mapper.observations]
-    assert max(numbers) < len(restarted.keyframes)
+    assert max(numbers) < len(restarted.past.keyframes)

@@ -129,8 +129,8 @@ def test_a_replay_leaves_the_same_map_to_the_last_bit(drive: Drive) -> None:
 
 def test_a_replay_makes_the_same_keyframes(drive: Drive) -> None:
     again = replayed(drive)
-    assert len(again.keyframes) == len(drive.pipeline.keyframes)
-    for one, other in zip(again.keyframes, drive.pipeline.keyframes, strict=True):
+    assert len(again.past.keyframes) == len(drive.pipeline.past.keyframes)
+    for one, other in zip(again.past.keyframes, drive.pipeline.past.keyframes, strict=True):
         assert one.local_base == other.local_base
         assert one.map_base == other.map_base
         assert (one.scan is None) == (other.scan is None)

@@ -57,7 +57,7 @@ def test_a_bare_hall_is_driven_round_and_left_alone(
     run = play(carved([hall]), Pose(0.0, -0.5, 0.5), twin=twin, limit=400.0)
     assert_explored(run)
     assert len(run.pipeline.mapper.graph.edges) == 1
-    assert run.pipeline.travelled < 2 * 2 * (length + width)
+    assert run.pipeline.past.travelled < 2 * 2 * (length + width)
 
 
 def test_a_square_closet_is_explored_without_an_edge() -> None:
@@ -133,7 +133,7 @@ def test_a_ring_without_a_vertex_is_driven_round_once() -> None:
     assert edge.length == pytest.approx(around, rel=0.05)
     (vertex,) = run.vertices("meetpoint")
     assert np.hypot(*run.pipeline.mapper.belief.map_vertex(vertex).position) < 0.9
-    assert run.pipeline.travelled < 1.2 * edge.length
+    assert run.pipeline.past.travelled < 1.2 * edge.length
     (joined,) = (event for event in run.events if isinstance(event, EdgeJoined))
     assert (joined.start, joined.end, joined.driven) == (vertex, vertex, True)
 
@@ -279,4 +279,4 @@ def test_what_was_seen_from_near_to_be_no_fork_is_not_driven_to_again_from_afar(
     run = play(carved(free), Pose(1.0, 1.0, 1.0), twin=twin, limit=400.0)
     assert_explored(run)
     lengths = [edge.length for edge in run.pipeline.mapper.graph.edges.values()]
-    assert run.pipeline.travelled < 3 * sum(lengths)
+    assert run.pipeline.past.travelled < 3 * sum(lengths)

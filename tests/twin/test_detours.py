@@ -67,7 +67,7 @@ class Walker:
 
     async def go(self, clock: Clock, place: Point) -> float:
         """Drive to the vertex that is there, or to the point; metres driven."""
-        begin, belief = self.pipeline.travelled, self.pipeline.mapper.belief
+        begin, belief = self.pipeline.past.travelled, self.pipeline.mapper.belief
         x, y = point = START.inverse().transform(np.array(place)).tolist()
         off = {v: math.dist(belief.map_vertex(v).position, point) for v in belief.ids}
         vertex = min(off, key=off.__getitem__)
@@ -75,7 +75,7 @@ class Walker:
         await self.try_to_go(clock, **where)
         here = self.daemon.place
         assert math.dist((here.x, here.y), place) < NEAR
-        return self.pipeline.travelled - begin
+        return self.pipeline.past.travelled - begin
 
     async def try_to_go(self, clock: Clock, **where: object) -> None:
         """Drive to a vertex or a point, or as near to it as it comes."""

@@ -63,7 +63,7 @@ def diary(tmp_path_factory: pytest.TempPathFactory) -> Diary:
         return min(places, key=lambda vertex: math.dist(places[vertex], (x, y)))
 
     async def walk(clock: Clock, title: str, goal: tuple[float, float]) -> None:
-        begin = pipeline.travelled
+        begin = pipeline.past.travelled
         answer = await daemon.network.ask("goto", vertex=at(*goal))
         assert answer.done, answer.text
         while pipeline.errands.errand is not None:
@@ -72,7 +72,7 @@ def diary(tmp_path_factory: pytest.TempPathFactory) -> Diary:
         lines = [json.loads(line) for line in (out / "events.jsonl").read_text().splitlines()]
         (*_, end) = [line for line in lines if line["event"] == "errand_ended"]
         off = math.dist((daemon.place.x, daemon.place.y), goal)
-        kept.walks[title] = Walk(end["outcome"], pipeline.travelled - begin, off)
+        kept.walks[title] = Walk(end["outcome"], pipeline.past.travelled - begin, off)
 
     async def story(clock: Clock) -> None:
         while pipeline.mission.outcome is None:

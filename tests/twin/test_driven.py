@@ -99,10 +99,10 @@ def test_a_driven_robot_follows_and_stops_when_nothing_more_is_heard(
         seen["after"] = before.distance(daemon.place)
         await clock.sleep_until(clock.now() + 3.0)
         seen["later"] = before.distance(daemon.place)
-        seen["keyframes"] = len(daemon.session.pipeline.keyframes)
+        seen["keyframes"] = len(daemon.session.pipeline.past.keyframes)
         daemon.ros.drive(Twist(0.0, 0.3))
         await clock.sleep_until(clock.now() + 3.0)
-        seen["learnt"] = len(daemon.session.pipeline.keyframes) - seen["keyframes"]
+        seen["learnt"] = len(daemon.session.pipeline.past.keyframes) - seen["keyframes"]
 
     daemon.run(story)
     assert seen["turn rate"] == pytest.approx(0.5, abs=0.02)

@@ -90,8 +90,8 @@ def check_forgotten(lives: Lives, last: Session) -> None:
     )
     (lasting,) = explored_by
     assert len(told(lives.out, "way_forgotten")) > 2
-    assert pipeline.lasting == lasting < len(pipeline.keyframes) <= lasting + LATEST
-    assert len(pipeline.steps) == len(pipeline.keyframes) - 1
+    assert pipeline.past.lasting == lasting < len(pipeline.past.keyframes) <= lasting + LATEST
+    assert len(pipeline.past.steps) == len(pipeline.past.keyframes) - 1
     saved = MissionFiles(lives.out).read()
     assert saved is not None
     assert packed(saved.past) == packed(growth(pipeline))
@@ -131,7 +131,7 @@ def test_a_robot_that_had_finished_can_be_sent_about_after_a_restart(
         pipeline = session.pipeline
         if session is lives.sessions[0] or not explored(session):
             return False
-        errands, stamp = pipeline.errands, pipeline.keyframes[-1].stamp
+        errands, stamp = pipeline.errands, pipeline.past.keyframes[-1].stamp
         x, y = START.inverse().transform(np.array(ARM)).tolist()
         if not refused:
             with pytest.raises(Declined) as caught:
@@ -195,7 +195,7 @@ def test_a_map_that_is_lent_lends_nothing_that_was_asked_for(tmp_path: Path, end
     def is_over(session: Session) -> bool:
         errands = session.pipeline.errands
         if explored(session) and not errands.is_waiting and errands.errand is None:
-            stamp = session.pipeline.keyframes[-1].stamp
+            stamp = session.pipeline.past.keyframes[-1].stamp
             if ends == "paused":
                 errands.pause()
             elif ends == "on patrol":

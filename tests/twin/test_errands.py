@@ -189,7 +189,7 @@ class Story:
         self.tour.answers[title] = await self.daemon.network.ask(name, **arguments)
 
     async def trip(self, title: str, name: str, **arguments: object) -> None:
-        begin, first = self.pipeline.travelled, len(self.states)
+        begin, first = self.pipeline.past.travelled, len(self.states)
         made = self.tour.trips[title] = Trip(await self.daemon.network.ask(name, **arguments))
         await until(self.clock, self.is_done)
         await a_while(self.clock, 1.0)
@@ -197,7 +197,7 @@ class Story:
         (*_, end) = [event for event in events if event.kind == "errand_ended"]
         made.outcome, made.reason = str(end.details["outcome"]), str(end.details["reason"])
         made.world = self.place
-        made.driven = self.pipeline.travelled - begin
+        made.driven = self.pipeline.past.travelled - begin
         made.fastest = max(abs(state.twist[0]) for state in self.states[first:])
 
     def is_done(self) -> bool:
@@ -492,14 +492,14 @@ def test_who_stands_in_the_way_of_an_errand_is_left_alone_and_another_way_taken(
         put_person(1000.0, 1000.0)
         await until(clock, lambda: pipeline.mission.outcome is not None)
         for number, place in enumerate(MEETPOINTS):
-            begin = pipeline.travelled
+            begin = pipeline.past.travelled
             assert (await daemon.network.ask("goto", vertex=vertex_at(*place))).done
             if number:
                 put_person(5.5, north)
             await until(clock, lambda: pipeline.errands.errand is None)
             await a_while(clock, 1.0)
             assert math.dist((daemon.place.x, daemon.place.y), place) < NEAR
-            driven.append(pipeline.travelled - begin)
+            driven.append(pipeline.past.travelled - begin)
 
     with daemon.session.directory:
         daemon.run(tell)

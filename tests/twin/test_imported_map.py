@@ -46,7 +46,7 @@ def test_it_finds_its_place_and_drives_where_it_is_asked_to(tmp_path: Path) -> N
         if not ended:
             ended.append(pipeline.map_base.distance(here))
             ended.append(abs(wrap_angle(pipeline.map_base.theta - here.theta)))
-            pipeline.errands.goto_point(*FAR, pipeline.keyframes[-1].stamp)
+            pipeline.errands.goto_point(*FAR, pipeline.past.keyframes[-1].stamp)
         return pipeline.errands.errand is None
 
     lives = Lives(config, place(), tmp_path / "run", known=tmp_path / "known", over=sent_away)

@@ -150,7 +150,7 @@ def test_who_is_carried_while_it_looks_for_its_place_stands_and_then_looks_anew(
         pipeline = session.pipeline
         assert isinstance(pipeline, ReturningPipeline)
         seeker = pipeline._seeker
-        if not stood and seeker is not None and len(seeker.keyframes) > 6:
+        if not stood and seeker is not None and len(seeker.past.keyframes) > 6:
             lives.world.body.pose = Pose(-5.2, 0.3, 3.1)  # where the stick ends
             seeker._breaks -= 1
         stood += pipeline.errands.is_paused
@@ -295,7 +295,7 @@ def test_a_robot_that_was_paused_while_it_looked_for_its_place_stays_paused(
         return bool(asked) and now > asked[0] + 2.0
 
     def is_over(session: Session) -> bool:
-        return len(lives.sessions) > 2 and session.pipeline.keyframes != []
+        return len(lives.sessions) > 2 and session.pipeline.past.keyframes != []
 
     lives = Lives(config, open_place(config), tmp_path, over=is_over)
     last = lives.run([at(40.0), is_paused_for_long])

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gvgbot.autonomy.keyframes import Keyframe, Step
+from gvgbot.autonomy.keyframes import Keyframe, Past, Step
 from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.slam.graph import GvgGraph
 from gvgbot.autonomy.views import Observation
@@ -44,12 +44,13 @@ def drive(*, closes: bool = True, led: bool = False) -> Any:
         seen.append(Observation(at, 1, TRUE[at].to(VERTEX), 1e-4 * np.eye(3)))
     belief = Belief(np.array([0.0, 0.0, 0.0, VERTEX.x, VERTEX.y, 0.0]), np.eye(6), (1,))
     noise = np.diag([1e-6, 1e-6, (10 * WRONG_TURN) ** 2])
+    past = Past()
+    past.keyframes = [Keyframe(float(i), p, p, p, None) for i, p in enumerate(poses)]
+    past.steps = [Step(motion, noise) for motion in motions]
     return SimpleNamespace(
-        keyframes=[Keyframe(float(i), p, p, p, None) for i, p in enumerate(poses)],
-        steps=[Step(motion, noise) for motion in motions],
+        past=past,
         mapper=SimpleNamespace(graph=GvgGraph(), belief=belief, observations=seen),
         led=led,
-        lent=0,
         matches_walls=False,
     )
 
@@ -69,10 +70,10 @@ def taken(past: LivePast, pipeline: Any, stamp: float) -> tuple[list[Pose], bool
 
 def after_the_drive(pipeline: Any) -> LivePast:
     """All has been drawn as it was believed."""
-    past, keyframes = LivePast(), pipeline.keyframes
-    pipeline.keyframes = keyframes[:1]
+    past, keyframes = LivePast(), pipeline.past.keyframes
+    pipeline.past.keyframes = keyframes[:1]
     assert taken(past, pipeline, 0.0) == ([Pose()], False)
-    pipeline.keyframes = keyframes
+    pipeline.past.keyframes = keyframes
     believed = [keyframe.map_base for keyframe in keyframes]
     assert taken(past, pipeline, 1.0) == (believed[1:], False)
     assert error(believed) > 2.0
@@ -122,19 +123,24 @@ def test_there_is_a_rest_after_drawing_all() -> None:
 
 def test_of_a_way_that_is_not_kept_only_what_is_new_is_drawn() -> None:
     pipeline = drive(closes=False)
-    past, last = after_the_drive(pipeline), pipeline.keyframes[-1]
-    pipeline.keyframes[50:] = [last]
-    pipeline.steps[49:] = [Step(pipeline.keyframes[49].map_base.to(last.map_base), np.eye(3))]
+    past, last = after_the_drive(pipeline), pipeline.past.keyframes[-1]
+    pipeline.past.keyframes[50:] = [last]
+    pipeline.past.steps[49:] = [
+        Step(pipeline.past.keyframes[49].map_base.to(last.map_base), np.eye(3))
+    ]
     assert taken(past, pipeline, 2.0) is None
-    pipeline.keyframes.append(replace(last, map_base=last.map_base.compose(Pose(0.3))))
-    pipeline.steps.append(Step(Pose(0.3), np.eye(3)))
+    pipeline.past.keyframes.append(replace(last, map_base=last.map_base.compose(Pose(0.3))))
+    pipeline.past.steps.append(Step(Pose(0.3), np.eye(3)))
     past.doubt()
-    assert taken(past, pipeline, 3.0) == ([pipeline.keyframes[-1].map_base], False)
+    assert taken(past, pipeline, 3.0) == ([pipeline.past.keyframes[-1].map_base], False)
 
 
 def test_where_somebody_else_drives_only_what_is_new_is_drawn() -> None:
     pipeline = drive(led=True)
-    assert taken(LivePast(), pipeline, 0.0) == ([k.map_base for k in pipeline.keyframes], False)
+    assert taken(LivePast(), pipeline, 0.0) == (
+        [k.map_base for k in pipeline.past.keyframes],
+        False,
+    )
 
 
 def shown(live: LiveMap, pipeline: Any, stamp: float) -> Array:
@@ -151,10 +157,10 @@ def from_centre(way: Array) -> Array:
 
 def test_the_trajectory_that_is_shown_closes_with_the_loop() -> None:
     pipeline, live = drive(), LiveMap(began=0.0)
-    keyframes = pipeline.keyframes
-    pipeline.keyframes = keyframes[:1]
+    keyframes = pipeline.past.keyframes
+    pipeline.past.keyframes = keyframes[:1]
     shown(live, pipeline, 0.0)
-    pipeline.keyframes = keyframes
+    pipeline.past.keyframes = keyframes
     assert np.abs(from_centre(shown(live, pipeline, 1.0)) - RADIUS_M).max() > 0.8
     live.doubt()
     way = from_centre(shown(live, pipeline, 2.0))
@@ -168,11 +174,11 @@ def test_where_another_has_been_that_made_the_map_is_no_way_driven(
     at: int, *, is_corrected: bool
 ) -> None:
     pipeline, live = drive(), LiveMap(began=0.0)
-    keyframes, pipeline.lent = pipeline.keyframes, 50
-    pipeline.keyframes = keyframes[:at]
+    keyframes, pipeline.past.lent = pipeline.past.keyframes, 50
+    pipeline.past.keyframes = keyframes[:at]
     if at:
         live.update(pipeline, 0.0)()  # type: ignore[misc]
-    pipeline.keyframes = keyframes
+    pipeline.past.keyframes = keyframes
     if is_corrected:
         live.doubt()
     draw = live.update(pipeline, 200.0)
@@ -187,15 +193,15 @@ def test_where_another_has_been_that_made_the_map_is_no_way_driven(
 def test_no_way_leads_to_where_the_robot_was_carried(at: int, *, is_corrected: bool) -> None:
     """It is put down at the far side of the circle, and drives on from there."""
     pipeline, live = drive(), LiveMap(began=0.0)
-    keyframes, there = pipeline.keyframes, Pose(20.0, 0.0)
-    pipeline.keyframes = keyframes[:at]
+    keyframes, there = pipeline.past.keyframes, Pose(20.0, 0.0)
+    pipeline.past.keyframes = keyframes[:at]
     if at:
         live.update(pipeline, 0.0)()  # type: ignore[misc]
     for i in range(50, COUNT):
         keyframes[i] = replace(keyframes[i], map_base=there.compose(keyframes[i].map_base))
     motion = keyframes[49].map_base.to(keyframes[50].map_base)
-    pipeline.steps[49] = Step(motion, np.diag([1.0, 1.0, 0.1]))
-    pipeline.keyframes, pipeline.mapper.observations = keyframes, []
+    pipeline.past.steps[49] = Step(motion, np.diag([1.0, 1.0, 0.1]))
+    pipeline.past.keyframes, pipeline.mapper.observations = keyframes, []
     if is_corrected:
         live.doubt()
     draw = live.update(pipeline, 200.0)
@@ -211,12 +217,12 @@ def test_where_another_map_begins_nothing_is_left_of_the_one_before() -> None:
     pipeline, live = drive(), LiveMap(began=0.0)
     shown(live, pipeline, 0.0)
     here = TRUE[7]
-    pipeline.keyframes = [Keyframe(200.0, here, here, here, None)]
-    pipeline.steps, pipeline.mapper.observations = [], []
+    pipeline.past.keyframes = [Keyframe(200.0, here, here, here, None)]
+    pipeline.past.steps, pipeline.mapper.observations = [], []
     assert shown(live, pipeline, 200.0) == pytest.approx(np.array([[here.x, here.y]]))
 
 
 def test_before_the_first_keyframe_there_is_nothing_to_draw() -> None:
     pipeline = drive()
-    pipeline.keyframes = []
+    pipeline.past.keyframes = []
     assert LivePast().update(pipeline, 0.0) is None

@@ -42,8 +42,8 @@ class Heard:
 
 
 def live(heard: Heard, map_base: Pose | None = None, *, is_lost: bool = False) -> LiveRos:
-    keyframes = [] if map_base is None else [object()]
-    mind = SimpleNamespace(keyframes=keyframes, map_base=map_base, is_lost=is_lost)
+    past = SimpleNamespace(last=None if map_base is None else object())
+    mind = SimpleNamespace(past=past, map_base=map_base, is_lost=is_lost)
     return LiveRos([heard], cast(Pipeline, mind), NOISE, lambda stamp: stamp + LATER)
 
 
@@ -175,17 +175,17 @@ def test_a_grid_lies_where_its_corner_is() -> None:
 def test_the_map_is_drawn_anew_when_a_loop_has_closed() -> None:
     pipeline, heard = drive(), Heard(topics.MAP)
     around = np.full(360, 3.0)  # round walls, wherever it stood
-    pipeline.keyframes = [
+    pipeline.past.keyframes = [
         replace(one, scan=Scan(one.stamp, around, -math.pi, math.tau / 360, 0.1, 30.0))
-        for one in pipeline.keyframes
+        for one in pipeline.past.keyframes
     ]
     live = LiveRos([heard], pipeline, NOISE, lambda stamp: stamp + LATER)
-    later, pipeline.keyframes = pipeline.keyframes, pipeline.keyframes[:1]
+    later, pipeline.past.keyframes = pipeline.past.keyframes, pipeline.past.keyframes[:1]
     for stamp in (0.0, 10.0, 20.0):
         draw = live.draw(stamp)
         assert draw is not None
         draw()
-        pipeline.keyframes = later
+        pipeline.past.keyframes = later
         if stamp > 0.0:
             live.doubt()
     _, believed, corrected = ((m.info.width, m.info.height) for m in heard.got[topics.MAP])

@@ -18,7 +18,7 @@ from gvgbot.report import Journey, _corrected, route_graph, with_room_of
 def pipeline(keyframes: list[Keyframe]) -> Pipeline:
     config = Config()
     mind = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
-    mind.keyframes = keyframes
+    mind.past.keyframes = keyframes
     return mind
 
 

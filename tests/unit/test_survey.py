@@ -113,7 +113,7 @@ def test_a_daemon_makes_its_survey_off_the_loop_and_forgets_it_when_the_robot_dr
     async def off_loop(function: Callable[[], None]) -> None:
         await asyncio.sleep(0.0)
         function()
-        done.append(pipeline.travelled)
+        done.append(pipeline.past.travelled)
 
     async def until_there_is_something() -> Surveyed | None:
         for _ in range(10):
@@ -128,7 +128,7 @@ def test_a_daemon_makes_its_survey_off_the_loop_and_forgets_it_when_the_robot_dr
             assert found is not None
             assert len(found.places) == 0
             assert in_background.newest() is None
-            pipeline.travelled = 5.0
+            pipeline.past.travelled = 5.0
             assert await until_there_is_something() is None  # it was made elsewhere
             assert await until_there_is_something() is not None
             making.cancel()

@@ -4,7 +4,7 @@ import json
 import math
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import cast
 
 import msgspec
 import numpy as np
@@ -186,9 +186,9 @@ BELIEF = Belief(np.array([3.0, 1.0, 0.7]), np.diag([0.04, 0.01, 0.02]))
 
 def mind(belief: Belief, keyframe: Pose | None) -> Pipeline:
     """As much of a pipeline as its covariance needs."""
-    seen: list[Any] = [] if keyframe is None else [SimpleNamespace(odom_base=keyframe, stamp=1.0)]
-    mapper = SimpleNamespace(belief=belief)
-    return cast(Pipeline, SimpleNamespace(mapper=mapper, keyframes=seen, is_lost=False))
+    last = None if keyframe is None else SimpleNamespace(odom_base=keyframe, stamp=1.0)
+    mapper, past = SimpleNamespace(belief=belief), SimpleNamespace(last=last)
+    return cast(Pipeline, SimpleNamespace(mapper=mapper, past=past, is_lost=False))
 
 
 def test_without_a_keyframe_the_covariance_is_the_belief_s() -> None:

@@ -37,12 +37,12 @@ def driven(localisation: Localisation) -> Pipeline:
 
 def test_as_published_odometry_alone_tells_the_way_between_vertices() -> None:
     pipeline = driven("paper")
-    assert pipeline.keyframes[-1].local_base.x == pytest.approx(0.97 * 2.0)
-    assert pipeline.keyframes[-1].local_base.y == 0.0
+    assert pipeline.past.keyframes[-1].local_base.x == pytest.approx(0.97 * 2.0)
+    assert pipeline.past.keyframes[-1].local_base.y == 0.0
 
 
 def test_walls_tell_it_better() -> None:
-    assert driven("full").keyframes[-1].local_base.x == pytest.approx(2.0, abs=0.03)
+    assert driven("full").past.keyframes[-1].local_base.x == pytest.approx(2.0, abs=0.03)
 
 
 def looks(*, led: bool) -> int:
@@ -177,7 +177,7 @@ def test_a_base_that_was_carried_away_before_it_started_anew_stands_and_says_so(
     pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
     for k in range(26):  # once round, so that all walls are known
         looked(pipeline, 0.1 * k, 0.25 * k)
-    known, walls = len(pipeline.keyframes), pipeline._maps.near.points().copy()
+    known, walls = len(pipeline.past.keyframes), pipeline._maps.near.points().copy()
     happened: list[Event] = []
     for k in range(8):
         stamp = 6.5 + 0.1 * k
@@ -190,7 +190,7 @@ def test_a_base_that_was_carried_away_before_it_started_anew_stands_and_says_so(
     assert pipeline.errands.is_paused == stands
     assert not remember(pipeline).intent.is_paused  # when it is started anew, it looks
     if stands:
-        assert len(pipeline.keyframes) == known  # and spoils no map
+        assert len(pipeline.past.keyframes) == known  # and spoils no map
         assert (pipeline._maps.near.points() == walls).all()
 
 

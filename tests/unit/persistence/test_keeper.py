@@ -57,7 +57,7 @@ def test_a_full_disk_is_said_once_and_all_is_kept_when_there_is_room_again(
     ]
     saved = MissionFiles(tmp_path).read()
     assert saved is not None
-    assert len(saved.past) == len(session.pipeline.keyframes)
+    assert len(saved.past) == len(session.pipeline.past.keyframes)
     assert saved.journey.stamps == session.journey.stamps
     assert packed(saved.memory) == packed(remember(session.pipeline))
 
@@ -65,11 +65,10 @@ def test_a_full_disk_is_said_once_and_all_is_kept_when_there_is_room_again(
 def drive_on(session: Session, keyframes: int) -> None:
     """Let it have so many keyframes more, a row with each."""
     pipeline, journey = session.pipeline, session.journey
-    last = pipeline.keyframes[-1]
-    pipeline.keyframes += [replace(last, stamp=last.stamp + i + 1.0) for i in range(keyframes)]
-    pipeline._last = pipeline.keyframes[-1]
-    pipeline.steps += pipeline.steps[-1:] * keyframes
-    for keyframe in range(len(pipeline.keyframes) - keyframes, len(pipeline.keyframes)):
+    last = pipeline.past.keyframes[-1]
+    pipeline.past.keyframes += [replace(last, stamp=last.stamp + i + 1.0) for i in range(keyframes)]
+    pipeline.past.steps += pipeline.past.steps[-1:] * keyframes
+    for keyframe in range(len(pipeline.past.keyframes) - keyframes, len(pipeline.past.keyframes)):
         journey.stamps.append(journey.stamps[-1] + 1.0)
         journey.keyframes.append(keyframe)
         journey.odom_base.append(journey.odom_base[-1])
@@ -87,7 +86,7 @@ def test_much_that_was_not_kept_is_kept_bit_by_bit(session: Session, tmp_path: P
     """Until all of it is, the robot that is killed knows that it has lived through more."""
     keeper, pipeline = Keeper(session, MissionFiles(tmp_path)), session.pipeline
     keeper.keeping(20.0)()
-    before, snapshot = len(pipeline.keyframes), (tmp_path / SNAPSHOT).read_bytes()
+    before, snapshot = len(pipeline.past.keyframes), (tmp_path / SNAPSHOT).read_bytes()
     drive_on(session, 2 * MOST + 100)
     keeper.on_event(DoubtSettled(21.0, 99, 98, 1.0, 0.1))
     with structlog.testing.capture_logs(), full_disk(10):
@@ -119,7 +118,7 @@ def test_what_the_journal_holds_is_not_taken_from_it_bit_by_bit(
     keeper.on_event(DoubtSettled(23.0, 99, 98, 1.0, 0.1))
     session.pipeline.mapper.observations[0] = replace(session.pipeline.mapper.observations[0])
     keeper.keeping(23.0)()
-    assert len(found(tmp_path).past) == len(session.pipeline.keyframes)
+    assert len(found(tmp_path).past) == len(session.pipeline.past.keyframes)
 
 
 def test_a_known_map_is_kept_whole_when_something_is_asked_of_a_robot_that_is_lost(
@@ -138,7 +137,7 @@ def test_a_known_map_is_kept_whole_when_something_is_asked_of_a_robot_that_is_lo
     assert isinstance(again.pipeline, ReturningPipeline)
     again.pipeline._is_back = True
     keeper.keeping(2.0)()
-    assert len(found(tmp_path / "run").past) == len(session.pipeline.keyframes)
+    assert len(found(tmp_path / "run").past) == len(session.pipeline.past.keyframes)
 
 
 def test_a_disk_that_is_full_for_an_hour_is_tried_now_and_then(
@@ -164,7 +163,7 @@ def test_a_disk_that_is_full_for_an_hour_is_tried_now_and_then(
 
     with structlog.testing.capture_logs():
         run_in_virtual_time(hour())
-    assert len(found(tmp_path).past) == len(session.pipeline.keyframes)
+    assert len(found(tmp_path).past) == len(session.pipeline.past.keyframes)
 
 
 def test_a_disk_with_room_for_the_journal_only_takes_nothing_from_it_when_that_is_gone_too(
@@ -182,7 +181,7 @@ def test_a_disk_with_room_for_the_journal_only_takes_nothing_from_it_when_that_i
         for stamp in (30.0, 31.0):
             drive_on(session, 5)
             keeper.keeping(stamp)()
-        held = len(session.pipeline.keyframes)
+        held = len(session.pipeline.past.keyframes)
         assert len(found(tmp_path).past) == held
         drive_on(session, 5)
         with full_disk((tmp_path / JOURNAL).stat().st_size):
@@ -213,7 +212,7 @@ def test_a_robot_at_rest_gives_signs_of_life_that_take_no_room(
         saved = MissionFiles(tmp_path).read()
         assert saved is not None
         assert saved.beat.stamp == stamp
-        assert len(saved.past) == len(session.pipeline.keyframes)
+        assert len(saved.past) == len(session.pipeline.past.keyframes)
     assert max(sizes) < whole + 1000
     assert max(sizes) < min(sizes) + 10  # as numbers grow
 
@@ -223,17 +222,17 @@ def test_a_way_that_is_forgotten_leaves_the_journal_whole_and_short(
 ) -> None:
     """As on a patrol: of twenty keyframes and more only the newest is kept."""
     pipeline, whole = session.pipeline, copy.deepcopy(session.journey)
-    keyframes = pipeline.keyframes.copy()
+    keyframes = pipeline.past.keyframes.copy()
     kept, newest = len(keyframes) - 20, len(keyframes) - 1
     explored = sum(keyframe < kept for keyframe in whole.keyframes)
     keeper, sizes = Keeper(session, MissionFiles(tmp_path)), []
     session.journey.forget(kept)
     for journey, count in ((session.journey, kept), (whole, len(keyframes))):
-        session.journey, pipeline.keyframes[:] = journey, keyframes[:count]
+        session.journey, pipeline.past.keyframes[:] = journey, keyframes[:count]
         keeper.keeping(20.0 + count)()
         sizes.append((tmp_path / JOURNAL).stat().st_size)
-    pipeline.lasting, pipeline.keyframes[kept:] = kept, keyframes[-1:]
-    del pipeline.steps[kept:]
+    pipeline.past.lasting, pipeline.past.keyframes[kept:] = kept, keyframes[-1:]
+    del pipeline.past.steps[kept:]
     pipeline.mapper.forget_between(kept, newest)
     whole.forget(kept)
     keeper.on_event(WayForgotten(99.0, kept, newest - kept))
@@ -253,18 +252,18 @@ def test_a_way_is_cut_where_it_was_forgotten_even_if_the_robot_has_explored_on_s
     session: Session, tmp_path: Path
 ) -> None:
     pipeline = session.pipeline
-    keyframes, newest = pipeline.keyframes.copy(), len(pipeline.keyframes) - 1
+    keyframes, newest = pipeline.past.keyframes.copy(), len(pipeline.past.keyframes) - 1
     kept = newest - 20
     keeper = Keeper(session, MissionFiles(tmp_path))
     for count in (kept, newest + 1):
-        pipeline.keyframes[:] = keyframes[:count]
+        pipeline.past.keyframes[:] = keyframes[:count]
         keeper.keeping(20.0 + count)()
-    pipeline.keyframes[kept:] = keyframes[-1:] * 22  # the last one, and later ones
-    del pipeline.steps[kept:]
-    pipeline.steps += pipeline.steps[-1:] * 21
+    pipeline.past.keyframes[kept:] = keyframes[-1:] * 22  # the last one, and later ones
+    del pipeline.past.steps[kept:]
+    pipeline.past.steps += pipeline.past.steps[-1:] * 21
     pipeline.mapper.forget_between(kept, newest)
     keeper.on_event(WayForgotten(99.0, kept, newest - kept))
-    pipeline.lasting = len(pipeline.keyframes)
+    pipeline.past.lasting = len(pipeline.past.keyframes)
     keeper.keeping(99.0)()
     saved = MissionFiles(tmp_path).read()
     assert saved is not None
@@ -275,15 +274,15 @@ def test_a_closure_that_was_revoked_does_not_come_back(session: Session, tmp_pat
     """Nor what was seen by it: smoothing would lay the map by that."""
     pipeline, keeper = session.pipeline, Keeper(session, MissionFiles(tmp_path))
     mapper, unsettled = pipeline.mapper, pipeline.mapper.unsettled
-    keyframes, steps = pipeline.keyframes.copy(), pipeline.steps.copy()
+    keyframes, steps = pipeline.past.keyframes.copy(), pipeline.past.steps.copy()
     half = len(keyframes) // 2
     mapper.observations[:] = [seen for seen in mapper.observations if seen.keyframe < half]
-    pipeline.keyframes[half:], pipeline.steps[half - 1 :] = [], []
+    pipeline.past.keyframes[half:], pipeline.past.steps[half - 1 :] = [], []
     keeper.keeping(20.0)()
     right, wrong = mapper.observations.copy(), replace(mapper.observations[-1], keyframe=half)
     unsettled.note_closure(mapper.graph.vertices[wrong.vertex], is_surprising=True)
     mapper.observations += [wrong, replace(wrong, keyframe=half + 2)]
-    pipeline.keyframes[:], pipeline.steps[:] = keyframes, steps
+    pipeline.past.keyframes[:], pipeline.past.steps[:] = keyframes, steps
     keeper.on_event(LoopClosed(21.0, wrong.vertex, 9.0, 1.0, 6.0, 0.9))
     keeper.keeping(21.0)()
     (edge, *_) = mapper.graph.edges.values()

@@ -27,7 +27,8 @@ def beat(stamp: float) -> Beat:
 def snapshot(stamp: float, last: Keyframe | None = None) -> bytes:
     config = Config()
     pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
-    pipeline.travelled, pipeline._last = stamp, last
+    pipeline.past.travelled = stamp
+    pipeline.past.keyframes += [] if last is None else [last]
     return packed(Snapshot(memory=remember(pipeline), beat=beat(stamp)))
 
 

@@ -89,6 +89,6 @@ def test_what_is_written_after_a_journal_was_cut_follows_the_old_snapshot(
     batch = Batch(first=first, growth=grown, rows=no_rows, beat=saved.beat)
     files.append(packed(batch), sync=True)
     pipeline, whole = recalled(read(tmp_path)), recalled(saved)
-    assert len(pipeline.keyframes) == first + 1 + len(younger)
+    assert len(pipeline.past.keyframes) == first + 1 + len(younger)
     assert pipeline.mapper.belief.map_base == whole.mapper.belief.map_base
-    assert pipeline.travelled == whole.travelled
+    assert pipeline.past.travelled == whole.past.travelled
