@@ -54,7 +54,7 @@ class DrivenEdges:
         """Account for the robot's present place, `where` included."""
         where.on_edge = self._mapper.unsettled.current(where.on_edge)
         came_from = self._mapper.came_from
-        if where.on_edge in came_from:  # the vertex that the present edge left was none
+        while where.on_edge in came_from:  # the vertex that the present edge left was none
             where.rejoin(*came_from[where.on_edge])
         clearance = view.gvg.edges[place.edge].clearance_at(place.station)
         self._close_ring(view, where, clearance)

@@ -80,7 +80,8 @@ class Mapper(Knowledge):
         self._unbelieved = Candidates(config.candidates)
         self._evidence = Evidence(self, self._unbelieved, config, recognition)
         self._rivals: dict[int, Recognition] = {}  # by nodes of this view that may be known ones
-        # by half-edges of vertices that this view took out, as `loose_ends`, but in the local frame
+        # by half-edges of vertices that were taken out, until somebody clears it, as `loose_ends`,
+        # but in the local frame
         self.came_from: dict[HalfEdgeId, tuple[HalfEdgeId, Array]] = {}
         self._events: list[Event] = []
 
@@ -105,7 +106,7 @@ class Mapper(Knowledge):
 
         The list of what happened grows with what is joined or removed before the next view.
         """
-        self._events, self._rivals, self.came_from = [], {}, {}
+        self._events, self._rivals = [], {}
         self._events += self.unsettled.revoke(view.stamp) + self.unsettled.settle(view.stamp)
         known = Correspondence()
         sightings = sightings_of(view, self._config.trust_m)
@@ -365,6 +366,7 @@ class Mapper(Knowledge):
         """Take a vertex out of the map; of two edges that met there one is made."""
         local_map = view.local_base.compose(self.belief.map_base.inverse())
         for end, (far, line) in loose_ends(self.graph, self.belief, vertex).items():
+            self.came_from.pop(far, None)  # its vertex is back again
             self.came_from[end] = far, local_map.transform(line)
         take_out(self.graph, self.belief, vertex)
         self.belief = ekf.remove_vertex(self.belief, vertex.id)

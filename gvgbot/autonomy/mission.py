@@ -140,10 +140,13 @@ class Mission(Pursuit):
 
     def _learn(self, view: View, known: Correspondence, place: Place) -> None:
         """Account for what has been driven, and for what the target is called now."""
-        target, came_from = self._mapper.unsettled.current(self.target), self._mapper.came_from
-        self._obstructions.rename(self._mapper.unsettled.renamed)
-        self.target = came_from[target][0] if target in came_from else target
+        unsettled, came_from = self._mapper.unsettled, self._mapper.came_from
+        self._obstructions.rename(unsettled.renamed)
+        self.target = unsettled.current(self.target)
+        while self.target in came_from:
+            self.target = came_from[self.target][0]
         self._driven.learn(view, known, place, self.where)
+        came_from.clear()
 
     # -- where next ------------------------------------------------------------------------------
 

@@ -1,5 +1,7 @@
 """What a drive from vertex to vertex says of the departures, on graphs drawn by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -151,6 +153,21 @@ def test_who_comes_back_to_a_vertex_round_a_loop_need_not_see_by_where_it_left(
     joined = [{edge.a, edge.b} for edge in drive.mapper.graph.edges.values()]
     loops = [{HalfEdgeId(1, EAST), HalfEdgeId(1, NORTH)}]
     assert joined == ([] if all_seen else loops)
+
+
+def test_who_turns_round_where_a_vertex_proves_to_be_none_comes_from_the_one_before() -> None:
+    """While it turns, it learns nothing of where it is: that comes several views later."""
+    drive = Drive(HalfEdgeId(2, NORTH))
+    drive.where.trail = [np.array([5.0, 0.0])]
+    graph, line = drive.mapper.graph, np.array([[0.0, 0.0], [5.0, 0.0]])
+    graph.join(HalfEdgeId(1, EAST), HalfEdgeId(2, WEST), line, 1.0, driven=True)
+    drive.mapper.move(Pose(5.0, 0.0), np.zeros((3, 3)))
+    beside = View(0, 0.0, 0.0, Pose(5.0, 0.0), STREET, LocalMap(LocalMapConfig()))
+    drive.mapper.remove(beside, graph.vertices[2], "an edge passes here")
+    drive.mapper.observe(replace(beside, gvg=LocalGvg()))
+    drive.along(STREET, {}, (5.0, 0.0), (5.0, 1.0))
+    assert drive.where.on_edge == HalfEdgeId(1, EAST)
+    assert drive.where.trail_length == pytest.approx(6.0, abs=0.1)
 
 
 def with_north(drive: Drive, key: int, base: Pose) -> None:
