@@ -37,6 +37,7 @@ class OwnTasks:
         self._surveyed: set[int] = set()  # edges that there were,
         self._surveyed_m = 0.0  # and `travelled`
         self._narrows = np.empty((0, 2))  # ways too narrow for the robot
+        self._has_met = False  # somebody who stood: he may have hidden something, and gone
 
     def configure(self, config: CertaintyConfig) -> None:
         """Use another configuration from now on."""
@@ -49,6 +50,7 @@ class OwnTasks:
     def next(self, view: View, whereabouts: Callable[[], Situation | None]) -> Task | Stand | None:
         """What to do now; None to go on with the mission. Stand: a survey is to come."""
         mission = self._mission
+        self._has_met |= view.is_somebody_found
         if not mission.is_choosing:
             self._revisiting.note_target(mission.target)
             self._unseen.begin_anew()
@@ -94,7 +96,7 @@ class OwnTasks:
             route = None if foot is None else route_to_foot(here, starts, foot)
             return None if route is None else route.metres
 
-        place = self._unseen.next(surveyed.places, metres_to)
+        place = self._unseen.next(surveyed.places, metres_to, twice=self._has_met)
         if place is None:
             return None
         decision = Decision(view.stamp, None, None, "something may be missing there")

@@ -12,7 +12,6 @@ from gvgbot.words import counted
 
 _SAME_M = 1.0  # places nearer to each other are one
 _STILL_M = 0.01  # from look to look, at most
-_TRIES = 2  # visits of a place that come to nothing
 _TOLD = 3  # places that are told of one by one
 _MOST = 30  # visits altogether: where walls cannot be seen there is no end of unseen floor
 
@@ -38,13 +37,18 @@ class Unseen:
         before, self._stands_at = self._stands_at, travelled
         return before is not None and travelled - before < _STILL_M
 
-    def next(self, places: Array, metres_to: Callable[[Array], float | None]) -> Array | None:
-        """Which of these (2,), m, map frame, to visit now: the nearest, less tried ones first."""
+    def next(
+        self, places: Array, metres_to: Callable[[Array], float | None], *, twice: bool
+    ) -> Array | None:
+        """Which of these (2,), m, map frame, to visit now: the nearest, less tried ones first.
+
+        A visit that came to nothing is worth a second one only where things may have changed.
+        """
         self._stands_at = None
         chances = [
             (tries, metres, place.tolist())
             for place in places
-            if (tries := self._tries(place)) < _TRIES
+            if (tries := self._tries(place)) < 1 + twice
             and (metres := metres_to(place)) is not None
             and len(self._visits) < _MOST
         ]

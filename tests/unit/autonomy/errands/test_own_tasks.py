@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from gvgbot.autonomy.control.orders import Drive, Order, Stand
 from gvgbot.autonomy.ending import Surveyed
@@ -95,9 +96,11 @@ def test_who_stands_in_sight_is_watched_before_the_survey_is_made() -> None:
     assert robot.travelled == 0.0
 
 
-def test_a_gap_that_stays_is_told_of() -> None:
-    """Twice it goes there; the third survey shows that it is of no use."""
-    robot = Explorer([GAP], [GAP], [GAP])
+@pytest.mark.parametrize(("somebody_until", "visits"), [(0.0, 1), (5.0, 2)])
+def test_a_gap_that_stays_is_told_of(somebody_until: float, visits: int) -> None:
+    """It goes there once, or twice if somebody was about; then one more survey shows no use."""
+    robot = Explorer(*[[GAP]] * (visits + 1))
+    robot.somebody_until = somebody_until
     robot.until_it_moves_or_ends()
     robot.drive(CLOSED, (0.0, 0.0), (2.0, 0.0))
     robot.until_it_moves_or_ends()

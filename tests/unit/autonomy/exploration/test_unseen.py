@@ -21,7 +21,7 @@ def places(*which: list[float]) -> Array:
 def test_the_nearest_comes_first_and_each_has_had_its_turn_before_one_is_tried_again() -> None:
     unseen = Unseen()
     all_of_them = places(FAR, NEAR, WALLED_OFF)
-    visited = [unseen.next(all_of_them, metres_to) for _ in range(5)]
+    visited = [unseen.next(all_of_them, metres_to, twice=True) for _ in range(5)]
     assert [None if one is None else one.tolist() for one in visited] == [
         NEAR,
         FAR,
@@ -33,18 +33,26 @@ def test_the_nearest_comes_first_and_each_has_had_its_turn_before_one_is_tried_a
     assert len(unseen.left) == 3
 
 
+def test_where_nobody_was_met_one_look_is_enough() -> None:
+    """What looked like a passage was a pane of glass, and still is."""
+    unseen = Unseen()
+    assert unseen.next(places(FAR), metres_to, twice=False) is not None
+    assert unseen.next(places(FAR), metres_to, twice=False) is None
+    assert unseen.is_done
+
+
 def test_a_gap_that_has_moved_a_little_is_the_same() -> None:
     unseen = Unseen()
     for _ in range(2):
-        assert unseen.next(places(FAR), metres_to) is not None
-    assert unseen.next(places([5.3, 0.4]), metres_to) is None
+        assert unseen.next(places(FAR), metres_to, twice=True) is not None
+    assert unseen.next(places([5.3, 0.4]), metres_to, twice=True) is None
     assert len(unseen.left) == 1
 
 
 def test_without_walls_in_sight_it_ends_although_there_are_always_new_ones() -> None:
     unseen = Unseen()
     visits = 0
-    while unseen.next(places([2.0 * visits, 0.0]), metres_to) is not None:
+    while unseen.next(places([2.0 * visits, 0.0]), metres_to, twice=True) is not None:
         visits += 1
         assert visits < 100
     assert visits > 10
@@ -63,14 +71,14 @@ def test_without_walls_in_sight_it_ends_although_there_are_always_new_ones() -> 
 def test_the_first_places_are_told_of_one_by_one(count: int, told: str) -> None:
     unseen = Unseen()
     out_of_reach = places(*([-9.0 * i, 0.31 * i - 0.31] for i in range(count)))
-    assert unseen.next(out_of_reach, lambda _: None) is None
+    assert unseen.next(out_of_reach, lambda _: None, twice=True) is None
     assert unseen.where == told
 
 
 def test_what_has_been_seen_after_all_is_not_complained_about() -> None:
     unseen = Unseen()
-    unseen.next(places(FAR), metres_to)
-    assert unseen.next(places(), metres_to) is None
+    unseen.next(places(FAR), metres_to, twice=True)
+    assert unseen.next(places(), metres_to, twice=True) is None
     assert unseen.is_done
     assert len(unseen.left) == 0
     unseen.begin_anew()
