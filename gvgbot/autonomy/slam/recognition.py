@@ -102,13 +102,15 @@ def looks_alike(
     """Whether kind, degree, clearance and bearings agree, the vertex's frame at `local_vertex`.
 
     A degree that differs by one passes: of a pair of close meetpoints either may be seen as one. So
-    does more where many edges leave, of which some cannot be seen, and what is unclear may be one.
+    does more where many edges leave, of which some cannot be seen, and what is unclear may be one,
+    or none: behind who comes through a door are corners that nobody has seen.
     Clearance changes at most as much as the place: a vertex found from afar may have lain beside.
     """
     if vertex.kind != sighting.kind:
         return False
-    certain, possible = len(sighting.bearings), (*sighting.bearings, *sighting.unclear)
-    differing = max(1.0, _DEGREE_SHARE * min(vertex.degree, certain))
+    seen, possible = len(sighting.bearings), (*sighting.bearings, *sighting.unclear)
+    differing = max(1.0, _DEGREE_SHARE * min(vertex.degree, seen))
+    certain = len(set(sighting.bearings) - set(sighting.unclear))
     if not certain - differing <= vertex.degree <= len(possible) + differing:
         return False
     beside = min(float(np.hypot(*(sighting.position - local_vertex.position))), _BESIDE_M)
@@ -116,7 +118,7 @@ def looks_alike(
     if abs(vertex.clearance - sighting.clearance) > tolerance:
         return False
     matched = _turns(vertex, possible, local_vertex, config)
-    return len(matched) >= min(vertex.degree, certain)
+    return len(matched) >= min(vertex.degree, seen)
 
 
 def turn_by_bearings(

@@ -113,6 +113,16 @@ def test_what_is_certain_must_be_there_though_more_may_be() -> None:
     assert not looks_alike(vertex(*STAR[::2]), seen, Pose(), CONFIG)
 
 
+@pytest.mark.parametrize("certain", [(0.0,), (0.0, math.pi)], ids=["one", "two"])
+def test_departures_of_which_too_little_is_seen_may_be_none(certain: tuple[float, ...]) -> None:
+    """In a square room with three doors, what leads to the corners behind the robot is unclear."""
+    corners = (3 * math.pi / 4, -3 * math.pi / 4)
+    unclear = tuple(bearing for bearing in (*TEE, *corners) if bearing not in certain)
+    suspect = replace(sighting(*TEE, *corners), unclear=unclear)
+    assert looks_alike(vertex(*TEE), suspect, Pose(), CONFIG)
+    assert not looks_alike(vertex(math.pi / 2, *corners), suspect, Pose(), CONFIG)
+
+
 @pytest.mark.parametrize(("beside", "alike"), [(0.0, False), (0.3, True), (2.0, False)])
 def test_a_vertex_that_lies_beside_may_be_nearer_to_the_walls(beside: float, alike: bool) -> None:
     """Clearance is 1-Lipschitz; what is farther off than vertices err is not excused."""
