@@ -351,6 +351,7 @@ class Mapper(Knowledge):
         bearings = tuple(half.bearing + place.theta for half in vertex.half_edges.values())
         self._unbelieved.note_mistake(Mistake(place.position, bearings, view.travelled))
         if not self.graph.leave_ring(vertex):
+            self._note_loose_ends(view, vertex)
             self._leave_what_passes(view, vertex)
             self.remove(view, vertex, reason)
 
@@ -364,14 +365,18 @@ class Mapper(Knowledge):
 
     def remove(self, view: View, vertex: Vertex, reason: str) -> None:
         """Take a vertex out of the map; of two edges that met there one is made."""
-        local_map = view.local_base.compose(self.belief.map_base.inverse())
-        for end, (far, line) in loose_ends(self.graph, self.belief, vertex).items():
-            self.came_from.pop(far, None)  # its vertex is back again
-            self.came_from[end] = far, local_map.transform(line)
+        self._note_loose_ends(view, vertex)
         take_out(self.graph, self.belief, vertex)
         self.belief = ekf.remove_vertex(self.belief, vertex.id)
         self.unsettled.forget(vertex.id)
         self._events.append(VertexRemoved(view.stamp, vertex.id, reason))
+
+    def _note_loose_ends(self, view: View, vertex: Vertex) -> None:
+        """Keep where one came from who is on an edge of a vertex that is none."""
+        local_map = view.local_base.compose(self.belief.map_base.inverse())
+        for end, (far, line) in loose_ends(self.graph, self.belief, vertex).items():
+            self.came_from.pop(far, None)  # its vertex is back again
+            self.came_from[end] = far, local_map.transform(line)
 
     def close_ring(self, view: View, line: Array, min_clearance: float) -> None:
         """Make a vertex here on an edge without an end that has been driven round.

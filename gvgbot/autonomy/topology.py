@@ -15,6 +15,7 @@ from gvgbot.geometry import Array, Pose, stations_of, wrap_angle
 _OUT_M = 1.0  # from a vertex, where the direction of an edge is taken
 _OPPOSITE = math.radians(120)  # departures that differ by more go on as one line
 _GENTLY = 2.0  # times what it is off, a line is bent over
+_AT_VERTEX_M = 1.0  # nearer to one than this, the robot has not gone far on any of its edges
 _STRAYS = 3  # vertices that hang together with nothing else, though the robot has driven there
 
 
@@ -162,13 +163,16 @@ def loose_ends(
     """Where one comes from who is on an edge of a vertex that proves to be none.
 
     For half-edges of the vertex: the far end of their edge, or of the only one that ends there, and
-    the polyline (N, 2), map frame, from there to the vertex.
+    the polyline (N, 2), map frame, from there to the vertex. Who still stands at the vertex is on
+    any of its edges, if there are several.
     """
     ends = [HalfEdgeId(vertex.id, key) for key in vertex.half_edges]
     edges = {end: edge for end in ends if (edge := graph.edge_at(end)) is not None}
+    is_at_it = belief.map_base.distance(belief.map_vertex(vertex.id)) < _AT_VERTEX_M
     found = {}
     for end in ends:
-        near = end if end in edges or len(edges) != 1 else next(iter(edges))
+        serves = end not in edges and (len(edges) == 1 or (edges and is_at_it))
+        near = next(iter(edges)) if serves else end
         if near in edges and edges[near].other(near).vertex != vertex.id:
             found[end] = edges[near].other(near), outwards(belief, edges[near], near)[::-1]
     return found

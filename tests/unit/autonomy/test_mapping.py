@@ -251,17 +251,25 @@ def test_a_vertex_through_which_a_plain_edge_runs_is_taken_back() -> None:
 def test_of_a_bend_that_looked_like_a_fork_two_edges_are_one_if_sight_shows_it(
     bend: Point, driven: list[bool]
 ) -> None:
-    """The corridor turns north in the end; what was driven stays so if that is seen there."""
+    """The corridor turns north in the end; what was driven stays so if that is seen there.
+
+    Who was about to go by the third departure is on one of the two edges then.
+    """
     points = {1: (-1.0, 0.0), 2: (3.0, 0.0), 3: (3.0, 4.0), 4: (5.0, 2.0)}
     fork = drawn(points, {10: (1, 2, []), 11: (2, 3, []), 12: (2, 4, [])}, unseen={4: math.pi / 4})
     seen = Seen().look(fork, 20)
     for edge in seen.mapper.graph.edges.values():
         edge.driven = True
     assert len(seen.mapper.graph.edges) == 2
-    plain = drawn({1: points[1], 3: points[3]}, {10: (1, 3, [bend])})
-    seen.look_near(plain, CONFIG.misses + 1)
+    (third,) = seen.mapper.graph.frontiers()
+    plain, at_it = drawn({1: points[1], 3: points[3]}, {10: (1, 3, [bend])}), Pose(2.5)
+    seen.mapper.move(at_it, np.zeros((3, 3)))
+    seen.look(plain, CONFIG.misses + 1, at=at_it)
     assert seen.places("meetpoint") == []
     assert [edge.driven for edge in seen.mapper.graph.edges.values()] == driven
+    far, line = seen.mapper.came_from[third]
+    assert far.vertex in seen.mapper.graph.vertices
+    assert line[-1] == pytest.approx(points[2], abs=0.1)
 
 
 @pytest.mark.parametrize("walled", [True, False])

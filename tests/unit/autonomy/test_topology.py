@@ -164,13 +164,16 @@ def test_who_goes_on_from_a_vertex_that_is_none_came_from_the_one_before() -> No
         assert line[[0, -1]] == pytest.approx(np.array([[1.0, -STREET], [1.0, 0.0]]))
 
 
-def test_beside_two_edges_nobody_knows_which_one_who_goes_on_came_over() -> None:
+@pytest.mark.parametrize("away", [0.5, 3.0])
+def test_beside_two_edges_only_who_has_not_gone_on_is_known_to_be_on_one(away: float) -> None:
+    """Who has gone on may have come over either, or over none: there may be a way after all."""
     graph, ids = streets(3, 1)
     middle = graph.vertices[ids[1, 0]]
     onward = HalfEdgeId(middle.id, middle.add_half_edge(1.5))
-    x = np.hstack([np.zeros(3), np.pad(STREET * np.eye(3)[:, :2], ((0, 0), (0, 1))).ravel()])
+    places = np.array([(k * STREET, 0.0, 0.0) for k in range(3)])
+    x = np.hstack([(STREET, away, 0.0), places.ravel()])
     found = loose_ends(graph, Belief(x, np.eye(12), tuple(ids[k, 0] for k in range(3))), middle)
-    assert onward not in found
+    assert (onward in found) is (away < 1.0)
     assert {far.vertex for far, _ in found.values()} == {ids[0, 0], ids[2, 0]}
 
 
