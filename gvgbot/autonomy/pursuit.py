@@ -156,7 +156,8 @@ class Pursuit:
     def _begins_to_retrace(self, view: View) -> bool:
         """Forget what was only seen and nothing leads to; whether it goes back to what was driven.
 
-        If something was forgotten, it may be missing now.
+        If something was forgotten, it may be missing now. Who is on no edge of the map goes back to
+        where it was on one.
         """
         vertices, on_edge = self._mapper.graph.vertices, self.where.on_edge
         here = set() if on_edge is None else piece_of(self._mapper.graph, on_edge.vertex)
@@ -165,7 +166,7 @@ class Pursuit:
         if len(vertices) < before:
             self._examination.end()
         reason = "no known way leads to a part of the map"
-        return bool(here) and self._retraces(view, vertices.keys() - here, reason)
+        return self._retraces(view, vertices.keys() - here, reason)
 
     def _retraces(self, view: View, lost: set[int], reason: str) -> bool:
         """Go back to where one of these vertices was near last; whether it does."""

@@ -26,6 +26,7 @@ from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex
 from gvgbot.autonomy.slam.recognition import RecognitionConfig
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
 from gvgbot.autonomy.views import Correspondence, View
+from gvgbot.autonomy.whereabouts import Whereabouts
 from gvgbot.geometry import Array, Pose
 from tests.unit.autonomy.local_graphs import Point, drawn
 
@@ -471,13 +472,20 @@ STREET = drawn(  # with three side streets to the south, which go on unseen, as 
 )
 
 
-def test_what_no_known_way_leads_to_any_more_is_gone_back_to_over_the_way_that_was_driven() -> None:
-    """Through a gap that is hardly wide enough, into a room of which no edge leads back."""
-    room = drawn({5: (4.0, 6.0), 6: (4.0, 9.0)}, {20: (5, 6, [])})
+@pytest.mark.parametrize("open_at", [{}, {5: -math.pi / 2, 6: math.pi / 2}], ids=str)
+def test_what_no_known_way_leads_to_any_more_is_gone_back_to_over_the_way_that_was_driven(
+    open_at: dict[int, float],
+) -> None:
+    """Through a gap that is hardly wide enough, into a room of which no edge leads back.
+
+    Where the ends of that one are not to be seen, it is on none of the map.
+    """
+    room = drawn({5: (4.0, 6.0), 6: (4.0, 9.0)}, {20: (5, 6, [])}, unseen=open_at)
     robot = Robot()
     robot.stand(STREET, 20)
     robot.drive(STREET, (0.0, 0.0), (-5.0, 0.0), (4.0, 0.0), (4.0, 1.2))
     robot.drive(room, (4.0, 1.2), (4.0, 7.0))
+    robot.mission.where = Whereabouts()
     lost = {end.vertex for end in robot.mapper.graph.frontiers()}
     while not any("retrace" in str(event) for event in robot.said(Recovery)):
         assert robot.mission.outcome is None
