@@ -2,7 +2,7 @@
 
 from gvgbot.autonomy.control.company import Companion
 from gvgbot.autonomy.control.edge_follower import Track
-from gvgbot.autonomy.control.orders import Drive, Order, Stand
+from gvgbot.autonomy.control.orders import Drive, LookAround, Order, Stand
 from gvgbot.autonomy.driven_edges import DrivenEdges
 from gvgbot.autonomy.ending import all_examined, cut_short, left_to_others
 from gvgbot.autonomy.events import Decision, Event, Recovery
@@ -12,6 +12,7 @@ from gvgbot.autonomy.exploration.obstructions import Obstructions
 from gvgbot.autonomy.exploration.paths import shortest_paths
 from gvgbot.autonomy.gvg.local import Branch, Place
 from gvgbot.autonomy.mapping import Mapper
+from gvgbot.autonomy.overlooked import Overlooked
 from gvgbot.autonomy.pursuit import Pursuit
 from gvgbot.autonomy.scouting import Scouting
 from gvgbot.autonomy.search import NO_EDGE, Search
@@ -26,7 +27,7 @@ class Mission(Pursuit):
 
     def __init__(self, config: ExplorationConfig, mapper: Mapper) -> None:
         super().__init__(config, mapper)
-        self._driven, self._search = DrivenEdges(mapper), Search()
+        self._driven, self._search, self._overlooked = DrivenEdges(mapper), Search(), Overlooked()
         self._frontiers: set[HalfEdgeId] = set()  # that were known at the last view
 
     def advance(self, view: View, known: Correspondence) -> tuple[Order, list[Event]]:
@@ -157,6 +158,9 @@ class Mission(Pursuit):
         if self.target is None:
             return self._go_without_target(view, here)
         self._neighbours.depart_unseen(self._mapper, view, here, self.target)
+        turn = self._overlooked.turn(view, here, self.target)
+        if turn:
+            return LookAround(turn)
         path = here.path_to(self.target)
         if path is None:
             return self._wait_for_a_way(view, here)

@@ -219,6 +219,7 @@ class Pipeline:
             doubted,
             marks,
             self.traffic.newcomers.is_one_standing(scan.stamp, self._maps.near),
+            scan.field_of_view,
         )
 
     def _act(self, view: View, known: Correspondence, scan: Scan) -> list[Event]:

@@ -30,6 +30,7 @@ class View:
     # nodes that were made where the vertex of a ring should be: there is nothing to be seen of it
     marks: dict[int, Vertex] = field(default_factory=dict)
     is_somebody_found: bool = False  # who will be let into the map if he stays
+    field_of_view: tuple[float, float] = (-math.pi, math.pi)  # rad, base frame
 
     def is_doubtful(self, place: Array, within_m: float) -> bool:
         """Whether something that may go stands so near to a place (2,)."""
@@ -49,6 +50,12 @@ class View:
         line = np.linspace(base, place, math.ceil(math.dist(base, place) / _STEP_M) + 1)
         gaps, _ = self.local_map.tree().query(line, distance_upper_bound=_BESIDE_M)
         return bool(np.isinf(gaps).all())
+
+    def turn_to_see(self, bearing: float) -> float:
+        """How far to turn left until a bearing, rad, local frame, is in view; 0 if it is."""
+        first, last = self.field_of_view
+        beyond = (bearing - self.local_base.theta - last) % math.tau
+        return beyond if beyond < math.tau - (last - first) else 0.0
 
     def stands_free(self, place: Array, within_m: float) -> bool:
         """Whether it is certain that neither wall nor glass is so near to a place (2,)."""

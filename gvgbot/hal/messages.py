@@ -42,6 +42,12 @@ class Scan:
         return _beams(self.angle_min, self.angle_increment, len(self.ranges))[0]
 
     @property
+    def field_of_view(self) -> tuple[float, float]:
+        """Directions of the first and the last beam, rad, base frame, not wrapped."""
+        first = self.base_laser.theta + self.angle_min
+        return first, first + self.angle_increment * (len(self.ranges) - 1)
+
+    @property
     def directions(self) -> Array:
         """Beam directions (N, 2) in the laser frame, as vectors one metre long."""
         return _beams(self.angle_min, self.angle_increment, len(self.ranges))[1]

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from gvgbot.geometry import Pose
 from gvgbot.hal.messages import Scan
 
 
@@ -15,3 +16,8 @@ def test_a_beam_ends_where_it_hits_and_without_a_hit_nowhere() -> None:
     assert right == pytest.approx([0.0, -1.0])
     assert ahead == pytest.approx([2.0, 0.0])
     assert left == pytest.approx([0.0, 3.0])
+
+
+def test_a_laser_that_is_turned_on_its_base_looks_to_the_side() -> None:
+    scan = Scan(0.0, np.ones(181), -math.pi / 2, math.pi / 180, 0.1, 30.0, 0.0, Pose(theta=0.5))
+    assert scan.field_of_view == pytest.approx((0.5 - math.pi / 2, 0.5 + math.pi / 2))

@@ -1,0 +1,40 @@
+"""What a laser with a narrow view leaves unseen of a vertex: it is behind the robot there."""
+
+import math
+
+from gvgbot.autonomy.slam.graph import HalfEdgeId
+from gvgbot.autonomy.views import View
+from gvgbot.autonomy.whereabouts import Situation
+
+_AT_M = 0.5  # from a vertex, all of it is to be seen by turning
+_OVERLAP_RAD = 0.2  # by which it is turned farther
+
+
+class Overlooked:
+    """Departures of which too little is seen: looked at once, or the robot had to come back."""
+
+    def __init__(self) -> None:
+        self._looked = set[int]()  # the vertices at which it has turned
+
+    def turn(self, view: View, here: Situation, target: HalfEdgeId) -> float:
+        """How far to turn left to see all of the vertex where the robot is, rad; 0 if it need not.
+
+        The departure that it takes next it will see anyway.
+        """
+        for node, vertex in here.known.vertex_of.items():
+            centre = here.gvg.nodes[node]
+            away = math.dist(centre.position, view.local_base.position)
+            if vertex in self._looked or away > _AT_M:
+                continue
+            unseen = 0.0
+            for branch in centre.weak:
+                end = here.known.half_edge_of.get(branch)
+                half = None if end is None else here.graph.half_edge(end)
+                if half is not None and half.open and end != target:
+                    unseen = max(
+                        unseen, view.turn_to_see(here.gvg.bearing(branch, centre.clearance))
+                    )
+            if unseen:
+                self._looked.add(vertex)
+                return unseen + _OVERLAP_RAD
+        return 0.0
