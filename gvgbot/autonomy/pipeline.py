@@ -41,6 +41,10 @@ from gvgbot.hal.messages import Odometry, Scan
 
 _NOTHING_FELT = Felt()
 _LIFTED = np.diag([0.3**2, 0.3**2, 0.1**2])  # how far a robot is carried that is put down again
+_LOOKS_ASIDE = (
+    "the laser does not see where the robot drives: say how it is mounted by laser.yaw_deg, "
+    "or widen laser.first_angle_deg and laser.last_angle_deg"
+)
 _ROOM_BESIDE_EDGES_M = 0.08  # on each side, where no edge leads
 _LONGEST_GAP_S = 2.0  # between keyframes; a longer one is an outage of a device
 _TURNED_RAD = 0.4  # that a robot may have been turned unnoticed
@@ -229,6 +233,8 @@ class Pipeline:
         if self._execution.is_turning:
             return []
         if len(self.past.keyframes) == 1:
+            if not scan.looks_ahead:
+                return [self.mission.stop(scan.stamp, _LOOKS_ASIDE, "failed")]
             self._execution.turn(_blind_angle(scan))
             return []
         order, done = self.errands.advance(view, known)

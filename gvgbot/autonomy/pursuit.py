@@ -61,10 +61,10 @@ class Pursuit:
         """Whether ways are closed that will be tried again."""
         return self._obstructions.waiting
 
-    def stop(self, stamp: float, reason: str) -> Event:
-        """End the exploration, because somebody wants that."""
-        self.outcome, self.reason = "stopped", reason
-        return Finished(stamp, "stopped", reason)
+    def stop(self, stamp: float, reason: str, outcome: Outcome = "stopped") -> Event:
+        """End the exploration, because somebody wants that or it cannot even begin."""
+        self.outcome, self.reason = outcome, reason
+        return Finished(stamp, outcome, reason)
 
     # -- something in the way ----------------------------------------------------------------------
 

@@ -1,5 +1,6 @@
 """What crosses the hardware abstraction: frozen values, each with the stamp of when it was true."""
 
+import math
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Literal
@@ -7,6 +8,8 @@ from typing import Literal
 import numpy as np
 
 from gvgbot.geometry import Array, Pose, Twist
+
+_AHEAD = math.radians(30.0)  # to either side: what is there comes into the way of a body soon
 
 DockBeam = Literal["near left", "near centre", "near right", "far left", "far centre", "far right"]
 
@@ -46,6 +49,13 @@ class Scan:
         """Directions of the first and the last beam, rad, base frame, not wrapped."""
         first = self.base_laser.theta + self.angle_min
         return first, first + self.angle_increment * (len(self.ranges) - 1)
+
+    @property
+    def looks_ahead(self) -> bool:
+        """Whether beams cover what will soon be in the way of a base that drives forwards."""
+        first, last = self.field_of_view
+        reach = last - first + self.angle_increment  # the beams of a whole turn meet
+        return all((bearing - first) % math.tau <= reach for bearing in (-_AHEAD, 0.0, _AHEAD))
 
     @property
     def directions(self) -> Array:

@@ -9,7 +9,7 @@ import pytest
 from gvgbot.autonomy.control.company import Companion
 from gvgbot.autonomy.control.reflexes import Felt
 from gvgbot.autonomy.ending import Outcome
-from gvgbot.autonomy.events import Decision, Event, Recovery
+from gvgbot.autonomy.events import Decision, Event, Finished, Recovery
 from gvgbot.autonomy.localisation import Localisation
 from gvgbot.autonomy.memory import remember
 from gvgbot.autonomy.pipeline import Pipeline
@@ -245,3 +245,17 @@ def test_who_has_finished_turns_its_back_to_a_wall_when_another_robot_comes_near
 
 def test_who_was_lifted_after_the_end_stays_where_it_was_put() -> None:
     assert turned_after_the_end("explored", 2.5, lifted=True) == 0.0
+
+
+def test_who_does_not_see_where_it_drives_does_not_begin_to() -> None:
+    """Its laser looks astern."""
+    config = load_config()
+    pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
+    odometry = Odometry(0.0, Pose(), STANDSTILL)
+    pipeline.control(odometry)
+    scan = sweep(ROOMS, Pose(-1.5, 0.0, 0.0), field_of_view=LASER_270)
+    (event,) = pipeline.perceive(replace(scan, stamp=0.0, base_laser=Pose(theta=math.pi)))
+    assert isinstance(event, Finished)
+    assert event.outcome == "failed"
+    assert "laser.yaw_deg" in event.reason
+    assert pipeline.control(replace(odometry, stamp=0.1)) == STANDSTILL

@@ -21,3 +21,26 @@ def test_a_beam_ends_where_it_hits_and_without_a_hit_nowhere() -> None:
 def test_a_laser_that_is_turned_on_its_base_looks_to_the_side() -> None:
     scan = Scan(0.0, np.ones(181), -math.pi / 2, math.pi / 180, 0.1, 30.0, 0.0, Pose(theta=0.5))
     assert scan.field_of_view == pytest.approx((0.5 - math.pi / 2, 0.5 + math.pi / 2))
+
+
+@pytest.mark.parametrize(
+    ("first_deg", "beams", "yaw_deg", "is_so"),
+    [
+        (-90, 181, 0.0, True),
+        (-90, 181, 59.0, True),
+        (-90, 181, -59.0, True),
+        (-90, 181, 61.0, False),
+        (-90, 181, 180.0, False),
+        (-135, 271, 180.0, False),
+        (0, 181, 0.0, False),
+        (0, 360, 0.0, True),
+        (-29, 59, 0.0, False),
+    ],
+)
+def test_a_laser_looks_ahead_if_it_sees_30_degrees_to_either_side(
+    first_deg: int, beams: int, yaw_deg: float, *, is_so: bool
+) -> None:
+    """A degree from beam to beam; the one that begins ahead sees all around."""
+    mount, step = Pose(theta=math.radians(yaw_deg)), math.radians(1.0)
+    scan = Scan(0.0, np.ones(beams), first_deg * step, step, 0.1, 30.0, 0.0, mount)
+    assert scan.looks_ahead is is_so
