@@ -1,6 +1,7 @@
 """What a laser with a narrow view leaves unseen of a vertex: it is behind the robot there."""
 
 import math
+from collections.abc import Iterator
 
 from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.autonomy.views import View
@@ -22,19 +23,21 @@ class Overlooked:
         The departure that it takes next it will see anyway.
         """
         for node, vertex in here.known.vertex_of.items():
-            centre = here.gvg.nodes[node]
-            away = math.dist(centre.position, view.local_base.position)
+            away = math.dist(here.gvg.nodes[node].position, view.local_base.position)
             if vertex in self._looked or away > _AT_M:
                 continue
-            unseen = 0.0
-            for branch in centre.weak:
-                end = here.known.half_edge_of.get(branch)
-                half = None if end is None else here.graph.half_edge(end)
-                if half is not None and half.open and end != target:
-                    unseen = max(
-                        unseen, view.turn_to_see(here.gvg.bearing(branch, centre.clearance))
-                    )
-            if unseen:
+            turn = max(map(view.turn_to_see, _unclear(here, node, target)), default=0.0)
+            if turn:
                 self._looked.add(vertex)
-                return unseen + _OVERLAP_RAD
+                return turn + _OVERLAP_RAD
         return 0.0
+
+
+def _unclear(here: Situation, node: int, target: HalfEdgeId) -> Iterator[float]:
+    """Bearings, rad, local frame, of the frontiers of a vertex of which too little is seen."""
+    centre = here.gvg.nodes[node]
+    for branch in centre.weak:
+        end = here.known.half_edge_of.get(branch)
+        half = None if end is None else here.graph.half_edge(end)
+        if half is not None and half.open and end != target:
+            yield here.gvg.bearing(branch, centre.clearance)
