@@ -280,3 +280,16 @@ def test_what_was_seen_from_near_to_be_no_fork_is_not_driven_to_again_from_afar(
     assert_explored(run)
     lengths = [edge.length for edge in run.pipeline.mapper.graph.edges.values()]
     assert run.pipeline.past.travelled < 3 * sum(lengths)
+
+
+def test_with_a_view_of_190_degrees_a_round_of_rooms_is_driven_once() -> None:
+    """Two corners of each are behind the robot as it comes in: ways may seem to lead there."""
+    free: list[Rectangle] = [(x, y, x + 4.8, y + 4.8) for x in (0.0, 5.0) for y in (0.0, 5.0)]
+    free += [(4.7, 2.0, 5.1, 2.8), (4.7, 7.0, 5.1, 7.8)]  # doors
+    free += [(2.0, 4.7, 2.8, 5.1), (7.0, 4.7, 7.8, 5.1), (9.6, 2.0, 12.6, 2.8)]
+    twin = TwinConfig(seed=1, laser=HokuyoTwinConfig(model="UXM-30LX-E"))
+    run = play(carved(free), Pose(1.2, 2.4, 0.3), twin=twin, limit=300.0)
+    assert_explored(run)
+    assert graph_shape(run) == (1, 1, 2)
+    lengths = [edge.length for edge in run.pipeline.mapper.graph.edges.values()]
+    assert run.pipeline.past.travelled < 1.6 * sum(lengths)
