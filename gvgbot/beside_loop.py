@@ -16,7 +16,7 @@ class BesideLoop(Generic[Result]):
     """A function of a pipeline, off the loop: it takes longer than a robot may be deaf."""
 
     def __init__(self, pipeline: Pipeline, function: Callable[[Pipeline], Result]) -> None:
-        self._pipeline = self._past = pipeline
+        self._pipeline = self._copy = pipeline
         self._function = function
         self._wanted = asyncio.Event()
         self._found: Result | None = None
@@ -31,10 +31,10 @@ class BesideLoop(Generic[Result]):
         found, self._found = self._found, None
         if (
             found is not None
-            and self._pipeline.past.travelled < self._past.past.travelled + _DRIVEN_ON_M
+            and self._pipeline.past.travelled < self._copy.past.travelled + _DRIVEN_ON_M
         ):
             return found
-        self._past = still(self._pipeline)
+        self._copy = still(self._pipeline)
         self._wanted.set()
         return None
 
@@ -46,4 +46,4 @@ class BesideLoop(Generic[Result]):
             self._wanted.clear()
 
     def _find(self) -> None:
-        self._found = self._function(self._past)
+        self._found = self._function(self._copy)
