@@ -1,5 +1,6 @@
 """The live view: what ROS would hear, sent to who has the Foxglove app open."""
 
+import logging
 import threading
 from types import TracebackType
 from typing import Self
@@ -24,6 +25,8 @@ class FoxgloveServer:
 
     def __init__(self, config: FoxgloveConfig, robot: str) -> None:
         """Raises GvgbotError if the port cannot be had."""
+        # it would write a line for each message that a viewer who has gone did not get
+        logging.getLogger("foxglove").setLevel(logging.CRITICAL)
         self._context = foxglove.Context()
         self._channels = {topic: _channel(topic, self._context) for topic in TOPICS}
         latecomers = _Latecomers(self._channels)

@@ -4,7 +4,7 @@ import json
 import struct
 import threading
 from collections.abc import Iterator
-from socket import create_connection
+from socket import SHUT_RD, SO_LINGER, SOL_SOCKET, create_connection
 from typing import Any
 
 import pytest
@@ -107,6 +107,22 @@ def test_what_nobody_watches_is_not_wanted(server: FoxgloveServer, app: App) -> 
 def test_a_port_that_is_taken_is_said_in_a_line(server: FoxgloveServer) -> None:
     with pytest.raises(GvgbotError, match=r"foxglove\.port"):
         FoxgloveServer(FoxgloveConfig(port=server.port), "another")
+
+
+def test_who_goes_without_a_word_leaves_no_lines_in_the_log(
+    server: FoxgloveServer, caplog: pytest.LogCaptureFixture
+) -> None:
+    protocol = Subprotocol("foxglove.sdk.v1")
+    with connect(f"ws://127.0.0.1:{server.port}", subprotocols=[protocol]) as viewer:
+        App(viewer).watch(TF)
+        while not server.wants(TF):
+            threading.Event().wait(0.01)
+        viewer.socket.setsockopt(SOL_SOCKET, SO_LINGER, struct.pack("ii", 1, 0))
+        viewer.socket.shutdown(SHUT_RD)
+        viewer.socket.close()  # as if the computer was shut
+        while server.wants(TF):
+            threading.Event().wait(0.01)
+    assert not caplog.records
 
 
 def test_who_connects_and_says_nothing_does_not_hold_up_the_end() -> None:
