@@ -15,6 +15,7 @@ import numpy as np
 
 from gvgbot.autonomy.config import AutonomyConfig
 from gvgbot.autonomy.control.reflexes import Felt
+from gvgbot.autonomy.destinations import foot_of
 from gvgbot.autonomy.errands import Declined
 from gvgbot.autonomy.estimate import Estimate, scans_at, smoothed
 from gvgbot.autonomy.events import Event, Finished, Recovery, WayForgotten
@@ -31,6 +32,7 @@ from gvgbot.geometry import STANDSTILL, Pose, Twist
 from gvgbot.hal.messages import Odometry, Scan
 
 _MOVED_M, _MOVED_RAD = 0.5, 0.3  # farther from where odometry has it, something is wrong
+_ON_EDGE_M = 0.5  # from an edge, at most
 _FOUND = np.diag([0.1**2, 0.1**2, 0.03**2])  # covariance of a place found on the map
 _NOTHING_FELT = Felt()
 
@@ -200,6 +202,7 @@ class ReturningPipeline(Pipeline):
         self._breaks, self._unturned_s = seeker._breaks, seeker._unturned_s
         self._reflexes = seeker._reflexes
         self.traffic.newcomers = seeker.traffic.newcomers
+        self._be_on_edge(map_local)
         self.past.keyframes.append(replace(found, map_base=map_base))
         self.past.steps.append(Step(last.map_base.to(map_base), UNKNOWN_WAY))
         self.past.with_scan = None
@@ -228,6 +231,16 @@ class ReturningPipeline(Pipeline):
         mapper._unbelieved.forget()
         self.mission.where, self.mission.target = Whereabouts(), None
         self.mission.reason = ""
+
+    def _be_on_edge(self, map_local: Pose) -> None:
+        """Be on the known edge that passes here, if one does: its ends may be out of sight."""
+        belief = self.mapper.belief
+        foot = foot_of(self.mapper, belief.map_base.position)
+        if foot is None or foot.away > _ON_EDGE_M:
+            return
+        end, come = foot.edge.a, foot.edge.polyline[: foot.index + 1]
+        local_vertex = map_local.inverse().compose(belief.map_vertex(end.vertex))
+        self.mission.where.rejoin(end, local_vertex.transform(come))
 
     def _move_hazards(self, seeker: Pipeline, turn: Pose) -> None:
         """Take what was felt into the new local frame, which sees the old one at `turn`."""

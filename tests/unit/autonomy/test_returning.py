@@ -1,5 +1,6 @@
 """A robot that comes back: what it says when it is lost, and what it knows when it is found."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -61,3 +62,28 @@ def test_who_has_found_its_place_on_a_map_knows_no_better_where_that_map_lies() 
     for _ in range(3):
         found = ekf.update(found, here, base_vertex, R)
     assert np.linalg.eigvalsh(found.vertex_covariance(here)).min() > 0.99 * 2.0**2
+
+
+def test_who_finds_its_place_between_two_vertices_knows_the_ways_to_both() -> None:
+    """In a corridor so long that neither of them is in sight."""
+    saved, config = MissionFiles(MISSION).read(), load_config()
+    assert saved is not None
+    settings = config.autonomy, config.exploration, config.robot.radius_m
+    robot = ReturningPipeline(*settings, saved.memory, saved.past, lambda: False)
+    robot._estimate, seeker = smoothed(robot), robot._new_mind()
+    corridor = carved([(-25.0, -1.0, 25.0, 1.0)])
+    seeker.control(Odometry(0.0, Pose(), STANDSTILL))
+    seeker.perceive(sweep(corridor, Pose()))
+    belief = robot.mapper.belief
+    one, other = (belief.map_vertex(vertex).position for vertex in (1, 2))
+    middle, along = (one + other) / 2, other - one
+    x, y = middle.tolist()
+    robot._arrive(seeker, Pose(x, y, float(np.arctan2(along[1], along[0]))))
+    robot.control(Odometry(0.0, Pose(), STANDSTILL))
+    robot.perceive(sweep(corridor, Pose()))
+    metres = float(np.hypot(*along)) / 2
+    for vertex in (1, 2):
+        answer = robot.errands.goto_vertex(vertex, 0.0)
+        found = re.fullmatch(rf"it drives (\S+) m to vertex {vertex}", answer)
+        assert found is not None
+        assert float(found[1]) == pytest.approx(metres, abs=0.2)
