@@ -1,6 +1,7 @@
 """Sessions of zenoh with a robot or a router, and the robots that can be reached there."""
 
 import json
+import socket
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -14,6 +15,7 @@ from gvgbot.zenoh_config import opened, reason, session_config
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 
+_TRYING = 1.0  # s, whether anything listens at an address
 SETTLING = 1.0  # s after connecting, by when one has heard of all robots on the network
 
 
@@ -66,11 +68,23 @@ def open_session(endpoint: str, patience_s: float, file: Path | None) -> zenoh.S
     except zenoh.ZError as error:
         where = ", ".join(json.loads(config.get_json("connect/endpoints")))
         if "Unable to connect" in str(error):
-            why = "is a robot running there?"
-            if file is not None:
-                why = f"no robot is running there, or it does not accept the keys of {file}"
-            raise GvgbotError(f"nobody answers at {where}: {why}") from error
+            raise GvgbotError(f"nobody answers at {where}: {_why_nobody(where, file)}") from error
         raise GvgbotError(f"cannot connect to {where}: {reason(error)}") from error
+
+
+def _why_nobody(where: str, file: Path | None) -> str:
+    """What may be the reason that nobody answers at an address."""
+    if file is not None:
+        return f"no robot is running there, or it does not accept the keys of {file}"
+    host, _, port = where.partition("/")[2].partition("#")[0].rpartition(":")
+    try:
+        socket.create_connection((host.strip("[]"), int(port)), _TRYING).close()
+    except (OSError, ValueError):
+        return "is a robot running there?"
+    return (
+        "something listens there, but it is no robot, serves as many programs as it can already, "
+        "or wants a password or certificate, such as --zenoh-file client_tls.json5"
+    )
 
 
 def names_on(session: zenoh.Session) -> list[str]:

@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from itertools import permutations
+from socket import create_server
 from threading import Event as Flag
 
 import msgspec
@@ -442,6 +443,17 @@ def test_an_address_where_nobody_answers_is_one_error(endpoint: str) -> None:
         client.connect("near", endpoint, patience_s=0.3),
     ):
         pass
+
+
+def test_an_address_that_lets_nobody_in_is_told_from_one_where_nobody_is() -> None:
+    """Such as a robot that wants certificates, or something else at that port."""
+    with create_server(("127.0.0.1", 0)) as listener:
+        endpoint = f"tcp/127.0.0.1:{listener.getsockname()[1]}"
+        with (
+            pytest.raises(GvgbotError, match=r"something listens there, but"),
+            client.connect("near", endpoint, patience_s=0.3),
+        ):
+            pass
 
 
 @pytest.mark.parametrize(
