@@ -6,6 +6,7 @@ recording ends, and the log says so.
 
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -34,6 +35,7 @@ from gvgbot.recording.messages import (
     nanoseconds,
 )
 
+_BATTERY_EVERY = 60.0  # s, if it stays as it is
 BATCH = 25  # messages that are handed over together
 MOST_WAITING = 8_000_000  # bytes in memory; more are not kept for a disk that is slow
 
@@ -88,9 +90,16 @@ class Recorder:
         stamp = cycle.odometry.stamp
         self._add(CYCLE, stamp, encode_cycle(cycle))
         self._add(TRANSFORM, stamp, encode_transform(stamp, self.map_base()))
-        if battery is not None and battery != self._battery:
+        if battery is not None and self._is_news(battery):
             self._battery = battery
             self._add(BATTERY, battery.stamp, encode_battery(battery))
+
+    def _is_news(self, battery: Battery) -> bool:
+        """Whether it has changed, or was last taken down long ago, perhaps in an older file."""
+        last = self._battery
+        if last is None or not 0.0 <= battery.stamp - last.stamp < _BATTERY_EVERY:
+            return True
+        return battery != replace(last, stamp=battery.stamp)
 
     def on_event(self, record: dict[str, Any]) -> None:
         """Take down an event, as its line in events.jsonl has it."""

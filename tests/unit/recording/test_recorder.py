@@ -87,6 +87,17 @@ def test_what_is_recorded_is_read_in_the_same_order(tmp_path: Path) -> None:
     assert (recording.cut, recording.damaged, recording.missing) == ([], 0, None)
 
 
+def test_the_battery_is_taken_down_when_it_changes_and_once_a_minute(tmp_path: Path) -> None:
+    """A base tells of it fifty times a second, with a stamp of its own each time."""
+    stamps = np.arange(0.0, 100.0, 0.5).tolist()
+    with Recorder(config(tmp_path / "run.mcap"), ABOUT) as to:
+        for stamp in stamps:
+            voltage = 15.5 if stamp < 20.0 else 15.4
+            to.on_cycle(cycle(stamp), Battery(stamp, voltage, 0.8, charging=False))
+    taken = [one for one in read(tmp_path / "run.mcap") if isinstance(one, Battery)]
+    assert [(one.stamp, one.voltage) for one in taken] == [(0.0, 15.5), (20.0, 15.4), (80.0, 15.4)]
+
+
 def test_requests_that_were_granted_are_counted(tmp_path: Path) -> None:
     with Recorder(config(tmp_path / "run.mcap"), ABOUT | {"resumed": "yes"}) as to:
         for done in (True, False, True):
