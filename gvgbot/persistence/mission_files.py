@@ -187,9 +187,10 @@ def _begins_after(past: list[Growth], memory: Memory) -> bool:
 def _counted(memory: Memory, past: list[Growth]) -> Memory:
     """The memory, with its keyframes counted as in the journal.
 
-    One that lost some and goes on has the memory's last keyframe in the place of those.
+    One that lost some and goes on has the memory's last keyframe in the place of those. On a map
+    that was imported all have the same stamp.
     """
-    for number, grown in enumerate(past, 1):
+    for number, grown in reversed(list(enumerate(past, 1))):
         if memory.last is not None and grown.keyframe.stamp == memory.last.stamp:
             return replace(memory, keyframes=number)
     return memory
