@@ -20,7 +20,13 @@ from gvgbot.topics import (
     packed,
 )
 
-_NEEDS_SOMEBODY = ("wheel drop", "over-current", "charger cable", "no scan")
+_NEEDS_SOMEBODY = (
+    "wheel drop",
+    "over-current",
+    "charger cable",
+    "no scan",
+    "laser sees nothing",
+)
 _FARTHEST_MM = NOTHING_IN_RANGE - 1
 
 

@@ -19,6 +19,7 @@ Reason = Literal[
     "over-current",
     "charger cable",
     "no scan",
+    "laser sees nothing",
     "bumper",
     "cliff",
     "obstacle",
@@ -82,7 +83,9 @@ class Guard:
         Call it once per odometry.
         """
         state = self._observe(state, odometry, scan)
-        reason = self._fault(twist, stamp, None if scan is None else state.scan, contact)
+        reason = self._fault(twist, contact)
+        if reason is None and (scan is None or self._is_old(state.scan, stamp)):
+            reason = "no scan" if self._is_old(scan, stamp) else "laser sees nothing"
         permitted = STANDSTILL
         if reason is None:
             wish = self._ramp(state, self._limit(twist), stamp)
@@ -109,10 +112,11 @@ class Guard:
         stopping = speed * blind + speed**2 / (2.0 * limits.max_braking_mps2)
         return stopping + self.radius + limits.margin_m
 
-    def _fault(
-        self, twist: Twist, stamp: float, scan: Scan | None, contact: Contact | None
-    ) -> Reason | None:
-        """What forbids any motion at all."""
+    def _is_old(self, scan: Scan | None, stamp: float) -> bool:
+        return scan is None or stamp - scan.stamp > self.config.max_scan_age_s
+
+    def _fault(self, twist: Twist, contact: Contact | None) -> Reason | None:
+        """What forbids any motion at all, whatever the laser sees."""
         if not (isfinite(twist.linear) and isfinite(twist.angular)):
             return "bad command"
         if contact is not None and contact.wheel_drop:
@@ -121,8 +125,6 @@ class Guard:
             return "over-current"
         if contact is not None and contact.charger_cable:
             return "charger cable"
-        if scan is None or stamp - scan.stamp > self.config.max_scan_age_s:
-            return "no scan"
         return None
 
     def _limit(self, twist: Twist) -> Twist:

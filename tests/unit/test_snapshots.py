@@ -22,6 +22,7 @@ def state(phase: str, outcome: str | None = None, guard: str | None = None) -> A
         (state("exploring"), True, "searching"),
         (state("exploring", guard="obstacle"), False, "busy"),
         (state("exploring", guard="wheel drop"), False, "trouble"),
+        (state("exploring", guard="laser sees nothing"), False, "trouble"),
         (state("errand", outcome="explored"), False, "busy"),
         (state("errand", outcome="explored"), True, "searching"),
         (state("halted"), False, "trouble"),

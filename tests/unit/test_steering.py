@@ -104,6 +104,7 @@ def touched(**felt: bool) -> Body:
         (touched(over_current=True), "overloaded"),
         (touched(charger_cable=True), "cable"),
         (Body(stopped_for="no scan"), "no scan"),
+        (Body(stopped_for="laser sees nothing"), "laser sees nothing"),
         (Body(stopped_for="bad command"), "bad command"),
     ],
 )

@@ -241,6 +241,7 @@ _OTHER_STOPS: tuple[Reason, ...] = (
     "wheel drop",
     "over-current",
     "no scan",
+    "laser sees nothing",
     "bumper",
     "cliff",
 )

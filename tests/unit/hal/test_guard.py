@@ -189,12 +189,12 @@ def test_without_a_first_scan_nothing_moves_not_even_in_place() -> None:
     assert (permitted, reason) == (STANDSTILL, "no scan")
 
 
-def test_a_covered_laser_stops_the_robot_as_a_silent_one_does() -> None:
+def test_a_covered_laser_stops_the_robot_as_a_silent_one_does_and_is_called_so() -> None:
     drive = Drive(OPEN).run(Twist(0.3, 0.0), 2.0)
     assert drive.speeds[-1] == pytest.approx(0.3)
     drive.noise = math.nan
     drive.run(Twist(0.3, 0.0), 0.8)
-    assert (drive.twist, drive.reasons[-1]) == (STANDSTILL, "no scan")
+    assert (drive.twist, drive.reasons[-1]) == (STANDSTILL, "laser sees nothing")
 
 
 @pytest.mark.parametrize("bad", [math.nan, inf, -inf])

@@ -216,7 +216,8 @@ def test_a_robot_that_is_held_on_all_sides_stands_until_that_changes() -> None:
     assert robot.x == 0.0
 
 
-def test_a_laser_that_is_silent_is_no_obstacle() -> None:
+@pytest.mark.parametrize("reason", ["no scan", "laser sees nothing"])
+def test_a_laser_that_is_silent_or_covered_is_no_obstacle(reason: Reason) -> None:
     robot = Robot()
-    robot.feel(NOTHING, 60.0, grip=0.0, stopped_for="no scan")
+    robot.feel(NOTHING, 60.0, grip=0.0, stopped_for=reason)
     assert robot.incidents == []
