@@ -44,6 +44,7 @@ _WAITING_QUERIES = 1000  # more than this are dropped, oldest first; who asked g
 _WAITING_REQUESTS, _WAITING_REFUSALS, _WAITING_STOPS = 8, 1000, 2000
 _CROWDED = Answer(done=False, text="too many requests wait: ask again")
 _MAX_SESSIONS = 32
+_LARGEST_MESSAGE = 16 * 2**20  # bytes that may come at once: more could fill the memory
 _STRAYS = 30  # states of another robot by the same name, three seconds, before that is said
 _LONGEST_NAME = 80  # bytes of who asks
 _MISSES = zenoh.ext.MissDetectionConfig(heartbeat=HEARTBEAT, sporadic_heartbeat=None)
@@ -331,6 +332,7 @@ def _session_config(config: TelemetryConfig, *, relays: bool) -> zenoh.Config:
             "connect/endpoints": config.connect,
             "transport/link/tx/lease": round(1000 * config.lease_s),
             "transport/unicast/max_sessions": _MAX_SESSIONS,
+            "transport/link/rx/max_message_size": _LARGEST_MESSAGE,
             "timestamping/enabled": True,
         },
         config.zenoh_file,

@@ -210,6 +210,27 @@ def test_a_long_patrol_is_heard_whole_and_what_is_longer_called_too_long(endpoin
         parse(*cut)
 
 
+def test_what_would_fill_the_memory_is_not_let_in_and_holds_up_nothing(endpoint: str) -> None:
+    asked: list[str] = []
+
+    async def note(one: Asked) -> Answer:
+        asked.append(one.name)
+        return await obliging(one)
+
+    def ask() -> list[zenoh.Reply]:
+        with plain_session(endpoint) as session:
+            list(session.get("gvgbot/near/ctl/save", payload=bytes(40_000_000), timeout=1.0))
+            return get(session, "ctl/pause")
+
+    async def story() -> list[zenoh.Reply]:
+        async with a_robot(endpoint, note):
+            return await asyncio.to_thread(ask)
+
+    (reply,) = asyncio.run(story())
+    assert reply.ok is not None
+    assert asked == ["pause"]
+
+
 def test_a_crowd_of_requests_is_refused_and_a_pause_among_them_is_done(endpoint: str) -> None:
     asked: list[str] = []
 
