@@ -64,7 +64,9 @@ def convert(kind: Any, value: Any, path: KeyPath, problems: list[Problem]) -> An
     if origin is Annotated:
         return _ranged(kind, value, path, problems)
     if not _fits(kind, value):
-        problems.append(Problem(path, value, f"must be {describe(kind)}"))
+        is_bare = kind is str and type(value) is int
+        hint = f""": write "{shorten(value)}", in a shell '"{shorten(value)}"'""" if is_bare else ""
+        problems.append(Problem(path, value, f"must be {describe(kind)}{hint}"))
         return None
     return kind(value) if kind in (float, Path) else value
 

@@ -104,7 +104,7 @@ WRONG = {
     "infinity": ("weight_kg: -.inf", "weight_kg = -inf: must be a number"),
     "beyond floats": ("weight_kg: 1" + 400 * "0", "must be a number"),
     "null for a number": ("weight_kg:", "weight_kg = null: must be a number"),
-    "number for text": ("name: 7", "name = 7: must be text"),
+    "number for text": ("name: 7", 'name = 7: must be text: write "7", in a shell \'"7"\''),
     "date for text": ("name: 2020-02-03", "must be text"),
     "number for a flag": ("tame: 1", "tame = 1: must be true or false"),
     "fraction for a whole": ("leg: {toes: 2.0}", "leg.toes = 2.0: must be a whole number"),
