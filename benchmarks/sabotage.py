@@ -101,8 +101,8 @@ SABOTAGES = (
     Sabotage(
         "the guard trusts a scan however old it is",
         "hal/guard.py",
-        "if scan is None or stamp - scan.stamp > self.config.max_scan_age_s:",
-        "if scan is None:",
+        "return scan is None or stamp - scan.stamp > self.config.max_scan_age_s",
+        "return scan is None",
     ),
     Sabotage(
         "nobody looks whether the wheels hang in the air",

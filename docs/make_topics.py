@@ -13,7 +13,15 @@ import msgspec
 
 from docs.source import fields_of, table
 from gvgbot.requests import REQUESTS, request_key
-from gvgbot.topics import TOPICS, Topic, alive_key
+from gvgbot.topics import (
+    SCAN,
+    TEAM_PARTS,
+    TOPICS,
+    TelemetryConfig,
+    Topic,
+    alive_key,
+    team_key,
+)
 
 PAGE = Path(__file__).with_name("topics.md")
 HEAD = """\
@@ -69,9 +77,7 @@ def _overview() -> str:
         cells = (
             f"`{topic.key('ROBOT')}`",
             f"`{topic.encoding}`",
-            f"on change, at most {topic.rate_hz:g} Hz"
-            if topic.on_change
-            else f"{topic.rate_hz:g} Hz",
+            _sent(topic),
             topic.priority,
             str(topic.history or "none"),
             "yes" if topic.queryable else "no",
@@ -81,11 +87,23 @@ def _overview() -> str:
     rows.append(
         f"| `{alive_key('ROBOT')}` | liveliness token | while it is there | | | | the robot |"
     )
+    rows += [
+        f"| `{team_key('ROBOT', part)}` | for robots of a team alone, and may change | "
+        "with `team.enabled` | | | | the robot |"
+        for part in TEAM_PARTS
+    ]
     rows.append(
         f"| `{request_key('ROBOT', 'REQUEST')}` | query, see below | when asked | | | | "
         "whom the access control lets; `telemetry.requests` permits |"
     )
     return "\n".join(rows) + "\n"
+
+
+def _sent(topic: Topic) -> str:
+    """When samples are sent."""
+    if topic is SCAN:
+        return f"at most {TelemetryConfig().scan_rate_hz:g} Hz: `telemetry.scan_rate_hz`"
+    return f"{'on change, at most ' if topic.on_change else ''}{topic.rate_hz:g} Hz"
 
 
 def _section(topic: Topic) -> str:

@@ -4,7 +4,17 @@ import msgspec
 import pytest
 
 from docs.make_topics import PAGE, page
-from gvgbot.topics import STATE, TOPICS, LinkHealth, Topic, alive_key
+from gvgbot.topics import (
+    SCAN,
+    STATE,
+    TEAM_PARTS,
+    TOPICS,
+    LinkHealth,
+    TelemetryConfig,
+    Topic,
+    alive_key,
+    team_key,
+)
 
 by_name = pytest.mark.parametrize("topic", TOPICS, ids=lambda topic: topic.name)
 
@@ -42,8 +52,23 @@ def test_every_topic_is_listed_with_its_encoding(topic: Topic) -> None:
     assert f"gvgbot.{topic.payload.__name__}.v{topic.version}" in row
 
 
+def test_scans_are_said_to_be_as_frequent_as_the_configuration_has_them() -> None:
+    (row,) = [
+        line
+        for line in PAGE.read_text(encoding="utf-8").splitlines()
+        if line.startswith(f"| `{SCAN.key('ROBOT')}` |")
+    ]
+    assert "at most 10 Hz" in row
+    assert TelemetryConfig().scan_rate_hz == 10.0
+
+
 def test_the_liveliness_token_is_listed() -> None:
     assert f"`{alive_key('ROBOT')}`" in PAGE.read_text(encoding="utf-8")
+
+
+def test_what_robots_of_a_team_tell_each_other_is_listed() -> None:
+    for part in TEAM_PARTS:
+        assert f"\n| `{team_key('ROBOT', part)}` |" in PAGE.read_text(encoding="utf-8")
 
 
 def test_what_travels_within_a_payload_is_explained_too() -> None:
