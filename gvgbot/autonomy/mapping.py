@@ -351,32 +351,25 @@ class Mapper(Knowledge):
         bearings = tuple(half.bearing + place.theta for half in vertex.half_edges.values())
         self._unbelieved.note_mistake(Mistake(place.position, bearings, view.travelled))
         if not self.graph.leave_ring(vertex):
-            self._note_loose_ends(view, vertex)
-            self._leave_what_passes(view, vertex)
-            self.remove(view, vertex, reason)
+            is_passed = self._is_passed(view, vertex)
+            self.remove(view, vertex, reason, is_passed=is_passed)
 
-    def _leave_what_passes(self, view: View, vertex: Vertex) -> None:
-        """Drop all other departures of a vertex if sight shows that its two edges are one."""
-        ends = {HalfEdgeId(vertex.id, key) for key in vertex.half_edges}
+    def _is_passed(self, view: View, vertex: Vertex) -> bool:
+        """Whether sight shows that the two edges of a vertex are one, whatever else leaves it."""
+        ends = (HalfEdgeId(vertex.id, key) for key in vertex.half_edges)
         followed = {end for end in ends if self.graph.edge_at(end) is not None}
-        if len(followed) == 2 and followed == set(self._evidence.passed_along(view, vertex)):
-            for end in ends - followed:
-                self.graph.remove_half_edge(end)
+        return len(followed) == 2 and followed == set(self._evidence.passed_along(view, vertex))
 
-    def remove(self, view: View, vertex: Vertex, reason: str) -> None:
+    def remove(self, view: View, vertex: Vertex, reason: str, *, is_passed: bool = False) -> None:
         """Take a vertex out of the map; of two edges that met there one is made."""
-        self._note_loose_ends(view, vertex)
-        take_out(self.graph, self.belief, vertex)
-        self.belief = ekf.remove_vertex(self.belief, vertex.id)
-        self.unsettled.forget(vertex.id)
-        self._events.append(VertexRemoved(view.stamp, vertex.id, reason))
-
-    def _note_loose_ends(self, view: View, vertex: Vertex) -> None:
-        """Keep where one came from who is on an edge of a vertex that is none."""
         local_map = view.local_base.compose(self.belief.map_base.inverse())
         for end, (far, line) in loose_ends(self.graph, self.belief, vertex).items():
             self.came_from.pop(far, None)  # its vertex is back again
             self.came_from[end] = far, local_map.transform(line)
+        take_out(self.graph, self.belief, vertex, is_passed=is_passed)
+        self.belief = ekf.remove_vertex(self.belief, vertex.id)
+        self.unsettled.forget(vertex.id)
+        self._events.append(VertexRemoved(view.stamp, vertex.id, reason))
 
     def close_ring(self, view: View, line: Array, min_clearance: float) -> None:
         """Make a vertex here on an edge without an end that has been driven round.

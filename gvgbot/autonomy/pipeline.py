@@ -403,5 +403,5 @@ class Pipeline:
 
 def _blind_angle(scan: Scan) -> float:
     """How far to turn so that every direction has been seen, with some overlap; rad."""
-    seen = scan.angle_increment * (len(scan.ranges) - 1)
-    return max(0.0, math.tau - seen) + _OVERLAP_RAD
+    first, last = scan.field_of_view
+    return max(0.0, math.tau - (last - first)) + _OVERLAP_RAD

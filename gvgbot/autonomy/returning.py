@@ -21,6 +21,7 @@ from gvgbot.autonomy.estimate import Estimate, scans_at, smoothed
 from gvgbot.autonomy.events import Event, Finished, Recovery, WayForgotten
 from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.keyframes import UNKNOWN_WAY, Step
+from gvgbot.autonomy.knowledge import ON_EDGE_M
 from gvgbot.autonomy.localisation import Localisation
 from gvgbot.autonomy.memory import Growth, Memory, recall, remember
 from gvgbot.autonomy.pipeline import STANDS_CARRIED, Pipeline
@@ -32,7 +33,6 @@ from gvgbot.geometry import STANDSTILL, Pose, Twist
 from gvgbot.hal.messages import Odometry, Scan
 
 _MOVED_M, _MOVED_RAD = 0.5, 0.3  # farther from where odometry has it, something is wrong
-_ON_EDGE_M = 0.5  # from an edge, at most
 _FOUND = np.diag([0.1**2, 0.1**2, 0.03**2])  # covariance of a place found on the map
 _NOTHING_FELT = Felt()
 
@@ -236,7 +236,7 @@ class ReturningPipeline(Pipeline):
         """Be on the known edge that passes here, if one does: its ends may be out of sight."""
         belief = self.mapper.belief
         foot = foot_of(self.mapper, belief.map_base.position)
-        if foot is None or foot.away > _ON_EDGE_M:
+        if foot is None or foot.away > ON_EDGE_M:
             return
         end, come = foot.edge.a, foot.edge.polyline[: foot.index + 1]
         local_vertex = map_local.inverse().compose(belief.map_vertex(end.vertex))

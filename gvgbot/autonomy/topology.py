@@ -77,20 +77,20 @@ def direction(line: Array) -> float:
     return math.atan2(y, x)
 
 
-def take_out(graph: GvgGraph, belief: Belief, vertex: Vertex) -> None:
+def take_out(graph: GvgGraph, belief: Belief, vertex: Vertex, *, is_passed: bool = False) -> None:
     """Remove a vertex from the graph; of two edges that met there one is made.
 
     If a third departure had none, they may be a way round a corner that another one goes past: then
-    they must lead in opposite directions, or their other ends become frontiers.
+    sight must show that an edge passes, along both, or they must lead in opposite directions. If
+    not, their other ends become frontiers.
     """
     meeting = [
         (HalfEdgeId(vertex.id, key), graph.edges[half.edge])
         for key, half in vertex.half_edges.items()
         if half.edge is not None
     ]
-    is_line = vertex.degree == 2 or _are_opposite(
-        [vertex.half_edges[end.key] for end, _ in meeting]
-    )
+    departures = [vertex.half_edges[end.key] for end, _ in meeting]
+    is_line = is_passed or vertex.degree == 2 or _are_opposite(departures)
     graph.remove_vertex(vertex.id)
     if len(meeting) != 2 or meeting[0][1] is meeting[1][1] or not is_line:
         return
