@@ -1,5 +1,6 @@
 """Settings of every test: the same examples on every machine, however busy it is."""
 
+import signal
 from collections.abc import Iterator
 
 import pytest
@@ -14,6 +15,12 @@ settings.load_profile("dev")
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--laser-port", help="a real laser's port, for -m hardware")
     parser.addoption("--base-port", help="a real base's port, for -m hardware")
+
+
+def pytest_configure() -> None:
+    """Let programs that are started hear of a stop, though a script has it ignored here."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
 @pytest.fixture(autouse=True)
