@@ -33,6 +33,7 @@ from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.mission import Mission
 from gvgbot.autonomy.odometry_log import OdometryLog
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
+from gvgbot.autonomy.tight_spots import TightSpots
 from gvgbot.autonomy.traffic import Traffic
 from gvgbot.autonomy.views import Correspondence, View, touching
 from gvgbot.geometry import STANDSTILL, Array, Pose, Twist, rotated_covariance, wrap_angle
@@ -72,6 +73,9 @@ class Pipeline:
         """`led` if somebody else drives: it only learns, and its twists mean nothing."""
         self._config, self.radius, self.led = config, robot_radius, led
         self._maps = LocalMaps(config.local_map, config.far_map, config.scan_matching)
+        self._tight_spots = TightSpots(
+            robot_radius, config.passage_margin_m, config.local_map.memory_m
+        )
         self.mapper = Mapper(
             config.mapping,
             config.recognition,
@@ -173,6 +177,7 @@ class Pipeline:
         for one in self.traffic.nearby(self._local_map(local_base)):
             self._maps.near.stand_on(one.pose.position, one.radius, self.past.travelled)
         self._maps.insert(scan, local_base, self.past.travelled, free)
+        self._tight_spots.note(local_base.position, self._maps.near.points(), self.past.travelled)
         self._hazards.forget(self.past.travelled)
         if self.led and not self._worth_a_gvg(local_base):
             self.past.keep(scan, odom_base, local_base, self.mapper.belief.map_base)
@@ -205,7 +210,7 @@ class Pipeline:
         self.open_clearance = self._config.reduction.open_clearance(
             scan.range_max, self._config.local_map.half_width_m
         )
-        self.gvg, marks = self.mapper.marked(self._local_gvg(local_base), local_base)
+        self.gvg, marks = self.mapper.marked(self._local_gvg(scan, local_base), local_base)
         hazards, suspects = self._hazards.doubtful, self._maps.near.suspects()
         doubtful = np.concatenate([hazards, suspects, *self.traffic.standing])
         doubted = touching(self.gvg, doubtful)
@@ -245,13 +250,13 @@ class Pipeline:
         self._execution.obey(order)
         return done
 
-    def _local_gvg(self, local_base: Pose) -> LocalGvg:
+    def _local_gvg(self, scan: Scan, local_base: Pose) -> LocalGvg:
         """The GVG around the base, by what the local map shows and the map holds."""
         reduction, half_width = self._config.reduction, self._config.local_map.half_width_m
         fine = fine_graph(
-            self._maps.near,
+            self._tight_spots.eased(self._maps.near),
             local_base.position,
-            min_clearance=self.radius + self._config.passage_margin_m,
+            min_clearance=self._tight_spots.least_clearance(scan),
             roughness=reduction.roughness_m,
             open_clearance=self.open_clearance,
             felt=np.concatenate([self._hazards.points, *self.traffic.in_the_way]),

@@ -1,7 +1,7 @@
 """What a round robot's footprint sweeps: how far it can drive on an arc before it touches."""
 
 from collections.abc import Sequence
-from math import cos, hypot, inf, sin
+from math import cos, hypot, inf, sin, sqrt
 
 import numpy as np
 
@@ -10,6 +10,10 @@ from gvgbot.hal.messages import Odometry, Scan
 
 STRAIGHT = 1e-3  # 1/m; a flatter arc departs less than a millimetre from a line in a metre
 SAME_M = 0.05  # in range from beam to beam, on one surface
+_SAME_SIGMAS = 6.0  # and for all noise that is more than usual
+_MOST_SAME_M = 0.15
+_USUAL_NOISE_M = 0.0125  # sigma of the ranges of lasers that are as good as their data sheets
+_HALF_NORMAL = 0.6745  # sigmas: half of all errors are smaller
 LEAST = 1.0 / 3.0  # share of the margin that is kept when the robot is within it already
 
 
@@ -44,11 +48,12 @@ def evened(ranges: Array) -> Array:
     """Ranges (N,), m, each as the mean of it and two neighbours on either side on its surface.
 
     Of many beams on a wall the shortest is too short by two or three sigma. What only one beam
-    shows has no such neighbours and stays as it is.
+    shows has no such neighbours and stays as it is, unless it may be noise.
     """
     total, count = ranges.copy(), np.ones(len(ranges))
+    most = min(SAME_M + _SAME_SIGMAS * excess_noise(ranges), _MOST_SAME_M)
     with np.errstate(invalid="ignore"):  # of beams without an echo
-        is_same = np.abs(np.diff(ranges)) < SAME_M
+        is_same = np.abs(np.diff(ranges)) < most
     are_same = is_same[:-1] & is_same[1:]
     near, far = slice(None, -1), slice(1, None)
     for beams, others, same in (
@@ -60,6 +65,18 @@ def evened(ranges: Array) -> Array:
         total[beams] += np.where(same, ranges[others], 0.0)
         count[beams] += same
     return total / count
+
+
+def excess_noise(ranges: Array) -> float:
+    """By how much the sigma of ranges (N,) is more than usual, m, if most of them are of walls.
+
+    The second difference of three on one surface, (1, -2, 1), has sqrt(6) times the sigma of one.
+    """
+    with np.errstate(invalid="ignore"):  # of beams without an echo
+        bends = np.abs(np.diff(ranges, 2))
+    bends = bends[np.isfinite(bends)]
+    sigma = float(np.median(bends)) / (_HALF_NORMAL * sqrt(6.0)) if len(bends) else 0.0
+    return max(0.0, sigma - _USUAL_NOISE_M)
 
 
 def _placed(x: Array, y: Array, first: Pose, last: Pose, share: Array) -> Array:

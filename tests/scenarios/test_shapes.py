@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -207,6 +208,26 @@ def test_a_door_that_the_robot_fits_through_is_an_edge() -> None:
     assert_explored(run)
     assert len(run.vertices("meetpoint")) >= 1
     assert max(pose.y for pose in run.truth) > 1.2  # it has been inside
+
+
+@pytest.mark.parametrize("model", ["UTM-30LX", "URG-04LX"])
+def test_a_narrow_door_stays_open_for_a_noisy_laser(
+    model: Literal["UTM-30LX", "URG-04LX"],
+) -> None:
+    """Two rooms with doors of 0.5 m; sigma is 3 cm, and 7 cm are to spare on either side."""
+    rooms: list[Rectangle] = [(-5.0, 0.9, -1.0, 4.0), (1.0, -4.0, 5.0, -0.9)]
+    doors: list[Rectangle] = [(-3.26, 0.7, -2.76, 1.0), (2.74, -1.0, 3.24, -0.7)]
+    laser = HokuyoTwinConfig(model=model, range_sigma_m=0.03)
+    run = play(
+        carved([(-6.0, -0.8, 6.0, 0.8), *rooms, *doors]),
+        Pose(-5.0, 0.0, 0.0),
+        twin=TwinConfig(seed=1, laser=laser),
+    )
+    assert_explored(run)
+    assert max(pose.y for pose in run.truth) > 1.5  # it has been in both
+    assert min(pose.y for pose in run.truth) < -1.5
+    assert len(run.recoveries()) < 6
+    assert run.contacts == 0
 
 
 @pytest.mark.parametrize("width", [0.8, 2.0], ids=["narrow", "wide"])
