@@ -14,6 +14,7 @@ _SAME_SIGMAS = 6.0  # and for all noise that is more than usual
 _MOST_SAME_M = 0.15
 _USUAL_NOISE_M = 0.0125  # sigma of the ranges of lasers that are as good as their data sheets
 _HALF_NORMAL = 0.6745  # sigmas: half of all errors are smaller
+_TELLING = 0.25  # of all beams; fewer may be edges of things that stand about
 LEAST = 1.0 / 3.0  # share of the margin that is kept when the robot is within it already
 
 
@@ -68,15 +69,16 @@ def evened(ranges: Array) -> Array:
 
 
 def excess_noise(ranges: Array) -> float:
-    """By how much the sigma of ranges (N,) is more than usual, m, if most of them are of walls.
+    """By how much the sigma of ranges (N,) is more than usual, m; 0 where too few meet a wall.
 
     The second difference of three on one surface, (1, -2, 1), has sqrt(6) times the sigma of one.
     """
     with np.errstate(invalid="ignore"):  # of beams without an echo
         bends = np.abs(np.diff(ranges, 2))
     bends = bends[np.isfinite(bends)]
-    sigma = float(np.median(bends)) / (_HALF_NORMAL * sqrt(6.0)) if len(bends) else 0.0
-    return max(0.0, sigma - _USUAL_NOISE_M)
+    if len(bends) <= _TELLING * len(ranges):
+        return 0.0
+    return max(0.0, float(np.median(bends)) / (_HALF_NORMAL * sqrt(6.0)) - _USUAL_NOISE_M)
 
 
 def _placed(x: Array, y: Array, first: Pose, last: Pose, share: Array) -> Array:

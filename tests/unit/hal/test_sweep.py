@@ -209,7 +209,9 @@ def test_noise_is_told_by_the_walls_of_a_room(sigma: float, excess: float) -> No
     assert excess_noise(ranges) == pytest.approx(excess, abs=0.003)
 
 
-@pytest.mark.parametrize("ranges", [[], [1.0], [1.0, 2.0], [math.nan, inf, 1.0, inf]])
+@pytest.mark.parametrize(
+    "ranges", [[], [1.0], [1.0, 2.0], [math.nan, inf, 1.0, inf], [inf] * 9 + [1.0, 2.0, 1.0]]
+)
 def test_too_few_ranges_tell_of_no_noise(ranges: list[float]) -> None:
     assert excess_noise(np.array(ranges)) == 0.0
 
