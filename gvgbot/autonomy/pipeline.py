@@ -73,9 +73,8 @@ class Pipeline:
         """`led` if somebody else drives: it only learns, and its twists mean nothing."""
         self._config, self.radius, self.led = config, robot_radius, led
         self._maps = LocalMaps(config.local_map, config.far_map, config.scan_matching)
-        self._tight_spots = TightSpots(
-            robot_radius, config.passage_margin_m, config.local_map.memory_m
-        )
+        self._needed_m = robot_radius + config.passage_margin_m  # from its middle to walls
+        self._tight_spots = TightSpots(self._needed_m, config.local_map.memory_m)
         self.mapper = Mapper(
             config.mapping,
             config.recognition,
@@ -210,7 +209,7 @@ class Pipeline:
         self.open_clearance = self._config.reduction.open_clearance(
             scan.range_max, self._config.local_map.half_width_m
         )
-        self.gvg, marks = self.mapper.marked(self._local_gvg(scan, local_base), local_base)
+        self.gvg, marks = self.mapper.marked(self._local_gvg(local_base), local_base)
         hazards, suspects = self._hazards.doubtful, self._maps.near.suspects()
         doubtful = np.concatenate([hazards, suspects, *self.traffic.standing])
         doubted = touching(self.gvg, doubtful)
@@ -250,13 +249,13 @@ class Pipeline:
         self._execution.obey(order)
         return done
 
-    def _local_gvg(self, scan: Scan, local_base: Pose) -> LocalGvg:
+    def _local_gvg(self, local_base: Pose) -> LocalGvg:
         """The GVG around the base, by what the local map shows and the map holds."""
         reduction, half_width = self._config.reduction, self._config.local_map.half_width_m
         fine = fine_graph(
             self._tight_spots.eased(self._maps.near),
             local_base.position,
-            min_clearance=self._tight_spots.least_clearance(scan),
+            min_clearance=self._needed_m,
             roughness=reduction.roughness_m,
             open_clearance=self.open_clearance,
             felt=np.concatenate([self._hazards.points, *self.traffic.in_the_way]),

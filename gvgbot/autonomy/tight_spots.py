@@ -9,16 +9,10 @@ from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.gvg.coast import Space
 from gvgbot.geometry import Array
-from gvgbot.hal.messages import Scan
-from gvgbot.hal.sweep import excess_noise
 
 _TIGHT_M = 0.1  # more than the robot needs: where walls are as near, noise may close the way
 _STEP_M = 0.05  # between two of the spots
 _NEW = 0.5  # of the room it needs: what is nearer to where it was has come since
-# Sigmas beyond the usual by which either side of a gap comes nearer in the local map: passing a
-# door showed 5, 10 and 25 mm with a sigma of 15, 20 and 30 mm.
-_NEARER = 1.5
-_LEAST_MARGIN = 0.4  # of what is to spare, whatever the noise
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,10 +36,9 @@ class TightSpots:
     the door, or in the room behind.
     """
 
-    def __init__(self, radius: float, margin: float, memory_m: float) -> None:
-        """Of a robot that wants a margin, m, to each side; they last for `memory_m` driven."""
-        self._radius, self._margin, self._memory = radius, margin, memory_m
-        self._room = radius + margin
+    def __init__(self, room_m: float, memory_m: float) -> None:
+        """The robot needs `room_m` from its middle to walls; spots last for `memory_m` driven."""
+        self._room, self._memory = room_m, memory_m
         self._spots: deque[tuple[float, Array]] = deque()  # metres driven, and positions (N, 2)
         self._last: Array | None = None
 
@@ -59,11 +52,6 @@ class TightSpots:
         before = position if before is None else before
         steps = 1 + round(float(np.hypot(*(position - before))) / _STEP_M)
         self._spots.append((travelled, np.linspace(before, position, steps)))
-
-    def least_clearance(self, scan: Scan) -> float:
-        """How far, m, the middle of the robot has to be from walls as a local map shows them."""
-        nearer = _NEARER * excess_noise(scan.ranges)
-        return self._radius + max(self._margin - nearer, _LEAST_MARGIN * self._margin)
 
     def eased(self, space: Space) -> Space:
         """The space, with its walls as far off from where the robot was as it needs."""
