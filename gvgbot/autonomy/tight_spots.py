@@ -12,6 +12,7 @@ from gvgbot.geometry import Array
 
 _TIGHT_M = 0.1  # more than the robot needs: where walls are as near, noise may close the way
 _STEP_M = 0.05  # between two of the spots
+_FARTHEST_M = 0.5  # from one position to the next, if it was driven
 _NEW = 0.5  # of the room it needs: what is nearer to where it was has come since
 
 
@@ -44,14 +45,17 @@ class TightSpots:
 
     def note(self, position: Array, walls: Array, travelled: float) -> None:
         """Account for a position (2,) among walls (N, 2), after so many metres driven."""
-        before, self._last = self._last, position
+        before = position if self._last is None else self._last
+        moved = float(np.hypot(*(position - before)))
+        if self._last is not None and moved < _STEP_M / 2:
+            return
+        self._last = position
         while self._spots and self._spots[0][0] < travelled - self._memory:
             self._spots.popleft()
         if not len(walls) or np.hypot(*(walls - position).T).min() > self._room + _TIGHT_M:
             return
-        before = position if before is None else before
-        steps = 1 + round(float(np.hypot(*(position - before))) / _STEP_M)
-        self._spots.append((travelled, np.linspace(before, position, steps)))
+        steps = 1 + round(moved / _STEP_M) if moved < _FARTHEST_M else 1
+        self._spots.append((travelled, np.linspace(position, before, steps)))
 
     def eased(self, space: Space) -> Space:
         """The space, with its walls as far off from where the robot was as it needs."""

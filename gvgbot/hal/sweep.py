@@ -11,7 +11,7 @@ from gvgbot.hal.messages import Odometry, Scan
 STRAIGHT = 1e-3  # 1/m; a flatter arc departs less than a millimetre from a line in a metre
 SAME_M = 0.05  # in range from beam to beam, on one surface
 _SAME_SIGMAS = 6.0  # and for all noise that is more than usual
-_MOST_SAME_M = 0.15
+_MOST_SAME_M = 0.15  # whatever the noise
 _USUAL_NOISE_M = 0.0125  # sigma of the ranges of lasers that are as good as their data sheets
 _HALF_NORMAL = 0.6745  # sigmas: half of all errors are smaller
 _TELLING = 0.25  # of all beams; fewer may be edges of things that stand about

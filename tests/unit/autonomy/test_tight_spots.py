@@ -90,3 +90,18 @@ def test_a_spot_is_forgotten_when_the_robot_has_driven_on() -> None:
     spots = driven(2.0, walls)
     spots.note(np.array([2.0, 0.0]), walls.points(), 1.0 + MEMORY)
     assert not reaches_beyond(spots, walls)
+
+
+def test_who_was_carried_through_a_wall_has_not_driven_there() -> None:
+    walls = two_rooms(0.40)
+    spots = TightSpots(ROOM, MEMORY)
+    for x, travelled in ((-0.26, 0.0), (0.26, 0.52)):
+        spots.note(np.array([x, 0.0]), walls.points(), travelled)
+    assert not reaches_beyond(spots, walls)
+
+
+def test_a_robot_that_stands_remembers_no_more_than_one_that_drives() -> None:
+    walls, spots = two_rooms(0.40), TightSpots(ROOM, MEMORY)
+    for _ in range(1000):
+        spots.note(np.array([0.0, 0.001]), walls.points(), 0.0)
+    assert len(spots._spots) == 1
