@@ -39,6 +39,7 @@ from gvgbot.autonomy.views import Correspondence, View, touching
 from gvgbot.geometry import STANDSTILL, Array, Pose, Twist, rotated_covariance, wrap_angle
 from gvgbot.hal.deskew import deskewed
 from gvgbot.hal.messages import Odometry, Scan
+from gvgbot.hal.sweep import excess_noise
 
 _NOTHING_FELT = Felt()
 _LIFTED = np.diag([0.3**2, 0.3**2, 0.1**2])  # how far a robot is carried that is put down again
@@ -176,7 +177,10 @@ class Pipeline:
         for one in self.traffic.nearby(self._local_map(local_base)):
             self._maps.near.stand_on(one.pose.position, one.radius, self.past.travelled)
         self._maps.insert(scan, local_base, self.past.travelled, free)
-        self._tight_spots.note(local_base.position, self._maps.near.points(), self.past.travelled)
+        if excess_noise(whole.ranges):
+            self._tight_spots.note(
+                local_base.position, self._maps.near.points(), self.past.travelled
+            )
         self._hazards.forget(self.past.travelled)
         if self.led and not self._worth_a_gvg(local_base):
             self.past.keep(scan, odom_base, local_base, self.mapper.belief.map_base)

@@ -13,7 +13,7 @@ from gvgbot.geometry import Array
 _TIGHT_M = 0.1  # more than the robot needs: where walls are as near, noise may close the way
 _STEP_M = 0.05  # between two of the spots
 _FARTHEST_M = 0.5  # from one position to the next, if it was driven
-_NEW = 0.5  # of the room it needs: what is nearer to where it was has come since
+_NOISE_M = 0.11  # what is nearer to where it was than it needs, by more than this, has come since
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,8 +33,8 @@ class _Eased:
 class TightSpots:
     """Where the middle of the robot was, local frame, with walls nearer than it needs, or nearly.
 
-    It fits there, however near they may seem. A door would close behind it otherwise while it is in
-    the door, or in the room behind.
+    It fits there, though they may seem nearer to a noisy laser. A door would close behind it
+    otherwise while it is in the door, or in the room behind.
     """
 
     def __init__(self, room_m: float, memory_m: float) -> None:
@@ -44,7 +44,7 @@ class TightSpots:
         self._last: Array | None = None
 
     def note(self, position: Array, walls: Array, travelled: float) -> None:
-        """Account for a position (2,) among walls (N, 2), after so many metres driven."""
+        """Account for a position (2,) among noisy walls (N, 2), after so many metres driven."""
         before = position if self._last is None else self._last
         moved = float(np.hypot(*(position - before)))
         if self._last is not None and moved < _STEP_M / 2:
@@ -65,7 +65,7 @@ class TightSpots:
         spots = np.concatenate([spots for _, spots in self._spots])
         away, nearest = (np.asarray(found) for found in cKDTree(spots).query(walls))
         needed = self._room + _STEP_M / 8  # so that there is room between two spots as well
-        near = np.flatnonzero((away < needed) & (away > _NEW * self._room))
+        near = np.flatnonzero((away < needed) & (away > self._room - _NOISE_M))
         if not len(near):
             return space
         walls, spot = walls.copy(), spots[nearest[near]]
