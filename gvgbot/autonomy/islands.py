@@ -8,9 +8,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from gvgbot.autonomy.roundness import SURE, range_noise, round_evidence
+from gvgbot.autonomy.roundness import SURE, round_evidence
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
+from gvgbot.hal.noise import range_noise
 
 _STEP_M = 0.3  # in range from beam to beam, at the rim of something that stands free
 _SMOOTH_M = 0.15  # in range from beam to beam, on it: two legs of a chair are farther apart

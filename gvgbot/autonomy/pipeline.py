@@ -39,7 +39,7 @@ from gvgbot.autonomy.views import Correspondence, View, touching
 from gvgbot.geometry import STANDSTILL, Array, Pose, Twist, rotated_covariance, wrap_angle
 from gvgbot.hal.deskew import deskewed
 from gvgbot.hal.messages import Odometry, Scan
-from gvgbot.hal.sweep import excess_noise
+from gvgbot.hal.noise import excess_noise
 
 _NOTHING_FELT = Felt()
 _LIFTED = np.diag([0.3**2, 0.3**2, 0.1**2])  # how far a robot is carried that is put down again

@@ -22,18 +22,6 @@ _STEPS = 5
 _NEGLIGIBLE_M = 1e-4
 _LEAST_BEAMS = 5  # that tell where a body of known radius is
 _LOOSE_M = 0.03  # by which beams that end on such a body stray, and its width
-_MEDIAN = 0.6745  # sigma: half of the errors are smaller
-
-
-def range_noise(ranges: Array) -> float:
-    """The noise, 1 sigma in m, by how ranges (N,) stray from the mean of their neighbours."""
-    told = np.where(np.isfinite(ranges), ranges, np.nan)
-    stray = np.abs(told[:-2] - 2.0 * told[1:-1] + told[2:])
-    stray = np.sort(stray[~np.isnan(stray)])  # for the median: np.median is slow
-    if not len(stray):
-        return 0.0
-    median = float(stray[(len(stray) - 1) // 2] + stray[len(stray) // 2]) / 2
-    return median / (_MEDIAN * math.sqrt(6.0))
 
 
 def round_evidence(

@@ -1,20 +1,18 @@
 """What a round robot's footprint sweeps: how far it can drive on an arc before it touches."""
 
 from collections.abc import Sequence
-from math import cos, hypot, inf, sin, sqrt
+from math import cos, hypot, inf, sin
 
 import numpy as np
 
 from gvgbot.geometry import Array, Pose, Twist, wrap_angle
 from gvgbot.hal.messages import Odometry, Scan
+from gvgbot.hal.noise import excess_noise
 
 STRAIGHT = 1e-3  # 1/m; a flatter arc departs less than a millimetre from a line in a metre
 SAME_M = 0.05  # in range from beam to beam, on one surface
 _SAME_SIGMAS = 6.0  # and for all noise that is more than usual
 _MOST_SAME_M = 0.15  # whatever the noise
-_USUAL_NOISE_M = 0.0125  # sigma of the ranges of lasers that are as good as their data sheets
-_HALF_NORMAL = 0.6745  # sigmas: half of all errors are smaller
-_TELLING = 0.25  # of all beams; fewer may be edges of things that stand about
 LEAST = 1.0 / 3.0  # share of the margin that is kept when the robot is within it already
 
 
@@ -66,19 +64,6 @@ def evened(ranges: Array) -> Array:
         total[beams] += np.where(same, ranges[others], 0.0)
         count[beams] += same
     return total / count
-
-
-def excess_noise(ranges: Array) -> float:
-    """By how much the sigma of ranges (N,) is more than usual, m; 0 where too few meet a wall.
-
-    The second difference of three on one surface, (1, -2, 1), has sqrt(6) times the sigma of one.
-    """
-    with np.errstate(invalid="ignore"):  # of beams without an echo
-        bends = np.abs(np.diff(ranges, 2))
-    bends = bends[np.isfinite(bends)]
-    if len(bends) <= _TELLING * len(ranges):
-        return 0.0
-    return max(0.0, float(np.median(bends)) / (_HALF_NORMAL * sqrt(6.0)) - _USUAL_NOISE_M)
 
 
 def _placed(x: Array, y: Array, first: Pose, last: Pose, share: Array) -> Array:

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from gvgbot.autonomy.roundness import SURE, body_of, range_noise, round_evidence, with_look
+from gvgbot.autonomy.roundness import SURE, body_of, round_evidence, with_look
 from gvgbot.geometry import Array
 
 EYE = np.zeros(2)
@@ -131,20 +131,3 @@ def test_what_goes_back_farther_than_a_body_or_is_hardly_seen_is_none() -> None:
     disc = to_disc(bearings, 22.0, ROBOT)
     points = np.stack([disc * np.cos(bearings), disc * np.sin(bearings)], axis=1)
     assert body_of(points[np.isfinite(disc)], EYE, ROBOT) is None
-
-
-@pytest.mark.parametrize("noise", [0.0, 0.01, 0.03])
-def test_the_noise_is_measured_whatever_stands_in_the_room(noise: float) -> None:
-    bearings, rng = np.arange(-2.0, 2.0, FINE), np.random.default_rng(4)
-    with np.errstate(divide="ignore"):
-        walls = np.minimum(ROOM[0] / np.abs(np.cos(bearings)), ROOM[1] / np.abs(np.sin(bearings)))
-    ranges = np.minimum(walls, to_box(bearings, 2.5, (0.3, 0.3), 0.4))
-    ranges = np.where(rng.random(len(ranges)) < 0.02, np.nan, ranges)
-    ranges[:30] = np.inf
-    assert range_noise(ranges + noise * rng.standard_normal(len(ranges))) == pytest.approx(
-        noise, rel=0.1, abs=1e-3
-    )
-
-
-def test_a_blind_laser_has_no_noise_to_measure() -> None:
-    assert range_noise(np.full(100, np.nan)) == 0.0

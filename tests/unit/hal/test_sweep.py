@@ -13,7 +13,6 @@ from gvgbot.geometry import Array, Pose, Twist
 from gvgbot.hal.messages import Odometry, Scan
 from gvgbot.hal.sweep import (
     evened,
-    excess_noise,
     free_distance,
     has_sight,
     obstacle_points,
@@ -193,27 +192,6 @@ def test_a_door_lets_the_robot_through_in_spite_of_a_noisy_laser(step: float, wi
         way = free_distance((points[:, 0], points[:, 1]), Twist(0.2, 0.0), radius=RADIUS, margin=0)
         stopped += way < 0.1
     assert stopped < 8
-
-
-@pytest.mark.parametrize(
-    ("sigma", "excess"), [(0.0, 0.0), (0.01, 0.0), (0.02, 0.0075), (0.03, 0.0175)]
-)
-def test_noise_is_told_by_the_walls_of_a_room(sigma: float, excess: float) -> None:
-    """Of 6 by 4 m, whose door opens on nothing within reach; a usual sigma is up to 12.5 mm."""
-    rng = np.random.default_rng(1)
-    bearings = np.arange(-2.0, 2.0, math.radians(0.36))
-    x, y = np.abs(np.cos(bearings)), np.abs(np.sin(bearings))
-    ranges = np.minimum(3.0 / x, 2.0 / np.maximum(y, 1e-9)) + rng.normal(0.0, sigma, len(x))
-    ranges[100:140] = inf
-    ranges[300:320] = math.nan
-    assert excess_noise(ranges) == pytest.approx(excess, abs=0.003)
-
-
-@pytest.mark.parametrize(
-    "ranges", [[], [1.0], [1.0, 2.0], [math.nan, inf, 1.0, inf], [inf] * 9 + [1.0, 2.0, 1.0]]
-)
-def test_too_few_ranges_tell_of_no_noise(ranges: list[float]) -> None:
-    assert excess_noise(np.array(ranges)) == 0.0
 
 
 @pytest.mark.parametrize("beams", [1, 2])
