@@ -31,15 +31,14 @@ from gvgbot.autonomy.keyframes import Keyframe, Past, Step, has_come_on
 from gvgbot.autonomy.localisation import Localisation, LocalMaps, Match
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.mission import Mission
+from gvgbot.autonomy.noisy_walls import NoisyWalls
 from gvgbot.autonomy.odometry_log import OdometryLog
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
-from gvgbot.autonomy.tight_spots import TightSpots
 from gvgbot.autonomy.traffic import Traffic
 from gvgbot.autonomy.views import Correspondence, View, touching
 from gvgbot.geometry import STANDSTILL, Array, Pose, Twist, rotated_covariance, wrap_angle
 from gvgbot.hal.deskew import deskewed
 from gvgbot.hal.messages import Odometry, Scan
-from gvgbot.hal.noise import excess_noise
 
 _NOTHING_FELT = Felt()
 _LIFTED = np.diag([0.3**2, 0.3**2, 0.1**2])  # how far a robot is carried that is put down again
@@ -75,7 +74,7 @@ class Pipeline:
         self._config, self.radius, self.led = config, robot_radius, led
         self._maps = LocalMaps(config.local_map, config.far_map, config.scan_matching)
         self._needed_m = robot_radius + config.passage_margin_m  # from its middle to walls
-        self._tight_spots = TightSpots(self._needed_m, config.local_map.memory_m)
+        self._noisy_walls = NoisyWalls(self._needed_m, config.local_map)
         self.mapper = Mapper(
             config.mapping,
             config.recognition,
@@ -177,10 +176,7 @@ class Pipeline:
         for one in self.traffic.nearby(self._local_map(local_base)):
             self._maps.near.stand_on(one.pose.position, one.radius, self.past.travelled)
         self._maps.insert(scan, local_base, self.past.travelled, free)
-        if excess_noise(whole.ranges):
-            self._tight_spots.note(
-                local_base.position, self._maps.near.points(), self.past.travelled
-            )
+        self._noisy_walls.note(whole, local_base.position, self._maps.near, self.past.travelled)
         self._hazards.forget(self.past.travelled)
         if self.led and not self._worth_a_gvg(local_base):
             self.past.keep(scan, odom_base, local_base, self.mapper.belief.map_base)
@@ -257,7 +253,7 @@ class Pipeline:
         """The GVG around the base, by what the local map shows and the map holds."""
         reduction, half_width = self._config.reduction, self._config.local_map.half_width_m
         fine = fine_graph(
-            self._tight_spots.eased(self._maps.near),
+            self._noisy_walls.drawn(self._maps.near),
             local_base.position,
             min_clearance=self._needed_m,
             roughness=reduction.roughness_m,

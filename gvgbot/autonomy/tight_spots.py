@@ -1,33 +1,16 @@
 """Where the robot just fits: a noisy laser makes gaps look narrower than they are."""
 
 from collections import deque
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from gvgbot.autonomy.gvg.coast import Space
 from gvgbot.geometry import Array
 
 _TIGHT_M = 0.1  # more than the robot needs: where walls are as near, noise may close the way
 _STEP_M = 0.05  # between two of the spots
 _FARTHEST_M = 0.5  # from one position to the next, if it was driven
 _NOISE_M = 0.11  # what is nearer to where it was than it needs, by more than this, has come since
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Eased:
-    """A space whose walls give way."""
-
-    space: Space
-    walls: Array
-
-    def points(self) -> Array:
-        return self.walls
-
-    def known(self, points: Array) -> NDArray[np.bool_]:
-        return self.space.known(points)
 
 
 class TightSpots:
@@ -57,17 +40,16 @@ class TightSpots:
         steps = 1 + round(moved / _STEP_M) if moved < _FARTHEST_M else 1
         self._spots.append((travelled, np.linspace(position, before, steps)))
 
-    def eased(self, space: Space) -> Space:
-        """The space, with its walls as far off from where the robot was as it needs."""
-        walls = space.points()
+    def eased(self, walls: Array) -> Array:
+        """Walls (N, 2), as far off from where the robot was as it needs."""
         if not self._spots or not len(walls):
-            return space
+            return walls
         spots = np.concatenate([spots for _, spots in self._spots])
         away, nearest = (np.asarray(found) for found in cKDTree(spots).query(walls))
         needed = self._room + _STEP_M / 8  # so that there is room between two spots as well
         near = np.flatnonzero((away < needed) & (away > self._room - _NOISE_M))
         if not len(near):
-            return space
+            return walls
         walls, spot = walls.copy(), spots[nearest[near]]
         walls[near] = spot + (walls[near] - spot) * (needed / away[near])[:, None]
-        return _Eased(space, walls)
+        return walls
