@@ -50,6 +50,7 @@ class HokuyoTwinConfig:
 
     model: ModelName = "UTM-30LX"  # which laser it is
     range_sigma_m: Fraction = 0.01  # noise of a range
+    range_sigma_share: Fraction = 0.0  # of the range, where that is more
     dropout_fraction: Fraction = 0.005  # of the beams: nothing measured
     mixed_pixel_fraction: Fraction = 0.0  # of the edges: a beam between near and far
     double_echo_fraction: Fraction = 0.02  # beams that something thin reflects on their way

@@ -43,11 +43,15 @@ def with_mixed_pixels(ranges: Array, fraction: float, rng: np.random.Generator) 
 
 
 def noisy_readings(
-    ranges: Array, model: Model, sigma: float, dropout_fraction: float, rng: np.random.Generator
+    ranges: Array,
+    model: Model,
+    sigma: float | Array,
+    dropout_fraction: float,
+    rng: np.random.Generator,
 ) -> Values:
     """Readings (N,) in mm or the model's error codes, of true ranges (N,) in m, inf = nothing.
 
-    `sigma` is the range noise in m.
+    `sigma` is the range noise in m, of all or of each (N,).
     """
     noisy_mm = (ranges + sigma * rng.standard_normal(len(ranges))) * 1000.0
     beyond = model.usable_mm + 1

@@ -218,6 +218,18 @@ def test_readings_have_the_noise_and_the_codes_of_the_model() -> None:
     assert valid.mean() == pytest.approx(10_000, abs=0.2)
 
 
+@pytest.mark.parametrize(("metres", "sigma_mm"), [(0.5, 10.0), (4.0, 40.0), (8.0, 80.0)])
+def test_noise_may_grow_with_the_range(metres: float, sigma_mm: float) -> None:
+    """A centimetre, and 1 % of the range from a metre on."""
+    config = HokuyoTwinConfig(
+        range_sigma_m=0.01, range_sigma_share=0.01, dropout_fraction=0.0, clock_drift_ppm=0.0
+    )
+    twin = HokuyoTwin(config, lambda _: np.full(1081, metres), 0)
+    twin.receive(b"MD0000108001020\n", 0.0)
+    read = np.concatenate([message.ranges for _, message in frames(twin, 1.0)])
+    assert read.std() == pytest.approx(sigma_mm, rel=0.03)
+
+
 def test_what_cannot_be_measured_comes_as_a_code() -> None:
     truth = np.array([math.inf, 31.0, 30.0, 0.0, 0.0225, 0.023, math.nan])
     readings = noisy_readings(truth, MODELS["UTM-30LX"], 0.0, 0.0, np.random.default_rng(0))
