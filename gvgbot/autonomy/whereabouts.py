@@ -20,6 +20,7 @@ _PAST_M = 0.5  # a vertex: to turn back to it would be in vain
 _LEFT_M, _ASIDE_M = (0.1, 0.8), 0.4  # past a vertex, and beside the way that leaves it
 _BESIDE_M = 0.2, 1.5  # from the edge, the trail goes on beside the robot, on the edge
 _ABREAST_M = 0.15  # along its edge, the robot came from neither side
+_SAME_RAD = 0.7  # from its departure, the trail has come over that
 _BACK_M = 0.8  # how far back along the trail one looks to tell ahead from behind
 
 
@@ -164,6 +165,8 @@ class Whereabouts:
             return left
         came_over = gvg.place(trail[np.nonzero(away)[0][-1]]) if away.any() else None
         if came_over is None or came_over.distance > _AWAY_M:
+            if away.any() and not away[-1]:
+                return _half_edge_towards(trail[np.nonzero(away)[0][-1]], gvg, known, node)
             came_over = place
         _, path = gvg.routes(came_over).get(node, (0.0, ()))
         if not path or any(gvg.end_of(branch) in known.vertex_of for branch in path[:-1]):
@@ -207,6 +210,22 @@ class Whereabouts:
             return Branch(place.edge, forward=offset > 0)
         same = abs(wrap_angle(math.atan2(along[1], along[0]) - local_base.theta)) < math.pi / 2
         return Branch(place.edge, forward=not same)
+
+
+def _half_edge_towards(
+    point: Array, gvg: LocalGvg, known: Correspondence, node: int
+) -> HalfEdgeId | None:
+    """The half-edge that leaves a node towards a point (2,) to which no known way leads."""
+    x, y = point - gvg.nodes[node].position
+
+    def turn(branch: Branch) -> float:
+        bearing = gvg.bearing(branch, gvg.nodes[node].clearance)
+        return abs(wrap_angle(bearing - math.atan2(y, x)))
+
+    nearest = min(gvg.nodes[node].branches, key=turn, default=None)
+    if nearest is None or turn(nearest) > _SAME_RAD:
+        return None
+    return known.half_edge_of.get(nearest)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

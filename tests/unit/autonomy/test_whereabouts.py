@@ -126,6 +126,25 @@ def test_a_way_back_beside_the_edge_is_taken_off_the_trail_too() -> None:
     assert walk.where.trail_length == pytest.approx(2.0, abs=0.5)  # _LOOP_M, and a step
 
 
+@pytest.mark.parametrize(("stub", "arrived"), [((5.97, 0.01), HalfEdgeId(2, WEST)), (None, None)])
+def test_who_has_passed_a_meetpoint_came_from_behind_it_though_no_way_is_seen_there(
+    stub: Point | None, arrived: HalfEdgeId | None
+) -> None:
+    """Half a metre past it there is but the beginning of the way behind, or not even that."""
+    unknown = known_as({Branch(10, forward=True): HalfEdgeId(1, EAST)}, {1: 1})
+    walk = Walk().along(CORRIDOR, unknown, (1.05, 0.0), (6.45, 0.0))
+    points: dict[int, Point] = {2: (6.0, 0.0), 3: (12.0, 0.0)}
+    lines: dict[int, tuple[int, int, list[Point]]] = {11: (2, 3, [])}
+    ends = {Branch(11, forward=True): HalfEdgeId(2, EAST)}
+    if stub is not None:
+        points[5], lines[13] = stub, (2, 5, [])
+        ends[Branch(13, forward=True)] = HalfEdgeId(2, WEST)
+    walk.along(drawn(points, lines), known_as(ends, {2: 2}), (6.5, 0.0), (6.6, 0.0))
+    (passed,) = walk.passages[1:]
+    assert (passed.left, passed.arrived) == (HalfEdgeId(1, EAST), arrived)
+    assert walk.where.on_edge == HalfEdgeId(2, EAST)
+
+
 def test_a_meetpoint_seen_only_after_it_was_passed_is_still_passed_by_the_edge_before() -> None:
     """The vertex enters the map when the robot is already a metre beyond it."""
     unknown = known_as({Branch(10, forward=True): HalfEdgeId(1, EAST)}, {1: 1})
