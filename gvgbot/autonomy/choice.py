@@ -10,9 +10,9 @@ from gvgbot.autonomy.exploration.ears import ear_next, nearest_frontier
 from gvgbot.autonomy.exploration.paths import Approach, shortest_path
 from gvgbot.autonomy.exploration.sharing import Sharing
 from gvgbot.autonomy.mapping import Mapper
+from gvgbot.autonomy.situation import Situation
 from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.autonomy.views import View
-from gvgbot.autonomy.whereabouts import Situation
 
 _LED_M = 1.0, 4.0  # ahead: who drives there behind others need not
 _WORTH_TURNING_M = 1.0  # a new frontier must be so much nearer than the old one

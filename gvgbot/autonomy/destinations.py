@@ -7,9 +7,9 @@ import numpy as np
 from gvgbot.autonomy.exploration.paths import Approach, first_arrival, shortest_path, shortest_paths
 from gvgbot.autonomy.gvg.local import Branch
 from gvgbot.autonomy.mapping import Mapper
+from gvgbot.autonomy.situation import Situation
 from gvgbot.autonomy.slam.graph import Edge, GvgGraph, HalfEdgeId
 from gvgbot.autonomy.views import View
-from gvgbot.autonomy.whereabouts import Situation
 from gvgbot.geometry import Array, length_of, stations_of
 
 

@@ -16,9 +16,9 @@ from gvgbot.autonomy.overlooked import Overlooked
 from gvgbot.autonomy.pursuit import Pursuit
 from gvgbot.autonomy.scouting import Scouting
 from gvgbot.autonomy.search import NO_EDGE, Search
+from gvgbot.autonomy.situation import Situation
 from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.autonomy.views import Correspondence, View
-from gvgbot.autonomy.whereabouts import Situation
 from gvgbot.geometry import Array, Pose, wrap_angle
 
 

@@ -15,9 +15,9 @@ from gvgbot.autonomy.control.company import (
 from gvgbot.autonomy.control.edge_follower import Track
 from gvgbot.autonomy.control.orders import ARRIVED_M
 from gvgbot.autonomy.mapping import Mapper
+from gvgbot.autonomy.situation import Situation
 from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.autonomy.views import View
-from gvgbot.autonomy.whereabouts import Situation
 from gvgbot.geometry import Array, Pose
 
 

@@ -3,9 +3,9 @@
 import math
 from collections.abc import Iterator
 
+from gvgbot.autonomy.situation import Situation
 from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.autonomy.views import View
-from gvgbot.autonomy.whereabouts import Situation
 
 _AT_M = 0.5  # from a vertex, all of it is to be seen by turning
 _OVERLAP_RAD = 0.2  # by which it is turned farther

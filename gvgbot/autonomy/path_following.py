@@ -11,8 +11,8 @@ from gvgbot.autonomy.exploration.headway import Headway
 from gvgbot.autonomy.exploration.hindrance import Hindrance
 from gvgbot.autonomy.gvg.local import Branch
 from gvgbot.autonomy.neighbours import Neighbours
+from gvgbot.autonomy.situation import Situation
 from gvgbot.autonomy.views import View
-from gvgbot.autonomy.whereabouts import Situation
 
 _MOST_LOOKS = 2  # around, before nothing more is to be seen
 _FACING_RAD = 1.0  # looking so far past a thing, one would not see it go

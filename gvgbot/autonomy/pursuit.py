@@ -14,10 +14,11 @@ from gvgbot.autonomy.path_following import PathFollowing
 from gvgbot.autonomy.progress import Progress
 from gvgbot.autonomy.retracing import Retracing
 from gvgbot.autonomy.scouting import Scouting
+from gvgbot.autonomy.situation import Situation
 from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.autonomy.topology import piece_of
 from gvgbot.autonomy.views import View
-from gvgbot.autonomy.whereabouts import Situation, Whereabouts
+from gvgbot.autonomy.whereabouts import Whereabouts
 
 _UNSEEN = "the way on is not to be seen"
 _SECOND = 1  # try, in the end, of what was given up: things may have changed

@@ -8,8 +8,8 @@ from gvgbot.autonomy.control.edge_follower import Track
 from gvgbot.autonomy.control.orders import ARRIVED_M
 from gvgbot.autonomy.exploration.paths import first_arrival, shortest_paths
 from gvgbot.autonomy.gvg.local import Branch
+from gvgbot.autonomy.situation import Situation
 from gvgbot.autonomy.slam.ekf import Belief
-from gvgbot.autonomy.whereabouts import Situation
 from gvgbot.geometry import Array
 
 _MOST_NEAR = 2  # vertices to go to, for each that no known way leads to

@@ -11,8 +11,8 @@ from gvgbot.autonomy.events import ErrandEnded, Event
 from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.mission import Mission
+from gvgbot.autonomy.situation import Situation
 from gvgbot.autonomy.views import Correspondence, View
-from gvgbot.autonomy.whereabouts import Situation
 from gvgbot.geometry import STANDSTILL, Twist
 
 _MOST_STOPS = 10  # that are passed at once

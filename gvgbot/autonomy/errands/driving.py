@@ -30,9 +30,9 @@ from gvgbot.autonomy.exploration.certainty import robot_sigma
 from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.mission import Mission
+from gvgbot.autonomy.situation import Situation
 from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.autonomy.views import Correspondence, View
-from gvgbot.autonomy.whereabouts import Situation
 from gvgbot.geometry import Array, wrap_angle
 
 _OFF_GRAPH_M = 3.0  # a point farther from every edge is out of reach

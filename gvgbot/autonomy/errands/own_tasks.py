@@ -14,8 +14,8 @@ from gvgbot.autonomy.exploration.certainty import CertaintyConfig, Revisiting
 from gvgbot.autonomy.exploration.unseen import Unseen
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.mission import Mission
+from gvgbot.autonomy.situation import Situation
 from gvgbot.autonomy.views import View
-from gvgbot.autonomy.whereabouts import Situation
 from gvgbot.geometry import Array
 
 _DRIVEN_ON_M = 0.5  # what can be seen there is new

@@ -8,11 +8,12 @@ from gvgbot.autonomy.exploration.access import Access
 from gvgbot.autonomy.gvg.local import LocalGvg
 from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
 from gvgbot.autonomy.mapping import Mapper
+from gvgbot.autonomy.situation import Situation
 from gvgbot.autonomy.slam.graph import GvgGraph
 from gvgbot.autonomy.slam.recognition import RecognitionConfig
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
 from gvgbot.autonomy.views import Correspondence, View
-from gvgbot.autonomy.whereabouts import Situation, Whereabouts
+from gvgbot.autonomy.whereabouts import Whereabouts
 from gvgbot.geometry import Pose
 from tests.unit.autonomy.local_graphs import drawn
 

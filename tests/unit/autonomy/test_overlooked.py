@@ -10,9 +10,10 @@ from gvgbot.autonomy.exploration.access import access
 from gvgbot.autonomy.gvg.local import Branch, LocalGvg
 from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
 from gvgbot.autonomy.overlooked import Overlooked
+from gvgbot.autonomy.situation import Situation
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex
 from gvgbot.autonomy.views import Correspondence, View
-from gvgbot.autonomy.whereabouts import Situation, Whereabouts
+from gvgbot.autonomy.whereabouts import Whereabouts
 from gvgbot.geometry import Pose
 from tests.unit.autonomy.local_graphs import drawn
 

@@ -8,10 +8,11 @@ import pytest
 from gvgbot.autonomy.exploration.access import Access
 from gvgbot.autonomy.gvg.local import Branch
 from gvgbot.autonomy.scouting import Scouting
+from gvgbot.autonomy.situation import Situation
 from gvgbot.autonomy.slam.ekf import Belief, add_vertex
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex
 from gvgbot.autonomy.views import Correspondence
-from gvgbot.autonomy.whereabouts import Situation, Whereabouts
+from gvgbot.autonomy.whereabouts import Whereabouts
 from gvgbot.geometry import Pose
 from tests.unit.autonomy.local_graphs import drawn
 
