@@ -14,7 +14,6 @@ from gvgbot.autonomy.whereabouts import Whereabouts
 from gvgbot.geometry import Array, Pose, wrap_angle
 
 _PAST_M = 0.5  # a vertex: to turn back to it would be in vain
-_DRIVEN_M = 0.4  # nearer to the trail, a way ends where the robot has come from
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -182,11 +181,8 @@ class Situation:
 
     def _leads_back(self, branch: Branch) -> bool:
         """Whether a branch ends where the robot has come from: as one round another one does."""
-        if not self.in_team:
-            return False
         end = self.gvg.nodes[self.gvg.end_of(branch)].position
-        trail = np.array(self.where.trail).reshape(-1, 2)
-        return bool((np.hypot(*(trail - end).T) < _DRIVEN_M).any())
+        return self.in_team and self.where.has_come_by(end)
 
     def _turn(self, branch: Branch, node: LocalNode, straight: float) -> float:
         """How much a branch turns away from straight on, rad."""

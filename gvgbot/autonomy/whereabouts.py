@@ -7,6 +7,7 @@ import numpy as np
 
 from gvgbot.autonomy.gvg.local import Branch, LocalGvg, Place
 from gvgbot.autonomy.slam.graph import HalfEdgeId
+from gvgbot.autonomy.slam.recognition import match_bearings
 from gvgbot.autonomy.views import Correspondence
 from gvgbot.geometry import Array, Pose, length_of, wrap_angle
 
@@ -44,6 +45,10 @@ class Whereabouts:
     def trail_length(self) -> float:
         """Metres driven along the edge since its vertex."""
         return length_of(np.array(self.trail).reshape(-1, 2))
+
+    def has_come_by(self, point: Array) -> bool:
+        """Whether the trail passes a point (2,), local frame."""
+        return bool((np.hypot(*(np.array(self.trail).reshape(-1, 2) - point).T) < _LOOP_M).any())
 
     def way_back(self, base: Array) -> Array:
         """The way (N, 2) back over where the robot came from, from beside it to its vertex."""
@@ -160,10 +165,11 @@ class Whereabouts:
         left = self.on_edge
         if left is not None and left.vertex == known.vertex_of.get(node) and not away.any():
             return left
-        came_over = gvg.place(trail[np.nonzero(away)[0][-1]]) if away.any() else None
+        outside = trail[away][-1:]  # the last point there
+        came_over = gvg.place(outside[0]) if len(outside) else None
         if came_over is None or came_over.distance > _AWAY_M:
-            if away.any() and not away[-1]:
-                return _half_edge_towards(trail[np.nonzero(away)[0][-1]], gvg, known, node)
+            if len(outside) and not away[-1]:
+                return _half_edge_towards(outside[0], gvg, known, node)
             came_over = place
         _, path = gvg.routes(came_over).get(node, (0.0, ()))
         if not path or any(gvg.end_of(branch) in known.vertex_of for branch in path[:-1]):
@@ -214,12 +220,7 @@ def _half_edge_towards(
 ) -> HalfEdgeId | None:
     """The half-edge that leaves a node towards a point (2,) to which no known way leads."""
     x, y = point - gvg.nodes[node].position
-
-    def turn(branch: Branch) -> float:
-        bearing = gvg.bearing(branch, gvg.nodes[node].clearance)
-        return abs(wrap_angle(bearing - math.atan2(y, x)))
-
-    nearest = min(gvg.nodes[node].branches, key=turn, default=None)
-    if nearest is None or turn(nearest) > _SAME_RAD:
-        return None
-    return known.half_edge_of.get(nearest)
+    branches, clearance = gvg.nodes[node].branches, gvg.nodes[node].clearance
+    bearings = {i: gvg.bearing(branch, clearance) for i, branch in enumerate(branches)}
+    matched = match_bearings((math.atan2(y, x),), bearings, _SAME_RAD)
+    return known.half_edge_of.get(branches[matched[0]]) if matched else None

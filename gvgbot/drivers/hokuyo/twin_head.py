@@ -97,8 +97,8 @@ class Head:
         dropouts = config.dropout_fraction * (LESS_DROPOUTS if self.is_sensitive else 1.0)
         ranges = with_mixed_pixels(ranges, config.mixed_pixel_fraction, self._rng)
         dropouts = 1.0 if is_blind else dropouts
-        share = config.range_sigma_share * np.where(np.isfinite(ranges), ranges, 0.0)
-        sigma = np.maximum(config.range_sigma_m, share)
+        farther = config.range_sigma_share * np.fmin(ranges, model.usable_mm / 1000.0)
+        sigma = np.maximum(config.range_sigma_m, farther)
         readings = noisy_readings(ranges, model, sigma, dropouts, self._rng)
         scan = ScanReply(request, status, self.device_ms(stamp), readings)
         return self._spoil(encode_scan(self._filled(scan, readings)))

@@ -43,8 +43,6 @@ CORRIDOR = drawn(
     {1: (0.0, 0.0), 2: (6.0, 0.0), 3: (12.0, 0.0), 4: (6.0, -3.0)},
     {10: (1, 2, []), 11: (2, 3, []), 12: (2, 4, [])},
 )
-
-
 ENDS = {
     Branch(10, forward=True): HalfEdgeId(1, EAST),
     Branch(10, forward=False): HalfEdgeId(2, WEST),
@@ -52,10 +50,7 @@ ENDS = {
     Branch(11, forward=False): HalfEdgeId(3, WEST),
     Branch(12, forward=True): HalfEdgeId(2, 2),
 }
-
-
 ALL_KNOWN = known_as(ENDS, {1: 1, 2: 2, 3: 3})
-
 
 # A loop of 28 m that leaves vertex 1 at the origin to the east and comes back from the north, in
 # three sights: the beginning, the far side, and the end.
