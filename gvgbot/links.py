@@ -11,7 +11,7 @@ from gvgbot.drivers.hokuyo.driver import HokuyoLaser, LinkStatistics
 from gvgbot.drivers.kobuki.driver import STANDSTILL_FRAME, KobukiBase
 from gvgbot.drivers.kobuki.feedback import FeedbackReader
 from gvgbot.drivers.tapped import Tap, TappedStream
-from gvgbot.drivers.tcp import SCHEME, open_tcp
+from gvgbot.drivers.tcp import SCHEME, TcpStream, open_tcp
 from gvgbot.drivers.transport import ByteStream, SerialStream, open_serial
 from gvgbot.errors import DeviceLost
 from gvgbot.hal.devices import Base, Laser
@@ -48,6 +48,7 @@ class Links:
     async def open_laser(self) -> tuple[Laser, Close]:
         """A laser to be run, and what closes its link. Raises DeviceLost."""
         config, longest_s = self.config.laser, self.config.robot.limits.max_scan_age_s
+        stream: ByteStream
         if self.simulation is None:
             stream, close = await _open_port("laser", config.port, config.baud)
         else:
@@ -59,10 +60,11 @@ class Links:
     async def open_base(self) -> tuple[Base, Close]:
         """A base to be run, and what closes its link. Raises DeviceLost."""
         config = self.config.base
+        stream: ByteStream
         if self.simulation is None:
-            stream, close = await _open_port("base", config.port, config.baud)
-            if isinstance(stream, SerialStream):
-                stream.watch_over(STANDSTILL_FRAME, config.deadman_s)
+            port, close = await _open_port("base", config.port, config.baud)
+            port.watch_over(STANDSTILL_FRAME, config.deadman_s)
+            stream = port
         else:
             stream, close = self.simulation.base, _leave_open
         stream = self._tapped("base", stream)
@@ -139,8 +141,9 @@ class Devices:
         return self._links.feedback.statistics.slips
 
 
-async def _open_port(name: str, port: str, baud: int) -> tuple[ByteStream, Close]:
+async def _open_port(name: str, port: str, baud: int) -> tuple[SerialStream | TcpStream, Close]:
     is_tcp = port.startswith(SCHEME)
+    stream: SerialStream | TcpStream
     try:
         stream = await open_tcp(port) if is_tcp else await open_serial(port, baud)
     except DeviceLost as error:

@@ -3,17 +3,19 @@
 import asyncio
 import contextlib
 import errno
+import ipaddress
 import os
-import re
 import socket
+import threading
+from concurrent.futures import Future
 
+from gvgbot.drivers.deadman import Deadman
 from gvgbot.errors import DeviceLost
 
 SCHEME = "tcp://"
 CONNECT_TIMEOUT = 3.0  # s
 UNSENT_LIMIT = 65536  # bytes; a device that takes no more than this is gone
 _LAST_PORT = 65535
-_NUMBERS = re.compile(r"\[Errno (\d+)\]")  # of what went wrong at each of several addresses
 
 
 def parse_address(port: str) -> tuple[str, int]:
@@ -64,6 +66,7 @@ class TcpStream:
         self._writer: asyncio.StreamWriter | None = None
         self._unsent = bytearray()
         self._closed = False
+        self._watch = contextlib.ExitStack()
 
     async def connect(self) -> asyncio.StreamReader:
         """Wait for the connection, which is made on when nobody waits. Raises DeviceLost."""
@@ -100,9 +103,20 @@ class TcpStream:
             raise DeviceLost(f"{self._name} takes no more bytes")
         self._writer.write(data)
 
+    def watch_over(self, last_words: bytes, patience_s: float) -> None:
+        """Write the last words while the event loop hangs for longer than that.
+
+        The connection has to be there. If it ends, the number of its file may be another's.
+        """
+        assert self._writer is not None, "nothing is said without a connection"
+        fd = os.dup(self._writer.get_extra_info("socket").fileno())
+        self._watch.callback(os.close, fd)
+        self._watch.callback(Deadman(fd, last_words, patience_s).close)
+
     def close(self) -> None:
         """End the connection; closing twice is harmless."""
         self._closed = True
+        self._watch.close()
         if self._connecting is not None:
             self._connecting.cancel()
         if self._writer is not None:
@@ -111,8 +125,9 @@ class TcpStream:
 
     async def _connect(self) -> asyncio.StreamReader:
         try:
+            addresses = await _addresses(self._host)
             async with asyncio.timeout(CONNECT_TIMEOUT):
-                reader, self._writer = await asyncio.open_connection(self._host, self._number)
+                reader, self._writer = await _connected(addresses, self._number)
         except (OSError, TimeoutError) as error:
             raise self._lost(error) from error
         connection = self._writer.get_extra_info("socket")
@@ -129,15 +144,51 @@ class TcpStream:
         return DeviceLost(f"{self._name}: the connection is closed")
 
 
+async def _addresses(host: str) -> list[str]:
+    """The addresses of a host, in numbers, the best one first. Raises OSError if none is found.
+
+    A name server that is silent takes half a minute, and would hold up whatever else waits for a
+    thread of the event loop's.
+    """
+    with contextlib.suppress(ValueError):
+        return [str(ipaddress.ip_address(host))]
+    found: Future[list[str]] = Future()
+    found.set_running_or_notify_cancel()
+
+    def look_up() -> None:
+        try:
+            found.set_result(_look_up(host))
+        except OSError as error:
+            found.set_exception(error)
+
+    threading.Thread(target=look_up, name="lookup", daemon=True).start()  # noqa: TID251  # see above
+    return await asyncio.wrap_future(found)
+
+
+def _look_up(host: str) -> list[str]:
+    found = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
+    numbers = socket.NI_NUMERICHOST | socket.NI_NUMERICSERV
+    return [socket.getnameinfo(address, numbers)[0] for *_, address in found]
+
+
+async def _connected(
+    addresses: list[str], number: int
+) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
+    """The first connection that one of the addresses takes. Raises OSError if none does."""
+    for address in addresses[:-1]:
+        with contextlib.suppress(OSError):
+            return await asyncio.open_connection(address, number)
+    return await asyncio.open_connection(addresses[-1], number)
+
+
 def _reason(error: OSError) -> str:
     if isinstance(error, socket.gaierror):  # with numbers of its own
         return f"is not found: {error.strerror}"
-    numbers = [error.errno] if error.errno else [int(one) for one in _NUMBERS.findall(str(error))]
-    if errno.ECONNREFUSED in numbers:
+    if error.errno == errno.ECONNREFUSED:
         return "refuses the connection"
-    if isinstance(error, TimeoutError) or not numbers:
+    if isinstance(error, TimeoutError) or error.errno is None:
         return "does not answer"
-    return f"fails: {os.strerror(numbers[0])}"
+    return f"fails: {os.strerror(error.errno)}"
 
 
 def _heed(connecting: asyncio.Task[asyncio.StreamReader]) -> None:

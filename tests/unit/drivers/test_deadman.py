@@ -2,12 +2,14 @@
 
 import asyncio
 import os
+import socket
 import threading
 import tty
 from collections.abc import Iterator
 
 import pytest
 
+from gvgbot.drivers.tcp import SCHEME, open_tcp
 from gvgbot.drivers.transport import SerialStream
 
 LAST_WORDS = b"stand still"
@@ -66,3 +68,23 @@ def test_a_loop_that_runs_is_left_alone_and_so_is_a_closed_port(ends: tuple[int,
 
     asyncio.run(drive())
     assert heard(end) == b""
+
+
+def test_a_base_on_the_network_is_told_as_well() -> None:
+    async def drive(listener: socket.socket) -> None:
+        stream = await open_tcp(f"{SCHEME}127.0.0.1:{listener.getsockname()[1]}")
+        base, _ = listener.accept()
+        with base:
+            stream.watch_over(LAST_WORDS, PATIENCE_S)
+            stream.write(b"drive")
+            hang(5 * PATIENCE_S)
+            said = base.recv(10_000)
+            assert said.startswith(b"drive" + LAST_WORDS)
+            assert said.count(LAST_WORDS) >= 2
+            stream.close()
+            await asyncio.sleep(0)
+            assert base.recv(1) == b""  # nothing holds the connection any more
+        assert "deadman" not in {thread.name for thread in threading.enumerate()}
+
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        asyncio.run(drive(listener))

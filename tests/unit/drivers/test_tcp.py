@@ -3,6 +3,8 @@
 import asyncio
 import contextlib
 import socket
+import threading
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
@@ -56,12 +58,13 @@ def test_what_is_no_address_says_how_one_looks(port: str) -> None:
         parse_address(port)
 
 
-def test_a_host_that_nobody_knows_is_said_to_be_unknown() -> None:
-    async def unknown(*_: object, **__: object) -> None:
+def test_a_host_that_nobody_knows_is_said_to_be_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
+    def unknown(*_: object, **__: object) -> None:
         raise socket.gaierror(socket.EAI_NONAME, "Name or service not known")
 
+    monkeypatch.setattr(socket, "getaddrinfo", unknown)
+
     async def main() -> None:
-        asyncio.get_running_loop().getaddrinfo = unknown  # type: ignore[assignment]
         with pytest.raises(
             DeviceLost, match="tcp://lasr:10940 is not found: Name or service not known"
         ):
@@ -169,19 +172,70 @@ def test_who_no_longer_waits_for_an_open_connection_leaves_nothing_behind() -> N
     run_in_virtual_time(main())
 
 
-def test_a_name_whose_addresses_all_refuse_is_said_to_refuse() -> None:
+def a_name_has(hosts: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let every name be that of hosts with these addresses."""
+    kind = socket.AF_INET, socket.SOCK_STREAM, socket.IPPROTO_TCP, ""
+
+    def all_of_them(*_: object, **__: object) -> list[object]:
+        return [(*kind, (host, 0)) for host in hosts]
+
+    monkeypatch.setattr(socket, "getaddrinfo", all_of_them)
+
+
+def test_a_name_whose_addresses_all_refuse_is_said_to_refuse(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    a_name_has(("127.0.0.1", "127.0.0.2"), monkeypatch)
+
     async def main() -> None:
         with socket.socket() as deaf:  # bound, so that nobody else can listen there
             deaf.bind(("0.0.0.0", 0))
             number = deaf.getsockname()[1]
-
-            async def both(*_: object, **__: object) -> list[object]:
-                hosts = ("127.0.0.1", "127.0.0.2")
-                kind = socket.AF_INET, socket.SOCK_STREAM, socket.IPPROTO_TCP, ""
-                return [(*kind, (host, number)) for host in hosts]
-
-            asyncio.get_running_loop().getaddrinfo = both  # type: ignore[assignment, method-assign]
             with pytest.raises(DeviceLost, match="refuses the connection: check address"):
                 await TcpStream(f"{SCHEME}laser.local:{number}").read()
 
     asyncio.run(main())
+
+
+def test_of_several_addresses_of_a_name_the_one_that_answers_is_taken(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    a_name_has(("127.0.0.2", "127.0.0.1"), monkeypatch)
+
+    async def main() -> None:
+        port = TcpPort("tcp://127.0.0.1:0")
+        assert port.path is not None
+        number = parse_address(port.path)[1]
+        stream = await open_tcp(f"{SCHEME}laser.local:{number}")
+        stream.write(b"hello")
+        assert await port.read() == b"hello"
+        stream.close()
+        port.close()
+
+    asyncio.run(main())
+
+
+def test_a_silent_name_server_holds_up_nothing_but_its_device(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Threads of the event loop are there for others, and its end waits for none."""
+    answers = threading.Event()
+
+    def silent(*_: object, **__: object) -> None:
+        answers.wait(30.0)
+        raise socket.gaierror(socket.EAI_AGAIN, "Temporary failure in name resolution")
+
+    monkeypatch.setattr(socket, "getaddrinfo", silent)
+
+    async def main() -> None:
+        asyncio.get_running_loop().set_default_executor(ThreadPoolExecutor(1))
+        stream = TcpStream(f"{SCHEME}laser.local:10940")
+        with pytest.raises(TimeoutError):
+            await impatient_read(stream, 0.1)
+        async with asyncio.timeout(20.0):
+            await asyncio.to_thread(str)
+        stream.close()
+
+    asyncio.run(main())
+    assert not answers.is_set()
+    answers.set()
