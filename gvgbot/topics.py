@@ -18,6 +18,10 @@ TeamPart = Literal["team", "course"]  # what robots know; and where each is and 
 Priority = Literal["interactive_high", "data_high", "data", "data_low"]
 
 LAST_PORT = 65535
+_POINT, _POSE, _TIME, _RANGE = 8, 12, 8, 2  # bytes of what travels packed
+_COVARIANCE = 9  # of a pose: 3 by 3
+_LARGEST_SIDE = 1024  # cells, of a tile
+_MOST_CELLS = 2**28  # of a grid: a square of 800 m with cells of 5 cm
 _HAVE_PORTS = ("tcp", "udp", "tls", "quic", "ws")
 
 
@@ -114,10 +118,21 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
     base: LinkHealth
     team: tuple[Mate, ...] = ()  # the other robots, as far as this one knows where they are
 
+    def __post_init__(self) -> None:
+        """Raises ValueError for a covariance that is none of a pose."""
+        if len(self.covariance) != _COVARIANCE:
+            raise ValueError(f"a covariance of {len(self.covariance)} instead of {_COVARIANCE}")
+
     @property
     def is_lost(self) -> bool:
         """Whether the robot does not know where it is: its pose means nothing."""
         return self.covariance[0] >= UNKNOWN
+
+
+def _check_whole(data: bytes, size: int) -> None:
+    """Raises ValueError unless bytes are so many items of a size (bytes)."""
+    if len(data) % size:
+        raise ValueError(f"{len(data)} bytes are no whole number of items of {size}")
 
 
 def packed(points: NDArray[np.floating]) -> bytes:
@@ -143,6 +158,10 @@ class MapEdge(msgspec.Struct, frozen=True, kw_only=True):
     end: int  # id of a vertex
     length: float  # m
     points: bytes  # little-endian float32 pairs x, y, m, from start to end
+
+    def __post_init__(self) -> None:
+        """Raises ValueError for a part of a point."""
+        _check_whole(self.points, _POINT)
 
     @property
     def polyline(self) -> NDArray[np.float32]:
@@ -193,13 +212,20 @@ class Grid(msgspec.Struct, frozen=True, kw_only=True):
     side: int  # cells along the side of a tile
     tiles: tuple[Tile, ...]
 
+    def __post_init__(self) -> None:
+        """Raises ValueError for tiles of no size, or of far too many cells."""
+        if not 0 < self.side <= _LARGEST_SIDE:
+            raise ValueError(f"tiles of {self.side} cells a side")
+
     def raster(self) -> Raster:
         """The tiles laid side by side; unknown between them. Raises ValueError for damaged ones."""
         if not self.tiles:
             return Raster(np.full((1, 1), -1, np.int8), self.resolution, (0.0, 0.0))
         places = np.array([(tile.row, tile.column) for tile in self.tiles])
         corner = places.min(axis=0)
-        rows, columns = (places.max(axis=0) + 1 - corner) * self.side
+        rows, columns = (int(n) * self.side for n in places.max(axis=0) + 1 - corner)
+        if rows * columns > _MOST_CELLS:
+            raise ValueError(f"a grid of {rows} by {columns} cells is no building's")
         cells = np.full((rows, columns), -1, np.int8)
         for (row, column), tile in zip((places - corner) * self.side, self.tiles, strict=True):
             cells[row : row + self.side, column : column + self.side] = self._unpacked(tile)
@@ -209,8 +235,9 @@ class Grid(msgspec.Struct, frozen=True, kw_only=True):
 
     def _unpacked(self, tile: Tile) -> NDArray[np.int8]:
         try:
-            return np.frombuffer(zlib.decompress(tile.cells), np.int8).reshape(self.side, self.side)
-        except zlib.error as error:
+            cells = zlib.decompressobj().decompress(tile.cells, self.side**2 + 1)
+            return np.frombuffer(cells, np.int8).reshape(self.side, self.side)
+        except (zlib.error, ValueError) as error:
             raise ValueError(f"a damaged tile at {tile.column}, {tile.row}: {error}") from error
 
 
@@ -225,6 +252,13 @@ class Trajectory(msgspec.Struct, frozen=True, kw_only=True):
     stamps: bytes  # little-endian float64, s: when it was there
     poses: bytes  # little-endian float32 triples x, y, theta, m and rad: map_base at these times
     breaks: tuple[int, ...] = ()  # poses, from 0, to which no way is known: it was carried there
+
+    def __post_init__(self) -> None:
+        """Raises ValueError unless there is a time for each pose."""
+        _check_whole(self.stamps, _TIME)
+        _check_whole(self.poses, _POSE)
+        if len(self.stamps) // _TIME != len(self.poses) // _POSE:
+            raise ValueError("there is not a time for each pose")
 
     @property
     def times(self) -> NDArray[np.float64]:
@@ -291,6 +325,10 @@ class Scan(msgspec.Struct, frozen=True, kw_only=True):
     map_base: tuple[float, float, float] | None  # at the middle of the sweep; None if not known
     ranges: bytes  # little-endian uint16, mm; 0: nothing trusted, 65535: nothing within range
 
+    def __post_init__(self) -> None:
+        """Raises ValueError for a part of a range."""
+        _check_whole(self.ranges, _RANGE)
+
     @property
     def metres(self) -> NDArray[np.float32]:
         """The ranges (N,), m; NaN where nothing is trusted, inf where nothing is within range."""
@@ -316,6 +354,11 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
     reason: str  # of the decision: ear, nearest frontier and others; empty before the first
     track: bytes  # little-endian float32 pairs x, y, m: what is driven now, as far as it is seen
     route: bytes  # the same: known edges from there on, to the vertex
+
+    def __post_init__(self) -> None:
+        """Raises ValueError for a part of a point."""
+        _check_whole(self.track, _POINT)
+        _check_whole(self.route, _POINT)
 
     @property
     def ahead(self) -> NDArray[np.float32]:

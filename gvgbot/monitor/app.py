@@ -128,8 +128,11 @@ class _Floor:
         self._raster: Raster | None = None
 
     def of(self, grid: Grid | None) -> Raster | None:
-        """The cells of a grid."""
+        """The cells of a grid. Raises GvgbotError if it is damaged."""
         if grid is not self._grid:
             self._grid = grid
-            self._raster = None if grid is None else grid.raster()
+            try:
+                self._raster = None if grid is None else grid.raster()
+            except ValueError as error:
+                raise GvgbotError(f"a damaged sample of grid: {error}") from error
         return self._raster
