@@ -1,6 +1,7 @@
 """What becomes of a request: permitted or not, safe or not, done, answered and written down."""
 
 import dataclasses
+import math
 from collections.abc import Awaitable, Callable
 from typing import Any, Protocol, get_type_hints
 
@@ -27,6 +28,7 @@ SETTABLE = (
 _MOVING = ("resume", "home", "goto", "patrol", "coverage", "explore", "relocalise")
 _HARMLESS: tuple[Reason, ...] = ("obstacle", "obstacle near")  # the robot may turn away from it
 _LONGEST_WORDS = 200  # characters of a request in the list of events
+_BURST, _A_SECOND = 20.0, 1.0  # requests that change nothing, and are written down all the same
 
 
 class Body(Protocol):
@@ -67,9 +69,13 @@ class Steering:
         self._config, self._limits = config, config.robot.limits
         self._errands, self._body = errands, body
         self._now, self._save, self._use, self._tell = now, save, use, tell
+        self._ledger = _Ledger()
 
     async def handle(self, asked: Asked) -> Answer:
-        """Do what is asked for, or say why not; either is written down with who asked."""
+        """Do what is asked for, or say why not; either is written down with who asked.
+
+        Not so what changes nothing, if there is much of it: whoever can ask could fill the disk.
+        """
         words = asked.name
         try:
             arguments = parse(asked.name, asked.data, asked.encoding)
@@ -81,7 +87,7 @@ class Steering:
         answer = Answer(done=answer.done, text=printable(answer.text))
         words = printable(words)[:_LONGEST_WORDS]
         happened = Requested(self._now(), words, asked.origin, answer.done, answer.text)
-        self._tell([happened, *self._errands.take_events()])
+        self._tell([*self._ledger.enter(happened), *self._errands.take_events()])
         return answer
 
     def _check(self, name: str) -> None:
@@ -181,3 +187,32 @@ def _replaced(config: Config, key: str, value: bool | float | str) -> Config:
         changed = dataclasses.replace(node, **{part: changed})
     result: Config = changed
     return result
+
+
+class _Ledger:
+    """Which requests are written down: all that do something new, and a few of the others."""
+
+    def __init__(self) -> None:
+        self._newest: Requested | None = None
+        self._room, self._since = _BURST, -math.inf  # for others, by when
+        self._missing = 0
+
+    def enter(self, asked: Requested) -> list[Requested]:
+        """The request, if it is to be written down, with how many before it were not."""
+        is_new = self._newest is None or not _are_alike(asked, self._newest)
+        if not (asked.done and is_new):
+            self._room = min(_BURST, self._room + _A_SECOND * (asked.stamp - self._since))
+            self._since = asked.stamp
+            if self._room < 1.0:
+                self._missing += 1
+                return []
+            self._room -= 1.0
+        self._newest, missing, self._missing = asked, self._missing, 0
+        if not missing:
+            return [asked]
+        answer = f"{asked.answer} ({missing} requests before this one were not written down)"
+        return [dataclasses.replace(asked, answer=answer)]
+
+
+def _are_alike(one: Requested, other: Requested) -> bool:
+    return dataclasses.replace(one, stamp=other.stamp) == other

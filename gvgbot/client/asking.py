@@ -7,6 +7,7 @@ from collections.abc import Generator
 from concurrent.futures import Future
 
 import msgspec
+import numpy as np
 import zenoh
 
 from gvgbot import __version__
@@ -65,9 +66,16 @@ def ask(session: zenoh.Session, robot: str, name: RequestName, arguments: Argume
 def _payload(arguments: Arguments) -> bytes:
     """Raises GvgbotError for what has no form on the network: a huge number, a broken character."""
     try:
-        return msgspec.msgpack.encode(arguments)
+        return msgspec.msgpack.encode(arguments, enc_hook=_plain)
     except (OverflowError, UnicodeEncodeError) as error:
         raise GvgbotError(f"this cannot be asked for: {error}") from error
+
+
+def _plain(value: object) -> object:
+    """A number of NumPy's as one of Python's: what the robot says of places is in arrays."""
+    if isinstance(value, np.generic):
+        return value.item()
+    raise NotImplementedError
 
 
 def _text(replies: list[zenoh.Reply], robot: str) -> str:

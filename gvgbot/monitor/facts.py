@@ -11,7 +11,7 @@ from gvgbot.words import shortened
 Tone = Literal["plain", "good", "warning", "bad", "faint"]
 
 _STUCK_AFTER = 1.0  # s without a control cycle
-_LOW_BATTERY = 0.2  # of a full charge
+_LOW_BATTERY = 0.28  # of a full charge, from where on the robot itself warns
 _GAUGE = 8  # characters
 _MATE = 30  # characters that another robot and its place take
 _QUIET = {"edge_joined"}  # too many of them, and they say little

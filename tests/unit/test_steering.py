@@ -60,6 +60,7 @@ class Rig:
     told: list[Event] = field(default_factory=list)
     used: list[Config] = field(default_factory=list)
     disk_is_full: bool = False
+    time: float = 12.5
 
     async def save(self) -> str:
         if self.disk_is_full:
@@ -71,7 +72,7 @@ class Rig:
             replace(CONFIG, telemetry=TelemetryConfig(requests=self.permitted)),
             cast(Errands, self.errands),
             self.body,
-            now=lambda: 12.5,
+            now=lambda: self.time,
             save=self.save,
             use=self.used.append,
             tell=self.told.extend,
@@ -230,3 +231,38 @@ def test_every_key_that_is_offered_exists(key: str) -> None:
     rig = Rig()
     assert rig.ask("set", key=key, value=node).done
     assert rig.used == [replace(CONFIG, telemetry=TelemetryConfig(requests=REQUESTS))]
+
+
+def refused(rig: Rig) -> list[str]:
+    return [one.answer for one in rig.told if isinstance(one, Requested) and not one.done]
+
+
+def test_who_is_refused_over_and_over_does_not_fill_the_disk() -> None:
+    """A second of 1,500 requests, and another one a minute later: each of them is answered."""
+    rig = Rig(permitted=())
+    for k in range(1500):
+        rig.time = 10.0 + k / 1500
+        assert not rig.ask("goto", vertex=k).done
+    assert 10 < len(rig.told) < 30
+    rig.time = 70.0
+    rig.ask("home")
+    first, *_, last = refused(rig)
+    assert "not written down" not in first
+    assert f"{1500 - len(rig.told) + 1} requests before this one were not written down" in last
+
+
+def test_the_same_over_and_over_is_written_down_a_few_times() -> None:
+    rig = Rig()
+    for k in range(1500):
+        rig.time = 10.0 + k / 1500
+        assert rig.ask("pause").done
+    assert rig.errands.did == ["pause"] * 1500
+    assert 10 < len(rig.told) < 30
+
+
+def test_whatever_does_something_else_than_before_is_written_down() -> None:
+    rig = Rig()
+    for _ in range(100):
+        rig.ask("pause")
+        rig.ask("resume")
+    assert len(rig.told) == 200

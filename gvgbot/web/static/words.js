@@ -1,6 +1,6 @@
 // A robot in words: what `gvgbot monitor` says of it too, with more room.
 
-export const LOW_BATTERY = 0.2, STUCK = 1.0, LATE = 0.1; // of a full charge; s; s
+export const LOW_BATTERY = 0.28, STUCK = 1.0, LATE = 0.1; // of a full charge; s; s
 
 export const degrees = (angle) => `${Math.round((angle * 180) / Math.PI) + 0}°`;
 export const percent = (share) => `${Math.round(100 * share)} %`;

@@ -3,6 +3,8 @@
 from types import SimpleNamespace
 from typing import Any, cast
 
+import msgspec
+import numpy as np
 import pytest
 import zenoh
 
@@ -21,8 +23,10 @@ class Network:
 
     def __init__(self, reply: object = None) -> None:
         self.reply = reply
+        self.payload = b""
 
-    def get(self, _: str, callback: Any, **__: object) -> None:
+    def get(self, _: str, callback: Any, *, payload: bytes, **__: object) -> None:
+        self.payload = payload
         callback.callback(self.reply)
         callback.drop()
 
@@ -43,6 +47,22 @@ def asked(reply: object) -> Asking:
 def test_what_no_message_can_say_is_an_error_in_words(arguments: Arguments) -> None:
     with pytest.raises(GvgbotError, match="cannot be asked for"):
         ask(cast(zenoh.Session, Network()), "near", "goto", arguments)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sent"),
+    [
+        (Goto(x=np.float32(0.5), y=np.float32(-2.0)), {"x": 0.5, "y": -2.0}),  # type: ignore[arg-type]
+        (Patrol(vertices=(np.int64(3), np.int64(7))), {"vertices": [3, 7]}),  # type: ignore[arg-type]
+        (Set(key="exploration.patience_m", value=np.float64(2.5)), {"value": 2.5}),
+    ],
+)
+def test_numbers_of_arrays_are_sent_as_numbers(
+    arguments: Arguments, sent: dict[str, object]
+) -> None:
+    network = Network()
+    ask(cast(zenoh.Session, network), "near", "goto", arguments)
+    assert sent.items() <= msgspec.msgpack.decode(network.payload).items()
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """The words for a robot's state, its events and its presence."""
 
 import math
+from pathlib import Path
 
 import msgspec
 import numpy as np
@@ -8,6 +9,8 @@ import pytest
 
 from gvgbot.client import Event, Health, Plan, Presence
 from gvgbot.client.presence import Word
+from gvgbot.hal.messages import LOW_BATTERY
+from gvgbot.monitor import facts as facts_module
 from gvgbot.monitor.facts import Fact, duration, facts, headline, told
 from gvgbot.topics import Mate, packed
 from tests.unit.test_telemetry import EXAMPLE, NOWHERE
@@ -35,6 +38,13 @@ HEALTH = Health(
     laser=EXAMPLE.laser,
     base=EXAMPLE.base,
 )
+
+
+def test_page_and_monitor_warn_of_the_battery_when_the_robot_itself_does() -> None:
+    words = (Path(facts_module.__file__).parents[1] / "web/static/words.js").read_text()
+    assert f"LOW_BATTERY = {LOW_BATTERY}," in words
+    below, above = (said(battery_fraction=LOW_BATTERY + more) for more in (-0.01, 0.01))
+    assert (below["battery"].tone, above["battery"].tone) == ("bad", "good")
 
 
 def said(**changes: object) -> dict[str, Fact]:
