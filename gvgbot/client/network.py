@@ -79,6 +79,8 @@ def _why_nobody(where: str, file: Path | None) -> str:
     host, _, port = where.partition("/")[2].partition("#")[0].rpartition(":")
     try:
         socket.create_connection((host.strip("[]"), int(port)), _TRYING).close()
+    except socket.gaierror as error:
+        return f"the name {host} is not found ({error.strerror})"
     except (OSError, ValueError):
         return "is a robot running there?"
     return (

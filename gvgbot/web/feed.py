@@ -10,7 +10,7 @@ from typing import TypeVar
 
 from gvgbot import client
 from gvgbot.client import Asking, Robot, State
-from gvgbot.errors import GvgbotError, UsageError, reason_of
+from gvgbot.errors import GvgbotError, UsageError, reason_of, underlying
 from gvgbot.requests import Goto, Patrol, Set
 from gvgbot.topics import Events, Health, Map, Odometry, Plan, Scan, Tile, Trajectory
 from gvgbot.web.viewers import Audience
@@ -18,6 +18,7 @@ from gvgbot.web.wire import Floor, History, Kind, Link, Reply, Wish
 
 _PATIENCE = 1.0  # s for a connection, before the page says that there is none
 _BEAT = 0.5  # s between words on how things are
+_SILENT = 2.0  # s without such a word; a page gives up after four
 _PAUSE = 0.1  # s between two values of a kind: more often nobody sees
 _SAMPLE_EVERY, _SAMPLES = 2.0, 900  # s of the robot's clock, and how many: half an hour
 
@@ -45,17 +46,40 @@ class Feed:
         self._tiles: dict[tuple[int, int], Tile] = {}  # of its grid
         self._history = _Histories()
         self._lost_at: float | None = None  # by the loop's clock; None while connected
+        self._trouble = f"looking for a robot at {endpoint}"  # why there is no connection
+        self._told_at = 0.0  # by the loop's clock, how things are
 
     async def run(self) -> None:
         """Watch until cancelled, and say why if that is not possible just now.
 
         Raises UsageError if several robots are there and none is named.
         """
+        try:
+            async with asyncio.TaskGroup() as tasks:
+                tasks.create_task(self._keep_watching(), name="watch")
+                tasks.create_task(self._repeat_why(), name="repeat why")
+        except* UsageError as errors:
+            raise underlying(errors) from None
+
+    async def _repeat_why(self) -> None:
+        """Say again why there is no connection while it takes long to find that out anew.
+
+        A name server may be silent for half a minute, and a page that hears nothing for some
+        seconds takes this program for gone.
+        """
+        loop = asyncio.get_running_loop()
+        self._told_at = loop.time()
+        while True:
+            await asyncio.sleep(_BEAT)
+            if self._robot is None and loop.time() > self._told_at + _SILENT:
+                self._say_why(self._trouble)
+
+    async def _keep_watching(self) -> None:
         while True:
             try:
                 await self._connect()
             except* UsageError as errors:
-                raise errors.exceptions[0] from None
+                raise underlying(errors) from None
             except* GvgbotError as errors:
                 self._say_why(reason_of(errors))
             await asyncio.sleep(_BEAT)
@@ -72,7 +96,7 @@ class Feed:
                 self._robot = None
 
     def _say_why(self, trouble: str) -> None:
-        now = asyncio.get_running_loop().time()
+        self._trouble, now = trouble, asyncio.get_running_loop().time()
         self._lost_at = now if self._lost_at is None else self._lost_at
         said = Link(
             robot=self._name,
@@ -84,6 +108,7 @@ class Feed:
         self._show_link(said)
 
     def _show_link(self, link: Link) -> None:
+        self._told_at = asyncio.get_running_loop().time()
         self._audience.show("link", link)
         self._on_link(link)
 

@@ -70,3 +70,11 @@ class HokuyoTwinConfig:
     serial_number: str = "H0000001"  # what it answers when asked
     mishaps: LaserMishapConfig = field(default_factory=LaserMishapConfig)
     link: LinkFaultConfig = field(default_factory=LinkFaultConfig)
+
+    def __post_init__(self) -> None:
+        """Raises ValueError for a serial number that no laser could answer."""
+        number = self.serial_number
+        if not (number.isascii() and number.isprintable()) or ";" in number:
+            raise ValueError(
+                f"serial_number = {number!r}: must be of letters, digits and signs of ASCII, no ;"
+            )

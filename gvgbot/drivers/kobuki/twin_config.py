@@ -1,5 +1,6 @@
 """Which base is simulated, and its imperfections."""
 
+import re
 from dataclasses import dataclass, field
 from typing import Annotated
 
@@ -7,6 +8,9 @@ from gvgbot.drivers.kobuki.mishaps import MishapConfig
 from gvgbot.drivers.kobuki.odometry_error import OdometryProfile
 from gvgbot.drivers.link_faults import LinkFaultConfig
 from gvgbot.ranges import Range
+
+_VERSION = re.compile(r"[0-9]{1,3}(\.[0-9]{1,3}){2}")
+_LARGEST = 255  # a number is a byte
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,3 +33,10 @@ class KobukiTwinConfig:
     firmware_version: str = "1.2.0"  # likewise; decides what it can do
     mishaps: MishapConfig = field(default_factory=MishapConfig)
     link: LinkFaultConfig = field(default_factory=LinkFaultConfig)
+
+    def __post_init__(self) -> None:
+        """Raises ValueError for a version that no base could answer."""
+        for key in ("hardware_version", "firmware_version"):
+            text = getattr(self, key)
+            if not _VERSION.fullmatch(text) or max(map(int, text.split("."))) > _LARGEST:
+                raise ValueError(f"{key} = {text!r}: must be three numbers, such as 1.2.0")

@@ -223,3 +223,9 @@ def test_newer_lasers_tell_that_they_become_unstable(commands: list[str], state:
     twin.inject("unstable", 1.0)
     assert ask(twin, "%ST").lines == (state,)
     assert ask(laser("UST-10LX", starts_abnormal=True), "%ST").lines == ("900",)
+
+
+@pytest.mark.parametrize("number", ["ЖH1", "a\nb", "H1;H2"])
+def test_a_serial_number_that_no_reply_can_hold_is_refused(number: str) -> None:
+    with pytest.raises(ValueError, match="serial_number = "):
+        HokuyoTwinConfig(serial_number=number)
