@@ -73,7 +73,8 @@ def _usage(parser: argparse.ArgumentParser) -> str:
     joined = " ".join(
         [parser.prog.replace(" ", GLUE), *(word.replace(" ", GLUE) for word in words)]
     )
-    return textwrap.fill(joined, 76, subsequent_indent="    ").replace(GLUE, " ")
+    lines = textwrap.fill(joined, 76, subsequent_indent="    ", break_on_hyphens=False)
+    return lines.replace(GLUE, " ")
 
 
 def _form(action: argparse.Action) -> str:

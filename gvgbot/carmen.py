@@ -47,11 +47,15 @@ _MANY, _OFTEN = 3, 0.01  # beams of a sweep that have the same range; of the swe
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CarmenLog:
-    """What a log holds, each by its stamp; `damaged` lines were left out."""
+    """What a log holds, each by its stamp; `damaged` lines were left out.
+
+    An archive that `is_cut` ends before the log does.
+    """
 
     odometry: list[Odometry]
     scans: list[Scan]
     damaged: int
+    is_cut: bool
 
     @property
     def pauses(self) -> int:
@@ -98,8 +102,11 @@ def read_carmen(path: Path, *, no_echo_m: float, base_laser: Pose) -> CarmenLog:
 
 def _read(path: Path, no_echo_m: float, *, by_logger: bool) -> CarmenLog:
     """A log by the stamps of those who sent the messages, or of the logger. Raises UsageError."""
-    odometry, scans, damaged = list[Odometry](), list[Scan](), 0
+    odometry, scans, damaged, is_cut = list[Odometry](), list[Scan](), 0, False
     for line in _lines(path):
+        if line is None:
+            is_cut = True
+            break
         try:
             match _words(line, by_logger=by_logger):
                 case ["ODOM", *words]:
@@ -111,7 +118,7 @@ def _read(path: Path, no_echo_m: float, *, by_logger: bool) -> CarmenLog:
                     odometry.append(at)
         except ValueError:
             damaged += 1
-    return _in_order(odometry, scans, damaged)
+    return replace(_in_order(odometry, scans, damaged), is_cut=is_cut)
 
 
 def _in_order(odometry: list[Odometry], scans: list[Scan], damaged: int) -> CarmenLog:
@@ -125,6 +132,7 @@ def _in_order(odometry: list[Odometry], scans: list[Scan], damaged: int) -> Carm
         within_reach,
         sorted((scan for scan in scans if scan.stamp in kept), key=by_stamp),
         damaged + len(odometry) - len(within_reach),
+        is_cut=False,
     )
 
 
@@ -180,8 +188,8 @@ def _can_reach(one: Odometry, other: Odometry) -> bool:
     )
 
 
-def _lines(path: Path) -> Iterator[str]:
-    """The lines, as far as the file goes: an archive that was cut ends with a piece of one."""
+def _lines(path: Path) -> Iterator[str | None]:
+    """The lines, as far as the file goes; None after those of an archive that was cut."""
     try:
         with _opened(path) as file:
             if b"\0" in file.peek(_BEGINNING)[:_BEGINNING]:
@@ -191,7 +199,7 @@ def _lines(path: Path) -> Iterator[str]:
                 )
             yield from (line.decode(errors="replace") for line in file)
     except EOFError:
-        yield "ODOM"
+        yield None
     except (OSError, zlib.error, lzma.LZMAError) as error:
         reason = getattr(error, "strerror", None) or error
         raise UsageError(f"cannot read {path}: {reason}") from error

@@ -114,6 +114,8 @@ def _conclude(session: Session) -> int:
     )
     for line in session.directory.whereabouts:
         _say(line)
+    if session.recorder is not None:
+        _say(f"recording: {session.recorder.first}")
     return 0 if mission.outcome == "explored" else 1
 
 
@@ -189,6 +191,7 @@ def recorded(session: Session, *, patient: bool) -> AbstractContextManager[objec
 
         session.recorder = Recorder(session.config.recording, about, patient=patient)
     session.recorder.map_base = lambda: session.pipeline.map_base
+    log.info("recording", path=str(session.recorder.first))
     return session.recorder
 
 

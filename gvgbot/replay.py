@@ -174,6 +174,10 @@ def _carmen(wanted: Wanted) -> Log:
         "long pauses, or a clock that was set": log.pauses,
     }
     flaws = [f"but:     {flaw}: {count}" for flaw, count in found.items() if count]
+    if log.is_cut:
+        flaws.append(
+            "but:     the archive ends in the middle: copy it anew, if there is more of it"
+        )
     if (range_m := log.likely_no_echo_m) is not None:
         flaws.append(
             f"but:     the greatest range, {range_m:g} m, comes again and again: if nothing was "

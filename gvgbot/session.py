@@ -186,10 +186,11 @@ class Session:
 
     def _summary(self, unfinished: str) -> dict[str, object]:
         mission, graph = self.pipeline.mission, self.pipeline.mapper.graph
+        recording = {} if self.recorder is None else {"recording": str(self.recorder.first)}
         return {
             "outcome": mission.outcome or ("failed" if self.failure else "stopped"),
             "reason": mission.reason or self.failure or unfinished,
-            "distance_m": self.pipeline.past.driven,
+            "distance_m": self.pipeline.driven,
             "duration_s": self._last_stamp - (self._first_stamp or 0.0),
             "wall_s": time.perf_counter() - self._started,
             "vertices": len(graph.vertices),
@@ -200,6 +201,7 @@ class Session:
             "seed": self.config.twin.seed,
             "version": __version__,
             "config": self.config,
+            **recording,
         }
 
 

@@ -73,7 +73,7 @@ def state(
         vertices=len(graph.vertices),
         edges=len(graph.edges),
         frontiers=len(graph.frontiers()),
-        distance=pipeline.past.driven,
+        distance=pipeline.driven,
         guard=guard,
         contacts=contacts,
         slips=slips,

@@ -63,6 +63,7 @@ class Past:
         self.lasting = 0  # keyframes that are kept for good
         self.lent = 0  # keyframes that came with another's map: it has not driven there
         self.travelled = self.lent_m = 0.0  # the latter by who made that map
+        self.sought_m = 0.0  # driven to find its place on it
         self.with_scan: Pose | None = None  # local_base of the last keyframe that has its scan
 
     @property
@@ -73,7 +74,7 @@ class Past:
     @property
     def driven(self) -> float:
         """Metres that the robot has driven itself, whoever made the map that it began with."""
-        return self.travelled - self.lent_m
+        return self.travelled - self.lent_m + self.sought_m
 
     def still(self) -> Self:
         """A copy that does not grow as the robot goes on."""

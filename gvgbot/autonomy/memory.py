@@ -118,6 +118,7 @@ class Memory:
     passed: list[Passed] = field(default_factory=list)
     lent: int = 0  # keyframes that came with another's map,
     lent_m: float = 0.0  # and metres driven
+    sought_m: float = 0.0  # driven to find its place
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -160,6 +161,7 @@ def remember(pipeline: Pipeline) -> Memory:
         passed=pipeline.traffic.passed,
         lent=past.lent,
         lent_m=past.lent_m,
+        sought_m=past.sought_m,
     )
 
 
@@ -255,7 +257,7 @@ def recall(pipeline: Pipeline, memory: Memory, grown: list[Growth]) -> None:
     if memory.lasting is not None and memory.lasting < memory.keyframes:
         past.lasting = min(memory.lasting, past.lasting)
     past.lent = min(memory.lent, len(past.keyframes))
-    past.lent_m = memory.lent_m
+    past.lent_m, past.sought_m = memory.lent_m, memory.sought_m
     _tie_vertices(pipeline)
     if past.last is not None:
         _awake(pipeline, past.last)

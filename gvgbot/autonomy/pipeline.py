@@ -123,6 +123,11 @@ class Pipeline:
         return False
 
     @property
+    def driven(self) -> float:
+        """Metres that the robot has driven itself."""
+        return self.past.driven
+
+    @property
     def _is_idle(self) -> bool:
         """Whether it rests, and no other robot of its team may want to pass, or be recognised."""
         rests, stands_by = self.errands.is_resting, self.errands.stands_by

@@ -79,6 +79,11 @@ class ReturningPipeline(Pipeline):
         """Whether it drives about to find its place: what it knew of it is out of date."""
         return self._seeker is not None
 
+    @property
+    def driven(self) -> float:
+        """Metres that the robot has driven itself, to find its place as well."""
+        return super().driven + (0.0 if self._seeker is None else self._seeker.driven)
+
     def perceive(self, scan: Scan) -> list[Event]:
         """Learn from a scan; while it is lost, where on the map it was taken."""
         if self._is_back:
@@ -155,7 +160,8 @@ class ReturningPipeline(Pipeline):
         seeker.perceive(scan)
         if seeker.errands.is_carried:
             self.errands.pause()
-            self.errands.is_carried, self._seeker, self._is_doubted = True, None, True
+            self.errands.is_carried = self._is_doubted = True
+            self._end_seeking(seeker)
             return [Recovery(scan.stamp, *STANDS_CARRIED)]
         last = seeker.past.last
         if last is None or seeker._execution.is_turning:
@@ -169,7 +175,8 @@ class ReturningPipeline(Pipeline):
         if not opinion.is_hopeless and self._goes_on(seeker, scan.stamp):
             return []
         self.mission.reason = self.errands.unplaced = _given_up(opinion)
-        self.mission.outcome, self._seeker = "failed", None
+        self.mission.outcome = "failed"
+        self._end_seeking(seeker)
         return [Finished(scan.stamp, "failed", self.mission.reason)]
 
     def _goes_on(self, seeker: Pipeline, stamp: float) -> bool:
@@ -184,6 +191,10 @@ class ReturningPipeline(Pipeline):
                 seeker.errands.goto_vertex(self._tour.pop(), stamp)
                 return True
         return False
+
+    def _end_seeking(self, seeker: Pipeline) -> None:
+        self.past.sought_m += seeker.driven
+        self._seeker = None
 
     def _arrive(self, seeker: Pipeline, map_local: Pose) -> None:
         """Be at a place, in the second mind's local frame and with its local maps."""
@@ -206,8 +217,8 @@ class ReturningPipeline(Pipeline):
         self.past.keyframes.append(replace(found, map_base=map_base))
         self.past.steps.append(Step(last.map_base.to(map_base), UNKNOWN_WAY))
         self.past.with_scan = None
-        self._look_now = True
-        self._seeker, self._is_back = None, True
+        self._look_now = self._is_back = True
+        self._end_seeking(seeker)
 
     def _place(self, map_base: Pose) -> None:
         """Believe to be at a pose on the smoothed map, independently of the way there.

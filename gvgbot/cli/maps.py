@@ -1,6 +1,7 @@
 """`gvgbot map`: pictures, facts and other formats of saved maps."""
 
 import argparse
+import shlex
 
 from gvgbot.cli.arguments import Commands, add_overrides, frames, path, positive, say
 from gvgbot.errors import ExtraMissing, UsageError
@@ -103,7 +104,10 @@ def _import(options: argparse.Namespace) -> int:
     config = load_config(options.config, options.overrides)
     vertices, edges = import_map(options.map, options.out, config)
     say(f"imported: {counted(vertices, 'vertex', 'vertices')}, {counted(edges, 'edge')}")
-    say(f"to drive in it: gvgbot run --map {options.out}")
+    known = f"gvgbot run --map {shlex.quote(str(options.out))}"
+    if config.twin.enabled:
+        known += f" --set twin.world={shlex.quote(str(options.map))}"
+    say(f"to drive in it: {known}")
     return 0
 
 
@@ -154,8 +158,10 @@ def _export(options: argparse.Namespace) -> int:
         return _export_bag(options)
     if options.sensors_only:
         raise UsageError("--sensors-only is about bags: give --ros-bag, too")
-    export(options.run, options.file)
+    flaw = export(options.run, options.file)
     say(f"written: {options.file}")
+    if flaw is not None:
+        say(f"but:     {flaw}")
     return 0
 
 

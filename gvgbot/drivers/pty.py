@@ -122,14 +122,17 @@ class PtyPort:
 
 def _place_link(link: Path, target: str) -> None:
     """Make the link, over an old one if need be, never over anything else. Raises UsageError."""
-    if link.exists() and not link.is_symlink():
+    if not link.name:
+        raise UsageError("a link without a name: give a path")
+    if os.path.lexists(link) and not link.is_symlink():
         raise UsageError(f"{link}: exists and is no link: choose another name, or remove it")
     fresh = link.with_name(f".{link.name}.{os.getpid()}")
     try:
         fresh.symlink_to(target)
         fresh.replace(link)
     except OSError as error:
-        fresh.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            fresh.unlink()
         raise UsageError(f"{link}: cannot make the link: {error.strerror}") from error
 
 

@@ -44,8 +44,11 @@ def _picture_of(found: Comparison, grids: Grids, names: Titles, verdict: str) ->
 
 
 def _lines(found: Comparison, names: tuple[str, str]) -> Iterator[str]:
-    turn, shift = math.degrees(found.a_b.theta), math.hypot(found.a_b.x, found.a_b.y)
-    yield f"aligned    {names[1]} was turned by {turn:z.1f} deg and moved by {shift:.2f} m"
+    if found.vertices or found.edges:
+        turn, shift = math.degrees(found.a_b.theta), math.hypot(found.a_b.x, found.a_b.y)
+        yield f"aligned    {names[1]} was turned by {turn:z.1f} deg and moved by {shift:.2f} m"
+    else:
+        yield "aligned    not at all: they have nothing in common"
     yield f"vertices   {_shared(found.vertices)}"
     yield f"edges      {_shared(found.edges)}"
     for which, name in enumerate(names):

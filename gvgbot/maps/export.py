@@ -17,8 +17,8 @@ GRAPHS: dict[str, Callable[[SavedRun], bytes]] = {
 }
 
 
-def export(directory: Path, out: Path) -> None:
-    """Write the map of a run in the format that the file's name ends with.
+def export(directory: Path, out: Path) -> str | None:
+    """Write the map of a run in the format that the file's name ends with; what it is not good for.
 
     Raises UsageError if there is no such format, the run cannot be read, or a run needs the file
     that is there; GvgbotError if nothing can be written.
@@ -29,6 +29,9 @@ def export(directory: Path, out: Path) -> None:
     run = SavedRun.read(directory)
     check_output(out)
     write_files(out.parent, {out.name: _encoded(run, suffix)})
+    if suffix == ".geojson" and not run.graph.edges:
+        return "there is no edge in it, and Nav2's route server refuses a graph without one"
+    return None
 
 
 def _encoded(run: SavedRun, suffix: str) -> bytes:

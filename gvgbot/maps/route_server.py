@@ -70,7 +70,7 @@ def _waypoint(number: int, place: Array) -> Feature:
 
 
 def _straight(edge: MapEdge, number: int, start: int, end: int, line: Array) -> Feature:
-    length = round(length_of(line), geojson.DECIMALS)
+    length = round(length_of(line[[0, -1]]), geojson.DECIMALS)
     metadata = {
         "length": length,
         "min_clearance": round(edge.min_clearance, geojson.DECIMALS),

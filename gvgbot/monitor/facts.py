@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from gvgbot.client import Event, Health, LinkHealth, Plan, Presence, State
-from gvgbot.words import shortened
+from gvgbot.words import counted, shortened
 
 Tone = Literal["plain", "good", "warning", "bad", "faint"]
 
@@ -61,7 +61,7 @@ def facts(state: State, plan: Plan | None, health: Health | None) -> Iterator[Fa
     yield Fact("program", *_program(health))
     yield Fact("contacts", *_contacts(state))
     yield Fact("speed", f"{state.twist[0]:.2f} m/s  {math.degrees(state.twist[1]):+.0f}°/s")
-    yield Fact("vertices", f"{state.vertices}, {state.edges} edges")
+    yield Fact("vertices", f"{state.vertices}, {counted(state.edges, 'edge')}")
 
 
 def _tone_of_phase(state: State) -> Tone:

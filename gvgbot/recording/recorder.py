@@ -60,6 +60,7 @@ class Recorder:
         self.map_base: Callable[[], Pose] = Pose  # where the robot is believed to be
         self._patient = patient
         self._files = _opened(config, about, files)
+        self.first = self._files.path  # another than configured if there was one already
         self._thread = ThreadPoolExecutor(1, "recording")
         self._batch: list[Entry] = []
         self._bytes = 0  # of the batch

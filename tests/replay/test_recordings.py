@@ -54,6 +54,19 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
     return Recorded(run, recording)
 
 
+def test_a_second_recording_of_that_name_is_told_by_its_own(
+    recorded: Recorded, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What is there stays, and whoever replays should not replay that by mistake."""
+    again = [f"recording.path={recorded.recording}", "twin.time_limit_s=5"]
+    out = tmp_path / "run"
+    main(["explore", "--out", str(out), *(word for one in again for word in ("--set", one))])
+    second = recorded.recording.with_name("run-2.mcap")
+    assert f"recording: {second}" in capsys.readouterr().out.splitlines()
+    assert json.loads((out / "summary.json").read_text())["recording"] == str(second)
+    assert second.exists()
+
+
 def test_a_recording_is_replayed_to_the_same_map_byte_for_byte(
     recorded: Recorded, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

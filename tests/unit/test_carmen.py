@@ -229,10 +229,10 @@ def test_a_packed_log_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
     whole = gzip.compress("\n".join([FLASER] * 2000).encode(), mtime=0)
     path = tmp_path / "a.log.gz"
     path.write_bytes(whole)
-    assert (len(read(path).scans), read(path).damaged) == (2000, 0)
+    assert (len(read(path).scans), read(path).damaged, read(path).is_cut) == (2000, 0, False)
     path.write_bytes(whole[: len(whole) // 2])
     assert 0 < len(read(path).scans) < 2000
-    assert read(path).damaged >= 1
+    assert read(path).is_cut
 
 
 @pytest.mark.parametrize(

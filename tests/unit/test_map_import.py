@@ -1,6 +1,7 @@
 """A map that somebody else has made becomes a run, or one line that says why not."""
 
 import itertools
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -140,6 +141,20 @@ def test_the_run_holds_a_mission_on_which_a_daemon_can_begin(tmp_path: Path) -> 
     assert len(saved.past) == saved.memory.keyframes == saved.memory.lasting
     assert saved.memory.intent.outcome is None
     assert main(["map", "show", str(tmp_path / "run")]) == 0
+
+
+def test_what_to_do_with_an_imported_map_can_be_pasted_into_a_shell(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The simulated robot has to be put into that building as well, a real one is in it."""
+    place, out = painted(tmp_path), tmp_path / "my run"
+    assert main(["map", "import", str(place), "--out", str(out)]) == 0
+    words = capsys.readouterr().out.splitlines()[-1].removeprefix("to drive in it: ")
+    expected = ["gvgbot", "run", "--map", str(out), "--set", f"twin.world={place}"]
+    assert shlex.split(words) == expected
+    real = ["--set", "twin.enabled=false", "--out", str(tmp_path / "real")]
+    assert main(["map", "import", str(place), *real]) == 0
+    assert "twin.world" not in capsys.readouterr().out
 
 
 def test_a_map_of_somebody_else_has_not_been_driven(

@@ -15,7 +15,7 @@ import serial
 
 from gvgbot.drivers.pty import PtyPort
 from gvgbot.drivers.transport import SerialStream
-from gvgbot.errors import DeviceLost
+from gvgbot.errors import DeviceLost, UsageError
 
 EVERY_BYTE = bytes(range(256))
 LOCAL_FLAGS = 3  # places in the list that termios gives
@@ -223,3 +223,18 @@ def test_a_rate_that_a_port_has_is_taken_and_another_one_refused(baud: int) -> N
         port.close()
 
     asyncio.run(main())
+
+
+@pytest.mark.parametrize("name", ["file/link", "nowhere/link", "", "file"])
+def test_a_link_that_cannot_be_made_is_one_line(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.chdir(tmp_path)
+
+    async def main() -> None:
+        with pytest.raises(UsageError, match="link"):
+            PtyPort(Path(name))
+
+    asyncio.run(main())
+    assert [one.name for one in tmp_path.iterdir()] == ["file"]

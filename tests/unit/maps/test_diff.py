@@ -187,6 +187,16 @@ def test_equal_maps_exit_with_0(tmp_path: Path, capsys: Captured) -> None:
     assert main(["map", "diff", str(one), str(other), "--tolerance", "0.01"]) == 1
 
 
+def test_maps_that_share_nothing_are_not_said_to_be_laid_on_each_other(
+    tmp_path: Path, capsys: Captured
+) -> None:
+    one, other = a_run(tmp_path / "a", town()), a_run(tmp_path / "b", RouteGraph())
+    assert main(["map", "diff", str(one), str(other)]) == 1
+    assert capsys.readouterr().out.splitlines()[0] == (
+        "aligned    not at all: they have nothing in common"
+    )
+
+
 @pytest.mark.parametrize("turn", [1e-4, -1e-4])
 def test_next_to_no_turn_has_no_sign(turn: float, tmp_path: Path, capsys: Captured) -> None:
     one, other = a_run(tmp_path / "a", town()), a_run(tmp_path / "b", town(turn))

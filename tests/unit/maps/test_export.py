@@ -135,6 +135,14 @@ def test_geojson_is_for_the_route_server(run: Path) -> None:
     assert len(loaded.edges) == 2 * len(GRAPH.edges)  # all are straight
 
 
+def test_a_graph_that_the_route_server_refuses_is_said_to_be_one(
+    run: Path, capsys: Captured
+) -> None:
+    (run / "map.geojson").write_text(geojson.encode(type(GRAPH)(GRAPH.vertices, ())))
+    export(run, ".geojson")
+    assert "but:     there is no edge in it" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize("name", ["map.jpg", "map", "nowhere/map.svg"])
 def test_an_unfit_name_is_one_line(
     run: Path, name: str, monkeypatch: pytest.MonkeyPatch, capsys: Captured

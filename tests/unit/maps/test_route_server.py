@@ -47,6 +47,7 @@ def test_the_straight_ways_of_an_export_run_where_the_edges_do(graph: RouteGraph
         start, end = piece["properties"]["metadata"]["edge"]
         lines = [e.polyline for e in graph.edges if (e.start, e.end) == (start, end)]
         (a, b) = piece["geometry"]["coordinates"][0]
+        assert piece["properties"]["cost"] == pytest.approx(math.dist(a, b), abs=1e-5)
         for share in np.linspace(0.0, 1.0, 5):
             point = (1.0 - share) * np.array(a) + share * np.array(b)
             assert min(away(point, line) for line in lines) < route_server.TOLERANCE_M + 1e-5
