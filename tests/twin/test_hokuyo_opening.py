@@ -160,6 +160,32 @@ def test_a_laser_that_stays_abnormal_is_refused() -> None:
     run_in_virtual_time(main())
 
 
+@pytest.mark.parametrize("wanted", ["", "H0000007"])
+def test_a_laser_with_the_wanted_serial_number_is_used(wanted: str) -> None:
+    async def scenario(bench: Bench) -> None:
+        await opens_within(bench, 3.0)
+
+    on_bench(twin_of(serial_number="H0000007"), scenario, HokuyoConfig(serial=wanted))
+
+
+@pytest.mark.parametrize(
+    ("told", "named"), [("H0000007", "the laser H0000007"), ("", "without a serial number")]
+)
+def test_another_laser_than_the_wanted_one_is_refused(told: str, named: str) -> None:
+    """On USB all Hokuyos look alike, and may change places when they are plugged in."""
+
+    async def main() -> None:
+        here, there = pipe()
+        clock = LoopClock()
+        async with asyncio.TaskGroup() as tasks:
+            served = tasks.create_task(serve_twin(twin_of(serial_number=told), there, clock))
+            with pytest.raises(DeviceRefused, match=f"{named}, not H0000002: set laser.port"):
+                await HokuyoLaser(here, HokuyoConfig(serial="H0000002"), clock).run()
+            served.cancel()
+
+    run_in_virtual_time(main())
+
+
 def test_a_stop_that_was_lost_is_sent_again() -> None:
     """Two of three QT do not stop the stream, and the time cannot be asked while it runs."""
 

@@ -17,6 +17,7 @@ class HokuyoConfig:
     """How the laser is connected, mounted and read."""
 
     port: str = "/dev/ttyACM0"  # or tcp://host:10940
+    serial: str = ""  # number of the laser to use, where several are; empty: whichever is there
     baud: Annotated[int, Range(19200, 750000)] = 115200  # means nothing on USB and Ethernet
     # what carries the bytes, and so how many; auto: told by the port
     link: Literal["auto", "usb", "serial", "tcp"] = "auto"

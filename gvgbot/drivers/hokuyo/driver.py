@@ -195,6 +195,7 @@ class HokuyoLaser:
 
     async def _open(self) -> Parameters:
         self._identity = Identity.from_lines((await self._dialogue.ask("VV")).fields)
+        self._check_serial(self._identity.serial)
         try:
             self._parameters = Parameters.from_lines((await self._dialogue.ask("PP")).fields)
         except ValueError as error:
@@ -209,6 +210,15 @@ class HokuyoLaser:
         if every + late > self._longest_s:
             log.warning("scans are too rare to drive by", every_s=every, late_s=late, remedy=FASTER)
         return self._parameters
+
+    def _check_serial(self, serial: str) -> None:
+        """Raises DeviceRefused if another laser is wanted: on USB they are alike but for this."""
+        wanted = self._config.serial
+        if wanted not in ("", serial):
+            raise DeviceRefused(
+                f"{self._config.port} is the laser {serial or 'without a serial number'}, not "
+                f"{wanted}: set laser.port to the other one, or correct laser.serial"
+            )
 
     def _choose(self, parameters: Parameters) -> Mode:
         port = self._config.port
