@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.estimate import scans_at, smoothed
@@ -18,6 +17,7 @@ from gvgbot.drivers.world import World, save_world
 from gvgbot.geometry import Array, Pose, composed, resampled, seen_from
 from gvgbot.hal.messages import Odometry
 from gvgbot.maps import geojson
+from gvgbot.maps.distances import cells_to
 from gvgbot.maps.gaps import is_floor, is_wall
 from gvgbot.maps.map_server import encode_map_server
 from gvgbot.maps.occupancy import OccupancyGrid, occupancy_grid
@@ -194,7 +194,7 @@ def _known_room(grid: OccupancyGrid, line: Array, most: float) -> float:
     first = np.maximum(cells.min(axis=0) - margin, 0)
     (top, left), (bottom, right) = first, np.maximum(cells.max(axis=0) + margin + 1, 0)
     floor = np.pad(is_floor(grid.cells[top:bottom, left:right]), 1)  # beyond, nothing is known
-    free = ndimage.distance_transform_edt(floor) * grid.resolution_m
+    free = cells_to(~floor) * grid.resolution_m
     row, column = np.clip(cells - first + 1, 0, np.array(floor.shape) - 1).T
     return float(free[row, column].min())
 

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from gvgbot.geometry import Array
+from gvgbot.maps.distances import cells_to
 from gvgbot.maps.map_server import FREE_THRESH, OCCUPIED_THRESH
 from gvgbot.maps.occupancy import UNKNOWN, Cells, OccupancyGrid
 
@@ -29,7 +30,7 @@ def gaps(grid: OccupancyGrid, around: Array, passage_m: float) -> Array:
     wall, seen = is_wall(cells), is_floor(cells)
     if not wall.any():
         return np.empty((0, 2))
-    has_room = ndimage.distance_transform_edt(~wall) * cell > passage_m
+    has_room = cells_to(wall) * cell > passage_m
     floor = reachable(seen & has_room, (around - corner)[::-1] / cell)
     unseen = has_room & ~seen & ~wall
     brink = unseen & ndimage.binary_dilation(floor)

@@ -4,6 +4,7 @@ import numpy as np
 from scipy import ndimage
 
 from gvgbot.geometry import Array
+from gvgbot.maps.distances import cells_to
 from gvgbot.maps.gaps import Mask, is_floor, is_wall, reachable
 from gvgbot.maps.occupancy import OccupancyGrid
 from gvgbot.maps.viewpoints import cells_near
@@ -21,7 +22,7 @@ def narrows(
     grid are one or two cells thicker than they are.
     """
     cell, corner = grid.resolution_m, np.array(grid.origin)
-    clearance = ndimage.distance_transform_edt(~is_wall(grid.cells)) * cell
+    clearance = cells_to(is_wall(grid.cells)) * cell
     here = (around - corner)[::-1] / cell
     fits = reachable(is_floor(grid.cells) & (clearance > radius - 2 * cell), here)
     has_room = fits & (clearance > passage_m)
@@ -29,16 +30,12 @@ def narrows(
     reached = np.unique(areas[reachable(has_room, here) | cells_near(ways, grid, has_room)])
     large = np.flatnonzero(np.bincount(areas.ravel()) * cell**2 >= _AREA_M2)
     known, necks = has_room & np.isin(areas, reached), fits & ~has_room
-    to_known = _cells_to(known)
+    to_known = cells_to(known)
     found = [
-        _nearest(necks, np.maximum(to_known, _cells_to(areas == area)))
+        _nearest(necks, np.maximum(to_known, cells_to(areas == area)))
         for area in np.setdiff1d(large, [0, *reached])
     ]
     return corner + (np.array(found).reshape(-1, 2)[:, ::-1] + 0.5) * cell
-
-
-def _cells_to(area: Mask) -> Array:
-    return np.asarray(ndimage.distance_transform_edt(~area))
 
 
 def _nearest(necks: Mask, cells_away: Array) -> Array:
