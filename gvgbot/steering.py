@@ -201,7 +201,8 @@ class _Ledger:
         """The request, if it is to be written down, with how many before it were not."""
         is_new = self._newest is None or not _are_alike(asked, self._newest)
         if not (asked.done and is_new):
-            self._room = min(_BURST, self._room + _A_SECOND * (asked.stamp - self._since))
+            waited = max(0.0, asked.stamp - self._since)
+            self._room = min(_BURST, self._room + _A_SECOND * waited)
             self._since = asked.stamp
             if self._room < 1.0:
                 self._missing += 1

@@ -106,10 +106,15 @@ class TcpStream:
     def watch_over(self, last_words: bytes, patience_s: float) -> None:
         """Write the last words while the event loop hangs for longer than that.
 
-        The connection has to be there. If it ends, the number of its file may be another's.
+        Raises DeviceLost if the connection has ended by now. If it ends later, the number of its
+        file may be another's, so this has one of its own.
         """
         assert self._writer is not None, "nothing is said without a connection"
-        fd = os.dup(self._writer.get_extra_info("socket").fileno())
+        try:
+            fd = os.dup(self._writer.get_extra_info("socket").fileno())
+        except OSError as error:
+            self.close()
+            raise DeviceLost(f"{self._name} closed the connection") from error
         self._watch.callback(os.close, fd)
         self._watch.callback(Deadman(fd, last_words, patience_s).close)
 

@@ -3,6 +3,7 @@
 import asyncio
 import os
 import socket
+import struct
 import threading
 import tty
 from collections.abc import Iterator
@@ -11,6 +12,7 @@ import pytest
 
 from gvgbot.drivers.tcp import SCHEME, open_tcp
 from gvgbot.drivers.transport import SerialStream
+from gvgbot.errors import DeviceLost
 
 LAST_WORDS = b"stand still"
 PATIENCE_S = 0.1
@@ -84,6 +86,22 @@ def test_a_base_on_the_network_is_told_as_well() -> None:
             stream.close()
             await asyncio.sleep(0)
             assert base.recv(1) == b""  # nothing holds the connection any more
+        assert "deadman" not in {thread.name for thread in threading.enumerate()}
+
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        asyncio.run(drive(listener))
+
+
+def test_a_base_that_hangs_up_at_once_is_lost_and_not_watched() -> None:
+    async def drive(listener: socket.socket) -> None:
+        stream = await open_tcp(f"{SCHEME}127.0.0.1:{listener.getsockname()[1]}")
+        base, _ = listener.accept()
+        base.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+        base.close()  # which resets the connection
+        with pytest.raises(DeviceLost):
+            await stream.read()
+        with pytest.raises(DeviceLost, match="closed the connection"):
+            stream.watch_over(LAST_WORDS, PATIENCE_S)
         assert "deadman" not in {thread.name for thread in threading.enumerate()}
 
     with socket.create_server(("127.0.0.1", 0)) as listener:
