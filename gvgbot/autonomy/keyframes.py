@@ -2,7 +2,7 @@
 
 import copy
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Annotated, Self
 
 import numpy as np
@@ -41,10 +41,7 @@ class Step:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Keyframe:
-    """The poses at which a scan was used; the scan itself only where it shows something new.
-
-    Its ranges are of single precision.
-    """
+    """The poses at which a scan was used; the scan itself only where it shows something new."""
 
     stamp: float
     odom_base: Pose
@@ -90,8 +87,7 @@ class Past:
         is_kept = has_come_on(self.with_scan, local_base, _SCAN_EVERY_M, _SCAN_EVERY_RAD)
         if is_kept:
             self.with_scan = local_base
-        # to a micrometre, in half of the memory, most of which these are
-        kept = replace(scan, ranges=scan.ranges.astype(np.float32)) if is_kept else None
+        kept = scan if is_kept else None
         self.keyframes.append(Keyframe(scan.stamp, odom_base, local_base, map_base, kept))
 
     def leave_out(self) -> int:

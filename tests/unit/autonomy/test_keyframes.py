@@ -26,17 +26,6 @@ def test_a_scan_is_kept_where_it_shows_something_new() -> None:
     assert kept == [0.0, 0.8, 1.6]
 
 
-def test_a_scan_that_is_kept_takes_half_the_memory_and_is_right_to_a_micrometre() -> None:
-    look = Scan(0.0, np.array([0.123456789, 5.6, 29.87654321, np.inf, np.nan]), -1, 0.1, 0, 30.0)
-    past = Past()
-    past.keep(look, Pose(), Pose(), Pose())
-    assert past.last is not None
-    assert past.last.scan is not None
-    kept = past.last.scan.ranges
-    assert kept.nbytes == look.ranges.nbytes / 2
-    np.testing.assert_allclose(kept, look.ranges, atol=1e-6)
-
-
 def test_of_a_way_that_is_left_out_only_its_end_stays_and_nobody_knows_how_it_came_there() -> None:
     past = driven(0.0, 1.0, 2.0, 3.0, 4.0)
     past.lasting, past.lent = 2, 3
