@@ -25,7 +25,8 @@ class Scan:
     `ranges` (N,) in metres, read-only; NaN = nothing trusted, inf = nothing within range.
     Beam i points to `angle_min + i * angle_increment` (rad) in the laser frame, anticlockwise.
     `stamp` is the time of the first beam (s, monotonic); beam i is `i * time_increment` later.
-    `noise` (1 sigma, m) is that of the ranges as they came, if they have been changed since.
+    `noise` (1 sigma, m) is that of the ranges as they came, if it was more than usual and they have
+    been changed since.
     """
 
     stamp: float
