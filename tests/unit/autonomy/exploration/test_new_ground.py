@@ -30,6 +30,24 @@ def test_old_ground_is_none() -> None:
     assert ground.is_over(100.0, 1200.0)
 
 
+def test_ground_beside_old_ground_is_none_where_the_map_sways() -> None:
+    """To and fro for hours, at times 0.7 m farther to one side or to the other."""
+    ground = NewGround()
+    for stamp in range(12_000):
+        y = 0.5 if stamp < 4000 else 1.2 if stamp < 11_500 else -0.2
+        ground.note(np.array([5.0 * np.sin(0.1 * stamp), y]), float(stamp))
+    assert ground.is_over(100.0, 12_000.0)
+
+
+def test_a_room_off_an_old_corridor_is_new_ground() -> None:
+    ground = NewGround()
+    for stamp in range(2000):
+        ground.note(np.array([5.0 * np.sin(0.1 * stamp), 0.0]), float(stamp))
+    for stamp in range(2000, 2010):
+        ground.note(np.array([0.0, 0.4 * (stamp - 2000)]), float(stamp))
+    assert not ground.is_over(0.0, 2010.0)
+
+
 def test_outages_and_other_tasks_do_not_count() -> None:
     ground = NewGround()
     ground.note(np.zeros(2), 0.0)
