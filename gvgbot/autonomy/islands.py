@@ -107,7 +107,7 @@ class _Look:
 
     def __init__(self, scan: Scan, local_laser: Pose, told: NDArray[np.intp]) -> None:
         self._laser = local_laser
-        self._noise = range_noise(scan.ranges) if scan.noise is None else scan.noise
+        self._noise = range_noise(scan.ranges)
         self._smooth = math.hypot(_SMOOTH_M, _NOISE * self._noise)
         self._depth = np.minimum(scan.ranges[told], scan.range_max)
         self._beam_ends = beam_ends(scan, told, self._depth, local_laser)

@@ -47,7 +47,7 @@ class NoisyWalls:
 
     def note(self, scan: Scan, position: Array, local_map: LocalMap, travelled: float) -> None:
         """Account for a scan, taken at a position (2,), local frame, after so many metres."""
-        excess = excess_noise(scan.ranges, scan.noise)
+        excess = excess_noise(scan.ranges)
         before = excess if self._excess is None else self._excess
         self._excess = before + _NEWEST * (excess - before)
         if self._is_noisy:

@@ -6,7 +6,6 @@ import numpy as np
 
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
-from gvgbot.hal.noise import excess_noise, range_noise
 
 _STILL_M, _STILL_RAD = 1e-3, 2e-4  # less motion than this during a sweep does not show
 _SLANT = 12.0  # of a wall between two beams, which sees it at five degrees: longer than wide
@@ -15,12 +14,8 @@ _SLANT = 12.0  # of a wall between two beams, which sees it at five degrees: lon
 def deskewed(scan: Scan, motion: Pose) -> Scan:
     """The scan as if taken at its stamp; `motion` is that of the base during the whole sweep.
 
-    The base is taken to move evenly. Directions that no beam looked into are NaN. Ranges between
-    two beams have less noise than both, and the same as those beside them: it remembers how much
-    there was, if that was more than usual.
+    The base is taken to move evenly. Directions that no beam looked into are NaN.
     """
-    if excess_noise(scan.ranges, noise := range_noise(scan.ranges)) > 0.0:
-        scan = replace(scan, noise=noise)
     if abs(motion.x) + abs(motion.y) < _STILL_M and abs(motion.theta) < _STILL_RAD:
         return replace(scan, time_increment=0.0)
     share = np.arange(len(scan.ranges)) / len(scan.ranges)

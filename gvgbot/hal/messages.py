@@ -25,8 +25,6 @@ class Scan:
     `ranges` (N,) in metres, read-only; NaN = nothing trusted, inf = nothing within range.
     Beam i points to `angle_min + i * angle_increment` (rad) in the laser frame, anticlockwise.
     `stamp` is the time of the first beam (s, monotonic); beam i is `i * time_increment` later.
-    `noise` (1 sigma, m) is that of the ranges as they came, if it was more than usual and they have
-    been changed since.
     """
 
     stamp: float
@@ -37,7 +35,6 @@ class Scan:
     range_max: float
     time_increment: float = 0.0
     base_laser: Pose = field(default_factory=Pose)
-    noise: float | None = None
 
     def __post_init__(self) -> None:
         self.ranges.setflags(write=False)

@@ -22,11 +22,8 @@ def range_noise(ranges: Array) -> float:
     return median / (_MEDIAN * math.sqrt(6.0))
 
 
-def excess_noise(ranges: Array, noise: float | None = None) -> float:
-    """By how much the noise of ranges (N,) is more than usual, m; 0 where too few meet a wall.
-
-    `noise` is what it is, m, if that is known: it is found out otherwise.
-    """
+def excess_noise(ranges: Array) -> float:
+    """By how much the noise of ranges (N,) is more than usual, m; 0 where too few meet a wall."""
     if np.count_nonzero(np.isfinite(ranges)) <= _TELLING * len(ranges):
         return 0.0
-    return max(0.0, (range_noise(ranges) if noise is None else noise) - _USUAL_M)
+    return max(0.0, range_noise(ranges) - _USUAL_M)

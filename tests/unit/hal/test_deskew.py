@@ -8,7 +8,6 @@ import pytest
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.deskew import deskewed
 from gvgbot.hal.messages import Scan
-from gvgbot.hal.noise import range_noise
 
 BEAMS = 1081
 BEARINGS = np.radians(np.linspace(-135.0, 135.0, BEAMS))
@@ -88,14 +87,3 @@ def test_between_a_post_and_the_wall_behind_it_nothing_is_invented() -> None:
     straight = deskewed(to_scan(ranges), Pose(0.0, 0.0, 0.05))
     seen = straight.ranges[np.isfinite(straight.ranges)]
     assert set(np.round(seen, 1)) == {3.0, 4.0}
-
-
-@pytest.mark.parametrize("motion", [Pose(), Pose(0.0, 0.0, 0.06), Pose(0.05, 0.0, 0.0)])
-def test_a_deskewed_sweep_remembers_how_noisy_it_was(motion: Pose) -> None:
-    """Its own ranges no longer tell: they are means of two."""
-    sigma = 0.03
-    ranges = sweep(motion).ranges + np.random.default_rng(1).normal(0.0, sigma, BEAMS)
-    straight = deskewed(to_scan(ranges), motion)
-    assert straight.noise == pytest.approx(sigma, rel=0.1)
-    if motion != Pose():
-        assert range_noise(straight.ranges) < 0.8 * sigma
