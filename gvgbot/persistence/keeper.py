@@ -111,7 +111,7 @@ class Keeper:
             session.journey = saved.journey
         else:  # another has lived so far
             past = session.pipeline.past
-            past.lent, past.lent_m = len(past.keyframes), past.travelled
+            past.lent, past.lent_m, past.sought_m = len(past.keyframes), past.travelled, 0.0
             session.pipeline.errands.forget()
             beat = msgspec.structs.replace(saved.beat, tally=session.tally)
             self._saved = replace(saved, beat=beat)

@@ -121,6 +121,20 @@ def test_what_the_journal_holds_is_not_taken_from_it_bit_by_bit(
     assert len(found(tmp_path).past) == len(session.pipeline.past.keyframes)
 
 
+def test_whoever_begins_with_a_known_map_has_driven_nothing_yet(
+    session: Session, tmp_path: Path
+) -> None:
+    """Not what was driven to make it, nor to find a place on it."""
+    drive_on(session, 3)
+    session.pipeline.past.sought_m = 7.0
+    (tmp_path / "known").mkdir()
+    Keeper(session, MissionFiles(tmp_path / "known")).finish()
+    with RunDirectory(tmp_path / "run") as directory:
+        again = Session(load_config(), directory, None)
+    Keeper(again, MissionFiles(tmp_path / "run"), found(tmp_path / "known"))
+    assert again.pipeline.driven == 0.0
+
+
 def test_a_known_map_is_kept_whole_when_something_is_asked_of_a_robot_that_is_lost(
     session: Session, tmp_path: Path
 ) -> None:
