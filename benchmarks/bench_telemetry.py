@@ -38,7 +38,12 @@ from gvgbot.live_feed import LiveFeed
 from gvgbot.live_map import LiveMap
 from gvgbot.snapshots import state
 from gvgbot.telemetry import Telemetry
-from gvgbot.topics import HEALTH, LinkHealth, Map, TelemetryConfig
+from gvgbot.telemetry_config import TelemetryConfig
+from gvgbot.topics import (
+    HEALTH,
+    LinkHealth,
+    Map,
+)
 from gvgbot.vitals import Vitals
 
 VERTICES, BEAMS, SIDE = 200, 1081, 60.0

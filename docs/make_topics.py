@@ -13,11 +13,11 @@ import msgspec
 
 from docs.source import fields_of, table
 from gvgbot.requests import REQUESTS, request_key
+from gvgbot.telemetry_config import TelemetryConfig
 from gvgbot.topics import (
     SCAN,
     TEAM_PARTS,
     TOPICS,
-    TelemetryConfig,
     Topic,
     alive_key,
     team_key,

@@ -21,7 +21,7 @@ from gvgbot.ros2.config import Ros2Config
 from gvgbot.strict_yaml import has_section, load, load_text, packaged
 from gvgbot.team.member import TeamConfig
 from gvgbot.team.troubles import TroublesConfig
-from gvgbot.topics import TelemetryConfig
+from gvgbot.telemetry_config import TelemetryConfig
 
 DEFAULT = "sim.yaml"
 

@@ -23,15 +23,14 @@ from gvgbot.requests import (
     Asked,
     request_key,
 )
+from gvgbot.telemetry_config import LAST_PORT, TelemetryConfig
 from gvgbot.topics import (
     HEARTBEAT,
-    LAST_PORT,
     STATE,
     TEAM_PARTS,
     TOPICS,
     Payload,
     TeamPart,
-    TelemetryConfig,
     Topic,
     alive_key,
     team_key,

@@ -1,71 +1,21 @@
 """What the robot says on the network: the table of topics, and the types that travel."""
 
-import re
 import zlib
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from gvgbot.ranges import Range
-from gvgbot.requests import RequestName
-
 Phase = Literal["starting", "exploring", "errand", "waiting", "paused", "halted", "finished"]
 TeamPart = Literal["team", "course"]  # what robots know; and where each is and drives
 Priority = Literal["interactive_high", "data_high", "data", "data_low"]
 
-LAST_PORT = 65535
 _POINT, _POSE, _TIME, _RANGE = 8, 12, 8, 2  # bytes of what travels packed
 _COVARIANCE = 9  # of a pose: 3 by 3
 _LARGEST_SIDE = 1024  # cells, of a tile
 _MOST_CELLS = 2**28  # of a grid: a square of 800 m with cells of 5 cm
-_HAVE_PORTS = ("tcp", "udp", "tls", "quic", "ws")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TelemetryConfig:
-    """Where the robot can be watched; loopback only, unless the configuration opens it.
-
-    `requests` names what it may be asked for; to permit all, list pause, resume, stop, home, goto,
-    patrol, coverage, explore, relocalise, save and set.
-    """
-
-    enabled: bool = True  # false: nothing goes over the network
-    requests: tuple[RequestName, ...] = ()  # what the robot may be asked for
-    zenoh_file: Path | None = None  # JSON5: keys, passwords, access control; see configs/zenoh
-    listen: tuple[str, ...] = ("tcp/127.0.0.1:7447",)  # addresses that others can reach it at
-    connect: tuple[str, ...] = ()  # routers or robots of the team, joined again when they are back
-    lease_s: Annotated[float, Range(0.5, 60.0)] = 2.0  # silence until the robot counts as gone
-    scan_rate_hz: Annotated[float, Range(0.1, 40.0)] = 10.0  # at most; with nobody there, none
-
-    def __post_init__(self) -> None:
-        """Raises ValueError for addresses that cannot be listened on."""
-        check_endpoints("listen", self.listen)
-        check_endpoints("connect", self.connect)
-        if self.enabled and not self.listen:
-            raise ValueError("listen is empty: give an address, or set enabled: false")
-
-
-def check_endpoints(key: str, endpoints: tuple[str, ...]) -> None:
-    """Raises ValueError if one of a key's addresses cannot be one."""
-    for endpoint in endpoints:
-        if not is_endpoint(endpoint):
-            raise ValueError(
-                f"{key} = {endpoint!r}: must be protocol/host:port, such as tcp/0.0.0.0:7447"
-            )
-
-
-def is_endpoint(text: str) -> bool:
-    """Whether the text has the form of an address: protocol/address, or protocol/host:port."""
-    protocol, _, address = text.partition("/")
-    if not protocol or not address or "/" in address:
-        return False
-    host, _, port = re.split("[?#]", address)[0].rpartition(":")
-    has_port = host != "" and re.fullmatch("[0-9]{1,5}", port) and int(port) <= LAST_PORT
-    return protocol not in _HAVE_PORTS or bool(has_port)
 
 
 class LinkHealth(msgspec.Struct, frozen=True, kw_only=True):

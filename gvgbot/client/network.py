@@ -10,7 +10,11 @@ import zenoh
 import zenoh.ext
 
 from gvgbot.errors import GvgbotError, UsageError
-from gvgbot.topics import Topic, alive_key, is_endpoint
+from gvgbot.telemetry_config import is_endpoint
+from gvgbot.topics import (
+    Topic,
+    alive_key,
+)
 from gvgbot.zenoh_config import opened, reason, session_config
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from gvgbot.ranges import Range
-from gvgbot.topics import check_endpoints
+from gvgbot.telemetry_config import check_endpoints
 
 _NAMESPACE = r"(/[A-Za-z_]\w*)*"
 

@@ -20,7 +20,12 @@ from gvgbot import client
 from gvgbot.errors import GvgbotError, UsageError
 from gvgbot.requests import Answer, Asked
 from gvgbot.telemetry import Telemetry
-from gvgbot.topics import Event, Events, TelemetryConfig, Trajectory
+from gvgbot.telemetry_config import TelemetryConfig
+from gvgbot.topics import (
+    Event,
+    Events,
+    Trajectory,
+)
 from gvgbot.zenoh_config import session_config
 from tests.process.addresses import free_endpoint
 from tests.unit.monitor.maps import a_grid

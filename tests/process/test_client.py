@@ -29,6 +29,7 @@ from gvgbot import client
 from gvgbot.client.newest import Newest
 from gvgbot.errors import GvgbotError, UsageError
 from gvgbot.telemetry import Telemetry
+from gvgbot.telemetry_config import TelemetryConfig
 from gvgbot.topics import (
     Event,
     Events,
@@ -41,7 +42,6 @@ from gvgbot.topics import (
     Plan,
     Scan,
     State,
-    TelemetryConfig,
     Tile,
     Trajectory,
 )
@@ -107,7 +107,7 @@ A_PLAN = Plan(
 ROBOT = """
 import sys, time
 from gvgbot.telemetry import Telemetry
-from gvgbot.topics import TelemetryConfig
+from gvgbot.telemetry_config import TelemetryConfig
 from tests.unit.monitor.maps import SIDE, a_grid
 from tests.unit.test_telemetry import EXAMPLE
 with Telemetry(TelemetryConfig(listen=(sys.argv[1],)), "far") as robot:
@@ -119,7 +119,7 @@ with Telemetry(TelemetryConfig(listen=(sys.argv[1],)), "far") as robot:
 STUCK = """
 import select, sys
 from gvgbot.telemetry import Telemetry
-from gvgbot.topics import TelemetryConfig
+from gvgbot.telemetry_config import TelemetryConfig
 from tests.unit.test_telemetry import EXAMPLE
 with Telemetry(TelemetryConfig(listen=(sys.argv[1],)), "far") as robot:
     while not select.select([sys.stdin], [], [], 0.1)[0]:

@@ -28,7 +28,12 @@ from rich.text import Text
 
 from gvgbot import client
 from gvgbot.telemetry import Telemetry
-from gvgbot.topics import Event, Events, Plan, TelemetryConfig
+from gvgbot.telemetry_config import TelemetryConfig
+from gvgbot.topics import (
+    Event,
+    Events,
+    Plan,
+)
 from tests.process.addresses import free_endpoint, router
 from tests.process.browser import browser, chromium
 from tests.unit.monitor.maps import a_grid, a_map, vertex

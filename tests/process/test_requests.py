@@ -18,7 +18,7 @@ from gvgbot import client
 from gvgbot.errors import GvgbotError
 from gvgbot.requests import Answer, Asked, Goto, Patrol, Set, parse
 from gvgbot.telemetry import Telemetry
-from gvgbot.topics import TelemetryConfig
+from gvgbot.telemetry_config import TelemetryConfig
 from tests.process.addresses import free_endpoint, plain_session, router
 from tests.unit.test_telemetry import EXAMPLE
 
@@ -290,7 +290,7 @@ with client.connect("near", sys.argv[1]) as robot:
 SLEEPER = """
 import asyncio, sys
 from gvgbot.telemetry import Telemetry
-from gvgbot.topics import TelemetryConfig
+from gvgbot.telemetry_config import TelemetryConfig
 async def handle(asked):
     print("asked", flush=True)
     await asyncio.Event().wait()

@@ -22,7 +22,7 @@ from gvgbot.ros2.node import Ros2Node
 from gvgbot.ros2.topics import MAP, SCAN, TF_STATIC
 from gvgbot.ros2.translation import occupancy_grid
 from gvgbot.telemetry import Telemetry
-from gvgbot.topics import TelemetryConfig
+from gvgbot.telemetry_config import TelemetryConfig
 from tests.process.addresses import free_endpoint, plain_session, router
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(180)]

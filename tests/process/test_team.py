@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from gvgbot.telemetry import Telemetry
-from gvgbot.topics import TelemetryConfig
+from gvgbot.telemetry_config import TelemetryConfig
 from tests.process.addresses import free_endpoint, router
 from tests.process.test_run_process import gvgbot
 

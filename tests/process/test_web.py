@@ -33,6 +33,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from gvgbot import client
 from gvgbot.requests import REQUESTS, Answer, Asked, Goto, parse
 from gvgbot.telemetry import Telemetry
+from gvgbot.telemetry_config import TelemetryConfig
 from gvgbot.topics import (
     Event,
     Events,
@@ -40,7 +41,6 @@ from gvgbot.topics import (
     Mate,
     Plan,
     State,
-    TelemetryConfig,
     Trajectory,
     packed,
 )

@@ -23,6 +23,7 @@ from gvgbot.robot import Robot
 from gvgbot.service import Notifier
 from gvgbot.session import Session
 from gvgbot.simulation import Place, Simulation
+from gvgbot.telemetry_config import TelemetryConfig
 from gvgbot.topics import (
     Events,
     Grid,
@@ -33,7 +34,6 @@ from gvgbot.topics import (
     Plan,
     Scan,
     State,
-    TelemetryConfig,
     Trajectory,
 )
 from gvgbot.worlds.canvas import Canvas

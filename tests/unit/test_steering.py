@@ -15,7 +15,7 @@ from gvgbot.hal.guard import GuardConfig, Reason
 from gvgbot.hal.messages import Contact
 from gvgbot.requests import MESSAGEPACK, REQUESTS, Answer, Asked, RequestName
 from gvgbot.steering import SETTABLE, Steering
-from gvgbot.topics import TelemetryConfig
+from gvgbot.telemetry_config import TelemetryConfig
 
 FREE = Contact(stamp=0.0)
 CONFIG = Config(robot=RobotConfig(limits=GuardConfig(max_speed_mps=0.5)))

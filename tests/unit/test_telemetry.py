@@ -19,7 +19,14 @@ from gvgbot.geometry import STANDSTILL, Array, Pose
 from gvgbot.hal.messages import Odometry
 from gvgbot.snapshots import pose_covariance
 from gvgbot.telemetry import _session_config
-from gvgbot.topics import STATE, TOPICS, LinkHealth, State, TelemetryConfig, alive_key
+from gvgbot.telemetry_config import TelemetryConfig
+from gvgbot.topics import (
+    STATE,
+    TOPICS,
+    LinkHealth,
+    State,
+    alive_key,
+)
 
 EXAMPLE = State(
     stamp=12.5,

@@ -4,13 +4,13 @@ import msgspec
 import pytest
 
 from docs.make_topics import PAGE, page
+from gvgbot.telemetry_config import TelemetryConfig
 from gvgbot.topics import (
     SCAN,
     STATE,
     TEAM_PARTS,
     TOPICS,
     LinkHealth,
-    TelemetryConfig,
     Topic,
     alive_key,
     team_key,
