@@ -13,6 +13,7 @@ from gvgbot.autonomy.exploration.paths import shortest_paths
 from gvgbot.autonomy.gvg.local import Branch, Place
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.overlooked import Overlooked
+from gvgbot.autonomy.progress import Progress
 from gvgbot.autonomy.pursuit import Pursuit
 from gvgbot.autonomy.scouting import Scouting
 from gvgbot.autonomy.search import NO_EDGE, Search
@@ -98,7 +99,7 @@ class Mission(Pursuit):
             assert half is not None
             half.blocked = False
         self._obstructions = Obstructions(self._config.retries, self._config.retry_after_s)
-        self._scouting = Scouting()
+        self._scouting, self._progress = Scouting(), Progress(self._mapper)
         self.set_aside()
 
     def set_aside(self) -> None:

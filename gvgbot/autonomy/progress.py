@@ -77,7 +77,10 @@ class Progress:
         """Whether no target has led anywhere new for a long time."""
         self._ground.note(self._mapper.belief.map_base.position, view.stamp)
         is_long = self._ground.is_over(0.0, view.stamp)
-        return is_long and self._ground.is_over(self._known_m, view.stamp)
+        is_over = is_long and self._ground.is_over(self._known_m, view.stamp)
+        if is_over:
+            self._ground.run_out()
+        return is_over
 
     @property
     def _known_m(self) -> float:

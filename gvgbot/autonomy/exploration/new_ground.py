@@ -1,5 +1,6 @@
 """Since when the robot has not been anywhere new."""
 
+import math
 from itertools import product
 
 import numpy as np
@@ -21,6 +22,7 @@ class NewGround:
     def __init__(self) -> None:
         self._cells = dict[tuple[int, int], float]()  # and the stamp of the first time
         self._since: float | None = None  # stamp
+        self._patience = 1.0  # half as much each time it has run out
 
     def note(self, place: Array, stamp: float) -> None:
         """The robot is at a place (2,), m, map frame."""
@@ -28,6 +30,8 @@ class NewGround:
         beside = product((x - 1, x, x + 1), (y - 1, y, y + 1))
         known = [self._cells[cell] for cell in beside if cell in self._cells]
         is_new = (x, y) not in self._cells and min(known, default=stamp) > stamp - _LATELY_S
+        if is_new:
+            self._patience = 1.0
         if is_new or self._since is None:
             self._since = stamp
         self._cells.setdefault((x, y), stamp)
@@ -36,11 +40,20 @@ class NewGround:
         """Count anew: it had something else to do, or to wait for others."""
         self._since = None
 
+    def run_out(self) -> None:
+        """There is no more hope; the next time sooner, unless there is new ground by then."""
+        if self._since != -math.inf:
+            self._since, self._patience = -math.inf, 0.5 * self._patience
+
     def skip(self, seconds: float) -> None:
         """Do not count a time in which nothing was to be seen."""
         self._since = None if self._since is None else self._since + seconds
 
     def is_over(self, edges_m: float, stamp: float) -> bool:
-        """Whether it has had the time to drive all edges, so many metres, twice since then."""
+        """Whether it has had the time to drive all edges, so many metres, twice since then.
+
+        After that has run out, half of it; there is an end to what looks like frontiers.
+        """
         since = stamp if self._since is None else self._since
-        return stamp - since > _AT_LEAST_S + 2.0 * edges_m / _SPEED_MPS
+        patience_s = _AT_LEAST_S + 2.0 * edges_m / _SPEED_MPS
+        return stamp - since > self._patience * patience_s

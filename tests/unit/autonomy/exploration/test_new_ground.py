@@ -58,3 +58,25 @@ def test_outages_and_other_tasks_do_not_count() -> None:
     ground.note(np.zeros(2), 9000.0)
     assert not ground.is_over(100.0, 9900.0)
     assert ground.is_over(100.0, 10_200.0)
+
+
+def test_patience_that_has_run_out_is_shorter_until_there_is_new_ground() -> None:
+    """Without a bound of all waits together, whoever looks once more for what is missing might
+    find frontiers that come and go for ever.
+    """
+    ground = NewGround()
+    ground.note(np.zeros(2), 0.0)
+    waits, begin = [], 0.0
+    for _ in range(4):
+        stamp = begin
+        while not ground.is_over(100.0, stamp):
+            stamp += 1.0
+        waits.append(stamp - begin)
+        ground.run_out()
+        assert ground.is_over(100.0, stamp + 1.0)  # until it had something else to do
+        ground.restart()
+        begin = stamp + 100.0
+        ground.note(np.zeros(2), begin)
+    assert np.allclose(waits, waits[0] / np.array([1.0, 2.0, 4.0, 8.0]), atol=1.0)
+    ground.note(np.array([50.0, 0.0]), begin)
+    assert not ground.is_over(100.0, begin + waits[0] - 2.0)
