@@ -213,7 +213,7 @@ class LocalMaps:
         if found is not None:
             assert self._walls is not None
             numbers = np.rint(self._walls.looks[found.walls]).astype(np.int64)
-            looks = np.flatnonzero(np.bincount(numbers))
+            looks = np.unique(numbers)
             at_each = (numbers == looks[:, None]).astype(np.float64)
             told = (at_each @ found.information.reshape(-1, 9)).reshape(-1, 3, 3)
             gains = found.covariance @ told

@@ -303,6 +303,7 @@ class Mapper(Knowledge):
                 self.join(view, a, b, edge.polyline, float(edge.clearance.min()), driven=False)
             elif here is there or self._is_one_between(known, a, b):
                 for edge_seen in filter(None, (here, there)):
+                    edge_seen.conflicts = max(0, edge_seen.conflicts - 1)
                     edge_seen.doubted_since = None
             else:
                 self._dispute(view, known, here, there)

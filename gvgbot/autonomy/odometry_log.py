@@ -62,16 +62,20 @@ class OdometryLog:
         )
 
     def motion_during(self, scan: Scan) -> Pose:
-        """Motion of the base during a sweep, by the odometry nearest to it in time."""
+        """Motion of the base from the first beam to the last, by the odometry nearest in time.
+
+        The last beam is the earlier one of a laser that is mounted upside down.
+        """
         duration = scan.time_increment * len(scan.ranges)
         if duration == 0.0 or self.newest is None:
             return Pose()
-        span = max(duration, _LEAST_SPAN_S)
-        end = min(scan.stamp + duration, self.newest.stamp)
+        span = max(abs(duration), _LEAST_SPAN_S)
+        end = min(max(scan.stamp, scan.stamp + duration), self.newest.stamp)
         before, after = self.odom_base_at(end - span), self.odom_base_at(end)
         if before is None or after is None:
             return Pose()
-        return before.to(after).part(duration / span)
+        motion = before.to(after) if duration > 0.0 else after.to(before)
+        return motion.part(abs(duration) / span)
 
 
 def _between(earlier: Odometry, later: Odometry, stamp: float) -> Pose:

@@ -122,7 +122,7 @@ class Edge:
     min_clearance: float
     driven: bool = False
     traversals: int = 0
-    conflicts: int = 0
+    conflicts: int = 0  # sights that spoke against it, less those that spoke for it
     established: bool = False  # part of a map that was finished
     is_part: bool = False  # of an edge that was parted: it may have more room than it says
     doubted_since: float | None = None  # stamp; since when sight speaks against it

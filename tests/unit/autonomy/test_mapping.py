@@ -448,6 +448,17 @@ def test_a_dead_end_whose_edge_proves_to_end_elsewhere_is_taken_back() -> None:
     assert {end.vertex for end in seen.mapper.graph.frontiers()} == {seen.known.vertex_of[2]}
 
 
+def test_an_edge_that_is_seen_far_more_often_than_another_in_its_place_stays() -> None:
+    points = {**TEE_POINTS, 4: (5.0, -4.0)}
+    bent = drawn(points, {**TEE_LINES, 12: (2, 4, [(3.0, -3.2)])}, unseen=UNSEEN)
+    seen = Seen().look(TEE, 20)
+    seen.look(bent, 2)
+    edges = set(seen.mapper.graph.edges)
+    for _ in range(2 * CONFIG.conflicts):
+        seen.look(TEE, 20).look(bent, 1)
+    assert set(seen.mapper.graph.edges) == edges
+
+
 def test_a_side_door_that_is_not_seen_from_afar_still_hangs_on_its_corridor() -> None:
     seen = Seen().look(TEE_BETWEEN, 20)
     frontiers = seen.mapper.graph.frontiers()

@@ -1,10 +1,11 @@
 """Where the base was at the stamp of a scan, if anything is known of that time."""
 
+import numpy as np
 import pytest
 
 from gvgbot.autonomy.odometry_log import OdometryLog
 from gvgbot.geometry import Pose, Twist
-from gvgbot.hal.messages import Odometry
+from gvgbot.hal.messages import Odometry, Scan
 
 
 def driven(*stamps: float) -> OdometryLog:
@@ -51,3 +52,14 @@ def test_of_the_time_before_the_clock_was_set_back_nothing_is_known() -> None:
     log = driven(50.0, 50.02, 1.0, 1.02)
     assert log.odom_base_at(0.99) == Pose(0.5, 0.0, 0.0)
     assert not log.has_gap_since(0.99)
+
+
+@pytest.mark.parametrize("duration", [0.1, 0.025, -0.1, -0.025])
+def test_a_sweep_is_driven_from_its_first_beam_to_its_last(duration: float) -> None:
+    """A base that turns faster and faster; upside down, the last beam is the earlier one."""
+    log = OdometryLog()
+    for stamp in np.arange(1.0, 1.6, 0.02).tolist():
+        log.append(Odometry(stamp, Pose(theta=1.5 * (stamp - 1.0) ** 2), Twist(0.0, 0.0)))
+    scan = Scan(1.4, np.ones(10), -1.0, 0.2, 0.02, 30.0, duration / 10, Pose())
+    turned = 1.5 * ((0.4 + duration) ** 2 - 0.4**2)
+    assert log.motion_during(scan).theta == pytest.approx(turned, abs=0.003)
