@@ -10,6 +10,7 @@ from gvgbot.autonomy.control.execution import Execution
 from gvgbot.autonomy.control.orders import Drive, Stand
 from gvgbot.autonomy.control.reflexes import (
     AWAY_M,
+    WAITS,
     Felt,
     Held,
     Hit,
@@ -46,6 +47,7 @@ _LOOKS_ASIDE = (
     "the laser does not see where the robot drives: say how it is mounted by laser.yaw_deg, "
     "or widen laser.first_angle_deg and laser.last_angle_deg"
 )
+_CANNOT_TURN = "go on without a look around", "the base does not turn"
 _ROOM_BESIDE_EDGES_M = 0.08  # on each side, where no edge leads
 _LONGEST_GAP_S = 2.0  # between keyframes; a longer one is an outage of a device
 _TURNED_RAD = 0.4  # that a robot may have been turned unnoticed
@@ -239,6 +241,9 @@ class Pipeline:
         """Decide what to do next; what happened by that."""
         if self.led:
             return self.mission.witness(view, known)
+        if self._execution.cannot_turn:
+            self._execution.stand()
+            self._incidents.append(_CANNOT_TURN)
         if self._execution.is_turning:
             return []
         if len(self.past.keyframes) == 1:
@@ -271,7 +276,8 @@ class Pipeline:
     def _worth_a_look(self, scan: Scan, odom_base: Pose) -> bool:
         """Whether the robot is about something, and has come on, turned or waited enough."""
         last, c = self.past.last, self._config.keyframe
-        if (self._is_idle and last is not None) or self._reflexes.is_lifted:
+        rests = self._is_idle or self._reflexes.is_plugged_in
+        if (rests and last is not None) or self._reflexes.is_lifted:
             return False
         if last is None or self._look_now:
             self._look_now = False
@@ -345,7 +351,9 @@ class Pipeline:
         """The twist to drive now."""
         before = self._odometry.newest
         if before is not None:
-            self._execution.note_turn(wrap_angle(odometry.odom_base.theta - before.odom_base.theta))
+            turned = wrap_angle(odometry.odom_base.theta - before.odom_base.theta)
+            is_free = not self._is_idle and felt.stopped_for not in WAITS
+            self._execution.note_turn(turned, is_free * (odometry.stamp - before.stamp))
         self._odometry.append(odometry)
         if self.past.last is None or self.led:
             return STANDSTILL

@@ -114,6 +114,7 @@ class Reflexes:
         self._tries = 0
         self._overloaded = -math.inf  # stamp
         self._past: deque[Moment] = deque()
+        self.is_plugged_in = False  # on the charger's cable
 
     @property
     def is_lifted(self) -> bool:
@@ -123,6 +124,7 @@ class Reflexes:
     def act(self, now: Moment, room: Room) -> tuple[Twist, Incident | None]:
         """The twist to drive, and what has happened."""
         contact = now.felt.contact
+        self.is_plugged_in = contact is not None and contact.charger_cable
         if contact is not None and contact.wheel_drop:
             self._doing = _Rest(now.stamp + self._config.rest_s, PutDown())
         elif contact is not None and contact.over_current and not self.is_lifted:
@@ -236,15 +238,15 @@ class Reflexes:
         return Twist(-self._config.back_off_speed_mps, 0.0)
 
 
-_OTHER_STOPS: tuple[Reason, ...] = (
+# wherever the robot wants to go, it must wait
+WAITS: tuple[Reason, ...] = (
     "bad command",
     "wheel drop",
-    "over-current",
+    "charger cable",
     "no scan",
     "laser sees nothing",
-    "bumper",
-    "cliff",
 )
+_OTHER_STOPS: tuple[Reason, ...] = (*WAITS, "over-current", "bumper", "cliff")
 
 
 def _is_touching(contact: Contact | None) -> bool:

@@ -84,6 +84,36 @@ def test_it_decides_by_nothing_that_was_seen_before_it_had_turned_round() -> Non
     assert twists[decided[0]] == STANDSTILL
 
 
+def test_a_base_that_cannot_turn_is_told_of_and_keeps_the_robot_busy_for_no_longer() -> None:
+    config = load_config()
+    pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
+    happened = list[Event]()
+    for second in range(1000):
+        happened += looked(pipeline, float(second))[1]
+    told = [event.reason for event in happened if isinstance(event, Recovery)]
+    assert told[0] == "the base does not turn"
+    assert isinstance(happened[-1], Finished)
+
+
+def test_on_the_charger_s_cable_it_waits_and_takes_nothing_for_an_obstacle() -> None:
+    config = load_config()
+    pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
+    theta, stamp, twist = 0.0, 0.0, STANDSTILL
+    while twist.linear == 0.0:
+        twist, _ = looked(pipeline, stamp, theta)
+        theta, stamp = theta + 0.1 * twist.angular, stamp + 0.1
+    plugged_in = Felt(Contact(stamp, charger_cable=True), "charger cable")
+    scan = sweep(ROOMS, Pose(-1.5, 0.0, theta), field_of_view=LASER_270)
+    keyframes = len(pipeline.past.keyframes)
+    for later in np.arange(stamp, stamp + 600.0, 0.2).tolist():
+        pipeline.control(Odometry(later, Pose(theta=theta), STANDSTILL), plugged_in)
+        assert not pipeline.perceive(replace(scan, stamp=later, time_increment=0.0))
+    assert len(pipeline.past.keyframes) == keyframes
+    twist, happened = looked(pipeline, stamp + 601.0, theta)
+    assert twist.linear > 0.0
+    assert not any(isinstance(event, Recovery) for event in happened)
+
+
 def speed_before(radius: float) -> float:
     """How fast somebody sets out who has another robot of a radius 0.9 m before it, m/s."""
     config = load_config()

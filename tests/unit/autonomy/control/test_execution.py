@@ -29,12 +29,12 @@ def test_at_first_it_stands(execution: Execution) -> None:
 def test_it_turns_on_the_spot_until_the_base_has_turned_so_far(execution: Execution) -> None:
     execution.obey(LookAround(math.pi))
     for turned in (2.0, -0.5, 1.0):  # 2.5 rad in all
-        execution.note_turn(turned)
+        execution.note_turn(turned, 0.1)
         twist = execution.wish(Pose(), as_it_is)
         assert (twist.linear, twist.angular > 0.0) == (0.0, True)
-    execution.note_turn(0.7)
+    execution.note_turn(0.7, 0.1)
     assert not execution.is_turning
-    execution.note_turn(-1.0)  # a turn that has ended does not begin again
+    execution.note_turn(-1.0, 0.1)  # a turn that has ended does not begin again
     assert execution.wish(Pose(), as_it_is) == STANDSTILL
 
 
@@ -42,7 +42,7 @@ def test_a_track_is_followed_after_the_turn(execution: Execution) -> None:
     execution.turn(1.0)
     execution.obey(AHEAD)
     assert execution.wish(Pose(), as_it_is).linear == 0.0
-    execution.note_turn(1.0)
+    execution.note_turn(1.0, 0.1)
     assert execution.wish(Pose(), as_it_is).linear > 0.0
 
 
@@ -58,3 +58,20 @@ def test_to_stand_gives_up_the_turn_and_the_track(execution: Execution) -> None:
     assert not execution.is_turning
     assert execution.order == Stand()
     assert execution.wish(Pose(), as_it_is) == STANDSTILL
+
+
+def test_a_base_that_does_not_turn_is_known_after_ten_seconds_that_it_was_free_to(
+    execution: Execution,
+) -> None:
+    """Not the time in which the guard forbids it; and each turn is a new one."""
+    execution.turn(3.0)
+    for _ in range(200):
+        execution.note_turn(0.0001, 0.0)
+    for _ in range(12):
+        execution.note_turn(0.06, 2.0)  # slowly, but it turns
+    assert not execution.cannot_turn
+    for _ in range(6):
+        execution.note_turn(0.001, 2.0)
+    assert execution.cannot_turn
+    execution.turn(1.0)
+    assert not execution.cannot_turn

@@ -216,8 +216,8 @@ def test_a_robot_that_is_held_on_all_sides_stands_until_that_changes() -> None:
     assert robot.x == 0.0
 
 
-@pytest.mark.parametrize("reason", ["no scan", "laser sees nothing"])
-def test_a_laser_that_is_silent_or_covered_is_no_obstacle(reason: Reason) -> None:
+@pytest.mark.parametrize("reason", ["no scan", "laser sees nothing", "charger cable"])
+def test_what_makes_it_wait_wherever_it_wants_to_go_is_no_obstacle(reason: Reason) -> None:
     robot = Robot()
     robot.feel(NOTHING, 60.0, grip=0.0, stopped_for=reason)
     assert robot.incidents == []
