@@ -1,6 +1,6 @@
 """Ways that something was found to stand in: not to be driven for a while."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
 
@@ -18,6 +18,10 @@ class Closures:
             if half is not None and not half.blocked:
                 half.blocked = True
                 self.until[end] = until
+
+    def rename(self, renamed: Mapping[HalfEdgeId, HalfEdgeId]) -> None:
+        """Take over what half-edges are called now whose vertices proved to be known ones."""
+        self.until = {renamed.get(end, end): until for end, until in self.until.items()}
 
     def open_due(self, graph: GvgGraph, stamp: float) -> None:
         """Unblock what was closed long enough ago."""

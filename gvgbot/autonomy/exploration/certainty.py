@@ -64,14 +64,16 @@ class Revisiting:
     def next(self, graph: GvgGraph, belief: Belief, starts: list[Approach]) -> Revisit | None:
         """The vertex to visit now; None to go on exploring, or to end if all is explored."""
         is_over = not graph.frontiers()
-        if not self._has_explored and not is_over:
+        if self._has_explored and not is_over:
+            self._owed += (1.0 - self._config.p_explore) / self._config.p_explore
+        if not self._has_explored and self._owed < 1.0 and not is_over:
             return None  # nothing has changed since this was asked last
         ways = shortest_paths(graph, starts)
-        back = None
-        if self._has_explored:
-            self._has_explored = False
-            back = self._reassurance(belief, ways) or self._turn(graph, belief, ways)
-        return back or (self._towards_goal(belief, ways) if is_over else None)
+        back = self._reassurance(belief, ways) if self._has_explored else None
+        self._has_explored = False
+        if is_over:
+            return back or self._towards_goal(belief, ways)
+        return back or self._turn(belief, ways)
 
     def _reassurance(self, belief: Belief, ways: dict[int, Approach]) -> Revisit | None:
         """The nearest well-known vertex, if the robot hardly knows where it is.
@@ -89,12 +91,9 @@ class Revisiting:
         nearest = min(known, key=lambda v: (ways[v].metres, v))
         return Revisit(nearest, f"the pose is uncertain by {own:.2f} m")
 
-    def _turn(self, graph: GvgGraph, belief: Belief, ways: dict[int, Approach]) -> Revisit | None:
+    def _turn(self, belief: Belief, ways: dict[int, Approach]) -> Revisit | None:
         """An uncertain vertex around, when it is its turn."""
-        if not graph.frontiers() or not ways:
-            return None
-        self._owed += 1.0 - self._config.p_explore
-        if self._owed < 1.0:
+        if not ways or self._owed < 1.0:
             return None
         self._owed -= 1.0
         worth = {v: vertex_sigma(belief, v) * math.exp(-ways[v].metres / _AROUND_M) for v in ways}

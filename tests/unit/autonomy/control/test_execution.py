@@ -63,7 +63,7 @@ def test_to_stand_gives_up_the_turn_and_the_track(execution: Execution) -> None:
 def test_a_base_that_does_not_turn_is_known_after_ten_seconds_that_it_was_free_to(
     execution: Execution,
 ) -> None:
-    """Not the time in which the guard forbids it; and each turn is a new one."""
+    """Not the time in which the guard forbids it."""
     execution.turn(3.0)
     for _ in range(200):
         execution.note_turn(0.0001, 0.0)
@@ -73,5 +73,10 @@ def test_a_base_that_does_not_turn_is_known_after_ten_seconds_that_it_was_free_t
     for _ in range(6):
         execution.note_turn(0.001, 2.0)
     assert execution.cannot_turn
+
+
+def test_another_turn_is_tried_anew(execution: Execution) -> None:
+    execution.turn(3.0)
+    execution.note_turn(0.0, 20.0)
     execution.turn(1.0)
     assert not execution.cannot_turn

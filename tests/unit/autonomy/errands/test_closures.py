@@ -1,6 +1,11 @@
 """Ways that are closed for a while."""
 
+import math
+
 from gvgbot.autonomy.errands.closures import Closures
+from gvgbot.autonomy.slam.graph import HalfEdgeId
+from gvgbot.autonomy.topology import fuse
+from gvgbot.geometry import Pose
 from tests.unit.autonomy.graphs import between, streets
 
 
@@ -37,3 +42,17 @@ def test_an_edge_may_vanish_while_it_is_closed() -> None:
     graph.remove_vertex(end.vertex)
     closures.open_due(graph, 2.0)
     assert closures.until == {}
+
+
+def test_a_way_closed_at_a_vertex_that_proves_to_be_a_known_one_opens_when_its_time_comes() -> None:
+    graph, ids = streets(2, 1)
+    kept, gone = (graph.vertices[ids[place]] for place in ((0, 0), (1, 0)))
+    end = HalfEdgeId(gone.id, gone.add_half_edge(2.0))
+    closures = Closures()
+    closures.close(graph, [end], until=100.0)
+    fused = fuse(graph, kept, gone, Pose(), math.radians(40))
+    closures.rename(fused.renamed)
+    closures.rename(fused.renamed)
+    assert graph.blocked() == [fused.renamed[end]]
+    closures.open_due(graph, 100.0)
+    assert graph.blocked() == []
