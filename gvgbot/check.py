@@ -215,6 +215,14 @@ def _laser_lines(
         f"{len(scans[-1].ranges)} beams, {seen:.0%} of them of use",
         "uncover and clean its window",
     )
+    if not scans[-1].looks_ahead:
+        yield Line(
+            "fail",
+            "laser mount",
+            "it does not see where the robot drives",
+            "say how it is mounted by laser.yaw_deg, or widen laser.first_angle_deg and "
+            "laser.last_angle_deg",
+        )
 
 
 def _base_lines(base: KobukiBase, heard: Heard) -> Iterator[Line]:

@@ -90,7 +90,9 @@ def set_up_logging(
     """Log to the stream: for people, or as JSON with a severity where a journal reads along."""
     journal = "JOURNAL_STREAM" in environment
     structlog.configure(
-        processors=_for_journal() if journal else _for_people(colors=stream.isatty()),
+        processors=_for_journal()
+        if journal
+        else _for_people(colors=stream.isatty() and not os.environ.get("NO_COLOR")),
         wrapper_class=structlog.make_filtering_bound_logger(least),
         logger_factory=structlog.PrintLoggerFactory(cast(TextIO, _Unbreakable(stream))),
         cache_logger_on_first_use=False,

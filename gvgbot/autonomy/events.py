@@ -40,7 +40,8 @@ class EdgeJoined:
 class LoopClosed:
     """A known vertex was recognised after the robot had been away; with what the tests measured.
 
-    `away_m` is None for a vertex of a map from elsewhere, at the first time.
+    `away_m` is driven since the vertex was seen last, on the map of another run by who made that
+    too; None for a vertex of an imported map, at the first time.
     """
 
     stamp: float

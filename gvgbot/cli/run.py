@@ -23,12 +23,13 @@ def add_run(commands: Commands) -> None:
     run.add_argument(
         "--out", type=path, metavar="DIR", help="run directory (default: a new one in runs/)"
     )
-    known = run.add_mutually_exclusive_group()
-    known.add_argument(
+    run.add_argument(
         "--map", type=path, metavar="RUN_DIR", help="begin with the map of an earlier run"
     )
-    known.add_argument(
-        "--new", action="store_true", help="begin a new map, whatever the state directory holds"
+    run.add_argument(
+        "--new",
+        action="store_true",
+        help="begin a new map, or with --map once more, whatever the state directory holds",
     )
     run.set_defaults(command=_run)
 

@@ -93,6 +93,15 @@ def test_what_is_wrong_is_named_with_a_remedy(
     assert status == (1 if verdict == "fail" else 0)
 
 
+def test_a_laser_that_does_not_look_where_the_robot_drives_is_not_ready() -> None:
+    narrow = "laser.first_angle_deg=-60", "laser.last_angle_deg=60"
+    assert said(*narrow)[0] == 0
+    status, points = said(*narrow, "laser.yaw_deg=180")
+    verdict, finding = points["laser mount"]
+    assert (status, verdict) == (1, "fail")
+    assert "laser.yaw_deg" in finding
+
+
 def test_the_rate_is_compared_with_what_the_laser_was_asked_for() -> None:
     """Of the 40 scans a second that a UTM-30LX measures, its data sheet says."""
     _, points = said("laser.rate_hz=40")

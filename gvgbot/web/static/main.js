@@ -2,7 +2,7 @@
 
 import { Link } from "./link.js";
 import { LAYERS, MapPicture } from "./map.js";
-import { Plot } from "./plots.js";
+import { extent, Plot } from "./plots.js";
 import { Requests } from "./requests.js";
 import { View } from "./view.js";
 import * as words from "./words.js";
@@ -107,8 +107,9 @@ function drawPanel() {
   requests.show(state, isConnected && !isStale);
   drawPlace();
   const styles = getComputedStyle(document.body);
-  sigmaPlot.draw(styles);
-  batteryPlot.draw(styles);
+  const span = extent([sigmaPlot, batteryPlot]);
+  sigmaPlot.draw(styles, ...span);
+  batteryPlot.draw(styles, ...span);
 }
 
 function said() {
