@@ -107,9 +107,10 @@ function drawPanel() {
   requests.show(state, isConnected && !isStale);
   drawPlace();
   const styles = getComputedStyle(document.body);
-  const span = extent([sigmaPlot, batteryPlot]);
-  sigmaPlot.draw(styles, ...span);
-  batteryPlot.draw(styles, ...span);
+  const [first, span] = extent([sigmaPlot, batteryPlot]);
+  $("plots-title").textContent = `last ${Math.round(span / 60)} min`;
+  sigmaPlot.draw(styles, first, span);
+  batteryPlot.draw(styles, first, span);
 }
 
 function said() {

@@ -22,8 +22,8 @@ export class Plot {
     while (this.samples[0][0] < stamp - 1800) this.samples.shift();
   }
 
-  // From the first stamp to the last, which plots above each other have in common.
-  draw(styles, first, last) {
+  // So many seconds from a stamp on, which plots above each other have in common.
+  draw(styles, first, span) {
     const { canvas } = this, ratio = devicePixelRatio || 1, width = canvas.clientWidth, height = canvas.clientHeight;
     canvas.width = width * ratio;
     canvas.height = height * ratio;
@@ -37,7 +37,6 @@ export class Plot {
     c.strokeRect(GUTTER + 0.5, 0.5, width - GUTTER - 1, height - 1);
     c.globalAlpha = 1;
     if (this.samples.length < 2) { c.fillText("nothing yet", GUTTER + 8, height / 2 + 4); return; }
-    const span = Math.max(60, last - first);
     c.beginPath();
     for (const [stamp, value] of this.samples) {
       c.lineTo(GUTTER + 2 + ((stamp - first) / span) * (width - GUTTER - 4), height - 2 - (Math.min(value, top) / top) * (height - 4));
@@ -49,15 +48,14 @@ export class Plot {
     c.textAlign = "right";
     c.fillText(this.format(top), GUTTER - 6, 10);
     c.fillText("0", GUTTER - 6, height - 2);
-    c.textAlign = "left";
-    c.fillText(`${Math.round(span / 60)} min ago`, GUTTER + 6, 12);
   }
 }
 
-// What several plots show: their first stamp and their last.
+// What several plots show: the first stamp, and the seconds from there, a minute at least.
 export function extent(plots) {
   const ends = plots.filter((plot) => plot.samples.length).flatMap((plot) => [plot.samples[0][0], plot.samples.at(-1)[0]]);
-  return [Math.min(...ends), Math.max(...ends)];
+  const first = Math.min(...ends);
+  return [first, Math.max(60, ...ends.map((stamp) => stamp - first))];
 }
 
 // 1, 2 or 5 times a power of ten, not below the value.
