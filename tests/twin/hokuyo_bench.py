@@ -168,19 +168,19 @@ class Reports(Scripted):
         return encode_reply(Reply(self.echo, self.status)) if self.status else b""
 
 
-class LosesStops(Scripted):
-    """A laser that says yes to a stop and goes on, so many times."""
+class TiresOfTime(Scripted):
+    """A laser that tells its time so often, and then no more; one that is `dying` says nothing."""
 
-    def __init__(self, twin: TwinDevice, losses: int) -> None:
-        super().__init__({b"QT\n": b"QT\n00P\n\n"}, twin)
-        self.losses = losses
+    def __init__(self, twin: TwinDevice, times: int, *, dying: bool = False) -> None:
+        super().__init__({}, twin)
+        self.times = times
+        self.is_dying = dying
 
     def answer(self, command: bytes, now: float) -> bytes:
-        if command == b"QT\n":
-            self.losses -= 1
-            if self.losses < 0:
-                return self.twin.receive(command, now)
-        return super().answer(command, now)
+        is_question = command == b"TM1\n"
+        self.times -= is_question
+        is_mute = self.times < 0 and (is_question or self.is_dying)
+        return b"" if is_mute else super().answer(command, now)
 
 
 class CutsReply(Scripted):

@@ -12,7 +12,7 @@ from gvgbot.drivers.hokuyo.driver import HokuyoConfig, HokuyoLaser
 from gvgbot.drivers.hokuyo.twin import HokuyoTwin, HokuyoTwinConfig
 from gvgbot.drivers.transport import ByteStream, pipe, serve_twin
 from gvgbot.errors import DeviceLost, DeviceRefused
-from tests.twin.hokuyo_bench import PERFECT, Bench, Scripted, World, on_bench
+from tests.twin.hokuyo_bench import PERFECT, Bench, Scripted, TiresOfTime, World, on_bench
 
 pytestmark = pytest.mark.twin
 
@@ -66,35 +66,11 @@ def test_a_laser_that_keeps_its_time_to_itself_is_opened(mute: tuple[bytes, ...]
 
     async def scenario(bench: Bench) -> None:
         await opens_within(bench, 3.0)
-        assert bench.laser.synchronisation is None
         scans = await bench.scans(20)
         assert [scan.stamp for scan in scans] == pytest.approx(world.stamps[-20:], abs=0.003)
 
     world = World()
     on_bench(Scripted(dict.fromkeys(mute, b""), twin_of(world)), scenario)
-
-
-class TiresOfTime(Scripted):
-    """A laser that tells its time so often, and then no more; one that is `dying` says nothing."""
-
-    def __init__(self, twin: HokuyoTwin, times: int, *, dying: bool = False) -> None:
-        super().__init__({}, twin)
-        self.times = times
-        self.is_dying = dying
-
-    def answer(self, command: bytes, now: float) -> bytes:
-        is_question = command == b"TM1\n"
-        self.times -= is_question
-        is_mute = self.times < 0 and (is_question or self.is_dying)
-        return b"" if is_mute else super().answer(command, now)
-
-
-def test_times_from_before_a_silence_say_nothing_of_the_clock() -> None:
-    async def scenario(bench: Bench) -> None:
-        await opens_within(bench, 3.0)
-        assert bench.laser.synchronisation is None
-
-    on_bench(TiresOfTime(twin_of(), 5), scenario)
 
 
 def test_a_laser_that_goes_dead_while_it_is_asked_for_its_time_is_lost() -> None:

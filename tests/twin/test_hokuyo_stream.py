@@ -19,7 +19,6 @@ from tests.twin.hokuyo_bench import (
     CutsReply,
     Deaf,
     FrozenClock,
-    LosesStops,
     Reports,
     Scripted,
     SlowLink,
@@ -142,37 +141,12 @@ def test_it_opens_whatever_the_last_program_left_behind(left_over: bytes) -> Non
     on_bench(HokuyoTwin(PERFECT, World(), seed=5), scenario, first=first)
 
 
-@pytest.mark.parametrize("losses", [1, 2])
-def test_a_lost_stop_costs_no_synchronisation(losses: int) -> None:
-    async def first(link: ByteStream, clock: LoopClock) -> None:
-        link.write(b"MD0000108001300\n")
-        await clock.sleep_until(clock.now() + 1.0)
-
-    async def scenario(bench: Bench) -> None:
-        await bench.scans(1)
-        assert bench.laser.synchronisation is not None
-
-    twin = LosesStops(HokuyoTwin(PERFECT, World(), seed=18), losses)
-    on_bench(twin, scenario, first=first)
-
-
 def test_a_cut_reply_costs_one_time_out_and_not_two() -> None:
     async def scenario(bench: Bench) -> None:
         await bench.scans(1)
         assert bench.laser.link.unanswered == 1
 
     on_bench(CutsReply(HokuyoTwin(PERFECT, World(), seed=19), b"VV\n"), scenario)
-
-
-def test_a_laser_that_is_in_time_mode_already_is_synchronised() -> None:
-    """It is when its reply to the first TM0 got lost, and then it answers 02 to the second."""
-
-    async def scenario(bench: Bench) -> None:
-        await bench.scans(1)
-        assert bench.laser.link.unanswered == 1
-        assert bench.laser.synchronisation is not None
-
-    on_bench(CutsReply(HokuyoTwin(PERFECT, World(), seed=20), b"TM0\n"), scenario)
 
 
 def test_identity_and_parameters_are_those_of_the_laser() -> None:

@@ -11,7 +11,7 @@ import structlog
 
 from gvgbot.clock import Clock
 from gvgbot.drivers.hokuyo import clock_sync
-from gvgbot.drivers.hokuyo.clock_sync import ClockMap, Synchronisation, TimeSample
+from gvgbot.drivers.hokuyo.clock_sync import ClockMap, Synchronisation
 from gvgbot.drivers.hokuyo.config import HokuyoConfig
 from gvgbot.drivers.hokuyo.dialogue import Arrival, Dialogue, Refusal, Silence
 from gvgbot.drivers.hokuyo.models import Identity, Parameters
@@ -23,10 +23,10 @@ from gvgbot.drivers.hokuyo.scan_geometry import (
     one_per_step,
     scan_geometry,
 )
-from gvgbot.drivers.hokuyo.scip import decode_time
-from gvgbot.drivers.hokuyo.scip_codec import DamagedError, Values
+from gvgbot.drivers.hokuyo.scip_codec import Values
 from gvgbot.drivers.hokuyo.scip_messages import BadReply, Message, Reply, ScanReply, ScanRequest
 from gvgbot.drivers.hokuyo.statistics import LinkStatistics
+from gvgbot.drivers.hokuyo.time_mode import DENIED, synchronise
 from gvgbot.drivers.transport import ByteStream
 from gvgbot.errors import DeviceLost, DeviceRefused
 from gvgbot.hal.latest import Latest
@@ -35,12 +35,6 @@ from gvgbot.hal.messages import Scan
 __all__ = ["HokuyoConfig", "HokuyoLaser", "LinkStatistics"]
 
 SHORTEST_SILENCE = 0.2  # s; links deliver in bursts
-TIME_SAMPLES = 12  # of the laser's clock
-CONVERTER_BEAT = 0.016  # s; a serial converter's usual latency timer
-GOLDEN = 0.618034  # its multiples spread evenly over a beat
-DENIED = "10"  # in this state; of TM0: the laser still measures
-ALREADY_ON = "02"  # what a laser says to TM0 when its reply to an earlier one was lost
-LOST_STOPS = 3  # in a row; a stop that comes as a scan begins can be lost
 UNKNOWN_COMMAND = frozenset({"0C", "0D", "0E", "0F"})  # firmware generations disagree on which
 UNSTABLE = "0M"  # in place of a scan: the motor is not at its speed
 HALTED = range(21, 50)  # statuses of a laser that looks into a fault, and is silent until it knows
@@ -121,7 +115,6 @@ class HokuyoLaser:
         self._parameters: Parameters | None = None
         self._mode: Mode | None = None
         self._status: Mapping[str, str] = {}
-        self._sync: Synchronisation | None = None
         self._intensities: Values | None = None
 
     @property
@@ -150,11 +143,6 @@ class HokuyoLaser:
         return self._mode
 
     @property
-    def synchronisation(self) -> Synchronisation | None:
-        """How the laser's clock stood when it was opened; None if it was not asked or silent."""
-        return self._sync
-
-    @property
     def clock_offset(self) -> float | None:
         """The host's clock minus the laser's at the newest scan (s); None before the first."""
         now = self._clock_map
@@ -177,9 +165,9 @@ class HokuyoLaser:
             self._baud = await tune(self._dialogue, self._baud, patience=patience)
             parameters = await self._open()
             while True:
-                self._sync = await self._synchronise()
+                sync = await synchronise(self._dialogue) if self._config.synchronise else None
                 stream = await self._start(parameters)
-                stream.clock_map = before
+                stream.sync, stream.clock_map = sync, before
                 await self._stream_until_silence(stream)
                 before = stream.clock_map
                 self.link.restarts += 1
@@ -229,60 +217,6 @@ class HokuyoLaser:
         except ValueError as error:
             raise DeviceRefused(str(error)) from error
 
-    async def _synchronise(self) -> Synchronisation | None:
-        """How the clocks stand to each other, as far as the laser tells."""
-        if not self._config.synchronise:
-            return None
-        samples: list[TimeSample] = []
-        try:
-            await self._sample_time(samples)
-        except (Refusal, DamagedError) as error:
-            log.info("laser does not tell its time", reason=str(error))
-        except Silence as silence:
-            log.info("laser does not tell its time", reason=str(silence))
-            samples.clear()  # in the silence it may have rebooted, which resets its clock
-        await self._leave_time_mode()
-        return clock_sync.synchronise(samples)
-
-    async def _sample_time(self, samples: list[TimeSample]) -> None:
-        """Raises Refusal, DamagedError or Silence; the samples until then count."""
-        await self._enter_time_mode()
-        while len(samples) < TIME_SAMPLES:
-            samples.append(await self._time_sample())
-            await self._pause(len(samples))
-
-    async def _enter_time_mode(self) -> None:
-        """Raises Refusal if the laser cannot, Silence if it does not answer."""
-        for _ in range(LOST_STOPS):
-            try:
-                await self._dialogue.ask("TM0")
-            except Refusal as refusal:
-                if refusal.status == ALREADY_ON:
-                    return
-                if refusal.status != DENIED:
-                    raise
-                await quiet(self._dialogue, patience=2 * self._config.reply_timeout_s)
-            else:
-                return
-        raise Refusal("TM0", DENIED)
-
-    async def _leave_time_mode(self) -> None:
-        """A laser that does not answer that has to come to rest. Raises DeviceLost if it cannot."""
-        self._dialogue.send("TM2")
-        if await self._dialogue.reply_to("TM2") is None:
-            await quiet(self._dialogue, patience=2 * self._config.reply_timeout_s)
-
-    async def _time_sample(self) -> TimeSample:
-        """Raises Refusal, DamagedError or Silence."""
-        sent = self._dialogue.clock.now()
-        reply = await self._dialogue.ask("TM1")
-        return TimeSample(sent, decode_time(reply), self._dialogue.answered)
-
-    async def _pause(self, number: int) -> None:
-        """Wait a while that is never the same: converters hand out bytes on a beat of their own."""
-        clock = self._dialogue.clock
-        await clock.sleep_until(clock.now() + CONVERTER_BEAT * (number * GOLDEN % 1.0))
-
     async def _start(self, parameters: Parameters) -> _Stream:
         """Start the scans, simpler ones if the laser does not know those that were asked for."""
         assert self._mode is not None
@@ -324,7 +258,6 @@ class HokuyoLaser:
             patience,
             last_scan=now,
             until=now + patience,
-            sync=self._sync,
         )
 
     # -- streaming ---------------------------------------------------------------------------------
