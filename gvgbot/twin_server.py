@@ -7,6 +7,7 @@ from pathlib import Path
 
 from gvgbot.clock import LoopClock
 from gvgbot.config import Config
+from gvgbot.drivers.device_port import DevicePort
 from gvgbot.drivers.pty import PtyPort
 from gvgbot.drivers.tcp import SCHEME
 from gvgbot.drivers.tcp_port import TcpPort
@@ -14,8 +15,6 @@ from gvgbot.drivers.transport import serve_twin
 from gvgbot.errors import UsageError
 from gvgbot.simulation import Place, Simulation, open_place
 from gvgbot.stop_signals import StopSignals
-
-Port = PtyPort | TcpPort
 
 
 def serve(
@@ -50,7 +49,7 @@ async def _serve(
 
 
 async def serve_on(
-    simulation: Simulation, laser: Port, base: Port, stopped: Awaitable[object]
+    simulation: Simulation, laser: DevicePort, base: DevicePort, stopped: Awaitable[object]
 ) -> None:
     """Serve the twins of a simulation on these ports until `stopped` returns."""
     clock = LoopClock()
@@ -66,14 +65,14 @@ async def serve_on(
             task.cancel()
 
 
-def _port(link: str | None) -> Port:
+def _port(link: str | None) -> DevicePort:
     """What clients will open there. Raises UsageError."""
     if link is not None and link.startswith(SCHEME):
         return TcpPort(link)
     return PtyPort(None if link is None else Path(link))
 
 
-def _greeting(place: Place, laser: Port, base: Port) -> str:
+def _greeting(place: Place, laser: DevicePort, base: DevicePort) -> str:
     start = place.start
     return (
         f"world: {place.world.name}, start {start.x:g} {start.y:g} {start.theta:g}\n"
