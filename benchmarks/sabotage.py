@@ -59,7 +59,7 @@ SABOTAGES = (
     Sabotage(
         "a snapshot is written without its last byte, and over the one before",
         "persistence/mission_files.py",
-        "_replace(self._snapshot, content, keep=self._before if self._is_whole else None)",
+        "replace_file(self._snapshot, content, keep=self._before if self._is_whole else None)",
         "self._snapshot.write_bytes(content[:-1])",
     ),
     Sabotage(

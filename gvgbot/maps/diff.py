@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
+from gvgbot.atomic_files import write_files
 from gvgbot.errors import UsageError
 from gvgbot.maps.alignment import Comparison, Pair, compare
-from gvgbot.maps.atomic_files import write_files
 from gvgbot.maps.diff_picture import Grids, Titles, draw_diff
 from gvgbot.maps.outputs import check_output
 from gvgbot.maps.picture_files import PICTURES, Paint

@@ -3,9 +3,9 @@
 from collections.abc import Callable
 from pathlib import Path
 
+from gvgbot.atomic_files import write_files
 from gvgbot.errors import UsageError
 from gvgbot.maps import graphml, route_server
-from gvgbot.maps.atomic_files import write_files
 from gvgbot.maps.outputs import check_output
 from gvgbot.maps.picture_files import PICTURES
 from gvgbot.maps.saved_run import SavedRun

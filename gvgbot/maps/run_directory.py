@@ -14,8 +14,8 @@ from typing import Any, Self
 
 import numpy as np
 
+from gvgbot.atomic_files import write_all, write_files
 from gvgbot.errors import GvgbotError, UsageError
-from gvgbot.maps.atomic_files import write_files
 from gvgbot.maps.map_server import DESCRIPTION, IMAGE, SEEN
 
 EVENTS, EVENTS_BEFORE = "events.jsonl", "events-before.jsonl"
@@ -82,7 +82,7 @@ class RunDirectory:
         """
         line = json.dumps(record_of(event), ensure_ascii=False, allow_nan=False) + "\n"
         try:
-            _write_all(self._events, line.encode())
+            _append(self._events, line.encode())
             if self._events.tell() > _MOST_EVENTS:
                 self._turn_over()
         except OSError as error:
@@ -156,13 +156,11 @@ def _cut_to_lines(path: Path) -> None:
             file.truncate(lines)
 
 
-def _write_all(file: io.FileIO, content: bytes) -> None:
+def _append(file: io.FileIO, content: bytes) -> None:
     """Add all of it to a file, or nothing. Raises OSError."""
     end = file.seek(0, io.SEEK_END)
-    left = memoryview(content)
     try:
-        while left:
-            left = left[file.write(left) :]
+        write_all(file.fileno(), content)
     except OSError:
         with contextlib.suppress(OSError):
             file.truncate(end)

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
+from gvgbot.atomic_files import write_files
 from gvgbot.errors import UsageError
 from gvgbot.maps import film
-from gvgbot.maps.atomic_files import write_files
 from gvgbot.maps.growth import Growth
 from gvgbot.maps.outputs import check_output
 from gvgbot.maps.picture import draw_map_on, known_corners

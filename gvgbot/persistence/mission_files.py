@@ -10,8 +10,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+from gvgbot.atomic_files import replace_file, write_all
 from gvgbot.autonomy.memory import Growth, Memory
-from gvgbot.maps.atomic_files import sync_directory
 from gvgbot.persistence.mission_state import (
     VERSION,
     Batch,
@@ -127,7 +127,7 @@ class MissionFiles:
             for path in (self._snapshot, self._before):
                 path.unlink(missing_ok=True)
         start = record(packed(Header("gvgbot journal", VERSION)))
-        _replace(self._journal, start)
+        replace_file(self._journal, start)
         self._ends = [len(start)]
 
     def append(self, batch: bytes, *, sync: bool, after: int | None = None) -> None:
@@ -145,7 +145,7 @@ class MissionFiles:
             journal.truncate(end)  # what an earlier attempt may have left
             journal.seek(end)
             try:
-                _write_all(journal.fileno(), framed)
+                write_all(journal.fileno(), framed)
                 if sync:
                     os.fsync(journal.fileno())
             except OSError:
@@ -170,7 +170,7 @@ class MissionFiles:
         OSError; then the old ones stand.
         """
         content = record(packed(Header("gvgbot snapshot", VERSION))) + record(snapshot)
-        _replace(self._snapshot, content, keep=self._before if self._is_whole else None)
+        replace_file(self._snapshot, content, keep=self._before if self._is_whole else None)
         self._is_whole = True
 
 
@@ -216,25 +216,3 @@ def _check(header: bytes, content: str) -> None:
         raise Damaged(f"it is a {found.content}")
     if found.version > VERSION:
         raise Damaged(f"it is of version {found.version}, and this program knows {VERSION}")
-
-
-def _replace(path: Path, content: bytes, keep: Path | None = None) -> None:
-    """Put content in the place of a file, and the file in the place of `keep`. Raises OSError."""
-    aside = path.with_name(f".{path.name}.tmp")
-    try:
-        with aside.open("wb", buffering=0) as file:
-            _write_all(file.fileno(), content)
-            os.fsync(file.fileno())
-        if keep is not None and path.exists():
-            path.replace(keep)
-        aside.replace(path)
-        sync_directory(path.parent)
-    finally:
-        with contextlib.suppress(OSError):
-            aside.unlink(missing_ok=True)
-
-
-def _write_all(file: int, content: bytes) -> None:
-    left = memoryview(content)
-    while left:
-        left = left[os.write(file, left) :]

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
+from gvgbot.atomic_files import write_files
 from gvgbot.maps import geojson
-from gvgbot.maps.atomic_files import write_files
 from gvgbot.maps.map_server import encode_map_server
 from gvgbot.maps.occupancy import OccupancyGrid
 from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph, VertexKind

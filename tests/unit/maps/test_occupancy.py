@@ -10,10 +10,10 @@ import yaml
 from numpy.typing import NDArray
 from PIL import Image
 
+from gvgbot.atomic_files import write_files
 from gvgbot.errors import GvgbotError, UsageError
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
-from gvgbot.maps.atomic_files import write_files
 from gvgbot.maps.map_server import encode_map_server, read_map_server
 from gvgbot.maps.occupancy import GrowingGrid, OccupancyGrid, occupancy_grid
 

@@ -14,7 +14,7 @@ def write_files(directory: Path, contents: Mapping[str, bytes | str]) -> None:
     Text is UTF-8. Raises GvgbotError if one cannot be written; then the old files stand, and
     nothing is left beside them, whatever the failure was.
     """
-    aside = {directory / name: directory / f".{name}.tmp" for name in contents}
+    aside = {directory / name: _aside(directory / name) for name in contents}
     try:
         for path, content in zip(aside.values(), contents.values(), strict=True):
             _write_through(path, content.encode() if isinstance(content, str) else content)
@@ -26,16 +26,27 @@ def write_files(directory: Path, contents: Mapping[str, bytes | str]) -> None:
         raise GvgbotError(f"cannot write {names} to {directory}: {error.strerror}") from error
     finally:
         for temporary in aside.values():
-            with contextlib.suppress(OSError):  # a disk that is read-only tells so again
-                temporary.unlink(missing_ok=True)
+            _remove(temporary)
 
 
-def _write_through(path: Path, content: bytes) -> None:
-    """Write a file, and wait until it is on the disk. Raises OSError."""
-    with path.open("wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
+def replace_file(path: Path, content: bytes, keep: Path | None = None) -> None:
+    """Put content in the place of a file, and the file in the place of `keep`. Raises OSError."""
+    aside = _aside(path)
+    try:
+        _write_through(aside, content)
+        if keep is not None and path.exists():
+            path.replace(keep)
+        aside.replace(path)
+        sync_directory(path.parent)
+    finally:
+        _remove(aside)
+
+
+def write_all(file: int, content: bytes) -> None:
+    """Write all of it to a descriptor. Raises OSError; then a part may have been written."""
+    left = memoryview(content)
+    while left:
+        left = left[os.write(file, left) :]
 
 
 def sync_directory(path: Path) -> None:
@@ -46,3 +57,20 @@ def sync_directory(path: Path) -> None:
             os.fsync(directory)
         finally:
             os.close(directory)
+
+
+def _aside(path: Path) -> Path:
+    """Where a file is written before it takes its place."""
+    return path.with_name(f".{path.name}.tmp")
+
+
+def _write_through(path: Path, content: bytes) -> None:
+    """Write a file, and wait until it is on the disk. Raises OSError."""
+    with path.open("wb", buffering=0) as file:
+        write_all(file.fileno(), content)
+        os.fsync(file.fileno())
+
+
+def _remove(path: Path) -> None:
+    with contextlib.suppress(OSError):  # a disk that is read-only tells so again
+        path.unlink(missing_ok=True)

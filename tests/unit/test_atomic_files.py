@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from gvgbot.atomic_files import replace_file, write_all, write_files
 from gvgbot.errors import GvgbotError
-from gvgbot.maps.atomic_files import write_files
 
 OLD = {"map.yaml": b"old", "map.png": b"old"}
 NEW: dict[str, bytes | str] = {"map.yaml": "new\n", "map.png": b"new one"}
@@ -82,3 +82,43 @@ def test_a_filesystem_may_be_unable_to_sync_a_directory(
     monkeypatch.setattr(os, "fsync", fsync)
     write_files(directory, NEW)
     assert (directory / "map.png").read_bytes() == b"new one"
+
+
+def test_what_takes_a_file_s_place_is_on_the_disk_before_the_old_one_moves(
+    directory: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    synced: list[int | str] = []
+
+    def fsync(descriptor: int) -> None:
+        if is_directory(descriptor):
+            assert contents(directory) == {**OLD, "map.png": b"new one", "before.png": b"old"}
+            synced.append("directory")
+        else:
+            assert contents(directory).items() >= OLD.items()
+            synced.append(os.fstat(descriptor).st_size)
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    replace_file(directory / "map.png", b"new one", keep=directory / "before.png")
+    assert synced == [7, "directory"]
+
+
+def test_a_disk_that_does_not_take_what_replaces_a_file_keeps_both_old_ones(
+    directory: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fsync(descriptor: int) -> None:
+        raise OSError(errno.EIO, "Input/output error")
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    with pytest.raises(OSError, match="Input/output error"):
+        replace_file(directory / "map.png", b"new", keep=directory / "map.yaml")
+    assert contents(directory) == OLD
+
+
+def test_what_is_taken_in_parts_is_written_whole(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write = os.write
+    monkeypatch.setattr(os, "write", lambda file, data: write(file, data[:3]))
+    with (tmp_path / "file").open("wb", buffering=0) as file:
+        write_all(file.fileno(), b"one, two, three")
+    assert (tmp_path / "file").read_bytes() == b"one, two, three"
