@@ -125,7 +125,6 @@ async def _examine_laser(links: Links, clock: Clock) -> list[Line]:
         laser, close = await links.open_laser()
     except DeviceLost as error:
         return [Line("fail", "laser", str(error))]
-    assert isinstance(laser, HokuyoLaser)
     scans: list[Scan] = []
 
     async def next_stamp() -> float:
@@ -143,7 +142,6 @@ async def _examine_base(links: Links, clock: Clock) -> list[Line]:
         base, close = await links.open_base()
     except DeviceLost as error:
         return [Line("fail", "base", str(error))]
-    assert isinstance(base, KobukiBase)
 
     async def next_stamp() -> float:
         return (await base.next_odometry()).stamp

@@ -12,9 +12,8 @@ from gvgbot.drivers.kobuki.driver import STANDSTILL_FRAME, KobukiBase
 from gvgbot.drivers.kobuki.feedback import FeedbackReader
 from gvgbot.drivers.tapped import Tap, TappedStream
 from gvgbot.drivers.tcp import SCHEME, TcpStream, open_tcp
-from gvgbot.drivers.transport import ByteStream, SerialStream, open_serial
+from gvgbot.drivers.transport import ByteStream, NoSerialPort, SerialStream, open_serial
 from gvgbot.errors import DeviceLost
-from gvgbot.hal.devices import Base, Laser
 from gvgbot.hal.reopening import ReopeningBase, ReopeningLaser
 from gvgbot.simulation import Simulation
 from gvgbot.topics import LinkHealth
@@ -45,7 +44,7 @@ class Links:
             config.base.heading, config.base.link_delay_s, config.base.geometry
         )
 
-    async def open_laser(self) -> tuple[Laser, Close]:
+    async def open_laser(self) -> tuple[HokuyoLaser, Close]:
         """A laser to be run, and what closes its link. Raises DeviceLost."""
         config, longest_s = self.config.laser, self.config.robot.limits.max_scan_age_s
         stream: ByteStream
@@ -57,7 +56,7 @@ class Links:
         self._laser = HokuyoLaser(stream, config, self.clock, self._laser_link, longest_s)
         return self._laser, close
 
-    async def open_base(self) -> tuple[Base, Close]:
+    async def open_base(self) -> tuple[KobukiBase, Close]:
         """A base to be run, and what closes its link. Raises DeviceLost."""
         config = self.config.base
         stream: ByteStream
@@ -146,9 +145,9 @@ async def _open_port(name: str, port: str, baud: int) -> tuple[SerialStream | Tc
     stream: SerialStream | TcpStream
     try:
         stream = await open_tcp(port) if is_tcp else await open_serial(port, baud)
+    except NoSerialPort as error:
+        raise DeviceLost(f"{port} is no serial port: set {name}.port") from error
     except DeviceLost as error:
-        if "Inappropriate ioctl" in str(error):  # what the system says of any other file
-            raise DeviceLost(f"{port} is no serial port: set {name}.port") from error
         is_path = port.startswith("/")
         form = "" if is_tcp or is_path else f" (on Ethernet it is {SCHEME}host:number)"
         raise DeviceLost(f"{error}, or set {name}.port{form}") from error

@@ -24,6 +24,10 @@ _TERMIOS2_SIZE = 44  # bytes, of which the last four are the rate of sending
 _RATE_TOLERANCE = 0.03  # of a bit rate; 0.05 is half a bit at the last of the ten of a byte
 
 
+class NoSerialPort(DeviceLost):
+    """What was to be opened is something else: a file, say."""
+
+
 class ByteStream(Protocol):
     """Bytes both ways."""
 
@@ -87,12 +91,13 @@ def pipe() -> tuple[ByteStream, ByteStream]:
 def open_port(path: str, baud: int) -> serial.Serial:
     """A serial port, raw and exclusive; waits for it.
 
-    Raises DeviceLost when the port is absent or in use.
+    Raises DeviceLost when the port is absent or in use, NoSerialPort when it is none.
     """
     try:
         return serial.Serial(path, baud, timeout=0, write_timeout=0, exclusive=True)
     except (serial.SerialException, OSError, ValueError, termios.error) as error:
-        raise DeviceLost(f"cannot open {path}: {_obstacle(error)}") from error
+        lost = NoSerialPort if _number(error) == errno.ENOTTY else DeviceLost
+        raise lost(f"cannot open {path}: {_obstacle(error)}") from error
 
 
 async def open_serial(

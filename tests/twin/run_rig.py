@@ -15,7 +15,6 @@ from gvgbot.drivers.kobuki.driver import KobukiBase
 from gvgbot.drivers.kobuki.twin import KobukiTwinConfig
 from gvgbot.drivers.transport import ByteStream
 from gvgbot.geometry import Pose
-from gvgbot.hal.devices import Base
 from gvgbot.links import Close, Links
 from gvgbot.maps.run_directory import RunDirectory
 from gvgbot.requests import MESSAGEPACK, REQUESTS, Answer, Asked, RequestName
@@ -89,7 +88,7 @@ class CabledLinks(Links):
 
     cable: Cable
 
-    async def open_base(self) -> tuple[Base, Close]:
+    async def open_base(self) -> tuple[KobukiBase, Close]:
         return KobukiBase(self.cable, self.config.base, self.clock, self.feedback), lambda: None
 
 

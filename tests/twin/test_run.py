@@ -19,9 +19,10 @@ from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.clock import Clock
 from gvgbot.config import load_config
 from gvgbot.daemon import run
+from gvgbot.drivers.hokuyo.driver import HokuyoLaser
+from gvgbot.drivers.kobuki.driver import KobukiBase
 from gvgbot.errors import DeviceLost
 from gvgbot.geometry import Pose, Twist
-from gvgbot.hal.devices import Base, Laser
 from gvgbot.hal.messages import Contact, Odometry, Scan, Sign
 from gvgbot.links import Close, Links
 from gvgbot.stop_signals import StopSignals
@@ -221,10 +222,10 @@ def test_a_robot_stands_while_its_laser_is_unplugged_and_then_goes_on(daemon: Da
 
 
 class NoPorts(Links):
-    async def open_laser(self) -> tuple[Laser, Close]:
+    async def open_laser(self) -> tuple[HokuyoLaser, Close]:
         raise DeviceLost("cannot open /dev/hokuyo")
 
-    async def open_base(self) -> tuple[Base, Close]:
+    async def open_base(self) -> tuple[KobukiBase, Close]:
         raise DeviceLost("cannot open /dev/kobuki")
 
 
@@ -272,7 +273,7 @@ class Frozen:
 
 
 class FrozenLinks(NoPorts):
-    async def open_base(self) -> tuple[Base, Close]:
+    async def open_base(self) -> tuple[Any, Close]:  # a base of another kind
         return Frozen(), lambda: None
 
 

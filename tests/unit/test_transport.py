@@ -1,14 +1,16 @@
-"""Byte streams in memory, and twins served on them."""
+"""Byte streams in memory, twins served on them, and what cannot be opened as a port."""
 
 import asyncio
+import os
 from math import inf
+from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from gvgbot.clock import LoopClock, run_in_virtual_time
-from gvgbot.drivers.transport import ByteStream, pipe, serve_twin
+from gvgbot.drivers.transport import ByteStream, NoSerialPort, open_port, pipe, serve_twin
 from gvgbot.errors import DeviceLost
 
 
@@ -169,3 +171,16 @@ def test_serving_ends_quietly_when_the_other_end_goes() -> None:
         return LoopClock().now()
 
     assert 5.0 <= run_in_virtual_time(run()) <= 5.2
+
+
+@pytest.mark.parametrize("name", ["file", os.devnull])
+def test_what_is_no_serial_port_is_told_from_a_port_that_is_lost(name: str, tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(NoSerialPort, match=r"cannot open .*: check its name"):
+        open_port(str(tmp_path / name), 115_200)
+
+
+def test_a_port_that_is_absent_may_be_one() -> None:
+    with pytest.raises(DeviceLost, match="plug it in") as lost:
+        open_port("/dev/absent", 115_200)
+    assert not isinstance(lost.value, NoSerialPort)
