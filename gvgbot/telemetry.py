@@ -5,7 +5,6 @@ import contextlib
 from collections import deque
 from collections.abc import Awaitable, Callable, Sequence
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 import msgspec
@@ -36,7 +35,7 @@ from gvgbot.topics import (
     team_key,
 )
 from gvgbot.words import printable
-from gvgbot.zenoh_config import addresses, opened, reason, session_config
+from gvgbot.zenoh_config import addresses, has_listener, opened, reason, session_config
 
 _WAITING_QUERIES = 1000  # more than this are dropped, oldest first; who asked gets nothing
 # While as many wait, others are refused; then dropped; then even those that stop the robot.
@@ -108,7 +107,7 @@ class Telemetry:
         _, publisher = self._publishers[payload]
         if isinstance(publisher, zenoh.ext.AdvancedPublisher):
             return True
-        return publisher.matching_status.matching  # type: ignore[attr-defined, no-any-return]
+        return has_listener(publisher)
 
     def publish(self, value: Payload, latest: Payload | None = None) -> None:
         """Send to whoever listens; without waiting, and without complaining if it fails.
@@ -259,12 +258,7 @@ class Telemetry:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 

@@ -5,7 +5,7 @@ import re
 from collections.abc import Iterator, Mapping
 from importlib.resources import files
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import msgspec
 import zenoh
@@ -63,6 +63,12 @@ def opened(config: zenoh.Config, file: Path | None = None) -> zenoh.Session:
                 f"{name} in {file or 'the configuration of zenoh'}"
             ) from error
     return zenoh.open(config)
+
+
+def has_listener(publisher: zenoh.Publisher) -> bool:
+    """Whether anybody listens to a publisher just now."""
+    status: Any = publisher.matching_status  # no bool, whatever zenoh's types say
+    return bool(status.matching)
 
 
 def _files(config: zenoh.Config) -> Iterator[tuple[str, str]]:

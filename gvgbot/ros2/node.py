@@ -3,7 +3,6 @@
 import asyncio
 from collections import deque
 from collections.abc import Callable
-from types import TracebackType
 from typing import Self
 
 import structlog
@@ -16,7 +15,7 @@ from gvgbot.ros2 import messages
 from gvgbot.ros2.cdr import decode_twist
 from gvgbot.ros2.config import Ros2Config
 from gvgbot.ros2.topics import TOPICS, Node, Topic, attachment, gid
-from gvgbot.zenoh_config import addresses, opened, reason, session_config
+from gvgbot.zenoh_config import addresses, has_listener, opened, reason, session_config
 
 _HEARTBEAT_S = 0.5  # by which receivers of latched topics find out that they have missed one
 _TWISTS = {"Twist": messages.Twist, "TwistStamped": messages.TwistStamped}
@@ -122,12 +121,7 @@ class Ros2Node:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 
@@ -157,7 +151,7 @@ class _Publisher:
     @property
     def is_heard(self) -> bool:
         """Whether there is a point in sending."""
-        return self._plain is None or self._plain.matching_status.matching  # type: ignore[attr-defined]
+        return self._plain is None or has_listener(self._plain)
 
     def put(self, data: bytes, unix_ns: int) -> None:
         """Send a message."""

@@ -48,6 +48,7 @@ from gvgbot.web.feed import Feed
 from gvgbot.web.server import Web
 from gvgbot.web.viewers import Audience
 from gvgbot.web.wire import Reply, Wish
+from gvgbot.zenoh_config import has_listener
 from tests.process.addresses import free_endpoint, plain_session, router
 from tests.process.browser import Page, browser, chromium
 from tests.process.test_requests import a_robot
@@ -395,7 +396,7 @@ def test_a_robot_of_another_version_is_said_to_be_one() -> None:
         encoding = zenoh.Encoding("application/msgpack;gvgbot.State.v9")
         with web("karl", "--connect", endpoint) as address:
             publisher = other.declare_publisher("gvgbot/karl/state", encoding=encoding)
-            while not publisher.matching_status.matching:  # type: ignore[attr-defined]
+            while not has_listener(publisher):
                 pass
             publisher.put(b"\x80")
             asyncio.run(story(address))
