@@ -74,11 +74,19 @@ class PtyPort(DevicePort):
 
 
 def _place_link(link: Path, target: str) -> None:
-    """Make the link, over an old one if need be, never over anything else. Raises UsageError."""
+    """Make the link, over an old one that leads nowhere, never over anything else.
+
+    Raises UsageError.
+    """
     if not link.name:
         raise UsageError("a link without a name: give a path")
     if os.path.lexists(link) and not link.is_symlink():
         raise UsageError(f"{link}: exists and is no link: choose another name, or remove it")
+    if link.exists() and str(link.readlink()) != target:
+        raise UsageError(
+            f"{link}: leads to {link.readlink()}, a device that is there, perhaps of another twin: "
+            "choose another name, or remove it"
+        )
     fresh = link.with_name(f".{link.name}.{os.getpid()}")
     try:
         fresh.symlink_to(target)

@@ -198,6 +198,23 @@ def test_unplugging_hangs_up_on_clients_and_takes_the_name_away(tmp_path: Path) 
     asyncio.run(main())
 
 
+def test_a_link_to_a_device_that_is_there_is_not_taken_and_one_to_nowhere_is(
+    tmp_path: Path,
+) -> None:
+    async def main() -> None:
+        link = tmp_path / "port"
+        link.symlink_to("/dev/pts/of-a-twin-that-was-killed")
+        first = PtyPort(link)
+        with pytest.raises(UsageError, match="perhaps of another twin"):
+            PtyPort(link)
+        with opened(link) as client:
+            os.write(client, b"?")
+            assert await first.read() == b"?"
+        first.close()
+
+    asyncio.run(main())
+
+
 class OldChip(serial.Serial):
     """A port of which the driver takes the nearest rate that its chip has, without a word."""
 
