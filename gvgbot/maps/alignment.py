@@ -8,14 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 from scipy.spatial import KDTree
 from scipy.spatial.distance import cdist
 
 from gvgbot.geometry import Array, Pose, resampled
 from gvgbot.maps.moved import moved_graph
 from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
-from gvgbot.team.laying import least_squares
+from gvgbot.registration import assigned, rigid_fit
 
 _MOST_TRIES = 4000  # the longest edges come first: they give the best angles
 _FITS = 10  # rounds of pairing and fitting, more than were ever needed
@@ -83,7 +82,7 @@ def _fitted(a: Array, b: Array, pose: Pose, reach: float) -> Pose:
         if len(pairs) < 2:
             return pose
         ours, theirs = [i for i, _, _ in pairs], [j for _, j, _ in pairs]
-        pose, _ = least_squares(a[ours, :2], b[theirs, :2])
+        pose, _ = rigid_fit(a[ours, :2], b[theirs, :2])
     return pose
 
 
@@ -120,12 +119,7 @@ def _partners(a: Array, b: Array, reach: float) -> list[Pair]:
 
 def _paired(distances: Array, reach: float) -> list[Pair]:
     """Rows and columns, each once, so that the sum of distances within reach is least."""
-    rows, columns = linear_sum_assignment(np.minimum(distances, reach))
-    return [
-        (int(i), int(j), float(distances[i, j]))
-        for i, j in zip(rows, columns, strict=True)
-        if distances[i, j] < reach
-    ]
+    return [(i, j, float(distances[i, j])) for i, j in assigned(distances, reach)]
 
 
 def _edge_distances(a: RouteGraph, b: RouteGraph, names: dict[int, int], reach: float) -> Array:

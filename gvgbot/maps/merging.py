@@ -16,6 +16,7 @@ from scipy.spatial.distance import cdist
 from gvgbot.geometry import Array, Pose, direction_of, stations_of, wrap_angle
 from gvgbot.maps.moved import moved_graph
 from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph, lines_from
+from gvgbot.registration import assigned
 
 SAME_M = 0.6  # vertices nearer to each other are one
 _SAME_RAD = 0.7  # departures nearer to each other are one
@@ -76,13 +77,8 @@ def settled(vertices: Sequence[MapVertex], edges: Sequence[MapEdge]) -> RouteGra
 
 def _pairs(ours: RouteGraph, theirs: RouteGraph) -> list[tuple[int, int]]:
     """Indices of the vertices that both have."""
-    from scipy.optimize import linear_sum_assignment
-
     a, b = (np.array([v.position for v in g.vertices]).reshape(-1, 2) for g in (ours, theirs))
-    away = np.minimum(cdist(a, b), SAME_M)
-    rows, columns = linear_sum_assignment(away)
-    pairs = zip(rows.tolist(), columns.tolist(), strict=True)
-    return [(i, j) for i, j in pairs if away[i, j] < SAME_M]
+    return assigned(cdist(a, b), SAME_M)
 
 
 def _refuted(graph: RouteGraph, paired: set[int], other: RouteGraph) -> set[int]:
@@ -294,15 +290,10 @@ def _unexplained(leaving: list[float], followed: list[float]) -> list[float]:
 
     An edge may set out a little to the side of the bearing that it was seen at.
     """
-    from scipy.optimize import linear_sum_assignment
-
     if not (leaving and followed):
         return leaving
     off = np.array([[abs(wrap_angle(d - b)) for b in followed] for d in leaving])
-    rows, columns = linear_sum_assignment(np.minimum(off, _KINK_RAD))
-    explained = {
-        i for i, j in zip(rows.tolist(), columns.tolist(), strict=True) if off[i, j] < _KINK_RAD
-    }
+    explained = {i for i, _ in assigned(off, _KINK_RAD)}
     return [d for i, d in enumerate(leaving) if i not in explained and off[i].min() > _SAME_RAD / 2]
 
 

@@ -19,8 +19,9 @@ from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
 from gvgbot.geometry import Array, Pose, wrap_angle
+from gvgbot.registration import assigned, rigid_fit
 from gvgbot.team.chart import Chart
-from gvgbot.team.laying import fitted, laid_on_walls, least_squares
+from gvgbot.team.laying import fitted, laid_on_walls
 from gvgbot.team.likeness import UNLIKE_SHARE, likeness
 from gvgbot.team.side import SPACING_M, Side
 from gvgbot.team.stretches import Complex, leeway
@@ -286,9 +287,8 @@ def _examine(a: Side, b: Side, pose: Pose) -> _Evidence:
         before, partners = partners, _partners(a, b, pose)
         if partners == before or len(partners) < _FIXED_BY:
             break
-        pose, _ = least_squares(
-            a.points[[i for i, _ in partners]], b.points[[j for _, j in partners]]
-        )
+        ours, theirs = ([pair[k] for pair in partners] for k in (0, 1))
+        pose, _ = rigid_fit(a.points[ours], b.points[theirs])
     alike = {(i, j): likeness(a, b, i, j, pose) for i, j in partners}
     pairs = [(a.ids[i], b.ids[j]) for (i, j), share in alike.items() if share >= _ALIKE_SHARE]
     against = sum(share < UNLIKE_SHARE for share in alike.values())
@@ -312,13 +312,9 @@ def _examine(a: Side, b: Side, pose: Pose) -> _Evidence:
 
 def _partners(a: Side, b: Side, pose: Pose) -> list[tuple[int, int]]:
     """Indices of vertices of one kind that lie where the other's do."""
-    from scipy.optimize import linear_sum_assignment
-
-    laid = pose.transform(b.points)
-    away = np.minimum(cdist(a.points, laid), _SAME_M)
+    away = cdist(a.points, pose.transform(b.points))
     away[a.is_meetpoint[:, None] != b.is_meetpoint] = _SAME_M
-    rows, columns = linear_sum_assignment(away)
-    return [(int(i), int(j)) for i, j in zip(rows, columns, strict=True) if away[i, j] < _SAME_M]
+    return assigned(away, _SAME_M)
 
 
 def _connected(ours: Chart, theirs: Chart, pairs: list[tuple[int, int]]) -> int:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from gvgbot.autonomy.control.company import BodiesSeen
 from gvgbot.geometry import Array, Pose, wrap_angle
-from gvgbot.team.laying import least_squares
+from gvgbot.registration import rigid_fit
 
 WINDOW_S = 20.0  # what was seen before is not asked: either map may have been bent since
 _RADIUS_M = 0.04  # by which a body may seem wider or slimmer than it is
@@ -65,13 +65,13 @@ def frame_of(
         return None
     for _ in range(_FITS):
         kept = _borne_out(best, ours, told)
-        best, _ = least_squares(ours[kept], told[kept])
+        best, _ = rigid_fit(ours[kept], told[kept])
     kept = _borne_out(best, ours, told)
     first = np.arange(len(ours)) < len(a.look)
     stamps = np.array([look.stamp for look in (*mine, *theirs)])[looks]
     if not _is_sure(best, ours, told, kept & first, kept & ~first, stamps):
         return None
-    return least_squares(ours[kept], told[kept])
+    return rigid_fit(ours[kept], told[kept])
 
 
 def _seen(looks: Sequence[BodiesSeen], other: Sequence[BodiesSeen], radius: float) -> _Seen:

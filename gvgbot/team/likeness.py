@@ -6,8 +6,8 @@ import numpy as np
 
 from gvgbot.autonomy.slam.recognition import match_bearings
 from gvgbot.geometry import Array, Pose, wrap_angle
+from gvgbot.registration import rigid_fit
 from gvgbot.team.chart import ChartVertex
-from gvgbot.team.laying import least_squares
 from gvgbot.team.side import Side
 from gvgbot.team.stretches import as_clear
 
@@ -51,7 +51,7 @@ def _agreement(a: Side, b: Side, ours: ChartVertex, theirs: ChartVertex, pose: P
         found = np.isfinite(np.asarray(away))
         if np.count_nonzero(found) < max(_LEAST_POINTS, _HOPELESS_SHARE * len(found)):
             return 0.0
-        local, _ = least_squares(a.walls.data[np.asarray(index)[found]], near_b[found])
+        local, _ = rigid_fit(a.walls.data[np.asarray(index)[found]], near_b[found])
     shift = local.transform(theirs.position) - pose.transform(theirs.position)
     if np.hypot(*shift) > _SHIFT_M or abs(wrap_angle(local.theta - pose.theta)) > _TURN_RAD:
         return 0.0

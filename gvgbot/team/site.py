@@ -14,6 +14,7 @@ from scipy.spatial.distance import cdist
 
 from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.geometry import Array, direction_of, length_of, wrap_angle
+from gvgbot.registration import assigned
 from gvgbot.team.chart import Chart, Departure
 from gvgbot.team.ways import BESIDE_M, WELL_ON_M, Ways, leads_over
 
@@ -81,17 +82,13 @@ class Site:
 
     def _lay(self, number: int, chart: Chart) -> None:
         """Let vertices of one more chart be at known places, or at new ones."""
-        from scipy.optimize import linear_sum_assignment
-
         ids = list(chart.vertices)
         points = np.array([chart.vertices[i].position for i in ids]).reshape(-1, 2)
         if ids and self._points:
-            away = np.minimum(cdist(points, np.array(self._points)), _SAME_M)
-            rows, places = linear_sum_assignment(away)
-            for row, place in zip(rows.tolist(), places.tolist(), strict=True):
-                if away[row, place] < _SAME_M:
-                    self._place[number, ids[row]] = place
-                    self._members[place][number] = ids[row]
+            away = cdist(points, np.array(self._points))
+            for row, place in assigned(away, _SAME_M):
+                self._place[number, ids[row]] = place
+                self._members[place][number] = ids[row]
         for i, point in zip(ids, points, strict=True):
             if (number, i) not in self._place:
                 self._place[number, i] = len(self._points)

@@ -7,7 +7,6 @@ import pytest
 
 from gvgbot.geometry import Pose, wrap_angle
 from gvgbot.team.alignment import Alignment, align, refined
-from gvgbot.team.laying import least_squares
 from gvgbot.team.likeness import likeness
 from gvgbot.team.side import Side
 from tests.unit.team.building import Building, irregular, lattice
@@ -141,18 +140,6 @@ def test_the_covariance_of_a_frame_grows_with_how_far_apart_the_charts_stay() ->
     assert exact is not None
     assert blurred is not None
     assert math.sqrt(np.trace(blurred.covariance)) > math.sqrt(np.trace(exact.covariance))
-
-
-@pytest.mark.parametrize(
-    "points", [[[1.0, 1.0]], [[1.0, 1.0], [1.0, 1.0]], [[1.0, 1.0], [2.0, 5.0]]]
-)
-def test_points_that_were_only_moved_lie_on_each_other_also_a_single_one(
-    points: list[list[float]],
-) -> None:
-    there, moved = np.array(points), np.add(points, (2.0, 3.0))
-    pose, _ = least_squares(moved, there)
-    assert pose.transform(there) == pytest.approx(moved)
-    assert pose.theta == pytest.approx(0.0)
 
 
 def test_equal_corridors_without_number_do_not_fill_the_memory() -> None:
