@@ -123,6 +123,17 @@ def stations_of(line: Array) -> Array:
     return np.concatenate([[0.0], np.hypot(*np.diff(line, axis=0).T).cumsum()])
 
 
+def anchored(line: Array, start: Array, end: Array) -> Array:
+    """A line (N, 2), bent so that it begins and ends at two points (2,), in its unit.
+
+    What its ends are off by is spread over its length.
+    """
+    along = stations_of(line)
+    share = (along / max(along[-1], 1e-9))[:, None]
+    bent: Array = line + (1 - share) * (start - line[0]) + share * (end - line[-1])
+    return bent
+
+
 def direction_of(line: Array, over: float) -> float:
     """In which a line (N, 2) of two points or more sets out, rad.
 

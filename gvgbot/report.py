@@ -14,7 +14,7 @@ from gvgbot.autonomy.estimate import scans_at, smoothed
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.graph import Edge, Vertex
 from gvgbot.drivers.world import World, save_world
-from gvgbot.geometry import Array, Pose, composed, resampled, seen_from
+from gvgbot.geometry import Array, Pose, anchored, composed, resampled, seen_from
 from gvgbot.hal.messages import Odometry
 from gvgbot.maps import geojson
 from gvgbot.maps.distances import cells_to
@@ -152,15 +152,11 @@ def _map_vertex(vertex: Vertex, pose: Pose, covariance: Array) -> MapVertex:
 def _map_edge(edge: Edge, vertices: dict[int, Pose]) -> MapEdge:
     """An edge whose polyline is bent so that it ends on its vertices."""
     line = vertices[edge.a.vertex].transform(edge.shown)
-    start, end = vertices[edge.a.vertex].position, vertices[edge.b.vertex].position
-    steps, along = line[1:] - line[:-1], np.zeros(len(line))
-    np.cumsum(np.hypot(steps[:, 0], steps[:, 1]), out=along[1:])
-    share = (along / max(along[-1], 1e-9))[:, None]
-    line = line + (1 - share) * (start - line[0]) + share * (end - line[-1])
+    start, end = (vertices[half.vertex].position for half in (edge.a, edge.b))
     return MapEdge(
         start=edge.a.vertex,
         end=edge.b.vertex,
-        polyline=line,
+        polyline=anchored(line, start, end),
         length=edge.length,
         min_clearance=edge.min_clearance,
         traversals=edge.traversals,

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
-from gvgbot.geometry import Array, Pose, direction_of, stations_of, wrap_angle
+from gvgbot.geometry import Array, Pose, anchored, direction_of, stations_of, wrap_angle
 from gvgbot.maps.moved import moved_graph
 from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph, lines_from
 from gvgbot.registration import assigned
@@ -300,8 +300,4 @@ def _unexplained(leaving: list[float], followed: list[float]) -> list[float]:
 def _anchored(edge: MapEdge, vertices: Sequence[MapVertex]) -> MapEdge:
     """The edge, bent so that it ends on its vertices."""
     places = {vertex.id: np.array(vertex.position) for vertex in vertices}
-    line = edge.polyline
-    along = stations_of(line)
-    share = (along / max(along[-1], 1e-9))[:, None]
-    off = (1 - share) * (places[edge.start] - line[0]) + share * (places[edge.end] - line[-1])
-    return replace(edge, polyline=line + off)
+    return replace(edge, polyline=anchored(edge.polyline, places[edge.start], places[edge.end]))

@@ -12,6 +12,7 @@ from gvgbot.geometry import (
     STANDSTILL,
     Pose,
     Twist,
+    anchored,
     composed,
     direction_of,
     length_of,
@@ -181,3 +182,19 @@ def test_a_line_sets_out_towards_where_it_is_so_far_from_its_start(
 ) -> None:
     line = np.array([(1.0, 1.0), (2.0, 1.0), (3.0, 3.0), (1.0, 5.0)])
     assert direction_of(line, over) == pytest.approx(expected)
+
+
+@given(st.lists(st.tuples(lengths, lengths), min_size=2, max_size=6), poses)
+def test_a_line_whose_ends_are_moved_alike_is_moved_as_a_whole(
+    points: list[tuple[float, float]], by: Pose
+) -> None:
+    line = np.array(points)
+    moved = anchored(line, line[0] + by.position, line[-1] + by.position)
+    assert moved == pytest.approx(line + by.position, abs=1e-9)
+    assert anchored(line, line[0], line[-1]) == pytest.approx(line, abs=1e-9)
+
+
+def test_a_line_is_bent_the_more_the_nearer_to_the_end_that_is_off() -> None:
+    line = np.array([(0.0, 0.0), (1.0, 0.0), (4.0, 0.0)])
+    there = anchored(line, np.array([0.0, 0.4]), np.array([4.0, -0.8]))
+    assert there == pytest.approx(np.array([(0.0, 0.4), (1.0, 0.1), (4.0, -0.8)]))

@@ -7,10 +7,12 @@ from collections.abc import Iterator
 import msgspec
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from gvgbot.autonomy.keyframes import Keyframe
-from gvgbot.geometry import Pose
+from gvgbot.geometry import Pose, anchored
 from gvgbot.hal.messages import Scan
 from gvgbot.live_grid import LiveGrid
 from gvgbot.live_map import Stretch, Trail, bent
@@ -158,6 +160,20 @@ def test_edges_are_turned_with_their_vertex_and_bent_to_end_on_the_other() -> No
     assert edges[0].polyline == pytest.approx(np.array(expected), abs=1e-6)
     moved = [[1.0, 2.5], [1.0, 4.25], [1.0, 6.0]]  # by -1 at the start, +0.5 at the end
     assert edges[1].polyline == pytest.approx(np.array(moved), abs=1e-6)
+
+
+@given(st.integers(0, 2**32 - 1), st.lists(st.integers(1, 9), min_size=1, max_size=5))
+def test_edges_are_bent_at_once_as_they_would_be_one_by_one(seed: int, counts: list[int]) -> None:
+    rng = np.random.default_rng(seed)
+    poses = {number: Pose(*rng.uniform(-9.0, 9.0, 3).tolist()) for number in range(4)}
+    edges = [
+        Stretch(int(start), int(end), 1.0, rng.uniform(-5.0, 5.0, (count, 2)))
+        for (start, end), count in zip(rng.integers(0, 4, (len(counts), 2)), counts, strict=True)
+    ]
+    for edge, told in zip(edges, bent(edges, poses), strict=True):
+        line = poses[edge.start].transform(edge.points)
+        expected = anchored(line, poses[edge.start].position, poses[edge.end].position)
+        assert told.polyline == pytest.approx(expected, abs=1e-5)
 
 
 def test_a_map_without_edges_has_none() -> None:
