@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from gvgbot.carmen import CarmenLog, read_carmen
-from gvgbot.geometry import Array, Pose
+from gvgbot.geometry import Array, Pose, rows_of
 from gvgbot.maps.trajectory import decode_tum
 from gvgbot.replay import NO_ECHO_M, Wanted, replay
 
@@ -97,7 +97,7 @@ def _read(log: Path) -> CarmenLog:
 
 
 def _rows(poses: list[tuple[float, Pose]]) -> tuple[Array, Array]:
-    return np.array([t for t, _ in poses]), np.array([(p.x, p.y, p.theta) for _, p in poses])
+    return np.array([t for t, _ in poses]), rows_of(p for _, p in poses)
 
 
 def measure(

@@ -25,7 +25,7 @@ import numpy as np
 from gvgbot.autonomy.control.reflexes import Felt
 from gvgbot.autonomy.loop import Cycle
 from gvgbot.errors import UsageError
-from gvgbot.geometry import STANDSTILL, Array, Pose
+from gvgbot.geometry import STANDSTILL, Array, Pose, rows_of
 from gvgbot.hal.messages import Odometry, Scan
 from gvgbot.recording import Lived
 
@@ -147,7 +147,7 @@ def _steady_place(places: list[Pose]) -> Pose:
     """Where a laser is all along; the middle if it moves, as when somebody corrected its poses."""
     if not places:
         return Pose()
-    found = np.array([(place.x, place.y, place.theta) for place in places])
+    found = rows_of(places)
     middle = np.median(found, axis=0)
     is_there = np.abs(found - middle).max(axis=1) < _STEADY
     if is_there.mean() <= _MOSTLY:

@@ -1,6 +1,7 @@
 """Planar geometry: angles, poses and twists, in metres, radians and seconds."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Self
 
@@ -77,6 +78,12 @@ class Pose:
     def from_array(cls, values: Array) -> Self:
         """Pose from (x, y, theta)."""
         return cls(float(values[0]), float(values[1]), float(values[2]))
+
+
+def rows_of(poses: Iterable[Pose]) -> Array:
+    """Poses as rows (N, 3) of x, y, theta."""
+    rows = [(pose.x, pose.y, pose.theta) for pose in poses]
+    return np.array(rows, np.float64).reshape(-1, 3)
 
 
 def composed(a_b: Array, b_c: Array) -> Array:

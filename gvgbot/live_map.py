@@ -10,7 +10,7 @@ import numpy as np
 from gvgbot.autonomy.keyframes import Keyframe
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.graph import Vertex
-from gvgbot.geometry import Array, Pose
+from gvgbot.geometry import Array, Pose, rows_of
 from gvgbot.live_grid import LiveGrid
 from gvgbot.live_past import LivePast, Portion
 from gvgbot.topics import (
@@ -176,10 +176,8 @@ def bent(edges: Sequence[Stretch], poses: Mapping[int, Pose]) -> tuple[MapEdge, 
     counts = np.array([len(edge.points) for edge in edges])
     last = np.cumsum(counts) - 1
     first, which = last + 1 - counts, np.repeat(np.arange(len(edges)), counts)
-    starts, ends = (
-        np.array([(poses[n].x, poses[n].y, poses[n].theta) for n in numbers])
-        for numbers in ([edge.start for edge in edges], [edge.end for edge in edges])
-    )
+    starts = rows_of(poses[edge.start] for edge in edges)
+    ends = rows_of(poses[edge.end] for edge in edges)
     turned = np.concatenate([edge.points for edge in edges])
     x, y, theta = starts[which].T
     c, s = np.cos(theta), np.sin(theta)

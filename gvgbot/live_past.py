@@ -10,7 +10,7 @@ import numpy as np
 from gvgbot.autonomy.estimate import smoothed_keyframes, still_past
 from gvgbot.autonomy.keyframes import Keyframe, Step
 from gvgbot.autonomy.pipeline import Pipeline
-from gvgbot.geometry import Pose, wrap_angles
+from gvgbot.geometry import Pose, rows_of, wrap_angles
 
 TOLERANCE_M = 0.05  # by which what is drawn may be wrong: a cell of the grid
 _WALLS_M = 4.0  # about so far off they are: a turn moves them by so much times its angle
@@ -91,6 +91,5 @@ def _breaks(steps: Sequence[Step], first: int, end: int) -> frozenset[int]:
 
 def _farthest(drawn: Sequence[Pose], best: Sequence[Pose]) -> float:
     """How far (m) walls seen from poses move, at most, when these are corrected."""
-    a, b = (np.array([(p.x, p.y, p.theta) for p in poses]) for poses in (drawn, best))
-    turns = wrap_angles((b - a)[:, 2])
-    return float((np.hypot(*(b - a)[:, :2].T) + _WALLS_M * np.abs(turns)).max())
+    dx, dy, turn = (rows_of(best) - rows_of(drawn)).T
+    return float((np.hypot(dx, dy) + _WALLS_M * np.abs(wrap_angles(turn))).max())

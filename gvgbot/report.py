@@ -14,7 +14,7 @@ from gvgbot.autonomy.estimate import scans_at, smoothed
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.graph import Edge, Vertex
 from gvgbot.drivers.world import World, save_world
-from gvgbot.geometry import Array, Pose, anchored, composed, resampled, seen_from
+from gvgbot.geometry import Array, Pose, anchored, composed, resampled, rows_of, seen_from
 from gvgbot.hal.messages import Odometry
 from gvgbot.maps import geojson
 from gvgbot.maps.distances import cells_to
@@ -76,11 +76,11 @@ def map_files(pipeline: Pipeline, journey: Journey, title: str) -> dict[str, byt
         "map.geojson": geojson.encode(graph),
         "map.png": draw_map(graph, grid=grid, estimate=estimate, odometry=odometry, title=title),
         "estimate.tum": encode_tum(estimate),
-        "online.tum": encode_tum(_trajectory(journey, _rows(journey.map_base))),
+        "online.tum": encode_tum(_trajectory(journey, rows_of(journey.map_base))),
         "odometry.tum": encode_tum(odometry),
     }
     if journey.world_base:
-        files["truth.tum"] = encode_tum(_trajectory(journey, _rows(journey.world_base)))
+        files["truth.tum"] = encode_tum(_trajectory(journey, rows_of(journey.world_base)))
     return files | encode_map_server(grid)
 
 
@@ -88,16 +88,11 @@ def _trajectory(journey: Journey, poses: Array) -> Trajectory:
     return Trajectory(np.array(journey.stamps, np.float64), poses)
 
 
-def _rows(poses: list[Pose]) -> Array:
-    """Poses as rows (N, 3)."""
-    return np.array([(p.x, p.y, p.theta) for p in poses], np.float64).reshape(-1, 3)
-
-
 def _by_odometry(journey: Journey, pipeline: Pipeline) -> Array:
     """The journey by odometry alone (N, 3), from where its own first keyframe was taken on."""
     own = pipeline.past.keyframes[pipeline.past.lent :]
     start, map_start = (own[0].odom_base, own[0].map_base) if own else (Pose(), Pose())
-    return composed(_rows([map_start]), seen_from(_rows([start]), _rows(journey.odom_base)))
+    return composed(rows_of([map_start]), seen_from(rows_of([start]), rows_of(journey.odom_base)))
 
 
 def _corrected(journey: Journey, pipeline: Pipeline, keyframes: list[Pose]) -> Array:
@@ -106,12 +101,12 @@ def _corrected(journey: Journey, pipeline: Pipeline, keyframes: list[Pose]) -> A
     What odometry is wrong by from one keyframe to the next is spread over the time between.
     """
     taken, last = pipeline.past.keyframes, len(pipeline.past.keyframes) - 1
-    stamps, odom_base = np.array(journey.stamps), _rows(journey.odom_base)
-    taken_at, felt = np.array([k.stamp for k in taken]), _rows([k.odom_base for k in taken])
+    stamps, odom_base = np.array(journey.stamps), rows_of(journey.odom_base)
+    taken_at, felt = np.array([k.stamp for k in taken]), rows_of([k.odom_base for k in taken])
     before = np.array(journey.keyframes, np.intp)
     later = np.minimum(before + 1, last)
     before = np.where(taken_at[later] <= stamps, later, before)  # it was learnt from too late
-    after, smoothed_base = np.minimum(before + 1, last), _rows(keyframes)
+    after, smoothed_base = np.minimum(before + 1, last), rows_of(keyframes)
     by_last, by_next = (
         composed(smoothed_base[k], seen_from(felt[k], odom_base)) for k in (before, after)
     )

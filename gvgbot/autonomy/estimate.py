@@ -12,7 +12,7 @@ from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.slam.revisits import Passage, revisits
 from gvgbot.autonomy.slam.smoothing import Constraint, PoseGraph
 from gvgbot.autonomy.views import Observation
-from gvgbot.geometry import Array, Pose
+from gvgbot.geometry import Array, Pose, rows_of
 from gvgbot.hal.messages import Scan
 
 
@@ -77,7 +77,7 @@ def _solved(pipeline: Pipeline) -> tuple[list[Pose], PoseGraph, Array]:
     keyframes, belief = pipeline.past.keyframes, pipeline.mapper.belief
     start = [k.map_base for k in keyframes] + [belief.map_vertex(v) for v in belief.ids]
     graph = PoseGraph(_constraints(pipeline))
-    x = graph.solve(np.array([(p.x, p.y, p.theta) for p in start]).reshape(-1, 3))
+    x = graph.solve(rows_of(start))
     return [Pose.from_array(row) for row in x[: len(keyframes)]], graph, x
 
 

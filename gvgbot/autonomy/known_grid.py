@@ -16,7 +16,7 @@ from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex
 from gvgbot.autonomy.views import Observation
-from gvgbot.geometry import Array, Pose
+from gvgbot.geometry import Array, Pose, rows_of
 from gvgbot.hal.messages import Scan
 
 _SCAN_EVERY_M = 1.0  # on the edges
@@ -143,7 +143,7 @@ def _believe(pipeline: Pipeline) -> None:
     vertices = list(mapper.graph.vertices.values())
     base = keyframes[-1].map_base
     poses = [base, *(vertex.local for vertex in vertices)]
-    x = np.array([(pose.x, pose.y, pose.theta) for pose in poses]).ravel()
+    x = rows_of(poses).ravel()
     P = np.kron(np.eye(len(poses)), _SIGMA).astype(np.float64)
     mapper.belief = Belief(x, P, tuple(vertex.id for vertex in vertices))
     places = np.array([keyframe.map_base.position for keyframe in keyframes])

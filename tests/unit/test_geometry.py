@@ -17,6 +17,7 @@ from gvgbot.geometry import (
     direction_of,
     length_of,
     resampled,
+    rows_of,
     seen_from,
     stations_of,
     wrap_angle,
@@ -134,11 +135,18 @@ def test_a_standstill_does_not_move() -> None:
     assert Twist(0.0, 0.0) == STANDSTILL
 
 
+@given(st.lists(poses, max_size=5))
+def test_rows_of_poses_are_read_back_as_these(listed: list[Pose]) -> None:
+    rows = rows_of(listed)
+    assert rows.shape == (len(listed), 3)
+    assert [Pose.from_array(row) for row in rows] == listed
+
+
 @given(st.lists(st.tuples(poses, poses), min_size=1, max_size=5))
 def test_rows_of_poses_are_composed_and_seen_from_each_other_as_matrices_say(
     pairs: list[tuple[Pose, Pose]],
 ) -> None:
-    a_b, other = (np.array([(p.x, p.y, p.theta) for p in row]) for row in zip(*pairs, strict=True))
+    a_b, other = (rows_of(row) for row in zip(*pairs, strict=True))
     together, apart = composed(a_b, other), seen_from(a_b, other)
     assert together.shape == apart.shape == (len(pairs), 3)
     for (one, two), a_c, b_c in zip(pairs, together, apart, strict=True):

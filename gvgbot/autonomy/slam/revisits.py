@@ -18,7 +18,7 @@ from scipy.spatial import cKDTree
 from gvgbot.autonomy.slam.ekf import Belief, predict
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig, Sides, register_coarsely
 from gvgbot.autonomy.slam.smoothing import Constraint, PoseGraph
-from gvgbot.geometry import Array, Pose, rotated_covariance, wrap_angle
+from gvgbot.geometry import Array, Pose, rotated_covariance, rows_of, wrap_angle
 
 _AROUND = 4  # scans before and after one, whose walls belong to its place
 _LEAST_LOOP_M = 10.0  # driven in between, or it is the same visit
@@ -97,7 +97,7 @@ def _laid_out(passage: Passage) -> Array:
     poses = [Pose()]
     for motion, _ in passage.steps:
         poses.append(poses[-1].compose(motion))
-    return np.array([(p.x, p.y, p.theta) for p in poses])
+    return rows_of(poses)
 
 
 def _tries(passage: Passage) -> Iterator[tuple[int, Belief]]:

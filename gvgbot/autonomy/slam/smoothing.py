@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import SuperLU, splu
 
-from gvgbot.geometry import Array, Pose, seen_from, wrap_angles
+from gvgbot.geometry import Array, Pose, rows_of, seen_from, wrap_angles
 
 Index = NDArray[np.intp]
 
@@ -41,8 +41,7 @@ class PoseGraph:
     def __init__(self, constraints: list[Constraint]) -> None:
         self._a = np.array([c.a for c in constraints], np.intp)
         self._b = np.array([c.b for c in constraints], np.intp)
-        z = [(c.a_b.x, c.a_b.y, c.a_b.theta) for c in constraints]
-        self._z = np.array(z).reshape(-1, 3)
+        self._z = rows_of(c.a_b for c in constraints)
         self._W = np.array([c.information for c in constraints]).reshape(-1, 3, 3)
         self._doubtful = np.array([c.doubtful for c in constraints], np.bool_)
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.ekf import Belief, Clone
-from gvgbot.geometry import Array, Pose, wrap_angle
+from gvgbot.geometry import Array, Pose, rows_of, wrap_angle
 
 MOST = 16  # old poses
 _SIZE = 3 + 3 * MOST  # of the trail's part of the state
@@ -93,7 +93,7 @@ def _by_clones(belief: Belief, laid: Laid, R: Array) -> Array:
     gains = R @ (at_all @ laid.gains.reshape(-1, 9)).reshape(-1, 3, 3) @ R.T
     slots = [clone.slot for clone in trail]
     map_clone = belief.x[belief.end + 3 :].reshape(MOST, 3)[slots]
-    local_clone = np.array([(c.local_base.x, c.local_base.y, c.local_base.theta) for c in trail])
+    local_clone = rows_of(clone.local_base for clone in trail)
     turn = map_clone[:, 2] - local_clone[:, 2]
     c, s = np.cos(turn), np.sin(turn)
     x, y = laid.local_base.x - local_clone[:, 0], laid.local_base.y - local_clone[:, 1]
