@@ -88,7 +88,7 @@ def by_yag_slam(log: Path) -> tuple[Array, Array]:
             for i in (k, min(k + 1, len(stamps) - 1))
         ]
         share = float(np.interp(o.stamp, stamps[k : k + 2], [0.0, 1.0][: len(stamps) - k]))
-        rows.append((o.stamp, by_scans[0].compose(by_scans[0].to(by_scans[1]).part(share))))
+        rows.append((o.stamp, by_scans[0].towards(by_scans[1], share)))
     return _rows(rows)
 
 

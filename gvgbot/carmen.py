@@ -309,11 +309,11 @@ def _without_gaps(odometry: list[Odometry]) -> Iterator[Odometry]:
     """The messages, and evenly spread ones in between, but none in pauses."""
     yield from odometry[:1]
     for earlier, later in pairwise(odometry):
-        motion = earlier.odom_base.to(later.odom_base)
         gap = later.stamp - earlier.stamp
         parts = max(1, math.ceil(gap / _LONGEST_GAP_S)) if gap <= _LONGEST_PAUSE_S else 1
         for part in range(1, parts):
             share = part / parts
             stamp = earlier.stamp + share * gap
-            yield Odometry(stamp, earlier.odom_base.compose(motion.part(share)), later.twist)
+            odom_base = earlier.odom_base.towards(later.odom_base, share)
+            yield Odometry(stamp, odom_base, later.twist)
         yield later

@@ -56,6 +56,10 @@ class Pose:
         """A share of a motion that is small, or goes on as it began."""
         return Pose(share * self.x, share * self.y, share * self.theta)
 
+    def towards(self, other: "Pose", share: float) -> "Pose":
+        """The pose at a share of the straight way to another, turning evenly and the short way."""
+        return self.compose(self.to(other).part(share))
+
     def distance(self, other: "Pose") -> float:
         """Metres between the two origins."""
         return math.hypot(other.x - self.x, other.y - self.y)

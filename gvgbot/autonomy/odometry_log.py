@@ -80,4 +80,4 @@ class OdometryLog:
 
 def _between(earlier: Odometry, later: Odometry, stamp: float) -> Pose:
     share = (stamp - earlier.stamp) / (later.stamp - earlier.stamp)
-    return earlier.odom_base.compose(earlier.odom_base.to(later.odom_base).part(share))
+    return earlier.odom_base.towards(later.odom_base, share)

@@ -85,18 +85,9 @@ def pose_at(track: Sequence[Odometry], stamp: float) -> Pose:
     for earlier in reversed(track):
         if earlier.stamp <= stamp:
             share = (stamp - earlier.stamp) / (later.stamp - earlier.stamp)
-            return _between(earlier.odom_base, later.odom_base, share)
+            return earlier.odom_base.towards(later.odom_base, share)
         later = earlier
     return later.odom_base
-
-
-def _between(first: Pose, last: Pose, share: float) -> Pose:
-    """The pose at a share of the way from the first to the last."""
-    return Pose(
-        first.x + share * (last.x - first.x),
-        first.y + share * (last.y - first.y),
-        wrap_angle(first.theta + share * wrap_angle(last.theta - first.theta)),
-    )
 
 
 def seen_from(odom_base: Pose, points: Array) -> tuple[Array, Array]:

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from gvgbot.geometry import (
@@ -97,6 +97,20 @@ def test_the_motion_to_a_pose_leads_there(a: Pose, b: Pose) -> None:
 @given(poses, poses, poses)
 def test_a_motion_does_not_depend_on_the_frame_it_is_seen_from(a: Pose, b: Pose, c: Pose) -> None:
     assert is_same(a.to(b), c.compose(a).to(c.compose(b)))
+
+
+@given(poses, poses, st.floats(0.0, 1.0))
+def test_between_two_poses_the_way_is_straight_and_the_turn_even_and_short(
+    a: Pose, b: Pose, share: float
+) -> None:
+    between = a.towards(b, share)
+    straight = [np.interp(share, [0.0, 1.0], ends) for ends in ((a.x, b.x), (a.y, b.y))]
+    assert between.position == pytest.approx(straight, abs=1e-9)
+    rotations = cmath.rect(1.0, a.theta), cmath.rect(1.0, b.theta)
+    turn = cmath.phase(rotations[1] / rotations[0])
+    assume(abs(turn) < math.pi - 1e-6)  # half a turn is as short either way round
+    turned = rotations[0] * cmath.rect(1.0, share * turn)
+    assert cmath.rect(1.0, between.theta) == pytest.approx(turned, abs=1e-9)
 
 
 @given(poses, st.lists(st.tuples(lengths, lengths), min_size=1, max_size=5))
