@@ -160,3 +160,13 @@ def resampled(line: Array, spacing: float) -> Array:
     along = stations_of(line)
     at = np.linspace(0.0, along[-1], 2 + int(along[-1] / spacing))
     return np.column_stack([np.interp(at, along, values) for values in line.T])
+
+
+def thinned(points: Array, cell: float) -> Array:
+    """One point (M, 2) for each cell of a grid that points (N, 2) are in: the mean of these."""
+    if not len(points):
+        return points
+    cells = np.floor(points / cell).astype(np.int64)
+    i, j = (cells - cells.min(axis=0)).T
+    _, index, count = np.unique(i * (j.max() + 1) + j, return_inverse=True, return_counts=True)
+    return np.stack([np.bincount(index, points[:, k]) / count for k in (0, 1)], axis=1)

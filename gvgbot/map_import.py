@@ -20,7 +20,7 @@ from gvgbot.drivers.hokuyo.models import MODELS
 from gvgbot.drivers.ray_casting import Mask
 from gvgbot.drivers.world import World, load_map
 from gvgbot.errors import GvgbotError, UsageError
-from gvgbot.geometry import Array, Pose
+from gvgbot.geometry import Array, Pose, thinned
 from gvgbot.hal.messages import Scan
 from gvgbot.maps.run_directory import RunDirectory
 from gvgbot.persistence.keeper import Keeper
@@ -118,10 +118,7 @@ def _walls(world: World, known: Mask) -> Array:
     free = known & ~world.occupied
     beside = ndimage.binary_dilation(free, np.ones((3, 3), np.bool_))
     points = _centres(world, *np.nonzero(world.occupied & beside))
-    cells = np.floor(points / max(_MERGE_M, world.resolution_m)).astype(np.int64)
-    _, index, count = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
-    index = index.ravel()
-    return np.stack([np.bincount(index, points[:, k]) / count for k in (0, 1)], axis=1)
+    return thinned(points, max(_MERGE_M, world.resolution_m))
 
 
 def _centres(world: World, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Array:

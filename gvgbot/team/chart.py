@@ -11,7 +11,7 @@ import numpy as np
 
 from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex
-from gvgbot.geometry import Array, Pose, wrap_angle
+from gvgbot.geometry import Array, Pose, thinned, wrap_angle
 
 WALL_CELL_M = 0.1  # one point of a wall is told for each cell of this size
 _WALLS_BEYOND_M = 2.5  # of a vertex's disc, walls tell what it looks like
@@ -117,7 +117,7 @@ def _vertex(vertex: Vertex, belief: Belief) -> ChartVertex:
             Departure(key, wrap_angle(half.bearing + place.theta), half.edge, half.blocked)
             for key, half in vertex.half_edges.items()
         ),
-        place.transform(thinned(vertex.snapshot[near])),
+        place.transform(thinned(vertex.snapshot[near], WALL_CELL_M)),
     )
 
 
@@ -142,13 +142,3 @@ def moved(chart: Chart, pose: Pose) -> Chart:
     }
     ways = (replace(way, polyline=pose.transform(way.polyline)) for way in chart.ways)
     return Chart(vertices, edges, tuple(ways))
-
-
-def thinned(points: Array) -> Array:
-    """One point (M, 2) for each cell that points (N, 2) are in: the mean of these."""
-    if not len(points):
-        return points
-    cells = np.floor(points / WALL_CELL_M).astype(np.int64)
-    _, index, count = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
-    index = index.ravel()
-    return np.stack([np.bincount(index, points[:, k]) / count for k in (0, 1)], axis=1)

@@ -7,8 +7,8 @@ from itertools import chain
 import numpy as np
 from scipy.spatial import cKDTree
 
-from gvgbot.geometry import Array, resampled
-from gvgbot.team.chart import Chart, thinned
+from gvgbot.geometry import Array, resampled, thinned
+from gvgbot.team.chart import WALL_CELL_M, Chart
 from gvgbot.team.stretches import Stretches
 
 SPACING_M = 0.2  # of points along an edge, where it is tested for walls
@@ -28,7 +28,7 @@ class Side:
     def walls(self) -> cKDTree:
         """All walls that are told."""
         around = [vertex.walls for vertex in self.vertices]
-        return cKDTree(thinned(np.concatenate([np.empty((0, 2)), *around])))
+        return cKDTree(thinned(np.concatenate([np.empty((0, 2)), *around]), WALL_CELL_M))
 
     @cached_property
     def sights(self) -> Array:

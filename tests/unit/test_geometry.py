@@ -20,6 +20,7 @@ from gvgbot.geometry import (
     rows_of,
     seen_from,
     stations_of,
+    thinned,
     wrap_angle,
     wrap_angles,
 )
@@ -220,3 +221,15 @@ def test_a_line_is_bent_the_more_the_nearer_to_the_end_that_is_off() -> None:
     line = np.array([(0.0, 0.0), (1.0, 0.0), (4.0, 0.0)])
     there = anchored(line, np.array([0.0, 0.4]), np.array([4.0, -0.8]))
     assert there == pytest.approx(np.array([(0.0, 0.4), (1.0, 0.1), (4.0, -0.8)]))
+
+
+@given(st.integers(0, 60), st.floats(0.1, 3.0), poses)
+def test_of_points_in_a_cell_their_mean_is_left(count: int, cell: float, at: Pose) -> None:
+    points = at.position + np.random.default_rng(count).uniform(-4.0, 4.0, (count, 2))
+    cells: dict[tuple[int, int], list[tuple[float, float]]] = {}
+    for x, y in points.tolist():
+        cells.setdefault((math.floor(x / cell), math.floor(y / cell)), []).append((x, y))
+    means = [
+        [sum(values) / len(values) for values in zip(*cells[k], strict=True)] for k in sorted(cells)
+    ]
+    assert thinned(points, cell) == pytest.approx(np.array(means).reshape(-1, 2), abs=1e-9)
