@@ -1,11 +1,12 @@
 """What takes long to find out about a pipeline, found beside the control loop of a daemon."""
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from typing import Generic, TypeVar
 
 from gvgbot.autonomy.estimate import still
 from gvgbot.autonomy.pipeline import Pipeline
+from gvgbot.clock import OffLoop
 
 _DRIVEN_ON_M = 0.1  # since the work was begun
 
@@ -38,7 +39,7 @@ class BesideLoop(Generic[Result]):
         self._wanted.set()
         return None
 
-    async def work(self, off_loop: Callable[[Callable[[], None]], Awaitable[None]]) -> None:
+    async def work(self, off_loop: OffLoop) -> None:
         """Find what is wanted, until cancelled."""
         while True:
             await self._wanted.wait()

@@ -3,12 +3,15 @@
 import asyncio
 import math
 import selectors
-from collections.abc import Coroutine
+from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any, Protocol, TypeVar
 
 from gvgbot.errors import Deadlock
 
 _T = TypeVar("_T")
+
+# Runs what takes long while the loop goes on: asyncio.to_thread, or at once in virtual time.
+OffLoop = Callable[[Callable[[], None]], Awaitable[None]]
 
 
 class Clock(Protocol):

@@ -1,7 +1,7 @@
 """What neighbours that speak the messages of ROS 2 are told while the robot moves."""
 
 import time
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Protocol
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.ekf import OdometryNoise
-from gvgbot.clock import Clock
+from gvgbot.clock import Clock, OffLoop
 from gvgbot.geometry import Array, rotated_covariance
 from gvgbot.hal.messages import Odometry, Scan
 from gvgbot.live_past import LivePast, Portion
@@ -26,7 +26,6 @@ MAP_EVERY = 5.0  # s at least between two maps, which travel whole
 _CLOCK_SET_S = 0.005  # a larger change of the computer's clock is followed
 
 Drawn = Callable[[float], Mapping[Topic, Message]]  # map and markers, given a stamp
-OffLoop = Callable[[Callable[[], None]], Awaitable[None]]
 
 
 class Neighbour(Protocol):

@@ -2,13 +2,13 @@
 
 import asyncio
 import secrets
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from typing import Protocol
 
 import structlog
 
 from gvgbot.autonomy.pipeline import Pipeline
-from gvgbot.clock import Clock
+from gvgbot.clock import Clock, OffLoop
 from gvgbot.config import RobotConfig
 from gvgbot.errors import GvgbotError
 from gvgbot.team.alignment import Alignment
@@ -55,9 +55,7 @@ class LiveTeam:
         pipeline.mission.choice.sharing = self.member.auction
         pipeline.traffic.company = []
 
-    async def take_part(
-        self, clock: Clock, off_loop: Callable[[Callable[[], None]], Awaitable[None]]
-    ) -> None:
+    async def take_part(self, clock: Clock, off_loop: OffLoop) -> None:
         """Tell and hear until cancelled; `off_loop` runs what takes long."""
         self._clock = clock
         async with asyncio.TaskGroup() as tasks:
@@ -111,7 +109,7 @@ class LiveTeam:
                 pipeline.traffic.strangers = self.member.strangers()
             await self._clock.sleep_until(self._clock.now() + self._config.steer_every_s)
 
-    async def _compare(self, off_loop: Callable[[Callable[[], None]], Awaitable[None]]) -> None:
+    async def _compare(self, off_loop: OffLoop) -> None:
         while True:
             for comparison in self.member.due(self._clock.now()):
                 self.member.settle(comparison, await _made(comparison, off_loop))
@@ -122,9 +120,7 @@ class LiveTeam:
             await self._clock.sleep_until(self._clock.now() + self._config.tell_every_s)
 
 
-async def _made(
-    comparison: Comparison, off_loop: Callable[[Callable[[], None]], Awaitable[None]]
-) -> Alignment | None:
+async def _made(comparison: Comparison, off_loop: OffLoop) -> Alignment | None:
     """What a comparison shows."""
     results: list[Alignment | None] = []
     await off_loop(lambda: results.append(comparison.made()))

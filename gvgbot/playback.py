@@ -4,14 +4,13 @@ import asyncio
 import contextlib
 import os
 import sys
-from collections.abc import Awaitable, Callable
 from dataclasses import replace
 from itertools import chain, islice
 from pathlib import Path
 
 import structlog
 
-from gvgbot.clock import Clock, LoopClock
+from gvgbot.clock import Clock, LoopClock, OffLoop
 from gvgbot.hal.messages import Battery, Contact, Scan
 from gvgbot.hal.reopening import ReopeningBase
 from gvgbot.links import Devices, Links
@@ -24,8 +23,6 @@ from gvgbot.session import Session
 from gvgbot.steering import Steering
 from gvgbot.stop_signals import StopSignals
 from gvgbot.telemetry import Telemetry
-
-OffLoop = Callable[[Callable[[], None]], Awaitable[None]]
 
 _BEAT = 0.1  # s of the recording's time, between signs of life when it is over
 

@@ -14,7 +14,7 @@ from gvgbot.autonomy.estimate import smoothed
 from gvgbot.autonomy.loop import Loop
 from gvgbot.autonomy.returning import ReturningPipeline
 from gvgbot.beside_loop import BesideLoop
-from gvgbot.clock import Clock, LoopClock
+from gvgbot.clock import Clock, LoopClock, OffLoop
 from gvgbot.config import Config
 from gvgbot.errors import GvgbotError
 from gvgbot.geometry import Twist
@@ -81,7 +81,7 @@ class Robot:
         session: Session,
         notifier: Notifier,
         network: Network | None,
-        off_loop: Callable[[Callable[[], None]], Awaitable[None]] = asyncio.to_thread,
+        off_loop: OffLoop = asyncio.to_thread,
         keeper: Keeper | None = None,
         *,
         neighbours: Sequence[Neighbour] = (),

@@ -1,17 +1,15 @@
 """Saves a session's map when somebody asks for that, one time after the other."""
 
 import asyncio
-from collections.abc import Awaitable, Callable
 
+from gvgbot.clock import OffLoop
 from gvgbot.session import Session
 
 
 class Saving:
     """Who asks while others wait shares the next saving; `off_loop` runs what takes long."""
 
-    def __init__(
-        self, session: Session, off_loop: Callable[[Callable[[], None]], Awaitable[None]]
-    ) -> None:
+    def __init__(self, session: Session, off_loop: OffLoop) -> None:
         self._session, self._off_loop = session, off_loop
         self._one_at_a_time = asyncio.Lock()
         self._asked = self._done = 0  # of those asked for, done are the first so many

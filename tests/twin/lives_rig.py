@@ -1,11 +1,11 @@
 """A robot that is killed and started again while its world goes on."""
 
 import asyncio
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from gvgbot.clock import Clock, LoopClock, run_in_virtual_time
+from gvgbot.clock import Clock, LoopClock, OffLoop, run_in_virtual_time
 from gvgbot.config import Config
 from gvgbot.maps.run_directory import RunDirectory
 from gvgbot.persistence.keeper import Keeper
@@ -53,7 +53,7 @@ class Lives:
     dead_s: float = 3.0
     between: Callable[[GoingWorld, Path], None] = nothing
     over: Callable[[Session], bool] = explored
-    off_loop: Callable[[Callable[[], None]], Awaitable[None]] = at_once
+    off_loop: OffLoop = at_once
     sessions: list[Session] = field(default_factory=list)
     keepers: list[Keeper] = field(default_factory=list)
     world: GoingWorld = field(init=False)
