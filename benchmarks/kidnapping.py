@@ -88,7 +88,7 @@ def _put_down(out: Path, world: str, number: int, settings: tuple[str, ...]) -> 
     known = out / re.sub(r"[^\w.]", "-", " ".join([world, *settings]))
     config = load_config(None, [f"twin.world={world}", "twin.seed=1", *settings])
     if not (known / SNAPSHOT).exists():
-        explore(config, out=known, real_time=False)
+        explore(config, print, out=known, real_time=False)
     config = load_config(None, [f"twin.world={world}", f"twin.seed={number}", *settings])
     named = {"world": world, "pose": number, "settings": settings}
     with tempfile.TemporaryDirectory() as directory:

@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import os
 import sys
+from collections.abc import Callable
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -40,8 +41,10 @@ if TYPE_CHECKING:  # it needs packages that only those have who want the live vi
 log = structlog.get_logger()
 
 
-def explore(config: Config, *, out: Path | None, real_time: bool) -> int:
-    """Explore a simulated world, print where the map is, and return the exit status.
+def explore(
+    config: Config, say: Callable[[str], None], *, out: Path | None, real_time: bool
+) -> int:
+    """Explore a simulated world, say where the map is, and return the exit status.
 
     Raises UsageError for a world or directory that cannot be used.
     """
@@ -49,7 +52,7 @@ def explore(config: Config, *, out: Path | None, real_time: bool) -> int:
     place = open_place(config)
     with (
         RunDirectory.create(out, world=place.world.name) as directory,
-        directory.told_if_interrupted(_say),
+        directory.told_if_interrupted(say),
     ):
         session, progress = Session(config, directory, place), Progress()
         factory = None if real_time else VirtualTimeLoop
@@ -64,7 +67,7 @@ def explore(config: Config, *, out: Path | None, real_time: bool) -> int:
             progress.clear()
             Keeper(session, MissionFiles(directory.path)).finish()
             session.save()
-    return _conclude(session)
+    return _conclude(session, say)
 
 
 async def explore_once(session: Session, progress: Progress) -> None:
@@ -103,8 +106,8 @@ async def explore_once(session: Session, progress: Progress) -> None:
         serving.cancel()
 
 
-def _conclude(session: Session) -> int:
-    """Print the outcome and where the map is; the exit status."""
+def _conclude(session: Session, say: Callable[[str], None]) -> int:
+    """Say the outcome and where the map is; the exit status."""
     mission, graph = session.pipeline.mission, session.pipeline.mapper.graph
     print(
         f"{mission.outcome or 'failed'}: {mission.reason or session.failure}; "
@@ -113,14 +116,10 @@ def _conclude(session: Session) -> int:
         file=sys.stdout if mission.outcome == "explored" else sys.stderr,
     )
     for line in session.directory.whereabouts:
-        _say(line)
+        say(line)
     if session.recorder is not None:
-        _say(f"recording: {session.recorder.first}")
+        say(f"recording: {session.recorder.first}")
     return 0 if mission.outcome == "explored" else 1
-
-
-def _say(text: str) -> None:
-    print(text, flush=True)
 
 
 def run(

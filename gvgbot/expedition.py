@@ -5,6 +5,7 @@ import contextlib
 import math
 import os
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -47,8 +48,10 @@ _APART_M = 2.0  # between two starts, at least
 _TRIES = 1000  # to draw a start
 
 
-def explore_together(config: Config, count: int, *, out: Path | None, real_time: bool) -> int:
-    """Explore a simulated world with several robots, print where the map is; the exit status.
+def explore_together(
+    config: Config, count: int, say: Callable[[str], None], *, out: Path | None, real_time: bool
+) -> int:
+    """Explore a simulated world with several robots, say where the map is; the exit status.
 
     Raises UsageError for a world or directory that cannot be used, or that has no room for all, and
     if it shall be recorded.
@@ -59,7 +62,7 @@ def explore_together(config: Config, count: int, *, out: Path | None, real_time:
     places = _places(config, open_place(config), count)
     with contextlib.ExitStack() as stack:
         directory = stack.enter_context(RunDirectory.create(out, world=places[0].world.name))
-        stack.enter_context(directory.told_if_interrupted(_say))
+        stack.enter_context(directory.told_if_interrupted(say))
         robots = [
             _Robot.made(stack, config, number, one, directory.path)
             for number, one in enumerate(places)
@@ -76,7 +79,7 @@ def explore_together(config: Config, count: int, *, out: Path | None, real_time:
             for robot in robots:
                 robot.session.save()
             joined = _save(directory, robots)
-    return _conclude(directory, robots, joined)
+    return _conclude(directory, robots, joined, say)
 
 
 def _places(config: Config, place: Place, count: int) -> list[Place]:
@@ -342,21 +345,21 @@ def _duration(robot: _Robot) -> float:
     return ended - (tally.first_stamp or 0.0)
 
 
-def _conclude(directory: RunDirectory, robots: list[_Robot], joined: list[_Robot]) -> int:
-    """Print the outcome and where the map is; the exit status."""
+def _conclude(
+    directory: RunDirectory,
+    robots: list[_Robot],
+    joined: list[_Robot],
+    say: Callable[[str], None],
+) -> int:
+    """Say the outcome and where the map is; the exit status."""
     for robot in robots:
         mission = robot.session.pipeline.mission
-        _say(
+        say(
             f"{robot.member.name}: {mission.outcome or 'failed'}: "
             f"{mission.reason or robot.session.failure}; "
             f"{robot.session.pipeline.past.travelled:.0f} m driven in {_duration(robot):.0f} s"
         )
-    _say(f"maps joined: {len(joined)} of {len(robots)}")
+    say(f"maps joined: {len(joined)} of {len(robots)}")
     for line in directory.whereabouts:
-        _say(line)
+        say(line)
     return 0 if _outcome(robots) == "explored" else 1
-
-
-def _say(text: str) -> None:
-    sys.stdout.write(text + "\n")
-    sys.stdout.flush()

@@ -2,7 +2,7 @@
 
 import argparse
 
-from gvgbot.cli.arguments import Commands, add_overrides, number, path, seed
+from gvgbot.cli.arguments import Commands, add_overrides, number, path, say, seed
 
 MOST_ROBOTS = 8
 
@@ -69,11 +69,11 @@ def _explore(options: argparse.Namespace) -> int:
         from gvgbot.expedition import explore_together
 
         return explore_together(
-            config, options.robots, out=options.out, real_time=options.real_time
+            config, options.robots, say, out=options.out, real_time=options.real_time
         )
     from gvgbot import daemon
 
-    return daemon.explore(config, out=options.out, real_time=options.real_time)
+    return daemon.explore(config, say, out=options.out, real_time=options.real_time)
 
 
 def _overrides(options: argparse.Namespace) -> list[str]:
