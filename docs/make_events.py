@@ -11,7 +11,7 @@ from typing import get_args
 
 from docs.source import fields_of, table
 from gvgbot.autonomy import events
-from gvgbot.maps.run_directory import _snake_case
+from gvgbot.maps.run_directory import event_name
 
 PAGE = Path(__file__).parent / "reference" / "events.md"
 HEAD = """\
@@ -36,7 +36,7 @@ def _section(event: type) -> str:
     columns = 3 if any(comment for _, _, comment in rows) else 2
     head = ("field", "type", "meaning")[:columns]
     text = table(head, (row[:columns] for row in rows))
-    return f"## `{_snake_case(event.__name__)}`\n\n{inspect.getdoc(event)}\n\n{text}"
+    return f"## `{event_name(event)}`\n\n{inspect.getdoc(event)}\n\n{text}"
 
 
 def _rows(event: type) -> Iterator[tuple[str, str, str]]:

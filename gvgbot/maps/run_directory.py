@@ -170,7 +170,12 @@ def numbers(runs: Path, world: str | None = None) -> dict[Path, int]:
 
 def record_of(event: object) -> dict[str, Any]:
     """An event as its line has it: the fields of the dataclass after its name as `event`."""
-    return {"event": _snake_case(type(event).__name__)} | _fields(event)
+    return {"event": event_name(type(event))} | _fields(event)
+
+
+def event_name(event: type) -> str:
+    """What a line calls an event of this type: its name in snake_case."""
+    return re.sub(r"(?<=.)([A-Z])", r"_\1", event.__name__).lower()
 
 
 def plain(value: object) -> Any:
@@ -199,10 +204,6 @@ def plain(value: object) -> Any:
 
 def _fields(value: Any) -> dict[str, Any]:
     return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
-
-
-def _snake_case(name: str) -> str:
-    return re.sub(r"(?<=.)([A-Z])", r"_\1", name).lower()
 
 
 def _check_room(path: Path) -> None:
