@@ -14,7 +14,7 @@ from gvgbot.maps import geojson
 from gvgbot.maps.map_server import encode_map_server
 from gvgbot.maps.occupancy import OccupancyGrid, occupancy_grid
 from gvgbot.maps.picture import draw_map
-from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
+from gvgbot.maps.route_graph import RouteEdge, RouteGraph, RouteNode
 from gvgbot.maps.trajectory import Trajectory, encode_tum
 
 SIDE = 60.0  # m
@@ -38,7 +38,7 @@ def graph() -> RouteGraph:
     rng = np.random.default_rng(2)
     places = rng.uniform(0.0, SIDE, (VERTICES, 2))
     vertices = [
-        MapVertex(
+        RouteNode(
             id=number,
             kind="meetpoint",
             position=(float(x), float(y)),
@@ -50,7 +50,7 @@ def graph() -> RouteGraph:
         for number, (x, y) in enumerate(places)
     ]
     edges = [
-        MapEdge(
+        RouteEdge(
             start=number,
             end=number + 1,
             polyline=np.linspace(places[number], places[number + 1], 100),

@@ -22,7 +22,7 @@ from gvgbot.maps.gaps import is_floor, is_wall
 from gvgbot.maps.map_server import encode_map_server
 from gvgbot.maps.occupancy import OccupancyGrid, occupancy_grid
 from gvgbot.maps.picture import draw_map
-from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
+from gvgbot.maps.route_graph import RouteEdge, RouteGraph, RouteNode
 from gvgbot.maps.trajectory import Trajectory, encode_tum
 
 
@@ -122,16 +122,16 @@ def route_graph(
     mapper = pipeline.mapper
     return RouteGraph(
         tuple(
-            _map_vertex(vertex, vertices[vertex.id], covariances[vertex.id])
+            _route_node(vertex, vertices[vertex.id], covariances[vertex.id])
             for vertex in mapper.graph.vertices.values()
         ),
-        tuple(_map_edge(edge, vertices) for edge in mapper.graph.edges.values()),
+        tuple(_route_edge(edge, vertices) for edge in mapper.graph.edges.values()),
     )
 
 
-def _map_vertex(vertex: Vertex, pose: Pose, covariance: Array) -> MapVertex:
+def _route_node(vertex: Vertex, pose: Pose, covariance: Array) -> RouteNode:
     (xx, xy), (yx, yy) = covariance.tolist()
-    return MapVertex(
+    return RouteNode(
         id=vertex.id,
         kind=vertex.kind,
         position=(pose.x, pose.y),
@@ -144,11 +144,11 @@ def _map_vertex(vertex: Vertex, pose: Pose, covariance: Array) -> MapVertex:
     )
 
 
-def _map_edge(edge: Edge, vertices: dict[int, Pose]) -> MapEdge:
+def _route_edge(edge: Edge, vertices: dict[int, Pose]) -> RouteEdge:
     """An edge whose polyline is bent so that it ends on its vertices."""
     line = vertices[edge.a.vertex].transform(edge.shown)
     start, end = (vertices[half.vertex].position for half in (edge.a, edge.b))
-    return MapEdge(
+    return RouteEdge(
         start=edge.a.vertex,
         end=edge.b.vertex,
         polyline=anchored(line, start, end),
@@ -168,7 +168,7 @@ def with_room_of(graph: RouteGraph, grid: OccupancyGrid, parts: Collection[int] 
     walls = np.argwhere(is_wall(grid.cells))[:, ::-1]
     tree = cKDTree(np.array(grid.origin) + (walls + 0.5) * grid.resolution_m)
 
-    def measured(number: int, edge: MapEdge) -> MapEdge:
+    def measured(number: int, edge: RouteEdge) -> RouteEdge:
         line, claimed = resampled(edge.polyline, grid.resolution_m), edge.min_clearance
         room = float(np.asarray(tree.query(line)[0]).min())
         if number in parts and tree.n:

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from gvgbot.geometry import Array
-from gvgbot.maps.route_graph import MapVertex, RouteGraph
+from gvgbot.maps.route_graph import RouteGraph, RouteNode
 from gvgbot.ros2.messages import ColorRGBA, Marker, MarkerArray, Pose, Vector3
 from gvgbot.ros2.translation import MAP, header
 
@@ -55,11 +55,11 @@ def _edges(graph: RouteGraph) -> Array:
     return _on_floor(np.concatenate([np.zeros((0, 2)), *pieces]))
 
 
-def _places(vertices: Iterable[MapVertex], kind: str) -> Array:
+def _places(vertices: Iterable[RouteNode], kind: str) -> Array:
     return _on_floor(np.array([v.position for v in vertices if v.kind == kind]).reshape(-1, 2))
 
 
-def _frontiers(vertices: Iterable[MapVertex]) -> Array:
+def _frontiers(vertices: Iterable[RouteNode]) -> Array:
     """Short lines from vertices into what was never followed."""
 
     def ends() -> Iterator[tuple[float, float]]:

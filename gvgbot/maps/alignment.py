@@ -13,7 +13,7 @@ from scipy.spatial.distance import cdist
 
 from gvgbot.geometry import Array, Pose, resampled
 from gvgbot.maps.moved import moved_graph
-from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
+from gvgbot.maps.route_graph import RouteEdge, RouteGraph, RouteNode
 from gvgbot.registration import assigned, rigid_fit
 
 _MOST_TRIES = 4000  # the longest edges come first: they give the best angles
@@ -41,13 +41,13 @@ class Comparison:
     vertices: tuple[Pair, ...]
     edges: tuple[Pair, ...]
 
-    def lone_vertices(self, which: int) -> tuple[MapVertex, ...]:
+    def lone_vertices(self, which: int) -> tuple[RouteNode, ...]:
         """The vertices that only map 0 or only map 1 has."""
         paired = {pair[which] for pair in self.vertices}
         vertices = self.graphs[which].vertices
         return tuple(vertex for k, vertex in enumerate(vertices) if k not in paired)
 
-    def lone_edges(self, which: int) -> tuple[MapEdge, ...]:
+    def lone_edges(self, which: int) -> tuple[RouteEdge, ...]:
         """The edges that only map 0 or only map 1 has."""
         paired = {pair[which] for pair in self.edges}
         edges = self.graphs[which].edges
@@ -132,7 +132,7 @@ def _edge_distances(a: RouteGraph, b: RouteGraph, names: dict[int, int], reach: 
     return distances
 
 
-def _farthest(edge: MapEdge, other: MapEdge) -> float:
+def _farthest(edge: RouteEdge, other: RouteEdge) -> float:
     """How far (m) the point of an edge that is farthest from another is from it."""
     points, begins = resampled(edge.polyline, _STEP_M)[:, None], other.polyline[:-1]
     ways = np.diff(other.polyline, axis=0)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from gvgbot.maps.occupancy import OccupancyGrid
-from gvgbot.maps.route_graph import MapEdge
+from gvgbot.maps.route_graph import RouteEdge
 from gvgbot.maps.saved_run import Happening, SavedRun
 
 _LONGER_M = 2.5  # than an edge was when it was found, the way along it may be, past new vertices
@@ -35,7 +35,7 @@ def edges_found(
 class _History:
     """The edges, and when (s) those were found, by index, that an event explains."""
 
-    edges: Sequence[MapEdge]
+    edges: Sequence[RouteEdge]
     vertex_found: Mapping[int, float]
     found: dict[int, float] = field(default_factory=dict)
 
@@ -80,7 +80,7 @@ class _History:
                     yield from ((index, *way) for way in ways)
 
 
-def _seen_whole(edge: MapEdge, grid: OccupancyGrid) -> float:
+def _seen_whole(edge: RouteEdge, grid: OccupancyGrid) -> float:
     """When (s) the last point of an edge was first seen; 0 if nobody took that down."""
     if grid.seen_s is None:
         return 0.0

@@ -11,7 +11,7 @@ from gvgbot.maps import legend, symbols
 from gvgbot.maps.canvas import Canvas, indexed
 from gvgbot.maps.growth import Growth, frontiers
 from gvgbot.maps.picture import counts, draw_ground, known_corners
-from gvgbot.maps.route_graph import MapEdge, MapVertex
+from gvgbot.maps.route_graph import RouteEdge, RouteNode
 from gvgbot.maps.surface import S, Surface
 from gvgbot.maps.view import View, box_around, pair
 
@@ -106,7 +106,7 @@ class _Scene:
         return canvas
 
 
-def _draw_vertex(canvas: Surface, view: View, vertex: MapVertex, edges: list[MapEdge]) -> None:
+def _draw_vertex(canvas: Surface, view: View, vertex: RouteNode, edges: list[RouteEdge]) -> None:
     """The vertex, with the frontiers that it has as long as there are only these edges."""
     at = view.pixel(vertex.position)
     if vertex.kind == "endpoint":

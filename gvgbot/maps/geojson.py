@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 
 from gvgbot.errors import UsageError
-from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph, VertexKind
+from gvgbot.maps.route_graph import RouteEdge, RouteGraph, RouteNode, VertexKind
 
 DECIMALS = 6  # of lengths and angles: micrometres
 COVARIANCE_DECIMALS = 9  # of squares: fewer could make a good fix look singular
@@ -108,10 +108,10 @@ def decode(text: str) -> RouteGraph:
     except msgspec.MsgspecError as error:
         raise UsageError(f"not a route graph in GeoJSON: {error}") from error
     features = [_feature(raw, number) for number, raw in enumerate(collection.features)]
-    vertices = [_map_vertex(feature) for feature in features if isinstance(feature, _Vertex)]
+    vertices = [_route_node(feature) for feature in features if isinstance(feature, _Vertex)]
     lines = _one_way(feature for feature in features if isinstance(feature, _Edge))
     try:
-        return RouteGraph(tuple(vertices), tuple(_map_edge(line) for line in lines))
+        return RouteGraph(tuple(vertices), tuple(_route_edge(line) for line in lines))
     except ValueError as error:
         raise UsageError(f"damaged route graph: {error}") from error
 
@@ -131,7 +131,7 @@ def _all_rounded(values: Iterable[float]) -> tuple[float, ...]:
     return tuple(_rounded(value) for value in values)
 
 
-def _vertex_feature(vertex: MapVertex) -> _Vertex:
+def _vertex_feature(vertex: RouteNode) -> _Vertex:
     x, y = vertex.position
     metadata = _VertexMetadata(
         kind=vertex.kind,
@@ -146,7 +146,7 @@ def _vertex_feature(vertex: MapVertex) -> _Vertex:
     return _Vertex(point, _VertexProperties(vertex.id, "map", metadata))
 
 
-def _both_ways(edge: MapEdge) -> tuple[_Edge, _Edge]:
+def _both_ways(edge: RouteEdge) -> tuple[_Edge, _Edge]:
     """The edge as two directed features whose ids are still to be given."""
     length = _rounded(edge.length)
     metadata = _EdgeMetadata(length, _rounded(edge.min_clearance), edge.traversals)
@@ -191,15 +191,15 @@ def _one_way(edges: Iterable[_Edge]) -> list[_Edge]:
     return kept
 
 
-def _map_vertex(feature: _Vertex) -> MapVertex:
+def _route_node(feature: _Vertex) -> RouteNode:
     metadata = msgspec.structs.asdict(feature.properties.metadata)
-    return MapVertex(id=feature.properties.id, position=feature.geometry.coordinates, **metadata)
+    return RouteNode(id=feature.properties.id, position=feature.geometry.coordinates, **metadata)
 
 
-def _map_edge(feature: _Edge) -> MapEdge:
+def _route_edge(feature: _Edge) -> RouteEdge:
     properties = feature.properties
     (line,) = feature.geometry.coordinates
-    return MapEdge(
+    return RouteEdge(
         start=properties.startid,
         end=properties.endid,
         polyline=np.array(line, np.float64).reshape(-1, 2),

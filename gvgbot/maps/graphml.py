@@ -6,7 +6,7 @@ GraphML knows plain values only: of frontiers there is the number, and lines are
 from collections.abc import Iterable
 from xml.etree import ElementTree as ET
 
-from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
+from gvgbot.maps.route_graph import RouteEdge, RouteGraph, RouteNode
 
 Value = str | int | float
 
@@ -51,13 +51,13 @@ def encode(graph: RouteGraph) -> bytes:
     return file
 
 
-def _vertex_values(vertex: MapVertex) -> tuple[Value, ...]:
+def _vertex_values(vertex: RouteNode) -> tuple[Value, ...]:
     xx, xy, _, yy = vertex.covariance
     counts = (len(vertex.frontiers), vertex.visits)
     return (vertex.kind, *vertex.position, vertex.degree, vertex.clearance, xx, xy, yy, *counts)
 
 
-def _edge_values(edge: MapEdge) -> tuple[Value, ...]:
+def _edge_values(edge: RouteEdge) -> tuple[Value, ...]:
     points = ", ".join(f"{x:.6f} {y:.6f}" for x, y in edge.polyline.tolist())
     return edge.length, edge.min_clearance, edge.traversals, f"LINESTRING ({points})"
 

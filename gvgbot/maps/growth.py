@@ -10,7 +10,7 @@ import numpy as np
 from gvgbot.geometry import Array, wrap_angle
 from gvgbot.maps.edge_history import edges_found
 from gvgbot.maps.occupancy import UNKNOWN, OccupancyGrid
-from gvgbot.maps.route_graph import MapEdge, MapVertex
+from gvgbot.maps.route_graph import RouteEdge, RouteNode
 from gvgbot.maps.saved_run import SavedRun
 from gvgbot.maps.trajectory import Trajectory
 
@@ -76,14 +76,14 @@ class Growth:
         cells = np.where(grid.seen_s <= time, grid.cells, UNKNOWN).astype(np.int8)
         return OccupancyGrid(cells, grid.resolution_m, grid.origin)
 
-    def graph(self, time: float) -> tuple[list[MapVertex], list[MapEdge]]:
+    def graph(self, time: float) -> tuple[list[RouteNode], list[RouteEdge]]:
         """The vertices and edges found by then."""
         vertices = [v for v in self.run.graph.vertices if self.vertex_found[v.id] <= time]
         found = zip(self.run.graph.edges, self.edge_found, strict=True)
         return vertices, [edge for edge, since in found if since <= time]
 
 
-def frontiers(vertex: MapVertex, edges: Sequence[MapEdge]) -> list[float]:
+def frontiers(vertex: RouteNode, edges: Sequence[RouteEdge]) -> list[float]:
     """The bearings (rad, map frame) of a vertex that none of these edges leaves along."""
     left = list(vertex.bearings)
     for direction in _departures(vertex, edges):
@@ -92,7 +92,7 @@ def frontiers(vertex: MapVertex, edges: Sequence[MapEdge]) -> list[float]:
     return left
 
 
-def _departures(vertex: MapVertex, edges: Sequence[MapEdge]) -> list[float]:
+def _departures(vertex: RouteNode, edges: Sequence[RouteEdge]) -> list[float]:
     """The directions (rad, map frame) in which edges leave a vertex, twice for a loop."""
     lines = [edge.polyline for edge in edges if edge.start == vertex.id]
     lines += [edge.polyline[::-1] for edge in edges if edge.end == vertex.id]

@@ -7,7 +7,7 @@ from dataclasses import replace
 from gvgbot.geometry import Pose
 from gvgbot.maps.merging import SAME_M, is_among, merged
 from gvgbot.maps.moved import moved_graph
-from gvgbot.maps.route_graph import MapVertex, RouteGraph
+from gvgbot.maps.route_graph import RouteGraph, RouteNode
 
 
 def joined_graph(graphs: Sequence[tuple[RouteGraph, Pose]]) -> RouteGraph:
@@ -27,7 +27,7 @@ def _agreed(graph: RouteGraph, graphs: Sequence[RouteGraph]) -> RouteGraph:
     return replace(graph, vertices=tuple(_heard(vertex, graphs) for vertex in graph.vertices))
 
 
-def _heard(vertex: MapVertex, graphs: Sequence[RouteGraph]) -> MapVertex:
+def _heard(vertex: RouteNode, graphs: Sequence[RouteGraph]) -> RouteNode:
     if not vertex.frontiers:
         return vertex
     said = [one.bearings for graph in graphs if (one := _visited(graph, vertex)) is not None]
@@ -45,7 +45,7 @@ def _heard(vertex: MapVertex, graphs: Sequence[RouteGraph]) -> MapVertex:
     )
 
 
-def _visited(graph: RouteGraph, vertex: MapVertex) -> MapVertex | None:
+def _visited(graph: RouteGraph, vertex: RouteNode) -> RouteNode | None:
     """What a map has at the place of a vertex, if its robot has been there."""
     driven = {end for e in graph.edges if e.traversals > 0 for end in (e.start, e.end)}
     here = [one for one in graph.vertices if one.id in driven]

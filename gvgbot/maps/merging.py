@@ -15,7 +15,7 @@ from scipy.spatial.distance import cdist
 
 from gvgbot.geometry import Array, Pose, anchored, direction_of, stations_of, wrap_angle
 from gvgbot.maps.moved import moved_graph
-from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph, lines_from
+from gvgbot.maps.route_graph import RouteEdge, RouteGraph, RouteNode, lines_from
 from gvgbot.registration import assigned
 
 SAME_M = 0.6  # vertices nearer to each other are one
@@ -67,7 +67,7 @@ def merged(ours: RouteGraph, theirs: RouteGraph, pose: Pose) -> RouteGraph:
     return settled((*vertices, *new), edges)
 
 
-def settled(vertices: Sequence[MapVertex], edges: Sequence[MapEdge]) -> RouteGraph:
+def settled(vertices: Sequence[RouteNode], edges: Sequence[RouteEdge]) -> RouteGraph:
     """The map of vertices and edges, where these end on those, and are no frontiers any more."""
     return RouteGraph(
         tuple(_settled(vertex, edges) for vertex in vertices),
@@ -113,7 +113,7 @@ def _refuted(graph: RouteGraph, paired: set[int], other: RouteGraph) -> set[int]
         wrong -= holding
 
 
-def _is_inside(vertex: MapVertex, edge: MapEdge) -> bool:
+def _is_inside(vertex: RouteNode, edge: RouteEdge) -> bool:
     """Whether a vertex lies on an edge that was driven, away from its ends."""
     line = edge.polyline
     away = np.hypot(*(line - vertex.position).T)
@@ -153,14 +153,14 @@ def _drawn_together(graph: RouteGraph, paired: set[int]) -> RouteGraph:
     )
 
 
-def _united(kept: MapVertex, lone: MapVertex) -> MapVertex:
+def _united(kept: RouteNode, lone: RouteNode) -> RouteNode:
     """Two vertices of one map as one, without the departures towards each other."""
     (x0, y0), (x1, y1) = kept.position, lone.position
     ahead = math.atan2(y1 - y0, x1 - x0)
     return _fused(_turned_from(kept, ahead), _turned_from(lone, ahead + math.pi))
 
 
-def _turned_from(vertex: MapVertex, bearing: float) -> MapVertex:
+def _turned_from(vertex: RouteNode, bearing: float) -> RouteNode:
     return replace(
         vertex,
         bearings=tuple(b for b in vertex.bearings if not is_among(b, [bearing])),
@@ -168,7 +168,7 @@ def _turned_from(vertex: MapVertex, bearing: float) -> MapVertex:
     )
 
 
-def _fused(ours: MapVertex, theirs: MapVertex) -> MapVertex:
+def _fused(ours: RouteNode, theirs: RouteNode) -> RouteNode:
     """One vertex of two, with the departures of both."""
     position, covariance = covariance_intersection(
         np.array(ours.position), _matrix(ours), np.array(theirs.position), _matrix(theirs)
@@ -210,7 +210,7 @@ def _regular(covariance: Array) -> Array:
     return np.asarray(covariance + 1e-6 * np.eye(2))
 
 
-def _matrix(vertex: MapVertex) -> Array:
+def _matrix(vertex: RouteNode) -> Array:
     return np.array(vertex.covariance).reshape(2, 2)
 
 
@@ -219,12 +219,12 @@ def is_among(bearing: float, bearings: Iterable[float]) -> bool:
     return any(abs(wrap_angle(bearing - other)) < _SAME_RAD for other in bearings)
 
 
-def _is_followed(bearing: float, vertex: MapVertex) -> bool:
+def _is_followed(bearing: float, vertex: RouteNode) -> bool:
     """Whether a vertex has an edge in a direction."""
     return is_among(bearing, [b for b in vertex.bearings if b not in vertex.frontiers])
 
 
-def _split(edges: Iterable[MapEdge], vertices: list[MapVertex]) -> Iterable[MapEdge]:
+def _split(edges: Iterable[RouteEdge], vertices: list[RouteNode]) -> Iterable[RouteEdge]:
     """The edges, cut where vertices lie on them that their map does not know."""
     for edge in edges:
         line = edge.polyline
@@ -244,7 +244,7 @@ def _split(edges: Iterable[MapEdge], vertices: list[MapVertex]) -> Iterable[MapE
         yield _piece(edge, start, edge.end, first, len(line) - 1, along)
 
 
-def _piece(edge: MapEdge, start: int, end: int, first: int, last: int, along: Array) -> MapEdge:
+def _piece(edge: RouteEdge, start: int, end: int, first: int, last: int, along: Array) -> RouteEdge:
     if (first, last) == (0, len(along) - 1):
         return edge
     share = float((along[last] - along[first]) / max(along[-1], 1e-9))
@@ -252,7 +252,7 @@ def _piece(edge: MapEdge, start: int, end: int, first: int, last: int, along: Ar
     return replace(edge, start=start, end=end, polyline=line, length=share * edge.length)
 
 
-def is_same(edge: MapEdge, other: MapEdge) -> bool:
+def is_same(edge: RouteEdge, other: RouteEdge) -> bool:
     """Whether two edges join the same vertices by the same way."""
     if {edge.start, edge.end} != {other.start, other.end}:
         return False
@@ -260,7 +260,7 @@ def is_same(edge: MapEdge, other: MapEdge) -> bool:
     return float(max(away.min(axis=0).max(), away.min(axis=1).max())) < _BESIDE_M
 
 
-def _as_driven_by_both(edge: MapEdge, other: MapEdge) -> MapEdge:
+def _as_driven_by_both(edge: RouteEdge, other: RouteEdge) -> RouteEdge:
     """One edge of two that are the same: who has driven along it has felt how narrow it is."""
     return replace(
         edge,
@@ -269,7 +269,7 @@ def _as_driven_by_both(edge: MapEdge, other: MapEdge) -> MapEdge:
     )
 
 
-def _settled(vertex: MapVertex, edges: Sequence[MapEdge]) -> MapVertex:
+def _settled(vertex: RouteNode, edges: Sequence[RouteEdge]) -> RouteNode:
     """A vertex whose frontiers are those that no edge of either map follows."""
     leaving = [direction_of(line, AHEAD_M) for line in lines_from(vertex.id, edges)]
     followed = [b for b in vertex.bearings if b not in vertex.frontiers]
@@ -297,7 +297,7 @@ def _unexplained(leaving: list[float], followed: list[float]) -> list[float]:
     return [d for i, d in enumerate(leaving) if i not in explained and off[i].min() > _SAME_RAD / 2]
 
 
-def _anchored(edge: MapEdge, vertices: Sequence[MapVertex]) -> MapEdge:
+def _anchored(edge: RouteEdge, vertices: Sequence[RouteNode]) -> RouteEdge:
     """The edge, bent so that it ends on its vertices."""
     places = {vertex.id: np.array(vertex.position) for vertex in vertices}
     return replace(edge, polyline=anchored(edge.polyline, places[edge.start], places[edge.end]))

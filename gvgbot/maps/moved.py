@@ -7,7 +7,7 @@ import numpy as np
 
 from gvgbot.geometry import Array, Pose, wrap_angle
 from gvgbot.maps.occupancy import UNKNOWN, Cells, OccupancyGrid
-from gvgbot.maps.route_graph import MapVertex, RouteGraph
+from gvgbot.maps.route_graph import RouteGraph, RouteNode
 from gvgbot.maps.view import pair
 
 
@@ -19,7 +19,7 @@ def moved_graph(graph: RouteGraph, pose: Pose) -> RouteGraph:
     )
 
 
-def _moved_vertex(vertex: MapVertex, pose: Pose) -> MapVertex:
+def _moved_vertex(vertex: RouteNode, pose: Pose) -> RouteNode:
     (position,) = pose.transform(np.array([vertex.position]))
     covariance = np.array(vertex.covariance).reshape(2, 2)
     turn = pose.transform(np.eye(2)) - pose.position  # its transpose: rows are turned axes

@@ -10,7 +10,7 @@ from gvgbot.geometry import Array, wrap_angle
 from gvgbot.maps import legend, symbols
 from gvgbot.maps.canvas import Canvas, Ink, Point
 from gvgbot.maps.occupancy import UNKNOWN, OccupancyGrid
-from gvgbot.maps.route_graph import MapVertex, RouteGraph
+from gvgbot.maps.route_graph import RouteGraph, RouteNode
 from gvgbot.maps.surface import S, Surface
 from gvgbot.maps.trajectory import Trajectory
 from gvgbot.maps.view import Box, View, box_around, pair
@@ -78,7 +78,7 @@ def _content(graph: RouteGraph, grid: OccupancyGrid | None, path: Array, raw: Ar
     return box.stretched(np.concatenate(astray), _ASTRAY * float(box.size.max()))
 
 
-def _ellipse_corners(vertex: MapVertex) -> Array:
+def _ellipse_corners(vertex: RouteNode) -> Array:
     """Two opposite corners (2, 2) of the upright box around a vertex's ellipse, m, map frame."""
     variances = np.array([vertex.covariance[0], vertex.covariance[3]])
     reach = _SIGMAS * np.sqrt(np.maximum(variances, 0.0))
@@ -132,7 +132,7 @@ def _draw_graph(canvas: Surface, view: View, graph: RouteGraph, path: list[Array
         draw_vertex(canvas, vertex, view.pixel(vertex.position))
 
 
-def draw_vertex(canvas: Surface, vertex: MapVertex, at: Point) -> None:
+def draw_vertex(canvas: Surface, vertex: RouteNode, at: Point) -> None:
     """The vertex, and its id where no edge leaves it."""
     draw = symbols.draw_meetpoint if vertex.kind == "meetpoint" else symbols.draw_endpoint
     draw(canvas, at)
@@ -152,7 +152,7 @@ def widest_gap(bearings: tuple[float, ...]) -> float:
     return wrap_angle(turns[widest] + float(gaps[widest]) / 2)
 
 
-def _half_axes(vertex: MapVertex) -> Array:
+def _half_axes(vertex: RouteNode) -> Array:
     """The half axes (m) of the ellipse, as columns (2, 2), for a picture whose y points down."""
     covariance = np.array(vertex.covariance).reshape(2, 2)
     variances, directions = np.linalg.eigh((covariance + covariance.T) / 2)

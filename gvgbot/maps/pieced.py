@@ -7,7 +7,7 @@ from scipy.ndimage import uniform_filter1d
 
 from gvgbot.geometry import Array, direction_of
 from gvgbot.maps.merging import AHEAD_M, is_among, is_same, settled
-from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph, lines_from
+from gvgbot.maps.route_graph import RouteEdge, RouteGraph, RouteNode, lines_from
 from gvgbot.team.ways import WELL_ON_M, Ways, leads_over
 
 _EVENED = 7  # points of a line, 0.1 m apart
@@ -34,7 +34,7 @@ def pieced(graph: RouteGraph, ways: Sequence[tuple[Array, float]]) -> RouteGraph
                 direction_of(walk.line[::-1], AHEAD_M), vertices[walk.place].frontiers
             ):
                 continue
-            edge = MapEdge(
+            edge = RouteEdge(
                 start=vertex.id,
                 end=vertices[walk.place].id,
                 polyline=_evened(walk.line),
@@ -54,6 +54,6 @@ def _evened(line: Array) -> Array:
     return line
 
 
-def _is_passed(vertex: MapVertex, ways: Sequence[tuple[Array, float]]) -> bool:
+def _is_passed(vertex: RouteNode, ways: Sequence[tuple[Array, float]]) -> bool:
     """Whether a way leads over a vertex, and well on to both sides."""
     return any(leads_over(line, np.array(vertex.position), WELL_ON_M) for line, _ in ways)

@@ -13,7 +13,7 @@ VertexKind = Literal["meetpoint", "endpoint"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MapVertex:
+class RouteNode:
     """A meetpoint or an endpoint, in the map frame.
 
     `position` in m, `covariance` of it as (xx, xy, yx, yy) in m^2, `clearance` in m. `bearings`
@@ -33,7 +33,7 @@ class MapVertex:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class MapEdge:
+class RouteEdge:
     """An edge between two vertices, which may be one and the same.
 
     `polyline` (N, 2) in m, map frame, runs from the vertex `start` to the vertex `end`; read-only.
@@ -53,7 +53,7 @@ class MapEdge:
         self.polyline.setflags(write=False)
 
 
-def lines_from(vertex: int, edges: Iterable[MapEdge]) -> Iterator[Array]:
+def lines_from(vertex: int, edges: Iterable[RouteEdge]) -> Iterator[Array]:
     """The polylines (N, 2) of those edges that end at a vertex, from there; a loop's both ways."""
     for edge in edges:
         if edge.start == vertex:
@@ -69,8 +69,8 @@ class RouteGraph:
     Raises ValueError if an id stands twice or is negative, or if an edge's end does not exist.
     """
 
-    vertices: tuple[MapVertex, ...] = ()
-    edges: tuple[MapEdge, ...] = ()
+    vertices: tuple[RouteNode, ...] = ()
+    edges: tuple[RouteEdge, ...] = ()
 
     def __post_init__(self) -> None:
         ids = Counter(vertex.id for vertex in self.vertices)

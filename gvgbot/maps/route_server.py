@@ -12,7 +12,7 @@ import numpy as np
 
 from gvgbot.geometry import Array, length_of
 from gvgbot.maps import geojson
-from gvgbot.maps.route_graph import MapEdge, RouteGraph
+from gvgbot.maps.route_graph import RouteEdge, RouteGraph
 
 TOLERANCE_M = 0.05  # from an edge to the chain: a cell of the grid
 
@@ -26,7 +26,7 @@ def encode(graph: RouteGraph) -> str:
     """
     given = msgspec.json.decode(geojson.encode(graph))["features"]
     nodes: list[Feature] = [one for one in given if one["geometry"]["type"] == "Point"]
-    pieces: list[tuple[MapEdge, int, int, Array]] = []
+    pieces: list[tuple[RouteEdge, int, int, Array]] = []
     ids = count(max((vertex.id for vertex in graph.vertices), default=-1) + 1)
     for edge in graph.edges:
         corners = _corners(edge.polyline)
@@ -69,7 +69,7 @@ def _waypoint(number: int, place: Array) -> Feature:
     }
 
 
-def _straight(edge: MapEdge, number: int, start: int, end: int, line: Array) -> Feature:
+def _straight(edge: RouteEdge, number: int, start: int, end: int, line: Array) -> Feature:
     length = round(length_of(line[[0, -1]]), geojson.DECIMALS)
     metadata = {
         "length": length,

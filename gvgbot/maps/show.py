@@ -13,7 +13,7 @@ from gvgbot.maps.growth import Growth
 from gvgbot.maps.outputs import check_output
 from gvgbot.maps.picture import draw_map_on, known_corners
 from gvgbot.maps.picture_files import PICTURES, Paint
-from gvgbot.maps.route_graph import MapVertex, RouteGraph
+from gvgbot.maps.route_graph import RouteGraph, RouteNode
 from gvgbot.maps.saved_run import SavedRun, robots_in
 from gvgbot.maps.surface import S
 from gvgbot.words import counted
@@ -113,7 +113,7 @@ def _accuracy(graph: RouteGraph) -> str:
     )
 
 
-def _sigma(vertex: MapVertex) -> float:
+def _sigma(vertex: RouteNode) -> float:
     """The standard deviation (m) of a vertex in the direction in which it is largest."""
     variances = np.linalg.eigvalsh(np.array(vertex.covariance).reshape(2, 2))
     return float(np.sqrt(max(0.0, variances[-1])))

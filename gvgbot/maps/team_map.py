@@ -7,7 +7,7 @@ from gvgbot.maps import geojson
 from gvgbot.maps.joined_graph import joined_graph
 from gvgbot.maps.picture import draw_map
 from gvgbot.maps.pieced import pieced
-from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
+from gvgbot.maps.route_graph import RouteEdge, RouteGraph, RouteNode
 from gvgbot.team.chart import Chart, ChartEdge, ChartVertex
 
 
@@ -37,10 +37,10 @@ def route_graph(chart: Chart) -> RouteGraph:
     )
 
 
-def _vertex(vertex: ChartVertex) -> MapVertex:
+def _vertex(vertex: ChartVertex) -> RouteNode:
     x, y = vertex.position.tolist()
     xx, xy, yx, yy = vertex.covariance.ravel().tolist()
-    return MapVertex(
+    return RouteNode(
         id=vertex.id,
         kind="meetpoint" if vertex.is_meetpoint else "endpoint",
         position=(x, y),
@@ -52,8 +52,8 @@ def _vertex(vertex: ChartVertex) -> MapVertex:
     )
 
 
-def _edge(edge: ChartEdge) -> MapEdge:
-    return MapEdge(
+def _edge(edge: ChartEdge) -> RouteEdge:
+    return RouteEdge(
         start=edge.a.vertex,
         end=edge.b.vertex,
         polyline=edge.polyline.copy(),

@@ -14,7 +14,7 @@ from benchmarks.score_run import Score, main, score_map, score_run
 from gvgbot.drivers.world import save_world
 from gvgbot.geometry import Pose
 from gvgbot.maps import geojson
-from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
+from gvgbot.maps.route_graph import RouteEdge, RouteGraph, RouteNode
 from gvgbot.maps.trajectory import Trajectory, encode_tum
 from gvgbot.worlds.canvas import Canvas
 
@@ -38,7 +38,7 @@ def route(
     """A map, in the frame of the start, of vertices at places in the world."""
     return RouteGraph(
         tuple(
-            MapVertex(
+            RouteNode(
                 id=node,
                 kind="meetpoint",
                 position=start.to(Pose(*place, 0.0)).position.tolist(),
@@ -50,7 +50,7 @@ def route(
             for node, place in places.items()
         ),
         tuple(
-            MapEdge(start=a, end=b, polyline=np.zeros((2, 2)), length=1.0, min_clearance=1.0)
+            RouteEdge(start=a, end=b, polyline=np.zeros((2, 2)), length=1.0, min_clearance=1.0)
             for a, b in edges
         ),
     )

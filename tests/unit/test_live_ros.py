@@ -14,7 +14,7 @@ from gvgbot.autonomy.slam.ekf import OdometryNoise
 from gvgbot.geometry import Array, Pose, Twist
 from gvgbot.hal.messages import Odometry, Scan
 from gvgbot.live_ros import LiveRos, UnixTime
-from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
+from gvgbot.maps.route_graph import RouteEdge, RouteGraph, RouteNode
 from gvgbot.ros2 import topics
 from gvgbot.ros2.cdr import encode
 from gvgbot.ros2.topics import TOPICS, Topic
@@ -194,8 +194,8 @@ def test_the_map_is_drawn_anew_when_a_loop_has_closed() -> None:
     assert np.abs(np.multiply(believed, 0.05) - whole).max() > 0.6
 
 
-def vertex(number: int, x: float, kind: Any, frontiers: tuple[float, ...] = ()) -> MapVertex:
-    return MapVertex(
+def vertex(number: int, x: float, kind: Any, frontiers: tuple[float, ...] = ()) -> RouteNode:
+    return RouteNode(
         id=number,
         kind=kind,
         position=(x, 1.0),
@@ -209,7 +209,7 @@ def vertex(number: int, x: float, kind: Any, frontiers: tuple[float, ...] = ()) 
 
 def test_markers_show_vertices_edges_and_frontiers() -> None:
     line = np.array([[0.0, 1.0], [2.0, 1.5], [4.0, 1.0]])
-    edge = MapEdge(start=1, end=2, polyline=line, length=4.1, min_clearance=0.5)
+    edge = RouteEdge(start=1, end=2, polyline=line, length=4.1, min_clearance=0.5)
     ends = (vertex(1, 0.0, "meetpoint", (math.pi / 2,)), vertex(2, 4.0, "meetpoint"))
     told: Any = STORE.deserialize_cdr(
         encode(markers(RouteGraph(ends, (edge,)), 7.5)), "visualization_msgs/msg/MarkerArray"

@@ -11,7 +11,7 @@ from gvgbot.autonomy.slam.graph import HalfEdgeId, Vertex
 from gvgbot.config import Config
 from gvgbot.geometry import Pose
 from gvgbot.maps.occupancy import UNKNOWN, OccupancyGrid
-from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
+from gvgbot.maps.route_graph import RouteEdge, RouteGraph, RouteNode
 from gvgbot.report import Journey, _corrected, route_graph, with_room_of
 
 
@@ -62,7 +62,7 @@ def test_directions_in_the_map_are_within_half_a_turn_of_straight_on() -> None:
 def street(claimed: float, start: tuple[float, float], end: tuple[float, float]) -> RouteGraph:
     """A straight edge that claims so much room."""
     vertices = tuple(
-        MapVertex(
+        RouteNode(
             id=vertex,
             kind="endpoint",
             position=place,
@@ -74,7 +74,7 @@ def street(claimed: float, start: tuple[float, float], end: tuple[float, float])
         for vertex, place in ((1, start), (2, end))
     )
     line, length = np.array([start, end]), math.dist(start, end)
-    edge = MapEdge(start=1, end=2, polyline=line, length=length, min_clearance=claimed)
+    edge = RouteEdge(start=1, end=2, polyline=line, length=length, min_clearance=claimed)
     return RouteGraph(vertices, (edge,))
 
 

@@ -15,7 +15,7 @@ from gvgbot.atomic_files import write_files
 from gvgbot.maps import geojson
 from gvgbot.maps.map_server import encode_map_server
 from gvgbot.maps.occupancy import OccupancyGrid
-from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph, VertexKind
+from gvgbot.maps.route_graph import RouteEdge, RouteGraph, RouteNode, VertexKind
 from gvgbot.maps.trajectory import Trajectory, encode_tum
 
 BEGIN = 1000.0  # s, the stamp of the first row
@@ -24,10 +24,10 @@ UP = math.pi / 2
 
 def vertex(
     number: int, x: float, y: float, bearings: tuple[float, ...], open_: tuple[float, ...] = ()
-) -> MapVertex:
+) -> RouteNode:
     kind: VertexKind = "endpoint" if len(bearings) == 1 else "meetpoint"
     covariance = (0.0004 * number**2, 0.0, 0.0, 0.0001)  # sigma 2 cm times the number
-    return MapVertex(
+    return RouteNode(
         id=number,
         kind=kind,
         position=(x, y),
@@ -39,10 +39,10 @@ def vertex(
     )
 
 
-def edge(start: int, end: int, *points: tuple[float, float]) -> MapEdge:
+def edge(start: int, end: int, *points: tuple[float, float]) -> RouteEdge:
     line = np.array(points)
     length = float(np.hypot(*np.diff(line, axis=0).T).sum())
-    return MapEdge(start=start, end=end, polyline=line, length=length, min_clearance=0.9)
+    return RouteEdge(start=start, end=end, polyline=line, length=length, min_clearance=0.9)
 
 
 GRAPH = RouteGraph(

@@ -14,7 +14,7 @@ from gvgbot.maps import geojson
 from gvgbot.maps.alignment import compare
 from gvgbot.maps.moved import moved_graph, moved_grid
 from gvgbot.maps.occupancy import OccupancyGrid
-from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
+from gvgbot.maps.route_graph import RouteEdge, RouteGraph, RouteNode
 from tests.unit.maps.small_run import vertex, write_run
 from tests.unit.maps.test_picture import RED, of_colour
 
@@ -55,10 +55,10 @@ def town(
     return RouteGraph(vertices, tuple(street(i, j, [at[i], at[j]]) for i, j in STREETS))
 
 
-def street(start: int, end: int, points: list[Array]) -> MapEdge:
+def street(start: int, end: int, points: list[Array]) -> RouteEdge:
     line = np.array(points)
     length = float(np.hypot(*np.diff(line, axis=0).T).sum())
-    return MapEdge(start=start, end=end, polyline=line, length=length, min_clearance=1.0)
+    return RouteEdge(start=start, end=end, polyline=line, length=length, min_clearance=1.0)
 
 
 def without(graph: RouteGraph, *numbers: int) -> RouteGraph:
@@ -69,9 +69,9 @@ def without(graph: RouteGraph, *numbers: int) -> RouteGraph:
 
 
 def renamed(graph: RouteGraph, by: int) -> RouteGraph:
-    def name(v: MapVertex) -> MapVertex:
-        fields = {field: getattr(v, field) for field in MapVertex.__slots__}
-        return MapVertex(**fields | {"id": v.id + by})
+    def name(v: RouteNode) -> RouteNode:
+        fields = {field: getattr(v, field) for field in RouteNode.__slots__}
+        return RouteNode(**fields | {"id": v.id + by})
 
     return RouteGraph(
         tuple(name(v) for v in graph.vertices),

@@ -14,7 +14,7 @@ from PIL import Image, ImageFilter
 
 from gvgbot.cli import main
 from gvgbot.maps import geojson
-from gvgbot.maps.route_graph import MapEdge
+from gvgbot.maps.route_graph import RouteEdge
 from tests.unit.maps.route_server import load
 from tests.unit.maps.small_run import GRAPH, write_run
 from tests.unit.maps.test_picture import BLUE, of_colour
@@ -124,9 +124,9 @@ def test_parallel_edges_and_loops_stay_what_they_are(run: Path) -> None:
     assert graph.number_of_edges(2, 2) == 1
 
 
-def _loop() -> MapEdge:
+def _loop() -> RouteEdge:
     line = np.array([[5.0, 0.0], [6.0, 1.0], [5.0, 0.0]])
-    return MapEdge(start=2, end=2, polyline=line, length=2.8, min_clearance=0.5)
+    return RouteEdge(start=2, end=2, polyline=line, length=2.8, min_clearance=0.5)
 
 
 def test_geojson_is_for_the_route_server(run: Path) -> None:

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 from gvgbot.errors import UsageError
 from gvgbot.maps.geojson import decode, encode
-from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
+from gvgbot.maps.route_graph import RouteEdge, RouteGraph, RouteNode
 
 
-def a_vertex(number: int, x: float = 0.0, y: float = 0.0, **changes: Any) -> MapVertex:
+def a_vertex(number: int, x: float = 0.0, y: float = 0.0, **changes: Any) -> RouteNode:
     fields: dict[str, Any] = {
         "id": number,
         "kind": "meetpoint",
@@ -24,11 +24,11 @@ def a_vertex(number: int, x: float = 0.0, y: float = 0.0, **changes: Any) -> Map
         "frontiers": (2.0,),
         "visits": 4,
     }
-    return MapVertex(**(fields | changes))
+    return RouteNode(**(fields | changes))
 
 
-def an_edge(start: int, end: int, *points: tuple[float, float], length: float = 3.0) -> MapEdge:
-    return MapEdge(
+def an_edge(start: int, end: int, *points: tuple[float, float], length: float = 3.0) -> RouteEdge:
+    return RouteEdge(
         start=start,
         end=end,
         polyline=np.array(points),
@@ -138,7 +138,7 @@ points = st.tuples(lengths, lengths)
 def graphs(draw: st.DrawFn) -> RouteGraph:
     ids = draw(st.lists(st.integers(0, 10**6), min_size=1, max_size=5, unique=True))
     vertices = [
-        MapVertex(
+        RouteNode(
             id=number,
             kind=draw(st.sampled_from(["meetpoint", "endpoint"])),
             position=draw(points),
@@ -152,7 +152,7 @@ def graphs(draw: st.DrawFn) -> RouteGraph:
         for number in ids
     ]
     edges = [
-        MapEdge(
+        RouteEdge(
             start=draw(st.sampled_from(ids)),
             end=draw(st.sampled_from(ids)),
             polyline=np.array(draw(st.lists(points, min_size=2, max_size=4))),
@@ -184,7 +184,7 @@ def test_every_vertex_and_edge_survives_saving(graph: RouteGraph) -> None:
     assert not unmatched
 
 
-def same(edge: MapEdge, other: MapEdge) -> bool:
+def same(edge: RouteEdge, other: RouteEdge) -> bool:
     return (
         (edge.start, edge.end, edge.traversals) == (other.start, other.end, other.traversals)
         and math.isclose(edge.length, other.length, abs_tol=1e-6)

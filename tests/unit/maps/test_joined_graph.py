@@ -8,13 +8,13 @@ import pytest
 from gvgbot.geometry import Pose
 from gvgbot.maps.joined_graph import joined_graph
 from gvgbot.maps.moved import moved_graph
-from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
+from gvgbot.maps.route_graph import RouteEdge, RouteGraph, RouteNode
 
 FRAMES = (Pose(), Pose(3.0, -1.0, 2.0), Pose(-4.0, 0.5, -1.0), Pose(0.0, 7.0, 3.1))
 
 
-def vertex(number: int, x: float, bearings: tuple[float, ...], followed: float) -> MapVertex:
-    return MapVertex(
+def vertex(number: int, x: float, bearings: tuple[float, ...], followed: float) -> RouteNode:
+    return RouteNode(
         id=number,
         kind="meetpoint",
         position=(x, 0.0),
@@ -32,7 +32,7 @@ def corridor(*, sees_door: bool, drove: bool = True) -> RouteGraph:
     return RouteGraph(
         (vertex(0, 0.0, (0.0, 3.0), 0.0), vertex(1, 8.0, (math.pi, -1.0, *door), math.pi)),
         (
-            MapEdge(
+            RouteEdge(
                 start=0,
                 end=1,
                 polyline=np.linspace((0, 0), (8, 0), 80),

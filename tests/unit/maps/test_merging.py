@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from gvgbot.geometry import Array, Pose
 from gvgbot.maps.merging import covariance_intersection, merged, settled
 from gvgbot.maps.moved import moved_graph
-from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
+from gvgbot.maps.route_graph import RouteEdge, RouteGraph, RouteNode
 
 PLACES = {
     0: (0.0, 0.0),
@@ -32,7 +32,7 @@ def seen(vertices: set[int], shift: int = 0) -> RouteGraph:
     return RouteGraph(
         tuple(vertex(v, vertices, shift) for v in sorted(vertices)),
         tuple(
-            MapEdge(
+            RouteEdge(
                 start=a + shift,
                 end=b + shift,
                 polyline=np.linspace(PLACES[a], PLACES[b], 30),
@@ -44,10 +44,10 @@ def seen(vertices: set[int], shift: int = 0) -> RouteGraph:
     )
 
 
-def vertex(v: int, vertices: set[int], shift: int) -> MapVertex:
+def vertex(v: int, vertices: set[int], shift: int) -> RouteNode:
     far = [b if a == v else a for a, b in CORRIDORS if v in (a, b)]
     bearing = {f: math.atan2(PLACES[f][1] - PLACES[v][1], PLACES[f][0] - PLACES[v][0]) for f in far}
-    return MapVertex(
+    return RouteNode(
         id=v + shift,
         kind="meetpoint",
         position=PLACES[v],
@@ -89,10 +89,10 @@ def positions(graph: RouteGraph) -> set[tuple[float, float]]:
     return {(round(v.position[0], 6), round(v.position[1], 6)) for v in graph.vertices}
 
 
-def way(start: int, end: int, line: Array) -> MapEdge:
+def way(start: int, end: int, line: Array) -> RouteEdge:
     """An edge that was driven."""
     length = float(np.hypot(*np.diff(line, axis=0).T).sum())
-    return MapEdge(
+    return RouteEdge(
         start=start, end=end, polyline=line, length=length, min_clearance=0.4, traversals=1
     )
 
@@ -200,7 +200,7 @@ def test_a_vertex_that_one_map_lacks_splits_its_edge() -> None:
     without = RouteGraph(
         tuple(v for v in seen(set(PLACES)).vertices if v.id in (0, 2)),
         (
-            MapEdge(
+            RouteEdge(
                 start=0,
                 end=2,
                 polyline=np.linspace(PLACES[0], PLACES[2], 60),

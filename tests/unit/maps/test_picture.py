@@ -13,7 +13,7 @@ from gvgbot.geometry import Array
 from gvgbot.maps.legend import round_length
 from gvgbot.maps.occupancy import OccupancyGrid
 from gvgbot.maps.picture import counts, draw_map, widest_gap
-from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
+from gvgbot.maps.route_graph import RouteEdge, RouteGraph, RouteNode
 from gvgbot.maps.trajectory import Trajectory
 from gvgbot.maps.view import View, box_around
 
@@ -27,7 +27,7 @@ UNKNOWN, WALL = (238, 238, 238), (35, 35, 35)
 NONE = (0.0, 0.0, 0.0, 0.0)
 
 
-def vertex(number: int, x: float, y: float, **changes: Any) -> MapVertex:
+def vertex(number: int, x: float, y: float, **changes: Any) -> RouteNode:
     fields: dict[str, Any] = {
         "kind": "meetpoint",
         "degree": 3,
@@ -35,7 +35,7 @@ def vertex(number: int, x: float, y: float, **changes: Any) -> MapVertex:
         "clearance": 1.0,
         "covariance": NONE,
     }
-    return MapVertex(id=number, position=(x, y), **(fields | changes))
+    return RouteNode(id=number, position=(x, y), **(fields | changes))
 
 
 TRIANGLE = RouteGraph((vertex(1, 0.0, 0.0), vertex(2, 20.0, 0.0), vertex(3, 0.0, 10.0)))
@@ -160,7 +160,7 @@ def test_of_a_huge_map_no_thin_wall_is_lost() -> None:
 
 
 def test_edges_paths_and_frontiers_are_drawn_in_their_colours() -> None:
-    edge = MapEdge(
+    edge = RouteEdge(
         start=1, end=2, polyline=np.array([[0.0, 0.0], [20.0, 0.0]]), length=20.0, min_clearance=1.0
     )
     graph = RouteGraph(

@@ -7,11 +7,11 @@ import pytest
 
 from gvgbot.geometry import Array
 from gvgbot.maps.pieced import pieced
-from gvgbot.maps.route_graph import MapEdge, MapVertex, RouteGraph
+from gvgbot.maps.route_graph import RouteEdge, RouteGraph, RouteNode
 
 
-def vertex(number: int, x: float, *frontiers: float) -> MapVertex:
-    return MapVertex(
+def vertex(number: int, x: float, *frontiers: float) -> RouteNode:
+    return RouteNode(
         id=number,
         kind="meetpoint",
         position=(x, 0.0),
@@ -65,7 +65,7 @@ def test_a_way_that_leads_nowhere_changes_nothing() -> None:
 
 
 def test_an_edge_that_is_known_is_not_there_twice() -> None:
-    known = MapEdge(
+    known = RouteEdge(
         start=4, end=7, polyline=line(0.0, 10.0), length=10.0, min_clearance=0.5, traversals=1
     )
     joined = pieced(RouteGraph(GRAPH.vertices, (known,)), HALVES)
