@@ -27,7 +27,7 @@ _POINT = 8  # bytes, as it travels
 _STEP_M = 0.1  # between poses of the trajectory, as long as there are few
 
 
-class News(NamedTuple):
+class Update(NamedTuple):
     """What to send, and what to answer who asks for the newest, if that is not the same."""
 
     value: Payload
@@ -57,7 +57,7 @@ class LiveMap:
         """Note that grid and trajectory may be known better by now."""
         self._past.doubt()
 
-    def update(self, pipeline: Pipeline, stamp: float) -> Callable[[], list[News]] | None:
+    def update(self, pipeline: Pipeline, stamp: float) -> Callable[[], list[Update]] | None:
         """A function that draws all of this moment, in a thread or later; None: no news.
 
         Call each such function before asking for the next.
@@ -84,8 +84,8 @@ class LiveMap:
         edges: Sequence[Stretch],
         poses: Mapping[int, Pose],
         stamp: float,
-    ) -> list[News]:
-        news = [News(Map(stamp=stamp, vertices=vertices, edges=bent(edges, poses)))]
+    ) -> list[Update]:
+        updates = [Update(Map(stamp=stamp, vertices=vertices, edges=bent(edges, poses)))]
         new, is_all, breaks, lent = find()
         if is_all:
             self._grid.redraw(new)
@@ -94,10 +94,10 @@ class LiveMap:
             self._grid.add(new)
         changed = self._grid.changes(stamp)
         if changed is not None:
-            news.append(News(changed, self._grid.whole(stamp)))
+            updates.append(Update(changed, self._grid.whole(stamp)))
         if self._trail.add(new, breaks, lent):
-            news.append(News(self._trail.told(stamp)))
-        return news
+            updates.append(Update(self._trail.told(stamp)))
+        return updates
 
 
 def _nothing() -> Portion:

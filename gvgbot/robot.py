@@ -24,7 +24,7 @@ from gvgbot.journal import BatteryJournal, GuardJournal, log_event, status_line
 from gvgbot.links import Devices, Links
 from gvgbot.live_events import LiveEvents
 from gvgbot.live_feed import LiveFeed, Pace
-from gvgbot.live_map import LiveMap, News
+from gvgbot.live_map import LiveMap, Update
 from gvgbot.live_ros import LiveRos, Neighbour, UnixTime
 from gvgbot.live_team import LiveTeam, TeamNetwork
 from gvgbot.persistence.keeper import Keeper
@@ -382,6 +382,6 @@ class Robot:
         )
 
 
-def _publish_drawn(network: Network, draw: Callable[[], list[News]]) -> None:
+def _publish_drawn(network: Network, draw: Callable[[], list[Update]]) -> None:
     for value, latest in draw():
         network.publish(value, latest)
