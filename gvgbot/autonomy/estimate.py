@@ -9,7 +9,7 @@ from gvgbot.autonomy.localisation import sampled
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.ekf import Belief
-from gvgbot.autonomy.slam.revisits import Passage, revisits
+from gvgbot.autonomy.slam.revisits import Traverse, revisits
 from gvgbot.autonomy.slam.smoothing import Constraint, PoseGraph
 from gvgbot.autonomy.views import Observation
 from gvgbot.geometry import Array, Pose, rows_of
@@ -90,7 +90,7 @@ def _constraints(pipeline: Pipeline) -> list[Constraint]:
         for i, step in enumerate(pipeline.past.steps[: len(keyframes) - 1])
     ]
     if pipeline.matches_walls:
-        constraints += revisits(_passage(pipeline), pipeline.matching)
+        constraints += revisits(_traverse(pipeline), pipeline.matching)
     met, recognised, headed = set[int](), set[int](), set[int]()
     for seen in mapper.observations:
         if seen.vertex not in ids or seen.keyframe >= len(keyframes):
@@ -111,10 +111,10 @@ def _constraints(pipeline: Pipeline) -> list[Constraint]:
     ]
 
 
-def _passage(pipeline: Pipeline) -> Passage:
+def _traverse(pipeline: Pipeline) -> Traverse:
     scans = {i: k.scan for i, k in enumerate(pipeline.past.keyframes) if k.scan is not None}
     walls = {i: sampled(scan, pipeline.matching.points) for i, scan in scans.items()}
-    return Passage([(step.motion, step.covariance) for step in pipeline.past.steps], walls)
+    return Traverse([(step.motion, step.covariance) for step in pipeline.past.steps], walls)
 
 
 def _believed(belief: Belief, vertex: int, last: int, number: int, *, is_met: bool) -> Constraint:

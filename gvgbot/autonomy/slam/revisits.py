@@ -42,11 +42,11 @@ _ROW = 1 << 32  # more cells than any building has side by side
 
 
 @dataclass(frozen=True, eq=False)
-class Passage:
+class Traverse:
     """A whole run: the steps from keyframe to keyframe, and what walls were seen at some of them.
 
     A step is a motion and its covariance (3, 3), both in the frame of its start; walls are points
-    (K, 2) in the frame of the base.
+    (K, 2) in the frame of the base. Surveyors call such a chain of legs a traverse.
     """
 
     steps: list[tuple[Pose, Array]]
@@ -64,16 +64,16 @@ class Passage:
         return np.concatenate([[0.0], np.cumsum(steps)])
 
 
-def revisits(passage: Passage, matching: ScanMatchingConfig) -> list[Constraint]:
+def revisits(traverse: Traverse, matching: ScanMatchingConfig) -> list[Constraint]:
     """How later visits of a place see earlier ones, by numbers of keyframes."""
     chain = [
         Constraint(i, i + 1, motion, np.asarray(np.linalg.inv(P), np.float64))
-        for i, (motion, P) in enumerate(passage.steps)
+        for i, (motion, P) in enumerate(traverse.steps)
     ]
-    x, found = _laid_out(passage), list[Constraint]()
-    for i, belief in _tries(passage):
-        j = _earlier_visit(x, passage, i, belief)
-        match = None if j is None else _match(x, passage, j, i, belief, matching)
+    x, found = _laid_out(traverse), list[Constraint]()
+    for i, belief in _tries(traverse):
+        j = _earlier_visit(x, traverse, i, belief)
+        match = None if j is None else _match(x, traverse, j, i, belief, matching)
         if match is None:
             continue
         found.append(match)
@@ -92,32 +92,32 @@ def _bend(x: Array, last: int, graph: PoseGraph) -> None:
     x[last + 1 :, 2] += moved.theta
 
 
-def _laid_out(passage: Passage) -> Array:
+def _laid_out(traverse: Traverse) -> Array:
     """The poses (N, 3) by the steps alone."""
     poses = [Pose()]
-    for motion, _ in passage.steps:
+    for motion, _ in traverse.steps:
         poses.append(poses[-1].compose(motion))
     return rows_of(poses)
 
 
-def _tries(passage: Passage) -> Iterator[tuple[int, Belief]]:
+def _tries(traverse: Traverse) -> Iterator[tuple[int, Belief]]:
     """The keyframes to look from, and the motion since the last place that was known again.
 
     Whoever knows a place again sets the covariance of that motion to zero.
     """
     belief, last, tried = Belief(), 0, 0.0
-    for i in passage.looks.tolist():
-        for motion, covariance in passage.steps[last:i]:
+    for i in traverse.looks.tolist():
+        for motion, covariance in traverse.steps[last:i]:
             belief = predict(belief, motion, _OVERRATED * covariance)
         last = i
-        if passage.driven[i] - tried >= _EVERY_M:
-            tried = passage.driven[i]
+        if traverse.driven[i] - tried >= _EVERY_M:
+            tried = traverse.driven[i]
             yield i, belief
 
 
-def _earlier_visit(x: Array, passage: Passage, i: int, belief: Belief) -> int | None:
+def _earlier_visit(x: Array, traverse: Traverse, i: int, belief: Belief) -> int | None:
     """The nearest keyframe of an earlier visit to the place of one."""
-    looks, driven = passage.looks, passage.driven
+    looks, driven = traverse.looks, traverse.driven
     earlier = looks[driven[looks] < driven[i] - _LEAST_LOOP_M]
     if len(earlier) == 0:
         return None
@@ -128,11 +128,11 @@ def _earlier_visit(x: Array, passage: Passage, i: int, belief: Belief) -> int | 
 
 
 def _match(
-    x: Array, passage: Passage, j: int, i: int, belief: Belief, matching: ScanMatchingConfig
+    x: Array, traverse: Traverse, j: int, i: int, belief: Belief, matching: ScanMatchingConfig
 ) -> Constraint | None:
     """Keyframe i seen from keyframe j, if the walls around both agree."""
-    walls, of_walls = _place(x, passage, j)
-    points, of_points = _place(x, passage, i)
+    walls, of_walls = _place(x, traverse, j)
+    points, of_points = _place(x, traverse, i)
     tree = cKDTree(walls)
     prior = _pose(x, j).to(_pose(x, i))
     Q = rotated_covariance(belief.P, -float(belief.x[2])) + _SLACK
@@ -157,8 +157,8 @@ def _match(
     in_view = np.isfinite(distance)
     if in_view.mean() < _LEAST_IN_VIEW or (distance[in_view] < _WALL_M).mean() < _LEAST_AGREEMENT:
         return None
-    seen = found.covariance + _spread(passage, i) + _FLOOR
-    covariance = rotated_covariance(seen, found.pose.theta) + _spread(passage, j)
+    seen = found.covariance + _spread(traverse, i) + _FLOOR
+    covariance = rotated_covariance(seen, found.pose.theta) + _spread(traverse, j)
     return Constraint(
         j, i, found.pose, np.asarray(np.linalg.inv(covariance), np.float64), doubtful=True
     )
@@ -169,28 +169,28 @@ def _tells(covariance: Array) -> bool:
     return bool(np.linalg.eigvalsh(covariance[:2, :2])[-1] < _TELLING_M**2)
 
 
-def _spread(passage: Passage, i: int) -> Array:
+def _spread(traverse: Traverse, i: int) -> Array:
     """By what the walls of a place may lie apart: the covariance (3, 3) of the way to a keyframe.
 
     In its frame, from the first look that its place is made of.
     """
-    at = int(np.searchsorted(passage.looks, i))
+    at = int(np.searchsorted(traverse.looks, i))
     belief = Belief()
-    for motion, covariance in passage.steps[int(passage.looks[max(0, at - _AROUND)]) : i]:
+    for motion, covariance in traverse.steps[int(traverse.looks[max(0, at - _AROUND)]) : i]:
         belief = predict(belief, motion, covariance)
     return rotated_covariance(belief.P, -float(belief.x[2]))
 
 
-def _place(x: Array, passage: Passage, i: int) -> tuple[Array, Array]:
+def _place(x: Array, traverse: Traverse, i: int) -> tuple[Array, Array]:
     """The walls (K, 2) around a keyframe in its frame, as seen there, just before and just after.
 
     One point for each cell of a grid, and vectors (K, 2) to where they were seen from.
     """
-    at, here = int(np.searchsorted(passage.looks, i)), _pose(x, i)
+    at, here = int(np.searchsorted(traverse.looks, i)), _pose(x, i)
     seen, from_ = list[Array](), list[Array]()
-    for k in passage.looks[max(0, at - _AROUND) : at + _AROUND + 1].tolist():
+    for k in traverse.looks[max(0, at - _AROUND) : at + _AROUND + 1].tolist():
         there = here.to(_pose(x, k))
-        seen.append(there.transform(passage.walls[k]))
+        seen.append(there.transform(traverse.walls[k]))
         from_.append(there.position - seen[-1])
     points = np.concatenate(seen)
     cells = np.floor(points / _CELL_M).astype(np.int64) @ (_ROW, 1)

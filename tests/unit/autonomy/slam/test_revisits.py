@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from gvgbot.autonomy.slam.revisits import Passage, revisits
+from gvgbot.autonomy.slam.revisits import Traverse, revisits
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
 from gvgbot.autonomy.slam.smoothing import Constraint, PoseGraph
 from gvgbot.geometry import Array, Pose
@@ -49,29 +49,29 @@ def seen(world: Array, pose: Pose) -> Array:
     return pose.inverse().transform(near)
 
 
-def run(true: list[Pose], world: Array, turn: float) -> Passage:
+def run(true: list[Pose], world: Array, turn: float) -> Traverse:
     """What somebody believes who turns too far by `turn` at each step."""
     steps = [(a.to(b).compose(Pose(0.0, 0.0, turn)), STEP_SIGMAS) for a, b in pairwise(true)]
-    return Passage(steps, {i: seen(world, p) for i, p in enumerate(true)})
+    return Traverse(steps, {i: seen(world, p) for i, p in enumerate(true)})
 
 
-def poses(passage: Passage, found: list[Constraint]) -> Array:
+def poses(traverse: Traverse, found: list[Constraint]) -> Array:
     """The poses (N, 3) by the steps, and by what was found."""
     chain = [
         Constraint(i, i + 1, motion, np.asarray(np.linalg.inv(P), np.float64))
-        for i, (motion, P) in enumerate(passage.steps)
+        for i, (motion, P) in enumerate(traverse.steps)
     ]
     way = [Pose()]
-    for motion, _ in passage.steps:
+    for motion, _ in traverse.steps:
         way.append(way[-1].compose(motion))
     return PoseGraph(chain + found).solve(np.array([(p.x, p.y, p.theta) for p in way]))
 
 
 def test_a_second_lap_is_laid_onto_the_first() -> None:
     true = lap() + lap()
-    passage = run(true, walls(), turn=0.001)
+    traverse = run(true, walls(), turn=0.001)
     n = len(lap())
-    before, after = (poses(passage, found) for found in ([], revisits(passage, MATCHING)))
+    before, after = (poses(traverse, found) for found in ([], revisits(traverse, MATCHING)))
     assert np.hypot(*(before[n:, :2] - before[:n, :2]).T).max() > 0.5
     assert np.hypot(*(after[n:, :2] - after[:n, :2]).T).max() < 0.05
 
@@ -90,11 +90,11 @@ def test_another_place_that_looks_the_same_is_not_taken_for_it() -> None:
     """Two equal streets, 1.5 m apart: nobody jumps who knows well enough where he is."""
     street = [Pose(x, 0.0, 0.0) for x in np.arange(0.0, 12.0, STEP_M)]
     world = np.concatenate([box(x, y, 0.8) for x in range(-3, 16, 2) for y in (-1.2, 0.7)])
-    passage = run(street + [Pose(p.x, 1.5, 0.0) for p in street], world, turn=0.0)
+    traverse = run(street + [Pose(p.x, 1.5, 0.0) for p in street], world, turn=0.0)
     for i, pose in enumerate(street):
-        passage.walls[i] = passage.walls[len(street) + i] = seen(world, pose)
-    passage.steps[:] = [(motion, 0.01 * P) for motion, P in passage.steps]
-    assert revisits(passage, MATCHING) == []
+        traverse.walls[i] = traverse.walls[len(street) + i] = seen(world, pose)
+    traverse.steps[:] = [(motion, 0.01 * P) for motion, P in traverse.steps]
+    assert revisits(traverse, MATCHING) == []
 
 
 def test_a_run_without_a_second_visit_has_no_matches() -> None:
@@ -108,25 +108,25 @@ def test_a_round_corridor_tells_no_place() -> None:
     true = [Pose(6.0 * math.cos(a), 6.0 * math.sin(a), a + math.pi / 2) for a in turns]
     around = np.arange(0.0, math.tau, 0.005)
     circle = np.stack([np.cos(around), np.sin(around)], axis=1)
-    passage = run(true, np.concatenate([5.0 * circle, 7.0 * circle]), turn=0.004)
-    for i, points in passage.walls.items():
-        passage.walls[i] = points + rng.normal(0.0, 0.01, points.shape)
-    assert revisits(passage, MATCHING) == []
+    traverse = run(true, np.concatenate([5.0 * circle, 7.0 * circle]), turn=0.004)
+    for i, points in traverse.walls.items():
+        traverse.walls[i] = points + rng.normal(0.0, 0.01, points.shape)
+    assert revisits(traverse, MATCHING) == []
 
 
 def test_a_match_errs_as_much_as_it_says_where_steps_are_uncertain() -> None:
     """The walls of a place are of several scans, and lie as wrong as the steps between them."""
     true, world, distances = lap() + lap(), walls(), list[float]()
     for seed in range(6):
-        passage = run(true, world, turn=0.0)
+        traverse = run(true, world, turn=0.0)
         noise = np.random.default_rng(seed).multivariate_normal(
-            np.zeros(3), STEP_SIGMAS, len(passage.steps)
+            np.zeros(3), STEP_SIGMAS, len(traverse.steps)
         )
-        passage.steps[:] = [
+        traverse.steps[:] = [
             (motion.compose(Pose.from_array(off)), STEP_SIGMAS)
-            for (motion, _), off in zip(passage.steps, noise, strict=True)
+            for (motion, _), off in zip(traverse.steps, noise, strict=True)
         ]
-        for match in revisits(passage, MATCHING):
+        for match in revisits(traverse, MATCHING):
             expected = true[match.a].to(true[match.b])
             off = match.a_b
             r = np.array([off.x - expected.x, off.y - expected.y, off.theta - expected.theta])
