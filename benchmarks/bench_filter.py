@@ -15,10 +15,10 @@ from benchmarks.report import report
 from gvgbot.autonomy.slam.ekf import (
     Belief,
     OdometryNoise,
-    advance,
-    correct,
-    correct_vertex,
     distances,
+    predict_in_place,
+    update_in_place,
+    update_vertex_in_place,
 )
 from gvgbot.autonomy.slam.trail import MOST, Laid, move
 from gvgbot.geometry import Pose
@@ -62,13 +62,13 @@ def bench(vertices: int) -> None:
     belief, noise = belief_of(vertices), OdometryNoise()
     growth, R = noise.covariance(MOTION, 0.5), 0.01 * np.eye(3)
     seen = belief.map_base.to(belief.map_vertex(1))
-    blind = cpu_ms(lambda: advance(belief, MOTION, growth))
+    blind = cpu_ms(lambda: predict_in_place(belief, MOTION, growth))
     for look in range(2, MOST + 2):
         belief = move(belief, MOTION, growth, laid(look))
     steps: dict[str, Callable[[], object]] = {
         "motion": lambda: move(belief, MOTION, growth, laid(MOST + 2)),
-        "vertex still in sight": lambda: correct_vertex(belief, 1, seen, R[:2, :2]),
-        "loop closed": lambda: correct(belief, 1, seen, R),
+        "vertex still in sight": lambda: update_vertex_in_place(belief, 1, seen, R[:2, :2]),
+        "loop closed": lambda: update_in_place(belief, 1, seen, R),
         "gates of all vertices": lambda: distances(belief, np.zeros(2), R[:2, :2]),
     }
     report(f"{vertices} vertices: motion without walls", blind, "ms", at_most=KEYFRAME_MS)

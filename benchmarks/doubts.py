@@ -80,7 +80,7 @@ class Doubting(Tour):
         vertex, doubt = self._recognised(here, np.array([x, y]), R[:2, :2])
         if vertex is not None:
             self.tally[f"closed {'right' if self.place[vertex] == here else 'WRONG'}"] += 1
-            self.belief = ekf.update(self.belief, vertex, Pose(x, y, theta), R[:2, :2])
+            self.belief = ekf.update_in_place(self.belief, vertex, Pose(x, y, theta), R[:2, :2])
         else:
             vertex = self._add(here, Pose(x, y, theta), R, doubt)
         if self.last is not None and self.last != vertex:

@@ -16,9 +16,9 @@ from gvgbot.autonomy.slam.ekf import (
     Belief,
     OdometryNoise,
     add_vertex,
-    advance,
     distances,
-    update,
+    predict_in_place,
+    update_in_place,
 )
 from gvgbot.geometry import Array, Pose
 
@@ -130,7 +130,7 @@ class Tour:
         error = np.linalg.cholesky(Q) @ self.rng.normal(size=3)
         felt = Pose(motion.x + error[0], motion.y + error[1], motion.theta + error[2])
         self.true = self.true.compose(motion)
-        self.belief = advance(self.belief, felt, Q)
+        self.belief = predict_in_place(self.belief, felt, Q)
         self._separate()
 
     def _arrive(self, here: Crossing) -> None:
@@ -142,7 +142,7 @@ class Tour:
         self._judge(here, seen, R[:2, :2])
         self.sigmas.append(self.sigma)
         if here in self.ids:
-            self.belief = update(self.belief, self.ids[here], seen, R[:2, :2])
+            self.belief = update_in_place(self.belief, self.ids[here], seen, R[:2, :2])
         else:
             self.ids[here] = len(self.ids) + 1
             self.open[here] = {d for d in WAYS if self._is_street(self._beyond(here, d))}

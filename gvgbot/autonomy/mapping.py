@@ -279,12 +279,12 @@ class Mapper(Knowledge):
         own = sight_covariance(away, self._recognition)
         r, S, _ = ekf.innovation(self.belief, vertex.id, base_vertex, own)
         odd = max(1.0, ekf.mahalanobis(r, S) / _ODD)
-        self.belief = ekf.correct_vertex(self.belief, vertex.id, base_vertex, odd * own)
+        self.belief = ekf.update_vertex_in_place(self.belief, vertex.id, base_vertex, odd * own)
         self.observations.append(Observation(view.keyframe, vertex.id, base_vertex, odd * R))
 
     def _measure(self, view: View, vertex: Vertex, base_vertex: Pose, R: Array) -> None:
         """Correct the belief by a vertex seen again."""
-        self.belief = ekf.correct(self.belief, vertex.id, base_vertex, R)
+        self.belief = ekf.update_in_place(self.belief, vertex.id, base_vertex, R)
         self.observations.append(Observation(view.keyframe, vertex.id, base_vertex, R))
 
     # -- what hangs together -----------------------------------------------------------------

@@ -326,7 +326,9 @@ def _live_again(pipeline: Pipeline, grown: Growth) -> None:
         pipeline._maps.insert(keyframe.scan, keyframe.local_base, past.travelled)
     for seen in grown.observations:
         if seen.vertex in mapper.belief.ids:
-            mapper.belief = ekf.correct(mapper.belief, seen.vertex, seen.base_vertex, seen.R)
+            mapper.belief = ekf.update_in_place(
+                mapper.belief, seen.vertex, seen.base_vertex, seen.R
+            )
             mapper.observations.append(seen)
 
 

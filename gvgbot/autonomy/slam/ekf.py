@@ -118,10 +118,10 @@ class Belief:
 
 def predict(belief: Belief, motion: Pose, Q: Array) -> Belief:
     """The belief after a motion (base seen from where it was) with covariance Q (3, 3)."""
-    return advance(replace(belief, P=belief.P.copy()), motion, Q)
+    return predict_in_place(replace(belief, P=belief.P.copy()), motion, Q)
 
 
-def advance(belief: Belief, motion: Pose, Q: Array) -> Belief:
+def predict_in_place(belief: Belief, motion: Pose, Q: Array) -> Belief:
     """As `predict`, but in the covariance of the old belief, which is valid no more.
 
     What vertices know of each other stays where it is, however many there are.
@@ -300,19 +300,14 @@ def part(belief: Belief, vertices: Sequence[int]) -> Belief:
     return Belief(belief.x[rows], belief.P[np.ix_(rows, rows)], tuple(vertices))
 
 
-def update(belief: Belief, vertex: int, base_vertex: Pose, R: Array) -> Belief:
+def update_in_place(belief: Belief, vertex: int, base_vertex: Pose, R: Array) -> Belief:
     """The belief after seeing a vertex again; Joseph form, positive whatever the gain.
+
+    It is in the covariance of the old belief, which is valid no more. Every element of P changes;
+    what it costs is to read and to write them once.
 
     After a large innovation the Jacobian of where the robot thought to be is not that of where it
     is: it is taken again from there, as Gauss and Newton would (the iterated Kalman filter).
-    """
-    return correct(replace(belief, P=belief.P.copy()), vertex, base_vertex, R)
-
-
-def correct(belief: Belief, vertex: int, base_vertex: Pose, R: Array) -> Belief:
-    """As `update`, but in the covariance of the old belief, which is valid no more.
-
-    Every element of P changes; what it costs is to read and to write them once.
     """
     used = _used(belief, vertex)
     P_used = belief.P[used]  # HP = H P_used
@@ -336,8 +331,8 @@ def correct(belief: Belief, vertex: int, base_vertex: Pose, R: Array) -> Belief:
     return replace(belief, x=x)
 
 
-def correct_vertex(belief: Belief, vertex: int, base_vertex: Pose, R: Array) -> Belief:
-    """As `correct`, but only the vertex is moved, whatever that would tell of all else.
+def update_vertex_in_place(belief: Belief, vertex: int, base_vertex: Pose, R: Array) -> Belief:
+    """As `update_in_place`, but only the vertex is moved, whatever that would tell of all else.
 
     Joseph's form is valid for any gain. What it costs grows with the number of vertices.
     """

@@ -49,7 +49,7 @@ def move(belief: Belief, motion: Pose, covariance: Array, laid: Laid | None) -> 
     that is all there is: walls may be elsewhere for the robot, and a new trail begins.
     """
     if laid is None:
-        return ekf.advance(ekf.without_trail(belief), motion, covariance)
+        return ekf.predict_in_place(ekf.without_trail(belief), motion, covariance)
     if not belief.trail:
         belief = _begun(belief, laid.local_base.compose(motion.inverse()), laid.look - 1)
     return _cloned(_followed(belief, motion, laid), laid.local_base, laid.look)

@@ -34,6 +34,7 @@ from gvgbot.autonomy.views import Correspondence, View, touching
 from gvgbot.geometry import Array, Pose
 from tests.unit.autonomy.local_graphs import Point, drawn, resampled
 from tests.unit.autonomy.sights import carved, looked, sweep
+from tests.unit.autonomy.slam.beliefs import updated
 
 CONFIG = MappingConfig()
 NOTHING_SEEN = LocalMap(LocalMapConfig())
@@ -854,7 +855,7 @@ def test_a_vertex_in_doubt_becomes_part_of_the_known_one_as_soon_as_that_is_cert
     tee = doubt.known
     assert {tee, doubt.vertex} <= mapper.graph.vertices.keys()
     # walls tell where the robot truly is: three metres before the tee
-    mapper.belief = ekf.update(mapper.belief, tee, Pose(3.0, 0.0), 0.01 * np.eye(3))
+    mapper.belief = updated(mapper.belief, tee, Pose(3.0, 0.0), 0.01 * np.eye(3))
     mapper.unsettled._has_news = True
     seen.look(TEE)
     (settled,) = of_type(seen.events, DoubtSettled)
@@ -879,7 +880,7 @@ def test_who_takes_a_settled_doubt_back_knows_again_what_was_seen_of_both_places
     (doubt,) = of_type(seen.events, PlaceDoubted)
     assert isinstance(doubt, PlaceDoubted)
     before = list(mapper.observations)
-    mapper.belief = ekf.update(mapper.belief, doubt.known, Pose(3.0, 0.0), 0.01 * np.eye(3))
+    mapper.belief = updated(mapper.belief, doubt.known, Pose(3.0, 0.0), 0.01 * np.eye(3))
     mapper.unsettled._has_news = True
     seen.look(TEE)
     assert len(of_type(seen.events, DoubtSettled)) == 1

@@ -16,6 +16,7 @@ from gvgbot.geometry import STANDSTILL, Pose
 from gvgbot.hal.messages import Odometry
 from gvgbot.persistence.mission_files import MissionFiles
 from tests.unit.autonomy.sights import carved, sweep
+from tests.unit.autonomy.slam.beliefs import updated
 
 MISSION = Path(__file__).parents[2] / "data" / "mission_v1"
 
@@ -60,7 +61,7 @@ def test_who_has_found_its_place_on_a_map_knows_no_better_where_that_map_lies() 
     S = ekf.innovation(found, here, base_vertex, R)[1]
     assert np.sqrt(np.linalg.eigvalsh(S)[-1]) < 0.3
     for _ in range(3):
-        found = ekf.update(found, here, base_vertex, R)
+        found = updated(found, here, base_vertex, R)
     assert np.linalg.eigvalsh(found.vertex_covariance(here)).min() > 0.99 * 2.0**2
 
 

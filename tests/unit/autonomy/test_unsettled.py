@@ -66,9 +66,9 @@ def test_what_leaves_a_vertex_that_proves_to_be_a_known_one_turns_as_its_frame_w
     west, again, north = (Vertex(graph.next_id(), 1.0, Pose(), 0.0, 0.0) for _ in range(3))
     graph.vertices |= {vertex.id: vertex for vertex in (west, again, north)}
     belief = ekf.add_vertex(Belief(), west.id, Pose(), sure)
-    belief = ekf.advance(belief, Pose(STREET), sure)
-    belief = ekf.advance(belief, Pose(theta=math.pi - error), sure + np.diag([0.0, 0.0, error**2]))
-    belief = ekf.advance(belief, Pose(STREET), sure)
+    belief = ekf.predict(belief, Pose(STREET), sure)
+    belief = ekf.predict(belief, Pose(theta=math.pi - error), sure + np.diag([0.0, 0.0, error**2]))
+    belief = ekf.predict(belief, Pose(STREET), sure)
     belief = ekf.add_vertex(belief, again.id, Pose(theta=error - math.pi), sure)
     seen = math.pi / 2 - error  # where the north is in a frame that is turned by the error
     way = STREET * np.array([math.cos(seen), math.sin(seen)])

@@ -22,12 +22,12 @@ from gvgbot.autonomy.slam.ekf import (
     place_robot,
     predict,
     remove_vertex,
-    update,
     without_trail,
 )
 from gvgbot.autonomy.slam.graph import GvgGraph
 from gvgbot.autonomy.slam.trail import MOST, Laid, move
 from gvgbot.geometry import Array, Pose, rotated_covariance, wrap_angle
+from tests.unit.autonomy.slam.beliefs import updated
 from tests.unit.autonomy.slam.test_ekf import (
     as_array,
     numerical_jacobian,
@@ -202,7 +202,7 @@ def test_what_it_says_stays_possible(seed: int) -> None:
     """P is symmetric and has no negative variance, whatever is learnt, closed and merged."""
     rng = np.random.default_rng(seed)
     belief, _ = driven(rng, 40)
-    belief = update(belief, 10, random_pose(rng), random_covariance(rng, 3))
+    belief = updated(belief, 10, random_pose(rng), random_covariance(rng, 3))
     np.testing.assert_array_equal(belief.P, belief.P.T)
     scale = np.sqrt(np.diag(belief.P))
     assert np.linalg.eigvalsh(belief.P / np.outer(scale, scale)).min() > -1e-9
@@ -217,7 +217,7 @@ def test_a_closure_corrects_old_poses_as_well(rows: int) -> None:
     seen, R = foreseen.compose(Pose(0.1, -0.05, 0.02)), random_covariance(rng, rows, 0.1)
     r, H = (as_array(seen) - as_array(foreseen))[:rows], H[:rows]
     K = belief.P @ H.T @ np.linalg.inv(H @ belief.P @ H.T + R)
-    closed = update(belief, 11, seen, R)
+    closed = updated(belief, 11, seen, R)
     for i in range(6):
         own = clone_rows(belief, i)
         np.testing.assert_allclose(
@@ -252,7 +252,7 @@ def test_after_a_closure_that_was_revoked_it_is_as_if_there_had_been_none() -> N
     belief, local = driven(rng, 20)
     never = replace(belief, P=belief.P.copy())
     was = Revocable.before(10, belief, GvgGraph(), [], [])
-    belief = update(belief, 10, random_pose(rng), 0.01 * np.eye(3))
+    belief = updated(belief, 10, random_pose(rng), 0.01 * np.eye(3))
     for look in range(22, 30):
         local, looks = local.compose(STEP), [look - 15, look - 1]
         laid = laid_at(local, look, looks, np.array([0.3, 0.4])[:, None, None] * np.eye(3), NOISE)
