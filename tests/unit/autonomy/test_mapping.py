@@ -516,40 +516,6 @@ def test_a_dead_end_to_be_driven_is_joined_only_from_its_end() -> None:
     assert len(seen.mapper.graph.edges) == 1
 
 
-def test_strays_are_forgotten_only_beside_a_map_that_holds_together() -> None:
-    seen = Seen().look(TEE, CONFIG.candidates.meetpoint_sightings)  # one vertex, no edge yet
-    view = View(99, 99.0, 9.9, Pose(), TEE, NOTHING_SEEN)
-    seen.mapper.forget_strays(view)
-    assert len(seen.mapper.graph.vertices) == 1
-    seen.look(TEE, 20)
-    edges = seen.mapper.graph.edges
-    seen.mapper.close_ring(view, np.array([(9.0, 9.0), (9.0, 12.0), (12.0, 12.0)]), 1.0)
-    assert len(edges) == 2
-    ring = max(edges.values(), key=lambda edge: edge.id)
-    seen.mapper.graph.unjoin(ring)
-    stray = seen.mapper.graph.vertices[ring.a.vertex]
-    stray.half_edges[ring.a.key].blocked = True  # tried in vain: it stays
-    seen.mapper.forget_strays(view)
-    assert stray.id in seen.mapper.graph.vertices
-    stray.half_edges[ring.a.key].blocked = False
-    seen.mapper.forget_strays(view)
-    assert stray.id not in seen.mapper.graph.vertices
-    assert len(seen.mapper.graph.vertices) == 2
-
-
-def test_the_vertex_of_a_ring_has_the_room_that_is_around_it() -> None:
-    """More than where the ring is narrowest; or its walls would seem to have gone."""
-    walls = LocalMap(LocalMapConfig())
-    walls.insert(sweep(carved([(-4.0, -1.5, 4.0, 1.5)]), Pose()), Pose(), 0.0)
-    seen = Seen()
-    view = View(0, 0.0, 9.9, Pose(), TWO_ENDS, walls)
-    seen.mapper.close_ring(view, np.array([(3.0, 0.0), (9.0, 12.0), (-3.0, 0.0)]), 1.0)
-    (vertex,) = seen.mapper.graph.vertices.values()
-    assert vertex.clearance == pytest.approx(1.5, abs=0.03)
-    (edge,) = seen.mapper.graph.edges.values()
-    assert edge.min_clearance == 1.0
-
-
 PERSON = np.array([[3.0, 1.1], [3.2, 1.2], [2.8, 1.2]])  # beside the crossing of TEE
 
 
@@ -662,21 +628,6 @@ def test_graph_and_belief_agree_after_any_sequence_of_contradicting_sights(
     for end in seen.known.branch_of:
         assert end.vertex in graph.vertices
     assert np.linalg.eigvalsh(belief.P).min() > -1e-12
-
-
-def test_a_driven_edge_keeps_its_line_in_the_frame_of_its_first_vertex() -> None:
-    seen = Seen().look(TWO_ENDS, 30)
-    graph = seen.mapper.graph
-    (edge,) = graph.edges.values()
-    graph.unjoin(edge)
-    line = np.array([[-1.0, 0.0], [2.0, 1.0], [4.0, 0.0]])
-    view = View(99, 99.0, 9.9, Pose(), TWO_ENDS, NOTHING_SEEN)
-    seen.mapper.join(view, edge.a, edge.b, line, 0.5, driven=True)
-    (edge,) = graph.edges.values()
-    back = graph.vertices[edge.a.vertex].local.transform(edge.polyline)
-    assert back == pytest.approx(line)
-    assert edge.driven
-    assert graph.edge_at(HalfEdgeId(*edge.b)) is edge
 
 
 def test_what_comes_back_whenever_it_is_taken_out_is_left_alone_in_the_end() -> None:

@@ -1,0 +1,88 @@
+"""Changes of the map that somebody asks for: vertices and edges that were driven, and strays."""
+
+import math
+
+import numpy as np
+import pytest
+
+from gvgbot.autonomy.events import EdgeJoined, VertexAdded
+from gvgbot.autonomy.evidence import MappingConfig
+from gvgbot.autonomy.gvg.local import LocalGvg
+from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
+from gvgbot.autonomy.map_edits import MapEdits
+from gvgbot.autonomy.slam.graph import Edge, HalfEdgeId
+from gvgbot.autonomy.slam.recognition import RecognitionConfig
+from gvgbot.autonomy.views import View
+from gvgbot.geometry import Array, Pose
+from tests.unit.autonomy.sights import carved, sweep
+
+
+@pytest.fixture
+def edits() -> MapEdits:
+    return MapEdits(MappingConfig(), RecognitionConfig())
+
+
+@pytest.fixture
+def view() -> View:
+    """From the middle of a corridor three metres wide."""
+    walls = LocalMap(LocalMapConfig())
+    walls.insert(sweep(carved([(-4.0, -1.5, 4.0, 1.5)]), Pose()), Pose(), 0.0)
+    return View(0, 0.0, 9.9, Pose(), LocalGvg(), walls)
+
+
+def joined(edits: MapEdits, view: View, line: Array) -> Edge:
+    """The driven edge along a line, with vertices of its own, whose only departures it takes."""
+    bearings = ((0.0, line[0]), (math.pi, line[-1]))
+    ends = [edits.add_driven(view, place, bearing) for bearing, place in bearings]
+    a, b = (HalfEdgeId(vertex.id, key) for vertex in ends for key in vertex.half_edges)
+    edits.join(view, a, b, line, 0.5, driven=True)
+    edge = edits.graph.edge_at(a)
+    assert edge is not None
+    assert edge is edits.graph.edge_at(b)
+    return edge
+
+
+def test_a_driven_edge_keeps_its_line_in_the_frame_of_its_first_vertex(
+    edits: MapEdits, view: View
+) -> None:
+    line = np.array([[-1.0, 0.0], [2.0, 1.0], [4.0, 0.0]])
+    edge = joined(edits, view, line)
+    back = edits.graph.vertices[edge.a.vertex].local.transform(edge.polyline)
+    assert back == pytest.approx(line)
+    assert edge.driven
+
+
+def test_what_was_changed_is_told_in_its_order(edits: MapEdits, view: View) -> None:
+    joined(edits, view, np.array([[-1.0, 0.0], [2.0, 0.0]]))
+    assert [type(event) for event in edits._events] == [VertexAdded, VertexAdded, EdgeJoined]
+
+
+def test_strays_are_forgotten_only_beside_a_map_that_holds_together(
+    edits: MapEdits, view: View
+) -> None:
+    lone = edits.add_driven(view, np.array([0.0, 0.0]), 0.0)  # one vertex, no edge yet
+    edits.forget_strays(view)
+    assert list(edits.graph.vertices) == [lone.id]
+    edits.remove(view, lone, "it is in the way")
+    joined(edits, view, np.array([[-1.0, 0.0], [2.0, 0.0]]))
+    edits.close_ring(view, np.array([(9.0, 9.0), (9.0, 12.0), (12.0, 12.0)]), 1.0)
+    assert len(edits.graph.edges) == 2
+    ring = max(edits.graph.edges.values(), key=lambda edge: edge.id)
+    edits.graph.unjoin(ring)
+    stray = edits.graph.vertices[ring.a.vertex]
+    stray.half_edges[ring.a.key].blocked = True  # tried in vain: it stays
+    edits.forget_strays(view)
+    assert stray.id in edits.graph.vertices
+    stray.half_edges[ring.a.key].blocked = False
+    edits.forget_strays(view)
+    assert stray.id not in edits.graph.vertices
+    assert len(edits.graph.vertices) == 2
+
+
+def test_the_vertex_of_a_ring_has_the_room_that_is_around_it(edits: MapEdits, view: View) -> None:
+    """More than where the ring is narrowest; or its walls would seem to have gone."""
+    edits.close_ring(view, np.array([(3.0, 0.0), (9.0, 12.0), (-3.0, 0.0)]), 1.0)
+    (vertex,) = edits.graph.vertices.values()
+    assert vertex.clearance == pytest.approx(1.5, abs=0.03)
+    (edge,) = edits.graph.edges.values()
+    assert edge.min_clearance == 1.0
