@@ -44,7 +44,7 @@ class TimedPipeline(Pipeline):
         self.control_times: list[float] = []
         self.stages: dict[str, list[float]] = {}
         self._time("match", self, "_localise")
-        self._time("insert", self._maps, "insert")
+        self._time("insert", self.tracker.maps, "insert")
         self._time("local GVG", self, "_local_gvg")
         self._time("recognise", self.mapper, "observe")
         self._time("decide", self.errands, "advance")

@@ -135,7 +135,7 @@ class Growth:
 
 def remember(pipeline: Pipeline) -> Memory:
     """What there is to remember; it shares its parts with the pipeline, so keep it at once."""
-    past, mapper, maps = pipeline.past, pipeline.mapper, pipeline._maps
+    past, mapper, maps = pipeline.past, pipeline.mapper, pipeline.tracker.maps
     calibration = maps.calibration
     return Memory(
         keyframes=len(past.keyframes),
@@ -235,10 +235,11 @@ def recall(pipeline: Pipeline, memory: Memory, grown: list[Growth]) -> None:
     pipeline.errands.is_waiting = memory.intent.is_waiting
     pipeline.errands.recall(memory.intent.errand)
     pipeline.errands.closures.until = memory.intent.blocked_until
-    if _fits(pipeline._maps.near, memory.near) and _fits(pipeline._maps._far, memory.far):
-        _recall_cells(pipeline._maps.near, memory.near)
-        _recall_cells(pipeline._maps.far, memory.far)
-    calibration = pipeline._maps.calibration
+    maps = pipeline.tracker.maps
+    if _fits(maps.near, memory.near) and _fits(maps._far, memory.far):
+        _recall_cells(maps.near, memory.near)
+        _recall_cells(maps.far, memory.far)
+    calibration = maps.calibration
     calibration.x, calibration.P = memory.odds.x, memory.odds.P
     if len(memory.odds.noises) == len(calibration.noise):  # else it is of an older version
         calibration.noise, calibration.told = memory.odds.noises, memory.odds.told_of
@@ -265,8 +266,8 @@ def recall(pipeline: Pipeline, memory: Memory, grown: list[Growth]) -> None:
 
 def _awake(pipeline: Pipeline, last: Keyframe) -> None:
     """Be where the last keyframe was, as after a silence of the base."""
-    pipeline._odometry = OdometryLog()
-    pipeline._odometry.append(Odometry(last.stamp, last.odom_base, STANDSTILL))
+    pipeline.tracker.odometry = OdometryLog()
+    pipeline.tracker.odometry.append(Odometry(last.stamp, last.odom_base, STANDSTILL))
     pipeline._look_now = True
 
 
@@ -323,7 +324,7 @@ def _live_again(pipeline: Pipeline, grown: Growth) -> None:
     past.keyframes.append(keyframe)
     if keyframe.scan is not None:
         past.with_scan = keyframe.local_base
-        pipeline._maps.insert(keyframe.scan, keyframe.local_base, past.travelled)
+        pipeline.tracker.maps.insert(keyframe.scan, keyframe.local_base, past.travelled)
     for seen in grown.observations:
         if seen.vertex in mapper.belief.ids:
             mapper.belief = ekf.update_in_place(

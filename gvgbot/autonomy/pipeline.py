@@ -28,21 +28,20 @@ from gvgbot.autonomy.gvg.local import LocalGvg
 from gvgbot.autonomy.gvg.reduction import reduce_graph
 from gvgbot.autonomy.gvg.voronoi import fine_graph
 from gvgbot.autonomy.hazards import Hazards
-from gvgbot.autonomy.keyframes import Keyframe, Past, Step, has_come_on
-from gvgbot.autonomy.localisation import Localisation, LocalMaps, Match
+from gvgbot.autonomy.keyframes import Past, has_come_on
+from gvgbot.autonomy.localisation import Localisation
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.mission import Mission
 from gvgbot.autonomy.noisy_walls import NoisyWalls
-from gvgbot.autonomy.odometry_log import OdometryLog
+from gvgbot.autonomy.pose_tracking import PoseTracker
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
 from gvgbot.autonomy.traffic import Traffic
 from gvgbot.autonomy.views import Correspondence, View, touching
-from gvgbot.geometry import STANDSTILL, Array, Pose, Twist, rotated_covariance, wrap_angle
+from gvgbot.geometry import STANDSTILL, Array, Pose, Twist, wrap_angle
 from gvgbot.hal.deskew import deskewed
 from gvgbot.hal.messages import Odometry, Scan
 
 _NOTHING_FELT = Felt()
-_LIFTED = np.diag([0.3**2, 0.3**2, 0.1**2])  # how far a robot is carried that is put down again
 _LOOKS_ASIDE = (
     "the laser does not see where the robot drives: say how it is mounted by laser.yaw_deg, "
     "or widen laser.first_angle_deg and laser.last_angle_deg"
@@ -50,7 +49,7 @@ _LOOKS_ASIDE = (
 _CANNOT_TURN = "go on without a look around", "the base does not turn"
 _ROOM_BESIDE_EDGES_M = 0.08  # on each side, where no edge leads
 _LONGEST_GAP_S = 2.0  # between keyframes; a longer one is an outage of a device
-_TURNED_RAD = 0.4  # that a robot may have been turned unnoticed
+_SEARCHES_NEAR_BY = "look for its place near by", "the base has started anew"
 STANDS_CARRIED = (
     "stand until it is asked to resume",
     "no walls that it knows are around its base, which has started anew: if it was carried, "
@@ -74,7 +73,6 @@ class Pipeline:
     ) -> None:
         """`led` if somebody else drives: it only learns, and its twists mean nothing."""
         self._config, self.radius, self.led = config, robot_radius, led
-        self._maps = LocalMaps(config.local_map, config.far_map, config.scan_matching)
         self._needed_m = robot_radius + config.passage_margin_m  # from its middle to walls
         self._noisy_walls = NoisyWalls(self._needed_m, config.local_map)
         self.mapper = Mapper(
@@ -84,18 +82,16 @@ class Pipeline:
             drive_dead_ends=exploration.drive_dead_ends,
             by_position=localisation == "paper",
         )
-        self._trusts_odometry = localisation == "paper"
+        self.tracker = PoseTracker(config, matches_walls=localisation != "paper")
         self.mission = Mission(exploration, self.mapper)
         self.errands = Errands(
             self.mission, self.mapper, exploration, robot_radius + _ROOM_BESIDE_EDGES_M
         )
-        self._odometry = OdometryLog()
         self._reflexes = Reflexes(config.reflexes)
         self._hazards = Hazards(config.hazards)
         self.traffic = Traffic(config.newcomers)
         self._incidents: list[tuple[str, str]] = []  # action and reason, since the last scan
-        self._was_lifted = self._look_now = False
-        self._breaks, self._unturned_s = 0, 0.0  # of odometry, at the last look
+        self._look_now = False
         self._looked: Pose | None = None  # local_base of the last look for the GVG
         self._execution = Execution(config.edge_follower, robot_radius)
         self.gvg = LocalGvg()
@@ -112,7 +108,7 @@ class Pipeline:
     @property
     def matches_walls(self) -> bool:
         """Whether walls tell where it is, and not odometry and vertices alone."""
-        return not self._trusts_odometry
+        return self.tracker.matches_walls
 
     @property
     def is_lost(self) -> bool:
@@ -138,14 +134,14 @@ class Pipeline:
     @property
     def map_base(self) -> Pose:
         """The pose as believed now."""
-        last, newest = self.past.last, self._odometry.newest
+        last, newest = self.past.last, self.tracker.odometry.newest
         if last is None or newest is None:
             return Pose()
         return self.mapper.belief.map_base.compose(last.odom_base.to(newest.odom_base))
 
     def map_base_at(self, stamp: float) -> Pose | None:
         """The pose as believed now to have been a moment ago; None if odometry does not tell."""
-        last, odom_base = self.past.last, self._odometry.odom_base_at(stamp)
+        last, odom_base = self.past.last, self.tracker.odometry.odom_base_at(stamp)
         if last is None or odom_base is None:
             return None
         return self.mapper.belief.map_base.compose(last.odom_base.to(odom_base))
@@ -165,26 +161,27 @@ class Pipeline:
         """Learn from a scan, if it was taken somewhere new; what happened."""
         happened: list[Event] = [Recovery(scan.stamp, *what) for what in self._incidents]
         self._incidents.clear()
-        odom_base = self._odometry.odom_base_at(scan.stamp)
+        odom_base = self.tracker.odometry.odom_base_at(scan.stamp)
         if odom_base is None:
             return happened
         self._glance(scan, odom_base)
         if not self._worth_a_look(scan, odom_base):
-            self._maps.catch_up()
+            self.tracker.maps.catch_up()
             return happened
         if self.past.last is not None:
             self.mission.skip(max(0.0, scan.stamp - self.past.last.stamp - _LONGEST_GAP_S))
-        scan = deskewed(without_mixed_pixels(scan), self._odometry.motion_during(scan))
+        scan = deskewed(without_mixed_pixels(scan), self.tracker.odometry.motion_during(scan))
         local_base = self._localise(scan, odom_base)
         if local_base is None:
             return happened
         whole, scan = scan, self._sift(scan, local_base)
         free = self.traffic.newcomers.free(whole, local_base)
+        maps, travelled = self.tracker.maps, self.past.travelled
         for one in self.traffic.nearby(self._local_map(local_base)):
-            self._maps.near.stand_on(one.pose.position, one.radius, self.past.travelled)
-        self._maps.insert(scan, local_base, self.past.travelled, free)
-        self._noisy_walls.note(whole, local_base.position, self._maps.near, self.past.travelled)
-        self._hazards.forget(self.past.travelled)
+            maps.near.stand_on(one.pose.position, one.radius, travelled)
+        maps.insert(scan, local_base, travelled, free)
+        self._noisy_walls.note(whole, local_base.position, maps.near, travelled)
+        self._hazards.forget(travelled)
         if self.led and not self._worth_a_gvg(local_base):
             self.past.keep(scan, odom_base, local_base, self.mapper.belief.map_base)
             return happened
@@ -203,7 +200,7 @@ class Pipeline:
     def _sift(self, scan: Scan, local_base: Pose) -> Scan:
         """The scan without what may be people or robots; the mission hears of the robots."""
         self.mission.meet(local_base, self.traffic.nearby(self._local_map(local_base)))
-        walls, is_way = self._maps.near, partial(self.mapper.is_way, local_base)
+        walls, is_way = self.tracker.maps.near, partial(self.mapper.is_way, local_base)
         map_base, now = self.mapper.belief.map_base, len(self.past.keyframes)
         return self.traffic.sift(scan, local_base, map_base, walls, is_way, now)
 
@@ -217,7 +214,7 @@ class Pipeline:
             scan.range_max, self._config.local_map.half_width_m
         )
         self.gvg, marks = self.mapper.marked(self._local_gvg(local_base), local_base)
-        hazards, suspects = self._hazards.doubtful, self._maps.near.suspects()
+        hazards, suspects = self._hazards.doubtful, self.tracker.maps.near.suspects()
         doubtful = np.concatenate([hazards, suspects, *self.traffic.standing])
         doubted = touching(self.gvg, doubtful)
         if self.traffic.is_in_team:  # bodies lead the GVG nowhere, but hide how it goes on
@@ -229,11 +226,11 @@ class Pipeline:
             self.past.travelled,
             local_base,
             self.gvg,
-            self._maps.near,
+            self.tracker.maps.near,
             doubtful,
             doubted,
             marks,
-            self.traffic.newcomers.is_one_standing(scan.stamp, self._maps.near),
+            self.traffic.newcomers.is_one_standing(scan.stamp, self.tracker.maps.near),
             scan.field_of_view,
         )
 
@@ -263,7 +260,7 @@ class Pipeline:
         """The GVG around the base, by what the local map shows and the map holds."""
         reduction, half_width = self._config.reduction, self._config.local_map.half_width_m
         fine = fine_graph(
-            self._noisy_walls.drawn(self._maps.near),
+            self._noisy_walls.drawn(self.tracker.maps.near),
             local_base.position,
             min_clearance=self._needed_m,
             roughness=reduction.roughness_m,
@@ -293,44 +290,21 @@ class Pipeline:
         return is_worth
 
     def _localise(self, scan: Scan, odom_base: Pose) -> Pose | None:
-        """The base in the local frame; the belief moves with it. None: it may be anywhere."""
-        last, newest = self.past.last, self._odometry.newest
-        assert newest is not None, "it tells where the base is"
-        is_broken, self._breaks = newest.breaks != self._breaks, newest.breaks
-        if last is None:
+        """The base in the local frame; None, and the robot stands, if it may be anywhere."""
+        is_broken = self.tracker.notice_break()
+        if self.past.last is None:
             return Pose()
-        motion = last.odom_base.to(odom_base)
-        self.past.travelled += math.hypot(motion.x, motion.y)
-        local_base, covariance, laid = self._laid(scan, last, motion, is_broken=is_broken)
-        if is_broken and self.matches_walls and not self._maps.fits(scan, local_base):
+        is_doubted, self.errands.is_lost = self.errands.is_lost, False
+        if is_broken:
+            self._incidents.append(_SEARCHES_NEAR_BY)
+        local_base = self.tracker.track(
+            scan, odom_base, self.past, self.mapper, is_broken=is_broken, is_doubted=is_doubted
+        )
+        if local_base is None:
             self.errands.pause()
             self.errands.is_lost = self.errands.is_carried = True
             self._incidents.append(STANDS_CARRIED)
-            return None
-        moved = last.local_base.to(local_base)
-        step = Step(moved, rotated_covariance(covariance, moved.theta))
-        self.past.steps.append(step)
-        self.mapper.move(step.motion, step.covariance, laid)
         return local_base
-
-    def _laid(self, scan: Scan, last: Keyframe, motion: Pose, *, is_broken: bool) -> Match:
-        """A scan on the walls, after a motion by odometry, which has started anew if broken."""
-        unturned, self._unturned_s = self._unturned_s, self._odometry.unturned_s
-        duration = max(0.0, scan.stamp - last.stamp)
-        felt_s = max(0.0, duration - (self._unturned_s - unturned))  # in which the gyro may drift
-        noise = self._config.odometry_noise.parts(motion, duration)
-        is_doubted, self.errands.is_lost = self.errands.is_lost or is_broken, False
-        if is_broken:
-            self._incidents.append(("look for its place near by", "the base has started anew"))
-        lost = self._was_lifted or self._odometry.has_gap_since(last.stamp)
-        match = self._maps.trust if self._trusts_odometry else self._maps.match
-        if lost or is_doubted:
-            turned = math.pi if is_broken else _TURNED_RAD if is_doubted else None
-            match = partial(self._maps.find, turned=turned)
-        if self._was_lifted or is_doubted:
-            self._was_lifted, noise = False, np.append(noise, [_LIFTED], axis=0)
-        odometry_noise = rotated_covariance(noise, -motion.theta)
-        return match(scan, last.local_base, motion, felt_s, odometry_noise)
 
     def _forget(self, stamp: float, happened: list[Event]) -> list[Event]:
         """Leave out the way but its end, if it has become long and there was nothing to learn."""
@@ -349,12 +323,12 @@ class Pipeline:
 
     def control(self, odometry: Odometry, felt: Felt = _NOTHING_FELT) -> Twist:
         """The twist to drive now."""
-        before = self._odometry.newest
+        before = self.tracker.odometry.newest
         if before is not None:
             turned = wrap_angle(odometry.odom_base.theta - before.odom_base.theta)
             is_free = not self._is_idle and felt.stopped_for not in WAITS
             self._execution.note_turn(turned, is_free * (odometry.stamp - before.stamp))
-        self._odometry.append(odometry)
+        self.tracker.odometry.append(odometry)
         if self.past.last is None or self.led:
             return STANDSTILL
         local_base = self.past.last.local_base_at(odometry.odom_base)
@@ -395,7 +369,7 @@ class Pipeline:
         others = np.concatenate([self.traffic.newcomers.points, self._hazards.points])
         margin = self._config.passage_margin_m
         return room_ahead(
-            self._maps.near, others, turned, farthest, radius=self.radius, margin=margin
+            self.tracker.maps.near, others, turned, farthest, radius=self.radius, margin=margin
         )
 
     def _take_down(self, incident: Incident, local_base: Pose) -> None:
@@ -415,7 +389,7 @@ class Pipeline:
             case PutDown():
                 self.errands.note_lifted()
                 self._incidents.append(("look around", "the robot was lifted"))
-                self._was_lifted = True
+                self.tracker.was_lifted = True
 
 
 def _blind_angle(scan: Scan) -> float:

@@ -92,7 +92,7 @@ class ReturningPipeline(Pipeline):
             return []
         if self._seeker is not None:
             return self._seek(self._seeker, scan)
-        odom_base = self._odometry.odom_base_at(scan.stamp)
+        odom_base = self.tracker.odometry.odom_base_at(scan.stamp)
         if odom_base is None:
             return []
         if not self._is_doubted and self._is_vouched() and self._agrees(scan, odom_base):
@@ -115,11 +115,11 @@ class ReturningPipeline(Pipeline):
         before, motion = last.local_base, last.odom_base.to(odom_base)
         duration = scan.stamp - last.stamp
         noise = self._config.odometry_noise.parts(motion, duration)
-        local_base, *_ = self._maps.find(scan, before, motion, duration, noise)
+        local_base, *_ = self.tracker.maps.find(scan, before, motion, duration, noise)
         offset = before.compose(motion).to(local_base)
         if np.hypot(offset.x, offset.y) > _MOVED_M or abs(offset.theta) > _MOVED_RAD:
             return False
-        return self._maps.fits(scan, local_base)
+        return self.tracker.maps.fits(scan, local_base)
 
     def _begin_anew(self, scan: Scan) -> list[Event]:
         """Forget all, and learn from the scan as from the first one."""
@@ -128,7 +128,7 @@ class ReturningPipeline(Pipeline):
         is_waiting = self.errands.is_waiting
         recall(self, remember(fresh), [])
         self.errands.is_waiting = is_waiting
-        self._maps, self._is_back = fresh._maps, True
+        self.tracker.maps, self._is_back = fresh.tracker.maps, True
         happened: list[Event] = [
             Recovery(scan.stamp, "begin a new map", f"it may have been moved, and {why}"),
             WayForgotten(scan.stamp, 0, left_out),
@@ -148,7 +148,7 @@ class ReturningPipeline(Pipeline):
         is_whole = bool(graph.edges) and not graph.frontiers()
         self._relocaliser = Relocaliser(scans, self._matching, is_whole=is_whole)
         self._seeker, self._tour = self._new_mind(), None
-        self._seeker._odometry = self._odometry
+        self._seeker.tracker.odometry = self.tracker.odometry
         self.errands.unplaced = ""
         return [Recovery(scan.stamp, "look for its place on the map", "it may have been moved")]
 
@@ -166,7 +166,7 @@ class ReturningPipeline(Pipeline):
         last = seeker.past.last
         if last is None or seeker._execution.is_turning:
             return []
-        opinion = self._relocaliser.step(Look.around(last.local_base, seeker._maps.near))
+        opinion = self._relocaliser.step(Look.around(last.local_base, seeker.tracker.maps.near))
         if opinion.map_local is not None and opinion.is_sure:
             self._arrive(seeker, opinion.map_local)
             reason = f"{opinion.confidence:.3f} sure after {opinion.looks} looks"
@@ -207,11 +207,10 @@ class ReturningPipeline(Pipeline):
         map_local = map_base.compose(found.local_base.inverse())
         self._move_hazards(seeker, map_local.to(map_before))
         older = self.past.travelled - seeker.past.travelled
-        for local_map in (seeker._maps.near, seeker._maps._far):
+        for local_map in (seeker.tracker.maps.near, seeker.tracker.maps._far):
             local_map._seen_at += np.float32(older)
-        self._maps, self._odometry, self.gvg = seeker._maps, seeker._odometry, seeker.gvg
-        self._breaks, self._unturned_s = seeker._breaks, seeker._unturned_s
-        self._reflexes = seeker._reflexes
+        self.tracker.take_over(seeker.tracker)
+        self.gvg, self._reflexes = seeker.gvg, seeker._reflexes
         self.traffic.newcomers = seeker.traffic.newcomers
         self._be_on_edge(map_local)
         self.past.keyframes.append(replace(found, map_base=map_base))

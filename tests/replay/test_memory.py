@@ -81,12 +81,12 @@ def test_who_was_passed_is_looked_at_again_by_whoever_was_restarted() -> None:
 def test_what_an_older_version_learnt_of_the_noise_is_learnt_anew() -> None:
     """It kept three factors."""
     lived, restarted = fresh(load_config()), fresh(load_config())
-    lived._maps.calibration.x = np.array([0.01, 0.0, 0.0])
-    lived._maps.calibration.noise, lived._maps.calibration.told = np.full((2, 3), 0.1)
+    lived.tracker.maps.calibration.x = np.array([0.01, 0.0, 0.0])
+    lived.tracker.maps.calibration.noise, lived.tracker.maps.calibration.told = np.full((2, 3), 0.1)
     recall(restarted, *kept(lived))
-    calibration = restarted._maps.calibration
+    calibration = restarted.tracker.maps.calibration
     assert calibration.x[0] == 0.01
-    assert np.array_equal(calibration.noise, fresh(load_config())._maps.calibration.noise)
+    assert np.array_equal(calibration.noise, fresh(load_config()).tracker.maps.calibration.noise)
 
 
 def test_what_the_journal_says_after_the_snapshot_is_lived_again(

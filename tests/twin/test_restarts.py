@@ -151,7 +151,7 @@ def test_who_is_carried_while_it_looks_for_its_place_stands_and_then_looks_anew(
         seeker = pipeline._seeker
         if not stood and seeker is not None and len(seeker.past.keyframes) > 6:
             lives.world.body.pose = Pose(-5.2, 0.3, 3.1)  # where the stick ends
-            seeker._breaks -= 1
+            seeker.tracker._breaks -= 1
         stood += pipeline.errands.is_paused
         if stood == 20:
             stood += 1

@@ -207,7 +207,7 @@ def test_a_base_that_was_carried_away_before_it_started_anew_stands_and_says_so(
     pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
     for k in range(26):  # once round, so that all walls are known
         looked(pipeline, 0.1 * k, 0.25 * k)
-    known, walls = len(pipeline.past.keyframes), pipeline._maps.near.points().copy()
+    known, walls = len(pipeline.past.keyframes), pipeline.tracker.maps.near.points().copy()
     happened: list[Event] = []
     for k in range(8):
         stamp = 6.5 + 0.1 * k
@@ -221,7 +221,7 @@ def test_a_base_that_was_carried_away_before_it_started_anew_stands_and_says_so(
     assert not remember(pipeline).intent.is_paused  # when it is started anew, it looks
     if stands:
         assert len(pipeline.past.keyframes) == known  # and spoils no map
-        assert (pipeline._maps.near.points() == walls).all()
+        assert (pipeline.tracker.maps.near.points() == walls).all()
 
 
 @pytest.mark.parametrize("rest_s", [10.0, 3600.0])
@@ -230,7 +230,8 @@ def test_a_gyro_that_feels_nothing_for_an_hour_has_not_drifted(rest_s: float) ->
     pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
     for k in range(26):
         looked(pipeline, 0.1 * k, 0.25 * k)
-    pipeline._maps.calibration.x = np.array([0.0, 0.0, 5e-4])  # rad/s, as was learnt in driving
+    drift = np.array([0.0, 0.0, 5e-4])  # rad/s, as was learnt in driving
+    pipeline.tracker.maps.calibration.x = drift
     pipeline.errands.is_paused = True
     for stamp in np.arange(2.6, 2.6 + rest_s, 0.25):
         pipeline.control(Odometry(float(stamp), Pose(0.0, 0.0, 6.25), STANDSTILL))

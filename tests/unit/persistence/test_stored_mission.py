@@ -66,7 +66,7 @@ def test_a_mind_that_recalls_it_has_the_map_of_that_place(saved: Saved) -> None:
         place = START.compose(estimate.vertices[vertex.id])
         wanted = MEETPOINT if vertex.kind == "meetpoint" else ENDPOINT
         assert math.dist((place.x, place.y), wanted) < 0.1
-    walls = START.transform(pipeline._maps.near.points())
+    walls = START.transform(pipeline.tracker.maps.near.points())
     stem = walls[(walls[:, 0] > -5.5) & (walls[:, 0] < -1.5)]
     assert len(stem) > 50
     assert np.abs(np.abs(stem[:, 1]) - 1.0).max() < 0.1

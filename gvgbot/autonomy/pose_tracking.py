@@ -1,0 +1,91 @@
+"""Where the base is at each look: odometry since the one before, corrected by the walls around."""
+
+import math
+from functools import partial
+from typing import Self
+
+import numpy as np
+
+from gvgbot.autonomy.config import AutonomyConfig
+from gvgbot.autonomy.keyframes import Keyframe, Past, Step
+from gvgbot.autonomy.localisation import LocalMaps, Match
+from gvgbot.autonomy.map_edits import MapEdits
+from gvgbot.autonomy.odometry_log import OdometryLog
+from gvgbot.geometry import Pose, rotated_covariance
+from gvgbot.hal.messages import Scan
+
+_LIFTED = np.diag([0.3**2, 0.3**2, 0.1**2])  # how far a robot is carried that is put down again
+_TURNED_RAD = 0.4  # that a robot may have been turned unnoticed
+
+
+class PoseTracker:
+    """Keeps what tells where the base is: its odometry, and the walls seen so far."""
+
+    def __init__(self, config: AutonomyConfig, *, matches_walls: bool) -> None:
+        """`matches_walls` if walls tell where it is, and not odometry and vertices alone."""
+        self.maps = LocalMaps(config.local_map, config.far_map, config.scan_matching)
+        self.odometry = OdometryLog()
+        self.matches_walls = matches_walls
+        self.was_lifted = False  # since the last look
+        self._noise = config.odometry_noise
+        self._breaks, self._unturned_s = 0, 0.0  # of odometry, at the last look
+
+    def notice_break(self) -> bool:
+        """Whether the base has started anew since the last look; this one knows of it."""
+        newest = self.odometry.newest
+        assert newest is not None, "it tells where the base is"
+        is_broken, self._breaks = newest.breaks != self._breaks, newest.breaks
+        return is_broken
+
+    def track(
+        self,
+        scan: Scan,
+        odom_base: Pose,
+        past: Past,
+        mapper: MapEdits,
+        *,
+        is_broken: bool,
+        is_doubted: bool,
+    ) -> Pose | None:
+        """The base in the local frame; the belief moves with it. None: it may be anywhere.
+
+        `is_broken` if odometry has started anew, `is_doubted` if it is not certain for some other
+        reason where the robot is.
+        """
+        last = past.last
+        assert last is not None, "the local frame is where the first look was"
+        motion = last.odom_base.to(odom_base)
+        past.travelled += math.hypot(motion.x, motion.y)
+        local_base, covariance, laid = self._laid(
+            scan, last, motion, is_broken=is_broken, is_doubted=is_doubted or is_broken
+        )
+        if is_broken and self.matches_walls and not self.maps.fits(scan, local_base):
+            return None
+        moved = last.local_base.to(local_base)
+        step = Step(moved, rotated_covariance(covariance, moved.theta))
+        past.steps.append(step)
+        mapper.move(step.motion, step.covariance, laid)
+        return local_base
+
+    def _laid(
+        self, scan: Scan, last: Keyframe, motion: Pose, *, is_broken: bool, is_doubted: bool
+    ) -> Match:
+        """A scan on the walls, after a motion by odometry."""
+        unturned, self._unturned_s = self._unturned_s, self.odometry.unturned_s
+        duration = max(0.0, scan.stamp - last.stamp)
+        felt_s = max(0.0, duration - (self._unturned_s - unturned))  # in which the gyro may drift
+        noise = self._noise.parts(motion, duration)
+        lost = self.was_lifted or self.odometry.has_gap_since(last.stamp)
+        match = self.maps.match if self.matches_walls else self.maps.trust
+        if lost or is_doubted:
+            turned = math.pi if is_broken else _TURNED_RAD if is_doubted else None
+            match = partial(self.maps.find, turned=turned)
+        if self.was_lifted or is_doubted:
+            self.was_lifted, noise = False, np.append(noise, [_LIFTED], axis=0)
+        odometry_noise = rotated_covariance(noise, -motion.theta)
+        return match(scan, last.local_base, motion, felt_s, odometry_noise)
+
+    def take_over(self, other: Self) -> None:
+        """Go on in the local frame of another one, with its walls and by its odometry."""
+        self.maps, self.odometry = other.maps, other.odometry
+        self._breaks, self._unturned_s = other._breaks, other._unturned_s

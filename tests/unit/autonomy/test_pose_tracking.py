@@ -1,0 +1,94 @@
+"""Where the base is at a look, when odometry is to be trusted and when it is not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gvgbot.autonomy.config import AutonomyConfig
+from gvgbot.autonomy.evidence import MappingConfig
+from gvgbot.autonomy.keyframes import Past
+from gvgbot.autonomy.map_edits import MapEdits
+from gvgbot.autonomy.pose_tracking import PoseTracker
+from gvgbot.autonomy.slam.recognition import RecognitionConfig
+from gvgbot.geometry import STANDSTILL, Pose
+from gvgbot.hal.messages import Odometry
+from tests.unit.autonomy.sights import carved, sweep
+
+ROOMS = carved([(-4.0, -1.0, 4.0, 1.0), (0.0, -1.0, 2.0, 4.0)])
+START = Pose(-1.5, 0.0)
+
+
+class Tracked:
+    """A tracker that has looked round once, and what hangs on it; a second from look to look."""
+
+    def __init__(self) -> None:
+        self.tracker = PoseTracker(AutonomyConfig(), matches_walls=True)
+        self.past, self.mapper = Past(), MapEdits(MappingConfig(), RecognitionConfig())
+        self._stamp = 0.0
+        self._keep(Pose(), Pose())
+
+    def look(
+        self, odom_base: Pose, local_base: Pose, *, breaks: int = 0, is_doubted: bool = False
+    ) -> Pose | None:
+        """Where it finds itself that odometry has at one pose, and the walls at another."""
+        for stamp in np.arange(self._stamp, self._stamp + 1.01, 0.2).tolist():
+            self.tracker.odometry.append(Odometry(stamp, odom_base, STANDSTILL, breaks))
+        self._stamp += 1.0
+        is_broken = self.tracker.notice_break()
+        scan = replace(sweep(ROOMS, START.compose(local_base)), stamp=self._stamp)
+        found = self.tracker.track(
+            scan, odom_base, self.past, self.mapper, is_broken=is_broken, is_doubted=is_doubted
+        )
+        if found is not None:
+            self._keep(odom_base, found)
+        return found
+
+    def _keep(self, odom_base: Pose, local_base: Pose) -> None:
+        scan = replace(sweep(ROOMS, START.compose(local_base)), stamp=self._stamp)
+        self.tracker.maps.insert(scan, local_base, self.past.travelled)
+        self.past.keep(scan, odom_base, local_base, self.mapper.belief.map_base)
+
+
+def test_a_base_that_has_started_anew_is_noticed_once() -> None:
+    tracker = PoseTracker(AutonomyConfig(), matches_walls=True)
+    tracker.odometry.append(Odometry(0.0, Pose(), STANDSTILL))
+    assert not tracker.notice_break()
+    tracker.odometry.append(Odometry(0.1, Pose(), STANDSTILL, breaks=1))
+    assert tracker.notice_break()
+    assert not tracker.notice_break()
+
+
+def test_belief_and_past_come_along() -> None:
+    tracked, way = Tracked(), Pose(0.3)
+    found = tracked.look(way, way)
+    assert found is not None
+    assert found.distance(way) < 0.02
+    assert tracked.past.travelled == pytest.approx(0.3)
+    assert [step.motion for step in tracked.past.steps] == [found]
+    assert tracked.mapper.belief.map_base.distance(found) < 1e-9
+
+
+@pytest.mark.parametrize("lifted", [True, False])
+def test_who_was_lifted_is_looked_for_around_and_once_only(*, lifted: bool) -> None:
+    tracked, aside = Tracked(), Pose(0.6, 0.3)
+    tracked.tracker.was_lifted = lifted
+    found = tracked.look(Pose(), aside)
+    assert found is not None
+    assert (found.distance(aside) < 0.05) == lifted
+    assert not tracked.tracker.was_lifted
+
+
+def test_who_sees_no_known_walls_after_the_base_started_anew_may_be_anywhere() -> None:
+    tracked = Tracked()
+    assert tracked.look(Pose(), Pose(3.0, 3.0), breaks=1) is None
+    assert not tracked.past.steps
+    assert tracked.mapper.belief.map_base == Pose()
+
+
+def test_who_takes_over_from_another_goes_on_by_its_walls_and_odometry() -> None:
+    one, other = Tracked(), Tracked()
+    other.look(Pose(), Pose(), breaks=3)
+    one.tracker.take_over(other.tracker)
+    assert one.tracker.maps is other.tracker.maps
+    assert not one.tracker.notice_break()  # the other one has taken account of it
