@@ -222,9 +222,9 @@ class Evidence:
             return False
         clearance = view.gvg.edges[passing.edge].clearance_at(passing.station)
         lines = cKDTree(np.concatenate([edge.polyline for edge in view.gvg.edges.values()]))
-        local_map = view.local_base.compose(self._known.belief.map_base.inverse())
+        map_in_local = self._known.map_in_local(view.local_base)
         for way in ways:
-            turned = local_map.transform(way)
+            turned = map_in_local.transform(way)
             gaps = np.asarray(lines.query(turned + (point - turned[0]))[0])
             if gaps.max() > clearance:
                 return True

@@ -29,10 +29,13 @@ class Knowledge:
     observations: list[Observation] = field(default_factory=list)
     driven_parts: list[Array] = field(default_factory=list)
 
+    def map_in_local(self, local_base: Pose) -> Pose:
+        """The pose of the map frame in the local one; `local_map` is a grid of what was seen."""
+        return local_base.compose(self.belief.map_base.inverse())
+
     def positions_from(self, local_base: Pose) -> Array:
         """Where the vertices are (N, 2), local frame, in the order of the belief's ids."""
-        local_map = local_base.compose(self.belief.map_base.inverse())
-        return local_map.transform(self.belief.positions)
+        return self.map_in_local(local_base).transform(self.belief.positions)
 
     def in_local_frame(self, view: View, vertex: int) -> Pose:
         """Where a vertex, seen lately or not, stands in the local frame."""

@@ -114,10 +114,10 @@ class MapEdits(Knowledge):
 
     def remove(self, view: View, vertex: Vertex, reason: str, *, is_passed: bool = False) -> None:
         """Take a vertex out of the map; of two edges that met there one is made."""
-        local_map = view.local_base.compose(self.belief.map_base.inverse())
+        map_in_local = self.map_in_local(view.local_base)
         for end, (far, line) in loose_ends(self.graph, self.belief, vertex).items():
             self.came_from.pop(far, None)  # its vertex is back again
-            self.came_from[end] = far, local_map.transform(line)
+            self.came_from[end] = far, map_in_local.transform(line)
         take_out(self.graph, self.belief, vertex, is_passed=is_passed)
         self.belief = ekf.remove_vertex(self.belief, vertex.id)
         self.unsettled.forget(vertex.id)

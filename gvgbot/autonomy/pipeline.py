@@ -177,7 +177,7 @@ class Pipeline:
         whole, scan = scan, self._sift(scan, local_base)
         free = self.traffic.newcomers.free(whole, local_base)
         maps, travelled = self.tracker.maps, self.past.travelled
-        for one in self.traffic.nearby(self._local_map(local_base)):
+        for one in self.traffic.nearby(self.mapper.map_in_local(local_base)):
             maps.near.stand_on(one.pose.position, one.radius, travelled)
         maps.insert(scan, local_base, travelled, free)
         self._noisy_walls.note(whole, local_base.position, maps.near, travelled)
@@ -199,14 +199,9 @@ class Pipeline:
 
     def _sift(self, scan: Scan, local_base: Pose) -> Scan:
         """The scan without what may be people or robots; the mission hears of the robots."""
-        self.mission.meet(local_base, self.traffic.nearby(self._local_map(local_base)))
-        walls, is_way = self.tracker.maps.near, partial(self.mapper.is_way, local_base)
-        map_base, now = self.mapper.belief.map_base, len(self.past.keyframes)
-        return self.traffic.sift(scan, local_base, map_base, walls, is_way, now)
-
-    def _local_map(self, local_base: Pose) -> Pose:
-        """The map frame in the local one; the base of the belief is at a pose there."""
-        return local_base.compose(self.mapper.belief.map_base.inverse())
+        self.mission.meet(local_base, self.traffic.nearby(self.mapper.map_in_local(local_base)))
+        walls, now = self.tracker.maps.near, len(self.past.keyframes)
+        return self.traffic.sift(scan, local_base, self.mapper, walls, now)
 
     def _view(self, scan: Scan, local_base: Pose) -> View:
         """What there is to be seen of the GVG, and what of that is doubtful."""
@@ -251,8 +246,8 @@ class Pipeline:
         order, done = self.errands.advance(view, known)
         if isinstance(order, Drive) and self.traffic.is_in_team:
             room = self.radius, self._config.passage_margin_m
-            local_map = self._local_map(view.local_base)
-            order = Drive(self.traffic.led_round(order.track, view, local_map, *room))
+            map_in_local = self.mapper.map_in_local(view.local_base)
+            order = Drive(self.traffic.led_round(order.track, view, map_in_local, *room))
         self._execution.obey(order)
         return done
 
@@ -355,9 +350,9 @@ class Pipeline:
         """The twist, slow enough to stop with room for somebody ahead who comes as fast."""
         if not self.traffic.is_in_team or self.past.last is None:
             return twist
-        local_map = self._local_map(self.past.last.local_base)
+        map_in_local = self.mapper.map_in_local(self.past.last.local_base)
         slow = self._config.edge_follower.min_speed_mps
-        careful = self.traffic.careful(twist, local_base, local_map, self.radius, slow)
+        careful = self.traffic.careful(twist, local_base, map_in_local, self.radius, slow)
         if careful.linear == 0.0 < twist.linear:
             self.errands.hold()
         return careful

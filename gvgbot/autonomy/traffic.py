@@ -4,7 +4,7 @@ They are kept out of the map, and given room.
 """
 
 import math
-from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from gvgbot.autonomy.control.company import BodiesSeen, Companion
 from gvgbot.autonomy.control.detour import led_round
 from gvgbot.autonomy.control.edge_follower import Track
 from gvgbot.autonomy.gvg.local_map import LocalMap
+from gvgbot.autonomy.knowledge import Knowledge
 from gvgbot.autonomy.newcomers import Newcomers, NewcomersConfig, is_near
 from gvgbot.autonomy.passed import Passed
 from gvgbot.autonomy.views import View
@@ -28,7 +29,7 @@ Disc = tuple[Array, float]  # centre (2,) and radius, m
 
 
 class Traffic:
-    """People and other robots. `local_map` is the pose of the map frame in the local one."""
+    """People and other robots. `map_in_local` is the pose of the map frame in the local one."""
 
     def __init__(self, config: NewcomersConfig) -> None:
         self.newcomers = Newcomers(config)
@@ -60,9 +61,9 @@ class Traffic:
         """Rims (N, 2) of what stands in the way, seen or not."""
         return [*self.standing, self.newcomers.lost]
 
-    def nearby(self, local_map: Pose) -> list[Companion]:
+    def nearby(self, map_in_local: Pose) -> list[Companion]:
         """Other robots, where they say that they are, or are seen close to that; local frame."""
-        return [self._as_seen(company.moved(one, local_map)) for one in self.company or ()]
+        return [self._as_seen(company.moved(one, map_in_local)) for one in self.company or ()]
 
     def _as_seen(self, one: Companion) -> Companion:
         """The companion, and what it drives along, where a body is seen close to it.
@@ -86,25 +87,24 @@ class Traffic:
         self,
         scan: Scan,
         local_base: Pose,
-        map_base: Pose,
+        known: Knowledge,
         walls: LocalMap,
-        is_way: Callable[[Array], bool],
         keyframe: int,
     ) -> Scan:
         """The scan without what may be people or robots, which are remembered; see `Newcomers`.
 
         `keyframe` is the number of the present look.
         """
-        newcomers, local_map = self.newcomers, local_base.compose(map_base.inverse())
+        newcomers, map_in_local = self.newcomers, known.map_in_local(local_base)
         newcomers.in_team, newcomers.strangers = self.is_in_team, self.strangers
-        newcomers.company = _discs(self.nearby(local_map), _ELSEWHERE_M)
-        newcomers.lasting = local_map.transform(np.array(self.lasting).reshape(-1, 2))
-        scan = newcomers.sift(scan, local_base, walls, is_way)
-        self._note_lasting(local_map.inverse())
+        newcomers.company = _discs(self.nearby(map_in_local), _ELSEWHERE_M)
+        newcomers.lasting = map_in_local.transform(np.array(self.lasting).reshape(-1, 2))
+        scan = newcomers.sift(scan, local_base, walls, partial(known.is_way, local_base))
+        self._note_lasting(map_in_local.inverse())
         missed = [Passed(keyframe, one.centre, one.radius) for one in newcomers.missed]
         self.passed = (self.passed + missed)[-_MOST_PASSED:]
         if self.is_in_team:
-            self.seen = self._bodies_seen(scan.stamp, local_base, map_base)
+            self.seen = self._bodies_seen(scan.stamp, local_base, known.belief.map_base)
         return scan
 
     def _note_lasting(self, map_local: Pose) -> None:
@@ -123,13 +123,13 @@ class Traffic:
         return BodiesSeen(stamp, map_base, bodies)
 
     def led_round(
-        self, track: Track, view: View, local_map: Pose, radius: float, margin: float
+        self, track: Track, view: View, map_in_local: Pose, radius: float, margin: float
     ) -> Track:
         """The track led round bodies near by, or to where one sees how it goes on behind them."""
         seen = self.newcomers.discs
         told = [
             (centre, wide)
-            for centre, wide in _discs(self.nearby(local_map), 0.0)
+            for centre, wide in _discs(self.nearby(map_in_local), 0.0)
             if not any(math.dist(centre, c) < r + _ELSEWHERE_M for c, r in seen)
         ]
         base = view.local_base.position
@@ -138,14 +138,14 @@ class Traffic:
         return led_round(track, bodies, view.local_map, radius, margin, is_hidden=is_hidden)
 
     def careful(
-        self, twist: Twist, local_base: Pose, local_map: Pose, radius: float, slow: float
+        self, twist: Twist, local_base: Pose, map_in_local: Pose, radius: float, slow: float
     ) -> Twist:
         """The twist, slow enough to stop with room for somebody ahead who comes as fast.
 
         `local_base` is where the robot is now; slower than `slow`, m/s, it had better stand.
         """
         base_local = local_base.inverse()
-        others = _discs(self.nearby(local_map), 0.0) + self.newcomers.latest
+        others = _discs(self.nearby(map_in_local), 0.0) + self.newcomers.latest
         discs = [(base_local.transform(centre), wide) for centre, wide in others]
         return company.careful(twist, discs, radius, slow)
 

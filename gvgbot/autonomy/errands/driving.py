@@ -262,8 +262,7 @@ class Driving:
         self, view: View, here: Situation | None, stop: ToPoint | Home, waited: float
     ) -> Order | Ended:
         goal = np.array([stop.x, stop.y])
-        local_map = view.local_base.compose(self._mapper.belief.map_base.inverse())
-        local_goal = local_map.transform(goal)
+        local_goal = self._mapper.map_in_local(view.local_base).transform(goal)
         away = float(np.hypot(*(local_goal - view.local_base.position)))
         if away < _THERE_M:
             return Ended("arrived", "")

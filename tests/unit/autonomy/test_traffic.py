@@ -7,7 +7,9 @@ import pytest
 
 from gvgbot.autonomy.control.company import Companion
 from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
+from gvgbot.autonomy.knowledge import Knowledge
 from gvgbot.autonomy.newcomers import NewcomersConfig
+from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.traffic import Traffic
 from gvgbot.drivers.world import World
 from gvgbot.geometry import Pose
@@ -25,13 +27,14 @@ class Room:
     def __init__(self) -> None:
         self.traffic = Traffic(NewcomersConfig(found_after_s=20.0))
         self.map = LocalMap(LocalMapConfig())
+        self._known = Knowledge(Belief(np.array([MAP_BASE.x, MAP_BASE.y, MAP_BASE.theta])))
 
     def look(self, world: World, stamp: float, *, column: bool) -> None:
         scan = replace(sweep(world, HERE), stamp=stamp)
         if column:
             ranges = np.minimum(scan.ranges, to_disc(scan.bearings, (2.0, 0.0)))
             scan = replace(scan, ranges=ranges)
-        sifted = self.traffic.sift(scan, HERE, MAP_BASE, self.map, lambda place: False, 0)
+        sifted = self.traffic.sift(scan, HERE, self._known, self.map, 0)
         self.map.insert(sifted, HERE, 0.0)
 
 
