@@ -41,10 +41,15 @@ _FITS_M, _FITTING = 0.15, 0.8  # so near to the walls must be that share of a sc
 # vertex seen again corrects by its position only, as the method was published
 Localisation = Literal["full", "paper"]
 
-
-Match = tuple[Pose, Array, Laid | None]
-"""The base after a step, the covariance (3, 3) of that step, and how walls led to it."""
 _Lesson = tuple[Pose, float, Pose, Array, Array, float]  # as Calibration.learn takes it
+
+
+class ScanMatch(NamedTuple):
+    """The base after a step, the covariance (3, 3) of that step, and how walls led to it."""
+
+    local_base: Pose
+    covariance: Array
+    laid: Laid | None
 
 
 class _Walls(NamedTuple):
@@ -120,7 +125,9 @@ class LocalMaps:
         self._teach_far()
         return self._far
 
-    def match(self, scan: Scan, before: Pose, motion: Pose, duration: float, noise: Array) -> Match:
+    def match(
+        self, scan: Scan, before: Pose, motion: Pose, duration: float, noise: Array
+    ) -> ScanMatch:
         """The pose of the base after a motion, its covariance (3, 3) in its own frame, and how.
 
         That covariance is of what the step adds for good to the error of the one before. There are
@@ -136,7 +143,7 @@ class LocalMaps:
         calibration, per_error = self._calibration, per_unit(motion, duration)
         if best is None:
             laid = self._laid(None, prior, per_error, Q)
-            return prior, calibration.adds_up(motion, duration, np.eye(3), Q), laid
+            return ScanMatch(prior, calibration.adds_up(motion, duration, np.eye(3), Q), laid)
         found, used = best
         expected = self._matching.pair_sigma_m**2 / self._matching.independent_share
         walls = min(1.0, found.scatter / expected)
@@ -150,11 +157,13 @@ class LocalMaps:
         stays = np.linalg.inv(np.eye(3) + g * self._age(found))
         drift = stays @ error @ stays.T
         left = np.asarray(stays @ (np.eye(3) - g), np.float64)
-        return found.pose, calibration.adds_up(motion, duration, left, drift), laid
+        return ScanMatch(found.pose, calibration.adds_up(motion, duration, left, drift), laid)
 
-    def trust(self, scan: Scan, before: Pose, motion: Pose, duration: float, noise: Array) -> Match:
+    def trust(
+        self, scan: Scan, before: Pose, motion: Pose, duration: float, noise: Array
+    ) -> ScanMatch:
         """As `match`, but just where odometry has it, whatever the walls say."""
-        return before.compose(motion), noise.sum(axis=0), None
+        return ScanMatch(before.compose(motion), noise.sum(axis=0), None)
 
     def find(
         self,
@@ -165,7 +174,7 @@ class LocalMaps:
         noise: Array,
         *,
         turned: float | None = None,
-    ) -> Match:
+    ) -> ScanMatch:
         """As `match`, where nobody saw the way that the base took: it is searched for around.
 
         Wheels tell how far it went and how much it turned, but not which of it came first. Where
@@ -177,7 +186,9 @@ class LocalMaps:
         Q = noise.sum(axis=0) + _LOST
         priors = [(p, Q) for p in _around(prior)]
         best = self._best(scan, priors, clearly, turned or 0.0, least_known=_SEEN_SHARE)
-        return (prior, Q, None) if best is None else (best[0].pose, best[0].covariance, None)
+        if best is None:
+            return ScanMatch(prior, Q, None)
+        return ScanMatch(best[0].pose, best[0].covariance, None)
 
     def fits(self, scan: Scan, local_base: Pose) -> bool:
         """Whether a scan from a pose in the local frame shows the walls that are known there."""

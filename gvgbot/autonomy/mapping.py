@@ -159,7 +159,7 @@ class Mapper(MapEdits):
 
     def _may_be_known(self, view: View, sighting: Sighting) -> bool:
         vertices = self.graph.vertices.values()
-        return bool(self._recogniser.candidates(self.belief, vertices, view, sighting))
+        return bool(self._recogniser.gated(self.belief, vertices, view, sighting))
 
     # -- what is known better ----------------------------------------------------------------
 

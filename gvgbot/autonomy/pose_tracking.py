@@ -8,7 +8,7 @@ import numpy as np
 
 from gvgbot.autonomy.config import AutonomyConfig
 from gvgbot.autonomy.keyframes import Keyframe, Past, Step
-from gvgbot.autonomy.localisation import LocalMaps, Match
+from gvgbot.autonomy.localisation import LocalMaps, ScanMatch
 from gvgbot.autonomy.map_edits import MapEdits
 from gvgbot.autonomy.odometry_log import OdometryLog
 from gvgbot.geometry import Pose, rotated_covariance
@@ -56,20 +56,20 @@ class PoseTracker:
         assert last is not None, "the local frame is where the first look was"
         motion = last.odom_base.to(odom_base)
         past.travelled += math.hypot(motion.x, motion.y)
-        local_base, covariance, laid = self._laid(
+        match = self._matched(
             scan, last, motion, is_broken=is_broken, is_doubted=is_doubted or is_broken
         )
-        if is_broken and self.matches_walls and not self.maps.fits(scan, local_base):
+        if is_broken and self.matches_walls and not self.maps.fits(scan, match.local_base):
             return None
-        moved = last.local_base.to(local_base)
-        step = Step(moved, rotated_covariance(covariance, moved.theta))
+        moved = last.local_base.to(match.local_base)
+        step = Step(moved, rotated_covariance(match.covariance, moved.theta))
         past.steps.append(step)
-        mapper.move(step.motion, step.covariance, laid)
-        return local_base
+        mapper.move(step.motion, step.covariance, match.laid)
+        return match.local_base
 
-    def _laid(
+    def _matched(
         self, scan: Scan, last: Keyframe, motion: Pose, *, is_broken: bool, is_doubted: bool
-    ) -> Match:
+    ) -> ScanMatch:
         """A scan on the walls, after a motion by odometry."""
         unturned, self._unturned_s = self._unturned_s, self.odometry.unturned_s
         duration = max(0.0, scan.stamp - last.stamp)

@@ -36,7 +36,7 @@ _WALLS_M = 2.5  # from a vertex, about: turned by so much that these are missed,
 _REGISTRATION_FLOOR = np.diag([1e-4, 1e-4, 4e-6])  # what registration cannot know of itself
 
 
-class Candidate(NamedTuple):
+class GatedVertex(NamedTuple):
     """A vertex that may be what is seen, by its place: squared Mahalanobis distance and metres."""
 
     distance: float
@@ -114,8 +114,8 @@ class Recogniser:
         Who is wary takes none for it but one whose place is known.
         """
         compared = (
-            self._compare(belief, view, sighting, candidate)
-            for candidate in self.candidates(belief, vertices, view, sighting)
+            self._compare(belief, view, sighting, gated)
+            for gated in self.gated(belief, vertices, view, sighting)
         )
         matches = [match for match in compared if match is not None]
         best = self._beyond_doubt(belief, matches, sighting)
@@ -159,13 +159,13 @@ class Recogniser:
         elsewhere = sorted((metres, v) for v, (d2, metres) in far.items() if d2 > self._config.gate)
         alike = 0
         for metres, v in elsewhere[:_COMPARED]:
-            candidate = Candidate(0.0, metres, graph.vertices[v])
-            alike += self._compare(belief, view, sighting, candidate) is not None
+            gated = GatedVertex(0.0, metres, graph.vertices[v])
+            alike += self._compare(belief, view, sighting, gated) is not None
         return (1 + alike) / (2 + len(elsewhere[:_COMPARED]))
 
-    def candidates(
+    def gated(
         self, belief: Belief, vertices: Iterable[Vertex], view: View, sighting: Sighting
-    ) -> list[Candidate]:
+    ) -> list[GatedVertex]:
         """Those long out of sight that are inside the gate of a sighting; most likely first."""
         found = []
         far = gate_distances(belief, sighting, view.local_base, self._config)
@@ -174,17 +174,17 @@ class Recogniser:
                 continue
             d2, metres = far[vertex.id]
             if d2 < self._config.gate or metres < self._config.same_place_m:
-                found.append(Candidate(d2, metres, vertex))
-        return sorted(found, key=lambda candidate: (candidate.distance, candidate.vertex.id))
+                found.append(GatedVertex(d2, metres, vertex))
+        return sorted(found, key=lambda gated: (gated.distance, gated.vertex.id))
 
     def _compare(
-        self, belief: Belief, view: View, sighting: Sighting, candidate: Candidate
+        self, belief: Belief, view: View, sighting: Sighting, gated: GatedVertex
     ) -> Match | None:
         """The vertex found where a sighting is, if its shape and the walls agree.
 
         Walls that have changed cannot hide a vertex that stands where it should and looks alike.
         """
-        distance, metres, vertex = candidate
+        distance, metres, vertex = gated
         base_vertex = ekf.expected(belief, vertex.id)[0]
         foreseen = view.local_base.compose(base_vertex)
         if not looks_alike(vertex, sighting, foreseen, self._config):

@@ -115,7 +115,7 @@ class ReturningPipeline(Pipeline):
         before, motion = last.local_base, last.odom_base.to(odom_base)
         duration = scan.stamp - last.stamp
         noise = self._config.odometry_noise.parts(motion, duration)
-        local_base, *_ = self.tracker.maps.find(scan, before, motion, duration, noise)
+        local_base = self.tracker.maps.find(scan, before, motion, duration, noise).local_base
         offset = before.compose(motion).to(local_base)
         if np.hypot(offset.x, offset.y) > _MOVED_M or abs(offset.theta) > _MOVED_RAD:
             return False

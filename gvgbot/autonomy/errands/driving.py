@@ -17,7 +17,7 @@ from gvgbot.autonomy.destinations import (
     route_to_vertex,
 )
 from gvgbot.autonomy.errands.closures import Closures
-from gvgbot.autonomy.errands.kinds import Home, Look, Past, Rest, Stop, ToPoint, ToVertex
+from gvgbot.autonomy.errands.kinds import Home, Look, Rest, Stop, ToPoint, ToVertex, Waypoint
 from gvgbot.autonomy.events import Event, Recovery
 from gvgbot.autonomy.exploration.access import (
     NEAR_M,
@@ -139,7 +139,7 @@ class Driving:
                 return self._rest(view, seconds)
             case ToVertex(vertex=vertex):
                 return self._to_vertex(view, here, vertex, waited)
-            case Past(end=end, station=station):
+            case Waypoint(end=end, station=station):
                 return self._past(view, here, foot_at(self._mapper.graph, end, station), waited)
             case ToPoint() | Home():
                 return self._to_point(view, here, self.stop, waited)

@@ -64,7 +64,7 @@ class Coverage:
 
 
 @dataclass(frozen=True, slots=True)
-class Past:
+class Waypoint:
     """A stop at which the robot does not stop: metres `station` from the half-edge `end`."""
 
     end: HalfEdgeId
@@ -81,5 +81,5 @@ class Rest:
     seconds: float
 
 
-Stop = ToVertex | ToPoint | Home | Look | Past | Rest
+Stop = ToVertex | ToPoint | Home | Look | Waypoint | Rest
 Errand = ToVertex | ToPoint | Home | Look | Patrol | Coverage

@@ -11,12 +11,12 @@ from gvgbot.autonomy.errands.kinds import (
     Errand,
     Home,
     Look,
-    Past,
     Patrol,
     Rest,
     Stop,
     ToPoint,
     ToVertex,
+    Waypoint,
 )
 from gvgbot.autonomy.events import Event, Recovery, RoundEnded
 from gvgbot.autonomy.exploration.paths import Approach, shortest_paths
@@ -276,13 +276,13 @@ def _once_each(graph: GvgGraph, tour: list[HalfEdgeId]) -> Iterator[HalfEdgeId]:
 def _stops(graph: GvgGraph, end: HalfEdgeId, *, is_last: bool) -> list[Stop]:
     """Where to pass so that the shortest way from each to the next is along the edge."""
     edge = graph.edge_at(end)
-    stops: list[Stop] = [Past(end, 0.0)]
+    stops: list[Stop] = [Waypoint(end, 0.0)]
     if edge is None:
         return stops
     third = edge.length / 3
-    stops += [Past(end, third), Past(end, 2 * third)]
+    stops += [Waypoint(end, third), Waypoint(end, 2 * third)]
     if third > _NEAR_END_M:
-        stops.append(Past(end, edge.length - _NEAR_END_M))
+        stops.append(Waypoint(end, edge.length - _NEAR_END_M))
     far = edge.other(end).vertex
     if is_last or graph.vertices[far].degree == 1:
         stops.append(ToVertex(far))

@@ -727,7 +727,7 @@ class Believing:
     def __init__(self, known: int, *, as_rival: bool, looks: float = math.inf) -> None:
         self._known, self._as_rival, self._looks = known, as_rival, looks
 
-    def candidates(self, *_: object) -> list[object]:
+    def gated(self, *_: object) -> list[object]:
         return []
 
     def find(

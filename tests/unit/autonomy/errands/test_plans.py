@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gvgbot.autonomy.errands.driving import Ended
-from gvgbot.autonomy.errands.kinds import Coverage, Past, Patrol, Rest, ToVertex
+from gvgbot.autonomy.errands.kinds import Coverage, Patrol, Rest, ToVertex, Waypoint
 from gvgbot.autonomy.errands.plans import AllEdges, Here, Plan, Rounds, plan_for, recalled
 from gvgbot.autonomy.events import Recovery, RoundEnded
 from gvgbot.autonomy.exploration.paths import Approach
@@ -35,7 +35,7 @@ def in_steps(graph: GvgGraph) -> nx.Graph:
     return town
 
 
-def point_of(graph: GvgGraph, stop: Past | ToVertex) -> Point:
+def point_of(graph: GvgGraph, stop: Waypoint | ToVertex) -> Point:
     if isinstance(stop, ToVertex):
         return stop.vertex
     edge = graph.edge_at(stop.end)
@@ -51,7 +51,7 @@ def drive(graph: GvgGraph, plan: Plan, start: int) -> list[Point]:
     town, at, way = in_steps(graph), start, list[Point]()
     place: Point = at
     while not isinstance(stop := plan.next(here(graph, at)), Ended):
-        assert isinstance(stop, Past | ToVertex)
+        assert isinstance(stop, Waypoint | ToVertex)
         goal = point_of(graph, stop)
         way += nx.shortest_path(town, place, goal)
         place = goal
@@ -90,7 +90,7 @@ def test_a_coverage_goes_on_after_a_restart_where_it_was() -> None:
     assert kept is not None
     again = recalled(kept)
     assert (str(again), again.kept()) == (str(plan), kept)
-    assert isinstance(again.next(here(graph, ids[0, 0])), Past)
+    assert isinstance(again.next(here(graph, ids[0, 0])), Waypoint)
 
 
 def test_an_edge_that_cannot_be_driven_is_tried_once_more_at_the_end_and_told_of() -> None:
@@ -98,8 +98,8 @@ def test_an_edge_that_cannot_be_driven_is_tried_once_more_at_the_end_and_told_of
     plan, refused = AllEdges(Coverage()), list[HalfEdgeId]()
     shut = next(iter(graph.edges.values()))
     while not isinstance(stop := plan.next(here(graph, ids[0, 0])), Ended):
-        is_shut = isinstance(stop, Past) and stop.end in (shut.a, shut.b)
-        if is_shut and isinstance(stop, Past):
+        is_shut = isinstance(stop, Waypoint) and stop.end in (shut.a, shut.b)
+        if is_shut and isinstance(stop, Waypoint):
             refused.append(stop.end)
         plan.note(here(graph, ids[0, 0]), GIVEN_UP if is_shut else ARRIVED)
     assert len(refused) == 2
