@@ -27,6 +27,7 @@ _AT_ALL = 0.01  # better agreement, where no place is likelier than another
 # of a fit: what a point counts that lies where nothing is known yet. Of 100 points on known ground
 # 94 fit where the robot is and 40 where it is not: ln(60 / 6) / (ln(60 / 6) + ln(94 / 40)) = 0.73
 _UNKNOWN = 0.7
+_ON_WALLS = 0.8  # so near to walls, as a share of the reach, points are on them, lines or not
 _CLEARLY = 0.1  # better agreement of beams and walls than this is no chance
 _SEARCH_M, _SEARCH_STEP_M = 1.0, 0.25  # around the pose by odometry
 _SEARCH_STEP_RAD, _SEARCH_PAIR_M = 0.05, 0.3
@@ -139,7 +140,7 @@ class LocalMaps:
         prior = before.compose(motion)
         still = Pose(before.x, before.y, prior.theta)
         slipping = [] if self._matching.search_rad else [(still, _SLIPPING * Q)]
-        best = self._best(scan, [(prior, Q), *slipping], least_known=_SEEN_SHARE)
+        best = self._best(scan, [(prior, Q), *slipping], least_known=_SEEN_SHARE, stays=True)
         calibration, per_error = self._calibration, per_unit(motion, duration)
         if best is None:
             laid = self._laid(None, prior, per_error, Q)
@@ -248,11 +249,15 @@ class LocalMaps:
         clearly: float = _CLEARLY,
         turned: float = 0.0,
         least_known: float = 1.0,
+        *,
+        stays: bool = False,
     ) -> tuple[Registration, Array] | None:
         """The match from the first prior, unless that from another one is clearly better.
 
         With `least_known`, what lies where nothing is known yet speaks neither for a place nor
-        against it; enough of the rest, which is taken for at least that share, must fit.
+        against it; enough of the rest, which is taken for at least that share, must fit. Where the
+        robot `stays` by the first prior, points must also lie nearer to walls by another one: few
+        of them lie on lines among posts, and by chance on lines from post to post.
         """
         self.catch_up()
         assert self._walls is not None
@@ -264,8 +269,8 @@ class LocalMaps:
         if min(len(walls), len(points)) < _LEAST_POINTS:
             return None
         best: tuple[Registration, Array] | None = None
-        agreement = 0.0
-        for prior, Q in priors:
+        agreement, first = 0.0, priors[0][0]
+        for i, (prior, Q) in enumerate(priors):
             if agreement + clearly >= 1.0:
                 break  # nothing can be clearly better
             reach = max(config.search_rad, turned)
@@ -274,18 +279,41 @@ class LocalMaps:
             found = register_coarsely(
                 points, tree, walls, near, Q, config, coarse, hits, sides, so_far
             )
+            pose = near if found is None else found.pose
+            first = pose if i == 0 else first
             if found is None:
                 continue
-            known = 1.0
-            if least_known < 1.0:
-                known = float(self.near.known(found.pose.transform(points)).mean())
-            if found.inliers < config.min_inliers * max(known, found.inliers, least_known):
+            now = self._agreement(found, points, least_known)
+            if now is None:
+                if stays and i == 0 and self._nearness(points, pose) >= _ON_WALLS:
+                    best = found, Q
                 continue
-            fits = found.inliers * (1.0 - found.rms / config.max_pair_m)
-            now = fits + _UNKNOWN * (1.0 - max(known, found.inliers))
-            if now > agreement + clearly:
-                best, agreement = (found, Q), now
+            if now <= agreement + clearly:
+                continue
+            if stays and i and self._nearness(points, pose) <= self._nearness(points, first):
+                continue
+            best, agreement = (found, Q), now
         return best
+
+    def _agreement(self, found: Registration, points: Array, least_known: float) -> float | None:
+        """How well points (N, 2) fit where they were found, 0 to 1; None if too few of them do."""
+        known, config = 1.0, self._matching
+        if least_known < 1.0:
+            known = float(self.near.known(found.pose.transform(points)).mean())
+        if found.inliers < config.min_inliers * max(known, found.inliers, least_known):
+            return None
+        fits = found.inliers * (1.0 - found.rms / config.max_pair_m)
+        return fits + _UNKNOWN * (1.0 - max(known, found.inliers))
+
+    def _nearness(self, points: Array, pose: Pose) -> float:
+        """How near points (N, 2) lie to walls, where anything is known: 1 on them, 0 off them."""
+        assert self._walls is not None
+        laid, reach = pose.transform(points), self._matching.max_pair_m
+        laid = laid[self.near.known(laid)]
+        if not len(laid):
+            return 0.0
+        away = np.asarray(self._walls.tree.query(laid, distance_upper_bound=reach)[0])
+        return 1.0 - float(np.minimum(away, reach).mean()) / reach
 
 
 def _error(found: Registration, g: Array, felt: Array, walls: float) -> Array:

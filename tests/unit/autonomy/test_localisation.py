@@ -176,6 +176,26 @@ def test_a_match_tells_what_the_one_before_has_taught_of_odometry() -> None:
     assert second.looks.tolist() == [1, 2]
 
 
+POSTS = [(0.5 * k, y, 0.5 * k + 0.1, y + 0.1) for k in range(25) for y in (0.0, 9.0)]
+POSTS += [(x, 0.5 * k, x + 0.1, 0.5 * k + 0.1) for k in range(1, 18) for x in (0.0, 12.0)]
+YARD = carved([(-3.0, -3.0, 15.0, 12.0)], [*POSTS, (5.0, 4.0, 7.0, 5.0)])
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_between_posts_the_robot_does_not_take_its_wheels_for_slipping(seed: int) -> None:
+    """Few points of a fence lie on lines; many do where the robot is not, from post to post."""
+    rng, local, truth = np.random.default_rng(seed), maps(), Pose(2.0, 2.0)
+    noise, believed = noise_of(0.02, 0.01, 0.01), truth
+    for step in range(28):
+        scan = sweep(YARD, truth, field_of_view=math.radians(240), sigma=0.01, rng=rng, reach=5.6)
+        if step:
+            slip = Pose.from_array(rng.multivariate_normal([0.25, 0.0, 0.0], noise.sum(axis=0)))
+            believed, *_ = local.match(scan, believed, slip, 0.5, noise)
+        local.insert(scan, believed, 0.25 * step)
+        assert believed.distance(truth) < 0.15
+        truth = truth.compose(Pose(0.25))
+
+
 def test_where_walls_are_old_errors_do_not_add_up() -> None:
     """To and fro three times: the walls of the first way hold the robot, and its steps say so.
 
