@@ -15,6 +15,7 @@ from pathlib import Path
 from time import perf_counter
 
 from benchmarks.report import report, report_fact
+from tests.process.addresses import free_endpoint
 
 LASERS = {"URG-04LX": 10.0, "UTM-30LX": 40.0}  # scans a second
 TARGET_PERCENT = {10.0: 6.0, 40.0: 24.0}  # of a core; with four times the scans, four times that
@@ -96,12 +97,6 @@ def resident_mb(process: int) -> float:
         if line.startswith("VmRSS:"):
             return int(line.split()[1]) / 1024
     raise LookupError(process)
-
-
-def free_endpoint() -> str:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
 
 
 def main() -> None:

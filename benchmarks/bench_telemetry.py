@@ -13,7 +13,6 @@ import contextlib
 import json
 import math
 import resource
-import socket
 import subprocess
 import sys
 import time
@@ -45,6 +44,7 @@ from gvgbot.topics import (
     Map,
 )
 from gvgbot.vitals import Vitals
+from tests.process.addresses import free_endpoint
 
 VERTICES, BEAMS, SIDE = 200, 1081, 60.0
 STATE_HZ, MAP_HZ, SCAN_HZ, ODOMETRY_HZ = 10.0, 1.0, 40.0, 50.0
@@ -264,12 +264,6 @@ async def listen(endpoint: str, seconds: float) -> None:
                 for kind, values in sources.items():
                     tasks.create_task(note(kind, values))
     print(json.dumps(late), flush=True)
-
-
-def free_endpoint() -> str:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
 
 
 def main(seconds: float) -> None:

@@ -18,10 +18,11 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
-from benchmarks.bench_telemetry import free_endpoint
 from benchmarks.report import report, report_fact
 from gvgbot import client
 from gvgbot.client import Health, Robot
+from tests.process.addresses import free_endpoint
+from tests.process.programs import program
 
 KOBUKI_HZ = 50.0
 SETTLING_S = 15.0
@@ -45,19 +46,6 @@ with client.connect("bench", sys.argv[1], patience_s=60.0) as robot:
         while hang:
             threading.Event().wait(1.0)
 """
-
-
-@contextmanager
-def program(source: str, *arguments: str) -> Iterator["subprocess.Popen[str]"]:
-    """A process that says when it is there."""
-    command = [sys.executable, "-c", source, *arguments]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-        try:
-            assert process.stdout is not None
-            process.stdout.readline()
-            yield process
-        finally:
-            process.kill()
 
 
 @contextmanager

@@ -22,26 +22,21 @@ def free_endpoint() -> str:
 
 @contextmanager
 def router(endpoint: str) -> Iterator[zenoh.Session]:
-    config = zenoh.Config()
-    for key, value in {
-        "mode": "router",
-        "listen/endpoints": [endpoint],
-        "scouting/multicast/enabled": False,
-    }.items():
-        config.insert_json5(key, json.dumps(value))
-    with zenoh.open(config) as session:
+    with zenoh.open(_config({"mode": "router", "listen/endpoints": [endpoint]})) as session:
         yield session
 
 
 @contextmanager
-def plain_session(endpoint: str) -> Iterator[zenoh.Session]:
-    """A program on the network that knows nothing of us."""
-    config = zenoh.Config()
-    for key, value in {
-        "mode": "client",
-        "connect/endpoints": [endpoint],
-        "scouting/multicast/enabled": False,
-    }.items():
-        config.insert_json5(key, json.dumps(value))
-    with zenoh.open(config) as session:
+def plain_session(endpoint: str, *, patience_s: float = 0.0) -> Iterator[zenoh.Session]:
+    """A program on the network that knows nothing of us; it waits until somebody is there."""
+    timeout_ms = round(1e3 * patience_s)
+    settings = {"connect/endpoints": [endpoint], "connect/timeout_ms": timeout_ms}
+    with zenoh.open(_config({"mode": "client", **settings})) as session:
         yield session
+
+
+def _config(settings: dict[str, object]) -> zenoh.Config:
+    config = zenoh.Config()
+    for key, value in {**settings, "scouting/multicast/enabled": False}.items():
+        config.insert_json5(key, json.dumps(value))
+    return config

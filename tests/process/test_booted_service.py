@@ -1,13 +1,13 @@
 """The service under a systemd that was booted for it: ready, killed, hung, stopped."""
 
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from gvgbot.installation import system_files
 from tests.process.machine import Machine, NoMachine, machine
+from tests.process.programs import until
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(240)]
 
@@ -34,13 +34,6 @@ def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Machine]:
         pytest.skip(str(reason))
 
 
-def until(holds: Callable[[], bool]) -> None:
-    deadline = time.perf_counter() + PATIENCE
-    while not holds():
-        assert time.perf_counter() < deadline, "it never came"
-        time.sleep(0.2)  # noqa: TID251  # another program is waited for
-
-
 def is_up_anew(robot: Machine, before: str) -> bool:
     pid = robot.property("MainPID")  # 0 between two lives; no process, but a whole group to `kill`
     return robot.property("ActiveState") == "active" and pid not in ("0", before)
@@ -53,15 +46,15 @@ def test_it_is_ready_lives_through_a_kill_and_a_hang_and_stops(robot: Machine) -
     first = robot.property("MainPID")
     assert robot.run("ps", "-o", "user=", "-p", first).strip() == "gvgbot"
     run = "/var/lib/gvgbot/runs/ring-1"
-    until(lambda: "snapshot.gvg" in robot.run("ls", run))
+    until(lambda: "snapshot.gvg" in robot.run("ls", run), patience_s=PATIENCE)
 
     robot.run("kill", "-KILL", first)
-    until(lambda: is_up_anew(robot, first))
+    until(lambda: is_up_anew(robot, first), patience_s=PATIENCE)
     second = robot.property("MainPID")
     assert robot.run("ls", "/var/lib/gvgbot/runs").split() == ["ring-1"]
 
     robot.run("kill", "-STOP", second)
-    until(lambda: is_up_anew(robot, second))
+    until(lambda: is_up_anew(robot, second), patience_s=PATIENCE)
     assert int(robot.property("NRestarts")) == 2
 
     robot.run("systemctl", "stop", "gvgbot")

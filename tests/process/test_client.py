@@ -12,9 +12,8 @@ import sys
 import time
 import tracemalloc
 import zlib
-from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from itertools import permutations
 from socket import create_server
 from threading import Event as Flag
@@ -46,12 +45,12 @@ from gvgbot.topics import (
     Trajectory,
 )
 from tests.process.addresses import free_endpoint, plain_session, router
+from tests.process.programs import PATIENCE, program, until
 from tests.unit.monitor.maps import SIDE, a_grid
 from tests.unit.test_telemetry import EXAMPLE
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(60)]
 
-PATIENCE = 15.0  # s, for a busy machine
 A_MAP = Map(
     stamp=3.0,
     vertices=(
@@ -111,6 +110,7 @@ from gvgbot.telemetry_config import TelemetryConfig
 from tests.unit.monitor.maps import SIDE, a_grid
 from tests.unit.test_telemetry import EXAMPLE
 with Telemetry(TelemetryConfig(listen=(sys.argv[1],)), "far") as robot:
+    print("there", flush=True)
     while True:
         robot.publish(EXAMPLE)
         time.sleep(0.1)
@@ -152,15 +152,6 @@ with contextlib.suppress(asyncio.CancelledError):
 """
 
 
-def until(is_so: Callable[[], bool], *, patience_s: float = PATIENCE) -> float:
-    """Wait until something is so; the seconds that took."""
-    start, pause = time.perf_counter(), Flag()
-    while not is_so():
-        assert time.perf_counter() - start < patience_s, "it did not become so"
-        pause.wait(0.02)
-    return time.perf_counter() - start
-
-
 def a_robot(endpoint: str, name: str = "near") -> Telemetry:
     return Telemetry(TelemetryConfig(listen=(endpoint,)), name)
 
@@ -171,11 +162,6 @@ def numbered(number: int) -> State:
 
 def happened(number: int, kind: str = "decision") -> Event:
     return Event(number=number, stamp=float(number), kind=kind, details={"reason": "ear"})
-
-
-@pytest.fixture
-def endpoint() -> str:
-    return free_endpoint()
 
 
 def test_who_joins_gets_the_newest_values_at_once_though_nothing_more_is_sent(
@@ -517,30 +503,20 @@ def test_silence_is_told_from_absence(endpoint: str) -> None:
 
 
 def test_who_leaves_a_frozen_robot_is_not_held(endpoint: str) -> None:
-    with far_robot(endpoint) as process, client.connect("far", endpoint) as seen:
+    with program(ROBOT, endpoint) as process, client.connect("far", endpoint) as seen:
         process.send_signal(signal.SIGSTOP)
         until(lambda: seen.presence.word == "gone")  # and the client tries to connect again
         seen.close()
         assert next(iter(seen.state()), None) is None
 
 
-@contextmanager
-def far_robot(endpoint: str) -> Iterator["subprocess.Popen[bytes]"]:
-    """A robot in a process of its own."""
-    with subprocess.Popen([sys.executable, "-c", ROBOT, endpoint]) as process:
-        try:
-            yield process
-        finally:
-            process.kill()
-
-
 def test_a_robot_that_was_killed_is_gone_and_back_when_it_starts_again(endpoint: str) -> None:
-    with far_robot(endpoint) as process, client.connect("far", endpoint) as seen:
+    with program(ROBOT, endpoint) as process, client.connect("far", endpoint) as seen:
         assert next(iter(seen.state())) == EXAMPLE
         until(lambda: seen.presence.word == "alive")
         process.send_signal(signal.SIGKILL)
         until(lambda: seen.presence.word == "gone", patience_s=3.0)
-        with far_robot(endpoint):
+        with program(ROBOT, endpoint):
             until(lambda: seen.presence.word == "alive")
             until(lambda: (seen.state().age or 9.0) < 1.0)
 
@@ -602,7 +578,7 @@ def test_two_robots_of_one_name_are_told_from_one_that_was_started_again(endpoin
 
 def test_a_robot_that_is_frozen_is_noticed(endpoint: str) -> None:
     """A stopped process is as silent as one whose cable was pulled."""
-    with far_robot(endpoint) as process, client.connect("far", endpoint) as seen:
+    with program(ROBOT, endpoint) as process, client.connect("far", endpoint) as seen:
         until(lambda: seen.presence.word == "alive")
         process.send_signal(signal.SIGSTOP)
         until(lambda: seen.presence.word in ("quiet", "gone"), patience_s=3.0)

@@ -129,11 +129,6 @@ def monitor(*arguments: str) -> Iterator[Seat]:
             os.close(theirs)
 
 
-@pytest.fixture
-def endpoint() -> str:
-    return free_endpoint()
-
-
 def a_robot(endpoint: str, name: str = "karl") -> Telemetry:
     robot = Telemetry(TelemetryConfig(listen=(endpoint,)), name)
     robot.publish(msgspec.structs.replace(EXAMPLE, reason="", pose=(3.0, 2.0, 0.0)))

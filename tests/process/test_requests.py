@@ -6,8 +6,8 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
-from contextlib import asynccontextmanager, contextmanager
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
 from pathlib import Path
 
 import msgspec
@@ -20,6 +20,7 @@ from gvgbot.requests import Answer, Asked, Goto, Patrol, Set, parse
 from gvgbot.telemetry import Telemetry
 from gvgbot.telemetry_config import TelemetryConfig
 from tests.process.addresses import free_endpoint, plain_session, router
+from tests.process.programs import program
 from tests.unit.test_telemetry import EXAMPLE
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(60)]
@@ -45,11 +46,6 @@ async def a_robot(
         await asyncio.sleep(0)
         yield
         hearing.cancel()
-
-
-@pytest.fixture
-def endpoint() -> str:
-    return free_endpoint()
 
 
 def get(session: zenoh.Session, name: str, **settings: object) -> list[zenoh.Reply]:
@@ -298,19 +294,6 @@ with Telemetry(TelemetryConfig(listen=(sys.argv[1],)), "near") as robot:
     print("there", flush=True)
     asyncio.run(robot.hear(handle))
 """
-
-
-@contextmanager
-def program(source: str, endpoint: str) -> Iterator["subprocess.Popen[str]"]:
-    """A program in a process of its own, as soon as it says that it is there."""
-    command = [sys.executable, "-c", source, endpoint]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-        try:
-            assert process.stdout is not None
-            assert process.stdout.readline() == "there\n"
-            yield process
-        finally:
-            process.kill()
 
 
 async def answered(ask: Callable[[], client.Asking]) -> str:

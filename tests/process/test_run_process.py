@@ -7,10 +7,8 @@ import signal
 import socket
 import subprocess
 import sys
-import time
 import tty
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
 from queue import Queue
 from typing import Any
@@ -19,7 +17,8 @@ import msgspec
 import pytest
 import zenoh
 
-from tests.process.addresses import free_endpoint
+from tests.process.addresses import plain_session
+from tests.process.programs import gvgbot, until
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(60)]
 
@@ -40,49 +39,7 @@ PATIENCE = 20.0  # s, for a busy machine
 STANDSTILL = bytes.fromhex("aa55 06 01 04 0000 0000 03")
 
 
-@pytest.fixture
-def endpoint() -> str:
-    return free_endpoint()
-
-
 STOPPED = ["map:     run/map.geojson", "picture: run/map.png", "gvgbot: interrupted"]
-
-
-@contextmanager
-def gvgbot(
-    *arguments: str, cwd: Path, python: Sequence[str] = (sys.executable,)
-) -> Iterator["subprocess.Popen[str]"]:
-    """A gvgbot process with its log on a pipe; whatever happens, it does not outlive the test."""
-    command = [*python, "-m", "gvgbot", *arguments]
-    environment = {k: v for k, v in os.environ.items() if k not in ("NOTIFY_SOCKET",)}
-    with subprocess.Popen(
-        command,
-        cwd=cwd,
-        env=environment,
-        text=True,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        start_new_session=True,
-    ) as process:
-        try:
-            yield process
-        finally:
-            process.kill()
-
-
-@contextmanager
-def client(endpoint: str) -> Iterator[zenoh.Session]:
-    """A plain program on the network, which waits until the robot is there."""
-    config = zenoh.Config()
-    for key, value in {
-        "mode": "client",
-        "connect/endpoints": [endpoint],
-        "connect/timeout_ms": round(PATIENCE * 1000),
-        "scouting/multicast/enabled": False,
-    }.items():
-        config.insert_json5(key, json.dumps(value))
-    with zenoh.open(config) as session:
-        yield session
 
 
 def until_driving(samples: "Queue[zenoh.Sample]") -> tuple[str, list[dict[str, Any]]]:
@@ -97,8 +54,7 @@ def until_driving(samples: "Queue[zenoh.Sample]") -> tuple[str, list[dict[str, A
 
 def until_kept(state: Path) -> None:
     """Wait for a mission that another program could go on with."""
-    while not list(state.glob("runs/*/snapshot.gvg")):
-        time.sleep(0.1)  # noqa: TID251  # another program is waited for
+    until(lambda: bool(list(state.glob("runs/*/snapshot.gvg"))), patience_s=PATIENCE)
 
 
 def until_joined(events: Path, edges: int, process: "subprocess.Popen[str]") -> None:
@@ -121,7 +77,10 @@ def test_a_running_robot_is_watched_asked_and_stopped(
 ) -> None:
     out = tmp_path / "run"
     arguments = ["--out", str(out), "--set", f"telemetry.listen=[{endpoint}]"]
-    with gvgbot("run", *arguments, cwd=tmp_path) as process, client(endpoint) as session:
+    with (
+        gvgbot("run", *arguments, cwd=tmp_path) as process,
+        plain_session(endpoint, patience_s=PATIENCE) as session,
+    ):
         samples: Queue[zenoh.Sample] = Queue()
         with session.declare_subscriber("gvgbot/*/state", samples.put):
             encoding, states = until_driving(samples)

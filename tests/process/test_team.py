@@ -14,7 +14,7 @@ import pytest
 from gvgbot.telemetry import Telemetry
 from gvgbot.telemetry_config import TelemetryConfig
 from tests.process.addresses import free_endpoint, router
-from tests.process.test_run_process import gvgbot
+from tests.process.programs import gvgbot
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(60)]
 

@@ -5,7 +5,6 @@ import select
 import signal
 import socket
 import subprocess
-import sys
 import tty
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -16,29 +15,13 @@ from pathlib import Path
 
 import pytest
 
+from tests.process.programs import gvgbot
 from tests.twin.run_rig import base_commands
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(90)]
 PATIENCE = 30.0  # s, for a busy machine
 GET_GAIN = bytes.fromhex("aa55 03 0e 01 00 0c")
 GAINS = bytes.fromhex("150d 00 a0860100 64000000 d0070000")
-
-
-@contextmanager
-def gvgbot(*arguments: str, cwd: Path) -> Iterator["subprocess.Popen[str]"]:
-    """A gvgbot process; whatever happens, it does not outlive the test."""
-    with subprocess.Popen(
-        [sys.executable, "-m", "gvgbot", *arguments],
-        cwd=cwd,
-        text=True,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        start_new_session=True,
-    ) as process:
-        try:
-            yield process
-        finally:
-            process.kill()
 
 
 @contextmanager

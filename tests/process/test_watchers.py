@@ -2,7 +2,6 @@
 
 import signal
 import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -14,7 +13,7 @@ from websockets.sync.client import connect
 from gvgbot import client
 from gvgbot.client import State
 from tests.process.addresses import free_endpoint
-from tests.process.test_client import until
+from tests.process.programs import gvgbot, until
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(120)]
 
@@ -22,20 +21,6 @@ PATIENCE = 60.0  # s, for a busy machine
 WATCHERS = 10
 KOBUKI_HZ = 50.0  # of its feedback, and so of the control loop
 WINDOW = 150  # cycles over which the rate is taken
-
-
-@contextmanager
-def gvgbot(*arguments: str) -> Iterator["subprocess.Popen[str]"]:
-    with subprocess.Popen(
-        [sys.executable, "-m", "gvgbot", *arguments],
-        text=True,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-    ) as process:
-        try:
-            yield process
-        finally:
-            process.kill()
 
 
 @contextmanager

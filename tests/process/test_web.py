@@ -51,6 +51,7 @@ from gvgbot.web.wire import Reply, Wish
 from gvgbot.zenoh_config import has_listener
 from tests.process.addresses import free_endpoint, plain_session, router
 from tests.process.browser import Page, browser, chromium
+from tests.process.programs import gvgbot
 from tests.process.test_requests import a_robot
 from tests.unit.monitor.maps import a_grid, a_map, vertex
 from tests.unit.test_telemetry import EXAMPLE, NOWHERE
@@ -255,22 +256,6 @@ def test_a_viewer_that_does_not_read_holds_nobody_up() -> None:
 
 
 # -- the program -----------------------------------------------------------------------------------
-
-
-@contextmanager
-def gvgbot(*arguments: str, cwd: Path | None = None) -> Iterator["subprocess.Popen[str]"]:
-    """A gvgbot process that does not outlive the test."""
-    with subprocess.Popen(
-        [sys.executable, "-m", "gvgbot", *arguments],
-        cwd=cwd,
-        text=True,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-    ) as process:
-        try:
-            yield process
-        finally:
-            process.kill()
 
 
 @contextmanager

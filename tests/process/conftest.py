@@ -1,0 +1,10 @@
+"""What tests of whole programs are given."""
+
+import pytest
+
+from tests.process.addresses import free_endpoint
+
+
+@pytest.fixture
+def endpoint() -> str:
+    return free_endpoint()
