@@ -290,9 +290,13 @@ from gvgbot.telemetry_config import TelemetryConfig
 async def handle(asked):
     print("asked", flush=True)
     await asyncio.Event().wait()
+async def sleep(robot):
+    async with asyncio.TaskGroup() as tasks:
+        tasks.create_task(robot.hear(handle))
+        await asyncio.sleep(0)
+        print("there", flush=True)
 with Telemetry(TelemetryConfig(listen=(sys.argv[1],)), "near") as robot:
-    print("there", flush=True)
-    asyncio.run(robot.hear(handle))
+    asyncio.run(sleep(robot))
 """
 
 
