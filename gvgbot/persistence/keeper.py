@@ -64,10 +64,20 @@ class Keeper:
     Whoever has a keeper makes the robot's clock and its links by it.
     """
 
-    def __init__(self, session: Session, files: MissionFiles, saved: Saved | None = None) -> None:
-        """Make the session what was `saved`, if it was; in other files if it shall begin there."""
+    def __init__(
+        self,
+        session: Session,
+        files: MissionFiles,
+        saved: Saved | None = None,
+        *,
+        boot: str | None = None,
+    ) -> None:
+        """Make the session what was `saved`, if it was; in other files if it shall begin there.
+
+        `boot` names the computer's start, if it is not to be asked.
+        """
         self._session, self._files, self._saved = session, files, saved
-        self._boot = boot_id()
+        self._boot = boot_id() if boot is None else boot
         self._ahead = 0.0  # s, the robot's clock minus the computer's
         self._feedback: FeedbackReader | None = None
         self._counts: list[Count] = []  # of what is in the journal after each batch

@@ -43,7 +43,8 @@ def nothing(world: GoingWorld, out: Path) -> None:
 class Lives:
     """Several lives of one robot; each ends with a kill when it is told, or when it is `over`.
 
-    `between` is done to the world and to the run directory while the robot is dead for `dead_s`.
+    `between` is done to the world and to the run directory while the robot is dead for `dead_s`;
+    `reboots` tells whether the computer starts anew meanwhile.
     """
 
     config: Config
@@ -51,6 +52,7 @@ class Lives:
     out: Path
     known: Path | None = None
     dead_s: float = 3.0
+    reboots: bool = False
     between: Callable[[GoingWorld, Path], None] = nothing
     over: Callable[[Session], bool] = explored
     off_loop: OffLoop = at_once
@@ -85,7 +87,8 @@ class Lives:
         directory = RunDirectory(self.out)
         session = Session(self.config, directory, self.place)
         session.simulation = self.world
-        keeper = Keeper(session, files, saved)
+        boot = f"start {len(self.sessions)}" if self.reboots else None
+        keeper = Keeper(session, files, saved, boot=boot)
         self.sessions.append(session)
         self.keepers.append(keeper)
         links = CabledLinks(self.config, clock, self.world)

@@ -5,7 +5,6 @@ import json
 import math
 import re
 from collections.abc import Callable
-from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +17,6 @@ from gvgbot.autonomy.returning import ReturningPipeline
 from gvgbot.config import Config, load_config
 from gvgbot.geometry import Pose
 from gvgbot.live_map import LiveMap
-from gvgbot.persistence import keeper
 from gvgbot.persistence.mission_files import JOURNAL, SNAPSHOT, MissionFiles
 from gvgbot.persistence.records import packed
 from gvgbot.session import Session
@@ -187,16 +185,12 @@ def test_in_another_building_it_claims_no_place_and_spoils_no_map(
         last.pipeline.errands.home(0.0)
 
 
-def test_after_each_power_cut_in_a_building_it_finds_its_place_and_keeps_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_after_each_power_cut_in_a_building_it_finds_its_place_and_keeps_it(tmp_path: Path) -> None:
     """The computer has started anew, so that nothing vouches for the base, whose wheels are worn.
 
     A while later it still knows its place. How well is decided by little: by how floats are
     added up on one kind of computer it was 0.1 m off, and on another one 0.18 and 0.38 m.
     """
-    starts = count()
-    monkeypatch.setattr(keeper, "boot_id", lambda: f"start {next(starts)}")
     settings = ["twin.seed=2", "twin.world=floor_plan:5", "twin.base.odometry=worn"]
     config = load_config(None, settings)
     place = open_place(config)
@@ -224,7 +218,7 @@ def test_after_each_power_cut_in_a_building_it_finds_its_place_and_keeps_it(
     def take_down(world: GoingWorld, out: Path) -> None:
         cut.append(world.body.distance_m)
 
-    lives = Lives(config, place, tmp_path, over=is_over, between=take_down)
+    lives = Lives(config, place, tmp_path, over=is_over, between=take_down, reboots=True)
     note_error(lives.run([power_cut(40.0), power_cut(140.0)]))
     assert max(errors) < 0.5
     for before, (after, _) in zip(cut, found, strict=True):
@@ -232,11 +226,9 @@ def test_after_each_power_cut_in_a_building_it_finds_its_place_and_keeps_it(
 
 
 def test_a_robot_that_was_moved_before_its_first_vertex_begins_a_new_map(
-    config: Config, whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    config: Config, whole: Path, tmp_path: Path
 ) -> None:
     """Nothing vouches for the base; a map of one corridor would tell no place apart."""
-    starts = count()
-    monkeypatch.setattr(keeper, "boot_id", lambda: f"start {next(starts)}")
     left = list[Pose]()
 
     def take_up(world: GoingWorld, out: Path) -> None:
@@ -244,7 +236,7 @@ def test_a_robot_that_was_moved_before_its_first_vertex_begins_a_new_map(
         world.body.pose = world.body.pose.compose(Pose(0.1, 0.0, 0.5))
         left.append(world.body.pose)
 
-    lives = Lives(config, Place(LOLLIPOP, START), tmp_path, between=take_up)
+    lives = Lives(config, Place(LOLLIPOP, START), tmp_path, between=take_up, reboots=True)
     last = lives.run([at(3.0)])
     assert lives.sessions[0].pipeline.mapper.graph.vertices == {}
     assert summary(tmp_path)["outcome"] == "explored"
@@ -290,12 +282,8 @@ def test_a_robot_goes_on_controlling_while_its_known_map_is_made_ready(
     assert max(stood) < 0.01
 
 
-def test_a_robot_that_was_paused_while_it_looked_for_its_place_stays_paused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_robot_that_was_paused_while_it_looked_for_its_place_stays_paused(tmp_path: Path) -> None:
     """Killed, and again two seconds after the pause; the computer has started anew each time."""
-    starts = count()
-    monkeypatch.setattr(keeper, "boot_id", lambda: f"start {next(starts)}")
     config = load_config(None, ["twin.seed=2", "twin.world=floor_plan:5"])
     asked = list[float]()
 
@@ -309,7 +297,7 @@ def test_a_robot_that_was_paused_while_it_looked_for_its_place_stays_paused(
     def is_over(session: Session) -> bool:
         return len(lives.sessions) > 2 and session.pipeline.past.keyframes != []
 
-    lives = Lives(config, open_place(config), tmp_path, over=is_over)
+    lives = Lives(config, open_place(config), tmp_path, over=is_over, reboots=True)
     last = lives.run([at(40.0), is_paused_for_long])
     assert last.pipeline.errands.is_paused
     assert len(last.pipeline.mapper.graph.vertices) > 1
