@@ -113,6 +113,7 @@ def test_squares_of_a_growing_grid_are_cut_out_of_it_and_all_changes_lie_around_
         (row + bottom, column + left): grid.cells[row, column]
         for row, column in zip(rows.tolist(), columns.tolist(), strict=True)
     }
+    assert known
     found, side = {}, 37
     for row in range(bottom - 50, bottom + grid.cells.shape[0] + 50, side):
         for column in range(left - 50, left + grid.cells.shape[1] + 50, side):

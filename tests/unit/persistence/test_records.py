@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import msgspec
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -57,9 +57,10 @@ def test_a_flipped_bit_costs_its_record_and_what_follows_but_nothing_before(
     assert read(bytes(altered)) == contents[: int((ends <= at).sum())]
 
 
+@example(bytes(8))  # the checksum of nothing is 0
 @given(st.binary(max_size=200))
 def test_noise_is_no_record_and_no_error(noise: bytes) -> None:
-    assert all(isinstance(payload, bytes) for payload in read(noise))
+    assert read(noise) == []
 
 
 @dataclass(eq=False)

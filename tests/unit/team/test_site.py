@@ -52,6 +52,7 @@ def test_ways_to_frontiers_are_shortest_over_what_all_know(seed: int) -> None:
     reached = nx.single_source_dijkstra_path_length(known_alone, start)
     everywhere = nx.single_source_dijkstra_path_length(graph, start)
     costs = site.costs(reached)
+    assert site.open
     for many in site.open.values():
         for frontier in many:
             place = int(np.argmin(np.hypot(*(building.places - (frontier.x, frontier.y)).T)))

@@ -80,6 +80,7 @@ def test_it_stops_at_the_end(acceleration: float) -> None:
 def test_it_comes_to_the_end_slowly_enough_to_brake_there() -> None:
     """From any place the robot could stop at the end, one point of the edge more or less."""
     drive = driven(straight(3.0), Pose(0.0, 0.0, 0.0), 20.0)
+    assert drive.poses[-1].x > 2.9
     for pose, twist in zip(drive.poses, drive.twists, strict=False):
         left = max(0.0, 3.0 - pose.x) + 0.06
         assert twist.linear <= math.sqrt(2 * CONFIG.braking_mps2 * left) + 1e-9

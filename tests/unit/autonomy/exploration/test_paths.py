@@ -46,7 +46,9 @@ def test_the_departures_lead_to_the_vertex_in_as_many_metres(seed: int) -> None:
     rng = np.random.default_rng(seed)
     graph = random_multigraph(rng)
     start = int(rng.choice(list(graph.vertices)))
-    for vertex, approach in shortest_paths(graph, [Approach(0.0, HalfEdgeId(start, -1))]).items():
+    found = shortest_paths(graph, [Approach(0.0, HalfEdgeId(start, -1))])
+    assert start in found
+    for vertex, approach in found.items():
         metres, arrival = walked(graph, start, approach)
         assert metres == pytest.approx(approach.metres)
         assert vertex == approach.arrival.vertex

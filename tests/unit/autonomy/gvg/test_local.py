@@ -85,7 +85,9 @@ def test_from_the_middle_of_a_loop_both_ways_lead_to_its_node() -> None:
 @given(st.sampled_from(sorted(GVG.edges)), st.floats(0.0, 1.0))
 def test_the_line_of_a_route_is_as_long_as_the_route(edge: int, share: float) -> None:
     start = Place(edge, share * GVG.edges[edge].length, 0.0)
-    for node, (metres, path) in GVG.routes(start).items():
+    routes = GVG.routes(start)
+    assert routes.keys() == POINTS.keys()
+    for node, (metres, path) in routes.items():
         line, clearance = GVG.line_from(start, path)
         assert len(line) == len(clearance)
         length = float(np.hypot(*np.diff(line, axis=0).T).sum())

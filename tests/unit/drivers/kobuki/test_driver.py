@@ -130,8 +130,9 @@ def test_driving_goes_on_as_long_as_it_is_asked_for() -> None:
             bench.base.drive(Twist(0.2, 0.0))
             await bench.stream(0.4)
 
-    controls = play(script).controls(since=0.02)
-    assert all(control == MOVE for _, control in controls[:-1])
+    controls = [control for _, control in play(script).controls(since=0.02)]
+    assert controls[:-1] == [MOVE] * (len(controls) - 1)
+    assert len(controls) >= 10
 
 
 def test_a_cancelled_driver_leaves_zeros_as_its_last_command() -> None:

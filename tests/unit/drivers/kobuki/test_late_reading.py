@@ -55,6 +55,7 @@ def test_a_base_that_is_read_late_has_not_started_anew(
 ) -> None:
     reader, heard = read_late(seed, longest, lag)
     assert reader.statistics.resets == 0
+    assert heard[-1][0] * PERIOD > 55.0
     for k, odometry in heard:
         truth = RATE * PERIOD * k
         assert abs(wrap_angle(odometry.odom_base.theta - truth)) < 0.002
