@@ -132,6 +132,11 @@ class People:
                 self.centres[k] = self._walked(person, self.centres[k], robots, robot_radius)
         self.next_step += STEP
 
+    def stand(self, number: int, x: float, y: float) -> None:
+        """Put one of them somewhere, to stand there for good."""
+        self._people[number].stands_until = math.inf
+        self.centres[number] = (x, y)
+
     def offsets(self, x: float, y: float, reach: float) -> Array:
         """From (x, y) to the nearest point of each person within `reach`: (M, 2), m."""
         return disc_offsets(self.centres, self.radii, x, y, reach)

@@ -84,9 +84,8 @@ class Play:
 
     def put_person(self, x: float, y: float) -> None:
         """Let the one person of this world stand somewhere from now on."""
-        people = self.simulation.body._people
-        assert people is not None
-        people.centres[0] = (x, y)
+        assert self.simulation.people is not None
+        self.simulation.people.stand(0, x, y)
 
     async def until(self, condition: Callable[[], bool]) -> None:
         """Wait for something to become true."""
@@ -147,9 +146,6 @@ async def _played(
     pipeline.mission.survey = partial(survey, pipeline)
     run = Play(simulation, pipeline, clock)
     if walkways is not None:
-        people = simulation.body._people
-        assert people is not None
-        people._people[0].stands_until = math.inf
         run.put_person(*FAR_AWAY)
     laser = HokuyoLaser(simulation.laser, config.laser, clock)
     base = KobukiBase(simulation.base, config.base, clock)

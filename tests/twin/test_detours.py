@@ -45,10 +45,9 @@ class Walker:
 
     def put_person(self, x: float, y: float) -> None:
         assert self.daemon.session.simulation is not None
-        people = self.daemon.session.simulation.body._people
+        people = self.daemon.session.simulation.people
         assert people is not None
-        people._people[0].stands_until = math.inf
-        people.centres[0] = (x, y)
+        people.stand(0, x, y)
 
     def tell(self, story: Callable[[Clock], Awaitable[None]]) -> None:
         """Explore alone, and go on with a story."""

@@ -474,10 +474,9 @@ def test_who_stands_in_the_way_of_an_errand_is_left_alone_and_another_way_taken(
 
     def put_person(x: float, y: float) -> None:
         assert daemon.session.simulation is not None
-        people = daemon.session.simulation.body._people
+        people = daemon.session.simulation.people
         assert people is not None
-        people._people[0].stands_until = math.inf
-        people.centres[0] = (x, y)
+        people.stand(0, x, y)
 
     def vertex_at(x: float, y: float) -> int:
         map_point = START.inverse().transform(np.array((x, y)))

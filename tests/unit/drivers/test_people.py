@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gvgbot.drivers.body import BodyConfig, RobotBody
-from gvgbot.drivers.people import STEP, People, Walkways
+from gvgbot.drivers.people import STANDING, STEP, People, Walkways
 from gvgbot.drivers.world import World
 from gvgbot.errors import WorldError
 from gvgbot.geometry import Array, Pose
@@ -33,8 +33,7 @@ def open_floor() -> World:
 def still(world: World, centre: tuple[float, float]) -> People:
     """One person who never moves."""
     people = People(Walkways(world, Pose(2.0, 6.0, 0.0)), 1, seed=1)
-    people.centres[0] = centre
-    people.next_step = math.inf
+    people.stand(0, *centre)
     return people
 
 
@@ -142,6 +141,10 @@ def test_a_robot_that_drives_into_a_person_is_stopped_and_counts_a_contact() -> 
     body.advance(20.0)
     assert body.pose.x == pytest.approx(6.0 - people.radii[0] - RADIUS, abs=1e-3)
     assert (body.contacts, body.bumper) == (1, (False, True, False))
+
+
+def test_who_is_put_somewhere_stands_there_for_good() -> None:
+    assert (walked(still(open_floor(), (6.0, 6.0)), 2 * STANDING[1]) == (6.0, 6.0)).all()
 
 
 def test_a_robot_can_leave_a_person_it_touches() -> None:
