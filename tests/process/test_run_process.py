@@ -131,7 +131,7 @@ def test_a_simulated_exploration_that_is_stopped_leaves_its_map(
     assert json.loads((events.parent / "map.geojson").read_text())["features"]
 
 
-@pytest.mark.parametrize("robots", [1, 3])
+@pytest.mark.parametrize("robots", [1, 2])
 def test_an_exploration_that_a_script_left_in_the_background_is_stopped_as_any(
     robots: int, tmp_path: Path
 ) -> None:

@@ -165,7 +165,7 @@ def test_it_is_not_wrong_where_more_places_look_alike_than_it_can_follow() -> No
         end for k in range(5) for end in ((0.0, 10.0 * k), (40.0, 10.0 * k), (0.0, 10.0 * k + 0.1))
     ]
     path = along(
-        [(17.3, 20.1), (39.5, 20.0), (37.6, 20.1), (37.6, 24.0), (37.6, 20.1), (33.0, 20.0)]
+        [(27.3, 20.1), (39.5, 20.0), (37.6, 20.1), (37.6, 24.0), (37.6, 20.1), (33.0, 20.0)]
     )
     formed = opinions(world, path, tour)
     for pose, opinion in zip(path, formed, strict=True):

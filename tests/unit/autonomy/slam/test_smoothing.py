@@ -204,7 +204,7 @@ def test_covariances_of_many_poses_are_the_blocks_of_a_dense_inverse() -> None:
 
 
 def test_covariances_of_all_poses_take_hardly_more_memory_than_those_of_one() -> None:
-    graph, x = laps(600)
+    graph, x = laps(300)
 
     def peak(*wanted: int) -> int:
         tracemalloc.start()
@@ -213,7 +213,7 @@ def test_covariances_of_all_poses_take_hardly_more_memory_than_those_of_one() ->
         tracemalloc.stop()
         return most
 
-    assert peak(*range(600)) < 1.5 * peak(599)
+    assert peak(*range(300)) < 1.5 * peak(299)
 
 
 def relative_array(x: Array, a: int, b: int) -> tuple[float, float, float]:
