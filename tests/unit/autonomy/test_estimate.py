@@ -54,6 +54,7 @@ def test_who_has_kept_less_of_its_sights_of_vertices_is_no_more_certain_of_them(
     """With nothing the filter is asked, to which a sight is worth four times as much."""
     pipeline = from_end_to_end()
     by_all = smoothed(pipeline).covariances
+    assert by_all.keys() == pipeline.mapper.graph.vertices.keys() != set()
     keep(kept, pipeline)
     found = smoothed(pipeline).covariances
     assert all(np.trace(found[vertex]) > share * np.trace(by_all[vertex]) for vertex in by_all)
