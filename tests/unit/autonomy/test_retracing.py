@@ -50,6 +50,17 @@ def test_it_leads_over_the_way_to_where_the_vertex_was_near() -> None:
     assert rest(retracing, 0.1, 0.0) is None
 
 
+def test_it_leads_to_a_vertex_that_is_far_from_the_origin() -> None:
+    retracing, seen = Retracing(), Correspondence()
+    seen.pair(2, 8)
+    for x in np.arange(9.0, 4.9, -0.05).tolist():
+        retracing.note(view_from(x, 0.0), seen if x > 6.0 else Correspondence())
+    assert retracing.begin({8})
+    last = rest(retracing, 7.0, 0.0)
+    assert last is not None
+    assert last.polyline[-1] == pytest.approx((9.0, 0.0), abs=0.11)
+
+
 def test_detours_are_left_out() -> None:
     loop = [(4.0, 0.0), (6.0, 0.0), (6.0, 3.0), (4.1, 3.0), (4.1, 0.1), (4.1, -3.0)]
     retracing = driven((0.0, 0.0), *loop)
