@@ -25,6 +25,8 @@ from gvgbot.maps.picture import draw_map
 from gvgbot.maps.route_graph import RouteEdge, RouteGraph, RouteNode
 from gvgbot.maps.trajectory import Trajectory, encode_tum
 
+_SAME_ROOM_M = 0.1  # a grid does not tell a clearance better
+
 
 @dataclass(slots=True)
 class Journey:
@@ -159,9 +161,11 @@ def _route_edge(edge: Edge, vertices: dict[int, Pose]) -> RouteEdge:
 
 
 def with_room_of(graph: RouteGraph, grid: OccupancyGrid, parts: Collection[int] = ()) -> RouteGraph:
-    """The same graph, of which no edge claims more room than there is along it in the grid.
+    """The same graph, of which nothing claims more room than there is in the grid.
 
-    An edge that was in sight from end to end may have been seen before all that stands beside it.
+    An edge that was in sight from end to end may have been seen before all that stands beside it,
+    and a vertex while columns were left out for what may be people; its own clearance, which is
+    the mean of many looks, counts if the grid tells about the same.
     `parts` are the places, among the edges, of those whose narrowest place may be in another part
     of an edge that was parted: they claim the room in which the grid knows the floor to be free.
     """
@@ -175,7 +179,12 @@ def with_room_of(graph: RouteGraph, grid: OccupancyGrid, parts: Collection[int] 
             claimed = max(claimed, _known_room(grid, line, room))
         return replace(edge, min_clearance=min(claimed, room))
 
-    return replace(graph, edges=tuple(measured(i, edge) for i, edge in enumerate(graph.edges)))
+    def seen(node: RouteNode) -> RouteNode:
+        room = float(np.asarray(tree.query(node.position)[0]))
+        return node if node.clearance < room + _SAME_ROOM_M else replace(node, clearance=room)
+
+    edges = tuple(measured(i, edge) for i, edge in enumerate(graph.edges))
+    return replace(graph, vertices=tuple(map(seen, graph.vertices)), edges=edges)
 
 
 def _known_room(grid: OccupancyGrid, line: Array, most: float) -> float:

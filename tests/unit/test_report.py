@@ -96,6 +96,20 @@ def test_no_edge_claims_more_room_than_the_saved_grid_has_along_it(
     assert with_room_of(graph, empty).edges[0].min_clearance == claimed
 
 
+@pytest.mark.parametrize(("away", "told"), [(0.5, 0.5), (0.95, 1.0), (3.0, 1.0)])
+def test_no_vertex_claims_far_more_room_than_the_saved_grid_has_around_it(
+    away: float, told: float
+) -> None:
+    """A metre is claimed; a column was out of the map then, for somebody might have stood there."""
+    cells = np.zeros((40, 160), np.int8)
+    cells[20, 100] = 100
+    column = 100.5 * 0.05, 20.5 * 0.05
+    graph = street(0.3, (column[0] - away, column[1]), (column[0] - away - 1.5, column[1]))
+    near, far = with_room_of(graph, OccupancyGrid(cells, 0.05, (0.0, 0.0))).vertices
+    assert near.clearance == pytest.approx(told, abs=0.01)
+    assert far.clearance == 1.0
+
+
 @pytest.mark.parametrize(("beside", "told"), [(100, 0.8), (UNKNOWN, 0.8), (0, 1.5)])
 def test_part_of_an_edge_that_was_narrow_elsewhere_claims_the_room_that_is_known(
     beside: int, told: float
