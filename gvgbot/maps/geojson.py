@@ -171,6 +171,10 @@ def _feature(raw: msgspec.Raw, number: int) -> _Vertex | _Edge:
             return msgspec.json.decode(raw, type=_Vertex)
         return msgspec.json.decode(raw, type=_Edge)
     except msgspec.MsgspecError as error:
+        if b'"waypoint"' in bytes(raw):
+            raise UsageError(
+                "an export for Nav2's route server, and no run's map.geojson: give the run itself"
+            ) from error
         raise UsageError(f"damaged route graph, feature {number}: {error}") from error
 
 

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 
+from gvgbot.errors import UsageError
 from gvgbot.geometry import Array
 from gvgbot.maps import route_server
-from gvgbot.maps.geojson import encode
+from gvgbot.maps.geojson import decode, encode
 from gvgbot.maps.route_graph import RouteGraph
 from tests.unit.maps.route_server import Malformed, load
 from tests.unit.maps.small_run import write_run
@@ -58,7 +59,7 @@ def away(point: Array, line: Array) -> float:
     found = []
     for a, b in pairwise(line):
         length = math.dist(a, b)
-        along = 0.0 if length == 0.0 else float((point - a) @ (b - a)) / length**2
+        along = 0.0 if length < 1e-9 else float((point - a) @ (b - a)) / length**2
         found.append(math.dist(point, a + min(max(along, 0.0), 1.0) * (b - a)))
     return min(found)
 
@@ -72,6 +73,11 @@ def test_a_way_round_a_corner_is_as_long_from_node_to_node() -> None:
     for way in ((3, 7), (7, 3)):
         assert nx.shortest_path_length(graph, *way, weight="metres") == pytest.approx(3.0)
     assert sorted(loaded.nodes.values()) == [(0.0, 0.0), (2.0, 0.0), (2.0, 1.0)]
+
+
+def test_an_export_that_is_taken_for_the_map_of_a_run_is_told_to_be_one() -> None:
+    with pytest.raises(UsageError, match="an export for Nav2's route server"):
+        decode(route_server.encode(CORNER))
 
 
 def test_a_saved_run_is_taken(tmp_path: Path) -> None:
