@@ -19,7 +19,7 @@ _GAP_M = 0.1  # in range from beam to beam, from a person to what is close behin
 _NOISE = 4.0  # sigma: what differs by more is no noise
 _BEAMS = 3  # fewer see nothing for sure
 _ARC_BEAMS = 8  # fewer lie on a circle by chance
-_SLIM_M, _WIDE_M = 0.1, 0.8  # people are between these; what is slimmer is furniture
+_SLIM_M, _WIDE_M = 0.1, 0.65  # people are between these; what is slimmer is furniture
 _FLAT = 0.06  # of its width: what bulges less towards the laser is a piece of wall, or of glass
 
 Piece = tuple[int, int]  # the first beam, and the one after the last

@@ -171,7 +171,7 @@ def test_who_is_as_wide_as_a_robot_that_may_be_anywhere_may_be_it_from_far_away(
 @pytest.mark.parametrize("noise", [0.0, 0.01, 0.03])
 def test_what_surely_has_an_edge_is_a_post_after_a_glimpse(noise: float) -> None:
     """Else doors beside it are not believed until the robot has passed them."""
-    post = carved([ROOM], [(1.6, 0.6, 2.1, 1.1)])
+    post = carved([ROOM], [(1.6, 0.6, 2.0, 1.0)])
     watch = Watch(noise=noise)
     assert all(watch.dropped(post, float(second)) > 0 for second in range(3))
     assert watch.dropped(post, 4.0) == 0
