@@ -189,7 +189,8 @@ def test_after_each_power_cut_in_a_building_it_finds_its_place_and_keeps_it(tmp_
     """The computer has started anew, so that nothing vouches for the base, whose wheels are worn.
 
     A while later it still knows its place. How well is decided by little: by how floats are
-    added up on one kind of computer it was 0.1 m off, and on another one 0.18 and 0.38 m.
+    added up on one kind of computer it was 0.1 m off, and on another one 0.18 and 0.38 m. So is how
+    far it drives until then: 11 to 47 m in the seeds 1 to 3.
     """
     settings = ["twin.seed=2", "twin.world=floor_plan:5", "twin.base.odometry=worn"]
     config = load_config(None, settings)
@@ -222,7 +223,7 @@ def test_after_each_power_cut_in_a_building_it_finds_its_place_and_keeps_it(tmp_
     note_error(lives.run([power_cut(40.0), power_cut(140.0)]))
     assert max(errors) < 0.5
     for before, (after, _) in zip(cut, found, strict=True):
-        assert after - before < 40.0
+        assert after - before < 60.0
 
 
 def test_a_robot_that_was_moved_before_its_first_vertex_begins_a_new_map(
