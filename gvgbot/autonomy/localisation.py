@@ -261,39 +261,41 @@ class LocalMaps:
         """
         self.catch_up()
         assert self._walls is not None
-        walls, hits, sights, _, tree = self._walls
-        config = self._matching
-        points = sampled(scan, config.points)
-        sides = Sides(sights, scan.base_laser.position - points)
-        coarse = (config.coarse_pair_m,) if config.coarse_pair_m else ()
-        if min(len(walls), len(points)) < _LEAST_POINTS:
+        points, reach = sampled(scan, self._matching.points), max(self._matching.search_rad, turned)
+        if min(len(self._walls.points), len(points)) < _LEAST_POINTS:
             return None
         best: tuple[Registration, Array] | None = None
         agreement, first = 0.0, priors[0][0]
         for i, (prior, Q) in enumerate(priors):
             if agreement + clearly >= 1.0:
                 break  # nothing can be clearly better
-            reach = max(config.search_rad, turned)
-            near = _turned(points, tree, prior, reach) if reach else prior
-            so_far = None if best is None else best[0].pose
-            found = register_coarsely(
-                points, tree, walls, near, Q, config, coarse, hits, sides, so_far
-            )
-            pose = near if found is None else found.pose
-            first = pose if i == 0 else first
+            near = _turned(points, self._walls.tree, prior, reach) if reach else prior
+            found = self._registered(scan, points, near, Q, None if best is None else best[0].pose)
+            if i == 0:
+                first = near if found is None else found.pose
             if found is None:
                 continue
             now = self._agreement(found, points, least_known)
             if now is None:
-                if stays and i == 0 and self._nearness(points, pose) >= _ON_WALLS:
+                if stays and i == 0 and self._nearness(points, first) >= _ON_WALLS:
                     best = found, Q
-                continue
-            if now <= agreement + clearly:
-                continue
-            if stays and i and self._nearness(points, pose) <= self._nearness(points, first):
-                continue
-            best, agreement = (found, Q), now
+            elif now > agreement + clearly and (
+                i == 0
+                or not stays
+                or self._nearness(points, found.pose) > self._nearness(points, first)
+            ):
+                best, agreement = (found, Q), now
         return best
+
+    def _registered(
+        self, scan: Scan, points: Array, near: Pose, Q: Array, so_far: Pose | None
+    ) -> Registration | None:
+        """Points (N, 2) of a scan, laid onto the walls near a pose; None as `register` has it."""
+        assert self._walls is not None
+        walls, hits, sights, _, tree = self._walls
+        config, sides = self._matching, Sides(sights, scan.base_laser.position - points)
+        coarse = (config.coarse_pair_m,) if config.coarse_pair_m else ()
+        return register_coarsely(points, tree, walls, near, Q, config, coarse, hits, sides, so_far)
 
     def _agreement(self, found: Registration, points: Array, least_known: float) -> float | None:
         """How well points (N, 2) fit where they were found, 0 to 1; None if too few of them do."""

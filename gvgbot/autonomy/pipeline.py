@@ -322,7 +322,8 @@ class Pipeline:
         if before is not None:
             turned = wrap_angle(odometry.odom_base.theta - before.odom_base.theta)
             is_free = not self._is_idle and felt.stopped_for not in WAITS
-            self._execution.note_turn(turned, is_free * (odometry.stamp - before.stamp))
+            free_s = odometry.stamp - before.stamp if is_free else 0.0
+            self._execution.note_turn(turned, free_s)
         self.tracker.odometry.append(odometry)
         if self.past.last is None or self.led:
             return STANDSTILL
