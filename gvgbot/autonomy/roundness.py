@@ -20,6 +20,7 @@ _MOST = 8.0  # that one look can tell: whatever hides a part of somebody is not 
 _FADING = 0.8  # of the evidence is left at the next look: looks from one place err alike
 _STEPS = 5
 _NEGLIGIBLE_M = 1e-4
+_DAMPING = 1e-9 * np.eye(3)  # far less than what noise does, far more than rounding
 _LEAST_BEAMS = 5  # that tell where a body of known radius is
 _LOOSE_M = 0.03  # by which beams that end on such a body stray, and its width
 
@@ -60,8 +61,8 @@ def body_of(ends: Array, eye: Array, radius: float) -> Array | None:
     for _ in range(_STEPS):
         to_centre = ends - centre
         distance = np.hypot(*to_centre.T)
-        step, *_ = np.linalg.lstsq(to_centre / distance[:, None], distance - radius)
-        centre = centre + step
+        slopes = to_centre / distance[:, None]
+        centre = centre + _least_squares(list(slopes.T), distance - radius)
     stray = np.hypot(*(ends - centre).T) - radius
     return centre if float(np.sqrt(np.mean(stray**2))) < _LOOSE_M else None
 
@@ -83,29 +84,36 @@ def _circle(ends: Array, eye: Array) -> tuple[Array, float]:
     Gauss-Newton, from the algebraic fit of Kåsa: |p|² = 2 c·p + r² - |c|².
     """
     middle = ends.mean(axis=0)
-    about = ends - middle
-    equations = np.ones((len(ends), 3))
-    equations[:, :2] = 2.0 * about
-    (x, y, rest), *_ = np.linalg.lstsq(equations, (about**2).sum(axis=1))
-    centre, radius = np.array([x, y]), _possible(math.sqrt(rest + x**2 + y**2))
+    px, py = (ends - middle).T
+    square = px * px + py * py
+    x, y = _least_squares([2.0 * px, 2.0 * py], square)
+    radius = _possible(math.sqrt(float(square.mean()) + x * x + y * y))
     away = (middle - eye) / np.hypot(*(middle - eye))
-    if centre @ away <= 0.0 or np.hypot(x, y) > radius:
-        centre = radius * away
-    slopes = np.ones((len(ends), 3))
+    if x * away[0] + y * away[1] <= 0.0 or math.hypot(x, y) > radius:
+        x, y = (radius * away).tolist()
     for _ in range(_STEPS):
-        to_centre = about - centre
-        distance = np.hypot(to_centre[:, 0], to_centre[:, 1])
-        slopes[:, :2] = to_centre / distance[:, None]
-        step, *_ = np.linalg.lstsq(slopes, distance - radius)
-        if _possible(radius + step[2]) != radius + step[2]:
-            wider = _possible(radius + step[2]) - radius
-            moved, *_ = np.linalg.lstsq(slopes[:, :2], distance - radius - wider)
-            step = np.array([*moved, wider])
-        step /= max(1.0, float(np.hypot(*step[:2])) / radius)
-        centre, radius = centre + step[:2], radius + float(step[2])
-        if np.abs(step).max() < _NEGLIGIBLE_M:
+        dx, dy = px - x, py - y
+        distance = np.hypot(dx, dy)
+        slopes, stray = [dx / distance, dy / distance], distance - radius
+        u, v, wider = _least_squares([*slopes, np.ones(len(stray))], stray)
+        if _possible(radius + wider) != radius + wider:
+            wider = _possible(radius + wider) - radius
+            u, v = _least_squares(slopes, stray - wider)
+        shorter = 1.0 / max(1.0, math.hypot(u, v) / radius)
+        x, y, radius = x + shorter * u, y + shorter * v, radius + shorter * wider
+        if shorter * max(abs(u), abs(v), abs(wider)) < _NEGLIGIBLE_M:
             break
-    return middle + centre, radius
+    return middle + np.array([x, y]), radius
+
+
+def _least_squares(columns: list[Array], b: Array) -> list[float]:
+    """The x (M,) for which A x is nearest to b (N,), by the columns of A: the normal equations.
+
+    They are damped a little, so that there is an x if all beams end on one ray.
+    """
+    A = np.array(columns)
+    x: list[float] = np.linalg.solve(A @ A.T + _DAMPING[: len(A), : len(A)], A @ b).tolist()
+    return x
 
 
 def _possible(radius: float) -> float:

@@ -1,6 +1,7 @@
 """The multigraph that is reduced: chains of Voronoi points between ends and forks."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -131,15 +132,27 @@ def contracted(fine: FineGraph) -> Draft:
     leaving = leaving.take(np.argsort(own.take(leaving), kind="stable"))
     stops, both = is_key.tolist(), np.bincount(own, other, len(is_key)).astype(int).tolist()
     walked: set[tuple[int, int]] = set()
+    paths: list[list[int]] = []
     for key, second in zip(own.take(leaving).tolist(), other.take(leaving).tolist(), strict=True):
         if (key, second) not in walked:
             path = _walk(both, stops, key, second)
             walked.add((path[-1], path[-2]))
             walked.add((key, second))
-            on = np.array(path)
-            points, clearance = fine.points.take(on, axis=0), fine.clearance.take(on)
-            draft.add(Chain(key, path[-1], points, clearance))
+            paths.append(path)
+    for chain in _chains(fine, paths):
+        draft.add(chain)
     return draft
+
+
+def _chains(fine: FineGraph, paths: list[list[int]]) -> Iterator[Chain]:
+    """The chains along paths of points, which lie one after another in the same arrays."""
+    on = np.array([point for path in paths for point in path], np.intp)
+    points, clearance = fine.points.take(on, axis=0), fine.clearance.take(on)
+    steps, stop = steps_of(points), 0
+    for path in paths:
+        start, stop = stop, stop + len(path)
+        length = float(steps[start : stop - 1].sum())
+        yield Chain(path[0], path[-1], points[start:stop], clearance[start:stop], length)
 
 
 def _walk(both: list[int], stops: list[bool], start: int, second: int) -> list[int]:

@@ -70,6 +70,14 @@ def test_a_bay_is_no_body_though_it_is_round() -> None:
     assert round_evidence(bay, EYE, 0.01)[0] <= 0.0
 
 
+def test_what_no_circle_goes_through_is_no_body() -> None:
+    """A flat wall seen head-on, exactly, and beams that all end on one ray: nothing to solve."""
+    wall = np.stack([np.full(20, 2.0), np.linspace(-0.2, 0.2, 20)], axis=1)
+    ray = np.stack([np.linspace(1.0, 1.3, 20), np.zeros(20)], axis=1)
+    for points in (wall, ray):
+        assert round_evidence(points, EYE, 0.01)[0] <= 0.0
+
+
 @NOISES
 @PLACES
 def test_a_few_looks_at_somebody_are_sure(noise: float, increment: float, away: float) -> None:
