@@ -45,8 +45,10 @@ _TELLING = 0.01  # share of the walls: who disagrees with so much more is e time
 # where it looks alike by chance, and of what the map has not seen: that says nothing
 _CHANCE = 0.15
 _CHANCE_OUTSIDE = 0.07  # where half a building looks by chance like the other, unknown half
-_STAYED_M, _STAYED_RAD = 2.0, 1.0  # from where it was, a robot that nobody carried may have rolled
-_STAYED = 5.0  # log of how much likelier that is than any other place on half a map
+# Nobody carried it, but a base goes on for up to two seconds after its last command: so far at
+# most, m, and e times less likely for each so many rad
+_STAYED_M, _STAYED_RAD = 2.0, 0.6
+_STAYED = 5.0  # log of how much likelier where it was is than any other place on half a map
 _LOOKS = 5  # before anything is said
 _SURE = 0.995  # share of a place
 # in a row, with the same place: one may be wrong about a wall that has moved a little
@@ -240,10 +242,12 @@ class Relocaliser:
         """Being nowhere on the map, where everything fits as it does by chance."""
         return Hypothesis(Pose(), newest=-self._chance / _TELLING)
 
-    def _has_stayed(self, hypothesis: Hypothesis) -> bool:
-        """Whether the local frame would begin where the robot was seen last."""
+    def _stayed(self, hypothesis: Hypothesis) -> float:
+        """Log of how much likelier it is for beginning where the robot was seen last."""
         off = self._scans[-1][0].to(hypothesis.map_local)
-        return math.hypot(off.x, off.y) < _STAYED_M and abs(off.theta) < _STAYED_RAD
+        if math.hypot(off.x, off.y) > _STAYED_M:
+            return 0.0
+        return max(0.0, _STAYED - abs(off.theta) / _STAYED_RAD)
 
     def _begin(self, look: Look, guesses: list[Pose]) -> Generator[None, None, None]:
         """Make hypotheses of what fits closely, too."""
@@ -251,7 +255,7 @@ class Relocaliser:
         self._hypotheses = [Hypothesis(guess.compose(inverse)) for guess in guesses]
         if not self._is_whole:  # what was being mapped, after a power cut; nobody was to carry it
             for hypothesis in self._hypotheses:
-                hypothesis.behind = _STAYED * self._has_stayed(hypothesis)
+                hypothesis.behind = self._stayed(hypothesis)
         self._nowhere, self._looks = self._elsewhere(), 0
         yield from self._weigh(look, _GUESSED)
 

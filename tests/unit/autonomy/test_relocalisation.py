@@ -1,6 +1,7 @@
 """Where on a known map a robot is: told by walls that differ, and never by walls that do not."""
 
 import math
+from dataclasses import replace
 from collections.abc import Iterable, Iterator
 from itertools import pairwise
 
@@ -120,9 +121,12 @@ def test_who_stays_on_half_a_map_is_sure_of_the_right_place_in_the_end() -> None
     assert found.compose(path[0].to(path[first])).distance(path[first]) < 0.1
 
 
-def test_who_wakes_where_it_was_is_sure_of_that_on_half_a_map_as_well() -> None:
+@pytest.mark.parametrize("turned", [0.0, -1.9, 1.9])
+def test_who_wakes_where_it_was_is_sure_of_that_on_half_a_map_as_well(turned: float) -> None:
+    """However it has turned meanwhile: a base goes on for two seconds after its last command."""
     tour = [(1.5, 5.5), (1.5, 1.5), (4.0, 1.5)]
     path = along([(3.5, 1.5), (6.0, 1.5), (6.0, 6.5)])  # and drives on from there
+    path[0] = replace(path[0], theta=turned)
     formed = opinions(one_ring().world, path, tour, is_whole=False)
     sure = [i for i, opinion in enumerate(formed) if opinion.is_sure]
     assert sure
