@@ -7,6 +7,7 @@ What a moment decides (the order, reflexes, patience) is left to the next moment
 
 from bisect import bisect_left
 from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,7 @@ from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
+from gvgbot.autonomy.slam.names import Names
 from gvgbot.autonomy.start_edge import StartEdge
 from gvgbot.autonomy.views import Observation
 from gvgbot.autonomy.whereabouts import Whereabouts
@@ -34,6 +36,7 @@ from gvgbot.hal.messages import Odometry
 
 _LEAST = np.diag([1e-5, 1e-5, 1e-6])  # variance of a step or sighting that had to be made up
 _JUMP_M = 0.5  # as no closure of a loop moves the robot
+_T = TypeVar("_T")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -167,7 +170,7 @@ def remember(pipeline: Pipeline) -> Memory:
 
 def _intent(pipeline: Pipeline) -> Intent:
     mission, errands = pipeline.mission, pipeline.errands
-    closed = mission._obstructions
+    closed, names = mission._obstructions, pipeline.mapper.unsettled.names
     return Intent(
         mission.where,
         mission.target,
@@ -177,12 +180,16 @@ def _intent(pipeline: Pipeline) -> Intent:
         mission._progress._newest_m,
         mission._driven.start,
         mission._frontiers,
-        Closed(closed._times, closed._since),
+        Closed(_by_new_names(closed._times, names), _by_new_names(closed._since, names)),
         errands.is_paused and not errands.is_carried,
         errands.will_wait,
         errands.kept(),
-        errands.closures.until,
+        _by_new_names(errands.closures.until, names),
     )
+
+
+def _by_new_names(values: dict[HalfEdgeId, _T], names: Names) -> dict[HalfEdgeId, _T]:
+    return {names.half_edge(end): value for end, value in values.items()}
 
 
 def _cells(local_map: LocalMap) -> Cells:

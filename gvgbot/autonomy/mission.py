@@ -8,7 +8,6 @@ from gvgbot.autonomy.ending import all_examined, cut_short, left_to_others
 from gvgbot.autonomy.events import Decision, Event, Recovery
 from gvgbot.autonomy.exploration.access import NEAR_M, Access, access, way_to_edge
 from gvgbot.autonomy.exploration.config import ExplorationConfig
-from gvgbot.autonomy.exploration.obstructions import Obstructions
 from gvgbot.autonomy.exploration.paths import shortest_paths
 from gvgbot.autonomy.gvg.local import Branch, Place
 from gvgbot.autonomy.mapping import Mapper
@@ -98,7 +97,7 @@ class Mission(Pursuit):
             half = self._mapper.graph.half_edge(end)
             assert half is not None
             half.blocked = False
-        self._obstructions = Obstructions(self._config.retries, self._config.retry_after_s)
+        self._obstructions = self._no_obstructions()
         self._scouting, self._progress = Scouting(), Progress(self._mapper)
         self.set_aside()
 
@@ -143,7 +142,6 @@ class Mission(Pursuit):
     def _learn(self, view: View, known: Correspondence, place: Place) -> None:
         """Account for what has been driven, and for what the target is called now."""
         unsettled, came_from = self._mapper.unsettled, self._mapper.came_from
-        self._obstructions.rename(unsettled.renamed)
         self.target = unsettled.current(self.target)
         while self.target in came_from:
             self.target = came_from[self.target][0]

@@ -39,7 +39,7 @@ class Pursuit:
         self._progress = Progress(mapper)
         # before it knew a vertex: others had driven on, or nothing was there
         self._has_turned = False
-        self._obstructions = Obstructions(config.retries, config.retry_after_s)
+        self._obstructions = self._no_obstructions()
         self._hindrance = Hindrance()
         self._neighbours = Neighbours()
         self._scouting, self._backtracking = Scouting(), Backtracking()
@@ -68,6 +68,10 @@ class Pursuit:
         return Finished(stamp, outcome, reason)
 
     # -- something in the way ----------------------------------------------------------------------
+
+    def _no_obstructions(self) -> Obstructions:
+        config, names = self._config, self._mapper.unsettled.names
+        return Obstructions(config.retries, config.retry_after_s, names)
 
     def _watch_the_way(self, view: View) -> None:
         """Wait a little for what stands in the way, then try another one."""

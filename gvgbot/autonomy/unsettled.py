@@ -17,6 +17,7 @@ from gvgbot.autonomy.revocable import Revocable
 from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.doubts import NEW_PER_M2, SAME, Doubt, Doubts, habit_density
 from gvgbot.autonomy.slam.graph import Edge, HalfEdgeId, Vertex
+from gvgbot.autonomy.slam.names import Names
 from gvgbot.autonomy.slam.trail import Laid
 from gvgbot.autonomy.topology import fuse
 from gvgbot.geometry import Array, Pose, wrap_angle
@@ -35,8 +36,7 @@ class Unsettled:
         self._has_news = False  # on what is in doubt
         self._revocable: Revocable | None = None
         self.is_wary = False  # no closure without the next vertices
-        # what half-edges are called now whose vertices proved to be known ones
-        self.renamed: dict[HalfEdgeId, HalfEdgeId] = {}
+        self.names = Names()
 
     # -- what happens meanwhile ----------------------------------------------------------------
 
@@ -86,7 +86,7 @@ class Unsettled:
 
     def current(self, end: HalfEdgeId | None) -> HalfEdgeId | None:
         """What a half-edge is called now: its vertex may have proved to be a known one."""
-        return None if end is None else self.renamed.get(end, end)
+        return None if end is None else self.names.half_edge(end)
 
     # -- which of the known ones it is after all -----------------------------------------------
 
@@ -146,8 +146,7 @@ class Unsettled:
             kept.seen_at, kept.updated_at = gone.seen_at, gone.updated_at
         kept.visits += gone.visits
         fused = fuse(known.graph, kept, gone, Pose(theta=turn), self._same_bearing)
-        before = {old: fused.renamed.get(new, new) for old, new in self.renamed.items()}
-        self.renamed = before | fused.renamed
+        self.names.change(fused.renamed)
         known.observations[:] = [
             replace(seen, vertex=kept.id, R=seen.R[:2, :2]) if seen.vertex == gone.id else seen
             for seen in known.observations
@@ -177,6 +176,6 @@ class Unsettled:
         self._doubts.recent = was.doubts
         self._doubts.refute(was.vertex)
         self._revocable, self.is_wary = None, True
-        self.renamed.clear()
+        self.names.forget()
         gone = [VertexRemoved(stamp, vertex, "a closure was revoked") for vertex in added]
         return [ClosureRevoked(stamp, was.vertex), *gone]

@@ -123,7 +123,6 @@ class Agenda:
     def advance(self, view: View, known: Correspondence) -> tuple[Order, list[Event]]:
         """The order for the next keyframe interval, and what has happened."""
         self._seen = view, known
-        self.closures.rename(self._mapper.unsettled.renamed)
         self.closures.open_due(self._mapper.graph, view.stamp)
         if self._command is not None:
             return Stand(), self._mission.witness(view, known) + self.take_events()

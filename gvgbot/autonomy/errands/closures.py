@@ -1,14 +1,19 @@
 """Ways that something was found to stand in: not to be driven for a while."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
+from gvgbot.autonomy.slam.names import Names
 
 
 class Closures:
-    """Blocks half-edges, and unblocks them when their time is over."""
+    """Blocks half-edges, and unblocks them when their time is over.
 
-    def __init__(self) -> None:
+    It knows them by what they were called when they were closed.
+    """
+
+    def __init__(self, names: Names) -> None:
+        self._names = names
         self.until: dict[HalfEdgeId, float] = {}  # stamps
 
     def close(self, graph: GvgGraph, ends: Iterable[HalfEdgeId], until: float) -> None:
@@ -18,10 +23,6 @@ class Closures:
             if half is not None and not half.blocked:
                 half.blocked = True
                 self.until[end] = until
-
-    def rename(self, renamed: Mapping[HalfEdgeId, HalfEdgeId]) -> None:
-        """Take over what half-edges are called now whose vertices proved to be known ones."""
-        self.until = {renamed.get(end, end): until for end, until in self.until.items()}
 
     def open_due(self, graph: GvgGraph, stamp: float) -> None:
         """Unblock what was closed long enough ago."""
@@ -38,6 +39,6 @@ class Closures:
 
     def _open(self, graph: GvgGraph, end: HalfEdgeId) -> None:
         self.until.pop(end, None)
-        half = graph.half_edge(end)
+        half = graph.half_edge(self._names.half_edge(end))
         if half is not None:
             half.blocked = False

@@ -66,7 +66,7 @@ class Ground:
 
     def __init__(self, mission: Mission, mapper: Mapper, room_m: float) -> None:
         self.mission, self.mapper, self.room_m = mission, mapper, room_m
-        self.closures = Closures()
+        self.closures = Closures(mapper.unsettled.names)
 
     def situation(self, view: View, known: Correspondence) -> Situation | None:
         """Where the robot is on the graph; None if it is off it."""

@@ -1,16 +1,20 @@
 """Ways that something stood in, and when they are worth another try."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
+from gvgbot.autonomy.slam.names import Names
 
 
 class Obstructions:
-    """Closes half-edges for a while: frontiers are not chosen, edges not driven."""
+    """Closes half-edges for a while: frontiers are not chosen, edges not driven.
 
-    def __init__(self, retries: int, retry_after: float) -> None:
+    It knows them by what they were called when they were closed.
+    """
+
+    def __init__(self, retries: int, retry_after: float, names: Names) -> None:
         """Each is opened again so many times, so many seconds after it was closed."""
-        self._retries, self._retry_after = retries, retry_after
+        self._retries, self._retry_after, self._names = retries, retry_after, names
         self._times: dict[HalfEdgeId, int] = {}  # that it was closed
         self._since: dict[HalfEdgeId, float] = {}  # stamps of those that will be opened again
 
@@ -35,20 +39,15 @@ class Obstructions:
                 continue
             half.blocked = True
             self._times[end] = self._times.get(end, 0) + 1
-            if self._times[end] <= most:
+            if sum(n for e, n in self._times.items() if self._names.half_edge(e) == end) <= most:
                 self._since[end] = stamp
-
-    def rename(self, renamed: Mapping[HalfEdgeId, HalfEdgeId]) -> None:
-        """Take over what half-edges are called now whose vertices proved to be known ones."""
-        self._times = {renamed.get(end, end): times for end, times in self._times.items()}
-        self._since = {renamed.get(end, end): since for end, since in self._since.items()}
 
     def open(self, graph: GvgGraph, stamp: float) -> bool:
         """Unblock what was closed long enough ago; whether there was something."""
         due = [end for end, since in self._since.items() if stamp - since >= self._retry_after]
         for end in due:
             del self._since[end]
-            half = graph.half_edge(end)
+            half = graph.half_edge(self._names.half_edge(end))
             if half is not None:
                 half.blocked = False
         return bool(due)

@@ -12,6 +12,7 @@ from gvgbot.autonomy.recogniser import Recognition
 from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex
+from gvgbot.autonomy.slam.names import Names
 from gvgbot.autonomy.unsettled import Unsettled
 from gvgbot.geometry import Pose
 from tests.unit.autonomy.graphs import STREET, between, streets
@@ -95,21 +96,45 @@ def test_what_is_closed_for_a_while_is_opened_again_though_its_vertex_has_anothe
     known, second, third = (Vertex(graph.next_id(), 1.0, Pose(), 0.0, 0.0) for _ in places)
     graph.vertices |= {vertex.id: vertex for vertex in (known, second, third)}
     closed = HalfEdgeId(third.id, third.add_half_edge(math.pi / 2))
-    obstructions = Obstructions(retries=3, retry_after=20.0)
-    obstructions.close(graph, [closed], 0.0)
     x = np.concatenate([np.zeros(3), np.pad(places, ((0, 0), (0, 1))).ravel()])
     knowledge = Knowledge(Belief(x, 0.01 * np.eye(12), tuple(graph.vertices)), graph)
     unsettled = Unsettled(knowledge, margin=2.0, same_bearing=math.radians(40))
     for vertex, rival in ((third, second), (second, known)):
         unsettled.doubt(vertex, Recognition(None, (rival.id,), (1.0,), 0.02, 9.0), 0.0)
+    obstructions = Obstructions(retries=3, retry_after=20.0, names=unsettled.names)
+    obstructions.close(graph, [closed], 0.0)
     for stamp in (1.0, 2.0):
         assert unsettled.settle(stamp)
     assert list(graph.vertices) == [known.id]
     (north,) = graph.blocked()
     assert unsettled.current(closed) == north
-    obstructions.rename(unsettled.renamed)
     assert obstructions.open(graph, 30.0)
     assert graph.frontiers() == [north]
+
+
+def test_who_has_been_tried_often_stays_so_when_it_proves_to_be_another_one_after_all() -> None:
+    """A closure makes the second entry of a street's west end one with the first; it is revoked."""
+    graph, ids = streets(2, 1)
+    west, again = graph.vertices[ids[0, 0]], Vertex(graph.next_id(), 1.0, Pose(), 0.0, 0.0)
+    graph.vertices[again.id] = again
+    ends = [HalfEdgeId(vertex.id, vertex.add_half_edge(2.0)) for vertex in (west, again)]
+    places = np.array([[0.0, 0.0], [STREET, 0.0], [0.1, 0.1]])
+    x = np.concatenate([np.zeros(3), np.pad(places, ((0, 0), (0, 1))).ravel()])
+    known = Knowledge(Belief(x, 0.01 * np.eye(12), (*ids.values(), again.id)), graph)
+    unsettled = Unsettled(known, margin=2.0, same_bearing=math.radians(40))
+    unsettled.doubt(again, Recognition(None, (west.id,), (1.0,), 0.02, 9.0), 0.0)
+    obstructions = Obstructions(retries=1, retry_after=20.0, names=unsettled.names)
+    obstructions.close(graph, ends[1:], 0.0)
+    assert obstructions.open(graph, 30.0)
+    assert unsettled.settle(31.0)
+    assert unsettled.current(ends[1]) == ends[0]
+    obstructions.close(graph, ends[:1], 32.0)
+    assert not obstructions.waiting, "it is the one that has been tried"
+    (edge,) = graph.edges.values()
+    unsettled.note_way(edge, arrived=99)  # not at its far end
+    assert unsettled.revoke(33.0)
+    obstructions.close(known.graph, ends[1:], 34.0)
+    assert not obstructions.waiting
 
 
 class Contradicted:
@@ -139,7 +164,8 @@ def test_what_was_closed_before_a_closure_that_is_taken_back_is_opened_when_its_
     town = Contradicted()
     places = town.ids[0, 0], town.ids[1, 0]
     end = between(town.known.graph, *places)
-    obstructions, errands = Obstructions(retries=3, retry_after=20.0), Closures()
+    obstructions = Obstructions(retries=3, retry_after=20.0, names=Names())
+    errands = Closures(Names())
     obstructions.close(town.known.graph, [end], 0.0)
     errands.close(town.known.graph, [between(town.known.graph, *places[::-1])], until=20.0)
     town.close_a_loop()
@@ -159,7 +185,7 @@ def test_what_is_closed_after_a_closure_that_is_taken_back_stays_closed_until_it
     town = Contradicted()
     end = between(town.known.graph, town.ids[0, 0], town.ids[1, 0])
     town.close_a_loop()
-    obstructions = Obstructions(retries=3, retry_after=20.0)
+    obstructions = Obstructions(retries=3, retry_after=20.0, names=Names())
     obstructions.close(town.known.graph, [end], 0.0)
     town.take_it_back()
     assert town.known.graph.blocked() == [end]

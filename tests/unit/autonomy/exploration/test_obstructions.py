@@ -2,6 +2,7 @@
 
 from gvgbot.autonomy.exploration.obstructions import Obstructions
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex
+from gvgbot.autonomy.slam.names import Names
 from gvgbot.geometry import Pose
 
 
@@ -14,7 +15,7 @@ def graph_with_a_frontier() -> tuple[GvgGraph, HalfEdgeId]:
 
 def test_a_closed_frontier_is_none_until_it_is_opened() -> None:
     graph, end = graph_with_a_frontier()
-    obstructions = Obstructions(retries=1, retry_after=20.0)
+    obstructions = Obstructions(retries=1, retry_after=20.0, names=Names())
     obstructions.close(graph, [end], 100.0)
     assert graph.frontiers() == []
     assert not obstructions.open(graph, 119.0)
@@ -26,7 +27,7 @@ def test_a_closed_frontier_is_none_until_it_is_opened() -> None:
 
 def test_after_its_retries_it_stays_closed() -> None:
     graph, end = graph_with_a_frontier()
-    obstructions = Obstructions(retries=2, retry_after=20.0)
+    obstructions = Obstructions(retries=2, retry_after=20.0, names=Names())
     for stamp in (0.0, 100.0):
         obstructions.close(graph, [end], stamp)
         assert obstructions.open(graph, stamp + 50.0)
@@ -38,7 +39,7 @@ def test_after_its_retries_it_stays_closed() -> None:
 
 def test_an_end_that_is_gone_is_not_waited_for() -> None:
     graph, end = graph_with_a_frontier()
-    obstructions = Obstructions(retries=2, retry_after=20.0)
+    obstructions = Obstructions(retries=2, retry_after=20.0, names=Names())
     graph.remove_vertex(end.vertex)
     obstructions.close(graph, [end], 0.0)
     assert not obstructions.waiting
@@ -46,7 +47,7 @@ def test_an_end_that_is_gone_is_not_waited_for() -> None:
 
 def test_some_are_opened_less_often_than_others() -> None:
     graph, end = graph_with_a_frontier()
-    obstructions = Obstructions(retries=3, retry_after=20.0)
+    obstructions = Obstructions(retries=3, retry_after=20.0, names=Names())
     obstructions.close(graph, [end], 0.0, retries=1)
     assert obstructions.open(graph, 50.0)
     obstructions.close(graph, [end], 100.0, retries=1)
