@@ -189,13 +189,15 @@ class Agenda:
     def _here(self, view: View) -> Here:
         here = self.whereabouts()
         starts = [] if here is None else here.starts()
-        return Here(view.stamp, self._mapper.graph, starts, view.travelled)
+        names = self._mapper.unsettled.names
+        return Here(view.stamp, self._mapper.graph, starts, view.travelled, names)
 
     # -- after a restart ---------------------------------------------------------------------------
 
     def kept(self) -> Kept | None:
         """What there is to remember of the errand that somebody asked for."""
-        return None if self._plan is None or self._is_own else self._plan.kept()
+        kept = None if self._plan is None or self._is_own else self._plan.kept()
+        return None if kept is None else kept.renamed(self._mapper.unsettled.names)
 
     @property
     def will_wait(self) -> bool:

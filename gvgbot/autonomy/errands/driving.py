@@ -131,16 +131,17 @@ class Driving:
             ended = self._close_way(view)
             if ended is not None:
                 return ended
-        here = self._ground.situation(view, known)
+        here, names = self._ground.situation(view, known), self._mapper.unsettled.names
         match self.stop:
             case Look():
                 return self._look_once(view)
             case Rest(seconds=seconds):
                 return self._rest(view, seconds)
             case ToVertex(vertex=vertex):
-                return self._to_vertex(view, here, vertex, waited)
+                return self._to_vertex(view, here, names.vertex(vertex), waited)
             case Waypoint(end=end, station=station):
-                return self._past(view, here, foot_at(self._mapper.graph, end, station), waited)
+                foot = foot_at(self._mapper.graph, names.half_edge(end), station)
+                return self._past(view, here, foot, waited)
             case ToPoint() | Home():
                 return self._to_point(view, here, self.stop, waited)
 

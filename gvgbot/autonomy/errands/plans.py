@@ -1,8 +1,9 @@
 """Which stop comes next on an errand: the only one, the next of a patrol, or of all edges."""
 
+import math
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, Protocol
 
 from gvgbot.autonomy.errands.driving import Ended
@@ -22,6 +23,7 @@ from gvgbot.autonomy.events import Event, Recovery, RoundEnded
 from gvgbot.autonomy.exploration.paths import Approach, shortest_paths
 from gvgbot.autonomy.exploration.postman import postman_tour
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
+from gvgbot.autonomy.slam.names import Names
 
 _REST_S = 30.0  # after a round of a patrol that led nowhere
 _MOVED_M = 1.0  # a round shorter than this led nowhere
@@ -30,12 +32,16 @@ _NEAR_END_M = 0.5  # from its end, an edge counts as driven
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Here:
-    """What a plan is made by: the graph, the first vertices around, and m driven so far."""
+    """What a plan is made by: the graph, the first vertices around, and m driven so far.
+
+    Vertices and half-edges of a plan keep the `names` that they had when it was made.
+    """
 
     stamp: float
     graph: GvgGraph
     starts: list[Approach]
     travelled: float
+    names: Names
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +58,13 @@ class Kept:
     missed: tuple[HalfEdgeId, ...] = ()  # in vain
     driven: int = 0
     is_last_try: bool = False
+
+    def renamed(self, names: Names) -> "Kept":
+        """With the names of now, the only ones that are known after a restart."""
+        vertices, left = (tuple(map(names.vertex, some)) for some in (self.vertices, self.left))
+        missed = tuple(map(names.half_edge, self.missed))
+        departures = self.departures and tuple(map(names.half_edge, self.departures))
+        return replace(self, vertices=vertices, left=left, departures=departures, missed=missed)
 
 
 class Plan(Protocol):
@@ -148,9 +161,8 @@ class Rounds:
         """The next vertex of the round; a rest after one that led nowhere."""
         if not self._left:
             led_nowhere = self._end_round(here)
-            self._left = [
-                v for v in self._wanted or here.graph.vertices if v in here.graph.vertices
-            ]
+            known = here.graph.vertices
+            self._left = [v for v in self._wanted or known if here.names.vertex(v) in known]
             if not self._left:
                 return Ended("given up", "none of its vertices is in the map any more")
             if led_nowhere:
@@ -172,7 +184,12 @@ class Rounds:
 
     def _nearest(self, here: Here) -> int:
         ways = shortest_paths(here.graph, here.starts)
-        return min(self._left, key=lambda v: (ways[v].metres if v in ways else float("inf"), v))
+
+        def away(vertex: int) -> float:
+            way = ways.get(here.names.vertex(vertex))
+            return math.inf if way is None else way.metres
+
+        return min(self._left, key=lambda vertex: (away(vertex), vertex))
 
     def note(self, here: Here, ended: Ended) -> None:
         """One vertex fewer is left, whether it was reached or not."""
@@ -217,7 +234,7 @@ class AllEdges:
         if not self._left:
             return self._end()
         if not self._stops:
-            self._stops.extend(_stops(here.graph, self._left[0], is_last=len(self._left) == 1))
+            self._stops.extend(_stops(here, self._left[0], is_last=len(self._left) == 1))
         return self._stops[0]
 
     def note(self, here: Here, ended: Ended) -> None:
@@ -273,9 +290,10 @@ def _once_each(graph: GvgGraph, tour: list[HalfEdgeId]) -> Iterator[HalfEdgeId]:
             yield end
 
 
-def _stops(graph: GvgGraph, end: HalfEdgeId, *, is_last: bool) -> list[Stop]:
+def _stops(here: Here, end: HalfEdgeId, *, is_last: bool) -> list[Stop]:
     """Where to pass so that the shortest way from each to the next is along the edge."""
-    edge = graph.edge_at(end)
+    now = here.names.half_edge(end)
+    edge = here.graph.edge_at(now)
     stops: list[Stop] = [Waypoint(end, 0.0)]
     if edge is None:
         return stops
@@ -283,7 +301,7 @@ def _stops(graph: GvgGraph, end: HalfEdgeId, *, is_last: bool) -> list[Stop]:
     stops += [Waypoint(end, third), Waypoint(end, 2 * third)]
     if third > _NEAR_END_M:
         stops.append(Waypoint(end, edge.length - _NEAR_END_M))
-    far = edge.other(end).vertex
-    if is_last or graph.vertices[far].degree == 1:
+    far = edge.other(now).vertex
+    if is_last or here.graph.vertices[far].degree == 1:
         stops.append(ToVertex(far))
     return stops

@@ -2,6 +2,9 @@
 
 import numpy as np
 
+from gvgbot.autonomy.control.orders import Drive
+from gvgbot.autonomy.errands.plans import Kept
+from gvgbot.autonomy.events import ErrandEnded
 from gvgbot.autonomy.slam.graph import HalfEdgeId, Vertex
 from gvgbot.geometry import Pose
 from tests.unit.autonomy.errands.test_own_tasks import Explorer
@@ -21,3 +24,18 @@ def test_a_coverage_promises_no_edge_that_no_known_way_leads_to() -> None:
     graph.join(a, b, np.array([[0.0, 0.0], [100.0, 0.0]]), 1.0, driven=True)
     answer = robot.errands.coverage(robot.stamp)
     assert f"over 1 of 2 edges, {edge.length:.0f} m" in answer
+
+
+def test_who_drives_to_a_vertex_that_proves_to_be_a_known_one_drives_on_to_that() -> None:
+    robot, gone = Explorer(), 99
+    while not robot.mapper.graph.edges:
+        robot.look(CLOSED)
+    (edge,) = robot.mapper.graph.edges.values()
+    ends = sorted((edge.a, edge.b), key=lambda end: robot.mapper.belief.map_vertex(end.vertex).x)
+    robot.errands.recall(Kept("vertex", vertices=(gone,)))
+    robot.mapper.unsettled.names.change({HalfEdgeId(gone, 0): ends[-1]})
+    order = robot.look(CLOSED)
+    assert isinstance(order, Drive)
+    assert order.track.polyline[-1].tolist() == [4.0, 0.0]
+    assert robot.errands.kept() == Kept("vertex", vertices=(ends[-1].vertex,))
+    assert not robot.said(ErrandEnded)

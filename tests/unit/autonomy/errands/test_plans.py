@@ -1,5 +1,7 @@
 """Which stops a patrol and a coverage make, driven by somebody who takes the shortest ways."""
 
+import math
+
 import networkx as nx
 import numpy as np
 import pytest
@@ -8,19 +10,23 @@ from hypothesis import strategies as st
 
 from gvgbot.autonomy.errands.driving import Ended
 from gvgbot.autonomy.errands.kinds import Coverage, Patrol, Rest, ToVertex, Waypoint
-from gvgbot.autonomy.errands.plans import AllEdges, Here, Plan, Rounds, plan_for, recalled
+from gvgbot.autonomy.errands.plans import AllEdges, Here, Kept, Plan, Rounds, plan_for, recalled
 from gvgbot.autonomy.events import Recovery, RoundEnded
 from gvgbot.autonomy.exploration.paths import Approach
-from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
-from tests.unit.autonomy.graphs import random_multigraph, streets
+from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex
+from gvgbot.autonomy.slam.names import Names
+from gvgbot.autonomy.topology import fuse
+from gvgbot.geometry import Pose
+from tests.unit.autonomy.graphs import STREET, random_multigraph, streets
 
 ARRIVED, GIVEN_UP = Ended("arrived", ""), Ended("given up", "a door is shut")
 STEP = 0.25  # m
 Point = int | tuple[int, int]  # a vertex, or an edge and the number of a step on it
 
 
-def here(graph: GvgGraph, vertex: int, travelled: float = 0.0) -> Here:
-    return Here(0.0, graph, [Approach(0.0, HalfEdgeId(vertex, -1))], travelled)
+def here(graph: GvgGraph, vertex: int, travelled: float = 0.0, names: Names | None = None) -> Here:
+    starts = [Approach(0.0, HalfEdgeId(vertex, -1))]
+    return Here(0.0, graph, starts, travelled, names or Names())
 
 
 def in_steps(graph: GvgGraph) -> nx.Graph:
@@ -172,6 +178,41 @@ def test_vertices_that_are_not_in_the_map_any_more_are_no_stops() -> None:
     plan = Rounds(Patrol((ids[0, 0], 99, ids[2, 0])))
     assert visits(plan, graph, ids[0, 0], 2) == [ids[0, 0], ids[2, 0]]
     assert isinstance(Rounds(Patrol((98, 99))).next(here(graph, ids[0, 0])), Ended)
+
+
+def entered_twice() -> tuple[GvgGraph, dict[tuple[int, int], int], Vertex, HalfEdgeId]:
+    """A street of three crossings, another vertex where the first is, and a dead end there."""
+    graph, ids = streets(3, 1)
+    again, end = (Vertex(graph.next_id(), 1.0, Pose(), 0.0, 0.0) for _ in range(2))
+    graph.vertices |= {vertex.id: vertex for vertex in (again, end)}
+    out = HalfEdgeId(again.id, again.add_half_edge(2.0))
+    line = STREET * np.array([[0.0, 0.0], [math.cos(2.0), math.sin(2.0)]])
+    graph.join(out, HalfEdgeId(end.id, end.add_half_edge(-1.0)), line, 1.0, driven=True)
+    return graph, ids, again, out
+
+
+def test_a_patrol_goes_on_to_the_known_vertex_that_one_of_its_own_proves_to_be() -> None:
+    graph, ids, again, _ = entered_twice()
+    plan, names = Rounds(Patrol((again.id, ids[2, 0]))), Names()
+    names.change(fuse(graph, graph.vertices[ids[0, 0]], again, Pose(), 0.5).renamed)
+    for i, vertex in enumerate((again.id, ids[2, 0]) * 2):
+        assert plan.next(here(graph, ids[1, 0], 10.0 * i, names)) == ToVertex(vertex)
+        plan.note(here(graph, ids[1, 0], 10.0 * i, names), ARRIVED)
+    kept = plan.kept()
+    assert kept is not None
+    assert kept.renamed(names).vertices == (ids[0, 0], ids[2, 0])
+
+
+def test_a_coverage_drives_the_edge_of_a_vertex_that_proves_to_be_a_known_one() -> None:
+    graph, ids, again, out = entered_twice()
+    plan, names = AllEdges(Coverage(), Kept("coverage", departures=(out,))), Names()
+    names.change(fuse(graph, graph.vertices[ids[0, 0]], again, Pose(), 0.5).renamed)
+    stops = []
+    while not isinstance(stop := plan.next(here(graph, ids[0, 0], names=names)), Ended):
+        stops.append(stop)
+        plan.note(here(graph, ids[0, 0], names=names), ARRIVED)
+    assert len(stops) == 5
+    assert Kept("coverage", departures=(out,)).renamed(names).departures == (names.half_edge(out),)
 
 
 @pytest.mark.parametrize("errand", [ToVertex(3), Patrol((1, 2)), Coverage()])
