@@ -15,7 +15,7 @@ from pathlib import Path
 from time import perf_counter
 
 from benchmarks.report import report, report_fact
-from tests.process.addresses import free_endpoint
+from benchmarks.rigs.addresses import free_endpoint
 
 LASERS = {"URG-04LX": 10.0, "UTM-30LX": 40.0}  # scans a second
 TARGET_PERCENT = {10.0: 6.0, 40.0: 24.0}  # of a core; with four times the scans, four times that

@@ -11,13 +11,13 @@ from pathlib import Path
 from time import process_time
 
 from benchmarks.report import report, report_rate
+from benchmarks.rigs.stamp_errors import odometry_stamp_errors, rms, scan_stamp_errors
 from gvgbot.clock import LoopClock
 from gvgbot.drivers.hokuyo.driver import HokuyoConfig, HokuyoLaser
 from gvgbot.drivers.kobuki.driver import KobukiBase, KobukiConfig
 from gvgbot.drivers.link_faults import LinkFaultConfig
 from gvgbot.drivers.transport import SerialStream
 from gvgbot.geometry import Twist
-from tests.twin.stamp_errors import odometry_stamp_errors, rms, scan_stamp_errors
 
 OPENING = 5.0  # s
 MEASURED = 30.0  # s

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from time import process_time
 
 from benchmarks.report import report_rate
+from benchmarks.rigs.stamp_errors import RollingBody
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.drivers.kobuki.driver import KobukiBase, KobukiConfig
 from gvgbot.drivers.kobuki.feedback import FeedbackReader
@@ -13,7 +14,6 @@ from gvgbot.drivers.kobuki.payloads import decode_feedback, encode_feedback
 from gvgbot.drivers.kobuki.twin import KobukiTwin, KobukiTwinConfig
 from gvgbot.drivers.transport import pipe, serve_twin
 from gvgbot.geometry import Twist
-from tests.twin.stamp_errors import RollingBody
 
 FRAMES = 20_000
 DRIVE_S = 120.0

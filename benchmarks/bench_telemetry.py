@@ -23,6 +23,7 @@ import msgspec
 import numpy as np
 
 from benchmarks.report import report, report_fact
+from benchmarks.rigs.addresses import free_endpoint
 from gvgbot import client
 from gvgbot.autonomy.config import AutonomyConfig
 from gvgbot.autonomy.exploration.config import ExplorationConfig
@@ -44,7 +45,6 @@ from gvgbot.topics import (
     Map,
 )
 from gvgbot.vitals import Vitals
-from tests.process.addresses import free_endpoint
 
 VERTICES, BEAMS, SIDE = 200, 1081, 60.0
 STATE_HZ, MAP_HZ, SCAN_HZ, ODOMETRY_HZ = 10.0, 1.0, 40.0, 50.0

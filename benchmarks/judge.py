@@ -10,13 +10,13 @@ from scipy import ndimage
 
 from benchmarks.faults import LAYER, Fault
 from benchmarks.reference_gvg import reference_gvg
+from benchmarks.rigs.lives_rig import GoingWorld
 from benchmarks.small_worlds import one_ring
 from benchmarks.standers import Standers
 from gvgbot.config import load_config
 from gvgbot.geometry import Array, Pose
 from gvgbot.session import Session
 from gvgbot.simulation import Place
-from tests.twin.lives_rig import GoingWorld
 
 STILL_MPS, SPEED_MPS = 0.03, 0.12  # standing; touching something faster than this is a collision
 VERTEX_M = 0.6  # from the nearest true one, a vertex is false,

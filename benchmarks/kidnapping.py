@@ -26,6 +26,7 @@ from scipy import ndimage
 
 from benchmarks import campaign
 from benchmarks.campaign import Row
+from benchmarks.rigs.run_rig import at_once
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.config import Config, load_config
 from gvgbot.daemon import explore
@@ -38,7 +39,6 @@ from gvgbot.robot import Robot
 from gvgbot.service import Notifier
 from gvgbot.session import Session
 from gvgbot.simulation import Place, open_place
-from tests.twin.run_rig import at_once
 
 WORLDS = ("office", "floor_plan:3", "jittered:1", "grid", "rooms", "ring")
 RESULTS = "kidnapping.jsonl"

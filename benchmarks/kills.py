@@ -24,6 +24,7 @@ from scipy.optimize import linear_sum_assignment
 
 from benchmarks import campaign
 from benchmarks.campaign import Row
+from benchmarks.rigs.lives_rig import GoingWorld, Lives
 from benchmarks.small_worlds import two_rings
 from gvgbot.config import load_config
 from gvgbot.geometry import Array
@@ -32,7 +33,6 @@ from gvgbot.maps.run_directory import EVENTS
 from gvgbot.persistence.mission_files import JOURNAL, SNAPSHOT
 from gvgbot.session import Session
 from gvgbot.simulation import open_place
-from tests.twin.lives_rig import GoingWorld, Lives
 
 RESULTS = "kills.jsonl"
 WANTED_M = 0.05  # vertices may be so far from those of the uninterrupted run

@@ -19,6 +19,7 @@ from pathlib import Path
 import msgspec
 
 from benchmarks.report import report_fact
+from benchmarks.rigs.run_rig import at_once
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.config import Config, TwinConfig
 from gvgbot.maps.run_directory import RunDirectory
@@ -28,7 +29,6 @@ from gvgbot.service import Notifier
 from gvgbot.session import Session
 from gvgbot.simulation import open_place
 from gvgbot.topics import Payload
-from tests.twin.run_rig import at_once
 
 _TOP = 15  # lines of code
 

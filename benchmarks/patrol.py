@@ -25,6 +25,8 @@ from typing import Any
 import numpy as np
 import structlog
 
+from benchmarks.rigs.doors_rig import FLUSH, MIDDLE, START, swing, theta
+from benchmarks.rigs.run_rig import at_once
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.config import Config, load_config
 from gvgbot.maps.run_directory import EVENTS, RunDirectory
@@ -34,8 +36,6 @@ from gvgbot.robot import Robot
 from gvgbot.service import Notifier
 from gvgbot.session import Session
 from gvgbot.simulation import Place
-from tests.twin.doors_rig import FLUSH, MIDDLE, START, swing, theta
-from tests.twin.run_rig import at_once
 
 OPEN_S, SHUT_S = 600.0, 300.0  # a door, on average
 HOUR_S = 3600.0

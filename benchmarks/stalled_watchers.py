@@ -19,10 +19,10 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from benchmarks.report import report, report_fact
+from benchmarks.rigs.addresses import free_endpoint
+from benchmarks.rigs.programs import program
 from gvgbot import client
 from gvgbot.client import Health, Robot
-from tests.process.addresses import free_endpoint
-from tests.process.programs import program
 
 KOBUKI_HZ = 50.0
 SETTLING_S = 15.0

@@ -22,6 +22,8 @@ import numpy as np
 
 from benchmarks.faults import Fault
 from benchmarks.judge import ABANDONED_S, ASKED_S, Judge, Verdict, clearance, timed
+from benchmarks.rigs.lives_rig import GoingWorld
+from benchmarks.rigs.run_rig import Cable, CabledLinks, at_once
 from benchmarks.small_worlds import one_ring
 from benchmarks.surroundings import Disk, FullDirectory, FullFiles, Hand, Listeners, Manager
 from gvgbot.clock import LoopClock, run_in_virtual_time
@@ -40,8 +42,6 @@ from gvgbot.requests import REQUESTS
 from gvgbot.robot import Robot
 from gvgbot.session import Session
 from gvgbot.simulation import Place
-from tests.twin.lives_rig import GoingWorld
-from tests.twin.run_rig import Cable, CabledLinks, at_once
 
 LOOK_S = 0.05  # between two looks at the truth
 END_S, QUIET_S = 60.0, 5.0  # it ends then, or so long after the last fault when all is explored

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.process.addresses import free_endpoint
+from benchmarks.rigs.addresses import free_endpoint
 
 
 @pytest.fixture

@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 import zenoh
 
+from benchmarks.rigs.addresses import free_endpoint
 from gvgbot import client
 from gvgbot.errors import GvgbotError, UsageError
 from gvgbot.requests import Answer, Asked
@@ -27,7 +28,6 @@ from gvgbot.topics import (
     Trajectory,
 )
 from gvgbot.zenoh_config import session_config
-from tests.process.addresses import free_endpoint
 from tests.unit.monitor.maps import a_grid
 from tests.unit.test_telemetry import EXAMPLE
 

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.rigs.programs import until
 from gvgbot.installation import system_files
 from tests.process.machine import Machine, NoMachine, machine
-from tests.process.programs import until
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(240)]
 

@@ -24,6 +24,8 @@ import pytest
 import structlog
 import zenoh
 
+from benchmarks.rigs.addresses import free_endpoint, plain_session, router
+from benchmarks.rigs.programs import PATIENCE, program, until
 from gvgbot import client
 from gvgbot.client.newest import Newest
 from gvgbot.errors import GvgbotError, UsageError
@@ -44,8 +46,6 @@ from gvgbot.topics import (
     Tile,
     Trajectory,
 )
-from tests.process.addresses import free_endpoint, plain_session, router
-from tests.process.programs import PATIENCE, program, until
 from tests.unit.monitor.maps import SIDE, a_grid
 from tests.unit.test_telemetry import EXAMPLE
 

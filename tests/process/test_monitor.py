@@ -26,6 +26,7 @@ import pytest
 from rich.console import Console
 from rich.text import Text
 
+from benchmarks.rigs.addresses import free_endpoint, router
 from gvgbot import client
 from gvgbot.telemetry import Telemetry
 from gvgbot.telemetry_config import TelemetryConfig
@@ -34,7 +35,6 @@ from gvgbot.topics import (
     Events,
     Plan,
 )
-from tests.process.addresses import free_endpoint, router
 from tests.process.browser import browser, chromium
 from tests.unit.monitor.maps import a_grid, a_map, vertex
 from tests.unit.test_telemetry import EXAMPLE

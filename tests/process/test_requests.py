@@ -14,13 +14,13 @@ import msgspec
 import pytest
 import zenoh
 
+from benchmarks.rigs.addresses import free_endpoint, plain_session, router
+from benchmarks.rigs.programs import program
 from gvgbot import client
 from gvgbot.errors import GvgbotError
 from gvgbot.requests import Answer, Asked, Goto, Patrol, Set, parse
 from gvgbot.telemetry import Telemetry
 from gvgbot.telemetry_config import TelemetryConfig
-from tests.process.addresses import free_endpoint, plain_session, router
-from tests.process.programs import program
 from tests.unit.test_telemetry import EXAMPLE
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(60)]

@@ -15,6 +15,7 @@ import structlog
 import zenoh
 import zenoh.ext
 
+from benchmarks.rigs.addresses import free_endpoint, plain_session, router
 from gvgbot.errors import UsageError
 from gvgbot.ros2.cdr import encode
 from gvgbot.ros2.config import Ros2Config
@@ -23,7 +24,6 @@ from gvgbot.ros2.topics import MAP, SCAN, TF_STATIC
 from gvgbot.ros2.translation import occupancy_grid
 from gvgbot.telemetry import Telemetry
 from gvgbot.telemetry_config import TelemetryConfig
-from tests.process.addresses import free_endpoint, plain_session, router
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(180)]
 

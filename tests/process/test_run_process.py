@@ -17,8 +17,8 @@ import msgspec
 import pytest
 import zenoh
 
-from tests.process.addresses import plain_session
-from tests.process.programs import gvgbot, until
+from benchmarks.rigs.addresses import plain_session
+from benchmarks.rigs.programs import gvgbot, until
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(60)]
 

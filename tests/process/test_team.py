@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.rigs.addresses import free_endpoint, router
+from benchmarks.rigs.programs import gvgbot
 from gvgbot.telemetry import Telemetry
 from gvgbot.telemetry_config import TelemetryConfig
-from tests.process.addresses import free_endpoint, router
-from tests.process.programs import gvgbot
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(60)]
 

@@ -15,8 +15,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.process.programs import gvgbot
-from tests.twin.run_rig import base_commands
+from benchmarks.rigs.programs import gvgbot
+from benchmarks.rigs.run_rig import base_commands
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(90)]
 PATIENCE = 30.0  # s, for a busy machine

@@ -10,10 +10,10 @@ import msgspec
 import pytest
 from websockets.sync.client import connect
 
+from benchmarks.rigs.addresses import free_endpoint
+from benchmarks.rigs.programs import gvgbot, until
 from gvgbot import client
 from gvgbot.client import State
-from tests.process.addresses import free_endpoint
-from tests.process.programs import gvgbot, until
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(120)]
 

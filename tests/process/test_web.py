@@ -30,6 +30,8 @@ from numpy.typing import NDArray
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
+from benchmarks.rigs.addresses import free_endpoint, plain_session, router
+from benchmarks.rigs.programs import gvgbot
 from gvgbot import client
 from gvgbot.requests import REQUESTS, Answer, Asked, Goto, parse
 from gvgbot.telemetry import Telemetry
@@ -49,9 +51,7 @@ from gvgbot.web.server import Web
 from gvgbot.web.viewers import Audience
 from gvgbot.web.wire import Reply, Wish
 from gvgbot.zenoh_config import has_listener
-from tests.process.addresses import free_endpoint, plain_session, router
 from tests.process.browser import Page, browser, chromium
-from tests.process.programs import gvgbot
 from tests.process.test_requests import a_robot
 from tests.unit.monitor.maps import a_grid, a_map, vertex
 from tests.unit.test_telemetry import EXAMPLE, NOWHERE

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.rigs.run_rig import Network, at_once
 from gvgbot.autonomy.loop import Cycle
 from gvgbot.cli import main
 from gvgbot.clock import LoopClock, run_in_virtual_time
@@ -25,7 +26,6 @@ from gvgbot.replay import Wanted, open_log
 from gvgbot.session import Session
 from gvgbot.topics import Grid
 from tests.replay.test_pipeline import LOLLIPOP, START
-from tests.twin.run_rig import Network, at_once
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(120)]
 

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Awaitable, Callable
 
+from benchmarks.rigs.stamp_errors import OtherClock
 from gvgbot.clock import LoopClock
 from gvgbot.drivers.kobuki.driver import KobukiBase, KobukiConfig
 from gvgbot.drivers.kobuki.feedback import FeedbackReader
@@ -15,7 +16,6 @@ from gvgbot.hal.reopening import ReopeningBase
 from tests.twin.device_rig import ENDS_OF_LINK, Wire, Work
 from tests.twin.device_rig import play as play_rig
 from tests.twin.kobuki_body import IdealBody
-from tests.twin.stamp_errors import OtherClock
 
 WRAP_MS, FRAME_MS = 1 << 16, 20
 COUNTER = slice(5, 7)  # of a frame's bytes: after preamble, length, and the first part's head

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.rigs.run_rig import Daemon
 from gvgbot.clock import Clock
 from gvgbot.config import TwinConfig
 from gvgbot.drivers.kobuki.twin import KobukiTwinConfig
@@ -15,7 +16,6 @@ from gvgbot.drivers.people import Walkways
 from gvgbot.geometry import Pose
 from gvgbot.simulation import Place
 from gvgbot.worlds.canvas import Canvas
-from tests.twin.run_rig import Daemon
 
 pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(300)]
 

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
+from benchmarks.rigs.doors_rig import FLUSH, MIDDLE, NORTH, SOUTH, START, swing, theta
+from benchmarks.rigs.run_rig import Daemon
 from gvgbot.clock import Clock
 from gvgbot.config import TwinConfig
 from gvgbot.drivers.kobuki.twin import KobukiTwinConfig
 from gvgbot.simulation import Place
-from tests.twin.doors_rig import FLUSH, MIDDLE, NORTH, SOUTH, START, swing, theta
-from tests.twin.run_rig import Daemon
 
 pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(300)]
 

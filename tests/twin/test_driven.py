@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.rigs.run_rig import Daemon, at_once
 from gvgbot.clock import Clock
 from gvgbot.geometry import Twist
 from gvgbot.hal.messages import Odometry
 from gvgbot.robot import Robot
 from gvgbot.ros2.topics import MAP, ODOM, SCAN, TF, TF_STATIC, Topic
-from tests.twin.run_rig import Daemon, at_once
 from tests.unit.ros2.oracle import STORE
 
 pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(120)]

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from benchmarks.kills import vertices
+from benchmarks.rigs.lives_rig import Lives, explored
 from gvgbot.autonomy.config import AutonomyConfig
 from gvgbot.autonomy.errands import Declined
 from gvgbot.autonomy.errands.kinds import Patrol
@@ -26,7 +27,6 @@ from gvgbot.session import Session
 from gvgbot.simulation import Place
 from gvgbot.snapshots import _phase
 from gvgbot.worlds.canvas import Canvas
-from tests.twin.lives_rig import Lives, explored
 
 pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(300)]
 

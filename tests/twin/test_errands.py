@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from benchmarks.rigs.run_rig import STOP, Daemon, base_commands
 from gvgbot.clock import Clock
 from gvgbot.config import TwinConfig
 from gvgbot.drivers.kobuki.twin import KobukiTwinConfig
@@ -23,7 +24,6 @@ from gvgbot.geometry import Pose
 from gvgbot.requests import REQUESTS, Answer
 from gvgbot.simulation import Place
 from gvgbot.worlds.canvas import Canvas
-from tests.twin.run_rig import STOP, Daemon, base_commands
 
 pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(300)]
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from benchmarks.rigs.hokuyo_bench import QUANTISATION, Bench, World, on_bench
 from gvgbot.clock import LoopClock
 from gvgbot.drivers.hokuyo.config import Echo, HokuyoConfig
 from gvgbot.drivers.hokuyo.models import MODELS
@@ -14,7 +15,6 @@ from gvgbot.drivers.hokuyo.twin import HokuyoTwin, HokuyoTwinConfig
 from gvgbot.drivers.transport import ByteStream
 from gvgbot.geometry import Array
 from gvgbot.hal.messages import Scan
-from tests.twin.hokuyo_bench import QUANTISATION, Bench, World, on_bench
 
 pytestmark = pytest.mark.twin
 

@@ -7,12 +7,12 @@ from typing import Any
 import pytest
 import structlog
 
+from benchmarks.rigs.hokuyo_bench import PERFECT, Bench, Scripted, TiresOfTime, World, on_bench
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.drivers.hokuyo.driver import HokuyoConfig, HokuyoLaser
 from gvgbot.drivers.hokuyo.twin import HokuyoTwin, HokuyoTwinConfig
 from gvgbot.drivers.transport import ByteStream, pipe, serve_twin
 from gvgbot.errors import DeviceLost, DeviceRefused
-from tests.twin.hokuyo_bench import PERFECT, Bench, Scripted, TiresOfTime, World, on_bench
 
 pytestmark = pytest.mark.twin
 

@@ -6,13 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from gvgbot.clock import LoopClock, run_in_virtual_time
-from gvgbot.drivers.hokuyo.driver import HokuyoConfig, HokuyoLaser
-from gvgbot.drivers.hokuyo.models import MODELS
-from gvgbot.drivers.hokuyo.twin import HokuyoTwin, HokuyoTwinConfig
-from gvgbot.drivers.transport import ByteStream, pipe, serve_twin
-from gvgbot.errors import DeviceLost, DeviceRefused
-from tests.twin.hokuyo_bench import (
+from benchmarks.rigs.hokuyo_bench import (
     PERFECT,
     QUANTISATION,
     Bench,
@@ -28,6 +22,12 @@ from tests.twin.hokuyo_bench import (
     quantised,
     until_lost,
 )
+from gvgbot.clock import LoopClock, run_in_virtual_time
+from gvgbot.drivers.hokuyo.driver import HokuyoConfig, HokuyoLaser
+from gvgbot.drivers.hokuyo.models import MODELS
+from gvgbot.drivers.hokuyo.twin import HokuyoTwin, HokuyoTwinConfig
+from gvgbot.drivers.transport import ByteStream, pipe, serve_twin
+from gvgbot.errors import DeviceLost, DeviceRefused
 
 pytestmark = pytest.mark.twin
 

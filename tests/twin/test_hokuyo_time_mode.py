@@ -4,6 +4,7 @@ import asyncio
 
 import pytest
 
+from benchmarks.rigs.hokuyo_bench import CutsReply, Scripted, TiresOfTime, World
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.drivers.hokuyo.clock_sync import Synchronisation
 from gvgbot.drivers.hokuyo.dialogue import Dialogue
@@ -12,7 +13,6 @@ from gvgbot.drivers.hokuyo.statistics import LinkStatistics
 from gvgbot.drivers.hokuyo.time_mode import synchronise
 from gvgbot.drivers.hokuyo.twin import HokuyoTwin, HokuyoTwinConfig
 from gvgbot.drivers.transport import TwinDevice, pipe, serve_twin
-from tests.twin.hokuyo_bench import CutsReply, Scripted, TiresOfTime, World
 
 pytestmark = pytest.mark.twin
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from benchmarks.rigs.lives_rig import Lives, explored
 from gvgbot.config import Config, TwinConfig
 from gvgbot.drivers.kobuki.twin import KobukiTwinConfig
 from gvgbot.drivers.world import save_world
@@ -16,7 +17,6 @@ from gvgbot.maps.map_server import UNSEEN
 from gvgbot.session import Session
 from gvgbot.simulation import Place
 from gvgbot.worlds.canvas import Canvas
-from tests.twin.lives_rig import Lives, explored
 
 pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(300)]
 

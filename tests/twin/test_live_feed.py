@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.rigs.run_rig import Daemon
 from gvgbot.clock import Clock
 from gvgbot.geometry import Pose
-from tests.twin.run_rig import Daemon
 
 pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(120)]
 

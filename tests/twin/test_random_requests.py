@@ -11,11 +11,11 @@ import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
+from benchmarks.rigs.run_rig import STOP, Daemon, base_commands
 from gvgbot.clock import Clock
 from gvgbot.geometry import Pose
 from gvgbot.requests import JSON, MESSAGEPACK, REQUESTS, Answer, Asked
 from gvgbot.steering import SETTABLE
-from tests.twin.run_rig import STOP, Daemon, base_commands
 
 pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(300)]
 

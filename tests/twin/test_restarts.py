@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.rigs.lives_rig import GoingWorld, Lives, at
 from gvgbot.autonomy.errands import Declined
 from gvgbot.autonomy.events import Requested
 from gvgbot.autonomy.memory import growth
@@ -23,7 +24,6 @@ from gvgbot.session import Session
 from gvgbot.simulation import Place, open_place
 from gvgbot.topics import Trajectory
 from tests.replay.test_pipeline import LOLLIPOP, START
-from tests.twin.lives_rig import GoingWorld, Lives, at
 from tests.unit.autonomy.sights import carved
 
 pytestmark = [pytest.mark.slow, pytest.mark.twin, pytest.mark.timeout(180)]

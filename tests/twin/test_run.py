@@ -14,6 +14,7 @@ import pytest
 import structlog
 from scipy.spatial import cKDTree
 
+from benchmarks.rigs.run_rig import STOP, Daemon, base_commands
 from gvgbot.autonomy.events import Event
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.clock import Clock
@@ -27,7 +28,6 @@ from gvgbot.hal.messages import Contact, Odometry, Scan, Sign
 from gvgbot.links import Close, Links
 from gvgbot.stop_signals import StopSignals
 from gvgbot.topics import Grid
-from tests.twin.run_rig import STOP, Daemon, base_commands
 
 pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(120)]
 

@@ -5,12 +5,12 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.rigs.run_rig import Daemon
 from gvgbot.clock import Clock
 from gvgbot.config import load_config
 from gvgbot.drivers.kobuki.driver import KobukiBase, KobukiConfig
 from gvgbot.hal.messages import Sign
 from tests.twin.kobuki_rig import Robot, play
-from tests.twin.run_rig import Daemon
 
 pytestmark = pytest.mark.twin
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from benchmarks.rigs.stamp_errors import odometry_stamp_errors, rms, scan_stamp_errors
 from gvgbot.drivers.hokuyo.driver import HokuyoConfig
 from gvgbot.drivers.link_faults import LinkFaultConfig
-from tests.twin.stamp_errors import odometry_stamp_errors, rms, scan_stamp_errors
 
 pytestmark = pytest.mark.twin
 SCANS, FRAMES = 200, 1000  # those of the time that is measured

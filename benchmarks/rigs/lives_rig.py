@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from benchmarks.rigs.run_rig import Cable, CabledLinks, at_once
 from gvgbot.clock import Clock, LoopClock, OffLoop, run_in_virtual_time
 from gvgbot.config import Config
 from gvgbot.maps.run_directory import RunDirectory
@@ -14,7 +15,6 @@ from gvgbot.robot import Robot
 from gvgbot.service import Notifier
 from gvgbot.session import Session
 from gvgbot.simulation import Place, Simulation
-from tests.twin.run_rig import Cable, CabledLinks, at_once
 
 PATIENCE = 900.0  # s of the robot's time
 LOOK = 0.1  # s between two looks at the robot

@@ -4,6 +4,7 @@ import asyncio
 
 import numpy as np
 
+from benchmarks.rigs.hokuyo_bench import Bench, World, on_bench
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.drivers.hokuyo.driver import HokuyoConfig
 from gvgbot.drivers.hokuyo.twin import HokuyoTwin, HokuyoTwinConfig
@@ -12,7 +13,6 @@ from gvgbot.drivers.kobuki.twin import KobukiTwin, KobukiTwinConfig
 from gvgbot.drivers.link_faults import FaultyLink, LinkFaultConfig
 from gvgbot.drivers.transport import TwinDevice, pipe, serve_twin
 from gvgbot.geometry import Array, Pose
-from tests.twin.hokuyo_bench import Bench, World, on_bench
 
 SETTLING = 60.0  # s in which errors do not count
 MEASURED = 20.0  # s after that
