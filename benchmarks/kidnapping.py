@@ -39,6 +39,7 @@ from gvgbot.robot import Robot
 from gvgbot.service import Notifier
 from gvgbot.session import Session
 from gvgbot.simulation import Place, open_place
+from gvgbot.stop_signals import StopSignals
 
 WORLDS = ("office", "floor_plan:3", "jittered:1", "grid", "rooms", "ring")
 RESULTS = "kidnapping.jsonl"
@@ -88,7 +89,7 @@ def _put_down(out: Path, world: str, number: int, settings: tuple[str, ...]) -> 
     known = out / re.sub(r"[^\w.]", "-", " ".join([world, *settings]))
     config = load_config(None, [f"twin.world={world}", "twin.seed=1", *settings])
     if not (known / SNAPSHOT).exists():
-        explore(config, print, out=known, real_time=False)
+        explore(config, print, StopSignals(), out=known, real_time=False)
     config = load_config(None, [f"twin.world={world}", f"twin.seed={number}", *settings])
     named = {"world": world, "pose": number, "settings": settings}
     with tempfile.TemporaryDirectory() as directory:

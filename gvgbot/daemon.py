@@ -42,11 +42,17 @@ log = structlog.get_logger()
 
 
 def explore(
-    config: Config, say: Callable[[str], None], *, out: Path | None, real_time: bool
+    config: Config,
+    say: Callable[[str], None],
+    signals: StopSignals,
+    *,
+    out: Path | None,
+    real_time: bool,
 ) -> int:
     """Explore a simulated world, say where the map is, and return the exit status.
 
-    Raises UsageError for a world or directory that cannot be used.
+    Raises UsageError for a world or directory that cannot be used, KeyboardInterrupt if a signal
+    ended it; the map that there was by then is saved.
     """
     set_up_logging(sys.stderr, os.environ, "warning")
     place = open_place(config)
@@ -59,7 +65,9 @@ def explore(
         recording = recorded(session, patient=not real_time)
         try:
             with recording, asyncio.Runner(loop_factory=factory) as runner:
-                runner.run(explore_once(session, progress))
+                runner.run(signals.end(explore_once(session, progress)))
+        except asyncio.CancelledError:
+            raise KeyboardInterrupt from None
         except Exception as error:
             session.failure = reason_of(error)
             raise

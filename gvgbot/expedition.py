@@ -36,6 +36,7 @@ from gvgbot.report import world_files
 from gvgbot.service import set_up_logging
 from gvgbot.session import Session
 from gvgbot.simulation import Place, Simulation, open_place
+from gvgbot.stop_signals import StopSignals
 from gvgbot.team.chart import chart_of
 from gvgbot.team.member import Member
 from gvgbot.team.news import Course, News, decode, encode
@@ -49,12 +50,18 @@ _TRIES = 1000  # to draw a start
 
 
 def explore_together(
-    config: Config, count: int, say: Callable[[str], None], *, out: Path | None, real_time: bool
+    config: Config,
+    count: int,
+    say: Callable[[str], None],
+    signals: StopSignals,
+    *,
+    out: Path | None,
+    real_time: bool,
 ) -> int:
     """Explore a simulated world with several robots, say where the map is; the exit status.
 
     Raises UsageError for a world or directory that cannot be used, or that has no room for all, and
-    if it shall be recorded.
+    if it shall be recorded; KeyboardInterrupt if a signal ended it.
     """
     if config.recording.path is not None:
         raise UsageError("recording.path: a team is not recorded; record a robot that is alone")
@@ -70,7 +77,9 @@ def explore_together(
         try:
             factory = None if real_time else VirtualTimeLoop
             with asyncio.Runner(loop_factory=factory) as runner:
-                runner.run(_explore(robots, config))
+                runner.run(signals.end(_explore(robots, config)))
+        except asyncio.CancelledError:
+            raise KeyboardInterrupt from None
         except Exception as error:
             for robot in robots:
                 robot.session.failure = robot.session.failure or reason_of(error)

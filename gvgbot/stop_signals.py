@@ -2,7 +2,7 @@
 
 import asyncio
 import signal
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from functools import partial
 from typing import Any, Self
 
@@ -13,9 +13,11 @@ class StopSignals:
     """Remembers that the process was asked to end; as a context manager it takes those signals.
 
     Being asked again changes nothing: shells, supervisors and impatient people send signals twice.
+    A signal that is blocked comes only if it `unblocks` them.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, unblocks: bool = True) -> None:
+        self._unblocks = unblocks
         self._asked: str | None = None
         self._tell: Callable[[], object] | None = None
         self._before: dict[signal.Signals, Any] = {}
@@ -33,10 +35,23 @@ class StopSignals:
         assert self._asked is not None
         return self._asked
 
+    async def end(self, work: Awaitable[None]) -> None:
+        """Do some work, which the first signal ends: it is cancelled."""
+        loop, task = asyncio.get_running_loop(), asyncio.current_task()
+        assert task is not None
+        self._tell = partial(loop.call_soon_threadsafe, task.cancel)
+        try:
+            if self._asked is not None:
+                task.cancel()
+            await work
+        finally:
+            self._tell = None
+
     def _take(self, number: int, frame: object) -> None:
-        self._asked = self._asked or signal.Signals(number).name
-        if self._tell is not None:
-            self._tell()
+        if self._asked is None:
+            self._asked = signal.Signals(number).name
+            if self._tell is not None:
+                self._tell()
 
     def __enter__(self) -> Self:
         for number in _STOP_SIGNALS:
@@ -44,7 +59,8 @@ class StopSignals:
             if number is signal.SIGHUP and before is signal.SIG_IGN:
                 continue  # started by nohup: to outlive its terminal
             self._before[number] = signal.signal(number, self._take)
-        self._blocked = signal.pthread_sigmask(signal.SIG_UNBLOCK, self._before)
+        heard = self._before if self._unblocks else ()
+        self._blocked = signal.pthread_sigmask(signal.SIG_UNBLOCK, heard)
         return self
 
     def __exit__(self, *_: object) -> None:

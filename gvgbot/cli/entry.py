@@ -28,7 +28,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     _fill_streams()
     options = parser().parse_args(arguments)
     with _ctrl_c_shut_out_if_ignored(), _any_stop_as_by_ctrl_c():
-        return status_of(lambda: options.command(options))
+        status = status_of(lambda: options.command(options))
+    if status == INTERRUPTED:  # once more would break into what Python does at its end
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+    return status
 
 
 def _fill_streams() -> None:

@@ -63,17 +63,19 @@ def robots(text: str) -> int:
 
 def _explore(options: argparse.Namespace) -> int:
     from gvgbot.config import load_config
+    from gvgbot.stop_signals import StopSignals
 
     config = load_config(options.config, _overrides(options))
+    where = {"out": options.out, "real_time": options.real_time}
     if options.robots > 1:
         from gvgbot.expedition import explore_together
 
-        return explore_together(
-            config, options.robots, say, out=options.out, real_time=options.real_time
-        )
+        with StopSignals(unblocks=False) as signals:
+            return explore_together(config, options.robots, say, signals, **where)
     from gvgbot import daemon
 
-    return daemon.explore(config, say, out=options.out, real_time=options.real_time)
+    with StopSignals(unblocks=False) as signals:
+        return daemon.explore(config, say, signals, **where)
 
 
 def _overrides(options: argparse.Namespace) -> list[str]:

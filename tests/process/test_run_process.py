@@ -11,6 +11,7 @@ import tty
 from contextlib import suppress
 from pathlib import Path
 from queue import Queue
+from threading import Event
 from typing import Any
 
 import msgspec
@@ -129,6 +130,22 @@ def test_a_simulated_exploration_that_is_stopped_leaves_its_map(
     assert process.returncode == 130
     assert log.splitlines()[-3:] == STOPPED
     assert json.loads((events.parent / "map.geojson").read_text())["features"]
+
+
+@pytest.mark.parametrize("pause_s", [0.0, 0.01, 0.1])
+def test_an_exploration_that_is_stopped_twice_ends_as_after_once(
+    pause_s: float, tmp_path: Path
+) -> None:
+    """As people press Ctrl-C again who see that something goes on."""
+    events = tmp_path / "run" / "events.jsonl"
+    with gvgbot("explore", "--world", "narrow", "--out", "run", cwd=tmp_path) as process:
+        until_joined(events, 1, process)
+        process.send_signal(signal.SIGINT)
+        Event().wait(pause_s)
+        process.send_signal(signal.SIGINT)
+        log, _ = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 130, log
+    assert log.splitlines() == STOPPED
 
 
 @pytest.mark.parametrize("robots", [1, 2])

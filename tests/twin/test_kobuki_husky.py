@@ -19,6 +19,7 @@ from gvgbot.drivers.transport import pipe, serve_twin
 from gvgbot.drivers.world import World
 from gvgbot.geometry import Pose, Twist, wrap_angle
 from gvgbot.hal.messages import Odometry
+from gvgbot.stop_signals import StopSignals
 
 pytestmark = pytest.mark.twin
 START = Pose(15.0, 15.0, 0.0)
@@ -83,7 +84,7 @@ def test_its_fast_wheel_is_limited_by_its_own_width() -> None:
 @pytest.mark.slow
 def test_it_explores_a_ring_without_touching_a_wall(tmp_path: Path) -> None:
     """Geometry: along the middle of the ring the robot comes back to where it was."""
-    assert explore(HUSKY, print, out=tmp_path / "run", real_time=False) == 0
+    assert explore(HUSKY, print, StopSignals(), out=tmp_path / "run", real_time=False) == 0
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert summary["contacts"] == 0
     assert summary["config"]["robot"]["radius_m"] == 0.6

@@ -38,6 +38,44 @@ def test_signals_after_the_first_change_nothing() -> None:
         assert run_in_virtual_time(signals.wait()) == "SIGINT"
 
 
+def test_a_signal_ends_work_and_the_next_one_does_not_break_into_how_it_ends() -> None:
+    done = []
+
+    async def work() -> None:
+        try:
+            signal.raise_signal(signal.SIGINT)
+            await asyncio.sleep(1.0)
+            done.append("all of it")
+        finally:
+            signal.raise_signal(signal.SIGINT)
+            await asyncio.sleep(1.0)
+            done.append("tidied up")
+
+    with StopSignals() as signals, pytest.raises(asyncio.CancelledError):
+        run_in_virtual_time(signals.end(work()))
+    assert done == ["tidied up"]
+
+
+def test_work_does_not_begin_after_a_signal() -> None:
+    async def work() -> None:
+        await asyncio.sleep(1.0)
+        raise AssertionError("it went on")
+
+    with StopSignals() as signals:
+        signal.raise_signal(signal.SIGTERM)
+        with pytest.raises(asyncio.CancelledError):
+            run_in_virtual_time(signals.end(work()))
+
+
+def test_a_signal_that_was_blocked_can_stay_so() -> None:
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        with StopSignals(unblocks=False):
+            assert signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, {})
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def test_signals_are_what_they_were_afterwards() -> None:
     before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
     with StopSignals():
