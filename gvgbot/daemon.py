@@ -23,7 +23,7 @@ from gvgbot.maps.picture import counts
 from gvgbot.maps.run_directory import RunDirectory
 from gvgbot.persistence.keeper import Keeper
 from gvgbot.persistence.mission_files import MissionFiles
-from gvgbot.persistence.start import Wanted, begin, state_directory
+from gvgbot.persistence.start import begin, wanted
 from gvgbot.progress import Progress
 from gvgbot.recording import extra_needed
 from gvgbot.robot import Robot
@@ -136,7 +136,7 @@ def run(
     """Be the daemon until a signal ends it; the exit status, 0 whatever was found by then.
 
     With a state directory it goes on with the map that it was making, unless `anew` or `out` say
-    otherwise; `known` is the directory of a run whose map it begins with.
+    otherwise; `known` is the directory of a run whose map it begins with (default: `service.map`).
 
     Raises UsageError for a world or directory that cannot be used, GvgbotError if the network
     address is taken or the map cannot be written. Devices that are missing are waited for.
@@ -146,8 +146,8 @@ def run(
     name = config.robot.name if place is None else place.world.name
     with contextlib.ExitStack() as stack:
         telemetry = _telemetry(config, stack)
-        wanted = Wanted(out, known, anew, state_directory(config, os.environ))
-        start = begin(wanted, world=name, stack=stack)
+        asked = wanted(config, os.environ, out=out, known=known, anew=anew)
+        start = begin(asked, world=name, stack=stack)
         directory = start.directory
         session = Session(config, directory, place)
         keeper = Keeper(session, start.files, start.saved)

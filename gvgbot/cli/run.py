@@ -24,12 +24,16 @@ def add_run(commands: Commands) -> None:
         "--out", type=path, metavar="DIR", help="run directory (default: a new one in runs/)"
     )
     run.add_argument(
-        "--map", type=path, metavar="RUN_DIR", help="begin with the map of an earlier run"
+        "--map",
+        type=path,
+        metavar="RUN_DIR",
+        help="begin with the map of an earlier run (default: service.map, if set)",
     )
     run.add_argument(
         "--new",
         action="store_true",
-        help="begin a new map, or with --map once more, whatever the state directory holds",
+        help="begin a new map, or with that of --map or service.map once more, whatever the state "
+        "directory holds",
     )
     run.set_defaults(command=_run)
 

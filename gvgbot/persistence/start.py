@@ -45,6 +45,18 @@ def state_directory(config: Config, environment: Mapping[str, str]) -> Path | No
     return Path(given) if given else None
 
 
+def wanted(
+    config: Config,
+    environment: Mapping[str, str],
+    *,
+    out: Path | None = None,
+    known: Path | None = None,
+    anew: bool = False,
+) -> Wanted:
+    """What options ask for, and the configuration where they say nothing."""
+    return Wanted(out, known or config.service.map, anew, state_directory(config, environment))
+
+
 def begin(wanted: Wanted, *, world: str, stack: ExitStack) -> Start:
     """Where to begin; until the stack is left, no other program may write to that directory.
 

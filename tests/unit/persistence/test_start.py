@@ -13,7 +13,7 @@ from gvgbot.errors import UsageError
 from gvgbot.maps.run_directory import RunDirectory
 from gvgbot.persistence.keeper import Keeper
 from gvgbot.persistence.mission_files import SNAPSHOT, SNAPSHOT_BEFORE
-from gvgbot.persistence.start import Start, Wanted, begin, held, state_directory
+from gvgbot.persistence.start import Start, Wanted, begin, held, state_directory, wanted
 from gvgbot.session import Session
 from tests.unit.persistence.test_mission_files import written
 
@@ -209,16 +209,24 @@ def test_of_a_file_for_a_known_map_what_may_have_been_meant_is_named(tmp_path: P
         begun(Wanted(known=floor))
 
 
+def test_the_known_map_is_the_configured_one_unless_an_option_names_another() -> None:
+    config = Config(service=ServiceConfig(map=Path("floor")))
+    assert wanted(config, {}).known == Path("floor")
+    assert wanted(config, {}, known=Path("hall")).known == Path("hall")
+    assert wanted(Config(), {}).known is None
+
+
+@pytest.mark.parametrize("given", [["--map", "{}"], ["--set", "service.map={}"]])
 @pytest.mark.parametrize("damage", [None, b"?"])
 def test_a_known_map_that_cannot_be_read_is_one_line(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], damage: bytes | None
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], damage: bytes | None, given: list[str]
 ) -> None:
     if damage is not None:
         (tmp_path / SNAPSHOT).write_bytes(damage)
     with pytest.raises(UsageError):
         begun(Wanted(known=tmp_path))
     arguments = ["--set", "telemetry.enabled=false", "--out", str(tmp_path / "out")]
-    assert main(["run", "--map", str(tmp_path), *arguments]) == 2
+    assert main(["run", *(word.format(tmp_path) for word in given), *arguments]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert str(tmp_path) in line
     assert not (tmp_path / "out").exists()
