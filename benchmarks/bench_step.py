@@ -6,7 +6,6 @@ Each world is explored with both lasers. Times are of the thread, not of the clo
 programs disturb them less. A scan's time is its perception and all control until the next scan.
 """
 
-import asyncio
 import sys
 import time
 from collections.abc import Callable
@@ -18,14 +17,13 @@ from benchmarks.report import report, report_fact
 from gvgbot.autonomy.control.reflexes import Felt
 from gvgbot.autonomy.estimate import smoothed
 from gvgbot.autonomy.events import Event
-from gvgbot.autonomy.loop import Loop
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.config import Config, load_config
+from gvgbot.driving import drive
 from gvgbot.geometry import Twist
-from gvgbot.hal.guard import Guard
 from gvgbot.hal.messages import Odometry, Scan
-from gvgbot.links import Links
+from gvgbot.links import Devices, Links
 from gvgbot.simulation import Simulation, open_place
 
 DEFAULT_WORLDS = ("office", "floor_plan:201")
@@ -89,15 +87,7 @@ async def explore(config: Config, pipeline: Pipeline) -> float:
     """Drive through the twins until there is an outcome; seconds of the robot's clock."""
     clock = LoopClock()
     simulation = Simulation(config, open_place(config), clock)
-    links = Links(config, clock, simulation)
-    (laser, _), (base, _) = await links.open_laser(), await links.open_base()
-    guard = Guard(config.robot.limits, config.robot.radius_m)
-    loop = Loop(laser, base, pipeline, guard, on_events=lambda _: None, on_cycle=lambda _: None)
-    async with asyncio.TaskGroup() as tasks:
-        serving = [tasks.create_task(part.run()) for part in (laser, base, simulation)]
-        await loop.run()
-        for task in serving:
-            task.cancel()
+    await drive(config.robot, Devices(Links(config, clock, simulation)), pipeline)
     return clock.now()
 
 

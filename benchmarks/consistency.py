@@ -16,7 +16,6 @@ them. --plot needs matplotlib (the extra `plot`).
 """
 
 import argparse
-import asyncio
 import contextlib
 import json
 import sys
@@ -34,16 +33,15 @@ from benchmarks.consistency_report import Row, line, plot, summary
 from benchmarks.reference_gvg import reference_gvg
 from gvgbot.autonomy.estimate import smoothed
 from gvgbot.autonomy.events import Event, LoopClosed
-from gvgbot.autonomy.loop import Loop
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.config import Config, load_config
 from gvgbot.drivers.kobuki.odometry_error import PROFILES, OdometryError, OdometryProfile
+from gvgbot.driving import drive
 from gvgbot.errors import GvgbotError
 from gvgbot.geometry import Array, Pose, rotated_covariance, wrap_angle
-from gvgbot.hal.guard import Guard
 from gvgbot.hal.messages import Odometry, Scan
-from gvgbot.links import Links
+from gvgbot.links import Devices, Links
 from gvgbot.simulation import Simulation, open_place
 
 MATCH = 1.5  # m: a vertex farther from the true one is another
@@ -80,23 +78,15 @@ async def explore(config: Config, pipeline: Pipeline, truth: list[tuple[float, .
     """Drive until there is an outcome, or no more time; rows of stamp and world_base."""
     clock = LoopClock()
     simulation = Simulation(config, open_place(config), clock)
-    links = Links(config, clock, simulation)
-    (laser, _), (base, _) = await links.open_laser(), await links.open_base()
+    devices = Devices(Links(config, clock, simulation))
 
     def note(odometry: Odometry) -> None:
         simulation.body.advance(odometry.stamp)
         pose = simulation.body.pose
         truth.append((odometry.stamp, pose.x, pose.y, pose.theta))
 
-    guard = Guard(config.robot.limits, config.robot.radius_m)
-    loop = Loop(laser, base, pipeline, guard, on_events=lambda _: None, on_cycle=note)
-    async with asyncio.TaskGroup() as tasks:
-        serving = [tasks.create_task(part.run()) for part in (laser, base, simulation)]
-        with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(config.twin.time_limit_s):
-                await loop.run()
-        for task in serving:
-            task.cancel()
+    limit = config.twin.time_limit_s
+    await drive(config.robot, devices, pipeline, on_cycle=note, limit_s=limit)
 
 
 def run(overrides: Sequence[str]) -> Row:

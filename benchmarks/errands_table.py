@@ -24,12 +24,11 @@ from benchmarks.campaign import Row
 from gvgbot.autonomy.destinations import foot_of, route_to_foot, route_to_vertex
 from gvgbot.autonomy.errands import Declined
 from gvgbot.autonomy.events import ErrandEnded, Event
-from gvgbot.autonomy.loop import Loop
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.config import Config, load_config
+from gvgbot.driving import drive
 from gvgbot.geometry import Array, Pose
-from gvgbot.hal.guard import Guard
 from gvgbot.links import Devices, Links
 from gvgbot.simulation import Place, Simulation, open_place
 
@@ -199,20 +198,13 @@ async def explore_and_visit(config: Config, score: Score, count: int, *, verbose
     devices = Devices(Links(config, clock, simulation))
     pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
     tour = Tour(config, place, pipeline, clock, simulation, score, verbose)
-    loop = Loop(
-        devices.laser,
-        devices.base,
-        pipeline,
-        Guard(config.robot.limits, config.robot.radius_m),
-        on_events=tour.events.extend,
-        on_cycle=lambda odometry: None,
-        goes_on=lambda: True,
+    driving = drive(
+        config.robot, devices, pipeline, on_events=tour.events.extend, goes_on=lambda: True
     )
     async with asyncio.TaskGroup() as tasks:
-        work = [tasks.create_task(devices.run()), tasks.create_task(loop.run())]
+        work = tasks.create_task(driving)
         await tour.run(count)
-        for task in work:
-            task.cancel()
+        work.cancel()
 
 
 def main() -> None:

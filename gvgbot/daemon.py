@@ -12,11 +12,10 @@ from typing import TYPE_CHECKING
 import structlog
 
 from gvgbot import __version__
-from gvgbot.autonomy.loop import Loop
 from gvgbot.clock import LoopClock, VirtualTimeLoop
 from gvgbot.config import Config
+from gvgbot.driving import drive
 from gvgbot.errors import ExtraMissing, GvgbotError, UsageError, reason_of, underlying
-from gvgbot.hal.guard import Guard
 from gvgbot.hal.messages import Odometry
 from gvgbot.links import Devices, Links
 from gvgbot.maps.picture import counts
@@ -92,26 +91,15 @@ async def explore_once(session: Session, progress: Progress) -> None:
         session.on_cycle(odometry, devices.base.contact)
         progress.show(session.pipeline, odometry.stamp)
 
-    robot = session.config.robot
-    guard = Guard(robot.limits, robot.radius_m)
-    loop = Loop(
-        devices.laser,
-        devices.base,
+    session.failure = await drive(
+        session.config.robot,
+        devices,
         session.pipeline,
-        guard,
         on_events=session.on_events,
         on_cycle=on_cycle,
         log=session.recorder,
+        limit_s=session.config.twin.time_limit_s,
     )
-    limit = session.config.twin.time_limit_s
-    async with asyncio.TaskGroup() as tasks:
-        serving = tasks.create_task(devices.run(), name="devices")
-        try:
-            async with asyncio.timeout(limit):
-                await loop.run()
-        except TimeoutError:
-            session.failure = devices.away or f"not explored after {limit:g} s"
-        serving.cancel()
 
 
 def _conclude(session: Session, say: Callable[[str], None]) -> int:

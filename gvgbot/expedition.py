@@ -14,13 +14,12 @@ import numpy as np
 import structlog
 
 from gvgbot import __version__
-from gvgbot.autonomy.loop import Loop
 from gvgbot.clock import LoopClock, VirtualTimeLoop
 from gvgbot.config import Config
 from gvgbot.drivers.people import Walkways
+from gvgbot.driving import drive
 from gvgbot.errors import UsageError, WorldError, reason_of
 from gvgbot.geometry import Array, Pose
-from gvgbot.hal.guard import Guard
 from gvgbot.hal.messages import Odometry
 from gvgbot.links import Devices, Links
 from gvgbot.maps import geojson
@@ -218,30 +217,20 @@ async def _live(robot: _Robot, air: _Air, clock: LoopClock) -> None:
     sets_out, breaks_down = air.troubles.sets_out_s(number), air.troubles.breaks_down_s(number)
     await air.until(sets_out)
     devices = Devices(Links(session.config, clock, session.simulation, session.tap))
-    config = session.config.robot
-    loop = Loop(
-        devices.laser,
-        devices.base,
+    limit, lasts = session.config.twin.time_limit_s, breaks_down - sets_out
+    trouble = await drive(
+        session.config.robot,
+        devices,
         session.pipeline,
-        Guard(config.limits, config.radius_m),
         on_events=session.on_events,
         on_cycle=partial(_on_cycle, robot, air, devices),
-        log=None,
         goes_on=lambda: not air.is_quiet,  # and keeps out of the way of who explores
+        limit_s=min(limit, lasts),
     )
-    async with asyncio.TaskGroup() as tasks:
-        serving = tasks.create_task(devices.run(), name="devices")
-        limit, lasts = session.config.twin.time_limit_s, breaks_down - sets_out
-        try:
-            async with asyncio.timeout(min(limit, lasts)):
-                await loop.run()
-        except TimeoutError:
-            if not robot.is_over:
-                robot.is_broken = lasts < limit
-                session.failure = devices.away or f"not explored after {limit:g} s"
-            if robot.is_broken:
-                session.failure = f"it broke down after {breaks_down:.0f} s, as configured"
-        serving.cancel()
+    if trouble is not None and not robot.is_over:
+        robot.is_broken = lasts < limit
+        broken = f"it broke down after {breaks_down:.0f} s, as configured"
+        session.failure = broken if robot.is_broken else trouble
     if not robot.is_over:
         robot.ended = clock.now()
     while not (air.is_quiet or robot.is_broken):

@@ -1,23 +1,20 @@
 """A recorded sequence of HAL messages drives a fresh pipeline to the same bits."""
 
-import asyncio
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
+from gvgbot import driving
 from gvgbot.autonomy.control.reflexes import Felt
 from gvgbot.autonomy.estimate import smoothed
 from gvgbot.autonomy.events import Event, LoopClosed
-from gvgbot.autonomy.loop import Loop
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.config import Config, load_config
-from gvgbot.drivers.hokuyo.driver import HokuyoLaser
-from gvgbot.drivers.kobuki.driver import KobukiBase
 from gvgbot.geometry import Pose, Twist
-from gvgbot.hal.guard import Guard
 from gvgbot.hal.messages import Odometry, Scan
+from gvgbot.links import Devices, Links
 from gvgbot.maps import geojson
 from gvgbot.report import route_graph
 from gvgbot.simulation import Place, Simulation
@@ -77,15 +74,7 @@ class Drive:
 async def drive_through_the_twins(config: Config, pipeline: Pipeline) -> None:
     clock = LoopClock()
     simulation = Simulation(config, Place(LOLLIPOP, START), clock)
-    laser = HokuyoLaser(simulation.laser, config.laser, clock)
-    base = KobukiBase(simulation.base, config.base, clock)
-    guard = Guard(config.robot.limits, config.robot.radius_m)
-    loop = Loop(laser, base, pipeline, guard, on_events=lambda _: None, on_cycle=lambda _: None)
-    async with asyncio.TaskGroup() as tasks:
-        serving = [tasks.create_task(part.run()) for part in (laser, base, simulation)]
-        await loop.run()
-        for task in serving:
-            task.cancel()
+    await driving.drive(config.robot, Devices(Links(config, clock, simulation)), pipeline)
 
 
 @pytest.fixture(scope="module")

@@ -8,14 +8,13 @@ import numpy as np
 import pytest
 
 from gvgbot.autonomy.control.company import Companion, moved
-from gvgbot.autonomy.loop import Loop
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.config import Config
 from gvgbot.drivers.hokuyo.twin import HokuyoTwinConfig
 from gvgbot.drivers.world import World
+from gvgbot.driving import drive
 from gvgbot.geometry import Pose, wrap_angle
-from gvgbot.hal.guard import Guard
 from gvgbot.hal.messages import Odometry
 from gvgbot.links import Devices, Links
 from gvgbot.simulation import Place, Simulation
@@ -158,16 +157,4 @@ async def _live(number: int, both: list[Explorer], config: Config, clock: LoopCl
             explorer.told = odometry.stamp
             explorer.hear(other, goes_first=number == 1)
 
-    guard = Guard(config.robot.limits, RADIUS)
-    loop = Loop(
-        devices.laser,
-        devices.base,
-        explorer.pipeline,
-        guard,
-        on_events=lambda happened: None,
-        on_cycle=on_cycle,
-        goes_on=lambda: True,
-    )
-    async with asyncio.TaskGroup() as tasks:
-        tasks.create_task(devices.run())
-        await loop.run()
+    await drive(config.robot, devices, explorer.pipeline, on_cycle=on_cycle, goes_on=lambda: True)

@@ -9,12 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gvgbot.autonomy.loop import Loop
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.config import load_config
+from gvgbot.driving import drive
 from gvgbot.geometry import Array, Pose, wrap_angle
-from gvgbot.hal.guard import Guard
 from gvgbot.hal.messages import Odometry
 from gvgbot.links import Devices, Links
 from gvgbot.simulation import Simulation, open_place
@@ -119,17 +118,9 @@ def test_a_robot_that_rolled_and_was_turned_while_its_base_was_away_finds_its_pl
         simulation = Simulation(config, open_place(config), clock)
         devices, body = Devices(Links(config, clock, simulation)), simulation.body
         pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
-        guard = Guard(config.robot.limits, config.robot.radius_m)
-        loop = Loop(
-            devices.laser,
-            devices.base,
-            pipeline,
-            guard,
-            on_events=lambda _: None,
-            on_cycle=wheels.append,
-        )
+        driving = drive(config.robot, devices, pipeline, on_cycle=wheels.append)
         async with asyncio.TaskGroup() as tasks:
-            work = [tasks.create_task(devices.run()), tasks.create_task(loop.run())]
+            work = tasks.create_task(driving)
             await clock.sleep_until(31.0)
             assert body.linear > 0.4
             simulation.base_twin.inject("unplug", 8.0)
@@ -139,8 +130,7 @@ def test_a_robot_that_rolled_and_was_turned_while_its_base_was_away_finds_its_pl
             await clock.sleep_until(37.0)
             body.command(0.0, 0.0)
             await clock.sleep_until(43.0)
-            for task in work:
-                task.cancel()
+            work.cancel()
         body.advance(clock.now())
         start = simulation.place.start
         odom_base = wheels[-1].odom_base
