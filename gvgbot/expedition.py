@@ -22,6 +22,7 @@ from gvgbot.errors import UsageError, WorldError, reason_of
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Odometry
 from gvgbot.links import Devices, Links
+from gvgbot.live_team import member_of, steered
 from gvgbot.maps import geojson
 from gvgbot.maps.joined_graph import joined_graph
 from gvgbot.maps.joined_grid import joined_grid
@@ -36,7 +37,6 @@ from gvgbot.service import set_up_logging
 from gvgbot.session import Session
 from gvgbot.simulation import Place, Simulation, open_place
 from gvgbot.stop_signals import StopSignals
-from gvgbot.team.chart import chart_of
 from gvgbot.team.member import Member
 from gvgbot.team.news import Course, News, decode, encode
 from gvgbot.team.troubles import Troubles
@@ -150,15 +150,7 @@ class _Robot:
         )
         directory = stack.enter_context(RunDirectory.create(out / name, world=name))
         session = Session(config, directory, place)
-        mapper = session.pipeline.mapper
-        member = Member(
-            name,
-            config.team,
-            lambda: chart_of(mapper.graph, mapper.belief, session.pipeline.mission.parts()),
-            radius=config.robot.radius_m,
-        )
-        session.pipeline.mission.choice.sharing = member.auction
-        return cls(session, member)
+        return cls(session, member_of(config.robot, config.team, session.pipeline))
 
 
 class _Air:
@@ -245,12 +237,7 @@ def _on_cycle(robot: _Robot, air: _Air, devices: Devices, odometry: Odometry) ->
         robot.ended, robot.told = odometry.stamp, -math.inf  # the others shall hear of it now
     if odometry.stamp >= robot.steered + config.steer_every_s:
         robot.steered = odometry.stamp
-        course = robot.member.course(
-            odometry.stamp, pipeline.map_base, pipeline.track, pipeline.traffic.seen
-        )
-        air.send(course, robot)
-        pipeline.traffic.company = robot.member.company()
-        pipeline.traffic.strangers = robot.member.strangers()
+        air.send(steered(robot.member, pipeline, odometry.stamp), robot)
     if odometry.stamp >= robot.told + config.tell_every_s:
         _tell(robot, air, odometry.stamp)
         robot.member.look(odometry.stamp)

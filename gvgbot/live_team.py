@@ -12,9 +12,9 @@ from gvgbot.clock import Clock, OffLoop
 from gvgbot.config import RobotConfig
 from gvgbot.errors import GvgbotError
 from gvgbot.team.alignment import Alignment
-from gvgbot.team.chart import chart_of
+from gvgbot.team.chart import Chart, chart_of
 from gvgbot.team.member import Comparison, Member, TeamConfig
-from gvgbot.team.news import decode, encode
+from gvgbot.team.news import Course, decode, encode
 from gvgbot.topics import TeamPart
 
 _COMPLAINTS = 10  # under one key, different ones; then it is known that something is wrong
@@ -41,19 +41,10 @@ class LiveTeam:
     ) -> None:
         self._config, self._pipeline, self._network = config, pipeline, network
         self._clock: Clock
-        mapper = pipeline.mapper
         life = secrets.randbits(31)
         self._lives = {life}  # of robots by this name
         self._complaints: set[tuple[str, str]] = set()  # under which key, and why
-        self.member = Member(
-            robot.name,
-            config,
-            lambda: chart_of(mapper.graph, mapper.belief, pipeline.mission.parts()),
-            radius=robot.radius_m,
-            life=life,
-        )
-        pipeline.mission.choice.sharing = self.member.auction
-        pipeline.traffic.company = []
+        self.member = member_of(robot, config, pipeline, life)
 
     async def take_part(self, clock: Clock, off_loop: OffLoop) -> None:
         """Tell and hear until cancelled; `off_loop` runs what takes long."""
@@ -100,13 +91,8 @@ class LiveTeam:
         pipeline = self._pipeline
         while True:
             if not pipeline.is_lost:
-                now = self._clock.now()
-                course = self.member.course(
-                    now, pipeline.map_base, pipeline.track, pipeline.traffic.seen
-                )
+                course = steered(self.member, pipeline, self._clock.now())
                 self._network.tell_team("course", encode(course))
-                pipeline.traffic.company = self.member.company()
-                pipeline.traffic.strangers = self.member.strangers()
             await self._clock.sleep_until(self._clock.now() + self._config.steer_every_s)
 
     async def _compare(self, off_loop: OffLoop) -> None:
@@ -118,6 +104,27 @@ class LiveTeam:
                 log.info("maps joined", other=met.robot, confidence=confidence)
             self.member.met.clear()
             await self._clock.sleep_until(self._clock.now() + self._config.tell_every_s)
+
+
+def member_of(robot: RobotConfig, config: TeamConfig, pipeline: Pipeline, life: int = 0) -> Member:
+    """The robot as one of a team, with which its mission shares the frontiers from now on."""
+    mapper, mission = pipeline.mapper, pipeline.mission
+
+    def chart() -> Chart:
+        return chart_of(mapper.graph, mapper.belief, mission.parts())
+
+    member = Member(robot.name, config, chart, radius=robot.radius_m, life=life)
+    mission.choice.sharing = member.auction
+    pipeline.traffic.company = []
+    return member
+
+
+def steered(member: Member, pipeline: Pipeline, stamp: float) -> Course:
+    """What to tell the others of where the robot is and drives; it keeps clear of them."""
+    traffic = pipeline.traffic
+    course = member.course(stamp, pipeline.map_base, pipeline.track, traffic.seen)
+    traffic.company, traffic.strangers = member.company(), member.strangers()
+    return course
 
 
 async def _made(comparison: Comparison, off_loop: OffLoop) -> Alignment | None:
