@@ -63,10 +63,8 @@ def explore(
         factory = None if real_time else VirtualTimeLoop
         recording = recorded(session, patient=not real_time)
         try:
-            with recording, asyncio.Runner(loop_factory=factory) as runner:
-                runner.run(signals.end(explore_once(session, progress)))
-        except asyncio.CancelledError:
-            raise KeyboardInterrupt from None
+            with recording:
+                signals.run(explore_once(session, progress), factory)
         except Exception as error:
             session.failure = reason_of(error)
             raise

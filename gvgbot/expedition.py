@@ -75,10 +75,7 @@ def explore_together(
         ]
         try:
             factory = None if real_time else VirtualTimeLoop
-            with asyncio.Runner(loop_factory=factory) as runner:
-                runner.run(signals.end(_explore(robots, config)))
-        except asyncio.CancelledError:
-            raise KeyboardInterrupt from None
+            signals.run(_explore(robots, config), factory)
         except Exception as error:
             for robot in robots:
                 robot.session.failure = robot.session.failure or reason_of(error)

@@ -2,7 +2,7 @@
 
 import asyncio
 import signal
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable, Coroutine
 from functools import partial
 from typing import Any, Self
 
@@ -35,8 +35,19 @@ class StopSignals:
         assert self._asked is not None
         return self._asked
 
-    async def end(self, work: Awaitable[None]) -> None:
-        """Do some work, which the first signal ends: it is cancelled."""
+    def run(
+        self,
+        work: Coroutine[Any, Any, None],
+        loop_factory: Callable[[], asyncio.AbstractEventLoop] | None = None,
+    ) -> None:
+        """Do some work. Raises KeyboardInterrupt if a signal ended it: the first one cancels it."""
+        try:
+            with asyncio.Runner(loop_factory=loop_factory) as runner:
+                runner.run(self._cancelled_by_signal(work))
+        except asyncio.CancelledError:
+            raise KeyboardInterrupt from None
+
+    async def _cancelled_by_signal(self, work: Coroutine[Any, Any, None]) -> None:
         loop, task = asyncio.get_running_loop(), asyncio.current_task()
         assert task is not None
         self._tell = partial(loop.call_soon_threadsafe, task.cancel)

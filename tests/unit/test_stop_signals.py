@@ -5,7 +5,7 @@ import signal
 
 import pytest
 
-from gvgbot.clock import run_in_virtual_time
+from gvgbot.clock import VirtualTimeLoop, run_in_virtual_time
 from gvgbot.stop_signals import StopSignals
 
 
@@ -51,8 +51,8 @@ def test_a_signal_ends_work_and_the_next_one_does_not_break_into_how_it_ends() -
             await asyncio.sleep(1.0)
             done.append("tidied up")
 
-    with StopSignals() as signals, pytest.raises(asyncio.CancelledError):
-        run_in_virtual_time(signals.end(work()))
+    with StopSignals() as signals, pytest.raises(KeyboardInterrupt):
+        signals.run(work(), VirtualTimeLoop)
     assert done == ["tidied up"]
 
 
@@ -63,8 +63,8 @@ def test_work_does_not_begin_after_a_signal() -> None:
 
     with StopSignals() as signals:
         signal.raise_signal(signal.SIGTERM)
-        with pytest.raises(asyncio.CancelledError):
-            run_in_virtual_time(signals.end(work()))
+        with pytest.raises(KeyboardInterrupt):
+            signals.run(work(), VirtualTimeLoop)
 
 
 def test_a_signal_that_was_blocked_can_stay_so() -> None:
