@@ -1,8 +1,8 @@
 """Where on a known map a robot is: told by walls that differ, and never by walls that do not."""
 
 import math
-from dataclasses import replace
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
