@@ -92,7 +92,7 @@ def set_up_logging(
     structlog.configure(
         processors=_for_journal()
         if journal
-        else _for_people(colors=stream.isatty() and not os.environ.get("NO_COLOR")),
+        else _for_people(colors=stream.isatty() and not environment.get("NO_COLOR")),
         wrapper_class=structlog.make_filtering_bound_logger(least),
         logger_factory=structlog.PrintLoggerFactory(cast(TextIO, _Unbreakable(stream))),
         cache_logger_on_first_use=False,

@@ -115,6 +115,29 @@ def test_people_get_a_line_without_escapes_where_there_is_no_terminal() -> None:
     assert "\x1b" not in line
 
 
+class Watched(io.StringIO):
+    """A terminal."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.mark.usefixtures("_fresh_log")
+@pytest.mark.parametrize(
+    ("environment", "is_coloured"),
+    [({}, True), ({"NO_COLOR": ""}, True), ({"NO_COLOR": "1"}, False)],
+    ids=["as it is", "empty, which asks for nothing", "asked for none"],
+)
+def test_a_terminal_gets_colours_unless_somebody_wants_none(
+    environment: dict[str, str], is_coloured: bool
+) -> None:
+    stream = Watched()
+    set_up_logging(stream, environment)
+    structlog.get_logger().info("laser lost", port="/dev/hokuyo")
+    assert "laser lost" in stream.getvalue()
+    assert ("\x1b[" in stream.getvalue()) == is_coloured
+
+
 class HungUp(io.StringIO):
     def write(self, text: str) -> int:
         raise OSError(5, "Input/output error")
