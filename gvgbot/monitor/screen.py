@@ -13,6 +13,7 @@ from gvgbot.words import printable
 
 _FACTS_WIDTH, _NAME_WIDTH = 31, 10
 _LEAST_MAP_WIDTH = 20
+_NO_MAP = f"the map needs {_FACTS_WIDTH + 1 + _LEAST_MAP_WIDTH} columns"
 _COLOURS: dict[Layer, str] = {
     "empty": "default",
     "wall": "white",
@@ -155,9 +156,11 @@ def _ruled(title: str, width: int) -> Text:
 
 
 def _foot(scale: float | None, width: int) -> Text:
-    """What the signs mean, how large a character is, and how to leave."""
+    """What the signs mean, or why there are none, how large a character is, and how to leave."""
     right = ("" if scale is None else f"{scale:.2f} m per sign  ") + "q quit"
     text = Text()
+    if scale is None:
+        text.append(_NO_MAP, "yellow").truncate(max(0, width - len(right) - 1), overflow="ellipsis")
     for layer, sign, name in _LEGEND if scale is not None else ():
         if len(text) + len(f"{sign} {name}  ") > width - len(right):
             break

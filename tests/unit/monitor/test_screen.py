@@ -113,6 +113,16 @@ def test_a_small_terminal_shows_what_matters_most() -> None:
         assert any(line.startswith(fact) for line in shown), fact
 
 
+def test_a_terminal_that_is_too_narrow_for_the_map_says_so() -> None:
+    told = "the map needs 52 columns"
+    assert Terminal(40, 12).show(PICTURE)[-1] == told.ljust(34) + "q quit"
+    assert Terminal(20, 12).show(PICTURE)[-1] == "the map need… q quit"
+    for width, is_told in ((51, True), (52, False)):
+        lines = Terminal(width, 12).show(PICTURE)
+        assert (told in lines[-1]) == is_told
+        assert ("●" in "".join(lines[1:9])) == (not is_told)
+
+
 def test_the_place_of_a_robot_with_a_long_name_is_there_whole() -> None:
     team = (Mate(name="a-robot-with-a-very-long-name", pose=(-123.45, -67.89, 0.0)),)
     picture = replace(PICTURE, state=msgspec.structs.replace(EXAMPLE, team=team))
