@@ -508,7 +508,9 @@ def stretches(page: Page, *names: str) -> dict[str, tuple[NDArray[np.float64], i
         "(() => { const r = document.querySelector('#map').getBoundingClientRect();"
         "return [r.x, r.y, r.width, r.height].map(Math.round) })()"
     )
-    picture = page.pixels().astype(int)[top : top + height, left : left + width]
+    ratio = page.look("devicePixelRatio")
+    whole = page.pixels().astype(int)[::ratio, ::ratio]
+    picture = whole[top : top + height, left : left + width]
     found = {}
     for name in names:
         rows, columns = np.nonzero(np.abs(picture - colour(page, name)).sum(axis=2) < 12)
@@ -762,6 +764,56 @@ def test_two_fingers_zoom_on_a_phone(page: Page) -> None:
             page.touch("touchEnd")
             play.drawn()
             assert page.look(f"{scale} / {text}") == pytest.approx(2 * before, rel=0.1)
+
+
+def test_all_layers_and_a_short_word_on_a_vertex_find_room_on_a_phone(page: Page) -> None:
+    endpoint = free_endpoint()
+    with web("--connect", endpoint) as address:
+        play = Play(endpoint, page)
+        with play.robot:
+            page.open(address, 390, 844, phone=True, dark=False)
+            play.drawn()
+            ends = "[...document.querySelectorAll('#layers label')].map((one) => "
+            ends += "one.getBoundingClientRect().right)"
+            assert max(page.look(ends)) <= 390
+            assert page.look("document.querySelector('#layers').offsetHeight") < 100
+            play.until_drawn(lambda seen: seen["wall"][1] > 1000, "wall")
+            play.drawn()
+            x, y = stretch(page, "vertex")[0]
+            page.touch("touchStart", (x, y))
+            page.touch("touchEnd")
+            play.until_read("meetpoint 1 at 6.00, 2.00 m")
+            play.until("!document.querySelector('#place-go').hidden")
+            assert page.look("document.querySelector('#place').offsetHeight") < 50
+            page.click("#place-close")
+            play.until("document.querySelector('#place').hidden")
+
+
+def test_plots_above_each_other_have_one_axis_of_time(page: Page) -> None:
+    """The battery is known from the second of three moments on, and drawn below that one."""
+    endpoint = free_endpoint()
+    unknown = msgspec.structs.replace(HERE, battery_fraction=None)
+    with web("--connect", endpoint) as address:
+        play = Play(endpoint, page, state=unknown)
+        with play.robot:
+            desktop(page, address)
+            play.drawn()
+            page.look(
+                "(() => { const p = CanvasRenderingContext2D.prototype, line = p.lineTo,"
+                "begin = p.beginPath; window.xs = {};"
+                "p.beginPath = function () { xs[this.canvas.id] = []; begin.call(this) };"
+                "p.lineTo = function (x, y) { xs[this.canvas.id]?.push(x); line.call(this, x, y) }"
+                "})()"
+            )
+            for stamp, battery in ((100.0, None), (400.0, 0.9), (700.0, 0.8)):
+                play.state = msgspec.structs.replace(
+                    HERE, stamp=stamp, distance=stamp, battery_fraction=battery
+                )
+                play.until_read(f"{stamp:.1f} m")
+            play.until("(xs['battery-plot'] ?? []).length === 2")
+            sigmas, batteries = page.look("[xs['sigma-plot'], xs['battery-plot']]")
+    assert sigmas[-2:] == pytest.approx(batteries)
+    assert batteries[0] < batteries[1]
 
 
 def test_a_robot_that_is_stuck_waits_is_silent_or_has_left_and_a_lost_server_are_told_apart(
