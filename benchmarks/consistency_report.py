@@ -113,14 +113,12 @@ def plot(rows: list[Row], directory: Path) -> None:
     shares = np.arange(1, len(of_vertices) + 1) / len(of_vertices)
     axes[0].plot(of_vertices, shares, label="vertices, 2")
     axes[0].set(xlabel="mean NEES of a run", ylabel="share of runs", xscale="log")
-    axes[0].legend()
     share = np.linspace(0, 1, len(rows[0]["along"]))
     rms = np.sqrt(np.mean([np.square(row["along"]) for row in rows], axis=0))
     sigma = np.sqrt(np.mean([np.square(row["along_sigma"]) for row in rows], axis=0))
     axes[1].plot(share, rms, label="error, rms over runs")
     axes[1].plot(share, sigma, label="sigma that the filter gives")
     axes[1].set(xlabel="share of the run", ylabel="position of the robot, m")
-    axes[1].legend()
     x = np.linspace(0, 8, 33)
     for axis, key, what in (
         (axes[2], "vertex_distances", "vertices of the map (NEES)"),
@@ -129,5 +127,6 @@ def plot(rows: list[Row], directory: Path) -> None:
         axis.hist(np.concatenate([row[key] for row in rows]), x, density=True, label=what)
         axis.plot(x, chi2.pdf(x, 2), label="chi-square, 2")
         axis.set(xlabel="squared Mahalanobis distance", ylabel="density")
-        axis.legend()
+    for axis in axes:
+        axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), frameon=False)  # hides no curve
     figure.savefig(directory / "consistency.png", dpi=110)

@@ -40,7 +40,9 @@ def find() -> Finding:
     right.axvline(BLOCK_M, color=drawing.PALE)
     right.set_xticks(by_sigma, [f"{sigma:.1f}" for sigma in by_sigma])
     right.set_xticks([], minor=True)
-    right.legend(fontsize=7)
+    right.legend(
+        fontsize=7, ncols=2, loc="upper center", bbox_to_anchor=(0.5, -0.12), frameon=False
+    )
     drawing.labelled(
         right, f"{len(SEEDS)} tours each", "largest sigma of the robot, m", "share of arrivals"
     )
