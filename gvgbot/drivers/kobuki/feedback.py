@@ -129,7 +129,7 @@ class FeedbackReader:
         self._felt = [felt for felt in self._felt if arrival - felt[0] < _FELT_S]
         frames = [frame for frame in self._parser.feed(data) if not isinstance(frame, BadFrame)]
         for later, frame in zip(reversed(range(len(frames))), frames, strict=True):
-            made_by = arrival - later * FRAME_PERIOD
+            self.spoke = made_by = arrival - later * FRAME_PERIOD
             parts = decode_feedback(frame.payload, unread=DIAGNOSTICS)
             is_prompt = len(frames) <= _PROMPT
             newest = self._take_parts(parts, made_by, is_prompt=is_prompt) or newest
@@ -230,7 +230,6 @@ class FeedbackReader:
     def _take_core(
         self, core: CoreSensors, inertia: Inertia | None, arrival: float, clock: DeviceClock
     ) -> Odometry | None:
-        self.spoke = arrival
         before, self._clock = self._clock, clock
         self._missed += max(0, round(clock.step / FRAME_PERIOD) - 1)
         if core.feels:

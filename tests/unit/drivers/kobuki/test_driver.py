@@ -30,6 +30,7 @@ from gvgbot.drivers.kobuki.payloads import (
     Version,
     encode_feedback,
 )
+from gvgbot.drivers.kobuki.sub_payloads import Truncated, Unknown
 from gvgbot.drivers.transport import pipe
 from gvgbot.errors import DeviceLost
 from gvgbot.geometry import STANDSTILL, Twist
@@ -395,9 +396,15 @@ def test_the_cable_of_the_charger_is_felt_and_the_dock_is_not(charger: int, is_t
     play(script)
 
 
-@pytest.mark.parametrize("is_frozen", [True, False])
-def test_a_base_that_talks_but_tells_of_no_motion_is_lost(is_frozen: bool) -> None:
-    """It says the same frame for ever, or leaves out its gyro."""
+@pytest.mark.parametrize("silence", ["frozen", "no gyro", "no core", "a long core", "cut"])
+def test_a_base_that_talks_but_tells_of_no_motion_is_lost(silence: str) -> None:
+    """It says the same frame for ever, or leaves out its gyro, or what all else depends on."""
+    tail: dict[str, list[FeedbackPart]] = {
+        "frozen": [core(25), Inertia(0, 0)],
+        "no core": [Inertia(0, 0)],
+        "a long core": [Unknown(1, bytes(17)), Inertia(0, 0)],
+        "cut": [Inertia(0, 0), Truncated(b"\x63\x50")],
+    }
 
     async def main() -> None:
         bench = Bench()
@@ -405,8 +412,8 @@ def test_a_base_that_talks_but_tells_of_no_motion_is_lost(is_frozen: bool) -> No
         async def chatter() -> None:
             await bench.stream(0.5)
             while True:
-                bench.cycle += not is_frozen
-                await bench.say(core(bench.cycle), *([Inertia(0, 0)] if is_frozen else []))
+                bench.cycle += 1
+                await bench.say(*tail.get(silence, [core(bench.cycle)]))
 
         async with asyncio.TaskGroup() as tasks:
             chattering = tasks.create_task(chatter())
