@@ -2,6 +2,7 @@
 
 import asyncio
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -324,6 +325,33 @@ def test_a_laser_without_a_first_scan_is_reset_and_lost(status: str) -> None:
 
     twin = Reports(HokuyoTwin(PERFECT, World(), seed=22), status, 0.0, math.inf)
     on_bench(twin, scenario)
+
+
+@pytest.mark.parametrize(
+    ("status", "damaged", "told"),
+    [
+        pytest.param("", 0.0, "no scans: switch it off", id="silent"),
+        pytest.param("0M", 0.0, "status 0M in place of scans: switch it off", id="unstable"),
+        pytest.param("21", 0.0, "status 21 in place of scans: switch it off", id="checking"),
+        pytest.param("99", 1.0, "damaged scans only: try another cable", id="damaged"),
+    ],
+)
+def test_a_laser_without_a_first_scan_is_lost_with_what_it_sent(
+    status: str, damaged: float, told: str
+) -> None:
+    async def main() -> None:
+        here, there = pipe()
+        clock = LoopClock()
+        config = replace(PERFECT, bad_checksum_fraction=damaged)
+        since = math.inf if damaged else 0.0
+        twin = Reports(HokuyoTwin(config, World(), seed=27), status, since, math.inf)
+        async with asyncio.TaskGroup() as tasks:
+            served = tasks.create_task(serve_twin(twin, there, clock))
+            with pytest.raises(DeviceLost, match=told):
+                await HokuyoLaser(here, HokuyoConfig(), clock).run()
+            served.cancel()
+
+    run_in_virtual_time(main())
 
 
 @pytest.mark.parametrize(("lost", "wait"), [(1, 8.0), (2, 18.0), (3, 38.0)])

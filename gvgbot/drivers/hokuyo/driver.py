@@ -45,6 +45,8 @@ REMEDIES = {  # against a refusal, by its status
     UNSTABLE: f"its mirror does not turn as fast as it must; check its power, and {OFF_AND_ON}",
     DENIED: f"it is busy with something else; end other programs that use it, and {OFF_AND_ON}",
 }
+NO_SCANS, DAMAGED = "no scans", "damaged scans only"
+CHECK_CABLE = "try another cable or port, away from motors"
 FASTER = "raise robot.limits.max_scan_age_s, laser.rate_hz or laser.baud, or lower laser.skip"
 LONGEST_WITHOUT_SCAN = 5.0  # s, for a motor to reach its speed or a laser to check itself
 MOST_DOUBLINGS = 3  # of that: a laser that needed longer must not be reset for ever
@@ -73,14 +75,21 @@ class _Stream:
     clock_map: ClockMap | None = None
     is_fresh: bool = True  # no scan was handed on yet
     is_doubted: bool = False  # the first one fits no synchronisation
+    instead: str = NO_SCANS  # what it has sent since it began
 
     def note_scan(self, now: float) -> None:
         """One more scan has come."""
         self.last_scan = now
         self.until = now + self.silence
 
+    def note_damage(self) -> None:
+        """Something has come, but not whole."""
+        if self.instead == NO_SCANS:
+            self.instead = DAMAGED
+
     def note_status(self, status: str, now: float) -> None:
         """There is no scan, but the laser says why."""
+        self.instead = f"status {status} in place of scans"
         limit = self.last_scan + self.patience
         if _is_in(status, HALTED):
             self.until = limit
@@ -269,7 +278,8 @@ class HokuyoLaser:
         if stream.is_fresh:
             self.link.fruitless += 1
             self._dialogue.send("RS")
-            raise DeviceLost("the laser answers but sends no scans: switch it off and on")
+            remedy = CHECK_CABLE if stream.instead == DAMAGED else "switch it off and on"
+            raise DeviceLost(f"the laser answers but sends {stream.instead}: {remedy}")
 
     async def _listen(self, stream: _Stream) -> None:
         """Hand on what comes; a timer for each scan would cost more than its checksums."""
@@ -294,8 +304,8 @@ class HokuyoLaser:
                 return self._timed_scan(message, arrival, stream)
             case Reply(echo=echo, status=status) if echo == stream.request.text():
                 self._no_scan(status, stream)
-            case BadReply():
-                pass  # counted as it was heard
+            case BadReply():  # counted as it was heard
+                stream.note_damage()
             case _:
                 self.link.stray_messages += 1
         return None
