@@ -14,6 +14,7 @@ from gvgbot.drivers.hokuyo.twin_settings import BROKEN, LENGTHS, Settings
 
 DENIED = "10"
 UNDEFINED = "0E"
+TOO_SHORT, TOO_LONG = "0C", "0D"
 ABNORMAL = "0L"
 NOT_CONTROLLED = "01"  # the laser does not light up
 NO_SUCH_CODE = "01"  # of TM
@@ -99,7 +100,7 @@ class Answers:
             return _key_lines(text, lines)
         if self.is_abnormal and command not in {"RB", "%ST"}:
             return status_reply(text, ABNORMAL)
-        if command[:2] in SCAN_COMMANDS and command[2:3] != "":
+        if command[:2] in SCAN_COMMANDS:
             return self._answer_scan(text, command, now)
         return self._answer_state(text, command, now)
 
@@ -144,7 +145,7 @@ class Answers:
         """The reply to what is no question and no scan."""
         if command[:2] in LENGTHS:
             return status_reply(text, self._set(command, now))
-        if command[:2] == "TM" and len(command) == 3:
+        if command[:2] == "TM":
             return self._answer_time(text, command, now)
         if command == "%ST" and self._head.model.is_newer:
             return encode_reply(Reply(text, ACCEPTED, (self._state(),)))
@@ -194,6 +195,8 @@ class Answers:
         return ACCEPTED
 
     def _answer_time(self, text: str, command: str, now: float) -> bytes:
+        if len(command) != len("TM0"):
+            return status_reply(text, TOO_SHORT if command == "TM" else TOO_LONG)
         match command, self.phase:
             case "TM0", TimeMode():
                 return status_reply(text, ALREADY_ON)
