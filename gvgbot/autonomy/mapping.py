@@ -261,10 +261,14 @@ class Mapper(MapEdits):
             self._refute(view, vertex, "it was driven past")
 
     def _refute(self, view: View, vertex: Vertex, reason: str) -> None:
-        """Take a vertex out for a mistake, which it would be once more if it is seen again."""
+        """Take a vertex out for a mistake, which it would be once more if it is seen again.
+
+        What made it one may be a departure that was taken out before.
+        """
         place = self.in_local_frame(view, vertex.id)
-        bearings = tuple(half.bearing + place.theta for half in vertex.half_edges.values())
-        self._unbelieved.note_mistake(Mistake(place.position, bearings, view.travelled))
+        bearings = [*(half.bearing for half in vertex.half_edges.values()), *vertex.gone]
+        turned = tuple(bearing + place.theta for bearing in bearings)
+        self._unbelieved.note_mistake(Mistake(place.position, turned, view.travelled))
         if not self.graph.leave_ring(vertex):
             is_passed = self._is_passed(view, vertex)
             self.remove(view, vertex, reason, is_passed=is_passed)

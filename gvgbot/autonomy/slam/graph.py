@@ -47,6 +47,7 @@ class Vertex:
     seen_at: float  # metres driven when last seen
     updated_at: float  # metres driven when it last corrected the belief
     half_edges: dict[int, HalfEdge] = field(default_factory=dict)
+    gone: list[float] = field(default_factory=list)  # bearings of departures that were none
     snapshot: Array = field(
         default_factory=lambda: np.empty((0, 2))
     )  # walls around it, vertex frame
@@ -98,7 +99,7 @@ class Vertex:
 
         What comes and goes, as half a corner in sight may, is then no news for ever.
         """
-        return 1 + self.serial - self.degree
+        return 1 + len(self.gone)
 
     @property
     def kind(self) -> Kind:
@@ -194,7 +195,8 @@ class GvgGraph:
         edge = self.edge_at(end)
         if edge is not None:
             self.unjoin(edge)
-        del self.vertices[end.vertex].half_edges[end.key]
+        vertex = self.vertices[end.vertex]
+        vertex.gone.append(vertex.half_edges.pop(end.key).bearing)
 
     def remove_vertex(self, vertex: int) -> None:
         """Take a vertex out; the edges that ended there become frontiers at their other ends."""

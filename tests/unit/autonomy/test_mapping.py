@@ -410,6 +410,21 @@ def test_an_unclear_departure_that_was_looked_at_and_was_none_comes_back_no_more
     assert vertex.degree == degree
 
 
+def test_a_side_way_that_proved_to_be_none_makes_no_vertex_again() -> None:
+    """Who drove into it came out by a known edge, so it went before its vertex did."""
+    stub = drawn({**TEE_POINTS, 4: (3.0, -0.3)}, TEE_LINES, unseen={**UNSEEN, 4: -math.pi / 2})
+    weak = replace(stub.nodes[2], weak=frozenset({Branch(12, forward=True)}))
+    passing = LocalGvg({**stub.nodes, 2: weak}, stub.edges)
+    here = Pose(2.6, 0.0)
+    seen = Seen()
+    seen.mapper.move(here, np.zeros((3, 3)))
+    assert seen.look(passing, 20, at=here).places("meetpoint") == [pytest.approx((3.0, 0.0))]
+    seen.mapper.graph.remove_half_edge(seen.known.half_edge_of[Branch(12, forward=True)])
+    assert seen.look(PLAIN, 20, at=here).places("meetpoint") == []
+    seen.drive_elsewhere(30.0)
+    assert seen.look(passing, 20, at=here).places("meetpoint") == []
+
+
 def test_of_a_vertex_on_a_ring_that_proves_to_be_none_the_ring_is_left() -> None:
     """Its third departure was none; the way round is known all the same."""
     seen = Seen().look(TEE, 20)
