@@ -15,7 +15,7 @@ from gvgbot.clock import Clock, LoopClock, VirtualTimeLoop
 from gvgbot.config import Config
 from gvgbot.drivers.hokuyo.driver import HokuyoLaser
 from gvgbot.drivers.kobuki.driver import KobukiBase
-from gvgbot.errors import DeviceLost, DeviceRefused
+from gvgbot.errors import DeviceLost, DeviceRefused, GvgbotError
 from gvgbot.hal.guard import GuardConfig
 from gvgbot.hal.messages import EMPTY_BATTERY, LOW_BATTERY, Battery, Contact, Scan
 from gvgbot.links import Links
@@ -75,9 +75,10 @@ class Heard:
 
 
 def check(config: Config, say: Callable[[str], None]) -> int:
-    """Look at the devices of a configuration, say a line on each point; 1 if any point fails.
+    """Look at the devices of a configuration, say a line on each point; 0, the exit status.
 
-    Twins are looked at in virtual time. Raises WorldError for a world that cannot be used.
+    Twins are looked at in virtual time. Raises GvgbotError if any point fails, WorldError for a
+    world that cannot be used.
     """
     say(str(Line("ok", "configuration", _summary(config))))
     with asyncio.Runner(loop_factory=VirtualTimeLoop if config.twin.enabled else None) as runner:
@@ -85,13 +86,13 @@ def check(config: Config, say: Callable[[str], None]) -> int:
     for line in lines:
         say(str(line))
     say(_conclusion([line.verdict for line in lines]))
-    return int(any(line.verdict == "fail" for line in lines))
+    return 0
 
 
 def _conclusion(verdicts: list[Verdict]) -> str:
     failed, doubtful = verdicts.count("fail"), verdicts.count("warn")
     if failed:
-        return f"{failed} of {len(verdicts)} points failed"
+        raise GvgbotError(f"{failed} of {len(verdicts)} points failed")
     return f"ready to drive, {doubtful} to look at" if doubtful else "ready to drive"
 
 

@@ -3,6 +3,7 @@
 import contextlib
 import errno
 import os
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,6 +15,7 @@ import serial
 import structlog
 
 from gvgbot.check import Heard, _base_lines, check, examine
+from gvgbot.cli.entry import status_of
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.config import load_config
 from gvgbot.drivers.kobuki.driver import KobukiBase
@@ -28,8 +30,10 @@ CONFIG = load_config()
 def said(*overrides: str) -> tuple[int, dict[str, tuple[str, str]]]:
     """The exit status, and by subject the verdict and what follows it."""
     lines: list[str] = []
-    status = check(load_config(None, overrides), lines.append)
-    table = [(line[:5].strip(), line[6:20].strip(), line[21:]) for line in lines[:-1]]
+    config = load_config(None, overrides)
+    status = status_of(lambda: check(config, lines.append))
+    points = lines if status else lines[:-1]
+    table = [(line[:5].strip(), line[6:20].strip(), line[21:]) for line in points]
     return status, {subject: (verdict, finding) for verdict, subject, finding in table}
 
 
@@ -40,6 +44,12 @@ def test_sound_twins_pass_on_every_point() -> None:
     assert set(points) >= {"laser", "laser rate", "base", "base rate", "battery", "contact"}
     assert points["base rate"][1].startswith("50.0 of 50")
     assert points["laser rate"][1].startswith("10.0 of 10")
+
+
+def test_a_failure_is_told_in_one_line_where_errors_go(capsys: pytest.CaptureFixture[str]) -> None:
+    assert said("twin.base.battery_v=13.1")[0] == 1
+    error = capsys.readouterr().err
+    assert re.fullmatch(r"gvgbot: 1 of \d+ points failed\n", error)
 
 
 ILLS = {
