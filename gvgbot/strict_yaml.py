@@ -77,12 +77,28 @@ def _loaded(
     in_all: list[Problem] = []
     convert(cls, content, (), in_file)
     result = convert(cls, _merged(content, assigned), (), in_all)
+    lines += _lost(assigned)
     lines += [f"{source}: {one}" for one in in_file if not one.missing or one in in_all]
     blamed = [_blame(cls, content, one, assigned) for one in in_all if one not in in_file]
     if lines + blamed:
         raise ConfigError("\n".join(lines + blamed))
     assert isinstance(result, cls)
     return result
+
+
+def _lost(assigned: Sequence[_Override]) -> list[str]:
+    """A line for each plain value that a later override, of a key in it, would silently replace."""
+    lines = []
+    for number, one in enumerate(assigned):
+        inside = (
+            later.text
+            for later in assigned[number + 1 :]
+            if later.path != one.path and later.path[: len(one.path)] == one.path
+        )
+        other = None if isinstance(one.value, Mapping | None) else next(inside, None)
+        if other is not None:
+            lines.append(f"--set {one.text}: cannot go with --set {other}, a key in it")
+    return lines
 
 
 def _blame(

@@ -248,6 +248,13 @@ def test_a_wrong_override_is_named(override: str, expected: str, tmp_path: Path)
     assert expected in line
 
 
+def test_a_plain_value_is_not_lost_to_a_key_in_it(tmp_path: Path) -> None:
+    (line,) = mistakes("leg: {toes: 3}", tmp_path, "leg=3", "leg.toes=2", "leg.length_m=1")
+    assert line == "--set leg=3: cannot go with --set leg.toes=2, a key in it"
+    assert loaded("", tmp_path, "leg=", "leg.toes=2").leg.toes == 2
+    assert loaded("", tmp_path, "leg={length_m: 1}", "leg.toes=2").leg == Leg(length_m=1.0, toes=2)
+
+
 @pytest.mark.parametrize("others", [(), ("name=Rex",), ("name=Rex", "leg.toes=2")])
 def test_a_wrong_combination_is_blamed_on_the_override_that_made_it_wrong(
     others: tuple[str, ...], tmp_path: Path
