@@ -95,6 +95,9 @@ def status_of(command: Callable[[], int]) -> int:
         return _fail(str(error), BAD_USAGE)
     except GvgbotError as error:
         return _fail(str(error), FAILURE)
+    except MemoryError as error:  # NumPy says how much it wanted, Python nothing
+        wanted = f" ({error})" if str(error) else ""
+        return _fail(f"out of memory{wanted}: take a smaller or coarser map", FAILURE)
     except BrokenPipeError:  # whoever read our output has gone, as `head` does
         return FAILURE
     except PermissionError as error:

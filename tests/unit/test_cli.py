@@ -205,6 +205,15 @@ def test_a_full_disk_to_print_to_is_one_line(capsys: Captured) -> None:
     assert said(capsys) == ["gvgbot: output: no space left: make room"]
 
 
+@pytest.mark.parametrize("text", ["", "Unable to allocate 452. MiB"])
+def test_a_world_that_no_memory_can_hold_is_one_line(text: str, capsys: Captured) -> None:
+    tasks = ExceptionGroup("tasks", [MemoryError(text)])
+    assert status_of(lambda: raising(tasks)) == 1
+    (line,) = said(capsys)
+    assert line.startswith("gvgbot: out of memory")
+    assert text in line
+
+
 def test_what_a_task_met_with_is_said_and_not_that_a_task_met_with_something(
     capsys: Captured,
 ) -> None:
