@@ -1,10 +1,9 @@
 """Going back over where the robot came from, when nothing that it knows is in sight."""
 
-import numpy as np
-
-from gvgbot.autonomy.control.company import Companion, free_metres
+from gvgbot.autonomy.control.company import Companion
 from gvgbot.autonomy.control.edge_follower import Track
 from gvgbot.autonomy.control.orders import ARRIVED_M
+from gvgbot.autonomy.own_way import own_way
 from gvgbot.autonomy.views import View
 from gvgbot.autonomy.whereabouts import Whereabouts
 
@@ -26,9 +25,7 @@ class Backtracking:
 
     def track(self, view: View, where: Whereabouts, company: list[Companion]) -> Track | None:
         """The way back; None when known vertices are in sight, or it cannot go farther."""
-        line = where.way_back(view.local_base.position)
-        room = np.asarray(view.local_map.tree().query(line)[0])
-        track = Track.of(line, room).until(free_metres(line, room, company))
+        track = own_way(where.way_back(view.local_base.position), view, company)
         return None if self.sees_known or track.length < ARRIVED_M else track
 
     def end(self) -> None:

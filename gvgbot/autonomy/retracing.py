@@ -9,8 +9,9 @@ from collections import deque
 import numpy as np
 from scipy.spatial import cKDTree
 
-from gvgbot.autonomy.control.company import Companion, free_metres
+from gvgbot.autonomy.control.company import Companion
 from gvgbot.autonomy.control.edge_follower import Track
+from gvgbot.autonomy.own_way import own_way
 from gvgbot.autonomy.views import Correspondence, View
 from gvgbot.geometry import Array
 
@@ -67,8 +68,7 @@ class Retracing:
         assert self._back is not None
         away = np.hypot(*(self._back - view.local_base.position).T)
         line = self._back[int(away.argmin()) :][: round(_AHEAD_M / _STEP_M)]
-        room = np.asarray(view.local_map.tree().query(line)[0])
-        track = Track.of(line, room).until(free_metres(line, room, company))
+        track = own_way(line, view, company)
         return None if track.length < _THERE_M else track
 
     def end(self) -> None:
