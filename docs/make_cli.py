@@ -19,11 +19,11 @@ HEAD = """\
 <!-- Written by docs/make_cli.py from gvgbot/cli/: change the parser there, not here. -->
 
 Every command has `--help`. The exit status is 0 when a command did what it was asked for, 1 when
-it failed, and 2 when it was asked wrongly; for 1 and 2 a line on stderr says why (`map diff` says on
-stdout what differs). After Ctrl-C it
-is 0 if the command goes on until it is told to end (`run`, `twin`, `monitor`, `web`, `replay
---serve`), else 130; `explore` and `replay` save the map as it is then. `CONFIG` is a file, or the
-name of a packaged one: `sim.yaml`, `turtlebot2.yaml`, `husky.yaml`, `carmen.yaml`.
+it failed, and 2 when it was asked wrongly; for 1 and 2 a line on stderr says why (`map diff` says
+on stdout what differs). After Ctrl-C it is 0 if the command goes on until it is told to end (`run`,
+`twin`, `monitor`, `web`, `replay --serve`), else 130; `explore` and `replay` save the map as it is
+then. `CONFIG` is a file, or the name of a packaged one: `sim.yaml`, `turtlebot2.yaml`,
+`husky.yaml`, `carmen.yaml`.
 """
 
 
