@@ -745,27 +745,6 @@ def test_no_word_of_an_event_sticks_out(page: Page) -> None:
             assert needed == inner  # no bar to scroll sideways
 
 
-def test_two_fingers_zoom_on_a_phone(page: Page) -> None:
-    endpoint = free_endpoint()
-    with web("--connect", endpoint) as address:
-        play = Play(endpoint, page)
-        with play.robot:
-            page.open(address, 390, 844, phone=True, dark=False)
-            play.until_read("vertex 1, 0°: ear")
-            assert page.look("document.documentElement.scrollWidth") == 390  # nothing sticks out
-            scale = "document.querySelector('#scale-bar').offsetWidth"
-            text = "parseFloat(document.querySelector('#scale-text').textContent)"
-            play.drawn()
-            before = page.look(f"{scale} / {text}")
-            x, y = page.middle("#map")
-            page.touch("touchStart", (x - 40, y), (x + 40, y))
-            page.touch("touchMove", (x - 60, y), (x + 60, y))
-            page.touch("touchMove", (x - 80, y), (x + 80, y))
-            page.touch("touchEnd")
-            play.drawn()
-            assert page.look(f"{scale} / {text}") == pytest.approx(2 * before, rel=0.1)
-
-
 def test_all_layers_and_a_short_word_on_a_vertex_find_room_on_a_phone(page: Page) -> None:
     endpoint = free_endpoint()
     with web("--connect", endpoint) as address:
@@ -787,6 +766,28 @@ def test_all_layers_and_a_short_word_on_a_vertex_find_room_on_a_phone(page: Page
             assert page.look("document.querySelector('#place').offsetHeight") < 50
             page.click("#place-close")
             play.until("document.querySelector('#place').hidden")
+
+
+def test_two_fingers_zoom_on_a_phone(page: Page) -> None:
+    """The last on a phone: of what is touched later, the browser tells a page the clicks alone."""
+    endpoint = free_endpoint()
+    with web("--connect", endpoint) as address:
+        play = Play(endpoint, page)
+        with play.robot:
+            page.open(address, 390, 844, phone=True, dark=False)
+            play.until_read("vertex 1, 0°: ear")
+            assert page.look("document.documentElement.scrollWidth") == 390  # nothing sticks out
+            scale = "document.querySelector('#scale-bar').offsetWidth"
+            text = "parseFloat(document.querySelector('#scale-text').textContent)"
+            play.drawn()
+            before = page.look(f"{scale} / {text}")
+            x, y = page.middle("#map")
+            page.touch("touchStart", (x - 40, y), (x + 40, y))
+            page.touch("touchMove", (x - 60, y), (x + 60, y))
+            page.touch("touchMove", (x - 80, y), (x + 80, y))
+            page.touch("touchEnd")
+            play.drawn()
+            assert page.look(f"{scale} / {text}") == pytest.approx(2 * before, rel=0.1)
 
 
 def test_plots_above_each_other_have_one_axis_of_time(page: Page) -> None:
