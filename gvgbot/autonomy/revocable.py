@@ -1,7 +1,7 @@
 """What was believed before a closure, in case the next vertices contradict it."""
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from gvgbot.autonomy.slam import trail
@@ -22,6 +22,7 @@ class Revocable:
     graph: GvgGraph
     doubts: list[Doubt]
     observations: list[Observation]
+    names: Mapping[HalfEdgeId, HalfEdgeId]  # what half-edges were called, by their first names
     is_contradicted: bool = False  # by a way that led elsewhere
     witnesses: set[int] = field(default_factory=set)  # vertices that contradict it if they are new
 
@@ -33,10 +34,11 @@ class Revocable:
         graph: GvgGraph,
         doubts: Sequence[Doubt],
         observations: Sequence[Observation],
+        names: Mapping[HalfEdgeId, HalfEdgeId],
     ) -> "Revocable":
         """As things are, just before a closure."""
         own = replace(belief, P=belief.P.copy())
-        return cls(vertex, own, copy.deepcopy(graph), list(doubts), list(observations))
+        return cls(vertex, own, copy.deepcopy(graph), list(doubts), list(observations), names)
 
     def move(self, motion: Pose, covariance: Array, laid: Laid | None) -> None:
         """Believe what would be believed without the closure, and without what is seen since."""

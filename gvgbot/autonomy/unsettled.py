@@ -161,8 +161,9 @@ class Unsettled:
     def _be_ready_to_revoke(self, vertex: Vertex) -> None:
         """Keep what is believed, before it is corrected by a closure at a vertex."""
         known = self._known
+        doubts, names = self._doubts.recent, self.names.now
         self._revocable = Revocable.before(
-            vertex.id, known.belief, known.graph, self._doubts.recent, known.observations
+            vertex.id, known.belief, known.graph, doubts, known.observations, names
         )
 
     def revoke(self, stamp: float) -> list[Event]:
@@ -176,6 +177,6 @@ class Unsettled:
         self._doubts.recent = was.doubts
         self._doubts.refute(was.vertex)
         self._revocable, self.is_wary = None, True
-        self.names.forget()
+        self.names.now = was.names
         gone = [VertexRemoved(stamp, vertex, "a closure was revoked") for vertex in added]
         return [ClosureRevoked(stamp, was.vertex), *gone]

@@ -12,20 +12,16 @@ class Names:
     """
 
     def __init__(self) -> None:
-        self._now: dict[HalfEdgeId, HalfEdgeId] = {}
+        self.now: Mapping[HalfEdgeId, HalfEdgeId] = {}  # replaced as a whole, never changed
 
     def half_edge(self, then: HalfEdgeId) -> HalfEdgeId:
         """What a half-edge is called now."""
-        return self._now.get(then, then)
+        return self.now.get(then, then)
 
     def vertex(self, then: int) -> int:
         """What a vertex is called now."""
-        return next((new.vertex for old, new in self._now.items() if old.vertex == then), then)
+        return next((new.vertex for old, new in self.now.items() if old.vertex == then), then)
 
     def change(self, renamed: Mapping[HalfEdgeId, HalfEdgeId]) -> None:
         """The half-edges of a vertex belong to another one."""
-        self._now = {old: renamed.get(new, new) for old, new in self._now.items()} | dict(renamed)
-
-    def forget(self) -> None:
-        """All are called what they were called before."""
-        self._now.clear()
+        self.now = {old: renamed.get(new, new) for old, new in self.now.items()} | dict(renamed)

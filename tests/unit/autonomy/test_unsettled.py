@@ -112,8 +112,8 @@ def test_what_is_closed_for_a_while_is_opened_again_though_its_vertex_has_anothe
     assert graph.frontiers() == [north]
 
 
-def test_who_has_been_tried_often_stays_so_when_it_proves_to_be_another_one_after_all() -> None:
-    """A closure makes the second entry of a street's west end one with the first; it is revoked."""
+def entered_twice() -> tuple[Knowledge, Unsettled, list[HalfEdgeId]]:
+    """A street, and a vertex that may be its west end: a frontier of each of the two."""
     graph, ids = streets(2, 1)
     west, again = graph.vertices[ids[0, 0]], Vertex(graph.next_id(), 1.0, Pose(), 0.0, 0.0)
     graph.vertices[again.id] = again
@@ -123,18 +123,42 @@ def test_who_has_been_tried_often_stays_so_when_it_proves_to_be_another_one_afte
     known = Knowledge(Belief(x, 0.01 * np.eye(12), (*ids.values(), again.id)), graph)
     unsettled = Unsettled(known, margin=2.0, same_bearing=math.radians(40))
     unsettled.doubt(again, Recognition(None, (west.id,), (1.0,), 0.02, 9.0), 0.0)
+    return known, unsettled, ends
+
+
+def test_who_has_been_tried_often_stays_so_when_it_proves_to_be_another_one_after_all() -> None:
+    """A closure makes the second entry of a street's west end one with the first; it is revoked."""
+    known, unsettled, ends = entered_twice()
     obstructions = Obstructions(retries=1, retry_after=20.0, names=unsettled.names)
-    obstructions.close(graph, ends[1:], 0.0)
-    assert obstructions.open(graph, 30.0)
+    obstructions.close(known.graph, ends[1:], 0.0)
+    assert obstructions.open(known.graph, 30.0)
     assert unsettled.settle(31.0)
     assert unsettled.current(ends[1]) == ends[0]
-    obstructions.close(graph, ends[:1], 32.0)
+    obstructions.close(known.graph, ends[:1], 32.0)
     assert not obstructions.waiting, "it is the one that has been tried"
-    (edge,) = graph.edges.values()
+    (edge,) = known.graph.edges.values()
     unsettled.note_way(edge, arrived=99)  # not at its far end
     assert unsettled.revoke(33.0)
     obstructions.close(known.graph, ends[1:], 34.0)
     assert not obstructions.waiting
+
+
+def test_a_closure_that_is_revoked_takes_no_earlier_one_with_it() -> None:
+    """What was closed by a name that an earlier closure changed is opened when its time comes."""
+    known, unsettled, (frontier, then) = entered_twice()
+    obstructions = Obstructions(retries=3, retry_after=20.0, names=unsettled.names)
+    obstructions.close(known.graph, [then], 0.0)
+    others = Obstructions(retries=0, retry_after=20.0, names=unsettled.names)
+    others.close(known.graph, [frontier], 0.0)  # else it would be open as one of the two is
+    assert unsettled.settle(1.0)
+    unsettled.take_for_granted()
+    unsettled.note_closure(known.graph.vertices[frontier.vertex], is_surprising=True)
+    (edge,) = known.graph.edges.values()
+    unsettled.note_way(edge, arrived=99)  # not at its far end
+    assert unsettled.revoke(2.0)
+    assert known.graph.blocked() == [frontier]
+    assert obstructions.open(known.graph, 30.0)
+    assert known.graph.blocked() == []
 
 
 class Contradicted:

@@ -251,7 +251,7 @@ def test_after_a_closure_that_was_revoked_it_is_as_if_there_had_been_none() -> N
     rng = np.random.default_rng(2)
     belief, local = driven(rng, 20)
     never = replace(belief, P=belief.P.copy())
-    was = Revocable.before(10, belief, GvgGraph(), [], [])
+    was = Revocable.before(10, belief, GvgGraph(), [], [], {})
     belief = updated(belief, 10, random_pose(rng), 0.01 * np.eye(3))
     for look in range(22, 30):
         local, looks = local.compose(STEP), [look - 15, look - 1]
