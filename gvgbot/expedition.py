@@ -60,10 +60,14 @@ def explore_together(
     """Explore a simulated world with several robots, say where the map is; the exit status.
 
     Raises UsageError for a world or directory that cannot be used, or that has no room for all, and
-    if it shall be recorded; KeyboardInterrupt if a signal ended it.
+    if it shall be recorded or has virtual walls; KeyboardInterrupt if a signal ended it.
     """
     if config.recording.path is not None:
         raise UsageError("recording.path: a team is not recorded; record a robot that is alone")
+    if config.autonomy.virtual_walls:
+        raise UsageError(
+            "autonomy.virtual_walls: they are on the map of one robot; explore without --robots"
+        )
     set_up_logging(sys.stderr, os.environ, "warning")
     places = _places(config, open_place(config), count)
     with contextlib.ExitStack() as stack:

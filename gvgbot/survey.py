@@ -1,5 +1,7 @@
 """What a robot that has explored all may have missed, by the grid of all its scans."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from gvgbot.autonomy.ending import Surveyed
@@ -9,7 +11,7 @@ from gvgbot.geometry import Array, Pose, resampled
 from gvgbot.maps.blanks import blanks
 from gvgbot.maps.gaps import gaps
 from gvgbot.maps.narrows import narrows
-from gvgbot.maps.occupancy import occupancy_grid
+from gvgbot.maps.occupancy import OccupancyGrid, occupancy_grid
 from gvgbot.maps.passages import Way, passages
 from gvgbot.maps.spots import spots
 from gvgbot.maps.viewpoints import viewpoints
@@ -17,6 +19,7 @@ from gvgbot.maps.viewpoints import viewpoints
 _INTO_M = 2.0  # off its ways: through a door, and the robot faces what it looks at
 _TOWARDS_M = 1.0  # what seems to be a passage may be a pane of glass
 _STEP_M = 0.05  # between points of a way: a cell of the grid
+_WALL = 100  # percent
 _NONE = np.empty((0, 2))
 
 
@@ -31,7 +34,7 @@ def survey(pipeline: Pipeline) -> Surveyed:
     if ways and not pipeline.matches_walls:
         return Surveyed(_NONE, _NONE)
     keyframes = smoothed_keyframes(pipeline)
-    grid = occupancy_grid(scans_at(keyframes, pipeline))
+    grid = _walled(occupancy_grid(scans_at(keyframes, pipeline)), pipeline.virtual_walls)
     here, room = pipeline.map_base.position, pipeline.errands.room_m
     stood = spots(grid, *_passed(pipeline, keyframes), here, room)
     found = np.concatenate([gaps(grid, here, room), stood])
@@ -44,6 +47,15 @@ def survey(pipeline: Pipeline) -> Surveyed:
     off = np.repeat([_INTO_M, _TOWARDS_M], [len(found), len(through)])
     places = np.concatenate([found, through])
     return Surveyed(viewpoints(grid, beside, places, here, room, off), narrow)
+
+
+def _walled(grid: OccupancyGrid, points: Array) -> OccupancyGrid:
+    """The grid with walls where points (N, 2), map frame, are."""
+    cells = grid.cells.copy()
+    column, row = np.floor((points - grid.origin) / grid.resolution_m).astype(np.int64).T
+    inside = (row >= 0) & (row < cells.shape[0]) & (column >= 0) & (column < cells.shape[1])
+    cells[row[inside], column[inside]] = _WALL
+    return replace(grid, cells=cells)
 
 
 def _passed(pipeline: Pipeline, keyframes: list[Pose]) -> tuple[Array, Array]:

@@ -14,6 +14,7 @@ from gvgbot.autonomy.newcomers import NewcomersConfig
 from gvgbot.autonomy.slam.ekf import OdometryNoise
 from gvgbot.autonomy.slam.recognition import RecognitionConfig
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
+from gvgbot.autonomy.virtual_walls import VirtualWall, checked
 from gvgbot.ranges import Range
 
 
@@ -36,3 +37,9 @@ class AutonomyConfig:
     scan_matching: ScanMatchingConfig = field(default_factory=ScanMatchingConfig)
     odometry_noise: OdometryNoise = field(default_factory=OdometryNoise)
     passage_margin_m: Annotated[float, Range(0.0, 0.5)] = 0.05  # beyond the radius, on each side
+    # lines that it does not cross, as if there were walls, from corner to corner: m, map frame
+    virtual_walls: tuple[VirtualWall, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Raises ValueError for a virtual wall that is no line."""
+        checked(self.virtual_walls)

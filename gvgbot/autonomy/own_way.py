@@ -18,7 +18,8 @@ def own_way(way: Array, view: View, company: list[Companion]) -> Track:
     It leads through the middle of what is narrow. Who came round a jamb as near to it as it may
     would be held there by the guard, for another way of turning.
     """
-    tree, walls = view.local_map.tree(), view.local_map.points()
+    tree = view.obstacles()
+    walls = tree.data
     line = resampled(way, _STEP_M) if len(way) else way
     if len(walls):
         for step in _ASIDE_M:

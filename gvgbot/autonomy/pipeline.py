@@ -37,6 +37,7 @@ from gvgbot.autonomy.pose_tracking import PoseTracker
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
 from gvgbot.autonomy.traffic import Traffic
 from gvgbot.autonomy.views import Correspondence, View, touching
+from gvgbot.autonomy.virtual_walls import points_of
 from gvgbot.geometry import STANDSTILL, Array, Pose, Twist, wrap_angle
 from gvgbot.hal.deskew import deskewed
 from gvgbot.hal.messages import Odometry, Scan
@@ -89,6 +90,8 @@ class Pipeline:
         )
         self._reflexes = Reflexes(config.reflexes)
         self._hazards = Hazards(config.hazards)
+        self.virtual_walls = points_of(config.virtual_walls, config.local_map.cell_m)  # map frame
+        self._walls_near = np.empty((0, 2))  # those in reach at the last look, local frame
         self.traffic = Traffic(config.newcomers)
         self._incidents: list[tuple[str, str]] = []  # action and reason, since the last scan
         self._look_now = False
@@ -208,6 +211,7 @@ class Pipeline:
         self.open_clearance = self._config.reduction.open_clearance(
             scan.range_max, self._config.local_map.half_width_m
         )
+        self._walls_near = self._virtual_near(local_base)
         self.gvg, marks = self.mapper.marked(self._local_gvg(local_base), local_base)
         hazards, suspects = self._hazards.doubtful, self.tracker.maps.near.suspects()
         doubtful = np.concatenate([hazards, suspects, *self.traffic.standing])
@@ -227,6 +231,7 @@ class Pipeline:
             marks,
             self.traffic.newcomers.is_one_standing(scan.stamp, self.tracker.maps.near),
             scan.field_of_view,
+            self._walls_near,
         )
 
     def _act(self, view: View, known: Correspondence, scan: Scan) -> list[Event]:
@@ -260,10 +265,16 @@ class Pipeline:
             min_clearance=self._needed_m,
             roughness=reduction.roughness_m,
             open_clearance=self.open_clearance,
-            felt=np.concatenate([self._hazards.points, *self.traffic.in_the_way]),
+            felt=np.concatenate([self._hazards.points, *self.traffic.in_the_way, self._walls_near]),
         )
         known = self.mapper.known_around(local_base, half_width)
         return reduce_graph(fine, reduction, known).rings_cut_far_from(local_base.position)
+
+    def _virtual_near(self, local_base: Pose) -> Array:
+        """The points (N, 2) of virtual walls in reach of the local map, local frame."""
+        points = self.mapper.map_in_local(local_base).transform(self.virtual_walls)
+        away = np.abs(points - local_base.position).max(axis=1, initial=0.0)
+        return np.asarray(points[away < self._config.local_map.half_width_m])
 
     def _worth_a_look(self, scan: Scan, odom_base: Pose) -> bool:
         """Whether the robot is about something, and has come on, turned or waited enough."""
@@ -362,7 +373,9 @@ class Pipeline:
         """How far the robot can go straight at a bearing over what it knows to be free, m."""
         turned = Pose(local_base.x, local_base.y, local_base.theta + bearing)
         farthest = max(AWAY_M, self._config.reflexes.back_off_m)
-        others = np.concatenate([self.traffic.newcomers.points, self._hazards.points])
+        others = np.concatenate(
+            [self.traffic.newcomers.points, self._hazards.points, self._walls_near]
+        )
         margin = self._config.passage_margin_m
         return room_ahead(
             self.tracker.maps.near, others, turned, farthest, radius=self.radius, margin=margin

@@ -54,8 +54,9 @@ class ReturningPipeline(Pipeline):
         """`is_vouched` tells, once the base is heard, whether it counted on all the time."""
         super().__init__(config, exploration, robot_radius, localisation=localisation)
         recall(self, memory, past)
+        unwalled = replace(config, virtual_walls=())  # who is lost does not know where they are
         self._new_mind = partial(
-            Pipeline, config, exploration, robot_radius, localisation=localisation
+            Pipeline, unwalled, exploration, robot_radius, localisation=localisation
         )
         self._is_vouched = is_vouched
         # the best estimate of the map; None as long as that takes

@@ -135,7 +135,7 @@ class Traffic:
         base = view.local_base.position
         bodies = [one for one in seen + told if math.dist(one[0], base) < _ROUND_M]
         is_hidden = view.is_end_doubted(track.polyline[-1])
-        return led_round(track, bodies, view.local_map, radius, margin, is_hidden=is_hidden)
+        return led_round(track, bodies, view, radius, margin, is_hidden=is_hidden)
 
     def careful(
         self, twist: Twist, local_base: Pose, map_in_local: Pose, radius: float, slow: float

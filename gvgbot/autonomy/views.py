@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.gvg.local import Branch, LocalGvg
 from gvgbot.autonomy.gvg.local_map import LocalMap
@@ -31,6 +32,14 @@ class View:
     marks: dict[int, Vertex] = field(default_factory=dict)
     is_somebody_found: bool = False  # who will be let into the map if he stays
     field_of_view: tuple[float, float] = (-math.pi, math.pi)  # rad, base frame
+    virtual_walls: Array = field(default_factory=lambda: np.empty((0, 2)))  # points (N, 2)
+
+    def obstacles(self) -> cKDTree:
+        """To find the nearest of all that it must not drive into: walls, virtual ones too."""
+        if not len(self.virtual_walls):
+            return self.local_map.tree()
+        walls = np.concatenate([self.local_map.points(), self.virtual_walls])
+        return cKDTree(walls, balanced_tree=False)
 
     def is_doubtful(self, place: Array, within_m: float) -> bool:
         """Whether something that may go stands so near to a place (2,)."""

@@ -9,11 +9,13 @@ from functools import partial
 
 import numpy as np
 
+from gvgbot.autonomy.config import AutonomyConfig
 from gvgbot.autonomy.events import Event, Recovery
 from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.loop import Loop
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.graph import Vertex
+from gvgbot.autonomy.virtual_walls import VirtualWall
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.config import Config, TwinConfig
 from gvgbot.drivers.body import RobotBody
@@ -119,14 +121,20 @@ def play(
     limit: float = 600.0,
     twin: TwinConfig | None = None,
     exploration: ExplorationConfig | None = None,
+    virtual_walls: tuple[VirtualWall, ...] = (),
     grip: Grip | None = None,
+    goes_on: Callable[[], bool] | None = None,
 ) -> Play:
-    """Explore a world while a story happens to the robot, for at most so many seconds."""
+    """Explore a world while a story happens to the robot, for at most so many seconds.
+
+    It ends with an outcome, or when it no longer `goes_on`, if that is given.
+    """
     config = Config(
         twin=replace(twin or TwinConfig(seed=3), people=int(with_person)),
         exploration=exploration or ExplorationConfig(),
+        autonomy=AutonomyConfig(virtual_walls=virtual_walls),
     )
-    return run_in_virtual_time(_played(config, world, start, story, limit, grip))
+    return run_in_virtual_time(_played(config, world, start, story, limit, grip, goes_on))
 
 
 async def _played(
@@ -136,6 +144,7 @@ async def _played(
     story: Story | None,
     limit: float,
     grip: Grip | None,
+    goes_on: Callable[[], bool] | None,
 ) -> Play:
     clock = LoopClock()
     walkways = Walkways(world, start) if config.twin.people else None
@@ -155,7 +164,15 @@ async def _played(
         run.stopped_for[loop.stopped_for] += 1
 
     guard = Guard(config.robot.limits, config.robot.radius_m)
-    loop = Loop(laser, base, pipeline, guard, on_events=run.events.extend, on_cycle=on_cycle)
+    loop = Loop(
+        laser,
+        base,
+        pipeline,
+        guard,
+        on_events=run.events.extend,
+        on_cycle=on_cycle,
+        goes_on=goes_on,
+    )
     async with asyncio.TaskGroup() as tasks:
         serving = [tasks.create_task(part.run()) for part in (laser, base, simulation)]
         if story is not None:

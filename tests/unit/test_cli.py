@@ -122,6 +122,16 @@ def test_a_team_that_shall_be_recorded_is_refused(tmp_path: Path, capsys: Captur
     assert not list(tmp_path.iterdir())
 
 
+def test_virtual_walls_are_not_for_a_team_of_which_each_has_its_own_map(
+    tmp_path: Path, capsys: Captured
+) -> None:
+    settings = ["--set", "autonomy.virtual_walls=[[[1, 2], [3, 4]]]", "--out", f"{tmp_path}/run"]
+    assert main(["explore", "--world", "ring", "--robots", "2", *settings]) == 2
+    (line,) = said(capsys)
+    assert "autonomy.virtual_walls: they are on the map of one robot" in line
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_recording_that_cannot_begin_leaves_no_run_in_the_way(
     tmp_path: Path, capsys: Captured
 ) -> None:

@@ -66,6 +66,22 @@ def test_a_laser_that_could_see_nothing_is_refused(max_range_m: float) -> None:
     load_config(None, [overrides[0], "laser.max_range_m=1.1"])
 
 
+@pytest.mark.parametrize(
+    ("walls", "complaint"),
+    [
+        ("[[[1, 2]]]", r"virtual_walls\[0\]: a wall needs two different points"),
+        ("[[[0, 0], [1, 0]], [[1, 2], [1, 2]]]", r"virtual_walls\[1\]: a wall needs two"),
+        ("[[1, 2], [3, 4]]", r"write \[\[\[1, 2\], \[3, 4\]\]\]"),
+        ("[[[1, 2], [3, x]]]", r"virtual_walls\[0\]\[1\]\[1\] = 'x': must be a number"),
+        ("[[[1, 2], [3, 1e9]]]", "from -10000 to 10000"),
+        ("[[[1, 2], [3, .nan]]]", "must be a number"),
+    ],
+)
+def test_a_virtual_wall_that_is_no_line_is_refused(walls: str, complaint: str) -> None:
+    with pytest.raises(ConfigError, match=complaint):
+        load_config(None, [f"autonomy.virtual_walls={walls}"])
+
+
 @pytest.mark.parametrize("name", ["a/b", "a b", "*", "", "ä"])
 def test_a_name_that_cannot_be_part_of_a_topic_is_refused(name: str) -> None:
     with pytest.raises(ConfigError, match="letters, digits"):

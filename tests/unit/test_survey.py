@@ -11,6 +11,7 @@ from gvgbot.autonomy.ending import Surveyed
 from gvgbot.autonomy.localisation import Localisation
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.ekf import Belief
+from gvgbot.autonomy.virtual_walls import points_of
 from gvgbot.beside_loop import BesideLoop
 from gvgbot.config import load_config
 from gvgbot.drivers.world import World
@@ -70,6 +71,14 @@ def test_a_door_that_the_robot_leaves_alone_is_told_of() -> None:
     narrow = survey(driven(carved([CORRIDOR, door, room]), 6.0)).narrows
     assert START.transform(narrow) == pytest.approx(np.array([[1.5, 1.25]]), abs=0.2)
     assert len(survey(driven(carved([CORRIDOR, room]), 6.0)).narrows) == 0
+
+
+def test_nothing_is_missing_beyond_a_virtual_wall() -> None:
+    """One before the shadow of the corner, from wall to wall."""
+    pipeline = driven(carved([CORRIDOR, SIDE]), 3.0)
+    before = START.inverse().transform(np.array([(1.8, 1.0), (4.2, 1.0)]))
+    pipeline.virtual_walls = points_of([tuple((x, y) for x, y in before.tolist())], CELL)
+    assert len(survey(pipeline).places) == 0
 
 
 def driven_past_a_post(seconds: float) -> Pipeline:

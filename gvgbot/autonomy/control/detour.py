@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 
 from gvgbot.autonomy.control.edge_follower import Track
-from gvgbot.autonomy.gvg.local_map import LocalMap
+from gvgbot.autonomy.views import View
 from gvgbot.geometry import Array, resampled, stations_of
 
 Disc = tuple[Array, float]  # centre (2,) and radius, m
@@ -23,23 +23,24 @@ _SPACING_M, _ARC_RAD = 0.1, 0.15
 def led_round(
     track: Track,
     bodies: list[Disc],
-    near: LocalMap,
+    view: View,
     radius: float,
     margin: float,
     *,
     is_hidden: bool,
 ) -> Track:
-    """The track led round bodies on it where the map shows room, by a robot of a radius, m.
+    """The track led round bodies on it where there is room, by a robot of a radius, m.
 
     `is_hidden` if a body hides how it goes on at its end: then to where that is to be seen.
     """
     if not bodies:
         return track
+    walls = view.obstacles()
 
     def is_free(way: Array) -> bool:
-        room = np.asarray(near.tree().query(way)[0])
+        room = np.asarray(walls.query(way)[0])
         narrow = room < min(radius + margin, float(room[0]))  # where it stands, it may stand close
-        return bool(not narrow.any() and near.known(way).all())
+        return bool(not narrow.any() and view.local_map.known(way).all())
 
     line = detour(track.polyline, bodies, radius, is_free)
     line = stepping_off(line, bodies, radius, is_free)
@@ -47,7 +48,7 @@ def led_round(
         line = peek(line, bodies, radius, is_free)
     if line is track.polyline:
         return track
-    return Track.of(line, np.asarray(near.tree().query(line)[0]))
+    return Track.of(line, np.asarray(walls.query(line)[0]))
 
 
 def stepping_off(

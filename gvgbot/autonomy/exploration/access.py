@@ -57,7 +57,7 @@ def access(view: View) -> Access | None:
         or straight
         or _between_things(view)
         or next(filter(None, (_straight(view, place, _BETWEEN_M) for place in near)), None)
-        or Access(nearest, base[None], np.atleast_1d(view.local_map.tree().query(base)[0]))
+        or Access(nearest, base[None], np.atleast_1d(view.obstacles().query(base)[0]))
     )
 
 
@@ -76,7 +76,7 @@ def _uphill(view: View) -> Access | None:
 
     None if there is most room, but no edge, before that.
     """
-    base, tree = view.local_base.position, view.local_map.tree()
+    base, tree = view.local_base.position, view.obstacles()
     line = [base]
     rooms = [float(tree.query(base)[0])]
     for _ in range(round(NEAR_M / _CLIMB_M)):
@@ -128,7 +128,7 @@ def way_into_the_open(view: View, sought: list[Array]) -> tuple[Array, Array] | 
     goals = base.position + (
         metres[:, None, None] * np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
     ).reshape(-1, 2)
-    room = np.asarray(view.local_map.tree().query(goals)[0])
+    room = np.asarray(view.obstacles().query(goals)[0])
     for goal in goals[np.argsort(-np.minimum(room, _ROOM_ENOUGH_M), kind="stable")]:
         if all(math.dist(goal, place) > _SOUGHT_M for place in sought):
             way = straight_way(view, goal, _ROOM_M)
@@ -169,7 +169,7 @@ def _straight_from(
 ) -> tuple[Array, Array] | None:
     distance = float(np.hypot(*(goal - start)))
     line = np.linspace(start, goal, math.ceil(distance / _SPACING_M) + 1)
-    room = np.asarray(view.local_map.tree().query(line)[0])
+    room = np.asarray(view.obstacles().query(line)[0])
     narrow = room < min(least_room, float(room[0]))  # where it stands, it may stand close
     if narrow.any() or not view.local_map.known(line).all():
         return None

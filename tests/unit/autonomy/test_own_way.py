@@ -1,5 +1,7 @@
 """The way back through a door, by its geometry."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -32,6 +34,14 @@ def test_where_there_is_room_it_is_as_it_was() -> None:
     corner = np.hypot(*(track.polyline - driven[1]).T).min()
     assert corner < 0.03  # half a step
     assert track.length == pytest.approx(3.4, abs=0.05)
+
+
+def test_it_keeps_off_virtual_walls() -> None:
+    """Driven 10 cm beside one: it goes to the side where there is more room, by 17.5 cm at most."""
+    wall = resampled(np.array([[-2.5, 0.5], [-0.5, 0.5]]), 0.1)
+    view = replace(VIEW, virtual_walls=wall)
+    _, y = own_way(np.array([[-2.2, 0.4], [-0.8, 0.4]]), view, []).polyline.T
+    assert y == pytest.approx(np.full(len(y), 0.225), abs=0.02)
 
 
 def test_of_no_way_there_is_no_track() -> None:

@@ -137,6 +137,23 @@ def test_a_large_robot_is_kept_away_from_as_far_as_it_is_large() -> None:
 CORRIDOR = carved([(-10.0, -1.5, 10.0, 1.5)])
 
 
+def test_it_backs_off_no_farther_than_to_a_virtual_wall() -> None:
+    config = load_config(None, ["autonomy.virtual_walls=[[[-0.4, -2], [-0.4, 2]]]"])
+    walled = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
+    config = load_config()
+    free = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
+    for pipeline in (walled, free):
+        for heading in (0.0, np.pi):  # it sees 270 degrees
+            pipeline.control(Odometry(heading, Pose(theta=heading), STANDSTILL))
+            scan = sweep(CORRIDOR, Pose(theta=heading), field_of_view=LASER_270)
+            pipeline.perceive(replace(scan, stamp=heading, time_increment=0.0))
+    here = Pose(theta=np.pi)
+    assert free._room(here, 0.0) > 0.2
+    margin = config.autonomy.passage_margin_m
+    expected = 0.4 - config.robot.radius_m - margin
+    assert walled._room(here, 0.0) == pytest.approx(expected, abs=0.02)
+
+
 def between_two(*, in_team: bool) -> Pipeline:
     """A robot in the middle of a corridor where others stand, 1.5 m away on either side."""
     config = load_config()

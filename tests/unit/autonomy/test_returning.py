@@ -1,6 +1,7 @@
 """A robot that comes back: what it says when it is lost, and what it knows when it is found."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -37,6 +38,16 @@ def test_a_robot_that_gives_up_says_what_to_do(opinion: Opinion, says: str) -> N
         f"not sure where it is: {says}; "
         "start it where it stopped, or begin a new map (gvgbot run --new)"
     )
+
+
+def test_who_is_lost_does_not_know_where_virtual_walls_are() -> None:
+    saved, config = MissionFiles(MISSION).read(), load_config()
+    assert saved is not None
+    walled = replace(config.autonomy, virtual_walls=(((0.0, 1.0), (3.0, 1.0)),))
+    settings = walled, config.exploration, config.robot.radius_m
+    robot = ReturningPipeline(*settings, saved.memory, saved.past, lambda: False)
+    assert len(robot.virtual_walls) > 30
+    assert len(robot._new_mind().virtual_walls) == 0
 
 
 def test_who_has_found_its_place_on_a_map_knows_no_better_where_that_map_lies() -> None:

@@ -1,5 +1,7 @@
 """From the middle of a room to the nearest edge that no wall keeps the robot from."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -30,6 +32,18 @@ def test_the_edge_behind_a_wall_is_not_the_way_although_it_is_nearer() -> None:
     assert line[-1] == pytest.approx((0.0, 1.2), abs=0.06)
     assert room[0] == pytest.approx(0.8, abs=0.05)
     assert np.all(room > 0.7)
+
+
+def test_a_virtual_wall_is_before_an_edge_as_well() -> None:
+    gvg = drawn({1: (-3.0, 1.2), 2: (3.0, 1.2)}, {10: (1, 2, [])})
+    view = view_of(gvg)
+    assert way_to_edge(view) is not None
+    across = np.stack([np.linspace(-4.0, 4.0, 81), np.full(81, 0.5)], axis=1)
+    assert way_to_edge(replace(view, virtual_walls=across)) is None
+    aside = np.array([[0.5, 0.0]])
+    way = way_to_edge(replace(view, virtual_walls=aside))
+    assert way is not None
+    assert way[1].min() == pytest.approx(0.5, abs=0.05)
 
 
 def test_with_walls_before_every_edge_there_is_no_way() -> None:

@@ -1,0 +1,91 @@
+"""Lines on the map that the robot does not cross, though its laser sees beyond them."""
+
+import math
+
+import numpy as np
+import pytest
+
+from gvgbot.autonomy.events import ErrandEnded
+from gvgbot.autonomy.exploration.config import ExplorationConfig
+from gvgbot.autonomy.virtual_walls import VirtualWall, points_of
+from gvgbot.geometry import Pose
+from tests.scenarios.rig import (
+    NEAR,
+    ROBOT_RADIUS,
+    Play,
+    assert_degrees,
+    assert_explored,
+    assert_found,
+    play,
+)
+from tests.unit.autonomy.sights import carved
+
+pytestmark = [pytest.mark.slow, pytest.mark.twin, pytest.mark.timeout(120)]
+
+# A T: a corridor of 1.4 m from west to east, and one to the south.
+TEE = carved([(-3.5, -0.7, 3.5, 0.7), (-0.7, -6.0, 0.7, 0.0)])
+START = Pose(-2.0, 0.0, 0.3)
+MEETPOINT = (0.0, -(1.4**2) / (8 * 1.4))  # as far from the wall opposite as from both corners
+ENDS = [(-2.8, 0.0), (2.8, 0.0)]
+ACROSS_M = -3.0  # the wall is here, from side to side of the arm to the south
+HALL = carved([(-10.0, -10.0, 10.0, 10.0)])
+
+
+def in_map(*corners: tuple[float, float]) -> VirtualWall:
+    """Corners in the world as they are on the map, which begins at the start."""
+    return tuple((x, y) for x, y in START.inverse().transform(np.array(corners)).tolist())
+
+
+ARM = in_map((-0.8, ACROSS_M), (0.8, ACROSS_M))
+
+
+def southernmost(run: Play) -> float:
+    return min(pose.y for pose in run.truth)
+
+
+@pytest.mark.parametrize("drives_dead_ends", [False, True])
+def test_an_arm_ends_at_a_virtual_wall_as_at_any_other(drives_dead_ends: bool) -> None:
+    exploration = ExplorationConfig(drive_dead_ends=drives_dead_ends)
+    run = play(TEE, START, exploration=exploration, virtual_walls=(ARM,))
+    assert_explored(run)
+    assert run.pipeline.mission.reason == "no frontier is left"
+    assert_found(run, "meetpoint", [MEETPOINT])
+    assert_degrees(run, {MEETPOINT: 3})
+    assert_found(run, "endpoint", [*ENDS, (0.0, ACROSS_M + 0.7)])
+    assert southernmost(run) > ACROSS_M + ROBOT_RADIUS
+
+
+def test_a_fence_in_an_empty_hall_is_a_room() -> None:
+    fence = in_map((-4.0, -3.0), (3.0, -3.0), (3.0, 2.0), (-4.0, 2.0), (-4.0, -3.0))
+    run = play(HALL, START, virtual_walls=(fence,))
+    assert_explored(run)
+    assert_found(run, "endpoint", [(-1.5, -0.5), (0.5, -0.5)])  # of its middle line
+    x, y = np.array([(pose.x, pose.y) for pose in run.truth]).T
+    assert (x > -4.0 + ROBOT_RADIUS).all()
+    assert (x < 3.0 - ROBOT_RADIUS).all()
+    assert (y > -3.0 + ROBOT_RADIUS).all()
+    assert (y < 2.0 - ROBOT_RADIUS).all()
+
+
+def test_on_a_known_map_it_is_a_door_that_is_shut() -> None:
+    """The map keeps what is beyond; who is asked to go there says that there is no way."""
+    far = START.inverse().transform(np.array([0.0, -5.3]))
+
+    async def story(run: Play) -> None:
+        await run.until(lambda: run.pipeline.mission.outcome is not None)
+        run.pipeline.virtual_walls = points_of([ARM], 0.1)
+        for place in (far, START.inverse().transform(np.array([2.5, 0.0]))):
+            run.truth.clear()
+            run.pipeline.errands.goto_point(float(place[0]), float(place[1]), run.clock.now())
+            await run.until(lambda: run.pipeline.errands.is_resting)
+            await run.sleep(1.0)
+            souths.append(southernmost(run))
+
+    souths: list[float] = []
+    run = play(TEE, START, story=story, goes_on=lambda: len(souths) < 2)
+    assert souths[0] > ACROSS_M + ROBOT_RADIUS
+    ended = [event for event in run.events if isinstance(event, ErrandEnded)]
+    assert [event.outcome for event in ended] == ["given up", "arrived"]
+    assert ended[0].reason == "no known way leads there"
+    assert math.dist((run.truth[-1].x, run.truth[-1].y), (2.5, 0.0)) < NEAR
+    assert_found(run, "endpoint", [*ENDS, (0.0, -5.3)])
