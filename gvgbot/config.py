@@ -65,6 +65,7 @@ class ServiceConfig:
     state_dir: str | None = None  # runs are in it and go on there; None: $STATE_DIRECTORY, if set
     resume: Literal["running", "paused"] = "running"  # what an interrupted run does when it goes on
     map: Path | None = None  # directory of an earlier run; its map is begun with, as by --map
+    home_when_low: bool = True  # a busy robot drives to where it started when its battery is low
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -123,7 +123,7 @@ def _union(kind: Any, value: Any, path: KeyPath, problems: list[Problem]) -> Any
 def _sequence(kind: Any, value: Any, path: KeyPath, problems: list[Problem]) -> Any:
     items = typing.get_args(kind)
     open_ended = typing.get_origin(kind) is list or items[-1:] == (...,)
-    if open_ended and value is not None and _converts(items[0], value):
+    if open_ended and value not in (None, [], ()) and _converts(items[0], value):
         hint = f"write [{value}]" if isinstance(value, str) else f"write [{shorten(value)}]"
         problems.append(Problem(path, value, f"must be {describe(kind)}: {hint}"))
         return None

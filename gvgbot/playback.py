@@ -20,7 +20,6 @@ from gvgbot.replay import Log, Wanted, open_log
 from gvgbot.robot import Network, Robot
 from gvgbot.service import Notifier, set_up_logging
 from gvgbot.session import Session
-from gvgbot.steering import Steering
 from gvgbot.stop_signals import StopSignals
 from gvgbot.telemetry import Telemetry
 
@@ -88,13 +87,9 @@ class PlayedRobot(Robot):
         session.pipeline.mission.survey = survey
         self._played, self._speed = played, speed
 
-    def _steering(self) -> Steering:
-        steering = super()._steering()
-        steering.declines = "this is a recording: it can only be watched"
-        return steering
-
     def _prepare(self, links: Links) -> None:
         super()._prepare(links)
+        self._steering.declines = "this is a recording: it can only be watched"
         first = list(islice(self._played.messages, 1))
         self._messages = chain(first, self._played.messages)
         start = first[0][0] if first else 0.0

@@ -126,6 +126,7 @@ class Robot:
         self._vitals: Vitals
         self._devices: Devices
         self._loop: Loop
+        self._steering: Steering
 
     # -- the tasks ---------------------------------------------------------------------------------
 
@@ -149,7 +150,7 @@ class Robot:
         if self._network is not None:
             work["network"] = self._network.answer()
             work["map"] = self._keep_shown(self._network)
-            work["requests"] = self._network.hear(self._steering().handle)
+            work["requests"] = self._network.hear(self._steering.handle)
         if self._ros is not None:
             work["neighbours"] = self._ros.keep_shown(self._clock, self._off_loop)
         if self._team is not None:
@@ -194,11 +195,7 @@ class Robot:
             log=self._session.recorder,
             goes_on=lambda: True,
         )
-        if self._pipeline.mission.outcome is not None:  # before a restart
-            self._grown.set()
-
-    def _steering(self) -> Steering:
-        return Steering(
+        self._steering = Steering(
             self._session.config,
             self._pipeline.errands,
             self,
@@ -207,6 +204,8 @@ class Robot:
             use=self._use,
             tell=self._on_events,
         )
+        if self._pipeline.mission.outcome is not None:  # before a restart
+            self._grown.set()
 
     def _show_scan(self, scan: Scan) -> None:
         for shown in (self._feed, self._ros):
@@ -350,7 +349,9 @@ class Robot:
             if happened is not None:
                 self._network.publish(happened)
         self._notifier.status(status_line(now))
-        self._battery.note(self._devices.base.battery, now.stamp)
+        is_news = self._battery.note(self._devices.base.battery, now.stamp)
+        if is_news and self._session.config.service.home_when_low:
+            self._steering.go_home("low battery")
         self._devices.base.show(sign(now, is_lost=self._pipeline.is_lost))
         stuck = now.cycle_age is not None and now.cycle_age > STUCK_AFTER
         if not stuck or self._devices.base.away is not None:

@@ -90,6 +90,17 @@ class Steering:
         self._tell([*self._ledger.enter(happened), *self._errands.take_events()])
         return answer
 
+    def go_home(self, why: str) -> None:
+        """Let a robot that is busy drive home; it is written down as asked for by `why`."""
+        if self.declines is not None or not self._errands.is_busy:
+            return
+        try:
+            answer = Answer(done=True, text=self._errands.home(self._now()))
+        except Declined as error:
+            answer = Answer(done=False, text=str(error))
+        happened = Requested(self._now(), "home", why, answer.done, answer.text)
+        self._tell([happened, *self._errands.take_events()])
+
     def _check(self, name: str) -> None:
         """Raises Declined if that is not permitted, or not safe just now."""
         if self.declines is not None:

@@ -10,7 +10,7 @@ from typing import Any
 import msgspec
 
 from gvgbot.clock import Clock, LoopClock, run_in_virtual_time
-from gvgbot.config import Config, RobotConfig, TwinConfig
+from gvgbot.config import Config, RobotConfig, ServiceConfig, TwinConfig
 from gvgbot.drivers.kobuki.driver import KobukiBase
 from gvgbot.drivers.kobuki.twin import KobukiTwinConfig
 from gvgbot.drivers.transport import ByteStream
@@ -173,6 +173,7 @@ class Daemon:
         place: Place | None = None,
         requests: tuple[RequestName, ...] = REQUESTS,
         twin: TwinConfig | None = None,
+        service: ServiceConfig | None = None,
     ) -> None:
         canvas = Canvas(14.0, 14.0)
         canvas.carve_path([(2.0, 2.0), (12.0, 2.0), (12.0, 12.0), (2.0, 12.0), (2.0, 5.0)], 1.4)
@@ -181,6 +182,7 @@ class Daemon:
             robot=RobotConfig(name="tester"),
             twin=twin or TwinConfig(base=KobukiTwinConfig(odometry="perfect")),
             telemetry=TelemetryConfig(requests=requests),
+            service=service or ServiceConfig(),
         )
         self.manager, self.network = Manager(), Network()
         self.session = Session(self.config, RunDirectory(out), place)

@@ -80,6 +80,7 @@ def test_a_laser_that_could_see_nothing_is_refused(max_range_m: float) -> None:
 def test_a_virtual_wall_that_is_no_line_is_refused(walls: str, complaint: str) -> None:
     with pytest.raises(ConfigError, match=complaint):
         load_config(None, [f"autonomy.virtual_walls={walls}"])
+    assert load_config(None, ["autonomy.virtual_walls=[]"]).autonomy.virtual_walls == ()
 
 
 @pytest.mark.parametrize("name", ["a/b", "a b", "*", "", "ä"])

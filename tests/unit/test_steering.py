@@ -127,6 +127,21 @@ def test_what_cannot_be_steered_says_why_and_does_nothing(name: str) -> None:
     assert rig.errands.did == []
 
 
+def test_why_it_does_not_drive_home_is_written_down() -> None:
+    rig = Rig()
+    rig.errands.refuses = True
+    rig.steering.go_home("low battery")
+    (told,) = rig.told
+    assert told == Requested(12.5, "home", "low battery", False, "it does not want to")
+
+
+def test_a_recording_is_not_driven_home() -> None:
+    rig = Rig()
+    rig.steering.declines = "this is a recording"
+    rig.steering.go_home("low battery")
+    assert (rig.errands.did, rig.told) == ([], [])
+
+
 @pytest.mark.parametrize("name", ["pause", "stop", "save", "set"])
 def test_what_does_not_move_the_robot_is_done_whatever_it_feels(name: str) -> None:
     rig = Rig(body=touched(bumper_left=True))

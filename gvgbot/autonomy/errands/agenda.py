@@ -75,6 +75,11 @@ class Agenda:
         is_own = self._is_own or (self._plan is None and self._command is None)
         return is_own and not self.is_resting
 
+    @property
+    def is_busy(self) -> bool:
+        """Whether it is about something, be that exploring or an errand, and nobody drives it."""
+        return not self.is_resting and self._command is None
+
     def configure(self, config: ExplorationConfig) -> None:
         """Use another configuration from now on."""
         self._config = config

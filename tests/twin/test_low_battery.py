@@ -1,0 +1,106 @@
+"""A robot whose battery is low while it explores, in virtual time, in the world of the errands."""
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from benchmarks.rigs.run_rig import Daemon
+from gvgbot.clock import Clock
+from gvgbot.config import ServiceConfig, TwinConfig
+from gvgbot.drivers.kobuki.twin import KobukiTwinConfig
+from gvgbot.geometry import STANDSTILL, Pose
+from gvgbot.journal import SAGGING_S
+from tests.twin.test_errands import NEAR, START, a_while, theta, until
+
+pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(120)]
+
+BASE = KobukiTwinConfig(odometry="perfect", battery_v=13.8)  # a Kobuki is low below 14 V
+
+
+def daemon(tmp_path: Path, *, home_when_low: bool = True) -> Daemon:
+    service = ServiceConfig(home_when_low=home_when_low)
+    return Daemon(tmp_path / "run", theta(), twin=TwinConfig(base=BASE), service=service)
+
+
+def told(lives: Daemon, kind: str) -> list[dict[str, Any]]:
+    text = (lives.session.directory.path / "events.jsonl").read_text()
+    return [line for line in map(json.loads, text.splitlines()) if line["event"] == kind]
+
+
+def begun(lives: Daemon) -> bool:
+    return bool(lives.network.states)
+
+
+def off(place: Pose) -> float:
+    return math.hypot(place.x - START.x, place.y - START.y)
+
+
+def test_it_drives_to_where_it_started_and_waits_there(tmp_path: Path) -> None:
+    lives, offs = daemon(tmp_path), list[float]()
+
+    async def story(clock: Clock) -> None:
+        await until(clock, lambda: begun(lives) and lives.network.states[-1].errand == "home")
+        offs.append(off(lives.place))
+        await until(clock, lambda: lives.network.states[-1].errand is None)
+        await a_while(clock, 60.0)
+        offs.append(off(lives.place))
+
+    with lives.session.directory:
+        lives.run(story)
+    (asked,) = told(lives, "requested")
+    assert (asked["request"], asked["origin"], asked["done"]) == ("home", "low battery", True)
+    assert asked["stamp"] == pytest.approx(SAGGING_S + 1.0, abs=1.0)
+    assert [line["outcome"] for line in told(lives, "errand_ended")] == ["arrived"]
+    assert offs[0] > 1.0
+    assert offs[1] < NEAR
+    assert lives.session.pipeline.errands.is_waiting
+
+
+def test_it_goes_on_if_it_shall_not(tmp_path: Path) -> None:
+    lives = daemon(tmp_path, home_when_low=False)
+
+    async def story(clock: Clock) -> None:
+        await until(clock, lambda: begun(lives) and lives.network.states[-1].phase == "finished")
+
+    with lives.session.directory:
+        lives.run(story)
+    assert told(lives, "requested") == []
+    assert lives.session.pipeline.mission.outcome == "explored"
+
+
+@pytest.mark.parametrize("name", ["pause", "stop"])
+def test_who_was_told_to_stand_stands(name: str, tmp_path: Path) -> None:
+    lives, places = daemon(tmp_path), list[Pose]()
+
+    async def story(clock: Clock) -> None:
+        await clock.sleep_until(8.0)
+        await lives.network.ask(name)
+        await a_while(clock, 2.0)  # to brake
+        places.append(lives.place)
+        await a_while(clock, 30.0)
+        places.append(lives.place)
+
+    with lives.session.directory:
+        lives.run(story)
+    before, after = places
+    assert math.hypot(after.x - before.x, after.y - before.y) < 1e-3
+    assert [line["request"] for line in told(lives, "requested")] == [name]
+
+
+def test_who_is_driven_by_somebody_is_driven_on(tmp_path: Path) -> None:
+    lives = daemon(tmp_path)
+    errands = lives.session.pipeline.errands
+
+    async def story(clock: Clock) -> None:
+        await clock.sleep_until(8.0)
+        while clock.now() < SAGGING_S + 5.0:
+            lives.robot._let_drive(STANDSTILL)
+            await a_while(clock, 0.2)
+        assert errands.progress == "driven by somebody"
+
+    with lives.session.directory:
+        lives.run(story)
+    assert [line["request"] for line in told(lives, "requested")] == ["cmd_vel"]
