@@ -3,12 +3,12 @@
     python -m benchmarks.patrol --hours 24
 
 In virtual time, on the twins: the robot explores two rings with a bar in common, and drives from
-vertex to vertex from then on. Two doors in the bar swing at random moments. After every hour a
-line says how many vertices were reached and missed, how far the worst vertex is from where it was
-when the patrol began and the robot from where it believes to be, what the map and the mission have
-come to, in memory and on disk, and what the hour cost. The exit status is 1 if the map has changed,
-if the robot touched something, or if at the end the journal is a tenth longer than it ever was
-before, or memory holds a tenth more objects than after the second hour.
+vertex to vertex from then on; its battery stays full. Two doors in the bar swing at random moments.
+After every hour a line says how many vertices were reached and missed, how far the worst vertex is
+from where it was when the patrol began and the robot from where it believes to be, what the map and
+the mission have come to, in memory and on disk, and what the hour cost. The exit status is 1 if the
+map has changed, if the robot touched something, or if at the end the journal is a tenth longer than
+it ever was before, or memory holds a tenth more objects than after the second hour.
 """
 
 import argparse
@@ -64,7 +64,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--set", dest="overrides", nargs="+", default=[])
     parser.add_argument("--out", type=Path, help="a file for a line of JSON per hour")
     options = parser.parse_args(arguments)
-    config = load_config(None, [f"twin.seed={options.seed}", *options.overrides])
+    settings = [f"twin.seed={options.seed}", "twin.base.battery_drain_v_per_h=0"]
+    config = load_config(None, [*settings, *options.overrides])
     with tempfile.TemporaryDirectory() as directory, RunDirectory(Path(directory)) as run:
         patrol = Patrol(config, run, options.hours, options.out)
         print(HEAD, flush=True)

@@ -319,6 +319,7 @@ def _set_up(seed: int, faults: list[Fault], overrides: Sequence[str]) -> tuple[C
         place = replace(place, walkways=Walkways(place.world, place.start))
     laser = ("UTM-30LX", "URG-04LX")[seed % 2]
     settings = [f"twin.seed={seed}", f"twin.people={people}", f"twin.laser.model={laser}"]
+    settings.append("service.home_when_low=false")  # one that went home would explore no more
     config = load_config(None, [*settings, *overrides])
     return config, place
 
