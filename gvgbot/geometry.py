@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 
@@ -160,6 +160,12 @@ def resampled(line: Array, spacing: float) -> Array:
     along = stations_of(line)
     at = np.linspace(0.0, along[-1], 2 + int(along[-1] / spacing))
     return np.column_stack([np.interp(at, along, values) for values in line.T])
+
+
+def sampled(lines: Iterable[ArrayLike], spacing: float) -> Array:
+    """Points (M, 2) along all lines, each (N, 2), as `resampled` has them."""
+    parts = (resampled(np.asarray(line, np.float64), spacing) for line in lines)
+    return np.concatenate([np.empty((0, 2)), *parts])
 
 
 def thinned(points: Array, cell: float) -> Array:

@@ -76,7 +76,14 @@ def map_files(pipeline: Pipeline, journey: Journey, title: str) -> dict[str, byt
     odometry = _trajectory(journey, _by_odometry(journey, pipeline))
     files: dict[str, bytes | str] = {
         "map.geojson": geojson.encode(graph),
-        "map.png": draw_map(graph, grid=grid, estimate=estimate, odometry=odometry, title=title),
+        "map.png": draw_map(
+            graph,
+            grid=grid,
+            estimate=estimate,
+            odometry=odometry,
+            virtual_walls=pipeline.virtual_walls,
+            title=title,
+        ),
         "estimate.tum": encode_tum(estimate),
         "online.tum": encode_tum(_trajectory(journey, rows_of(journey.map_base))),
         "odometry.tum": encode_tum(odometry),

@@ -3,9 +3,6 @@
 from collections.abc import Sequence
 from typing import Annotated
 
-import numpy as np
-
-from gvgbot.geometry import Array, resampled
 from gvgbot.ranges import Range
 
 Coordinate = Annotated[float, Range(-1e4, 1e4)]  # m, map frame
@@ -17,9 +14,3 @@ def checked(walls: Sequence[VirtualWall]) -> None:
     for number, wall in enumerate(walls):
         if len(set(wall)) < 2:
             raise ValueError(f"virtual_walls[{number}]: a wall needs two different points, x and y")
-
-
-def points_of(walls: Sequence[VirtualWall], spacing_m: float) -> Array:
-    """Points (N, 2) on all walls, map frame, not farther apart than `spacing_m`."""
-    lines = (resampled(np.array(wall, np.float64), spacing_m) for wall in walls)
-    return np.concatenate([np.empty((0, 2)), *lines])

@@ -43,6 +43,12 @@ def _stroke(draw: Callable[[Surface, Array], None]) -> Callable[[Surface, Point]
 EDGE = Entry("GVG edge", _stroke(symbols.draw_edge))
 ESTIMATE = Entry("estimated path", _stroke(symbols.draw_estimate))
 ODOMETRY = Entry("raw odometry", _stroke(symbols.draw_odometry))
+VIRTUAL_WALL = Entry(
+    "virtual wall",
+    lambda canvas, at: symbols.draw_virtual_wall(
+        canvas, np.column_stack([at[0] + np.linspace(-16.0, 16.0, 5), np.full(5, at[1])])
+    ),
+)
 MEETPOINT = Entry("meetpoint", symbols.draw_meetpoint)
 ENDPOINT = Entry("endpoint", symbols.draw_endpoint)
 ELLIPSE = Entry(

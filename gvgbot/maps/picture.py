@@ -31,11 +31,21 @@ def draw_map(
     grid: OccupancyGrid | None = None,
     estimate: Trajectory | None = None,
     odometry: Trajectory | None = None,
+    virtual_walls: Array = _NO_POINTS,
     title: str = "",
 ) -> bytes:
-    """A PNG of all that is given, in the map frame with x to the right, cut to what is known."""
+    """A PNG of all that is given, in the map frame with x to the right, cut to what is known.
+
+    `virtual_walls` are points (N, 2) of such, m.
+    """
     return draw_map_on(
-        Canvas, graph, grid=grid, estimate=estimate, odometry=odometry, title=title
+        Canvas,
+        graph,
+        grid=grid,
+        estimate=estimate,
+        odometry=odometry,
+        virtual_walls=virtual_walls,
+        title=title,
     ).png()
 
 
@@ -46,6 +56,7 @@ def draw_map_on(
     grid: OccupancyGrid | None,
     estimate: Trajectory | None,
     odometry: Trajectory | None,
+    virtual_walls: Array,
     title: str,
 ) -> S:
     """The same, on a new sheet of the kind that is given."""
@@ -54,12 +65,14 @@ def draw_map_on(
     box = _content(graph, grid, path, raw)
     view = View.fitted(box, (_MARGIN, _MARGIN), width=_WIDTH, height=_TALLEST).centred(_NARROWEST)
     width = max(view.size[0], _NARROWEST)
+    walls = virtual_walls[box.holds(virtual_walls)]
     signs = legend.arranged(
-        _entries(graph, path, raw), _caption(graph, title), width=width, scale=view.scale
+        _entries(graph, path, raw, walls), _caption(graph, title), width=width, scale=view.scale
     )
     bottom = view.corner[1] + view.size[1]
     canvas = sheet(round(width) + 2 * _MARGIN, round(bottom + signs.height) + _MARGIN)
     draw_ground(canvas, view, grid)
+    symbols.draw_virtual_wall(canvas, view.pixels(walls))
     for stretch in _stretches(odometry):
         symbols.draw_odometry(canvas, view.pixels(stretch))
     _draw_graph(canvas, view, graph, _stretches(estimate))
@@ -161,7 +174,7 @@ def _half_axes(vertex: RouteNode) -> Array:
     return axes
 
 
-def _entries(graph: RouteGraph, path: Array, raw: Array) -> Iterator[legend.Entry]:
+def _entries(graph: RouteGraph, path: Array, raw: Array, walls: Array) -> Iterator[legend.Entry]:
     """The signs that the picture uses."""
     kinds = {vertex.kind for vertex in graph.vertices}
     used = [
@@ -173,6 +186,7 @@ def _entries(graph: RouteGraph, path: Array, raw: Array) -> Iterator[legend.Entr
         (legend.ESTIMATE, len(path) > 1),
         (legend.ODOMETRY, len(raw) > 1),
         (legend.START, len(path) > 0),
+        (legend.VIRTUAL_WALL, len(walls) > 0),
     ]
     return (entry for entry, is_used in used if is_used)
 

@@ -9,6 +9,7 @@ import msgspec
 import structlog
 
 from gvgbot.errors import UsageError
+from gvgbot.geometry import Array, sampled
 from gvgbot.maps import geojson
 from gvgbot.maps.map_server import read_map_server
 from gvgbot.maps.occupancy import OccupancyGrid
@@ -17,6 +18,8 @@ from gvgbot.maps.run_directory import EVENTS, SUMMARY
 from gvgbot.maps.trajectory import Trajectory, decode_tum
 
 T = TypeVar("T")
+
+_SPACING_M = 0.1  # of the points of a virtual wall
 
 log = structlog.get_logger()
 
@@ -32,6 +35,18 @@ class Happening(msgspec.Struct, frozen=True):
     length: float = 0.0  # m
 
 
+class Autonomy(msgspec.Struct, frozen=True):
+    """What a map shows of this section of the configuration; corners in m, map frame."""
+
+    virtual_walls: tuple[tuple[tuple[float, float], ...], ...] = ()
+
+
+class Settings(msgspec.Struct, frozen=True):
+    """What a map shows of the configuration."""
+
+    autonomy: Autonomy = Autonomy()
+
+
 class Summary(msgspec.Struct, frozen=True):
     """How a run ended; distances in m, durations in s of the robot's clock."""
 
@@ -40,6 +55,7 @@ class Summary(msgspec.Struct, frozen=True):
     distance_m: float
     duration_s: float
     loop_closures: int | None = None  # of several robots that is not told
+    config: Settings = Settings()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,6 +72,12 @@ class SavedRun:
     odometry: Trajectory
     events: tuple[Happening, ...]
     summary: Summary | None
+
+    @property
+    def virtual_walls(self) -> Array:
+        """Points (N, 2) of the lines that the robot did not cross, m."""
+        walls = () if self.summary is None else self.summary.config.autonomy.virtual_walls
+        return sampled(walls, _SPACING_M)
 
     @classmethod
     def read(cls, directory: Path) -> Self:

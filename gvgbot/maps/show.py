@@ -55,6 +55,7 @@ def picture_of(run: SavedRun) -> Paint:
             grid=run.grid,
             estimate=run.estimate,
             odometry=run.odometry,
+            virtual_walls=run.virtual_walls,
             title=run.name,
         )
 

@@ -44,6 +44,12 @@ def draw_odometry(canvas: Surface, points: Array) -> None:
     canvas.line(_thinned(points), Ink.RED, 1.4)
 
 
+def draw_virtual_wall(canvas: Surface, points: Array) -> None:
+    """A line of dots, each a point of it."""
+    for point in points:
+        canvas.disc((float(point[0]), float(point[1])), 2.5, fill=Ink.RED)
+
+
 def draw_meetpoint(canvas: Surface, at: Point) -> None:
     """A filled disc."""
     canvas.disc(at, VERTEX_RADIUS + 1.0, fill=Ink.WHITE)

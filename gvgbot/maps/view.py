@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gvgbot.geometry import Array
 
@@ -26,6 +27,10 @@ class Box:
     def grown(self, margin: float) -> "Box":
         """The box with a margin (m) on every side."""
         return Box(self.low - margin, self.high + margin)
+
+    def holds(self, points: Array) -> NDArray[np.bool_]:
+        """Which of some points (N, 2) lie in it."""
+        return np.asarray(((points >= self.low) & (points <= self.high)).all(axis=1))
 
     def stretched(self, points: Array, limit: float) -> "Box":
         """The box grown to hold these points (N, 2), by no more than `limit` (m) on any side."""

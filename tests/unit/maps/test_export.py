@@ -1,6 +1,7 @@
 """`gvgbot map export`, read by programs that are not ours."""
 
 import io
+import json
 import sys
 from pathlib import Path
 from xml.etree import ElementTree as ET
@@ -54,6 +55,24 @@ def test_an_svg_has_lines_at_their_places_and_words_as_text(run: Path) -> None:
     words = [text.text for text in tree.iter(f"{SVG}text")]
     assert {"1", "2", "3", "4", "GVG edge", "frontier left"} <= set(words)
     assert any(word and word.startswith(f"{run.name}: 4 vertices") for word in words)
+
+
+def test_virtual_walls_of_the_run_are_at_their_places(run: Path) -> None:
+    """One across the corridor at x = 7.5 m, which begins and ends outside."""
+    assert "virtual wall" not in export(run, ".svg").decode()
+    summary = json.loads((run / "summary.json").read_text())
+    walls = {"autonomy": {"virtual_walls": [[[7.5, -50.0], [7.5, 50.0]]]}}
+    (run / "summary.json").write_text(json.dumps(summary | {"config": walls}))
+    tree = ET.fromstring(export(run, ".svg"))
+    (_, (x2, _), (x3, y3), (_, y4)) = meetpoints(tree)  # at 5 and 10 m; a metre apart
+    dots = [
+        tuple(map(float, line.attrib["points"].split()[0].split(",")))
+        for line in tree.findall(f"{SVG}g/{SVG}polyline")
+        if (line.attrib["stroke"], line.attrib["stroke-width"]) == ("#d55e00", "5")
+    ]
+    assert {round(x, 1) for x, _ in dots} == {round((x2 + x3) / 2, 1)}
+    assert len(dots) == pytest.approx(10 * 4.0, abs=3)  # the grid is 4 m high
+    assert "virtual wall" in {text.text for text in tree.iter(f"{SVG}text")}
 
 
 def test_what_odometry_leaves_the_map_by_is_cut_off(run: Path) -> None:
