@@ -64,7 +64,7 @@ def test_virtual_walls_of_the_run_are_at_their_places(run: Path) -> None:
     walls = {"autonomy": {"virtual_walls": [[[7.5, -50.0], [7.5, 50.0]]]}}
     (run / "summary.json").write_text(json.dumps(summary | {"config": walls}))
     tree = ET.fromstring(export(run, ".svg"))
-    (_, (x2, _), (x3, y3), (_, y4)) = meetpoints(tree)  # at 5 and 10 m; a metre apart
+    (_, (x2, _), (x3, _), _) = meetpoints(tree)  # the others at 5 and 10 m
     dots = [
         tuple(map(float, line.attrib["points"].split()[0].split(",")))
         for line in tree.findall(f"{SVG}g/{SVG}polyline")
