@@ -107,7 +107,8 @@ class FeedbackReader:
         self._parser = FrameParser()
         self._clock: DeviceClock | None = None
         self._odometry: WheelOdometry | None = None
-        self._odometry_elapsed = 0.0  # s of the base's time at the last reading used
+        self._odometry_elapsed = 0.0  # s of the base's time at the last reading used,
+        self._odometry_resets: int | None = None  # and how often the base had started anew
         self._extras: dict[type, str] = {}
         self._missed = self._malformed = self._unknown = self._doubted = 0
         self.contact: Contact | None = None
@@ -157,6 +158,7 @@ class FeedbackReader:
         self._odometry = memory.odometry
         if counting:
             self._clock, self._odometry_elapsed = memory.clock, memory.elapsed
+            self._odometry_resets = memory.clock.resets
 
     @property
     def slip_rate(self) -> float:
@@ -230,7 +232,7 @@ class FeedbackReader:
     def _take_core(
         self, core: CoreSensors, inertia: Inertia | None, arrival: float, clock: DeviceClock
     ) -> Odometry | None:
-        before, self._clock = self._clock, clock
+        self._clock = clock
         self._missed += max(0, round(clock.step / FRAME_PERIOD) - 1)
         if core.feels:
             self._felt.append((arrival, core))
@@ -239,7 +241,7 @@ class FeedbackReader:
         if inertia is None:
             return None
         reading = WheelReading(core.left_encoder, core.right_encoder, inertia.angle, inertia.rate)
-        is_new = before is None or clock.resets > before.resets
+        is_new = clock.resets != self._odometry_resets  # a frame before may have told of no motion
         if is_new or clock.elapsed > self._odometry_elapsed:
             self.heard = arrival
         return self._take_reading(reading, clock, is_new=is_new)
@@ -251,7 +253,7 @@ class FeedbackReader:
         if state is None or is_new or state.implausible >= _JUMPS_BELIEVED:
             self._odometry = start_odometry(reading, None if state is None else state.odom_base)
             self._breaks += state is not None
-            self._odometry_elapsed = clock.elapsed
+            self._odometry_elapsed, self._odometry_resets = clock.elapsed, clock.resets
             return None
         dt = clock.elapsed - self._odometry_elapsed
         if dt <= 0.0:

@@ -19,6 +19,7 @@ from gvgbot.drivers.kobuki.commands import (
     decode_commands,
 )
 from gvgbot.drivers.kobuki.driver import KobukiBase, KobukiConfig
+from gvgbot.drivers.kobuki.feedback import FeedbackReader
 from gvgbot.drivers.kobuki.frames import Frame, FrameParser, encode_frame
 from gvgbot.drivers.kobuki.payloads import (
     CoreSensors,
@@ -326,6 +327,19 @@ def test_encoders_that_start_anew_do_not_move_the_robot_but_count_from_there() -
     steps += [core(k, 30_000 + 60 * k, 30_000 + 60 * k) for k in range(10, 20)]
     odometry, _ = odometry_after(*steps)
     assert 14 * 60 / TICKS_PER_M < odometry.odom_base.x <= 18 * 60 / TICKS_PER_M
+
+
+@pytest.mark.parametrize("late", [0, 1, 20])
+def test_a_base_that_starts_anew_may_tell_of_its_gyro_a_few_frames_later(late: int) -> None:
+    reader, back, odometry = FeedbackReader("gyro", 0.0), 12.0, None
+    for k in range(500):
+        reader.take(frame(core(k, 60 * k, 60 * k), Inertia(0, 0)), 0.02 * k)
+    for k in range(100):
+        gyro = [Inertia(0, 0)] if k >= late else []
+        odometry = reader.take(frame(core(k, 60 * k, 60 * k), *gyro), back + 0.02 * k)
+    assert odometry is not None
+    assert odometry.odom_base.x == pytest.approx((499 + 99 - late) * 60 / TICKS_PER_M)
+    assert (odometry.breaks, reader.statistics.resets) == (1, 1)
 
 
 def test_lost_frames_lose_no_way_and_are_counted() -> None:
