@@ -48,7 +48,7 @@ _LOOKS_ASIDE = (
 )
 _CANNOT_TURN = "go on without a look around", "the base does not turn"
 _ROOM_BESIDE_EDGES_M = 0.08  # on each side, where no edge leads
-_LONGEST_GAP_S = 2.0  # between keyframes; a longer one is an outage of a device
+_LONGEST_GAP_S = 2.0  # between keyframes or cycles; a longer one is an outage of a device
 _SEARCHES_NEAR_BY = "look for its place near by", "the base has started anew"
 STANDS_CARRIED = (
     "stand until it is asked to resume",
@@ -331,9 +331,10 @@ class Pipeline:
         before = self.tracker.odometry.newest
         if before is not None:
             turned = wrap_angle(odometry.odom_base.theta - before.odom_base.theta)
+            since_s = odometry.stamp - before.stamp
             is_free = not self._is_idle and felt.stopped_for not in WAITS
-            free_s = odometry.stamp - before.stamp if is_free else 0.0
-            self._execution.note_turn(turned, free_s)
+            counts = is_free and since_s < _LONGEST_GAP_S
+            self._execution.note_turn(turned, since_s if counts else 0.0)
         self.tracker.odometry.append(odometry)
         if self.past.last is None or self.led:
             return STANDSTILL

@@ -95,6 +95,17 @@ def test_a_base_that_cannot_turn_is_told_of_and_keeps_the_robot_busy_for_no_long
     assert isinstance(happened[-1], Finished)
 
 
+def test_a_base_that_was_away_in_the_midst_of_a_turn_turns_on() -> None:
+    config = load_config()
+    pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
+    for k in range(10):
+        looked(pipeline, 0.1 * k, 0.1 * k)
+    twist, happened = looked(pipeline, 13.0, 0.9)
+    assert twist.angular > 0.0
+    assert not happened
+    assert looked(pipeline, 13.1, 0.9)[0].angular > 0.0
+
+
 def test_on_the_charger_s_cable_it_waits_and_takes_nothing_for_an_obstacle() -> None:
     config = load_config()
     pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)

@@ -156,6 +156,14 @@ def test_a_robot_that_comes_on_slowly_is_not_stuck() -> None:
     assert robot.incidents == []
 
 
+def test_a_robot_whose_base_is_away_as_it_sets_out_is_not_stuck() -> None:
+    robot = Robot()
+    robot.feel(NOTHING, 0.1)
+    robot.stamp += 6.0
+    robot.feel(NOTHING, 10.0)
+    assert robot.incidents == []
+
+
 def test_a_robot_that_the_guard_holds_tells_so_and_makes_room() -> None:
     robot = Robot()
     robot.feel(NOTHING, 5.1, grip=0.0, stopped_for="obstacle")
