@@ -4,7 +4,10 @@ from dataclasses import dataclass, replace
 
 WRAP_MS = 1 << 24
 MEAN_TRUNCATION = 0.0005  # s; the laser's clock counts whole milliseconds
-LARGEST_DRIFT = 1e-4  # of two quartz clocks against each other
+LARGEST_DRIFT = 1e-4  # of two quartz clocks against each other,
+LARGEST_SLEW = 2e-3  # and of one that is being set right little by little, as a host's by NTP
+BEHIND = 0.005  # s; scans that are all so late
+BEHIND_BELIEVED = 20.0  # for so long (s) show that it is
 RESET_LEAD = 1.0  # s; a stamp so far ahead of its arrival is of another clock
 LEARNING = 5.0  # s of scans in which the delay of the link is learnt after a synchronisation
 LONGEST_GUESS = 0.5  # s; a longer delay than this was not measured but mistaken
@@ -53,7 +56,8 @@ class ClockMap:
     `stamp_ms` is the last stamp on the wire, `elapsed` the laser's time since the map began (s),
     `offset` the least delay seen between a stamp and its arrival, as host minus laser time (s).
     Of that, `delay` is the link's and the laser's own (s). After a synchronisation it is learnt
-    for a while, in which `anchor` is the true offset (s); `least` is the smallest seen then.
+    for a while, in which `anchor` is the true offset (s); `least` is the smallest seen then. All
+    scans have come late since the laser's time `behind_since` (s); None: not the last one.
     """
 
     stamp_ms: int
@@ -63,6 +67,7 @@ class ClockMap:
     resets: int = 0
     anchor: float | None = None
     least: float = LONGEST_GUESS
+    behind_since: float | None = None
 
     @property
     def host_stamp(self) -> float:
@@ -99,19 +104,33 @@ def follow(clock_map: ClockMap, stamp_ms: int, arrival: float) -> ClockMap:
     """The map after a scan with this stamp began to arrive at host time `arrival` (s).
 
     Delays only ever add, so the offset follows the lower envelope of arrival minus stamp; it
-    rises no faster than two clocks can drift. A clock that jumped starts a new map: taken for an
-    advance, a jump to either side puts the stamp far ahead of its arrival.
+    rises no faster than two clocks can drift, and faster only while not one scan keeps up with it.
+    A clock that jumped starts a new map: taken for an advance, a jump to either side puts the stamp
+    far ahead of its arrival.
     """
     advance_ms = (stamp_ms - clock_map.stamp_ms) % WRAP_MS
     elapsed = clock_map.elapsed + advance_ms / 1000.0
     latest_offset = arrival - elapsed
     if latest_offset < clock_map.offset - RESET_LEAD:
         return ClockMap(stamp_ms, 0.0, arrival, clock_map.known_delay, clock_map.resets + 1)
-    highest_offset = clock_map.offset + LARGEST_DRIFT * advance_ms / 1000.0
+    since = _behind_since(clock_map, elapsed, latest_offset)
+    is_slewed = since is not None and elapsed - since > BEHIND_BELIEVED
+    drift = LARGEST_SLEW if is_slewed else LARGEST_DRIFT
     moved = replace(
-        clock_map, stamp_ms=stamp_ms, elapsed=elapsed, offset=min(latest_offset, highest_offset)
+        clock_map,
+        stamp_ms=stamp_ms,
+        elapsed=elapsed,
+        offset=min(latest_offset, clock_map.offset + drift * advance_ms / 1000.0),
+        behind_since=since,
     )
     return moved if moved.anchor is None else _learnt(moved, latest_offset)
+
+
+def _behind_since(clock_map: ClockMap, elapsed: float, latest_offset: float) -> float | None:
+    """Since when all scans have come late, with one that suggests this offset (s)."""
+    if latest_offset - clock_map.offset <= BEHIND:
+        return None
+    return elapsed if clock_map.behind_since is None else clock_map.behind_since
 
 
 def _learnt(clock_map: ClockMap, latest_offset: float) -> ClockMap:

@@ -10,7 +10,9 @@ that come together say nothing about that, for then it is the host that was late
 from dataclasses import dataclass, replace
 
 _WRAP_MS = 65536
-_DRIFT = 2e-4  # s/s that the envelope may rise: more than two cheap crystals differ
+_DRIFT = 2e-4  # s/s that the envelope may rise: more than two cheap crystals differ,
+_SLEW = 2e-3  # and while the host's clock is being set right little by little, as by NTP:
+_BEHIND_S, _BEHIND_BELIEVED_S = 5e-3, 10.0  # then all frames are so late for so long
 _RESET_S = 1.0  # a counter this far ahead of the host's clock has started anew
 _GAP_S = 0.1  # a silence this much longer or shorter by the counter has seen a restart
 _NEXT_S = 0.03  # the next frame of a link that stalled is no farther by the counter
@@ -35,6 +37,7 @@ class DeviceClock:
     resets: int = 0
     late_since: float | None = None  # arrival of the first of the frames that are all late, s
     arrival: float = 0.0  # of the frame, s
+    behind_since: float | None = None  # as `late_since`, of frames that are but a little late
 
 
 def start_clock(raw_ms: int, arrival: float) -> DeviceClock:
@@ -51,7 +54,9 @@ def advance_clock(
     """
     step = (raw_ms - clock.raw_ms) % _WRAP_MS / 1000
     elapsed = clock.elapsed + step
-    late_since = _late_since(clock, arrival - elapsed, arrival) if is_prompt else None
+    late = arrival - elapsed - clock.offset if is_prompt else 0.0
+    late_since = _since(clock.late_since, arrival, is_so=late > _LATE_S)
+    behind_since = _since(clock.behind_since, arrival, is_so=late > _BEHIND_S)
     if (
         elapsed + clock.offset > arrival + _RESET_S
         or arrival - clock.arrival >= _WRAP_MS / 1000  # nobody knows how often it turned over
@@ -60,11 +65,15 @@ def advance_clock(
     ):
         started = start_clock(raw_ms, max(arrival, clock.stamp + _SHORTEST_STEP_S))
         return replace(started, resets=clock.resets + 1)
-    offset = min(clock.offset + _DRIFT * step, arrival - elapsed)
+    is_slewed = behind_since is not None and arrival - behind_since > _BEHIND_BELIEVED_S
+    highest = clock.offset + (_SLEW if is_slewed else _DRIFT) * step
+    offset = min(highest, arrival - elapsed)
     stamp = elapsed + offset
     if step > 0.0:
         stamp = max(stamp, clock.stamp + _SHORTEST_STEP_S)
-    return DeviceClock(raw_ms, offset, elapsed, stamp, step, clock.resets, late_since, arrival)
+    return DeviceClock(
+        raw_ms, offset, elapsed, stamp, step, clock.resets, late_since, arrival, behind_since
+    )
 
 
 def _is_restart(raw_ms: int, step: float, silence: float) -> bool:
@@ -72,8 +81,8 @@ def _is_restart(raw_ms: int, step: float, silence: float) -> bool:
     return raw_ms / 1000 <= silence and abs(step - silence) > _GAP_S
 
 
-def _late_since(clock: DeviceClock, offset: float, arrival: float) -> float | None:
-    """Since when all frames have been late, with one that suggests this offset (s)."""
-    if offset - clock.offset <= _LATE_S:
+def _since(before: float | None, arrival: float, *, is_so: bool) -> float | None:
+    """Since when something has been so, with a frame that arrived at `arrival` (s)."""
+    if not is_so:
         return None
-    return arrival if clock.late_since is None else clock.late_since
+    return arrival if before is None else before

@@ -126,6 +126,18 @@ def test_stamps_stay_right_for_minutes_of_jitter_and_drift(law: str, drift_ppm: 
     assert np.abs(errors).max() < 0.004
 
 
+def test_stamps_keep_up_with_a_host_s_clock_that_is_set_right_little_by_little() -> None:
+    """By 0.36 s, at 500 ppm, as NTP does it."""
+    made = PERIOD * np.arange(9000)
+    truth = made + 500e-6 * np.minimum(made, 720.0)
+    jitter = np.random.default_rng(1).exponential(0.002, len(made))
+    maps = follow_all(np.floor(made * 1000.0), truth + jitter)
+    errors = host_stamps(maps) - truth
+    assert maps[-1].resets == 0
+    assert np.abs(errors).max() < 0.015
+    assert np.abs(errors[8000:]).max() < 0.002
+
+
 def test_a_clock_reset_keeps_what_was_learnt_about_the_link() -> None:
     truth = 51.0 + 0.1 * np.arange(200)
     device_ms = np.round((truth - 42.0) * 1000.0) - np.where(np.arange(200) < 100, 0, 12_000)

@@ -29,6 +29,18 @@ def test_clocks_of_different_speed_do_not_drift_apart() -> None:
     assert clock.stamp == pytest.approx(0.02 * 179_999 * 1.0001, abs=0.001)
 
 
+def test_a_host_s_clock_that_is_set_right_little_by_little_is_no_reset() -> None:
+    """Truth: it gains 0.36 s at 500 ppm, as NTP does it."""
+    clock, errors = start_clock(0, 0.0), []
+    for k in range(1, 45_000):
+        truth = 0.02 * k + 500e-6 * min(0.02 * k, 720.0)
+        clock = advance_clock(clock, 20 * k % 65536, truth)
+        errors.append(clock.stamp - truth)
+    assert clock.resets == 0
+    assert np.abs(errors).max() < 0.01
+    assert np.abs(errors[-1000:]).max() < 0.001
+
+
 def test_a_gap_is_measured_by_the_bases_own_counter() -> None:
     clock = advance_clock(start_clock(65500, 5.0), 264, 5.31)
     assert clock.step == pytest.approx(0.3)
