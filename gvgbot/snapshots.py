@@ -51,14 +51,16 @@ def state(
     """The state at `stamp`; `odometry` is the last control cycle's, `away` says what is missing."""
     mission, graph, map_base = pipeline.mission, pipeline.mapper.graph, pipeline.map_base
     twist = STANDSTILL if odometry is None else odometry.twist
+    phase = _phase(pipeline, away)
     return State(
         stamp=stamp,
         sequence=sequence,
         cycles=cycles,
         cycle_age=None if odometry is None else stamp - odometry.stamp,
-        phase=_phase(pipeline, away),
+        phase=phase,
         outcome=mission.outcome,
-        reason=mission.reason or away or "",
+        # of a robot on an errand, the mission's is how the exploration ended
+        reason=(phase != "halted" and mission.reason) or away or "",
         errand=pipeline.errands.progress,
         requests=requests,
         team=tuple(

@@ -221,6 +221,25 @@ def test_a_robot_stands_while_its_laser_is_unplugged_and_then_goes_on(daemon: Da
     assert (last.phase, last.laser.connected, last.laser.reconnects) == ("exploring", True, 1)
 
 
+def test_on_an_errand_it_says_what_it_waits_for_and_not_how_the_exploration_ended(
+    daemon: Daemon,
+) -> None:
+    async def story(clock: Clock) -> None:
+        await clock.sleep_until(10.0)
+        for request in ("stop", "home"):
+            assert (await daemon.network.ask(request)).done
+        assert daemon.session.simulation is not None
+        daemon.session.simulation.laser_twin.inject("unplug", 6.0)
+        await clock.sleep_until(13.0)
+
+    daemon.run(story)
+    last = daemon.network.states[-1]
+    assert (last.phase, last.outcome, last.errand) == ("halted", "stopped", "home")
+    assert last.reason.startswith("no laser")
+    status = [told for told in daemon.manager.told if told.startswith("STATUS=")]
+    assert status[-1].startswith("STATUS=home: no laser")
+
+
 class NoPorts(Links):
     async def open_laser(self) -> tuple[HokuyoLaser, Close]:
         raise DeviceLost("cannot open /dev/hokuyo")
