@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import structlog
 
 from gvgbot.autonomy import events
+from gvgbot.hal.guard import NEEDS_SOMEBODY
 from gvgbot.hal.messages import EMPTY_BATTERY, LOW_BATTERY, Battery
 from gvgbot.topics import State
 from gvgbot.words import counted
@@ -110,4 +111,6 @@ def status_line(state: State) -> str:
     vertices = counted(state.vertices, "vertex", "vertices")
     graph = f"{vertices}, {counted(state.frontiers, 'frontier')}"
     what = state.outcome if state.phase == "finished" else state.errand or state.phase
-    return f"{what}: {state.reason}; {graph}" if state.reason else f"{what}: {graph}"
+    is_held = state.phase != "halted" and state.guard in NEEDS_SOMEBODY
+    why = state.guard if is_held else state.reason
+    return f"{what}: {why}; {graph}" if why else f"{what}: {graph}"

@@ -8,6 +8,7 @@ from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.ekf import OdometryNoise, part, predict
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
 from gvgbot.geometry import STANDSTILL, Array, Pose, wrap_angle
+from gvgbot.hal.guard import NEEDS_SOMEBODY
 from gvgbot.hal.messages import Battery, Odometry, Scan, Sign
 from gvgbot.topics import (
     NOTHING_IN_RANGE,
@@ -20,13 +21,6 @@ from gvgbot.topics import (
     packed,
 )
 
-_NEEDS_SOMEBODY = (
-    "wheel drop",
-    "over-current",
-    "charger cable",
-    "no scan",
-    "laser sees nothing",
-)
 _FARTHEST_MM = NOTHING_IN_RANGE - 1
 
 
@@ -104,7 +98,7 @@ def sign(now: State, *, is_lost: bool) -> Sign:
     """What people beside the robot are shown of its state."""
     if now.phase == "starting":
         return "starting"
-    if now.phase == "halted" or now.guard in _NEEDS_SOMEBODY:
+    if now.phase == "halted" or now.guard in NEEDS_SOMEBODY:
         return "trouble"
     if now.phase == "finished":
         return "trouble" if now.outcome == "failed" else "finished"

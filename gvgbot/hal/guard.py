@@ -25,6 +25,13 @@ Reason = Literal[
     "obstacle",
     "obstacle near",
 ]
+NEEDS_SOMEBODY: tuple[Reason, ...] = (
+    "wheel drop",
+    "over-current",
+    "charger cable",
+    "no scan",
+    "laser sees nothing",
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -6,7 +6,9 @@ import os
 import socket
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
+import msgspec
 import pytest
 import structlog
 
@@ -238,3 +240,25 @@ def test_an_unknown_battery_is_no_news() -> None:
 
 def test_the_status_says_what_counts() -> None:
     assert status_line(EXAMPLE) == "exploring: 3 vertices, 4 frontiers"
+
+
+@pytest.mark.parametrize(
+    ("now", "said"),
+    [
+        ({"guard": "wheel drop"}, "exploring: wheel drop"),
+        ({"guard": "obstacle near"}, "exploring: 3 vertices"),
+        ({"phase": "errand", "errand": "home", "reason": "all explored"}, "home: all explored"),
+        (
+            {
+                "phase": "errand",
+                "errand": "home",
+                "reason": "all explored",
+                "guard": "over-current",
+            },
+            "home: over-current",
+        ),
+        ({"phase": "halted", "reason": "no laser: gone", "guard": "no scan"}, "halted: no laser"),
+    ],
+)
+def test_the_status_says_why_the_robot_needs_somebody(now: dict[str, Any], said: str) -> None:
+    assert status_line(msgspec.structs.replace(EXAMPLE, **now)).startswith(said)
