@@ -139,7 +139,9 @@ class Steering:
             case "resume", _:
                 return errands.resume()
             case "stop", _:
-                return f"{errands.stop(stamp)}; {await self._saved_or_why_not()}"
+                text = errands.stop(stamp)
+                self._tell(errands.take_events())  # now: to save the map may take long
+                return f"{text}; {await self._saved_or_why_not()}"
             case "home", _:
                 return errands.home(stamp)
             case "explore", _:

@@ -8,7 +8,7 @@ import msgspec
 import pytest
 
 from gvgbot.autonomy.errands import Declined, Errands
-from gvgbot.autonomy.events import Event, Requested
+from gvgbot.autonomy.events import Event, Finished, Requested
 from gvgbot.config import Config, RobotConfig
 from gvgbot.errors import GvgbotError
 from gvgbot.hal.guard import GuardConfig, Reason
@@ -35,6 +35,7 @@ class Willing:
 
     def __init__(self) -> None:
         self.did: list[str] = []
+        self.happened: list[Event] = []
         self.refuses = False
 
     def __getattr__(self, name: str) -> object:
@@ -47,7 +48,8 @@ class Willing:
         return do
 
     def take_events(self) -> list[Event]:
-        return []
+        happened, self.happened = self.happened, []
+        return happened
 
 
 @dataclass
@@ -60,9 +62,11 @@ class Rig:
     told: list[Event] = field(default_factory=list)
     used: list[Config] = field(default_factory=list)
     disk_is_full: bool = False
+    told_when_saving: list[Event] = field(default_factory=list)
     time: float = 12.5
 
     async def save(self) -> str:
+        self.told_when_saving = self.told.copy()
         if self.disk_is_full:
             raise GvgbotError("no space left")
         return "/somewhere"
@@ -205,6 +209,15 @@ def test_a_robot_that_stops_says_so_though_its_map_cannot_be_saved() -> None:
     rig = Rig(disk_is_full=True)
     assert rig.ask("stop") == Answer(done=True, text="did stop; map not saved: no space left")
     assert rig.errands.did == ["stop"]
+
+
+def test_that_a_robot_has_stopped_is_told_before_its_map_is_saved() -> None:
+    """Saving takes long, and the power may fail meanwhile."""
+    rig, ended = Rig(), Finished(12.5, "stopped", "by a request")
+    rig.errands.happened = [ended]
+    assert rig.ask("stop").done
+    assert rig.told_when_saving == [ended]
+    assert [type(event) for event in rig.told] == [Finished, Requested]
 
 
 def test_a_value_takes_effect_and_the_next_one_counts_from_there() -> None:
