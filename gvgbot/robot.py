@@ -234,7 +234,7 @@ class Robot:
             await self._grown.wait()
             self._grown.clear()
             await self._save()
-            if self._pipeline.mission.outcome is not None:
+            if self._pipeline.mission.outcome is not None and self._pipeline.errands.is_resting:
                 log.info("standing still until stopped", map=str(self._session.directory.path))
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(SAVE_EVERY):

@@ -221,6 +221,19 @@ def test_a_robot_stands_while_its_laser_is_unplugged_and_then_goes_on(daemon: Da
     assert (last.phase, last.laser.connected, last.laser.reconnects) == ("exploring", True, 1)
 
 
+def test_a_robot_on_an_errand_does_not_say_that_it_stands(daemon: Daemon) -> None:
+    async def story(clock: Clock) -> None:
+        await clock.sleep_until(10.0)
+        for request in ("stop", "home"):
+            assert (await daemon.network.ask(request)).done
+        await clock.sleep_until(12.0)
+
+    with structlog.testing.capture_logs() as logs:
+        daemon.run(story)
+    assert daemon.network.states[-1].phase == "errand"
+    assert "standing still until stopped" not in [log["event"] for log in logs]
+
+
 def test_on_an_errand_it_says_what_it_waits_for_and_not_how_the_exploration_ended(
     daemon: Daemon,
 ) -> None:
