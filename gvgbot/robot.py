@@ -112,6 +112,7 @@ class Robot:
         self._odometry: Odometry | None = None
         self._sequence, self._ready = 0, False
         self._events = LiveEvents()
+        self._unsaved = ""  # why the map is not on the disk as it should be
         self._decided = ""  # the reason of the last decision
         self._not_driven = ""  # why nobody may drive it just now
         self._feed: LiveFeed | None = None
@@ -229,12 +230,14 @@ class Robot:
             self._on_events([asked, *errands.take_events()])
 
     async def _keep_saved(self) -> None:
-        """Save now and then while the map grows, and when it is finished."""
+        """Save now and then while the map grows, and when it is finished, until it is saved."""
         while True:
             await self._grown.wait()
             self._grown.clear()
             await self._save()
-            if self._pipeline.mission.outcome is not None and self._pipeline.errands.is_resting:
+            if self._unsaved:
+                self._grown.set()
+            elif self._pipeline.mission.outcome is not None and self._pipeline.errands.is_resting:
                 log.info("standing still until stopped", map=str(self._session.directory.path))
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(SAVE_EVERY):
@@ -242,10 +245,15 @@ class Robot:
             self._finished.clear()
 
     async def _save(self) -> None:
+        """Save the map, and the events that could not be written before; say once if it fails."""
+        before, self._unsaved = self._unsaved, ""
+        self._session.on_events([])
         try:
             await self._saving.save()
         except GvgbotError as error:
-            log.warning("map not saved", reason=str(error))
+            self._unsaved = str(error)
+            if self._unsaved != before:
+                log.warning("map not saved", reason=self._unsaved)
 
     def _use(self, config: Config) -> None:
         """Put a configuration into effect, as far as that can be changed."""

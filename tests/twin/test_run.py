@@ -1,6 +1,7 @@
 """The daemon in virtual time: how it starts, goes on without a device, ends, and what it leaves."""
 
 import asyncio
+import errno
 import gc
 import json
 import math
@@ -26,6 +27,7 @@ from gvgbot.errors import DeviceLost
 from gvgbot.geometry import Pose, Twist
 from gvgbot.hal.messages import Contact, Odometry, Scan, Sign
 from gvgbot.links import Close, Links
+from gvgbot.maps import run_directory
 from gvgbot.stop_signals import StopSignals
 from gvgbot.topics import Grid
 
@@ -162,6 +164,36 @@ def test_a_finished_daemon_saves_the_map_and_stands_until_it_is_stopped(daemon: 
     assert [log["event"] for log in logs].count("finished") == 1
     late = base_commands(bytes(daemon.cable.written))[-1000:]  # of 50 a second
     assert set(late) == {STOP}
+
+
+def test_a_map_that_could_not_be_saved_is_saved_as_soon_as_that_is_possible(
+    daemon: Daemon, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    path = daemon.session.directory.path
+    away = path.with_name("unplugged")
+    reasons: list[str] = []
+
+    async def story(clock: Clock) -> None:
+        await clock.sleep_until(10.0)
+        path.rename(away)
+        monkeypatch.setattr(run_directory, "_append", full)
+        answer = await daemon.network.ask("stop")
+        assert "map not saved" in answer.text
+        await clock.sleep_until(100.0)
+        away.rename(path)
+        monkeypatch.undo()
+        await clock.sleep_until(131.0)
+        reasons.append(json.loads((path / "summary.json").read_text())["reason"])
+        *_, ended, _ = map(json.loads, (path / "events.jsonl").read_text().splitlines())
+        reasons.append(ended["reason"])
+
+    with structlog.testing.capture_logs() as logs:
+        daemon.run(story)
+    assert reasons == 2 * ["stopped by a request"]
+    assert [log["event"] for log in logs].count("map not saved") == 1
 
 
 def test_a_robot_goes_on_where_it_was_after_its_base_was_lost_for_a_while(
