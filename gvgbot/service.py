@@ -3,6 +3,7 @@
 import contextlib
 import gc
 import os
+import re
 import socket
 from collections.abc import Iterator, Mapping
 from typing import Any, Literal, TextIO, cast
@@ -18,7 +19,7 @@ class Notifier:
 
     def __init__(self, address: str | None) -> None:
         """`address` is a socket's path, or `@` and an abstract name; None: nobody listens."""
-        self._address = None if not address else address.replace("@", "\0", 1)
+        self._address = re.sub("^@", "\0", address) if address else None
         self._status = ""
 
     @classmethod

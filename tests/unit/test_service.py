@@ -59,6 +59,15 @@ def test_a_name_with_an_at_sign_is_an_abstract_one() -> None:
         assert heard(manager) == [b"READY=1"]
 
 
+def test_an_at_sign_within_a_path_is_part_of_it(tmp_path: Path) -> None:
+    path = tmp_path / "gvgbot@2"
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
+        manager.bind(str(path))
+        manager.setblocking(False)
+        Notifier(str(path)).ready()
+        assert heard(manager) == [b"READY=1"]
+
+
 def test_the_manager_is_found_in_the_environment(
     manager: socket.socket, monkeypatch: pytest.MonkeyPatch
 ) -> None:
