@@ -81,8 +81,9 @@ class LiveTeam:
         while True:
             if not pipeline.is_lost:
                 finished = pipeline.errands.is_resting
-                now = self._clock.now()
-                news = self.member.news(now, pipeline.map_base, finished=finished)
+                on_errand = not (finished or pipeline.errands.is_exploring)
+                now, map_base = self._clock.now(), pipeline.map_base
+                news = self.member.news(now, map_base, finished=finished, on_errand=on_errand)
                 self._network.tell_team("team", encode(news))
             await self._clock.sleep_until(self._clock.now() + self._config.tell_every_s)
 

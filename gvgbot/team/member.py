@@ -105,13 +105,15 @@ class Member:
 
     # -- what is told and heard --------------------------------------------------------------------
 
-    def news(self, stamp: float, map_base: Pose, *, finished: bool) -> News:
-        """What to tell the others now."""
+    def news(
+        self, stamp: float, map_base: Pose, *, finished: bool, on_errand: bool = False
+    ) -> News:
+        """What to tell the others now; on an errand, one leaves all frontiers to them."""
         self._stamp = stamp
         self._chart = self._own_chart()
         self.auction.renew()
         self._sequence += 1
-        if finished:
+        if finished or on_errand:
             self.auction.withdraw()
         frames = tuple(
             Frame(name, self._mates[name].news.life, (pose.x, pose.y, pose.theta))
@@ -125,7 +127,7 @@ class Member:
             radius=self._radius,
             claim=self.auction.claim,
             finished=finished,
-            idle=self.auction.is_idle,
+            idle=self.auction.is_idle or on_errand,
             frames=frames,
             vertices=told_vertices(self._chart),
             edges=told_edges(self._chart),

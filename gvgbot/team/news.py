@@ -116,7 +116,8 @@ class News(msgspec.Struct, frozen=True, kw_only=True, tag="news"):
     radius: Radius  # m, of its body
     claim: Claim | None
     finished: bool  # it does not drive any more
-    idle: bool = False  # it knows of nothing that is left to do, but waits for what others find
+    # it knows of nothing that is left to do, but waits for what others find, or is on an errand
+    idle: bool = False
     frames: tuple[Frame, ...]
     vertices: Annotated[tuple[TeamVertex, ...], msgspec.Meta(max_length=1000)]
     edges: Annotated[tuple[TeamEdge, ...], msgspec.Meta(max_length=3000)]

@@ -8,12 +8,14 @@ import pytest
 import structlog
 
 from gvgbot.autonomy.config import AutonomyConfig
+from gvgbot.autonomy.errands.plans import Kept
 from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.config import RobotConfig
 from gvgbot.live_team import LiveTeam
 from gvgbot.team.member import TeamConfig
+from gvgbot.team.news import Claim, News, decode
 from gvgbot.topics import TeamPart, team_key
 
 CONFIG = TeamConfig(enabled=True)
@@ -77,6 +79,37 @@ def test_robots_hear_of_each_other_and_lose_each_other() -> None:
         assert not one.is_lost("two")
 
     together(scene)
+
+
+def test_who_is_sent_on_a_patrol_claims_no_frontier_that_others_would_wait_for() -> None:
+    """One that is on its way to a frontier keeps it until then."""
+    claim, pipeline = (
+        Claim(1.0, 2.0, 0.0, 3.0),
+        Pipeline(AutonomyConfig(), ExplorationConfig(), 0.2),
+    )
+    air, told = Air(), list[tuple[Claim | None, bool, bool]]()
+
+    def hear(_: str, data: bytes) -> None:
+        news = decode(data)
+        if isinstance(news, News):
+            told.append((news.claim, news.idle, news.finished))
+
+    async def play() -> None:
+        part = LiveTeam(RobotConfig(name="one"), CONFIG, pipeline, air)
+        part.member.auction.claim = claim
+        async with asyncio.TaskGroup() as tasks:
+            running = [
+                tasks.create_task(part.take_part(LoopClock(), at_once)),
+                tasks.create_task(air.hear_team(hear)),
+            ]
+            await asyncio.sleep(3.0)
+            pipeline.errands.recall(Kept("patrol", (1, 2)))
+            await asyncio.sleep(3.0)
+            for task in running:
+                task.cancel()
+
+    run_in_virtual_time(play())
+    assert (told[0], told[-1]) == ((claim, False, False), (None, True, False))
 
 
 @pytest.mark.parametrize("noise", [b"", b"\xff" * 40, b"\x80", NESTED])
