@@ -10,10 +10,11 @@ from gvgbot.geometry import Array, Pose, wrap_angle
 from gvgbot.team.alignment import Alignment
 from gvgbot.team.chart import Chart
 from gvgbot.team.encounter import WINDOW_S
-from gvgbot.team.news import Course, News
+from gvgbot.team.news import Claim, Course, News
 
 _STANDING_M = 0.1  # moved less from news to news, a robot stands
 _RESTS_S = 30.0  # who stands for so long, and is on its way to nothing, finds no more
+_HELD_S = 120.0  # who stands for so long on its way does not get there: a device may be away
 _SAME_M, _SAME_RAD = 0.5, 0.1  # frames nearer to each other are the same
 
 
@@ -47,8 +48,13 @@ class Mate:
     @property
     def is_busy(self) -> bool:
         """Whether it has something to do."""
-        rests = self.news.claim is None and self.stands > _RESTS_S
+        rests = self.claim is None and self.stands > _RESTS_S
         return not (self.news.finished or self.news.idle or rests)
+
+    @property
+    def claim(self) -> Claim | None:
+        """What it is on its way to, unless something holds it: others need not wait for that."""
+        return None if self.stands > _HELD_S else self.news.claim
 
     def learn(self, news: News, stamp: float) -> None:
         """Take in what it tells now."""

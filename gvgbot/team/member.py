@@ -363,7 +363,7 @@ class Member:
         """What others are on their way to, own map frame."""
         found = []
         for name, pose in sorted(self.frames.items()):
-            claim = self._mates[name].news.claim
+            claim = self._mates[name].claim
             if claim is None or self.is_lost(name):
                 continue
             there = pose.compose(Pose(claim.x, claim.y, claim.bearing))

@@ -275,6 +275,24 @@ def test_what_a_lost_robot_was_about_to_do_is_free_again() -> None:
     np.testing.assert_allclose(place(two, free[0]), place(one, first[0]), atol=0.1)
 
 
+def test_what_a_robot_was_about_to_do_that_is_held_for_minutes_is_free_again() -> None:
+    """It is heard all the time, but its laser may be away, or somebody has lifted it."""
+    one, two = team()
+    two.at = one.at = 3
+    first = one.choose()
+    assert first is not None
+    for stamp in (2.0, 60.0, 100.0):
+        one.tell(stamp, two)
+        two.choose()
+        assert two.member.claims()
+    one.tell(130.0, two)
+    free = two.choose()
+    assert free is not None
+    np.testing.assert_allclose(place(two, free[0]), place(one, first[0]), atol=0.1)
+    one.tell(135.0, two, at=Pose(1.0, 0.0, 0.0))  # it drives again
+    assert two.member.claims()
+
+
 def test_alone_a_robot_takes_the_nearest_frontier_of_its_own() -> None:
     one = robot("one", irregular(1), LEFT, 0)
     one.tell(0.0)
