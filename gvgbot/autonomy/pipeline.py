@@ -52,8 +52,8 @@ _LONGEST_GAP_S = 2.0  # between keyframes or cycles; a longer one is an outage o
 _SEARCHES_NEAR_BY = "look for its place near by", "the base has started anew"
 STANDS_CARRIED = (
     "stand until it is asked to resume",
-    "no walls that it knows are around its base, which has started anew: if it was carried, "
-    "restart the program, and it looks for its place on the whole map",
+    "no walls that it knows are around it, and it was lifted or its base has started anew: if it "
+    "was carried, restart the program, and it looks for its place on the whole map",
 )
 _OVERLAP_RAD = 0.2  # of what is seen before and after the first turn
 _LED_EVERY_M, _LED_EVERY_RAD = 0.4, 2.0  # looks for the GVG, where nobody waits for a way

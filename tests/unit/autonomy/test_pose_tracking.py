@@ -86,6 +86,16 @@ def test_who_sees_no_known_walls_after_the_base_started_anew_may_be_anywhere() -
     assert tracked.mapper.belief.map_base == Pose()
 
 
+def test_who_sees_no_known_walls_after_it_was_lifted_may_be_anywhere() -> None:
+    tracked = Tracked()
+    tracked.tracker.was_lifted = True
+    assert tracked.look(Pose(), Pose(3.0, 3.0)) is None
+    assert not tracked.past.steps
+    again = tracked.look(Pose(), Pose(), is_doubted=True)  # it was put back
+    assert again is not None
+    assert again.distance(Pose()) < 0.05
+
+
 def test_who_takes_over_from_another_goes_on_by_its_walls_and_odometry() -> None:
     one, other = Tracked(), Tracked()
     other.look(Pose(), Pose(), breaks=3)
