@@ -279,8 +279,10 @@ def _listed(words: list[str]) -> tuple[list[str], list[str]]:
 
 
 def _ranges(words: list[str], range_max: float) -> Array:
-    """Raises ValueError."""
-    ranges = np.array(_numbers(words))
+    """Numbers, and inf and nan as in logs converted from those of ROS. Raises ValueError."""
+    ranges = np.array([float(word) for word in words])
+    if (np.abs(ranges[np.isfinite(ranges)]) > _LARGEST).any():
+        raise ValueError(words)
     ranges[ranges >= range_max] = np.inf
     ranges[ranges <= 0.0] = np.nan
     return ranges

@@ -57,6 +57,18 @@ ROBOTLASER = (
 )
 
 
+@pytest.mark.parametrize("line", [FLASER, ROBOTLASER])
+def test_ranges_may_be_inf_and_nan_as_in_logs_made_of_those_of_ros(
+    line: str, tmp_path: Path
+) -> None:
+    """There inf is nothing in range, -inf something too near, and nan no measurement."""
+    words = line.replace(" 1.5 ", " inf ").replace(" 0.0 2.5 ", " nan -inf ")
+    log = read(written(tmp_path / "a.log", words))
+    (scan,) = log.scans
+    assert log.damaged == 0
+    np.testing.assert_array_equal(scan.ranges[:4], [math.inf, math.inf, math.nan, math.nan])
+
+
 def test_a_newer_line_says_itself_how_its_laser_looks(tmp_path: Path) -> None:
     """Type, start, width, step, greatest range, accuracy, mode; readings; remissions; poses."""
     log = read(written(tmp_path / "a.log", ROBOTLASER))
@@ -84,6 +96,7 @@ def test_a_newer_line_says_itself_how_its_laser_looks(tmp_path: Path) -> None:
         "FLASER",
         FLASER.replace("FLASER 4", "FLASER 5"),
         FLASER.replace("1.5", "1.5.5"),
+        FLASER.replace("1.5", "-1e300"),
         FLASER[:30],
     ],
 )
