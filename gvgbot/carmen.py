@@ -25,7 +25,7 @@ import numpy as np
 from gvgbot.autonomy.control.reflexes import Felt
 from gvgbot.autonomy.loop import Cycle
 from gvgbot.errors import UsageError
-from gvgbot.geometry import STANDSTILL, Array, Pose, rows_of
+from gvgbot.geometry import STANDSTILL, Array, Pose, rows_of, wrap_angles
 from gvgbot.hal.messages import Odometry, Scan
 from gvgbot.recording import Lived
 
@@ -148,6 +148,8 @@ def _steady_place(places: list[Pose]) -> Pose:
     if not places:
         return Pose()
     found = rows_of(places)
+    turn = float(np.angle(np.exp(1j * found[:, 2]).sum()))
+    found[:, 2] = turn + wrap_angles(found[:, 2] - turn)  # one that looks back is at pi and -pi
     middle = np.median(found, axis=0)
     is_there = np.abs(found - middle).max(axis=1) < _STEADY
     if is_there.mean() <= _MOSTLY:

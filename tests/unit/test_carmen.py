@@ -144,6 +144,21 @@ def test_the_laser_is_where_it_is_told_to_be(
     assert {scan.base_laser for scan in scans} == {Pose(expected, 0.0, 0.0)}
 
 
+def test_a_laser_that_looks_back_is_where_the_log_has_it(tmp_path: Path) -> None:
+    """Its heading, rounded, is now a little less than half a turn, now a little more."""
+    headings = [0.1 * k for k in range(20)]
+    lines = [
+        f"FLASER 2 1 1 {0.3 * math.cos(a):.6f} {0.3 * math.sin(a):.6f} "
+        f"{a + math.pi + off:.6f} 0 0 {a:.6f} {10 * a + 1:.6f} host 0"
+        for a, off in zip(headings, [1e-5, -1e-5] * 10, strict=True)
+    ]
+    for scan in read_carmen(
+        written(tmp_path / "a.log", *lines), no_echo_m=80.0, base_laser=Pose()
+    ).scans:
+        assert scan.base_laser.distance(Pose(0.3, 0.0, 0.0)) < 1e-3
+        assert math.cos(scan.base_laser.theta) == pytest.approx(-1.0)
+
+
 @pytest.mark.parametrize(("beyond", "told"), [("8.19", 8.19), ("81.91", None), ("0.0", None)])
 def test_a_laser_that_gives_its_own_greatest_range_for_no_echo_is_told(
     beyond: str, told: float | None, tmp_path: Path
