@@ -5,7 +5,7 @@ import contextlib
 import math
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -32,7 +32,7 @@ from gvgbot.maps.picture import draw_map
 from gvgbot.maps.pieced import pieced
 from gvgbot.maps.route_graph import RouteGraph
 from gvgbot.maps.run_directory import RunDirectory
-from gvgbot.report import world_files
+from gvgbot.report import with_room_of, world_files
 from gvgbot.service import set_up_logging
 from gvgbot.session import Session
 from gvgbot.simulation import Place, Simulation, open_place
@@ -263,17 +263,31 @@ def _save(directory: RunDirectory, robots: list[_Robot]) -> list[_Robot]:
     poses = {first.member.name: Pose()} | first.member.frames
     others = [robot for robot in robots if robot is not first and robot.member.name in poses]
     joined = [first, *others]
-    graph = joined_graph([(_graph(robot), poses[robot.member.name]) for robot in joined])
-    graph = pieced(graph, [way for robot in joined for way in _ways(robot, poses)])
+    graph, grid = joined_map(
+        [(_graph(robot), _grid(robot), poses[robot.member.name]) for robot in joined],
+        [way for robot in joined for way in _ways(robot, poses)],
+    )
     world = _place(first.session).world
     files = world_files(world)
     files["map.geojson"] = geojson.encode(graph)
-    grid = joined_grid([(_grid(robot), poses[robot.member.name]) for robot in joined])
     files |= encode_map_server(grid)
     files["map.png"] = draw_map(graph, grid=grid, title=world.name)
     directory.write(files)
     directory.write_summary(_summary(robots, joined, poses, graph))
     return joined
+
+
+def joined_map(
+    maps: Sequence[tuple[RouteGraph, OccupancyGrid, Pose]], ways: Sequence[tuple[Array, float]]
+) -> tuple[RouteGraph, OccupancyGrid]:
+    """The maps of several robots as one, each with the pose of its frame in that of the result.
+
+    `ways` are the parts of edges that they have driven, in the result: lines (N, 2) and their
+    least clearances, m. The graph claims no more room than there is in the grid of all.
+    """
+    graph = pieced(joined_graph([(graph, pose) for graph, _, pose in maps]), ways)
+    grid = joined_grid([(grid, pose) for _, grid, pose in maps])
+    return with_room_of(graph, grid), grid
 
 
 def _ways(robot: _Robot, poses: dict[str, Pose]) -> list[tuple[Array, float]]:
