@@ -7,11 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gvgbot.autonomy import events
 from gvgbot.autonomy.estimate import smoothed_keyframes, still_past
 from gvgbot.autonomy.keyframes import Keyframe, Step
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.geometry import Pose, rows_of, wrap_angles
 
+# after which the past may be known better
+CORRECTIONS = events.LoopClosed | events.DoubtSettled | events.ClosureRevoked | events.Finished
 TOLERANCE_M = 0.05  # by which what is drawn may be wrong: a cell of the grid
 _WALLS_M = 4.0  # about so far off they are: a turn moves them by so much times its angle
 _REST_S = 0.02  # for each keyframe, between drawing all again and the next time

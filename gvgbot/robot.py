@@ -25,6 +25,7 @@ from gvgbot.links import Devices, Links
 from gvgbot.live_events import LiveEvents
 from gvgbot.live_feed import LiveFeed, Pace
 from gvgbot.live_map import LiveMap, Update
+from gvgbot.live_past import CORRECTIONS
 from gvgbot.live_ros import LiveRos, Neighbour, UnixTime
 from gvgbot.live_team import LiveTeam, TeamNetwork
 from gvgbot.persistence.keeper import Keeper
@@ -42,8 +43,6 @@ from gvgbot.vitals import Vitals
 SAVE_EVERY = 30.0  # s at least between two savings while the map grows
 STUCK_AFTER = 1.0  # s without a control cycle, though the base is there
 _DRIVEN = "it is driven until it is asked for something else"
-# what changes the past as it is known now
-_CORRECTIONS = events.LoopClosed | events.DoubtSettled | events.ClosureRevoked
 
 log = structlog.get_logger()
 
@@ -312,7 +311,7 @@ class Robot:
                 self._finished.set()
             if isinstance(event, events.Decision):
                 self._decided = event.reason
-            if isinstance(event, _CORRECTIONS | events.Finished):
+            if isinstance(event, CORRECTIONS):
                 self._doubt_the_past()
 
     def _doubt_the_past(self) -> None:

@@ -20,6 +20,7 @@ from gvgbot.autonomy.loop import Cycle
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.errors import GvgbotError, UsageError
 from gvgbot.hal.messages import Scan
+from gvgbot.live_past import CORRECTIONS
 from gvgbot.live_ros import MAP_EVERY, LiveRos
 from gvgbot.replay import Log, Wanted, open_log
 from gvgbot.ros2.cdr import definition
@@ -69,7 +70,7 @@ def _play(log: Log, bag: "_Bag", *, sensors_only: bool) -> None:
             case Scan():
                 live.on_scan(message)
                 if not sensors_only:
-                    pipeline.perceive(message)
+                    _perceive(pipeline, message, live)
             case Cycle():
                 if not sensors_only:
                     pipeline.control(message.odometry, message.felt)
@@ -78,6 +79,12 @@ def _play(log: Log, bag: "_Bag", *, sensors_only: bool) -> None:
             _draw(live, at)
             due = at + MAP_EVERY
     _draw(live, at)
+
+
+def _perceive(pipeline: Pipeline, scan: Scan, live: LiveRos) -> None:
+    happened = pipeline.perceive(scan)
+    if any(isinstance(event, CORRECTIONS) for event in happened):
+        live.doubt()
 
 
 def _unix(stamp: float) -> float:

@@ -11,12 +11,23 @@ from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability
 
 from gvgbot.autonomy.control.reflexes import Felt
+from gvgbot.autonomy.events import (
+    ClosureRevoked,
+    DoubtSettled,
+    Event,
+    Finished,
+    LoopClosed,
+    Recovery,
+)
 from gvgbot.autonomy.loop import Cycle
+from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.cli import main
 from gvgbot.geometry import Pose, Twist
 from gvgbot.hal.messages import Odometry, Scan
+from gvgbot.live_ros import LiveRos
 from gvgbot.recording.config import RecordingConfig
 from gvgbot.recording.recorder import Recorder
+from gvgbot.ros_bag import _perceive
 
 STILL = Twist()
 ROOM = 3.0  # m, half of a square room's side
@@ -134,6 +145,42 @@ def test_a_bag_for_which_there_is_no_room_leaves_nothing(
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
     assert "File too large" in capsys.readouterr().err
     assert set(tmp_path.iterdir()) == before
+
+
+class Recogniser(Pipeline):
+    """A mind to which each scan brings the same event."""
+
+    def __init__(self, event: Event) -> None:
+        self.event = event
+
+    def perceive(self, scan: Scan) -> list[Event]:
+        return [self.event]
+
+
+class Counting(LiveRos):
+    """Counts how often the past was doubted."""
+
+    def __init__(self) -> None:
+        self.doubts = 0
+
+    def doubt(self) -> None:
+        self.doubts += 1
+
+
+@pytest.mark.parametrize(
+    ("event", "doubts"),
+    [
+        (LoopClosed(1.0, 1, 9.0, 0.5, 0.3, 0.9), 1),
+        (DoubtSettled(1.0, 2, 1, 9.0, 0.3), 1),
+        (ClosureRevoked(1.0, 1), 1),
+        (Finished(1.0, "explored", "no frontier is left"), 1),
+        (Recovery(1.0, "turned", "stuck"), 0),
+    ],
+)
+def test_the_map_of_a_bag_follows_when_the_past_is_known_better(event: Event, doubts: int) -> None:
+    live = Counting()
+    _perceive(Recogniser(event), scan(1.0, 0.0), live)
+    assert live.doubts == doubts
 
 
 def test_sensors_only_is_about_bags(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
