@@ -1,5 +1,6 @@
 """A recording as a bag that ROS 2 programs play: what ROS would have heard of that run."""
 
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import TracebackType
@@ -25,6 +26,7 @@ from gvgbot.live_ros import MAP_EVERY, LiveRos
 from gvgbot.replay import Log, Wanted, open_log
 from gvgbot.ros2.cdr import definition
 from gvgbot.ros2.topics import Topic
+from gvgbot.survey import survey
 
 _VERSION: Final = 9  # of the format, as Iron and later write it
 _LAST = 2**31 - 1  # s since 1970, as ROS counts
@@ -55,15 +57,8 @@ def export_bag(recording: Path, out: Path, *, sensors_only: bool) -> list[str]:
 
 
 def _play(log: Log, bag: "_Bag", *, sensors_only: bool) -> None:
-    config = log.config
-    pipeline = Pipeline(
-        config.autonomy,
-        config.exploration,
-        config.robot.radius_m,
-        led=log.led,
-        localisation=config.localisation,
-    )
-    live = LiveRos([bag], pipeline, config.autonomy.odometry_noise, unix=_unix)
+    pipeline = _mind(log)
+    live = LiveRos([bag], pipeline, log.config.autonomy.odometry_noise, unix=_unix)
     at = due = 0.0
     for at, message in log.messages:
         match message:
@@ -79,6 +74,20 @@ def _play(log: Log, bag: "_Bag", *, sensors_only: bool) -> None:
             _draw(live, at)
             due = at + MAP_EVERY
     _draw(live, at)
+
+
+def _mind(log: Log) -> Pipeline:
+    """The mind that is to live through a log, as that of a replay."""
+    config = log.config
+    pipeline = Pipeline(
+        config.autonomy,
+        config.exploration,
+        config.robot.radius_m,
+        led=log.led,
+        localisation=config.localisation,
+    )
+    pipeline.mission.survey = partial(survey, pipeline)
+    return pipeline
 
 
 def _perceive(pipeline: Pipeline, scan: Scan, live: LiveRos) -> None:

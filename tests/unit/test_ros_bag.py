@@ -27,7 +27,8 @@ from gvgbot.hal.messages import Odometry, Scan
 from gvgbot.live_ros import LiveRos
 from gvgbot.recording.config import RecordingConfig
 from gvgbot.recording.recorder import Recorder
-from gvgbot.ros_bag import _perceive
+from gvgbot.replay import Wanted, open_log
+from gvgbot.ros_bag import _mind, _perceive
 
 STILL = Twist()
 ROOM = 3.0  # m, half of a square room's side
@@ -145,6 +146,19 @@ def test_a_bag_for_which_there_is_no_room_leaves_nothing(
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
     assert "File too large" in capsys.readouterr().err
     assert set(tmp_path.iterdir()) == before
+
+
+def test_the_mind_of_a_bag_looks_where_something_may_be_missing(recording: Path) -> None:
+    """As the one that drove: without that it would be through too soon."""
+    log = open_log(Wanted(path=recording, config=None, overrides=[], no_echo_m=None))
+    pipeline = _mind(log)
+    assert pipeline.mission.survey is not None
+    for _, message in log.messages:
+        if isinstance(message, Scan):
+            pipeline.perceive(message)
+        elif isinstance(message, Cycle):
+            pipeline.control(message.odometry, message.felt)
+    assert pipeline.mission.survey() is not None
 
 
 class Recogniser(Pipeline):
