@@ -43,9 +43,11 @@ class LivePast:
         self._is_doubtful = True  # what an earlier life has left may have been corrected since
         self._rests_until = -float("inf")  # stamp
 
-    def doubt(self) -> None:
-        """Note that the past may be known better by now."""
+    def doubt(self, *, at_last: bool = False) -> None:
+        """Note that the past may be known better by now; `at_last` there is no later update."""
         self._is_doubtful = True
+        if at_last:
+            self._rests_until = -float("inf")
 
     def update(self, pipeline: Pipeline, stamp: float) -> Callable[[], Portion] | None:
         """A function that finds what is to be drawn, in a thread or later; None: nothing.

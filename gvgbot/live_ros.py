@@ -110,9 +110,9 @@ class LiveRos:
         for topic, message in work(stamp).items():
             self._send(topic, message, stamp)
 
-    def doubt(self) -> None:
-        """Note that the grid may be known better by now."""
-        self._drawing.past.doubt()
+    def doubt(self, *, at_last: bool = False) -> None:
+        """Note that the grid may be known better by now; `at_last` it is not drawn later on."""
+        self._drawing.past.doubt(at_last=at_last)
 
     async def keep_shown(self, clock: Clock, off_loop: OffLoop) -> None:
         """Send the map as it grows, until cancelled."""

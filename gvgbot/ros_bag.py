@@ -73,6 +73,7 @@ def _play(log: Log, bag: "_Bag", *, sensors_only: bool) -> None:
         if at >= due:
             _draw(live, at)
             due = at + MAP_EVERY
+    live.doubt(at_last=True)
     _draw(live, at)
 
 

@@ -108,7 +108,9 @@ def test_what_an_earlier_life_has_left_is_drawn_where_it_was() -> None:
     assert error(drawn[0]) < 0.1
 
 
-def test_there_is_a_rest_after_drawing_all() -> None:
+@pytest.mark.parametrize(("at_last", "stamp"), [(False, 60.0), (True, 2.1)])
+def test_there_is_a_rest_after_drawing_all(at_last: bool, stamp: float) -> None:
+    """Not when there is no later."""
     pipeline = drive()
     past = after_the_drive(pipeline)
     past.doubt()
@@ -116,7 +118,8 @@ def test_there_is_a_rest_after_drawing_all() -> None:
     pipeline.mapper.observations[-1] = Observation(COUNT - 1, 1, Pose(2.0, 0.0), 1e-4 * np.eye(3))
     past.doubt()
     assert taken(past, pipeline, 2.1) is None
-    later = taken(past, pipeline, 60.0)
+    past.doubt(at_last=at_last)
+    later = taken(past, pipeline, stamp)
     assert later is not None
     assert later[1]
 

@@ -49,16 +49,16 @@ def recording(tmp_path: Path) -> Path:
     return recorded(tmp_path / "run.mcap", 100.0)
 
 
-def recorded(path: Path, start: float) -> Path:
-    """Four seconds straight ahead, at a quarter of a metre a second."""
+def recorded(path: Path, start: float, *, cycles: int = 200) -> Path:
+    """Four seconds straight ahead, at a quarter of a metre a second; then it stands."""
     about = {"title": "room", "config": "{}"}
     with Recorder(RecordingConfig(path=path), about, patient=True) as recorder:
-        for k in range(200):
-            stamp = start + 0.02 * k
-            odometry = Odometry(stamp, Pose(0.005 * k, 0.0, 0.0), Twist(0.25, 0.0))
+        for k in range(cycles):
+            stamp, x = start + 0.02 * k, 0.005 * min(k, 199)
+            odometry = Odometry(stamp, Pose(x, 0.0, 0.0), Twist(0.25, 0.0))
             recorder.on_cycle(Cycle(odometry, Felt(), STILL, STILL), None)
             if k % 5 == 4:
-                recorder.on_scan(scan(stamp - 0.01, 0.005 * k))
+                recorder.on_scan(scan(stamp - 0.01, x))
     return path
 
 
@@ -93,6 +93,15 @@ def test_a_bag_holds_what_ros_would_have_heard(recording: Path, tmp_path: Path) 
     sides = np.abs(walls + grid.info.resolution / 2).max(axis=1)
     assert len(walls) > 300
     assert sides == pytest.approx(ROOM, abs=0.08)
+
+
+def test_the_end_of_a_bag_has_what_is_known_then(tmp_path: Path) -> None:
+    """Though nothing has happened since the map was drawn last."""
+    recording, bag = recorded(tmp_path / "run.mcap", 100.0, cycles=253), tmp_path / "bag"
+    assert main(["map", "export", str(recording), str(bag), "--ros-bag"]) == 0
+    found = messages(bag)
+    told = [array.markers[0].header.stamp for array in found["/gvg/markers"]]
+    assert told[-1] == found["/odom"][-1].header.stamp
 
 
 def test_what_comes_late_is_kept_for_latecomers(recording: Path, tmp_path: Path) -> None:
@@ -177,7 +186,7 @@ class Counting(LiveRos):
     def __init__(self) -> None:
         self.doubts = 0
 
-    def doubt(self) -> None:
+    def doubt(self, *, at_last: bool = False) -> None:
         self.doubts += 1
 
 
