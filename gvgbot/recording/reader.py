@@ -162,6 +162,8 @@ def _records(file: BinaryIO) -> Iterator[tuple[int, bytes]]:
 def _first(path: Path, number: int) -> Path:
     """The first file of a recording, of which the path is that of a number."""
     ending = f".{number}{path.suffix}" if number else path.suffix
+    if path.suffix == f".{number}" and not path.name.endswith(ending):
+        return path.with_suffix("")  # its files are run, run.1, run.2
     return path.with_name(path.name.removesuffix(ending) + path.suffix)
 
 

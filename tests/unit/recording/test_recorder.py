@@ -284,15 +284,16 @@ def first_chunk(whole: bytes | bytearray) -> int:
     return at
 
 
-def test_files_follow_each_other_and_are_read_as_one(tmp_path: Path) -> None:
-    with Recorder(config(tmp_path / "run.mcap", file_mb=0.3), ABOUT, patient=True) as to:
+@pytest.mark.parametrize("suffix", [".mcap", "", ".1"])
+def test_files_follow_each_other_and_are_read_as_one(suffix: str, tmp_path: Path) -> None:
+    with Recorder(config(tmp_path / f"run{suffix}", file_mb=0.3), ABOUT, patient=True) as to:
         lived = record(to, 2000)
     names = {path.name for path in tmp_path.iterdir()}
-    assert {"run.mcap", "run.1.mcap", "run.2.mcap"} <= names
-    found = read(tmp_path / "run.mcap")
+    assert {f"run{suffix}", f"run.1{suffix}", f"run.2{suffix}"} <= names
+    found = read(tmp_path / f"run{suffix}")
     assert len(found) == len(lived)
     assert_begins_as(found, lived)
-    later = read(tmp_path / "run.1.mcap")
+    later = read(tmp_path / f"run.1{suffix}")
     assert 0 < len(later) < len(lived)
     assert_begins_as(later[::-1], lived[::-1])
 
