@@ -77,7 +77,9 @@ class Growth:
         return OccupancyGrid(cells, grid.resolution_m, grid.origin)
 
     def graph(self, time: float) -> tuple[list[RouteNode], list[RouteEdge]]:
-        """The vertices and edges found by then."""
+        """The vertices and edges found by then; at the end also what came after the last row."""
+        if time >= self.duration:
+            return list(self.run.graph.vertices), list(self.run.graph.edges)
         vertices = [v for v in self.run.graph.vertices if self.vertex_found[v.id] <= time]
         found = zip(self.run.graph.edges, self.edge_found, strict=True)
         return vertices, [edge for edge, since in found if since <= time]

@@ -35,6 +35,17 @@ def test_vertices_and_edges_are_there_from_their_events_on(
     assert {(e.start, e.end) for e in found[1]} == edges
 
 
+def test_what_was_found_after_the_last_row_is_there_at_the_end(tmp_path: Path) -> None:
+    directory = write_run(tmp_path / "run")
+    events = (directory / "events.jsonl").read_text().replace("1009.0", "1010.05")
+    (directory / "events.jsonl").write_text(events)
+    growth = Growth.of(SavedRun.read(directory))
+    assert {v.id for v in growth.graph(9.9)[0]} == {1, 2, 3}
+    vertices, edges = growth.graph(growth.duration)
+    assert {v.id for v in vertices} == {1, 2, 3, 4}
+    assert {(e.start, e.end) for e in edges} == {(1, 2), (2, 3), (3, 4)}
+
+
 def test_the_path_ends_where_the_robot_is(growth: Growth) -> None:
     assert growth.duration == pytest.approx(10.0)
     assert growth.path(0.0).poses == pytest.approx(np.zeros((1, 3)))
