@@ -199,6 +199,8 @@ class Relocaliser:
 
     def _guesses(self, look: Look) -> Generator[None, None, tuple[list[Pose], bool]]:
         """map_base where the walls around fit roughly, the best first; and whether that are all."""
+        if not len(look.walls):  # nothing is in sight that could fit anywhere
+            return [], True
         base_walls = look.local_base.inverse().transform(_some(look.walls, _ROUGH_POINTS))
         headings = np.arange(_HEADINGS) * math.tau / _HEADINGS
         c, s = np.cos(headings), np.sin(headings)

@@ -159,6 +159,18 @@ def test_it_is_sure_when_it_has_seen_the_branch_and_not_before() -> None:
     assert formed[-1].is_sure
 
 
+def test_who_sees_no_wall_thinks_nothing_until_it_has_driven_to_one() -> None:
+    known = [(pose, sweep(ALIKE, pose)) for pose in along([*CORNERS, CORNERS[0]])[::2]]
+    relocaliser = Relocaliser(known, ScanMatchingConfig(), is_whole=True)
+    local_map = LocalMap(LocalMapConfig(half_width_m=10.0))
+    opinion = [relocaliser.step(Look.around(Pose(), local_map)) for _ in range(WORK)][-1]
+    assert opinion.map_local is None
+    assert opinion.possible == 0
+    local_map.insert(sweep(ALIKE, Pose(5.0, 0.0)), Pose(2.0), 2.0)
+    look = Look.around(Pose(2.0), local_map)
+    assert [relocaliser.step(look) for _ in range(WORK)][-1].possible > 0
+
+
 @pytest.mark.timeout(60)
 def test_it_is_not_wrong_where_more_places_look_alike_than_it_can_follow() -> None:
     """Along five corridors of 40 m most places are alike; two have a branch near the end."""
