@@ -51,10 +51,11 @@ def merged(ours: RouteGraph, theirs: RouteGraph, pose: Pose) -> RouteGraph:
     names |= {vertex.id: free_id + k for k, vertex in enumerate(lone)}
     new = [replace(vertex, id=names[vertex.id]) for vertex in lone]
     known = {ours.vertices[i].id for i, _ in pairs}
-    edges = list(_split(ours.edges, new))
+    own = list(_split(ours.edges, new))
+    edges = list(own)
     others = [replace(e, start=names[e.start], end=names[e.end]) for e in theirs.edges]
     for edge in _split(others, [v for v in ours.vertices if v.id not in known]):
-        twin = next((i for i, other in enumerate(edges) if is_same(edge, other)), None)
+        twin = _twin(edge, own)
         if twin is None:
             edges.append(edge)
         else:
@@ -252,12 +253,27 @@ def _piece(edge: RouteEdge, start: int, end: int, first: int, last: int, along: 
     return replace(edge, start=start, end=end, polyline=line, length=share * edge.length)
 
 
+def _twin(edge: RouteEdge, own: Sequence[RouteEdge]) -> int | None:
+    """Which of the own edges another map's edge is, by its index; None if it is none of them.
+
+    Two that one map has are two, however close: something stands between them.
+    """
+    away = [_apart(edge, other) for other in own]
+    nearest = min(away, default=math.inf)
+    return away.index(nearest) if nearest < _BESIDE_M else None
+
+
 def is_same(edge: RouteEdge, other: RouteEdge) -> bool:
     """Whether two edges join the same vertices by the same way."""
+    return _apart(edge, other) < _BESIDE_M
+
+
+def _apart(edge: RouteEdge, other: RouteEdge) -> float:
+    """How far apart, m, edges between the same vertices are at most; infinity for all others."""
     if {edge.start, edge.end} != {other.start, other.end}:
-        return False
+        return math.inf
     away = cdist(edge.polyline, other.polyline)
-    return float(max(away.min(axis=0).max(), away.min(axis=1).max())) < _BESIDE_M
+    return float(max(away.min(axis=0).max(), away.min(axis=1).max()))
 
 
 def _as_driven_by_both(edge: RouteEdge, other: RouteEdge) -> RouteEdge:

@@ -128,6 +128,19 @@ def test_a_vertex_beside_somebody_who_stood_there_goes_with_both_ways_round_him(
     assert positions(whole) == {PLACES[0], PLACES[2]}
 
 
+@pytest.mark.parametrize("is_first", [True, False])
+def test_both_ways_round_a_post_stay_though_they_are_close(is_first: bool) -> None:
+    known = seen({0, 1, 2})
+    (here,) = (replace(v, frontiers=()) for v in known.vertices if v.id == 1)
+    there = replace(here, id=7, position=(6.0, 3.0))
+    lines = [np.array([here.position, (6.0 + x, 1.5), there.position]) for x in (0.4, -0.4)]
+    post = RouteGraph((here, there), tuple(way(1, 7, line) for line in lines))
+    whole = merged(*((post, known) if is_first else (known, post)), Pose())
+    assert len(whole.edges) == len(known.edges) + 2
+    again = merged(whole, post, Pose())
+    assert sorted(e.traversals for e in again.edges) == [0, 0, 2, 2]
+
+
 def ring(at: float) -> RouteGraph:
     """A way round 4 m off the origin, whose vertex is at an angle, rad."""
     angles = at + np.linspace(0.0, math.tau, 100)
