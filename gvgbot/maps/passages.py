@@ -56,7 +56,7 @@ def passages(
     shortest = np.flatnonzero(is_long)[np.argsort(meeting.length[is_long], kind="stable")]
     found: list[Array] = []
     for row, column in meeting.places[shortest]:
-        place = corner + (np.array([column, row]) + 0.5) * cell
+        place = corner + (coarse * np.array([column, row]) + 0.5) * grid.resolution_m
         if all(math.dist(place, one) > _APART_M for one in found):
             found.append(place)
     return np.array(found).reshape(-1, 2)

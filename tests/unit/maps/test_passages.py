@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from gvgbot.geometry import Array
+from gvgbot.maps.distances import cells_to
+from gvgbot.maps.gaps import is_wall
 from gvgbot.maps.passages import Way, passages
 from tests.unit.maps.test_gaps import drawn
 
@@ -44,6 +46,14 @@ def found(
 def test_a_door_between_two_rooms_that_no_edge_leads_through_is_one(cell: float) -> None:
     (place,) = found(*ROOMS, ways=LOWER, cell=cell)
     assert place == pytest.approx(DOOR, abs=DOOR_HALFWAY)
+
+
+def test_a_place_in_a_narrow_door_is_where_the_robot_has_room() -> None:
+    grid, room = drawn(*ROOMS, cell=0.05), 0.49  # of the 0.5 m to either side of the door
+    (place,) = passages(grid, LOWER, np.array(LEFT), room, OPEN)
+    assert place == pytest.approx(DOOR, abs=DOOR_HALFWAY)
+    column, row = ((place - grid.origin) / grid.resolution_m).astype(int)
+    assert cells_to(is_wall(grid.cells))[row, column] * grid.resolution_m > room
 
 
 def test_a_door_that_an_edge_leads_through_is_none() -> None:
