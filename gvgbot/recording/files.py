@@ -3,6 +3,7 @@
 Chunks are small and go out at once, so that whatever ends the program costs the last second only.
 """
 
+import glob
 import os
 from collections import deque
 from collections.abc import Mapping, Sequence
@@ -42,7 +43,7 @@ def part_path(first: Path, number: int) -> Path:
 def free_path(wanted: Path) -> Path:
     """The path, or the next like it (run-2.mcap) at which there is nothing of a recording yet."""
     path, number = wanted, 1
-    while path.exists() or any(path.parent.glob(f"{path.stem}.*{path.suffix}")):
+    while path.exists() or any(path.parent.glob(f"{glob.escape(path.stem)}.*{path.suffix}")):
         number += 1
         path = wanted.with_stem(f"{wanted.stem}-{number}")
     return path

@@ -337,6 +337,11 @@ def test_an_earlier_recording_stays(tmp_path: Path) -> None:
     assert free_path(tmp_path / "run.mcap").name == "run-3.mcap"
 
 
+def test_what_is_left_of_a_recording_stays_whatever_its_name(tmp_path: Path) -> None:
+    (tmp_path / "run[1].1.mcap").touch()
+    assert free_path(tmp_path / "run[1].mcap").name == "run[1]-2.mcap"
+
+
 class FullDisk(McapFiles):
     """Has room for one batch only."""
 
