@@ -20,7 +20,7 @@ from gvgbot.autonomy.slam.recognition import (
     sight_covariance,
 )
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
-from gvgbot.autonomy.views import Correspondence, Observation, View
+from gvgbot.autonomy.views import Correspondence, Observation, View, touches
 from gvgbot.geometry import Array, Pose
 
 _ODD = 9.0  # squared Mahalanobis distance, 2 degrees of freedom, of a sight that counts less
@@ -209,7 +209,11 @@ class Mapper(MapEdits):
     # -- what hangs together -----------------------------------------------------------------
 
     def _join(self, view: View, known: Correspondence) -> None:
-        """Make edges of those that are in sight from end to end."""
+        """Make edges of those that are in sight from end to end.
+
+        What sends lone echoes may be glass: an edge beside that is believed when it was driven.
+        """
+        glass = view.local_map.suspects()
         for key, edge in view.gvg.edges.items():
             a = known.half_edge_of.get(Branch(key, forward=True))
             b = known.half_edge_of.get(Branch(key, forward=False))
@@ -219,7 +223,8 @@ class Mapper(MapEdits):
             if self._drive_dead_ends and self._is_far_end(view, edge):
                 continue
             if here is None and there is None:
-                self.join(view, a, b, edge.polyline, float(edge.clearance.min()), driven=False)
+                if not touches(edge, glass):
+                    self.join(view, a, b, edge.polyline, float(edge.clearance.min()), driven=False)
             elif here is there or self._is_one_between(known, a, b):
                 for edge_seen in filter(None, (here, there)):
                     edge_seen.conflicts = max(0, edge_seen.conflicts - 1)

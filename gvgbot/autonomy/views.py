@@ -6,13 +6,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial import cKDTree
 
-from gvgbot.autonomy.gvg.local import Branch, LocalGvg
+from gvgbot.autonomy.gvg.local import Branch, LocalEdge, LocalGvg
 from gvgbot.autonomy.gvg.local_map import LocalMap
 from gvgbot.autonomy.slam.graph import HalfEdgeId, Vertex
 from gvgbot.geometry import Array, Pose
 
 _AT_M = 0.2  # from a node, a line ends there
-_RIM_M = 0.25  # a point so near to a node's disc may shape it
+_RIM_M = 0.25  # a point so near to a disc of the GVG may shape it
 _BESIDE_M, _STEP_M = 0.1, 0.05  # from a line of sight, a wall is on it; and from point to point
 
 
@@ -81,6 +81,14 @@ def touching(gvg: LocalGvg, points: Array) -> frozenset[int]:
         for key, node in gvg.nodes.items()
         if (np.hypot(*(points - node.position).T) < node.clearance + _RIM_M).any()
     )
+
+
+def touches(edge: LocalEdge, points: Array) -> bool:
+    """Whether an edge would be elsewhere, or not at all, with obstacles (N, 2)."""
+    if not len(points):
+        return False
+    away = np.hypot(*(edge.polyline[:, None] - points).transpose(2, 0, 1)).min(axis=1)
+    return bool((away < edge.clearance + _RIM_M).any())
 
 
 @dataclass(frozen=True, slots=True, eq=False)

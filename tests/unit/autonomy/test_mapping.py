@@ -168,6 +168,29 @@ def test_what_lies_on_an_edge_nearer_than_its_walls_lies_on_a_way() -> None:
         assert mapper.is_way(turned, turned.transform(np.array(place))) == is_way
 
 
+class BesideGlass(LocalMap):
+    """A local map that knows of a lone echo."""
+
+    def __init__(self, x: float, y: float) -> None:
+        super().__init__(LocalMapConfig())
+        self._echo = np.array([[x, y]])
+
+    def suspects(self) -> Array:
+        return self._echo
+
+
+@pytest.mark.parametrize(("y", "is_joined"), [(0.0, False), (1.1, False), (1.4, True)])
+def test_an_edge_that_may_pass_through_glass_is_not_believed_at_sight(
+    y: float, is_joined: bool
+) -> None:
+    """Its walls are a metre off: what is nearer than that and a rim would shape it."""
+    seen = Seen().look(TWO_ENDS, 30, local_map=BesideGlass(1.5, y))
+    assert len(seen.mapper.graph.vertices) == 2
+    assert bool(of_type(seen.events, EdgeJoined)) == is_joined
+    seen.look(TWO_ENDS)  # it was dust
+    assert len(of_type(seen.events, EdgeJoined)) == 1
+
+
 def test_two_dead_ends_in_sight_are_a_whole_map() -> None:
     seen = Seen().look(TWO_ENDS, 30)
     assert sorted(seen.places("endpoint")) == [
