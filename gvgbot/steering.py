@@ -90,16 +90,22 @@ class Steering:
         self._tell([*self._ledger.enter(happened), *self._errands.take_events()])
         return answer
 
-    def go_home(self, why: str) -> None:
-        """Let a robot that is busy drive home; it is written down as asked for by `why`."""
+    def go_home(self, why: str) -> bool:
+        """Let a robot that is busy drive home; it is written down as asked for by `why`.
+
+        False if it is too early for that, as the robot does not know its place yet.
+        """
         if self.declines is not None or not self._errands.is_busy:
-            return
+            return True
+        if not self._errands.is_placed:
+            return False
         try:
             answer = Answer(done=True, text=self._errands.home(self._now()))
         except Declined as error:
             answer = Answer(done=False, text=str(error))
         happened = Requested(self._now(), "home", why, answer.done, answer.text)
         self._tell([happened, *self._errands.take_events()])
+        return True
 
     def _check(self, name: str) -> None:
         """Raises Declined if that is not permitted, or not safe just now."""

@@ -7,12 +7,17 @@ from typing import Any
 
 import pytest
 
+from benchmarks.rigs.lives_rig import Lives
 from benchmarks.rigs.run_rig import Daemon
 from gvgbot.clock import Clock
-from gvgbot.config import ServiceConfig, TwinConfig
+from gvgbot.config import ServiceConfig, TwinConfig, load_config
 from gvgbot.drivers.kobuki.twin import KobukiTwinConfig
 from gvgbot.geometry import STANDSTILL, Pose
 from gvgbot.journal import SAGGING_S
+from gvgbot.session import Session
+from gvgbot.simulation import Place
+from tests.replay.test_pipeline import LOLLIPOP
+from tests.replay.test_pipeline import START as HOME
 from tests.twin.test_errands import NEAR, START, a_while, theta, until
 
 pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(120)]
@@ -57,6 +62,27 @@ def test_it_drives_to_where_it_started_and_waits_there(tmp_path: Path) -> None:
     assert offs[0] > 1.0
     assert offs[1] < NEAR
     assert lives.session.pipeline.errands.is_waiting
+
+
+def test_who_looks_for_its_place_drives_home_when_it_has_found_that(tmp_path: Path) -> None:
+    """It was restarted elsewhere, with a battery that is low already."""
+    config = load_config(None, ["twin.seed=1"])
+    Lives(config, Place(LOLLIPOP, HOME), tmp_path / "whole").run([])
+    config = load_config(None, ["twin.seed=1", f"twin.base.battery_v={BASE.battery_v}"])
+    place, known = Place(LOLLIPOP, Pose(8.0, 4.0, -1.2)), tmp_path / "whole"
+    lives = Lives(config, place, tmp_path / "run", known=known, over=waits)
+    lives.run([])
+    text = (tmp_path / "run/events.jsonl").read_text()
+    told = [json.loads(line) for line in text.splitlines()]
+    about = [line for line in told if line["event"] in ("requested", "recovery")]
+    assert [line["event"] for line in about] == ["recovery", "recovery", "requested"]
+    assert about[1]["action"] == "go on from its place on the map"
+    assert (about[2]["origin"], about[2]["done"]) == ("low battery", True)
+    assert lives.world.body.pose.distance(HOME) < NEAR
+
+
+def waits(session: Session) -> bool:
+    return session.pipeline.errands.is_waiting
 
 
 def test_it_goes_on_if_it_shall_not(tmp_path: Path) -> None:

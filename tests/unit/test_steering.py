@@ -37,6 +37,7 @@ class Willing:
         self.did: list[str] = []
         self.happened: list[Event] = []
         self.refuses = False
+        self.is_placed = True
 
     def __getattr__(self, name: str) -> object:
         def do(*_: object) -> str:
@@ -139,10 +140,20 @@ def test_why_it_does_not_drive_home_is_written_down() -> None:
     assert told == Requested(12.5, "home", "low battery", False, "it does not want to")
 
 
+def test_who_does_not_know_its_place_yet_drives_home_later() -> None:
+    rig = Rig()
+    rig.errands.is_placed = False
+    assert not rig.steering.go_home("low battery")
+    assert (rig.errands.did, rig.told) == ([], [])
+    rig.errands.is_placed = True
+    assert rig.steering.go_home("low battery")
+    assert rig.errands.did == ["home"]
+
+
 def test_a_recording_is_not_driven_home() -> None:
     rig = Rig()
     rig.steering.declines = "this is a recording"
-    rig.steering.go_home("low battery")
+    assert rig.steering.go_home("low battery")
     assert (rig.errands.did, rig.told) == ([], [])
 
 

@@ -80,6 +80,11 @@ class Agenda:
         """Whether it is about something, be that exploring or an errand, and nobody drives it."""
         return not self.is_resting and self._command is None
 
+    @property
+    def is_placed(self) -> bool:
+        """Whether it has looked around where it knows to be on its map."""
+        return self._seen is not None
+
     def configure(self, config: ExplorationConfig) -> None:
         """Use another configuration from now on."""
         self._config = config
