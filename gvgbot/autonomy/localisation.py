@@ -193,9 +193,18 @@ class LocalMaps:
 
     def fits(self, scan: Scan, local_base: Pose) -> bool:
         """Whether a scan from a pose in the local frame shows the walls that are known there."""
+        return self._fits(scan, local_base, self._matching.min_pairs)
+
+    def may_fit(self, scan: Scan, local_base: Pose) -> bool:
+        """Whether it does, or shows too little to tell: in the open there may be no walls."""
+        least = self._matching.min_pairs
+        return len(scan.ends) < least or self._fits(scan, local_base, least // 2)
+
+    def _fits(self, scan: Scan, local_base: Pose, least: int) -> bool:
+        """Whether so many ends of beams or more are where something is known, and walls there."""
         ends = local_base.compose(scan.base_laser).transform(scan.ends)
         ends = ends[self.near.known(ends)]
-        if not len(self.near.points()) or len(ends) < self._matching.min_pairs:
+        if not len(self.near.points()) or len(ends) < least:
             return False
         distance = np.asarray(self.near.tree().query(ends)[0])
         return float((distance < _FITS_M).mean()) >= _FITTING

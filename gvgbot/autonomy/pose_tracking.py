@@ -49,7 +49,7 @@ class PoseTracker:
     ) -> Pose | None:
         """The base in the local frame; the belief moves with it. None: it may be anywhere.
 
-        After it was lifted it is looked for near by, and must see walls that are known there.
+        After it was lifted it is looked for near by, and the walls that it sees must be known.
         `is_broken` if odometry has started anew, `is_doubted` if it is not certain for some other
         reason where the robot is.
         """
@@ -58,10 +58,11 @@ class PoseTracker:
         motion = last.odom_base.to(odom_base)
         past.travelled += math.hypot(motion.x, motion.y)
         is_carried = is_broken or self.was_lifted  # perhaps
+        fits = self.maps.fits if is_broken else self.maps.may_fit
         match = self._matched(
             scan, last, motion, is_broken=is_broken, is_doubted=is_doubted or is_broken
         )
-        if is_carried and self.matches_walls and not self.maps.fits(scan, match.local_base):
+        if is_carried and self.matches_walls and not fits(scan, match.local_base):
             return None
         moved = last.local_base.to(match.local_base)
         step = Step(moved, rotated_covariance(match.covariance, moved.theta))

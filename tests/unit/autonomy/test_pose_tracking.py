@@ -1,5 +1,6 @@
 """Where the base is at a look, when odometry is to be trusted and when it is not."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -29,14 +30,24 @@ class Tracked:
         self._keep(Pose(), Pose())
 
     def look(
-        self, odom_base: Pose, local_base: Pose, *, breaks: int = 0, is_doubted: bool = False
+        self,
+        odom_base: Pose,
+        local_base: Pose,
+        *,
+        breaks: int = 0,
+        is_doubted: bool = False,
+        reach: float = math.inf,
     ) -> Pose | None:
-        """Where it finds itself that odometry has at one pose, and the walls at another."""
+        """Where it finds itself that odometry has at one pose, and the walls at another.
+
+        It sees no farther than `reach`, m.
+        """
         for stamp in np.arange(self._stamp, self._stamp + 1.01, 0.2).tolist():
             self.tracker.odometry.append(Odometry(stamp, odom_base, STANDSTILL, breaks))
         self._stamp += 1.0
         is_broken = self.tracker.notice_break()
         scan = replace(sweep(ROOMS, START.compose(local_base)), stamp=self._stamp)
+        scan = replace(scan, ranges=np.where(scan.ranges < reach, scan.ranges, np.inf))
         found = self.tracker.track(
             scan, odom_base, self.past, self.mapper, is_broken=is_broken, is_doubted=is_doubted
         )
@@ -94,6 +105,14 @@ def test_who_sees_no_known_walls_after_it_was_lifted_may_be_anywhere() -> None:
     again = tracked.look(Pose(), Pose(), is_doubted=True)  # it was put back
     assert again is not None
     assert again.distance(Pose()) < 0.05
+
+
+def test_who_sees_hardly_a_wall_after_it_was_lifted_goes_on_by_odometry() -> None:
+    tracked = Tracked()
+    tracked.tracker.was_lifted = True
+    found = tracked.look(Pose(0.1), Pose(0.1), reach=1.0005)
+    assert found is not None
+    assert found.distance(Pose(0.1)) < 0.05
 
 
 def test_who_takes_over_from_another_goes_on_by_its_walls_and_odometry() -> None:
