@@ -36,7 +36,8 @@ _UNLIKELY_M = 0.07  # nearer to the walls must be what is turned as far as it ma
 _SLIPPING = 25.0  # times the covariance of odometry, when the wheels slip
 _LOST = np.diag([0.5**2, 0.5**2, 0.05**2])  # of a base that nobody heard for a while
 _SEEN_SHARE = 0.3  # of the walls must be known to a robot that comes round a corner unseen
-_FITS_M, _FITTING = 0.15, 0.8  # so near to the walls must be that share of a scan's ends
+_FITS_M, _FITTING = 0.15, 0.8  # so near to the walls must be that share of a scan's ends,
+_FITTING_AMONG_PEOPLE = 0.6  # and where people may hide them; elsewhere it is hardly ever half
 
 # full: scans are matched, and vertices are poses. paper: odometry alone between vertices, and a
 # vertex seen again corrects by its position only, as the method was published
@@ -193,21 +194,22 @@ class LocalMaps:
 
     def fits(self, scan: Scan, local_base: Pose) -> bool:
         """Whether a scan from a pose in the local frame shows the walls that are known there."""
-        return self._fits(scan, local_base, self._matching.min_pairs)
+        return self._fits(scan, local_base, self._matching.min_pairs, _FITTING)
 
     def may_fit(self, scan: Scan, local_base: Pose) -> bool:
-        """Whether it does, or shows too little to tell: in the open there may be no walls."""
+        """Whether it may do so: in the open it shows no walls, and among people not all of them."""
         least = self._matching.min_pairs
-        return len(scan.ends) < least or self._fits(scan, local_base, least // 2)
+        seen = len(scan.ends)
+        return seen < least or self._fits(scan, local_base, least // 2, _FITTING_AMONG_PEOPLE)
 
-    def _fits(self, scan: Scan, local_base: Pose, least: int) -> bool:
-        """Whether so many ends of beams or more are where something is known, and walls there."""
+    def _fits(self, scan: Scan, local_base: Pose, least: int, share: float) -> bool:
+        """Whether of `least` ends or more that lie where something is known a share is at walls."""
         ends = local_base.compose(scan.base_laser).transform(scan.ends)
         ends = ends[self.near.known(ends)]
         if not len(self.near.points()) or len(ends) < least:
             return False
         distance = np.asarray(self.near.tree().query(ends)[0])
-        return float((distance < _FITS_M).mean()) >= _FITTING
+        return float((distance < _FITS_M).mean()) >= share
 
     def _drawn(self) -> _Walls:
         """The walls of the near map, and of the far one around it."""

@@ -37,17 +37,20 @@ class Tracked:
         breaks: int = 0,
         is_doubted: bool = False,
         reach: float = math.inf,
+        hidden: float = 0.0,
     ) -> Pose | None:
         """Where it finds itself that odometry has at one pose, and the walls at another.
 
-        It sees no farther than `reach`, m.
+        It sees no farther than `reach`, m, and somebody stands before a share of the walls.
         """
         for stamp in np.arange(self._stamp, self._stamp + 1.01, 0.2).tolist():
             self.tracker.odometry.append(Odometry(stamp, odom_base, STANDSTILL, breaks))
         self._stamp += 1.0
         is_broken = self.tracker.notice_break()
         scan = replace(sweep(ROOMS, START.compose(local_base)), stamp=self._stamp)
-        scan = replace(scan, ranges=np.where(scan.ranges < reach, scan.ranges, np.inf))
+        ranges = np.where(scan.ranges < reach, scan.ranges, np.inf)
+        ranges[: round(hidden * len(ranges))] *= 0.7
+        scan = replace(scan, ranges=ranges)
         found = self.tracker.track(
             scan, odom_base, self.past, self.mapper, is_broken=is_broken, is_doubted=is_doubted
         )
@@ -111,6 +114,14 @@ def test_who_sees_hardly_a_wall_after_it_was_lifted_goes_on_by_odometry() -> Non
     tracked = Tracked()
     tracked.tracker.was_lifted = True
     found = tracked.look(Pose(0.1), Pose(0.1), reach=1.0005)
+    assert found is not None
+    assert found.distance(Pose(0.1)) < 0.05
+
+
+def test_who_is_put_down_among_people_goes_on_by_the_walls_between_them() -> None:
+    tracked = Tracked()
+    tracked.tracker.was_lifted = True
+    found = tracked.look(Pose(0.1), Pose(0.1), hidden=0.25)
     assert found is not None
     assert found.distance(Pose(0.1)) < 0.05
 
