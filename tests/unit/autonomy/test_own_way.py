@@ -44,5 +44,12 @@ def test_it_keeps_off_virtual_walls() -> None:
     assert y == pytest.approx(np.full(len(y), 0.225), abs=0.02)
 
 
+def test_it_ends_before_a_virtual_wall_that_was_driven_over() -> None:
+    wall = resampled(np.array([[-1.5, -2.0], [-1.5, 2.0]]), 0.1)
+    view = replace(VIEW, virtual_walls=wall)
+    track = own_way(np.array([[-0.8, 0.4], [-2.2, 0.4]]), view, [])
+    assert track.polyline[:, 0].min() > -1.5 + 0.1
+
+
 def test_of_no_way_there_is_no_track() -> None:
     assert own_way(np.empty((0, 2)), VIEW, []).polyline.shape == (0, 2)
