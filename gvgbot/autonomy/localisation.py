@@ -38,6 +38,7 @@ _LOST = np.diag([0.5**2, 0.5**2, 0.05**2])  # of a base that nobody heard for a 
 _SEEN_SHARE = 0.3  # of the walls must be known to a robot that comes round a corner unseen
 _FITS_M, _FITTING = 0.15, 0.8  # so near to the walls must be that share of a scan's ends,
 _FITTING_AMONG_PEOPLE = 0.6  # and where people may hide them; elsewhere it is hardly ever half
+_OPEN = 0.25  # where less of all beams hit something, odometry alone may have led it for long
 
 # full: scans are matched, and vertices are poses. paper: odometry alone between vertices, and a
 # vertex seen again corrects by its position only, as the method was published
@@ -198,9 +199,9 @@ class LocalMaps:
 
     def may_fit(self, scan: Scan, local_base: Pose) -> bool:
         """Whether it may do so: in the open it shows no walls, and among people not all of them."""
-        least = self._matching.min_pairs
-        seen = len(scan.ends)
-        return seen < least or self._fits(scan, local_base, least // 2, _FITTING_AMONG_PEOPLE)
+        is_open = len(scan.ends) < _OPEN * len(scan.ranges)
+        least = self._matching.min_pairs // 2
+        return is_open or self._fits(scan, local_base, least, _FITTING_AMONG_PEOPLE)
 
     def _fits(self, scan: Scan, local_base: Pose, least: int, share: float) -> bool:
         """Whether of `least` ends or more that lie where something is known a share is at walls."""

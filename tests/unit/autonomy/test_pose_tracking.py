@@ -118,6 +118,12 @@ def test_who_sees_hardly_a_wall_after_it_was_lifted_goes_on_by_odometry() -> Non
     assert found.distance(Pose(0.1)) < 0.05
 
 
+def test_few_walls_in_the_open_are_no_reason_to_stand_after_a_lift() -> None:
+    tracked = Tracked()
+    tracked.tracker.was_lifted = True
+    assert tracked.look(Pose(), Pose(3.0, 3.0), reach=0.6) is not None
+
+
 def test_who_is_put_down_among_people_goes_on_by_the_walls_between_them() -> None:
     tracked = Tracked()
     tracked.tracker.was_lifted = True
