@@ -76,28 +76,31 @@ def explore(
 
 
 async def explore_once(session: Session, progress: Progress) -> None:
-    """Explore with the twins until there is an outcome, or no more time.
+    """Explore with the twins until there is an outcome, no more time, or nothing that it knows.
 
     The robot stands while a device is away; what is missing at the end is the session's failure.
     """
     assert session.place is not None
-    clock = LoopClock()
+    clock, pipeline = LoopClock(), session.pipeline
     session.simulation = Simulation(session.config, session.place, clock)
     devices = Devices(Links(session.config, clock, session.simulation, session.tap))
 
     def on_cycle(odometry: Odometry) -> None:
         session.on_cycle(odometry, devices.base.contact)
-        progress.show(session.pipeline, odometry.stamp)
+        progress.show(pipeline, odometry.stamp)
 
     session.failure = await drive(
         session.config.robot,
         devices,
-        session.pipeline,
+        pipeline,
         on_events=session.on_events,
         on_cycle=on_cycle,
         log=session.recorder,
+        goes_on=lambda: pipeline.mission.outcome is None and not pipeline.errands.is_carried,
         limit_s=session.config.twin.time_limit_s,
     )
+    if pipeline.errands.is_carried:  # nobody is there to resume it
+        session.failure = "no walls that it knows are around it: it may have been carried"
 
 
 def _conclude(session: Session, say: Callable[[str], None]) -> int:

@@ -19,6 +19,7 @@ from PIL import Image
 from scipy.stats import chi2
 
 from benchmarks.score_run import score_run
+from gvgbot.autonomy.localisation import LocalMaps
 from gvgbot.cli import main
 from gvgbot.drivers.world import World, save_world
 from gvgbot.geometry import Array, Pose
@@ -368,3 +369,16 @@ def test_an_exploration_that_the_disk_ends_says_so_and_leaves_a_map(
     assert summary["outcome"] == "failed"
     assert "No space left on device" in summary["reason"]
     assert (run.path / "map.geojson").exists()
+
+
+def test_who_may_be_anywhere_after_a_lift_has_failed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Nobody is there who could ask it to resume."""
+    monkeypatch.setattr(LocalMaps, "may_fit", lambda *_: False)
+    drops = "twin.base.mishaps.wheel_drops_per_h=600"
+    assert main(["explore", "--set", drops, "--out", str(tmp_path / "run")]) == 1
+    assert "failed: no walls that it knows are around it" in capsys.readouterr().err
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert summary["outcome"] == "failed"
+    assert summary["duration_s"] < 120.0
