@@ -46,6 +46,8 @@ _LARGEST_MESSAGE = 16 * 2**20  # bytes that may come at once: more could fill th
 _STRAYS = 30  # states of another robot by the same name, three seconds, before that is said
 _LONGEST_NAME = 80  # bytes of who asks
 _MISSES = zenoh.ext.MissDetectionConfig(heartbeat=HEARTBEAT, sporadic_heartbeat=None)
+# Each sample says who has sent it: its time may be a router's, if the two clocks do not agree.
+_NUMBERED = zenoh.ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=None)
 _PRIORITIES = {
     "interactive_high": zenoh.Priority.INTERACTIVE_HIGH,
     "data_high": zenoh.Priority.DATA_HIGH,
@@ -98,7 +100,7 @@ class Telemetry:
             congestion_control=zenoh.CongestionControl.DROP,
             priority=_PRIORITIES[topic.priority],
             cache=zenoh.ext.CacheConfig(topic.history),
-            sample_miss_detection=_MISSES if topic.on_change else None,
+            sample_miss_detection=_MISSES if topic.on_change else _NUMBERED,
             publisher_detection=True,
         )
 

@@ -294,10 +294,10 @@ class Robot:
         Unless the one before that speaks again, as when two robots have one name. And tell a router
         from a robot that is one for its team.
         """
-        if self._session is None or sample.timestamp is None:
+        if self._session is None or sample.source_info is None:
             return
         with self._life_gate:
-            life = str(sample.timestamp.get_id())
+            life = str(sample.source_info.source_id.zid)
             if life == self._life:
                 return
             earlier, said = self._earlier

@@ -15,6 +15,7 @@ import zlib
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack
 from itertools import permutations
+from pathlib import Path
 from socket import create_server
 from threading import Event as Flag
 
@@ -690,6 +691,27 @@ def test_two_robots_of_one_name_say_so_once(endpoint: str, relays: tuple[bool, b
     assert [log["event"] for log in logs] == [
         "another robot has this name; give one another robot.name"
     ] * 2
+
+
+def test_what_a_router_puts_its_own_time_on_is_known_to_be_the_robot_s(
+    endpoint: str, tmp_path: Path
+) -> None:
+    """A router does so if the robot's clock is ahead of its own by more than half a second."""
+    file = tmp_path / "no_time.json5"
+    file.write_text("{timestamping: {enabled: false}}")
+    config = TelemetryConfig(listen=(free_endpoint(),), connect=(endpoint,), zenoh_file=file)
+    with router(endpoint) as between, client.connect("near", endpoint) as seen:
+        with Telemetry(config, "near") as robot:
+            robot.publish(numbered(1))
+            robot.publish(A_MAP)
+            until(lambda: seen.map().latest == A_MAP)
+            assert seen.life == robot.zid
+        with Telemetry(config, "near") as again:
+            again.publish(numbered(2))
+            until(lambda: seen.state().latest == numbered(2))
+            assert (seen.life, seen.map().latest) == (again.zid, None)
+            between.close()
+            until(lambda: seen.presence.word == "cut off")
 
 
 def test_a_router_in_between_may_come_and_go(endpoint: str) -> None:
