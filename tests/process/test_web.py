@@ -768,6 +768,16 @@ def test_all_layers_and_a_short_word_on_a_vertex_find_room_on_a_phone(page: Page
             play.until("document.querySelector('#place').hidden")
 
 
+def test_the_whole_map_is_seen_on_a_small_phone_that_lies_on_its_side(page: Page) -> None:
+    endpoint = free_endpoint()
+    with web("--connect", endpoint) as address:
+        play = Play(endpoint, page)
+        with play.robot:
+            page.open(address, 568, 240, phone=True, dark=False)
+            assert page.look("document.querySelector('#sheet').offsetHeight") < 80
+            play.until("parseFloat(document.querySelector('#scale-bar').style.width) >= 60")
+
+
 def test_two_fingers_zoom_on_a_phone(page: Page) -> None:
     """The last on a phone: of what is touched later, the browser tells a page the clicks alone."""
     endpoint = free_endpoint()

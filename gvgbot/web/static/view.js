@@ -32,11 +32,12 @@ export class View {
   fit(box) {
     const [left, bottom, right, top] = box;
     const wide = (this.width - 2 * MARGIN) / Math.max(right - left, 4);
-    const high = (this.height - MARGIN - BUTTONS) / Math.max(top - bottom, 4);
+    const below = Math.min(BUTTONS, (this.height - MARGIN) / 2); // in a low window it lies under the buttons
+    const high = (this.height - MARGIN - below) / Math.max(top - bottom, 4);
     this.scale = clamp(Math.min(wide, high), 0);
     this.least = Math.min(LEAST, this.scale);
     this.x = (left + right) / 2;
-    this.y = (bottom + top) / 2 - (BUTTONS - MARGIN) / 2 / this.scale;
+    this.y = (bottom + top) / 2 - (below - MARGIN) / 2 / this.scale;
   }
 
   zoom(factor, px = this.width / 2, py = this.height / 2) {
