@@ -768,6 +768,22 @@ def test_all_layers_and_a_short_word_on_a_vertex_find_room_on_a_phone(page: Page
             play.until("document.querySelector('#place').hidden")
 
 
+def test_a_browser_that_may_keep_nothing_shows_the_robot_too(page: Page) -> None:
+    """Reading the storage raises an error where a person has forbidden it to all pages."""
+    refused = "Object.defineProperty(window, 'localStorage', {get() { throw new DOMException() }})"
+    endpoint = free_endpoint()
+    script = page.do("Page.addScriptToEvaluateOnNewDocument", source=refused)
+    with web("--connect", endpoint) as address:
+        play = Play(endpoint, page)
+        with play.robot:
+            desktop(page, address)
+            play.until_read("vertex 1, 0°: ear")
+            page.click("#theme")
+            play.until_read("theme: dark")
+            assert page.complaints == []
+    page.do("Page.removeScriptToEvaluateOnNewDocument", identifier=script["identifier"])
+
+
 def test_the_whole_map_is_seen_on_a_small_phone_that_lies_on_its_side(page: Page) -> None:
     endpoint = free_endpoint()
     with web("--connect", endpoint) as address:

@@ -197,8 +197,12 @@ function follow() {
 function setTheme(name) {
   document.documentElement.dataset.theme = name;
   $("theme").textContent = `theme: ${name}`;
-  localStorage.setItem("theme", name);
+  try { localStorage.setItem("theme", name); } catch { /* a browser that may not keep anything */ }
   readColours();
+}
+
+function themeBefore() {
+  try { return localStorage.getItem("theme"); } catch { return null; }
 }
 
 function readColours() {
@@ -234,5 +238,5 @@ document.addEventListener("keydown", (event) => {
 });
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", readColours);
 new ResizeObserver(redraw).observe($("map"));
-setTheme(THEMES.includes(localStorage.getItem("theme")) ? localStorage.getItem("theme") : "system");
+setTheme(THEMES.find((name) => name === themeBefore()) ?? "system");
 requestAnimationFrame(frame);
