@@ -784,6 +784,24 @@ def test_a_browser_that_may_keep_nothing_shows_the_robot_too(page: Page) -> None
     page.do("Page.removeScriptToEvaluateOnNewDocument", identifier=script["identifier"])
 
 
+def test_the_button_that_opens_a_menu_neither_moves_the_map_nor_marks_a_place(page: Page) -> None:
+    endpoint = free_endpoint()
+    with web("--connect", endpoint) as address:
+        play = Play(endpoint, page)
+        with play.robot:
+            desktop(page, address)
+            play.drawn()
+            before = stretch(page, "robot")[0]
+            x, y = page.middle("#map")
+            page.mouse("mousePressed", x, y, button="right", clickCount=1)
+            page.mouse("mouseMoved", x - 40, y + 30)  # the menu has kept the end
+            play.drawn()
+            assert stretch(page, "robot")[0] == pytest.approx(before, abs=1)
+            page.mouse("mouseReleased", x, y, button="right", clickCount=1)
+            play.drawn()
+            assert page.look("document.querySelector('#place').hidden")
+
+
 def test_the_whole_map_is_seen_on_a_small_phone_that_lies_on_its_side(page: Page) -> None:
     endpoint = free_endpoint()
     with web("--connect", endpoint) as address:

@@ -62,6 +62,7 @@ export class View {
       this.zoom(Math.exp(-0.0015 * pixels * (event.ctrlKey ? 5 : 1)), ...here(event));
     }, { passive: false });
     canvas.addEventListener("pointerdown", (event) => {
+      if (event.button !== 0) return; // it opens a menu, which may keep the end of it
       canvas.setPointerCapture(event.pointerId);
       this.fingers.set(event.pointerId, here(event));
       this.path = this.fingers.size === 1 ? 0 : Infinity; // two fingers never tap
