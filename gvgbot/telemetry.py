@@ -2,8 +2,11 @@
 
 import asyncio
 import contextlib
+import threading
 from collections import deque
 from collections.abc import Awaitable, Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Self
 
@@ -43,6 +46,7 @@ _WAITING_REQUESTS, _WAITING_REFUSALS, _WAITING_STOPS = 8, 1000, 2000
 _CROWDED = Answer(done=False, text="too many requests wait: ask again")
 _MAX_SESSIONS = 32
 _LARGEST_MESSAGE = 16 * 2**20  # bytes that may come at once: more could fill the memory
+_PARTING_S = 1.0  # that what was said last may take
 _STRAYS = 30  # states of another robot by the same name, three seconds, before that is said
 _LONGEST_NAME = 80  # bytes of who asks
 _MISSES = zenoh.ext.MissDetectionConfig(heartbeat=HEARTBEAT, sporadic_heartbeat=None)
@@ -72,6 +76,9 @@ class Telemetry:
         """
         self.failures = 0  # samples that could not be sent
         self._latest: dict[Topic, Payload] = {}
+        self._sender = ThreadPoolExecutor(1, "sender")
+        self._unsent: dict[str, Callable[[], None]] = {}  # the newest of each topic
+        self._gate = threading.Lock()
         self._robot, self._strays = robot, 0  # states of another robot by this name
         settings = _session_config(config, relays=relays)
         self.addresses = ", ".join(addresses(settings, "listen"))  # perhaps those of a file
@@ -118,20 +125,35 @@ class Telemetry:
         """
         topic, publisher = self._publishers[type(value)]
         self._latest[topic] = value if latest is None else latest
-        try:
-            publisher.put(msgspec.msgpack.encode(value))
-        except zenoh.ZError:
-            self.failures += 1
+        self._send(topic.name, partial(publisher.put, msgspec.msgpack.encode(value)))
 
     def tell_team(self, part: TeamPart, data: bytes) -> None:
         """Send to the other robots, without waiting, and without complaining if it fails.
 
         Of each part they may get the newest only.
         """
+        key = team_key(self._robot, part)
+        drop = zenoh.CongestionControl.DROP
+        self._send(part, partial(self._session.put, key, data, congestion_control=drop))
+
+    def _send(self, name: str, put: Callable[[], None]) -> None:
+        """Let a thread send the newest of a topic.
+
+        An answer on its way to somebody who does not read holds up for seconds whatever else is
+        sent there, also what is dropped rather than waits.
+        """
+        with self._gate:
+            is_due = name not in self._unsent
+            self._unsent[name] = put
+        if is_due:
+            with contextlib.suppress(RuntimeError):  # closed meanwhile
+                self._sender.submit(self._send_newest, name)
+
+    def _send_newest(self, name: str) -> None:
+        with self._gate:
+            put = self._unsent.pop(name)
         try:
-            self._session.put(
-                team_key(self._robot, part), data, congestion_control=zenoh.CongestionControl.DROP
-            )
+            put()
         except zenoh.ZError:
             self.failures += 1
 
@@ -244,18 +266,20 @@ class Telemetry:
                     while waiting:
                         query, key, handler = waiting.popleft()
                         if "*" in key:
-                            query.drop()
+                            tasks.create_task(asyncio.to_thread(query.drop))
                         else:  # one that takes long must not hold up the next
                             tasks.create_task(self._put(query, key, handler))
 
     async def _put(self, query: zenoh.Query, key: str, handle: Handle) -> None:
-        with query:
-            answer = await handle(_asked(query, key))
-            await asyncio.to_thread(_tell, query, key, answer)
+        answer = await handle(_asked(query, key))
+        await asyncio.to_thread(_tell, query, key, answer)
 
     def close(self) -> None:
-        """Leave the network."""
+        """Leave the network, after what was said last."""
+        with contextlib.suppress(TimeoutError, RuntimeError):  # nobody reads, or it is closed
+            self._sender.submit(lambda: None).result(_PARTING_S)
         self._session.close()
+        self._sender.shutdown(wait=False)
 
     def __enter__(self) -> Self:
         return self
@@ -288,7 +312,7 @@ def _tell(query: zenoh.Query, key: str, answer: Answer) -> None:
     is_json = query.encoding is not None and str(query.encoding).startswith(JSON)
     encode = msgspec.json.encode if is_json else msgspec.msgpack.encode
     encoding = zenoh.Encoding(JSON if is_json else MESSAGEPACK)
-    with contextlib.suppress(zenoh.ZError):  # who asked may have gone
+    with query, contextlib.suppress(zenoh.ZError):  # who asked may have gone
         if answer.done:
             query.reply(key, encode(answer), encoding=encoding)
         else:

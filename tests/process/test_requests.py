@@ -21,6 +21,7 @@ from gvgbot.errors import GvgbotError
 from gvgbot.requests import Answer, Asked, Goto, Patrol, Set, parse
 from gvgbot.telemetry import Telemetry
 from gvgbot.telemetry_config import TelemetryConfig
+from gvgbot.topics import Events
 from tests.unit.test_telemetry import EXAMPLE
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(60)]
@@ -273,6 +274,18 @@ def test_who_asks_can_name_itself_but_not_flood_the_log(endpoint: str) -> None:
     assert origins[3] == "somebody"
 
 
+NO_EVENTS = Events(events=())
+DEAF = """
+import sys, time, zenoh
+from benchmarks.rigs.addresses import plain_session
+with plain_session(sys.argv[1]) as session:
+    session.declare_subscriber("gvgbot/near/**", lambda sample: time.sleep(60))
+    print("there", flush=True)
+    while True:
+        for key in ("state?format=json", "ctl/pause"):
+            session.get(f"gvgbot/near/{key}", lambda reply: time.sleep(60), timeout=60.0)
+        time.sleep(0.002)
+"""
 WATCHER = """
 import sys, zenoh
 from gvgbot import client
@@ -397,6 +410,35 @@ def test_a_watcher_that_hangs_holds_up_no_request(endpoint: str) -> None:
                     assert seen.pause().result() == "does pause"
 
     asyncio.run(story())
+
+
+def test_who_asks_over_and_over_and_reads_no_answer_does_not_hold_up_the_robot(
+    endpoint: str,
+) -> None:
+    big = msgspec.structs.replace(EXAMPLE, reason="x" * 400_000)
+
+    async def longest_s(robot: Telemetry) -> float:
+        """The longest that a turn of the loop takes in some seconds."""
+        loop, longest = asyncio.get_running_loop(), 0.0
+        end = loop.time() + 10.0
+        while (begun := loop.time()) < end:
+            robot.publish(NO_EVENTS)  # as important as the answers
+            await asyncio.sleep(0.02)
+            longest = max(longest, loop.time() - begun)
+        return longest
+
+    async def story() -> float:
+        with Telemetry(TelemetryConfig(listen=(endpoint,)), "near") as robot:
+            robot.publish(big)
+            async with asyncio.TaskGroup() as tasks:
+                serving = [tasks.create_task(one) for one in (robot.answer(), robot.hear(obliging))]
+                with program(DEAF, endpoint):
+                    longest = await longest_s(robot)
+                for task in serving:
+                    task.cancel()
+                return longest
+
+    assert asyncio.run(story()) < 2.0
 
 
 def test_a_robot_that_dies_over_a_request_is_noticed(endpoint: str) -> None:
