@@ -37,6 +37,7 @@ from gvgbot.autonomy.pose_tracking import PoseTracker
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
 from gvgbot.autonomy.traffic import Traffic
 from gvgbot.autonomy.views import Correspondence, View, touching
+from gvgbot.autonomy.virtual_walls import SPACING_M
 from gvgbot.geometry import STANDSTILL, Array, Pose, Twist, sampled, wrap_angle
 from gvgbot.hal.deskew import deskewed
 from gvgbot.hal.messages import Odometry, Scan
@@ -89,7 +90,7 @@ class Pipeline:
         )
         self._reflexes = Reflexes(config.reflexes)
         self._hazards = Hazards(config.hazards)
-        self.virtual_walls = sampled(config.virtual_walls, config.local_map.cell_m)  # map frame
+        self.virtual_walls = sampled(config.virtual_walls, SPACING_M)  # points, map frame
         self._walls_near = np.empty((0, 2))  # those in reach at the last look, local frame
         self.traffic = Traffic(config.newcomers)
         self._incidents: list[tuple[str, str]] = []  # action and reason, since the last scan

@@ -6,6 +6,7 @@ from typing import Annotated
 from gvgbot.ranges import Range
 
 Coordinate = Annotated[float, Range(-1e4, 1e4)]  # m, map frame
+SPACING_M = 0.1  # of the points that stand for a wall: no robot fits between two
 VirtualWall = tuple[tuple[Coordinate, Coordinate], ...]  # from corner to corner
 
 
