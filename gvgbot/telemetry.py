@@ -47,6 +47,7 @@ _CROWDED = Answer(done=False, text="too many requests wait: ask again")
 _MAX_SESSIONS = 32
 _LARGEST_MESSAGE = 16 * 2**20  # bytes that may come at once: more could fill the memory
 _PARTING_S = 1.0  # that what was said last may take
+_ANSWERERS = 8  # threads, of which somebody who does not read may hold up one for seconds
 _STRAYS = 30  # states of another robot by the same name, three seconds, before that is said
 _LONGEST_NAME = 80  # bytes of who asks
 _MISSES = zenoh.ext.MissDetectionConfig(heartbeat=HEARTBEAT, sporadic_heartbeat=None)
@@ -77,6 +78,7 @@ class Telemetry:
         self.failures = 0  # samples that could not be sent
         self._latest: dict[Topic, Payload] = {}
         self._sender = ThreadPoolExecutor(1, "sender")
+        self._answerers = ThreadPoolExecutor(_ANSWERERS, "answers")
         self._unsent: dict[str, Callable[[], None]] = {}  # the newest of each topic
         self._gate = threading.Lock()
         self._robot, self._strays = robot, 0  # states of another robot by this name
@@ -217,7 +219,7 @@ class Telemetry:
                 await arrived.wait()
                 arrived.clear()
                 # a frozen asker can block a reply, so the loop stays out of it
-                await asyncio.to_thread(self._reply_to_all, waiting)
+                await self._aside(self._reply_to_all, waiting)
 
     def _note_stray(self) -> None:
         self._strays += 1
@@ -266,13 +268,17 @@ class Telemetry:
                     while waiting:
                         query, key, handler = waiting.popleft()
                         if "*" in key:
-                            tasks.create_task(asyncio.to_thread(query.drop))
+                            self._aside(query.drop)
                         else:  # one that takes long must not hold up the next
                             tasks.create_task(self._put(query, key, handler))
 
     async def _put(self, query: zenoh.Query, key: str, handle: Handle) -> None:
         answer = await handle(_asked(query, key))
-        await asyncio.to_thread(_tell, query, key, answer)
+        await self._aside(_tell, query, key, answer)
+
+    def _aside(self, function: Callable[..., None], *arguments: object) -> asyncio.Future[None]:
+        """Let a thread do what may wait for an asker, beside those that save and draw the map."""
+        return asyncio.get_running_loop().run_in_executor(self._answerers, function, *arguments)
 
     def close(self) -> None:
         """Leave the network, after what was said last."""
@@ -280,6 +286,7 @@ class Telemetry:
             self._sender.submit(lambda: None).result(_PARTING_S)
         self._session.close()
         self._sender.shutdown(wait=False)
+        self._answerers.shutdown(wait=False, cancel_futures=True)
 
     def __enter__(self) -> Self:
         return self
