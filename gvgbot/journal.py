@@ -82,26 +82,27 @@ class GuardJournal:
 class BatteryJournal:
     """Says once that the battery is low, and once that it is empty, until it is charged again."""
 
+    calls_home: bool = False  # it was told of, and not charged since; whoever heeds it resets it
     _said: float = 1.0  # the charge below which it was said
     _since: float | None = None  # stamp; since when it is lower than what was said last
 
-    def note(self, battery: Battery | None, stamp: float) -> bool:
-        """Take note of the state of the battery at a stamp, s; whether that was told of."""
+    def note(self, battery: Battery | None, stamp: float) -> None:
+        """Take note of the state of the battery at a stamp, s."""
         if battery is None:
-            return False
+            return
+        self.calls_home &= not battery.charging
         if battery.charging or battery.fraction > CHARGED:
             self._said = 1.0
         level = EMPTY_BATTERY if battery.fraction < EMPTY_BATTERY else LOW_BATTERY
         if battery.charging or not battery.fraction < level < self._said:
             self._since = None
-            return False
+            return
         self._since = stamp if self._since is None else self._since
         if stamp - self._since < SAGGING_S:
-            return False
-        self._said = level
+            return
+        self._said, self.calls_home = level, True
         what = "battery empty" if level == EMPTY_BATTERY else "battery low"
         log.warning(what, volts=round(battery.voltage, 1), remedy="charge it")
-        return True
 
 
 def status_line(state: State) -> str:

@@ -75,6 +75,12 @@ class Driver(Protocol):
 class Robot:
     """One exploration as a daemon. `off_loop` runs a function that takes long, and waits for it."""
 
+    _clock: Clock
+    _vitals: Vitals
+    _devices: Devices
+    _loop: Loop
+    _steering: Steering
+
     def __init__(
         self,
         session: Session,
@@ -120,14 +126,8 @@ class Robot:
             rate_hz = session.config.telemetry.scan_rate_hz
             self._feed = LiveFeed(network, session.pipeline, rate_hz)
         self._guard, self._battery = GuardJournal(), BatteryJournal()
-        self._is_called_home = False  # by a low battery, and has not begun to drive there
         self._healths = Pace(HEALTH.rate_hz)
         self._ros: LiveRos | None = None
-        self._clock: Clock
-        self._vitals: Vitals
-        self._devices: Devices
-        self._loop: Loop
-        self._steering: Steering
 
     # -- the tasks ---------------------------------------------------------------------------------
 
@@ -357,21 +357,13 @@ class Robot:
             if happened is not None:
                 self._network.publish(happened)
         self._notifier.status(status_line(now))
-        self._heed_battery(now.stamp)
+        self._battery.note(self._devices.base.battery, now.stamp)
+        if self._battery.calls_home and self._session.config.service.home_when_low:
+            self._battery.calls_home = not self._steering.go_home("low battery")
         self._devices.base.show(sign(now, is_lost=self._pipeline.is_lost))
         stuck = now.cycle_age is not None and now.cycle_age > STUCK_AFTER
         if not stuck or self._devices.base.away is not None:
             self._notifier.alive()
-
-    def _heed_battery(self, stamp: float) -> None:
-        """Tell of a low battery, and go home because of it, once the robot knows its place."""
-        battery = self._devices.base.battery
-        if self._battery.note(battery, stamp):
-            self._is_called_home = self._session.config.service.home_when_low
-        elif battery is not None and battery.charging:
-            self._is_called_home = False
-        if self._is_called_home:
-            self._is_called_home = not self._steering.go_home("low battery")
 
     def _health(self, network: Network, now: State) -> Health:
         return self._vitals.health(

@@ -45,16 +45,14 @@ def state(
     """The state at `stamp`; `odometry` is the last control cycle's, `away` says what is missing."""
     mission, graph, map_base = pipeline.mission, pipeline.mapper.graph, pipeline.map_base
     twist = STANDSTILL if odometry is None else odometry.twist
-    phase = _phase(pipeline, away)
     return State(
         stamp=stamp,
         sequence=sequence,
         cycles=cycles,
         cycle_age=None if odometry is None else stamp - odometry.stamp,
-        phase=phase,
+        phase=_phase(pipeline, away),
         outcome=mission.outcome,
-        # of a robot on an errand, the mission's is how the exploration ended
-        reason=(phase != "halted" and mission.reason) or away or "",
+        reason=_reason(pipeline, away),
         errand=pipeline.errands.progress,
         requests=requests,
         team=tuple(
@@ -76,6 +74,12 @@ def state(
         laser=laser,
         base=base,
     )
+
+
+def _reason(pipeline: Pipeline, away: str | None) -> str:
+    """Why it is as it is; where a device is away, the mission's may be how exploring ended."""
+    is_halted = _phase(pipeline, away) == "halted"
+    return (not is_halted and pipeline.mission.reason) or away or ""
 
 
 def _phase(pipeline: Pipeline, away: str | None) -> Phase:

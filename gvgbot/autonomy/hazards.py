@@ -1,4 +1,4 @@
-"""What was felt but not seen: obstacles in the local frame that only the planner knows of."""
+"""What was felt or forbidden but not seen: obstacles that only the planner knows of."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -38,11 +38,12 @@ class Hazard:
 
 
 class Hazards:
-    """Obstacles that were felt."""
+    """Obstacles that were felt, and virtual walls."""
 
     def __init__(self, config: HazardConfig) -> None:
         self._config = config
         self._all: list[Hazard] = []
+        self.virtual_walls = np.empty((0, 2))  # points of those in reach, local frame
 
     def add(
         self,
@@ -75,8 +76,8 @@ class Hazards:
 
     @property
     def points(self) -> Array:
-        """All of them (N, 2), local frame."""
-        return np.concatenate([np.empty((0, 2)), *(h.points for h in self._all)])
+        """All of them (N, 2), local frame, virtual walls as well."""
+        return np.concatenate([*(h.points for h in self._all), self.virtual_walls])
 
     @property
     def doubtful(self) -> Array:

@@ -213,7 +213,6 @@ class Mapper(MapEdits):
 
         What sends lone echoes may be glass: an edge beside that is believed when it was driven.
         """
-        glass = view.local_map.suspects()
         for key, edge in view.gvg.edges.items():
             a = known.half_edge_of.get(Branch(key, forward=True))
             b = known.half_edge_of.get(Branch(key, forward=False))
@@ -223,7 +222,7 @@ class Mapper(MapEdits):
             if self._drive_dead_ends and self._is_far_end(view, edge):
                 continue
             if here is None and there is None:
-                if not touches(edge, glass):
+                if not touches(edge, view.local_map.suspects()):
                     self.join(view, a, b, edge.polyline, float(edge.clearance.min()), driven=False)
             elif here is there or self._is_one_between(known, a, b):
                 for edge_seen in filter(None, (here, there)):

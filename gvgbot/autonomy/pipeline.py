@@ -10,6 +10,7 @@ from gvgbot.autonomy.control.execution import Execution
 from gvgbot.autonomy.control.orders import Drive, Stand
 from gvgbot.autonomy.control.reflexes import (
     AWAY_M,
+    LONGEST_GAP_S,
     WAITS,
     Felt,
     Held,
@@ -37,8 +38,8 @@ from gvgbot.autonomy.pose_tracking import PoseTracker
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
 from gvgbot.autonomy.traffic import Traffic
 from gvgbot.autonomy.views import Correspondence, View, touching
-from gvgbot.autonomy.virtual_walls import SPACING_M
-from gvgbot.geometry import STANDSTILL, Array, Pose, Twist, sampled, wrap_angle
+from gvgbot.autonomy.virtual_walls import points_of
+from gvgbot.geometry import STANDSTILL, Array, Pose, Twist, wrap_angle
 from gvgbot.hal.deskew import deskewed
 from gvgbot.hal.messages import Odometry, Scan
 
@@ -49,7 +50,6 @@ _LOOKS_ASIDE = (
 )
 _CANNOT_TURN = "go on without a look around", "the base does not turn"
 _ROOM_BESIDE_EDGES_M = 0.08  # on each side, where no edge leads
-_LONGEST_GAP_S = 2.0  # between keyframes or cycles; a longer one is an outage of a device
 _SEARCHES_NEAR_BY = "look for its place near by", "the base has started anew"
 STANDS_CARRIED = (
     "stand until it is asked to resume",
@@ -90,8 +90,7 @@ class Pipeline:
         )
         self._reflexes = Reflexes(config.reflexes)
         self._hazards = Hazards(config.hazards)
-        self.virtual_walls = sampled(config.virtual_walls, SPACING_M)  # points, map frame
-        self._walls_near = np.empty((0, 2))  # those in reach at the last look, local frame
+        self.virtual_walls = points_of(config.virtual_walls)  # map frame
         self.traffic = Traffic(config.newcomers)
         self._incidents: list[tuple[str, str]] = []  # action and reason, since the last scan
         self._look_now = False
@@ -172,7 +171,7 @@ class Pipeline:
             self.tracker.maps.catch_up()
             return happened
         if self.past.last is not None:
-            self.mission.skip(max(0.0, scan.stamp - self.past.last.stamp - _LONGEST_GAP_S))
+            self.mission.skip(max(0.0, scan.stamp - self.past.last.stamp - LONGEST_GAP_S))
         scan = deskewed(without_mixed_pixels(scan), self.tracker.odometry.motion_during(scan))
         local_base = self._localise(scan, odom_base)
         if local_base is None:
@@ -211,7 +210,8 @@ class Pipeline:
         self.open_clearance = self._config.reduction.open_clearance(
             scan.range_max, self._config.local_map.half_width_m
         )
-        self._walls_near = self._virtual_near(local_base)
+        virtual = self.mapper.map_in_local(local_base).transform(self.virtual_walls)
+        self._hazards.virtual_walls = virtual[self.tracker.maps.near.covers(virtual)]
         self.gvg, marks = self.mapper.marked(self._local_gvg(local_base), local_base)
         hazards, suspects = self._hazards.doubtful, self.tracker.maps.near.suspects()
         doubtful = np.concatenate([hazards, suspects, *self.traffic.standing])
@@ -231,7 +231,7 @@ class Pipeline:
             marks,
             self.traffic.newcomers.is_one_standing(scan.stamp, self.tracker.maps.near),
             scan.field_of_view,
-            self._walls_near,
+            self._hazards.virtual_walls,
         )
 
     def _act(self, view: View, known: Correspondence, scan: Scan) -> list[Event]:
@@ -265,16 +265,10 @@ class Pipeline:
             min_clearance=self._needed_m,
             roughness=reduction.roughness_m,
             open_clearance=self.open_clearance,
-            felt=np.concatenate([self._hazards.points, *self.traffic.in_the_way, self._walls_near]),
+            felt=np.concatenate([self._hazards.points, *self.traffic.in_the_way]),
         )
         known = self.mapper.known_around(local_base, half_width)
         return reduce_graph(fine, reduction, known).rings_cut_far_from(local_base.position)
-
-    def _virtual_near(self, local_base: Pose) -> Array:
-        """The points (N, 2) of virtual walls in reach of the local map, local frame."""
-        points = self.mapper.map_in_local(local_base).transform(self.virtual_walls)
-        away = np.abs(points - local_base.position).max(axis=1, initial=0.0)
-        return np.asarray(points[away < self._config.local_map.half_width_m])
 
     def _worth_a_look(self, scan: Scan, odom_base: Pose) -> bool:
         """Whether the robot is about something, and has come on, turned or waited enough."""
@@ -334,7 +328,7 @@ class Pipeline:
             turned = wrap_angle(odometry.odom_base.theta - before.odom_base.theta)
             since_s = odometry.stamp - before.stamp
             is_free = not self._is_idle and felt.stopped_for not in WAITS
-            counts = is_free and since_s < _LONGEST_GAP_S
+            counts = is_free and since_s < LONGEST_GAP_S
             self._execution.note_turn(turned, since_s if counts else 0.0)
         self.tracker.odometry.append(odometry)
         if self.past.last is None or self.led:
@@ -374,9 +368,7 @@ class Pipeline:
         """How far the robot can go straight at a bearing over what it knows to be free, m."""
         turned = Pose(local_base.x, local_base.y, local_base.theta + bearing)
         farthest = max(AWAY_M, self._config.reflexes.back_off_m)
-        others = np.concatenate(
-            [self.traffic.newcomers.points, self._hazards.points, self._walls_near]
-        )
+        others = np.concatenate([self.traffic.newcomers.points, self._hazards.points])
         margin = self._config.passage_margin_m
         return room_ahead(
             self.tracker.maps.near, others, turned, farthest, radius=self.radius, margin=margin

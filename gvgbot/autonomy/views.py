@@ -33,13 +33,16 @@ class View:
     is_somebody_found: bool = False  # who will be let into the map if he stays
     field_of_view: tuple[float, float] = (-math.pi, math.pi)  # rad, base frame
     virtual_walls: Array = field(default_factory=lambda: np.empty((0, 2)))  # points (N, 2)
+    _obstacles: list[cKDTree] = field(default_factory=list, init=False)  # once they were asked for
 
     def obstacles(self) -> cKDTree:
         """To find the nearest of all that it must not drive into: walls, virtual ones too."""
         if not len(self.virtual_walls):
             return self.local_map.tree()
-        walls = np.concatenate([self.local_map.points(), self.virtual_walls])
-        return cKDTree(walls, balanced_tree=False)
+        if not self._obstacles:
+            walls = np.concatenate([self.local_map.points(), self.virtual_walls])
+            self._obstacles.append(cKDTree(walls, balanced_tree=False))
+        return self._obstacles[0]
 
     def is_doubtful(self, place: Array, within_m: float) -> bool:
         """Whether something that may go stands so near to a place (2,)."""

@@ -7,8 +7,8 @@ import pytest
 
 from gvgbot.autonomy.events import ErrandEnded
 from gvgbot.autonomy.exploration.config import ExplorationConfig
-from gvgbot.autonomy.virtual_walls import VirtualWall
-from gvgbot.geometry import Pose, sampled
+from gvgbot.autonomy.virtual_walls import VirtualWall, points_of
+from gvgbot.geometry import Pose
 from tests.scenarios.rig import (
     NEAR,
     ROBOT_RADIUS,
@@ -73,7 +73,7 @@ def test_on_a_known_map_it_is_a_door_that_is_shut() -> None:
 
     async def story(run: Play) -> None:
         await run.until(lambda: run.pipeline.mission.outcome is not None)
-        run.pipeline.virtual_walls = sampled([ARM], 0.1)
+        run.pipeline.virtual_walls = points_of([ARM])
         for place in (far, START.inverse().transform(np.array([2.5, 0.0]))):
             run.truth.clear()
             run.pipeline.errands.goto_point(float(place[0]), float(place[1]), run.clock.now())

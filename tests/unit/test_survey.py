@@ -11,10 +11,11 @@ from gvgbot.autonomy.ending import Surveyed
 from gvgbot.autonomy.localisation import Localisation
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.ekf import Belief
+from gvgbot.autonomy.virtual_walls import points_of
 from gvgbot.beside_loop import BesideLoop
 from gvgbot.config import load_config
 from gvgbot.drivers.world import World
-from gvgbot.geometry import STANDSTILL, Array, Pose, sampled
+from gvgbot.geometry import STANDSTILL, Array, Pose
 from gvgbot.hal.messages import Odometry
 from gvgbot.survey import survey
 from gvgbot.worlds.canvas import Canvas
@@ -76,7 +77,7 @@ def test_nothing_is_missing_beyond_a_virtual_wall() -> None:
     """One before the shadow of the corner, from wall to wall."""
     pipeline = driven(carved([CORRIDOR, SIDE]), 3.0)
     before = START.inverse().transform(np.array([(1.8, 1.0), (4.2, 1.0)]))
-    pipeline.virtual_walls = sampled([tuple((x, y) for x, y in before.tolist())], CELL)
+    pipeline.virtual_walls = points_of([tuple((x, y) for x, y in before.tolist())])
     assert len(survey(pipeline).places) == 0
 
 

@@ -14,7 +14,7 @@ from gvgbot.ranges import Range
 _SIDE_RAD = math.radians(55)  # where the middle of the left bumper is
 _GRIP_S = 3.0  # backing off longer than it should take, by this, is given up
 _DEAD_S, _BRAKING_MPS2 = 0.1, 0.5  # until a base obeys, and how it then slows down
-_LONGEST_GAP_S = 2.0  # between cycles; a longer one is an outage of the base, in which it stands
+LONGEST_GAP_S = 2.0  # between cycles, or keyframes; a longer one is an outage of a device
 _OFTEN_S = 20.0  # a second overload within this time means that something is in the way
 _TRIES = 3  # to get rid of a contact by backing off
 AWAY_M = 0.2  # out of a place in which nothing else helps
@@ -171,7 +171,7 @@ class Reflexes:
         if now.wish.linear < c.stuck_speed_mps or now.felt.stopped_for in _OTHER_STOPS:
             past.clear()
             return None
-        if past and now.stamp - past[-1].stamp > _LONGEST_GAP_S:
+        if past and now.stamp - past[-1].stamp > LONGEST_GAP_S:
             past.clear()
         past.append(now)
         if now.stamp - past[0].stamp < c.stuck_s:
