@@ -110,10 +110,15 @@ def test_who_sees_no_known_walls_after_it_was_lifted_may_be_anywhere() -> None:
     assert again.distance(Pose()) < 0.05
 
 
-def test_who_sees_hardly_a_wall_after_it_was_lifted_goes_on_by_odometry() -> None:
+@pytest.mark.parametrize(
+    ("reach", "hidden"), [(1.0005, 0.0), (math.inf, 0.25)], ids=["hardly a wall", "among people"]
+)
+def test_who_sees_few_walls_that_it_knows_after_it_was_lifted_goes_on(
+    reach: float, hidden: float
+) -> None:
     tracked = Tracked()
     tracked.tracker.was_lifted = True
-    found = tracked.look(Pose(0.1), Pose(0.1), reach=1.0005)
+    found = tracked.look(Pose(0.1), Pose(0.1), reach=reach, hidden=hidden)
     assert found is not None
     assert found.distance(Pose(0.1)) < 0.05
 
@@ -122,14 +127,6 @@ def test_few_walls_in_the_open_are_no_reason_to_stand_after_a_lift() -> None:
     tracked = Tracked()
     tracked.tracker.was_lifted = True
     assert tracked.look(Pose(), Pose(3.0, 3.0), reach=0.6) is not None
-
-
-def test_who_is_put_down_among_people_goes_on_by_the_walls_between_them() -> None:
-    tracked = Tracked()
-    tracked.tracker.was_lifted = True
-    found = tracked.look(Pose(0.1), Pose(0.1), hidden=0.25)
-    assert found is not None
-    assert found.distance(Pose(0.1)) < 0.05
 
 
 def test_who_takes_over_from_another_goes_on_by_its_walls_and_odometry() -> None:
