@@ -24,7 +24,7 @@ RING = [(2.0, 2.0), (9.0, 2.0), (9.0, 7.0), (2.0, 7.0), (2.0, 2.0)]
 SOUTH, NORTH = (5.5, 2.0), (5.5, 7.0)  # the ends of a bar across the ring
 EAST = (9.0, 4.5)
 NEAR = 0.3  # m
-REMEMBERED = 60.0  # s
+REMEMBERED = 25.0  # s
 
 Point = tuple[float, float]  # m, world frame
 

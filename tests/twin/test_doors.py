@@ -16,7 +16,7 @@ from gvgbot.simulation import Place
 
 pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(300)]
 
-REMEMBERED = 60.0  # s
+REMEMBERED = 25.0  # s
 
 
 @dataclass

@@ -214,13 +214,13 @@ def test_after_each_power_cut_in_a_building_it_finds_its_place_and_keeps_it(tmp_
         body = lives.world.body
         if len(lives.sessions) == len(found) + 2 and not session.pipeline.is_lost:
             found.append((body.distance_m, body.now))
-        return len(found) == 2 and body.now > found[1][1] + 60.0
+        return len(found) == 2 and body.now > found[1][1] + 20.0
 
     def take_down(world: GoingWorld, out: Path) -> None:
         cut.append(world.body.distance_m)
 
     lives = Lives(config, place, tmp_path, over=is_over, between=take_down, reboots=True)
-    note_error(lives.run([power_cut(40.0), power_cut(140.0)]))
+    note_error(lives.run([power_cut(40.0), power_cut(120.0)]))
     assert max(errors) < 0.5
     for before, (after, _) in zip(cut, found, strict=True):
         assert after - before < 60.0
