@@ -75,17 +75,17 @@ class LiveMap:
             Stretch(edge.a.vertex, edge.b.vertex, edge.length, edge.shown)
             for edge in graph.edges.values()
         ]
-        return partial(self._drawn, portion or _nothing, vertices, edges, poses, stamp)
+
+        def graph_of_now() -> Map:
+            lines, walls = bent(edges, poses), packed(pipeline.virtual_walls)
+            return Map(stamp=stamp, vertices=vertices, edges=lines, virtual_walls=walls)
+
+        return partial(self._drawn, portion or _nothing, graph_of_now, stamp)
 
     def _drawn(
-        self,
-        find: Callable[[], Portion],
-        vertices: tuple[MapVertex, ...],
-        edges: Sequence[Stretch],
-        poses: Mapping[int, Pose],
-        stamp: float,
+        self, find: Callable[[], Portion], graph_of_now: Callable[[], Map], stamp: float
     ) -> list[Update]:
-        updates = [Update(Map(stamp=stamp, vertices=vertices, edges=bent(edges, poses)))]
+        updates = [Update(graph_of_now())]
         new, is_all, breaks, lent = find()
         if is_all:
             self._grid.redraw(new)

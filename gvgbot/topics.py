@@ -125,6 +125,16 @@ class Map(msgspec.Struct, frozen=True, kw_only=True):
     stamp: float  # s, the robot's monotonic clock
     vertices: tuple[MapVertex, ...]
     edges: tuple[MapEdge, ...]
+    virtual_walls: bytes = b""  # little-endian float32 pairs x, y, m: points 0.1 m apart
+
+    def __post_init__(self) -> None:
+        """Raises ValueError for a part of a point."""
+        _check_whole(self.virtual_walls, _POINT)
+
+    @property
+    def forbidden(self) -> NDArray[np.float32]:
+        """The points (N, 2), m, of the virtual walls; read-only."""
+        return np.frombuffer(self.virtual_walls, "<f4").reshape(-1, 2)
 
 
 class Tile(msgspec.Struct, frozen=True, kw_only=True):

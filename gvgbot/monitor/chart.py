@@ -64,6 +64,8 @@ def chart(scene: Scene, width: int, height: int) -> Chart:
         cells = _sampled(scene.floor, view)
         canvas.lay("wall", _walls(scene.floor, view, cells))
         floor = lit(cells >= 0)  # or a wall
+    if scene.graph is not None:
+        canvas.lay("wall", _dotted(view, scene.graph.forbidden))  # virtual ones
     canvas.lay("trail", _drawn(view, scene.trail))
     if scene.graph is not None:
         canvas.lay("edge", _drawn(view, [edge.polyline for edge in scene.graph.edges]))
@@ -159,6 +161,13 @@ def _drawn(view: View, polylines: Iterable[Points]) -> Dots:
     dots = np.zeros(view.shape, bool)
     for polyline in polylines:
         view.draw(dots, polyline)
+    return dots
+
+
+def _dotted(view: View, points: Points) -> Dots:
+    """Every third of points along lines, so that these are no walls to the eye."""
+    dots = np.zeros(view.shape, bool)
+    view.plot(dots, points[::3])
     return dots
 
 

@@ -644,6 +644,23 @@ def test_the_way_driven_has_a_gap_where_the_robot_was_carried(page: Page) -> Non
     assert gaps[0] / gaps[1] == pytest.approx(5.0 / 2.0, rel=0.1)
 
 
+def test_virtual_walls_are_dots_that_come_and_go_with_the_other_walls(page: Page) -> None:
+    """From (2, 4.5) to (8, 4.5), where no number and no plan is."""
+    wall = np.column_stack([np.linspace(2.0, 8.0, 61), np.full(61, 4.5)])
+    endpoint = free_endpoint()
+    with web("--connect", endpoint) as address:
+        play = Play(endpoint, page)
+        with play.robot:
+            desktop(page, address)
+            before = play.until_drawn(lambda seen: seen["wall"][1] > 1000, "wall")["wall"][1]
+            play.robot.publish(msgspec.structs.replace(GRAPH, virtual_walls=packed(wall)))
+            least = before + len(wall)
+            after = play.until_drawn(lambda seen: seen["wall"][1] > least, "wall")["wall"][1]
+            assert after - before < 10 * len(wall)  # a line would be 9 pixels for each
+            page.click("#layer-grid")
+            play.until_drawn(lambda seen: seen["wall"][1] < 1000, "wall")
+
+
 def test_vertices_have_their_numbers_wherever_there_is_room(page: Page) -> None:
     endpoint = free_endpoint()
     boxes = [(0, 10), (11, 21), (30, 40), (22, 32)]  # from left to right

@@ -16,7 +16,7 @@ from gvgbot.autonomy.views import Observation
 from gvgbot.geometry import Array, Pose
 from gvgbot.live_map import LiveMap
 from gvgbot.live_past import TOLERANCE_M, LivePast
-from gvgbot.topics import Trajectory
+from gvgbot.topics import Map, Trajectory
 
 COUNT, RADIUS_M = 101, 8.0
 WRONG_TURN = 0.004  # rad at each step
@@ -26,6 +26,9 @@ TRUE = [
     for a in (TURN * np.arange(COUNT)).tolist()
 ]
 VERTEX = Pose(1.0, 0.0)
+
+
+FORBIDDEN = np.array([[1.0, 2.0], [1.0, 2.5]])  # points of a virtual wall
 
 
 def drive(*, closes: bool = True, led: bool = False) -> Any:
@@ -52,6 +55,7 @@ def drive(*, closes: bool = True, led: bool = False) -> Any:
         mapper=SimpleNamespace(graph=GvgGraph(), belief=belief, observations=seen),
         led=led,
         matches_walls=False,
+        virtual_walls=FORBIDDEN,
     )
 
 
@@ -152,6 +156,13 @@ def shown(live: LiveMap, pipeline: Any, stamp: float) -> Array:
     assert draw is not None
     (way,) = [one.value for one in draw() if isinstance(one.value, Trajectory)]
     return np.asarray(way.map_base[:, :2], np.float64)
+
+
+def test_virtual_walls_are_told_with_the_map() -> None:
+    draw = LiveMap(began=0.0).update(drive(), 0.0)
+    assert draw is not None
+    (told,) = [one.value for one in draw() if isinstance(one.value, Map)]
+    assert told.forbidden.tolist() == FORBIDDEN.tolist()
 
 
 def from_centre(way: Array) -> Array:

@@ -49,6 +49,7 @@ export class MapPicture {
   setMap(known) {
     this.known = known;
     this.edges = known.edges.map((edge) => points(edge.points));
+    this.virtualWalls = points(known.virtual_walls ?? new Uint8Array()); // none from an older robot
     this.at = new Map(known.vertices.map((vertex) => [vertex.id, vertex.position]));
   }
 
@@ -92,7 +93,7 @@ export class MapPicture {
     c.clearRect(0, 0, view.width, view.height);
     c.lineJoin = c.lineCap = "round";
     const layers = {
-      grid: () => this.drawGrid(), trail: () => this.drawTrail(), edges: () => this.drawEdges(),
+      grid: () => (this.drawGrid(), this.drawVirtualWalls()), trail: () => this.drawTrail(), edges: () => this.drawEdges(),
       ellipses: () => this.drawEllipses(), frontiers: () => this.drawFrontiers(), vertices: () => this.drawVertices(),
       plan: () => this.drawPlan(), scan: () => this.drawScan(),
     };
@@ -125,6 +126,21 @@ export class MapPicture {
     this.c.imageSmoothingEnabled = this.view.scale * resolution < 3;
     this.c.imageSmoothingQuality = "high";
     this.c.drawImage(picture, ...this.view.toScreen(left, top), picture.width * resolution * this.view.scale, picture.height * resolution * this.view.scale);
+  }
+
+  // A dot for each point, or as many as there is room for.
+  drawVirtualWalls() {
+    if (this.known === null) return;
+    const c = this.c, xy = this.virtualWalls;
+    c.fillStyle = this.colours.wall;
+    for (let i = 0, last = null; i < xy.length; i += 2) {
+      const [px, py] = this.view.toScreen(xy[i], xy[i + 1]);
+      if (last !== null && Math.hypot(px - last[0], py - last[1]) < 5) continue;
+      c.beginPath();
+      c.arc(px, py, 1.6, 0, 2 * Math.PI);
+      c.fill();
+      last = [px, py];
+    }
   }
 
   line(xy, colour, width) {

@@ -4,13 +4,14 @@ import math
 import unicodedata
 from dataclasses import replace
 
+import msgspec
 import numpy as np
 import pytest
 
 from gvgbot.monitor.braille import Dots, patterns
 from gvgbot.monitor.chart import LAYERS, Chart, Scene, chart
 from gvgbot.monitor.view import View
-from gvgbot.topics import Map, Plan
+from gvgbot.topics import Map, Plan, packed
 from tests.unit.monitor.maps import a_floor, a_map, vertex
 
 
@@ -129,6 +130,18 @@ def test_an_edge_is_a_line_without_gaps_and_hides_the_trail_under_it() -> None:
     assert (dots_of(found) == expected).all()
     edge, trail = LAYERS.index("edge"), LAYERS.index("trail")
     assert found.layers[3].tolist() == [0, edge, trail, trail, trail, trail, trail, 0]
+
+
+def test_a_virtual_wall_is_a_line_with_gaps() -> None:
+    wall = np.column_stack([np.full(91, 3.0), np.linspace(2.0, 11.0, 91)])
+    known = msgspec.structs.replace(a_map(), virtual_walls=packed(wall))
+    found = chart(Scene(known, a_floor(EMPTY, origin=HALF)), 32, 16)  # dots of a quarter of a metre
+    dots = dots_of(found)
+    assert np.flatnonzero(dots.any(axis=0)).tolist() == [14]  # from 3.0 to 3.25 m
+    lit, rows = int(dots.sum()), np.flatnonzero(dots.any(axis=1))
+    assert lit == 31  # one every 0.3 m
+    assert rows[-1] - rows[0] + 1 > lit
+    assert set(found.layers[found.layers > 0].tolist()) == {LAYERS.index("wall")}
 
 
 def test_where_no_way_is_known_no_line_is_drawn() -> None:
