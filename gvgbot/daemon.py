@@ -30,7 +30,7 @@ from gvgbot.ros2.node import Ros2Node
 from gvgbot.service import Notifier, set_up_logging, start_left_out_of_collections
 from gvgbot.session import Session
 from gvgbot.simulation import Simulation, open_place
-from gvgbot.stop_signals import StopSignals
+from gvgbot.stop_signals import StopSignals, standing_while_suspended
 from gvgbot.strict_yaml import dump
 from gvgbot.telemetry import Telemetry
 
@@ -155,7 +155,7 @@ def run(
         recording = recorded(session, patient=False)
         try:
             with recording, start_left_out_of_collections(), asyncio.Runner() as runner:
-                runner.run(robot.serve(signals.wait()))
+                runner.run(_serve(robot, signals))
         except* GvgbotError as failures:
             session.failure = reason_of(failures)
             raise underlying(failures) from None
@@ -167,6 +167,11 @@ def run(
             session.save()
             log.info("map saved", path=str(directory.path))
     return 0
+
+
+async def _serve(robot: Robot, signals: StopSignals) -> None:
+    with standing_while_suspended(robot.stand):
+        await robot.serve(signals.wait())
 
 
 def recorded(session: Session, *, patient: bool) -> AbstractContextManager[object]:

@@ -17,7 +17,7 @@ from gvgbot.beside_loop import BesideLoop
 from gvgbot.clock import Clock, LoopClock, OffLoop
 from gvgbot.config import Config
 from gvgbot.errors import GvgbotError
-from gvgbot.geometry import Twist
+from gvgbot.geometry import STANDSTILL, Twist
 from gvgbot.hal.guard import Guard, Reason
 from gvgbot.hal.messages import Contact, Odometry, Scan
 from gvgbot.journal import BatteryJournal, GuardJournal, log_event, status_line
@@ -164,6 +164,10 @@ class Robot:
             self._notifier.stopping()
             for task in serving:
                 task.cancel()
+
+    def stand(self) -> None:
+        """Tell the base to stand, until the next control cycle."""
+        self._devices.base.drive(STANDSTILL)
 
     async def _explore(self) -> None:
         """Drive, or stand, until cancelled."""

@@ -1,8 +1,9 @@
-"""The signals that end a program which tidies up by itself."""
+"""The signals that end a program which tidies up by itself, and the one that suspends it."""
 
 import asyncio
+import contextlib
 import signal
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Iterator
 from functools import partial
 from typing import Any, Self
 
@@ -78,3 +79,27 @@ class StopSignals:
         signal.pthread_sigmask(signal.SIG_SETMASK, self._blocked)
         for number, handler in self._before.items():
             signal.signal(number, handler)
+
+
+@contextlib.contextmanager
+def standing_while_suspended(stand: Callable[[], object]) -> Iterator[None]:
+    """Let the robot stand before Ctrl-Z suspends the program; on the running loop.
+
+    A base that is no longer heard or driven would roll on until it stops itself.
+    """
+    loop = asyncio.get_running_loop()
+    if signal.getsignal(signal.SIGTSTP) is signal.SIG_IGN:
+        yield
+        return
+
+    def suspend() -> None:
+        stand()
+        loop.remove_signal_handler(signal.SIGTSTP)
+        signal.raise_signal(signal.SIGTSTP)  # it goes on from here once somebody wants that
+        loop.add_signal_handler(signal.SIGTSTP, suspend)
+
+    loop.add_signal_handler(signal.SIGTSTP, suspend)
+    try:
+        yield
+    finally:
+        loop.remove_signal_handler(signal.SIGTSTP)

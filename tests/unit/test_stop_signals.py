@@ -1,12 +1,13 @@
 """Programs that are told to end."""
 
 import asyncio
+import os
 import signal
 
 import pytest
 
 from gvgbot.clock import VirtualTimeLoop, run_in_virtual_time
-from gvgbot.stop_signals import StopSignals
+from gvgbot.stop_signals import StopSignals, standing_while_suspended
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
@@ -102,3 +103,38 @@ def test_a_robot_started_by_nohup_outlives_its_terminal() -> None:
             assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
     finally:
         signal.signal(signal.SIGHUP, before)
+
+
+def test_a_robot_stands_each_time_before_it_is_suspended(monkeypatch: pytest.MonkeyPatch) -> None:
+    done: list[str] = []
+
+    async def main() -> None:
+        suspended = asyncio.Event()
+
+        def suspend(number: signal.Signals) -> None:
+            done.append(number.name)
+            suspended.set()
+
+        monkeypatch.setattr(signal, "raise_signal", suspend)
+        with standing_while_suspended(lambda: done.append("stand")):
+            for _ in range(2):
+                os.kill(os.getpid(), signal.SIGTSTP)
+                await suspended.wait()
+                suspended.clear()
+
+    asyncio.run(main())
+    assert done == ["stand", "SIGTSTP", "stand", "SIGTSTP"]
+    assert signal.getsignal(signal.SIGTSTP) is signal.SIG_DFL
+
+
+def test_a_program_that_nobody_can_suspend_stays_so() -> None:
+    async def main() -> None:
+        with standing_while_suspended(lambda: None):
+            assert signal.getsignal(signal.SIGTSTP) is signal.SIG_IGN
+
+    before = signal.signal(signal.SIGTSTP, signal.SIG_IGN)
+    try:
+        asyncio.run(main())
+        assert signal.getsignal(signal.SIGTSTP) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGTSTP, before)
