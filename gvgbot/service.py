@@ -4,6 +4,7 @@ import contextlib
 import gc
 import os
 import re
+import select
 import socket
 from collections.abc import Iterator, Mapping
 from typing import Any, Literal, TextIO, cast
@@ -11,6 +12,7 @@ from typing import Any, Literal, TextIO, cast
 import structlog
 from structlog.typing import EventDict, Processor, WrappedLogger
 
+_READER_S = 0.05  # that who reads the log may take to catch up
 _SEVERITY = {"debug": 7, "info": 6, "warning": 4, "error": 3, "critical": 2}  # as syslog counts
 
 
@@ -56,19 +58,41 @@ class Notifier:
 
 
 class _Unbreakable:
-    """A text stream that may go away, as a terminal does, without taking the robot with it."""
+    """A text stream that may go away, as a terminal does, without taking the robot with it.
+
+    Nor does it hold the robot up while nobody reads it, as after Ctrl-S: what is written then is
+    left out, and the next line says how many are `missing`.
+    """
 
     def __init__(self, stream: TextIO) -> None:
-        self._stream = stream
+        self._stream, self._line = stream, ""
+        self._missing = 0
 
     def write(self, text: str) -> int:
-        with contextlib.suppress(OSError):
-            self._stream.write(text)
+        self._line += text
         return len(text)
 
     def flush(self) -> None:
+        line, self._line = self._line, ""
+        if not _takes_more(self._stream, 0.0 if self._missing else _READER_S):
+            self._missing += 1
+            return
+        self._missing = 0
         with contextlib.suppress(OSError):
+            self._stream.write(line)
             self._stream.flush()
+
+    def own_up(self, logger: WrappedLogger, method: str, event: EventDict) -> EventDict:
+        """The event with the number of lines that are missing before it."""
+        return {**event, "missing": self._missing} if self._missing else event
+
+
+def _takes_more(stream: TextIO, patience_s: float) -> bool:
+    """Whether a line can be written now or soon, as far as the system tells."""
+    try:
+        return bool(select.select([], [stream], [], patience_s)[1])
+    except (OSError, ValueError):  # it is no file, or has a number that is too high
+        return True
 
 
 @contextlib.contextmanager
@@ -90,12 +114,16 @@ def set_up_logging(
 ) -> None:
     """Log to the stream: for people, or as JSON with a severity where a journal reads along."""
     journal = "JOURNAL_STREAM" in environment
-    structlog.configure(
-        processors=_for_journal()
+    unbreakable = _Unbreakable(stream)
+    form = (
+        _for_journal()
         if journal
-        else _for_people(colors=stream.isatty() and not environment.get("NO_COLOR")),
+        else _for_people(colors=stream.isatty() and not environment.get("NO_COLOR"))
+    )
+    structlog.configure(
+        processors=[unbreakable.own_up, *form],
         wrapper_class=structlog.make_filtering_bound_logger(least),
-        logger_factory=structlog.PrintLoggerFactory(cast(TextIO, _Unbreakable(stream))),
+        logger_factory=structlog.PrintLoggerFactory(cast(TextIO, unbreakable)),
         cache_logger_on_first_use=False,
     )
 

@@ -160,6 +160,24 @@ def test_a_terminal_that_is_gone_does_not_end_the_robot() -> None:
     structlog.get_logger().info("still here")
 
 
+@pytest.mark.usefixtures("_fresh_log")
+@pytest.mark.timeout(10)
+def test_a_log_that_nobody_reads_does_not_hold_up_the_robot() -> None:
+    """As after Ctrl-S in its terminal, or behind a pager. What was left out is owned up to."""
+    reading, writing = os.pipe()
+    with os.fdopen(reading, "rb", buffering=0) as reader, os.fdopen(writing, "w") as stream:
+        set_up_logging(stream, {"JOURNAL_STREAM": "8:1234"})
+        for number in range(2000):
+            structlog.get_logger().info("vertex added", vertex=number)
+        before = reader.read(1_000_000).splitlines()
+        structlog.get_logger().info("still here")
+        structlog.get_logger().info("as ever")
+        one, other = (json.loads(line[3:]) for line in reader.read(1000).splitlines())
+    assert 0 < len(before) < 2000
+    assert one == {"event": "still here", "missing": 2000 - len(before), "level": "info"}
+    assert other == {"event": "as ever", "level": "info"}
+
+
 def test_what_happens_is_logged_but_for_details() -> None:
     with structlog.testing.capture_logs() as logs:
         log_event(VertexAdded(1.0, 3, "meetpoint", 1.234, 5.678, 3, 1.0))
