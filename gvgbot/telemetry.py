@@ -2,7 +2,9 @@
 
 import asyncio
 import contextlib
+import math
 import threading
+import time
 from collections import deque
 from collections.abc import Awaitable, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -44,6 +46,10 @@ _WAITING_QUERIES = 1000  # more than this are dropped, oldest first; who asked g
 # While as many wait, others are refused; then dropped; then even those that stop the robot.
 _WAITING_REQUESTS, _WAITING_REFUSALS, _WAITING_STOPS = 8, 1000, 2000
 _CROWDED = Answer(done=False, text="too many requests wait: ask again")
+_ASLEEP = Answer(done=False, text="the robot's program was asleep when that came: ask again")
+_ASLEEP_S = 2.0  # without a word: who asked meanwhile may have been told that nobody is there
+_WAKING_S = 1.0  # that what came meanwhile may take
+_LOOK_S = 0.5
 _MAX_SESSIONS = 32
 _LARGEST_MESSAGE = 16 * 2**20  # bytes that may come at once: more could fill the memory
 _PARTING_S = 1.0  # that what was said last may take
@@ -244,12 +250,14 @@ class Telemetry:
     async def hear(self, handle: Handle) -> None:
         """Put requests to the handler as they come, and send its answers, until cancelled.
 
-        Of a crowd the first are heard, and those that stop the robot. A query for several keys at
-        once is none: who reads all that a robot has to say must not find that it has stopped.
+        Of a crowd the first are heard, and those that stop the robot. So are only these of what has
+        come while the program was suspended or hung: nobody may expect any more that the robot
+        moves. A query for several keys at once is none: who reads all that a robot has to say must
+        not find that it has stopped.
         """
         loop, arrived = asyncio.get_running_loop(), asyncio.Event()
         waiting: deque[tuple[zenoh.Query, str, Handle]] = deque()
-        stops = {request_key(self._robot, name) for name in STOPS}
+        stops, sleep = {request_key(self._robot, name) for name in STOPS}, _Sleep()
 
         def take(query: zenoh.Query) -> None:
             key, others = str(query.key_expr), len(waiting)
@@ -262,11 +270,14 @@ class Telemetry:
         every = request_key(self._robot, "*")
         with self._session.declare_queryable(every, take):
             async with asyncio.TaskGroup() as tasks:
+                tasks.create_task(sleep.watch())
                 while True:
                     await arrived.wait()
                     arrived.clear()
                     while waiting:
                         query, key, handler = waiting.popleft()
+                        if key not in stops and sleep.is_or_was:
+                            handler = _decline
                         if "*" in key:
                             self._aside(query.drop)
                         else:  # one that takes long must not hold up the next
@@ -295,8 +306,41 @@ class Telemetry:
         self.close()
 
 
+class _Sleep:
+    """Tells whether the loop has not run for so long that what it finds may have come long ago."""
+
+    def __init__(self) -> None:
+        self._ran, self._woke = _now(), -math.inf
+
+    async def watch(self) -> None:
+        """Watch the loop until cancelled."""
+        while True:
+            if self._has_paused:
+                self._woke = _now()
+            self._ran = _now()
+            await asyncio.sleep(_LOOK_S)
+
+    @property
+    def is_or_was(self) -> bool:
+        """Whether that is so, or has been just now."""
+        return self._has_paused or _now() < self._woke + _WAKING_S
+
+    @property
+    def _has_paused(self) -> bool:
+        return _now() > self._ran + _ASLEEP_S
+
+
+def _now() -> float:
+    """Seconds that go on while the computer sleeps, where the system counts these."""
+    return time.clock_gettime(getattr(time, "CLOCK_BOOTTIME", time.CLOCK_MONOTONIC))
+
+
 async def _refuse(_: Asked) -> Answer:
     return _CROWDED
+
+
+async def _decline(_: Asked) -> Answer:
+    return _ASLEEP
 
 
 def _asked(query: zenoh.Query, key: str) -> Asked:

@@ -251,6 +251,26 @@ def test_a_crowd_of_requests_is_refused_and_a_pause_among_them_is_done(endpoint:
     assert {told["text"] for told in refusals} == {"too many requests wait: ask again"}
 
 
+def test_what_came_while_the_program_was_asleep_is_refused_but_a_pause(endpoint: str) -> None:
+    """Who asked may have been told that nobody answers, and stand before the robot by now."""
+
+    async def story() -> tuple[list[zenoh.Reply], list[zenoh.Reply]]:
+        async with a_robot(endpoint):
+            with plain_session(endpoint) as session:
+                selectors = [f"gvgbot/near/ctl/{name}" for name in ("home", "resume", "pause")]
+                replies = [session.get(one, timeout=9.0) for one in selectors]
+                time.sleep(2.5)  # noqa: ASYNC251, TID251  # a loop that hangs
+                early = [reply for one in replies for reply in await asyncio.to_thread(list, one)]
+                await asyncio.sleep(1.5)
+                return early, await asyncio.to_thread(get, session, "ctl/home")
+
+    early, late = asyncio.run(story())
+    refusals = [msgspec.msgpack.decode(one.err.payload.to_bytes()) for one in early if one.err]
+    assert ["asleep" in refusal["text"] for refusal in refusals] == [True, True]
+    assert [str(one.ok.key_expr) for one in early if one.ok] == ["gvgbot/near/ctl/pause"]
+    assert [one.ok is not None for one in late] == [True]
+
+
 def test_who_asks_can_name_itself_but_not_flood_the_log(endpoint: str) -> None:
     origins: list[str] = []
 
