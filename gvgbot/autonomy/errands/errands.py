@@ -49,6 +49,7 @@ class Errands(Agenda):
         had_errand = self._plan is not None
         self._end(stamp, "stopped", "by a request")
         if self._mission.outcome is not None:
+            self.is_waiting = True  # it makes way for nobody
             if had_errand:
                 return f"it stands; the exploration had ended before: {self._mission.outcome}"
             return f"it had ended before: {self._mission.outcome}"

@@ -268,10 +268,12 @@ def test_a_gyro_that_feels_nothing_for_an_hour_has_not_drifted(rest_s: float) ->
     assert abs(wrap_angle(pipeline.map_base.theta - 6.25)) < 0.003
 
 
-def turned_after_the_end(outcome: Outcome, away_m: float, *, lifted: bool = False) -> float:
+def turned_after_the_end(
+    outcome: Outcome, away_m: float, *, lifted: bool = False, told: bool = False
+) -> float:
     """The bearing of somebody who has finished in a corridor, another robot so far east of it.
 
-    If it is lifted, that is just after the end.
+    If it is lifted, or told to stand still and then to stop, that is just after the end.
     """
     config = load_config()
     pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
@@ -281,6 +283,9 @@ def turned_after_the_end(outcome: Outcome, away_m: float, *, lifted: bool = Fals
             theta, twist, pipeline.mission.outcome = 0.0, STANDSTILL, outcome
             other = Companion("other", Pose(away_m), goes_first=True, radius=0.18)
             pipeline.traffic.company = [other]
+            if told:
+                pipeline.errands.pause()
+                pipeline.errands.stop(0.1 * k)
         theta += 0.1 * twist.angular
         scan = sweep(CORRIDOR, Pose(0.0, 0.0, theta), field_of_view=LASER_270)
         contact = Contact(0.1 * k, wheel_drop_left=lifted and k == 60)
@@ -304,6 +309,10 @@ def test_who_has_finished_turns_its_back_to_a_wall_when_another_robot_comes_near
 
 def test_who_was_lifted_after_the_end_stays_where_it_was_put() -> None:
     assert turned_after_the_end("explored", 2.5, lifted=True) == 0.0
+
+
+def test_who_is_told_to_stop_after_the_end_stays_where_it_is() -> None:
+    assert turned_after_the_end("explored", 2.5, told=True) == 0.0
 
 
 def test_who_does_not_see_where_it_drives_does_not_begin_to() -> None:
