@@ -266,6 +266,7 @@ class Pipeline:
             roughness=reduction.roughness_m,
             open_clearance=self.open_clearance,
             felt=np.concatenate([self._hazards.points, *self.traffic.in_the_way]),
+            virtual_walls=self._hazards.virtual_walls,
         )
         known = self.mapper.known_around(local_base, half_width)
         return reduce_graph(fine, reduction, known).rings_cut_far_from(local_base.position)

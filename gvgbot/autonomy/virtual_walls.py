@@ -3,11 +3,17 @@
 from collections.abc import Sequence
 from typing import Annotated
 
+import numpy as np
+from numpy.typing import NDArray
+
 from gvgbot.geometry import Array, sampled
 from gvgbot.ranges import Range
 
 Coordinate = Annotated[float, Range(-1e4, 1e4)]  # m, map frame
 _SPACING_M = 0.1  # of the points that stand for a wall: no robot fits between two
+_CROSSING_M = 0.06  # so near to a point a way leads over the wall: half of that and a little
+_ON_M = 0.1  # who stands so near to a point is on the wall
+_FEW = 50  # places, that are asked about before all others
 VirtualWall = tuple[tuple[Coordinate, Coordinate], ...]  # from corner to corner
 
 
@@ -21,3 +27,29 @@ def checked(walls: Sequence[VirtualWall]) -> None:
 def points_of(walls: Sequence[VirtualWall]) -> Array:
     """Points (N, 2) that stand for the walls, map frame."""
     return sampled(walls, _SPACING_M)
+
+
+def nearest_before(walls: Array, here: Array, places: Array, away: Array) -> int | None:
+    """Which of places (N, 2) is the least `away` (N,) of those before walls, as points (M, 2).
+
+    None if a straight way from here (2,) leads to none of them but over a wall.
+    """
+    if not len(walls):
+        return int(away.argmin())
+    order = np.argsort(away, kind="stable")
+    for some in np.split(order, [1, _FEW]):  # it is hardly ever another one than the first
+        before = some[~_are_beyond(walls, here, places[some])]
+        if len(before):
+            return int(before[0])
+    return None
+
+
+def _are_beyond(walls: Array, here: Array, places: Array) -> NDArray[np.bool_]:
+    """Which of places (N, 2) are beyond walls; who stands on a wall is on neither side of it."""
+    ways, walls = places - here, walls - here
+    lengths, away = np.hypot(*ways.T), np.hypot(*walls.T)
+    walls = walls[(away > _ON_M) & (away < lengths.max(initial=0.0) + _CROSSING_M)]
+    share = np.clip(ways @ walls.T / np.maximum(lengths, 1e-6)[:, None] ** 2, 0.0, 1.0)
+    x, y = (walls[:, k] - share * ways[:, k, None] for k in (0, 1))
+    beyond: NDArray[np.bool_] = (np.hypot(x, y) < _CROSSING_M).any(axis=1)
+    return beyond

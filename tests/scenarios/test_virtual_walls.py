@@ -27,13 +27,15 @@ TEE = carved([(-3.5, -0.7, 3.5, 0.7), (-0.7, -6.0, 0.7, 0.0)])
 START = Pose(-2.0, 0.0, 0.3)
 MEETPOINT = (0.0, -(1.4**2) / (8 * 1.4))  # as far from the wall opposite as from both corners
 ENDS = [(-2.8, 0.0), (2.8, 0.0)]
+# A room of 6 m by 6 m, and a corridor that leads out of it to the west.
+ROOM = carved([(-3.0, -1.0, 3.0, 5.0), (-4.5, 0.5, -2.9, 1.5)])
 ACROSS_M = -3.0  # the wall is here, from side to side of the arm to the south
 HALL = carved([(-10.0, -10.0, 10.0, 10.0)])
 
 
-def in_map(*corners: tuple[float, float]) -> VirtualWall:
+def in_map(*corners: tuple[float, float], start: Pose = START) -> VirtualWall:
     """Corners in the world as they are on the map, which begins at the start."""
-    return tuple((x, y) for x, y in START.inverse().transform(np.array(corners)).tolist())
+    return tuple((x, y) for x, y in start.inverse().transform(np.array(corners)).tolist())
 
 
 ARM = in_map((-0.8, ACROSS_M), (0.8, ACROSS_M))
@@ -65,6 +67,22 @@ def test_a_fence_in_an_empty_hall_is_a_room() -> None:
     assert (x < 3.0 - ROBOT_RADIUS).all()
     assert (y > -3.0 + ROBOT_RADIUS).all()
     assert (y < 2.0 - ROBOT_RADIUS).all()
+
+
+def test_who_starts_beside_one_stays_on_its_side() -> None:
+    """The strip beyond is narrow: its middle line is nearer than that of the room."""
+    start = Pose(0.0, 0.6, 0.2)
+    run = play(ROOM, start, virtual_walls=(in_map((-3.1, 0.0), (3.1, 0.0), start=start),))
+    assert_explored(run)
+    assert_found(run, "endpoint", [(0.5, 2.5), (-4.0, 1.0)])
+    assert southernmost(run) > ROBOT_RADIUS
+
+
+def test_who_is_shut_in_closely_stays_there() -> None:
+    fence = in_map((-2.3, -0.3), (-1.7, -0.3), (-1.7, 0.3), (-2.3, 0.3), (-2.3, -0.3))
+    run = play(TEE, START, virtual_walls=(fence,))
+    assert run.outcome == "failed"
+    assert max(math.dist((pose.x, pose.y), (START.x, START.y)) for pose in run.truth) < 0.1
 
 
 def test_on_a_known_map_it_is_a_door_that_is_shut() -> None:

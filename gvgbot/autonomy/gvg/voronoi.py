@@ -13,6 +13,7 @@ from scipy.spatial.distance import cdist
 
 from gvgbot.autonomy.gvg.coast import Diagram, Space, with_coast
 from gvgbot.autonomy.gvg.triangulation import Triangulation, delaunay
+from gvgbot.autonomy.virtual_walls import nearest_before
 from gvgbot.geometry import Array
 
 _RING = np.stack([f(np.arange(16) * np.pi / 8) for f in (np.cos, np.sin)], axis=1)
@@ -50,6 +51,7 @@ def fine_graph(
     roughness: float,
     open_clearance: float = np.inf,
     felt: Array = _NOTHING,
+    virtual_walls: Array = _NOTHING,
 ) -> FineGraph:
     """The certain Voronoi graph around the robot (2,); EMPTY where there is none.
 
@@ -58,7 +60,8 @@ def fine_graph(
     wall if they are less than sqrt(8 h r) apart. `roughness` is that h, m. Ridges that could be of
     such bumps count where they lead from some that could not to others: the way from a door into
     the middle of a room is that of its two posts. Farther from all walls than `open_clearance` m,
-    the graph goes along the coast instead. `felt` are obstacles (N, 2) that the map does not show.
+    the graph goes along the coast instead. `felt` are obstacles (N, 2) that the map does not show,
+    and `virtual_walls` those of them that the robot sees beyond, but must not cross.
     """
     triangulation = delaunay(np.concatenate([local_map.points(), felt]))
     if triangulation is None:
@@ -78,7 +81,8 @@ def fine_graph(
         np.concatenate([rim[:, 0], diagram.a[endless]]),
         np.concatenate([points[rim[:, 1]] - points[rim[:, 0]], away]),
     )
-    return _piece_of_robot(*_prolonged(points, clearance, links[here & there], rays, room), robot)
+    whole = _prolonged(points, clearance, links[here & there], rays, room)
+    return _piece_of_robot(*whole, robot, virtual_walls)
 
 
 class _Room(NamedTuple):
@@ -318,9 +322,14 @@ def _least_clearance(
 
 
 def _piece_of_robot(
-    centres: Array, clearance: Array, ridges: NDArray[np.int64], lead: Array, robot: Array
+    centres: Array,
+    clearance: Array,
+    ridges: NDArray[np.int64],
+    lead: Array,
+    robot: Array,
+    virtual_walls: Array,
 ) -> FineGraph:
-    """The connected piece that is nearest to the robot."""
+    """The connected piece that is nearest to the robot, with no virtual walls (N, 2) between."""
     if len(ridges) == 0:
         return EMPTY
     used = np.zeros(len(centres), bool)
@@ -328,10 +337,14 @@ def _piece_of_robot(
     nodes = np.flatnonzero(used)
     ridges = (np.cumsum(used) - 1).take(ridges)
     piece = _pieces(ridges[:, 0], ridges[:, 1], len(nodes))
-    distance = np.hypot(*(centres.take(nodes, axis=0) - robot).T)
+    places = centres.take(nodes, axis=0)
+    distance = np.hypot(*(places - robot).T)
     size = np.bincount(piece)
     distance[size[piece] < 4] += 2.0  # crumbs lose against a real piece nearby
-    keep = piece == piece[np.argmin(distance)]
+    nearest = nearest_before(virtual_walls, robot, places, distance)
+    if nearest is None:
+        return EMPTY
+    keep = piece == piece[nearest]
     renumber = np.cumsum(keep) - 1
     inside = keep[ridges[:, 0]]
     nodes = nodes[keep]
