@@ -41,6 +41,7 @@ from gvgbot.topics import HEALTH, MAP, STATE, Health, Payload, State
 from gvgbot.vitals import Vitals
 
 SAVE_EVERY = 30.0  # s at least between two savings while the map grows
+CALL_EVERY = 10.0  # s between two attempts to drive home with a low battery
 STUCK_AFTER = 1.0  # s without a control cycle, though the base is there
 _DRIVEN = "it is driven until it is asked for something else"
 
@@ -126,7 +127,7 @@ class Robot:
             rate_hz = session.config.telemetry.scan_rate_hz
             self._feed = LiveFeed(network, session.pipeline, rate_hz)
         self._guard, self._battery = GuardJournal(), BatteryJournal()
-        self._healths = Pace(HEALTH.rate_hz)
+        self._healths, self._calls_home = Pace(HEALTH.rate_hz), Pace(1.0 / CALL_EVERY)
         self._ros: LiveRos | None = None
 
     # -- the tasks ---------------------------------------------------------------------------------
@@ -361,13 +362,18 @@ class Robot:
             if happened is not None:
                 self._network.publish(happened)
         self._notifier.status(status_line(now))
-        self._battery.note(self._devices.base.battery, now.stamp)
-        if self._battery.calls_home and self._session.config.service.home_when_low:
-            self._battery.calls_home = not self._steering.go_home("low battery")
+        self._heed_battery(now.stamp)
         self._devices.base.show(sign(now, is_lost=self._pipeline.is_lost))
         stuck = now.cycle_age is not None and now.cycle_age > STUCK_AFTER
         if not stuck or self._devices.base.away is not None:
             self._notifier.alive()
+
+    def _heed_battery(self, stamp: float) -> None:
+        """Drive home when it is low, as soon as that can be."""
+        self._battery.note(self._devices.base.battery, stamp)
+        is_called = self._battery.calls_home and self._session.config.service.home_when_low
+        if is_called and self._calls_home.allows(stamp):
+            self._battery.calls_home = not self._steering.go_home("low battery")
 
     def _health(self, network: Network, now: State) -> Health:
         return self._vitals.health(

@@ -70,6 +70,7 @@ class Steering:
         self._errands, self._body = errands, body
         self._now, self._save, self._use, self._tell = now, save, use, tell
         self._ledger = _Ledger()
+        self._is_called_home, self._no_way_home = False, ""  # later; and why not at once
 
     async def handle(self, asked: Asked) -> Answer:
         """Do what is asked for, or say why not; either is written down with who asked.
@@ -93,19 +94,28 @@ class Steering:
     def go_home(self, why: str) -> bool:
         """Let a robot that is busy drive home; it is written down as asked for by `why`.
 
-        False if it is too early for that, as the robot does not know its place yet.
+        False if it is too early for that: it is paused, does not know its place, or no way. Then
+        ask again, also when all is explored meanwhile. Why it knows no way is written down once.
         """
-        if self.declines is not None or not self._errands.is_busy:
-            return True
-        if not self._errands.is_placed:
+        errands = self._errands
+        is_late = self._is_called_home and errands.stands_by
+        is_due = self.declines is None and (errands.is_busy or is_late)
+        self._is_called_home = is_due and not self._goes_home(why)
+        return not self._is_called_home
+
+    def _goes_home(self, why: str) -> bool:
+        errands = self._errands
+        if errands.is_paused or not errands.is_placed:
             return False
         try:
-            answer = Answer(done=True, text=self._errands.home(self._now()))
+            answer = Answer(done=True, text=errands.home(self._now()))
         except Declined as error:
             answer = Answer(done=False, text=str(error))
-        happened = Requested(self._now(), "home", why, answer.done, answer.text)
-        self._tell([happened, *self._errands.take_events()])
-        return True
+        if answer.done or answer.text != self._no_way_home:
+            happened = Requested(self._now(), "home", why, answer.done, answer.text)
+            self._tell([happened, *errands.take_events()])
+        self._no_way_home = "" if answer.done else answer.text
+        return answer.done
 
     def _check(self, name: str) -> None:
         """Raises Declined if that is not permitted, or not safe just now."""

@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from gvgbot.geometry import STANDSTILL, Pose
 from gvgbot.journal import SAGGING_S
 from gvgbot.session import Session
 from gvgbot.simulation import Place
+from gvgbot.worlds.canvas import Canvas
 from tests.replay.test_pipeline import LOLLIPOP
 from tests.replay.test_pipeline import START as HOME
 from tests.twin.test_errands import NEAR, START, a_while, theta, until
@@ -114,6 +116,24 @@ def test_who_was_told_to_stand_stands(name: str, tmp_path: Path) -> None:
     before, after = places
     assert math.hypot(after.x - before.x, after.y - before.y) < 1e-3
     assert [line["request"] for line in told(lives, "requested")] == [name]
+
+
+def test_it_drives_home_once_there_is_a_way(tmp_path: Path) -> None:
+    """In a long corridor no edge is known before its end is in sight."""
+    canvas = Canvas(32.0, 8.0)
+    canvas.carve_path([(1.0, 1.5), (30.0, 1.5), (30.0, 6.0)], 1.4)
+    place = Place(canvas.world("long"), Pose(2.0, 1.5))
+    base = replace(BASE, battery_v=14.0, battery_drain_v_per_h=10.0)
+    lives = Daemon(tmp_path / "run", place, twin=TwinConfig(base=base))
+
+    async def story(clock: Clock) -> None:
+        await until(clock, lambda: bool(told(lives, "errand_ended")))
+
+    with lives.session.directory:
+        lives.run(story)
+    asked = [line["done"] for line in told(lives, "requested")]
+    assert asked == [False, True]
+    assert lives.session.pipeline.map_base.distance(Pose()) < NEAR
 
 
 def test_who_is_driven_by_somebody_is_driven_on(tmp_path: Path) -> None:

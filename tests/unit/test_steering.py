@@ -37,7 +37,7 @@ class Willing:
         self.did: list[str] = []
         self.happened: list[Event] = []
         self.refuses = False
-        self.is_placed = True
+        self.is_placed, self.is_paused = True, False
 
     def __getattr__(self, name: str) -> object:
         def do(*_: object) -> str:
@@ -132,12 +132,24 @@ def test_what_cannot_be_steered_says_why_and_does_nothing(name: str) -> None:
     assert rig.errands.did == []
 
 
-def test_why_it_does_not_drive_home_is_written_down() -> None:
+def test_why_it_does_not_drive_home_is_written_down_once_until_it_does() -> None:
     rig = Rig()
     rig.errands.refuses = True
-    rig.steering.go_home("low battery")
+    assert not any(rig.steering.go_home("low battery") for _ in range(3))
     (told,) = rig.told
     assert told == Requested(12.5, "home", "low battery", False, "it does not want to")
+    rig.errands.refuses = False
+    assert rig.steering.go_home("low battery")
+    assert rig.told[1:] == [Requested(12.5, "home", "low battery", True, "did home")]
+
+
+def test_who_is_paused_drives_home_when_it_is_resumed() -> None:
+    rig = Rig()
+    rig.errands.is_paused = True
+    assert not rig.steering.go_home("low battery")
+    assert (rig.errands.did, rig.told) == ([], [])
+    rig.errands.is_paused = False
+    assert rig.steering.go_home("low battery")
 
 
 def test_who_does_not_know_its_place_yet_drives_home_later() -> None:

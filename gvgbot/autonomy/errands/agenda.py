@@ -77,8 +77,9 @@ class Agenda:
 
     @property
     def is_busy(self) -> bool:
-        """Whether it is about something, be that exploring or an errand, and nobody drives it."""
-        return not self.is_resting and self._command is None
+        """Whether it explores or is on an errand, or will when it is resumed."""
+        is_over = self._plan is None and (self.is_waiting or self._mission.outcome is not None)
+        return not (is_over or self.unplaced or self._command is not None)
 
     @property
     def is_placed(self) -> bool:
