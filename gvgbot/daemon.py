@@ -14,7 +14,7 @@ import structlog
 from gvgbot import __version__
 from gvgbot.clock import LoopClock, VirtualTimeLoop
 from gvgbot.config import Config
-from gvgbot.driving import drive
+from gvgbot.driving import CARRIED, drive
 from gvgbot.errors import ExtraMissing, GvgbotError, UsageError, reason_of, underlying
 from gvgbot.hal.messages import Odometry
 from gvgbot.links import Devices, Links
@@ -100,7 +100,7 @@ async def explore_once(session: Session, progress: Progress) -> None:
         limit_s=session.config.twin.time_limit_s,
     )
     if pipeline.errands.is_carried:  # nobody is there to resume it
-        session.failure = "no walls that it knows are around it: it may have been carried"
+        session.failure = CARRIED
 
 
 def _conclude(session: Session, say: Callable[[str], None]) -> int:

@@ -11,6 +11,8 @@ from gvgbot.hal.guard import Guard
 from gvgbot.hal.messages import Odometry
 from gvgbot.links import Devices
 
+CARRIED = "no walls that it knows are around it: it may have been carried"
+
 
 async def drive(
     robot: RobotConfig,

@@ -17,7 +17,7 @@ from gvgbot import __version__
 from gvgbot.clock import LoopClock, VirtualTimeLoop
 from gvgbot.config import Config
 from gvgbot.drivers.people import Walkways
-from gvgbot.driving import drive
+from gvgbot.driving import CARRIED, drive
 from gvgbot.errors import UsageError, WorldError, reason_of
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Odometry
@@ -234,7 +234,10 @@ async def _live(robot: _Robot, air: _Air, clock: LoopClock) -> None:
 def _on_cycle(robot: _Robot, air: _Air, devices: Devices, odometry: Odometry) -> None:
     robot.session.on_cycle(odometry, devices.base.contact)
     pipeline, config = robot.session.pipeline, robot.session.config.team
-    if not robot.is_over and pipeline.mission.outcome is not None:
+    is_carried = pipeline.errands.is_carried  # and nobody is there to resume it
+    if is_carried and not robot.is_over:
+        robot.session.failure = CARRIED
+    if not robot.is_over and (is_carried or pipeline.mission.outcome is not None):
         robot.ended, robot.told = odometry.stamp, -math.inf  # the others shall hear of it now
     if odometry.stamp >= robot.steered + config.steer_every_s:
         robot.steered = odometry.stamp

@@ -371,14 +371,19 @@ def test_an_exploration_that_the_disk_ends_says_so_and_leaves_a_map(
     assert (run.path / "map.geojson").exists()
 
 
+@pytest.mark.parametrize("robots", ["1", "2"])
 def test_who_may_be_anywhere_after_a_lift_has_failed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    robots: str,
 ) -> None:
     """Nobody is there who could ask it to resume."""
     monkeypatch.setattr(LocalMaps, "may_fit", lambda *_: False)
     drops = "twin.base.mishaps.wheel_drops_per_h=600"
-    assert main(["explore", "--set", drops, "--out", str(tmp_path / "run")]) == 1
-    assert "failed: no walls that it knows are around it" in capsys.readouterr().err
+    arguments = ["explore", "--set", drops, "--robots", robots, "--out", str(tmp_path / "run")]
+    assert main(arguments) == 1
+    assert "failed: no walls that it knows are around it" in "".join(capsys.readouterr())
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert summary["outcome"] == "failed"
     assert summary["duration_s"] < 120.0
