@@ -54,9 +54,10 @@ def merged(ours: RouteGraph, theirs: RouteGraph, pose: Pose) -> RouteGraph:
     own = list(_split(ours.edges, new))
     edges = list(own)
     others = [replace(e, start=names[e.start], end=names[e.end]) for e in theirs.edges]
-    for edge in _split(others, [v for v in ours.vertices if v.id not in known]):
+    others = list(_split(others, [v for v in ours.vertices if v.id not in known]))
+    for number, edge in enumerate(others):
         twin = _twin(edge, own)
-        if twin is None:
+        if twin is None or _twin(own[twin], others) != number:
             edges.append(edge)
         else:
             edges[twin] = _as_driven_by_both(edges[twin], edge)
@@ -254,9 +255,10 @@ def _piece(edge: RouteEdge, start: int, end: int, first: int, last: int, along: 
 
 
 def _twin(edge: RouteEdge, own: Sequence[RouteEdge]) -> int | None:
-    """Which of the own edges another map's edge is, by its index; None if it is none of them.
+    """Which of the own edges another map's edge may be, by its index; None if it is none of them.
 
-    Two that one map has are two, however close: something stands between them.
+    Two that one map has are two, however close: something stands between them. So it must be the
+    nearest of that map's edges to that one as well.
     """
     away = [_apart(edge, other) for other in own]
     nearest = min(away, default=math.inf)

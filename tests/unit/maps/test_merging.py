@@ -141,6 +141,16 @@ def test_both_ways_round_a_post_stay_though_they_are_close(is_first: bool) -> No
     assert sorted(e.traversals for e in again.edges) == [0, 0, 2, 2]
 
 
+@pytest.mark.parametrize("is_first", [True, False])
+def test_who_knows_one_way_round_a_post_learns_of_the_other_one(is_first: bool) -> None:
+    here, there = (replace(v, frontiers=()) for v in seen({0, 2}).vertices)
+    lines = [np.array([here.position, (6.5, y), there.position]) for y in (0.4, -0.4)]
+    ways = [way(here.id, there.id, line) for line in lines]
+    both, one = RouteGraph((here, there), tuple(ways)), RouteGraph((here, there), (ways[1],))
+    whole = merged(*((both, one) if is_first else (one, both)), Pose())
+    assert sorted(e.traversals for e in whole.edges) == [1, 2]
+
+
 def ring(at: float) -> RouteGraph:
     """A way round 4 m off the origin, whose vertex is at an angle, rad."""
     angles = at + np.linspace(0.0, math.tau, 100)
