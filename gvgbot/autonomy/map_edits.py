@@ -9,7 +9,7 @@ from gvgbot.autonomy.events import EdgeJoined, Event, VertexAdded, VertexRemoved
 from gvgbot.autonomy.evidence import MappingConfig
 from gvgbot.autonomy.knowledge import Knowledge
 from gvgbot.autonomy.slam import ekf, trail
-from gvgbot.autonomy.slam.graph import HalfEdgeId, Vertex
+from gvgbot.autonomy.slam.graph import Edge, HalfEdgeId, Vertex
 from gvgbot.autonomy.slam.recognition import RecognitionConfig, Sighting, sight_covariance
 from gvgbot.autonomy.slam.trail import Laid
 from gvgbot.autonomy.topology import (
@@ -144,10 +144,33 @@ class MapEdits(Knowledge):
         line = self.graph.vertices[a.vertex].local.inverse().transform(local_line)
         edge = self.graph.join(a, b, line, min_clearance, driven=driven)
         start, end = (self.in_local_frame(view, one.vertex) for one in (a, b))
-        room = self.graph.vertices[a.vertex].clearance, self.graph.vertices[b.vertex].clearance
-        tied = tied_to(local_line, start.position, end.position, room)
+        tied = tied_to(local_line, start.position, end.position, self._room_at_ends(edge))
         edge.drawn = start.inverse().transform(tied)
         self._events.append(EdgeJoined(view.stamp, a.vertex, b.vertex, edge.length, driven))
+
+    def _room_at_ends(self, edge: Edge) -> tuple[float, float]:
+        a, b = (self.graph.vertices[end.vertex].clearance for end in (edge.a, edge.b))
+        return a, b
+
+    def redraw(self, vertex: Vertex, before: Pose) -> None:
+        """Let lines for maps end where a vertex is believed now, and else stay where they were.
+
+        It was believed at a pose `before`, map frame, which it proved to be beside.
+        """
+        moved = self.belief.map_vertex(vertex.id).position - before.position
+        ends = [HalfEdgeId(vertex.id, key) for key in vertex.half_edges]
+        edges = {edge.id: edge for edge in map(self.graph.edge_at, ends) if edge is not None}
+        for edge in edges.values():
+            if edge.drawn is None:
+                continue
+            frame = self.belief.map_vertex(edge.a.vertex)
+            line = (before if edge.a.vertex == vertex.id else frame).transform(edge.drawn)
+            start, end = (
+                place + moved * (half.vertex == vertex.id)
+                for place, half in ((line[0], edge.a), (line[-1], edge.b))
+            )
+            tied = tied_to(line, start, end, self._room_at_ends(edge))
+            edge.drawn = frame.inverse().transform(tied)
 
     def close_ring(self, view: View, line: Array, min_clearance: float) -> None:
         """Make a vertex here on an edge without an end that has been driven round.

@@ -198,7 +198,9 @@ class Mapper(MapEdits):
         own = sight_covariance(away, self._recognition)
         r, S, _ = ekf.innovation(self.belief, vertex.id, base_vertex, own)
         odd = max(1.0, ekf.mahalanobis(r, S) / _ODD)
+        before = self.belief.map_vertex(vertex.id)
         self.belief = ekf.update_vertex_in_place(self.belief, vertex.id, base_vertex, odd * own)
+        self.redraw(vertex, before)
         self.observations.append(Observation(view.keyframe, vertex.id, base_vertex, odd * R))
 
     def _measure(self, view: View, vertex: Vertex, base_vertex: Pose, R: Array) -> None:

@@ -86,3 +86,24 @@ def test_the_vertex_of_a_ring_has_the_room_that_is_around_it(edits: MapEdits, vi
     assert vertex.clearance == pytest.approx(1.5, abs=0.03)
     (edge,) = edits.graph.edges.values()
     assert edge.min_clearance == 1.0
+
+
+@pytest.mark.parametrize("is_end", [False, True])
+def test_a_line_for_maps_follows_a_vertex_only_near_to_it(
+    edits: MapEdits, view: View, is_end: bool
+) -> None:
+    edge = joined(edits, view, np.linspace((-1.0, 0.0), (7.0, 0.0), 81))
+
+    def drawn() -> Array:
+        assert edge.drawn is not None
+        return edits.belief.map_vertex(edge.a.vertex).transform(edge.drawn)
+
+    vertex = edits.graph.vertices[(edge.b if is_end else edge.a).vertex]
+    line, before = drawn(), edits.belief.map_vertex(vertex.id)
+    at = 3 * (1 + edits.belief.ids.index(vertex.id))
+    edits.belief.x[at : at + 2] += (0.2, 0.3)
+    edits.redraw(vertex, before)
+    moved = np.hypot(*(drawn() - line).T)[:: -1 if is_end else 1]
+    assert moved[0] == pytest.approx(math.hypot(0.2, 0.3))
+    near = max(vertex.clearance, 2 * moved[0])
+    assert moved[np.arange(81) * 0.1 > near] == pytest.approx(0.0, abs=1e-9)

@@ -159,6 +159,19 @@ def test_an_edge_in_sight_from_end_to_end_is_joined_once() -> None:
     assert len(seen.mapper.graph.frontiers()) == 2
 
 
+def test_the_line_of_an_edge_for_maps_ends_where_its_vertex_proves_to_be() -> None:
+    seen = Seen().look(TWO_ENDS, 30)
+    end_beside = drawn({1: (-1.0, 0.0), 2: (4.0, 0.3)}, {10: (1, 2, [(3.5, 0.0)])})
+    seen.look(end_beside, 60)
+    (edge,) = seen.mapper.graph.edges.values()
+    assert len(of_type(seen.events, EdgeJoined)) == 1
+    start, end = (seen.mapper.belief.map_vertex(half.vertex) for half in (edge.a, edge.b))
+    line = start.transform(edge.shown)
+    np.testing.assert_allclose(line[[0, -1]], [start.position, end.position], atol=1e-9)
+    assert max(start.y, end.y) > 0.1
+    assert np.abs(line[len(line) // 2, 1]) < 0.01
+
+
 def test_what_lies_on_an_edge_nearer_than_its_walls_lies_on_a_way() -> None:
     """The edge goes from (3, 0) to (3, -4), a metre away from its walls."""
     mapper = Seen().look(TEE, 30).mapper
