@@ -173,7 +173,9 @@ class Mapper(MapEdits):
         vertex.sightings += 1
         vertex.misses, vertex.doubted_since = 0, None
         vertex.seen_at = view.travelled
-        is_beside = math.dist(position, view.local_base.position) < _BESIDE_M
+        away = math.dist(position, view.local_base.position)
+        is_beside = away < _BESIDE_M
+        vertex.reached = vertex.reached or away < _AT_END_M
         if node.settled:
             vertex.clearance += share * (sighting.clearance - vertex.clearance)
         if is_beside and vertex.visits == 1 and node.settled:
@@ -221,7 +223,7 @@ class Mapper(MapEdits):
             if a is None or b is None or a == b:
                 continue
             here, there = self.graph.edge_at(a), self.graph.edge_at(b)
-            if self._drive_dead_ends and self._is_far_end(view, edge):
+            if self._drive_dead_ends and self._is_end_left(view, edge, a, b):
                 continue
             if here is None and there is None:
                 if not touches(edge, view.local_map.suspects()):
@@ -244,11 +246,12 @@ class Mapper(MapEdits):
         middle = here.other(a).vertex
         return middle == there.other(b).vertex and middle not in known.node_of
 
-    def _is_far_end(self, view: View, edge: LocalEdge) -> bool:
-        """Whether an edge ends in a dead end where the robot is not."""
-        ends = (view.gvg.nodes[edge.a], view.gvg.nodes[edge.b])
-        base = view.local_base.position
-        return any(n.is_endpoint and np.hypot(*(n.position - base)) > _AT_END_M for n in ends)
+    def _is_end_left(self, view: View, edge: LocalEdge, a: HalfEdgeId, b: HalfEdgeId) -> bool:
+        """Whether an edge ends in a dead end where the robot has not been; both its ends may be."""
+        return any(
+            view.gvg.nodes[node].is_endpoint and not self.graph.vertices[end.vertex].reached
+            for node, end in ((edge.a, a), (edge.b, b))
+        )
 
     def _dispute(self, view: View, known: Correspondence, *disputed: Edge | None) -> None:
         """Sight speaks against edges believed so far; after a few times it wins."""

@@ -57,6 +57,7 @@ class Vertex:
     surplus: int = 0  # sightings in a row with a departure that is not known
     unclear: int = 0  # sightings from it with a departure of which too little can be seen
     visits: int = 1
+    reached: bool = False  # the robot has been there, and did not only see it
     serial: int = 0
     established: bool = False  # part of a map that was finished
     doubted_since: float | None = None  # stamp; since when sight speaks against it

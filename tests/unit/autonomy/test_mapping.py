@@ -567,6 +567,17 @@ def test_a_dead_end_to_be_driven_is_joined_only_from_its_end() -> None:
     assert len(seen.mapper.graph.edges) == 1
 
 
+def test_of_two_dead_ends_to_be_driven_the_robot_has_been_at_both() -> None:
+    seen = Seen(drive_dead_ends=True).look(TWO_ENDS, 20)
+    assert len(seen.mapper.graph.vertices) == 2
+    seen.mapper.move(Pose(-0.8), np.zeros((3, 3)))
+    seen.look(TWO_ENDS, 2, at=Pose(-0.8))
+    assert len(seen.mapper.graph.edges) == 0
+    seen.mapper.move(Pose(4.6), np.zeros((3, 3)))
+    seen.look(TWO_ENDS, 1, at=Pose(3.8))
+    assert len(seen.mapper.graph.edges) == 1
+
+
 PERSON = np.array([[3.0, 1.1], [3.2, 1.2], [2.8, 1.2]])  # beside the crossing of TEE
 
 
