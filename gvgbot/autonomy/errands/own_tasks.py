@@ -17,6 +17,7 @@ from gvgbot.autonomy.mission import Mission
 from gvgbot.autonomy.situation import Situation
 from gvgbot.autonomy.views import View
 from gvgbot.geometry import Array
+from gvgbot.words import counted
 
 _DRIVEN_ON_M = 0.5  # what can be seen there is new
 
@@ -105,6 +106,7 @@ class OwnTasks:
     def _remark(self) -> str:
         """What there is to say about the map, if that is the end."""
         doubtful, unseen = self._revisiting.too_uncertain(self._mapper.belief), self._unseen.where
-        remark = f"; {len(doubtful)} vertices stay less certain than wanted" if doubtful else ""
+        stay = counted(len(doubtful), "vertex stays", "vertices stay")
+        remark = f"; {stay} less certain than wanted" if doubtful else ""
         remark += f"; something may be missing near {unseen}" if unseen else ""
         return remark + too_narrow(self._narrows)

@@ -11,6 +11,7 @@ from gvgbot.autonomy.ending import Surveyed
 from gvgbot.autonomy.errands import Errands
 from gvgbot.autonomy.errands.plans import Kept
 from gvgbot.autonomy.events import Decision, ErrandEnded, Event
+from gvgbot.autonomy.exploration.certainty import CertaintyConfig, vertex_sigma
 from gvgbot.autonomy.gvg.local import LocalGvg
 from gvgbot.autonomy.views import Correspondence, View
 from gvgbot.geometry import Pose
@@ -187,3 +188,18 @@ def test_into_a_room_whose_door_lies_aslant_from_the_edge_it_drives_by_way_of_be
     assert order.track.polyline[-1].tolist() == gap
     jambs = np.array([(x, y) for x in (-0.3, 0.3) for y in (2.0, 2.2)])
     assert min(np.hypot(*(jambs - point).T).min() for point in order.track.polyline) > 0.2
+
+
+@pytest.mark.parametrize(("share", "told"), [(0.5, "1 vertex stays"), (-1.0, "2 vertices stay")])
+def test_vertices_that_stay_less_certain_than_wanted_are_counted(share: float, told: str) -> None:
+    """The robot knows its own place so badly that no visit helps."""
+    robot = Explorer([])
+    robot.mapper.move(Pose(), np.diag([1.0, 1.0, 0.0]))
+    while len(robot.mapper.belief.ids) < 2:
+        robot.look(CLOSED)
+    near, far = (vertex_sigma(robot.mapper.belief, v) for v in robot.mapper.belief.ids)
+    goal = CertaintyConfig(pose_sigma_m=100.0, vertex_sigma_m=near + share * (far - near))
+    config = replace(CONFIG, certainty=goal)
+    robot.errands = Errands(robot.mission, robot.mapper, config, room_m=0.2)
+    robot.until_it_moves_or_ends()
+    assert robot.mission.reason == f"no frontier is left; {told} less certain than wanted"
