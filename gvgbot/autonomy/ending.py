@@ -54,19 +54,35 @@ def cut_short(graph: GvgGraph, without_map: str, reason: str) -> tuple[Outcome, 
     return "explored_with_blocked", f"frontiers left: {left}; {reason}"
 
 
+def leading_nowhere(
+    graph: GvgGraph, survey: Survey | None, reason: str
+) -> tuple[Outcome, str] | None:
+    """Frontiers are left, and the robot does not come on there; None as long as the survey takes.
+
+    The middle of a room that is nearly square looks like the end of an edge from where not all of
+    the room is in sight.
+    """
+    left: tuple[Outcome, str] = ("explored_with_blocked", reason)
+    is_bare = not graph.edges and all(v.kind == "endpoint" for v in graph.vertices.values())
+    return left if survey is None or not is_bare else _closed_room_or(left, survey)
+
+
 def without_target(
     graph: GvgGraph, survey: Survey | None, reason: str
 ) -> tuple[Outcome, str] | None:
-    """There is nothing to go for, and no way on; None as long as the survey takes.
+    """There is nothing to go for, and no way on; None as long as the survey takes."""
+    failed = cut_short(graph, f"no vertex found, perhaps no way out: {reason}", reason)
+    return failed if survey is None or graph.vertices else _closed_room_or(failed, survey)
 
-    Without a vertex, where no floor is unseen that the robot could drive onto, it is in a closed
-    room, and all is explored.
+
+def _closed_room_or(other: tuple[Outcome, str], survey: Survey) -> tuple[Outcome, str] | None:
+    """Explored, where no floor is unseen that the robot could drive onto; None: not yet told.
+
+    Without an edge it is in a closed room then.
     """
-    if not graph.vertices and survey is not None:
-        surveyed = survey()
-        if surveyed is None:
-            return None
-        if not len(surveyed.places):
-            narrow = too_narrow(surveyed.narrows)
-            return "explored", f"a space without edges, and no way out{narrow}"
-    return cut_short(graph, f"no vertex found, perhaps no way out: {reason}", reason)
+    surveyed = survey()
+    if surveyed is None:
+        return None
+    if len(surveyed.places):
+        return other
+    return "explored", f"a space without edges, and no way out{too_narrow(surveyed.narrows)}"

@@ -353,5 +353,9 @@ class Mission(Pursuit):
         if not self._examination.is_over:
             self._examination.is_over = True
             return Stand()
-        self._end(view, *all_examined(self._mapper.graph, self.remark))
+        outcome, reason = all_examined(self._mapper.graph, self.remark)
+        if outcome == "explored":
+            self._end(view, outcome, reason)
+        else:
+            self._end_before(view, reason)
         return Stand()

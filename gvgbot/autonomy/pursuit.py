@@ -2,7 +2,7 @@
 
 from gvgbot.autonomy.backtracking import Backtracking
 from gvgbot.autonomy.choice import Choice
-from gvgbot.autonomy.ending import Outcome, Survey, without_target
+from gvgbot.autonomy.ending import Outcome, Survey, leading_nowhere, without_target
 from gvgbot.autonomy.events import Event, Finished, Recovery
 from gvgbot.autonomy.examination import Examination
 from gvgbot.autonomy.exploration.config import ExplorationConfig
@@ -243,8 +243,17 @@ class Pursuit:
             return
         frontiers = len(self._mapper.graph.frontiers())
         if frontiers:
-            reason = f"frontiers that cannot be reached: {frontiers}"
-            self._end(view, "explored_with_blocked", reason)
+            self._end_before(view, f"frontiers that cannot be reached: {frontiers}")
+
+    def _end_before(self, view: View, reason: str) -> None:
+        """End with frontiers left, once it is told whether they are any."""
+        verdict = leading_nowhere(self._mapper.graph, self.survey, reason)
+        if verdict is None:
+            return
+        if verdict[0] == "explored":
+            for vertex in list(self._mapper.graph.vertices.values()):
+                self._mapper.remove(view, vertex, "it is on no edge")
+        self._end(view, *verdict)
 
     def _end(self, view: View, outcome: Outcome, reason: str) -> None:
         self.outcome, self.reason = outcome, reason

@@ -339,6 +339,28 @@ def test_a_room_without_a_vertex_is_explored_when_all_of_it_is_seen(
     assert robot.mission.outcome == outcome
 
 
+@pytest.mark.parametrize(
+    ("unseen", "outcome"),
+    [(np.empty((0, 2)), "explored"), (np.array([[2.0, 1.0]]), "explored_with_blocked")],
+    ids=["closed", "open"],
+)
+def test_an_end_that_is_none_from_nearer_leaves_a_room_without_edges(
+    unseen: Array, outcome: str
+) -> None:
+    """Of a room a little longer than wide, the far end of the middle line was not in sight."""
+    from_afar = drawn({1: (1.0, 0.0), 2: (3.0, 0.0)}, {10: (1, 2, [])}, unseen={2: 0.0})
+    middle = drawn({1: (1.0, 0.0), 2: (1.6, 0.0)}, {10: (1, 2, [])}, unseen={1: 2.0, 2: -1.0})
+    robot = Robot()
+    robot.mission.survey = lambda: Surveyed(unseen, np.empty((0, 2)))
+    robot.stand(from_afar, 10)
+    assert len(robot.mapper.graph.vertices) == 1
+    robot.drive(middle, (0.0, 0.0), (1.6, 0.0))
+    while robot.mission.outcome is None and robot.stamp < 1000.0:
+        robot.look(middle)
+    assert robot.mission.outcome == outcome
+    assert len(robot.mapper.graph.vertices) == len(unseen)
+
+
 def test_who_has_lost_sight_of_all_that_is_known_goes_back_over_the_way_it_came() -> None:
     """Five metres past the tee, nothing but a stretch that leads away from there is in sight."""
     elsewhere = drawn({5: (8.0, 0.0), 6: (9.0, 1.0)}, {20: (5, 6, [])}, unseen={5: 2.0, 6: 0.8})
