@@ -170,16 +170,18 @@ def _check_paths(source: Path, config: Config, *, user: bool) -> None:
         "twin.world": Path(config.twin.world),
         "telemetry.zenoh_file": config.telemetry.zenoh_file,
         "ros2.zenoh_file": config.ros2.zenoh_file,
+        "service.map": config.service.map,
     }
     for key, path in wanted.items():
         if path is None:
             continue
-        is_here = path.is_file() and not path.is_absolute()
+        exists = path.is_dir() if key == "service.map" else path.is_file()
+        is_here = exists and not path.is_absolute()
         hidden = None if user else _hidden(path.resolve() if is_here else path)
         if hidden is not None:
             raise ConfigError(
                 f"{source}: {key}: {path}: the service sees nothing of {hidden}: "
-                "put the file elsewhere, for instance into /etc/gvgbot"
+                "put it elsewhere, for instance into /etc/gvgbot"
             )
         if is_here:
             raise ConfigError(

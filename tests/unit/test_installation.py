@@ -134,6 +134,7 @@ def test_a_configuration_with_mistakes_is_not_installed(
         ("telemetry: {zenoh_file: mine}", "telemetry.zenoh_file"),
         ("ros2: {zenoh_file: mine}", "ros2.zenoh_file"),
         ("twin: {world: mine}", "world"),
+        ("service: {map: mine}", "service.map"),
     ],
 )
 def test_a_configuration_with_files_that_the_service_would_not_find_is_not_installed(
@@ -145,7 +146,8 @@ def test_a_configuration_with_files_that_the_service_would_not_find_is_not_insta
 ) -> None:
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "mine").touch()
+    make_mine = Path.mkdir if key == "service.map" else Path.touch
+    make_mine(tmp_path / "mine")
     (tmp_path / "robot.yaml").write_text(setting)
     assert main(["install-service", "--user", "robot.yaml"]) == 2
     (line,) = capsys.readouterr().err.splitlines()
@@ -156,7 +158,13 @@ def test_a_configuration_with_files_that_the_service_would_not_find_is_not_insta
 
 
 @pytest.mark.parametrize(
-    "setting", ["telemetry: {zenoh_file: %s}", "ros2: {zenoh_file: %s}", "twin: {world: %s}"]
+    "setting",
+    [
+        "telemetry: {zenoh_file: %s}",
+        "ros2: {zenoh_file: %s}",
+        "twin: {world: %s}",
+        "service: {map: %s}",
+    ],
 )
 def test_a_configuration_with_files_that_the_service_cannot_see_is_not_installed(
     tmp_path: Path,
