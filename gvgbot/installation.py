@@ -197,12 +197,16 @@ def _hidden(path: Path) -> str | None:
 
 def _check_place(executable: Path) -> None:
     """Raises GvgbotError if the service, which sees no home, would not find its program."""
-    for path in (executable, executable.resolve()):
+    elsewhere = "install gvgbot elsewhere, for instance with python3 -m venv /opt/gvgbot"
+    another = (
+        "make its environment with a Python that is elsewhere, for instance with "
+        f"/usr/bin/python3 -m venv --clear {executable.parent.parent}, and install gvgbot again"
+    )
+    for path, remedy in ((executable, elsewhere), (executable.resolve(), another)):
         hidden = _hidden(path)
         if hidden is not None:
             raise GvgbotError(
-                f"the service cannot see {path}, for it sees nothing of {hidden}: "
-                "install gvgbot elsewhere, for instance with python3 -m venv /opt/gvgbot"
+                f"the service cannot see {path}, for it sees nothing of {hidden}: {remedy}"
             )
 
 

@@ -193,3 +193,16 @@ def test_a_service_that_could_not_see_its_program_is_not_installed(
     (line,) = capsys.readouterr().err.splitlines()
     assert "/home/me/gvgbot/bin/python" in line
     assert "/opt/gvgbot" in line
+
+
+def test_an_environment_whose_interpreter_the_service_could_not_see_is_to_be_made_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    python = tmp_path / "gvgbot/bin/python"
+    python.parent.mkdir(parents=True)
+    python.symlink_to("/home/me/.pyenv/bin/python3.11")
+    monkeypatch.setattr(sys, "executable", str(python))
+    assert main(["install-service", "--dry-run"]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "/home/me/.pyenv/bin/python3.11" in line
+    assert f"/usr/bin/python3 -m venv --clear {tmp_path / 'gvgbot'}" in line
