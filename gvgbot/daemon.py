@@ -135,6 +135,7 @@ def run(
     name = config.robot.name if place is None else place.world.name
     with contextlib.ExitStack() as stack:
         telemetry = _telemetry(config, stack)
+        ros2, foxglove = _ros2(config, stack, telemetry), _foxglove(config, stack)
         asked = wanted(config, os.environ, out=out, known=known, anew=anew)
         start = begin(asked, world=name, stack=stack)
         directory = start.directory
@@ -142,7 +143,6 @@ def run(
         keeper = Keeper(session, start.files, start.saved)
         network = "off" if telemetry is None else telemetry.addresses
         _announce(session, network, resumed=start.saved is not None)
-        ros2, foxglove = _ros2(config, stack, telemetry), _foxglove(config, stack)
         robot = Robot(
             session,
             Notifier.from_environment(),

@@ -4,6 +4,7 @@ import json
 import struct
 import threading
 from collections.abc import Iterator
+from pathlib import Path
 from socket import SHUT_RD, SO_LINGER, SOL_SOCKET, create_connection
 from typing import Any
 
@@ -12,6 +13,8 @@ from rosbags.typesys import get_types_from_msg
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
+from gvgbot.config import Config, ServiceConfig
+from gvgbot.daemon import run
 from gvgbot.errors import GvgbotError
 from gvgbot.foxglove.config import FoxgloveConfig
 from gvgbot.foxglove.server import FoxgloveServer
@@ -19,6 +22,8 @@ from gvgbot.geometry import Pose
 from gvgbot.ros2.cdr import encode
 from gvgbot.ros2.topics import SCAN, TF, TF_STATIC, TOPICS, Topic
 from gvgbot.ros2.translation import transforms
+from gvgbot.stop_signals import StopSignals
+from gvgbot.telemetry_config import TelemetryConfig
 from tests.unit.ros2.oracle import STORE
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(120)]
@@ -107,6 +112,19 @@ def test_what_nobody_watches_is_not_wanted(server: FoxgloveServer, app: App) -> 
 def test_a_port_that_is_taken_is_said_in_a_line(server: FoxgloveServer) -> None:
     with pytest.raises(GvgbotError, match=r"foxglove\.port"):
         FoxgloveServer(FoxgloveConfig(port=server.port), "another")
+
+
+def test_a_daemon_whose_port_is_taken_leaves_no_run_however_often_it_is_started(
+    server: FoxgloveServer, tmp_path: Path
+) -> None:
+    service = ServiceConfig(state_dir=str(tmp_path))
+    network = TelemetryConfig(enabled=False)
+    viewer = FoxgloveConfig(enabled=True, port=server.port)
+    config = Config(service=service, telemetry=network, foxglove=viewer)
+    for _ in range(2):
+        with pytest.raises(GvgbotError, match=r"foxglove\.port"):
+            run(config, StopSignals(), out=None, known=None, anew=False)
+    assert not list(tmp_path.glob("runs/*"))
 
 
 def test_who_goes_without_a_word_leaves_no_lines_in_the_log(
