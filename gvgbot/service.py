@@ -113,11 +113,10 @@ def set_up_logging(
     stream: TextIO, environment: Mapping[str, str], least: Literal["info", "warning"] = "info"
 ) -> None:
     """Log to the stream: for people, or as JSON with a severity where a journal reads along."""
-    journal = "JOURNAL_STREAM" in environment
     unbreakable = _Unbreakable(stream)
     form = (
         _for_journal()
-        if journal
+        if _is_journal(stream, environment)
         else _for_people(colors=stream.isatty() and not environment.get("NO_COLOR"))
     )
     structlog.configure(
@@ -126,6 +125,15 @@ def set_up_logging(
         logger_factory=structlog.PrintLoggerFactory(cast(TextIO, unbreakable)),
         cache_logger_on_first_use=False,
     )
+
+
+def _is_journal(stream: TextIO, environment: Mapping[str, str]) -> bool:
+    """Whether a journal reads the stream: terminals, too, inherit the variable of a service."""
+    try:
+        status = os.fstat(stream.fileno())
+    except OSError:
+        return False
+    return environment.get("JOURNAL_STREAM") == f"{status.st_dev}:{status.st_ino}"
 
 
 def _for_people(*, colors: bool) -> list[Processor]:

@@ -101,17 +101,28 @@ def _fresh_log() -> Iterator[None]:
 
 @pytest.mark.usefixtures("_fresh_log")
 @pytest.mark.parametrize(("method", "prefix"), [("info", "<6>"), ("warning", "<4>")])
-def test_a_journal_gets_json_with_its_severity(method: str, prefix: str) -> None:
-    stream = io.StringIO()
-    set_up_logging(stream, {"JOURNAL_STREAM": "8:1234"})
-    getattr(structlog.get_logger(), method)("laser lost", port="/dev/hokuyo", after_s=None)
-    (line,) = stream.getvalue().splitlines()
+def test_a_journal_gets_json_with_its_severity(tmp_path: Path, method: str, prefix: str) -> None:
+    path = tmp_path / "journal"
+    with path.open("w") as stream:
+        status = os.fstat(stream.fileno())
+        set_up_logging(stream, {"JOURNAL_STREAM": f"{status.st_dev}:{status.st_ino}"})
+        getattr(structlog.get_logger(), method)("laser lost", port="/dev/hokuyo", after_s=None)
+    (line,) = path.read_text().splitlines()
     assert line.startswith(prefix)
     assert json.loads(line.removeprefix(prefix)) == {
         "event": "laser lost",
         "port": "/dev/hokuyo",
         "level": method,
     }
+
+
+@pytest.mark.usefixtures("_fresh_log")
+def test_a_terminal_that_a_service_has_opened_is_no_journal(tmp_path: Path) -> None:
+    path = tmp_path / "terminal"
+    with path.open("w") as stream:
+        set_up_logging(stream, {"JOURNAL_STREAM": "8:1234"})
+        structlog.get_logger().info("laser lost")
+    assert "<6>" not in path.read_text()
 
 
 @pytest.mark.usefixtures("_fresh_log")
