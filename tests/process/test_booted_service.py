@@ -1,5 +1,6 @@
 """The service under a systemd that was booted for it: ready, killed, hung, stopped."""
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -47,6 +48,9 @@ def test_it_is_ready_lives_through_a_kill_and_a_hang_and_stops(robot: Machine) -
     assert robot.run("ps", "-o", "user=", "-p", first).strip() == "gvgbot"
     run = "/var/lib/gvgbot/runs/ring-1"
     until(lambda: "snapshot.gvg" in robot.run("ls", run), patience_s=PATIENCE)
+
+    log = robot.run("journalctl", "-u", "gvgbot", "-o", "cat", "_PID=" + first).splitlines()
+    assert "started" in [json.loads(line)["event"] for line in log]
 
     robot.run("kill", "-KILL", first)
     until(lambda: is_up_anew(robot, first), patience_s=PATIENCE)
