@@ -4,7 +4,7 @@ import dataclasses
 import reprlib
 import types
 import typing
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Union
@@ -153,7 +153,7 @@ def _record(kind: Any, value: Any, path: KeyPath, problems: list[Problem]) -> An
     before = len(problems)
     fields = {field.name: field for field in dataclasses.fields(kind) if field.init}
     problems += [
-        _unknown(key, value[key], path, list(fields)) for key in value if key not in fields
+        _unknown(key, value[key], path, kind, list(fields)) for key in value if key not in fields
     ]
     problems += [
         Problem((*path, name), None, "is missing", missing=True)
@@ -178,12 +178,22 @@ def _is_required(field: "dataclasses.Field[Any]") -> bool:
     return field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
 
 
-def _unknown(key: Any, value: Any, path: KeyPath, names: list[str]) -> Problem:
-    """The mistake of a key that does not exist, with the nearest that does."""
+def _unknown(key: Any, value: Any, path: KeyPath, kind: Any, names: list[str]) -> Problem:
+    """The mistake of a key that does not exist, with those that do and may be meant."""
     near = nearest(str(key), names)
-    meant = None if near is None else ".".join((*path, near))
+    inside = list(_places(kind, str(key))) or ([] if near is None else [near])
+    meant = " or ".join(".".join((*path, one)) for one in inside)
     hint = f"did you mean {meant}?" if meant else f"here are {', '.join(names)}"
     return Problem((*path, str(key)), value, f"no such key; {hint}")
+
+
+def _places(kind: Any, name: str) -> Iterator[str]:
+    """Where in the sections below a dataclass there are keys of that name."""
+    for section, inner in typing.get_type_hints(kind).items():
+        if dataclasses.is_dataclass(inner):
+            if name in typing.get_type_hints(inner):
+                yield f"{section}.{name}"
+            yield from (f"{section}.{place}" for place in _places(inner, name))
 
 
 def describe(kind: Any) -> str:

@@ -134,6 +134,7 @@ WRONG = {
     "inside an optional section": ("spare: {toes: 0}", "spare.toes = 0: must be a whole number"),
     "unknown key": ("wieght_kg: 3", "wieght_kg = 3: no such key; did you mean weight_kg?"),
     "unknown nested key": ("leg: {toe: 3}", "leg.toe = 3: no such key; did you mean leg.toes?"),
+    "key of a section": ("toes: 3", "toes = 3: no such key; did you mean leg.toes?"),
     "unlike any key": ("leg: {q: 3}", "leg.q = 3: no such key; here are length_m, toes, longest_m"),
     "key that is no text": ("1: 2", "1 = 2: no such key"),
     "fields at odds": ("shortest_m: 3", "the whole: shortest_m must be at most tallest_m"),
