@@ -3,7 +3,7 @@
 import argparse
 import contextlib
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import inf, isfinite
 from pathlib import Path
 from typing import Any, NoReturn, TypeAlias, TypeVar
@@ -15,6 +15,11 @@ Number = TypeVar("Number", int, float)
 BAD_USAGE = 2
 MOST_FRAMES = 200
 LAST_PORT = 65535
+KEYS = {  # of the configuration, which have options of their own with some commands
+    "--world": "twin.world",
+    "--start": "twin.start",
+    "--seed": "twin.seed",
+}
 NEGATIVE_NUMBER = re.compile(r"-\.?\d")
 
 
@@ -29,8 +34,14 @@ class Parser(argparse.ArgumentParser):
         """Refuse what is not known here, so that the help that is named is that of the command."""
         parsed, unknown = super().parse_known_args(args, namespace)
         if unknown:
-            self.error(f"unrecognized arguments: {' '.join(unknown)}")
+            self.error(f"unrecognized arguments: {' '.join(unknown)}{self._hint(unknown)}")
         return parsed, unknown
+
+    def _hint(self, unknown: Sequence[str]) -> str:
+        """What to type instead of an option that is a key of the configuration here."""
+        keys = [KEYS[name] for one in unknown if (name := one.partition("=")[0]) in KEYS]
+        is_key = keys and "--set" in self._option_string_actions
+        return f": here it is --set {keys[0]}=..." if is_key else ""
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         """Refuse what is no choice, with the one that may have been meant."""

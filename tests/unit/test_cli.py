@@ -27,6 +27,8 @@ BAD_ARGUMENTS = {
     "mistyped command": (["eksplore"], "'eksplore': did you mean explore?"),
     "mistyped action": (["map", "sohw", "."], "'sohw': did you mean show?"),
     "unknown option": (["explore", "--wrold", "office"], "--wrold"),
+    "an option that is a key here": (["run", "--world", "ring"], "it is --set twin.world=..."),
+    "one with its value": (["twin", "--seed=3"], "it is --set twin.seed=... (see gvgbot twin"),
     "another command's option": (["run", "--config", "a.yaml"], "see gvgbot run --help"),
     "a range below nothing": (["replay", "x.log", "--no-echo", "-1"], "a number above 0"),
     "two numbers for a start": (["explore", "--start", "1", "2"], "--start"),
