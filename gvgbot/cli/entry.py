@@ -1,12 +1,12 @@
 """The command line: arguments in, exit status out, one clear line for every failure."""
 
+import contextlib
 import errno
 import io
 import os
 import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 
@@ -46,7 +46,7 @@ def _fill_streams() -> None:
         sys.stdout.reconfigure(errors="backslashreplace")
 
 
-@contextmanager
+@contextlib.contextmanager
 def _ctrl_c_shut_out_if_ignored() -> Iterator[None]:
     """Let tasks be ended in order though Ctrl-C is ignored, as `&` in a script has it.
 
@@ -65,7 +65,7 @@ def _ctrl_c_shut_out_if_ignored() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-@contextmanager
+@contextlib.contextmanager
 def _any_stop_as_by_ctrl_c() -> Iterator[None]:
     """Let a command that is told to end, or loses its terminal, tidy up as after Ctrl-C."""
     taken = [
@@ -99,6 +99,7 @@ def status_of(command: Callable[[], int]) -> int:
         wanted = f" ({error})" if str(error) else ""
         return _fail(f"out of memory{wanted}: take a smaller or coarser map", FAILURE)
     except BrokenPipeError:  # whoever read our output has gone, as `head` does
+        _drop_output()
         return FAILURE
     except PermissionError as error:
         if error.filename is None:
@@ -110,6 +111,12 @@ def status_of(command: Callable[[], int]) -> int:
         if error.errno != errno.ENAMETOOLONG:
             raise
         return _fail(f"{error.filename}: {error.strerror}: choose a shorter one", BAD_USAGE)
+
+
+def _drop_output() -> None:
+    """Let nobody hear of what is still to be written, which Python tries once more at its end."""
+    with contextlib.suppress(OSError), Path(os.devnull).open("wb") as nobody:
+        os.dup2(nobody.fileno(), sys.stdout.fileno())
 
 
 def _ungrouped(command: Callable[[], int]) -> int:

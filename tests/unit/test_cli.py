@@ -1,6 +1,8 @@
 """The command line says in one line what is wrong, with the right exit status."""
 
 import errno
+import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -243,6 +245,26 @@ def test_an_interrupted_command_says_so_and_exits_as_shells_expect(capsys: Captu
 def test_a_mistake_of_the_program_is_not_hidden() -> None:
     with pytest.raises(ZeroDivisionError):
         status_of(lambda: raising(ZeroDivisionError()))
+
+
+NOBODY_READS = """
+import sys
+from gvgbot.cli import status_of
+from gvgbot.cli.arguments import say
+sys.exit(status_of(lambda: say("vertices")))
+"""
+
+
+def test_a_reader_that_has_gone_is_no_news() -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    environment = {key: value for key, value in os.environ.items() if key != "PYTHONUNBUFFERED"}
+    program = [sys.executable, "-c", NOBODY_READS]
+    done = subprocess.run(
+        program, stdout=writer, stderr=subprocess.PIPE, check=False, env=environment
+    )
+    os.close(writer)
+    assert (done.returncode, done.stderr) == (1, b"")
 
 
 @pytest.mark.parametrize("status", [0, 1])
