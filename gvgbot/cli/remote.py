@@ -45,8 +45,8 @@ def add_web(commands: Commands) -> None:
         "web",
         help="watch a robot in the browser",
         description="Serve a page with the live map, the state and the events of a robot, to this "
-        "machine only unless --host says otherwise, until Ctrl-C. Who has the page open can ask "
-        "the robot for what its telemetry.requests permits.",
+        "machine only unless --host says otherwise, until Ctrl-C. Whoever has the page open can "
+        "ask the robot for what its telemetry.requests permits.",
         epilog="example: gvgbot web turtlebot2 --connect tcp/192.168.1.7:7447",
     )
     web.add_argument(
