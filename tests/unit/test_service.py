@@ -177,7 +177,8 @@ def test_a_log_that_nobody_reads_does_not_hold_up_the_robot() -> None:
     """As after Ctrl-S in its terminal, or behind a pager. What was left out is owned up to."""
     reading, writing = os.pipe()
     with os.fdopen(reading, "rb", buffering=0) as reader, os.fdopen(writing, "w") as stream:
-        set_up_logging(stream, {"JOURNAL_STREAM": "8:1234"})
+        status = os.fstat(stream.fileno())
+        set_up_logging(stream, {"JOURNAL_STREAM": f"{status.st_dev}:{status.st_ino}"})
         for number in range(2000):
             structlog.get_logger().info("vertex added", vertex=number)
         before = reader.read(1_000_000).splitlines()
