@@ -81,6 +81,8 @@ def _words(link: Link) -> str:
     match link.word:
         case "alive":
             return f"connected to {link.robot}"
+        case "doubled":
+            return f"several robots are named {link.robot}: give one another robot.name"
         case "quiet":
             return f"{link.robot} says nothing: its program hangs"
         case "gone":
@@ -89,7 +91,7 @@ def _words(link: Link) -> str:
             return f"no robot named {link.robot} here; there is {', '.join(link.others) or 'none'}"
         case "unreachable":
             return f"{link.trouble} (trying again)"
-        case _:
+        case "cut off":
             return f"connection to {link.robot} lost (trying again)"
 
 

@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal, get_args
 
 import msgspec
 
+from gvgbot.client.presence import Word
 from gvgbot.requests import JSON, Arguments, RequestName, parse
 from gvgbot.topics import Events, Health, Map, Odometry, Plan, Scan, State, Tile, Trajectory
 
@@ -27,7 +28,7 @@ class Link(msgspec.Struct, frozen=True, kw_only=True):
 
     robot: str | None  # its name, as far as it is known
     endpoint: str  # where the server looks for it
-    word: str  # as a Presence has it, or `unreachable`: no connection to the robot's address
+    word: Word | Literal["unreachable"]  # the latter: no connection to the robot's address
     for_s: float  # since when
     others: tuple[str, ...] = ()  # who else is there, if the robot is absent
     trouble: str = ""  # why it is unreachable
