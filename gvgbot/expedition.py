@@ -34,7 +34,7 @@ from gvgbot.maps.route_graph import RouteGraph
 from gvgbot.maps.run_directory import RunDirectory
 from gvgbot.report import with_room_of, world_files
 from gvgbot.service import set_up_logging
-from gvgbot.session import Session
+from gvgbot.session import Session, Tally
 from gvgbot.simulation import Place, Simulation, open_place
 from gvgbot.stop_signals import StopSignals
 from gvgbot.team.member import Member
@@ -324,8 +324,7 @@ def _summary(
         "joined": [robot.member.name for robot in joined],
         "frames": {name: (pose.x, pose.y, pose.theta) for name, pose in poses.items()},
         "distance_m": sum(robot.session.pipeline.past.travelled for robot in robots),
-        "duration_s": max(t.last_stamp for t in tallies)
-        - min(t.first_stamp or 0.0 for t in tallies),
+        "duration_s": lasted(tallies),
         "durations_s": [_duration(robot) for robot in robots],
         "vertices": len(graph.vertices),
         "edges": len(graph.edges),
@@ -344,8 +343,13 @@ def _outcome(robots: list[_Robot]) -> str:
 
 def _duration(robot: _Robot) -> float:
     tally = robot.session.tally
-    ended = tally.last_stamp if robot.ended is None else robot.ended
-    return ended - (tally.first_stamp or 0.0)
+    return lasted([tally if robot.ended is None else replace(tally, last_stamp=robot.ended)])
+
+
+def lasted(tallies: Sequence[Tally]) -> float:
+    """Seconds from the first control cycle of several robots to the last; 0 if there was none."""
+    first = [tally.first_stamp for tally in tallies if tally.first_stamp is not None]
+    return max(tally.last_stamp for tally in tallies) - min(first) if first else 0.0
 
 
 def _conclude(

@@ -1,12 +1,13 @@
-"""What several robots leave together: the map and the grid of all agree."""
+"""What several robots leave together: the map, the grid of all, and how long it took."""
 
 import numpy as np
 import pytest
 
-from gvgbot.expedition import joined_map
+from gvgbot.expedition import joined_map, lasted
 from gvgbot.geometry import Pose
 from gvgbot.maps.occupancy import UNKNOWN, OccupancyGrid
 from gvgbot.maps.route_graph import RouteEdge, RouteGraph, RouteNode
+from gvgbot.session import Tally
 
 CELL = 0.05  # m
 
@@ -49,3 +50,21 @@ def test_no_edge_claims_more_room_than_the_grid_of_all_has_along_it(first: int) 
     nearest = float(np.abs(grid.origin[1] + CELL * walls[:, 0]).min())
     assert nearest == pytest.approx(0.6, abs=CELL)
     assert edge.min_clearance <= nearest + 1e-3
+
+
+def counted(first_stamp: float | None, last_stamp: float) -> Tally:
+    return Tally(
+        first_stamp=first_stamp, last_stamp=last_stamp, contacts=0, closures=0, recoveries=0
+    )
+
+
+def test_a_robot_that_never_set_out_makes_no_expedition_longer() -> None:
+    """In real time, stamps count from the start of the computer."""
+    begun, late, never = (
+        counted(85_000.0, 85_060.0),
+        counted(85_010.0, 85_090.0),
+        counted(None, 0.0),
+    )
+    assert lasted([begun, late]) == 90.0
+    assert lasted([begun, late, never]) == 90.0
+    assert lasted([never]) == 0.0
