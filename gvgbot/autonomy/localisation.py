@@ -142,7 +142,7 @@ class LocalMaps:
         prior = before.compose(motion)
         still = Pose(before.x, before.y, prior.theta)
         slipping = [] if self._matching.search_rad else [(still, _SLIPPING * Q)]
-        best = self._best(scan, [(prior, Q), *slipping], least_known=_SEEN_SHARE, stays=True)
+        best = self._best(scan, [(prior, Q), *slipping], stays=True)
         calibration, per_error = self._calibration, per_unit(motion, duration)
         if best is None:
             laid = self._laid(None, prior, per_error, Q)
@@ -188,7 +188,7 @@ class LocalMaps:
         clearly = _CLEARLY if turned is None else _AT_ALL
         Q = noise.sum(axis=0) + _LOST
         priors = [(p, Q) for p in _around(prior)]
-        best = self._best(scan, priors, clearly, turned or 0.0, least_known=_SEEN_SHARE)
+        best = self._best(scan, priors, clearly, turned or 0.0)
         if best is None:
             return ScanMatch(prior, Q, None)
         return ScanMatch(best[0].pose, best[0].covariance, None)
@@ -260,16 +260,13 @@ class LocalMaps:
         priors: list[tuple[Pose, Array]],
         clearly: float = _CLEARLY,
         turned: float = 0.0,
-        least_known: float = 1.0,
         *,
         stays: bool = False,
     ) -> tuple[Registration, Array] | None:
         """The match from the first prior, unless that from another one is clearly better.
 
-        With `least_known`, what lies where nothing is known yet speaks neither for a place nor
-        against it; enough of the rest, which is taken for at least that share, must fit. Where the
-        robot `stays` by the first prior, points must also lie nearer to walls by another one: few
-        of them lie on lines among posts, and by chance on lines from post to post.
+        Where the robot `stays` by the first prior, points must also lie nearer to walls by another
+        one: few of them lie on lines among posts, and by chance on lines from post to post.
         """
         self.catch_up()
         assert self._walls is not None
@@ -287,7 +284,7 @@ class LocalMaps:
                 first = near if found is None else found.pose
             if found is None:
                 continue
-            now = self._agreement(found, points, least_known)
+            now = self._agreement(found, points)
             if now is None:
                 if stays and i == 0 and self._nearness(points, first) >= _ON_WALLS:
                     best = found, Q
@@ -309,12 +306,15 @@ class LocalMaps:
         coarse = (config.coarse_pair_m,) if config.coarse_pair_m else ()
         return register_coarsely(points, tree, walls, near, Q, config, coarse, hits, sides, so_far)
 
-    def _agreement(self, found: Registration, points: Array, least_known: float) -> float | None:
-        """How well points (N, 2) fit where they were found, 0 to 1; None if too few of them do."""
-        known, config = 1.0, self._matching
-        if least_known < 1.0:
-            known = float(self.near.known(found.pose.transform(points)).mean())
-        if found.inliers < config.min_inliers * max(known, found.inliers, least_known):
+    def _agreement(self, found: Registration, points: Array) -> float | None:
+        """How well points (N, 2) fit where they were found, 0 to 1; None if too few of them do.
+
+        What lies where nothing is known yet speaks neither for a place nor against it; enough of
+        the rest, which is taken for a least share of all, must fit.
+        """
+        config = self._matching
+        known = float(self.near.known(found.pose.transform(points)).mean())
+        if found.inliers < config.min_inliers * max(known, found.inliers, _SEEN_SHARE):
             return None
         fits = found.inliers * (1.0 - found.rms / config.max_pair_m)
         return fits + _UNKNOWN * (1.0 - max(known, found.inliers))
