@@ -114,8 +114,7 @@ class PlayedRobot(Robot):
             case Battery():
                 self._base.charge = message
             case Scan():
-                if self._feed is not None:
-                    self._feed.on_scan(message)
+                self._show_scan(message)
                 self._on_events(self._pipeline.perceive(message))
             case _:
                 self._base.felt = message.felt.contact
