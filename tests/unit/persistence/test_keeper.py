@@ -3,6 +3,7 @@
 import asyncio
 import copy
 import errno
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -358,6 +359,18 @@ def test_what_is_asked_of_a_robot_that_saw_nothing_yet_is_kept(tmp_path: Path, d
         Keeper(again, files, saved)
         assert again.pipeline.errands.is_paused == done
         assert not again.pipeline.is_lost
+
+
+@pytest.mark.parametrize("resume", ["running", "paused"])
+def test_an_interrupted_run_waits_if_the_configuration_says_so(tmp_path: Path, resume: str) -> None:
+    shutil.copytree(MISSION, tmp_path, dirs_exist_ok=True)
+    files = MissionFiles(tmp_path)
+    with RunDirectory(tmp_path) as directory:
+        config = load_config(overrides=[f"service.resume={resume}"])
+        session = Session(config, directory, None)
+    Keeper(session, files, files.read())
+    assert session.pipeline.past.keyframes
+    assert session.pipeline.errands.is_paused == (resume == "paused")
 
 
 def test_time_goes_on_where_a_map_from_elsewhere_ended(tmp_path: Path) -> None:
