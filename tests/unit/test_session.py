@@ -1,15 +1,20 @@
-"""What is counted of a run."""
+"""What is counted of a run, and what is written of it."""
 
 import json
 from pathlib import Path
 
 import pytest
+import structlog
 
+from gvgbot.autonomy.events import LoopClosed, Recovery
 from gvgbot.config import load_config
 from gvgbot.geometry import Pose, Twist
-from gvgbot.hal.messages import Odometry
+from gvgbot.hal.messages import Contact, Odometry
 from gvgbot.maps.run_directory import RunDirectory
 from gvgbot.session import Session
+from tests.unit.persistence.test_mission_files import full_disk
+
+STUCK = Recovery(1.0, "look around", "no edge in sight")
 
 
 def test_a_run_lasts_as_long_as_it_did_though_its_clock_was_set_back(tmp_path: Path) -> None:
@@ -21,3 +26,35 @@ def test_a_run_lasts_as_long_as_it_did_though_its_clock_was_set_back(tmp_path: P
         session.save()
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert summary["duration_s"] == pytest.approx(60.0)
+
+
+def test_each_press_of_a_bumper_is_counted_once_however_long_it_lasts(tmp_path: Path) -> None:
+    felt = [
+        Contact(0.0),
+        None,
+        *3 * [Contact(0.0, bumper_left=True)],
+        Contact(0.0, cliff_left=True),
+    ]
+    with RunDirectory(tmp_path) as directory:
+        session = Session(load_config(), directory, None)
+        for stamp, contact in enumerate(2 * felt):
+            session.on_cycle(Odometry(float(stamp), Pose(), Twist(0.0, 0.0)), contact)
+        session.save()
+    assert json.loads((tmp_path / "summary.json").read_text())["contacts"] == 2
+
+
+def test_events_are_counted_at_once_and_written_when_there_is_room(tmp_path: Path) -> None:
+    closed = LoopClosed(2.0, 3, 25.0, 1.0, 0.1, 0.9)
+    with RunDirectory(tmp_path) as directory:
+        session = Session(load_config(), directory, None)
+        with structlog.testing.capture_logs() as logs, full_disk(10):
+            session.on_events([STUCK])
+            session.on_events([closed])
+        assert [log["event"] for log in logs] == ["events not written, exploring on"]
+        assert (session.tally.recoveries, session.tally.closures) == (1, 1)
+        assert (tmp_path / "events.jsonl").read_bytes() == b""
+        session.on_events([STUCK])
+    kinds = [
+        json.loads(line)["event"] for line in (tmp_path / "events.jsonl").read_text().splitlines()
+    ]
+    assert kinds == ["recovery", "loop_closed", "recovery"]
