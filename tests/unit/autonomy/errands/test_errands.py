@@ -1,12 +1,13 @@
 """What is answered to who asks for an errand."""
 
 import numpy as np
+import pytest
 
-from gvgbot.autonomy.control.orders import Drive
+from gvgbot.autonomy.control.orders import Drive, Stand
 from gvgbot.autonomy.errands.plans import Kept
 from gvgbot.autonomy.events import ErrandEnded
 from gvgbot.autonomy.slam.graph import HalfEdgeId, Vertex
-from gvgbot.geometry import Pose
+from gvgbot.geometry import Pose, Twist
 from tests.unit.autonomy.errands.test_own_tasks import Explorer
 from tests.unit.autonomy.test_mission import CLOSED
 
@@ -39,3 +40,25 @@ def test_who_drives_to_a_vertex_that_proves_to_be_a_known_one_drives_on_to_that(
     assert order.track.polyline[-1].tolist() == [4.0, 0.0]
     assert robot.errands.kept() == Kept("vertex", vertices=(ends[-1].vertex,))
     assert not robot.said(ErrandEnded)
+
+
+@pytest.mark.parametrize("is_sent", [True, False])
+def test_who_drives_the_robot_ends_its_errand_and_it_waits_where_it_is_left(is_sent: bool) -> None:
+    robot, twist = Explorer(), Twist(0.0, 0.4)
+    while not robot.mapper.graph.edges:
+        robot.look(CLOSED)
+    (edge,) = robot.mapper.graph.edges.values()
+    far = max((edge.a, edge.b), key=lambda end: robot.mapper.belief.map_vertex(end.vertex).x)
+    if is_sent:
+        robot.errands.goto_vertex(far.vertex, robot.stamp)
+        assert isinstance(robot.look(CLOSED), Drive)
+    assert robot.errands.drive(twist, robot.stamp)
+    assert not robot.errands.drive(twist, robot.stamp)
+    assert robot.errands.progress == "driven by somebody"
+    told = ErrandEnded(robot.stamp, f"goto {far.vertex}", "replaced", "by somebody who drives")
+    assert robot.errands.take_events() == [told] * is_sent
+    assert isinstance(robot.look(CLOSED), Stand)
+    assert not robot.errands.is_resting
+    robot.errands.pause()
+    robot.errands.resume()
+    assert robot.errands.is_resting
