@@ -108,20 +108,32 @@ class DrivenEdges:
         if left is None or arrived is None or left == arrived:
             return
         edge = graph.edge_at(left)
-        if edge is not None:
-            between = edge.other(left).vertex
-            comes_back = arrived.vertex == left.vertex != between  # round something, past its end
-            if not (comes_back or self._leads_past(between, arrived)):
-                self._mapper.unsettled.note_way(edge, arrived.vertex)
-            edge.traversals += 1
-            edge.doubted_since = None
-            if graph.edge_at(arrived) is not None:
-                self._note_missed(view, known, between, arrived)
-            else:
-                self._join_beyond(view, between, arrived, passage)
+        if edge is None:
+            self._close(view, known, left, arrived, passage)
             return
+        between = edge.other(left).vertex
+        comes_back = arrived.vertex == left.vertex != between  # round something, past its end
+        if not (comes_back or self._leads_past(between, arrived)):
+            self._mapper.unsettled.note_way(edge, arrived.vertex)
+        edge.traversals += 1
+        edge.doubted_since = None
+        if graph.edge_at(arrived) is not None:
+            self._note_missed(view, known, between, arrived)
+        else:
+            self._join_beyond(view, between, arrived, passage)
+
+    def _close(
+        self,
+        view: View,
+        known: Correspondence,
+        left: HalfEdgeId,
+        arrived: HalfEdgeId,
+        passage: Passage,
+    ) -> None:
+        """Join the frontier that the robot left by to where it has arrived, unless sight will."""
+        graph = self._mapper.graph
         far, near = graph.half_edge(arrived), graph.half_edge(left)
-        if far is None or near is None or near.edge is not None:
+        if far is None or near is None:
             return
         before = graph.edge_at(arrived)
         if before is not None and before.other(arrived).vertex == left.vertex:
