@@ -18,7 +18,6 @@ _QUIET = {"edge_joined"}  # too many of them, and they say little
 _TONES: Mapping[str, Tone] = {
     "recovery": "warning",
     "closure_revoked": "warning",
-    "finished": "good",
     "loop_closed": "good",
 }
 _PHASES: Mapping[str, Tone] = {
@@ -179,8 +178,13 @@ def told(event: Event, now: float) -> Fact | None:
     """An event as a line at a stamp, s; None for those that only fill the list."""
     if event.kind in _QUIET:
         return None
-    tone = _TONES.get(event.kind, "plain")
-    return Fact(f"{_age(now - event.stamp):>8}", _words(event), tone)
+    return Fact(f"{_age(now - event.stamp):>8}", _words(event), _tone_of(event))
+
+
+def _tone_of(event: Event) -> Tone:
+    if event.kind == "finished":
+        return "good" if event.details.get("outcome") == "explored" else "warning"
+    return _TONES.get(event.kind, "plain")
 
 
 def _words(event: Event) -> str:
@@ -206,7 +210,7 @@ def _words(event: Event) -> str:
         case "recovery":
             return f"{get('action')}: {get('reason')}"
         case "finished":
-            return f"{get('outcome')}: {get('reason')}"
+            return f"{str(get('outcome')).replace('_', ' ')}: {get('reason')}"
         case "requested":
             refused = "" if get("done") else " refused"
             return f"{get('request')}{refused}: {get('answer')} ({get('origin')})"

@@ -163,7 +163,7 @@ export function told(event) {
     case "doubt_settled": return [`vertex ${d.vertex} is ${d.known ?? "a new one"}`, "plain"];
     case "closure_revoked": return [`closure at vertex ${d.vertex} taken back`, "warning"];
     case "recovery": return [`${d.action}: ${d.reason}`, "warning"];
-    case "finished": return [`${d.outcome.replaceAll("_", " ")}: ${d.reason}`, "good"];
+    case "finished": return [`${d.outcome.replaceAll("_", " ")}: ${d.reason}`, d.outcome === "explored" ? "good" : "warning"];
     case "requested": return [`${d.request}${d.done ? "" : " refused"}: ${d.answer} (${d.origin})`, "plain"];
     case "errand_ended": return [`${d.errand} ${d.outcome}${d.reason ? `, ${d.reason}` : ""}`, "plain"];
     case "round_ended": return [`round ${d.round}: ${d.reached} reached, ${d.missed} missed`, "plain"];

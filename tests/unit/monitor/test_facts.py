@@ -11,7 +11,7 @@ from gvgbot.client import Event, Health, Plan, Presence
 from gvgbot.client.presence import Word
 from gvgbot.hal.messages import LOW_BATTERY
 from gvgbot.monitor import facts as facts_module
-from gvgbot.monitor.facts import Fact, duration, facts, headline, told
+from gvgbot.monitor.facts import Fact, Tone, duration, facts, headline, told
 from gvgbot.topics import Mate, packed
 from tests.unit.test_telemetry import EXAMPLE, NOWHERE
 
@@ -251,6 +251,21 @@ def test_what_happened_is_told_in_words(
     fact = told(Event(number=1, stamp=0.0, kind=kind, details=details), 0.0)
     assert fact is not None
     assert fact.text == text
+
+
+@pytest.mark.parametrize(
+    ("outcome", "words", "tone"),
+    [
+        ("explored", "explored", "good"),
+        ("explored_with_blocked", "explored with blocked", "warning"),
+        ("failed", "failed", "warning"),
+        ("stopped", "stopped", "warning"),
+    ],
+)
+def test_an_end_is_good_when_all_is_explored(outcome: str, words: str, tone: Tone) -> None:
+    details: dict[str, str | int | float | bool | None] = {"outcome": outcome, "reason": "why"}
+    ended = Event(number=1, stamp=0.0, kind="finished", details=details)
+    assert told(ended, 12.0) == Fact("    12 s", f"{words}: why", tone)
 
 
 def test_a_kind_of_event_that_is_not_known_yet_is_told_all_the_same() -> None:
