@@ -69,8 +69,9 @@ def connect(
     `endpoint` is the address of the robot or of a zenoh router. Entering raises GvgbotError if
     nobody answers there for as long as the patience lasts; whether the robot itself is there, now
     or later, its `presence` tells. A connection that is lost later is made again by itself.
-    `zenoh_file` (JSON5) has keys and passwords; an address in it replaces the default one.
-    Raises UsageError for a name or an address that cannot be one, or a file that cannot be used.
+    `zenoh_file` (JSON5) has keys and passwords; an address in it replaces the default one. It is
+    read when the robot is entered, which raises UsageError if it cannot be used.
+    Raises UsageError for a name or an address that cannot be one.
     """
     if not is_robot_name(robot):
         raise UsageError(f"no robot can be named {robot!r}: letters, digits, - and _ only")

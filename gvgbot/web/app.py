@@ -29,7 +29,7 @@ def web(
     Raises UsageError if an argument cannot be right, or if several robots are there and none is
     named, GvgbotError if the address cannot be had.
     """
-    client.connect(robot or "any", endpoint, zenoh_file=zenoh_file)  # complains of wrong arguments
+    client.connect(robot or "any", endpoint)  # complains of wrong arguments
     with StopSignals() as signals:
         try:
             asyncio.run(_serve(signals, robot, endpoint, zenoh_file, (host, port), say))
