@@ -4,6 +4,7 @@ import contextlib
 import io
 import json
 import math
+import os
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
@@ -35,8 +36,7 @@ class RunDirectory:
         self.path = path
         try:
             path.mkdir(parents=True, exist_ok=True)
-            _cut_to_lines(path / EVENTS)
-            self._events = (path / EVENTS).open("ab", buffering=0)
+            self._events = _list_of_events(path / EVENTS)
         except OSError as error:
             raise _unfit(path, error) from error
 
@@ -76,11 +76,15 @@ class RunDirectory:
     def append_event(self, event: object) -> None:
         """Add a line to `events.jsonl`: the fields of a dataclass after its name as `event`.
 
-        When that has become long, it takes the place of the older ones, and a new one begins.
+        When that has become long, it takes the place of the older ones, and a new one begins. Where
+        a disk was pulled out and put in again it goes on in the list that is there.
         Raises TypeError if the event is no dataclass, GvgbotError if the line cannot be written.
         """
         line = json.dumps(record_of(event), ensure_ascii=False, allow_nan=False) + "\n"
         try:
+            if not _is_at(self._events, self.path / EVENTS):
+                before, self._events = self._events, _list_of_events(self.path / EVENTS)
+                before.close()
             _append(self._events, line.encode())
             if self._events.tell() > _MOST_EVENTS:
                 self._turn_over()
@@ -138,6 +142,20 @@ class RunDirectory:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def _list_of_events(path: Path) -> io.FileIO:
+    """The file at a path, made if it is missing, to be added to. Raises OSError."""
+    _cut_to_lines(path)
+    return path.open("ab", buffering=0)
+
+
+def _is_at(file: io.FileIO, path: Path) -> bool:
+    """Whether it is this file that is at a path. Raises OSError."""
+    try:
+        return os.path.samestat(os.fstat(file.fileno()), path.stat())
+    except FileNotFoundError:
+        return False
 
 
 def _cut_to_lines(path: Path) -> None:

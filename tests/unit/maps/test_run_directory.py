@@ -1,5 +1,6 @@
 import json
 import math
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -138,6 +139,30 @@ def test_what_a_power_cut_has_left_of_an_event_is_cut_off(tmp_path: Path, rest: 
         run.append_event(LoopClosed(2.0, 2, 0.0))
     lines = (tmp_path / "events.jsonl").read_text().splitlines()
     assert [json.loads(line)["stamp"] for line in lines] == [1.0, 2.0]
+
+
+def test_events_go_on_on_a_disk_that_was_out_for_a_while(tmp_path: Path) -> None:
+    disk, pulled_out = tmp_path / "disk", tmp_path / "elsewhere"
+    with RunDirectory(disk) as run:
+        run.append_event(LoopClosed(1.0, 1, 0.0))
+        disk.rename(pulled_out)
+        with pytest.raises(GvgbotError, match="No such file"):
+            run.append_event(LoopClosed(2.0, 2, 0.0))
+        shutil.copytree(pulled_out, disk)
+        with (disk / "events.jsonl").open("ab") as events:
+            events.write(b'{"event": "loop_cl')
+        run.append_event(LoopClosed(2.0, 2, 0.0))
+    lines = (disk / "events.jsonl").read_text().splitlines()
+    assert [json.loads(line)["stamp"] for line in lines] == [1.0, 2.0]
+    assert len((pulled_out / "events.jsonl").read_text().splitlines()) == 1
+
+
+def test_a_list_that_was_removed_begins_anew(tmp_path: Path) -> None:
+    with RunDirectory(tmp_path) as run:
+        run.append_event(LoopClosed(1.0, 1, 0.0))
+        (tmp_path / "events.jsonl").unlink()
+        run.append_event(LoopClosed(2.0, 2, 0.0))
+    assert json.loads((tmp_path / "events.jsonl").read_text())["stamp"] == 2.0
 
 
 def test_of_a_list_that_ends_in_its_first_event_nothing_is_kept(tmp_path: Path) -> None:
