@@ -109,6 +109,7 @@ class Robot:
         self._network, self._off_loop, self._keeper = network, off_loop, keeper
         self._pipeline = session.pipeline
         self._grown, self._finished = asyncio.Event(), asyncio.Event()
+        self._happened = asyncio.Event()  # something that is to be written
         self._saving = Saving(session, off_loop)
         self._survey = BesideLoop(session.pipeline, survey)
         self._pipeline.mission.survey = self._survey.newest
@@ -142,6 +143,7 @@ class Robot:
             "devices": self._devices.run(),
             "explore": self._explore(),
             "beat": self._beat(),
+            "events": self._keep_written(),
             "save": self._keep_saved(),
             "survey": self._survey.work(self._off_loop),
             "estimate": self._estimate.work(self._off_loop),
@@ -234,6 +236,13 @@ class Robot:
             asked = events.Requested(stamp, "cmd_vel", "ROS 2", is_done, text)
             self._on_events([asked, *errands.take_events()])
 
+    async def _keep_written(self) -> None:
+        """Write what happens, until cancelled: a slow disk must not hold up the loop."""
+        while True:
+            await self._happened.wait()
+            self._happened.clear()
+            await self._off_loop(self._session.write_events)
+
     async def _keep_saved(self) -> None:
         """Save now and then while the map grows, and when it is finished, until it is saved."""
         while True:
@@ -252,7 +261,7 @@ class Robot:
     async def _save(self) -> None:
         """Save the map, and the events that could not be written before; say once if it fails."""
         before, self._unsaved = self._unsaved, ""
-        self._session.on_events([])
+        self._happened.set()
         try:
             await self._saving.save()
         except GvgbotError as error:
@@ -305,7 +314,8 @@ class Robot:
     # -- what happens ------------------------------------------------------------------------------
 
     def _on_events(self, happened: list[events.Event]) -> None:
-        self._session.on_events(happened)
+        self._session.note_events(happened)
+        self._happened.set()
         for event in happened:
             log_event(event)
             self._events.note(event)

@@ -71,7 +71,8 @@ class Session:
         self._counts = {events.LoopClosed: 0, events.Recovery: 0}
         self.contacts = 0  # times that a bumper was pressed
         self._in_contact = False
-        self._untold: list[events.Event] = []  # that could not be written yet
+        self._untold: list[events.Event] = []  # that are not written yet
+        self._has_trouble = False  # they could not be
         self._started = time.perf_counter()
         self._first_stamp: float | None = None
         self._last_stamp = 0.0
@@ -89,14 +90,13 @@ class Session:
         return self.recorder.on_bytes
 
     def on_events(self, happened: list[events.Event]) -> None:
-        """Take down what happened; what cannot be written just now is written later."""
-        had_trouble = bool(self._untold)
+        """Take down what happened, and write it."""
+        self.note_events(happened)
+        self.write_events()
+
+    def note_events(self, happened: list[events.Event]) -> None:
+        """Take down what happened, to be written."""
         self._untold += happened
-        try:
-            self._tell()
-        except GvgbotError as error:
-            if not had_trouble:
-                log.warning("events not written, exploring on", reason=str(error))
         for event in happened:
             if self.recorder is not None:
                 self.recorder.on_event(record_of(event))
@@ -104,6 +104,17 @@ class Session:
                 self._counts[type(event)] += 1
             if isinstance(event, events.WayForgotten):
                 self.journey.forget(event.kept)
+
+    def write_events(self) -> None:
+        """Write what happened, perhaps in a thread; what cannot be written now is written later."""
+        had_trouble, self._has_trouble = self._has_trouble, True
+        try:
+            self._tell()
+        except GvgbotError as error:
+            if not had_trouble:
+                log.warning("events not written, exploring on", reason=str(error))
+        else:
+            self._has_trouble = False
 
     def _tell(self) -> None:
         """Write what is still to be told. Raises GvgbotError if that is not possible."""

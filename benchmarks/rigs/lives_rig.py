@@ -65,7 +65,8 @@ class Lives:
         run_in_virtual_time(self._run(kills))
         last = self.sessions[-1]
         self.keepers[-1].finish()
-        last.save()
+        with RunDirectory(self.out) as last.directory:
+            last.save()
         return last
 
     async def _run(self, kills: Sequence[Callable[[Session, float], bool]]) -> None:

@@ -5,7 +5,7 @@ import errno
 import gc
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -28,6 +28,7 @@ from gvgbot.geometry import Pose, Twist
 from gvgbot.hal.messages import Contact, Odometry, Scan, Sign
 from gvgbot.links import Close, Links
 from gvgbot.maps import run_directory
+from gvgbot.robot import Robot
 from gvgbot.stop_signals import StopSignals
 from gvgbot.topics import Grid
 
@@ -194,6 +195,24 @@ def test_a_map_that_could_not_be_saved_is_saved_as_soon_as_that_is_possible(
         daemon.run(story)
     assert reasons == 2 * ["stopped by a request"]
     assert [log["event"] for log in logs].count("map not saved") == 1
+
+
+def test_a_disk_that_hangs_does_not_hold_up_the_robot(daemon: Daemon) -> None:
+    async def never(_: Callable[[], None]) -> None:
+        await asyncio.Event().wait()
+
+    path = daemon.session.directory.path / "events.jsonl"
+    written: list[str] = []
+
+    async def story(clock: Clock) -> None:
+        await clock.sleep_until(20.0)
+        written.append(path.read_text())
+
+    daemon.robot = Robot(daemon.session, daemon.manager, daemon.network, never)
+    daemon.run(story)
+    assert daemon.network.states[-1].vertices > 0
+    assert written == [""]
+    assert "vertex_added" in path.read_text()
 
 
 def test_a_robot_goes_on_where_it_was_after_its_base_was_lost_for_a_while(
