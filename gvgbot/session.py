@@ -163,9 +163,11 @@ class Session:
         return self.simulation.body.pose
 
     def save(self, *, unfinished: str = "stopped from outside") -> None:
-        """Write the map and the summary. Raises GvgbotError if they cannot be written."""
-        self._tell()
-        self.saving(unfinished=unfinished)()
+        """Write events, map and summary. Raises GvgbotError if not all of them can be written."""
+        try:
+            self._tell()
+        finally:
+            self.saving(unfinished=unfinished)()
 
     def saving(self, *, unfinished: str) -> Callable[[], None]:
         """A function that writes the map as it is now, even if it is called later or in a thread.

@@ -8,6 +8,7 @@ import structlog
 
 from gvgbot.autonomy.events import LoopClosed, Recovery
 from gvgbot.config import load_config
+from gvgbot.errors import GvgbotError
 from gvgbot.geometry import Pose, Twist
 from gvgbot.hal.messages import Contact, Odometry
 from gvgbot.maps.run_directory import RunDirectory
@@ -58,3 +59,14 @@ def test_events_are_counted_at_once_and_written_when_there_is_room(tmp_path: Pat
         json.loads(line)["event"] for line in (tmp_path / "events.jsonl").read_text().splitlines()
     ]
     assert kinds == ["recovery", "loop_closed", "recovery"]
+
+
+def test_the_map_is_saved_though_events_cannot_be_written(tmp_path: Path) -> None:
+    with RunDirectory(tmp_path / "run") as directory:
+        session = Session(load_config(), directory, None)
+        (directory.path / "events.jsonl").unlink()
+        (directory.path / "events.jsonl").mkdir()
+        session.on_events([STUCK])
+        with pytest.raises(GvgbotError, match=r"cannot write .*events\.jsonl"):
+            session.save()
+    assert {"map.geojson", "summary.json"} <= {path.name for path in directory.path.iterdir()}
