@@ -16,10 +16,13 @@ _NANOSECONDS = 10**9
 
 
 def to_time(stamp: float) -> ros.Time:
-    """A stamp, to the nanosecond as far as a float has it."""
+    """A stamp, to the nanosecond as far as a float has it.
+
+    Seconds have 32 bits: after January 2038, as of a clock that is set wrong, they come round.
+    """
     sec = math.floor(stamp)
     carry, nanosec = divmod(round((stamp - sec) * _NANOSECONDS), _NANOSECONDS)
-    return ros.Time(sec + carry, nanosec)
+    return ros.Time((sec + carry + 2**31) % 2**32 - 2**31, nanosec)
 
 
 def header(stamp: float, frame: str) -> ros.Header:

@@ -17,8 +17,9 @@ from gvgbot.live_ros import LiveRos, UnixTime
 from gvgbot.maps.route_graph import RouteEdge, RouteGraph, RouteNode
 from gvgbot.ros2 import topics
 from gvgbot.ros2.cdr import encode
+from gvgbot.ros2.messages import Time
 from gvgbot.ros2.topics import TOPICS, Topic
-from gvgbot.ros2.translation import occupancy_grid
+from gvgbot.ros2.translation import occupancy_grid, to_time
 from gvgbot.ros_markers import markers
 from tests.unit.ros2.oracle import STORE
 from tests.unit.test_live_past import RADIUS_M, drive
@@ -238,6 +239,15 @@ def test_stamps_follow_a_clock_that_is_set_and_do_not_shiver() -> None:
     assert unix(9.5) == LATER + 9.5
     wall[0] += 3600.0
     assert unix(9.5) == pytest.approx(LATER + 3609.5, abs=0.001)
+
+
+@pytest.mark.parametrize(
+    ("stamp", "sec"), [(2.0**31 - 1, 2**31 - 1), (2.0**31, -(2**31)), (2.0**32 + 7, 7), (-1.0, -1)]
+)
+def test_a_clock_that_is_set_wrong_gives_stamps_all_the_same(stamp: float, sec: int) -> None:
+    time = to_time(stamp + 0.5)
+    assert time == Time(sec, 500_000_000)
+    assert len(encode(time)) == len(encode(Time()))
 
 
 def test_every_topic_has_a_name_of_its_own() -> None:
