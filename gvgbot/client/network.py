@@ -88,8 +88,9 @@ def _why_nobody(where: str, file: Path | None) -> str:
     except (OSError, ValueError):
         return "is a robot running there?"
     return (
-        "something listens there, but it is no robot, serves as many programs as it can already, "
-        "or wants a password or certificate, such as --zenoh-file client_tls.json5"
+        "something listens there, but it is no robot, hangs or is suspended, serves as many "
+        "programs as it can already, or wants a password or certificate, such as "
+        "--zenoh-file client_tls.json5"
     )
 
 
