@@ -19,7 +19,7 @@ from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.ekf import OdometryNoise
 from gvgbot.geometry import Pose, Twist
 from gvgbot.hal.messages import Odometry, Scan
-from gvgbot.live_ros import LiveRos
+from gvgbot.live.ros import LiveRos
 from gvgbot.ros2.cdr import encode
 from gvgbot.ros2.topics import Topic
 from gvgbot.ros2.translation import occupancy_grid

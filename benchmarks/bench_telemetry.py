@@ -34,8 +34,8 @@ from gvgbot.autonomy.slam.ekf import Belief, OdometryNoise
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex
 from gvgbot.geometry import Pose, Twist
 from gvgbot.hal.messages import Battery, Odometry, Scan
-from gvgbot.live_feed import LiveFeed
-from gvgbot.live_map import LiveMap
+from gvgbot.live.feed import LiveFeed
+from gvgbot.live.map import LiveMap
 from gvgbot.snapshots import state
 from gvgbot.telemetry import Telemetry
 from gvgbot.telemetry_config import TelemetryConfig

@@ -22,7 +22,7 @@ from gvgbot.errors import UsageError, WorldError, reason_of
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Odometry
 from gvgbot.links import Devices, Links
-from gvgbot.live_team import member_of, steered
+from gvgbot.live.team import member_of, steered
 from gvgbot.maps import geojson
 from gvgbot.maps.joined_graph import joined_graph
 from gvgbot.maps.joined_grid import joined_grid

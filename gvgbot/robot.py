@@ -22,12 +22,12 @@ from gvgbot.hal.guard import Guard, Reason
 from gvgbot.hal.messages import Contact, Odometry, Scan
 from gvgbot.journal import BatteryJournal, GuardJournal, log_event, status_line
 from gvgbot.links import Devices, Links
-from gvgbot.live_events import LiveEvents
-from gvgbot.live_feed import LiveFeed, Pace
-from gvgbot.live_map import LiveMap, Update
-from gvgbot.live_past import CORRECTIONS
-from gvgbot.live_ros import LiveRos, Neighbour, UnixTime
-from gvgbot.live_team import LiveTeam, TeamNetwork
+from gvgbot.live.events import LiveEvents
+from gvgbot.live.feed import LiveFeed, Pace
+from gvgbot.live.map import LiveMap, Update
+from gvgbot.live.past import CORRECTIONS
+from gvgbot.live.ros import LiveRos, Neighbour, UnixTime
+from gvgbot.live.team import LiveTeam, TeamNetwork
 from gvgbot.persistence.keeper import Keeper
 from gvgbot.requests import Answer, Asked
 from gvgbot.saving import Saving

@@ -21,8 +21,8 @@ from gvgbot.autonomy.loop import Cycle
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.errors import GvgbotError, UsageError
 from gvgbot.hal.messages import Scan
-from gvgbot.live_past import CORRECTIONS
-from gvgbot.live_ros import MAP_EVERY, LiveRos
+from gvgbot.live.past import CORRECTIONS
+from gvgbot.live.ros import MAP_EVERY, LiveRos
 from gvgbot.replay import Log, Wanted, open_log
 from gvgbot.ros2.cdr import definition
 from gvgbot.ros2.topics import Topic

@@ -17,7 +17,7 @@ from gvgbot.autonomy.memory import growth
 from gvgbot.autonomy.returning import ReturningPipeline
 from gvgbot.config import Config, load_config
 from gvgbot.geometry import Pose
-from gvgbot.live_map import LiveMap
+from gvgbot.live.map import LiveMap
 from gvgbot.persistence.mission_files import JOURNAL, SNAPSHOT, MissionFiles
 from gvgbot.persistence.records import packed
 from gvgbot.session import Session

@@ -24,7 +24,7 @@ from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.cli import main
 from gvgbot.geometry import Pose, Twist
 from gvgbot.hal.messages import Odometry, Scan
-from gvgbot.live_ros import LiveRos
+from gvgbot.live.ros import LiveRos
 from gvgbot.recording.config import RecordingConfig
 from gvgbot.recording.recorder import Recorder
 from gvgbot.replay import Wanted, open_log

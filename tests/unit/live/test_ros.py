@@ -13,7 +13,7 @@ from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.ekf import OdometryNoise
 from gvgbot.geometry import Array, Pose, Twist
 from gvgbot.hal.messages import Odometry, Scan
-from gvgbot.live_ros import LiveRos, UnixTime
+from gvgbot.live.ros import LiveRos, UnixTime
 from gvgbot.maps.route_graph import RouteEdge, RouteGraph, RouteNode
 from gvgbot.ros2 import topics
 from gvgbot.ros2.cdr import encode
@@ -21,8 +21,8 @@ from gvgbot.ros2.messages import Time
 from gvgbot.ros2.topics import TOPICS, Topic
 from gvgbot.ros2.translation import occupancy_grid, to_time
 from gvgbot.ros_markers import markers
+from tests.unit.live.test_past import RADIUS_M, drive
 from tests.unit.ros2.oracle import STORE
-from tests.unit.test_live_past import RADIUS_M, drive
 
 NOISE = OdometryNoise()
 LATER = 1.7e9  # s from the start of the robot's clock to 1970

@@ -11,7 +11,7 @@ from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex
 from gvgbot.geometry import Pose, Twist
 from gvgbot.hal import messages
-from gvgbot.live_feed import LiveFeed, Pace
+from gvgbot.live.feed import LiveFeed, Pace
 from gvgbot.snapshots import plan, sweep
 from gvgbot.topics import Odometry, Payload, Plan, Scan
 

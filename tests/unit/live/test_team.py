@@ -13,7 +13,7 @@ from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.config import RobotConfig
-from gvgbot.live_team import LiveTeam
+from gvgbot.live.team import LiveTeam
 from gvgbot.team.member import TeamConfig
 from gvgbot.team.news import Claim, News, decode
 from gvgbot.topics import TeamPart, team_key

@@ -11,8 +11,8 @@ from gvgbot.autonomy.keyframes import Keyframe
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.graph import Vertex
 from gvgbot.geometry import Array, Pose, rows_of
-from gvgbot.live_grid import LiveGrid
-from gvgbot.live_past import LivePast, Portion
+from gvgbot.live.grid import LiveGrid
+from gvgbot.live.past import LivePast, Portion
 from gvgbot.topics import (
     TRAJECTORY_POSES,
     Map,

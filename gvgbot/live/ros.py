@@ -12,7 +12,7 @@ from gvgbot.autonomy.slam.ekf import OdometryNoise
 from gvgbot.clock import Clock, OffLoop
 from gvgbot.geometry import Array, rotated_covariance
 from gvgbot.hal.messages import Odometry, Scan
-from gvgbot.live_past import LivePast, Portion
+from gvgbot.live.past import LivePast, Portion
 from gvgbot.maps.occupancy import GrowingGrid
 from gvgbot.maps.route_graph import RouteGraph
 from gvgbot.report import route_graph

@@ -14,8 +14,8 @@ from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.slam.graph import GvgGraph
 from gvgbot.autonomy.views import Observation
 from gvgbot.geometry import Array, Pose
-from gvgbot.live_map import LiveMap
-from gvgbot.live_past import TOLERANCE_M, LivePast
+from gvgbot.live.map import LiveMap
+from gvgbot.live.past import TOLERANCE_M, LivePast
 from gvgbot.topics import Map, Trajectory
 
 COUNT, RADIUS_M = 101, 8.0

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from gvgbot.autonomy.keyframes import Keyframe
 from gvgbot.geometry import Pose, anchored
 from gvgbot.hal.messages import Scan
-from gvgbot.live_grid import LiveGrid
-from gvgbot.live_map import Stretch, Trail, bent
+from gvgbot.live.grid import LiveGrid
+from gvgbot.live.map import Stretch, Trail, bent
 from gvgbot.maps.occupancy import occupancy_grid
 from gvgbot.topics import TRAJECTORY_POSES, Grid, Raster
 
