@@ -34,7 +34,8 @@ def log_event(event: events.Event) -> None:
         case events.Recovery():
             log.info("recovery", action=event.action, reason=event.reason)
         case events.Finished():
-            log.info("finished", outcome=event.outcome, reason=event.reason)
+            say = log.error if event.outcome == "failed" else log.info
+            say("finished", outcome=event.outcome, reason=event.reason)
         case events.Requested():
             log.info(
                 "requested",

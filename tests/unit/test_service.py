@@ -202,6 +202,21 @@ def test_what_happens_is_logged_but_for_details() -> None:
     assert (logs[0]["vertex"], logs[0]["x"], logs[0]["y"]) == (3, 1.23, 5.68)
 
 
+@pytest.mark.parametrize(
+    ("outcome", "level"),
+    [
+        ("explored", "info"),
+        ("explored_with_blocked", "info"),
+        ("stopped", "info"),
+        ("failed", "error"),
+    ],
+)
+def test_an_exploration_that_failed_is_an_error(outcome: str, level: str) -> None:
+    with structlog.testing.capture_logs() as logs:
+        log_event(Finished(4.0, outcome, "as it is"))
+    assert [log["log_level"] for log in logs] == [level]
+
+
 def guard_lines(reasons: list[tuple[float, str | None]]) -> list[tuple[str, str]]:
     journal = GuardJournal()
     with structlog.testing.capture_logs() as logs:
