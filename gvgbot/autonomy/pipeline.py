@@ -28,6 +28,7 @@ from gvgbot.autonomy.gvg.beams import without_mixed_pixels
 from gvgbot.autonomy.gvg.local import LocalGvg
 from gvgbot.autonomy.gvg.reduction import reduce_graph
 from gvgbot.autonomy.gvg.voronoi import fine_graph
+from gvgbot.autonomy.handedness import Handedness
 from gvgbot.autonomy.hazards import Hazards
 from gvgbot.autonomy.keyframes import Past, has_come_on
 from gvgbot.autonomy.localisation import Localisation
@@ -47,6 +48,10 @@ _NOTHING_FELT = Felt()
 _LOOKS_ASIDE = (
     "the laser does not see where the robot drives: say how it is mounted by laser.yaw_deg, "
     "or widen laser.first_angle_deg and laser.last_angle_deg"
+)
+_MIRRORED = (
+    "what is on the left of the robot counts as being on the right: "
+    "set laser.upside_down: {}, and restart the program"
 )
 _CANNOT_TURN = "go on without a look around", "the base does not turn"
 _ROOM_BESIDE_EDGES_M = 0.08  # on each side, where no edge leads
@@ -92,6 +97,7 @@ class Pipeline:
         self._hazards = Hazards(config.hazards)
         self.virtual_walls = points_of(config.virtual_walls)  # map frame
         self.traffic = Traffic(config.newcomers)
+        self._handedness, self._turning = Handedness(), 0.0  # the latter as it wished last, rad/s
         self._incidents: list[tuple[str, str]] = []  # action and reason, since the last scan
         self._look_now = False
         self._looked: Pose | None = None  # local_base of the last look for the GVG
@@ -172,6 +178,9 @@ class Pipeline:
             return happened
         if self.past.last is not None:
             self.mission.skip(max(0.0, scan.stamp - self.past.last.stamp - LONGEST_GAP_S))
+        self._handedness.note(scan, odom_base, self._turning)
+        if self._handedness.is_mirrored:
+            return [*happened, *self._halt(scan.stamp, _MIRRORED.format(_other_way_up(scan)))]
         scan = deskewed(without_mixed_pixels(scan), self.tracker.odometry.motion_during(scan))
         local_base = self._localise(scan, odom_base)
         if local_base is None:
@@ -193,6 +202,11 @@ class Pipeline:
         done = self._act(view, known, scan)
         happened += learnt + done  # what was done may have taught the mapper more
         return happened + self._forget(scan.stamp, happened)
+
+    def _halt(self, stamp: float, reason: str) -> list[Event]:
+        """Stand until it is started anew: nothing that it sees or does would be right."""
+        self.errands.halt(stamp, reason)
+        return [*self.errands.take_events(), self.mission.stop(stamp, reason, "failed")]
 
     def _glance(self, scan: Scan, odom_base: Pose) -> None:
         """Look out for other robots in every scan: they move."""
@@ -345,6 +359,7 @@ class Pipeline:
             incident, twist = incident if isinstance(incident, PutDown) else None, STANDSTILL
         if incident is not None:
             self._take_down(incident, local_base)
+        self._turning = twist.angular
         return twist
 
     def _wish(self, local_base: Pose) -> Twist:
@@ -393,6 +408,11 @@ class Pipeline:
                 self.errands.note_lifted()
                 self._incidents.append(("look around", "the robot was lifted"))
                 self.tracker.was_lifted = True
+
+
+def _other_way_up(scan: Scan) -> str:
+    """What to set for a laser that hangs, and is not said to, or the other way round."""
+    return "false" if scan.time_increment < 0.0 else "true"  # it turns the other way as it hangs
 
 
 def _blind_angle(scan: Scan) -> float:

@@ -164,6 +164,9 @@ class ReturningPipeline(Pipeline):
             self.errands.is_carried = self._is_doubted = True
             self._end_seeking(seeker)
             return [Recovery(scan.stamp, *STANDS_CARRIED)]
+        if seeker.errands.unfit:
+            self._end_seeking(seeker)
+            return self._halt(scan.stamp, seeker.errands.unfit)
         last = seeker.past.last
         if last is None or seeker._execution.is_turning:
             return []

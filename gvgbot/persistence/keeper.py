@@ -180,6 +180,8 @@ class Keeper:
         before asking for the next.
         """
         pipeline = self._session.pipeline
+        if pipeline.errands.unfit:  # what it has seen is wrong
+            return self._files.forget if self._saved is None else self._files.fall_behind
         if pipeline.is_lost:
             return self._keeping_wish()
         if not (pipeline.past.keyframes or self._is_asked):

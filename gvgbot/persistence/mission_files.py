@@ -163,6 +163,14 @@ class MissionFiles:
             if self._is_current():
                 os.utime(self._journal, (_BEHIND, _BEHIND))
 
+    def forget(self) -> None:
+        """Let nothing go on from what was written."""
+        if self.is_begun:
+            with contextlib.suppress(OSError):
+                for path in (self._snapshot, self._before, self._journal):
+                    path.unlink(missing_ok=True)
+                self._ends.clear()
+
     def save(self, snapshot: bytes) -> None:
         """Replace the snapshot (MessagePack) at once; the old one stays beside it.
 

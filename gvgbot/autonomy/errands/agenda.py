@@ -35,6 +35,7 @@ class Agenda:
         self.is_carried = False  # perhaps: it paused by itself, until it is started anew
         self.is_waiting = False  # after an errand, for what comes next
         self.unplaced = ""  # why it found no place on its map when it looked for that
+        self.unfit = ""  # why it must not drive until it is started anew
         self.is_lost = False  # somebody doubts the pose; whoever takes that into account resets it
         self.happened: list[Event] = []  # because of requests; whoever tells of it takes it out
         self._seen: tuple[View, Correspondence] | None = None
@@ -61,13 +62,13 @@ class Agenda:
         """Whether there is nothing to do but to stand."""
         is_free = self._plan is None and self._command is None
         is_over = is_free and (self.is_waiting or self._mission.outcome is not None)
-        return self.is_paused or is_over or bool(self.unplaced)
+        return self.is_paused or is_over or bool(self.unplaced or self.unfit)
 
     @property
     def stands_by(self) -> bool:
         """Whether it has explored what it could, and nobody has asked it for anything since."""
         asked = self.is_paused or self.is_waiting or self.unplaced
-        return self.is_resting and not asked and self._mission.outcome != "stopped"
+        return self.is_resting and not (asked or self.unfit) and self._mission.outcome != "stopped"
 
     @property
     def is_exploring(self) -> bool:
@@ -127,6 +128,11 @@ class Agenda:
 
     def give_up(self, stamp: float, reason: str) -> None:
         """End the errand, if there is one: it is about a map that is forgotten."""
+        self._end(stamp, "given up", reason)
+
+    def halt(self, stamp: float, reason: str) -> None:
+        """Do nothing any more, whatever is asked for, until it is started anew."""
+        self.unfit = reason
         self._end(stamp, "given up", reason)
 
     # -- what is done about it ---------------------------------------------------------------------

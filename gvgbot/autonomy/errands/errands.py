@@ -35,6 +35,8 @@ class Errands(Agenda):
         if not self.is_paused:
             return "it was not paused"
         self.is_paused = self.is_carried = False
+        if self.unfit:
+            return f"it does not drive: {self.unfit}"
         if self.unplaced:
             return self._unplaced_for()
         if self._plan is not None:
@@ -58,7 +60,7 @@ class Errands(Agenda):
 
     def explore(self, stamp: float) -> str:
         """Go on exploring, even if that had ended; after a restart by finding its place first."""
-        if not self.is_resting or self.is_paused:
+        if not self.is_resting or self.is_paused or self.unfit:
             self._check_going(stamp)
         if self._plan is None and self._command is None and not self.is_resting:
             return "it is exploring already"
@@ -183,6 +185,8 @@ class Errands(Agenda):
         return f"it has looked for its place, and is {self.unplaced}; {again}"
 
     def _check_going(self, stamp: float) -> None:
+        if self.unfit:
+            raise Declined(self.unfit)
         if self.is_paused:
             raise Declined("it is paused: ask it to resume first")
         if self._seen is None and self.is_resting and self.unplaced:

@@ -9,6 +9,7 @@ import pytest
 from gvgbot.autonomy.control.company import Companion
 from gvgbot.autonomy.control.reflexes import Felt
 from gvgbot.autonomy.ending import Outcome
+from gvgbot.autonomy.errands import Declined
 from gvgbot.autonomy.events import Decision, Event, Finished, Recovery
 from gvgbot.autonomy.localisation import Localisation
 from gvgbot.autonomy.memory import remember
@@ -93,6 +94,32 @@ def test_a_base_that_cannot_turn_is_told_of_and_keeps_the_robot_busy_for_no_long
     told = [event.reason for event in happened if isinstance(event, Recovery)]
     assert told[0] == "the base does not turn"
     assert isinstance(happened[-1], Finished)
+
+
+@pytest.mark.parametrize(("time_increment", "to_be_set"), [(2e-5, "true"), (-2e-5, "false")])
+def test_who_takes_left_for_right_turns_and_stands_and_does_nothing_that_is_asked(
+    time_increment: float, to_be_set: str
+) -> None:
+    config = load_config()
+    pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
+    theta, stamp, happened, twist = 0.0, 0.0, list[Event](), STANDSTILL
+    for _ in range(100):
+        twist = pipeline.control(Odometry(stamp, Pose(theta=theta), STANDSTILL))
+        assert twist.linear == 0.0
+        scan = sweep(ROOMS, Pose(-1.5, 0.0, theta), field_of_view=LASER_270)
+        flipped = replace(scan, ranges=scan.ranges[::-1].copy(), time_increment=time_increment)
+        happened += pipeline.perceive(replace(flipped, stamp=stamp))
+        theta, stamp = theta + 0.1 * twist.angular, stamp + 0.1
+    assert twist == STANDSTILL
+    assert theta < 2.0
+    assert isinstance(happened[-1], Finished)
+    assert happened[-1].outcome == "failed"
+    assert f"set laser.upside_down: {to_be_set}, " in happened[-1].reason
+    for asked in (pipeline.errands.explore, pipeline.errands.home):
+        with pytest.raises(Declined, match=to_be_set):
+            asked(stamp)
+    with pytest.raises(Declined, match=to_be_set):
+        pipeline.errands.drive(Twist(0.2, 0.0), stamp)
 
 
 def test_a_base_that_was_away_in_the_midst_of_a_turn_turns_on() -> None:

@@ -63,6 +63,29 @@ def test_a_full_disk_is_said_once_and_all_is_kept_when_there_is_room_again(
     assert packed(saved.memory) == packed(remember(session.pipeline))
 
 
+@pytest.mark.parametrize("is_old", [False, True])
+def test_who_is_unfit_leaves_the_map_of_before_or_none(
+    session: Session, tmp_path: Path, *, is_old: bool
+) -> None:
+    keeper = Keeper(session, MissionFiles(tmp_path))
+    keeper.keeping(20.0)()
+    if is_old:
+        files = MissionFiles(tmp_path)
+        keeper = Keeper(session, files, files.read())
+    keyframes = len(session.pipeline.past.keyframes)
+    drive_on(session, 3)
+    session.pipeline.errands.halt(21.0, "its laser hangs upside down")
+    keeper.keeping(21.0)()
+    keeper.finish()
+    saved = MissionFiles(tmp_path).read()
+    if is_old:
+        assert saved is not None
+        assert len(saved.past) == keyframes
+        assert not saved.is_current
+    else:
+        assert saved is None
+
+
 def drive_on(session: Session, keyframes: int) -> None:
     """Let it have so many keyframes more, a row with each."""
     pipeline, journey = session.pipeline, session.journey
