@@ -277,6 +277,7 @@ def web(*arguments: str) -> Iterator[str]:
             "nobody ",
             "connection ",
             "the robot ",
+            "several robots ",
         )
         assert all(line.startswith(told) for line in rest.split("\n") if line.strip()), rest
 
