@@ -47,7 +47,7 @@ from gvgbot.hal.messages import Odometry, Scan
 _NOTHING_FELT = Felt()
 _LOOKS_ASIDE = (
     "the laser does not see where the robot drives: say how it is mounted by laser.yaw_deg, "
-    "or widen laser.first_angle_deg and laser.last_angle_deg"
+    "or widen laser.first_angle_deg and laser.last_angle_deg, and restart the program"
 )
 _MIRRORED = (
     "what is on the left of the robot counts as being on the right: "
@@ -204,7 +204,7 @@ class Pipeline:
         return happened + self._forget(scan.stamp, happened)
 
     def _halt(self, stamp: float, reason: str) -> list[Event]:
-        """Stand until it is started anew: nothing that it sees or does would be right."""
+        """Stand until it is started anew: it cannot drive by what it sees."""
         self.errands.halt(stamp, reason)
         return [*self.errands.take_events(), self.mission.stop(stamp, reason, "failed")]
 
@@ -259,7 +259,7 @@ class Pipeline:
             return []
         if len(self.past.keyframes) == 1:
             if not scan.looks_ahead:
-                return [self.mission.stop(scan.stamp, _LOOKS_ASIDE, "failed")]
+                return self._halt(scan.stamp, _LOOKS_ASIDE)
             self._execution.turn(_blind_angle(scan))
             return []
         order, done = self.errands.advance(view, known)

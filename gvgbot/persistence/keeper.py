@@ -180,7 +180,7 @@ class Keeper:
         before asking for the next.
         """
         pipeline = self._session.pipeline
-        if pipeline.errands.unfit:  # what it has seen is wrong
+        if pipeline.errands.unfit:  # what it has seen is no map to go on with
             return self._files.forget if self._saved is None else self._files.fall_behind
         if pipeline.is_lost:
             return self._keeping_wish()

@@ -1,4 +1,4 @@
-"""A laser that hangs upside down, and is not said to, or the other way round."""
+"""A laser that hangs upside down, or looks ahead, and is not said to, or the other way round."""
 
 import json
 from collections.abc import Callable
@@ -41,8 +41,8 @@ def turned_over(config: Config, place: Place, clock: Clock) -> Simulation:
     return Simulation(other_way_up(config), place, clock)
 
 
-def going_turned_over(config: Config, place: Place, clock: Clock) -> GoingWorld:
-    return GoingWorld(other_way_up(config), place, clock)
+def astern(config: Config) -> Config:
+    return replace(config, laser=replace(config.laser, yaw_deg=180.0))
 
 
 @pytest.mark.parametrize(("said", "to_be_set"), [("false", SET_TRUE), ("true", SET_FALSE)])
@@ -120,28 +120,36 @@ def never(session: Session, stamp: float) -> bool:
     return False
 
 
+@pytest.mark.parametrize("wrong", [other_way_up, astern])
 def test_what_was_mapped_by_then_is_no_map_to_go_on_with(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wrong: Callable[[Config], Config]
 ) -> None:
     config = load_config(None, ["twin.seed=1"])
-    monkeypatch.setattr(lives_rig, "GoingWorld", going_turned_over)
-    lives = Remounted(config, Place(LOLLIPOP, START), tmp_path)
-    last = lives.live_with([other_way_up(config)], [never])
+    monkeypatch.setattr(lives_rig, "GoingWorld", lambda _, *there: GoingWorld(config, *there))
+    lives = Remounted(wrong(config), Place(LOLLIPOP, START), tmp_path)
+    last = lives.live_with([config], [never])
     assert [one.pipeline.mission.outcome for one in lives.sessions] == ["failed", "explored"]
     assert not isinstance(last.pipeline, ReturningPipeline)
 
 
-@pytest.mark.parametrize("reboots", [False, True])
+@pytest.mark.parametrize(
+    ("wrong", "why", "reboots"),
+    [
+        (other_way_up, LEFT_IS_RIGHT, False),
+        (other_way_up, LEFT_IS_RIGHT, True),
+        (astern, "the laser does not see where the robot drives", False),
+    ],
+)
 def test_a_map_of_before_is_gone_on_with_when_it_is_set_right(
-    tmp_path: Path, *, reboots: bool
+    tmp_path: Path, wrong: Callable[[Config], Config], why: str, *, reboots: bool
 ) -> None:
     config = load_config(None, ["twin.seed=1"])
     lives = Remounted(config, Place(LOLLIPOP, START), tmp_path, reboots=reboots)
-    last = lives.live_with([other_way_up(config), config], [at(25.0), never])
-    before, wrong, _ = lives.sessions
+    last = lives.live_with([wrong(config), config], [at(25.0), never])
+    before, unfit, _ = lives.sessions
     assert len(before.pipeline.mapper.graph.vertices) > 0
     assert before.pipeline._handedness.is_settled
-    assert wrong.pipeline.errands.unfit.startswith(LEFT_IS_RIGHT)
+    assert unfit.pipeline.errands.unfit.startswith(why)
     assert isinstance(last.pipeline, ReturningPipeline)
     assert not last.pipeline.is_lost
     assert last.pipeline.mission.outcome == "explored"

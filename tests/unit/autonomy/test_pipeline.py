@@ -354,3 +354,5 @@ def test_who_does_not_see_where_it_drives_does_not_begin_to() -> None:
     assert event.outcome == "failed"
     assert "laser.yaw_deg" in event.reason
     assert pipeline.control(replace(odometry, stamp=0.1)) == STANDSTILL
+    with pytest.raises(Declined, match=r"laser\.yaw_deg"):
+        pipeline.errands.explore(0.1)
