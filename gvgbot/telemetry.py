@@ -2,9 +2,7 @@
 
 import asyncio
 import contextlib
-import math
 import threading
-import time
 from collections import deque
 from collections.abc import Awaitable, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -27,6 +25,7 @@ from gvgbot.requests import (
     Asked,
     request_key,
 )
+from gvgbot.sleep import Sleep
 from gvgbot.telemetry_config import LAST_PORT, TelemetryConfig
 from gvgbot.topics import (
     HEARTBEAT,
@@ -47,9 +46,6 @@ _WAITING_QUERIES = 1000  # more than this are dropped, oldest first; who asked g
 _WAITING_REQUESTS, _WAITING_REFUSALS, _WAITING_STOPS = 8, 1000, 2000
 _CROWDED = Answer(done=False, text="too many requests wait: ask again")
 _ASLEEP = Answer(done=False, text="the robot's program was asleep when that came: ask again")
-_ASLEEP_S = 2.0  # without a word: who asked meanwhile may have been told that nobody is there
-_WAKING_S = 1.0  # that what came meanwhile may take
-_LOOK_S = 0.5
 _MAX_SESSIONS = 32
 _LARGEST_MESSAGE = 16 * 2**20  # bytes that may come at once: more could fill the memory
 _PARTING_S = 1.0  # that what was said last may take
@@ -257,7 +253,7 @@ class Telemetry:
         """
         loop, arrived = asyncio.get_running_loop(), asyncio.Event()
         waiting: deque[tuple[zenoh.Query, str, Handle]] = deque()
-        stops, sleep = {request_key(self._robot, name) for name in STOPS}, _Sleep()
+        stops, sleep = {request_key(self._robot, name) for name in STOPS}, Sleep()
 
         def take(query: zenoh.Query) -> None:
             key, others = str(query.key_expr), len(waiting)
@@ -304,35 +300,6 @@ class Telemetry:
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-
-class _Sleep:
-    """Tells whether the loop has not run for so long that what it finds may have come long ago."""
-
-    def __init__(self) -> None:
-        self._ran, self._woke = _now(), -math.inf
-
-    async def watch(self) -> None:
-        """Watch the loop until cancelled."""
-        while True:
-            if self._has_paused:
-                self._woke = _now()
-            self._ran = _now()
-            await asyncio.sleep(_LOOK_S)
-
-    @property
-    def is_or_was(self) -> bool:
-        """Whether that is so, or has been just now."""
-        return self._has_paused or _now() < self._woke + _WAKING_S
-
-    @property
-    def _has_paused(self) -> bool:
-        return _now() > self._ran + _ASLEEP_S
-
-
-def _now() -> float:
-    """Seconds that go on while the computer sleeps, where the system counts these."""
-    return time.clock_gettime(getattr(time, "CLOCK_BOOTTIME", time.CLOCK_MONOTONIC))
 
 
 async def _refuse(_: Asked) -> Answer:

@@ -15,6 +15,7 @@ from gvgbot.ros2 import messages
 from gvgbot.ros2.cdr import decode_twist
 from gvgbot.ros2.config import Ros2Config
 from gvgbot.ros2.topics import TOPICS, Node, Topic, attachment, gid
+from gvgbot.sleep import Sleep
 from gvgbot.zenoh_config import addresses, has_listener, opened, reason, session_config
 
 _HEARTBEAT_S = 0.5  # by which receivers of latched topics find out that they have missed one
@@ -83,11 +84,14 @@ class Ros2Node:
         self._publishers[topic].put(data, unix_ns)
 
     async def hear(self, drive: Callable[[Twist], None]) -> None:
-        """Hand on the newest twist each time until cancelled, if the configuration permits that."""
+        """Hand on the newest twist each time until cancelled, if the configuration permits that.
+
+        Not what has come while the program was suspended or hung: who sent it may have stopped.
+        """
         kind = self._config.cmd_vel
         if kind is None:
             return
-        loop, arrived = asyncio.get_running_loop(), asyncio.Event()
+        loop, arrived, sleep = asyncio.get_running_loop(), asyncio.Event(), Sleep()
         newest: deque[zenoh.Sample] = deque(maxlen=1)
 
         def take(sample: zenoh.Sample) -> None:
@@ -97,11 +101,15 @@ class Ros2Node:
         topic = Topic("/cmd_vel", _TWISTS[kind])
         with self._session.declare_subscriber(self._node.key(topic), take):
             self._declare_token(self._node.endpoint_token(len(TOPICS) + 1, topic, hears=True))
-            while True:
-                await arrived.wait()
-                arrived.clear()
-                if newest:  # one that came while another was read has been read in its place
-                    self._hand_on(newest.popleft(), drive)
+            async with asyncio.TaskGroup() as tasks:
+                tasks.create_task(sleep.watch())
+                while True:
+                    await arrived.wait()
+                    arrived.clear()
+                    if newest:  # one that came while another was read has been read in its place
+                        sample = newest.popleft()
+                        if not sleep.is_or_was:
+                            self._hand_on(sample, drive)
 
     def _hand_on(self, sample: zenoh.Sample, drive: Callable[[Twist], None]) -> None:
         data = sample.payload.to_bytes()[:_LONGEST_COMMAND]

@@ -1,9 +1,11 @@
 """A robot among ROS 2 nodes, which are an independent implementation's, and see it by a router."""
 
+import asyncio
 import json
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,6 +19,7 @@ import zenoh.ext
 
 from benchmarks.rigs.addresses import free_endpoint, plain_session, router
 from gvgbot.errors import UsageError
+from gvgbot.ros2 import messages
 from gvgbot.ros2.cdr import encode
 from gvgbot.ros2.config import Ros2Config
 from gvgbot.ros2.node import Ros2Node
@@ -154,6 +157,27 @@ def test_a_latecomer_gets_the_map(network: str, robot: Ros2Node) -> None:
     with other_node(network) as node:
         topic, what = next(said for said in node.said() if said[0] != "ready")
     assert (topic, what) == ("/map", {"walls": 400 * 400, "cells": 400 * 400})
+
+
+def test_what_came_while_the_program_was_asleep_does_not_drive_the_robot(network: str) -> None:
+    """Who sent it may have stopped since."""
+    config = Ros2Config(enabled=True, connect=(network,), domain=DOMAIN, cmd_vel="Twist")
+    driven: list[float] = []
+
+    async def story(robot: Ros2Node, others: zenoh.Session) -> None:
+        key = f"{DOMAIN}/cmd_vel/geometry_msgs::msg::dds_::Twist_/RIHS01_{messages.Twist.type_hash}"
+        async with asyncio.TaskGroup() as tasks:
+            hearing = tasks.create_task(robot.hear(lambda twist: driven.append(twist.linear)))
+            for metres_per_s, sleeps_s in ((0.1, 0.0), (0.2, 2.5), (0.3, 0.0)):
+                await asyncio.sleep(1.5)
+                others.put(key, encode(messages.Twist(linear=messages.Vector3(metres_per_s))))
+                time.sleep(sleeps_s)  # noqa: ASYNC251, TID251  # a loop that hangs
+            await asyncio.sleep(0.5)
+            hearing.cancel()
+
+    with Ros2Node(config, "a-b") as robot, plain_session(network) as others:
+        asyncio.run(story(robot, others))
+    assert driven == [0.1, 0.3]
 
 
 def test_an_advanced_subscriber_as_rmw_zenoh_has_it_gets_the_map_with_its_attachment(
