@@ -382,7 +382,9 @@ class Robot:
         """Drive home when it is low, as soon as that can be."""
         self._battery.note(self._devices.base.battery, stamp)
         is_called = self._battery.calls_home and self._session.config.service.home_when_low
-        if is_called and self._calls_home.allows(stamp):
+        if not is_called:
+            self._steering.call_off()
+        elif self._calls_home.allows(stamp):
             self._battery.calls_home = not self._steering.go_home("low battery")
 
     def _health(self, network: Network, now: State) -> Health:

@@ -94,7 +94,7 @@ class Steering:
     def go_home(self, why: str) -> bool:
         """Let a robot that is busy drive home; it is written down as asked for by `why`.
 
-        False if it is too early for that: it is paused, does not know its place, or no way. Then
+        False if it is too early for that: it is paused, or its place or a way is not known. Then
         ask again, also when all is explored meanwhile. Why it knows no way is written down once.
         """
         errands = self._errands
@@ -102,6 +102,10 @@ class Steering:
         is_due = self.declines is None and (errands.is_busy or is_late)
         self._is_called_home = is_due and not self._goes_home(why)
         return not self._is_called_home
+
+    def call_off(self) -> None:
+        """Forget that it was called home and could not go: it need not any more."""
+        self._is_called_home, self._no_way_home = False, ""
 
     def _goes_home(self, why: str) -> bool:
         errands = self._errands

@@ -12,7 +12,7 @@ from benchmarks.rigs.lives_rig import Lives
 from benchmarks.rigs.run_rig import Daemon
 from gvgbot.clock import Clock
 from gvgbot.config import ServiceConfig, TwinConfig, load_config
-from gvgbot.drivers.kobuki.twin import KobukiTwinConfig
+from gvgbot.drivers.kobuki.twin import KobukiTwin, KobukiTwinConfig
 from gvgbot.geometry import STANDSTILL, Pose
 from gvgbot.journal import SAGGING_S
 from gvgbot.session import Session
@@ -116,6 +116,35 @@ def test_who_was_told_to_stand_stands(name: str, tmp_path: Path) -> None:
     before, after = places
     assert math.hypot(after.x - before.x, after.y - before.y) < 1e-3
     assert [line["request"] for line in told(lives, "requested")] == [name]
+
+
+def test_who_could_not_go_home_before_it_was_charged_stands_in_the_end(tmp_path: Path) -> None:
+    lives, places = daemon(tmp_path), list[Pose]()
+
+    async def story(clock: Clock) -> None:
+        await clock.sleep_until(8.0)
+        await lives.network.ask("pause")
+        await clock.sleep_until(SAGGING_S + 5.0)
+        assert lives.session.simulation is not None
+        base = lives.session.simulation.base_twin._device
+        assert isinstance(base, KobukiTwin)
+        base.plug_adapter(True)
+        base._power.volts = 16.0
+        await a_while(clock, 5.0)
+        base.plug_adapter(False)
+        await a_while(clock, 1.0)
+        await lives.network.ask("resume")
+        await until(clock, lambda: lives.network.states[-1].phase == "finished")
+        base._power.volts = 13.8
+        for seconds in (2.0, 40.0):
+            await a_while(clock, seconds)
+            places.append(lives.place)
+
+    with lives.session.directory:
+        lives.run(story)
+    before, after = places
+    assert math.hypot(after.x - before.x, after.y - before.y) < 1e-3
+    assert [line["request"] for line in told(lives, "requested")] == ["pause", "resume"]
 
 
 def test_it_drives_home_once_there_is_a_way(tmp_path: Path) -> None:

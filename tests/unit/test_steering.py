@@ -38,6 +38,7 @@ class Willing:
         self.happened: list[Event] = []
         self.refuses = False
         self.is_placed, self.is_paused = True, False
+        self.is_busy, self.stands_by = True, True
 
     def __getattr__(self, name: str) -> object:
         def do(*_: object) -> str:
@@ -160,6 +161,20 @@ def test_who_does_not_know_its_place_yet_drives_home_later() -> None:
     rig.errands.is_placed = True
     assert rig.steering.go_home("low battery")
     assert rig.errands.did == ["home"]
+
+
+@pytest.mark.parametrize("is_charged", [False, True])
+def test_who_could_not_go_home_goes_though_all_is_explored_unless_it_was_charged(
+    *, is_charged: bool
+) -> None:
+    rig = Rig()
+    rig.errands.is_paused = True
+    assert not rig.steering.go_home("low battery")
+    if is_charged:
+        rig.steering.call_off()
+    rig.errands.is_paused = rig.errands.is_busy = False
+    assert rig.steering.go_home("low battery")
+    assert rig.errands.did == ([] if is_charged else ["home"])
 
 
 def test_a_recording_is_not_driven_home() -> None:
