@@ -1,6 +1,6 @@
 """Ways that something was found to stand in: not to be driven for a while."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
 from gvgbot.autonomy.slam.names import Names
@@ -29,13 +29,22 @@ class Closures:
         for end in [end for end, until in self.until.items() if until <= stamp]:
             self._open(graph, end)
 
-    def open_all(self, graph: GvgGraph) -> bool:
-        """Unblock everything, and edges that were closed while exploring; whether there was any."""
+    def open_all(self, graph: GvgGraph) -> dict[HalfEdgeId, float | None]:
+        """Unblock everything, and edges that were closed while exploring; what, and up to when."""
         edges = (end for end in graph.blocked() if graph.edge_at(end) is not None)
-        closed = {*self.until, *edges}
+        closed = {end: self.until.get(end) for end in (*self.until, *edges)}
         for end in closed:
             self._open(graph, end)
-        return bool(closed)
+        return closed
+
+    def close_again(self, graph: GvgGraph, opened: Mapping[HalfEdgeId, float | None]) -> None:
+        """Block what has just been opened: that was of no use."""
+        for end, until in opened.items():
+            half = graph.half_edge(self._names.half_edge(end))
+            if half is not None:
+                half.blocked = True
+            if until is not None:
+                self.until[end] = until
 
     def _open(self, graph: GvgGraph, end: HalfEdgeId) -> None:
         self.until.pop(end, None)

@@ -94,10 +94,12 @@ class Errands(Agenda):
         self._check_known(vertex)
         if self.errand == ToVertex(vertex) and not self._is_own:
             return f"it is on its way to vertex {vertex} already"
-        route = self._way_to_vertex(vertex)
-        if route is None and self.closures.open_all(self._mapper.graph):
+        route, graph = self._way_to_vertex(vertex), self._mapper.graph
+        opened = self.closures.open_all(graph) if route is None else {}
+        if opened:
             route = self._way_to_vertex(vertex)  # what was in the way may have gone
         if route is None and self.whereabouts() is not None:
+            self.closures.close_again(graph, opened)
             raise Declined(f"no known way leads to vertex {vertex}")
         self._take(ToVertex(vertex), stamp)
         far = "" if route is None else f" {route.metres:.1f} m"
@@ -155,11 +157,13 @@ class Errands(Agenda):
             return "it is on its way there already"
         base = self._mapper.belief.map_base
         away = math.hypot(errand.x - base.x, errand.y - base.y)
-        here = self.whereabouts()
+        here, graph = self.whereabouts(), self._mapper.graph
         trouble = self._ground.trouble_to(errand, here)
-        if trouble is not None and self.closures.open_all(self._mapper.graph):
+        opened = self.closures.open_all(graph) if trouble is not None else {}
+        if opened:
             trouble = self._ground.trouble_to(errand, here)
         if trouble is not None and away > DIRECT_M:
+            self.closures.close_again(graph, opened)
             raise Declined(trouble)
         self._take(errand, stamp)
         where = "to where it started" if isinstance(errand, Home) else "there"

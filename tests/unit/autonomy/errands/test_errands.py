@@ -1,9 +1,12 @@
 """What is answered to who asks for an errand."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
 from gvgbot.autonomy.control.orders import Drive, Stand
+from gvgbot.autonomy.errands import Declined
 from gvgbot.autonomy.errands.plans import Kept
 from gvgbot.autonomy.events import ErrandEnded
 from gvgbot.autonomy.slam.graph import HalfEdgeId, Vertex
@@ -25,6 +28,27 @@ def test_a_coverage_promises_no_edge_that_no_known_way_leads_to() -> None:
     graph.join(a, b, np.array([[0.0, 0.0], [100.0, 0.0]]), 1.0, driven=True)
     answer = robot.errands.coverage(robot.stamp)
     assert f"over 1 of 2 edges, {edge.length:.0f} m" in answer
+
+
+@pytest.mark.parametrize("is_vertex", [True, False])
+def test_what_is_declined_opens_no_way_that_is_closed(is_vertex: bool) -> None:
+    """A low battery calls the robot home every few seconds while it knows no way there."""
+    robot = Explorer()
+    graph = robot.mapper.graph
+    while not graph.edges:
+        robot.look(CLOSED)
+    (edge,) = graph.edges.values()
+    graph.vertices[edge.a.vertex].half_edges[edge.a.key].blocked = True  # while exploring
+    robot.errands.closures.close(graph, [edge.b], until=1000.0)
+    away = Vertex(graph.next_id(), 1.0, Pose(), 0.0, 0.0)
+    graph.vertices[away.id] = away
+    errands = robot.errands
+    to_vertex, to_point = partial(errands.goto_vertex, away.id), partial(errands.goto_point, 30, 0)
+    with pytest.raises(Declined):
+        (to_vertex if is_vertex else to_point)(robot.stamp)
+    assert set(graph.blocked()) == {edge.a, edge.b}
+    robot.errands.closures.open_due(graph, 1000.0)
+    assert graph.blocked() == [edge.a]
 
 
 def test_who_drives_to_a_vertex_that_proves_to_be_a_known_one_drives_on_to_that() -> None:
