@@ -7,7 +7,6 @@ import numpy as np
 
 from gvgbot.autonomy.gvg.local import Place
 from gvgbot.autonomy.views import View
-from gvgbot.autonomy.virtual_walls import nearest_before
 from gvgbot.geometry import Array, resampled
 
 NEAR_M = 1.5  # from an edge, one is as good as on it
@@ -64,13 +63,8 @@ def access(view: View) -> Access | None:
 
 def _places(view: View) -> list[Place]:
     """The nearest point of each edge before virtual walls, the nearest of them first."""
-    base, found = view.local_base.position, []
-    for key, edge in view.gvg.edges.items():
-        away = np.hypot(*(edge.polyline - base).T)
-        i = nearest_before(view.virtual_walls, base, edge.polyline, away)
-        if i is not None:
-            found.append(Place(key, float(edge.stations[i]), float(away[i])))
-    return sorted(found, key=lambda place: place.distance)
+    places = view.gvg.places(view.local_base.position, view.virtual_walls)
+    return sorted(places, key=lambda place: place.distance)
 
 
 def _straight(view: View, place: Place, least_room: float) -> Access | None:

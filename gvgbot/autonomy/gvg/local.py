@@ -6,10 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gvgbot.autonomy.virtual_walls import nearest_before
 from gvgbot.geometry import Array
 
 _WIDE_M = 4.0  # a disc with such a radius holds other meetpoints
 _LEAST_M, _IN_WIDE_M = 0.5, 1.0  # from a node, where the direction of a branch is taken
+_NO_WALLS = np.empty((0, 2))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -127,13 +129,14 @@ class LocalGvg:
         """The point of the graph nearest to a point (2,); None on an empty graph."""
         return min(self.places(point), key=lambda place: place.distance, default=None)
 
-    def places(self, point: Array) -> list[Place]:
-        """The point of each edge that is nearest to a point (2,)."""
+    def places(self, point: Array, virtual_walls: Array = _NO_WALLS) -> list[Place]:
+        """The point of each edge that is nearest to a point (2,), before virtual walls (N, 2)."""
         found = []
         for key, edge in self.edges.items():
             d = np.hypot(edge.polyline[:, 0] - point[0], edge.polyline[:, 1] - point[1])
-            i = int(np.argmin(d))
-            found.append(Place(key, float(edge.stations[i]), float(d[i])))
+            i = nearest_before(virtual_walls, point, edge.polyline, d)
+            if i is not None:
+                found.append(Place(key, float(edge.stations[i]), float(d[i])))
         return found
 
     def point(self, place: Place) -> Array:
