@@ -64,6 +64,15 @@ class Handedness:
             self._before = None
 
 
+def what_to_set(scan: Scan) -> str:
+    """What is wrong with a laser that is mirrored, and what to set, for people."""
+    hangs = "false" if scan.time_increment < 0.0 else "true"  # one that hangs turns the other way
+    return (
+        "what is on the left of the robot counts as being on the right: "
+        f"set laser.upside_down: {hangs}, and restart the program"
+    )
+
+
 def _off(before: Scan, now: Scan, turn: float) -> Array | None:
     """Mean distances (2,), m, between sweeps before and after a turn: as they are, and mirrored.
 

@@ -28,7 +28,7 @@ from gvgbot.autonomy.gvg.beams import without_mixed_pixels
 from gvgbot.autonomy.gvg.local import LocalGvg
 from gvgbot.autonomy.gvg.reduction import reduce_graph
 from gvgbot.autonomy.gvg.voronoi import fine_graph
-from gvgbot.autonomy.handedness import Handedness
+from gvgbot.autonomy.handedness import Handedness, what_to_set
 from gvgbot.autonomy.hazards import Hazards
 from gvgbot.autonomy.keyframes import Past, has_come_on
 from gvgbot.autonomy.localisation import Localisation
@@ -48,10 +48,6 @@ _NOTHING_FELT = Felt()
 _LOOKS_ASIDE = (
     "the laser does not see where the robot drives: say how it is mounted by laser.yaw_deg, "
     "or widen laser.first_angle_deg and laser.last_angle_deg, and restart the program"
-)
-_MIRRORED = (
-    "what is on the left of the robot counts as being on the right: "
-    "set laser.upside_down: {}, and restart the program"
 )
 _CANNOT_TURN = "go on without a look around", "the base does not turn"
 _ROOM_BESIDE_EDGES_M = 0.08  # on each side, where no edge leads
@@ -180,7 +176,7 @@ class Pipeline:
             self.mission.skip(max(0.0, scan.stamp - self.past.last.stamp - LONGEST_GAP_S))
         self._handedness.note(scan, odom_base, self._turning)
         if self._handedness.is_mirrored:
-            return [*happened, *self._halt(scan.stamp, _MIRRORED.format(_other_way_up(scan)))]
+            return [*happened, *self._halt(scan.stamp, what_to_set(scan))]
         scan = deskewed(without_mixed_pixels(scan), self.tracker.odometry.motion_during(scan))
         local_base = self._localise(scan, odom_base)
         if local_base is None:
@@ -408,11 +404,6 @@ class Pipeline:
                 self.errands.note_lifted()
                 self._incidents.append(("look around", "the robot was lifted"))
                 self.tracker.was_lifted = True
-
-
-def _other_way_up(scan: Scan) -> str:
-    """What to set for a laser that hangs, and is not said to, or the other way round."""
-    return "false" if scan.time_increment < 0.0 else "true"  # it turns the other way as it hangs
 
 
 def _blind_angle(scan: Scan) -> float:
