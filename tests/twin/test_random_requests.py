@@ -19,7 +19,7 @@ from gvgbot.steering import SETTABLE
 
 pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(300)]
 
-RUNS, REQUESTS_A_RUN = 3, 200  # ten a second
+RUNS, REQUESTS_A_RUN = 2, 200  # ten a second
 BRAKING_S = 2.0
 STILL_M = 0.005
 DRIVING = ("resume", "home", "goto", "patrol", "coverage", "explore", "relocalise")
