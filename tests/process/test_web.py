@@ -704,7 +704,7 @@ def test_what_a_robot_showed_before_it_was_started_again_is_shown_no_more(page: 
             play.until(f"{label} === 'map, nothing known yet'")
             for _ in range(2):
                 assert stretch(page, "wall")[1] < 1000
-                assert "vertex 1, 0°: ear" not in page.text()
+                play.until("!document.body.innerText.includes('vertex 1, 0°: ear')")
                 desktop(page, address)  # who comes later sees no more
                 play.until_read("31.5 m")
 
