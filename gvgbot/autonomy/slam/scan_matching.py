@@ -108,12 +108,6 @@ def register(
     Q (3, 3) is the prior's covariance in its own frame. None when too few points find a wall, or
     when it comes to where another prior has led, which has been `found`: the pairs are the same.
     """
-
-    def is_found(pose: Pose) -> bool:
-        return found is not None and not _is_elsewhere(found, pose)
-
-    if is_found(prior):
-        return None  # before walls are looked for
     information = np.linalg.inv(Q)
     counts = np.ones(len(walls)) if hits is None else hits
 
@@ -126,7 +120,7 @@ def register(
     J = JW = np.empty((3, 0))
     paired_at, pairs = pose, paired(pose)
     for _ in range(_ITERATIONS):
-        if is_found(pose):
+        if found is not None and not _is_elsewhere(found, pose):
             return None
         if _is_elsewhere(paired_at, pose):
             paired_at, pairs = pose, paired(pose)

@@ -1,7 +1,6 @@
 """Registration finds an offset that is known, and only in directions that the walls constrain."""
 
 import math
-from typing import cast
 
 import numpy as np
 import pytest
@@ -94,12 +93,6 @@ def test_a_prior_that_leads_to_where_another_one_has_led_tells_nothing_more() ->
     other = led(Pose(0.0, 0.1, 0.02), Pose(2.0, 0.0, 0.0))
     assert other is not None
     assert first.pose.distance(other.pose) < 0.01
-
-
-def test_no_walls_are_looked_for_where_another_prior_has_led_already() -> None:
-    walls, points = looked(CORNER, [Pose()]).points(), hits(CORNER, Pose())
-    unasked, found = cast(cKDTree, object()), Pose(0.01, 0.0, 0.0)
-    assert register(points, unasked, walls, Pose(), Q, CONFIG, found=found) is None
 
 
 @pytest.mark.parametrize("seed", range(5))
