@@ -119,14 +119,13 @@ class Keeper:
         if self._files.is_read:
             session.count_on(saved.beat.tally)
             session.journey = saved.journey
+            session.pipeline.errands.is_paused |= config.service.resume == "paused"
         else:  # another has lived so far
             past = session.pipeline.past
             past.lent, past.lent_m, past.sought_m = len(past.keyframes), past.travelled, 0.0
             session.pipeline.errands.forget()
             beat = msgspec.structs.replace(saved.beat, tally=session.tally)
             self._saved = replace(saved, beat=beat)
-        if session.config.service.resume == "paused":
-            session.pipeline.errands.is_paused = True
 
     def _is_vouched(self) -> bool:
         """Whether the base has counted all the time since, so that it cannot have driven."""

@@ -396,6 +396,14 @@ def test_an_interrupted_run_waits_if_the_configuration_says_so(tmp_path: Path, r
     assert session.pipeline.errands.is_paused == (resume == "paused")
 
 
+def test_a_first_start_with_a_known_map_was_not_interrupted(tmp_path: Path) -> None:
+    with RunDirectory(tmp_path) as directory:
+        session = Session(load_config(overrides=["service.resume=paused"]), directory, None)
+    Keeper(session, MissionFiles(tmp_path), MissionFiles(MISSION).read())
+    assert session.pipeline.past.keyframes
+    assert not session.pipeline.errands.is_paused
+
+
 def test_time_goes_on_where_a_map_from_elsewhere_ended(tmp_path: Path) -> None:
     """The map may be that of a simulation on this computer, whose clock began with zero."""
     known = MissionFiles(MISSION).read()
