@@ -6,6 +6,7 @@ from collections.abc import Awaitable, Callable
 from typing import Any, Protocol, get_type_hints
 
 from gvgbot.autonomy.errands import Declined, Errands
+from gvgbot.autonomy.errands.kinds import Home
 from gvgbot.autonomy.events import Event, Requested
 from gvgbot.config import Config
 from gvgbot.conversion import Problem, convert
@@ -70,7 +71,8 @@ class Steering:
         self._errands, self._body = errands, body
         self._now, self._save, self._use, self._tell = now, save, use, tell
         self._ledger = _Ledger()
-        self._is_called_home, self._no_way_home = False, ""  # later; and why not at once
+        self._is_called_home, self._is_homeward = False, False  # and is not there; and has set out
+        self._no_way_home = ""  # why not
 
     async def handle(self, asked: Asked) -> Answer:
         """Do what is asked for, or say why not; either is written down with who asked.
@@ -94,18 +96,24 @@ class Steering:
     def go_home(self, why: str) -> bool:
         """Let a robot that is busy drive home; it is written down as asked for by `why`.
 
-        False if it is too early for that: it is paused, or its place or a way is not known. Then
-        ask again, also when all is explored meanwhile. Why it knows no way is written down once.
+        False if it is not over: it is paused or under way, or its place or a way is not known. Then
+        ask again, also when all is explored meanwhile, or something stood in the way. Why it knows
+        no way is written down once.
         """
         errands = self._errands
-        is_late = self._is_called_home and errands.stands_by
-        is_due = self.declines is None and (errands.is_busy or is_late)
-        self._is_called_home = is_due and not self._goes_home(why)
+        if self._is_homeward and isinstance(errands.errand, Home):
+            return False
+        is_late = errands.stands_by or isinstance(errands.given_up, Home)
+        is_busy = errands.is_busy and not self._is_homeward  # with what was asked for since
+        is_due = is_busy or (self._is_called_home and is_late)
+        self._is_called_home = is_due and self.declines is None
+        self._is_homeward = self._is_called_home and self._goes_home(why)
         return not self._is_called_home
 
     def call_off(self) -> None:
         """Forget that it was called home and could not go: it need not any more."""
-        self._is_called_home, self._no_way_home = False, ""
+        self._is_called_home = self._is_homeward = False
+        self._no_way_home = ""
 
     def _goes_home(self, why: str) -> bool:
         errands = self._errands

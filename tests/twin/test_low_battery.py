@@ -8,6 +8,8 @@ from typing import Any
 
 import pytest
 
+from benchmarks.rigs import doors_rig
+from benchmarks.rigs.doors_rig import swing
 from benchmarks.rigs.lives_rig import Lives
 from benchmarks.rigs.run_rig import Daemon
 from gvgbot.clock import Clock
@@ -24,6 +26,7 @@ from tests.twin.test_errands import NEAR, START, a_while, theta, until
 
 pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(120)]
 
+DOORS = (2.8, 3.0, 1.2, 2.8), (4.0, 4.2, 1.2, 2.8)  # x, x, y, y; to either side of the start
 BASE = KobukiTwinConfig(odometry="perfect", battery_v=13.8)  # a Kobuki is low below 14 V
 
 
@@ -163,6 +166,29 @@ def test_it_drives_home_once_there_is_a_way(tmp_path: Path) -> None:
     asked = [line["done"] for line in told(lives, "requested")]
     assert asked == [False, True]
     assert lives.session.pipeline.map_base.distance(Pose()) < NEAR
+
+
+def test_it_drives_home_once_nothing_stands_in_the_way_any_more(tmp_path: Path) -> None:
+    world = doors_rig.theta()
+    place, offs = Place(world, START), list[float]()
+    lives = Daemon(tmp_path / "run", place, twin=TwinConfig(base=BASE))
+
+    async def story(clock: Clock) -> None:
+        await until(clock, lambda: begun(lives) and lives.network.states[-1].errand == "home")
+        for door in DOORS:
+            swing(world, door, shut=True)
+        await until(clock, lambda: bool(told(lives, "errand_ended")))
+        offs.append(off(lives.place))
+        for door in DOORS:
+            swing(world, door, shut=False)
+        await a_while(clock, 40.0)
+        offs.append(off(lives.place))
+
+    with lives.session.directory:
+        lives.run(story)
+    assert [line["outcome"] for line in told(lives, "errand_ended")] == ["given up", "arrived"]
+    assert offs[0] > 1.0
+    assert offs[1] < NEAR
 
 
 def test_who_is_driven_by_somebody_is_driven_on(tmp_path: Path) -> None:

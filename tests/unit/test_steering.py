@@ -8,6 +8,7 @@ import msgspec
 import pytest
 
 from gvgbot.autonomy.errands import Declined, Errands
+from gvgbot.autonomy.errands.kinds import Errand, Home, ToVertex
 from gvgbot.autonomy.events import Event, Finished, Requested
 from gvgbot.config import Config, RobotConfig
 from gvgbot.errors import GvgbotError
@@ -39,6 +40,8 @@ class Willing:
         self.refuses = False
         self.is_placed, self.is_paused = True, False
         self.is_busy, self.stands_by = True, True
+        self.errand: Errand | None = None
+        self.given_up: Errand | None = None
 
     def __getattr__(self, name: str) -> object:
         def do(*_: object) -> str:
@@ -140,7 +143,7 @@ def test_why_it_does_not_drive_home_is_written_down_once_until_it_does() -> None
     (told,) = rig.told
     assert told == Requested(12.5, "home", "low battery", False, "it does not want to")
     rig.errands.refuses = False
-    assert rig.steering.go_home("low battery")
+    rig.steering.go_home("low battery")
     assert rig.told[1:] == [Requested(12.5, "home", "low battery", True, "did home")]
 
 
@@ -150,7 +153,8 @@ def test_who_is_paused_drives_home_when_it_is_resumed() -> None:
     assert not rig.steering.go_home("low battery")
     assert (rig.errands.did, rig.told) == ([], [])
     rig.errands.is_paused = False
-    assert rig.steering.go_home("low battery")
+    rig.steering.go_home("low battery")
+    assert rig.errands.did == ["home"]
 
 
 def test_who_does_not_know_its_place_yet_drives_home_later() -> None:
@@ -159,7 +163,7 @@ def test_who_does_not_know_its_place_yet_drives_home_later() -> None:
     assert not rig.steering.go_home("low battery")
     assert (rig.errands.did, rig.told) == ([], [])
     rig.errands.is_placed = True
-    assert rig.steering.go_home("low battery")
+    rig.steering.go_home("low battery")
     assert rig.errands.did == ["home"]
 
 
@@ -173,8 +177,30 @@ def test_who_could_not_go_home_goes_though_all_is_explored_unless_it_was_charged
     if is_charged:
         rig.steering.call_off()
     rig.errands.is_paused = rig.errands.is_busy = False
-    assert rig.steering.go_home("low battery")
+    rig.steering.go_home("low battery")
     assert rig.errands.did == ([] if is_charged else ["home"])
+
+
+@pytest.mark.parametrize(
+    ("errand", "given_up", "is_over", "did"),
+    [
+        (Home(), None, False, ["home"]),
+        (None, Home(), False, ["home", "home"]),
+        (None, None, True, ["home"]),
+        (ToVertex(3), None, True, ["home"]),
+        (None, ToVertex(3), True, ["home"]),
+    ],
+    ids=["under way", "somebody stood there", "arrived", "sent elsewhere", "elsewhere in vain"],
+)
+def test_who_was_called_home_is_called_until_it_is_there_or_sent_elsewhere(
+    errand: Errand | None, given_up: Errand | None, *, is_over: bool, did: list[str]
+) -> None:
+    rig = Rig()
+    assert not rig.steering.go_home("low battery")
+    rig.errands.errand, rig.errands.given_up = errand, given_up
+    rig.errands.is_busy, rig.errands.stands_by = errand is not None, False
+    assert rig.steering.go_home("low battery") == is_over
+    assert rig.errands.did == did
 
 
 def test_a_recording_is_not_driven_home() -> None:

@@ -37,6 +37,7 @@ class Agenda:
         self.unplaced = ""  # why it found no place on its map when it looked for that
         self.unfit = ""  # why it must not drive until it is started anew
         self.is_lost = False  # somebody doubts the pose; whoever takes that into account resets it
+        self.given_up: Errand | None = None  # in vain, until something else is asked for
         self.happened: list[Event] = []  # because of requests; whoever tells of it takes it out
         self._seen: tuple[View, Correspondence] | None = None
         self.own_tasks = OwnTasks(config.certainty, mission, mapper)
@@ -114,6 +115,7 @@ class Agenda:
 
     def _end(self, stamp: float, how: str, reason: str) -> None:
         """Be done with the errand, if there is one, and wait for what comes next."""
+        self.given_up = self.errand if how == "given up" else None
         if self._plan is not None:
             self.happened.append(ErrandEnded(stamp, str(self._plan.errand), how, reason))
             self.is_waiting = not self._is_own
