@@ -20,6 +20,7 @@ from gvgbot.hal.guard import GuardConfig
 from gvgbot.hal.messages import EMPTY_BATTERY, LOW_BATTERY, Battery, Contact, Scan
 from gvgbot.links import Links
 from gvgbot.simulation import Simulation, open_place
+from gvgbot.words import counted
 
 PATIENCE = 10.0  # s for a device's first message
 LISTEN = 3.0  # s of messages that are judged
@@ -280,13 +281,19 @@ def _link(subject: str, statistics: Any) -> Line:
     counts = {key: value for key, value in asdict(statistics).items() if isinstance(value, int)}
     good = sum(counts.pop(key, 0) for key in MESSAGE_COUNTS)
     odd = {key: value for key, value in counts.items() if value}
-    told = ", ".join(f"{value} {key.replace('_', ' ')}" for key, value in odd.items())
+    told = ", ".join(_counted(value, key.replace("_", " ")) for key, value in odd.items())
     return Line(
         "warn" if odd.keys() - {OF_NEWER_FIRMWARE} else "ok",
         subject,
-        f"{good} messages, {told or 'no damage'}",
+        f"{counted(good, 'message')}, {told or 'no damage'}",
         "try another cable or port, away from motors",
     )
+
+
+def _counted(count: int, what: str) -> str:
+    """A number and what there is of it, by its name for many, or for any number."""
+    one = what if what.endswith("ss") else what.removesuffix("s")
+    return counted(count, one, what)
 
 
 def _timing(subject: str, heard: Heard) -> Line:

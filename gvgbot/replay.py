@@ -15,6 +15,7 @@ from gvgbot.maps.picture import counts
 from gvgbot.maps.run_directory import RunDirectory
 from gvgbot.recording import Lived, extra_needed
 from gvgbot.session import Session
+from gvgbot.words import counted
 
 MCAP = b"\x89MCAP"
 CARMEN_CONFIG = Path("carmen.yaml")
@@ -139,8 +140,8 @@ def _recording(wanted: Wanted) -> Log:
     def flaws() -> list[str]:
         found = {
             "the run went on with an earlier map, which is not here": recording.about.resumed,
-            f"{recording.requests} requests steered the run, and are left out": recording.requests,
-            f"{recording.left_out} messages are missing: the disk was slow": recording.left_out,
+            f"left out: {counted(recording.requests, 'request')} to the robot": recording.requests,
+            f"{counted(recording.left_out, 'message')} lost to a slow disk": recording.left_out,
             f"damaged pieces that were passed over: {recording.damaged}": recording.damaged,
             f"{recording.missing} is missing, and what follows it left out": recording.missing,
         }

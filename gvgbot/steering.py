@@ -14,7 +14,7 @@ from gvgbot.errors import GvgbotError
 from gvgbot.hal.guard import Reason
 from gvgbot.hal.messages import Contact
 from gvgbot.requests import Answer, Arguments, Asked, Goto, Patrol, Set, in_words, parse
-from gvgbot.words import printable
+from gvgbot.words import counted, printable
 
 SETTABLE = (
     "robot.limits.max_speed_mps",
@@ -252,7 +252,8 @@ class _Ledger:
         self._newest, missing, self._missing = asked, self._missing, 0
         if not missing:
             return [asked]
-        answer = f"{asked.answer} ({missing} requests before this one were not written down)"
+        were = counted(missing, "request before this one was", "requests before this one were")
+        answer = f"{asked.answer} ({were} not written down)"
         return [dataclasses.replace(asked, answer=answer)]
 
 

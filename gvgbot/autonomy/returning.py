@@ -31,6 +31,7 @@ from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.whereabouts import Whereabouts
 from gvgbot.geometry import STANDSTILL, Pose, Twist
 from gvgbot.hal.messages import Odometry, Scan
+from gvgbot.words import counted
 
 _MOVED_M, _MOVED_RAD = 0.5, 0.3  # farther from where odometry has it, something is wrong
 _FOUND = np.diag([0.1**2, 0.1**2, 0.03**2])  # covariance of a place found on the map
@@ -173,7 +174,7 @@ class ReturningPipeline(Pipeline):
         opinion = self._relocaliser.step(Look.around(last.local_base, seeker.tracker.maps.near))
         if opinion.map_local is not None and opinion.is_sure:
             self._arrive(seeker, opinion.map_local)
-            reason = f"{opinion.confidence:.3f} sure after {opinion.looks} looks"
+            reason = f"{opinion.confidence:.3f} sure after {counted(opinion.looks, 'look')}"
             return [Recovery(scan.stamp, "go on from its place on the map", reason)]
         self.mission.reason = _doubt(opinion)
         if not opinion.is_hopeless and self._goes_on(seeker, scan.stamp):

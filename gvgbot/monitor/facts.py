@@ -134,7 +134,7 @@ def _sigma(state: State) -> str:
 
 
 def _contacts(state: State) -> tuple[str, Tone]:
-    slips = f", {state.slips} slips" if state.slips else ""
+    slips = f", {counted(state.slips, 'slip')}" if state.slips else ""
     return f"{state.contacts}{slips}", "warning" if state.contacts or state.slips else "plain"
 
 
@@ -150,8 +150,12 @@ def _battery(state: State) -> tuple[str, Tone]:
 def _link(link: LinkHealth) -> tuple[str, Tone]:
     if not link.connected:
         return "away" if link.messages else "not there", "bad"
-    troubles = {"lost": link.lost, "damaged": link.damaged, "reconnects": link.reconnects}
-    said = ", ".join(f"{count} {name}" for name, count in troubles.items() if count)
+    troubles = {
+        f"{link.lost} lost": link.lost,
+        f"{link.damaged} damaged": link.damaged,
+        counted(link.reconnects, "reconnect"): link.reconnects,
+    }
+    said = ", ".join(words for words, count in troubles.items() if count)
     return (said, "plain") if said else ("fine", "good")
 
 

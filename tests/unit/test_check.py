@@ -14,7 +14,7 @@ import pytest
 import serial
 import structlog
 
-from gvgbot.check import Heard, _base_lines, check, examine
+from gvgbot.check import Heard, _base_lines, _link, check, examine
 from gvgbot.cli.entry import status_of
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.config import load_config
@@ -79,6 +79,15 @@ def test_a_base_that_answers_in_part_has_a_sound_wire(identity: Identity, says: 
     heard = Heard([0.0, 0.02], [0.0, 0.02], [0, 1])
     first = next(_base_lines(cast(KobukiBase, base), heard))
     assert str(first).startswith(says)
+
+
+def test_what_a_link_suffered_is_counted() -> None:
+    once, often = LinkStatistics(9, 1, missed_frames=1, malformed=1), LinkStatistics(1, resets=2)
+    said_of_both = [_link("base link", statistics).finding for statistics in (once, often)]
+    assert said_of_both == [
+        "9 messages, 1 bad frame, 1 missed frame, 1 malformed",
+        "1 message, 2 resets",
+    ]
 
 
 def test_parts_that_only_newer_firmware_knows_are_no_damage() -> None:

@@ -8,6 +8,7 @@ from gvgbot.autonomy.errands.driving import DIRECT_M
 from gvgbot.autonomy.errands.kinds import Coverage, Home, Look, Patrol, ToPoint, ToVertex
 from gvgbot.autonomy.exploration.paths import shortest_paths
 from gvgbot.geometry import Twist
+from gvgbot.words import counted
 
 _MOST_NAMED = 40  # vertices, in an answer
 
@@ -70,7 +71,8 @@ class Errands(Agenda):
         if self._mission.outcome is not None:
             self._mission.reopen()
             self.own_tasks.reopen()
-        return f"it explores; {len(self._mapper.graph.frontiers())} frontiers are known"
+        count = len(self._mapper.graph.frontiers())
+        return f"it explores; {counted(count, 'frontier is', 'frontiers are')} known"
 
     def relocalise(self, stamp: float) -> str:
         """Find the place in the map again, by the walls around."""

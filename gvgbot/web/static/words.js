@@ -85,8 +85,9 @@ function battery(state) {
 
 function device(link) {
   if (!link.connected) return [link.messages ? "away" : "not there", "bad"];
-  const troubles = ["lost", "damaged", "reconnects"].filter((name) => link[name]);
-  return troubles.length ? [troubles.map((name) => `${link[name]} ${name}`).join(", "), "plain"] : ["fine", "good"];
+  const said = ["lost", "damaged"].filter((name) => link[name]).map((name) => `${link[name]} ${name}`);
+  if (link.reconnects) said.push(counted(link.reconnects, "reconnect", "reconnects"));
+  return said.length ? [said.join(", "), "plain"] : ["fine", "good"];
 }
 
 function control(state) {
@@ -114,7 +115,7 @@ function counters(link, unit) {
   return [`${link.messages} ${unit}, ${text}`, tone];
 }
 
-const contacts = (state) => `${state.contacts}${state.slips ? `, ${state.slips} slips` : ""}`;
+const contacts = (state) => `${state.contacts}${state.slips ? `, ${counted(state.slips, "slip", "slips")}` : ""}`;
 
 // What to say first of a robot: [text, tone]; and whether what is shown may be wrong by now.
 export function headline(link, state) {

@@ -7,7 +7,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from gvgbot.client import Event, Health, Plan, Presence
+from gvgbot.client import Event, Health, LinkHealth, Plan, Presence
 from gvgbot.client.presence import Word
 from gvgbot.hal.messages import LOW_BATTERY
 from gvgbot.monitor import facts as facts_module
@@ -15,6 +15,9 @@ from gvgbot.monitor.facts import Fact, Tone, duration, facts, headline, told
 from gvgbot.topics import Mate, packed
 from tests.unit.test_telemetry import EXAMPLE, NOWHERE
 
+ONCE_AWAY = LinkHealth(
+    connected=True, messages=9, damaged=1, lost=0, reconnects=1, clock_offset=None
+)
 DECISION = Event(
     number=0,
     stamp=1.0,
@@ -145,6 +148,8 @@ def test_troubles_of_links_are_counted() -> None:
         ({"cycle_age": None}, "control", Fact("control", "not begun", "faint")),
         ({"guard": "obstacle near"}, "guard", Fact("guard", "obstacle near", "warning")),
         ({"contacts": 0, "slips": 0}, "contacts", Fact("contacts", "0", "plain")),
+        ({"contacts": 0, "slips": 1}, "contacts", Fact("contacts", "0, 1 slip", "warning")),
+        ({"laser": ONCE_AWAY}, "laser", Fact("laser", "1 damaged, 1 reconnect", "plain")),
         ({"battery_fraction": None}, "battery", Fact("battery", "unknown", "faint")),
         (
             {"battery_fraction": 0.1, "battery_voltage": 13.2},
