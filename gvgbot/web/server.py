@@ -19,6 +19,7 @@ from gvgbot.web.viewers import Audience, Viewer
 from gvgbot.web.wire import Reply, Wish, frame, wish
 
 _FOREIGN = "open the page by this machine's address, or by the name given with --host"
+_TOO_MANY = "there are too many viewers: close the page where nobody looks at it"
 LIVE = "/live"  # where the page asks for its WebSocket
 _METHODS = "GET, HEAD"
 _MOST_VIEWERS = 32
@@ -74,12 +75,13 @@ class Web:
             return self._pages.answer(request.path)
         if "Upgrade" not in request.headers:
             return said(HTTPStatus.UPGRADE_REQUIRED, "this is for the page, not for people")
-        if len(self._audience) >= _MOST_VIEWERS:
-            return said(HTTPStatus.SERVICE_UNAVAILABLE, "there are too many viewers")
         return None
 
     async def _attend(self, connection: ServerConnection) -> None:
-        """Serve one viewer until it leaves."""
+        """Serve one viewer until it leaves; one too many is told so, as its page can read it."""
+        if len(self._audience) >= _MOST_VIEWERS:
+            await connection.close(CloseCode.TRY_AGAIN_LATER, _TOO_MANY)
+            return
         viewer = Viewer()
         self._audience.join(viewer)
         try:

@@ -15,7 +15,7 @@ import subprocess
 import sys
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
-from contextlib import asynccontextmanager, contextmanager
+from contextlib import ExitStack, asynccontextmanager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -29,6 +29,7 @@ import zenoh
 from numpy.typing import NDArray
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import connect as sync_connect
 
 from benchmarks.rigs.addresses import free_endpoint, plain_session, router
 from benchmarks.rigs.programs import gvgbot
@@ -221,8 +222,8 @@ def test_a_page_from_elsewhere_gets_nothing() -> None:
 def test_the_thirty_third_viewer_is_told_that_there_are_too_many() -> None:
     async def story(audience: Audience, port: int) -> None:
         viewers = [await live(port) for _ in range(32)]
-        with pytest.raises(InvalidStatus, match="503"):
-            await live(port)
+        with pytest.raises(ConnectionClosed, match="too many viewers"):
+            await (await live(port)).recv()
         await viewers[0].close()
         await so_many(audience, 31)
         async with live(port):
@@ -945,6 +946,17 @@ def test_a_robot_that_is_stuck_waits_is_silent_or_has_left_and_a_lost_server_are
         play = Play(endpoint, page)
         with play.robot:
             play.until("document.querySelector('#banner').hidden")
+
+
+def test_a_page_for_which_there_is_no_room_says_so_until_another_one_is_closed(page: Page) -> None:
+    banner = "document.querySelector('#banner')"
+    with web("--connect", free_endpoint()) as address, ExitStack() as others:
+        there = address.replace("http", "ws") + "live"
+        viewers = [others.enter_context(sync_connect(there)) for _ in range(32)]
+        desktop(page, address)
+        page.until(f"{banner}.innerText.startsWith('there are too many viewers')")
+        viewers[0].close()
+        page.until(f"{banner}.innerText.includes('nobody answers')")
 
 
 def test_a_button_asks_the_robot_and_its_answer_is_shown(page: Page) -> None:

@@ -9,6 +9,7 @@ export class Link {
     this.onMessage = onMessage;
     this.onChange = onChange;
     this.isOpen = false;
+    this.refusal = ""; // why the server closed it
     this.pause = FIRST_PAUSE;
     this.waiting = new Map();
     this.number = 0;
@@ -28,34 +29,37 @@ export class Link {
       if (socket !== this.socket) return;
       this.heardAt = performance.now();
       this.pause = FIRST_PAUSE;
-      this.tell(true);
+      this.refusal = "";
+      this.open();
       const [kind, value] = decode(event.data);
       if (kind === "reply") this.settle(value);
       else this.onMessage(kind, value);
     };
-    socket.onclose = () => { if (socket === this.socket) this.lose(); };
+    socket.onclose = ({ reason }) => { if (socket === this.socket) this.lose(reason); };
   }
 
   watch() {
     if (this.retry === null && performance.now() - this.heardAt > SILENCE) this.lose();
   }
 
-  lose() {
+  lose(refusal = "") {
     const socket = this.socket;
+    this.refusal = refusal;
     this.socket = null;
     socket?.close();
     for (const id of [...this.waiting.keys()]) {
       this.settle({ id, done: false, text: "the connection was lost before an answer came" });
     }
-    this.tell(false);
+    this.isOpen = false;
+    this.onChange(false);
     this.retry = setTimeout(() => this.connect(), this.pause);
     this.pause = Math.min(2 * this.pause, LONGEST_PAUSE);
   }
 
-  tell(isOpen) {
-    if (isOpen === this.isOpen) return;
-    this.isOpen = isOpen;
-    this.onChange(isOpen);
+  open() {
+    if (this.isOpen) return;
+    this.isOpen = true;
+    this.onChange(true);
   }
 
   // What the robot answers: { done, text }.

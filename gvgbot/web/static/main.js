@@ -115,6 +115,7 @@ function drawPanel() {
 
 function said() {
   if (isConnected && robotLink !== null) return words.headline(robotLink, state);
+  if (link.refusal) return [`${link.refusal} (trying again)`, "bad", true];
   return robotLink === null ? ["connecting", "faint", false] : ["connection to gvgbot web lost, trying again", "bad", true];
 }
 
