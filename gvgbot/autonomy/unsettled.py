@@ -145,6 +145,7 @@ class Unsettled:
             kept.local = gone.local.compose(Pose(theta=-turn))
             kept.seen_at, kept.updated_at = gone.seen_at, gone.updated_at
         kept.visits += gone.visits
+        kept.reached |= gone.reached
         fused = fuse(known.graph, kept, gone, Pose(theta=turn), self._same_bearing)
         self.names.change(fused.renamed)
         known.observations[:] = [

@@ -43,18 +43,20 @@ def test_with_one_end_of_a_street_that_was_driven_twice_the_other_end_is_known_t
 
 
 def test_what_may_be_a_vertex_in_doubt_is_the_known_one_that_this_proves_to_be() -> None:
-    """Three visits of one place, of which the third looked like the second only."""
+    """Three visits of one place, of which the third looked like the second only, and came there."""
     graph, places = GvgGraph(), np.array([[0.0, 0.0], [0.1, 0.1], [0.1, -0.1]])
     known, second, third = (Vertex(graph.next_id(), 1.0, Pose(), 0.0, 0.0) for _ in places)
     graph.vertices |= {vertex.id: vertex for vertex in (known, second, third)}
     x = np.concatenate([np.zeros(3), np.pad(places, ((0, 0), (0, 1))).ravel()])
     knowledge = Knowledge(Belief(x, 0.01 * np.eye(12), tuple(graph.vertices)), graph)
     unsettled = Unsettled(knowledge, margin=2.0, same_bearing=math.radians(40))
+    third.reached = True
     for vertex, rival in ((second, known), (third, second)):
         unsettled.doubt(vertex, Recognition(None, (rival.id,), (1.0,), 0.02, 9.0), 0.0)
     for stamp in (1.0, 2.0):
         unsettled.settle(stamp)
     assert list(graph.vertices) == list(knowledge.belief.ids) == [known.id]
+    assert known.reached, "else a dead end is driven into once more"
 
 
 def test_what_leaves_a_vertex_that_proves_to_be_a_known_one_turns_as_its_frame_was_turned() -> None:
