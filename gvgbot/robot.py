@@ -272,7 +272,7 @@ class Robot:
     def _use(self, config: Config) -> None:
         """Put a configuration into effect, as far as that can be changed."""
         self._session.config = config
-        self._pipeline.errands.configure(config.exploration)
+        self._pipeline.configure(config.exploration)
         self._loop.guard_by(Guard(config.robot.limits, config.robot.radius_m))
 
     # -- what the robot feels ----------------------------------------------------------------------

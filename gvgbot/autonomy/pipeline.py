@@ -102,6 +102,10 @@ class Pipeline:
         self.open_clearance = config.reduction.open_clearance_m  # from walls; farther is no edge
         self.past = Past()
 
+    def configure(self, exploration: ExplorationConfig) -> None:
+        """Explore by another configuration from now on."""
+        self.errands.configure(exploration)
+
     # -- state -----------------------------------------------------------------------------------
 
     @property

@@ -56,9 +56,7 @@ class ReturningPipeline(Pipeline):
         super().__init__(config, exploration, robot_radius, localisation=localisation)
         recall(self, memory, past)
         unwalled = replace(config, virtual_walls=())  # who is lost does not know where they are
-        self._new_mind = partial(
-            Pipeline, unwalled, exploration, robot_radius, localisation=localisation
-        )
+        self._unwalled, self._exploration, self._localisation = unwalled, exploration, localisation
         self._is_vouched = is_vouched
         # the best estimate of the map; None as long as that takes
         self.smooth: Callable[[], Estimate | None] = partial(smoothed, self)
@@ -70,6 +68,17 @@ class ReturningPipeline(Pipeline):
         self._tour: list[int] | None = None  # vertices of its own that it still drives to
         self._relocaliser: Relocaliser
         self._estimate: Estimate
+
+    def configure(self, exploration: ExplorationConfig) -> None:
+        """Explore by another configuration from now on, for its place as well."""
+        super().configure(exploration)
+        self._exploration = exploration
+        if self._seeker is not None:
+            self._seeker.configure(exploration)
+
+    def _new_mind(self) -> Pipeline:
+        settings = self._unwalled, self._exploration, self.radius
+        return Pipeline(*settings, localisation=self._localisation)
 
     @property
     def is_lost(self) -> bool:

@@ -50,6 +50,21 @@ def test_who_is_lost_does_not_know_where_virtual_walls_are() -> None:
     assert len(robot._new_mind().virtual_walls) == 0
 
 
+def test_who_looks_for_its_place_does_so_as_it_is_told_meanwhile() -> None:
+    saved, config = MissionFiles(MISSION).read(), load_config()
+    assert saved is not None
+    settings = config.autonomy, config.exploration, config.robot.radius_m
+    robot = ReturningPipeline(*settings, saved.memory, saved.past, lambda: False)
+    robot.control(Odometry(0.0, Pose(), STANDSTILL))
+    robot.perceive(sweep(carved([(-4.0, -1.0, 6.0, 1.0)]), Pose()))
+    seeker = robot._seeker
+    assert seeker is not None
+    told = replace(config.exploration, in_the_way_s=99.0)
+    robot.configure(told)
+    for mind in (robot, seeker, robot._new_mind()):
+        assert mind.mission._config == told
+
+
 def test_who_has_found_its_place_on_a_map_knows_no_better_where_that_map_lies() -> None:
     """The map may lie metres aside of where it began, as a whole, and so may the robot on it.
 
