@@ -19,14 +19,16 @@ from gvgbot.maps.surface import S
 def diff(a: Path, b: Path, out: Path | None, *, tolerance: float) -> tuple[bool, list[str]]:
     """Whether two runs left the same map, within the tolerance (m), and how they differ, in lines.
 
-    With `out` a picture of both goes there. Raises UsageError if a run cannot be read or no picture
-    can go to `out`, GvgbotError if it cannot be written.
+    With `out` a picture of both goes there. Raises UsageError if a run cannot be read, if both maps
+    are empty, or no picture can go to `out`, GvgbotError if it cannot be written.
     """
     if out is not None and out.suffix.lower() not in PICTURES:
         raise UsageError(f"{out}: let its name end in {' or '.join(PICTURES)}")
     if out is not None:
         check_output(out)
     runs = (SavedRun.read(a), SavedRun.read(b))
+    if not any(run.graph.vertices for run in runs):
+        raise UsageError(f"neither {a} nor {b} has a vertex: there is nothing to compare")
     found = compare(runs[0].graph, runs[1].graph, tolerance)
     verdict = f"{'equal' if found.is_equal else 'different'} within {tolerance:g} m"
     names = (str(a), str(b))

@@ -197,6 +197,14 @@ def test_maps_that_share_nothing_are_not_said_to_be_laid_on_each_other(
     )
 
 
+def test_of_two_empty_maps_it_is_not_said_that_they_are_equal(
+    tmp_path: Path, capsys: Captured
+) -> None:
+    one, other = a_run(tmp_path / "a", RouteGraph()), a_run(tmp_path / "b", RouteGraph())
+    assert main(["map", "diff", str(one), str(other)]) == 2
+    assert "nothing to compare" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("turn", [1e-4, -1e-4])
 def test_next_to_no_turn_has_no_sign(turn: float, tmp_path: Path, capsys: Captured) -> None:
     one, other = a_run(tmp_path / "a", town()), a_run(tmp_path / "b", town(turn))
