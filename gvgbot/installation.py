@@ -50,7 +50,8 @@ def install_service(
         else system_files(source, Path("/"), programs, version)
     )
     for file in wanted:
-        say(f"{_would(file) if dry_run else _write(file)} {file.path}: {file.purpose}")
+        done = _would(file) if dry_run else _write(file, "" if user else ": try sudo, or --user")
+        say(f"{done} {file.path}: {file.purpose}")
     say("then run:")
     for command in USER_COMMANDS if user else SYSTEM_COMMANDS:
         say(f"  {command}")
@@ -151,15 +152,15 @@ def _would(file: Written) -> str:
     return "would keep" if file.kept and file.path.exists() else "would write"
 
 
-def _write(file: Written) -> str:
-    """Write a file; what was done, in a word. Raises GvgbotError."""
+def _write(file: Written, remedy: str) -> str:
+    """Write a file; what was done, in a word. Raises GvgbotError with what helps who may not."""
     if file.kept and file.path.exists():
         return "kept"
     try:
         file.path.parent.mkdir(parents=True, exist_ok=True)
         file.path.write_text(file.content, "utf-8")
     except OSError as error:
-        hint = ": try sudo, or --user" if isinstance(error, PermissionError) else ""
+        hint = remedy if isinstance(error, PermissionError) else ""
         raise GvgbotError(f"cannot write {file.path}: {error.strerror}{hint}") from error
     return "wrote"
 

@@ -1,5 +1,7 @@
 """What `install-service` writes, where, and what it says of it."""
 
+import errno
+import os
 import sys
 from pathlib import Path
 
@@ -115,6 +117,19 @@ def test_what_is_written_can_be_used_and_a_configuration_is_kept(
     assert main(["install-service", "--user"]) == 0
     assert load_config(config).robot.name == "mine"
     assert f"kept {config}" in capsys.readouterr().out
+
+
+def test_who_may_not_write_at_home_is_not_sent_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def refuse(path: Path, **_: object) -> None:
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
+
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setattr(Path, "mkdir", refuse)
+    assert main(["install-service", "--user"]) == 1
+    wanted = tmp_path / ".config/gvgbot/gvgbot.yaml"
+    assert capsys.readouterr().err == f"gvgbot: cannot write {wanted}: Permission denied\n"
 
 
 def test_a_configuration_with_mistakes_is_not_installed(
