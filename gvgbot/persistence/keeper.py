@@ -89,6 +89,7 @@ class Keeper:
         self._snapshot_of = -1  # keyframes in it
         self._settled = False  # the map has changed since the last snapshot
         self._is_asked = False  # for something, in this life
+        self._is_urgent = False  # to keep what it was asked for last
         self._goes_on = files.is_begun  # in the files in which it ended
         self._same_life = False  # the computer and its clock have gone on since
         self.trouble: str | None = None  # why nothing can be written just now
@@ -157,7 +158,8 @@ class Keeper:
     def on_event(self, event: events.Event) -> None:
         """Note what happened: a map that has changed is kept at once, and so is a wish."""
         self._settled = self._settled or isinstance(event, _SETTLED)
-        self._is_asked |= isinstance(event, events.Requested) and event.done
+        if isinstance(event, events.Requested) and event.done:
+            self._is_asked = self._is_urgent = True
         self._is_retold |= isinstance(event, events.ClosureRevoked | events.DoubtSettled)
         if isinstance(event, events.WayForgotten):
             self._stay = min(self._stay, event.kept)
@@ -165,12 +167,19 @@ class Keeper:
     async def keep(
         self, clock: Clock, off_loop: Callable[[Callable[[], None]], Awaitable[None]]
     ) -> None:
-        """Keep the mission until cancelled; wait longer each time while that cannot be."""
-        pause = KEEP_EVERY
+        """Keep the mission until cancelled; wait longer each time while that cannot be.
+
+        What the robot is asked for does not wait.
+        """
+        pause, due = KEEP_EVERY, clock.now()
         while True:
-            await clock.sleep_until(clock.now() + pause)
+            await clock.sleep_until(clock.now() + KEEP_EVERY)
+            if clock.now() < due and not self._is_urgent:
+                continue
+            self._is_urgent = False
             await off_loop(self.keeping(clock.now()))
             pause = KEEP_EVERY if self.trouble is None else min(2.0 * pause, RETRY_WITHIN)
+            due = clock.now() + pause
 
     def keeping(self, stamp: float, most: int = MOST) -> Callable[[], None]:
         """A function that writes what is new at a stamp, in a thread or later.
@@ -208,8 +217,9 @@ class Keeper:
             snapshot = packed(Snapshot(memory=remember(pipeline), beat=beat, known=self._known))
             self._settled = False
         self._stay, self._observed = math.inf, list(pipeline.mapper.observations)
-        counts = [*self._counts[:after], count]
-        return partial(self._write, packed(batch), counts, snapshot, stamp, is_all=is_all)
+        counts, rests = [*self._counts[:after], count], pipeline.errands.is_resting
+        write = partial(self._write, packed(batch), counts, snapshot, stamp)
+        return partial(write, is_all=is_all, rests=rests)
 
     def _count(self, before: Count, most: int) -> Count:
         """How much the journal shall hold after a batch: no less than it held already."""
@@ -248,10 +258,17 @@ class Keeper:
             way = rows(journey, 0)
             past = packed(Batch(first=0, growth=growth(pipeline), rows=way, beat=saved.beat))
         count = Count(len(pipeline.past.keyframes), len(journey.stamps))
-        return partial(self._write_wish, past, count, before, snapshot)
+        rests = pipeline.errands.is_resting
+        return partial(self._write_wish, past, count, before, snapshot, rests=rests)
 
     def _write_wish(
-        self, past: bytes | None, count: Count, before: Callable[[], None], snapshot: bytes
+        self,
+        past: bytes | None,
+        count: Count,
+        before: Callable[[], None],
+        snapshot: bytes,
+        *,
+        rests: bool,
     ) -> None:
         def write() -> None:
             if past is not None:
@@ -262,6 +279,7 @@ class Keeper:
 
         if not self._is_kept(write):
             self._settled = True
+            self._files.note_rest(rests=rests)
 
     def finish(self) -> None:
         """Write all that is new; call when nothing runs any more."""
@@ -278,6 +296,7 @@ class Keeper:
         stamp: float,
         *,
         is_all: bool,
+        rests: bool,
     ) -> None:
         def write() -> None:
             self._files.append(batch, sync=snapshot is not None, after=len(counts) - 1)
@@ -293,6 +312,7 @@ class Keeper:
             if self._counts is not counts:
                 self._stay = min(self._stay, counts[-2].keyframes if len(counts) > 1 else 0)
             self._files.fall_behind()
+            self._files.note_rest(rests=rests)
 
     def _is_kept(self, write: Callable[[], None]) -> bool:
         """Write, and say so if that cannot be; whether it was written."""

@@ -26,7 +26,8 @@ from gvgbot.persistence.records import Damaged, packed, record, records, unpacke
 
 JOURNAL, SNAPSHOT, SNAPSHOT_BEFORE = "journal.gvg", "snapshot.gvg", "snapshot-before.gvg"
 
-# When a journal was changed that lacks what happened last: the year 2000, which FAT knows as well.
+# When a journal was changed that lacks what happened last, and a snapshot that lacks that the robot
+# stands: the year 2000, which FAT knows as well.
 _BEHIND = 946_684_800.0
 
 
@@ -79,6 +80,8 @@ class MissionFiles:
             past, parts, counts, is_current = [], [], [], False
         journey = journey_of(parts, len(past))
         memory = _counted(snapshot.memory, past)
+        if _is_dated_back(self._snapshot):
+            memory = replace(memory, intent=replace(memory.intent, is_paused=True))
         return Saved(memory, past, journey, newest, counts, is_current, snapshot.known)
 
     def _newest_snapshot(self) -> Snapshot | None:
@@ -114,10 +117,7 @@ class MissionFiles:
             self._ends.append(end)
 
     def _is_current(self) -> bool:
-        try:
-            return self._journal.stat().st_mtime != _BEHIND
-        except OSError:
-            return False
+        return self._journal.is_file() and not _is_dated_back(self._journal)
 
     # -- writing -----------------------------------------------------------------------------------
 
@@ -163,6 +163,17 @@ class MissionFiles:
             if self._is_current():
                 os.utime(self._journal, (_BEHIND, _BEHIND))
 
+    def note_rest(self, *, rests: bool) -> None:
+        """Note whether the robot stands, which the snapshot cannot tell: in the same way.
+
+        It outlives a power cut. Who reads it finds a robot that is paused.
+        """
+        with contextlib.suppress(OSError):
+            if _is_dated_back(self._snapshot) != rests:
+                with self._snapshot.open("rb") as snapshot:
+                    os.utime(snapshot.fileno(), (_BEHIND, _BEHIND) if rests else None)
+                    os.fsync(snapshot.fileno())
+
     def forget(self) -> None:
         """Let nothing go on from what was written."""
         if self.is_begun:
@@ -180,6 +191,13 @@ class MissionFiles:
         content = record(packed(Header("gvgbot snapshot", VERSION))) + record(snapshot)
         replace_file(self._snapshot, content, keep=self._before if self._is_whole else None)
         self._is_whole = True
+
+
+def _is_dated_back(path: Path) -> bool:
+    try:
+        return path.stat().st_mtime == _BEHIND
+    except OSError:
+        return False
 
 
 def _begins_after(past: list[Growth], memory: Memory) -> bool:

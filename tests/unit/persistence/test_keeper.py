@@ -227,6 +227,41 @@ def test_a_disk_with_room_for_the_journal_only_takes_nothing_from_it_when_that_i
     assert len(found(tmp_path).past) == held
 
 
+@pytest.mark.parametrize("is_ended", [False, True], ids=["pause", "stop"])
+def test_who_was_told_to_stand_stands_after_a_power_cut_though_the_disk_is_full(
+    session: Session, tmp_path: Path, *, is_ended: bool
+) -> None:
+    """It is full for so long that it is hardly tried any more."""
+    keeper, errands = Keeper(session, MissionFiles(tmp_path)), session.pipeline.errands
+    keeper.keeping(20.0)()
+    asked = Requested(60.0, "anything", "ana", True, "so be it")
+
+    async def at_once(work: Callable[[], None]) -> None:
+        work()
+
+    async def story() -> None:
+        clock = LoopClock()
+        async with asyncio.TaskGroup() as tasks:
+            keeping = tasks.create_task(keeper.keep(clock, at_once))
+            drive_on(session, 5)
+            await clock.sleep_until(clock.now() + 101.0)
+            assert not found(tmp_path).memory.intent.is_paused
+            for rests in (True, False, True):
+                if not rests:
+                    errands.explore(60.0) if is_ended else errands.resume()
+                else:
+                    errands.stop(60.0) if is_ended else errands.pause()
+                keeper.on_event(asked)
+                await clock.sleep_until(clock.now() + 2 * KEEP_EVERY)
+                assert found(tmp_path).memory.intent.is_paused == rests
+            keeping.cancel()
+
+    with structlog.testing.capture_logs(), full_disk(10):
+        run_in_virtual_time(story())
+    keeper.keeping(200.0)()
+    assert packed(found(tmp_path).memory) == packed(remember(session.pipeline))
+
+
 def test_what_did_not_change_is_not_written_again(session: Session, tmp_path: Path) -> None:
     keeper = Keeper(session, MissionFiles(tmp_path))
     keeper.keeping(20.0)()
