@@ -160,15 +160,16 @@ def test_identity_and_parameters_are_those_of_the_laser() -> None:
     on_bench(HokuyoTwin(PERFECT, World(), seed=6), scenario)
 
 
-def test_clusters_keep_the_nearest_range_and_point_to_their_middle() -> None:
+def test_clusters_point_to_their_middle_and_tell_the_range_there() -> None:
     async def scenario(bench: Bench) -> None:
         (scan,) = await bench.scans(1)
         assert len(scan.ranges) == 360
-        assert scan.ranges[1:] == pytest.approx(nearest[1:], abs=QUANTISATION)
+        assert scan.ranges[whole] == pytest.approx(ranges[1::3][whole], abs=2 * QUANTISATION)
         assert scan.bearings == pytest.approx(MODELS["UTM-30LX"].parameters.bearings[1::3])
 
     ranges = World().ranges(0)
-    nearest = [min(ranges[i : i + 3]) for i in range(0, 1080, 3)]
+    is_hit = np.isfinite(ranges[:1080]).reshape(-1, 3).all(axis=1)
+    whole = np.convolve(is_hit, np.ones(3), mode="same") == 3  # and so are those beside it
     twin = HokuyoTwin(PERFECT, lambda stamp: ranges, seed=7)
     on_bench(twin, scenario, HokuyoConfig(cluster=3))
 

@@ -9,7 +9,7 @@ import pytest
 
 from gvgbot.drivers.hokuyo.driver import HokuyoConfig
 from gvgbot.drivers.hokuyo.models import MODELS, Identity, Parameters, find_model
-from gvgbot.drivers.hokuyo.scan_geometry import scan_geometry
+from gvgbot.drivers.hokuyo.scan_geometry import in_the_middle, scan_geometry
 from gvgbot.drivers.hokuyo.scip_messages import ScanRequest
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
@@ -21,6 +21,34 @@ def scan_of(parameters: Parameters, readings: list[int], config: HokuyoConfig) -
     request = ScanRequest("MD", parameters.first_step, parameters.last_step)
     geometry = scan_geometry(config, parameters, request)
     return geometry.scan(np.array(readings, np.int32), 1.0)
+
+
+@pytest.mark.parametrize("group", [2, 3, 10])
+@pytest.mark.parametrize("slant", [-60.0, -20.0, 0.0, 45.0])
+def test_the_least_range_of_a_group_is_that_of_the_wall_in_its_middle(
+    group: int, slant: float
+) -> None:
+    """A wall 2 m away, slanted to what is ahead; within 60 degrees of square to it."""
+    alpha = np.radians(np.arange(-50, 50, 0.25))
+    alpha = alpha[: len(alpha) // group * group]
+    alpha = alpha[np.abs(alpha - math.radians(slant)) < math.radians(60)]
+    alpha = alpha[: len(alpha) // group * group].reshape(-1, group)
+    least = (2.0 / np.cos(alpha - math.radians(slant))).min(axis=1)
+    middle = 2.0 / np.cos(alpha.mean(axis=1) - math.radians(slant))
+    off, before = in_the_middle(least, group) - middle, least - middle
+    assert np.abs(off[1:-1]).max() < 0.004
+    assert np.abs(before[1:-1]).max() > 0.005 * (group - 1)
+
+
+def test_where_a_wall_ends_no_range_is_moved_towards_what_is_behind() -> None:
+    """Two walls square to the beams, and one that runs away until a door is open behind it."""
+    gone, square = math.inf, np.array([1.0, 1.0, 1.0, 3.0, 3.0, 3.0, math.nan, 2.0, 2.0, math.inf])
+    assert in_the_middle(square, 3) == pytest.approx(square, nan_ok=True)
+    away = 1.0 / np.array([1.0, 0.99, 0.98, 0.97, 0.5])
+    there = in_the_middle(np.append(away, gone), 3)
+    assert there[1:4] == pytest.approx(1.0 / np.array([0.99, 0.98, 0.97]), abs=0.0035 + 0.005)
+    assert there[3] < 1.0 / 0.96
+    assert there[5] == gone
 
 
 def ranges_of(parameters: Parameters, readings: list[int], **config: Any) -> Array:
