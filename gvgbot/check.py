@@ -13,7 +13,7 @@ import numpy as np
 
 from gvgbot.clock import Clock, LoopClock, VirtualTimeLoop
 from gvgbot.config import Config
-from gvgbot.drivers.hokuyo.driver import HokuyoLaser
+from gvgbot.drivers.hokuyo.driver import FEWEST_BEAMS, FINER, HokuyoLaser
 from gvgbot.drivers.kobuki.driver import KobukiBase
 from gvgbot.errors import DeviceLost, DeviceRefused, GvgbotError
 from gvgbot.hal.guard import GuardConfig
@@ -215,6 +215,8 @@ def _laser_lines(
         f"{len(scans[-1].ranges)} beams, {seen:.0%} of them of use",
         "uncover and clean its window",
     )
+    if len(scans[-1].ranges) < FEWEST_BEAMS:
+        yield Line("warn", "laser beams", f"they are fewer than {FEWEST_BEAMS}", FINER)
     if not scans[-1].looks_ahead:
         yield Line(
             "fail",

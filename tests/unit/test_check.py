@@ -157,6 +157,24 @@ def test_whoever_drives_by_scans_that_are_too_rare_is_told(
     assert all("robot.limits.max_scan_age_s" in remedy for remedy in told)
 
 
+@pytest.mark.parametrize(
+    ("settings", "is_told"),
+    [
+        (("laser.cluster=10",), False),
+        (("laser.cluster=11",), True),
+        (("laser.cluster=5", "laser.first_angle_deg=-60", "laser.last_angle_deg=60"), True),
+    ],
+)
+def test_whoever_maps_by_too_few_beams_is_told(settings: tuple[str, ...], is_told: bool) -> None:
+    """A UTM-30LX has 1081."""
+    with structlog.testing.capture_logs() as logs:
+        points = said(*settings)[1]
+    assert points.get("laser beams", ("ok", ""))[0] == ("warn" if is_told else "ok")
+    told = [line for line in logs if line["event"] == "too few beams to map by"]
+    assert len(told) == is_told
+    assert all("laser.cluster" in line["remedy"] for line in told)
+
+
 @pytest.mark.parametrize(("baud", "is_told"), [(19200, True), (115200, False)])
 def test_whoever_drives_by_scans_that_a_slow_line_delays_is_told(baud: int, is_told: bool) -> None:
     """The least of a URG-04LX, every third step, is 733 bytes: 0.38 s at 19200 bit/s."""

@@ -47,6 +47,8 @@ REMEDIES = {  # against a refusal, by its status
 }
 NO_SCANS, DAMAGED = "no scans", "damaged scans only"
 CHECK_CABLE = "try another cable or port, away from motors"
+FEWEST_BEAMS = 100  # of a scan; with fewer the place is lost
+FINER = "lower laser.cluster, or widen laser.first_angle_deg and laser.last_angle_deg"
 FASTER = "raise robot.limits.max_scan_age_s, laser.rate_hz or laser.baud, or lower laser.skip"
 LONGEST_WITHOUT_SCAN = 5.0  # s, for a motor to reach its speed or a laser to check itself
 MOST_DOUBLINGS = 3  # of that: a laser that needed longer must not be reset for ever
@@ -202,6 +204,8 @@ class HokuyoLaser:
         self._mode = mode = self._choose(self._parameters)
         if mode.adapted is not None:
             log.warning("laser mode fitted to its link", change=mode.adapted)
+        if mode.request.values < FEWEST_BEAMS:
+            log.warning("too few beams to map by", beams=mode.request.values, remedy=FINER)
         every = round(self._parameters.period * (mode.request.skip + 1), 3)
         late = round(arrival_delay(self._config, self._parameters, mode.request) + mode.transfer, 3)
         if every + late > self._longest_s:
