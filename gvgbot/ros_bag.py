@@ -81,7 +81,7 @@ def _mind(log: Log) -> Pipeline:
     """The mind that is to live through a log, as that of a replay."""
     config = log.config
     pipeline = Pipeline(
-        config.autonomy,
+        config.mind,
         config.exploration,
         config.robot.radius_m,
         led=log.led,

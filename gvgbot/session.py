@@ -55,7 +55,7 @@ class Session:
         self.config, self.directory, self.place = config, directory, place
         self.begin_with(
             Pipeline(
-                config.autonomy,
+                config.mind,
                 config.exploration,
                 config.robot.radius_m,
                 led=led,

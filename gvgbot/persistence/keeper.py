@@ -103,7 +103,7 @@ class Keeper:
         config = session.config
         session.begin_with(
             ReturningPipeline(
-                config.autonomy,
+                config.mind,
                 config.exploration,
                 config.robot.radius_m,
                 saved.memory,

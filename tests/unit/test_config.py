@@ -103,6 +103,24 @@ def test_a_base_that_obeys_the_guard_late_is_refused(key: str) -> None:
         load_config(None, overrides)
 
 
+@pytest.mark.parametrize(
+    ("settings", "search_rad"),
+    [
+        ([], 0.0),
+        (["base.heading=wheels"], 0.4),
+        (["base.heading=wheels", "autonomy.scan_matching.search_rad=0.2"], 0.2),
+    ],
+)
+def test_without_a_gyro_scans_are_searched_for_what_a_slip_has_turned(
+    settings: list[str], search_rad: float
+) -> None:
+    """A slip of 9 cm turns wheels that are 23 cm apart by 0.39 rad."""
+    config = load_config(None, settings)
+    assert config.mind.scan_matching.search_rad == search_rad
+    if not search_rad:
+        assert config.mind is config.autonomy
+
+
 def test_a_port_can_only_be_that_of_one_device(tmp_path: Path) -> None:
     link = tmp_path / "laser"
     link.symlink_to("/dev/ttyUSB0")

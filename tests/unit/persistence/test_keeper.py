@@ -439,6 +439,15 @@ def test_a_first_start_with_a_known_map_was_not_interrupted(tmp_path: Path) -> N
     assert not session.pipeline.errands.is_paused
 
 
+def test_who_has_no_gyro_has_none_in_another_life_either(tmp_path: Path) -> None:
+    with RunDirectory(tmp_path) as directory:
+        session = Session(load_config(overrides=["base.heading=wheels"]), directory, None)
+    lives = [session.pipeline.matching]
+    Keeper(session, MissionFiles(tmp_path), MissionFiles(MISSION).read())
+    lives += [session.pipeline.matching]
+    assert lives == [session.config.mind.scan_matching] * 2
+
+
 def test_time_goes_on_where_a_map_from_elsewhere_ended(tmp_path: Path) -> None:
     """The map may be that of a simulation on this computer, whose clock began with zero."""
     known = MissionFiles(MISSION).read()
