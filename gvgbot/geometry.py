@@ -10,6 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 
+_BACK = math.cos(math.radians(100.0))  # of a turn in a line that is none of an edge
+_SAME_M = 1e-6  # no farther apart, two points are one
+
 
 def wrap_angle(angle: float) -> float:
     """The same direction in (-pi, pi]."""
@@ -143,6 +146,24 @@ def anchored(line: Array, start: Array, end: Array) -> Array:
     share = (along / max(along[-1], 1e-9))[:, None]
     bent: Array = line + (1 - share) * (start - line[0]) + share * (end - line[-1])
     return bent
+
+
+def without_spikes(line: Array) -> Array:
+    """A line (N, 2) along an edge of the GVG without the points where it turns back: (M, 2).
+
+    Where the way into a corner is left out, an edge turns by a right angle at most. Where a line
+    turns by more, pieces were put together that do not fit, or its end was moved.
+    """
+    while len(line) > 2:
+        steps = np.diff(line, axis=0)
+        lengths = np.hypot(*steps.T)
+        ahead = (steps[1:] * steps[:-1]).sum(axis=1) / np.maximum(lengths[1:] * lengths[:-1], 1e-9)
+        ahead[np.minimum(lengths[1:], lengths[:-1]) < _SAME_M] = -1.0
+        sharpest = int(ahead.argmin())
+        if ahead[sharpest] > _BACK:
+            break
+        line = np.delete(line, sharpest + 1, axis=0)
+    return line
 
 
 def direction_of(line: Array, over: float) -> float:

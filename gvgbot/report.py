@@ -14,7 +14,16 @@ from gvgbot.autonomy.estimate import scans_at, smoothed
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.graph import Edge, Vertex
 from gvgbot.drivers.world import World, save_world
-from gvgbot.geometry import Array, Pose, anchored, composed, resampled, rows_of, seen_from
+from gvgbot.geometry import (
+    Array,
+    Pose,
+    anchored,
+    composed,
+    resampled,
+    rows_of,
+    seen_from,
+    without_spikes,
+)
 from gvgbot.hal.messages import Odometry
 from gvgbot.maps import geojson
 from gvgbot.maps.distances import cells_to
@@ -160,7 +169,7 @@ def _route_edge(edge: Edge, vertices: dict[int, Pose]) -> RouteEdge:
     return RouteEdge(
         start=edge.a.vertex,
         end=edge.b.vertex,
-        polyline=anchored(line, start, end),
+        polyline=without_spikes(anchored(line, start, end)),
         length=edge.length,
         min_clearance=edge.min_clearance,
         traversals=edge.traversals,

@@ -21,6 +21,7 @@ from gvgbot.geometry import (
     seen_from,
     stations_of,
     thinned,
+    without_spikes,
     wrap_angle,
     wrap_angles,
 )
@@ -221,6 +222,19 @@ def test_a_line_is_bent_the_more_the_nearer_to_the_end_that_is_off() -> None:
     line = np.array([(0.0, 0.0), (1.0, 0.0), (4.0, 0.0)])
     there = anchored(line, np.array([0.0, 0.4]), np.array([4.0, -0.8]))
     assert there == pytest.approx(np.array([(0.0, 0.4), (1.0, 0.1), (4.0, -0.8)]))
+
+
+@given(poses)
+def test_a_line_keeps_its_right_angles_and_loses_where_it_turns_back(by: Pose) -> None:
+    """Behind its start, in the middle, there in two steps and back, and before its end."""
+    way = [(0.0, 0.0), (0.5, 0.0), (1.0, 0.0), (1.0, 0.5), (1.0, 1.0), (0.0, 1.0)]
+    spiky = [*way]
+    spiky[5:5] = [(0.3, 1.0), (0.0, 0.9)]
+    spiky[3:3] = [(1.0, -0.2), (1.01, -0.4), (1.0, -0.2)]
+    spiky[1:1] = [(-0.1, 0.02)]
+    left = without_spikes(by.transform(np.array(spiky)))
+    assert left == pytest.approx(by.transform(np.array([*way[:5], (0.3, 1.0), way[5]])), abs=1e-9)
+    assert without_spikes(left) == pytest.approx(left)
 
 
 @given(st.integers(0, 60), st.floats(0.1, 3.0), poses)

@@ -9,7 +9,7 @@ from gvgbot.autonomy.keyframes import Keyframe
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.graph import HalfEdgeId, Vertex
 from gvgbot.config import Config
-from gvgbot.geometry import Pose
+from gvgbot.geometry import Pose, length_of
 from gvgbot.maps.occupancy import UNKNOWN, OccupancyGrid
 from gvgbot.maps.route_graph import RouteEdge, RouteGraph, RouteNode
 from gvgbot.report import Journey, _corrected, route_graph, with_room_of
@@ -57,6 +57,19 @@ def test_directions_in_the_map_are_within_half_a_turn_of_straight_on() -> None:
     (told,) = route_graph(mind, {1: Pose(0.0, 0.0, 3.0)}, {1: np.eye(2)}).vertices
     assert told.bearings == pytest.approx((3.0, 4.0 - math.tau, 2.5, 5.0 - math.tau))
     assert told.frontiers == pytest.approx((2.5, 5.0 - math.tau))
+
+
+def test_an_edge_that_was_put_together_of_two_does_not_turn_back() -> None:
+    """Of a vertex that was none, seen a little beside the way that both its edges now are."""
+    mind = pipeline([])
+    ends = []
+    for number, x in ((1, 0.0), (2, 4.0)):
+        vertex = mind.mapper.graph.vertices[number] = Vertex(number, 1.0, Pose(x), 0.0, 0.0)
+        ends.append(HalfEdgeId(number, vertex.add_half_edge(0.0)))
+    line = np.array([[0, 0], [1, 0], [2, 0], [2.05, 0.3], [2.1, 0], [3, 0], [4, 0]], float)
+    mind.mapper.graph.join(ends[0], ends[1], line, 1.0, driven=True)
+    (told,) = route_graph(mind, {1: Pose(), 2: Pose(4.0)}, {1: np.eye(2), 2: np.eye(2)}).edges
+    assert length_of(told.polyline) == pytest.approx(4.0)
 
 
 def street(claimed: float, start: tuple[float, float], end: tuple[float, float]) -> RouteGraph:
