@@ -18,8 +18,11 @@ _AROUND = np.stack([f(np.arange(16) * np.pi / 8) for f in (np.cos, np.sin)], axi
 _ROOM_M = 0.35  # from the walls, on the way
 _SPACING_M = 0.1
 _BEND_M = 0.2  # between places of an edge where a way may bend
-_BEARINGS, _STEP_M, _FARTHEST_M = 16, 0.5, 4.0  # of places to go to where no edge leads
-_NEAREST_M = 1.0  # of those places
+_FARTHEST_M = 4.0  # of places to go to where no edge leads, and of bends
+_NEAREST_M, _STEP_M = 1.0, 0.5  # of those places
+# Their bearings, how far away they are at most, and by how much less room the way may have than
+# there is where the robot stands: all around, and out of a slot.
+_FANS = ((16, _FARTHEST_M, 0.0), (180, 2.0, 0.02))
 _ROOM_ENOUGH_M = 5.0  # from the walls: more says nothing
 _SOUGHT_M = 1.5  # so near, one has been
 
@@ -121,29 +124,39 @@ def way_into_the_open(view: View, sought: list[Array]) -> tuple[Array, Array] | 
     """The straight way away from the walls, to where most room is known and nobody has been.
 
     There an edge may come into sight, or a wall. `sought` are the places (2,), local frame, where
-    none was. As `straight_way` has it.
+    none was. Out of a slot only few directions lead, so all are tried where there is no other way.
+    As `straight_way` has it.
     """
-    base = view.local_base
-    bearings = base.theta + np.linspace(0.0, math.tau, _BEARINGS, endpoint=False)
-    metres = np.arange(_FARTHEST_M, _NEAREST_M - _STEP_M / 2, -_STEP_M)
-    goals = base.position + (
-        metres[:, None, None] * np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
-    ).reshape(-1, 2)
-    room = np.asarray(view.obstacles().query(goals)[0])
-    for goal in goals[np.argsort(-np.minimum(room, _ROOM_ENOUGH_M), kind="stable")]:
-        if all(math.dist(goal, place) > _SOUGHT_M for place in sought):
-            way = straight_way(view, goal, _ROOM_M)
-            if way is not None:
-                return way
+    for bearings, farthest, slack in _FANS:
+        for goal in _open_places(view, bearings, farthest):
+            if all(math.dist(goal, place) > _SOUGHT_M for place in sought):
+                way = straight_way(view, goal, _ROOM_M, slack)
+                if way is not None:
+                    return way
     return None
 
 
-def straight_way(view: View, goal: Array, least_room: float) -> tuple[Array, Array] | None:
+def _open_places(view: View, bearings: int, farthest: float) -> Array:
+    """Places (N, 2), local frame, around the base, those with most room about them first."""
+    base = view.local_base
+    angles = base.theta + np.linspace(0.0, math.tau, bearings, endpoint=False)
+    metres = np.arange(farthest, _NEAREST_M - _STEP_M / 2, -_STEP_M)
+    rays = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    goals = base.position + (metres[:, None, None] * rays).reshape(-1, 2)
+    room = np.asarray(view.obstacles().query(goals)[0])
+    best_first: Array = goals[np.argsort(-np.minimum(room, _ROOM_ENOUGH_M), kind="stable")]
+    return best_first
+
+
+def straight_way(
+    view: View, goal: Array, least_room: float, slack: float = 0.0
+) -> tuple[Array, Array] | None:
     """The straight way to a point (2,), local frame; None if it is not known to be free.
 
-    Its points (N, 2), local frame, and their distances (N,) from the walls, m.
+    Its points (N, 2), local frame, and their distances (N,) from the walls, m: `least_room`, or as
+    much as where it stands, less a `slack`.
     """
-    return _straight_from(view, view.local_base.position, goal, least_room)
+    return _straight_from(view, view.local_base.position, goal, least_room, slack)
 
 
 def bent_way(view: View, goal: Array, least_room: float) -> tuple[Array, Array] | None:
@@ -166,12 +179,12 @@ def bent_way(view: View, goal: Array, least_room: float) -> tuple[Array, Array] 
 
 
 def _straight_from(
-    view: View, start: Array, goal: Array, least_room: float
+    view: View, start: Array, goal: Array, least_room: float, slack: float = 0.0
 ) -> tuple[Array, Array] | None:
     distance = float(np.hypot(*(goal - start)))
     line = np.linspace(start, goal, math.ceil(distance / _SPACING_M) + 1)
     room = np.asarray(view.obstacles().query(line)[0])
-    narrow = room < min(least_room, float(room[0]))  # where it stands, it may stand close
+    narrow = room < min(least_room, float(room[0]) - slack)  # where it stands, it may stand close
     if narrow.any() or not view.local_map.known(line).all():
         return None
     return line, room

@@ -5,7 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gvgbot.autonomy.exploration.access import access, bent_way, straight_way, way_to_edge
+from gvgbot.autonomy.exploration.access import (
+    access,
+    bent_way,
+    straight_way,
+    way_into_the_open,
+    way_to_edge,
+)
 from gvgbot.autonomy.gvg.local import LocalGvg
 from gvgbot.autonomy.views import View
 from gvgbot.geometry import Pose
@@ -49,6 +55,19 @@ def test_a_virtual_wall_is_before_an_edge_as_well() -> None:
 def test_with_walls_before_every_edge_there_is_no_way() -> None:
     gvg = drawn({1: (-3.0, -3.1), 2: (3.0, -3.1)}, {10: (1, 2, [])})
     assert way_to_edge(view_of(gvg)) is None
+
+
+@pytest.mark.parametrize("heading", [1.4, -0.7])
+def test_out_of_a_slot_there_is_a_way_whichever_way_one_looks(heading: float) -> None:
+    """One of 43 cm, narrower than an edge may be, whose mouth is a metre away."""
+    here = Pose(0.0, 0.0, heading)
+    slot = carved([(-0.215, -0.3, 0.215, 1.0), (-3.0, 1.0, 3.0, 2.6)])
+    gvg = drawn({1: (-2.0, 9.0), 2: (2.0, 9.0)}, {10: (1, 2, [])})
+    way = way_into_the_open(View(0, 0.0, 0.0, here, gvg, looked(slot, [here])), [])
+    assert way is not None
+    line, room = way
+    assert line[-1, 1] > 1.0
+    assert room.min() > 0.19
 
 
 def test_on_an_edge_there_is_no_way_to_go() -> None:
