@@ -28,12 +28,13 @@ from gvgbot.autonomy.exploration.access import (
 )
 from gvgbot.autonomy.exploration.certainty import robot_sigma
 from gvgbot.autonomy.exploration.config import ExplorationConfig
+from gvgbot.autonomy.keyframes import has_come_on
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.mission import Mission
 from gvgbot.autonomy.situation import Situation
 from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.autonomy.views import Correspondence, View
-from gvgbot.geometry import Array, wrap_angle
+from gvgbot.geometry import Array, Pose, wrap_angle
 
 _OFF_GRAPH_M = 3.0  # a point farther from every edge is out of reach
 DIRECT_M = 4.0  # off a point, one drives there straight, or with one bend
@@ -43,6 +44,7 @@ _AT_VERTEX_M = 1.0  # from a vertex, what stands in the way stands on the edge b
 _ALMOST_M = 0.6  # as well, where one cannot come nearer
 _SHORT_M = 0.3  # a track so short leads nowhere
 _PROGRESS_M = 0.3
+_STIRS_M, _STIRS_RAD = 0.05, 0.1  # who moves less stands
 _SURE_M = 0.4  # of a place that was found again
 _LOOKS = 2  # around, before giving up
 _UNSEEN_LOOKS = 3, 15  # at where an edge should leave: before it waits, and gives that up
@@ -105,12 +107,13 @@ class Driving:
         self._began: float | None = None  # stamp
         self._closed: HalfEdgeId | None = None  # something stands between it and the robot
         self._route: Route | None = None  # that is being driven
-        self._nearest_m = math.inf  # that has been left of it
+        self._nearest_m: dict[bool, float] = {}  # least that was left of it, and straight on
         self._looks = 0
         self._unseen = 0  # looks at where the route goes on, without seeing that
         self._is_looking = self._is_obstructed = False
         self._is_off = True  # the graph, and looks for it; else coming nearer is what counts
-        self._progress = -math.inf  # stamp
+        self._progress = self._stood = -math.inf  # stamps: since when it has made none, and stands
+        self._place: Pose | None = None  # where it stands
         self._last_view = -math.inf  # stamp
         self._travelled_then = -math.inf
         self._budget_m = math.inf  # of `travelled`
@@ -127,7 +130,6 @@ class Driving:
             return Ended("given up", "driven too far without reaching it")
         waited = self._waited(view)
         if self._is_obstructed or waited > self.config.in_the_way_s:
-            waited = 0.0
             ended = self._close_way(view)
             if ended is not None:
                 return ended
@@ -138,27 +140,40 @@ class Driving:
             case Rest(seconds=seconds):
                 return self._rest(view, seconds)
             case ToVertex(vertex=vertex):
-                return self._to_vertex(view, here, names.vertex(vertex), waited)
+                return self._to_vertex(view, here, names.vertex(vertex))
             case Waypoint(end=end, station=station):
                 foot = foot_at(self._mapper.graph, names.half_edge(end), station)
-                return self._past(view, here, foot, waited)
+                return self._past(view, here, foot)
             case ToPoint() | Home():
-                return self._to_point(view, here, self.stop, waited)
+                return self._to_point(view, here, self.stop)
 
     def _begin(self, view: View) -> None:
         known = sum(edge.length for edge in self._mapper.graph.edges.values())
         self._budget_m = view.travelled + 2 * known + self.config.patience_m
-        self._began = self._progress = self._last_view = view.stamp
+        self._began = self._last_view = view.stamp
+        self._wait_anew(view)
 
     def _waited(self, view: View) -> float:
         """Seconds without progress."""
-        outage = view.stamp - self._last_view - _LONGEST_VIEW_S
-        since = self._progress + max(0.0, outage)  # lets no patience run out
+        unseen = max(0.0, view.stamp - self._last_view - _LONGEST_VIEW_S)  # an outage
+        self._progress += unseen
+        self._stood += unseen
+        self._last_view = view.stamp
         has_moved = self._is_off and view.travelled > self._travelled_then + _PROGRESS_M
         if has_moved or self._is_looking:
-            self._travelled_then, since = view.travelled, view.stamp
-        self._progress, self._last_view, self._is_looking = since, view.stamp, False
-        return view.stamp - since
+            self._travelled_then, self._progress = view.travelled, view.stamp
+        if self._is_looking or has_come_on(self._place, view.local_base, _STIRS_M, _STIRS_RAD):
+            self._place, self._stood = view.local_base, view.stamp
+        self._is_looking = False
+        return view.stamp - self._progress
+
+    def _stands(self, view: View) -> bool:
+        """Whether it has not stirred for so long that it will come no nearer in this way."""
+        return view.stamp - self._stood > self.config.look_around_s
+
+    def _wait_anew(self, view: View) -> None:
+        """Let no patience run out by the time before."""
+        self._progress = self._stood = view.stamp
 
     # -- something in the way ----------------------------------------------------------------------
 
@@ -175,8 +190,9 @@ class Driving:
         self, view: View, end: HalfEdgeId | None, heading: HalfEdgeId | None
     ) -> Ended | None:
         """Drive an edge no more, and not to that end of it if the robot is on it."""
-        self._is_obstructed, self._progress, self._unseen = False, view.stamp, 0
-        self._nearest_m = math.inf
+        self._is_obstructed, self._unseen = False, 0
+        self._wait_anew(view)
+        self._nearest_m.clear()
         graph = self._mapper.graph
         edge = None if end is None else graph.edge_at(end)
         ends = [edge.a, edge.b] if edge is not None else [end] if end is not None else []
@@ -222,12 +238,10 @@ class Driving:
 
     def _rest(self, view: View, seconds: float) -> Order | Ended:
         assert self._began is not None
-        self._progress = view.stamp
+        self._wait_anew(view)
         return Stand() if view.stamp < self._began + seconds else Ended("arrived", "")
 
-    def _to_vertex(
-        self, view: View, here: Situation | None, vertex: int, waited: float
-    ) -> Order | Ended:
+    def _to_vertex(self, view: View, here: Situation | None, vertex: int) -> Order | Ended:
         graph = self._mapper.graph
         if vertex not in graph.vertices:
             return Ended("given up", f"vertex {vertex} is not in the map any more")
@@ -237,31 +251,27 @@ class Driving:
             if node is None
             else view.gvg.nodes[node].position
         )
-        if self._is_there(view, there, waited):
+        if self._is_there(view, there):
             return Ended("arrived", f"vertex {vertex}")
         if here is None:
-            return self._find_edge(view, waited)
+            return self._find_edge(view)
         route = route_to_vertex(graph, here.starts(self._closed), vertex)
-        return self._drive(view, here, route, waited, there if node is None else None)
+        return self._drive(view, here, route, there if node is None else None)
 
-    def _past(
-        self, view: View, here: Situation | None, foot: Foot | None, waited: float
-    ) -> Order | Ended:
+    def _past(self, view: View, here: Situation | None, foot: Foot | None) -> Order | Ended:
         if foot is None:
             return Ended("given up", "the edge is not in the map any more")
         away = foot.in_local_frame(self._mapper, view) - view.local_base.position
         if float(np.hypot(*away)) < _PAST_M:
             return Ended("arrived", "")
         if here is None:
-            return self._find_edge(view, waited)
+            return self._find_edge(view)
         route = route_to_foot(here, here.starts(self._closed), foot, self._closed)
         if route is not None and route.metres < _PAST_M:
             return Ended("arrived", "")
-        return self._drive(view, here, route, waited)
+        return self._drive(view, here, route)
 
-    def _to_point(
-        self, view: View, here: Situation | None, stop: ToPoint | Home, waited: float
-    ) -> Order | Ended:
+    def _to_point(self, view: View, here: Situation | None, stop: ToPoint | Home) -> Order | Ended:
         goal = np.array([stop.x, stop.y])
         local_goal = self._mapper.map_in_local(view.local_base).transform(goal)
         away = float(np.hypot(*(local_goal - view.local_base.position)))
@@ -270,9 +280,9 @@ class Driving:
         way, room_m = None, self._ground.room_m
         if away < DIRECT_M:
             way = straight_way(view, local_goal, room_m) or bent_way(view, local_goal, room_m)
-        if way is not None and waited < self.config.look_around_s:
+        if way is not None and not self._stands(view):
             self._route, track = None, Track.of(*way)
-            self._come_nearer(view, track.length)
+            self._come_nearer(view, track.length, straight=True)
             return Drive(track)
         foot = foot_of(self._mapper, goal)
         if foot is None:
@@ -280,15 +290,18 @@ class Driving:
                 return self._look_around(view)
             return Ended("given up", "no edge is known that it could drive on")
         at_foot = foot.in_local_frame(self._mapper, view)
-        if self._is_there(view, at_foot, waited):
+        if self._is_there(view, at_foot):
+            if way is not None and isinstance(stop, ToPoint):  # who stands in it may go
+                self._route = None
+                return Drive(Track.of(*way))
             short = f"{away:.1f} m from there, where the known ways end"
             if isinstance(stop, Home):
                 return Ended("arrived", short)
             return Ended("given up", f"the way is not free; it stands {short}")
         if here is None:
-            return self._find_edge(view, waited)
+            return self._find_edge(view)
         route = route_to_foot(here, here.starts(self._closed), foot, self._closed)
-        return self._drive(view, here, route, waited, at_foot)
+        return self._drive(view, here, route, at_foot)
 
     # -- on the way --------------------------------------------------------------------------------
 
@@ -297,7 +310,6 @@ class Driving:
         view: View,
         here: Situation,
         route: Route | None,
-        waited: float,
         end: Array | None = None,
     ) -> Order | Ended:
         """Along a route, to its end or to a point of it (2,), local frame."""
@@ -314,7 +326,7 @@ class Driving:
         if self._unseen >= _UNSEEN_LOOKS[1]:
             return self._close_way(view) or Stand()
         if self._unseen >= _UNSEEN_LOOKS[0]:  # a door that has opened just now is still a wall
-            self._progress = view.stamp
+            self._wait_anew(view)
             return Stand()
         self._come_nearer(view, route.metres)
         path = route.branches(here) or here.ahead()
@@ -325,7 +337,7 @@ class Driving:
                 i = max(1, int(np.argmin(d)))
                 line, clearance = line[: i + 1], clearance[: i + 1]
         track = Track.of(line, clearance)
-        is_at_end = track.length < _SHORT_M and waited > self.config.look_around_s
+        is_at_end = track.length < _SHORT_M and self._stands(view)
         if is_at_end and not view.is_end_doubted(line[-1]):  # else somebody hides the rest
             if self._looks < _LOOKS:
                 return self._look_around(view)
@@ -333,17 +345,20 @@ class Driving:
             return self._close_way(view) or Stand()
         return Drive(track)
 
-    def _come_nearer(self, view: View, metres: float) -> None:
-        """Note how much is left of the way: wheels that spin are no progress."""
-        self._is_off = False
-        if metres < self._nearest_m - _PROGRESS_M:
-            self._nearest_m, self._progress = metres, view.stamp
+    def _come_nearer(self, view: View, metres: float, *, straight: bool = False) -> None:
+        """Note how much is left of the way: wheels that spin are no progress.
 
-    def _find_edge(self, view: View, waited: float) -> Order | Ended:
+        A route may end before the stop: what is left of it says nothing of the way straight on.
+        """
+        self._is_off = False
+        if metres < self._nearest_m.get(straight, math.inf) - _PROGRESS_M:
+            self._nearest_m[straight], self._progress = metres, view.stamp
+
+    def _find_edge(self, view: View) -> Order | Ended:
         """Off the graph: go to the nearest edge, or look around for one."""
         self._route, self._is_off = None, True
         way = way_to_edge(view)
-        if way is not None and waited < self.config.look_around_s:
+        if way is not None and not self._stands(view):
             return Drive(Track.of(*way))
         if self._looks >= _LOOKS:
             return Ended("given up", "no edge is in sight")
@@ -355,8 +370,7 @@ class Driving:
         self.happened.append(Recovery(view.stamp, "look around", f"on the way: {self.stop}"))
         return LookAround(math.tau)
 
-    def _is_there(self, view: View, there: Array, waited: float) -> bool:
+    def _is_there(self, view: View, there: Array) -> bool:
         """Whether the robot is at a place (2,), local frame, or as near as it comes."""
         away = float(np.hypot(*(there - view.local_base.position)))
-        has_waited = waited > self.config.look_around_s
-        return away < _THERE_M or (has_waited and away < _ALMOST_M)
+        return away < _THERE_M or (away < _ALMOST_M and self._stands(view))

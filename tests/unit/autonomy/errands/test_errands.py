@@ -1,18 +1,21 @@
 """What is answered to who asks for an errand."""
 
+import math
 from functools import partial
 
 import numpy as np
 import pytest
 
-from gvgbot.autonomy.control.orders import Drive, Stand
+from gvgbot.autonomy.control.edge_follower import Track
+from gvgbot.autonomy.control.orders import Drive, Order, Stand
 from gvgbot.autonomy.errands import Declined
 from gvgbot.autonomy.errands.plans import Kept
 from gvgbot.autonomy.events import ErrandEnded
 from gvgbot.autonomy.slam.graph import HalfEdgeId, Vertex
 from gvgbot.geometry import Pose, Twist
 from tests.unit.autonomy.errands.test_own_tasks import Explorer
-from tests.unit.autonomy.test_mission import CLOSED
+from tests.unit.autonomy.sights import carved, looked
+from tests.unit.autonomy.test_mission import CLOSED, CONFIG
 
 
 def test_a_coverage_promises_no_edge_that_no_known_way_leads_to() -> None:
@@ -86,3 +89,47 @@ def test_who_drives_the_robot_ends_its_errand_and_it_waits_where_it_is_left(is_s
     robot.errands.pause()
     robot.errands.resume()
     assert robot.errands.is_resting
+
+
+def in_a_hall() -> Explorer:
+    """A robot at one end of an edge of 5 m that has a wide space on its left."""
+    robot = Explorer()
+    robot.walls = looked(carved([(-2.0, -2.0, 5.0, 4.0)]), [Pose()])
+    robot.pose = Pose(-1.0, 0.0)
+    robot.mapper.move(robot.pose, np.zeros((3, 3)))
+    while not robot.mapper.graph.edges:
+        robot.look(CLOSED)
+    return robot
+
+
+def creep(robot: Explorer, track: Track) -> Order:
+    """The next order, after a decimetre along a track in a second."""
+    here = int(np.hypot(*(track.polyline - robot.pose.position).T).argmin())
+    station = track.stations[here] + 0.1
+    x, y = (float(np.interp(station, track.stations, line)) for line in track.polyline.T)
+    robot.stamp += 0.5
+    return robot.drive(CLOSED, (robot.pose.x, robot.pose.y), (x, y))
+
+
+def test_a_slow_robot_leaves_its_edge_for_a_point_far_beside_it() -> None:
+    """It may be told to be slow; the way straight on is longer than what is left of the edge."""
+    robot, goal = in_a_hall(), (3.0, 2.4)
+    robot.errands.goto_point(*goal, robot.stamp)
+    order = robot.look(CLOSED)
+    while isinstance(order, Drive):
+        order = creep(robot, order.track)
+    (ended,) = robot.said(ErrandEnded)
+    assert isinstance(ended, ErrandEnded)
+    assert ended.outcome == "arrived", ended.reason
+    assert math.dist((robot.pose.x, robot.pose.y), goal) < 0.2
+    assert robot.travelled < math.hypot(4.0, 2.4) + 0.5
+
+
+def test_who_stands_on_a_point_has_as_long_to_go_as_in_any_other_way() -> None:
+    robot = in_a_hall()
+    robot.drive(CLOSED, (-1.0, 0.0), (2.0, 0.0))
+    robot.errands.goto_point(2.0, 0.4, robot.stamp)
+    since, patience = robot.stamp, CONFIG.in_the_way_s
+    while not robot.said(ErrandEnded):
+        robot.look(CLOSED)
+    assert since + patience < robot.stamp < since + patience + 2.0
