@@ -1,5 +1,6 @@
 """Ways over the known graph to a vertex, or to the point of an edge that is nearest to a place."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,12 @@ from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.situation import Situation
 from gvgbot.autonomy.slam.graph import Edge, GvgGraph, HalfEdgeId
 from gvgbot.autonomy.views import View
+from gvgbot.autonomy.virtual_walls import nearest_before
 from gvgbot.geometry import Array, length_of, stations_of
+
+_SIGHT_M = 3.0  # from a place, an edge on its side of the walls may be its foot
+_SHOWS_M = 8.0  # so near to it, a vertex shows the walls around it
+_EVERY = 4  # points of edges, of which one is looked at
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,15 +56,43 @@ class Route:
 
 
 def foot_of(mapper: Mapper, point: Array) -> Foot | None:
-    """The foot of a point (2,), map frame; None if no edge is known."""
-    feet = []
-    for edge in mapper.graph.edges.values():
-        line = mapper.belief.map_vertex(edge.a.vertex).transform(edge.polyline)
-        away = np.hypot(*(line - point).T)
-        i = int(np.argmin(away))
-        station = length_of(line[: i + 1])
-        feet.append(Foot(edge, i, station, float(away[i])))
-    return min(feet, key=lambda foot: foot.away, default=None)
+    """The foot of a point (2,), map frame; None if no edge is known.
+
+    One near by on the point's side of the walls, where there is one: the edge that is nearest to a
+    place in a room may be in the corridor behind it.
+    """
+    edges = list(mapper.graph.edges.values())
+    if not edges:
+        return None
+    lines = [mapper.belief.map_vertex(e.a.vertex).transform(e.polyline) for e in edges]
+    places = np.concatenate(lines)
+    away = np.hypot(*(places - point).T)
+    i = _nearest_in_sight(mapper, point, places, away)
+    ends = np.cumsum([len(line) for line in lines])
+    k = int(ends.searchsorted(i, side="right"))
+    index = i - int(ends[k]) + len(lines[k])
+    return Foot(edges[k], index, length_of(lines[k][: index + 1]), float(away[i]))
+
+
+def _nearest_in_sight(mapper: Mapper, point: Array, places: Array, away: Array) -> int:
+    """The nearest of places (N, 2) before the walls around a point, else the very nearest."""
+    some = np.argsort(away, kind="stable")
+    some = some[: max(1, int(away[some].searchsorted(_SIGHT_M)))][::_EVERY]
+    walls = _walls_around(mapper, point)
+    before = nearest_before(walls, point, places[some], away[some])
+    return int(some[before or 0])
+
+
+def _walls_around(mapper: Mapper, point: Array) -> Array:
+    """The walls (N, 2), map frame, that vertices near a point (2,) were seen among."""
+    belief, walls = mapper.belief, [np.empty((0, 2))]
+    for vertex in belief.ids:
+        map_vertex = belief.map_vertex(vertex)
+        if math.dist(map_vertex.position, point) < _SHOWS_M:
+            walls.append(map_vertex.transform(mapper.graph.vertices[vertex].snapshot))
+    found = np.concatenate(walls)
+    near: Array = found[np.hypot(*(found - point).T) < _SIGHT_M]
+    return near
 
 
 def foot_at(graph: GvgGraph, end: HalfEdgeId, station: float) -> Foot | None:
