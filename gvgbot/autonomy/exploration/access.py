@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, field
+from itertools import chain
 
 import numpy as np
 
@@ -114,9 +115,18 @@ def _between_things(view: View) -> Access | None:
 def way_to_edge(view: View) -> tuple[Array, Array] | None:
     """The straight way to the nearest edge of the local GVG to which there is one.
 
-    The very nearest edge may be behind a wall. As `straight_way` has it.
+    The very nearest edge may be behind a wall. Who has come between things gets out again. As
+    `straight_way` has it.
     """
-    ways = (straight_way(view, view.gvg.point(place), _ROOM_M) for place in _places(view))
+    nearest = ((view.gvg.point(place), _ROOM_M) for place in _places(view))
+    lines = [resampled(edge.polyline, _BEND_M) for edge in view.gvg.edges.values()]
+    others = np.concatenate([np.empty((0, 2)), *lines])
+    away = np.hypot(*(others - view.local_base.position).T)
+    order = [i for i in np.argsort(away, kind="stable") if away[i] < _FARTHEST_M]
+    ways = (
+        straight_way(view, goal, room)
+        for goal, room in chain(nearest, ((others[i], _TIGHT_M) for i in order))
+    )
     return next((way for way in ways if way is not None), None)
 
 

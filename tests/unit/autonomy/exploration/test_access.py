@@ -70,6 +70,18 @@ def test_out_of_a_slot_there_is_a_way_whichever_way_one_looks(heading: float) ->
     assert room.min() > 0.19
 
 
+def test_who_has_come_between_things_gets_out_to_another_point_of_the_edge() -> None:
+    """Before the nearest point is a wall; beside its end there is as much room as on errands."""
+    hall, wall, end = (-3.5, -0.8, 3.6, 2.8), (-3.5, 0.6, 0.4, 0.8), (3.0, 2.0)
+    walls = looked(carved([hall], [wall]), [Pose(), Pose(*end)])
+    gvg = drawn({1: (-3.0, 2.0), 2: end}, {10: (1, 2, [])})
+    way = way_to_edge(View(0, 0.0, 0.0, Pose(), gvg, walls))
+    assert way is not None
+    x, y = way[0][-1]
+    assert 2.4 < x <= 3.0  # farther to the left the wall's end is 0.2 m away
+    assert y == pytest.approx(2.0)
+
+
 def test_on_an_edge_there_is_no_way_to_go() -> None:
     gvg = drawn({1: (-2.0, -1.1), 2: (2.0, -1.1)}, {10: (1, 2, [])})
     found = access(view_of(gvg))
