@@ -25,8 +25,7 @@ class LiveGrid:
         self._grid = GrowingGrid(_RESOLUTION_M, _REACH_M)
         self._began, self._number = began, 0
         self._touched: dict[Place, None] = {}  # since they were sent, the longest ago first
-        self._sent: dict[Place, bytes] = {}
-        self._tiles: dict[Place, Tile] = {}
+        self._tiles: dict[Place, Tile] = {}  # as they were sent last
 
     @property
     def has_more(self) -> bool:
@@ -45,7 +44,7 @@ class LiveGrid:
     def redraw(self, keyframes: Iterable[Keyframe]) -> None:
         """Begin anew with these; every tile that was sent is looked at again."""
         self._grid = GrowingGrid(_RESOLUTION_M, _REACH_M)
-        self._touched = dict.fromkeys(self._sent)
+        self._touched = dict.fromkeys(self._tiles)
         self.add(keyframes)
 
     def changes(self, stamp: float) -> Grid | None:
@@ -56,8 +55,7 @@ class LiveGrid:
             del self._touched[place]
             row, column = place
             cells = self._grid.square(row * _SIDE, column * _SIDE, _SIDE).tobytes()
-            if cells != self._sent.get(place, _BLANK):
-                self._sent[place] = cells
+            if cells != self._sent(place):
                 packed = zlib.compress(cells, _EFFORT)
                 self._tiles[place] = Tile(column=column, row=row, cells=packed)
                 changed.append(self._tiles[place])
@@ -65,6 +63,11 @@ class LiveGrid:
             return None
         self._number += 1
         return self._message(stamp, changed)
+
+    def _sent(self, place: Place) -> bytes:
+        """The cells of a tile as they are known where it was sent."""
+        tile = self._tiles.get(place)
+        return _BLANK if tile is None else zlib.decompress(tile.cells)
 
     def whole(self, stamp: float) -> Grid:
         """All tiles that have been sent."""

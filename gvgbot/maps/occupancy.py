@@ -70,29 +70,33 @@ def occupancy_grid(
     reach = min(max_range_m, max((scan.range_max for _, scan in lasers), default=0.0))
     disc = _Disc.of_radius(reach, resolution_m)
     ballot = _Ballot.around([laser for laser, _ in lasers], disc)
+    seen_s = np.full(ballot.votes.shape, np.inf, np.float32)
     for map_laser, scan in lasers:
-        _vote(ballot, disc, map_laser, scan, age=max(0.0, scan.stamp - began))
-    return _finished(ballot, resolution_m)
+        around, seen = _vote(ballot, disc, map_laser, scan)
+        window = seen_s[around]
+        window[seen & np.isinf(window)] = max(0.0, scan.stamp - began)
+    return _finished(ballot, resolution_m, seen_s)
 
 
 class GrowingGrid:
-    """The same grid of scans that come one by one; lasers of a longer range see as the first."""
+    """The same grid of scans that come one by one; lasers of a longer range see as the first.
+
+    It does not note when a cell was first seen, which would take four fifths of the memory.
+    """
 
     def __init__(self, resolution_m: float = 0.05, max_range_m: float = 12.0) -> None:
         self._cell, self._max_range = resolution_m, max_range_m
         self._disc: _Disc | None = None
         self._ballot: _Ballot | None = None
-        self._first_stamp = 0.0
 
     def add(self, map_base: Pose, scan: Scan) -> None:
         """Let a scan vote that was taken at a pose."""
         map_laser = map_base.compose(scan.base_laser)
         if self._disc is None:
             self._disc = _Disc.of_radius(min(self._max_range, scan.range_max), self._cell)
-            self._first_stamp = scan.stamp
         around = _Ballot.around([map_laser], self._disc)
         self._ballot = around if self._ballot is None else self._ballot.grown(around)
-        _vote(self._ballot, self._disc, map_laser, scan, age=scan.stamp - self._first_stamp)
+        _vote(self._ballot, self._disc, map_laser, scan)
 
     def around(self, map_base: Pose, scan: Scan) -> tuple[Indices, Indices]:
         """The first (row, column) that a scan from a pose can change, and that after the last.
@@ -144,10 +148,9 @@ class _Disc:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Ballot:
-    """Votes, and when each cell was first seen (s); `corner` is (row, column) of the first cell."""
+    """Votes; `corner` is (row, column) of the first cell."""
 
     votes: Cells
-    seen_s: Seconds
     corner: Indices
 
     @classmethod
@@ -165,7 +168,7 @@ class _Ballot:
             raise GvgbotError(
                 f"a grid of {rows} by {columns} cells is too large: is the odometry damaged?"
             )
-        return cls(np.zeros(shape, np.int8), np.full(shape, np.inf, np.float32), corner)
+        return cls(np.zeros(shape, np.int8), corner)
 
     def grown(self, other: Self) -> Self:
         """This ballot, or a larger one with its votes that covers the other's cells as well."""
@@ -176,8 +179,8 @@ class _Ballot:
             return self
         larger = self._empty(corner, (rows, columns))
         row, column = self.corner - corner
-        here = np.s_[row : row + self.votes.shape[0], column : column + self.votes.shape[1]]
-        larger.votes[here], larger.seen_s[here] = self.votes, self.seen_s
+        rows, columns = self.votes.shape
+        larger.votes[row : row + rows, column : column + columns] = self.votes
         return larger
 
 
@@ -191,15 +194,17 @@ def _cell(pose: Pose, cell: float) -> tuple[int, int]:
     return math.floor(pose.y / cell), math.floor(pose.x / cell)
 
 
-def _vote(ballot: _Ballot, disc: _Disc, map_laser: Pose, scan: Scan, *, age: float) -> None:
-    """Add what one scan saw, `age` seconds after the first, to the votes around its laser."""
+def _vote(
+    ballot: _Ballot, disc: _Disc, map_laser: Pose, scan: Scan
+) -> tuple[tuple[slice, slice], NDArray[np.bool_]]:
+    """Add what a scan saw to the votes around its laser; a part of the cells, and which it saw."""
     here = np.array(_cell(map_laser, disc.cell))
     hits = _hits(disc, map_laser, scan) - here
     free_ranges = _free_ranges(disc, map_laser, scan)
     low, high = _extent(disc, hits, free_ranges)
     first = here - ballot.corner
     around = _box(first + low, first + high)
-    window, seen_s = ballot.votes[around], ballot.seen_s[around]
+    window = ballot.votes[around]
     hits -= low
     free = _seen_through(disc, _box(disc.half + low, disc.half + high), free_ranges)
     free[hits[:, 0], hits[:, 1]] = False
@@ -207,7 +212,7 @@ def _vote(ballot: _Ballot, disc: _Disc, map_laser: Pose, scan: Scan, *, age: flo
     window[hits[:, 0], hits[:, 1]] += np.int8(_HIT)
     np.clip(window, -_CERTAIN, _CERTAIN, out=window)
     free[hits[:, 0], hits[:, 1]] = True
-    seen_s[free & np.isinf(seen_s)] = age
+    return around, free
 
 
 def _extent(disc: _Disc, hits: Indices, free_ranges: Array) -> tuple[Indices, Indices]:
@@ -261,19 +266,20 @@ def _beams(map_laser: Pose, scan: Scan) -> Indices:
     return np.minimum(beams, len(scan.ranges))
 
 
-def _finished(ballot: _Ballot, cell: float) -> OccupancyGrid:
+def _finished(ballot: _Ballot, cell: float, seen_s: Seconds | None = None) -> OccupancyGrid:
     """The votes as percent, cut to the known cells and a margin."""
     votes = ballot.votes
     rows, columns = np.flatnonzero(votes.any(axis=1)), np.flatnonzero(votes.any(axis=0))
     if not len(rows):
-        never = np.full((1, 1), np.inf, np.float32)
+        never = None if seen_s is None else np.full((1, 1), np.inf, np.float32)
         return OccupancyGrid(np.full((1, 1), UNKNOWN, np.int8), cell, (0.0, 0.0), never)
     edge = math.ceil(_EDGE_M / cell)
     bottom, left = max(0, int(rows[0]) - edge), max(0, int(columns[0]) - edge)
     cut = np.s_[bottom : rows[-1] + edge + 1, left : columns[-1] + edge + 1]
     row, column = int(ballot.corner[0]) + bottom, int(ballot.corner[1]) + left
     origin = (column * cell, row * cell)
-    return OccupancyGrid(_PERCENT[votes[cut]], cell, origin, ballot.seen_s[cut].copy())
+    seen_s = None if seen_s is None else seen_s[cut].copy()
+    return OccupancyGrid(_PERCENT[votes[cut]], cell, origin, seen_s)
 
 
 def _percentages() -> Cells:
