@@ -1,6 +1,8 @@
 """Planar geometry: angles, poses and twists, in metres, radians and seconds."""
 
+import copy
 import math
+from array import array
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Self
@@ -91,6 +93,43 @@ def rows_of(poses: Iterable[Pose]) -> Array:
     """Poses as rows (N, 3) of x, y, theta."""
     rows = [(pose.x, pose.y, pose.theta) for pose in poses]
     return np.array(rows, np.float64).reshape(-1, 3)
+
+
+class Poses:
+    """A growing list of poses that takes 24 bytes for each, a fifth of what objects take."""
+
+    def __init__(self, poses: Iterable[Pose] = ()) -> None:
+        self._values = array("d")
+        for pose in poses:
+            self.append(pose)
+
+    def __len__(self) -> int:
+        return len(self._values) // 3
+
+    def __getitem__(self, i: int) -> Pose:
+        at = 3 * range(len(self))[i]
+        return Pose(*self._values[at : at + 3])
+
+    def append(self, pose: Pose) -> None:
+        """Add a pose."""
+        self._values.extend((pose.x, pose.y, pose.theta))
+
+    def extend(self, rows: Array) -> None:
+        """Add rows (N, 3) of x, y, theta."""
+        self._values.frombytes(np.ascontiguousarray(rows, np.float64).tobytes())
+
+    def cut(self, first: int) -> None:
+        """Take out all from a first one on."""
+        del self._values[3 * first :]
+
+    def rows(self, start: int = 0, end: int | None = None) -> Array:
+        """A copy of poses from one on, up to the one before `end`, as rows of x, y, theta."""
+        values = self._values[3 * start : None if end is None else 3 * end]
+        return np.array(values, np.float64).reshape(-1, 3)
+
+    def copy(self) -> "Poses":
+        """A list of the same poses."""
+        return copy.deepcopy(self)
 
 
 def composed(a_b: Array, b_c: Array) -> Array:

@@ -1,11 +1,14 @@
 """What a run leaves: the map, its picture, the trajectories and the summary, as files by name."""
 
+import copy
 import math
 import tempfile
+from array import array
 from bisect import bisect_left
 from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -17,6 +20,7 @@ from gvgbot.drivers.world import World, save_world
 from gvgbot.geometry import (
     Array,
     Pose,
+    Poses,
     anchored,
     composed,
     resampled,
@@ -42,11 +46,11 @@ class Journey:
     """The way of the robot, a row each `period` s, or for each odometry message if that is 0."""
 
     period: float = 0.1
-    stamps: list[float] = field(default_factory=list)
-    keyframes: list[int] = field(default_factory=list)  # the last one before each row
-    odom_base: list[Pose] = field(default_factory=list)
-    map_base: list[Pose] = field(default_factory=list)
-    world_base: list[Pose] = field(default_factory=list)  # simulation only
+    stamps: "array[float]" = field(default_factory=lambda: array("d"))
+    keyframes: "array[int]" = field(default_factory=lambda: array("q"))  # the last before each row
+    odom_base: Poses = field(default_factory=Poses)
+    map_base: Poses = field(default_factory=Poses)
+    world_base: Poses = field(default_factory=Poses)  # simulation only
 
     @property
     def began(self) -> float | None:
@@ -69,9 +73,13 @@ class Journey:
     def forget(self, keyframe: int) -> None:
         """Leave out the rows from a keyframe on."""
         first = bisect_left(self.keyframes, keyframe)
-        rows = (self.stamps, self.keyframes, self.odom_base, self.map_base, self.world_base)
-        for column in rows:
-            del column[first:]
+        del self.stamps[first:], self.keyframes[first:]
+        for poses in (self.odom_base, self.map_base, self.world_base):
+            poses.cut(first)
+
+    def still(self) -> Self:
+        """A copy that does not grow."""
+        return copy.deepcopy(self)
 
 
 def map_files(pipeline: Pipeline, journey: Journey, title: str) -> dict[str, bytes | str]:
@@ -94,11 +102,11 @@ def map_files(pipeline: Pipeline, journey: Journey, title: str) -> dict[str, byt
             title=title,
         ),
         "estimate.tum": encode_tum(estimate),
-        "online.tum": encode_tum(_trajectory(journey, rows_of(journey.map_base))),
+        "online.tum": encode_tum(_trajectory(journey, journey.map_base.rows())),
         "odometry.tum": encode_tum(odometry),
     }
     if journey.world_base:
-        files["truth.tum"] = encode_tum(_trajectory(journey, rows_of(journey.world_base)))
+        files["truth.tum"] = encode_tum(_trajectory(journey, journey.world_base.rows()))
     return files | encode_map_server(grid)
 
 
@@ -110,7 +118,7 @@ def _by_odometry(journey: Journey, pipeline: Pipeline) -> Array:
     """The journey by odometry alone (N, 3), from where its own first keyframe was taken on."""
     own = pipeline.past.keyframes[pipeline.past.lent :]
     start, map_start = (own[0].odom_base, own[0].map_base) if own else (Pose(), Pose())
-    return composed(rows_of([map_start]), seen_from(rows_of([start]), rows_of(journey.odom_base)))
+    return composed(rows_of([map_start]), seen_from(rows_of([start]), journey.odom_base.rows()))
 
 
 def _corrected(journey: Journey, pipeline: Pipeline, keyframes: list[Pose]) -> Array:
@@ -119,7 +127,7 @@ def _corrected(journey: Journey, pipeline: Pipeline, keyframes: list[Pose]) -> A
     What odometry is wrong by from one keyframe to the next is spread over the time between.
     """
     taken, last = pipeline.past.keyframes, len(pipeline.past.keyframes) - 1
-    stamps, odom_base = np.array(journey.stamps), rows_of(journey.odom_base)
+    stamps, odom_base = np.array(journey.stamps), journey.odom_base.rows()
     taken_at, felt = np.array([k.stamp for k in taken]), rows_of([k.odom_base for k in taken])
     before = np.array(journey.keyframes, np.intp)
     later = np.minimum(before + 1, last)

@@ -177,7 +177,7 @@ class Session:
         summary = self._summary(unfinished)
         others = None if self.member is None else self.member.charts
         parts = self.pipeline.mission.parts()
-        pipeline, journey = still(self.pipeline), still_journey(self.journey)
+        pipeline, journey = still(self.pipeline), self.journey.still()
         return partial(self._write, pipeline, journey, parts, others, summary)
 
     def _write(
@@ -216,15 +216,3 @@ class Session:
             "config": self.config,
             **recording,
         }
-
-
-def still_journey(journey: Journey) -> Journey:
-    """A copy that does not grow."""
-    return Journey(
-        journey.period,
-        journey.stamps.copy(),
-        journey.keyframes.copy(),
-        journey.odom_base.copy(),
-        journey.map_base.copy(),
-        journey.world_base.copy(),
-    )

@@ -13,7 +13,7 @@ import numpy as np
 
 from gvgbot.autonomy.memory import Growth, Memory
 from gvgbot.drivers.kobuki.feedback import FeedbackMemory
-from gvgbot.geometry import Array, Pose
+from gvgbot.geometry import Array
 from gvgbot.report import Journey
 from gvgbot.session import Tally
 
@@ -97,10 +97,10 @@ def rows(journey: Journey, start: int, end: int | None = None) -> Rows:
     """The rows of a journey from one on, up to the one before `end`."""
     return Rows(
         stamps=np.array(journey.stamps[start:end], np.float64),
-        keyframes=journey.keyframes[start:end],
-        odom_base=_poses(journey.odom_base[start:end]),
-        map_base=_poses(journey.map_base[start:end]),
-        world_base=_poses(journey.world_base[start:end]),
+        keyframes=journey.keyframes[start:end].tolist(),
+        odom_base=journey.odom_base.rows(start, end),
+        map_base=journey.map_base.rows(start, end),
+        world_base=journey.world_base.rows(start, end),
     )
 
 
@@ -109,19 +109,11 @@ def journey_of(batches: list[Rows], keyframes: int) -> Journey:
     journey = Journey()
     for part in batches:
         n = next((i for i, k in enumerate(part.keyframes) if k >= keyframes), len(part.keyframes))
-        journey.stamps += part.stamps[:n].tolist()
-        journey.keyframes += part.keyframes[:n]
-        journey.odom_base += _each(part.odom_base[:n])
-        journey.map_base += _each(part.map_base[:n])
-        journey.world_base += _each(part.world_base[:n])
+        journey.stamps.extend(part.stamps[:n].tolist())
+        journey.keyframes.extend(part.keyframes[:n])
+        journey.odom_base.extend(part.odom_base[:n])
+        journey.map_base.extend(part.map_base[:n])
+        journey.world_base.extend(part.world_base[:n])
     if len(journey.world_base) != len(journey.stamps):
-        journey.world_base.clear()
+        journey.world_base.cut(0)
     return journey
-
-
-def _poses(poses: list[Pose]) -> Array:
-    return np.array([(p.x, p.y, p.theta) for p in poses], np.float64).reshape(-1, 3)
-
-
-def _each(array: Array) -> list[Pose]:
-    return [Pose(x, y, theta) for x, y, theta in array.tolist()]

@@ -2,6 +2,7 @@
 
 import cmath
 import math
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 from gvgbot.geometry import (
     STANDSTILL,
     Pose,
+    Poses,
     Twist,
     anchored,
     composed,
@@ -156,6 +158,27 @@ def test_rows_of_poses_are_read_back_as_these(listed: list[Pose]) -> None:
     rows = rows_of(listed)
     assert rows.shape == (len(listed), 3)
     assert [Pose.from_array(row) for row in rows] == listed
+
+
+@given(st.lists(poses, max_size=4), st.lists(poses, max_size=4), st.integers(0, 8))
+def test_kept_poses_are_given_back_as_they_came(a: list[Pose], b: list[Pose], first: int) -> None:
+    kept = Poses(a)
+    before = kept.copy()
+    kept.extend(rows_of(b))
+    listed = a + b
+    assert before.rows().tolist() == rows_of(a).tolist()
+    assert [kept[i] for i in range(-len(listed), len(kept))] == listed + listed
+    assert kept.rows(first, 5).tolist() == rows_of(listed[first:5]).tolist()
+    kept.cut(first)
+    assert kept.rows().tolist() == rows_of(listed[:first]).tolist()
+
+
+def test_a_kept_pose_takes_the_room_of_three_numbers() -> None:
+    tracemalloc.start()
+    kept = Poses(Pose(0.1 * i, 0.2 * i, 0.3) for i in range(1000))
+    size, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert 24 * len(kept) < size < 30 * len(kept)
 
 
 @given(st.lists(st.tuples(poses, poses), min_size=1, max_size=5))

@@ -1,6 +1,7 @@
 """What is saved: the trajectory of a drive whose odometry is wrong by a known rate; the graph."""
 
 import math
+from array import array
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from gvgbot.autonomy.keyframes import Keyframe
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.graph import HalfEdgeId, Vertex
 from gvgbot.config import Config
-from gvgbot.geometry import Pose, length_of
+from gvgbot.geometry import Pose, Poses, length_of
 from gvgbot.maps.occupancy import UNKNOWN, OccupancyGrid
 from gvgbot.maps.route_graph import RouteEdge, RouteGraph, RouteNode
 from gvgbot.report import Journey, _corrected, route_graph, with_room_of
@@ -27,10 +28,10 @@ def test_what_odometry_is_wrong_by_is_spread_over_the_time_between_keyframes() -
     stamps = [0.1 * k for k in range(31)]
     felt = [Pose(0.9 * t, 0.0, 0.0) for t in stamps]
     frames = [Keyframe(float(k), felt[10 * k], Pose(), Pose(), None) for k in range(3)]
-    journey = Journey(stamps=stamps, odom_base=felt)
+    journey = Journey(stamps=array("d", stamps), odom_base=Poses(felt))
     true = [Pose(float(k), 0.0, 0.0) for k in range(3)]
     for late in (0, 1):  # by how many keyframes what is known then may be behind
-        journey.keyframes = [max(0, min(2, int(t + 1e-9)) - late) for t in stamps]
+        journey.keyframes = array("q", [max(0, min(2, int(t + 1e-9)) - late) for t in stamps])
         x = _corrected(journey, pipeline(frames), true)[:, 0].tolist()
         assert x[:21] == pytest.approx(stamps[:21])
         # then nothing tells what is wrong
@@ -40,7 +41,8 @@ def test_what_odometry_is_wrong_by_is_spread_over_the_time_between_keyframes() -
 def test_a_row_at_the_stamp_of_a_keyframe_that_came_later_is_that_keyframe() -> None:
     frames = [Keyframe(float(k), Pose(1.3 * k, 0.1, 0.2), Pose(), Pose(), None) for k in range(2)]
     true = [Pose(), Pose(1.0, 0.5, 0.1)]
-    journey = Journey(stamps=[1.0], keyframes=[0], odom_base=[frames[1].odom_base])
+    journey = Journey(stamps=array("d", [1.0]), keyframes=array("q", [0]))
+    journey.odom_base.append(frames[1].odom_base)
     (pose,) = _corrected(journey, pipeline(frames), true).tolist()
     assert pose == pytest.approx([true[1].x, true[1].y, true[1].theta])
 

@@ -97,7 +97,8 @@ def drive_on(session: Session, keyframes: int) -> None:
         journey.keyframes.append(keyframe)
         journey.odom_base.append(journey.odom_base[-1])
         journey.map_base.append(journey.map_base[-1])
-        journey.world_base += journey.world_base[-1:]
+        if journey.world_base:
+            journey.world_base.append(journey.world_base[-1])
 
 
 def found(path: Path) -> Saved:

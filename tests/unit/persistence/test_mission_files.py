@@ -137,7 +137,7 @@ def test_a_snapshot_of_the_map_before_has_no_part_in_a_map_that_was_begun_anew(
     files.save(snapshot(2.0, Keyframe(2.0, Pose(), Pose(), Pose(), None)))
     saved = MissionFiles(tmp_path).read()
     assert saved is not None
-    assert (saved.past, saved.counts, saved.journey.stamps) == ([], [], [])
+    assert (saved.past, saved.counts, list(saved.journey.stamps)) == ([], [], [])
     assert not saved.is_current
     files.append(batch(0, 4), sync=False, after=0)
     assert places(tmp_path) == [0.0, 1.0, 2.0, 3.0]
