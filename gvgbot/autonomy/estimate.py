@@ -56,10 +56,10 @@ def still_past(pipeline: Pipeline) -> Pipeline:
 def still(pipeline: Pipeline) -> Pipeline:
     """A copy, for reports, that does not change as the pipeline goes on.
 
-    What is only ever appended to is copied as a list, what is changed in place is copied deeply.
+    What is only ever appended to is copied as a list.
     """
     copied = still_past(pipeline)
-    copied.mapper.graph = copy.deepcopy(pipeline.mapper.graph)
+    copied.mapper.graph = pipeline.mapper.graph.copied()
     return copied
 
 

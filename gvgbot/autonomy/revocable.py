@@ -1,6 +1,5 @@
 """What was believed before a closure, in case the next vertices contradict it."""
 
-import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -38,7 +37,7 @@ class Revocable:
     ) -> "Revocable":
         """As things are, just before a closure."""
         own = replace(belief, P=belief.P.copy())
-        return cls(vertex, own, copy.deepcopy(graph), list(doubts), list(observations), names)
+        return cls(vertex, own, graph.copied(), list(doubts), list(observations), names)
 
     def move(self, motion: Pose, covariance: Array, laid: Laid | None) -> None:
         """Believe what would be believed without the closure, and without what is seen since."""

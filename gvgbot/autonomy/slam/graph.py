@@ -5,7 +5,7 @@ rather than vertices makes self-loops and parallel edges ordinary.
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -147,6 +147,22 @@ class GvgGraph:
     vertices: dict[int, Vertex] = field(default_factory=dict)
     edges: dict[int, Edge] = field(default_factory=dict)
     serial: int = 0
+
+    def copied(self) -> "GvgGraph":
+        """The same graph, to change apart from this one.
+
+        Both share lines and walls: these are replaced as a whole, never changed.
+        """
+        vertices = {
+            vertex.id: replace(
+                vertex,
+                half_edges={key: replace(half) for key, half in vertex.half_edges.items()},
+                gone=vertex.gone.copy(),
+            )
+            for vertex in self.vertices.values()
+        }
+        edges = {edge.id: replace(edge) for edge in self.edges.values()}
+        return GvgGraph(vertices, edges, self.serial)
 
     def next_id(self) -> int:
         """An id never used before."""

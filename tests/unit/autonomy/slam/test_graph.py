@@ -1,5 +1,6 @@
 """The graph keeps its books under any sequence of joins and removals."""
 
+import copy
 import math
 from collections.abc import Callable
 
@@ -66,10 +67,14 @@ def random_graph(rng: np.random.Generator, changes: int) -> GvgGraph:
     graph = GvgGraph()
     for _ in range(int(rng.integers(1, 7))):
         add_vertex(graph, *rng.uniform(-3.0, 3.0, int(rng.integers(1, 6))))
+    change(graph, rng, changes)
+    return graph
+
+
+def change(graph: GvgGraph, rng: np.random.Generator, changes: int) -> None:
     actions = [_join_two, _join_two, _block_one, _unjoin_one, _remove_half_edge, _remove_vertex]
     for _ in range(changes):
         actions[int(rng.integers(len(actions)))](graph, rng)
-    return graph
 
 
 def _join_two(graph: GvgGraph, rng: np.random.Generator) -> None:
@@ -127,6 +132,17 @@ def test_ids_are_unique_over_vertices_and_edges(seed: int, n: int) -> None:
     ids = [*graph.vertices, *graph.edges]
     assert len(ids) == len(set(ids))
     assert graph.next_id() not in ids
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(0, 20), st.integers(0, 20))
+def test_a_copy_stays_as_the_graph_was_and_shares_its_lines(seed: int, n: int, more: int) -> None:
+    rng = np.random.default_rng(seed)
+    graph = random_graph(rng, n)
+    copied, as_it_was = graph.copied(), copy.deepcopy(graph)
+    assert all(edge.polyline is copied.edges[i].polyline for i, edge in graph.edges.items())
+    change(graph, rng, more)
+    graph.next_id()
+    assert repr(copied) == repr(as_it_was)
 
 
 def test_a_self_loop_takes_two_half_edges_of_one_vertex() -> None:
