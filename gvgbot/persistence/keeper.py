@@ -37,7 +37,7 @@ from gvgbot.session import Session
 
 KEEP_EVERY = 0.5  # s between two batches
 RETRY_WITHIN = 30.0  # s between two attempts, at most, while the disk refuses
-MOST = 500  # keyframes in a batch: it is packed on the loop
+MOST = 500  # keyframes in a batch: it is packed on the loop, and in memory
 SNAPSHOT_EVERY = 5.0  # s between two snapshots, if nothing but the robot's place has changed
 BEAT_EVERY = 20.0  # s between two signs of life, while nothing is new
 _PAUSE_S = 1.0  # that the robot's clock is said to have stood while the computer was off
@@ -181,10 +181,10 @@ class Keeper:
             pause = KEEP_EVERY if self.trouble is None else min(2.0 * pause, RETRY_WITHIN)
             due = clock.now() + pause
 
-    def keeping(self, stamp: float, most: int = MOST) -> Callable[[], None]:
+    def keeping(self, stamp: float) -> Callable[[], None]:
         """A function that writes what is new at a stamp, in a thread or later.
 
-        That is `most` keyframes at once, and the others the next time. Call each such function
+        That is `MOST` keyframes at once, and the others the next time. Call each such function
         before asking for the next.
         """
         pipeline = self._session.pipeline
@@ -197,7 +197,7 @@ class Keeper:
         self._note_retold(pipeline.mapper.observations)
         after = bisect_right(self._counts, self._stay, key=lambda count: count.keyframes)
         before = self._counts[after - 1] if after else Count(0, 0)
-        count = self._count(before, most)
+        count = self._count(before)
         if count == before and not self._settled:
             if stamp < self._beat_at + BEAT_EVERY:
                 return _nothing
@@ -221,11 +221,11 @@ class Keeper:
         write = partial(self._write, packed(batch), counts, snapshot, stamp)
         return partial(write, is_all=is_all, rests=rests)
 
-    def _count(self, before: Count, most: int) -> Count:
+    def _count(self, before: Count) -> Count:
         """How much the journal shall hold after a batch: no less than it held already."""
         journey, all_there_are = self._session.journey, len(self._session.pipeline.past.keyframes)
         held = self._counts[-1].keyframes if self._counts else 0
-        keyframes = max(before.keyframes + most, held)
+        keyframes = max(before.keyframes + MOST, held)
         if keyframes >= all_there_are:
             return Count(all_there_are, len(journey.stamps))
         return Count(keyframes, bisect_left(journey.keyframes, keyframes))
@@ -282,11 +282,12 @@ class Keeper:
             self._files.note_rest(rests=rests)
 
     def finish(self) -> None:
-        """Write all that is new; call when nothing runs any more."""
+        """Write all that is new, in parts; call when nothing runs any more."""
         self._settled = True
         heard = -math.inf if self._feedback is None else self._feedback.heard
         stamp = max(heard, self._session.tally.last_stamp)
-        self.keeping(stamp, most=len(self._session.pipeline.past.keyframes))()
+        for _ in range(0, len(self._session.pipeline.past.keyframes) + 1, MOST):
+            self.keeping(stamp)()
 
     def _write(
         self,

@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import msgspec
+import numpy as np
 import pytest
 import structlog
 
@@ -289,6 +290,17 @@ def test_a_robot_at_rest_gives_signs_of_life_that_take_no_room(
         assert len(saved.past) == len(session.pipeline.past.keyframes)
     assert max(sizes) < whole + 1000
     assert max(sizes) < min(sizes) + 10  # as numbers grow
+
+
+def test_all_that_was_not_kept_is_kept_in_parts_at_the_end(
+    session: Session, tmp_path: Path
+) -> None:
+    drive_on(session, 2 * MOST + 100)
+    Keeper(session, MissionFiles(tmp_path)).finish()
+    saved = found(tmp_path)
+    assert saved.is_current
+    assert packed(saved.past) == packed(growth(session.pipeline))
+    assert max(np.diff([count.keyframes for count in saved.counts], prepend=0)) <= MOST
 
 
 def test_a_way_that_is_forgotten_leaves_the_journal_whole_and_short(
