@@ -50,12 +50,12 @@ def survey(pipeline: Pipeline) -> Surveyed:
 
 
 def _walled(grid: OccupancyGrid, points: Array) -> OccupancyGrid:
-    """The grid with walls where points (N, 2), map frame, are."""
+    """The grid, not told when it was seen, with walls where points (N, 2), map frame, are."""
     cells = grid.cells.copy()
     column, row = np.floor((points - grid.origin) / grid.resolution_m).astype(np.int64).T
     inside = (row >= 0) & (row < cells.shape[0]) & (column >= 0) & (column < cells.shape[1])
     cells[row[inside], column[inside]] = _WALL
-    return replace(grid, cells=cells)
+    return replace(grid, cells=cells, seen_s=None)
 
 
 def _passed(pipeline: Pipeline, keyframes: list[Pose]) -> tuple[Array, Array]:

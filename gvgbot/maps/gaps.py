@@ -57,12 +57,15 @@ def is_floor(cells: Cells) -> Mask:
 
 def reachable(floor: Mask, here: Array) -> Mask:
     """The part of the floor that hangs together and is nearest to a (row, column)."""
-    labels, _ = ndimage.label(floor)
-    places = np.argwhere(floor)
-    if not len(places):
+    if not floor.any():
         return floor
-    nearest = places[np.argmin(np.hypot(*(places + 0.5 - here).T))]
-    return np.asarray(labels == labels[tuple(nearest)])
+    row, column = (np.arange(n) + 0.5 - at for n, at in zip(floor.shape, here, strict=True))
+    away = np.hypot(row[:, None], column)
+    away[~floor] = np.inf
+    nearest = np.unravel_index(away.argmin(), floor.shape)
+    del away  # for what follows takes as much
+    labels, _ = ndimage.label(floor)
+    return np.asarray(labels == labels[nearest])
 
 
 def _is_worth(brink: Mask, unseen: Mask, cell: float) -> bool:

@@ -5,7 +5,7 @@ from scipy import ndimage
 
 from gvgbot.geometry import Array
 from gvgbot.maps.distances import cells_to
-from gvgbot.maps.gaps import Mask, is_floor, is_wall, reachable
+from gvgbot.maps.gaps import is_floor, is_wall, reachable
 from gvgbot.maps.occupancy import OccupancyGrid
 from gvgbot.maps.viewpoints import cells_near
 
@@ -26,20 +26,14 @@ def narrows(
     here = (around - corner)[::-1] / cell
     fits = reachable(is_floor(grid.cells) & (clearance > radius - 2 * cell), here)
     has_room = fits & (clearance > passage_m)
+    del clearance  # a large grid's takes much memory
     areas, _ = ndimage.label(has_room)
     reached = np.unique(areas[reachable(has_room, here) | cells_near(ways, grid, has_room)])
     large = np.flatnonzero(np.bincount(areas.ravel()) * cell**2 >= _AREA_M2)
     known, necks = has_room & np.isin(areas, reached), fits & ~has_room
-    to_known = cells_to(known)
+    to_known, places = cells_to(known)[necks], np.argwhere(necks)
     found = [
-        _nearest(necks, np.maximum(to_known, cells_to(areas == area)))
+        places[np.argmin(np.maximum(to_known, cells_to(areas == area)[necks]))]
         for area in np.setdiff1d(large, [0, *reached])
     ]
     return corner + (np.array(found).reshape(-1, 2)[:, ::-1] + 0.5) * cell
-
-
-def _nearest(necks: Mask, cells_away: Array) -> Array:
-    """The (row, column) of the cell of a neck that is nearest to what these are distances from."""
-    places = np.argwhere(necks)
-    nearest: Array = places[np.argmin(cells_away[necks])].astype(np.float64)
-    return nearest

@@ -22,6 +22,7 @@ _APART_M = 1.0  # nearer to each other they are one
 _NEIGHBOURS = ((0, 1), (1, 0), (1, 1), (1, -1))
 
 Indices = NDArray[np.intp]
+Numbers = NDArray[np.int32]
 
 
 class Way(NamedTuple):
@@ -46,7 +47,8 @@ def passages(
     has_room = (clearance > passage_m) & (clearance < _NOT_OPEN * open_m)
     floor = reachable(is_floor(grid.cells) & has_room, (around - corner)[::-1] / cell)
     coarse = max(1, round(_CELL_M / cell))
-    floor, cell = floor[::coarse, ::coarse], cell * coarse
+    floor, cell = floor[::coarse, ::coarse].copy(), cell * coarse
+    del clearance, has_room  # a large grid's take much memory
     if not ways:
         return np.empty((0, 2))
     points, along = _network(ways)
@@ -96,7 +98,7 @@ def _network(ways: list[Way]) -> tuple[Array, csr_array]:
 def _meeting(floor: Mask, points: Array, farthest: float) -> _Meeting:
     """Where ways over the floor from points (N, 2), by column and row, meet; all in cells."""
     places = np.argwhere(floor)
-    number = np.full(floor.shape, -1)
+    number = np.full(floor.shape, -1, np.int32)
     number[floor] = np.arange(len(places))
     rows, columns = np.floor(points).astype(np.intp).T[::-1]
     inside = (rows >= 0) & (columns >= 0) & (rows < floor.shape[0]) & (columns < floor.shape[1])
@@ -122,7 +124,7 @@ def _meeting(floor: Mask, points: Array, farthest: float) -> _Meeting:
     return _Meeting(nearest[a], nearest[b], away[a] + step + away[b], places[a])
 
 
-def _neighbours(number: NDArray[np.intp]) -> tuple[Indices, Indices, Array]:
+def _neighbours(number: Numbers) -> tuple[Numbers, Numbers, Array]:
     """Pairs of cells of the floor that touch, by their numbers (-1 is no floor); how far apart."""
     height, width = number.shape
     pairs = []

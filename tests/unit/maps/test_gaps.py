@@ -1,10 +1,12 @@
 """Gaps in hand-drawn maps: a metre for each letter, a cell each decimetre; expected by looking."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
 from gvgbot.geometry import Array
-from gvgbot.maps.gaps import gaps
+from gvgbot.maps.gaps import gaps, reachable
 from gvgbot.maps.occupancy import UNKNOWN, OccupancyGrid
 
 PASSAGE = 0.25  # m
@@ -76,3 +78,15 @@ def test_two_gaps_are_told_apart(cell: float) -> None:
 def test_without_any_wall_there_is_no_gap() -> None:
     assert len(found(drawn(".....", ".....", "....."))) == 0
     assert len(found(drawn("     "))) == 0
+
+
+def test_the_floor_that_hangs_together_is_found_in_the_memory_of_two_grids_of_numbers() -> None:
+    """A floor as large as a hall of 60 m has a million cells and more."""
+    floor = np.ones((400, 500), np.bool_)
+    floor[:, 250] = False
+    tracemalloc.start()
+    part = reachable(floor, np.array([3.0, 400.0]))
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert (part == (np.arange(500) > 250)).all()
+    assert peak < 20 * floor.size
