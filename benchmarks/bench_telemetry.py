@@ -34,6 +34,7 @@ from gvgbot.autonomy.slam.ekf import Belief, OdometryNoise
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex
 from gvgbot.geometry import Pose, Twist
 from gvgbot.hal.messages import Battery, Odometry, Scan
+from gvgbot.hal.packed_scan import PackedScan
 from gvgbot.live.feed import LiveFeed
 from gvgbot.live.map import LiveMap
 from gvgbot.snapshots import state
@@ -122,7 +123,9 @@ class Robot:
         x, y = self.rng.uniform(0.0, SIDE, 2).tolist()
         stamp = time.perf_counter()
         here = Pose(x, y)
-        self.pipeline.past.keyframes.append(Keyframe(stamp, here, here, here, self.scan(stamp)))
+        self.pipeline.past.keyframes.append(
+            Keyframe(stamp, here, here, here, PackedScan(self.scan(stamp)))
+        )
         draw = self.live_map.update(self.pipeline, stamp)
         assert draw is not None
         for value, latest in draw():  # stamped when ready, so that only the way is measured
@@ -139,7 +142,9 @@ class Robot:
         for x in np.arange(4.0, SIDE, 8.0).tolist():
             for y in np.arange(4.0, SIDE, 8.0).tolist():
                 here = Pose(x, y)
-                self.pipeline.past.keyframes.append(Keyframe(0.0, here, here, here, self.scan(0.0)))
+                self.pipeline.past.keyframes.append(
+                    Keyframe(0.0, here, here, here, PackedScan(self.scan(0.0)))
+                )
         for at in np.linspace(0.0, 50.0, 2000).tolist():
             there = Pose(at, at)
             self.pipeline.past.keyframes.append(Keyframe(0.0, there, there, there, None))
@@ -221,7 +226,9 @@ def redrawing() -> tuple[float, float]:
     step = math.radians(270.0) / (BEAMS - 1)
     for i, (true, believed) in enumerate(zip(way, far, strict=True)):
         seen = Scan(0.1 * i, rng.uniform(2.0, 12.0, BEAMS), -2.35, step, 0.1, 30.0)
-        keyframe = Keyframe(0.1 * i, believed, believed, believed, None if i % 3 else seen)
+        keyframe = Keyframe(
+            0.1 * i, believed, believed, believed, None if i % 3 else PackedScan(seen)
+        )
         pipeline.past.keyframes.append(keyframe)
         pipeline.past.steps.append(Step(true.to(way[min(i + 1, len(way) - 1)]), noise))
     live_map, begin = LiveMap(0.0), time.perf_counter()

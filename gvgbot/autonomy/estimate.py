@@ -13,7 +13,7 @@ from gvgbot.autonomy.slam.revisits import Traverse, revisits
 from gvgbot.autonomy.slam.smoothing import Constraint, PoseGraph
 from gvgbot.autonomy.views import Observation
 from gvgbot.geometry import Array, Pose, rows_of
-from gvgbot.hal.messages import Scan
+from gvgbot.hal.packed_scan import PackedScan
 
 
 class Estimate(NamedTuple):
@@ -63,7 +63,7 @@ def still(pipeline: Pipeline) -> Pipeline:
     return copied
 
 
-def scans_at(keyframes: list[Pose], pipeline: Pipeline) -> list[tuple[Pose, Scan]]:
+def scans_at(keyframes: list[Pose], pipeline: Pipeline) -> list[tuple[Pose, PackedScan]]:
     """The scans that were kept, each with where its keyframe is estimated to be (map_base)."""
     return [
         (pose, keyframe.scan)
@@ -113,7 +113,7 @@ def _constraints(pipeline: Pipeline) -> list[Constraint]:
 
 def _traverse(pipeline: Pipeline) -> Traverse:
     scans = {i: k.scan for i, k in enumerate(pipeline.past.keyframes) if k.scan is not None}
-    walls = {i: sampled(scan, pipeline.matching.points) for i, scan in scans.items()}
+    walls = {i: sampled(scan.unpacked(), pipeline.matching.points) for i, scan in scans.items()}
     return Traverse([(step.motion, step.covariance) for step in pipeline.past.steps], walls)
 
 

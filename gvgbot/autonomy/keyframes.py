@@ -9,6 +9,7 @@ import numpy as np
 
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
+from gvgbot.hal.packed_scan import PackedScan, Sweep
 from gvgbot.ranges import Range
 
 # covariance of a way on which the robot was carried, or that is not kept
@@ -47,7 +48,7 @@ class Keyframe:
     odom_base: Pose
     local_base: Pose
     map_base: Pose
-    scan: Scan | None
+    scan: PackedScan | None
 
     def local_base_at(self, odom_base: Pose) -> Pose:
         """Where odometry has the base now, in the local frame."""
@@ -82,12 +83,22 @@ class Past:
         copied.keyframes, copied.steps = self.keyframes.copy(), self.steps.copy()
         return copied
 
-    def keep(self, scan: Scan, odom_base: Pose, local_base: Pose, map_base: Pose) -> None:
-        """Add a keyframe, with its scan if that was taken far enough from the last one kept."""
+    def keep(
+        self,
+        scan: Scan,
+        odom_base: Pose,
+        local_base: Pose,
+        map_base: Pose,
+        sweep: Sweep | None = None,
+    ) -> None:
+        """Add a keyframe, with its scan if that was taken far enough from the last one kept.
+
+        The scan was made of a `sweep` by leaving out some beams.
+        """
         is_kept = has_come_on(self.with_scan, local_base, _SCAN_EVERY_M, _SCAN_EVERY_RAD)
         if is_kept:
             self.with_scan = local_base
-        kept = scan if is_kept else None
+        kept = PackedScan(scan, sweep) if is_kept else None
         self.keyframes.append(Keyframe(scan.stamp, odom_base, local_base, map_base, kept))
 
     def leave_out(self) -> int:

@@ -18,6 +18,7 @@ from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex
 from gvgbot.autonomy.views import Observation
 from gvgbot.geometry import Array, Pose, rows_of
 from gvgbot.hal.messages import Scan
+from gvgbot.hal.packed_scan import PackedScan
 
 _SCAN_EVERY_M = 1.0  # on the edges
 _SIGMA = np.diag([0.03**2, 0.03**2, 0.01**2])  # covariance of a vertex on a map that is right
@@ -124,7 +125,7 @@ def _drive_mentally(pipeline: Pipeline, gvg: LocalGvg, look: Look) -> None:
         for pose in _poses(edge):
             if past.last is not None:
                 past.steps.append(Step(past.last.map_base.to(pose), _STEP))
-            past.keyframes.append(Keyframe(0.0, pose, pose, pose, look(pose)))
+            past.keyframes.append(Keyframe(0.0, pose, pose, pose, PackedScan(look(pose))))
     past.lasting = past.lent = len(past.keyframes)
 
 

@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
+from gvgbot.hal.packed_scan import AnyScan
 
 REACH_M = 8.0  # around the robot, what is compared
 CELL_M = 0.25  # of what has been seen, and from place to place
@@ -43,7 +44,7 @@ class KnownWalls:
 
     @classmethod
     def gather(
-        cls, scans: Sequence[tuple[Pose, Scan]], *, is_whole: bool = True
+        cls, scans: Sequence[tuple[Pose, AnyScan]], *, is_whole: bool = True
     ) -> Generator[None, None, "KnownWalls"]:
         """What scans taken at map_base poses show, a few of them in one go.
 
@@ -53,7 +54,7 @@ class KnownWalls:
         lasers = [base.compose(scan.base_laser) for base, scan in scans]
         ends = [np.empty((0, 2))]
         for number, (laser, (_, scan)) in enumerate(zip(lasers, scans, strict=True), 1):
-            ends.append(laser.transform(scan.ends))
+            ends.append(laser.transform(scan.unpacked().ends))
             if number % _SCANS_A_STEP == 0:
                 yield
         points = _thinned(np.concatenate(ends), _WALL_CELL_M)
@@ -62,7 +63,7 @@ class KnownWalls:
         for number, (laser, (_, scan)) in enumerate(zip(lasers, scans, strict=True)):
             if number % _SCANS_A_STEP == 0:
                 yield
-            known._seen[known._cells(laser.transform(_passed(scan)), CELL_M)] = True
+            known._seen[known._cells(laser.transform(_passed(scan.unpacked())), CELL_M)] = True
         free = known._corner + (np.argwhere(known._seen) + 0.5) * CELL_M
         known.places = free[known.tree.query(free)[0] > _ROOM_M]
         around = _AROUND_WHOLE if is_whole else _AROUND_HALF

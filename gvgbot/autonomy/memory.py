@@ -330,8 +330,8 @@ def _live_again(pipeline: Pipeline, grown: Growth) -> None:
         past.travelled += past.last.odom_base.distance(keyframe.odom_base)
     past.keyframes.append(keyframe)
     if keyframe.scan is not None:
-        past.with_scan = keyframe.local_base
-        pipeline.tracker.maps.insert(keyframe.scan, keyframe.local_base, past.travelled)
+        past.with_scan, scan = keyframe.local_base, keyframe.scan.unpacked()
+        pipeline.tracker.maps.insert(scan, keyframe.local_base, past.travelled)
     for seen in grown.observations:
         if seen.vertex in mapper.belief.ids:
             mapper.belief = ekf.update_in_place(

@@ -41,8 +41,8 @@ from gvgbot.autonomy.traffic import Traffic
 from gvgbot.autonomy.views import Correspondence, View, touching
 from gvgbot.autonomy.virtual_walls import points_of
 from gvgbot.geometry import STANDSTILL, Array, Pose, Twist, wrap_angle
-from gvgbot.hal.deskew import deskewed
 from gvgbot.hal.messages import Odometry, Scan
+from gvgbot.hal.packed_scan import Sweep
 
 _NOTHING_FELT = Felt()
 _LOOKS_ASIDE = (
@@ -181,11 +181,13 @@ class Pipeline:
         self._handedness.note(scan, odom_base, self._turning)
         if self._handedness.is_mirrored:
             return [*happened, *self._halt(scan.stamp, what_to_set(scan))]
-        scan = deskewed(without_mixed_pixels(scan), self.tracker.odometry.motion_during(scan))
-        local_base = self._localise(scan, odom_base)
+        motion = self.tracker.odometry.motion_during(scan)
+        sweep = Sweep.of(without_mixed_pixels(scan), motion)
+        local_base = self._localise(sweep.deskewed, odom_base)
         if local_base is None:
             return happened
-        whole, scan = scan, self._sift(scan, local_base)
+        whole = sweep.deskewed
+        scan = self._sift(whole, local_base)
         free = self.traffic.newcomers.free(whole, local_base)
         maps, travelled = self.tracker.maps, self.past.travelled
         for one in self.traffic.nearby(self.mapper.map_in_local(local_base)):
@@ -194,11 +196,11 @@ class Pipeline:
         self._noisy_walls.note(whole, local_base.position, maps.near, travelled)
         self._hazards.forget(travelled)
         if self.led and not self._worth_a_gvg(local_base):
-            self.past.keep(scan, odom_base, local_base, self.mapper.belief.map_base)
+            self.past.keep(scan, odom_base, local_base, self.mapper.belief.map_base, sweep)
             return happened
         view = self._view(scan, local_base)
         known, learnt = self.mapper.observe(view)
-        self.past.keep(scan, odom_base, local_base, self.mapper.belief.map_base)
+        self.past.keep(scan, odom_base, local_base, self.mapper.belief.map_base, sweep)
         done = self._act(view, known, scan)
         happened += learnt + done  # what was done may have taught the mapper more
         return happened + self._forget(scan.stamp, happened)

@@ -19,7 +19,7 @@ from gvgbot.autonomy.gvg.local_map import LocalMap
 from gvgbot.autonomy.known_walls import CELL_M, REACH_M, KnownWalls
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig, register
 from gvgbot.geometry import Array, Pose, wrap_angle, wrap_angles
-from gvgbot.hal.messages import Scan
+from gvgbot.hal.packed_scan import AnyScan
 
 # Walls so near to each other are one, and so far off are two, m: maps are a little bent. Corridors
 # may differ by less, so one looks closely before one is sure. Then 0.13 of the walls disagree at
@@ -113,7 +113,7 @@ class Relocaliser:
     """Forms an opinion, a little work at a time."""
 
     def __init__(
-        self, scans: Sequence[tuple[Pose, Scan]], matching: ScanMatchingConfig, *, is_whole: bool
+        self, scans: Sequence[tuple[Pose, AnyScan]], matching: ScanMatchingConfig, *, is_whole: bool
     ) -> None:
         """`scans` were taken at map_base poses, the last one where the robot was seen last.
 

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 
@@ -61,6 +61,10 @@ class Scan:
     def directions(self) -> Array:
         """Beam directions (N, 2) in the laser frame, as vectors one metre long."""
         return _beams(self.angle_min, self.angle_increment, len(self.ranges))[1]
+
+    def unpacked(self) -> Self:
+        """The scan itself, where others have been packed."""
+        return self
 
     @property
     def ends(self) -> Array:

@@ -36,7 +36,7 @@ class LiveGrid:
         """Let scans vote."""
         for keyframe in keyframes:
             if keyframe.scan is not None:
-                self._grid.add(keyframe.map_base, keyframe.scan)
+                self._grid.add(keyframe.map_base, keyframe.scan.unpacked())
                 low, high = self._grid.around(keyframe.map_base, keyframe.scan)
                 rows, columns = zip(low // _SIDE, (high - 1) // _SIDE + 1, strict=True)
                 self._touched |= dict.fromkeys(product(range(*rows), range(*columns)))

@@ -157,7 +157,7 @@ class _Drawing:
             self._grid = GrowingGrid()
         scans = [(keyframe.map_base, keyframe.scan) for keyframe in new if keyframe.scan]
         for map_base, scan in scans:
-            self._grid.add(map_base, scan)
+            self._grid.add(map_base, scan.unpacked())
         if scans:
             grid = self._grid.grid()
             drawn[topics.MAP] = translation.occupancy_grid(

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from gvgbot.errors import GvgbotError
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
+from gvgbot.hal.packed_scan import AnyScan
 
 UNKNOWN = -1
 
@@ -51,7 +52,7 @@ class OccupancyGrid:
 
 
 def occupancy_grid(
-    scans: Sequence[tuple[Pose, Scan]],
+    scans: Sequence[tuple[Pose, AnyScan]],
     resolution_m: float = 0.05,
     max_range_m: float = 12.0,
     *,
@@ -72,7 +73,7 @@ def occupancy_grid(
     ballot = _Ballot.around([laser for laser, _ in lasers], disc)
     seen_s = np.full(ballot.votes.shape, np.inf, np.float32)
     for map_laser, scan in lasers:
-        around, seen = _vote(ballot, disc, map_laser, scan)
+        around, seen = _vote(ballot, disc, map_laser, scan.unpacked())
         window = seen_s[around]
         window[seen & np.isinf(window)] = max(0.0, scan.stamp - began)
     return _finished(ballot, resolution_m, seen_s)
@@ -98,7 +99,7 @@ class GrowingGrid:
         self._ballot = around if self._ballot is None else self._ballot.grown(around)
         _vote(self._ballot, self._disc, map_laser, scan)
 
-    def around(self, map_base: Pose, scan: Scan) -> tuple[Indices, Indices]:
+    def around(self, map_base: Pose, scan: AnyScan) -> tuple[Indices, Indices]:
         """The first (row, column) that a scan from a pose can change, and that after the last.
 
         Cell (0, 0) has its lower left corner at the map's origin.

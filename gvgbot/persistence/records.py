@@ -12,6 +12,9 @@ from typing import Any, TypeVar
 import msgspec
 import numpy as np
 
+from gvgbot.hal.messages import Scan
+from gvgbot.hal.packed_scan import PackedScan
+
 T = TypeVar("T")
 
 _HEAD = struct.Struct("<II")
@@ -63,11 +66,15 @@ def _plain(value: object) -> object:
         return {"dtype": little.dtype.str, "shape": little.shape, "data": little.tobytes()}
     if isinstance(value, np.generic):
         return value.item()
+    if isinstance(value, PackedScan):
+        return value.unpacked()
     raise TypeError(f"a {type(value).__name__} cannot be kept")
 
 
 def _restored(kind: Any, value: Any) -> object:
-    """Raises ValueError for what is no array."""
+    """Raises ValueError for what is no array, and no scan."""
+    if kind is PackedScan:
+        return PackedScan(msgspec.convert(value, Scan, dec_hook=_restored))
     try:
         dtype, shape, data = value["dtype"], value["shape"], value["data"]
     except (TypeError, KeyError) as error:

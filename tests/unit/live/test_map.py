@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from gvgbot.autonomy.keyframes import Keyframe
 from gvgbot.geometry import Pose, anchored
 from gvgbot.hal.messages import Scan
+from gvgbot.hal.packed_scan import PackedScan
 from gvgbot.live.grid import LiveGrid
 from gvgbot.live.map import Stretch, Trail, bent
 from gvgbot.maps.occupancy import occupancy_grid
@@ -25,7 +26,7 @@ def keyframe(x: float, y: float, reach: float = 3.0) -> Keyframe:
     angles = np.linspace(-math.pi, math.pi, 721)[:-1]
     here = Pose(x, y, 0.3)
     scan = Scan(x, np.full(angles.shape, reach), angles[0], angles[1] - angles[0], 0.1, 30.0)
-    return Keyframe(x, here, here, here, scan)
+    return Keyframe(x, here, here, here, PackedScan(scan))
 
 
 DRIVE = [keyframe(0.5 * i, -0.3 * i) for i in range(20)]

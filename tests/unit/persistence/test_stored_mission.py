@@ -45,7 +45,7 @@ def test_it_is_whole(saved: Saved) -> None:
     assert saved.beat.odometer is not None
     assert len(saved.journey.stamps) == pytest.approx(10 * saved.beat.stamp, rel=0.1)
     scans = [grown.keyframe.scan for grown in saved.past if grown.keyframe.scan is not None]
-    assert {len(scan.ranges) for scan in scans} == {1081}
+    assert {len(scan.unpacked().ranges) for scan in scans} == {1081}
 
 
 def recalled(saved: Saved) -> Pipeline:
