@@ -27,7 +27,12 @@ from gvgbot.progress import Progress
 from gvgbot.recording import extra_needed
 from gvgbot.robot import Robot
 from gvgbot.ros2.node import Ros2Node
-from gvgbot.service import Notifier, set_up_logging, start_left_out_of_collections
+from gvgbot.service import (
+    Notifier,
+    give_back_large_arrays,
+    set_up_logging,
+    start_left_out_of_collections,
+)
 from gvgbot.session import Session
 from gvgbot.simulation import Simulation, open_place
 from gvgbot.stop_signals import StopSignals, standing_while_suspended
@@ -54,6 +59,7 @@ def explore(
     ended it; the map that there was by then is saved.
     """
     set_up_logging(sys.stderr, os.environ, "warning")
+    give_back_large_arrays()
     place = open_place(config)
     with (
         RunDirectory.create(out, world=place.world.name) as directory,
@@ -131,6 +137,7 @@ def run(
     address is taken or the map cannot be written. Devices that are missing are waited for.
     """
     set_up_logging(sys.stderr, os.environ)
+    give_back_large_arrays()
     place = open_place(config) if config.twin.enabled else None
     name = config.robot.name if place is None else place.world.name
     with contextlib.ExitStack() as stack:

@@ -1,6 +1,7 @@
-"""Life as a service: what systemd is told, the collector of garbage, and the log."""
+"""Life as a service: what systemd is told, the collector of garbage, memory, and the log."""
 
 import contextlib
+import ctypes
 import gc
 import os
 import re
@@ -13,6 +14,8 @@ import structlog
 from structlog.typing import EventDict, Processor, WrappedLogger
 
 _READER_S = 0.05  # that who reads the log may take to catch up
+_LARGE = 4 << 20  # bytes; no array of a single scan is as large
+_M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3  # as malloc.h has them
 _SEVERITY = {"debug": 7, "info": 6, "warning": 4, "error": 3, "critical": 2}  # as syslog counts
 
 
@@ -107,6 +110,18 @@ def start_left_out_of_collections() -> Iterator[None]:
         yield
     finally:
         gc.unfreeze()
+
+
+def give_back_large_arrays() -> None:
+    """Let the C library get each large array from the system, and give it back when it is freed.
+
+    By itself glibc learns to keep their memory, where smaller things that stay are put in between:
+    whoever has drawn a large building once would need the memory of that for good.
+    """
+    with contextlib.suppress(AttributeError):  # another C library
+        mallopt = ctypes.CDLL(None).mallopt
+        mallopt(_M_MMAP_THRESHOLD, _LARGE)
+        mallopt(_M_TRIM_THRESHOLD, 4 * _LARGE)
 
 
 def set_up_logging(

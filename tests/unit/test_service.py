@@ -1,5 +1,6 @@
 """What the service manager and the log hear."""
 
+import ctypes
 import io
 import json
 import os
@@ -9,13 +10,14 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
+import numpy as np
 import pytest
 import structlog
 
 from gvgbot.autonomy.events import Decision, Finished, LoopClosed, Recovery, VertexAdded
 from gvgbot.hal.messages import Battery
 from gvgbot.journal import BatteryJournal, GuardJournal, log_event, status_line
-from gvgbot.service import Notifier, set_up_logging
+from gvgbot.service import Notifier, give_back_large_arrays, set_up_logging
 from tests.unit.test_telemetry import EXAMPLE
 
 
@@ -316,3 +318,27 @@ def test_the_status_says_what_counts() -> None:
 )
 def test_the_status_says_why_the_robot_needs_somebody(now: dict[str, Any], said: str) -> None:
     assert status_line(msgspec.structs.replace(EXAMPLE, **now)).startswith(said)
+
+
+def mapped_bytes() -> int:
+    """Of this process, in arrays that malloc has got from the system one by one."""
+
+    class Statistics(ctypes.Structure):
+        names = "arena ordblks smblks hblks hblkhd usmblks fsmblks uordblks fordblks keepcost"
+        _fields_ = tuple((name, ctypes.c_size_t) for name in names.split())
+
+    mallinfo2 = getattr(ctypes.CDLL(None), "mallinfo2", None)
+    if mallinfo2 is None:
+        pytest.skip("another C library, or an older one")
+    mallinfo2.restype = Statistics
+    return int(mallinfo2().hblkhd)
+
+
+def test_a_large_array_is_got_from_the_system_even_if_a_larger_one_has_been_freed() -> None:
+    give_back_large_arrays()
+    np.ones(20_000_000, np.uint8)
+    before = mapped_bytes()
+    array = np.ones(6_000_000, np.uint8)
+    assert mapped_bytes() >= before + len(array)
+    del array
+    assert mapped_bytes() == before
