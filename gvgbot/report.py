@@ -30,7 +30,7 @@ from gvgbot.geometry import (
 )
 from gvgbot.hal.messages import Odometry
 from gvgbot.maps import geojson
-from gvgbot.maps.distances import cells_to
+from gvgbot.maps.distances import metres_to
 from gvgbot.maps.gaps import is_floor, is_wall
 from gvgbot.maps.map_server import encode_map_server
 from gvgbot.maps.occupancy import OccupancyGrid, occupancy_grid
@@ -218,7 +218,7 @@ def _known_room(grid: OccupancyGrid, line: Array, most: float) -> float:
     first = np.maximum(cells.min(axis=0) - margin, 0)
     (top, left), (bottom, right) = first, np.maximum(cells.max(axis=0) + margin + 1, 0)
     floor = np.pad(is_floor(grid.cells[top:bottom, left:right]), 1)  # beyond, nothing is known
-    free = cells_to(~floor) * grid.resolution_m
+    free = metres_to(~floor, grid.resolution_m)
     row, column = np.clip(cells - first + 1, 0, np.array(floor.shape) - 1).T
     return float(free[row, column].min())
 

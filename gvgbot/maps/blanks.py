@@ -7,7 +7,7 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from gvgbot.geometry import Array
-from gvgbot.maps.distances import cells_to
+from gvgbot.maps.distances import metres_to
 from gvgbot.maps.gaps import is_floor, is_wall, reachable
 from gvgbot.maps.occupancy import OccupancyGrid
 
@@ -22,7 +22,7 @@ def blanks(grid: OccupancyGrid, ways: Array, around: Array, passage_m: float) ->
     The robot is at `around` (2,) and keeps `passage_m` from walls.
     """
     cell, corner = grid.resolution_m, np.array(grid.origin)
-    clearance = cells_to(is_wall(grid.cells) | (grid.cells < 0)) * cell
+    clearance = metres_to(is_wall(grid.cells) | (grid.cells < 0), cell)
     floor = reachable(
         is_floor(grid.cells) & (clearance > passage_m), (around - corner)[::-1] / cell
     )

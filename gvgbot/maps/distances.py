@@ -24,3 +24,10 @@ def cells_to(area: NDArray[np.bool_]) -> Array:
         to_row, to_column = nearest[:, strip]
         np.sqrt((to_row - rows) ** 2 + (to_column - columns) ** 2, out=away[strip])
     return away
+
+
+def metres_to(area: NDArray[np.bool_], cell: float) -> Array:
+    """The same in metres, for cells of a side, m; in the memory of the first."""
+    away = cells_to(area)
+    away *= cell
+    return away

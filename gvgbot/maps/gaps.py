@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from gvgbot.geometry import Array
-from gvgbot.maps.distances import cells_to
+from gvgbot.maps.distances import metres_to
 from gvgbot.maps.map_server import FREE_THRESH, OCCUPIED_THRESH
 from gvgbot.maps.occupancy import UNKNOWN, Cells, OccupancyGrid
 
@@ -30,7 +30,7 @@ def gaps(grid: OccupancyGrid, around: Array, passage_m: float) -> Array:
     wall, seen = is_wall(cells), is_floor(cells)
     if not wall.any():
         return np.empty((0, 2))
-    has_room = cells_to(wall) * cell > passage_m
+    has_room = metres_to(wall, cell) > passage_m
     floor = reachable(seen & has_room, (around - corner)[::-1] / cell)
     unseen = has_room & ~seen & ~wall
     brink = unseen & ndimage.binary_dilation(floor)
@@ -60,10 +60,12 @@ def reachable(floor: Mask, here: Array) -> Mask:
     if not floor.any():
         return floor
     row, column = (np.arange(n) + 0.5 - at for n, at in zip(floor.shape, here, strict=True))
-    away = np.hypot(row[:, None], column)
-    away[~floor] = np.inf
-    nearest = np.unravel_index(away.argmin(), floor.shape)
-    del away  # for what follows takes as much
+    nearest, least = (0, 0), math.inf
+    for i in np.flatnonzero(floor.any(axis=1)).tolist():  # by rows: a large grid takes much memory
+        away = np.where(floor[i], np.hypot(row[i], column), np.inf)
+        j = int(away.argmin())
+        if away[j] < least:
+            nearest, least = (i, j), away[j]
     labels, _ = ndimage.label(floor)
     return np.asarray(labels == labels[nearest])
 

@@ -4,7 +4,7 @@ import numpy as np
 from scipy import ndimage
 
 from gvgbot.geometry import Array
-from gvgbot.maps.distances import cells_to
+from gvgbot.maps.distances import cells_to, metres_to
 from gvgbot.maps.gaps import is_floor, is_wall, reachable
 from gvgbot.maps.occupancy import OccupancyGrid
 from gvgbot.maps.viewpoints import cells_near
@@ -22,7 +22,7 @@ def narrows(
     grid are one or two cells thicker than they are.
     """
     cell, corner = grid.resolution_m, np.array(grid.origin)
-    clearance = cells_to(is_wall(grid.cells)) * cell
+    clearance = metres_to(is_wall(grid.cells), cell)
     here = (around - corner)[::-1] / cell
     fits = reachable(is_floor(grid.cells) & (clearance > radius - 2 * cell), here)
     has_room = fits & (clearance > passage_m)

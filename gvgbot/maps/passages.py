@@ -9,7 +9,7 @@ from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from gvgbot.geometry import Array, resampled
-from gvgbot.maps.distances import cells_to
+from gvgbot.maps.distances import metres_to
 from gvgbot.maps.gaps import Mask, is_floor, is_wall, reachable
 from gvgbot.maps.occupancy import OccupancyGrid
 
@@ -43,7 +43,7 @@ def passages(
     there are no edges.
     """
     cell, corner = grid.resolution_m, np.array(grid.origin)
-    clearance = cells_to(is_wall(grid.cells)) * cell
+    clearance = metres_to(is_wall(grid.cells), cell)
     has_room = (clearance > passage_m) & (clearance < _NOT_OPEN * open_m)
     floor = reachable(is_floor(grid.cells) & has_room, (around - corner)[::-1] / cell)
     coarse = max(1, round(_CELL_M / cell))

@@ -3,7 +3,7 @@
 import numpy as np
 
 from gvgbot.geometry import Array
-from gvgbot.maps.distances import cells_to
+from gvgbot.maps.distances import metres_to
 from gvgbot.maps.gaps import Mask, is_floor, is_wall, reachable
 from gvgbot.maps.occupancy import OccupancyGrid
 
@@ -20,7 +20,7 @@ def spots(
     """
     cell, corner = grid.resolution_m, np.array(grid.origin)
     wall, floor = is_wall(grid.cells), is_floor(grid.cells)
-    has_room = cells_to(wall) * cell > passage_m
+    has_room = metres_to(wall, cell) > passage_m
     to_drive = reachable(floor & has_room, (around - corner)[::-1] / cell)
     found = []
     for place, radius in zip((places - corner)[:, ::-1] / cell, radii / cell, strict=True):

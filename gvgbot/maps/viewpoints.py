@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from gvgbot.geometry import Array
-from gvgbot.maps.distances import cells_to
+from gvgbot.maps.distances import metres_to
 from gvgbot.maps.gaps import Mask, is_floor, is_wall, reachable
 from gvgbot.maps.occupancy import OccupancyGrid
 
@@ -30,7 +30,7 @@ def viewpoints(
     """
     cell, corner = grid.resolution_m, np.array(grid.origin)
     walls = is_wall(grid.cells)
-    has_room = cells_to(walls) * cell > passage_m
+    has_room = metres_to(walls, cell) > passage_m
     floor = reachable(is_floor(grid.cells) & has_room, (around - corner)[::-1] / cell)
     near_ways = cells_near(ways, grid, floor)
     floor, near_ways = np.pad(floor, 1), np.pad(near_ways, 1)  # every cell has four neighbours
