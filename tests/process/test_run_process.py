@@ -118,21 +118,18 @@ def test_a_configuration_that_was_cut_short_is_said_to_tell_of_no_devices(tmp_pa
     assert "enabled: false" in line
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_a_simulated_exploration_that_is_stopped_leaves_its_map(
-    number: signal.Signals, tmp_path: Path
-) -> None:
+def test_a_simulated_exploration_whose_terminal_is_closed_leaves_its_map(tmp_path: Path) -> None:
     events = tmp_path / "run" / "events.jsonl"
     with gvgbot("explore", "--world", "narrow", "--out", "run", cwd=tmp_path) as process:
         until_joined(events, 1, process)
-        process.send_signal(number)
+        process.send_signal(signal.SIGHUP)
         log, _ = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130
     assert log.splitlines()[-3:] == STOPPED
     assert json.loads((events.parent / "map.geojson").read_text())["features"]
 
 
-@pytest.mark.parametrize("pause_s", [0.0, 0.01, 0.1])
+@pytest.mark.parametrize("pause_s", [0.0, 0.1])
 def test_an_exploration_that_is_stopped_twice_ends_as_after_once(
     pause_s: float, tmp_path: Path
 ) -> None:
@@ -148,18 +145,17 @@ def test_an_exploration_that_is_stopped_twice_ends_as_after_once(
     assert log.splitlines() == STOPPED
 
 
-@pytest.mark.parametrize("robots", [1, 2])
 def test_an_exploration_that_a_script_left_in_the_background_is_stopped_as_any(
-    robots: int, tmp_path: Path
+    tmp_path: Path,
 ) -> None:
-    """There `&` has Ctrl-C ignored, and that it stays."""
-    events = tmp_path / "run" / ("events.jsonl" if robots == 1 else "robot-1/events.jsonl")
+    """There `&` has Ctrl-C ignored, and that it stays. Of several robots, as of one above."""
+    events = tmp_path / "run" / "robot-1" / "events.jsonl"
     deaf = ["sh", "-c", 'trap "" INT; exec "$0" "$@"', sys.executable]
-    arguments = ["explore", "--world", "narrow", "--out", "run", "--robots", f"{robots}"]
+    arguments = ["explore", "--world", "narrow", "--out", "run", "--robots", "2"]
     with gvgbot(*arguments, cwd=tmp_path, python=deaf) as process:
         until_joined(events, 1, process)
         process.send_signal(signal.SIGINT)
-        until_joined(events, 3, process)
+        until_joined(events, 2, process)
         process.send_signal(signal.SIGTERM)
         log, _ = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130
