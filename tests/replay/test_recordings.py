@@ -198,7 +198,7 @@ def test_a_recording_is_played_at_the_pace_of_life_or_faster(
 def test_when_a_recording_is_over_the_robot_stands_and_is_still_there(
     cut: Path, tmp_path: Path
 ) -> None:
-    network = played(cut, tmp_path / "run", speed=10.0, seconds=20.0)
+    network = played(cut, tmp_path / "run", speed=10.0, seconds=6.0)
     last = network.states[-1]
     assert last.cycle_age is not None
     assert last.cycle_age < 0.2
@@ -216,7 +216,7 @@ def test_when_a_recording_is_over_the_robot_stands_and_is_still_there(
 def test_a_recording_that_is_played_to_its_end_ends_as_the_run_did(
     recorded: Recorded, tmp_path: Path
 ) -> None:
-    last = played(recorded.recording, tmp_path / "run", speed=100.0, seconds=20.0).states[-1]
+    last = played(recorded.recording, tmp_path / "run", speed=100.0, seconds=4.0).states[-1]
     assert (last.phase, last.outcome) == ("finished", "explored")
     played_once = (tmp_path / "run" / "map.geojson").read_bytes()
     assert played_once == (recorded.run / "map.geojson").read_bytes()
