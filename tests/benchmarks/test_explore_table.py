@@ -126,11 +126,11 @@ def test_a_failure_is_listed_with_the_command_that_repeats_it(changes: Row) -> N
 @pytest.mark.slow
 @pytest.mark.timeout(120)
 def test_the_workers_of_a_cluster_run_what_threads_would(tmp_path: Path) -> None:
-    """Two workers, each a process of its own; a world that does not exist takes them no time."""
+    """A process of its own; a world that does not exist takes it no time."""
     wanted = commands(_options(["--worlds", "nowhere", "--seeds", "1", "2"]))
     with (
-        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as two,
-        executor(1, two.scheduler_address) as pool,
+        distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as far,
+        executor(1, far.scheduler_address) as pool,
     ):
         rows = [pool.submit(run, c, tmp_path / str(n)).result() for n, c in enumerate(wanted)]
         assert pool.submit(os.getpid).result() != os.getpid()
