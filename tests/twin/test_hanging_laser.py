@@ -21,7 +21,7 @@ from gvgbot.persistence.mission_files import SNAPSHOT
 from gvgbot.requests import Answer
 from gvgbot.session import Session
 from gvgbot.simulation import Place, Simulation
-from tests.replay.test_pipeline import LOLLIPOP, START
+from tests.twin.test_errand_restarts import tee
 
 pytestmark = [pytest.mark.slow, pytest.mark.twin, pytest.mark.timeout(180)]
 
@@ -126,7 +126,7 @@ def test_what_was_mapped_by_then_is_no_map_to_go_on_with(
 ) -> None:
     config = load_config(None, ["twin.seed=1"])
     monkeypatch.setattr(lives_rig, "GoingWorld", lambda _, *there: GoingWorld(config, *there))
-    lives = Remounted(wrong(config), Place(LOLLIPOP, START), tmp_path)
+    lives = Remounted(wrong(config), tee(), tmp_path)
     last = lives.live_with([config], [never])
     assert [one.pipeline.mission.outcome for one in lives.sessions] == ["failed", "explored"]
     assert not isinstance(last.pipeline, ReturningPipeline)
@@ -144,13 +144,14 @@ def test_a_map_of_before_is_gone_on_with_when_it_is_set_right(
     tmp_path: Path, wrong: Callable[[Config], Config], why: str, *, reboots: bool
 ) -> None:
     config = load_config(None, ["twin.seed=1"])
-    lives = Remounted(config, Place(LOLLIPOP, START), tmp_path, reboots=reboots)
-    last = lives.live_with([wrong(config), config], [at(25.0), never])
+    lives = Remounted(config, tee(), tmp_path, reboots=reboots)
+    last = lives.live_with([wrong(config), config], [at(8.0), never])
     before, unfit, _ = lives.sessions
     assert len(before.pipeline.mapper.graph.vertices) > 0
+    assert before.pipeline.mission.outcome is None
     assert before.pipeline._handedness.is_settled
     assert unfit.pipeline.errands.unfit.startswith(why)
     assert isinstance(last.pipeline, ReturningPipeline)
     assert not last.pipeline.is_lost
     assert last.pipeline.mission.outcome == "explored"
-    assert len(last.pipeline.mapper.graph.vertices) == 2
+    assert len(last.pipeline.mapper.graph.vertices) == 4
