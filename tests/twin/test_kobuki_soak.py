@@ -14,18 +14,19 @@ from tests.twin.kobuki_rig import Robot, play
 pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(120)]
 
 SPEED, TURN = 0.2, 0.3
+SECONDS = 240.0
 FAULTS = KobukiTwinConfig(
     odometry="perfect",
     mishaps=MishapConfig(
-        bumps_per_h=60.0,
-        cliffs_per_h=60.0,
-        wheel_drops_per_h=60.0,
-        over_currents_per_h=60.0,
-        low_batteries_per_h=60.0,
-        slips_per_h=30.0,
-        reboots_per_h=30.0,
-        short_parts_per_h=60.0,
-        unknown_parts_per_h=60.0,
+        bumps_per_h=150.0,
+        cliffs_per_h=150.0,
+        wheel_drops_per_h=150.0,
+        over_currents_per_h=150.0,
+        low_batteries_per_h=150.0,
+        slips_per_h=75.0,
+        reboots_per_h=75.0,
+        short_parts_per_h=150.0,
+        unknown_parts_per_h=150.0,
     ),
     link=LinkFaultConfig(
         latency_s=0.001,
@@ -35,8 +36,8 @@ FAULTS = KobukiTwinConfig(
         lost_bytes_per_kb=0.1,
         inserted_bytes_per_kb=0.1,
         cut_messages_per_k=2.0,
-        silences_per_h=60.0,
-        unplugs_per_h=60.0,
+        silences_per_h=150.0,
+        unplugs_per_h=150.0,
     ),
 )
 KINDS = 9 + 6  # mishaps, and faults of the link
@@ -62,7 +63,7 @@ def soak(seconds: float, seed: int = 1) -> tuple[Robot, float]:
 
 def test_every_fault_is_survived_and_none_falsifies_the_odometry() -> None:
     """Truth: the body drives an arc or stands; only slips and restarts may part it from belief."""
-    robot, worst = soak(600.0)
+    robot, worst = soak(SECONDS)
     seen = robot.link.counts + robot.twin.mishaps.counts
     assert len(seen) == KINDS
     assert min(seen.values()) > 0
@@ -75,4 +76,4 @@ def test_every_fault_is_survived_and_none_falsifies_the_odometry() -> None:
         assert abs(turn) < 0.5 * dt + 0.1 or dt > 5.0
         assert -0.002 < arrival - after.stamp < 0.25
         assert math.isfinite(after.twist.linear)
-    assert len(robot.heard) > 0.5 * 50 * 600
+    assert len(robot.heard) > 0.5 * 50 * SECONDS
