@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.config import TwinConfig
 from gvgbot.drivers.hokuyo.twin_config import HokuyoTwinConfig
 from gvgbot.drivers.kobuki.twin_config import KobukiTwinConfig
@@ -22,6 +23,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.twin, pytest.mark.timeout(120)]
 
 # A T: a corridor of 1.4 m from west to east, and one to the south.
 TEE = carved([(-3.5, -0.7, 3.5, 0.7), (-0.7, -4.0, 0.7, 0.0)])
+IMPATIENT = ExplorationConfig(retries=0)
 MEETPOINT = (0.0, -(1.4**2) / (8 * 1.4))  # as far from the wall opposite as from both corners
 ENDS = [(-2.8, 0.0), (2.8, 0.0), (0.0, -3.3)]
 STARTS = {
@@ -73,7 +75,7 @@ def test_wheels_that_spin_for_a_while_leave_the_map_where_it_is() -> None:
 
 def test_a_robot_that_does_not_get_on_backs_off_and_gives_up_in_the_end() -> None:
     """Beyond x = -1, the wheels turn and nothing moves, but for the way back."""
-    run = play(TEE, Pose(-2.8, 0.0, 0.0), grip=_stuck_ahead, limit=300.0)
+    run = play(TEE, Pose(-2.8, 0.0, 0.0), grip=_stuck_ahead, exploration=IMPATIENT, limit=300.0)
     assert run.recoveries().count("back off") >= 1
     assert run.outcome is not None
     assert run.contacts == 0

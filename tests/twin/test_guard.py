@@ -61,8 +61,7 @@ async def drive_at_a_wall(model: str, speed: float, *more: str) -> tuple[float, 
     return float(away) - config.robot.radius_m, simulation.body.contacts
 
 
-@pytest.mark.parametrize("model", ["UTM-30LX", "URG-04LX"])
-@pytest.mark.parametrize("speed", [0.4, 0.7])
+@pytest.mark.parametrize(("model", "speed"), [("UTM-30LX", 0.7), ("URG-04LX", 0.4)])
 def test_the_robot_stops_before_a_wall_though_the_base_obeys_late(model: str, speed: float) -> None:
     room, contacts = run_in_virtual_time(drive_at_a_wall(model, speed))
     assert contacts == 0
