@@ -64,7 +64,7 @@ def tee() -> Case:
 
 def lollipop() -> Case:
     """A dead end that leads to a ring of corridors: an edge from a vertex to itself."""
-    free = [(-1, -1, 9, 1), (-1, -1, 1, 9), (-1, 7, 9, 9), (7, -1, 9, 9), (-6, -1, 0, 1)]
+    free = [(-1, -1, 6, 1), (-1, -1, 1, 6), (-1, 4, 6, 6), (4, -1, 6, 6), (-6, -1, 0, 1)]
     middle, end = (0.0, shift(2.0, 2.0)), (-5.0, 0.0)
     edges = [(middle, end), (middle, middle)]
     world = carved([(float(a), float(b), float(c), float(d)) for a, b, c, d in free])
@@ -73,7 +73,7 @@ def lollipop() -> Case:
 
 def four_blocks() -> Case:
     """Streets of 1.6 m round two by two blocks: four Ts about a crossing, and corners between."""
-    half, pitch, s = 0.8, 6.6, shift(1.6, 1.6)
+    half, pitch, s = 0.8, 5.0, shift(1.6, 1.6)
     long = 2 * pitch
     free = [(-half, c - half, long + half, c + half) for c in (0.0, pitch, long)]
     free += [(c - half, -half, c + half, long + half) for c in (0.0, pitch, long)]

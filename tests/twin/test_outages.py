@@ -17,11 +17,11 @@ from gvgbot.geometry import Array, Pose, wrap_angle
 from gvgbot.hal.messages import Odometry
 from gvgbot.links import Devices, Links
 from gvgbot.simulation import Simulation, open_place
-from tests.twin.test_explore import Case, Point, Run, explore, lollipop, matched, tee
+from tests.twin.test_explore import Case, Point, Run, explore, lollipop, matched
 
 pytestmark = [pytest.mark.slow, pytest.mark.twin, pytest.mark.timeout(120)]
 
-AT, AWAY = (6.0, 20.0), 8.0  # s: when the device is lost, and for how long
+AT, AWAY = (12.0, 32.0), 8.0  # s: when the device is lost, and for how long
 DEAD_TIME, FRAME, BRAKING = 0.06, 0.02, 1.0  # s, s, m/s2 of the simulated base
 OUTAGES = {
     "laser unplugged": (
@@ -47,7 +47,7 @@ def interrupted(case: Case, out: Path, *settings: str) -> Run:
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Run]:
     return {
-        name: interrupted(tee(), tmp_path_factory.mktemp("outage"), *settings)
+        name: interrupted(lollipop(), tmp_path_factory.mktemp("outage"), *settings)
         for name, settings in OUTAGES.items()
     }
 
