@@ -30,7 +30,9 @@ from gvgbot.links import Close, Links
 from gvgbot.maps import run_directory
 from gvgbot.robot import Robot
 from gvgbot.stop_signals import StopSignals
+from gvgbot.simulation import Place
 from gvgbot.topics import Grid
+from gvgbot.worlds.canvas import Canvas
 
 pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(120)]
 
@@ -49,10 +51,24 @@ async def ten_seconds(clock: Clock) -> None:
     await clock.sleep_until(10.0)
 
 
+@pytest.fixture(scope="module")
+def stopped(tmp_path_factory: pytest.TempPathFactory) -> tuple[Daemon, Pose]:
+    """A daemon that was stopped after ten seconds, and where it was then."""
+    rig, truth = Daemon(tmp_path_factory.mktemp("stopped") / "run"), list[Pose]()
+
+    async def story(clock: Clock) -> None:
+        await ten_seconds(clock)
+        truth.append(rig.place)
+
+    with rig.session.directory:
+        rig.run(story)
+    return rig, truth[0]
+
+
 def test_the_last_command_on_the_wire_is_a_stop_though_the_robot_was_driving(
-    daemon: Daemon,
+    stopped: tuple[Daemon, Pose],
 ) -> None:
-    daemon.run(ten_seconds)
+    daemon, _ = stopped
     commands = base_commands(bytes(daemon.cable.written))
     assert daemon.network.states[-1].phase == "exploring"
     assert commands[-1] == STOP
@@ -61,8 +77,8 @@ def test_the_last_command_on_the_wire_is_a_stop_though_the_robot_was_driving(
     assert commands.index(driving[-1]) < len(commands) - 1
 
 
-def test_a_stopped_daemon_leaves_a_complete_run(daemon: Daemon) -> None:
-    daemon.run(ten_seconds)
+def test_a_stopped_daemon_leaves_a_complete_run(stopped: tuple[Daemon, Pose]) -> None:
+    daemon, _ = stopped
     path = daemon.session.directory.path
     assert {file.name for file in path.iterdir()} >= MAP | WAYS
     summary = json.loads((path / "summary.json").read_text())
@@ -71,8 +87,11 @@ def test_a_stopped_daemon_leaves_a_complete_run(daemon: Daemon) -> None:
 
 
 def test_a_run_that_ended_by_a_fault_says_so_in_its_summary(daemon: Daemon) -> None:
+    async def at_once(clock: Clock) -> None:
+        await clock.sleep_until(1.0)
+
     daemon.session.failure = "the base does not answer"
-    daemon.run(ten_seconds)
+    daemon.run(at_once)
     summary = json.loads((daemon.session.directory.path / "summary.json").read_text())
     assert (summary["outcome"], summary["reason"]) == ("failed", "the base does not answer")
 
@@ -111,14 +130,10 @@ def test_a_collection_of_garbage_while_it_runs_passes_over_what_the_program_was_
     assert any(each is vars(np) for each in gc.get_objects())  # as before
 
 
-def test_the_state_is_published_ten_times_a_second_with_the_truth_in_it(daemon: Daemon) -> None:
-    truth: list[Pose] = []
-
-    async def story(clock: Clock) -> None:
-        await clock.sleep_until(10.0)
-        truth.append(daemon.place)
-
-    daemon.run(story)
+def test_the_state_is_published_ten_times_a_second_with_the_truth_in_it(
+    stopped: tuple[Daemon, Pose],
+) -> None:
+    daemon, truth = stopped
     states = daemon.network.states
     assert len(states) == pytest.approx(100, abs=1)
     assert [state.sequence for state in states] == list(range(len(states)))
@@ -126,12 +141,14 @@ def test_the_state_is_published_ten_times_a_second_with_the_truth_in_it(daemon: 
     assert states[-1].cycles == pytest.approx(50 * 10, abs=25)
     start = daemon.session.place
     assert start is not None
-    map_base = start.start.to(truth[0])
+    map_base = start.start.to(truth)
     assert states[-1].pose == pytest.approx((map_base.x, map_base.y, map_base.theta), abs=0.15)
 
 
-def test_the_service_manager_hears_ready_once_signs_of_life_and_stopping(daemon: Daemon) -> None:
-    daemon.run(ten_seconds)
+def test_the_service_manager_hears_ready_once_signs_of_life_and_stopping(
+    stopped: tuple[Daemon, Pose],
+) -> None:
+    daemon, _ = stopped
     told = daemon.manager.told
     assert daemon.manager.count("READY=1") == 1
     assert daemon.manager.count("WATCHDOG=1") == pytest.approx(100, abs=1)
@@ -143,8 +160,11 @@ def test_the_service_manager_hears_ready_once_signs_of_life_and_stopping(daemon:
     )
 
 
-def test_a_finished_daemon_saves_the_map_and_stands_until_it_is_stopped(daemon: Daemon) -> None:
-    path = daemon.session.directory.path
+def test_a_finished_daemon_saves_the_map_and_stands_until_it_is_stopped(tmp_path: Path) -> None:
+    canvas = Canvas(7.0, 4.0)
+    canvas.carve_path([(2.0, 2.0), (5.0, 2.0)], 1.4)
+    path = tmp_path / "run"
+    daemon = Daemon(path, Place(canvas.world("short"), Pose(2.0, 2.0, 0.3)))
     seen: list[Any] = []
 
     async def story(clock: Clock) -> None:
@@ -156,7 +176,7 @@ def test_a_finished_daemon_saves_the_map_and_stands_until_it_is_stopped(daemon: 
         await clock.sleep_until(clock.now() + 30.0)
         seen.append(daemon.place)
 
-    with structlog.testing.capture_logs() as logs:
+    with daemon.session.directory, structlog.testing.capture_logs() as logs:
         daemon.run(story)
     assert seen[0] == "explored"
     assert seen[1] == seen[2]
@@ -183,10 +203,10 @@ def test_a_map_that_could_not_be_saved_is_saved_as_soon_as_that_is_possible(
         monkeypatch.setattr(run_directory, "_append", full)
         answer = await daemon.network.ask("stop")
         assert "map not saved" in answer.text
-        await clock.sleep_until(100.0)
+        await clock.sleep_until(50.0)
         away.rename(path)
         monkeypatch.undo()
-        await clock.sleep_until(131.0)
+        await clock.sleep_until(81.0)
         reasons.append(json.loads((path / "summary.json").read_text())["reason"])
         *_, ended, _ = map(json.loads, (path / "events.jsonl").read_text().splitlines())
         reasons.append(ended["reason"])
