@@ -132,9 +132,8 @@ def test_a_file_in_the_place_of_a_link_is_left_alone(tmp_path: Path) -> None:
     assert (tmp_path / "base").read_text() == "precious"
 
 
-@pytest.mark.parametrize("same", ["port", "./port"])
-def test_both_twins_cannot_have_one_name(tmp_path: Path, same: str) -> None:
-    with gvgbot("twin", "--laser-link", "port", "--base-link", same, cwd=tmp_path) as process:
+def test_both_twins_cannot_have_one_name(tmp_path: Path) -> None:
+    with gvgbot("twin", "--laser-link", "port", "--base-link", "./port", cwd=tmp_path) as process:
         output, _ = process.communicate(timeout=PATIENCE)
     assert process.returncode == 2
     assert output == "gvgbot: port cannot be both the laser and the base: name two links\n"
