@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from gvgbot.clock import Clock
 from gvgbot.config import Config
 from gvgbot.drivers.body import BodyConfig, RobotBody
 from gvgbot.drivers.cable import Cable
-from gvgbot.drivers.hokuyo.models import MODELS, Model
+from gvgbot.drivers.hokuyo.models import MODELS, Model, Parameters
 from gvgbot.drivers.hokuyo.twin import HokuyoTwin
 from gvgbot.drivers.kobuki.twin import KobukiTwin
 from gvgbot.drivers.link_faults import FaultyLink
@@ -51,6 +52,16 @@ def _people_count(config: Config, world: World) -> int:
     return world.people if config.twin.people is None else config.twin.people
 
 
+@cache
+def _sectors(parameters: Parameters, count: int) -> list[tuple[float, Array]]:
+    """Of each sector how long after the beginning its middle is seen, s, and bearings (N,), rad."""
+    bearings, step_time = parameters.bearings, parameters.step_time
+    bearings.setflags(write=False)
+    beams = np.array_split(np.arange(len(bearings)), count)
+    middles = [parameters.first_step + float(sector.mean()) for sector in beams]
+    return list(zip([m * step_time for m in middles], np.array_split(bearings, count), strict=True))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _Eye:
     """What the laser on a body sees; it may hang upside down."""
@@ -64,14 +75,12 @@ class _Eye:
     def sweep(self, stamp: float) -> Array:
         """Ranges (N,), m, of a sweep that begins at a stamp, the body going on as it moves then."""
         self.body.advance(stamp)
-        parameters, seen = self.model.parameters, []
-        bearings = parameters.bearings
+        seen = []
         stands = self.body.linear == self.body.angular == 0.0
-        for beams in np.array_split(np.arange(len(bearings)), 1 if stands else _SECTORS):
-            late = (parameters.first_step + float(beams.mean())) * parameters.step_time
+        for late, bearings in _sectors(self.model.parameters, 1 if stands else _SECTORS):
             moved = Pose(self.body.linear * late, 0.0, self.body.angular * late)
             world_laser = self.body.pose.compose(moved).compose(self.base_laser)
-            seen.append(self._look(world_laser, bearings[beams]))
+            seen.append(self._look(world_laser, bearings))
         return np.concatenate(seen)
 
     def _look(self, world_laser: Pose, bearings: Array) -> Array:

@@ -82,7 +82,9 @@ class RayCaster:
             return np.zeros(len(directions))
         faces = self._faces_of(region).facing(x, y, reach)
         face, beam = _crossings(faces, directions)
-        slopes = np.stack((np.cos(directions), np.sin(directions)))
+        slopes = np.empty((2, len(directions)))
+        np.cos(directions, out=slopes[0])
+        np.sin(directions, out=slopes[1])
         crossed = faces.plane[face] / slopes[(face >= faces.vertical).astype(np.intp), beam]
         ranges = np.full(len(directions), np.inf)
         np.minimum.at(ranges, beam, crossed)
@@ -150,7 +152,7 @@ def _flipped(runs: _Runs) -> _Runs:
 
 def _require_fan(directions: Array) -> None:
     span = float(directions[-1] - directions[0]) if len(directions) else 0.0
-    if span > math.tau + 1e-9 or bool(np.any(directions[1:] < directions[:-1])):
+    if span > math.tau + 1e-9 or bool((directions[1:] < directions[:-1]).any()):
         raise ValueError("beam directions must ascend and span at most one turn")
 
 
