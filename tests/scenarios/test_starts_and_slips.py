@@ -54,12 +54,11 @@ def test_a_slot_that_the_robot_just_fits_into_is_left() -> None:
     assert min(pose.y for pose in run.truth) < 0.5
 
 
-@pytest.mark.parametrize("heading", [0.8, 2.4])
-def test_who_goes_into_the_corner_that_it_starts_in_turns_round(heading: float) -> None:
+def test_who_goes_into_the_corner_that_it_starts_in_turns_round() -> None:
     """Of two rooms, with a laser that does not see their far ends: one edge through the door."""
     rooms = carved([(0.5, 0.5, 5.9, 6.5), (5.9, 3.0, 6.1, 3.6), (6.1, 0.5, 11.5, 6.5)])
     twin = TwinConfig(seed=1, laser=HokuyoTwinConfig(model="URG-04LX"))
-    run = play(rooms, Pose(0.9, 0.9, heading), twin=twin)
+    run = play(rooms, Pose(0.9, 0.9, 0.8), twin=twin)
     assert_explored(run)
     assert run.recoveries().count("turn round") == 1
     assert max(pose.x for pose in run.truth) > 6.5
