@@ -79,7 +79,7 @@ def test_a_seed_repeats_itself_and_what_was_kept_is_not_run_again(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [99, 145, 323, 416, 504, 822])
+@pytest.mark.parametrize("seed", [99, 145, 416])
 def test_what_hurt_an_oracle_once_does_so_no_more(seed: int) -> None:
-    """Places beyond walls, a ring with a hidden door, what a full disk did not keep, half a map."""
+    """A place beyond a wall, a ring with a hidden branch, what a full disk did not keep."""
     assert once(seed, draw(seed)).violations == {}

@@ -29,8 +29,8 @@ from gvgbot.hal.messages import Contact, Odometry, Scan, Sign
 from gvgbot.links import Close, Links
 from gvgbot.maps import run_directory
 from gvgbot.robot import Robot
-from gvgbot.stop_signals import StopSignals
 from gvgbot.simulation import Place
+from gvgbot.stop_signals import StopSignals
 from gvgbot.topics import Grid
 from gvgbot.worlds.canvas import Canvas
 
