@@ -380,7 +380,7 @@ def test_who_may_be_anywhere_after_a_lift_has_failed(
 ) -> None:
     """Nobody is there who could ask it to resume."""
     monkeypatch.setattr(LocalMaps, "may_fit", lambda *_: False)
-    drops = "twin.base.mishaps.wheel_drops_per_h=600"
+    drops = "twin.base.mishaps.wheel_drops_per_h=3600"
     arguments = ["explore", "--set", drops, "--robots", robots, "--out", str(tmp_path / "run")]
     assert main(arguments) == 1
     assert "failed: no walls that it knows are around it" in "".join(capsys.readouterr())

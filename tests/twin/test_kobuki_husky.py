@@ -3,6 +3,7 @@
 import asyncio
 import json
 import math
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -16,10 +17,11 @@ from gvgbot.drivers.body import BodyConfig, RobotBody
 from gvgbot.drivers.kobuki.driver import KobukiBase
 from gvgbot.drivers.kobuki.twin import KobukiTwin
 from gvgbot.drivers.transport import pipe, serve_twin
-from gvgbot.drivers.world import World
+from gvgbot.drivers.world import World, save_world
 from gvgbot.geometry import Pose, Twist, wrap_angle
 from gvgbot.hal.messages import Odometry
 from gvgbot.stop_signals import StopSignals
+from gvgbot.worlds.canvas import Canvas
 
 pytestmark = pytest.mark.twin
 START = Pose(15.0, 15.0, 0.0)
@@ -84,7 +86,11 @@ def test_its_fast_wheel_is_limited_by_its_own_width() -> None:
 @pytest.mark.slow
 def test_it_explores_a_ring_without_touching_a_wall(tmp_path: Path) -> None:
     """Geometry: along the middle of the ring the robot comes back to where it was."""
-    assert explore(HUSKY, print, StopSignals(), out=tmp_path / "run", real_time=False) == 0
+    canvas = Canvas(10.0, 10.0)
+    canvas.carve_path([(2.0, 2.0), (8.0, 2.0), (8.0, 8.0), (2.0, 8.0), (2.0, 2.0)], 2.6)
+    ring = replace(HUSKY.twin, world=str(save_world(canvas.world("ring"), tmp_path)))
+    config = replace(HUSKY, twin=replace(ring, start=(5.0, 2.0, 0.0)))
+    assert explore(config, print, StopSignals(), out=tmp_path / "run", real_time=False) == 0
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert summary["contacts"] == 0
     assert summary["config"]["robot"]["radius_m"] == 0.6
