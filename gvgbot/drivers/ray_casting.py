@@ -42,8 +42,8 @@ class Faces:
         depth[: self.vertical] -= x
         depth[self.vertical :] -= y
         ahead = depth * self.side
-        kept = np.flatnonzero((ahead < -EDGE_ON) & (ahead >= -reach))
-        vertical = int(np.searchsorted(kept, self.vertical))
+        (kept,) = ((ahead < -EDGE_ON) & (ahead >= -reach)).nonzero()
+        vertical = int(kept.searchsorted(self.vertical))
         first, last = self.first[kept], self.last[kept]
         for ends in (first, last):
             ends[:vertical] -= y
@@ -161,16 +161,16 @@ def _crossings(faces: Faces, directions: Array) -> tuple[Index, Index]:
     first = faces.angles(faces.first)
     width = (faces.angles(faces.last) - first) % math.tau
     start = directions[0] + (first - directions[0]) % math.tau
-    wrapped = np.flatnonzero(start + width >= directions[0] + math.tau - ANGLE_SLACK)
+    (wrapped,) = (start + width >= directions[0] + math.tau - ANGLE_SLACK).nonzero()
     face = np.concatenate((np.arange(len(start)), wrapped))
     start = np.concatenate((start, start[wrapped] - math.tau))
-    low = np.searchsorted(directions, start - ANGLE_SLACK, side="left")
-    high = np.searchsorted(directions, start + width[face] + ANGLE_SLACK, side="right")
+    low = directions.searchsorted(start - ANGLE_SLACK, side="left")
+    high = directions.searchsorted(start + width[face] + ANGLE_SLACK, side="right")
     return _expanded(face, low, high - low)
 
 
 def _expanded(face: Index, low: Index, count: Index) -> tuple[Index, Index]:
     """Each face repeated for its `count` beams from `low` on, with those beams."""
-    before = np.cumsum(count) - count
-    beam = np.arange(int(count.sum())) + np.repeat(low - before, count)
-    return np.repeat(face, count), beam
+    before = count.cumsum() - count
+    beam = np.arange(int(count.sum())) + (low - before).repeat(count)
+    return face.repeat(count), beam
