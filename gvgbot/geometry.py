@@ -1,6 +1,5 @@
 """Planar geometry: angles, poses and twists, in metres, radians and seconds."""
 
-import copy
 import math
 from array import array
 from collections.abc import Iterable
@@ -127,10 +126,6 @@ class Poses:
         values = self._values[3 * start : None if end is None else 3 * end]
         return np.array(values, np.float64).reshape(-1, 3)
 
-    def copy(self) -> "Poses":
-        """A list of the same poses."""
-        return copy.deepcopy(self)
-
 
 def composed(a_b: Array, b_c: Array) -> Array:
     """Poses a_c as rows (N, 3) of x, y, theta, from a_b and b_c: `Pose.compose` for many."""
@@ -168,12 +163,12 @@ def rotated_covariance(covariance: Array, angle: float) -> Array:
 
 def length_of(line: Array) -> float:
     """The length of a line (N, 2), in its unit; 0 for less than two points."""
-    return float(np.hypot(*np.diff(line, axis=0).T).sum())
+    return float(np.hypot(*(line[1:] - line[:-1]).T).sum())
 
 
 def stations_of(line: Array) -> Array:
     """How far it is along a line (N, 2) to each of its points (N,), in its unit."""
-    return np.concatenate([[0.0], np.hypot(*np.diff(line, axis=0).T).cumsum()])
+    return np.concatenate([[0.0], np.hypot(*(line[1:] - line[:-1]).T).cumsum()])
 
 
 def anchored(line: Array, start: Array, end: Array) -> Array:

@@ -47,7 +47,7 @@ def islands(scan: Scan, local_base: Pose) -> list[Island]:
     A beam without an echo has the room of the whole range; one that failed tells nothing. Where a
     wall is so close to somebody that this is no room, only roundness tells them apart.
     """
-    told = np.flatnonzero(~np.isnan(scan.ranges))
+    told = (~np.isnan(scan.ranges)).nonzero()[0]
     if not len(told):  # it is blind
         return []
     look = _Look(scan, local_base.compose(scan.base_laser), told)
@@ -69,7 +69,7 @@ def slivers(scan: Scan, local_base: Pose) -> tuple[Array, NDArray[np.bool_]]:
     It is narrow and has more room on one side at least. And on which of them (N,) something nearer
     cuts it off on the other side, so that there may be more of it.
     """
-    told = np.flatnonzero(~np.isnan(scan.ranges))
+    told = (~np.isnan(scan.ranges)).nonzero()[0]
     if not len(told):
         return np.empty((0, 2)), np.zeros(0, np.bool_)
     look = _Look(scan, local_base.compose(scan.base_laser), told)
@@ -84,9 +84,9 @@ def without_fringes(scan: Scan) -> Scan:
 
     Something stands free there, and all but a sliver of it is out of sight: that may be a person.
     """
-    told = np.flatnonzero(~np.isnan(scan.ranges))
+    told = (~np.isnan(scan.ranges)).nonzero()[0]
     depth = np.minimum(scan.ranges[told], scan.range_max)
-    ends = np.flatnonzero(np.abs(np.diff(depth)) >= _STEP_M)
+    ends = (np.abs(np.diff(depth)) >= _STEP_M).nonzero()[0]
     if not len(ends):
         return scan
     first, last = ends[0] + 1, ends[-1] + 1
@@ -176,7 +176,7 @@ class _Look:
 def _pieces(piece: Piece, is_end: NDArray[np.bool_]) -> Iterator[Piece]:
     """The parts of a piece, each up to a beam that is the end of one."""
     start, stop = piece
-    ends = np.flatnonzero(is_end[start : stop - 1]) + start + 1
+    ends = is_end[start : stop - 1].nonzero()[0] + start + 1
     return pairwise([start, *ends.tolist(), stop])
 
 

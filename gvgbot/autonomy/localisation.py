@@ -22,6 +22,7 @@ from gvgbot.hal.messages import Scan
 _RANGE_M = 24.0  # of the beams that are matched
 _LONGEST_GAP_M = 0.5  # between two beams, for their even spacing
 _SMOOTHED = 9  # beams, to tell where the next point is due
+_ONE = np.eye(3)
 _LEAST_POINTS = 50  # fewer say nothing about a pose
 _AT_ALL = 0.01  # better agreement, where no place is likelier than another
 # of a fit: what a point counts that lies where nothing is known yet. Of 100 points on known ground
@@ -83,7 +84,7 @@ class LocalMaps:
         self._matching = matching
         self._calibration = Calibration()
         self._lesson: _Lesson | None = None  # what the calibration has yet to learn
-        self._left = np.eye(3)  # of odometry's errors, by what it has learnt since the last match
+        self._left = _ONE  # of odometry's errors, by what it has learnt since the last match
 
     def insert(
         self, scan: Scan, local_base: Pose, travelled: float, free: Array | None = None
@@ -146,7 +147,7 @@ class LocalMaps:
         calibration, per_error = self._calibration, per_unit(motion, duration)
         if best is None:
             laid = self._laid(None, prior, per_error, Q)
-            return ScanMatch(prior, calibration.adds_up(motion, duration, np.eye(3), Q), laid)
+            return ScanMatch(prior, calibration.adds_up(motion, duration, _ONE, Q), laid)
         found, used = best
         expected = self._matching.pair_sigma_m**2 / self._matching.independent_share
         walls = min(1.0, found.scatter / expected)
@@ -154,12 +155,12 @@ class LocalMaps:
         if used is Q:
             self._lesson = motion, duration, prior.to(found.pose), noise, found.covariance, walls
             felt = calibration.as_felt(noise).sum(axis=0)
-        g = np.eye(3) - found.covariance @ np.linalg.inv(used)
+        g = _ONE - found.covariance @ np.linalg.inv(used)
         error = _error(found, g, felt, walls)
-        laid = self._laid(found, found.pose, (np.eye(3) - g) @ per_error, error)
-        stays = np.linalg.inv(np.eye(3) + g * self._age(found))
+        laid = self._laid(found, found.pose, (_ONE - g) @ per_error, error)
+        stays = np.linalg.inv(_ONE + g * self._age(found))
         drift = stays @ error @ stays.T
-        left = np.asarray(stays @ (np.eye(3) - g), np.float64)
+        left = np.asarray(stays @ (_ONE - g), np.float64)
         return ScanMatch(found.pose, calibration.adds_up(motion, duration, left, drift), laid)
 
     def trust(
@@ -241,7 +242,7 @@ class LocalMaps:
             at_each = (numbers == looks[:, None]).astype(np.float64)
             told = (at_each @ found.information.reshape(-1, 9)).reshape(-1, 3, 3)
             gains = found.covariance @ told
-        left, self._left = self._left, np.eye(3)
+        left, self._left = self._left, _ONE
         look, P = self.near.looks + 1, self._calibration.P
         return Laid(local_base, look, looks, gains, by_odometry, noise, left, P)
 
@@ -338,7 +339,7 @@ def _error(found: Registration, g: Array, felt: Array, walls: float) -> Array:
     the mean error m of the scans that drew them and the noise v of a match, which has `walls` times
     the variance that the matcher expects. Of that e' and m are not new.
     """
-    error = (np.eye(3) - g) @ felt @ (np.eye(3) - g).T + walls * (g @ found.covariance)
+    error = (_ONE - g) @ felt @ (_ONE - g).T + walls * (g @ found.covariance)
     return np.asarray((error + error.T) / 2, np.float64)
 
 
@@ -368,7 +369,7 @@ def sampled(scan: Scan, count: int) -> Array:
     which is taken, in the order of the sweep, and turn the walls a little.
     """
     with np.errstate(invalid="ignore"):
-        hit = np.flatnonzero(scan.ranges < _RANGE_M)
+        hit = (scan.ranges < _RANGE_M).nonzero()[0]
     points = scan.ranges.take(hit)[:, None] * scan.directions.take(hit, axis=0)
     if len(points) == 0:
         return points

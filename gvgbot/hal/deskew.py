@@ -40,10 +40,10 @@ def _at_beams(index: Array, ranges: Array, scan: Scan) -> Array:
     Where two neighbours lie on one wall, it is straight between them; elsewhere the nearer counts.
     A wall that is only ever moved to the nearest beam is turned a little.
     """
-    order = np.argsort(index, kind="stable")
+    order = index.argsort(kind="stable")
     index, ranges = index[order], ranges[order]
     wanted = np.arange(len(ranges))
-    after = np.minimum(np.maximum(np.searchsorted(index, wanted), 1), len(index) - 1)
+    after = np.minimum(np.maximum(index.searchsorted(wanted), 1), len(index) - 1)
     near, far = ranges[after - 1], ranges[after]
     share = (wanted - index[after - 1]) / np.maximum(index[after] - index[after - 1], 1e-9)
     nearest = after - (share < 0.5)

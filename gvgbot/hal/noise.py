@@ -15,7 +15,8 @@ def range_noise(ranges: Array) -> float:
     """The noise, 1 sigma in m, by how ranges (N,) stray from the mean of their neighbours."""
     told = np.where(np.isfinite(ranges), ranges, np.nan)
     stray = np.abs(told[:-2] - 2.0 * told[1:-1] + told[2:])
-    stray = np.sort(stray[~np.isnan(stray)])  # for the median: np.median is slow
+    stray = stray[~np.isnan(stray)]
+    stray.sort()  # for the median: np.median is slow
     if not len(stray):
         return 0.0
     median = float(stray[(len(stray) - 1) // 2] + stray[len(stray) // 2]) / 2

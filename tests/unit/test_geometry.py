@@ -1,6 +1,7 @@
 """Poses and angles obey the laws of the plane."""
 
 import cmath
+import copy
 import math
 import tracemalloc
 
@@ -163,7 +164,7 @@ def test_rows_of_poses_are_read_back_as_these(listed: list[Pose]) -> None:
 @given(st.lists(poses, max_size=4), st.lists(poses, max_size=4), st.integers(0, 8))
 def test_kept_poses_are_given_back_as_they_came(a: list[Pose], b: list[Pose], first: int) -> None:
     kept = Poses(a)
-    before = kept.copy()
+    before = copy.deepcopy(kept)
     kept.extend(rows_of(b))
     listed = a + b
     assert before.rows().tolist() == rows_of(a).tolist()

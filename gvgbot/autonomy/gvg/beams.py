@@ -29,7 +29,7 @@ def without_mixed_pixels(scan: Scan) -> Scan:
     alone, between two on one wall, may have gone through glass and end in mid-air behind it. Beams
     that failed are passed over.
     """
-    told = np.flatnonzero(~np.isnan(scan.ranges))
+    told = (~np.isnan(scan.ranges)).nonzero()[0]
     if not len(told):
         return scan
     depth = scan.ranges.take(told).take(np.arange(-2, len(told) + 2), mode="clip")
@@ -60,7 +60,7 @@ def lone(ranges: Array) -> Array:
 
     Beams that failed are passed over.
     """
-    told = np.flatnonzero(~np.isnan(ranges))
+    told = (~np.isnan(ranges)).nonzero()[0]
     deep = ranges[told]
     inner = deep[1:-1] + _LONE_M
     lone = np.full(len(ranges), np.nan)
@@ -72,16 +72,16 @@ def lone(ranges: Array) -> Array:
 def end_points(ranges: Array, directions: Array, reach: float) -> Array:
     """End points (N, 2) of the beams that hit something within reach, laser frame."""
     with np.errstate(invalid="ignore"):
-        hit = np.flatnonzero(ranges < reach)
+        hit = (ranges < reach).nonzero()[0]
     ends: Array = ranges.take(hit)[:, None] * directions.take(hit, axis=0)
     return ends
 
 
 def bridged(points: Array, gap: float) -> Array:
     """The points with intermediate ones wherever neighbours are close enough to be one wall."""
-    step = np.diff(points, axis=0)
+    step = points[1:] - points[:-1]
     length = np.hypot(step[:, 0], step[:, 1])
-    near = np.flatnonzero((length < gap) & (length > gap / 4))
+    near = ((length < gap) & (length > gap / 4)).nonzero()[0]
     start, step = points.take(near, axis=0), step.take(near, axis=0)
     return np.concatenate([points, *(start + f * step for f in (0.25, 0.5, 0.75))])
 
@@ -100,6 +100,6 @@ def range_towards(
     bearing -= turn * np.floor(bearing / turn)
     bearing *= np.float32(1 / scan.angle_increment)
     bearing += np.float32(0.5)
-    beyond_last = np.append(see, see.dtype.type(0))
+    beyond_last = np.concatenate([see, np.zeros(1, see.dtype)])
     towards: NDArray[np.floating] = beyond_last.take(bearing.astype(np.int32), mode="clip")
     return towards

@@ -83,7 +83,7 @@ def with_coast(
 def _cuts(diagram: Diagram, walls: Array, radius: float) -> _Cuts:
     a, b = diagram.a, diagram.b
     farthest = np.maximum(diagram.clearance[a], diagram.clearance[b])  # on a ridge that ends
-    far = np.flatnonzero((b < 0) | (farthest > radius - _TOUCH_M))
+    far = ((b < 0) | (farthest > radius - _TOUCH_M)).nonzero()[0]
     p, q = walls[diagram.generators[far, 0]], walls[diagram.generators[far, 1]]
     middle, half = (p + q) / 2, np.hypot(*(q - p).T) / 2
     across = (q - p) / (2 * half)[:, None]
@@ -95,7 +95,7 @@ def _cuts(diagram: Diagram, walls: Array, radius: float) -> _Cuts:
     away = np.sqrt(np.maximum(radius**2 - half**2, 0.0))
     cut, along = [], []
     for side in (-away, away):
-        hit = np.flatnonzero((half < radius) & (low < side) & (side < high))
+        hit = ((half < radius) & (low < side) & (side < high)).nonzero()[0]
         cut.append(hit)
         along.append(side[hit])
     cuts, places = np.concatenate(cut), np.concatenate(along)

@@ -106,7 +106,7 @@ def _out_of_the_wide(points: Array, clearance: Array) -> tuple[float, float]:
 
     At their beginning, if they do not.
     """
-    narrow = np.flatnonzero(clearance <= _WIDE_M)
+    narrow = (clearance <= _WIDE_M).nonzero()[0]
     if not len(narrow) or narrow[0] == 0:
         return 0.0, float(clearance[0])
     last = narrow[0]
@@ -121,15 +121,15 @@ def contracted(fine: FineGraph) -> Draft:
     is_key = (np.bincount(own, minlength=len(fine.points)) != 2) | ~np.isnan(fine.lead)
     if len(is_key) and not is_key.any():
         is_key[0] = True  # a ring without a vertex
-    keys = np.flatnonzero(is_key).tolist()
+    keys = is_key.nonzero()[0].tolist()
     draft = Draft(
         {i: fine.points[i] for i in keys},
         {i: float(fine.clearance[i]) for i in keys},
         {i: None if math.isnan(angle := float(fine.lead[i])) else angle for i in keys},
         ends={i: [] for i in keys},
     )
-    leaving = np.flatnonzero(is_key[own])
-    leaving = leaving.take(np.argsort(own.take(leaving), kind="stable"))
+    leaving = is_key[own].nonzero()[0]
+    leaving = leaving.take(own.take(leaving).argsort(kind="stable"))
     stops, both = is_key.tolist(), np.bincount(own, other, len(is_key)).astype(int).tolist()
     walked: set[tuple[int, int]] = set()
     paths: list[list[int]] = []

@@ -1,7 +1,7 @@
 """The edges of the local GVG: chains of Voronoi points at even spacing, without their zigzag."""
 
 from collections.abc import Iterator
-from itertools import pairwise
+from itertools import accumulate, pairwise
 
 import numpy as np
 
@@ -25,7 +25,7 @@ def smooth_edges(chains: list[Chain]) -> Iterator[LocalEdge]:
     line, parts = _end_to_end([points for points, _ in even])
     is_inner = np.ones(len(line), bool)
     is_inner[[end for part in parts for end in (part.start, part.stop - 1)]] = False
-    inner = np.flatnonzero(is_inner)
+    inner = is_inner.nonzero()[0]
     for _ in range(2):
         before, here, after = (line.take(inner + k, axis=0) for k in (-1, 0, 1))
         line[inner] = 0.25 * before + 0.5 * here + 0.25 * after
@@ -48,8 +48,8 @@ def _resampled(chain: Chain, along: Array) -> tuple[Array, Array]:
 
 def _end_to_end(lines: list[Array]) -> tuple[Array, list[slice]]:
     """Polylines as one (N, 2), and which part of that each of them is."""
-    ends = np.cumsum([len(line) for line in lines]).tolist()
-    return np.concatenate(lines), [slice(a, b) for a, b in pairwise([0, *ends])]
+    ends = accumulate(map(len, lines), initial=0)
+    return np.concatenate(lines), [slice(a, b) for a, b in pairwise(ends)]
 
 
 def _stations(line: Array, parts: list[slice]) -> Array:

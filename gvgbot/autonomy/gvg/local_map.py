@@ -328,10 +328,10 @@ class LocalMap:
 
     def _occupy(self, points: Array, eye: Array, travelled: float) -> None:
         i, j = (np.floor(points / self._cell).astype(np.int64) - self._corner).T
-        inside = np.flatnonzero((i >= 0) & (i < self._size) & (j >= 0) & (j < self._size))
+        inside = ((i >= 0) & (i < self._size) & (j >= 0) & (j < self._size)).nonzero()[0]
         flat = i.take(inside) * self._size + j.take(inside)
         counts = np.bincount(flat)
-        cell = np.flatnonzero(counts > 0)
+        cell = (counts > 0).nonzero()[0]
         count = counts[cell]
         x, y = (np.bincount(flat, points[:, k].take(inside))[cell] / count for k in (0, 1))
         mean, sight = self._mean.reshape(-1, 2), self._sight.reshape(-1, 2)
@@ -378,12 +378,12 @@ def _merged(cells: NDArray[np.intp], columns: int, walls: Walls, reach: float) -
     """
     for step in (1, columns):
         points, hits, sights, looks = walls
-        beside = np.minimum(np.searchsorted(cells, cells + step), len(cells) - 1)
-        low = np.flatnonzero(cells.take(beside) == cells + step)
+        beside = np.minimum(cells.searchsorted(cells + step), len(cells) - 1)
+        low = (cells.take(beside) == cells + step).nonzero()[0]
         high = beside.take(low)
         dx, dy = (points.take(high, axis=0) - points.take(low, axis=0)).T
         u, v = (sights.take(high, axis=0) * sights.take(low, axis=0)).T
-        one = np.flatnonzero((np.hypot(dx, dy) < reach) & (u + v > 0.0))
+        one = ((np.hypot(dx, dy) < reach) & (u + v > 0.0)).nonzero()[0]
         low, high = low.take(one), high.take(one)
         share = (hits[high] / (hits[low] + hits[high]))[:, None]
         for means in (points, sights):
@@ -393,7 +393,7 @@ def _merged(cells: NDArray[np.intp], columns: int, walls: Walls, reach: float) -
         hits[low] += hits[high]
         is_kept = np.ones(len(cells), bool)
         is_kept[high] = False
-        kept = np.flatnonzero(is_kept)
+        kept = is_kept.nonzero()[0]
         cells = cells.take(kept)
         walls = Walls(*(values.take(kept, axis=0) for values in walls))
     return walls

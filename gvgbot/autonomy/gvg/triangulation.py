@@ -35,7 +35,7 @@ def delaunay(points: Array) -> Triangulation | None:
     found = cdt.triangles_array()
     corners, beyond = (found[part].view(np.int32) for part in ("vertices", "neighbors"))
     a, b, c = corners.T
-    inner = np.flatnonzero(np.minimum(np.minimum(a, b), c) >= _AROUND)
+    inner = (np.minimum(np.minimum(a, b), c) >= _AROUND).nonzero()[0]
     if not len(inner):
         return None
     number = np.full(len(corners) + 1, -1, np.int32)  # of what is kept; the last is of beyond, -1

@@ -99,7 +99,7 @@ class _Room(NamedTuple):
     def is_certain(self, centres: Array, clearance: Array) -> NDArray[np.bool_]:
         """Which maximal discs, by centres (N, 2) and radii (N,), are such and surely there."""
         fits = (clearance >= self.min_clearance) & (clearance <= self.open_clearance)
-        discs = np.flatnonzero(fits)
+        discs = fits.nonzero()[0]
         centres, radii = centres.take(discs, axis=0), clearance.take(discs)
         fits[discs] = _disc_is_known(self.local_map, centres, radii)
         return fits
@@ -130,7 +130,7 @@ def _diagram(triangulation: Triangulation, room: _Room, roughness: float) -> Dia
     certain = touched.copy()
     links = np.stack([a[rough], b[rough]])
     certain[links] = True
-    ends = np.flatnonzero(certain)
+    ends = certain.nonzero()[0]
     certain[ends] = room.is_certain(points.take(ends, axis=0), clearance.take(ends))
     sure = certain[links].all(axis=0)
     parts[rough[sure]] = _bridging(links[:, sure], touched)
@@ -143,7 +143,7 @@ def _far_apart(p: Array, q: Array, least: float) -> NDArray[np.intp]:
     Most are neighbours on one wall: the sum of both differences, which is longer, is told faster.
     """
     dx, dy = np.abs(p - q).T
-    hopeful = np.flatnonzero(dx + dy > 0.99 * least)
+    hopeful = (dx + dy > 0.99 * least).nonzero()[0]
     far: NDArray[np.intp] = hopeful[np.hypot(dx[hopeful], dy[hopeful]) >= least]
     return far
 
@@ -188,12 +188,12 @@ def _ridges_that_count(
     In the open they are those of the coast, where all ridges end.
     """
     is_whole = diagram.b >= 0
-    endless = np.flatnonzero(diagram.parts & ~is_whole)
+    endless = (diagram.parts & ~is_whole).nonzero()[0]
     if np.isfinite(room.open_clearance):
         coast = with_coast(diagram, room.generators, room.open_clearance, room.local_map)
         if coast is not None:
             return *coast, endless[:0]
-    whole = np.flatnonzero(diagram.parts & is_whole)
+    whole = (diagram.parts & is_whole).nonzero()[0]
     links = np.stack([diagram.a[whole], diagram.b[whole]], axis=1)
     return diagram.points, diagram.clearance, links, endless
 
@@ -223,7 +223,7 @@ def _prolonged(
     """
     length = np.hypot(*rays.way.T)
     unit = rays.way / np.maximum(length, 1e-9)[:, None]
-    long = np.flatnonzero(length > _LONG_RIDGE_M)
+    long = (length > _LONG_RIDGE_M).nonzero()[0]
     if not len(long):
         lead = np.full(len(points), np.nan)
         lead[rays.start] = _direction(rays.way)
@@ -280,7 +280,7 @@ def _disc_is_known(local_map: Space, centres: Array, radii: Array) -> NDArray[np
     """Whether the maximal discs, but for a rim of two cells, lie in known space."""
     outer = np.maximum(radii - _RIM_M, 0.5 * radii)
     unknown = _unknown(local_map, centres, outer, _WITHIN)
-    hopeful = np.flatnonzero(unknown <= _MAX_UNKNOWN)
+    hopeful = (unknown <= _MAX_UNKNOWN).nonzero()[0]
     centres, outer = centres.take(hopeful, axis=0), outer.take(hopeful)
     unknown[hopeful] += _unknown(local_map, centres, outer, _RING)
     return unknown <= _MAX_UNKNOWN
@@ -290,7 +290,7 @@ def _unknown(local_map: Space, centres: Array, radii: Array, places: Array) -> N
     """How many of the places (K, 2) of a unit disc lie in unknown space, for each disc (N,)."""
     # the discs last, of which there are far more than places, so that NumPy's loops are long
     x_y = centres.T[:, None, :] + places.T[:, :, None] * radii
-    unknown: NDArray[np.int64] = (~local_map.known(np.moveaxis(x_y, 0, -1))).sum(axis=0)
+    unknown: NDArray[np.int64] = (~local_map.known(x_y.transpose(1, 2, 0))).sum(axis=0)
     return unknown
 
 
@@ -301,7 +301,7 @@ def _ridges(
     triangles = triangulation.triangles
     other = triangulation.neighbours.ravel()
     own = np.repeat(np.arange(len(triangles)), 3)
-    once = np.flatnonzero((own < other) | (other < 0))
+    once = ((own < other) | (other < 0)).nonzero()[0]
     pair = triangles.take(_SIDES, axis=1).reshape(-1, 2).take(once, axis=0)
     return own.take(once), other.take(once).astype(np.int64), pair
 
@@ -334,8 +334,8 @@ def _piece_of_robot(
         return EMPTY
     used = np.zeros(len(centres), bool)
     used[ridges] = True
-    nodes = np.flatnonzero(used)
-    ridges = (np.cumsum(used) - 1).take(ridges)
+    nodes = used.nonzero()[0]
+    ridges = (used.cumsum() - 1).take(ridges)
     piece = _pieces(ridges[:, 0], ridges[:, 1], len(nodes))
     places = centres.take(nodes, axis=0)
     distance = np.hypot(*(places - robot).T)
@@ -345,7 +345,7 @@ def _piece_of_robot(
     if nearest is None:
         return EMPTY
     keep = piece == piece[nearest]
-    renumber = np.cumsum(keep) - 1
+    renumber = keep.cumsum() - 1
     inside = keep[ridges[:, 0]]
     nodes = nodes[keep]
     return FineGraph(

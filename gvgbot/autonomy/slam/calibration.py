@@ -12,7 +12,7 @@ import numpy as np
 from gvgbot.geometry import Array, Pose
 
 _SIGMA = np.array([0.02, 0.01, 0.0005])  # before anything is known: 1, 1, rad/s
-_WANDER = np.array([1e-5, 1e-5, 1e-6])  # of each with every step
+_WANDER = np.diag(np.array([1e-5, 1e-5, 1e-6]) ** 2)  # of each with every step
 _SURPRISING = 16.0  # squared Mahalanobis distance of a correction that tells of a slip
 _NOISE = (0.002, 25.0)  # variances of odometry, least and most, in units of what is expected
 _LEAST_DOUBTED = 0.5  # by so much of it motions are doubted, however good: floors have surprises
@@ -20,6 +20,7 @@ _RATE = 0.02  # at which they are learnt with each step; faster at first,
 _FEW = 4.0  # as if so many steps had told of what is expected: each base has its own
 _ODDEST = 9.0  # a correction says no more than one of three sigmas
 _LEAST_SHARE = 0.1  # of its own covariance, that a step has in every direction
+_ONE = np.eye(3)
 _LEAST = 1e-10 * np.eye(3)  # variance of a correction where walls say nothing, m^2 and rad^2
 
 
@@ -51,7 +52,7 @@ class Calibration:
     def scattered(self, parts: Array) -> Array:
         """The covariance (3, 3) by which a motion is doubted whose parts (4, 3, 3) are expected."""
         noise = np.maximum(self.noise, _LEAST_DOUBTED)
-        return np.asarray(np.tensordot(noise, parts, axes=1), np.float64)
+        return np.asarray((noise @ parts.reshape(4, 9)).reshape(3, 3), np.float64)
 
     def as_felt(self, parts: Array) -> Array:
         """The parts (4, 3, 3) of its covariance that a motion has proved to err by."""
@@ -94,18 +95,18 @@ class Calibration:
         which was doubted by Q before: 1 - C Q^-1 is the share g of an error that the change makes
         good. `walls` is the variance of what walls say, in units of what C takes it for.
         """
-        g = np.eye(3) - C @ np.linalg.inv(self.scattered(parts))
+        g = _ONE - C @ np.linalg.inv(self.scattered(parts))
         H = g @ per_unit(motion, duration)
         r = np.array([change.x, change.y, change.theta])
-        P = self.P + np.diag(_WANDER**2)
+        P = self.P + _WANDER
         felt = g @ self.as_felt(parts) @ g.T
         S = H @ P @ H.T + felt.sum(axis=0) + walls * (g @ C) + _LEAST  # g V g' = g C
         self._learn_noise(r, S, felt)
         if r @ np.linalg.solve(S, r) > _SURPRISING:
-            return np.eye(3)
+            return _ONE
         K = np.linalg.solve(S, H @ P).T
         self.x = self.x + K @ r
-        left = np.eye(3) - K @ H
+        left = _ONE - K @ H
         P -= K @ S @ K.T
         self.P, self.shared = (P + P.T) / 2, self.shared @ left.T
         return left

@@ -57,8 +57,8 @@ class OdometryNoise:
         heading = np.array([[0.0, 0.0, 0.0], [0.0, d * d / 3, d / 2], [0.0, d / 2, 1.0]])
         along_chord = np.array(
             [
-                np.diag([along, 1e-8, 0.0]),
-                np.diag([beside, beside, 0.0]),
+                [[along, 0.0, 0.0], [0.0, 1e-8, 0.0], [0.0, 0.0, 0.0]],
+                [[beside, 0.0, 0.0], [0.0, beside, 0.0], [0.0, 0.0, 0.0]],
                 by_turning * heading,
                 (by_driving + 1e-10) * heading,
             ]
@@ -216,13 +216,13 @@ def innovation(
     r, H = _residual(belief, vertex, base_vertex, len(R))
     used = _used(belief, vertex)
     H_used = H[:, used]
-    return r, H_used @ belief.P[np.ix_(used, used)] @ H_used.T + R, H
+    return r, H_used @ belief.P[used[:, None], used] @ H_used.T + R, H
 
 
 def _used(belief: Belief, vertex: int) -> Index:
     """The part (6,) of the state that a sight of a vertex depends on: H is 0 elsewhere."""
     i = 3 + 3 * belief.ids.index(vertex)
-    used: Index = np.r_[0:3, i : i + 3]
+    used: Index = np.array([0, 1, 2, i, i + 1, i + 2])
     return used
 
 

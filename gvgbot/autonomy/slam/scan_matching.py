@@ -201,7 +201,7 @@ def _pairs(
     found = tree.query(world, k=_NEIGHBOURS, distance_upper_bound=max(reach, _REACH_M))
     distance, near = np.asarray(found[0]), np.asarray(found[1])
     present = np.isfinite(distance)
-    paired = np.flatnonzero(present[:, _FEWEST - 1] & (distance[:, 0] < reach))
+    paired = (present[:, _FEWEST - 1] & (distance[:, 0] < reach)).nonzero()[0]
     present, points = present.take(paired, axis=0), points.take(paired, axis=0)
     near = near.take(paired, axis=0)
     near = np.where(present, near, near[:, :1])
@@ -214,13 +214,13 @@ def _pairs(
         facing = before * now[:, None] >= 0.0
         weight *= facing
         enough = np.einsum("kg->k", (weight > 0.0).astype(np.int8)) >= _FEWEST
-        mixed = np.flatnonzero(enough & (present & ~facing).any(axis=1))
+        mixed = (enough & (present & ~facing).any(axis=1)).nonzero()[0]
         if len(mixed):
             centre[:, mixed], normal[:, mixed], flat[mixed] = _lines(
                 x[mixed], y[mixed], weight[mixed]
             )
         flat &= enough
-    lines = np.flatnonzero(flat)
+    lines = flat.nonzero()[0]
     centre, normal = centre.take(lines, axis=1), normal.take(lines, axis=1)
     return _Pairs(
         points.take(lines, axis=0).T, normal, (centre * normal).sum(axis=0), near[lines, 0]
