@@ -1,6 +1,7 @@
 """Access: from a place off the GVG, in a wide space or beside it, onto the nearest edge."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import chain
 
@@ -22,8 +23,8 @@ _BEND_M = 0.2  # between places of an edge where a way may bend
 _FARTHEST_M = 4.0  # of places to go to where no edge leads, and of bends
 _NEAREST_M, _STEP_M = 1.0, 0.5  # of those places
 # Their bearings, how far away they are at most, and by how much less room the way may have than
-# there is where the robot stands: all around, and out of a slot.
-_FANS = ((16, _FARTHEST_M, 0.0), (180, 2.0, 0.02))
+# there is where the robot stands.
+_ALL_AROUND, _OUT_OF_A_SLOT = (16, _FARTHEST_M, 0.0), (180, 2.0, 0.03)
 _ROOM_ENOUGH_M = 5.0  # from the walls: more says nothing
 _SOUGHT_M = 1.5  # so near, one has been
 
@@ -134,25 +135,30 @@ def way_into_the_open(view: View, sought: list[Array]) -> tuple[Array, Array] | 
     """The straight way away from the walls, to where most room is known and nobody has been.
 
     There an edge may come into sight, or a wall. `sought` are the places (2,), local frame, where
-    none was. Out of a slot only few directions lead, so all are tried where there is no other way.
-    As `straight_way` has it.
+    none was. Out of a slot only few directions lead, so all are tried where there is no other way:
+    the one with most room on it, to a centimetre. As `straight_way` has it.
     """
-    for bearings, farthest, slack in _FANS:
+
+    def ways(bearings: int, farthest: float, slack: float) -> Iterator[tuple[Array, Array]]:
         for goal in _open_places(view, bearings, farthest):
             if all(math.dist(goal, place) > _SOUGHT_M for place in sought):
                 way = straight_way(view, goal, _ROOM_M, slack)
                 if way is not None:
-                    return way
-    return None
+                    yield way
+
+    return next(ways(*_ALL_AROUND), None) or max(
+        ways(*_OUT_OF_A_SLOT), key=lambda way: round(float(way[1].min()), 2), default=None
+    )
 
 
 def _open_places(view: View, bearings: int, farthest: float) -> Array:
-    """Places (N, 2), local frame, around the base, those with most room about them first."""
+    """Known places (N, 2), local frame, around the base, those with most room first."""
     base = view.local_base
     angles = base.theta + np.linspace(0.0, math.tau, bearings, endpoint=False)
     metres = np.arange(farthest, _NEAREST_M - _STEP_M / 2, -_STEP_M)
     rays = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     goals = base.position + (metres[:, None, None] * rays).reshape(-1, 2)
+    goals = goals[view.local_map.known(goals)]
     room = np.asarray(view.obstacles().query(goals)[0])
     best_first: Array = goals[np.argsort(-np.minimum(room, _ROOM_ENOUGH_M), kind="stable")]
     return best_first
