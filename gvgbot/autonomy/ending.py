@@ -15,6 +15,7 @@ class Surveyed(NamedTuple):
 
     places: Array  # (N, 2), that are worth another look
     narrows: Array  # (N, 2), ways too narrow for the robot that lead to floor without another
+    is_beside_floor: bool = False  # all edges are where it lacks the room it wants, places are not
 
 
 Survey = Callable[[], Surveyed | None]  # None: not yet told
@@ -23,6 +24,11 @@ Survey = Callable[[], Surveyed | None]  # None: not yet told
 def too_narrow(narrows: Array) -> str:
     """What there is to say of ways (N, 2) that the robot leaves alone."""
     return f"; too narrow for it near {places_in_words(narrows)}" if len(narrows) else ""
+
+
+def has_meetpoints(graph: GvgGraph) -> bool:
+    """Whether more than one edge is known, or where others begin."""
+    return any(vertex.kind == "meetpoint" for vertex in graph.vertices.values())
 
 
 def given_up(graph: GvgGraph) -> int:
@@ -36,6 +42,19 @@ def all_examined(graph: GvgGraph, remark: str) -> tuple[Outcome, str]:
     if blocked:
         return "explored_with_blocked", f"frontiers given up: {blocked}{remark}"
     return "explored", f"no frontier is left{remark}"
+
+
+def unless_shut_in(
+    survey: Survey | None, explored: tuple[Outcome, str]
+) -> tuple[Outcome, str] | None:
+    """Explored, or else what there is to say of a robot in a slot; None: not yet told."""
+    if survey is None:
+        return explored
+    surveyed = survey()
+    if surveyed is None:
+        return None
+    shut_in: tuple[Outcome, str] = ("failed", "there is floor in sight, but no way onto it")
+    return shut_in if surveyed.is_beside_floor else explored
 
 
 def left_to_others(graph: GvgGraph, unfollowed: Collection[HalfEdgeId]) -> tuple[Outcome, str]:

@@ -4,9 +4,14 @@ from gvgbot.autonomy.control.company import Companion
 from gvgbot.autonomy.control.edge_follower import Track
 from gvgbot.autonomy.control.orders import Drive, LookAround, Order, Stand
 from gvgbot.autonomy.driven_edges import DrivenEdges
-from gvgbot.autonomy.ending import all_examined, cut_short, left_to_others
+from gvgbot.autonomy.ending import (
+    all_examined,
+    cut_short,
+    left_to_others,
+    unless_shut_in,
+)
 from gvgbot.autonomy.events import Decision, Event, Recovery
-from gvgbot.autonomy.exploration.access import NEAR_M, Access, access, way_to_edge
+from gvgbot.autonomy.exploration.access import NEAR_M, Access, access, is_tight, way_to_edge
 from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.exploration.paths import shortest_paths
 from gvgbot.autonomy.gvg.local import Branch, Place
@@ -15,7 +20,7 @@ from gvgbot.autonomy.overlooked import Overlooked
 from gvgbot.autonomy.progress import Progress
 from gvgbot.autonomy.pursuit import Pursuit
 from gvgbot.autonomy.scouting import Scouting
-from gvgbot.autonomy.search import NO_EDGE, Search
+from gvgbot.autonomy.search import NO_EDGE
 from gvgbot.autonomy.situation import Situation
 from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.autonomy.views import Correspondence, View
@@ -27,7 +32,7 @@ class Mission(Pursuit):
 
     def __init__(self, config: ExplorationConfig, mapper: Mapper) -> None:
         super().__init__(config, mapper)
-        self._driven, self._search, self._overlooked = DrivenEdges(mapper), Search(), Overlooked()
+        self._driven, self._overlooked = DrivenEdges(mapper), Overlooked()
         self._frontiers: set[HalfEdgeId] = set()  # that were known at the last view
 
     def advance(self, view: View, known: Correspondence) -> tuple[Order, list[Event]]:
@@ -38,12 +43,12 @@ class Mission(Pursuit):
         found = access(view)
         is_beside = found is not None and found.place.distance <= NEAR_M
         if found is not None and is_beside:
-            self._search.end()
             self._learn(view, known, found.place)
+            self._end_search(view)
         back = self._go_back(view) if self._backtracking.is_on else self._retrace(view)
         if back is not None:
             return back, self._events
-        if found is None:
+        if found is None or self._search.leaves_slot:
             return self._look_for_an_edge(view), self._events
         if not is_beside:
             return self._access(view), self._events
@@ -333,6 +338,18 @@ class Mission(Pursuit):
         self._watch_progress(view)
         return Stand() if self.outcome is not None else Drive(Track.of(*way))
 
+    def _end_search(self, view: View) -> None:
+        """An edge is in sight; for who leaves a slot, only after it has come into the open.
+
+        What it knew of the slot need not hang together with what is there.
+        """
+        if self._search.leaves_slot:
+            if self._search.is_driving or is_tight(view):
+                return
+            for vertex in list(self._mapper.graph.vertices.values()):
+                self._mapper.remove(view, vertex, "nothing leads on from there")
+        self._search.end()
+
     def _look_for_an_edge(self, view: View) -> Order:
         """No edge in sight: look around, here and where there is more room, and then give up."""
         if self._search.is_driving:
@@ -341,7 +358,8 @@ class Mission(Pursuit):
         self._events += done
         if isinstance(order, Stand):
             reason = f"{NO_EDGE}: there are no walls within range, or no way out"
-            self._end(view, *cut_short(self._mapper.graph, reason, NO_EDGE))
+            verdict = cut_short(self._mapper.graph, reason, NO_EDGE)
+            self._end(view, *(self._otherwise if self._search.leaves_slot else verdict))
         return order
 
     def _examine(self, view: View, here: Situation) -> Order:
@@ -353,9 +371,10 @@ class Mission(Pursuit):
         if not self._examination.is_over:
             self._examination.is_over = True
             return Stand()
-        outcome, reason = all_examined(self._mapper.graph, self.remark)
+        explored = outcome, reason = all_examined(self._mapper.graph, self.remark)
         if outcome == "explored":
-            self._end(view, outcome, reason)
+            survey = self.survey if self._knows_a_slot(view) else None
+            self._conclude(view, unless_shut_in(survey, explored))
         else:
             self._end_before(view, reason)
         return Stand()

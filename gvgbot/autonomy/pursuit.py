@@ -2,9 +2,16 @@
 
 from gvgbot.autonomy.backtracking import Backtracking
 from gvgbot.autonomy.choice import Choice
-from gvgbot.autonomy.ending import Outcome, Survey, leading_nowhere, without_target
+from gvgbot.autonomy.ending import (
+    Outcome,
+    Survey,
+    has_meetpoints,
+    leading_nowhere,
+    without_target,
+)
 from gvgbot.autonomy.events import Event, Finished, Recovery
 from gvgbot.autonomy.examination import Examination
+from gvgbot.autonomy.exploration.access import is_tight
 from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.exploration.hindrance import Hindrance
 from gvgbot.autonomy.exploration.obstructions import Obstructions
@@ -14,6 +21,7 @@ from gvgbot.autonomy.path_following import PathFollowing
 from gvgbot.autonomy.progress import Progress
 from gvgbot.autonomy.retracing import Retracing
 from gvgbot.autonomy.scouting import Scouting
+from gvgbot.autonomy.search import Search
 from gvgbot.autonomy.situation import Situation
 from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.autonomy.topology import piece_of
@@ -40,7 +48,8 @@ class Pursuit:
         # before it knew a vertex: others had driven on, or nothing was there
         self._has_turned = False
         self._obstructions = self._no_obstructions()
-        self._hindrance = Hindrance()
+        self._hindrance, self._search = Hindrance(), Search()
+        self._otherwise: tuple[Outcome, str] = "failed", ""  # if it does not get out of a slot
         self._neighbours = Neighbours()
         self._scouting, self._backtracking = Scouting(), Backtracking()
         self._retracing = Retracing()
@@ -201,9 +210,7 @@ class Pursuit:
             is_done = self._mapper.graph.vertices and not self._mapper.graph.frontiers()
             if is_going_back or is_done:
                 return
-            verdict = without_target(self._mapper.graph, self.survey, reason)
-            if verdict is not None:
-                self._end(view, *verdict)
+            self._conclude(view, without_target(self._mapper.graph, self.survey, reason))
             return
         has_left = self.where.on_edge not in (None, self.target)
         if has_left and self._backtracking.begin():
@@ -248,12 +255,24 @@ class Pursuit:
     def _end_before(self, view: View, reason: str) -> None:
         """End with frontiers left, once it is told whether they are any."""
         verdict = leading_nowhere(self._mapper.graph, self.survey, reason)
-        if verdict is None:
-            return
-        if verdict[0] == "explored":
+        if verdict is not None and verdict[0] == "explored":
             for vertex in list(self._mapper.graph.vertices.values()):
                 self._mapper.remove(view, vertex, "it is on no edge")
+        self._conclude(view, verdict)
+
+    def _conclude(self, view: View, verdict: tuple[Outcome, str] | None) -> None:
+        """End, once it is told how; from a slot the robot goes into the open first."""
+        if verdict is None:
+            return
+        is_hopeful = verdict[0] != "explored" and self._knows_a_slot(view)
+        if is_hopeful and self._search.begin_in_slot():
+            self._otherwise = verdict
+            return
         self._end(view, *verdict)
+
+    def _knows_a_slot(self, view: View) -> bool:
+        """Whether the robot is in a narrow place, and knows an edge at most."""
+        return is_tight(view) and not has_meetpoints(self._mapper.graph)
 
     def _end(self, view: View, outcome: Outcome, reason: str) -> None:
         self.outcome, self.reason = outcome, reason

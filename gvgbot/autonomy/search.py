@@ -13,6 +13,7 @@ from gvgbot.geometry import Array
 
 NO_EDGE = "no edge in sight"
 _MOST_SOUGHT = 5  # places to look for an edge from
+_MOST_LEFT = 3  # times that a slot is left for the open
 
 
 class Search:
@@ -22,6 +23,7 @@ class Search:
         self._since: float | None = None  # stamp
         self._sought: list[Array] = []  # places to see an edge from, local frame
         self._track: Track | None = None  # to the last of them
+        self.leaves_slot, self._left = False, 0  # now, and how often it was tried
 
     @property
     def is_driving(self) -> bool:
@@ -30,7 +32,15 @@ class Search:
 
     def end(self) -> None:
         """Search anew next time: an edge is in sight, or something else is to be done."""
-        self._since = self._track = None
+        self._since, self._track, self.leaves_slot = None, None, False
+
+    def begin_in_slot(self) -> bool:
+        """Search although an edge is in sight; whether that is worth another try."""
+        if self._left >= _MOST_LEFT:
+            return False
+        self.end()
+        self.leaves_slot, self._left = True, self._left + 1
+        return True
 
     def skip(self, seconds: float) -> None:
         """Do not count a time in which nothing was to be seen."""

@@ -44,14 +44,27 @@ def viewpoints(
     return views
 
 
+def have_room(grid: OccupancyGrid, ways: Array, passage_m: float) -> bool:
+    """Whether any way (points (K, 2)) is farther from the walls, anywhere, than that."""
+    room = cells_to(is_wall(grid.cells)) * grid.resolution_m > passage_m
+    return bool((_marked(ways, grid) & room).any())
+
+
 def cells_near(ways: Array, grid: OccupancyGrid, floor: Mask) -> Mask:
     """The cells of the floor beside ways."""
-    near = np.zeros(floor.shape, np.bool_)
-    rows, columns = ((ways - grid.origin) / grid.resolution_m).astype(np.int64).T[::-1]
-    inside = (rows >= 0) & (columns >= 0) & (rows < floor.shape[0]) & (columns < floor.shape[1])
-    near[rows[inside], columns[inside]] = True
+    near = _marked(ways, grid)
     near = ndimage.binary_dilation(near, iterations=round(_BESIDE_M / grid.resolution_m))
     return np.asarray(near & floor)
+
+
+def _marked(ways: Array, grid: OccupancyGrid) -> Mask:
+    """The cells that ways (points (K, 2)) pass."""
+    height, width = grid.cells.shape
+    marked = np.zeros((height, width), np.bool_)
+    rows, columns = ((ways - grid.origin) / grid.resolution_m).astype(np.int64).T[::-1]
+    inside = (rows >= 0) & (columns >= 0) & (rows < height) & (columns < width)
+    marked[rows[inside], columns[inside]] = True
+    return marked
 
 
 def _on_the_way_there(place: Cell, floor: Mask, near_ways: Mask, off: int) -> Cell | None:

@@ -73,6 +73,19 @@ def test_a_door_that_the_robot_leaves_alone_is_told_of() -> None:
     assert len(survey(driven(carved([CORRIDOR, room]), 6.0)).narrows) == 0
 
 
+def test_floor_in_sight_from_a_slot_is_missing_though_no_edge_leads_there() -> None:
+    """All that is known is an edge in the slot, where the robot has less room than it wants."""
+    pipeline = driven(carved([(-3.4, -0.23, -2.0, 0.23), (-2.0, -3.0, 3.0, 3.0)]), 0.0)
+    graph, _ = streets(2, 1)
+    (edge,) = graph.edges.values()
+    edge.length, edge.polyline = 0.2, 0.02 * edge.polyline
+    pipeline.mapper.graph = graph
+    pipeline.mapper.belief = Belief(np.zeros(9), np.zeros((9, 9)), (1, 2))
+    found = survey(pipeline)
+    assert found.is_beside_floor
+    assert (START.transform(found.places)[:, 0] > -2.0).all()
+
+
 def test_nothing_is_missing_beyond_a_virtual_wall() -> None:
     """One before the shadow of the corner, from wall to wall."""
     pipeline = driven(carved([CORRIDOR, SIDE]), 3.0)

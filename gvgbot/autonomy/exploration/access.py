@@ -113,6 +113,11 @@ def _between_things(view: View) -> Access | None:
     return next(filter(None, (_straight(view, place, _TIGHT_M) for place in points)), None)
 
 
+def is_tight(view: View) -> bool:
+    """Whether walls are so near that the robot would scrape along them, or does."""
+    return float(view.obstacles().query(view.local_base.position)[0]) < _TIGHT_M
+
+
 def way_to_edge(view: View) -> tuple[Array, Array] | None:
     """The straight way to the nearest edge of the local GVG to which there is one.
 

@@ -29,6 +29,7 @@ from gvgbot.autonomy.views import Correspondence, View
 from gvgbot.autonomy.whereabouts import Whereabouts
 from gvgbot.geometry import Array, Pose
 from tests.unit.autonomy.local_graphs import Point, drawn
+from tests.unit.autonomy.sights import Rectangle, carved, looked
 
 CONFIG = ExplorationConfig()
 NOTHING_SEEN = LocalMap(LocalMapConfig())
@@ -359,6 +360,43 @@ def test_an_end_that_is_none_from_nearer_leaves_a_room_without_edges(
         robot.look(middle)
     assert robot.mission.outcome == outcome
     assert len(robot.mapper.graph.vertices) == len(unseen)
+
+
+SLOT: Rectangle = (-0.3, -0.23, 1.0, 0.23)
+HALL: Rectangle = (1.0, -3.0, 4.0, 3.0)
+IN_SLOT = drawn({1: (-0.1, 0.0), 2: (0.6, 0.0)}, {10: (1, 2, [])})
+
+
+def in_a_slot(*free: Rectangle, is_beside_floor: bool) -> Robot:
+    """A robot that sees only the edge in its slot, and what is free."""
+    robot = Robot()
+    robot.walls = looked(carved(list(free)), [robot.pose])
+    places = np.array([[2.0, 1.0]])
+    robot.mission.survey = lambda: Surveyed(places, np.empty((0, 2)), is_beside_floor)
+    return robot
+
+
+@pytest.mark.parametrize("is_beside_floor", [False, True])
+def test_an_edge_in_a_slot_is_not_all_there_is_if_floor_is_in_sight(
+    *, is_beside_floor: bool
+) -> None:
+    robot = in_a_slot(SLOT, is_beside_floor=is_beside_floor)
+    while robot.mission.outcome is None and robot.stamp < 300.0:
+        robot.look(IN_SLOT)
+    assert robot.mission.outcome == ("failed" if is_beside_floor else "explored")
+
+
+def test_who_knows_only_the_slot_it_is_in_drives_out_and_begins_anew() -> None:
+    robot = in_a_slot(SLOT, HALL, is_beside_floor=True)
+    order = robot.look(IN_SLOT)
+    while not isinstance(order, Drive) or end_of(order)[0] < 1.2:
+        assert robot.mission.outcome is None
+        order = robot.look(IN_SLOT)
+    assert len(robot.mapper.graph.vertices) == 2
+    robot.drive(IN_SLOT, (0.0, 0.0), end_of(order))
+    hall = drawn({1: (2.5, -2.0), 2: (2.5, 2.0)}, {10: (1, 2, [])}, unseen={1: -1.6, 2: 1.6})
+    assert isinstance(robot.stand(hall, 2), Drive)
+    assert not robot.mapper.graph.vertices
 
 
 def test_who_has_lost_sight_of_all_that_is_known_goes_back_over_the_way_it_came() -> None:
