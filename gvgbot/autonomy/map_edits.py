@@ -128,6 +128,12 @@ class MapEdits(Knowledge):
         for vertex in strays(self.graph):
             self.remove(view, vertex, "nothing leads there")
 
+    def forget_bends(self, view: View) -> None:
+        """Take out meetpoints that have lost their other departures: one edge passes there."""
+        for vertex in list(self.graph.vertices.values()):
+            if self.graph.is_bend(vertex):
+                self.remove(view, vertex, "an edge passes here")
+
     # -- edges -------------------------------------------------------------------------------
 
     def join(

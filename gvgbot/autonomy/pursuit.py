@@ -276,5 +276,6 @@ class Pursuit:
 
     def _end(self, view: View, outcome: Outcome, reason: str) -> None:
         self.outcome, self.reason = outcome, reason
+        self._mapper.forget_bends(view)
         self._mapper.establish()
         self._events.append(Finished(view.stamp, outcome, reason))

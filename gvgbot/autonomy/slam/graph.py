@@ -235,6 +235,11 @@ class GvgGraph:
         ends = ((edge.a.vertex, edge.b.vertex) for edge in self.edges.values())
         return [self.vertices[a] for a, b in ends if a == b and self.vertices[a].degree == 2]
 
+    def is_bend(self, vertex: Vertex) -> bool:
+        """Whether there is nothing to a vertex but two edges, which might as well be one."""
+        edges = {half.edge for half in vertex.half_edges.values()}
+        return vertex.degree == len(edges) == 2 and None not in edges
+
     def leave_ring(self, vertex: Vertex) -> bool:
         """Take out what leads away from a ring's vertex; False if there is more than that, or less.
 

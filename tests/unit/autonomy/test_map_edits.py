@@ -79,6 +79,25 @@ def test_strays_are_forgotten_only_beside_a_map_that_holds_together(
     assert len(edits.graph.vertices) == 2
 
 
+def test_of_a_meetpoint_that_has_lost_its_third_departure_an_edge_is_left(
+    edits: MapEdits, view: View
+) -> None:
+    """Two on a ring: of the second, the edge from and to the first is left, 8 m round a square."""
+    south, north = (edits.add_driven(view, np.array([0.0, y]), 0.0, 3.1) for y in (-1.0, 1.0))
+    (a, c), (b, d) = ([HalfEdgeId(v.id, key) for key in v.half_edges] for v in (south, north))
+    side = south.add_half_edge(-1.6)
+    for start, end, x in ((a, b, 1.0), (c, d, -1.0)):
+        line = np.array([(0.0, -1.0), (x, -1.0), (x, 1.0), (0.0, 1.0)])
+        edits.join(view, start, end, line, 0.5, driven=True)
+    edits.forget_bends(view)
+    assert list(edits.graph.vertices) == [south.id]
+    edits.graph.remove_half_edge(HalfEdgeId(south.id, side))
+    edits.forget_bends(view)
+    (edge,) = edits.graph.edges.values()
+    assert edge.a.vertex == edge.b.vertex == south.id
+    assert edge.length == pytest.approx(8.0)
+
+
 def test_the_vertex_of_a_ring_has_the_room_that_is_around_it(edits: MapEdits, view: View) -> None:
     """More than where the ring is narrowest; or its walls would seem to have gone."""
     edits.close_ring(view, np.array([(3.0, 0.0), (9.0, 12.0), (-3.0, 0.0)]), 1.0)

@@ -168,6 +168,25 @@ def test_a_map_without_frontiers_is_explored() -> None:
     assert end.reason
 
 
+def test_a_meetpoint_that_has_become_a_bend_is_no_part_of_an_explored_map() -> None:
+    """Its third departure led round somebody who has gone."""
+    robot = Robot()
+    robot.walls = Narrow(LocalMapConfig())
+    robot.stand(CLOSED, 6)
+    view = View(0, robot.stamp, 0.0, robot.pose, CLOSED, robot.walls)
+    graph, place = robot.mapper.graph, np.array([1.5, 0.0])
+    vertex = robot.mapper.add_driven(view, place, 0.0, math.pi, math.pi / 2)
+    robot.mapper.part_edge_at(vertex)
+    graph.remove_half_edge(HalfEdgeId(vertex.id, 2))
+    assert len(graph.edges) == 2
+    while robot.mission.outcome is None and robot.stamp < 100.0:
+        robot.look(CLOSED)
+    assert robot.mission.outcome == "explored"
+    (edge,) = graph.edges.values()
+    assert edge.length == pytest.approx(5.0, abs=0.01)
+    assert vertex.id not in graph.vertices
+
+
 LONG = drawn({1: (0.0, 0.0), 2: (20.0, 0.0)}, {10: (1, 2, [])})
 
 
