@@ -46,7 +46,7 @@ def viewpoints(
 
 def have_room(grid: OccupancyGrid, ways: Array, passage_m: float) -> bool:
     """Whether any way (points (K, 2)) is farther from the walls, anywhere, than that."""
-    room = cells_to(is_wall(grid.cells)) * grid.resolution_m > passage_m
+    room = metres_to(is_wall(grid.cells), grid.resolution_m) > passage_m
     return bool((_marked(ways, grid) & room).any())
 
 
