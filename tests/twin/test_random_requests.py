@@ -25,7 +25,7 @@ STILL_M = 0.005
 DRIVING = ("resume", "home", "goto", "patrol", "coverage", "explore", "relocalise")
 LIFTED_AT, NO_LASER_AT = 60, 120  # requests before somebody lifts the robot, or pulls a cable
 LASTS_S, REACTION_S = 2.5, 1.0
-LEFT_OUT = re.compile(r" \((\d+) requests before this one were not written down\)")
+LEFT_OUT = re.compile(r" \((\d+) requests? before this one w(?:as|ere) not written down\)")
 
 numbers = st.one_of(st.integers(-3, 12), st.floats(-20.0, 20.0), st.just(math.inf))
 fitting = st.one_of(
