@@ -105,8 +105,9 @@ def test_who_cannot_go_back_goes_on_to_an_end_of_the_corridor_that_is_out_of_sig
 def test_on_a_ring_that_comes_back_to_its_only_vertex_the_other_way_round_is_taken(
     tmp_path: Path,
 ) -> None:
-    """24 m around, the vertex is anywhere, and somebody stands on the shorter way."""
-    walker = Walker(tmp_path / "run", [RING])
+    """18 m around, the vertex is anywhere, and somebody stands on the shorter way of 5 m."""
+    ring, east = [(2.0, 2.0), (7.0, 2.0), (7.0, 6.0), (2.0, 6.0), (2.0, 2.0)], (7.0, 4.0)
+    walker = Walker(tmp_path / "run", [ring])
     driven: list[float] = []
 
     async def story(clock: Clock) -> None:
@@ -115,15 +116,15 @@ def test_on_a_ring_that_comes_back_to_its_only_vertex_the_other_way_round_is_tak
         x, y = START.transform(belief.map_vertex(vertex).position).tolist()
         assert math.dist((x, y), (4.0, 2.0)) < 1.0
         await walker.go(clock, (x, y))
-        walker.put_person(6.5, 2.0)
-        driven.append(await walker.go(clock, EAST))
+        walker.put_person(6.0, 2.0)
+        driven.append(await walker.go(clock, east))
         await clock.sleep_until(clock.now() + REMEMBERED)
-        walker.put_person(9.0, 2.8)
+        walker.put_person(7.0, 2.5)
         driven.append(await walker.go(clock, (x, y)))
 
     walker.tell(story)
     for metres in driven:
-        assert 24.0 - 8.5 < metres < 24.0 - 6.5 + 4.0  # and to the person and back
+        assert 18.0 - 6.0 < metres < 18.0 - 4.0 + 4.0  # and to the person and back
 
 
 def test_a_near_point_is_driven_to_when_somebody_asks_again_after_the_way_was_closed(

@@ -34,7 +34,7 @@ from gvgbot.autonomy.mission import Mission
 from gvgbot.autonomy.situation import Situation
 from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.autonomy.views import Correspondence, View
-from gvgbot.geometry import Array, Pose, wrap_angle
+from gvgbot.geometry import Array, Pose, length_of, wrap_angle
 
 _OFF_GRAPH_M = 3.0  # a point farther from every edge is out of reach
 DIRECT_M = 4.0  # off a point, one drives there straight, or with one bend
@@ -108,6 +108,8 @@ class Driving:
         self._closed: HalfEdgeId | None = None  # something stands between it and the robot
         self._route: Route | None = None  # that is being driven
         self._nearest_m: dict[bool, float] = {}  # least that was left of it, and straight on
+        self._straight_m = math.inf  # so long a way straight on is not driven
+        self._goes_round = False  # by the edges, what stood in the way straight on
         self._looks = 0
         self._unseen = 0  # looks at where the route goes on, without seeing that
         self._is_looking = self._is_obstructed = False
@@ -178,8 +180,18 @@ class Driving:
     # -- something in the way ----------------------------------------------------------------------
 
     def _close_way(self, view: View) -> Ended | None:
-        """Something stands in the way: try another one, if there is one."""
+        """Something stands in the way: try another one, if there is one.
+
+        After the way straight on that is the one along the edges, once.
+        """
         route, on_edge = self._route, self._ground.mission.where.on_edge
+        straight = self._nearest_m.pop(True, None)
+        if straight is not None:
+            self._straight_m = straight - _PROGRESS_M
+            if route is None and not self._goes_round:
+                self._goes_round = True
+                self._try_another_way(view)
+                return None
         if route is not None and route.departures and self._ground.is_at(view, route.first.vertex):
             end = route.departures[0]
             edge = self._mapper.graph.edge_at(end)
@@ -190,9 +202,6 @@ class Driving:
         self, view: View, end: HalfEdgeId | None, heading: HalfEdgeId | None
     ) -> Ended | None:
         """Drive an edge no more, and not to that end of it if the robot is on it."""
-        self._is_obstructed, self._unseen = False, 0
-        self._wait_anew(view)
-        self._nearest_m.clear()
         graph = self._mapper.graph
         edge = None if end is None else graph.edge_at(end)
         ends = [edge.a, edge.b] if edge is not None else [end] if end is not None else []
@@ -202,8 +211,14 @@ class Driving:
         self._closed = heading
         until = view.stamp + self.config.remember_blocked_s
         self._ground.closures.close(graph, ends, until)
-        self.happened.append(Recovery(view.stamp, "try another way", "something stands in the way"))
+        self._try_another_way(view)
         return None
+
+    def _try_another_way(self, view: View) -> None:
+        self._is_obstructed, self._unseen = False, 0
+        self._wait_anew(view)
+        self._nearest_m.clear()
+        self.happened.append(Recovery(view.stamp, "try another way", "something stands in the way"))
 
     def _is_missing(self, view: View, here: Situation, departure: HalfEdgeId) -> bool:
         """Whether nothing is to be seen of an edge where it should leave, which is in sight."""
@@ -280,7 +295,7 @@ class Driving:
         way, room_m = None, self._ground.room_m
         if away < DIRECT_M:
             way = straight_way(view, local_goal, room_m) or bent_way(view, local_goal, room_m)
-        if way is not None and not self._stands(view):
+        if way is not None and length_of(way[0]) < self._straight_m and not self._stands(view):
             self._route, track = None, Track.of(*way)
             self._come_nearer(view, track.length, straight=True)
             return Drive(track)
@@ -292,7 +307,7 @@ class Driving:
         at_foot = foot.in_local_frame(self._mapper, view)
         if self._is_there(view, at_foot):
             if way is not None and isinstance(stop, ToPoint):  # who stands in it may go
-                self._route = None
+                self._route, self._straight_m, self._goes_round = None, math.inf, True
                 return Drive(Track.of(*way))
             short = f"{away:.1f} m from there, where the known ways end"
             if isinstance(stop, Home):
@@ -328,7 +343,7 @@ class Driving:
         if self._unseen >= _UNSEEN_LOOKS[0]:  # a door that has opened just now is still a wall
             self._wait_anew(view)
             return Stand()
-        self._come_nearer(view, route.metres)
+        self._come_nearer(view, route.metres + here.place.distance)
         path = route.branches(here) or here.ahead()
         line, clearance = here.line_along(path)
         if end is not None:

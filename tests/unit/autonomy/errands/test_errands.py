@@ -10,7 +10,7 @@ from gvgbot.autonomy.control.edge_follower import Track
 from gvgbot.autonomy.control.orders import Drive, Order, Stand
 from gvgbot.autonomy.errands import Declined
 from gvgbot.autonomy.errands.plans import Kept
-from gvgbot.autonomy.events import ErrandEnded
+from gvgbot.autonomy.events import ErrandEnded, Recovery
 from gvgbot.autonomy.slam.graph import HalfEdgeId, Vertex
 from gvgbot.geometry import Pose, Twist
 from tests.unit.autonomy.errands.test_own_tasks import Explorer
@@ -133,3 +133,19 @@ def test_who_stands_on_a_point_has_as_long_to_go_as_in_any_other_way() -> None:
     while not robot.said(ErrandEnded):
         robot.look(CLOSED)
     assert since + patience < robot.stamp < since + patience + 2.0
+
+
+def test_who_meets_something_on_the_straight_way_to_a_point_comes_by_the_edge() -> None:
+    """Half way up to the left; the way round is along the edge, and a right angle to the left."""
+    robot, goal, corner = in_a_hall(), (2.0, 2.4), (2.0, 0.0)
+    robot.errands.goto_point(*goal, robot.stamp)
+    order, off_corner = robot.look(CLOSED), math.inf
+    while isinstance(order, Drive):
+        if robot.pose.x > 0.5 and not robot.said(Recovery):
+            robot.errands.obstruct("bumper again and again")
+        order = creep(robot, order.track)
+        off_corner = min(off_corner, math.dist((robot.pose.x, robot.pose.y), corner))
+    (ended,) = robot.said(ErrandEnded)
+    assert isinstance(ended, ErrandEnded)
+    assert ended.outcome == "arrived", ended.reason
+    assert off_corner < 0.2
