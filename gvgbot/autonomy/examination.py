@@ -6,7 +6,7 @@ from gvgbot.autonomy.evidence import IN_FULL_VIEW_M
 from gvgbot.autonomy.gvg.local import Branch
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.situation import Situation
-from gvgbot.autonomy.views import View
+from gvgbot.autonomy.views import View, touching
 from gvgbot.geometry import Array
 
 _SAME_M = 1.0  # what may be a vertex is seen elsewhere from elsewhere, by less than that
@@ -42,10 +42,11 @@ class Examination:
         if view.stamp - self._since >= patience_s:
             return None
         self._look_at_aim(view, here)
+        felt = touching(here.gvg, view.felt)  # looking on tells no more of it
         paths = [
             (metres, node, path)
             for node, (metres, path) in here.gvg.routes(here.place).items()
-            if self._may_be_new(view, here, node)
+            if node not in felt and self._may_be_new(view, here, node)
         ]
         if not paths:
             return None

@@ -248,6 +248,7 @@ class Pipeline:
             self.traffic.newcomers.is_one_standing(scan.stamp, self.tracker.maps.near),
             scan.field_of_view,
             self._hazards.virtual_walls,
+            hazards,
         )
 
     def _act(self, view: View, known: Correspondence, scan: Scan) -> list[Event]:

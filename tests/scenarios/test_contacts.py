@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from gvgbot.autonomy.events import EdgeJoined
 from gvgbot.geometry import Pose
 from gvgbot.worlds.canvas import Canvas
 from tests.scenarios.rig import Play, assert_found, graph_shape, play
@@ -37,6 +38,8 @@ def test_a_contact_makes_the_robot_back_off_once_and_go_on(mishap: str, cause: s
     assert xs[0] - min(xs[furthest : furthest + 250]) == pytest.approx(0.125, abs=0.035)
     assert run.recoveries().count("back off") == 1
     assert run.outcome == "explored", run.pipeline.mission.reason
+    joined = max(event.stamp for event in run.events if isinstance(event, EdgeJoined))
+    assert run.ended < joined + 10.0  # it does not wait before what it felt
     assert_found(run, "endpoint", ENDS)
     assert run.contacts == 0
 

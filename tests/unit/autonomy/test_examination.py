@@ -1,5 +1,6 @@
 """What is looked at once more, drawn by hand, when nothing is left to explore."""
 
+import numpy as np
 import pytest
 
 from gvgbot.autonomy.evidence import MappingConfig
@@ -14,8 +15,8 @@ from gvgbot.autonomy.slam.recognition import RecognitionConfig
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
 from gvgbot.autonomy.views import Correspondence, View
 from gvgbot.autonomy.whereabouts import Whereabouts
-from gvgbot.geometry import Pose
-from tests.unit.autonomy.local_graphs import drawn
+from gvgbot.geometry import Array, Pose
+from tests.unit.autonomy.local_graphs import Point, drawn
 
 # A corridor with a meetpoint at x = 6 that the map does not have.
 TEE = drawn(
@@ -24,6 +25,7 @@ TEE = drawn(
 )
 PLAIN = drawn({1: (0.0, 0.0), 3: (12.0, 0.0)}, {10: (1, 3, [])})
 CUT_OFF = drawn({1: (0.0, 0.0), 5: (4.5, 0.0)}, {10: (1, 5, [])}, unseen={5: 0.0})
+NOTHING = np.empty((0, 2))
 ENDS = {1: 1, 3: 3, 4: 4}  # are known
 
 
@@ -38,6 +40,13 @@ def test_in_a_team_what_only_bodies_make_is_not_waited_for(
     mapper = Mapper(MappingConfig(), RecognitionConfig(), ScanMatchingConfig())
     nodes = frozenset(doubted)
     assert sees(Examination(mapper), TEE, 1.0, nodes, in_team=in_team) == is_examined
+
+
+@pytest.mark.parametrize(("bump", "is_examined"), [((6.0, 0.5), False), ((2.0, 0.5), True)])
+def test_what_only_a_bump_makes_is_not_looked_at(bump: Point, is_examined: bool) -> None:
+    """It stays as long as the robot stands before it. The meetpoint is a metre from its walls."""
+    examination = Examination(Mapper(MappingConfig(), RecognitionConfig(), ScanMatchingConfig()))
+    assert sees(examination, TEE, 1.0, felt=np.array([bump])) == is_examined
 
 
 def test_what_was_seen_from_near_to_be_none_is_not_driven_to_again_from_afar() -> None:
@@ -68,6 +77,7 @@ def sees(
     doubted: frozenset[int] = frozenset(),
     *,
     in_team: bool = False,
+    felt: Array = NOTHING,
 ) -> bool:
     """Whether there is something to be examined, for a robot in the corridor."""
     known, pose = Correspondence(), Pose(x, 0.0, 0.0)
@@ -75,7 +85,7 @@ def sees(
         known.pair(node, vertex)
     place = gvg.place(pose.position)
     assert place is not None
-    view = View(0, 0.0, 0.0, pose, gvg, LocalMap(LocalMapConfig()), doubted=doubted)
+    view = View(0, 0.0, 0.0, pose, gvg, LocalMap(LocalMapConfig()), doubted=doubted, felt=felt)
     here = Situation(
         gvg, known, GvgGraph(), Whereabouts(), Access(place), pose, doubted, in_team=in_team
     )
