@@ -77,6 +77,12 @@ class Past:
         """Metres that the robot has driven itself, whoever made the map that it began with."""
         return self.travelled - self.lent_m + self.sought_m
 
+    def old(self, metres: float) -> list[Keyframe]:
+        """Those that are kept for good, since which the robot has driven so far or farther."""
+        lengths = [math.hypot(step.motion.x, step.motion.y) for step in reversed(self.steps)]
+        recent = int(np.searchsorted(np.cumsum(lengths), metres)) + 1
+        return self.keyframes[: min(self.lasting, len(self.keyframes) - recent)]
+
     def still(self) -> Self:
         """A copy that does not grow as the robot goes on."""
         copied = copy.copy(self)

@@ -62,6 +62,12 @@ class Mapper(MapEdits):
         near = np.flatnonzero(gaps < self._recognition.same_place_m)
         return any(self.belief.ids[i] not in known.node_of for i in near)
 
+    def lose_sight(self, seen_at: float) -> None:
+        """Know all vertices from afar: none was seen after so many metres, and nothing else was."""
+        for vertex in self.graph.vertices.values():
+            vertex.seen_at = min(vertex.seen_at, seen_at)
+        self._unbelieved.forget()
+
     def observe(self, view: View) -> tuple[Correspondence, list[Event]]:
         """Match a view with the map and learn from it.
 

@@ -1,6 +1,7 @@
 """Every stage from HAL messages to a twist, in the order of the flow. No I/O, clock or chance."""
 
 import math
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -22,6 +23,7 @@ from gvgbot.autonomy.control.reflexes import (
 )
 from gvgbot.autonomy.control.room import room_ahead
 from gvgbot.autonomy.errands import Errands
+from gvgbot.autonomy.errands.kinds import Look
 from gvgbot.autonomy.events import EdgeJoined, Event, Recovery, VertexAdded, WayForgotten
 from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.gvg.beams import without_mixed_pixels
@@ -35,6 +37,7 @@ from gvgbot.autonomy.localisation import Localisation
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.mission import Mission
 from gvgbot.autonomy.noisy_walls import NoisyWalls
+from gvgbot.autonomy.placing import LATELY_M, search_near_by
 from gvgbot.autonomy.pose_tracking import PoseTracker
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
 from gvgbot.autonomy.traffic import Traffic
@@ -96,6 +99,7 @@ class Pipeline:
         self._handedness, self._turning = Handedness(), 0.0  # the latter as it wished last, rad/s
         self._incidents: list[tuple[str, str]] = []  # action and reason, since the last scan
         self._look_now = False
+        self._doubted: int | None = None  # keyframe since which somebody doubts the pose
         self._looked: Pose | None = None  # local_base of the last look for the GVG
         self._execution = Execution(config.edge_follower, robot_radius)
         self.gvg = LocalGvg()
@@ -265,6 +269,10 @@ class Pipeline:
                 return self._halt(scan.stamp, _LOOKS_ASIDE)
             self._execution.turn(_blind_angle(scan))
             return []
+        if self._doubted is not None and len(self.past.keyframes) > self._doubted + 1:
+            placed = self._search_near_by(view)
+            if placed:
+                return placed
         order, done = self.errands.advance(view, known)
         if isinstance(order, Drive) and self.traffic.is_in_team:
             room = self.radius, self._config.passage_margin_m
@@ -313,6 +321,8 @@ class Pipeline:
         if self.past.last is None:
             return Pose()
         is_doubted, self.errands.is_lost = self.errands.is_lost, False
+        if is_doubted and isinstance(self.errands.errand, Look):
+            self._doubted = len(self.past.keyframes)
         if is_broken:
             self._incidents.append(_SEARCHES_NEAR_BY)
         local_base = self.tracker.track(
@@ -332,10 +342,29 @@ class Pipeline:
             past.lasting = len(past.keyframes)
         if len(past.keyframes) <= past.lasting + self._config.keyframe.latest:
             return []
+        return [self._leave_out(stamp)]
+
+    def _leave_out(self, stamp: float) -> Event:
+        past = self.past
         left_out = past.leave_out()
         self.mapper.forget_between(past.lasting, past.lasting + left_out)
         self.traffic.passed = [one.before(past.lasting) for one in self.traffic.passed]
-        return [WayForgotten(stamp, past.lasting, left_out)]
+        return WayForgotten(stamp, past.lasting, left_out)
+
+    def _search_near_by(self, view: View) -> list[Event]:
+        """After a look around because somebody doubts the pose, compare that with the map.
+
+        What was seen since the last new place, or since that, was drawn where the robot was not.
+        """
+        past, first, self._doubted = self.past, self._doubted, None
+        seen, old, seen_at = past.keyframes[first:], past.old(LATELY_M), past.travelled - LATELY_M
+        placed = search_near_by(self.mission, self.mapper, view, seen, old, self.matching, seen_at)
+        if placed is None:
+            return []
+        self._execution.stand()
+        self._look_now = True
+        past.keyframes[-1] = replace(past.keyframes[-1], map_base=self.mapper.belief.map_base)
+        return [placed, self._leave_out(view.stamp)]
 
     # -- control, per odometry message -------------------------------------------------------------
 

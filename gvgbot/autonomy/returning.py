@@ -15,26 +15,21 @@ import numpy as np
 
 from gvgbot.autonomy.config import AutonomyConfig
 from gvgbot.autonomy.control.reflexes import Felt
-from gvgbot.autonomy.destinations import foot_of
 from gvgbot.autonomy.errands import Declined
 from gvgbot.autonomy.estimate import Estimate, scans_at, smoothed
 from gvgbot.autonomy.events import Event, Finished, Recovery, WayForgotten
 from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.keyframes import UNKNOWN_WAY, Step
-from gvgbot.autonomy.knowledge import ON_EDGE_M
 from gvgbot.autonomy.localisation import Localisation
 from gvgbot.autonomy.memory import Growth, Memory, recall, remember
 from gvgbot.autonomy.pipeline import STANDS_CARRIED, Pipeline
+from gvgbot.autonomy.placing import be_on_edge, place
 from gvgbot.autonomy.relocalisation import Look, Opinion, Relocaliser
-from gvgbot.autonomy.slam import ekf
-from gvgbot.autonomy.slam.ekf import Belief
-from gvgbot.autonomy.whereabouts import Whereabouts
 from gvgbot.geometry import STANDSTILL, Pose, Twist
 from gvgbot.hal.messages import Odometry, Scan
 from gvgbot.words import counted
 
 _MOVED_M, _MOVED_RAD = 0.5, 0.3  # farther from where odometry has it, something is wrong
-_FOUND = np.diag([0.1**2, 0.1**2, 0.03**2])  # covariance of a place found on the map
 _NOTHING_FELT = Felt()
 
 
@@ -216,7 +211,13 @@ class ReturningPipeline(Pipeline):
         assert found is not None
         assert last is not None
         map_before = self.mapper.belief.map_base.compose(last.local_base.inverse())
-        self._place(map_local.compose(found.local_base))
+        place(
+            self.mission,
+            self.mapper,
+            self._estimate.vertices,
+            map_local.compose(found.local_base),
+            self.past.travelled - self._config.recognition.tracked_m,
+        )
         map_base = self.mapper.belief.map_base
         map_local = map_base.compose(found.local_base.inverse())
         self._move_hazards(seeker, map_local.to(map_before))
@@ -226,45 +227,12 @@ class ReturningPipeline(Pipeline):
         self.tracker.take_over(seeker.tracker)
         self.gvg, self._reflexes = seeker.gvg, seeker._reflexes
         self.traffic.newcomers = seeker.traffic.newcomers
-        self._be_on_edge(map_local)
+        be_on_edge(self.mission, self.mapper, found.local_base)
         self.past.keyframes.append(replace(found, map_base=map_base))
         self.past.steps.append(Step(last.map_base.to(map_base), UNKNOWN_WAY))
         self.past.with_scan = None
         self._look_now = self._is_back = True
         self._end_seeking(seeker)
-
-    def _place(self, map_base: Pose) -> None:
-        """Believe to be at a pose on the smoothed map, independently of the way there.
-
-        The belief may have the map elsewhere, and is unsure of that, but not of what is near there.
-        All vertices are known from afar.
-        """
-        mapper, vertices = self.mapper, self._estimate.vertices
-        if vertices:
-            nearest = min(vertices, key=lambda vertex: vertices[vertex].distance(map_base))
-            seen = vertices[nearest].to(map_base)
-            mapper.belief = ekf.place_robot(mapper.belief, nearest, seen, _FOUND)
-        else:
-            mapper.belief = Belief(
-                np.array([map_base.x, map_base.y, map_base.theta]), _FOUND.copy()
-            )
-        for vertex in mapper.graph.vertices.values():
-            vertex.seen_at = min(
-                vertex.seen_at, self.past.travelled - self._config.recognition.tracked_m
-            )
-        mapper._unbelieved.forget()
-        self.mission.where, self.mission.target = Whereabouts(), None
-        self.mission.reason = ""
-
-    def _be_on_edge(self, map_local: Pose) -> None:
-        """Be on the known edge that passes here, if one does: its ends may be out of sight."""
-        belief = self.mapper.belief
-        foot = foot_of(self.mapper, belief.map_base.position)
-        if foot is None or foot.away > ON_EDGE_M:
-            return
-        end, come = foot.edge.a, foot.edge.polyline[: foot.index + 1]
-        local_vertex = map_local.inverse().compose(belief.map_vertex(end.vertex))
-        self.mission.where.rejoin(end, local_vertex.transform(come))
 
     def _move_hazards(self, seeker: Pipeline, turn: Pose) -> None:
         """Take what was felt into the new local frame, which sees the old one at `turn`."""

@@ -36,6 +36,14 @@ def test_of_a_way_that_is_left_out_only_its_end_stays_and_nobody_knows_how_it_ca
     assert past.lent == 2
 
 
+def test_old_is_what_lasts_and_was_kept_so_many_metres_ago() -> None:
+    past = driven(0.0, 1.0, 2.0, 4.0, 5.0)
+    past.lasting = 4
+    assert [
+        [keyframe.local_base.x for keyframe in past.old(metres)] for metres in (0.5, 2.5, 5.0, 9.0)
+    ] == [[0.0, 1.0, 2.0, 4.0], [0.0, 1.0, 2.0], [0.0], []]
+
+
 def test_a_still_past_does_not_grow() -> None:
     past = driven(0.0, 1.0)
     past.travelled, past.lent_m = 7.0, 3.0
