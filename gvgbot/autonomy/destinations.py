@@ -84,8 +84,11 @@ def _nearest_in_sight(mapper: Mapper, point: Array, places: Array, away: Array) 
 
 
 def _walls_around(mapper: Mapper, point: Array) -> Array:
-    """The walls (N, 2), map frame, that vertices near a point (2,) were seen among."""
-    belief, walls = mapper.belief, [np.empty((0, 2))]
+    """The walls (N, 2), map frame, that vertices near a point (2,) were seen among.
+
+    Virtual ones as well.
+    """
+    belief, walls = mapper.belief, [mapper.virtual_walls]
     for vertex in belief.ids:
         map_vertex = belief.map_vertex(vertex)
         if math.dist(map_vertex.position, point) < _SHOWS_M:
@@ -125,12 +128,16 @@ def route_to_foot(
     routes = []
     for end, rest in ((edge.a, foot.station), (edge.b, edge.length - foot.station)):
         approach, half = reached.get(end.vertex), here.graph.half_edge(end)
-        if approach is not None and half is not None and (end == closed or not half.blocked):
+        is_shut = half is None or (end != closed and half.blocked)
+        begin = 0.0 if end == edge.a else edge.length
+        is_shut |= here.graph.is_walled(edge, begin, foot.station)
+        if approach is not None and not is_shut:
             first, departures = first_arrival(starts, approach), (*approach.departures, end)
             routes.append(Route(approach.metres + rest, first, departures))
         if end == here.where.on_edge:
             onwards = rest - here.where.trail_length
             towards = edge.other(end) if onwards > 0.0 else end
-            if towards != closed:
+            now = foot.station + (-onwards if end == edge.a else onwards)
+            if towards != closed and not here.graph.is_walled(edge, now, foot.station):
                 routes.append(Route(abs(onwards), towards, (), ahead=onwards > 0.0))
     return min(routes, key=lambda route: route.metres, default=None)

@@ -12,6 +12,7 @@ from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.slam.graph import Edge, GvgGraph, Vertex
 from gvgbot.autonomy.views import Observation, View
+from gvgbot.autonomy.virtual_walls import crossings
 from gvgbot.geometry import Array, Pose
 
 ON_EDGE_M = 0.5  # what is nearer to an edge stands on it
@@ -28,6 +29,7 @@ class Knowledge:
     graph: GvgGraph = field(default_factory=GvgGraph)
     observations: list[Observation] = field(default_factory=list)
     driven_parts: list[Array] = field(default_factory=list)
+    virtual_walls: Array = field(default_factory=lambda: np.empty((0, 2)))  # points, map frame
 
     def map_in_local(self, local_base: Pose) -> Pose:
         """The pose of the map frame in the local one; `local_map` is a grid of what was seen."""
@@ -79,6 +81,17 @@ class Knowledge:
             if math.dist(starts[edge.a.vertex], (x, y)) < within:
                 line = self.belief.map_vertex(edge.a.vertex).transform(edge.polyline)
                 yield edge, float(np.hypot(*(line - [x, y]).T).min())
+
+    def heed(self, virtual_walls: Array) -> None:
+        """Note over which of its edges virtual walls lie now, as points (N, 2), map frame."""
+        self.virtual_walls, self.graph.walled = virtual_walls, {}
+        if not len(virtual_walls):
+            return
+        edges = self.graph.edges.values()
+        lines = [self.belief.map_vertex(e.a.vertex).transform(e.polyline) for e in edges]
+        for edge, at in zip(edges, crossings(virtual_walls, lines), strict=True):
+            if at:
+                self.graph.walled[edge.id] = at
 
     def establish(self) -> None:
         """Take the map for the building: what speaks against it must do so for long, from now on.

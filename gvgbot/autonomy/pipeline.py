@@ -230,6 +230,7 @@ class Pipeline:
         self.open_clearance = self._config.reduction.open_clearance(
             scan.range_max, self._config.local_map.half_width_m
         )
+        self.mapper.heed(self.virtual_walls)
         virtual = self.mapper.map_in_local(local_base).transform(self.virtual_walls)
         self._hazards.virtual_walls = virtual[self.tracker.maps.near.covers(virtual)]
         self.gvg, marks = self.mapper.marked(self._local_gvg(local_base), local_base)

@@ -8,7 +8,7 @@ import numpy as np
 from gvgbot.autonomy.exploration.access import Access
 from gvgbot.autonomy.exploration.paths import Approach, first_arrival, shortest_path
 from gvgbot.autonomy.gvg.local import Branch, LocalGvg, LocalNode, Place
-from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
+from gvgbot.autonomy.slam.graph import Edge, GvgGraph, HalfEdgeId
 from gvgbot.autonomy.views import Correspondence
 from gvgbot.autonomy.whereabouts import Whereabouts
 from gvgbot.geometry import Array, Pose, wrap_angle
@@ -58,16 +58,28 @@ class Situation:
         end = self.where.on_edge
         if end is None or self.graph.half_edge(end) is None:
             return []
-        driven = self.where.trail_length
-        found = [Approach(driven, end)]
-        edge = self.graph.edge_at(end)
+        driven, edge = self.where.trail_length, self.graph.edge_at(end)
+        found = (
+            []
+            if self._is_walled(edge, end, 0.0, max(0.0, driven - _PAST_M))
+            else [Approach(driven, end)]
+        )
         half = self.graph.half_edge(end)
-        if edge is not None and half is not None and (closed == end or not half.blocked):
+        is_shut = half is None or (closed != end and half.blocked)
+        if edge is not None and not is_shut and not self._is_walled(edge, end, driven, math.inf):
             found.append(Approach(max(0.0, edge.length - driven), edge.other(end)))
         if self._loop_ends():
             return [a for a in found if a.arrival not in in_sight]
         vertices = {arrival.vertex for arrival in in_sight}
         return [a for a in found if a.arrival.vertex not in vertices]
+
+    def _is_walled(self, edge: Edge | None, end: HalfEdgeId, begin: float, to: float) -> bool:
+        """Whether a virtual wall crosses an edge between two places, m from one of its ends."""
+        if edge is None:
+            return False
+        if end == edge.b:
+            begin, to = edge.length - begin, edge.length - to
+        return self.graph.is_walled(edge, begin, to)
 
     def _loop_ends(self) -> tuple[HalfEdgeId, ...]:
         """The half-edges of the robot's edge if that comes back to its vertex."""

@@ -5,8 +5,9 @@ from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
-from gvgbot.geometry import Array, sampled
+from gvgbot.geometry import Array, resampled, sampled, stations_of
 from gvgbot.ranges import Range
 
 Coordinate = Annotated[float, Range(-1e4, 1e4)]  # m, map frame
@@ -27,6 +28,20 @@ def checked(walls: Sequence[VirtualWall]) -> None:
 def points_of(walls: Sequence[VirtualWall]) -> Array:
     """Points (N, 2) that stand for the walls, map frame."""
     return sampled(walls, _SPACING_M)
+
+
+def crossings(walls: Array, lines: Sequence[Array]) -> list[tuple[float, ...]]:
+    """Where each of the lines (N, 2) leads over walls, as points (M, 2): m along it."""
+    near = [resampled(line, _SPACING_M / 2) for line in lines]
+    away = np.asarray(cKDTree(walls).query(np.concatenate([np.empty((0, 2)), *near]))[0])
+    found = []
+    for line, gaps in zip(
+        near, np.split(away, np.cumsum([len(line) for line in near])), strict=False
+    ):
+        is_on = np.concatenate([[False], gaps < _CROSSING_M])
+        begins = np.flatnonzero(is_on[1:] & ~is_on[:-1])
+        found.append(tuple(stations_of(line)[begins].tolist()))
+    return found
 
 
 def nearest_before(walls: Array, here: Array, places: Array, away: Array) -> int | None:

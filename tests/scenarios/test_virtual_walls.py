@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from gvgbot.autonomy.errands import Declined
 from gvgbot.autonomy.events import ErrandEnded
 from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.virtual_walls import VirtualWall, points_of
@@ -85,25 +86,33 @@ def test_who_is_shut_in_closely_stays_there() -> None:
     assert max(math.dist((pose.x, pose.y), (START.x, START.y)) for pose in run.truth) < 0.1
 
 
-def test_on_a_known_map_it_is_a_door_that_is_shut() -> None:
-    """The map keeps what is beyond; who is asked to go there says that there is no way."""
-    far = START.inverse().transform(np.array([0.0, -5.3]))
+def test_on_a_known_map_no_way_leads_over_it_as_long_as_it_is_there() -> None:
+    """The map keeps what is beyond; who is asked to go there says at once what is in the way."""
+    goals = np.array([(2.5, 0.0), (-2.5, 0.0), (0.0, -5.3)])
+    east, west, far = START.inverse().transform(goals)
 
     async def story(run: Play) -> None:
         await run.until(lambda: run.pipeline.mission.outcome is not None)
         run.pipeline.virtual_walls = points_of([ARM])
-        for place in (far, START.inverse().transform(np.array([2.5, 0.0]))):
+        errands = run.pipeline.errands
+        for place in (east, west, far):
             run.truth.clear()
-            run.pipeline.errands.goto_point(float(place[0]), float(place[1]), run.clock.now())
-            await run.until(lambda: run.pipeline.errands.is_resting)
+            errands.goto_point(float(place[0]), float(place[1]), run.clock.now())
+            await run.until(lambda: errands.is_resting)
             await run.sleep(1.0)
             souths.append(southernmost(run))
+            if place is east:
+                with pytest.raises(Declined) as declined:
+                    errands.goto_point(float(far[0]), float(far[1]), run.clock.now())
+                reasons.append(str(declined.value))
+                run.pipeline.virtual_walls = np.empty((0, 2))
 
     souths: list[float] = []
-    run = play(TEE, START, story=story, goes_on=lambda: len(souths) < 2)
+    reasons: list[str] = []
+    run = play(TEE, START, story=story, goes_on=lambda: len(souths) < 3)
     assert souths[0] > ACROSS_M + ROBOT_RADIUS
     ended = [event for event in run.events if isinstance(event, ErrandEnded)]
-    assert [event.outcome for event in ended] == ["given up", "arrived"]
-    assert ended[0].reason == "no known way leads there"
-    assert math.dist((run.truth[-1].x, run.truth[-1].y), (2.5, 0.0)) < NEAR
+    assert [event.outcome for event in ended] == ["arrived"] * 3
+    assert reasons == ["no known way leads there but over a virtual wall"]
+    assert math.dist((run.truth[-1].x, run.truth[-1].y), (0.0, -5.3)) < NEAR
     assert_found(run, "endpoint", [*ENDS, (0.0, -5.3)])

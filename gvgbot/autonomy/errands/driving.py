@@ -93,8 +93,28 @@ class Ground:
         if foot.away > _OFF_GRAPH_M and isinstance(goal, ToPoint):
             return f"the nearest known way ends {foot.away:.1f} m from there"
         if here is not None and route_to_foot(here, here.starts(), foot) is None:
-            return "no known way leads there"
+            return self.no_way_to(goal, here)
         return None
+
+    def no_way_to(self, stop: Stop, here: Situation, there: str = "there") -> str:
+        """That no known way leads to a stop, and whether one would but for virtual walls."""
+        graph = self.mapper.graph
+        walled, graph.walled = graph.walled, {}
+        is_beyond = bool(walled) and self._leads_to(stop, here)
+        graph.walled = walled
+        return f"no known way leads {there}" + " but over a virtual wall" * is_beyond
+
+    def _leads_to(self, stop: Stop, here: Situation) -> bool:
+        match stop:
+            case ToVertex(vertex=vertex):
+                return route_to_vertex(self.mapper.graph, here.starts(), vertex) is not None
+            case ToPoint(x=x, y=y) | Home(x=x, y=y):
+                foot = foot_of(self.mapper, np.array([x, y]))
+            case Waypoint(end=end, station=station):
+                foot = foot_at(self.mapper.graph, end, station)
+            case _:
+                return True
+        return foot is not None and route_to_foot(here, here.starts(), foot) is not None
 
 
 class Driving:
@@ -329,7 +349,7 @@ class Driving:
     ) -> Order | Ended:
         """Along a route, to its end or to a point of it (2,), local frame."""
         if route is None:
-            return Ended("given up", "no known way leads there")
+            return Ended("given up", self._ground.no_way_to(self.stop, here))
         self._route = route
         next_one = next(iter(route.departures), None)
         is_missing = (

@@ -100,9 +100,10 @@ class Errands(Agenda):
         opened = self.closures.open_all(graph) if route is None else {}
         if opened:
             route = self._way_to_vertex(vertex)  # what was in the way may have gone
-        if route is None and self.whereabouts() is not None:
+        here = self.whereabouts()
+        if route is None and here is not None:
             self.closures.close_again(graph, opened)
-            raise Declined(f"no known way leads to vertex {vertex}")
+            raise Declined(self._ground.no_way_to(ToVertex(vertex), here, f"to vertex {vertex}"))
         self._take(ToVertex(vertex), stamp)
         far = "" if route is None else f" {route.metres:.1f} m"
         return f"it drives{far} to vertex {vertex}"
@@ -125,15 +126,17 @@ class Errands(Agenda):
     def coverage(self, stamp: float) -> str:
         """Drive over every edge once."""
         self._check_going(stamp)
-        edges = self._mapper.graph.edges.values()
+        graph = self._mapper.graph
+        edges = graph.edges.values()
         if not edges:
             raise Declined("no edge is known yet that it could drive on")
         if isinstance(self.errand, Coverage):
             return f"it does that already: {self._plan}"
-        self.closures.open_all(self._mapper.graph)
+        self.closures.open_all(graph)
         self._take(Coverage(), stamp)
-        reached = set().union(*self._in_reach()) or self._mapper.graph.vertices.keys()
-        lengths = [edge.length for edge in edges if edge.a.vertex in reached]
+        reached = set().union(*self._in_reach()) or graph.vertices.keys()
+        there = (edge for edge in edges if edge.a.vertex in reached)
+        lengths = [edge.length for edge in there if edge.id not in graph.walled]
         return (
             f"it drives over {len(lengths)} of {len(edges)} edges, {sum(lengths):.0f} m "
             "and what must be driven twice"

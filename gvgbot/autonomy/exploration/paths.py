@@ -32,8 +32,8 @@ def shortest_paths(
 ) -> dict[int, Approach]:
     """The shortest approach to every vertex that can be reached, from one or more first arrivals.
 
-    Those farther away than the `last` one are left out. Dijkstra on the multigraph; ties go to the
-    smaller ids, so that equal runs stay equal.
+    None leads over an edge that a virtual wall crosses; those farther away than the `last` one are
+    left out. Dijkstra on the multigraph; ties go to the smaller ids, so that equal runs stay equal.
     """
     queue = [(s.metres, i, s) for i, s in enumerate(starts)]
     heapq.heapify(queue)
@@ -48,7 +48,7 @@ def shortest_paths(
         if vertex == last:
             break
         for key, half in graph.vertices[vertex].half_edges.items():
-            if half.edge is None or half.blocked:
+            if half.edge is None or half.blocked or half.edge in graph.walled:
                 continue
             edge = graph.edges[half.edge]
             out = HalfEdgeId(vertex, key)

@@ -23,7 +23,7 @@ Pair = tuple[int, int]
 def postman_tour(graph: GvgGraph, start: int) -> list[HalfEdgeId]:
     """The departures, one after the other, over all edges that hang together with a vertex.
 
-    Edges that are blocked are left out. The tour ends wherever that is best.
+    Edges that are blocked, or walled, are left out. The tour ends wherever that is best.
     """
     graph = _drivable(graph)
     reached = _ways_from(graph, start)
@@ -39,7 +39,7 @@ def postman_tour(graph: GvgGraph, start: int) -> list[HalfEdgeId]:
 
 
 def _drivable(graph: GvgGraph) -> GvgGraph:
-    """The graph without frontiers, and without edges that are blocked at an end."""
+    """The graph without frontiers, and without edges that are blocked or walled."""
     ends = {
         edge.id: (graph.half_edge(edge.a), graph.half_edge(edge.b)) for edge in graph.edges.values()
     }
@@ -47,6 +47,7 @@ def _drivable(graph: GvgGraph) -> GvgGraph:
         edge
         for edge, halves in ends.items()
         if all(half is not None and not half.blocked for half in halves)
+        and edge not in graph.walled
     }
     vertices = {
         vertex.id: replace(

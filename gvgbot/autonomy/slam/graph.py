@@ -147,6 +147,13 @@ class GvgGraph:
     vertices: dict[int, Vertex] = field(default_factory=dict)
     edges: dict[int, Edge] = field(default_factory=dict)
     serial: int = 0
+    # by edge: m along it, at which virtual walls cross it as they are now
+    walled: dict[int, tuple[float, ...]] = field(default_factory=dict)
+
+    def is_walled(self, edge: Edge, begin: float, end: float) -> bool:
+        """Whether a virtual wall crosses an edge between two places, m along it."""
+        low, high = sorted((begin, end))
+        return any(low < at < high for at in self.walled.get(edge.id, ()))
 
     def copied(self) -> "GvgGraph":
         """The same graph, to change apart from this one.

@@ -194,6 +194,29 @@ def test_who_meets_something_can_go_to_the_other_end_of_its_edge_in_sight_or_not
     assert [start.arrival for start in blocked_corridor().starts(closed)] == [left]
 
 
+@pytest.mark.parametrize(
+    ("wall", "ends"), [(2.0, {1: 4.0, 2: 2.0}), (5.0, {1: 4.0}), (None, {1: 4.0, 2: 2.0})]
+)
+def test_no_way_leads_over_a_virtual_wall_ahead(wall: float | None, ends: dict[int, float]) -> None:
+    """An end that is in sight is reached: what is in sight ends at virtual walls."""
+    here = situation(4.0, known_as({Branch(10, forward=True): HalfEdgeId(1, EAST)}, {1: 1}))
+    edge = here.graph.edge_at(HalfEdgeId(1, EAST))
+    assert edge is not None
+    here.graph.walled[edge.id] = () if wall is None else (wall,)
+    found = {start.arrival.vertex: start.metres for start in here.starts()}
+    assert found == pytest.approx(ends, abs=0.2)
+
+
+@pytest.mark.parametrize(("wall", "metres"), [(2.0, 26.0), (4.0, 2.0), (14.0, 2.0), (0.5, 2.0)])
+def test_the_way_to_a_point_is_the_one_without_a_virtual_wall(wall: float, metres: float) -> None:
+    here = on_a_ring(is_in_sight=False)
+    here.graph.walled[next(iter(here.graph.edges))] = (wall,)
+    foot = foot_at(here.graph, HalfEdgeId(1, 0), 1.0)
+    assert foot is not None
+    route = route_to_foot(here, here.starts(), foot)
+    assert (None if route is None else route.metres) == pytest.approx(metres, abs=0.2)
+
+
 def on_a_ring(*, is_in_sight: bool) -> Situation:
     """Three metres past the only vertex of a ring of 28 m, all of which may be in sight."""
     graph, vertex = GvgGraph(), Vertex(1, 1.0, Pose(), 0.0, 0.0)

@@ -87,10 +87,16 @@ def test_of_parallel_edges_the_shorter_one_is_taken() -> None:
     assert found == Approach(1.0, ends[1], (ends[0],))
 
 
-def test_a_blocked_street_is_driven_around() -> None:
+@pytest.mark.parametrize("why", ["blocked", "a virtual wall"])
+def test_a_street_that_is_closed_is_driven_around(why: str) -> None:
     graph, ids = streets(2, 2)
     out = between(graph, ids[0, 0], ids[1, 0])
-    graph.vertices[out.vertex].half_edges[out.key].blocked = True
+    half = graph.vertices[out.vertex].half_edges[out.key]
+    if why == "blocked":
+        half.blocked = True
+    else:
+        assert half.edge is not None
+        graph.walled[half.edge] = (5.0,)
     found = shortest_paths(graph, [Approach(0.0, HalfEdgeId(ids[0, 0], -1))])
     assert found[ids[1, 0]].metres == 3 * STREET
 

@@ -70,3 +70,11 @@ def test_a_town_of_streets_takes_as_long_as_it_must(size: tuple[int, int]) -> No
     assert set(times) == set(graph.edges)
     assert metres == pytest.approx(least_length(drivable(graph, start), start))
     assert metres % STREET == pytest.approx(0.0)
+
+
+def test_a_street_that_a_virtual_wall_crosses_is_left_out() -> None:
+    graph, ids = streets(3, 2)
+    walled = min(graph.edges)
+    graph.walled[walled] = (5.0,)
+    _, times = driven(graph, ids[2, 1], postman_tour(graph, ids[2, 1]))
+    assert set(times) == set(graph.edges) - {walled}
