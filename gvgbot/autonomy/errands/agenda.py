@@ -3,7 +3,8 @@
 import math
 
 from gvgbot.autonomy.control.orders import Order, Stand
-from gvgbot.autonomy.errands.driving import Driving, Ended, Ground
+from gvgbot.autonomy.errands.driving import Driving, Ended
+from gvgbot.autonomy.errands.ground import Ground
 from gvgbot.autonomy.errands.kinds import Errand
 from gvgbot.autonomy.errands.own_tasks import OwnTasks
 from gvgbot.autonomy.errands.plans import Here, Kept, Plan, plan_for, recalled

@@ -16,12 +16,10 @@ from gvgbot.autonomy.destinations import (
     route_to_foot,
     route_to_vertex,
 )
-from gvgbot.autonomy.errands.closures import Closures
+from gvgbot.autonomy.errands.ground import AT_VERTEX_M, Ground
 from gvgbot.autonomy.errands.kinds import Home, Look, Rest, Stop, ToPoint, ToVertex, Waypoint
 from gvgbot.autonomy.events import Event, Recovery
 from gvgbot.autonomy.exploration.access import (
-    NEAR_M,
-    access,
     bent_way,
     straight_way,
     way_to_edge,
@@ -29,21 +27,18 @@ from gvgbot.autonomy.exploration.access import (
 from gvgbot.autonomy.exploration.certainty import robot_sigma
 from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.keyframes import has_come_on
-from gvgbot.autonomy.mapping import Mapper
-from gvgbot.autonomy.mission import Mission
 from gvgbot.autonomy.situation import Situation
 from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.autonomy.views import Correspondence, View
 from gvgbot.geometry import Array, Pose, length_of, wrap_angle
 
-_OFF_GRAPH_M = 3.0  # a point farther from every edge is out of reach
 DIRECT_M = 4.0  # off a point, one drives there straight, or with one bend
 _THERE_M = 0.15  # from a destination, one has arrived
 _PAST_M = 0.5  # from a stop at which one does not stop
-_AT_VERTEX_M = 1.0  # from a vertex, what stands in the way stands on the edge beyond it
 _ALMOST_M = 0.6  # as well, where one cannot come nearer
 _SHORT_M = 0.3  # a track so short leads nowhere
 _PROGRESS_M = 0.3
+_TURNED_RAD, _AHEAD_M = 0.3, 0.4  # less to turn to where its track leads, so far ahead
 _STIRS_M, _STIRS_RAD = 0.05, 0.1  # who moves less stands
 _SURE_M = 0.4  # of a place that was found again
 _LOOKS = 2  # around, before giving up
@@ -60,63 +55,6 @@ class Ended:
     reason: str
 
 
-class Ground:
-    """What is known of the ground: where the robot is on it, and which ways are closed.
-
-    `room_m` is how far from the walls the robot drives where there is no edge.
-    """
-
-    def __init__(self, mission: Mission, mapper: Mapper, room_m: float) -> None:
-        self.mission, self.mapper, self.room_m = mission, mapper, room_m
-        self.closures = Closures(mapper.unsettled.names)
-
-    def situation(self, view: View, known: Correspondence) -> Situation | None:
-        """Where the robot is on the graph; None if it is off it."""
-        found = access(view)
-        if found is None or found.place.distance > NEAR_M:
-            return None
-        graph, where = self.mapper.graph, self.mission.where
-        return Situation(view.gvg, known, graph, where, found, view.local_base, view.doubted)
-
-    def is_at(self, view: View, vertex: int) -> bool:
-        """Whether the robot is about at a vertex."""
-        if vertex not in self.mapper.graph.vertices:
-            return False
-        there = self.mapper.in_local_frame(view, vertex).position
-        return float(np.hypot(*(there - view.local_base.position))) < _AT_VERTEX_M
-
-    def trouble_to(self, goal: ToPoint | Home, here: Situation | None) -> str | None:
-        """Why no known way leads to a point."""
-        foot = foot_of(self.mapper, np.array([goal.x, goal.y]))
-        if foot is None:
-            return "no edge is known yet that it could drive on"
-        if foot.away > _OFF_GRAPH_M and isinstance(goal, ToPoint):
-            return f"the nearest known way ends {foot.away:.1f} m from there"
-        if here is not None and route_to_foot(here, here.starts(), foot) is None:
-            return self.no_way_to(goal, here)
-        return None
-
-    def no_way_to(self, stop: Stop, here: Situation, there: str = "there") -> str:
-        """That no known way leads to a stop, and whether one would but for virtual walls."""
-        graph = self.mapper.graph
-        walled, graph.walled = graph.walled, {}
-        is_beyond = bool(walled) and self._leads_to(stop, here)
-        graph.walled = walled
-        return f"no known way leads {there}" + " but over a virtual wall" * is_beyond
-
-    def _leads_to(self, stop: Stop, here: Situation) -> bool:
-        match stop:
-            case ToVertex(vertex=vertex):
-                return route_to_vertex(self.mapper.graph, here.starts(), vertex) is not None
-            case ToPoint(x=x, y=y) | Home(x=x, y=y):
-                foot = foot_of(self.mapper, np.array([x, y]))
-            case Waypoint(end=end, station=station):
-                foot = foot_at(self.mapper.graph, end, station)
-            case _:
-                return True
-        return foot is not None and route_to_foot(here, here.starts(), foot) is not None
-
-
 class Driving:
     """The way to one stop."""
 
@@ -130,6 +68,7 @@ class Driving:
         self._nearest_m: dict[bool, float] = {}  # least that was left of it, and straight on
         self._straight_m = math.inf  # so long a way straight on is not driven
         self._goes_round = False  # by the edges, what stood in the way straight on
+        self._least_turn = math.inf  # rad, that was left to the track since it came nearer
         self._looks = 0
         self._unseen = 0  # looks at where the route goes on, without seeing that
         self._is_looking = self._is_obstructed = False
@@ -155,7 +94,13 @@ class Driving:
             ended = self._close_way(view)
             if ended is not None:
                 return ended
-        here, names = self._ground.situation(view, known), self._mapper.unsettled.names
+        order = self._order(view, self._ground.situation(view, known))
+        if isinstance(order, Drive):
+            self._turn_to(view, order.track)
+        return order
+
+    def _order(self, view: View, here: Situation | None) -> Order | Ended:
+        names = self._mapper.unsettled.names
         match self.stop:
             case Look():
                 return self._look_once(view)
@@ -238,6 +183,7 @@ class Driving:
         self._is_obstructed, self._unseen = False, 0
         self._wait_anew(view)
         self._nearest_m.clear()
+        self._least_turn = math.inf
         self.happened.append(Recovery(view.stamp, "try another way", "something stands in the way"))
 
     def _is_missing(self, view: View, here: Situation, departure: HalfEdgeId) -> bool:
@@ -256,7 +202,7 @@ class Driving:
         ways = [
             passing.polyline[int(np.argmin(np.abs(passing.stations - place.station - way)))]
             - local_vertex.position
-            for way in (-_AT_VERTEX_M, _AT_VERTEX_M)
+            for way in (-AT_VERTEX_M, AT_VERTEX_M)
         ]
         bearing = half.bearing + local_vertex.theta
         turns = [abs(wrap_angle(math.atan2(dy, dx) - bearing)) for dx, dy in ways]
@@ -388,6 +334,17 @@ class Driving:
         self._is_off = False
         if metres < self._nearest_m.get(straight, math.inf) - _PROGRESS_M:
             self._nearest_m[straight], self._progress = metres, view.stamp
+            self._least_turn = math.inf
+
+    def _turn_to(self, view: View, track: Track) -> None:
+        """Note how far the robot has yet to turn to its track: that is progress, too, but once."""
+        base = view.local_base
+        is_ahead = np.hypot(*(track.polyline - base.position).T) > _AHEAD_M
+        ahead = track.polyline[int(is_ahead.argmax()) if is_ahead.any() else -1]
+        x, y = base.inverse().transform(ahead)
+        turn = abs(math.atan2(y, x))
+        if turn < self._least_turn - _TURNED_RAD:
+            self._least_turn, self._progress = turn, view.stamp
 
     def _find_edge(self, view: View) -> Order | Ended:
         """Off the graph: go to the nearest edge, or look around for one."""

@@ -1,6 +1,7 @@
 """What is answered to who asks for an errand."""
 
 import math
+from collections.abc import Iterable
 from functools import partial
 
 import numpy as np
@@ -12,7 +13,7 @@ from gvgbot.autonomy.errands import Declined
 from gvgbot.autonomy.errands.plans import Kept
 from gvgbot.autonomy.events import ErrandEnded, Recovery
 from gvgbot.autonomy.slam.graph import HalfEdgeId, Vertex
-from gvgbot.geometry import Pose, Twist
+from gvgbot.geometry import Pose, Twist, wrap_angle
 from tests.unit.autonomy.errands.test_own_tasks import Explorer
 from tests.unit.autonomy.sights import carved, looked
 from tests.unit.autonomy.test_mission import CLOSED, CONFIG
@@ -149,3 +150,26 @@ def test_who_meets_something_on_the_straight_way_to_a_point_comes_by_the_edge() 
     assert isinstance(ended, ErrandEnded)
     assert ended.outcome == "arrived", ended.reason
     assert off_corner < 0.2
+
+
+def turned(robot: Explorer, headings: Iterable[float]) -> bool:
+    """Whether its errand ends while it turns so, a heading each half second."""
+    for heading in headings:
+        turn = Pose(0.0, 0.0, wrap_angle(heading - robot.pose.theta))
+        robot.mapper.move(turn, np.zeros((3, 3)))
+        robot.pose = robot.pose.compose(turn)
+        robot.look(CLOSED)
+        if robot.said(ErrandEnded):
+            return True
+    return False
+
+
+def test_who_is_told_to_turn_slowly_comes_nearer_by_turning_to_its_way_but_not_to_and_fro() -> None:
+    patience = 2 * CONFIG.in_the_way_s  # looks
+    robot = in_a_hall()
+    robot.errands.goto_point(3.0, 0.0, robot.stamp)
+    assert not turned(robot, np.linspace(math.pi, 0.1, round(3 * patience)))
+    assert turned(robot, 0.1 * (-1.0) ** np.arange(round(patience) + 2))
+    robot = in_a_hall()
+    robot.errands.goto_point(3.0, 0.0, robot.stamp)
+    assert turned(robot, np.tile([2.0, 1.0], round(patience) + 2))
