@@ -33,6 +33,7 @@ class Fit(NamedTuple):
 
     map_base: Pose
     share: float
+    is_clear: bool = True  # they agree so well nowhere else
 
 
 def walls_known(mapper: Mapper, old: Sequence[Keyframe]) -> Array:
@@ -52,7 +53,7 @@ def walls_known(mapper: Mapper, old: Sequence[Keyframe]) -> Array:
     walls += [k.map_base.transform(_base_ends(k.scan)) for k in near if k.scan is not None]
     found = np.concatenate([np.empty((0, 2)), *walls])
     is_near = np.hypot(*(found - here.position).T) < REACH_M + _FAR_M
-    return thinned(found[is_near], _CELL_M / 2)
+    return thinned(found[is_near], _CELL_M)
 
 
 def walls_seen(keyframes: Sequence[Keyframe], local_base: Pose) -> Array:
@@ -74,7 +75,7 @@ def _base_ends(scan: Scan) -> Array:
 def misplaced(
     base_walls: Array, walls: Array, map_base: Pose, matching: ScanMatchingConfig
 ) -> Fit | None:
-    """Where the robot clearly is, if that is not where it believes to be.
+    """Where the robot is, if that is clearly not where it believes to be.
 
     `base_walls` (N, 2) are what it sees around, in its own frame, `walls` (M, 2) those of the map.
     """
@@ -87,8 +88,9 @@ def misplaced(
     if best is None or best.share < _FITS:
         return None
     elsewhere = [fit.share for fit in fits if not _same(fit.map_base, best.map_base)]
-    believed = _share(base_walls, known, map_base)
-    return best if best.share > max([believed, *elsewhere]) + _CLEARLY else None
+    if best.share <= _share(base_walls, known, map_base) + _CLEARLY:
+        return None
+    return best._replace(is_clear=best.share > max(elsewhere, default=0.0) + _CLEARLY)
 
 
 def _guesses(base_walls: Array, known: KnownWalls, map_base: Pose) -> list[Pose]:

@@ -19,6 +19,7 @@ from gvgbot.autonomy.whereabouts import Whereabouts
 from gvgbot.geometry import Pose
 
 LATELY_M = 25.0  # driven: since then a robot may have been elsewhere than it believed
+_UNCLEAR = np.diag([0.5**2, 0.5**2, 0.1**2])  # more covariance, of who is elsewhere near by
 _FOUND = np.diag([0.1**2, 0.1**2, 0.03**2])  # covariance of a place found on the map
 
 
@@ -63,13 +64,19 @@ def search_near_by(
 ) -> Recovery | None:
     """Be where walls `seen` from keyframes show it to be, if that is clearly elsewhere.
 
-    The walls of the map are those of `old` keyframes, and of vertices.
-    What vertices have come lately, since `seen_at`, were drawn where the robot was not.
+    If it is elsewhere, but not clear where, be unsure of that. The walls of the map are those of
+    `old` keyframes, and of vertices. What vertices have come lately, since `seen_at`, were drawn
+    where the robot was not.
     """
     map_base, walls = mapper.belief.map_base, walls_seen(seen, view.local_base)
     found = misplaced(walls, walls_known(mapper, old), map_base, matching)
     if found is None:
         return None
+    if not found.is_clear:
+        mapper.move(Pose(), _UNCLEAR)
+        mapper.lose_sight(seen_at)
+        reason = "the walls around fit better in more than one place near by"
+        return Recovery(view.stamp, "doubt its place until it knows a vertex again", reason)
     known = mapper.graph.vertices
     is_map = any(vertex.established for vertex in known.values())
     for vertex in [v for v in known.values() if is_map and not v.established]:

@@ -8,7 +8,7 @@ import pytest
 from gvgbot.autonomy.config import AutonomyConfig
 from gvgbot.autonomy.keyframes import Keyframe
 from gvgbot.autonomy.mapping import Mapper
-from gvgbot.autonomy.near_by import misplaced, walls_known, walls_seen
+from gvgbot.autonomy.near_by import Fit, misplaced, walls_known, walls_seen
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
 from gvgbot.drivers.world import World
 from gvgbot.geometry import Pose, wrap_angle
@@ -28,8 +28,8 @@ def keyframe(world: World, pose: Pose, field_of_view: float = LASER_270) -> Keyf
     )
 
 
-def found(world: World, believed: Pose) -> Pose | None:
-    """Where a robot that stands here is, if that is clear, after scans of the map from beside."""
+def found(world: World, believed: Pose) -> Fit | None:
+    """Where a robot that stands here is, after scans of the map from beside."""
     config = AutonomyConfig()
     mapper = Mapper(config.mapping, config.recognition, config.scan_matching)
     mapper.move(believed, 0.01 * np.eye(3))
@@ -40,18 +40,18 @@ def found(world: World, believed: Pose) -> Pose | None:
     ]
     seen = [keyframe(world, HERE.compose(Pose(theta=turn))) for turn in (0.0, 2.0, 4.0)]
     walls = walls_known(mapper, old)
-    fit = misplaced(walls_seen(seen, HERE), walls, believed, ScanMatchingConfig())
-    return None if fit is None else fit.map_base
+    return misplaced(walls_seen(seen, HERE), walls, believed, ScanMatchingConfig())
 
 
 @pytest.mark.parametrize(
     "off", [(0.3, 0.0, 0.0), (-0.7, 0.0, 0.2), (0.1, -0.7, 0.0), (0.9, 0.4, -0.3)]
 )
 def test_who_was_pushed_is_found_by_the_walls_of_the_map(off: tuple[float, float, float]) -> None:
-    pose = found(BEND, HERE.compose(Pose(*off)))
-    assert pose is not None
-    assert pose.distance(HERE) < 0.03
-    assert abs(wrap_angle(pose.theta - HERE.theta)) < 0.01
+    fit = found(BEND, HERE.compose(Pose(*off)))
+    assert fit is not None
+    assert fit.is_clear
+    assert fit.map_base.distance(HERE) < 0.03
+    assert abs(wrap_angle(fit.map_base.theta - HERE.theta)) < 0.01
 
 
 def test_who_is_about_where_it_believes_to_be_is_left_there() -> None:
@@ -60,7 +60,9 @@ def test_who_is_about_where_it_believes_to_be_is_left_there() -> None:
 
 @pytest.mark.parametrize("world", [CORRIDOR, NICHES])
 def test_where_walls_look_the_same_in_other_places_nothing_is_clear(world: World) -> None:
-    assert found(world, HERE.compose(Pose(0.6, 0.3, 0.0))) is None
+    fit = found(world, HERE.compose(Pose(0.6, 0.3, 0.0)))
+    assert fit is not None
+    assert not fit.is_clear
 
 
 def test_walls_that_the_map_does_not_know_place_nobody() -> None:
