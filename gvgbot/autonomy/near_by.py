@@ -16,7 +16,7 @@ from gvgbot.autonomy.known_walls import REACH_M, KnownWalls
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig, register
 from gvgbot.geometry import Array, Pose, thinned, wrap_angle
-from gvgbot.hal.messages import Scan
+from gvgbot.hal.packed_scan import AnyScan
 
 _FAR_M, _STEP_M = 1.2, 0.2  # around the believed pose
 _FAR_RAD, _STEP_RAD = 0.45, 0.075
@@ -67,9 +67,9 @@ def walls_seen(keyframes: Sequence[Keyframe], local_base: Pose) -> Array:
     return thinned(found[np.hypot(*found.T) < REACH_M], _CELL_M)
 
 
-def _base_ends(scan: Scan) -> Array:
+def _base_ends(scan: AnyScan) -> Array:
     """What a scan shows (N, 2), in the frame of the base."""
-    return scan.base_laser.transform(scan.ends)
+    return scan.base_laser.transform(scan.unpacked().ends)
 
 
 def misplaced(

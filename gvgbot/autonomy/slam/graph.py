@@ -169,7 +169,7 @@ class GvgGraph:
             for vertex in self.vertices.values()
         }
         edges = {edge.id: replace(edge) for edge in self.edges.values()}
-        return GvgGraph(vertices, edges, self.serial)
+        return GvgGraph(vertices, edges, self.serial, self.walled)
 
     def next_id(self) -> int:
         """An id never used before."""

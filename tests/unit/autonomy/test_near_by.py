@@ -12,6 +12,7 @@ from gvgbot.autonomy.near_by import Fit, misplaced, walls_known, walls_seen
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
 from gvgbot.drivers.world import World
 from gvgbot.geometry import Pose, wrap_angle
+from gvgbot.hal.packed_scan import PackedScan
 from tests.unit.autonomy.sights import LASER_270, carved, sweep
 
 BEND = carved([(-6.0, -1.0, 6.0, 1.0), (2.0, 1.0, 3.5, 6.0)])
@@ -23,9 +24,8 @@ HERE = Pose(0.5, 0.1, 0.4)
 
 def keyframe(world: World, pose: Pose, field_of_view: float = LASER_270) -> Keyframe:
     """A look from a pose of the world, where its frame is that of the map and the local one."""
-    return Keyframe(
-        0.0, pose, pose, pose, sweep(world, pose, field_of_view=field_of_view, reach=10.0)
-    )
+    scan = sweep(world, pose, field_of_view=field_of_view, reach=10.0)
+    return Keyframe(0.0, pose, pose, pose, PackedScan(scan))
 
 
 def found(world: World, believed: Pose) -> Fit | None:
