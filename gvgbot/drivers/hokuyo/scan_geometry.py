@@ -53,7 +53,7 @@ class ScanGeometry:
         if self.nothing_code is not None:
             ranges[readings == self.nothing_code] = np.inf
         if self.group > 1:
-            ranges = in_the_middle(ranges, self.group)
+            ranges = in_the_middle(ranges, self.group).round(3)  # mm, as all others
             ranges[ranges > self.longest_mm / 1000.0] = np.inf
         return ranges
 

@@ -51,6 +51,16 @@ def test_where_a_wall_ends_no_range_is_moved_towards_what_is_behind() -> None:
     assert there[5] == gone
 
 
+def test_ranges_of_groups_are_whole_millimetres_as_well() -> None:
+    """So a scan that is kept takes no more for a beam of many steps than for one of one."""
+    parameters = MODELS["URG-04LX"].parameters
+    request = ScanRequest("MD", parameters.first_step, parameters.first_step + 17, 3)
+    readings = np.array([1000, 1050, 1110, 1190, 1280, 1400])
+    ranges = scan_geometry(HokuyoConfig(), parameters, request).scan(readings, 1.0).ranges
+    assert (ranges[1:-1] > readings[1:-1] / 1000.0).all()
+    assert (ranges == np.rint(ranges * 1000.0) / 1000.0).all()
+
+
 def ranges_of(parameters: Parameters, readings: list[int], **config: Any) -> Array:
     return scan_of(parameters, readings, HokuyoConfig(**config)).ranges
 
