@@ -36,7 +36,7 @@ class TimedPipeline(Pipeline):
     """Takes down how long each of its steps took, s."""
 
     def __init__(self, config: Config) -> None:
-        super().__init__(config.autonomy, config.exploration, config.robot.radius_m)
+        super().__init__(config.mind, config.exploration, config.robot.radius_m)
         self.scan_times: list[float] = []
         self.keyframe_times: list[float] = []
         self.control_times: list[float] = []

@@ -56,7 +56,7 @@ class Watched(Pipeline):
 
     def __init__(self, config: Config) -> None:
         super().__init__(
-            config.autonomy,
+            config.mind,
             config.exploration,
             config.robot.radius_m,
             localisation=config.localisation,

@@ -196,7 +196,7 @@ async def explore_and_visit(config: Config, score: Score, count: int, *, verbose
     clock, place = LoopClock(), open_place(config)
     simulation = Simulation(config, place, clock)
     devices = Devices(Links(config, clock, simulation))
-    pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
+    pipeline = Pipeline(config.mind, config.exploration, config.robot.radius_m)
     tour = Tour(config, place, pipeline, clock, simulation, score, verbose)
     driving = drive(
         config.robot, devices, pipeline, on_events=tour.events.extend, goes_on=lambda: True
