@@ -142,7 +142,8 @@ class LocalMaps:
         motion, Q = self.calibration.corrected(motion, duration), self.calibration.scattered(noise)
         prior = before.compose(motion)
         still = Pose(before.x, before.y, prior.theta)
-        slipping = [] if self._matching.search_rad else [(still, _SLIPPING * Q)]
+        is_sparse = self._matching.coarse_pair_m > 0.0  # nobody stands from scan to scan
+        slipping = [] if is_sparse else [(still, _SLIPPING * Q)]
         best = self._best(scan, [(prior, Q), *slipping], stays=True)
         calibration, per_error = self._calibration, per_unit(motion, duration)
         if best is None:

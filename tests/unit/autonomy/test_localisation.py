@@ -63,6 +63,19 @@ def test_noise_does_not_turn_the_scan() -> None:
     assert abs(np.mean(errors)) < 3 * standard_error
 
 
+@pytest.mark.parametrize("search_rad", [0.0, 0.4])
+def test_wheels_that_spin_are_found_out_whether_the_heading_is_searched_or_not(
+    search_rad: float,
+) -> None:
+    rng, local = np.random.default_rng(2), maps(ScanMatchingConfig(search_rad=search_rad))
+    for x in np.arange(-2.0, 0.0, 0.25):
+        local.insert(room(rng, x), Pose(x, 0.0), x + 2.0)
+    found, noise = Pose(-0.25), noise_of(0.005, 0.01, 0.01)
+    for _ in range(4):
+        found, *_ = local.match(room(rng, -0.25), found, Pose(0.15), 0.5, noise)
+    assert found.x == pytest.approx(-0.25, abs=0.02)
+
+
 def test_what_is_done_while_there_is_time_changes_no_match() -> None:
     found = []
     for has_time in (False, True):
