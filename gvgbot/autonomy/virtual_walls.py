@@ -32,16 +32,25 @@ def points_of(walls: Sequence[VirtualWall]) -> Array:
 
 def crossings(walls: Array, lines: Sequence[Array]) -> list[tuple[float, ...]]:
     """Where each of the lines (N, 2) leads over walls, as points (M, 2): m along it."""
-    near = [resampled(line, _SPACING_M / 2) for line in lines]
-    away = np.asarray(cKDTree(walls).query(np.concatenate([np.empty((0, 2)), *near]))[0])
-    found = []
-    for line, gaps in zip(
-        near, np.split(away, np.cumsum([len(line) for line in near])), strict=False
-    ):
-        is_on = np.concatenate([[False], gaps < _CROSSING_M])
-        begins = np.flatnonzero(is_on[1:] & ~is_on[:-1])
-        found.append(tuple(stations_of(line)[begins].tolist()))
-    return found
+    if not lines:
+        return []
+    tree, ends = cKDTree(walls), np.cumsum([len(line) for line in lines])
+    points = np.concatenate(lines)
+    steps = np.hypot(*(points[1:] - points[:-1]).T)
+    steps[ends[:-1] - 1] = 0.0  # from line to line
+    reach = _CROSSING_M + float(steps.max(initial=0.0))  # of a crossing, both points are near
+    is_near = np.isfinite(tree.query(points, distance_upper_bound=reach)[0])
+    return [
+        _crossings_of(tree, line) if near.any() else ()
+        for line, near in zip(lines, np.split(is_near, ends[:-1]), strict=True)
+    ]
+
+
+def _crossings_of(walls: cKDTree, line: Array) -> tuple[float, ...]:
+    line = resampled(line, _SPACING_M / 2)
+    is_on = np.concatenate([[False], walls.query(line)[0] < _CROSSING_M])
+    begins = np.flatnonzero(is_on[1:] & ~is_on[:-1])
+    return tuple(stations_of(line)[begins].tolist())
 
 
 def nearest_before(walls: Array, here: Array, places: Array, away: Array) -> int | None:

@@ -125,15 +125,19 @@ def way_to_edge(view: View) -> tuple[Array, Array] | None:
     `straight_way` has it.
     """
     nearest = ((view.gvg.point(place), _ROOM_M) for place in _places(view))
-    lines = [resampled(edge.polyline, _BEND_M) for edge in view.gvg.edges.values()]
-    others = np.concatenate([np.empty((0, 2)), *lines])
-    away = np.hypot(*(others - view.local_base.position).T)
-    order = [i for i in np.argsort(away, kind="stable") if away[i] < _FARTHEST_M]
-    ways = (
-        straight_way(view, goal, room)
-        for goal, room in chain(nearest, ((others[i], _TIGHT_M) for i in order))
-    )
+    others = ((goal, _TIGHT_M) for goal in _points_of_edges(view))
+    ways = (straight_way(view, goal, room) for goal, room in chain(nearest, others))
     return next((way for way in ways if way is not None), None)
+
+
+def _points_of_edges(view: View) -> Iterator[Array]:
+    """Points (2,) of edges that are not too far away, the nearest first."""
+    lines = [resampled(edge.polyline, _BEND_M) for edge in view.gvg.edges.values()]
+    points = np.concatenate([np.empty((0, 2)), *lines])
+    away = np.hypot(*(points - view.local_base.position).T)
+    for i in np.argsort(away, kind="stable"):
+        if away[i] < _FARTHEST_M:
+            yield points[i]
 
 
 def way_into_the_open(view: View, sought: list[Array]) -> tuple[Array, Array] | None:
