@@ -4,7 +4,7 @@
 
 A relation is a line `t1 t2 dx dy dz roll pitch yaw`: where the robot was at t2, seen from t1. The
 relations of the usual logs, and the metric, are those of Kuemmerle et al. (2009).
-`pip install yag-slam` adds the second row; nothing else needs it.
+`pip install yag-slam opencv-python-headless` adds the last row; nothing else needs them.
 """
 
 import argparse
