@@ -31,6 +31,8 @@ BASE_RATE = 50.0  # Hz
 MESSAGE_COUNTS = ("frames", "scans")
 OF_NEWER_FIRMWARE = "unknown_parts"  # checksums were right
 SEEN_SHARE = 0.2  # of the beams; a laser that sees less is covered or dirty
+UNCOVER = "uncover and clean its window"
+UNCOVER_OR_MOVE = f"{UNCOVER}, or put the robot where there are walls"
 
 Verdict = Literal["ok", "warn", "fail"]
 
@@ -208,13 +210,7 @@ def _laser_lines(
         yield _steadiness("laser rate", heard, 1.0 / interval)
     yield _link("laser link", laser.link)
     yield _timing("laser clock", heard)
-    seen = float(np.mean([np.mean(~np.isnan(scan.ranges)) for scan in scans]))
-    yield Line(
-        "ok" if seen >= SEEN_SHARE else "fail",
-        "laser view",
-        f"{len(scans[-1].ranges)} beams, {seen:.0%} of them of use",
-        "uncover and clean its window",
-    )
+    yield _view(scans)
     if len(scans[-1].ranges) < FEWEST_BEAMS:
         yield Line("warn", "laser beams", f"they are fewer than {FEWEST_BEAMS}", FINER)
     if not scans[-1].looks_ahead:
@@ -256,6 +252,17 @@ def _absence(device: str, heard: Heard, silence: str) -> Line:
         return Line("fail", device, heard.failure)
     remedy = f"check that {device}.port is its port, then switch it off and on"
     return Line("fail", device, silence, remedy)
+
+
+def _view(scans: list[Scan]) -> Line:
+    """Whether something covers the laser."""
+    beams = f"{len(scans[-1].ranges)} beams"
+    trusted = float(np.mean([np.mean(~np.isnan(scan.ranges)) for scan in scans]))
+    if trusted < SEEN_SHARE:
+        return Line("fail", "laser view", f"{beams}, {trusted:.0%} of them of use", UNCOVER)
+    if not any(np.isfinite(scan.ranges).any() for scan in scans):
+        return Line("warn", "laser view", f"{beams}, nothing within range", UNCOVER_OR_MOVE)
+    return Line("ok", "laser view", f"{beams}, {trusted:.0%} of them of use")
 
 
 def _steadiness(subject: str, heard: Heard, nominal: float) -> Line:

@@ -29,6 +29,7 @@ from gvgbot.drivers.hokuyo.models import MODELS
 from gvgbot.drivers.hokuyo.twin import HokuyoTwin, HokuyoTwinConfig
 from gvgbot.drivers.transport import ByteStream, pipe, serve_twin
 from gvgbot.errors import DeviceLost, DeviceRefused
+from gvgbot.geometry import Array
 
 pytestmark = pytest.mark.twin
 
@@ -53,6 +54,20 @@ def test_ranges_are_those_of_the_world_to_half_a_millimetre() -> None:
             assert quantised(world.ranges(number))(scan.ranges)
 
     on_bench(HokuyoTwin(PERFECT, world, seed=1), scenario)
+
+
+def test_a_laser_whose_walls_vanish_at_once_is_not_trusted_to_see_a_hall() -> None:
+    world = World()
+
+    def covered(stamp: float) -> Array:
+        ranges = world(stamp)
+        return ranges if len(world.stamps) <= 20 else np.full_like(ranges, math.inf)
+
+    async def scenario(bench: Bench) -> None:
+        assert np.isfinite((await bench.scans(15))[-1].ranges).any()
+        assert np.isnan((await bench.scans(15))[-1].ranges).all()
+
+    on_bench(HokuyoTwin(PERFECT, covered, seed=1), scenario)
 
 
 @pytest.mark.parametrize("drift_ppm", [-90.0, 0.0, 90.0])

@@ -121,6 +121,15 @@ def test_a_laser_that_does_not_look_where_the_robot_drives_is_not_ready() -> Non
     assert "laser.yaw_deg" in finding
 
 
+def test_a_laser_with_nothing_within_range_may_be_covered() -> None:
+    status, points = said(
+        "twin.world=open_hall", "twin.laser.model=URG-04LX", "twin.start=[16.0, 12.4, 0.0]"
+    )
+    verdict, finding = points["laser view"]
+    assert (status, verdict) == (0, "warn")
+    assert "nothing within range" in finding
+
+
 def test_the_rate_is_compared_with_what_the_laser_was_asked_for() -> None:
     """Of the 40 scans a second that a UTM-30LX measures, its data sheet says."""
     _, points = said("laser.rate_hz=40")

@@ -29,6 +29,7 @@ from gvgbot.drivers.hokuyo.statistics import LinkStatistics
 from gvgbot.drivers.hokuyo.time_mode import DENIED, synchronise
 from gvgbot.drivers.transport import ByteStream
 from gvgbot.errors import DeviceLost, DeviceRefused
+from gvgbot.hal.cover import Cover
 from gvgbot.hal.latest import Latest
 from gvgbot.hal.messages import Scan
 
@@ -121,6 +122,7 @@ class HokuyoLaser:
         self._reboots_before = link.reboots
         self._clock_map: ClockMap | None = None
         self._scans: Latest[Scan] = Latest()
+        self._cover = Cover()
         self._baud = config.baud
         self._identity: Identity | None = None
         self._parameters: Parameters | None = None
@@ -339,7 +341,7 @@ class HokuyoLaser:
         ranges, intensities = one_per_step(reply, self._config.echo, self._parameters)
         if intensities is not None:
             self._intensities = intensities[::-1] if stream.geometry.is_reversed else intensities
-        return stream.geometry.scan(ranges, now.host_stamp)
+        return self._cover.judge(stream.geometry.scan(ranges, now.host_stamp))
 
     def _follow(self, stream: _Stream, stamp_ms: int, arrival: float) -> ClockMap:
         """The laser's clock after this scan; a stream that was started again begins a new map.
