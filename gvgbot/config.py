@@ -1,5 +1,6 @@
 """The configuration: one frozen tree of what every part of the robot needs to know."""
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -104,7 +105,7 @@ class Config:
 
     def _tell_its_ports_apart(self) -> None:
         laser, base = self.laser.port, self.base.port
-        if not self.twin.enabled and Path(laser).resolve() == Path(base).resolve():
+        if not self.twin.enabled and os.path.realpath(laser) == os.path.realpath(base):
             told = laser if laser == base else f"{laser} and {base}"
             raise ValueError(
                 f"laser.port and base.port are one and the same port, {told}: "

@@ -131,7 +131,11 @@ def test_a_port_can_only_be_that_of_one_device(tmp_path: Path) -> None:
         ):
             load_config(None, [*ports, "twin.enabled=false"])
         load_config(None, ports)  # twins have none
-    load_config(None, ["laser.port=/dev/ttyUSB1", "base.port=/dev/ttyUSB0", "twin.enabled=false"])
+    link.unlink()
+    link.symlink_to(link)
+    for laser in ("/dev/ttyUSB1", str(link)):
+        ports = [f"laser.port={laser}", "base.port=/dev/ttyUSB0"]
+        load_config(None, [*ports, "twin.enabled=false"])
 
 
 def test_an_unknown_odometry_profile_lists_the_known_ones() -> None:
