@@ -136,9 +136,11 @@ def link_rate(config: HokuyoConfig, baud: int, port_name: str, sbps: str) -> int
     """The link's bit/s, None where it is faster than any scan.
 
     `port_name` is the configured port with links resolved, `sbps` the laser's own account of its
-    bit rate, which says USB or Ethernet on lasers that have nothing else.
+    bit rate, which says USB or Ethernet on lasers that have nothing else. A pseudo-terminal has no
+    rate of its own.
     """
     is_fast = "ttyACM" in port_name or "USB" in sbps or "Ethernet" in sbps
+    is_fast = is_fast or (port_name.startswith("/dev/pts/") and "bps" not in sbps)
     match config.link:
         case "serial":
             return baud

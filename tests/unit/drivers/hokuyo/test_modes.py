@@ -96,6 +96,8 @@ def test_a_link_that_carries_nothing_is_an_error() -> None:
     ("config", "port", "sbps", "rate"),
     [
         (HokuyoConfig(), "/dev/pts/3", "Ethernet 100 [Mbps]", None),
+        (HokuyoConfig(), "/dev/pts/3", "", None),
+        (HokuyoConfig(), "/dev/pts/3", "19200[bps]", 57600),
         (HokuyoConfig(), "/dev/ttyACM1", "19200[bps]", None),
         (HokuyoConfig(), "/dev/ttyUSB0", "USB Full Speed", None),
         (HokuyoConfig(), "/dev/ttyUSB0", "19200[bps]", 57600),
