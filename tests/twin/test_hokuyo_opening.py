@@ -369,3 +369,20 @@ def test_the_perfect_twin_needs_no_cure() -> None:
         assert (link.reboots, link.restarts, link.unanswered) == (0, 0, 0)
 
     on_bench(HokuyoTwin(PERFECT, World(), seed=6), scenario)
+
+
+def test_a_laser_that_measures_only_once_it_is_switched_on_is_switched_on() -> None:
+    """Real ones switch themselves on when they are asked for scans."""
+    ask = b"MD0000108001300\n"
+
+    class Switched(Scripted):
+        def answer(self, command: bytes, now: float) -> bytes:
+            if command in (b"BM\n", b"QT\n"):
+                refusal = ask + b"10Q\n\n"
+                self.replies = {} if command == b"BM\n" else {ask: refusal}
+            return super().answer(command, now)
+
+    async def scenario(bench: Bench) -> None:
+        await bench.scans(3)
+
+    on_bench(Switched({}, twin_of()), scenario)

@@ -119,6 +119,8 @@ def test_a_frozen_laser_is_lost() -> None:
         await bench.running
         assert bench.laser.link.repeated_scans > 0
         assert bench.laser.link.scans == 5
+        with pytest.raises(DeviceLost, match="over and over, by its stamp"):
+            await HokuyoLaser(bench.link, HokuyoConfig(), bench.clock).run()
 
     on_bench(FrozenClock(HokuyoTwin(PERFECT, World(), seed=17), 5), scenario)
 

@@ -47,6 +47,7 @@ REMEDIES = {  # against a refusal, by its status
     DENIED: f"it is busy with something else; end other programs that use it, and {OFF_AND_ON}",
 }
 NO_SCANS, DAMAGED = "no scans", "damaged scans only"
+FROZEN = "one scan over and over, by its stamp"
 CHECK_CABLE = "try another cable or port, away from motors"
 FEWEST_BEAMS = 100  # of a scan; with fewer the place is lost
 FINER = "lower laser.cluster, or widen laser.first_angle_deg and laser.last_angle_deg"
@@ -123,6 +124,7 @@ class HokuyoLaser:
         self._clock_map: ClockMap | None = None
         self._scans: Latest[Scan] = Latest()
         self._cover = Cover()
+        self._is_switched_on = False  # by a command of its own, since the stream was to start
         self._baud = config.baud
         self._identity: Identity | None = None
         self._parameters: Parameters | None = None
@@ -235,6 +237,7 @@ class HokuyoLaser:
     async def _start(self, parameters: Parameters) -> _Stream:
         """Start the scans, simpler ones if the laser does not know those that were asked for."""
         assert self._mode is not None
+        self._is_switched_on = False
         while True:
             request = self._mode.request
             try:
@@ -245,7 +248,7 @@ class HokuyoLaser:
                 return self._stream(request, parameters)
 
     async def _give_way(self, refusal: Refusal, request: ScanRequest) -> None:
-        """Ask for less from now on, or reboot the laser. Raises the refusal if neither helps."""
+        """Ask for less, reboot the laser or switch it on. Raises the refusal if nothing helps."""
         simpler = SIMPLER.get(request.command)
         if refusal.status == ABNORMAL and self.link.reboots == self._reboots_before:
             await reboot(self._dialogue)
@@ -254,6 +257,10 @@ class HokuyoLaser:
             log.warning("laser has no such scans", command=request.command, instead=simpler)
             change = f"command {simpler} instead of {request.command}: the laser does not know it"
             self._mode = Mode(replace(request, command=simpler), change)
+        elif refusal.status == DENIED and not self._is_switched_on:
+            self._is_switched_on = True  # as a rule, asking for scans is enough
+            with contextlib.suppress(Refusal):
+                await self._dialogue.ask("BM")
         else:
             raise refusal
 
@@ -328,6 +335,7 @@ class HokuyoLaser:
         before = stream.clock_map
         if before is not None and reply.stamp == before.stamp_ms:
             self.link.repeated_scans += 1
+            stream.instead = FROZEN
             return None
         stream.clock_map = self._clock_map = now = self._follow(stream, reply.stamp, arrival)
         if before is not None:
