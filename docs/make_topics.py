@@ -39,6 +39,9 @@ is sent again to a subscriber that has lost it (`heartbeat` of an advanced subsc
 A queryable topic answers a `get` with its newest sample, and in JSON to `KEY?format=json`, where
 raw bytes are in base64. What is kept for latecomers is what an advanced subscriber gets when it
 joins. `gvgbot.client` does all of this for programs in Python.
+
+Other programs set zenoh's `mode` to `client`: as a peer, which is zenoh's default, they hear a
+robot that they connect to, but nothing of one that they meet at a router.
 """
 ALIVE = """\
 ## `{key}`
