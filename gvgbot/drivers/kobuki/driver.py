@@ -25,7 +25,7 @@ from gvgbot.drivers.kobuki.limits import Accelerations, ramped, slowed
 from gvgbot.drivers.kobuki.signs import LAMPS, SIGNS
 from gvgbot.drivers.kobuki.wheel_odometry import TICK_ANGLE, WHEEL_BASE, DriveGeometry, Heading
 from gvgbot.drivers.transport import ByteStream
-from gvgbot.errors import DeviceLost
+from gvgbot.errors import DeviceLost, DeviceRefused
 from gvgbot.geometry import STANDSTILL, Twist
 from gvgbot.hal.latest import Latest
 from gvgbot.hal.messages import Battery, Contact, Docking, Odometry, Sign
@@ -35,6 +35,10 @@ _STOP_REPEAT_S = 0.1  # while the base is to stand, it is told so again this oft
 _HUNG_S = 0.1  # so late, it was the host that was busy, and not the base that was silent
 _IDENTITY_RETRY_S = 0.5
 _ALL_EXTRAS = Extra.HARDWARE | Extra.FIRMWARE | Extra.UDID
+_NO_GYRO = (
+    "the gyro has told of no turn while the wheels made more than one: "
+    "switch the base off and on, or set base.heading=wheels"
+)
 _STOP = BaseControl(0, 0)
 STANDSTILL_FRAME = encode_commands([_STOP])
 
@@ -111,7 +115,10 @@ class KobukiBase:
         self._is_excused = False  # silent, but perhaps only because nobody listened
 
     async def run(self) -> None:
-        """Serve the link until cancelled. Raises DeviceLost when the base is silent or gone."""
+        """Serve the link until cancelled.
+
+        Raises DeviceLost when the base is silent or gone, DeviceRefused if its gyro is of no use.
+        """
         self._started = self._clock.now()
         try:
             due = self._started
@@ -256,6 +263,8 @@ class KobukiBase:
 
     def _take(self, data: bytes) -> None:
         odometry = self._feedback.take(data, self._clock.now())
+        if self._feedback.lacks_gyro:
+            raise DeviceRefused(_NO_GYRO)
         if odometry is not None:
             self._newest.put(odometry)
         self._ask_identity()

@@ -166,6 +166,12 @@ class FeedbackReader:
         return 0.0 if self._odometry is None else self._odometry.slip_rate
 
     @property
+    def lacks_gyro(self) -> bool:
+        """Whether the heading is to be the gyro's, which tells nothing while the wheels turn."""
+        state = self._odometry
+        return self._heading == "gyro" and state is not None and state.unfelt > math.tau
+
+    @property
     def is_unbroken(self) -> bool:
         """Whether no motion has been missed since `recall`."""
         return self._breaks == 0

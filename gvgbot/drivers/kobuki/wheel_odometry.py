@@ -14,6 +14,7 @@ TICK_ANGLE = 0.002436916871363930  # rad of a wheel's turn per encoder count
 _WRAP = 65536  # encoder counts
 _ANGLE_SPAN = math.radians(655.36)  # of what 16 bits of a hundredth of a degree can tell
 _SLIP_MEMORY_S = 0.5  # time constant of the reported slip rate
+_IDLE_RAD = 0.001  # that the encoders of a base at rest may seem to turn it between two frames
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +43,8 @@ class WheelOdometry:
     """Where the base is, `odom_base`, how it moves, and the reading that this is based on.
 
     `slip_rate` (rad/s, smoothed) is the turn rate of the gyro minus that of the wheels;
-    `implausible` counts readings in a row that jumped too far to be believed.
+    `implausible` counts readings in a row that jumped too far to be believed; `unfelt` is how far
+    the wheels have turned the base, to and fro (rad), since the gyro's heading last changed.
     """
 
     odom_base: Pose
@@ -50,6 +52,7 @@ class WheelOdometry:
     reading: WheelReading
     slip_rate: float = 0.0
     implausible: int = 0
+    unfelt: float = 0.0
 
 
 def start_odometry(reading: WheelReading, odom_base: Pose | None = None) -> WheelOdometry:
@@ -77,7 +80,10 @@ def advance_odometry(
     blend = dt / (dt + _SLIP_MEMORY_S)
     slip_rate = state.slip_rate + blend * ((by_gyro - by_wheels) / dt - state.slip_rate)
     pose = _moved(state.odom_base, travel, turn)
-    return WheelOdometry(pose, Twist(travel / dt, rate), reading, slip_rate)
+    unfelt = state.unfelt + max(0.0, abs(by_wheels) - _IDLE_RAD)
+    if reading.angle != state.reading.angle:
+        unfelt = 0.0
+    return WheelOdometry(pose, Twist(travel / dt, rate), reading, slip_rate, unfelt=unfelt)
 
 
 def wheel_travels(

@@ -32,8 +32,9 @@ from gvgbot.drivers.kobuki.payloads import (
     encode_feedback,
 )
 from gvgbot.drivers.kobuki.sub_payloads import Truncated, Unknown
+from gvgbot.drivers.kobuki.wheel_odometry import Heading
 from gvgbot.drivers.transport import pipe
-from gvgbot.errors import DeviceLost
+from gvgbot.errors import DeviceLost, DeviceRefused
 from gvgbot.geometry import STANDSTILL, Twist
 from gvgbot.hal.messages import Contact, Odometry
 
@@ -143,6 +144,32 @@ def test_a_cancelled_driver_leaves_zeros_as_its_last_command() -> None:
 
     controls = play(script).controls()
     assert [control for _, control in controls[-2:]] == [MOVE, STOP]
+
+
+@pytest.mark.parametrize(
+    ("heading", "gyro", "is_refused"),
+    [("gyro", 0, True), ("gyro", 1, False), ("wheels", 0, False)],
+    ids=["dead gyro", "one that moves, by a hundredth of a degree", "no gyro wanted"],
+)
+def test_a_gyro_that_stands_while_the_wheels_turn_the_base_round_is_of_no_use(
+    heading: Heading, gyro: int, *, is_refused: bool
+) -> None:
+    """For a turn, here half of it to either side, each wheel goes tau times 0.115 m."""
+    ticks = 1.2 * math.tau * 0.115 * TICKS_PER_M / 100
+
+    async def main() -> None:
+        bench = Bench(KobukiConfig(heading=heading))
+        running = asyncio.ensure_future(bench.base.run())  # noqa: TID251
+        for k in range(100):
+            way = round(ticks * min(k, 100 - k))
+            await bench.say(core(k, -way, way), Inertia(gyro * (k // 50), 0))
+        assert running.done() == is_refused
+        running.cancel()
+        with pytest.raises((DeviceRefused, asyncio.CancelledError)) as end:
+            await running
+        assert ("base.heading=wheels" in str(end.value)) == is_refused
+
+    run_in_virtual_time(main())
 
 
 def test_silence_stops_the_base_and_then_loses_it() -> None:
