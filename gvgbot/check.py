@@ -5,6 +5,7 @@ The robot is told to stand, and nothing else.
 
 import asyncio
 import contextlib
+import math
 from collections.abc import Awaitable, Callable, Coroutine, Iterator
 from dataclasses import asdict, astuple, dataclass, field
 from typing import Any, Literal
@@ -12,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from gvgbot.clock import Clock, LoopClock, VirtualTimeLoop
-from gvgbot.config import Config
+from gvgbot.config import Config, RobotConfig
 from gvgbot.drivers.hokuyo.driver import FEWEST_BEAMS, FINER, HokuyoLaser
 from gvgbot.drivers.kobuki.driver import KobukiBase
 from gvgbot.errors import DeviceLost, DeviceRefused, GvgbotError
@@ -31,6 +32,7 @@ BASE_RATE = 50.0  # Hz
 MESSAGE_COUNTS = ("frames", "scans")
 OF_NEWER_FIRMWARE = "unknown_parts"  # checksums were right
 SEEN_SHARE = 0.2  # of the beams; a laser that sees less is covered or dirty
+FAR = 1e3  # m, for beams that measured nothing
 UNCOVER = "uncover and clean its window"
 UNCOVER_OR_MOVE = f"{UNCOVER}, or put the robot where there are walls"
 
@@ -138,7 +140,7 @@ async def _examine_laser(links: Links, clock: Clock) -> list[Line]:
     with contextlib.ExitStack() as stack:
         stack.callback(close)
         heard = await _listen(laser.run, next_stamp, lambda: laser.link.scans, clock)
-    return list(_laser_lines(laser, scans, heard, links.config.robot.limits))
+    return list(_laser_lines(laser, scans, heard, links.config.robot))
 
 
 async def _examine_base(links: Links, clock: Clock) -> list[Line]:
@@ -188,8 +190,9 @@ async def _listen(
 
 
 def _laser_lines(
-    laser: HokuyoLaser, scans: list[Scan], heard: Heard, limits: GuardConfig
+    laser: HokuyoLaser, scans: list[Scan], heard: Heard, robot: RobotConfig
 ) -> Iterator[Line]:
+    limits = robot.limits
     identity = laser.identity
     if identity is not None:
         yield Line("ok", "laser", f"{identity.product}, serial {identity.serial or 'not told'}")
@@ -211,6 +214,7 @@ def _laser_lines(
     yield _link("laser link", laser.link)
     yield _timing("laser clock", heard)
     yield _view(scans)
+    yield from _own_parts(scans, robot.radius_m)
     if len(scans[-1].ranges) < FEWEST_BEAMS:
         yield Line("warn", "laser beams", f"they are fewer than {FEWEST_BEAMS}", FINER)
     if not scans[-1].looks_ahead:
@@ -263,6 +267,23 @@ def _view(scans: list[Scan]) -> Line:
     if not any(np.isfinite(scan.ranges).any() for scan in scans):
         return Line("warn", "laser view", f"{beams}, nothing within range", UNCOVER_OR_MOVE)
     return Line("ok", "laser view", f"{beams}, {trusted:.0%} of them of use")
+
+
+def _own_parts(scans: list[Scan], radius: float) -> Iterator[Line]:
+    """What the laser sees within the robot's radius (m), again and again: parts of the robot."""
+    mount = scans[-1].base_laser
+    ranges = np.median([np.nan_to_num(scan.ranges, nan=FAR, posinf=FAR) for scan in scans], axis=0)
+    near = np.flatnonzero(ranges < radius + math.hypot(mount.x, mount.y))
+    bearings = mount.theta + scans[-1].bearings[near]
+    x, y = mount.x + ranges[near] * np.cos(bearings), mount.y + ranges[near] * np.sin(bearings)
+    own = ranges[near][np.hypot(x, y) < radius]
+    if len(own):
+        yield Line(
+            "warn",
+            "laser view",
+            f"{len(own)} beams end within the robot, {own.min():.2f} to {own.max():.2f} m away",
+            f"clear its view, or set laser.min_range_m={own.max() + 0.02:.2f}",
+        )
 
 
 def _steadiness(subject: str, heard: Heard, nominal: float) -> Line:

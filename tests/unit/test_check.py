@@ -2,19 +2,22 @@
 
 import contextlib
 import errno
+import math
 import os
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from math import inf, nan
 from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
 
+import numpy as np
 import pytest
 import serial
 import structlog
 
-from gvgbot.check import Heard, _base_lines, _link, check, examine
+from gvgbot.check import Heard, _base_lines, _link, _own_parts, check, examine
 from gvgbot.cli.entry import status_of
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.config import load_config
@@ -22,6 +25,7 @@ from gvgbot.drivers.kobuki.driver import KobukiBase
 from gvgbot.drivers.kobuki.feedback import Identity, LinkStatistics
 from gvgbot.drivers.transport import _obstacle
 from gvgbot.geometry import Pose
+from gvgbot.hal.messages import Scan
 from gvgbot.simulation import Simulation, open_place
 
 CONFIG = load_config()
@@ -128,6 +132,24 @@ def test_a_laser_with_nothing_within_range_may_be_covered() -> None:
     verdict, finding = points["laser view"]
     assert (status, verdict) == (0, "warn")
     assert "nothing within range" in finding
+
+
+@pytest.mark.parametrize(
+    ("post_m", "ahead_m", "remedy"),
+    [(0.12, 0.0, "laser.min_range_m=0.14"), (0.12, 0.1, None), (0.3, 0.0, None), (inf, 0.0, None)],
+    ids=["a post of the robot", "of which the laser is ahead", "of something else", "nothing"],
+)
+def test_a_laser_that_sees_the_robot_itself_is_found_out(
+    post_m: float, ahead_m: float, remedy: str | None
+) -> None:
+    """The robot is round, with a radius of 0.177 m."""
+    ranges = np.full(683, 2.0)
+    ranges[330:352], ranges[:20] = post_m, nan
+    step = math.tau / 1024
+    scan = Scan(0.0, ranges, -341 * step, step, 0.02, 5.6, base_laser=Pose(ahead_m, 0.0))
+    lines = [str(line) for line in _own_parts([scan, scan], 0.177)]
+    assert len(lines) == (remedy is not None)
+    assert all("22 beams" in line and remedy in line for line in lines if remedy)
 
 
 def test_the_rate_is_compared_with_what_the_laser_was_asked_for() -> None:
