@@ -61,7 +61,8 @@ class KobukiConfig:
     # None: no ramp; not below that of robot.limits
     max_angular_acceleration_radps2: Annotated[float, Range(0.1, 1000.0)] | None = None
     deadman_s: Annotated[float, Range(0.05, 2.0)] = 0.5  # without drive(): stop
-    silence_stop_s: Annotated[float, Range(0.05, 2.0)] = 0.5  # without feedback: stop
+    # without feedback: stop; the guard, which is not asked meanwhile, allows for as long
+    silence_stop_s: Annotated[float, Range(0.05, 2.0)] = 0.25
     silence_lost_s: Annotated[float, Range(0.1, 10.0)] = 1.0  # without feedback: give up
     link_delay_s: Annotated[float, Range(0.0, 0.1)] = 0.0  # from measuring to arrival, at best
     sounds: bool = True  # a tune when it is done, and one when it needs somebody

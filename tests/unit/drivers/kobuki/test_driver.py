@@ -202,14 +202,14 @@ def test_silence_stops_the_base_and_then_loses_it() -> None:
     assert (MOVE in [control for t, control in bench.controls() if t < 0.99]) is True
 
 
-def test_half_a_second_of_silence_stops_the_base_long_before_the_deadman() -> None:
+def test_a_quarter_of_a_second_of_silence_stops_the_base_long_before_the_deadman() -> None:
     async def script(bench: Bench) -> None:
         await bench.stream(0.5, Twist(0.2, 0.0))
         await asyncio.sleep(0.9)
 
     bench = play(script, KobukiConfig(deadman_s=2.0))
     stops = [t for t, control in bench.controls(since=0.02) if control == STOP]
-    assert stops[0] == pytest.approx(0.48 + 0.5)
+    assert stops[0] == pytest.approx(0.48 + 0.25)
 
 
 def test_a_link_that_is_cut_is_reported_by_run_alone() -> None:
