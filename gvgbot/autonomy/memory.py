@@ -146,7 +146,7 @@ def remember(pipeline: Pipeline) -> Memory:
         travelled=past.travelled,
         kept=past.with_scan,
         belief=ekf.without_trail(mapper.belief),
-        graph=replace(mapper.graph, walled={}),
+        graph=mapper.graph.unwalled(),
         candidates=mapper._unbelieved._all,
         intent=_intent(pipeline),
         near=_cells(maps.near),

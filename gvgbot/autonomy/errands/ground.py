@@ -1,5 +1,7 @@
 """What is known of the ground that errands lead over: where the robot is on it, and which ways."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from gvgbot.autonomy.destinations import foot_at, foot_of, route_to_foot, route_to_vertex
@@ -53,20 +55,18 @@ class Ground:
 
     def no_way_to(self, stop: Stop, here: Situation, there: str = "there") -> str:
         """That no known way leads to a stop, and whether one would but for virtual walls."""
-        graph = self.mapper.graph
-        walled, graph.walled = graph.walled, {}
-        is_beyond = bool(walled) and self._leads_to(stop, here)
-        graph.walled = walled
+        unwalled = replace(here, graph=here.graph.unwalled())
+        is_beyond = bool(here.graph.walled) and self._leads_to(stop, unwalled)
         return f"no known way leads {there}" + " but over a virtual wall" * is_beyond
 
     def _leads_to(self, stop: Stop, here: Situation) -> bool:
         match stop:
             case ToVertex(vertex=vertex):
-                return route_to_vertex(self.mapper.graph, here.starts(), vertex) is not None
+                return route_to_vertex(here.graph, here.starts(), vertex) is not None
             case ToPoint(x=x, y=y) | Home(x=x, y=y):
                 foot = foot_of(self.mapper, np.array([x, y]))
             case Waypoint(end=end, station=station):
-                foot = foot_at(self.mapper.graph, end, station)
+                foot = foot_at(here.graph, end, station)
             case _:
                 return True
         return foot is not None and route_to_foot(here, here.starts(), foot) is not None

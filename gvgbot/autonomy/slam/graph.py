@@ -155,6 +155,10 @@ class GvgGraph:
         low, high = sorted((begin, end))
         return any(low < at < high for at in self.walled.get(edge.id, ()))
 
+    def unwalled(self) -> "GvgGraph":
+        """The same vertices and edges, as if there were no virtual walls."""
+        return replace(self, walled={})
+
     def copied(self) -> "GvgGraph":
         """The same graph, to change apart from this one.
 
