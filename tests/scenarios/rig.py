@@ -151,7 +151,7 @@ async def _played(
     simulation = Simulation(config, Place(world, start, walkways), clock)
     if grip is not None:
         _lose_grip(simulation.body, grip)
-    pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
+    pipeline = Pipeline(config.mind, config.exploration, config.robot.radius_m)
     pipeline.mission.survey = partial(survey, pipeline)
     run = Play(simulation, pipeline, clock)
     if walkways is not None:

@@ -117,7 +117,7 @@ def test_a_robot_that_rolled_and_was_turned_while_its_base_was_away_finds_its_pl
         config, clock = load_config(None, ["twin.world=rooms"]), LoopClock()
         simulation = Simulation(config, open_place(config), clock)
         devices, body = Devices(Links(config, clock, simulation)), simulation.body
-        pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
+        pipeline = Pipeline(config.mind, config.exploration, config.robot.radius_m)
         driving = drive(config.robot, devices, pipeline, on_cycle=wheels.append)
         async with asyncio.TaskGroup() as tasks:
             work = tasks.create_task(driving)
