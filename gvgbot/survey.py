@@ -14,7 +14,7 @@ from gvgbot.maps.narrows import narrows
 from gvgbot.maps.occupancy import OccupancyGrid, occupancy_grid
 from gvgbot.maps.passages import Way, passages
 from gvgbot.maps.spots import spots
-from gvgbot.maps.viewpoints import have_room, viewpoints
+from gvgbot.maps.viewpoints import viewpoints
 
 _INTO_M = 2.0  # off its ways: through a door, and the robot faces what it looks at
 _TOWARDS_M = 1.0  # what seems to be a passage may be a pane of glass
@@ -42,12 +42,13 @@ def survey(pipeline: Pipeline) -> Surveyed:
     narrow = narrows(grid, beside, here, pipeline.radius, room)
     if ways:
         found = np.concatenate([found, blanks(grid, beside, here, room)])
-    if not have_room(grid, beside, room):
-        return Surveyed(found, narrow, is_beside_floor=len(found) > 0)
     through = passages(grid, ways, here, room, pipeline.open_clearance)
     off = np.repeat([_INTO_M, _TOWARDS_M], [len(found), len(through)])
     places = np.concatenate([found, through])
-    return Surveyed(viewpoints(grid, beside, places, here, room, off), narrow)
+    views = viewpoints(grid, beside, places, here, room, off)
+    if views is None:
+        return Surveyed(found, narrow, is_beside_floor=len(found) > 0)
+    return Surveyed(views, narrow)
 
 
 def _walled(grid: OccupancyGrid, points: Array) -> OccupancyGrid:

@@ -42,6 +42,8 @@ def passages(
     robot is at `around` (2,) and keeps `passage_m` from walls; farther than `open_m` from them
     there are no edges.
     """
+    if not ways:
+        return np.empty((0, 2))
     cell, corner = grid.resolution_m, np.array(grid.origin)
     clearance = metres_to(is_wall(grid.cells), cell)
     has_room = (clearance > passage_m) & (clearance < _NOT_OPEN * open_m)
@@ -49,8 +51,6 @@ def passages(
     coarse = max(1, round(_CELL_M / cell))
     floor, cell = floor[::coarse, ::coarse].copy(), cell * coarse
     del clearance, has_room  # a large grid's take much memory
-    if not ways:
-        return np.empty((0, 2))
     points, along = _network(ways)
     meeting = _meeting(floor, (points - corner) / cell, _ASIDE_M / cell)
     meeting = meeting._replace(length=meeting.length * cell)

@@ -18,6 +18,8 @@ def spots(
     It tells of who has been let into the map, and of the floor where somebody has gone. The robot
     is at `around` (2,) and keeps `passage_m` from walls, and from them.
     """
+    if not len(places):
+        return np.empty((0, 2))
     cell, corner = grid.resolution_m, np.array(grid.origin)
     wall, floor = is_wall(grid.cells), is_floor(grid.cells)
     has_room = metres_to(wall, cell) > passage_m

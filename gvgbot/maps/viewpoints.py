@@ -21,16 +21,18 @@ def viewpoints(
     around: Array,
     passage_m: float,
     off_m: Array,
-) -> Array:
+) -> Array | None:
     """Where to go (M, 2), m, map frame, for a look at places (N, 2) to which the floor leads.
 
     That is on the shortest path over the floor from the nearest way (points (K, 2), a cell or less
     apart) to the place, `off_m` (N,) off that way at most. The robot is at `around` (2,) and keeps
-    `passage_m` from walls.
+    `passage_m` from walls. None if no way is so far from them, anywhere.
     """
     cell, corner = grid.resolution_m, np.array(grid.origin)
     walls = is_wall(grid.cells)
     has_room = metres_to(walls, cell) > passage_m
+    if not (_marked(ways, grid) & has_room).any():
+        return None
     floor = reachable(is_floor(grid.cells) & has_room, (around - corner)[::-1] / cell)
     near_ways = cells_near(ways, grid, floor)
     floor, near_ways = np.pad(floor, 1), np.pad(near_ways, 1)  # every cell has four neighbours
@@ -42,12 +44,6 @@ def viewpoints(
             found.append(view - 1)
     views: Array = corner + (np.array(found).reshape(-1, 2)[:, ::-1] + 0.5) * cell
     return views
-
-
-def have_room(grid: OccupancyGrid, ways: Array, passage_m: float) -> bool:
-    """Whether any way (points (K, 2)) is farther from the walls, anywhere, than that."""
-    room = metres_to(is_wall(grid.cells), grid.resolution_m) > passage_m
-    return bool((_marked(ways, grid) & room).any())
 
 
 def cells_near(ways: Array, grid: OccupancyGrid, floor: Mask) -> Mask:

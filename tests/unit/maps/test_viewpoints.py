@@ -26,8 +26,10 @@ OFF_M = 2.0
 
 
 def found(*places: tuple[float, float], off_m: float = OFF_M) -> Array:
-    off = np.full(len(places), off_m)
-    return viewpoints(drawn(*HOUSE), CORRIDOR, np.array(places), np.array([1.5, 0.5]), 0.25, off)
+    off, at = np.full(len(places), off_m), np.array(places).reshape(-1, 2)
+    views = viewpoints(drawn(*HOUSE), CORRIDOR, at, np.array([1.5, 0.5]), 0.25, off)
+    assert views is not None
+    return views
 
 
 def test_a_room_is_looked_at_through_its_door_and_not_from_behind_its_wall() -> None:
@@ -56,13 +58,20 @@ def test_however_far_off_the_nearest_way_is_the_robot_goes_from_there(
     """Of the middle of a hall 28 m long, and as well of what is at the border of a search."""
     hall = drawn("#" * 30, "#" + "." * 28 + "#", "#" * 30)
     place, ways = np.array([[14.05, -0.45]]), np.array([[14.05 + side * away, -0.45]])
-    (view,) = viewpoints(hall, ways, place, np.array([14.0, -0.5]), 0.25, np.array([OFF_M]))
+    views = viewpoints(hall, ways, place, np.array([14.0, -0.5]), 0.25, np.array([OFF_M]))
+    assert views is not None
+    (view,) = views
     assert 1.7 < side * (ways[0, 0] - view[0]) < 2.3  # from the way towards the place
 
 
 def test_where_no_floor_leads_there_is_no_viewpoint() -> None:
     assert len(found((1.5, 1.5))) == 0  # in the wall
-    assert (
-        len(viewpoints(drawn(*HOUSE), CORRIDOR, np.empty((0, 2)), np.zeros(2), 0.25, np.empty(0)))
-        == 0
-    )
+    assert len(found()) == 0
+
+
+def test_where_no_way_has_room_there_is_nothing_to_look_from() -> None:
+    """The corridor is a metre wide: its middle is half a metre from the walls."""
+    place, off = np.array([[0.5, 3.5]]), np.array([OFF_M])
+    here = np.array([1.5, 0.5])
+    assert viewpoints(drawn(*HOUSE), CORRIDOR, place, here, 0.4, off) is not None
+    assert viewpoints(drawn(*HOUSE), CORRIDOR, place, here, 0.7, off) is None
