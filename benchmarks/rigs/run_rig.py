@@ -23,18 +23,8 @@ from gvgbot.service import Notifier
 from gvgbot.session import Session
 from gvgbot.simulation import Place, Simulation
 from gvgbot.telemetry_config import TelemetryConfig
-from gvgbot.topics import (
-    Events,
-    Grid,
-    Health,
-    Map,
-    Odometry,
-    Payload,
-    Plan,
-    Scan,
-    State,
-    Trajectory,
-)
+from gvgbot.tiles import Grid
+from gvgbot.topics import Events, Health, Map, Odometry, Payload, Plan, Scan, State, Trajectory
 from gvgbot.worlds.canvas import Canvas
 
 STOP = (0, 0)

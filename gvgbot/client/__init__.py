@@ -15,9 +15,9 @@ from gvgbot.client.network import DEFAULT_ENDPOINT, only_robot, robots
 from gvgbot.client.presence import Presence
 from gvgbot.client.robot import Robot, connect
 from gvgbot.errors import GvgbotError, UsageError
+from gvgbot.tiles import Grid, Raster, Tile
 from gvgbot.topics import (
     Event,
-    Grid,
     Health,
     LinkHealth,
     Map,
@@ -25,10 +25,8 @@ from gvgbot.topics import (
     MapVertex,
     Odometry,
     Plan,
-    Raster,
     Scan,
     State,
-    Tile,
     Trajectory,
 )
 

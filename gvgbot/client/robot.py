@@ -28,6 +28,7 @@ from gvgbot.client.tiles import Tiles
 from gvgbot.errors import GvgbotError, UsageError
 from gvgbot.names import is_robot_name
 from gvgbot.requests import Arguments, Goto, Nothing, Patrol, RequestName, Set
+from gvgbot.tiles import Grid
 from gvgbot.topics import (
     EVENTS,
     GRID,
@@ -39,7 +40,6 @@ from gvgbot.topics import (
     STATE,
     TRAJECTORY,
     Events,
-    Grid,
     Health,
     Map,
     Odometry,

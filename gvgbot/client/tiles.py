@@ -6,7 +6,7 @@ from collections.abc import Callable
 import msgspec
 
 from gvgbot.client.newest import Newest
-from gvgbot.topics import Grid, Tile
+from gvgbot.tiles import Grid, Tile
 
 
 class Tiles:

@@ -8,7 +8,7 @@ import numpy as np
 
 from gvgbot.autonomy.keyframes import Keyframe
 from gvgbot.maps.occupancy import GrowingGrid
-from gvgbot.topics import Grid, Tile
+from gvgbot.tiles import Grid, Tile
 
 _RESOLUTION_M, _REACH_M = 0.05, 8.0  # a shorter reach than the saved grid's: cheap to send
 _SIDE = 64  # cells of a tile

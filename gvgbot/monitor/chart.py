@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from gvgbot.monitor.braille import Dots, lit, patterns
 from gvgbot.monitor.view import Points, View
-from gvgbot.topics import Map, Plan, Raster
+from gvgbot.tiles import Raster
+from gvgbot.topics import Map, Plan
 
 Layer = Literal["empty", "wall", "trail", "edge", "plan", "frontier", "vertex", "mate", "robot"]
 

@@ -12,7 +12,8 @@ from gvgbot import client
 from gvgbot.client import Asking, Robot, State
 from gvgbot.errors import GvgbotError, UsageError, reason_of, underlying
 from gvgbot.requests import Goto, Patrol, Set
-from gvgbot.topics import Events, Health, Map, Odometry, Plan, Scan, Tile, Trajectory
+from gvgbot.tiles import Tile
+from gvgbot.topics import Events, Health, Map, Odometry, Plan, Scan, Trajectory
 from gvgbot.web.viewers import Audience
 from gvgbot.web.wire import Floor, History, Kind, Link, Reply, Wish
 

@@ -12,7 +12,8 @@ import msgspec
 
 from gvgbot.client.presence import Word
 from gvgbot.requests import JSON, Arguments, RequestName, parse
-from gvgbot.topics import Events, Health, Map, Odometry, Plan, Scan, State, Tile, Trajectory
+from gvgbot.tiles import Tile
+from gvgbot.topics import Events, Health, Map, Odometry, Plan, Scan, State, Trajectory
 
 Known = Literal[
     "state", "map", "floor", "tile", "trajectory", "plan", "odometry", "scan", "events", "health"

@@ -32,10 +32,10 @@ from gvgbot.client.newest import Newest
 from gvgbot.errors import GvgbotError, UsageError
 from gvgbot.telemetry import Telemetry
 from gvgbot.telemetry_config import TelemetryConfig
+from gvgbot.tiles import Grid, Tile
 from gvgbot.topics import (
     Event,
     Events,
-    Grid,
     Health,
     Map,
     MapEdge,
@@ -44,7 +44,6 @@ from gvgbot.topics import (
     Plan,
     Scan,
     State,
-    Tile,
     Trajectory,
 )
 from tests.unit.monitor.maps import SIDE, a_grid

@@ -24,7 +24,7 @@ from gvgbot.recording.reader import Recording
 from gvgbot.recording.recorder import Recorder
 from gvgbot.replay import Wanted, open_log
 from gvgbot.session import Session
-from gvgbot.topics import Grid
+from gvgbot.tiles import Grid
 from tests.replay.test_pipeline import LOLLIPOP, START
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(120)]

@@ -31,7 +31,7 @@ from gvgbot.maps import run_directory
 from gvgbot.robot import Robot
 from gvgbot.simulation import Place
 from gvgbot.stop_signals import StopSignals
-from gvgbot.topics import Grid
+from gvgbot.tiles import Grid
 from gvgbot.worlds.canvas import Canvas
 
 pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(120)]

@@ -8,7 +8,8 @@ import pytest
 
 from gvgbot.client.newest import decoded
 from gvgbot.errors import GvgbotError
-from gvgbot.topics import GRID, MAP, PLAN, SCAN, STATE, TRAJECTORY, Grid, Tile, Topic
+from gvgbot.tiles import Grid, Tile
+from gvgbot.topics import GRID, MAP, PLAN, SCAN, STATE, TRAJECTORY, Topic
 from tests.unit.test_telemetry import EXAMPLE
 
 STATE_FIELDS = msgspec.to_builtins(EXAMPLE)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from gvgbot.client.newest import Newest
 from gvgbot.client.tiles import Tiles
-from gvgbot.topics import Grid, Tile
+from gvgbot.tiles import Grid, Tile
 
 SIDE = 4
 

@@ -18,7 +18,8 @@ from gvgbot.hal.packed_scan import PackedScan
 from gvgbot.live.grid import LiveGrid
 from gvgbot.live.map import Stretch, Trail, bent
 from gvgbot.maps.occupancy import occupancy_grid
-from gvgbot.topics import TRAJECTORY_POSES, Grid, Raster
+from gvgbot.tiles import Grid, Raster
+from gvgbot.topics import TRAJECTORY_POSES
 
 
 def keyframe(x: float, y: float, reach: float = 3.0) -> Keyframe:

@@ -5,7 +5,8 @@ import zlib
 import numpy as np
 from numpy.typing import NDArray
 
-from gvgbot.topics import Grid, Map, MapEdge, MapVertex, Raster, Tile
+from gvgbot.tiles import Grid, Raster, Tile
+from gvgbot.topics import Map, MapEdge, MapVertex
 
 CELLS = {"#": 100, ".": 0, " ": -1}
 SIDE = 64  # cells of a tile
