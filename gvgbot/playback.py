@@ -102,8 +102,7 @@ class PlayedRobot(Robot):
         for at, message in self._messages:
             await self._clock.sleep_until(at)
             self._live_through(message)
-        self._finished.set()
-        self._grown.set()
+        self._saving.finish()
         log.info("the recording is over")
         while self._odometry is not None:
             await self._clock.sleep_until(self._clock.now() + _BEAT)

@@ -1,7 +1,6 @@
 """The robot in real time: explores, stands when done, reports, saves, and outlives lost devices."""
 
 import asyncio
-import contextlib
 from collections.abc import Awaitable, Callable, Sequence
 from functools import partial
 from typing import Protocol
@@ -16,7 +15,6 @@ from gvgbot.autonomy.returning import ReturningPipeline
 from gvgbot.beside_loop import BesideLoop
 from gvgbot.clock import Clock, LoopClock, OffLoop
 from gvgbot.config import Config
-from gvgbot.errors import GvgbotError
 from gvgbot.geometry import STANDSTILL, Twist
 from gvgbot.hal.guard import Guard, Reason
 from gvgbot.hal.messages import Contact, Odometry, Scan
@@ -40,7 +38,6 @@ from gvgbot.survey import survey
 from gvgbot.topics import HEALTH, MAP, STATE, Health, Payload, State
 from gvgbot.vitals import Vitals
 
-SAVE_EVERY = 30.0  # s at least between two savings while the map grows
 CALL_EVERY = 10.0  # s between two attempts to drive home with a low battery
 STUCK_AFTER = 1.0  # s without a control cycle, though the base is there
 _DRIVEN = "it is driven until it is asked for something else"
@@ -108,8 +105,6 @@ class Robot:
         self._session, self._notifier = session, notifier
         self._network, self._off_loop, self._keeper = network, off_loop, keeper
         self._pipeline = session.pipeline
-        self._grown, self._finished = asyncio.Event(), asyncio.Event()
-        self._happened = asyncio.Event()  # something that is to be written
         self._saving = Saving(session, off_loop)
         self._survey = BesideLoop(session.pipeline, survey)
         self._pipeline.mission.survey = self._survey.newest
@@ -119,7 +114,6 @@ class Robot:
         self._odometry: Odometry | None = None
         self._sequence, self._ready = 0, False
         self._events = LiveEvents()
-        self._unsaved = ""  # why the map is not on the disk as it should be
         self._decided = ""  # the reason of the last decision
         self._not_driven = ""  # why nobody may drive it just now
         self._feed: LiveFeed | None = None
@@ -143,8 +137,8 @@ class Robot:
             "devices": self._devices.run(),
             "explore": self._explore(),
             "beat": self._beat(),
-            "events": self._keep_written(),
-            "save": self._keep_saved(),
+            "events": self._saving.keep_written(),
+            "save": self._saving.keep_saved(),
             "survey": self._survey.work(self._off_loop),
             "estimate": self._estimate.work(self._off_loop),
         }
@@ -212,8 +206,6 @@ class Robot:
             use=self._use,
             tell=self._on_events,
         )
-        if self._pipeline.mission.outcome is not None:  # before a restart
-            self._grown.set()
 
     def _show_scan(self, scan: Scan) -> None:
         for shown in (self._feed, self._ros):
@@ -235,39 +227,6 @@ class Robot:
         if is_new:
             asked = events.Requested(stamp, "cmd_vel", "ROS 2", is_done, text)
             self._on_events([asked, *errands.take_events()])
-
-    async def _keep_written(self) -> None:
-        """Write what happens, until cancelled: a slow disk must not hold up the loop."""
-        while True:
-            await self._happened.wait()
-            self._happened.clear()
-            await self._off_loop(self._session.write_events)
-
-    async def _keep_saved(self) -> None:
-        """Save now and then while the map grows, and when it is finished, until it is saved."""
-        while True:
-            await self._grown.wait()
-            self._grown.clear()
-            await self._save()
-            if self._unsaved:
-                self._grown.set()
-            elif self._pipeline.mission.outcome is not None and self._pipeline.errands.is_resting:
-                log.info("standing still until stopped", map=str(self._session.directory.path))
-            with contextlib.suppress(TimeoutError):
-                async with asyncio.timeout(SAVE_EVERY):
-                    await self._finished.wait()
-            self._finished.clear()
-
-    async def _save(self) -> None:
-        """Save the map, and the events that could not be written before; say once if it fails."""
-        before, self._unsaved = self._unsaved, ""
-        self._happened.set()
-        try:
-            await self._saving.save()
-        except GvgbotError as error:
-            self._unsaved = str(error)
-            if self._unsaved != before:
-                log.warning("map not saved", reason=self._unsaved)
 
     def _use(self, config: Config) -> None:
         """Put a configuration into effect, as far as that can be changed."""
@@ -314,17 +273,12 @@ class Robot:
     # -- what happens ------------------------------------------------------------------------------
 
     def _on_events(self, happened: list[events.Event]) -> None:
-        self._session.note_events(happened)
-        self._happened.set()
+        self._saving.on_events(happened)
         for event in happened:
             log_event(event)
             self._events.note(event)
             if self._keeper is not None:
                 self._keeper.on_event(event)
-            if isinstance(event, events.VertexAdded | events.Finished):
-                self._grown.set()
-            if isinstance(event, events.Finished):
-                self._finished.set()
             if isinstance(event, events.Decision):
                 self._decided = event.reason
             if isinstance(event, CORRECTIONS):
