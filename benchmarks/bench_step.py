@@ -43,7 +43,7 @@ class TimedPipeline(Pipeline):
         self.stages: dict[str, list[float]] = {}
         self._time("match", self, "_localise")
         self._time("insert", self.tracker.maps, "insert")
-        self._time("local GVG", self, "_local_gvg")
+        self._time("local GVG", self.sight, "_local_gvg")
         self._time("recognise", self.mapper, "observe")
         self._time("decide", self.errands, "advance")
 

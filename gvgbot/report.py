@@ -98,7 +98,7 @@ def map_files(pipeline: Pipeline, journey: Journey, title: str) -> dict[str, byt
             grid=grid,
             estimate=estimate,
             odometry=odometry,
-            virtual_walls=pipeline.virtual_walls,
+            virtual_walls=pipeline.sight.virtual_walls,
             title=title,
         ),
         "estimate.tum": encode_tum(estimate),

@@ -34,7 +34,7 @@ def survey(pipeline: Pipeline) -> Surveyed:
     if ways and not pipeline.matches_walls:
         return Surveyed(_NONE, _NONE)
     keyframes = smoothed_keyframes(pipeline)
-    grid = _walled(occupancy_grid(scans_at(keyframes, pipeline)), pipeline.virtual_walls)
+    grid = _walled(occupancy_grid(scans_at(keyframes, pipeline)), pipeline.sight.virtual_walls)
     here, room = pipeline.map_base.position, pipeline.errands.room_m
     stood = spots(grid, *_passed(pipeline, keyframes), here, room)
     found = np.concatenate([gaps(grid, here, room), stood])
@@ -42,7 +42,7 @@ def survey(pipeline: Pipeline) -> Surveyed:
     narrow = narrows(grid, beside, here, pipeline.radius, room)
     if ways:
         found = np.concatenate([found, blanks(grid, beside, here, room)])
-    through = passages(grid, ways, here, room, pipeline.open_clearance)
+    through = passages(grid, ways, here, room, pipeline.sight.open_clearance)
     off = np.repeat([_INTO_M, _TOWARDS_M], [len(found), len(through)])
     places = np.concatenate([found, through])
     views = viewpoints(grid, beside, places, here, room, off)

@@ -28,21 +28,18 @@ from gvgbot.autonomy.events import EdgeJoined, Event, Recovery, VertexAdded, Way
 from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.gvg.beams import without_mixed_pixels
 from gvgbot.autonomy.gvg.local import LocalGvg
-from gvgbot.autonomy.gvg.reduction import reduce_graph
-from gvgbot.autonomy.gvg.voronoi import fine_graph
 from gvgbot.autonomy.handedness import Handedness, what_to_set
 from gvgbot.autonomy.hazards import Hazards
 from gvgbot.autonomy.keyframes import Past, has_come_on
 from gvgbot.autonomy.localisation import Localisation
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.mission import Mission
-from gvgbot.autonomy.noisy_walls import NoisyWalls
 from gvgbot.autonomy.placing import LATELY_M, search_near_by
 from gvgbot.autonomy.pose_tracking import PoseTracker
+from gvgbot.autonomy.sight import Sight
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
 from gvgbot.autonomy.traffic import Traffic
-from gvgbot.autonomy.views import Correspondence, View, touching
-from gvgbot.autonomy.virtual_walls import points_of
+from gvgbot.autonomy.views import Correspondence, View
 from gvgbot.geometry import STANDSTILL, Array, Pose, Twist, wrap_angle
 from gvgbot.hal.messages import Odometry, Scan
 from gvgbot.hal.packed_scan import Sweep
@@ -78,8 +75,6 @@ class Pipeline:
     ) -> None:
         """`led` if somebody else drives: it only learns, and its twists mean nothing."""
         self._config, self.radius, self.led = config, robot_radius, led
-        self._needed_m = robot_radius + config.passage_margin_m  # from its middle to walls
-        self._noisy_walls = NoisyWalls(self._needed_m, config.local_map)
         self.mapper = Mapper(
             config.mapping,
             config.recognition,
@@ -94,8 +89,8 @@ class Pipeline:
         )
         self._reflexes = Reflexes(config.reflexes)
         self._hazards = Hazards(config.hazards)
-        self.virtual_walls = points_of(config.virtual_walls)  # map frame
         self.traffic = Traffic(config.newcomers)
+        self.sight = Sight(config, robot_radius, self.mapper, self._hazards, self.traffic)
         self._handedness, self._turning = Handedness(), 0.0  # the latter as it wished last, rad/s
         self._incidents: list[tuple[str, str]] = []  # action and reason, since the last scan
         self._look_now = False
@@ -103,7 +98,6 @@ class Pipeline:
         self._looked: Pose | None = None  # local_base of the last look for the GVG
         self._execution = Execution(config.edge_follower, robot_radius)
         self.gvg = LocalGvg()
-        self.open_clearance = config.reduction.open_clearance_m  # from walls; farther is no edge
         self.past = Past()
 
     def configure(self, exploration: ExplorationConfig) -> None:
@@ -197,12 +191,12 @@ class Pipeline:
         for one in self.traffic.nearby(self.mapper.map_in_local(local_base)):
             maps.near.stand_on(one.pose.position, one.radius, travelled)
         maps.insert(scan, local_base, travelled, free)
-        self._noisy_walls.note(whole, local_base.position, maps.near, travelled)
-        self._hazards.forget(travelled)
+        self.sight.note(whole, local_base.position, maps.near, travelled)
         if self.led and not self._worth_a_gvg(local_base):
             self.past.keep(scan, odom_base, local_base, self.mapper.belief.map_base, sweep)
             return happened
-        view = self._view(scan, local_base)
+        view = self.sight.view(scan, local_base, maps.near, len(self.past.keyframes), travelled)
+        self.gvg = view.gvg
         known, learnt = self.mapper.observe(view)
         self.past.keep(scan, odom_base, local_base, self.mapper.belief.map_base, sweep)
         done = self._act(view, known, scan)
@@ -224,37 +218,6 @@ class Pipeline:
         self.mission.meet(local_base, self.traffic.nearby(self.mapper.map_in_local(local_base)))
         walls, now = self.tracker.maps.near, len(self.past.keyframes)
         return self.traffic.sift(scan, local_base, self.mapper, walls, now)
-
-    def _view(self, scan: Scan, local_base: Pose) -> View:
-        """What there is to be seen of the GVG, and what of that is doubtful."""
-        self.open_clearance = self._config.reduction.open_clearance(
-            scan.range_max, self._config.local_map.half_width_m
-        )
-        self.mapper.heed(self.virtual_walls)
-        virtual = self.mapper.map_in_local(local_base).transform(self.virtual_walls)
-        self._hazards.virtual_walls = virtual[self.tracker.maps.near.covers(virtual)]
-        self.gvg, marks = self.mapper.marked(self._local_gvg(local_base), local_base)
-        hazards, suspects = self._hazards.doubtful, self.tracker.maps.near.suspects()
-        doubtful = np.concatenate([hazards, suspects, *self.traffic.standing])
-        doubted = touching(self.gvg, doubtful)
-        if self.traffic.is_in_team:  # bodies lead the GVG nowhere, but hide how it goes on
-            ends = (key for key, node in self.gvg.nodes.items() if node.degree == 1)
-            doubted |= touching(self.gvg, self.traffic.newcomers.points) & frozenset(ends)
-        return View(
-            len(self.past.keyframes),
-            scan.stamp,
-            self.past.travelled,
-            local_base,
-            self.gvg,
-            self.tracker.maps.near,
-            doubtful,
-            doubted,
-            marks,
-            self.traffic.newcomers.is_one_standing(scan.stamp, self.tracker.maps.near),
-            scan.field_of_view,
-            self._hazards.virtual_walls,
-            hazards,
-        )
 
     def _act(self, view: View, known: Correspondence, scan: Scan) -> list[Event]:
         """Decide what to do next; what happened by that."""
@@ -281,21 +244,6 @@ class Pipeline:
             order = Drive(self.traffic.led_round(order.track, view, map_in_local, *room))
         self._execution.obey(order)
         return done
-
-    def _local_gvg(self, local_base: Pose) -> LocalGvg:
-        """The GVG around the base, by what the local map shows and the map holds."""
-        reduction, half_width = self._config.reduction, self._config.local_map.half_width_m
-        fine = fine_graph(
-            self._noisy_walls.drawn(self.tracker.maps.near),
-            local_base.position,
-            min_clearance=self._needed_m,
-            roughness=reduction.roughness_m,
-            open_clearance=self.open_clearance,
-            felt=np.concatenate([self._hazards.points, *self.traffic.in_the_way]),
-            virtual_walls=self._hazards.virtual_walls,
-        )
-        known = self.mapper.known_around(local_base, half_width)
-        return reduce_graph(fine, reduction, known).rings_cut_far_from(local_base.position)
 
     def _worth_a_look(self, scan: Scan, odom_base: Pose) -> bool:
         """Whether the robot is about something, and has come on, turned or waited enough."""

@@ -77,7 +77,7 @@ class LiveMap:
         ]
 
         def graph_of_now() -> Map:
-            lines, walls = bent(edges, poses), packed(pipeline.virtual_walls)
+            lines, walls = bent(edges, poses), packed(pipeline.sight.virtual_walls)
             return Map(stamp=stamp, vertices=vertices, edges=lines, virtual_walls=walls)
 
         return partial(self._drawn, portion or _nothing, graph_of_now, stamp)

@@ -93,7 +93,7 @@ def test_on_a_known_map_no_way_leads_over_it_as_long_as_it_is_there() -> None:
 
     async def story(run: Play) -> None:
         await run.until(lambda: run.pipeline.mission.outcome is not None)
-        run.pipeline.virtual_walls = points_of([ARM])
+        run.pipeline.sight.virtual_walls = points_of([ARM])
         errands = run.pipeline.errands
         for place in (east, west, far):
             run.truth.clear()
@@ -105,7 +105,7 @@ def test_on_a_known_map_no_way_leads_over_it_as_long_as_it_is_there() -> None:
                 with pytest.raises(Declined) as declined:
                     errands.goto_point(float(far[0]), float(far[1]), run.clock.now())
                 reasons.append(str(declined.value))
-                run.pipeline.virtual_walls = np.empty((0, 2))
+                run.pipeline.sight.virtual_walls = np.empty((0, 2))
 
     souths: list[float] = []
     reasons: list[str] = []

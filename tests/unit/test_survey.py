@@ -90,7 +90,7 @@ def test_nothing_is_missing_beyond_a_virtual_wall() -> None:
     """One before the shadow of the corner, from wall to wall."""
     pipeline = driven(carved([CORRIDOR, SIDE]), 3.0)
     before = START.inverse().transform(np.array([(1.8, 1.0), (4.2, 1.0)]))
-    pipeline.virtual_walls = points_of([tuple((x, y) for x, y in before.tolist())])
+    pipeline.sight.virtual_walls = points_of([tuple((x, y) for x, y in before.tolist())])
     assert len(survey(pipeline).places) == 0
 
 

@@ -46,8 +46,8 @@ def test_who_is_lost_does_not_know_where_virtual_walls_are() -> None:
     walled = replace(config.autonomy, virtual_walls=(((0.0, 1.0), (3.0, 1.0)),))
     settings = walled, config.exploration, config.robot.radius_m
     robot = ReturningPipeline(*settings, saved.memory, saved.past, lambda: False)
-    assert len(robot.virtual_walls) > 30
-    assert len(robot._new_mind().virtual_walls) == 0
+    assert len(robot.sight.virtual_walls) > 30
+    assert len(robot._new_mind().sight.virtual_walls) == 0
 
 
 def test_who_looks_for_its_place_does_so_as_it_is_told_meanwhile() -> None:

@@ -55,7 +55,7 @@ def drive(*, closes: bool = True, led: bool = False) -> Any:
         mapper=SimpleNamespace(graph=GvgGraph(), belief=belief, observations=seen),
         led=led,
         matches_walls=False,
-        virtual_walls=FORBIDDEN,
+        sight=SimpleNamespace(virtual_walls=FORBIDDEN),
     )
 
 

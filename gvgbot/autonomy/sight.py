@@ -1,0 +1,90 @@
+"""What there is to be seen of the GVG from a keyframe, and what of that is doubtful."""
+
+import numpy as np
+
+from gvgbot.autonomy.config import AutonomyConfig
+from gvgbot.autonomy.gvg.local import LocalGvg
+from gvgbot.autonomy.gvg.local_map import LocalMap
+from gvgbot.autonomy.gvg.reduction import reduce_graph
+from gvgbot.autonomy.gvg.voronoi import fine_graph
+from gvgbot.autonomy.hazards import Hazards
+from gvgbot.autonomy.mapping import Mapper
+from gvgbot.autonomy.noisy_walls import NoisyWalls
+from gvgbot.autonomy.traffic import Traffic
+from gvgbot.autonomy.views import View, touching
+from gvgbot.autonomy.virtual_walls import points_of
+from gvgbot.geometry import Array, Pose
+from gvgbot.hal.messages import Scan
+
+
+class Sight:
+    """Makes a view of the local map, and of what the laser does not see."""
+
+    def __init__(
+        self,
+        config: AutonomyConfig,
+        robot_radius: float,
+        mapper: Mapper,
+        hazards: Hazards,
+        traffic: Traffic,
+    ) -> None:
+        self._reduction, self._half_width_m = config.reduction, config.local_map.half_width_m
+        self._needed_m = robot_radius + config.passage_margin_m  # from its middle to walls
+        self._noisy_walls = NoisyWalls(self._needed_m, config.local_map)
+        self._mapper, self._hazards, self._traffic = mapper, hazards, traffic
+        self.virtual_walls = points_of(config.virtual_walls)  # map frame
+        self.open_clearance = config.reduction.open_clearance_m  # from walls; farther is no edge
+
+    def note(self, scan: Scan, position: Array, local_map: LocalMap, travelled: float) -> None:
+        """Account for a scan, taken at a position (2,), local frame, after so many metres."""
+        self._noisy_walls.note(scan, position, local_map, travelled)
+        self._hazards.forget(travelled)
+
+    def view(
+        self, scan: Scan, local_base: Pose, local_map: LocalMap, keyframe: int, travelled: float
+    ) -> View:
+        """What a scan shows that is in the local map; it is that of the keyframe of a number."""
+        self.open_clearance = self._reduction.open_clearance(scan.range_max, self._half_width_m)
+        self._mapper.heed(self.virtual_walls)
+        virtual = self._mapper.map_in_local(local_base).transform(self.virtual_walls)
+        self._hazards.virtual_walls = virtual[local_map.covers(virtual)]
+        gvg, marks = self._mapper.marked(self._local_gvg(local_base, local_map), local_base)
+        felt, newcomers = self._hazards.doubtful, self._traffic.newcomers
+        doubtful = np.concatenate([felt, local_map.suspects(), *self._traffic.standing])
+        return View(
+            keyframe,
+            scan.stamp,
+            travelled,
+            local_base,
+            gvg,
+            local_map,
+            doubtful,
+            self._doubted(gvg, doubtful),
+            marks,
+            newcomers.is_one_standing(scan.stamp, local_map),
+            scan.field_of_view,
+            self._hazards.virtual_walls,
+            felt,
+        )
+
+    def _local_gvg(self, local_base: Pose, local_map: LocalMap) -> LocalGvg:
+        """The GVG around the base, by what the local map shows and the map holds."""
+        fine = fine_graph(
+            self._noisy_walls.drawn(local_map),
+            local_base.position,
+            min_clearance=self._needed_m,
+            roughness=self._reduction.roughness_m,
+            open_clearance=self.open_clearance,
+            felt=np.concatenate([self._hazards.points, *self._traffic.in_the_way]),
+            virtual_walls=self._hazards.virtual_walls,
+        )
+        known = self._mapper.known_around(local_base, self._half_width_m)
+        return reduce_graph(fine, self._reduction, known).rings_cut_far_from(local_base.position)
+
+    def _doubted(self, gvg: LocalGvg, doubtful: Array) -> frozenset[int]:
+        """The nodes that may be there for a while only, because of obstacles (N, 2)."""
+        doubted = touching(gvg, doubtful)
+        if self._traffic.is_in_team:  # bodies lead the GVG nowhere, but hide how it goes on
+            ends = (key for key, node in gvg.nodes.items() if node.degree == 1)
+            doubted |= touching(gvg, self._traffic.newcomers.points) & frozenset(ends)
+        return doubted
