@@ -95,7 +95,8 @@ def _signature(function: Callable[..., Any]) -> str:
 
 
 def _short(text: str) -> str:
-    """Without the modules that types come from."""
+    """Without the modules that types come from, and as types are written in the source."""
+    text = re.sub(r"Optional\[~(\w+)\]", r"\1 | None", text)
     return re.sub(r"\b(?:[a-z_]+\.)+(?=[A-Z])|'(?=[A-Z])|(?<=[a-z])'(?=$)", "", text)
 
 

@@ -127,6 +127,12 @@ def test_every_error_that_the_client_is_said_to_raise_can_be_had_from_it() -> No
     assert set(re.findall(r"\w+Error", text)) <= set(client.__all__)
 
 
+def test_types_are_written_as_in_the_source_and_not_as_python_has_them_inside() -> None:
+    text = make_client.PAGE.read_text(encoding="utf-8")
+    assert "`T | None`. The newest value" in text
+    assert not re.search(r"~|Optional\[", text)
+
+
 @pytest.mark.parametrize("name", client.__all__)
 def test_every_name_of_the_client_is_on_the_page(name: str) -> None:
     assert f"`{name}`" in make_client.PAGE.read_text(encoding="utf-8")
