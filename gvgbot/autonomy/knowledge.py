@@ -32,7 +32,7 @@ class Knowledge:
     virtual_walls: Array = field(default_factory=lambda: np.empty((0, 2)))  # points, map frame
 
     def map_in_local(self, local_base: Pose) -> Pose:
-        """The pose of the map frame in the local one; `local_map` is a grid of what was seen."""
+        """The pose of the map frame in the local one; the name `local_map` is that of a grid."""
         return local_base.compose(self.belief.map_base.inverse())
 
     def positions_from(self, local_base: Pose) -> Array:
