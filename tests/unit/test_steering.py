@@ -222,11 +222,13 @@ def test_an_obstacle_ahead_is_no_reason_not_to_turn_away_from_it(name: str) -> N
 
 
 @pytest.mark.parametrize("name", REQUESTS)
-def test_what_is_not_listed_is_refused_and_the_key_is_named(name: RequestName) -> None:
+def test_what_is_not_listed_is_refused_with_the_key_and_what_it_lists(name: RequestName) -> None:
     others = tuple(other for other in REQUESTS if other != name)
-    answer = Rig(permitted=others).ask(name, **FITTING.get(name, {}))
-    assert not answer.done
-    assert "telemetry.requests" in answer.text
+    for permitted, listed in ((others, ", ".join(others)), ((), "nothing")):
+        answer = Rig(permitted=permitted).ask(name, **FITTING.get(name, {}))
+        assert not answer.done
+        assert "telemetry.requests" in answer.text
+        assert answer.text.endswith(f"lists {listed}")
     assert Rig(permitted=(name,)).ask(name, **FITTING.get(name, {})).done
 
 
