@@ -134,10 +134,10 @@ class LocalMaps:
     ) -> ScanMatch:
         """The pose of the base after a motion, its covariance (3, 3) in its own frame, and how.
 
-        That covariance is of what the step adds for good to the error of the one before. There are
-        also the parts (4, 3, 3) of the noise of odometry. Without enough walls the pose is where
-        odometry has it. Wheels may have turned without effect, so it may as well be where it was
-        `before`.
+        That covariance is of what the step adds for good to the error of the one before. Odometry
+        is expected to err by `noise`, in its parts (4, 3, 3). Without enough walls the pose is
+        where odometry has it. Wheels may have turned without effect, so it may as well be where it
+        was `before`.
         """
         motion, Q = self.calibration.corrected(motion, duration), self.calibration.scattered(noise)
         prior = before.compose(motion)
