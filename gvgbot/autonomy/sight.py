@@ -58,13 +58,13 @@ class Sight:
             local_base,
             gvg,
             local_map,
-            doubtful,
-            self._doubted(gvg, doubtful),
-            marks,
-            newcomers.is_one_standing(scan.stamp, local_map),
-            scan.field_of_view,
-            self._hazards.virtual_walls,
-            felt,
+            doubtful=doubtful,
+            doubted=self._doubted(gvg, doubtful),
+            marks=marks,
+            is_somebody_found=newcomers.is_one_standing(scan.stamp, local_map),
+            field_of_view=scan.field_of_view,
+            virtual_walls=self._hazards.virtual_walls,
+            felt=felt,
         )
 
     def _local_gvg(self, local_base: Pose, local_map: LocalMap) -> LocalGvg:
