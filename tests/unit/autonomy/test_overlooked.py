@@ -79,7 +79,7 @@ def test_what_is_explored_or_given_up_is_not_looked_at() -> None:
     assert turn(view, here) == 0.0
 
 
-def test_once_is_enough() -> None:
+def test_it_turns_to_the_same_departure_only_once() -> None:
     overlooked, target = Overlooked(), HalfEdgeId(1, AHEAD)
     view, here = at_vertex(BACK_LEFT, base=Pose())
     assert overlooked.turn(view, here, target) > 0.0

@@ -42,7 +42,7 @@ def test_as_published_odometry_alone_tells_the_way_between_vertices() -> None:
     assert pipeline.past.keyframes[-1].local_base.y == 0.0
 
 
-def test_walls_tell_it_better() -> None:
+def test_where_walls_are_matched_they_make_odometry_good() -> None:
     assert driven("full").past.keyframes[-1].local_base.x == pytest.approx(2.0, abs=0.03)
 
 

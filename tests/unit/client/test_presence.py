@@ -37,5 +37,7 @@ NOW = 100.0
         ),
     ],
 )
-def test_presence(signs: Signs, linked: bool, word: Word, for_s: float) -> None:
+def test_a_robot_that_hangs_has_left_or_cannot_be_reached_is_told_apart(
+    signs: Signs, linked: bool, word: Word, for_s: float
+) -> None:
     assert signs.presence(NOW, linked=linked) == Presence(word, for_s)

@@ -290,7 +290,7 @@ def test_a_kind_of_event_that_is_not_known_yet_is_told_all_the_same() -> None:
         (7620, "2 h 7 min"),
     ],
 )
-def test_durations(seconds: float, text: str) -> None:
+def test_a_duration_is_told_in_whole_units_two_at_most(seconds: float, text: str) -> None:
     assert duration(seconds) == text
 
 

@@ -37,7 +37,7 @@ def saved() -> Saved:
     return read(MISSION)
 
 
-def test_it_is_whole(saved: Saved) -> None:
+def test_a_mission_of_version_1_is_read_whole(saved: Saved) -> None:
     assert len(saved.past) > 20
     assert saved.past[0].step is None
     assert all(grown.step is not None for grown in saved.past[1:])

@@ -23,7 +23,7 @@ def test_a_way_there_and_back_over_all_edges_at_half_the_speed_is_waited_for() -
     assert not after(range(1200), step_m=0.0, edges_m=400.0)
 
 
-def test_old_ground_is_none() -> None:
+def test_ground_that_was_driven_before_is_not_new() -> None:
     ground = NewGround()
     for stamp in range(1200):
         ground.note(np.array([5.0 * np.sin(0.1 * stamp), 0.0]), float(stamp))

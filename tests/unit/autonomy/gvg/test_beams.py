@@ -89,7 +89,9 @@ def test_a_wall_seen_at_a_low_angle_is_no_mixed_pixel(sigma: float, increment: f
         pytest.param((NAN, NAN), (NAN, NAN), id="blind"),
     ],
 )
-def test_single_beams(ranges: tuple[float, ...], expected: tuple[float, ...]) -> None:
+def test_readings_between_a_near_and_a_far_thing_are_dropped_and_no_others(
+    ranges: tuple[float, ...], expected: tuple[float, ...]
+) -> None:
     np.testing.assert_array_equal(without_mixed_pixels(scan_of(*ranges)).ranges, expected)
 
 
