@@ -127,6 +127,19 @@ def test_the_way_leads_round_another_robot_once_and_then_on_though_it_turns_more
     assert line[-1] == pytest.approx([7.0, -5.0])
 
 
+@pytest.mark.parametrize(("station", "is_ahead"), [(2.6, False), (3.4, True)])
+def test_to_a_place_a_step_ahead_or_behind_on_its_edge_it_goes_straight(
+    station: float, *, is_ahead: bool
+) -> None:
+    here = situation(3.0)
+    foot = foot_at(here.graph, HalfEdgeId(1, EAST), station)
+    assert foot is not None
+    route = route_to_foot(here, here.starts(), foot)
+    assert route is not None
+    assert route.ahead is is_ahead
+    assert route.metres == pytest.approx(0.4)
+
+
 @pytest.mark.parametrize(
     ("west", "is_ahead"), [(0.0, True), (-8.0, False)], ids=["10 of 24 m", "26 of 40 m"]
 )
