@@ -1,1 +1,1 @@
-"""From HAL messages to a twist: pure functions, and one task around them."""
+"""From HAL messages to a twist: no I/O, clock or chance, and one task around that."""
