@@ -9,7 +9,7 @@ written later, bit by bit, and then the snapshot, which never knows more than th
 
 import math
 from bisect import bisect_left, bisect_right
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
@@ -20,7 +20,7 @@ from gvgbot.autonomy import events
 from gvgbot.autonomy.memory import growth, remember
 from gvgbot.autonomy.returning import ReturningPipeline
 from gvgbot.autonomy.views import Observation
-from gvgbot.clock import Clock, LoopClock
+from gvgbot.clock import Clock, LoopClock, OffLoop
 from gvgbot.drivers.kobuki.feedback import FeedbackReader
 from gvgbot.persistence.mission_files import MissionFiles
 from gvgbot.persistence.mission_state import (
@@ -164,9 +164,7 @@ class Keeper:
         if isinstance(event, events.WayForgotten):
             self._stay = min(self._stay, event.kept)
 
-    async def keep(
-        self, clock: Clock, off_loop: Callable[[Callable[[], None]], Awaitable[None]]
-    ) -> None:
+    async def keep(self, clock: Clock, off_loop: OffLoop) -> None:
         """Keep the mission until cancelled; wait longer each time while that cannot be.
 
         What the robot is asked for does not wait.
