@@ -35,11 +35,10 @@ from gvgbot.simulation import Simulation
 from gvgbot.snapshots import sign, state
 from gvgbot.steering import Steering
 from gvgbot.survey import survey
-from gvgbot.topics import HEALTH, MAP, STATE, Health, Payload, State
+from gvgbot.topics import HEALTH, MAP, STATE, STUCK_AFTER, Health, Payload, State
 from gvgbot.vitals import Vitals
 
 CALL_EVERY = 10.0  # s between two attempts to drive home with a low battery
-STUCK_AFTER = 1.0  # s without a control cycle, though the base is there
 _DRIVEN = "it is driven until it is asked for something else"
 
 log = structlog.get_logger()

@@ -325,6 +325,7 @@ UNKNOWN = 1e6  # m^2 and rad^2, the variances of a pose that is not known
 EVENTS_KEPT = 64  # in a message
 TRAJECTORY_POSES = 2000  # in a message, at most
 LATE_AFTER = 0.1  # s, the age of odometry from which a control cycle counts as late
+STUCK_AFTER = 1.0  # s without a control cycle, though the base is there
 
 
 def alive_key(robot: str) -> str:

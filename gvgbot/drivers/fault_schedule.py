@@ -4,9 +4,13 @@ import math
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
+from gvgbot.ranges import Range
+
+PerHour = Annotated[float, Range(0.0, 36_000.0)]
 _HOUR = 3600.0  # s
 
 

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from gvgbot.drivers.fault_schedule import FaultSchedule, Rate
+from gvgbot.drivers.fault_schedule import FaultSchedule, PerHour, Rate
 from gvgbot.drivers.serial_line import SerialLine
 from gvgbot.drivers.transport import TwinDevice
 from gvgbot.ranges import Range
@@ -17,7 +17,6 @@ _CHIP_BYTES = 62  # a USB serial converter sends at once when it has gathered th
 _BACKLOG = 0.5  # s: a device leaves messages out when the line is so far behind
 PerThousand = Annotated[float, Range(0.0, 1000.0)]
 Moment = Annotated[float, Range(0.0, 86_400.0)]  # s
-PerHour = Annotated[float, Range(0.0, 36_000.0)]
 LinkFault = Literal["silence", "unplug"]
 
 

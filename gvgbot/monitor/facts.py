@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 from gvgbot.client import Event, Health, LinkHealth, Plan, Presence, State
+from gvgbot.topics import STUCK_AFTER
 from gvgbot.words import counted, shortened
 
 Tone = Literal["plain", "good", "warning", "bad", "faint"]
 
-_STUCK_AFTER = 1.0  # s without a control cycle
 _LOW_BATTERY = 0.28  # of a full charge, from where on the robot itself warns
 _GAUGE = 8  # characters
 _MATE = 30  # characters that another robot and its place take
@@ -163,7 +163,7 @@ def _control(state: State, health: Health | None) -> tuple[str, Tone]:
     """Whether the control loop turns, and how often it was late."""
     if state.cycle_age is None:
         return "not begun", "faint"
-    if state.cycle_age > _STUCK_AFTER:
+    if state.cycle_age > STUCK_AFTER:
         return f"no cycle for {state.cycle_age:.0f} s", "bad"
     if health is not None and health.late_cycles:
         return f"running, {health.late_cycles} late", "plain"
@@ -255,7 +255,7 @@ def headline(robot: str, presence: Presence, state: State | None, others: list[s
 def _alive(robot: str, state: State | None) -> Fact:
     if state is None:
         return Fact(robot, "has not said anything yet", "warning")
-    if state.cycle_age is not None and state.cycle_age > _STUCK_AFTER and state.base.connected:
+    if state.cycle_age is not None and state.cycle_age > STUCK_AFTER and state.base.connected:
         return Fact(robot, "its control loop is stuck", "bad")
     return Fact(robot, _doing(state), _tone_of_phase(state))
 

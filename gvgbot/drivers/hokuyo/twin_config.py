@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
-from gvgbot.drivers.fault_schedule import Rate
+from gvgbot.drivers.fault_schedule import PerHour, Rate
 from gvgbot.drivers.hokuyo.clock_sync import WRAP_MS
 from gvgbot.drivers.hokuyo.models import ModelName
 from gvgbot.drivers.link_faults import LinkFaultConfig, Moment
@@ -11,7 +11,6 @@ from gvgbot.ranges import Range
 
 LaserMishap = Literal["reboot", "frozen", "stalled", "unstable", "abnormal", "blind"]
 Fraction = Annotated[float, Range(0.0, 1.0)]
-PerHour = Annotated[float, Range(0.0, 36_000.0)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from gvgbot.drivers.fault_schedule import FaultSchedule, Rate
+from gvgbot.drivers.fault_schedule import FaultSchedule, PerHour, Rate
 from gvgbot.drivers.kobuki.payloads import CliffAdc, CoreSensors, FeedbackPart, encode_feedback
 from gvgbot.drivers.kobuki.sub_payloads import Unknown
 from gvgbot.ranges import Range
@@ -23,7 +23,6 @@ Mishap = Literal[
     "unknown part",
     "no replies",
 ]
-PerHour = Annotated[float, Range(0.0, 36_000.0)]
 
 _NO_FLOOR = 150  # reading of a cliff sensor that sees none
 _LOW_BATTERY = 131  # dV
