@@ -144,6 +144,14 @@ def test_what_stands_long_enough_is_a_part_of_the_building(
     assert watch.inside() > 0
 
 
+def test_who_has_stood_there_since_before_the_clock_began_anew_is_waited_for_the_rest() -> None:
+    """For 9 of 20 seconds; a memory of another run has its stamps."""
+    watch = Watch()
+    for stamp in [1000.0 + second for second in range(10)] + list(range(11)):
+        assert watch.dropped(EMPTY, stamp, person=(2.0, 0.0)) > 0
+    assert watch.dropped(EMPTY, 11.0, person=(2.0, 0.0)) == 0
+
+
 def test_who_may_be_a_robot_of_the_team_that_waits_is_no_pillar_so_soon() -> None:
     """Where its map lies is not known yet, so it may be anywhere."""
     slim, as_wide = Watch(), Watch()
