@@ -1,6 +1,6 @@
 """Keeps a session's mission on disk as it goes, and brings it back.
 
-The journal gets what is new about every second, and while nothing is, now and then a sign of life,
+The journal gets what is new twice a second, and while nothing is, now and then a sign of life,
 by which it is known later that the base has counted all the time. The snapshot is renewed when the
 map has changed or the robot has come on, at most that often; the journal is synchronised with the
 disk before. A disk that is full, read-only or slow holds up nothing: what was not written is
