@@ -1,4 +1,4 @@
-"""Localisation as published, beside the full one; and how often who is led looks for the GVG."""
+"""A whole mind, to which scans and odometry are given by hand."""
 
 import math
 from dataclasses import replace
@@ -19,6 +19,7 @@ from gvgbot.geometry import STANDSTILL, Pose, Twist, wrap_angle
 from gvgbot.hal.messages import Contact, Odometry
 from tests.unit.autonomy.sights import LASER_270, carved, sweep
 
+CLOSET = carved([(-0.6, -0.6, 0.6, 0.5)])
 ROOMS = carved([(-4.0, -1.0, 4.0, 1.0), (0.0, -1.0, 2.0, 4.0)])
 
 
@@ -71,6 +72,17 @@ def looked(pipeline: Pipeline, stamp: float, theta: float = 0.0) -> tuple[Twist,
     twist = pipeline.control(Odometry(stamp, Pose(0.0, 0.0, theta), STANDSTILL))
     scan = sweep(ROOMS, Pose(-1.5, 0.0, theta), field_of_view=LASER_270)
     return twist, pipeline.perceive(replace(scan, stamp=stamp, time_increment=0.0))
+
+
+def about_to_drive() -> tuple[Pipeline, float, float]:
+    """A robot that has looked round between the walls, its heading, rad, and the time, s."""
+    config = load_config()
+    pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
+    theta, stamp, twist = 0.0, 0.0, STANDSTILL
+    while twist.linear == 0.0:
+        twist, _ = looked(pipeline, stamp, theta)
+        theta, stamp = theta + 0.1 * twist.angular, stamp + 0.1
+    return pipeline, theta, stamp
 
 
 def test_it_decides_by_nothing_that_was_seen_before_it_had_turned_round() -> None:
@@ -134,12 +146,7 @@ def test_a_base_that_was_away_in_the_midst_of_a_turn_turns_on() -> None:
 
 
 def test_on_the_charger_s_cable_it_waits_and_takes_nothing_for_an_obstacle() -> None:
-    config = load_config()
-    pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
-    theta, stamp, twist = 0.0, 0.0, STANDSTILL
-    while twist.linear == 0.0:
-        twist, _ = looked(pipeline, stamp, theta)
-        theta, stamp = theta + 0.1 * twist.angular, stamp + 0.1
+    pipeline, theta, stamp = about_to_drive()
     plugged_in = Felt(Contact(stamp, charger_cable=True), "charger cable")
     scan = sweep(ROOMS, Pose(-1.5, 0.0, theta), field_of_view=LASER_270)
     keyframes = len(pipeline.past.keyframes)
@@ -150,6 +157,35 @@ def test_on_the_charger_s_cable_it_waits_and_takes_nothing_for_an_obstacle() -> 
     twist, happened = looked(pipeline, stamp + 601.0, theta)
     assert twist.linear > 0.0
     assert not any(isinstance(event, Recovery) for event in happened)
+
+
+@pytest.mark.parametrize(("felt", "is_kept"), [("bumper_centre", False), ("cliff_centre", True)])
+def test_a_cliff_is_in_the_way_for_ever_and_what_a_bumper_felt_for_some_metres(
+    felt: str, *, is_kept: bool
+) -> None:
+    pipeline, theta, stamp = about_to_drive()
+    contact = Contact(stamp, **{felt: True})
+    pipeline.control(Odometry(stamp, Pose(theta=theta), STANDSTILL), Felt(contact, "bumper"))
+    assert len(pipeline._hazards.points) > 0
+    pipeline.past.travelled += 100.0
+    looked(pipeline, stamp + 1.0, theta)
+    assert (len(pipeline._hazards.points) > 0) == is_kept
+
+
+def test_who_is_lifted_neither_drives_nor_looks_whoever_wants_it_to_drive() -> None:
+    pipeline, theta, stamp = about_to_drive()
+    keyframes, wanted = len(pipeline.past.keyframes), Twist(0.1, 0.2)
+    scan = sweep(ROOMS, Pose(-1.5, 0.0, theta), field_of_view=LASER_270)
+    for is_lifted in (False, True):
+        felt = Felt(Contact(stamp, wheel_drop_left=is_lifted))
+        for later in (stamp + 2.0, stamp + 4.0):
+            pipeline.errands.drive(wanted, later)
+            twist = pipeline.control(Odometry(later, Pose(theta=theta), STANDSTILL), felt)
+            assert twist == (STANDSTILL if is_lifted else wanted)
+            pipeline.perceive(replace(scan, stamp=later, time_increment=0.0))
+        keyframes += 0 if is_lifted else 2
+        assert len(pipeline.past.keyframes) == keyframes
+        stamp += 4.0
 
 
 def speed_before(radius: float) -> float:
@@ -336,6 +372,22 @@ def test_who_has_finished_turns_its_back_to_a_wall_when_another_robot_comes_near
 
 def test_who_was_lifted_after_the_end_stays_where_it_was_put() -> None:
     assert turned_after_the_end("explored", 2.5, lifted=True) == 0.0
+
+
+@pytest.mark.parametrize("is_carried", [False, True])
+def test_who_was_carried_after_the_end_does_not_believe_to_be_where_it_was(
+    *, is_carried: bool
+) -> None:
+    pipeline, theta, stamp = about_to_drive()
+    pipeline.mission.outcome = "explored"
+    for k in range(50):
+        stamp += 0.1
+        felt = Felt(Contact(stamp, wheel_drop_left=is_carried and k == 1))
+        pipeline.control(Odometry(stamp, Pose(theta=theta), STANDSTILL), felt)
+    pipeline.errands.explore(stamp)
+    scan = sweep(CLOSET if is_carried else ROOMS, Pose(-1.5 * (not is_carried), 0.0, theta))
+    pipeline.perceive(replace(scan, stamp=stamp))
+    assert pipeline.errands.is_paused == is_carried
 
 
 def test_who_is_told_to_stop_after_the_end_stays_where_it_is() -> None:
