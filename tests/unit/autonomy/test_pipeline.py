@@ -10,9 +10,10 @@ from gvgbot.autonomy.control.company import Companion
 from gvgbot.autonomy.control.reflexes import Felt
 from gvgbot.autonomy.ending import Outcome
 from gvgbot.autonomy.errands import Declined
-from gvgbot.autonomy.events import Decision, Event, Finished, Recovery
+from gvgbot.autonomy.events import Decision, Event, Finished, Recovery, WayForgotten
 from gvgbot.autonomy.localisation import Localisation
 from gvgbot.autonomy.memory import remember
+from gvgbot.autonomy.passed import Passed
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.config import load_config
 from gvgbot.geometry import STANDSTILL, Pose, Twist, wrap_angle
@@ -157,6 +158,21 @@ def test_on_the_charger_s_cable_it_waits_and_takes_nothing_for_an_obstacle() -> 
     twist, happened = looked(pipeline, stamp + 601.0, theta)
     assert twist.linear > 0.0
     assert not any(isinstance(event, Recovery) for event in happened)
+
+
+def test_all_of_the_way_is_kept_while_it_explores_and_of_what_comes_later_the_end() -> None:
+    config = load_config(None, ["autonomy.keyframe.latest=3"])
+    pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
+    happened = [looked(pipeline, float(k), 0.4 * k)[1] for k in range(10)]
+    assert not any(isinstance(one, WayForgotten) for some in happened for one in some)
+    assert len(pipeline.past.keyframes) == 10
+    pipeline.traffic.passed = [Passed(k, np.zeros(2), 0.2) for k in (5, 11)]
+    for stamp in np.arange(10.0, 14.0).tolist():
+        pipeline.errands.drive(STANDSTILL, stamp)
+        happened.append(looked(pipeline, stamp, 0.4 * stamp)[1])
+    assert WayForgotten(13.0, 10, 3) in happened[-1]
+    assert len(pipeline.past.keyframes) == 11
+    assert [one.keyframe for one in pipeline.traffic.passed] == [5, 10]
 
 
 @pytest.mark.parametrize(("felt", "is_kept"), [("bumper_centre", False), ("cliff_centre", True)])
