@@ -22,11 +22,12 @@ def straight(*corners: tuple[float, float], spacing: float = 0.2) -> Array:
 
 FROM_WEST = straight((0.0, 0.0), (4.8, 0.1)), 0.7
 FROM_EAST = straight((10.0, 0.0), (5.4, -0.1)), 0.6
+BESIDE = straight((5.1, 0.9), (5.1, 4.0)), 0.5  # a third one, in a room beside
 
 
 @pytest.mark.parametrize(("start", "bearing"), [(0, EAST), (1, WEST)])
 def test_two_that_met_half_way_have_driven_an_edge_together(start: int, bearing: float) -> None:
-    walk = Ways([FROM_WEST, FROM_EAST], PLACES).behind(start, bearing)
+    walk = Ways([BESIDE, FROM_WEST, FROM_EAST], PLACES).behind(start, bearing)
     assert walk is not None
     assert walk.place == 1 - start
     assert walk.length == pytest.approx(10.0, abs=0.1)
