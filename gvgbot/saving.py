@@ -16,7 +16,10 @@ log = structlog.get_logger()
 
 
 class Saving:
-    """Who asks while others wait shares the next saving; `off_loop` runs what takes long."""
+    """Writes what happens, and the map as it grows; `off_loop` runs what takes long.
+
+    Who asks for a saving while others wait shares the next one.
+    """
 
     def __init__(self, session: Session, off_loop: OffLoop) -> None:
         self._session, self._off_loop = session, off_loop
