@@ -3,6 +3,7 @@
 import asyncio
 import copy
 import errno
+import os
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
@@ -271,6 +272,21 @@ def test_what_did_not_change_is_not_written_again(session: Session, tmp_path: Pa
     for stamp in (20.5, 21.0, 20.0 + BEAT_EVERY - 0.5):
         keeper.keeping(stamp)()
     assert {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()} == before
+
+
+def test_the_journal_is_on_the_disk_before_the_snapshot_that_goes_on_from_it(
+    session: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sizes: list[int] = []
+
+    def fsync(descriptor: int) -> None:
+        if not (tmp_path / SNAPSHOT).exists():
+            sizes.append(os.fstat(descriptor).st_size)
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    Keeper(session, MissionFiles(tmp_path)).keeping(20.0)()
+    assert (tmp_path / JOURNAL).stat().st_size in sizes
+    assert (tmp_path / SNAPSHOT).exists()
 
 
 def test_a_robot_at_rest_gives_signs_of_life_that_take_no_room(
