@@ -8,6 +8,7 @@ import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import cast
 
 import msgspec
 import numpy as np
@@ -19,6 +20,7 @@ from gvgbot.autonomy.memory import growth, recall, remember
 from gvgbot.autonomy.returning import ReturningPipeline
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.config import load_config
+from gvgbot.drivers.kobuki.feedback import FeedbackMemory, FeedbackReader
 from gvgbot.maps.run_directory import RunDirectory
 from gvgbot.persistence.keeper import BEAT_EVERY, KEEP_EVERY, MOST, RETRY_WITHIN, Keeper
 from gvgbot.persistence.mission_files import JOURNAL, SNAPSHOT, MissionFiles
@@ -336,8 +338,9 @@ def test_a_way_that_is_forgotten_leaves_the_journal_whole_and_short(
     pipeline.past.lasting, pipeline.past.keyframes[kept:] = kept, keyframes[-1:]
     del pipeline.past.steps[kept:]
     pipeline.mapper.forget_between(kept, newest)
-    whole.forget(kept)
-    keeper.on_event(WayForgotten(99.0, kept, newest - kept))
+    forgotten = WayForgotten(99.0, kept, newest - kept)
+    session.note_events([forgotten])
+    keeper.on_event(forgotten)
     with structlog.testing.capture_logs(), full_disk(10):
         keeper.keeping(99.0)()
     assert keeper.trouble is not None
@@ -463,9 +466,50 @@ def test_an_interrupted_run_waits_if_the_configuration_says_so(tmp_path: Path, r
 def test_a_first_start_with_a_known_map_was_not_interrupted(tmp_path: Path) -> None:
     with RunDirectory(tmp_path) as directory:
         session = Session(load_config(overrides=["service.resume=paused"]), directory, None)
-    Keeper(session, MissionFiles(tmp_path), MissionFiles(MISSION).read())
+    known = found(MISSION)
+    intent = replace(known.memory.intent, is_paused=True, is_waiting=True)
+    known = replace(known, memory=replace(known.memory, intent=intent))
+    Keeper(session, MissionFiles(tmp_path), known)
     assert session.pipeline.past.keyframes
     assert not session.pipeline.errands.is_paused
+    assert not session.pipeline.errands.is_waiting
+
+
+class Wheels:
+    """A base that has been heard again, and whether its counters are believed to have gone on."""
+
+    is_unbroken, counting = True, False
+
+    def recall(self, memory: FeedbackMemory, *, counting: bool) -> None:
+        self.counting = counting
+
+
+@pytest.mark.parametrize(
+    ("goes_on", "away_s", "counting"),
+    [(True, 59.0, True), (True, 61.0, False), (False, 1.0, False)],
+    ids=["soon", "late", "from elsewhere"],
+)
+def test_a_base_vouches_for_the_place_of_its_own_robot_alone_and_that_for_a_minute(
+    tmp_path: Path, *, goes_on: bool, away_s: float, counting: bool
+) -> None:
+    with RunDirectory(tmp_path) as directory:
+        session = Session(load_config(), directory, None)
+    if goes_on:
+        shutil.copytree(MISSION, tmp_path, dirs_exist_ok=True)
+    files, wheels = MissionFiles(tmp_path), Wheels()
+    saved = files.read() if goes_on else found(MISSION)
+    assert saved is not None
+
+    async def come_back() -> bool:
+        stamp = LoopClock().now() - away_s
+        beat = msgspec.structs.replace(saved.beat, stamp=stamp, boot="this one", ahead=0.0)
+        keeper = Keeper(session, files, replace(saved, beat=beat), boot="this one")
+        keeper.clock()
+        keeper.attach(cast(FeedbackReader, wheels))
+        return keeper._is_vouched()
+
+    assert run_in_virtual_time(come_back()) == goes_on
+    assert wheels.counting == counting
 
 
 def test_who_has_no_gyro_has_none_in_another_life_either(tmp_path: Path) -> None:
