@@ -390,6 +390,24 @@ def test_who_was_lifted_after_the_end_stays_where_it_was_put() -> None:
     assert turned_after_the_end("explored", 2.5, lifted=True) == 0.0
 
 
+@pytest.mark.parametrize("is_asked", [False, True])
+def test_who_was_pushed_and_is_asked_to_relocalise_finds_its_place_by_the_walls(
+    *, is_asked: bool
+) -> None:
+    """By 0.8 m, along a corridor with a room at its side, of which odometry has felt nothing."""
+    pipeline, theta, stamp = about_to_drive()
+    start = pipeline.map_base
+    if is_asked:
+        pipeline.errands.relocalise(stamp)
+    for _ in range(10):
+        stamp += 0.1
+        pipeline.control(Odometry(stamp, Pose(theta=theta), STANDSTILL))
+    scan = sweep(ROOMS, Pose(-0.7, 0.0, theta), field_of_view=LASER_270)
+    pipeline.perceive(replace(scan, stamp=stamp, time_increment=0.0))
+    moved = pipeline.map_base.distance(start)
+    assert moved == pytest.approx(0.8 if is_asked else 0.0, abs=0.1)
+
+
 @pytest.mark.parametrize("is_carried", [False, True])
 def test_who_was_carried_after_the_end_does_not_believe_to_be_where_it_was(
     *, is_carried: bool
