@@ -175,8 +175,10 @@ def test_a_known_map_is_kept_whole_when_something_is_asked_of_a_robot_that_is_lo
         again = Session(load_config(), directory, None)
     keeper = Keeper(again, MissionFiles(tmp_path / "run"), found(tmp_path / "known"))
     assert again.pipeline.is_lost
+    again.pipeline.mission.outcome = "failed"  # it has found no place: the next life looks again
     keeper.on_event(Requested(1.0, "pause", "test", True, ""))
     keeper.keeping(1.0)()
+    assert found(tmp_path / "run").memory.intent.outcome is None
     assert isinstance(again.pipeline, ReturningPipeline)
     again.pipeline._is_back = True
     keeper.keeping(2.0)()
