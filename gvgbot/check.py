@@ -291,7 +291,7 @@ def _steadiness(subject: str, heard: Heard, nominal: float) -> Line:
     return Line(
         "ok" if is_right else "fail",
         subject,
-        f"{heard.rate:.1f} of {nominal:g} messages per second",
+        f"{heard.rate:.1f} of {nominal:.3g} messages per second",
         "check the cable, and what else the computer is busy with",
     )
 
