@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import accumulate, pairwise
 
 import numpy as np
 
@@ -147,11 +148,14 @@ def contracted(fine: FineGraph) -> Draft:
 def _chains(fine: FineGraph, paths: list[list[int]]) -> Iterator[Chain]:
     """The chains along paths of points, which lie one after another in the same arrays."""
     on = np.array([point for path in paths for point in path], np.intp)
+    if not paths:
+        return
     points, clearance = fine.points.take(on, axis=0), fine.clearance.take(on)
-    steps, stop = steps_of(points), 0
-    for path in paths:
-        start, stop = stop, stop + len(path)
-        length = float(steps[start : stop - 1].sum())
+    ends = list(accumulate(map(len, paths), initial=0))
+    steps = steps_of(points)
+    steps[[end - 1 for end in ends[1:-1]]] = 0.0  # from chain to chain
+    lengths = np.add.reduceat(steps, ends[:-1]).tolist()
+    for path, (start, stop), length in zip(paths, pairwise(ends), lengths, strict=True):
         yield Chain(path[0], path[-1], points[start:stop], clearance[start:stop], length)
 
 

@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from gvgbot.autonomy.gvg.draft import contracted
 from gvgbot.autonomy.gvg.local import LocalGvg
 from gvgbot.autonomy.gvg.reduction import KnownVertices, ReductionConfig, reduce_graph
 from gvgbot.autonomy.gvg.voronoi import FineGraph
@@ -70,6 +71,11 @@ def test_two_close_meetpoints_stay_one_or_two(
     offset: float, known: KnownVertices | None, expected: list[int]
 ) -> None:
     assert degrees(reduce_graph(crossing(offset), CONFIG, known)) == expected
+
+
+def test_chains_are_as_long_as_the_lines_between_forks_and_ends() -> None:
+    lengths = sorted(chain.length() for chain in contracted(crossing(0.7)).chains.values())
+    assert lengths == pytest.approx([0.7, 5.65, 5.65, 6.0, 6.0])
 
 
 def branching(reach: float) -> FineGraph:
