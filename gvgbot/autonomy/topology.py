@@ -27,9 +27,13 @@ def split_edge_at(
     The edge must pass the vertex within `reach` m, where it is known as well as that, and leave it
     within `angle` rad of two of its half-edges that have no edge.
     """
-    vertex_map = belief.map_vertex(vertex.id).inverse()
+    map_vertex = belief.map_vertex(vertex.id)
+    vertex_map, place = map_vertex.inverse(), map_vertex.position
     for edge in list(graph.edges.values()):
-        line = vertex_map.transform(belief.map_vertex(edge.a.vertex).transform(edge.polyline))
+        map_start = belief.map_vertex(edge.a.vertex)
+        if math.dist(map_start.transform(edge.polyline[0]), place) > edge.length + reach:
+            continue
+        line = vertex_map.transform(map_start.transform(edge.polyline))
         parts = _parted(line, reach)
         if parts is None:
             continue
