@@ -47,21 +47,20 @@ def access(view: View) -> Access | None:
     Beside a wall the robot drives away from it first. With walls before all edges it is the
     nearest one, straight ahead: the guard stops the robot, and what is then tried is the mission's.
     """
-    base, places = view.local_base.position, _places(view)
-    if not places:
+    base = view.local_base.position
+    nearest = view.gvg.place(base, view.virtual_walls)
+    if nearest is None:
         return None
-    nearest = places[0]
     if not _BESIDE_M < nearest.distance <= NEAR_M:
         return Access(nearest)
     straight = _straight(view, nearest, _ROOM_M)
     if straight is not None and straight.room[0] > _TIGHT_M:
         return straight
-    near = (place for place in places if place.distance <= NEAR_M)
     return (
         _uphill(view)
         or straight
         or _between_things(view)
-        or next(filter(None, (_straight(view, place, _BETWEEN_M) for place in near)), None)
+        or _between_walls(view)
         or Access(nearest, base[None], np.atleast_1d(view.obstacles().query(base)[0]))
     )
 
@@ -111,6 +110,12 @@ def _between_things(view: View) -> Access | None:
     ]
     points.sort(key=lambda place: place.distance)
     return next(filter(None, (_straight(view, place, _TIGHT_M) for place in points)), None)
+
+
+def _between_walls(view: View) -> Access | None:
+    """To the nearest edge near by to which no wall is in the way."""
+    near = (place for place in _places(view) if place.distance <= NEAR_M)
+    return next(filter(None, (_straight(view, place, _BETWEEN_M) for place in near)), None)
 
 
 def is_tight(view: View) -> bool:

@@ -125,9 +125,24 @@ class LocalGvg:
     # as far as they have been asked for
     _bearings: dict[tuple[Branch, float], float] = field(default_factory=dict, init=False)
 
-    def place(self, point: Array) -> Place | None:
-        """The point of the graph nearest to a point (2,); None on an empty graph."""
-        return min(self.places(point), key=lambda place: place.distance, default=None)
+    def place(self, point: Array, virtual_walls: Array = _NO_WALLS) -> Place | None:
+        """The point of the graph nearest to a point (2,), before virtual walls (N, 2).
+
+        None on an empty graph, or where all of it is beyond these.
+        """
+        if not self.edges:
+            return None
+        lines = np.concatenate([edge.polyline for edge in self.edges.values()])
+        away = np.hypot(lines[:, 0] - point[0], lines[:, 1] - point[1])
+        nearest = nearest_before(virtual_walls, point, lines, away)
+        if nearest is None:
+            return None
+        at, edges = nearest, iter(self.edges.items())
+        key, edge = next(edges)
+        while at >= len(edge.stations):
+            at -= len(edge.stations)
+            key, edge = next(edges)
+        return Place(key, float(edge.stations[at]), float(away[nearest]))
 
     def places(self, point: Array, virtual_walls: Array = _NO_WALLS) -> list[Place]:
         """The point of each edge that is nearest to a point (2,), before virtual walls (N, 2)."""

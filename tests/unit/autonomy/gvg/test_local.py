@@ -27,10 +27,29 @@ GVG = drawn(
 )
 
 
-def test_the_nearest_place_is_named_by_its_edge_and_station() -> None:
-    place = GVG.place(np.array([1.0, 0.3]))
+@pytest.mark.parametrize(
+    ("point", "expected"),
+    [
+        ((1.0, 0.3), (10, 1.0, 0.3)),
+        ((3.4, 1.6), (12, 1.6, 0.4)),
+        ((4.0, -1.7), (13, 3.0, 0.3)),
+        ((6.1, 0.6), (14, 1.6, 0.1)),
+    ],
+)
+def test_the_nearest_place_is_named_by_its_edge_and_station(
+    point: Point, expected: tuple[int, float, float]
+) -> None:
+    place = GVG.place(np.array(point))
     assert place is not None
-    assert place == pytest.approx((10, 1.0, 0.3), abs=0.05)
+    assert place == pytest.approx(expected, abs=0.05)
+
+
+def test_the_nearest_place_is_before_virtual_walls() -> None:
+    wall = np.stack([np.linspace(-1.0, 7.0, 81), np.full(81, 0.15)], axis=1)
+    place = GVG.place(np.array([1.0, 0.3]), wall)
+    assert place is not None
+    assert place.edge == 12
+    assert place.distance == pytest.approx(2.0, abs=0.05)
 
 
 def test_on_an_empty_graph_there_is_no_place() -> None:
