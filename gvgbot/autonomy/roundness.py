@@ -9,6 +9,7 @@ import math
 
 import numpy as np
 
+from gvgbot.autonomy.small_systems import solved
 from gvgbot.geometry import Array
 
 SURE = 3.0  # of the log-likelihood: twenty to one
@@ -112,7 +113,7 @@ def _least_squares(columns: list[Array], b: Array) -> list[float]:
     They are damped a little, so that there is an x if all beams end on one ray.
     """
     A = np.array(columns)
-    x: list[float] = np.linalg.solve(A @ A.T + _DAMPING[: len(A), : len(A)], A @ b).tolist()
+    x: list[float] = solved(A @ A.T + _DAMPING[: len(A), : len(A)], A @ b).tolist()
     return x
 
 

@@ -9,6 +9,7 @@ may be another, but errs no more for that.
 
 import numpy as np
 
+from gvgbot.autonomy.small_systems import solved
 from gvgbot.geometry import Array, Pose
 
 _SIGMA = np.array([0.02, 0.01, 0.0005])  # before anything is known: 1, 1, rad/s
@@ -71,8 +72,9 @@ class Calibration:
         self.shared = before + B @ self.P
         added = added + added.T + B @ self.P @ B.T
         added += np.diag(np.maximum(-np.diag(added), 0.0))
-        L = np.linalg.cholesky(drift)  # in its units, as metres and radians do not compare
-        values, axes = np.linalg.eigh(np.linalg.solve(L, np.linalg.solve(L, added).T))
+        # in units of what is new, as metres and radians do not compare
+        L = np.asarray(np.linalg.cholesky(drift), np.float64)
+        values, axes = np.linalg.eigh(solved(L, solved(L, added).T))
         axes = L @ axes
         return np.asarray(axes * np.maximum(1.0 + values, _LEAST_SHARE) @ axes.T)
 

@@ -15,6 +15,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gvgbot.autonomy.small_systems import solved
 from gvgbot.geometry import Array, Pose, wrap_angle, wrap_angles
 from gvgbot.ranges import Range
 
@@ -342,7 +343,7 @@ def update_vertex_in_place(belief: Belief, vertex: int, base_vertex: Pose, R: Ar
     H = H[:, used]
     HP = H @ belief.P[used]
     S = HP[:, used] @ H.T + R
-    K = np.asarray(np.linalg.solve(S, HP[:, own]).T, np.float64)
+    K = solved(S, HP[:, own]).T
     x, P = belief.x.copy(), belief.P
     x[own] += K @ r
     # (I - K H) P (I - K H)' + K R K' = P - K HP - P H' K' + K S K'
@@ -373,4 +374,4 @@ def _wrapped(x: Array) -> Array:
 
 def mahalanobis(r: Array, S: Array) -> float:
     """Squared Mahalanobis distance of an innovation."""
-    return float(r @ np.linalg.solve(S, r))
+    return float(r @ solved(S, r))

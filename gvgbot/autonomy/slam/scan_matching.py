@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from gvgbot.autonomy.small_systems import inverse, solved
 from gvgbot.geometry import Array, Pose, wrap_angle
 from gvgbot.ranges import Range
 
@@ -109,7 +110,7 @@ def register(
     Q (3, 3) is the prior's covariance in its own frame. None when too few points find a wall, or
     when it comes to where another prior has led, which has been `found`: the pairs are the same.
     """
-    information = np.linalg.inv(Q)
+    information = inverse(Q)
     counts = np.ones(len(walls)) if hits is None else hits
 
     def paired(pose: Pose) -> _Pairs:
@@ -130,7 +131,7 @@ def register(
             return None
         JW = J * _weights(residual, config)
         A = information + JW @ J.T
-        change = -np.linalg.solve(A, information @ step + JW @ residual)
+        change = -solved(A, information @ step + JW @ residual)
         step = step + change
         pose = prior.compose(Pose.from_array(step))
         if max(map(abs, change.tolist())) < within:
@@ -138,7 +139,7 @@ def register(
     rms = math.sqrt(float(residual @ residual) / len(residual))
     share = len(residual) / len(points)
     scatter, nearest = _scatter(residual), pairs.walls[near]
-    return Registration(pose, np.linalg.inv(A), share, rms, scatter, nearest, J, JW)
+    return Registration(pose, inverse(A), share, rms, scatter, nearest, J, JW)
 
 
 def register_coarsely(
