@@ -55,26 +55,17 @@ def least_of_three(ranges: Array) -> Array:
     return least
 
 
-def lone(ranges: Array) -> Array:
-    """The ranges of echoes much nearer than those on either side, NaN for all others.
+def is_lone(ranges: Array) -> NDArray[np.bool_]:
+    """Which ranges (N,) are echoes much nearer than those on either side.
 
     Beams that failed are passed over.
     """
     told = (~np.isnan(ranges)).nonzero()[0]
-    deep = ranges[told]
+    deep = ranges.take(told)
     inner = deep[1:-1] + _LONE_M
-    lone = np.full(len(ranges), np.nan)
-    found = told[1:-1][(inner < deep[:-2]) & (inner < deep[2:])]
-    lone[found] = ranges[found]
+    lone = np.zeros(len(ranges), np.bool_)
+    lone[told[1:-1][(inner < deep[:-2]) & (inner < deep[2:])]] = True
     return lone
-
-
-def end_points(ranges: Array, directions: Array, reach: float) -> Array:
-    """End points (N, 2) of the beams that hit something within reach, laser frame."""
-    with np.errstate(invalid="ignore"):
-        hit = (ranges < reach).nonzero()[0]
-    ends: Array = ranges.take(hit)[:, None] * directions.take(hit, axis=0)
-    return ends
 
 
 def bridged(points: Array, gap: float) -> Array:

@@ -14,9 +14,8 @@ from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.gvg.beams import (
     bridged,
-    end_points,
+    is_lone,
     least_of_three,
-    lone,
     range_towards,
     without_single_dropouts,
 )
@@ -113,13 +112,11 @@ class LocalMap:
         if free is not None:
             passed = np.fmax(passed, free)
         self._carve(scan, passed, directions, local_laser, travelled)
-        alone = lone(scan.ranges)
-        echoes, firm = (
-            local_laser.transform(end_points(ranges, directions, self._reach))
-            for ranges in (alone, np.where(np.isnan(alone), scan.ranges, np.nan))
-        )
-        on_glass = self._note_echoes(echoes)
-        points = np.concatenate([bridged(firm, self._config.bridge_gap_m), on_glass])
+        hit = (scan.ranges < self._reach).nonzero()[0]
+        ends = local_laser.transform(scan.ranges.take(hit)[:, None] * directions.take(hit, axis=0))
+        alone = is_lone(scan.ranges).take(hit)
+        on_glass = self._note_echoes(ends[alone])
+        points = np.concatenate([bridged(ends[~alone], self._config.bridge_gap_m), on_glass])
         self._occupy(points, local_laser.position, travelled)
         self._forget(travelled)
         self._renew()
@@ -383,7 +380,7 @@ def _merged(cells: NDArray[np.intp], columns: int, walls: Walls, reach: float) -
         high = beside.take(low)
         dx, dy = (points.take(high, axis=0) - points.take(low, axis=0)).T
         u, v = (sights.take(high, axis=0) * sights.take(low, axis=0)).T
-        one = ((np.hypot(dx, dy) < reach) & (u + v > 0.0)).nonzero()[0]
+        one = ((dx * dx + dy * dy < reach * reach) & (u + v > 0.0)).nonzero()[0]
         low, high = low.take(one), high.take(one)
         share = (hits[high] / (hits[low] + hits[high]))[:, None]
         for means in (points, sights):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from gvgbot.autonomy.gvg.beams import lone, without_mixed_pixels
+from gvgbot.autonomy.gvg.beams import is_lone, without_mixed_pixels
 from gvgbot.drivers.hokuyo.twin_readings import with_mixed_pixels
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
@@ -101,5 +101,5 @@ def test_readings_between_a_near_and_a_far_thing_are_dropped_and_no_others(
 def test_one_echo_among_beams_that_go_on_is_alone_whatever_failed(
     ranges: tuple[float, ...],
 ) -> None:
-    expected = [at if at == 1.0 else NAN for at in ranges]
-    np.testing.assert_array_equal(lone(np.array(ranges)), expected)
+    expected = [at == 1.0 for at in ranges]
+    np.testing.assert_array_equal(is_lone(np.array(ranges)), expected)
