@@ -106,7 +106,7 @@ class Choice:
         self, target: HalfEdgeId, found: set[HalfEdgeId], starts: list[Approach]
     ) -> HalfEdgeId | None:
         """A frontier `found` just now that is nearer than what is left of the way to the target."""
-        nearest = self.nearest(starts) if found else None
+        nearest = self.nearest(starts)
         if nearest is None or nearest[0].vertex not in {end.vertex for end in found}:
             return None
         way = shortest_path(self._mapper.graph, starts, target.vertex)

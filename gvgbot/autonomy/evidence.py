@@ -334,7 +334,8 @@ class Evidence:
             for edge in self._known.graph.edges.values()
             if edge.established or (is_dubious and edge.traversals > 0)
         ]
-        gaps = [gap for _, gap in self._known.edges_near(edges, view.local_base, place)]
+        near = self._known.edges_near(edges, view.local_base, place) if edges else ()
+        gaps = [gap for _, gap in near]
         if is_dubious:
             at = self._known.belief.map_base.transform(view.local_base.inverse().transform(place))
             gaps += [float(np.hypot(*(line - at).T).min()) for line in self._known.driven_parts]

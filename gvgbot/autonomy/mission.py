@@ -255,7 +255,7 @@ class Mission(Pursuit):
             return self._choose(view, here)
         if self.where.on_edge == target:
             return target
-        nearer = self.choice.nearer(target, found, here.starts())
+        nearer = self.choice.nearer(target, found, here.starts()) if found else None
         if nearer is None or self._progress.is_vain(nearer):
             return target
         self._commit(view, here, nearer, "nearer frontier")

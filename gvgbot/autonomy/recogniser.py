@@ -167,11 +167,12 @@ class Recogniser:
         self, belief: Belief, vertices: Iterable[Vertex], view: View, sighting: Sighting
     ) -> list[GatedVertex]:
         """Those long out of sight that are inside the gate of a sighting; most likely first."""
+        long_gone = [v for v in vertices if view.travelled - v.seen_at >= self._config.tracked_m]
+        if not long_gone:
+            return []
         found = []
         far = gate_distances(belief, sighting, view.local_base, self._config)
-        for vertex in vertices:
-            if view.travelled - vertex.seen_at < self._config.tracked_m:
-                continue
+        for vertex in long_gone:
             d2, metres = far[vertex.id]
             if d2 < self._config.gate or metres < self._config.same_place_m:
                 found.append(GatedVertex(d2, metres, vertex))

@@ -72,8 +72,9 @@ class View:
 
     def stands_free(self, place: Array, within_m: float) -> bool:
         """Whether it is certain that neither wall nor glass is so near to a place (2,)."""
-        gap, _ = self.local_map.tree().query(place, distance_upper_bound=within_m)
-        return bool(np.isinf(gap)) and self.local_map.is_bare(place, within_m)
+        away = np.hypot(*(self.local_map.points() - place).T)
+        is_walled = bool((away < within_m).any())
+        return not is_walled and self.local_map.is_bare(place, within_m)
 
 
 def touching(gvg: LocalGvg, points: Array) -> frozenset[int]:
