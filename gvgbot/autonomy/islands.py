@@ -113,7 +113,7 @@ class _Look:
         self._beam_ends = beam_ends(scan, told, self._depth, local_laser)
         # who is cut off at the first or the last beam is half hidden
         self._beside = np.concatenate([[-np.inf], self._depth, [-np.inf]])
-        self.steps = np.abs(np.diff(self._depth))
+        self.steps = np.abs(self._depth[1:] - self._depth[:-1])
         is_echo = self._depth < scan.range_max
         least = max(_GAP_M, _NOISE * math.sqrt(2.0) * self._noise)
         self.is_gap = (self.steps >= least) | (is_echo[1:] != is_echo[:-1])

@@ -16,6 +16,7 @@ from gvgbot.autonomy.slam.scan_matching import (
     register_coarsely,
 )
 from gvgbot.autonomy.slam.trail import Laid
+from gvgbot.autonomy.small_systems import inverse
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
 
@@ -156,10 +157,10 @@ class LocalMaps:
         if used is Q:
             self._lesson = motion, duration, prior.to(found.pose), noise, found.covariance, walls
             felt = calibration.as_felt(noise).sum(axis=0)
-        g = _ONE - found.covariance @ np.linalg.inv(used)
+        g = _ONE - found.covariance @ inverse(used)
         error = _error(found, g, felt, walls)
         laid = self._laid(found, found.pose, (_ONE - g) @ per_error, error)
-        stays = np.linalg.inv(_ONE + g * self._age(found))
+        stays = inverse(_ONE + g * self._age(found))
         drift = stays @ error @ stays.T
         left = np.asarray(stays @ (_ONE - g), np.float64)
         return ScanMatch(found.pose, calibration.adds_up(motion, duration, left, drift), laid)
@@ -369,14 +370,13 @@ def sampled(scan: Scan, count: int) -> Array:
     way along the walls is smoothed: where beams are dense, each point's own noise would decide
     which is taken, in the order of the sweep, and turn the walls a little.
     """
-    with np.errstate(invalid="ignore"):
-        hit = (scan.ranges < _RANGE_M).nonzero()[0]
+    hit = (scan.ranges < _RANGE_M).nonzero()[0]
     points = scan.ranges.take(hit)[:, None] * scan.directions.take(hit, axis=0)
     if len(points) == 0:
         return points
     way = uniform_filter1d(points, _SMOOTHED, axis=0, mode="nearest")
-    gaps = np.hypot(*np.diff(way, axis=0).T)
-    along = np.concatenate([[0.0], np.cumsum(np.minimum(gaps, _LONGEST_GAP_M))])
+    gaps = np.hypot(*(way[1:] - way[:-1]).T)
+    along = np.concatenate([[0.0], np.minimum(gaps, _LONGEST_GAP_M).cumsum()])
     step = max(float(along[-1]) / count, 1e-6)
     due = np.floor(along / step)
     is_next = np.concatenate([[True], due[1:] > due[:-1]])

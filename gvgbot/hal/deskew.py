@@ -41,15 +41,17 @@ def _at_beams(index: Array, ranges: Array, scan: Scan) -> Array:
     A wall that is only ever moved to the nearest beam is turned a little.
     """
     order = index.argsort(kind="stable")
-    index, ranges = index[order], ranges[order]
-    wanted = np.arange(len(ranges))
+    index, ranges = index.take(order), ranges.take(order)
+    wanted = np.arange(len(ranges), dtype=np.float64)
     after = np.minimum(np.maximum(index.searchsorted(wanted), 1), len(index) - 1)
-    near, far = ranges[after - 1], ranges[after]
-    share = (wanted - index[after - 1]) / np.maximum(index[after] - index[after - 1], 1e-9)
+    before = after - 1
+    near, far = ranges.take(before), ranges.take(after)
+    start, end = index.take(before), index.take(after)
+    share = (wanted - start) / np.maximum(end - start, 1e-9)
     nearest = after - (share < 0.5)
-    taken = np.abs(index[nearest] - wanted) <= 1.0
+    taken = np.abs(index.take(nearest) - wanted) <= 1.0
     width = scan.angle_increment * np.where(np.isfinite(near), near, 0.0)
     with np.errstate(invalid="ignore"):
         on_wall = (np.abs(far - near) < _SLANT * width) & (share >= 0.0) & (share <= 1.0)
         straight = near * far / ((1.0 - share) * far + share * near)
-    return np.where(taken, np.where(on_wall, straight, ranges[nearest]), np.nan)
+    return np.where(taken, np.where(on_wall, straight, ranges.take(nearest)), np.nan)

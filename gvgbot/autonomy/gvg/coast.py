@@ -82,15 +82,16 @@ def with_coast(
 
 def _cuts(diagram: Diagram, walls: Array, radius: float) -> _Cuts:
     a, b = diagram.a, diagram.b
-    farthest = np.maximum(diagram.clearance[a], diagram.clearance[b])  # on a ridge that ends
-    far = ((b < 0) | (farthest > radius - _TOUCH_M)).nonzero()[0]
-    p, q = walls[diagram.generators[far, 0]], walls[diagram.generators[far, 1]]
+    is_far = diagram.clearance > radius - _TOUCH_M
+    far = ((b < 0) | is_far.take(a) | is_far.take(b)).nonzero()[0]  # of those that end, at one end
+    p, q = walls.take(diagram.generators.take(far, axis=0).T, axis=0)
     middle, half = (p + q) / 2, np.hypot(*(q - p).T) / 2
     across = (q - p) / (2 * half)[:, None]
     direction = np.stack([-across[:, 1], across[:, 0]], axis=1)
-    start, end = (((diagram.points[i] - middle) * direction).sum(axis=1) for i in (a[far], b[far]))
-    inwards = ((walls.mean(axis=0) - middle) * direction).sum(axis=1)
-    end = np.where(b[far] < 0, -np.copysign(np.inf, inwards), end)  # out of the hull
+    a, b = a.take(far), b.take(far)
+    start, end = (_along(diagram.points.take(i, axis=0) - middle, direction) for i in (a, b))
+    out = (b < 0).nonzero()[0]  # of the hull
+    end[out] = -np.copysign(np.inf, _along(walls.mean(axis=0) - middle[out], direction[out]))
     low, high = np.minimum(start, end), np.maximum(start, end)
     away = np.sqrt(np.maximum(radius**2 - half**2, 0.0))
     cut, along = [], []
@@ -100,6 +101,12 @@ def _cuts(diagram: Diagram, walls: Array, radius: float) -> _Cuts:
         along.append(side[hit])
     cuts, places = np.concatenate(cut), np.concatenate(along)
     return _Cuts(middle[cuts] + places[:, None] * direction[cuts], far[cuts], places)
+
+
+def _along(ways: Array, directions: Array) -> Array:
+    """How far ways (N, 2) lead in directions (N, 2), m."""
+    x, y = (ways * directions).T
+    return np.asarray(x + y)
 
 
 def _cut_ridges(diagram: Diagram, cuts: _Cuts, radius: float) -> Indices:

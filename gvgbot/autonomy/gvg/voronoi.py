@@ -138,13 +138,9 @@ def _diagram(triangulation: Triangulation, room: _Room, roughness: float) -> Dia
 
 
 def _far_apart(p: Array, q: Array, least: float) -> NDArray[np.intp]:
-    """Which of the points p and q (N, 2) are at least so many metres apart.
-
-    Most are neighbours on one wall: the sum of both differences, which is longer, is told faster.
-    """
-    dx, dy = np.abs(p - q).T
-    hopeful = (dx + dy > 0.99 * least).nonzero()[0]
-    far: NDArray[np.intp] = hopeful[np.hypot(dx[hopeful], dy[hopeful]) >= least]
+    """Which of the points p and q (N, 2) are at least so many metres apart."""
+    dx, dy = (p - q).T
+    far: NDArray[np.intp] = (dx * dx + dy * dy >= least * least).nonzero()[0]
     return far
 
 
@@ -265,15 +261,15 @@ def _direction(vectors: Array) -> Array:
 
 def _circumcircles(generators: Array, triangles: NDArray[np.int32]) -> tuple[Array, Array]:
     """Centres (N, 2) and radii (N,) around triangles (N, 3); infinite for degenerate ones."""
-    x, y = (generators[:, k].take(triangles.T) for k in (0, 1))
+    x, y = generators.T.take(triangles.T, axis=1)
     bx, by, cx, cy = x[1] - x[0], y[1] - y[0], x[2] - x[0], y[2] - y[0]
     cross = 2 * (bx * cy - by * cx)
     bb, cc = bx * bx + by * by, cx * cx + cy * cy
     with np.errstate(divide="ignore", invalid="ignore"):
-        offset = np.stack([(cy * bb - by * cc) / cross, (bx * cc - cx * bb) / cross], axis=1)
-    offset[~(np.isfinite(offset[:, 0]) & np.isfinite(offset[:, 1]))] = _INFINITE_M
-    centres = np.stack([x[0], y[0]], axis=1) + offset
-    return centres, np.hypot(offset[:, 0], offset[:, 1])
+        dx, dy = (cy * bb - by * cc) / cross, (bx * cc - cx * bb) / cross
+    is_line = ~(np.isfinite(dx) & np.isfinite(dy))
+    dx[is_line] = dy[is_line] = _INFINITE_M
+    return np.stack([x[0] + dx, y[0] + dy], axis=1), np.hypot(dx, dy)
 
 
 def _disc_is_known(local_map: Space, centres: Array, radii: Array) -> NDArray[np.bool_]:

@@ -75,7 +75,7 @@ def _followed(belief: Belief, motion: Pose, laid: Laid) -> Belief:
     c, s = math.cos(moved.theta), math.sin(moved.theta)
     R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     by_before = F - R @ laid.gains.sum(axis=0) @ R.T @ F
-    by_trail = np.hstack([R @ laid.by_odometry, _by_clones(belief, laid, R)])
+    by_trail = np.concatenate([R @ laid.by_odometry, _by_clones(belief, laid, R)], axis=1)
     row = by_before @ P[:3] + by_trail @ P[end:]
     own = row[:, :3] @ by_before.T + row[:, end:] @ by_trail.T + R @ laid.noise @ R.T
     P[:3], P[:, :3] = row, row.T
@@ -88,7 +88,7 @@ def _by_clones(belief: Belief, laid: Laid, R: Array) -> Array:
     """How the pose after a match errs with each slot of the trail, (3, 3 MOST), map frame."""
     trail = belief.trail
     first = np.array([clone.first for clone in trail])
-    of = np.maximum(np.searchsorted(first, laid.looks, side="right") - 1, 0)
+    of = np.maximum(first.searchsorted(laid.looks, side="right") - 1, 0)
     at_all = (of == np.arange(len(trail))[:, None]).astype(np.float64)
     gains = R @ (at_all @ laid.gains.reshape(-1, 9)).reshape(-1, 3, 3) @ R.T
     slots = [clone.slot for clone in trail]
