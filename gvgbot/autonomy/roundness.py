@@ -63,7 +63,7 @@ def body_of(ends: Array, eye: Array, radius: float) -> Array | None:
         to_centre = ends - centre
         distance = np.hypot(*to_centre.T)
         slopes = to_centre / distance[:, None]
-        centre = centre + _least_squares(list(slopes.T), distance - radius)
+        centre = centre + _least_squares(np.ascontiguousarray(slopes.T), distance - radius)
     stray = np.hypot(*(ends - centre).T) - radius
     return centre if float(np.sqrt(np.mean(stray**2))) < _LOOSE_M else None
 
@@ -87,19 +87,20 @@ def _circle(ends: Array, eye: Array) -> tuple[Array, float]:
     middle = ends.mean(axis=0)
     px, py = (ends - middle).T
     square = px * px + py * py
-    x, y = _least_squares([2.0 * px, 2.0 * py], square)
+    x, y = _least_squares(np.array([2.0 * px, 2.0 * py]), square)
     radius = _possible(math.sqrt(float(square.mean()) + x * x + y * y))
     away = (middle - eye) / np.hypot(*(middle - eye))
     if x * away[0] + y * away[1] <= 0.0 or math.hypot(x, y) > radius:
         x, y = (radius * away).tolist()
+    A = np.ones((3, len(ends)))  # by how much distances shrink with x, y and the radius
     for _ in range(_STEPS):
         dx, dy = px - x, py - y
         distance = np.hypot(dx, dy)
-        slopes, stray = [dx / distance, dy / distance], distance - radius
-        u, v, wider = _least_squares([*slopes, np.ones(len(stray))], stray)
+        A[0], A[1], stray = dx / distance, dy / distance, distance - radius
+        u, v, wider = _least_squares(A, stray)
         if _possible(radius + wider) != radius + wider:
             wider = _possible(radius + wider) - radius
-            u, v = _least_squares(slopes, stray - wider)
+            u, v = _least_squares(A[:2], stray - wider)
         shorter = 1.0 / max(1.0, math.hypot(u, v) / radius)
         x, y, radius = x + shorter * u, y + shorter * v, radius + shorter * wider
         if shorter * max(abs(u), abs(v), abs(wider)) < _NEGLIGIBLE_M:
@@ -107,12 +108,11 @@ def _circle(ends: Array, eye: Array) -> tuple[Array, float]:
     return middle + np.array([x, y]), radius
 
 
-def _least_squares(columns: list[Array], b: Array) -> list[float]:
-    """The x (M,) for which A x is nearest to b (N,), by the columns of A: the normal equations.
+def _least_squares(A: Array, b: Array) -> list[float]:
+    """The x (M,) for which A' x is nearest to b (N,), by A (M, N): the normal equations.
 
     They are damped a little, so that there is an x if all beams end on one ray.
     """
-    A = np.array(columns)
     x: list[float] = solved(A @ A.T + _DAMPING[: len(A), : len(A)], A @ b).tolist()
     return x
 
