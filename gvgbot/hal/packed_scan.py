@@ -83,9 +83,10 @@ def _packed(ranges: Array) -> Millimetres | Array:
     """Ranges (N,), m, as millimetres; as they are, if they are no whole ones, or too long."""
     with np.errstate(invalid="ignore"):
         packed: Millimetres = np.rint(ranges * 1000.0).astype(np.uint16)
-    packed[np.isnan(ranges)], packed[np.isposinf(ranges)] = _UNTRUSTED, _NOTHING
-    is_same = np.array_equal(_unpacked(packed), ranges, equal_nan=True)
-    return packed if is_same else ranges
+    untrusted = np.isnan(ranges)
+    packed[untrusted], packed[np.isposinf(ranges)] = _UNTRUSTED, _NOTHING
+    is_same = (_unpacked(packed) == ranges) | untrusted
+    return packed if is_same.all() else ranges
 
 
 def _unpacked(packed: Millimetres | Array) -> Array:
