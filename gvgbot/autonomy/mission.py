@@ -38,6 +38,9 @@ class Mission(Pursuit):
     def advance(self, view: View, known: Correspondence) -> tuple[Order, list[Event]]:
         """The order for the next keyframe interval."""
         self._events = []
+        self._progress.note_ground(view)
+        if self._progress.does_not_end and self._ends_at_last(view):
+            return Stand(), self._events
         self._backtracking.sees_known = bool(known.vertex_of)
         self._retracing.note(view, known)
         found = access(view)
@@ -176,7 +179,7 @@ class Mission(Pursuit):
         graph = self._mapper.graph
         if self.choice.sharing is not None:  # what was in the way may have been one that drives on
             self._reopen(view, "the way may be free again")
-        if self._progress.finds_nothing_new(view):
+        if self._progress.finds_nothing_new:
             self._give_all_up(view)
         target = self.target
         half = None if target is None else graph.half_edge(target)

@@ -46,9 +46,9 @@ class Progress:
         self.headway.restart_stay()
 
     def set_aside(self) -> None:
-        """Count anew later: there is something else to do, or to wait for others."""
+        """Count later: there is something else to do, or to wait for others."""
         self.headway.restart_stay()
-        self._ground.restart()
+        self._ground.set_aside()
 
     def skip(self, seconds: float) -> None:
         """Let no patience run out by a time in which nothing was to be seen."""
@@ -73,14 +73,20 @@ class Progress:
             return "no progress"
         return None
 
-    def finds_nothing_new(self, view: View) -> bool:
+    def note_ground(self, view: View) -> None:
+        """The robot is where it is: there is more patience on new ground, and less elsewhere."""
+        place = self._mapper.belief.map_base.position
+        self._ground.note(place, view.stamp, self._known_m)
+
+    @property
+    def finds_nothing_new(self) -> bool:
         """Whether no target has led anywhere new for a long time."""
-        self._ground.note(self._mapper.belief.map_base.position, view.stamp)
-        is_long = self._ground.is_over(0.0, view.stamp)
-        is_over = is_long and self._ground.is_over(self._known_m, view.stamp)
-        if is_over:
-            self._ground.run_out()
-        return is_over
+        return self._ground.is_over
+
+    @property
+    def does_not_end(self) -> bool:
+        """Whether that was so long ago that it should have ended."""
+        return self._ground.is_past_its_end
 
     @property
     def _known_m(self) -> float:

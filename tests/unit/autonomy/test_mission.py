@@ -263,6 +263,18 @@ def test_frontiers_that_come_and_go_but_lead_nowhere_new_are_given_up_in_the_end
     assert "give all frontiers up" in given_up
 
 
+def test_a_robot_that_goes_to_and_fro_and_never_knows_a_vertex_ends_all_the_same() -> None:
+    """Nothing there is a frontier that could be given up."""
+    robot = Robot()
+    while not robot.said(Finished):
+        assert robot.stamp < 3000.0
+        to = -2.0 if robot.pose.x > 2.0 else 7.0
+        robot.mapper.move(robot.pose.to(Pose(to)), np.eye(3) * 1e-6)
+        robot.travelled, robot.pose = robot.travelled + 9.0, Pose(to)
+        robot.look(PLAIN, period=2.0)
+    assert robot.mission.outcome == "failed"
+
+
 def test_who_has_a_map_and_sees_no_edge_any_more_has_not_failed() -> None:
     """Stuck in a narrow door, for instance: what it has mapped is there all the same."""
     robot = Robot()
