@@ -53,12 +53,17 @@ class Knowledge:
         return KnownVertices(positions[near], degrees)
 
     def marked(self, gvg: LocalGvg, local_base: Pose) -> tuple[LocalGvg, dict[int, Vertex]]:
-        """A local GVG with a node where the vertex of a ring should be, and these vertices."""
+        """A local GVG with nodes where vertices should be that are nothing to see, and these.
+
+        That is the vertex of a ring, and one at a door that a virtual wall shuts.
+        """
         marks = {}
-        for vertex in self.graph.rings():
+        for vertex in [*self.graph.rings(), *self.graph.walled_up()]:
             vertex.local = local_base.compose(ekf.expected(self.belief, vertex.id)[0])
             place = gvg.place(vertex.local.position)
             if place is None or place.distance > vertex.clearance:
+                continue
+            if vertex.degree > 2 and gvg.is_meetpoint_near(vertex.local.position, vertex.clearance):
                 continue
             if gvg.may_divide(place):
                 gvg, node = gvg.divided(place)

@@ -87,8 +87,9 @@ class Mapper(MapEdits):
             else:
                 self._refresh(view, sightings[node], view.gvg.nodes[node], vertex, known)
         for node, vertex in view.marks.items():
-            known.pair(node, vertex.id)
-            self._evidence.pair_departures(view, view.gvg.nodes[node], vertex, known)
+            if vertex.id not in known.node_of:
+                known.pair(node, vertex.id)
+                self._evidence.pair_departures(view, view.gvg.nodes[node], vertex, known)
         for vertex, reason in self._evidence.refuted(view, known):
             self._refute(view, vertex, reason)
         self._join(view, known)

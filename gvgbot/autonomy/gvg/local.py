@@ -1,6 +1,7 @@
 """The local GVG: meetpoints, ends and edges in sight, in the local frame."""
 
 import heapq
+import math
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -158,6 +159,13 @@ class LocalGvg:
         """The point (2,) that a place is."""
         edge = self.edges[place.edge]
         return np.asarray(edge.polyline[int(np.abs(edge.stations - place.station).argmin())])
+
+    def is_meetpoint_near(self, point: Array, within_m: float) -> bool:
+        """Whether what may be a meetpoint is so near to a point (2,)."""
+        return any(
+            node.degree > 2 and math.dist(node.position, point) < within_m
+            for node in self.nodes.values()
+        )
 
     def may_divide(self, place: Place) -> bool:
         """Whether the edge of a place has a point between its ends."""

@@ -13,6 +13,7 @@ import numpy as np
 from gvgbot.geometry import Array, Pose, length_of, wrap_angle
 
 Kind = Literal["meetpoint", "endpoint"]
+_BESIDE = 3.0  # times its clearance: from a vertex, farther off walls leave it as it is
 
 
 class HalfEdgeId(NamedTuple):
@@ -245,6 +246,17 @@ class GvgGraph:
         """The vertices of edges without an end, at which there is nothing but the edge to see."""
         ends = ((edge.a.vertex, edge.b.vertex) for edge in self.edges.values())
         return [self.vertices[a] for a, b in ends if a == b and self.vertices[a].degree == 2]
+
+    def walled_up(self) -> list[Vertex]:
+        """The vertices beside which virtual walls lie over edges: there may be no more to see."""
+        found = dict[int, Vertex]()
+        for key, crossings in self.walled.items():
+            edge = self.edges.get(key)
+            for end, begin in () if edge is None else ((edge.a, 0.0), (edge.b, edge.length)):
+                vertex = self.vertices[end.vertex]
+                if any(abs(at - begin) < _BESIDE * vertex.clearance for at in crossings):
+                    found[vertex.id] = vertex
+        return list(found.values())
 
     def is_bend(self, vertex: Vertex) -> bool:
         """Whether there is nothing to a vertex but two edges, which might as well be one."""

@@ -928,3 +928,37 @@ def test_a_crossing_is_known_again_however_odometry_has_turned(turn: float) -> N
     assert isinstance(closed, LoopClosed)
     assert closed.agreement > 0.9
     assert len(seen.mapper.graph.vertices) == 1
+
+
+def test_a_meetpoint_at_a_door_that_a_virtual_wall_shuts_is_where_it_was() -> None:
+    """Nothing of it is to be seen any more, but ways over the map lead to it and on."""
+    seen = Seen().look_near(TEE, 30)
+    (tee,) = [v for v in seen.mapper.graph.vertices.values() if v.kind == "meetpoint"]
+    assert seen.mapper.marked(PLAIN, NEAR) == (PLAIN, {})
+    door = np.linspace([2.0, -1.0], [4.0, -1.0], 21)
+    seen.mapper.heed(seen.mapper.belief.map_base.transform(NEAR.inverse().transform(door)))
+    gvg, marks = seen.mapper.marked(PLAIN, NEAR)
+    ((node, marked),) = marks.items()
+    assert marked is tee
+    assert gvg.nodes[node].position == pytest.approx((3.0, 0.0), abs=0.06)
+    view = View(1000, 1000.0, 4.0, NEAR, gvg, NOTHING_SEEN, marks=marks)
+    known, _ = seen.mapper.observe(view)
+    bearings = {round(tee.half_edges[end.key].bearing, 1) for end in known.branch_of}
+    assert bearings == {0.0, round(math.pi, 1)}
+    assert seen.mapper.marked(TEE, NEAR) == (TEE, {})  # where the wall does not hide it
+
+
+def test_a_meetpoint_that_a_virtual_wall_moves_along_is_there_once() -> None:
+    tight = drawn(TEE_POINTS, TEE_LINES, clearance=0.5, unseen=UNSEEN)
+    moved = drawn(
+        TEE_POINTS | {2: (3.7, 0.0), 4: (3.7, -4.0)}, TEE_LINES, clearance=0.5, unseen=UNSEEN
+    )
+    seen = Seen().look_near(tight, 30)
+    (tee,) = [v for v in seen.mapper.graph.vertices.values() if v.kind == "meetpoint"]
+    door = np.linspace([2.0, -1.0], [4.0, -1.0], 21)
+    seen.mapper.heed(seen.mapper.belief.map_base.transform(NEAR.inverse().transform(door)))
+    gvg, marks = seen.mapper.marked(moved, NEAR)
+    assert list(marks.values()) == [tee]
+    view = View(30, 30.0, 3.0, NEAR, gvg, NOTHING_SEEN, marks=marks)
+    known, _ = seen.mapper.observe(view)
+    assert [node for node, vertex in known.vertex_of.items() if vertex == tee.id] == [2]
