@@ -12,11 +12,14 @@ from gvgbot.autonomy.situation import Situation
 from gvgbot.autonomy.slam.graph import Edge, GvgGraph, HalfEdgeId
 from gvgbot.autonomy.views import View
 from gvgbot.autonomy.virtual_walls import nearest_before
-from gvgbot.geometry import Array, length_of, stations_of
+from gvgbot.geometry import Array, Pose, length_of, stations_of
 
 _SIGHT_M = 3.0  # from a place, an edge on its side of the walls may be its foot
 _SHOWS_M = 8.0  # so near to it, a vertex shows the walls around it
 _EVERY = 4  # points of edges, of which one is looked at
+_WELL_ON_M = 1.5  # an edge that nobody knows, it is driven to its end
+_INTO_M = 1.0  # an edge that nobody knows, to tell which one leads nearer
+_NOWHERE = HalfEdgeId(-1, -1)  # that is known: the end of such an edge
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -140,4 +143,29 @@ def route_to_foot(
             now = foot.station + (-onwards if end == edge.a else onwards)
             if towards != closed and not here.graph.is_walled(edge, now, foot.station):
                 routes.append(Route(abs(onwards), towards, (), ahead=onwards > 0.0))
+    return min(routes, key=lambda route: route.metres, default=None)
+
+
+def route_exploring(
+    mapper: Mapper, here: Situation, starts: list[Approach], goal: Array
+) -> Route | None:
+    """The way into a frontier that leads towards a place (2,), map frame; None without frontiers.
+
+    Where furniture stands now that did not when the map was made, new edges lead round it.
+    """
+    graph, where, reached = here.graph, here.where, shortest_paths(here.graph, starts)
+    routes = []
+    for end in graph.frontiers():
+        bearing = graph.vertices[end.vertex].half_edges[end.key].bearing
+        into = Pose(_INTO_M * math.cos(bearing), _INTO_M * math.sin(bearing))
+        rest = math.dist(mapper.belief.map_vertex(end.vertex).compose(into).position, goal)
+        if end == where.on_edge:
+            on_it = Route(rest, _NOWHERE, (), ahead=True)
+            if where.trail_length > _WELL_ON_M:
+                return on_it
+            routes.append(on_it)
+        elif end.vertex in reached:
+            approach = reached[end.vertex]
+            first, departures = first_arrival(starts, approach), (*approach.departures, end)
+            routes.append(Route(approach.metres + rest, first, departures))
     return min(routes, key=lambda route: route.metres, default=None)

@@ -72,7 +72,8 @@ class Driving:
         self._looks = 0
         self._unseen = 0  # looks at where the route goes on, without seeing that
         self._is_looking = self._is_obstructed = False
-        self._is_off = True  # the graph, and looks for it; else coming nearer is what counts
+        self._is_off = True  # the ways it knows, and looks for one; else coming nearer counts
+        self._explores = False  # as no known way leads there
         self._progress = self._stood = -math.inf  # stamps: since when it has made none, and stands
         self._place: Pose | None = None  # where it stands
         self._last_view = -math.inf  # stamp
@@ -294,6 +295,8 @@ class Driving:
         end: Array | None = None,
     ) -> Order | Ended:
         """Along a route, to its end or to a point of it (2,), local frame."""
+        is_known = route is not None
+        route = route or self._explore(view, here)
         if route is None:
             return Ended("given up", self._ground.no_way_to(self.stop, here))
         self._route = route
@@ -309,7 +312,8 @@ class Driving:
         if self._unseen >= _UNSEEN_LOOKS[0]:  # a door that has opened just now is still a wall
             self._wait_anew(view)
             return Stand()
-        self._come_nearer(view, route.metres + here.place.distance)
+        if is_known:
+            self._come_nearer(view, route.metres + here.place.distance)
         path = route.branches(here) or here.ahead()
         line, clearance = here.line_along(path)
         if end is not None:
@@ -325,6 +329,14 @@ class Driving:
             self._looks = 0
             return self._close_way(view) or Stand()
         return Drive(track)
+
+    def _explore(self, view: View, here: Situation) -> Route | None:
+        """On where nobody has been, if no known way leads there: whatever it drives counts."""
+        route = self._ground.way_to_explore(self.stop, here, self._closed)
+        if route is not None and not self._explores:
+            self.happened.append(Recovery(view.stamp, "explore", "no known way leads there"))
+        self._explores = self._is_off = route is not None
+        return route
 
     def _come_nearer(self, view: View, metres: float, *, straight: bool = False) -> None:
         """Note how much is left of the way: wheels that spin are no progress.

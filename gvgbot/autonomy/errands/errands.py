@@ -5,8 +5,9 @@ import math
 from gvgbot.autonomy.destinations import Route, route_to_vertex
 from gvgbot.autonomy.errands.agenda import Agenda
 from gvgbot.autonomy.errands.driving import DIRECT_M
-from gvgbot.autonomy.errands.kinds import Coverage, Home, Look, Patrol, ToPoint, ToVertex
+from gvgbot.autonomy.errands.kinds import Coverage, Home, Look, Patrol, Stop, ToPoint, ToVertex
 from gvgbot.autonomy.exploration.paths import shortest_paths
+from gvgbot.autonomy.situation import Situation
 from gvgbot.geometry import Twist
 from gvgbot.words import counted
 
@@ -103,7 +104,8 @@ class Errands(Agenda):
         here = self.whereabouts()
         if route is None and here is not None:
             self.closures.close_again(graph, opened)
-            raise Declined(self._ground.no_way_to(ToVertex(vertex), here, f"to vertex {vertex}"))
+            trouble = self._ground.no_way_to(ToVertex(vertex), here, f"to vertex {vertex}")
+            self._check_explorable(ToVertex(vertex), here, trouble)
         self._take(ToVertex(vertex), stamp)
         far = "" if route is None else f" {route.metres:.1f} m"
         return f"it drives{far} to vertex {vertex}"
@@ -156,6 +158,11 @@ class Errands(Agenda):
         self._command = twist, stamp
         return is_new
 
+    def _check_explorable(self, stop: Stop, here: Situation | None, trouble: str) -> None:
+        """Raises Declined if a stop is out of reach, and nothing unknown may lead there."""
+        if here is None or self._ground.way_to_explore(stop, here) is None:
+            raise Declined(trouble)
+
     def _drive_to_point(self, errand: ToPoint | Home, stamp: float) -> str:
         self._check_going(stamp)
         if self.errand == errand and not self._is_own:
@@ -169,7 +176,7 @@ class Errands(Agenda):
             trouble = self._ground.trouble_to(errand, here)
         if trouble is not None and away > DIRECT_M:
             self.closures.close_again(graph, opened)
-            raise Declined(trouble)
+            self._check_explorable(errand, here, trouble)
         self._take(errand, stamp)
         where = "to where it started" if isinstance(errand, Home) else "there"
         return f"it drives {where}, {away:.1f} m away in a straight line"

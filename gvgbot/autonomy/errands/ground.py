@@ -4,14 +4,23 @@ from dataclasses import replace
 
 import numpy as np
 
-from gvgbot.autonomy.destinations import foot_at, foot_of, route_to_foot, route_to_vertex
+from gvgbot.autonomy.destinations import (
+    Route,
+    foot_at,
+    foot_of,
+    route_exploring,
+    route_to_foot,
+    route_to_vertex,
+)
 from gvgbot.autonomy.errands.closures import Closures
 from gvgbot.autonomy.errands.kinds import Home, Stop, ToPoint, ToVertex, Waypoint
 from gvgbot.autonomy.exploration.access import NEAR_M, access
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.mission import Mission
 from gvgbot.autonomy.situation import Situation
+from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.autonomy.views import Correspondence, View
+from gvgbot.geometry import Pose
 
 _OFF_GRAPH_M = 3.0  # a point farther from every edge is out of reach
 AT_VERTEX_M = 1.0  # from a vertex, what stands in the way stands on the edge beyond it
@@ -55,9 +64,34 @@ class Ground:
 
     def no_way_to(self, stop: Stop, here: Situation, there: str = "there") -> str:
         """That no known way leads to a stop, and whether one would but for virtual walls."""
+        is_walled_off = self._is_walled_off(stop, here)
+        return f"no known way leads {there}" + " but over a virtual wall" * is_walled_off
+
+    def way_to_explore(
+        self, stop: Stop, here: Situation, closed: HalfEdgeId | None = None
+    ) -> Route | None:
+        """On where nobody has been, towards a place to which no known way leads; None without one.
+
+        The robot does not set out for what lies behind virtual walls.
+        """
+        if not here.graph.frontiers() or self._is_walled_off(stop, here):
+            return None
+        match stop:
+            case ToVertex(vertex=vertex):
+                goal = self.mapper.belief.map_vertex(self.mapper.unsettled.names.vertex(vertex))
+            case ToPoint(x=x, y=y) | Home(x=x, y=y):
+                goal = Pose(x, y)
+                foot = foot_of(self.mapper, goal.position)
+                if foot is None or foot.away > _OFF_GRAPH_M:
+                    return None
+            case _:
+                return None
+        return route_exploring(self.mapper, here, here.starts(closed), goal.position)
+
+    def _is_walled_off(self, stop: Stop, here: Situation) -> bool:
+        """Whether a known way leads to a stop that none leads to, but for virtual walls."""
         unwalled = replace(here, graph=here.graph.unwalled())
-        is_beyond = bool(here.graph.walled) and self._leads_to(stop, unwalled)
-        return f"no known way leads {there}" + " but over a virtual wall" * is_beyond
+        return bool(here.graph.walled) and self._leads_to(stop, unwalled)
 
     def _leads_to(self, stop: Stop, here: Situation) -> bool:
         match stop:

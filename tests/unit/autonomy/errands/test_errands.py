@@ -15,6 +15,7 @@ from gvgbot.autonomy.events import ErrandEnded, Recovery
 from gvgbot.autonomy.slam.graph import HalfEdgeId, Vertex
 from gvgbot.geometry import Pose, Twist, wrap_angle
 from tests.unit.autonomy.errands.test_own_tasks import Explorer
+from tests.unit.autonomy.local_graphs import drawn
 from tests.unit.autonomy.sights import carved, looked
 from tests.unit.autonomy.test_mission import CLOSED, CONFIG
 
@@ -53,6 +54,43 @@ def test_what_is_declined_opens_no_way_that_is_closed(is_vertex: bool) -> None:
     assert set(graph.blocked()) == {edge.a, edge.b}
     robot.errands.closures.open_due(graph, 1000.0)
     assert graph.blocked() == [edge.a]
+
+
+def test_who_knows_no_way_explores_towards_its_goal() -> None:
+    """Furniture has moved: what is around the robot now hangs together with nothing it knows.
+
+    It has come from the west end of a corridor, 20 m away; the new tee leads west, east and south.
+    """
+    robot, east = Explorer(), Pose(20.0)
+    while not robot.mapper.graph.edges:
+        robot.look(CLOSED)
+    robot.mission.outcome = "explored"
+    robot.mapper.move(east, np.eye(3) * 1e-6)
+    robot.pose, robot.travelled = east, 20.0
+    tee = drawn(
+        {1: (17.0, 0.0), 2: (23.0, 0.0), 3: (28.0, 0.0), 4: (23.0, -4.0)},
+        {10: (1, 2, []), 11: (2, 3, []), 12: (2, 4, [])},
+        unseen={1: math.pi, 3: 0.0, 4: -math.pi / 2},
+    )
+    robot.stand(tee, 12)
+    (edge,) = robot.mapper.graph.edges.values()
+    assert len(robot.mapper.graph.frontiers()) == 3
+    robot.errands.goto_vertex(edge.a.vertex, robot.stamp)
+    order = robot.look(tee)
+    assert isinstance(order, Drive)
+    assert order.track.polyline[-1].tolist() == [17.0, 0.0]
+    (said,) = robot.said(Recovery)
+    assert "no known way leads there" in str(said)
+    robot.errands.obstruct("something stands in the way")
+    order = robot.look(tee)
+    assert isinstance(order, Drive)
+    assert order.track.polyline[-1].tolist() == [23.0, -4.0]  # nearer than the east end
+    for end in robot.mapper.graph.frontiers():
+        robot.mapper.graph.vertices[end.vertex].half_edges[end.key].blocked = True
+    robot.look(tee)
+    (ended,) = robot.said(ErrandEnded)
+    assert isinstance(ended, ErrandEnded)
+    assert ended.outcome == "given up"
 
 
 def test_who_drives_to_a_vertex_that_proves_to_be_a_known_one_drives_on_to_that() -> None:
