@@ -142,10 +142,11 @@ class LocalMaps:
         """
         motion, Q = self.calibration.corrected(motion, duration), self.calibration.scattered(noise)
         prior = before.compose(motion)
-        still = Pose(before.x, before.y, prior.theta)
         is_sparse = self._matching.coarse_pair_m > 0.0  # nobody stands from scan to scan
-        slipping = [] if is_sparse else [(still, _SLIPPING * Q)]
-        best = self._best(scan, [(prior, Q), *slipping], stays=True)
+        slipped = [] if is_sparse else self._slipped(scan, before, prior)
+        priors = [(prior, Q), *((pose, _SLIPPING * Q) for pose in slipped)]
+        searched = self._matching.search_rad if is_sparse else 0.0
+        best = self._best(scan, priors, turned=searched, stays=True)
         calibration, per_error = self._calibration, per_unit(motion, duration)
         if best is None:
             laid = self._laid(None, prior, per_error, Q)
@@ -191,7 +192,7 @@ class LocalMaps:
         clearly = _CLEARLY if turned is None else _AT_ALL
         Q = noise.sum(axis=0) + _LOST
         priors = [(p, Q) for p in _around(prior)]
-        best = self._best(scan, priors, clearly, turned or 0.0)
+        best = self._best(scan, priors, clearly, max(self._matching.search_rad, turned or 0.0))
         if best is None:
             return ScanMatch(prior, Q, None)
         return ScanMatch(best[0].pose, best[0].covariance, None)
@@ -273,7 +274,7 @@ class LocalMaps:
         """
         self.catch_up()
         assert self._walls is not None
-        points, reach = sampled(scan, self._matching.points), max(self._matching.search_rad, turned)
+        points = sampled(scan, self._matching.points)
         if min(len(self._walls.points), len(points)) < _LEAST_POINTS:
             return None
         best: tuple[Registration, Array] | None = None
@@ -281,7 +282,7 @@ class LocalMaps:
         for i, (prior, Q) in enumerate(priors):
             if agreement + clearly >= 1.0:
                 break  # nothing can be clearly better
-            near = _turned(points, self._walls.tree, prior, reach) if reach else prior
+            near = _turned(points, self._walls.tree, prior, turned) if turned else prior
             found = self._registered(scan, points, near, Q, None if best is None else best[0].pose)
             if i == 0:
                 first = near if found is None else found.pose
@@ -298,6 +299,22 @@ class LocalMaps:
             ):
                 best, agreement = (found, Q), now
         return best
+
+    def _slipped(self, scan: Scan, before: Pose, prior: Pose) -> list[Pose]:
+        """Where the base may be if its wheels slip: as far as it was, and turned if that is sought.
+
+        Turned it is only there if odometry leads where walls clearly speak against it: on its own
+        odometry tells more of the heading than such a search.
+        """
+        still, reach = Pose(before.x, before.y, prior.theta), self._matching.search_rad
+        if not reach:
+            return [still]
+        self.catch_up()
+        assert self._walls is not None
+        points, tree = sampled(scan, self._matching.points), self._walls.tree
+        if min(tree.n, len(points)) < _LEAST_POINTS:
+            return [still]
+        return [still, *(_turned(points, tree, pose, reach) for pose in (prior, still))]
 
     def _registered(
         self, scan: Scan, points: Array, near: Pose, Q: Array, so_far: Pose | None

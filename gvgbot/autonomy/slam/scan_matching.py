@@ -39,7 +39,8 @@ class ScanMatchingConfig:
     min_pairs: Annotated[int, Range(10, 1000)] = 40  # with fewer there is no match
     min_inliers: Annotated[float, Range(0.0, 1.0)] = 0.5  # share of a scan that must find a wall
     coarse_pair_m: Annotated[float, Range(0.0, 2.0)] = 0.0  # of a first match; 0: there is none
-    # for the heading first, to either side; with base.heading: wheels, 0 stands for 0.4
+    # for the heading, to either side, where a scan does not fit; with base.heading: wheels, 0
+    # stands for 0.4
     search_rad: Annotated[float, Range(0.0, 1.0)] = 0.0
 
 

@@ -117,6 +117,24 @@ def test_wheels_that_slipped_in_a_turn_are_found_out_by_a_search() -> None:
     assert searched.distance(Pose(-2.0, 0.0, 0.0)) < 0.02
 
 
+@pytest.mark.parametrize(
+    ("turn", "turn_without", "within"), [(0.04, 0.04, 1e-12), (0.3, 0.0, 0.01), (-0.35, 0.0, 0.01)]
+)
+def test_the_heading_is_searched_only_where_walls_speak_against_odometry(
+    turn: float, turn_without: float, within: float
+) -> None:
+    """What walls correct anyhow stays as it is; a slip is found, as if there had been none."""
+    found = []
+    for search_rad, felt in ((0.0, turn_without), (0.4, turn)):
+        rng, local = np.random.default_rng(5), maps(ScanMatchingConfig(search_rad=search_rad))
+        for x in np.arange(-2.0, 0.0, 0.25):
+            local.insert(room(rng, x), Pose(x, 0.0), x + 2.0)
+        found.append(local.match(room(rng, 0.0), Pose(-0.25), Pose(0.25, 0.0, felt), 1.0, LOOSE)[0])
+    without, searched = found
+    assert searched.theta == pytest.approx(without.theta, abs=within)
+    assert searched.distance(without) < 5 * within
+
+
 @pytest.mark.parametrize("locate", [LocalMaps.find, LocalMaps.match])
 def test_a_robot_that_comes_round_a_corner_unseen_is_found_by_the_walls_it_knew(
     locate: Callable[[LocalMaps, Scan, Pose, Pose, float, Array], tuple[Pose, Array, Laid | None]],
