@@ -21,6 +21,7 @@ _RATE = 0.02  # at which they are learnt with each step; faster at first,
 _FEW = 4.0  # as if so many steps had told of what is expected: each base has its own
 _ODDEST = 9.0  # a correction says no more than one of three sigmas
 _LEAST_SHARE = 0.1  # of its own covariance, that a step has in every direction
+_TELLING = 0.1  # of an error along the way: less is made good by the roughness of side walls only
 _ONE = np.eye(3)
 _LEAST = 1e-10 * np.eye(3)  # variance of a correction where walls say nothing, m^2 and rad^2
 
@@ -95,14 +96,18 @@ class Calibration:
         The change is in the frame of the base after it. In the same frame are the `parts`
         (4, 3, 3) of the noise that was expected and the covariance C (3, 3) of the pose after it,
         which was doubted by Q before: 1 - C Q^-1 is the share g of an error that the change makes
-        good. `walls` is the variance of what walls say, in units of what C takes it for.
+        good. `walls` is the variance of what walls say, in units of what C takes it for. What
+        bare side walls seem to say of the way along them holds back as much as it tells: it is
+        left out.
         """
         g = _ONE - C @ np.linalg.inv(self.scattered(parts))
+        told = np.array([g[0, 0] > _TELLING, 1.0, 1.0])
+        r, both = told * [change.x, change.y, change.theta], np.outer(told, told)
+        gC, g = both * (g @ C), both * g
         H = g @ per_unit(motion, duration)
-        r = np.array([change.x, change.y, change.theta])
         P = self.P + _WANDER
         felt = g @ self.as_felt(parts) @ g.T
-        S = H @ P @ H.T + felt.sum(axis=0) + walls * (g @ C) + _LEAST  # g V g' = g C
+        S = H @ P @ H.T + felt.sum(axis=0) + walls * gC + _LEAST  # g V g' = g C
         self._learn_noise(r, S, felt)
         if r @ np.linalg.solve(S, r) > _SURPRISING:
             return _ONE
