@@ -23,6 +23,7 @@ _FLATNESS = 0.08  # smallest over largest spread of the neighbours of a point on
 _REACH_M = 0.35  # as far away as neighbours on one wall may be
 _ITERATIONS = 6
 _BATCH = 10  # neighbouring points, of which the mean distance from the walls is taken
+_GRAZING = 0.2  # of how steeply a wall was seen: what is seen less steeply may be its other face
 _CONVERGED, _ROUGHLY = 1e-4, 2e-2  # metres and radians
 _SAME_PAIRS_M, _SAME_PAIRS_RAD = 0.02, 0.005  # moved less, points are near to the same walls
 
@@ -211,9 +212,11 @@ def _pairs(
     x, y = beside[..., 0], beside[..., 1]
     centre, normal, flat = _lines(x, y, weight)
     if sides is not None:
-        now = np.einsum("kj,jk->k", sides.of_points.take(paired, axis=0), normal)
+        seen_from = sides.of_points.take(paired, axis=0)
+        now = np.einsum("kj,jk->k", seen_from, normal)
         before = np.einsum("kgj,jk->kg", sides.of_walls.take(near, axis=0), normal)
-        facing = before * now[:, None] >= 0.0
+        least = _GRAZING * np.hypot(*seen_from.T)
+        facing = before * now[:, None] >= before**2 * least[:, None]
         weight *= facing
         enough = np.einsum("kg->k", (weight > 0.0).astype(np.int8)) >= _FEWEST
         mixed = (enough & (present & ~facing).any(axis=1)).nonzero()[0]

@@ -17,7 +17,7 @@ from gvgbot.autonomy.slam.scan_matching import (
 from gvgbot.drivers.world import World
 from gvgbot.geometry import Array, Pose, wrap_angle
 from gvgbot.worlds import builtin
-from tests.unit.autonomy.sights import carved, looked, sweep
+from tests.unit.autonomy.sights import carved, line, looked, sweep
 
 CORNER = carved([(-3.0, -1.0, 1.0, 1.0), (-1.0, -5.0, 1.0, 1.0)])  # an L of two corridors
 CORRIDOR = carved([(-9.0, -1.0, 9.0, 1.0)])
@@ -194,3 +194,17 @@ def test_points_are_laid_onto_the_face_that_was_seen_from_their_side() -> None:
     assert own.pose.y == pytest.approx(0.0, abs=1e-3)
     assert own.covariance[1, 1] > 0.5 * Q[1, 1]
     assert either.pose.y == pytest.approx(-0.1, abs=0.02)
+
+
+def test_who_comes_through_a_door_is_not_drawn_back_to_the_other_face_of_the_wall() -> None:
+    """The new face is seen from nearly its own plane: from which side, walls' noise would say."""
+    world = carved([(-6.0, -3.0, 0.0, 3.0), (0.3, -3.0, 7.0, 3.0), (-0.1, -0.5, 0.4, 0.5)])
+    rng, view, sigma = np.random.default_rng(2), math.radians(240.0), 0.01
+    way = line(-3.2, 0.0, 0.0, 0.0, 0.0, 12)
+    room = looked(world, way, sigma=sigma, rng=rng, field_of_view=view)
+    points = sweep(world, Pose(0.55), field_of_view=view, sigma=sigma, rng=rng, reach=5.6).ends
+    prior, noise = Pose(0.5), np.diag([0.03**2, 0.01**2, 0.01**2])
+    walls, sides = room.points(), Sides(room.sights(), -points)
+    found = register(points, cKDTree(walls), walls, prior, noise, CONFIG, room.hits(), sides)
+    assert found is not None
+    assert found.pose.x == pytest.approx(prior.x, abs=0.05)
