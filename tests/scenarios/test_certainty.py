@@ -21,7 +21,8 @@ def test_the_robot_visits_places_between_and_says_that_its_goal_is_out_of_reach(
     assert_explored(run)
     decisions = [e for e in run.events if isinstance(e, Decision)]
     visits = [e for e in decisions if "place is uncertain" in e.reason]
-    ended = [e for e in run.events if isinstance(e, ErrandEnded)]
+    goals = {f"goto {visit.vertex}" for visit in visits}  # a last look at the walls is none
+    ended = [e for e in run.events if isinstance(e, ErrandEnded) and e.errand in goals]
     assert visits
     assert [e.outcome for e in ended] == ["arrived"] * len(visits)
     assert "less certain than wanted" in run.pipeline.mission.reason
