@@ -119,8 +119,8 @@ SABOTAGES = (
     Sabotage(
         "scans are stamped 0.4 s too early",
         "drivers/hokuyo/driver.py",
-        "return stream.geometry.scan(ranges, now.host_stamp)",
-        "return stream.geometry.scan(ranges, now.host_stamp - 0.4)",
+        "stream.geometry.scan(ranges, now.host_stamp)",
+        "stream.geometry.scan(ranges, now.host_stamp - 0.4)",
     ),
     Sabotage(
         "odometry counts every way a tenth too long",
