@@ -19,8 +19,20 @@ def to_and_fro(ground: NewGround, stamps: range, y: float = 0.0) -> None:
         ground.note(np.array([5.0 * np.sin(0.1 * stamp), y]), float(stamp), 100.0)
 
 
-def test_whoever_comes_on_has_hope() -> None:
-    assert not driven(range(20_000), step_m=0.1).is_over
+@pytest.mark.parametrize("speed", [0.05, 0.1, 0.6])
+def test_whoever_comes_on_has_hope(speed: float) -> None:
+    assert not driven(range(20_000), step_m=speed).is_over
+
+
+@pytest.mark.parametrize("grows", [True, False])
+def test_aisles_side_by_side_are_explored_to_the_last(*, grows: bool) -> None:
+    """A hundred of them, 30 m long and a metre apart: cells touch, edges tell that they are new."""
+    ground = NewGround()
+    for aisle in range(100):
+        for second in range(60):
+            edges_m = 30.0 * aisle + 0.5 * second if grows else 30.0
+            ground.note(np.array([aisle + 0.5, 0.5 * second]), 60.0 * aisle + second, edges_m)
+    assert ground.is_over != grows
 
 
 @pytest.mark.parametrize(
@@ -61,14 +73,14 @@ def test_a_room_off_an_old_corridor_is_new_ground() -> None:
 
 def test_outages_and_other_tasks_do_not_count() -> None:
     ground = NewGround()
-    ground.note(np.zeros(2), 0.0, 100.0)
+    ground.note(np.zeros(2), 0.0, 0.0)
     ground.skip(5000.0)
-    ground.note(np.zeros(2), 5500.0, 100.0)
+    ground.note(np.zeros(2), 5500.0, 0.0)
     ground.set_aside()
-    ground.note(np.zeros(2), 9000.0, 100.0)
-    ground.note(np.zeros(2), 9080.0, 100.0)
+    ground.note(np.zeros(2), 9000.0, 0.0)
+    ground.note(np.zeros(2), 9080.0, 0.0)
     assert not ground.is_over
-    ground.note(np.zeros(2), 9150.0, 100.0)
+    ground.note(np.zeros(2), 9150.0, 0.0)
     assert ground.is_over
 
 
@@ -86,7 +98,7 @@ def test_it_ends_in_proportion_to_the_floor_wherever_new_ground_is_found(pause_s
 
 
 def test_who_finds_new_ground_without_hope_goes_on_there() -> None:
-    ground = driven(range(1000), step_m=0.0)
+    ground = driven(range(1000), step_m=0.0, edges_m=0.0)
     assert ground.is_over
     assert not ground.is_past_its_end
     for i in range(10):
