@@ -1,5 +1,6 @@
 """What the robot does unasked before exploring goes on, or ends: drives for a better map."""
 
+import math
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -10,6 +11,7 @@ from gvgbot.autonomy.destinations import foot_of, route_to_foot
 from gvgbot.autonomy.ending import too_narrow
 from gvgbot.autonomy.errands.kinds import ToPoint, ToVertex
 from gvgbot.autonomy.events import Decision
+from gvgbot.autonomy.evidence import IN_FULL_VIEW_M
 from gvgbot.autonomy.exploration.certainty import CertaintyConfig, Revisiting
 from gvgbot.autonomy.exploration.unseen import Unseen
 from gvgbot.autonomy.mapping import Mapper
@@ -20,6 +22,7 @@ from gvgbot.geometry import Array
 from gvgbot.words import counted
 
 _DRIVEN_ON_M = 0.5  # what can be seen there is new
+_AWAITED_S = 30.0  # that somebody goes who hides what it has come to see
 
 
 class Task(NamedTuple):
@@ -39,6 +42,7 @@ class OwnTasks:
         self._surveyed_m = 0.0  # and `travelled`
         self._narrows = np.empty((0, 2))  # ways too narrow for the robot
         self._has_met = False  # somebody who stood: he may have hidden something, and gone
+        self._arrived: float | None = None  # stamp, where it went for a look
 
     def configure(self, config: CertaintyConfig) -> None:
         """Use another configuration from now on."""
@@ -84,7 +88,8 @@ class OwnTasks:
         )
         if self._mission.is_waiting or (self._unseen.is_done and not has_news):
             return None
-        if not self._unseen.is_standing(view.travelled) or view.is_somebody_found:
+        is_standing = self._unseen.is_standing(view.travelled)
+        if not is_standing or view.is_somebody_found or self._is_hidden(view):
             return Stand()
         surveyed = survey()
         if surveyed is None:
@@ -97,11 +102,24 @@ class OwnTasks:
             route = None if foot is None else route_to_foot(here, starts, foot)
             return None if route is None else route.metres
 
+        self._arrived = None
         place = self._unseen.next(surveyed.places, metres_to, twice=self._has_met)
         if place is None:
             return None
         decision = Decision(view.stamp, None, None, "something may be missing there")
         return Task(ToPoint(*place.round(2).tolist()), decision)
+
+    def _is_hidden(self, view: View) -> bool:
+        """Whether somebody makes up meetpoints where it has just come for a look: he may go."""
+        if not self._unseen.is_visited(self._mapper.belief.map_base.position):
+            return False
+        self._arrived = view.stamp if self._arrived is None else self._arrived
+        nodes = [view.gvg.nodes[key] for key in view.doubted]
+        return view.stamp - self._arrived < _AWAITED_S and any(
+            math.dist(node.position, view.local_base.position) < IN_FULL_VIEW_M
+            for node in nodes
+            if node.degree > 2
+        )
 
     def _remark(self) -> str:
         """What there is to say about the map, if that is the end."""

@@ -3,6 +3,7 @@
 Somebody may have stood in a door, or glass may have hidden it, as the robot passed.
 """
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -58,6 +59,10 @@ class Unseen:
             return None
         self._visits.append(np.array(min(chances)[2]))
         return self._visits[-1]
+
+    def is_visited(self, place: Array) -> bool:
+        """Whether this (2,), m, map frame, is where it was sent to last."""
+        return bool(self._visits) and math.dist(self._visits[-1], place) < _SAME_M
 
     @property
     def where(self) -> str:

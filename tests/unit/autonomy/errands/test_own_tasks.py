@@ -20,6 +20,10 @@ from tests.unit.autonomy.sights import carved, looked
 from tests.unit.autonomy.test_mission import CLOSED, CONFIG, TEE, Robot
 
 GAP = [2.0, 0.0]
+BRANCH = drawn(
+    {1: (-1.0, 0.0), 2: (4.0, 0.0), 3: (2.5, 0.0), 4: (2.5, -2.0)},
+    {10: (1, 3, []), 11: (3, 2, []), 12: (3, 4, [])},
+)
 
 
 class Explorer(Robot):
@@ -32,12 +36,15 @@ class Explorer(Robot):
         self.mission.survey = self._survey
         self.narrows = np.empty((0, 2))
         self.somebody_until = 0.0  # s, that somebody is found
+        self.hidden_until = 0.0  # s, that the branch may be there for a while only
 
     def _survey(self) -> Surveyed:
         return Surveyed(np.array(self.left.pop(0)).reshape(-1, 2), self.narrows)
 
     def decide(self, view: View, known: Correspondence) -> tuple[Order, list[Event]]:
         is_found = view.stamp < self.somebody_until
+        if view.stamp < self.hidden_until:
+            view = replace(view, gvg=BRANCH, doubted=frozenset({3}))
         return self.errands.advance(replace(view, is_somebody_found=is_found), known)
 
     def until_it_moves_or_ends(self, gvg: LocalGvg = CLOSED) -> Order:
@@ -95,6 +102,19 @@ def test_who_stands_in_sight_is_watched_before_the_survey_is_made() -> None:
         robot.look(CLOSED)
     assert robot.stamp > 20.0
     assert robot.travelled == 0.0
+
+
+@pytest.mark.parametrize(("hidden_s", "waits_s"), [(0.0, 0.0), (12.0, 12.0), (50.0, 30.0)])
+def test_what_somebody_hides_where_it_went_for_a_look_is_waited_for(
+    hidden_s: float, waits_s: float
+) -> None:
+    robot = Explorer([GAP], [])
+    robot.until_it_moves_or_ends()
+    robot.drive(CLOSED, (0.0, 0.0), (2.0, 0.0))
+    came, robot.hidden_until = robot.stamp, robot.stamp + hidden_s
+    while robot.left:
+        robot.look(CLOSED)
+    assert robot.stamp - came == pytest.approx(waits_s, abs=1.5)
 
 
 @pytest.mark.parametrize(("somebody_until", "visits"), [(0.0, 1), (5.0, 2)])
