@@ -19,7 +19,7 @@ _SHOWS_M = 8.0  # so near to it, a vertex shows the walls around it
 _EVERY = 4  # points of edges, of which one is looked at
 _WELL_ON_M = 1.5  # an edge that nobody knows, it is driven to its end
 _INTO_M = 1.0  # an edge that nobody knows, to tell which one leads nearer
-_NOWHERE = HalfEdgeId(-1, -1)  # that is known: the end of such an edge
+NOWHERE = HalfEdgeId(-1, -1)  # that is known: the end of such an edge
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -160,7 +160,7 @@ def route_exploring(
         into = Pose(_INTO_M * math.cos(bearing), _INTO_M * math.sin(bearing))
         rest = math.dist(mapper.belief.map_vertex(end.vertex).compose(into).position, goal)
         if end == where.on_edge:
-            on_it = Route(rest, _NOWHERE, (), ahead=True)
+            on_it = Route(rest, NOWHERE, (), ahead=True)
             if where.trail_length > _WELL_ON_M:
                 return on_it
             routes.append(on_it)

@@ -9,6 +9,7 @@ import numpy as np
 from gvgbot.autonomy.control.edge_follower import Track
 from gvgbot.autonomy.control.orders import Drive, LookAround, Order, Stand
 from gvgbot.autonomy.destinations import (
+    NOWHERE,
     Foot,
     Route,
     foot_at,
@@ -161,7 +162,7 @@ class Driving:
         if route is not None and route.departures and self._ground.is_at(view, route.first.vertex):
             end = route.departures[0]
             edge = self._mapper.graph.edge_at(end)
-            return self._close(view, end, None if edge is None else edge.other(end))
+            return self._close(view, end, NOWHERE if edge is None else edge.other(end))
         return self._close(view, on_edge, None if route is None else route.first)
 
     def _close(
@@ -298,7 +299,8 @@ class Driving:
         is_known = route is not None
         route = route or self._explore(view, here)
         if route is None:
-            return Ended("given up", self._ground.no_way_to(self.stop, here))
+            trouble = self._ground.no_way_to(self.stop, here, closed=self._closed)
+            return Ended("given up", trouble)
         self._route = route
         next_one = next(iter(route.departures), None)
         is_missing = (

@@ -62,9 +62,18 @@ class Ground:
             return self.no_way_to(goal, here)
         return None
 
-    def no_way_to(self, stop: Stop, here: Situation, there: str = "there") -> str:
-        """That no known way leads to a stop, and whether one would but for virtual walls."""
-        is_walled_off = self._is_walled_off(stop, here)
+    def no_way_to(
+        self,
+        stop: Stop,
+        here: Situation,
+        there: str = "there",
+        closed: HalfEdgeId | None = None,
+    ) -> str:
+        """That no known way leads to a stop, and whether one would but for virtual walls.
+
+        Something may stand between the robot and an end of its edge, `closed`.
+        """
+        is_walled_off = self._is_walled_off(stop, here, closed)
         return f"no known way leads {there}" + " but over a virtual wall" * is_walled_off
 
     def way_to_explore(
@@ -74,7 +83,7 @@ class Ground:
 
         The robot does not set out for what lies behind virtual walls.
         """
-        if not here.graph.frontiers() or self._is_walled_off(stop, here):
+        if not here.graph.frontiers() or self._is_walled_off(stop, here, closed):
             return None
         match stop:
             case ToVertex(vertex=vertex):
@@ -88,19 +97,20 @@ class Ground:
                 return None
         return route_exploring(self.mapper, here, here.starts(closed), goal.position)
 
-    def _is_walled_off(self, stop: Stop, here: Situation) -> bool:
+    def _is_walled_off(self, stop: Stop, here: Situation, closed: HalfEdgeId | None) -> bool:
         """Whether a known way leads to a stop that none leads to, but for virtual walls."""
         unwalled = replace(here, graph=here.graph.unwalled())
-        return bool(here.graph.walled) and self._leads_to(stop, unwalled)
+        return bool(here.graph.walled) and self._leads_to(stop, unwalled, closed)
 
-    def _leads_to(self, stop: Stop, here: Situation) -> bool:
+    def _leads_to(self, stop: Stop, here: Situation, closed: HalfEdgeId | None) -> bool:
+        starts, names = here.starts(closed), self.mapper.unsettled.names
         match stop:
             case ToVertex(vertex=vertex):
-                return route_to_vertex(here.graph, here.starts(), vertex) is not None
+                return route_to_vertex(here.graph, starts, names.vertex(vertex)) is not None
             case ToPoint(x=x, y=y) | Home(x=x, y=y):
                 foot = foot_of(self.mapper, np.array([x, y]))
             case Waypoint(end=end, station=station):
-                foot = foot_at(here.graph, end, station)
+                foot = foot_at(here.graph, names.half_edge(end), station)
             case _:
                 return True
-        return foot is not None and route_to_foot(here, here.starts(), foot) is not None
+        return foot is not None and route_to_foot(here, starts, foot, closed) is not None

@@ -85,6 +85,11 @@ def test_who_knows_no_way_explores_towards_its_goal() -> None:
     order = robot.look(tee)
     assert isinstance(order, Drive)
     assert order.track.polyline[-1].tolist() == [23.0, -4.0]  # nearer than the east end
+    robot.drive(tee, (20.0, 0.0), (22.5, 0.0))
+    robot.errands.obstruct("something stands in the way")
+    order = robot.look(tee)
+    assert isinstance(order, Drive)
+    assert order.track.polyline[-1].tolist() == [28.0, 0.0]
     for end in robot.mapper.graph.frontiers():
         robot.mapper.graph.vertices[end.vertex].half_edges[end.key].blocked = True
     robot.look(tee)
@@ -106,6 +111,32 @@ def test_who_drives_to_a_vertex_that_proves_to_be_a_known_one_drives_on_to_that(
     assert order.track.polyline[-1].tolist() == [4.0, 0.0]
     assert robot.errands.kept() == Kept("vertex", vertices=(ends[-1].vertex,))
     assert not robot.said(ErrandEnded)
+
+
+@pytest.mark.parametrize("is_walled", [True, False])
+def test_a_virtual_wall_is_blamed_for_what_it_is_in_the_way_of_and_nothing_else(
+    *, is_walled: bool
+) -> None:
+    """It lies over the edge to where the robot is sent by an old name, or else somebody stands."""
+    robot, gone = Explorer(), 99
+    while not robot.mapper.graph.edges:
+        robot.look(CLOSED)
+    graph = robot.mapper.graph
+    (edge,) = graph.edges.values()
+    ends = sorted((edge.a, edge.b), key=lambda end: robot.mapper.belief.map_vertex(end.vertex).x)
+    robot.errands.recall(Kept("vertex", vertices=(gone,)))
+    robot.mapper.unsettled.names.change({HalfEdgeId(gone, 0): ends[-1]})
+    if is_walled:
+        graph.walled = {edge.id: (3.7 if edge.a == ends[0] else edge.length - 3.7,)}
+        robot.look(drawn({1: (-1.0, 0.0), 3: (2.5, 0.0)}, {10: (1, 3, [])}, unseen={3: 0.0}))
+    else:
+        graph.walled = {edge.id + 1: (1.0,)}
+        robot.look(CLOSED)
+        robot.errands.obstruct("something stands in the way")
+        robot.look(CLOSED)
+    (ended,) = robot.said(ErrandEnded)
+    assert isinstance(ended, ErrandEnded)
+    assert ended.reason.endswith("but over a virtual wall") == is_walled
 
 
 @pytest.mark.parametrize("is_sent", [True, False])
