@@ -41,8 +41,10 @@ from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
 from gvgbot.autonomy.traffic import Traffic
 from gvgbot.autonomy.views import Correspondence, View
 from gvgbot.geometry import STANDSTILL, Array, Pose, Twist, wrap_angle
+from gvgbot.hal.guard import TRUSTED_SHARE
 from gvgbot.hal.messages import Odometry, Scan
 from gvgbot.hal.packed_scan import Sweep
+from gvgbot.hal.sweep import has_sight
 
 _NOTHING_FELT = Felt()
 _LOOKS_ASIDE = (
@@ -246,9 +248,10 @@ class Pipeline:
         return done
 
     def _worth_a_look(self, scan: Scan, odom_base: Pose) -> bool:
-        """Whether the robot is about something, and has come on, turned or waited enough."""
+        """Whether it is about something, not covered, and has come on, turned or waited enough."""
         last, c = self.past.last, self._config.keyframe
         rests = self._is_idle or self._reflexes.is_plugged_in
+        rests |= not (self.led or has_sight(scan, share=TRUSTED_SHARE))  # the guard waits, too
         if (rests and last is not None) or self._reflexes.is_lifted:
             return False
         if last is None or self._look_now:

@@ -204,6 +204,28 @@ def test_who_is_lifted_neither_drives_nor_looks_whoever_wants_it_to_drive() -> N
         stamp += 4.0
 
 
+@pytest.mark.parametrize(("covered", "looks"), [(0.6, 0), (0.4, 10)])
+def test_who_sees_next_to_nothing_waits_as_for_a_laser_that_is_silent(
+    covered: float, looks: int
+) -> None:
+    """Half an hour: to go on standing there would be no progress, and the end of all frontiers."""
+    pipeline, theta, stamp = about_to_drive()
+    keyframes = len(pipeline.past.keyframes)
+    whole = sweep(ROOMS, Pose(-1.5, 0.0, theta), field_of_view=LASER_270)
+    ranges = whole.ranges.copy()
+    ranges[: round(covered * len(ranges))] = np.nan
+    happened = []
+    for later in np.linspace(stamp + 1.0, stamp + 1800.0, 10).tolist():
+        pipeline.control(Odometry(later, Pose(theta=theta), STANDSTILL))
+        scan = replace(whole, stamp=later, time_increment=0.0, ranges=ranges)
+        happened += pipeline.perceive(scan)
+    assert len(pipeline.past.keyframes) == keyframes + looks
+    pipeline.control(Odometry(later + 0.1, Pose(theta=theta), STANDSTILL))
+    happened += pipeline.perceive(replace(whole, stamp=later + 0.1, time_increment=0.0))
+    assert len(pipeline.past.keyframes) > keyframes
+    assert not any(isinstance(event, Recovery) for event in happened)
+
+
 def speed_before(radius: float) -> float:
     """How fast somebody sets out who has another robot of a radius 0.9 m before it, m/s."""
     config = load_config()
