@@ -39,7 +39,8 @@ class Mission(Pursuit):
         """The order for the next keyframe interval."""
         self._events = []
         self._progress.note_ground(view)
-        if self._progress.does_not_end and self._ends_at_last(view):
+        if self._progress.does_not_end:  # a survey is of no use to who drives on
+            self._end_at_last(view)
             return Stand(), self._events
         self._backtracking.sees_known = bool(known.vertex_of)
         self._retracing.note(view, known)

@@ -234,13 +234,12 @@ class Pursuit:
             self._events.append(Recovery(view.stamp, "give all frontiers up", reason))
             self.target = None
 
-    def _ends_at_last(self, view: View) -> bool:
-        """End, whatever the robot is about, unless the survey takes a moment; whether it does."""
+    def _end_at_last(self, view: View) -> None:
+        """End, whatever the robot is about, once it is told how."""
         reason = "they have not led anywhere new for far too long"
         verdict = without_target(self._mapper.graph, self.survey, reason)
         if verdict is not None:
             self._end(view, *verdict)
-        return verdict is not None
 
     def _frontier_beside(self, view: View) -> HalfEdgeId | None:
         """The frontier nearest to the robot as the crow flies."""
