@@ -1,6 +1,8 @@
 """The base in the local frame: odometry, corrected by laying each scan onto the local map."""
 
 import math
+from collections.abc import Iterable, Iterator
+from itertools import chain
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -143,8 +145,8 @@ class LocalMaps:
         motion, Q = self.calibration.corrected(motion, duration), self.calibration.scattered(noise)
         prior = before.compose(motion)
         is_sparse = self._matching.coarse_pair_m > 0.0  # nobody stands from scan to scan
-        slipped = [] if is_sparse else self._slipped(scan, before, prior)
-        priors = [(prior, Q), *((pose, _SLIPPING * Q) for pose in slipped)]
+        slipped = () if is_sparse else self._slipped(scan, before, prior)
+        priors = chain([(prior, Q)], ((pose, _SLIPPING * Q) for pose in slipped))
         searched = self._matching.search_rad if is_sparse else 0.0
         best = self._best(scan, priors, turned=searched, stays=True)
         calibration, per_error = self._calibration, per_unit(motion, duration)
@@ -261,7 +263,7 @@ class LocalMaps:
     def _best(
         self,
         scan: Scan,
-        priors: list[tuple[Pose, Array]],
+        priors: Iterable[tuple[Pose, Array]],
         clearly: float = _CLEARLY,
         turned: float = 0.0,
         *,
@@ -278,7 +280,7 @@ class LocalMaps:
         if min(len(self._walls.points), len(points)) < _LEAST_POINTS:
             return None
         best: tuple[Registration, Array] | None = None
-        agreement, first = 0.0, priors[0][0]
+        agreement = 0.0
         for i, (prior, Q) in enumerate(priors):
             if agreement + clearly >= 1.0:
                 break  # nothing can be clearly better
@@ -300,21 +302,18 @@ class LocalMaps:
                 best, agreement = (found, Q), now
         return best
 
-    def _slipped(self, scan: Scan, before: Pose, prior: Pose) -> list[Pose]:
+    def _slipped(self, scan: Scan, before: Pose, prior: Pose) -> Iterator[Pose]:
         """Where the base may be if its wheels slip: as far as it was, and turned if that is sought.
 
         Turned it is only there if odometry leads where walls clearly speak against it: on its own
         odometry tells more of the heading than such a search.
         """
         still, reach = Pose(before.x, before.y, prior.theta), self._matching.search_rad
-        if not reach:
-            return [still]
-        self.catch_up()
-        assert self._walls is not None
-        points, tree = sampled(scan, self._matching.points), self._walls.tree
-        if min(tree.n, len(points)) < _LEAST_POINTS:
-            return [still]
-        return [still, *(_turned(points, tree, pose, reach) for pose in (prior, still))]
+        yield still
+        if reach:
+            assert self._walls is not None
+            points, tree = sampled(scan, self._matching.points), self._walls.tree
+            yield from (_turned(points, tree, pose, reach) for pose in (prior, still))
 
     def _registered(
         self, scan: Scan, points: Array, near: Pose, Q: Array, so_far: Pose | None
