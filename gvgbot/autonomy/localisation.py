@@ -280,7 +280,7 @@ class LocalMaps:
         if min(len(self._walls.points), len(points)) < _LEAST_POINTS:
             return None
         best: tuple[Registration, Array] | None = None
-        agreement = 0.0
+        agreement, first = 0.0, Pose()  # the latter is where the first prior leads
         for i, (prior, Q) in enumerate(priors):
             if agreement + clearly >= 1.0:
                 break  # nothing can be clearly better
