@@ -250,15 +250,17 @@ class Pipeline:
     def _worth_a_look(self, scan: Scan, odom_base: Pose) -> bool:
         """Whether it is about something, not covered, and has come on, turned or waited enough."""
         last, c = self.past.last, self._config.keyframe
-        rests = self._is_idle or self._reflexes.is_plugged_in
-        rests |= not (self.led or has_sight(scan, share=TRUSTED_SHARE))  # the guard waits, too
-        if (rests and last is not None) or self._reflexes.is_lifted:
+        if self._reflexes.is_lifted:
             return False
-        if last is None or self._look_now:
-            self._look_now = False
-            return True
-        has_waited = scan.stamp - last.stamp >= c.interval_s
-        return has_waited or has_come_on(last.odom_base, odom_base, c.distance_m, c.turn_rad)
+        if last is not None:
+            if self._is_idle or self._reflexes.is_plugged_in:
+                return False
+            is_due = self._look_now or scan.stamp - last.stamp >= c.interval_s
+            is_due |= has_come_on(last.odom_base, odom_base, c.distance_m, c.turn_rad)
+            if not (is_due and (self.led or has_sight(scan, share=TRUSTED_SHARE))):
+                return False  # covered, it does not drive either
+        self._look_now = False
+        return True
 
     def _worth_a_gvg(self, local_base: Pose) -> bool:
         """Whether a robot that is led has come on; it is taken down."""

@@ -522,16 +522,16 @@ def stretches(page: Page, *names: str) -> dict[str, tuple[NDArray[np.float64], i
     return found
 
 
-def at_rest(play: Play, page: Page) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def at_rest(play: Play) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The middles of robot and vertex once two looks agree: as more of a map comes it is fitted."""
-    before = np.zeros((2, 2))
-    while True:
-        play.drawn()
-        seen = stretches(page, "robot", "vertex")
-        now = np.array([seen["robot"][0], seen["vertex"][0]])
-        if np.abs(now - before).max() < 1.0:
-            return now[0], now[1]
-        before = now
+    looks = [np.zeros((2, 2))]
+
+    def agree(seen: dict[str, tuple[NDArray[np.float64], int]]) -> bool:
+        looks.append(np.array([seen["robot"][0], seen["vertex"][0]]))
+        return bool(np.abs(looks[-1] - looks[-2]).max() < 1.0)
+
+    play.until_drawn(agree, "robot", "vertex")
+    return looks[-1][0], looks[-1][1]
 
 
 def test_the_page_decodes_what_msgpack_encodes(page: Page) -> None:
@@ -567,11 +567,11 @@ def test_the_page_shows_a_robot_on_its_map_that_can_be_moved_and_zoomed(page: Pa
             play.until("document.querySelector('#robot').textContent === 'karl'")
             for words in ("vertex 1, 0°: ear", "31.5 m", "90 %, 16.1 V", "3.00, 2.00 m, 0°"):
                 play.until_read(words)
-            robot, ahead = at_rest(play, page)
+            robot, ahead = at_rest(play)
             assert ahead[0] - robot[0] > 50  # 3 m to the east of it
             assert ahead[1] == pytest.approx(robot[1], abs=12)
             page.click("#zoom-in")
-            begin, end = at_rest(play, page)
+            begin, end = at_rest(play)
             wider = end - begin
             assert wider[0] == pytest.approx(1.4 * (ahead - robot)[0], rel=0.06)
             page.mouse("mouseWheel", *page.middle("#map"), deltaX=0, deltaY=-200)

@@ -99,8 +99,9 @@ class Ground:
 
     def _is_walled_off(self, stop: Stop, here: Situation, closed: HalfEdgeId | None) -> bool:
         """Whether a known way leads to a stop that none leads to, but for virtual walls."""
-        unwalled = replace(here, graph=here.graph.unwalled())
-        return bool(here.graph.walled) and self._leads_to(stop, unwalled, closed)
+        if not here.graph.walled:
+            return False
+        return self._leads_to(stop, replace(here, graph=here.graph.unwalled()), closed)
 
     def _leads_to(self, stop: Stop, here: Situation, closed: HalfEdgeId | None) -> bool:
         starts, names = here.starts(closed), self.mapper.unsettled.names

@@ -159,15 +159,17 @@ def test_a_gyro_that_stands_while_the_wheels_turn_the_base_round_is_of_no_use(
 
     async def main() -> None:
         bench = Bench(KobukiConfig(heading=heading))
-        running = asyncio.ensure_future(bench.base.run())  # noqa: TID251
-        for k in range(100):
-            way = round(ticks * min(k, 100 - k))
-            await bench.say(core(k, -way, way), Inertia(gyro * (k // 50), 0))
-        assert running.done() == is_refused
-        running.cancel()
-        with pytest.raises((DeviceRefused, asyncio.CancelledError)) as end:
-            await running
-        assert ("base.heading=wheels" in str(end.value)) == is_refused
+        async with asyncio.TaskGroup() as tasks:
+            running = tasks.create_task(until_refused(bench.base))
+            for k in range(100):
+                way = round(ticks * min(k, 100 - k))
+                await bench.say(core(k, -way, way), Inertia(gyro * (k // 50), 0))
+            assert running.done() == is_refused
+            running.cancel()
+
+    async def until_refused(base: KobukiBase) -> None:
+        with pytest.raises(DeviceRefused, match="heading=wheels"):
+            await base.run()
 
     run_in_virtual_time(main())
 
