@@ -60,12 +60,11 @@ class ScanMatch(NamedTuple):
 
 
 class _Walls(NamedTuple):
-    """Points (N, 2), the hits (N,) that each is made of, where it was seen from (N, 2), and when.
+    """Points in a tree, the hits (N,) that each is made of, and where it was seen from (N, 2).
 
     `looks` (N,) are the numbers of the looks at it, on average.
     """
 
-    points: Array
     hits: Array
     sights: Array
     looks: Array
@@ -224,7 +223,6 @@ class LocalMaps:
         around = ~self.near.covers(far)
         points = np.concatenate([self.near.points(), far[around]])
         return _Walls(
-            points,
             np.concatenate([self.near.hits(), self._far.hits()[around]]),
             np.concatenate([self.near.sights(), self._far.sights()[around]]),
             np.concatenate([self.near.looked_at(), self._far.looked_at()[around]]),
@@ -277,7 +275,7 @@ class LocalMaps:
         self.catch_up()
         assert self._walls is not None
         points = sampled(scan, self._matching.points)
-        if min(len(self._walls.points), len(points)) < _LEAST_POINTS:
+        if min(self._walls.tree.n, len(points)) < _LEAST_POINTS:
             return None
         best: tuple[Registration, Array] | None = None
         agreement, first = 0.0, Pose()  # the latter is where the first prior leads
@@ -320,10 +318,10 @@ class LocalMaps:
     ) -> Registration | None:
         """Points (N, 2) of a scan, laid onto the walls near a pose; None as `register` has it."""
         assert self._walls is not None
-        walls, hits, sights, _, tree = self._walls
+        hits, sights, _, walls = self._walls
         config, sides = self._matching, Sides(sights, scan.base_laser.position - points)
         coarse = (config.coarse_pair_m,) if config.coarse_pair_m else ()
-        return register_coarsely(points, tree, walls, near, Q, config, coarse, hits, sides, so_far)
+        return register_coarsely(points, walls, near, Q, config, coarse, hits, sides, so_far)
 
     def _agreement(self, found: Registration, points: Array) -> float | None:
         """How well points (N, 2) fit where they were found, 0 to 1; None if too few of them do.

@@ -114,7 +114,7 @@ def _fit(
     base_walls: Array, known: KnownWalls, pose: Pose, matching: ScanMatchingConfig
 ) -> Fit | None:
     """Lay walls onto those of the map near a pose; None if too few of them lie on any."""
-    found = register(base_walls, known.tree, known.points, pose, _GUESSED, matching)
+    found = register(base_walls, known.tree, pose, _GUESSED, matching)
     if found is None:
         return None
     return Fit(found.pose, _share(base_walls, known, found.pose))

@@ -218,9 +218,9 @@ class Recogniser:
     ) -> tuple[Registration | None, float]:
         """A vertex's frame laid onto the local map, and the share of its walls found where seen."""
         Q = np.diag([_PLACE_SIGMA_M**2, _PLACE_SIGMA_M**2, turn_sigma**2])
-        walls, tree = view.local_map.points(), view.local_map.tree()
+        tree = view.local_map.tree()
         sides = Sides(view.local_map.sights(), vertex.sights)
-        found = register(vertex.snapshot, tree, walls, prior, Q, self._matching, sides=sides)
+        found = register(vertex.snapshot, tree, prior, Q, self._matching, sides=sides)
         if found is None:
             return None, 0.0
         laid = found.pose.transform(vertex.snapshot)

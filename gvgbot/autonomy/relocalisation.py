@@ -174,7 +174,7 @@ class Relocaliser:
         """Whether the whole map looks the same after a turn about some point, nearly `turn`."""
         walls, tree = self._known.points, self._known.tree
         some = _some(walls, _POINTS)
-        found = register(some, tree, walls, turn, _GUESSED, self._matching)
+        found = register(some, tree, turn, _GUESSED, self._matching)
         if found is None:
             return False
         distance = np.asarray(tree.query(found.pose.transform(walls))[0])
@@ -295,7 +295,7 @@ class Relocaliser:
         points = look.local_base.inverse().transform(_some(look.walls, _POINTS))
         prior = hypothesis.map_local.compose(look.local_base)
         known = self._known
-        found = register(points, known.tree, known.points, prior, Q, self._matching)
+        found = register(points, known.tree, prior, Q, self._matching)
         if found is None:
             return False
         hypothesis.map_local = found.pose.compose(look.local_base.inverse())

@@ -32,7 +32,6 @@ def laid_on_walls(a: Side, b: Side, pose: Pose) -> Pose:
     found = register_coarsely(
         b.walls.data,
         a.walls,
-        a.walls.data,
         pose,
         _LOOSELY,
         _LAYING,

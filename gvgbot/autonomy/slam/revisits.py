@@ -140,7 +140,6 @@ def _match(
     found = register_coarsely(
         points[some],
         tree,
-        walls,
         prior,
         Q,
         matching,

@@ -94,8 +94,7 @@ class _Pairs(NamedTuple):
 
 def register(
     points: Array,
-    tree: cKDTree,
-    walls: Array,
+    walls: cKDTree,
     prior: Pose,
     Q: Array,
     config: ScanMatchingConfig,
@@ -104,7 +103,7 @@ def register(
     within: float = _CONVERGED,
     found: Pose | None = None,
 ) -> Registration | None:
-    """The pose that lays points (N, 2) of its frame onto wall points (M, 2), near a prior.
+    """The pose that lays points (N, 2) of its frame onto points of walls (M, 2), near a prior.
 
     `hits` (M,) is how much each wall point counts beside its neighbours, by default all the same;
     without `sides` a point may lie on either face of a wall. It is found when a step is less than
@@ -113,11 +112,11 @@ def register(
     when it comes to where another prior has led, which has been `found`: the pairs are the same.
     """
     information = inverse(Q)
-    counts = np.ones(len(walls)) if hits is None else hits
+    counts = np.ones(walls.n) if hits is None else hits
 
     def paired(pose: Pose) -> _Pairs:
         turned = None if sides is None else sides.turned(pose.theta)
-        return _pairs(points, pose, tree, walls, counts, config.max_pair_m, turned)
+        return _pairs(points, pose, walls, counts, config.max_pair_m, turned)
 
     pose, step = prior, np.zeros(3)  # from the prior to the pose
     A, near, residual = information, np.empty(0, bool), np.empty(0)
@@ -146,8 +145,7 @@ def register(
 
 def register_coarsely(
     points: Array,
-    tree: cKDTree,
-    walls: Array,
+    walls: cKDTree,
     prior: Pose,
     Q: Array,
     config: ScanMatchingConfig,
@@ -162,9 +160,9 @@ def register_coarsely(
     """
     for reach in reaches:
         far = replace(config, max_pair_m=reach)
-        near = register(points, tree, walls, prior, Q, far, hits, sides, _ROUGHLY)
+        near = register(points, walls, prior, Q, far, hits, sides, _ROUGHLY)
         prior = prior if near is None else near.pose
-    return register(points, tree, walls, prior, Q, config, hits, sides, found=found)
+    return register(points, walls, prior, Q, config, hits, sides, found=found)
 
 
 def _scatter(residual: Array) -> float:
@@ -193,22 +191,21 @@ def _is_elsewhere(before: Pose, now: Pose) -> bool:
 def _pairs(
     points: Array,
     pose: Pose,
-    tree: cKDTree,
-    walls: Array,
+    walls: cKDTree,
     hits: Array,
     reach: float,
     sides: Sides | None,
 ) -> _Pairs:
     """The points (N, 2) that are near to a wall when laid down at a pose, and its line there."""
     world = pose.transform(points)
-    found = tree.query(world, k=_NEIGHBOURS, distance_upper_bound=max(reach, _REACH_M))
+    found = walls.query(world, k=_NEIGHBOURS, distance_upper_bound=max(reach, _REACH_M))
     distance, near = np.asarray(found[0]), np.asarray(found[1])
     present = np.isfinite(distance)
     paired = (present[:, _FEWEST - 1] & (distance[:, 0] < reach)).nonzero()[0]
     present, points = present.take(paired, axis=0), points.take(paired, axis=0)
     near = near.take(paired, axis=0)
     near = np.where(present, near, near[:, :1])
-    beside, weight = walls.take(near, axis=0), present * hits[near]
+    beside, weight = walls.data.take(near, axis=0), present * hits[near]
     x, y = beside[..., 0], beside[..., 1]
     centre, normal, flat = _lines(x, y, weight)
     if sides is not None:

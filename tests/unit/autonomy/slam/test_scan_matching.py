@@ -45,7 +45,7 @@ def matched(
     walls = looked(world, [truth.compose(Pose(-0.2, 0.0, 0.05))]).points()
     prior = truth.compose(offset)
     points = hits(world, truth, rng)
-    found = register(points, cKDTree(walls), walls, prior, prior_covariance, CONFIG)
+    found = register(points, cKDTree(walls), prior, prior_covariance, CONFIG)
     assert found is not None
     return found
 
@@ -75,7 +75,7 @@ def test_how_far_neighbours_err_together_is_told(together: int) -> None:
     for _ in range(40):
         points = walls.copy()
         points[:, 1] += rng.normal(0.0, sigma, len(walls) // together).repeat(together)
-        found = register(points, cKDTree(walls), walls, Pose(), Q, CONFIG)
+        found = register(points, cKDTree(walls), Pose(), Q, CONFIG)
         assert found is not None
         scatters.append(found.scatter)
     assert np.mean(scatters) == pytest.approx(together * sigma**2, rel=0.1)
@@ -85,7 +85,7 @@ def test_a_prior_that_leads_to_where_another_one_has_led_tells_nothing_more() ->
     walls, points = looked(CORNER, [Pose()]).points(), hits(CORNER, Pose())
 
     def led(prior: Pose, found: Pose | None) -> Registration | None:
-        return register(points, cKDTree(walls), walls, prior, Q, CONFIG, found=found)
+        return register(points, cKDTree(walls), prior, Q, CONFIG, found=found)
 
     first = led(Pose(0.1, 0.0, 0.0), None)
     assert first is not None
@@ -155,9 +155,9 @@ def test_the_frame_of_the_walls_does_not_matter() -> None:
     """Walls and prior moved together give the pose moved with them and the same covariance."""
     offset, frame = Pose(0.06, -0.05, 0.03), Pose(4.0, -7.0, 2.0)
     walls, points = looked(CORNER, [Pose()]).points(), hits(CORNER, Pose())
-    here = register(points, cKDTree(walls), walls, offset, Q, CONFIG)
+    here = register(points, cKDTree(walls), offset, Q, CONFIG)
     walls = frame.transform(walls)
-    there = register(points, cKDTree(walls), walls, frame.compose(offset), Q, CONFIG)
+    there = register(points, cKDTree(walls), frame.compose(offset), Q, CONFIG)
     assert here is not None
     assert there is not None
     assert frame.compose(here.pose).distance(there.pose) < 1e-4
@@ -167,13 +167,13 @@ def test_the_frame_of_the_walls_does_not_matter() -> None:
 def test_points_far_from_all_walls_are_no_match() -> None:
     walls = looked(CORNER, [Pose()]).points()
     points = hits(CORNER, Pose())
-    assert register(points, cKDTree(walls), walls, Pose(40.0, 0.0, 0.0), Q, CONFIG) is None
+    assert register(points, cKDTree(walls), Pose(40.0, 0.0, 0.0), Q, CONFIG) is None
 
 
 def test_too_few_points_are_no_match() -> None:
     walls = looked(CORNER, [Pose()]).points()
     points = hits(CORNER, Pose())[: CONFIG.min_pairs - 1]
-    assert register(points, cKDTree(walls), walls, Pose(), Q, CONFIG) is None
+    assert register(points, cKDTree(walls), Pose(), Q, CONFIG) is None
 
 
 def test_points_are_laid_onto_the_face_that_was_seen_from_their_side() -> None:
@@ -186,8 +186,8 @@ def test_points_are_laid_onto_the_face_that_was_seen_from_their_side() -> None:
     points = np.concatenate([upper, end[up > 0.3]])
     sides = Sides(sights, np.array([0.0, 1.0]) - points)
     prior, tree = Pose(0.05, 0.0, 0.0), cKDTree(walls)
-    own = register(points, tree, walls, prior, Q, CONFIG, sides=sides)
-    either = register(points, tree, walls, prior, Q, CONFIG)
+    own = register(points, tree, prior, Q, CONFIG, sides=sides)
+    either = register(points, tree, prior, Q, CONFIG)
     assert own is not None
     assert either is not None
     assert own.pose.x == pytest.approx(0.0, abs=0.01)
@@ -205,6 +205,6 @@ def test_who_comes_through_a_door_is_not_drawn_back_to_the_other_face_of_the_wal
     points = sweep(world, Pose(0.55), field_of_view=view, sigma=sigma, rng=rng, reach=5.6).ends
     prior, noise = Pose(0.5), np.diag([0.03**2, 0.01**2, 0.01**2])
     walls, sides = room.points(), Sides(room.sights(), -points)
-    found = register(points, cKDTree(walls), walls, prior, noise, CONFIG, room.hits(), sides)
+    found = register(points, cKDTree(walls), prior, noise, CONFIG, room.hits(), sides)
     assert found is not None
     assert found.pose.x == pytest.approx(prior.x, abs=0.05)
