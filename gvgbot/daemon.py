@@ -15,7 +15,7 @@ from gvgbot import __version__
 from gvgbot.clock import LoopClock, VirtualTimeLoop
 from gvgbot.config import Config
 from gvgbot.driving import CARRIED, drive
-from gvgbot.errors import ExtraMissing, GvgbotError, UsageError, reason_of, underlying
+from gvgbot.errors import GvgbotError, UsageError, extra_for, reason_of, underlying
 from gvgbot.hal.messages import Odometry
 from gvgbot.links import Devices, Links
 from gvgbot.maps.picture import counts
@@ -224,12 +224,8 @@ def _ros2(
 def _foxglove(config: Config, stack: contextlib.ExitStack) -> "FoxgloveServer | None":
     if not config.foxglove.enabled:
         return None
-    try:
+    with extra_for("the live view needs foxglove-sdk", "foxglove", "foxglove"):
         from gvgbot.foxglove.server import FoxgloveServer
-    except ModuleNotFoundError as error:
-        if error.name is None or not error.name.startswith("foxglove"):
-            raise
-        raise ExtraMissing("the live view needs foxglove-sdk", "foxglove") from error
     return stack.enter_context(FoxgloveServer(config.foxglove, config.robot.name))
 
 

@@ -1,6 +1,8 @@
 """The errors a user or the daemon can do something about."""
 
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 
 class GvgbotError(Exception):
@@ -37,6 +39,17 @@ class DeviceRefused(GvgbotError):
 
 class Deadlock(GvgbotError):
     """In virtual time every task waits for something that nothing will ever do."""
+
+
+@contextmanager
+def extra_for(what: str, extra: str, *packages: str) -> Iterator[None]:
+    """Turn the lack of one of the packages into an ExtraMissing that says what needs it."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        if error.name is None or error.name.partition(".")[0] not in packages:
+            raise
+        raise ExtraMissing(what, extra) from error
 
 
 def underlying(error: BaseException) -> BaseException:

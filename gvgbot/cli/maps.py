@@ -4,7 +4,7 @@ import argparse
 import shlex
 
 from gvgbot.cli.arguments import Commands, add_overrides, frames, path, positive, say
-from gvgbot.errors import ExtraMissing, UsageError
+from gvgbot.errors import UsageError, extra_for
 from gvgbot.words import counted
 
 
@@ -166,12 +166,8 @@ def _export(options: argparse.Namespace) -> int:
 
 
 def _export_bag(options: argparse.Namespace) -> int:
-    try:
+    with extra_for("bags need rosbags", "ros2", "rosbags"):
         from gvgbot.ros_bag import export_bag
-    except ModuleNotFoundError as error:
-        if error.name is None or not error.name.startswith("rosbags"):
-            raise
-        raise ExtraMissing("bags need rosbags", "ros2") from error
 
     for line in export_bag(options.run, options.file, sensors_only=options.sensors_only):
         say(line)

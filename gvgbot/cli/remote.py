@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from gvgbot.cli.arguments import Commands, add_connection, host, say, tcp_port
-from gvgbot.errors import ExtraMissing
+from gvgbot.errors import extra_for
 
 
 def add_monitor(commands: Commands) -> None:
@@ -29,12 +29,8 @@ def add_monitor(commands: Commands) -> None:
 
 
 def _monitor(options: argparse.Namespace) -> int:
-    try:
+    with extra_for("the monitor needs rich", "tui", "rich"):
         from gvgbot.monitor.app import monitor
-    except ModuleNotFoundError as error:
-        if error.name is None or not error.name.startswith("rich"):
-            raise
-        raise ExtraMissing("the monitor needs rich", "tui") from error
 
     return monitor(options.robot or options.named, options.connect, options.zenoh_file)
 
@@ -71,12 +67,8 @@ def add_web(commands: Commands) -> None:
 
 
 def _web(options: argparse.Namespace) -> int:
-    try:
+    with extra_for("the page needs websockets", "web", "websockets"):
         from gvgbot.web.app import web
-    except ModuleNotFoundError as error:
-        if error.name is None or not error.name.startswith("websockets"):
-            raise
-        raise ExtraMissing("the page needs websockets", "web") from error
 
     connection = (options.robot, options.connect, options.zenoh_file)
     return web(*connection, host=options.host, port=options.port, say=say)

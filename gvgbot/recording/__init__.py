@@ -3,23 +3,17 @@
 Needs the `record` extra, which nothing else does: modules are imported when they are needed.
 """
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 
 from gvgbot.autonomy.loop import Cycle
-from gvgbot.errors import ExtraMissing
+from gvgbot.errors import extra_for
 from gvgbot.hal.messages import Battery, Scan
 
 Lived = Scan | Cycle | Battery
 """What a robot is given, and only has to be given again to leave the same map."""
 
 
-@contextmanager
-def extra_needed() -> Iterator[None]:
+def extra_needed() -> AbstractContextManager[None]:
     """Turns a missing package into an ExtraMissing."""
-    try:
-        yield
-    except ModuleNotFoundError as error:
-        if error.name is None or error.name.split(".")[0] not in ("mcap", "google", "zstandard"):
-            raise
-        raise ExtraMissing("recordings need mcap and protobuf", "record") from error
+    packages = "mcap", "google", "zstandard"
+    return extra_for("recordings need mcap and protobuf", "record", *packages)
