@@ -10,7 +10,7 @@ import numpy as np
 
 from gvgbot import client
 from gvgbot.client import Grid, Raster, Robot, Trajectory
-from gvgbot.errors import GvgbotError, UsageError
+from gvgbot.errors import GvgbotError, UsageError, underlying
 from gvgbot.monitor.chart import Scene
 from gvgbot.monitor.facts import Fact, headline
 from gvgbot.monitor.screen import Picture, Screen
@@ -20,7 +20,6 @@ from gvgbot.stop_signals import StopSignals
 
 _EVERY = 0.2  # s between pictures
 _PATIENCE = 1.0  # s for a connection, before the screen says that there is none
-
 
 Show = Callable[[Picture], None]
 
@@ -46,7 +45,7 @@ def monitor(robot: str | None, endpoint: str, zenoh_file: Path | None = None) ->
             show, connection = Screen(console).show, Connection(endpoint, zenoh_file)
             asyncio.run(_until_told(signals, robot, connection, show))
         except* UsageError as errors:
-            raise errors.exceptions[0] from None
+            raise underlying(errors) from None
     return 0
 
 
