@@ -172,6 +172,19 @@ def test_a_laser_that_gives_its_own_greatest_range_for_no_echo_is_told(
     assert [flaw.endswith(f"give --no-echo {told}") for flaw in log.flaws()] == [True] * bool(told)
 
 
+@pytest.mark.parametrize(("no_echo_m", "last"), [(None, 2.5), (2.0, math.inf)])
+def test_a_log_is_replayed_as_one_of_carmen_with_what_is_asked_for(
+    no_echo_m: float | None, last: float, tmp_path: Path
+) -> None:
+    path = written(tmp_path / "a.log", FLASER)
+    mount = ["laser.x_m=0.2", "laser.yaw_deg=90"]
+    log = open_log(Wanted(path=path, config=None, overrides=mount, no_echo_m=no_echo_m))
+    (scan,) = (message for _, message in log.messages if isinstance(message, Scan))
+    assert log.config.robot.name == "carmen"
+    assert scan.base_laser == Pose(0.2, 0.0, math.pi / 2)
+    np.testing.assert_array_equal(scan.ranges, [1.5, math.inf, math.nan, last])
+
+
 def test_lines_that_come_late_are_put_in_order(tmp_path: Path) -> None:
     late = ODOM.replace("7.25", "7.9")
     log = read(written(tmp_path / "a.log", late, FLASER, ODOM))
