@@ -118,6 +118,14 @@ def test_of_a_directory_to_replay_the_recording_in_it_is_named(
     assert line.endswith(f"; give {tmp_path / 'run.mcap'}")
 
 
+def test_a_missing_file_to_replay_is_taken_for_no_directory(
+    tmp_path: Path, capsys: Captured
+) -> None:
+    assert main(["replay", str(tmp_path / "absent.mcap")]) == 2
+    (line,) = said(capsys)
+    assert line.endswith("absent.mcap: No such file or directory")
+
+
 def test_a_team_that_shall_be_recorded_is_refused(tmp_path: Path, capsys: Captured) -> None:
     settings = ["--set", f"recording.path={tmp_path}/x.mcap", "--out", str(tmp_path / "run")]
     assert main(["explore", "--world", "ring", "--robots", "2", *settings]) == 2
