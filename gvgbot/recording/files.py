@@ -1,6 +1,7 @@
 """MCAP files that follow each other: run.mcap, run.1.mcap, ... each whole in itself.
 
-Chunks are small and go out at once, so that whatever ends the program costs the last second only.
+Chunks are small and go out at once, so that whatever ends the program costs the last second only,
+and a power failure a megabyte.
 """
 
 import glob

@@ -1,6 +1,7 @@
 """Recordings on disk: whole, cut, rotated, and on disks that are full or slow."""
 
 import errno
+import os
 import threading
 from collections.abc import Sequence
 from pathlib import Path
@@ -21,8 +22,10 @@ from gvgbot.hal.messages import Battery, Odometry, Scan
 from gvgbot.recording import Lived, extra_needed, recorder
 from gvgbot.recording.config import RecordingConfig
 from gvgbot.recording.files import Entry, McapFiles, free_path
+from gvgbot.recording.messages import RAW
 from gvgbot.recording.reader import Recording
 from gvgbot.recording.recorder import Recorder
+from gvgbot.replay import Wanted, open_log
 
 ABOUT = {"title": "ring", "config": "{}"}
 STILL = Twist(0.0, 0.0)
@@ -269,11 +272,26 @@ def test_a_recording_behind_another_in_one_file_is_told(tmp_path: Path) -> None:
         lived = record(to, 100)
     whole = (tmp_path / "run.mcap").read_bytes()
     joined = tmp_path / "joined.mcap"
-    for content, expected in [(whole, []), (whole + whole, [joined])]:
+    told = f"but:     {joined} has another one after its end, left out"
+    for content, flaws in [(whole, []), (whole + whole, [told])]:
         joined.write_bytes(content)
-        recording = Recording(joined)
-        assert len(list(recording.messages())) == len(lived)
-        assert (recording.joined, recording.cut) == (expected, [])
+        log = open_log(Wanted(path=joined, config=None, overrides=[], no_echo_m=None))
+        assert len(list(log.messages)) == len(lived)
+        assert log.flaws() == flaws
+
+
+def test_a_power_failure_costs_a_megabyte_at_most(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kept = [0]  # bytes of the file that the disk has, each time that it is told to keep them
+    monkeypatch.setattr(os, "fsync", lambda file: kept.append(os.fstat(file).st_size))
+    data, noise = 200_000, np.random.default_rng(1)  # no packing makes it smaller
+    files = McapFiles(tmp_path / "run.mcap", ABOUT, file_bytes=1e9, total_bytes=1e9)
+    for k in range(20):
+        files.write([Entry(RAW["laser"][False], k, k, noise.bytes(data))])
+        assert files.path.stat().st_size - kept[-1] <= 1e6
+    files.finish()
+    assert len(kept) > 3
 
 
 def first_chunk(whole: bytes | bytearray) -> int:
