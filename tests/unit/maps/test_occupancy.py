@@ -193,6 +193,15 @@ def test_untrusted_beams_say_nothing() -> None:
     assert (grid.cells[half_disc] >= 0).mean() > 0.98
 
 
+def test_a_single_untrusted_beam_says_nothing_though_its_neighbours_do() -> None:
+    ranges = np.full(36, 4.0)  # ten degrees apart
+    ranges[18] = np.nan  # straight ahead
+    grid = occupancy_grid([(Pose(), open_hall(ranges))], CELL)
+    x, y = centres(grid)
+    ahead = (x > 2.0)[None, :] & (np.abs(y) < 2 * CELL)[:, None]
+    assert (grid.cells[ahead] == -1).all()
+
+
 def test_single_untrusted_beams_leave_no_spokes_and_single_misses_no_holes() -> None:
     poses = [Pose(0.1 * k, 0.0, 0.05 * k) for k in range(10)]
     rng = np.random.default_rng(1)
@@ -302,6 +311,9 @@ def test_every_cell_knows_which_scan_saw_it_first() -> None:
     nowhere = np.minimum(np.minimum(first, second), third) > 3.15
     assert nowhere.any()
     assert np.isinf(grid.seen_s[nowhere]).all()
+    later = occupancy_grid(scans, CELL, began=105.0).seen_s  # with a map that was lent
+    assert later is not None
+    assert np.unique(later).tolist() == [0.0, 4.0, math.inf]
 
 
 def test_a_grid_that_was_written_can_be_read(tmp_path: Path) -> None:
