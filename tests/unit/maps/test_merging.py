@@ -79,10 +79,13 @@ def test_an_edge_of_both_has_been_driven_as_often_as_by_both_and_is_as_narrow_as
 ) -> None:
     saw, drove = seen({0, 1, 3, 4}), seen({0, 1, 3, 4}, shift=40)
     edges = (replace(e, traversals=3, min_clearance=0.6) for e in drove.edges)
-    drove = replace(drove, edges=tuple(edges))
+    drove = replace(
+        drove, edges=tuple(edges), vertices=tuple(replace(v, visits=2) for v in drove.vertices)
+    )
     saw = replace(saw, edges=tuple(replace(e, traversals=1) for e in saw.edges))
     both = merged(saw, drove, Pose()) if is_first else merged(drove, saw, Pose())
     assert [(e.traversals, e.min_clearance) for e in both.edges] == 4 * [(4, 0.6)]
+    assert [v.visits for v in both.vertices] == [v.visits + 2 for v in saw.vertices]
 
 
 def positions(graph: RouteGraph) -> set[tuple[float, float]]:
@@ -124,8 +127,10 @@ def test_a_vertex_beside_somebody_who_stood_there_goes_with_both_ways_round_him(
     edges = tuple(way(a, b, np.array([points[a], *by, points[b]])) for a, b, by in lines)
     template = seen({0}).vertices[0]
     vertices = tuple(replace(template, id=i, position=p, frontiers=()) for i, p in points.items())
-    whole = merged(passage(0, 1, 2), RouteGraph(vertices, edges), Pose())
-    assert positions(whole) == {PLACES[0], PLACES[2]}
+    past, theirs = passage(0, 1, 2), RouteGraph(vertices, edges)
+    assert positions(merged(past, theirs, Pose())) == {PLACES[0], PLACES[2]}
+    only_seen = replace(past, edges=tuple(replace(edge, traversals=0) for edge in past.edges))
+    assert positions(merged(only_seen, theirs, Pose())) == set(points.values())
 
 
 @pytest.mark.parametrize("is_first", [True, False])
