@@ -32,7 +32,7 @@ BAD_ARGUMENTS = {
     "an option that is a key here": (["run", "--world", "ring"], "it is --set twin.world=..."),
     "one with its value": (["twin", "--seed=3"], "it is --set twin.seed=... (see gvgbot twin"),
     "another command's option": (["run", "--config", "a.yaml"], "see gvgbot run --help"),
-    "a range below nothing": (["replay", "x.log", "--no-echo", "-1"], "a number above 0"),
+    "a range of nothing": (["replay", "x.log", "--no-echo", "0"], "a number above 0"),
     "two numbers for a start": (["explore", "--start", "1", "2"], "--start"),
     "a start that is no number": (
         ["explore", "--start", "1", "2", "north"],
@@ -54,6 +54,7 @@ BAD_ARGUMENTS = {
     "nowhere to import to": (["map", "import", "a.yaml", "--out", ""], "--out: it is empty"),
     "nowhere to draw": (["map", "show", ".", "--out", ""], "--out: it is empty"),
     "no run": (["map", "info", ""], "RUN_DIR: it is empty"),
+    "a port above the last": (["web", "--port", "65536"], "there are 0 to 65535"),
     "no host for the page": (["web", "--host", ""], "--host: it is empty: 127.0.0.1 is this"),
     "no request": (["ctl"], "REQUEST"),
     "two configurations": (["run", "a.yaml", "b.yaml"], "b.yaml"),
@@ -174,6 +175,13 @@ def test_a_missing_extra_is_one_line_to_copy_whatever_the_shell_knows(capsys: Ca
     assert status_of(lacking) == 1
     (line,) = said(capsys)
     assert f": {sys.executable} -m pip install 'gvgbot[web]'" in line
+
+
+@pytest.mark.parametrize("error", [OSError(errno.EIO, "Input/output error"), PermissionError()])
+def test_an_error_of_the_system_that_nobody_foresaw_keeps_its_traceback(error: OSError) -> None:
+    with pytest.raises(type(error)) as raised:
+        status_of(lambda: raising(error))
+    assert raised.value is error
 
 
 def test_every_mistake_of_a_configuration_has_its_own_line(
