@@ -795,6 +795,9 @@ def test_all_layers_and_a_short_word_on_a_vertex_find_room_on_a_phone(page: Page
             play.until_read("meetpoint 1 at 6.00, 2.00 m")
             play.until("!document.querySelector('#place-go').hidden")
             assert page.look("document.querySelector('#place').offsetHeight") < 50
+            known = json.dumps(msgspec.to_builtins(vertex((6.0, 2.0), frontiers=(0.5,))))
+            said = page.look(f"import('/words.js').then((words) => words.ofVertex({known}))")
+            assert said.endswith(" m, 1 frontier")
             page.click("#place-close")
             play.until("document.querySelector('#place').hidden")
 

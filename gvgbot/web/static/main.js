@@ -161,10 +161,7 @@ function drawPlace() {
 function placeText() {
   if (place.vertex === undefined) return `${place.x.toFixed(2)}, ${place.y.toFixed(2)} m`;
   const vertex = picture.known?.vertices.find((one) => one.id === place.vertex);
-  if (vertex === undefined) return `vertex ${place.vertex} is no more`;
-  const [x, y] = vertex.position, [xx, xy, , yy] = vertex.covariance;
-  const open = vertex.frontiers.length ? `, ${vertex.frontiers.length} frontiers` : "";
-  return `${vertex.kind} ${vertex.id} at ${x.toFixed(2)}, ${y.toFixed(2)} m; sigma ${words.length(words.axes(xx, xy, yy)[0])}, clearance ${vertex.clearance.toFixed(2)} m${open}`;
+  return vertex === undefined ? `vertex ${place.vertex} is no more` : words.ofVertex(vertex);
 }
 
 function closePlace() {

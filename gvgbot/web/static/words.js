@@ -26,6 +26,12 @@ export const length = (metres) => (metres < 1 ? `${(100 * metres).toFixed(1)} cm
 const counted = (count, one, many) => `${count} ${count === 1 ? one : many}`;
 export const size = (vertices, edges) => `${counted(vertices, "vertex", "vertices")}, ${counted(edges, "edge", "edges")}`;
 
+export function ofVertex(vertex) {
+  const [x, y] = vertex.position, [xx, xy, , yy] = vertex.covariance, open = vertex.frontiers.length;
+  const place = `${vertex.kind} ${vertex.id} at ${x.toFixed(2)}, ${y.toFixed(2)} m; sigma ${length(axes(xx, xy, yy)[0])}`;
+  return `${place}, clearance ${vertex.clearance.toFixed(2)} m${open ? `, ${counted(open, "frontier", "frontiers")}` : ""}`;
+}
+
 const TONES = { exploring: "good", errand: "good", waiting: "good", finished: "good", paused: "warning", starting: "warning", halted: "bad" };
 // Whether it looks for its place on the map, and says why.
 const isSearching = (state) => isLost(state) && ["exploring", "errand"].includes(state.phase) && state.reason !== "";
