@@ -11,7 +11,7 @@ from scipy.stats import chi2
 
 from gvgbot.autonomy import localisation
 from gvgbot.autonomy.gvg.local_map import LocalMapConfig
-from gvgbot.autonomy.localisation import LocalMaps
+from gvgbot.autonomy.localisation import LocalMaps, sampled
 from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
 from gvgbot.autonomy.slam.trail import Laid, move
@@ -290,3 +290,10 @@ def test_a_thin_wall_seen_from_behind_is_not_taken_for_the_face_seen_before() ->
         local.insert(scan, believed, 0.3 * len(errors))
         errors.append(abs(believed.y - here.y))
     assert max(errors) < 0.5 * thin
+
+
+def test_a_scan_is_sampled_along_walls_and_not_across_the_gaps_between_them() -> None:
+    """Half of the beams hit a wall at 2 m, the others one at 20 m, and nothing lies between."""
+    ranges = np.repeat([2.0, 20.0], 200)
+    points = sampled(Scan(0.0, ranges, -1.0, 0.005, 0.1, 30.0), 100)
+    assert 80 <= len(points) <= 101  # had the gap its share, it would be 64
