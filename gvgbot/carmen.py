@@ -35,6 +35,7 @@ _TAIL = 9  # words of a FLASER line after the ranges
 _HEAD, _ROBOT_TAIL = 7, 14  # words of a ROBOTLASER1 line before and after its two lists
 _ODOM_WORDS = 10
 _STAMP, _HOST, _LOGGER_STAMP = -3, -2, -1  # the last words of each line
+_FIELDS_DEG = {400: 100.0, 540: 270.0, 1080: 270.0}  # of sweeps with so many steps; others 180
 _FULL_TURN = math.tau + 1e-3  # of a sweep, with rounding
 _LARGEST = 1e10  # m, rad or s since 1970; what is beyond comes of a damaged line
 _LONGEST_GAP_S = 0.2  # between messages; logs leave some out
@@ -81,7 +82,7 @@ class CarmenLog:
 def read_carmen(path: Path, *, no_echo_m: float, base_laser: Pose) -> CarmenLog:
     """The odometry and the scans of a log, plain or packed with gzip, bzip2 or xz.
 
-    A FLASER sweep covers the half-circle ahead. Ranges from `no_echo_m` on, or from the greatest
+    A FLASER sweep covers the half-circle ahead, or what lasers with so many beams do. Ranges from `no_echo_m` on, or from the greatest
     that a ROBOTLASER1 line says it can measure, mean that nothing was hit. The base's pose at each
     scan counts as odometry too. The laser is at `base_laser`, or where the log has it if that is
     the middle of the base. The logger's stamps count where all others are the same. Raises
@@ -244,9 +245,11 @@ def _sweep(words: list[str], no_echo_m: float) -> tuple[Scan, Odometry]:
     if beams < 2 or len(words) != 1 + beams + _TAIL:
         raise ValueError(words)
     laser, base, stamp = _poses(words[beams + 1 : beams + 7], words[beams + 7])
-    step = math.pi / (beams - beams % 2)  # 180 or 181 beams are a degree apart
+    steps = beams - beams % 2  # 180 or 181 beams are a degree apart
+    field = math.radians(_FIELDS_DEG.get(steps, 180.0))
     ranges = _ranges(words[1 : 1 + beams], no_echo_m)
-    scan = Scan(stamp, ranges, -math.pi / 2, step, 0.0, no_echo_m, base_laser=base.to(laser))
+    at = base.to(laser)
+    scan = Scan(stamp, ranges, -field / 2, field / steps, 0.0, no_echo_m, base_laser=at)
     return scan, Odometry(stamp, base, STANDSTILL)
 
 

@@ -41,14 +41,27 @@ def test_odometry_and_scans_are_read_by_the_fields_of_the_format(tmp_path: Path)
     np.testing.assert_array_equal(scan.ranges, [1.5, math.inf, math.nan, 2.5])
 
 
-@pytest.mark.parametrize(("beams", "step_deg"), [(180, 1.0), (181, 1.0), (360, 0.5), (361, 0.5)])
-def test_a_sweep_covers_half_a_circle_from_the_right(
-    beams: int, step_deg: float, tmp_path: Path
+@pytest.mark.parametrize(
+    ("beams", "start_deg", "step_deg"),
+    [
+        (180, -90.0, 1.0),
+        (181, -90.0, 1.0),
+        (360, -90.0, 0.5),
+        (361, -90.0, 0.5),
+        (400, -50.0, 0.25),
+        (401, -50.0, 0.25),
+        (541, -135.0, 0.5),
+        (1081, -135.0, 0.25),
+    ],
+)
+def test_the_count_of_beams_says_how_wide_a_sweep_is(
+    beams: int, start_deg: float, step_deg: float, tmp_path: Path
 ) -> None:
+    """As the makers have it: SICK LMS with 180 or 100 degrees, LMS1xx and Hokuyo with 270."""
     line = f"FLASER {beams} {' '.join(['1'] * beams)} 0 0 0 0 0 0 1 h 1"
     (scan,) = read(written(tmp_path / "a.log", line)).scans
     assert math.degrees(scan.angle_increment) == pytest.approx(step_deg)
-    assert math.degrees(scan.angle_min) == pytest.approx(-90.0)
+    assert math.degrees(scan.angle_min) == pytest.approx(start_deg)
 
 
 ROBOTLASER = (
