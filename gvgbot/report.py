@@ -38,12 +38,13 @@ from gvgbot.maps.picture import draw_map
 from gvgbot.maps.route_graph import RouteEdge, RouteGraph, RouteNode
 from gvgbot.maps.trajectory import Trajectory, encode_tum
 
+_TICK_S = 1e-6  # from one row to the next; files tell no less
 _SAME_ROOM_M = 0.1  # a grid does not tell a clearance better
 
 
 @dataclass(slots=True)
 class Journey:
-    """The way of the robot, a row each `period` s, or for each odometry message if that is 0."""
+    """The way of the robot, a row each `period` s, or for each stamp of odometry if that is 0."""
 
     period: float = 0.1
     stamps: "array[float]" = field(default_factory=lambda: array("d"))
@@ -60,7 +61,7 @@ class Journey:
     def record(self, odometry: Odometry, pipeline: Pipeline, world_base: Pose | None) -> None:
         """Take down a control cycle, if a row is due."""
         if not pipeline.past.keyframes or (
-            self.stamps and odometry.stamp < self.stamps[-1] + self.period - 1e-3
+            self.stamps and odometry.stamp < self.stamps[-1] + max(self.period - 1e-3, _TICK_S)
         ):
             return
         self.stamps.append(odometry.stamp)
