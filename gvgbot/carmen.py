@@ -27,6 +27,7 @@ from gvgbot.autonomy.loop import Cycle
 from gvgbot.errors import UsageError
 from gvgbot.geometry import STANDSTILL, Array, Pose, rows_of, wrap_angles
 from gvgbot.hal.messages import Odometry, Scan
+from gvgbot.log_order import LONGEST_PAUSE_S, Line, in_order
 from gvgbot.recording import Lived
 
 _GZIP, _BZIP2, _XZ = b"\x1f\x8b", b"BZh", b"\xfd7zXZ"  # how packed files begin
@@ -39,30 +40,35 @@ _FIELDS_DEG = {400: 100.0, 540: 270.0, 1080: 270.0}  # of sweeps with so many st
 _FULL_TURN = math.tau + 1e-3  # of a sweep, with rounding
 _LARGEST = 1e10  # m, rad or s since 1970; what is beyond comes of a damaged line
 _LONGEST_GAP_S = 0.2  # between messages; logs leave some out
-_LONGEST_PAUSE_S = 300.0  # what is longer comes of a clock that was set, or of a damaged stamp
-_JUMP_M, _JUMP_MPS = 10.0, 10.0  # from one pose to the next; what is beyond both is no motion
 _STEADY, _MOSTLY = 0.01, 0.9  # m and rad; of the sweeps
+_COARSE, _TIMELESS = 0.5, 0.95  # shares of the motion at stamps that are the same
 _DIGITS = 4  # of a place on the base
 _MANY, _OFTEN = 3, 0.01  # beams of a sweep that have the same range; of the sweeps
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CarmenLog:
-    """What a log holds, each by its stamp; `damaged` lines were left out.
+    """What a log holds, each by its stamp, and which of its lines, from 1, were left out.
 
-    An archive that `is_cut` ends before the log does.
+    At those in `set_back` its clock was. An archive that `is_cut` ends before the log does.
     """
 
     odometry: list[Odometry]
     scans: list[Scan]
-    damaged: int
+    damaged_lines: list[int]
+    set_back: list[int]
     is_cut: bool
+
+    @property
+    def damaged(self) -> int:
+        """How many lines were left out."""
+        return len(self.damaged_lines)
 
     @property
     def pauses(self) -> int:
         """How often it goes on after so long that nothing is known of the time between."""
         stamps = pairwise(one.stamp for one in self.odometry)
-        return sum(later - earlier > _LONGEST_PAUSE_S for earlier, later in stamps)
+        return sum(later - earlier > LONGEST_PAUSE_S for earlier, later in stamps)
 
     @property
     def likely_no_echo_m(self) -> float | None:
@@ -73,68 +79,71 @@ class CarmenLog:
         return greatest if often > _OFTEN * len(sweeps) else None
 
     @property
-    def is_timeless(self) -> bool:
-        """Whether the base moves while its clock stands still."""
-        stamps = {one.stamp for one in self.odometry}
-        return len(stamps) == 1 and len({one.odom_base for one in self.odometry}) > 1
+    def timeless(self) -> float:
+        """The share of its motion (m and rad) for which the clock of the base stands still."""
+        steps = np.diff(rows_of(one.odom_base for one in self.odometry), axis=0)
+        motion = np.hypot(steps[:, 0], steps[:, 1]) + np.abs(wrap_angles(steps[:, 2]))
+        still = motion[np.diff([one.stamp for one in self.odometry]) == 0.0].sum()
+        return float(still / motion.sum()) if still else 0.0
 
 
 def read_carmen(path: Path, *, no_echo_m: float, base_laser: Pose) -> CarmenLog:
     """The odometry and the scans of a log, plain or packed with gzip, bzip2 or xz.
 
-    A FLASER sweep covers the half-circle ahead, or what lasers with so many beams do. Ranges from `no_echo_m` on, or from the greatest
-    that a ROBOTLASER1 line says it can measure, mean that nothing was hit. The base's pose at each
-    scan counts as odometry too. The laser is at `base_laser`, or where the log has it if that is
-    the middle of the base. The logger's stamps count where all others are the same. Raises
-    UsageError for a file that cannot be read, is no text, or has no sweep or no times in it.
+    A FLASER sweep covers the half-circle ahead, or what lasers with so many beams cover. Ranges
+    from `no_echo_m` on, or from the greatest that a ROBOTLASER1 line says it can measure, mean
+    that nothing was hit. The base's pose at each scan counts as odometry too. The laser is at
+    `base_laser`, or where the log has it if that is the middle of the base. The logger's stamps
+    count where most others are the same. Raises UsageError for a file that cannot be read, is no
+    text, or has no sweep or no times in it.
     """
     log = _read(path, no_echo_m, by_logger=False)
-    if log.is_timeless:
-        log = _read(path, no_echo_m, by_logger=True)
+    if log.timeless > _COARSE:
+        log = min(log, _read(path, no_echo_m, by_logger=True), key=attrgetter("timeless"))
     if not log.scans:
+        damage = f": {first_of('damaged lines', log.damaged_lines)}" if log.damaged else ""
         raise UsageError(
             f"{path} is no recording (MCAP), and as a CARMEN log it has no FLASER or ROBOTLASER1 "
-            "line to read"
+            f"line to read{damage}"
         )
-    if log.is_timeless:
-        raise UsageError(f"{path}: all its lines have the same stamp; give them their own, in s")
+    if log.timeless > _TIMELESS:
+        raise UsageError(
+            f"{path}: nearly all its lines have the same stamp as the next; give them their own, "
+            "in s"
+        )
     return replace(log, scans=_mounted(log.scans, base_laser))
 
 
 def _read(path: Path, no_echo_m: float, *, by_logger: bool) -> CarmenLog:
     """A log by the stamps of those who sent the messages, or of the logger. Raises UsageError."""
-    odometry, scans, damaged, is_cut = list[Odometry](), list[Scan](), 0, False
-    for line in _lines(path):
-        if line is None:
+    lines, damaged, is_cut = list[Line](), list[int](), False
+    for number, text in enumerate(_lines(path), start=1):
+        if text is None:
             is_cut = True
             break
         try:
-            match _words(line, by_logger=by_logger):
+            match _words(text, by_logger=by_logger):
                 case ["ODOM", *words]:
-                    odometry.append(_odometry(words))
+                    lines.append(Line(number, _odometry(words), None))
                 case ["FLASER" | "ROBOTLASER1" as kind, *words]:
                     sweep = _sweep if kind == "FLASER" else _robot_sweep
-                    scan, at = sweep(words, no_echo_m)
-                    scans.append(scan)
-                    odometry.append(at)
+                    lines.append(sweep(number, words, no_echo_m))
         except ValueError:
-            damaged += 1
-    return replace(_in_order(odometry, scans, damaged), is_cut=is_cut)
-
-
-def _in_order(odometry: list[Odometry], scans: list[Scan], damaged: int) -> CarmenLog:
-    """A log in the order of its stamps, without those that must be damaged."""
-    by_stamp = attrgetter("stamp")
-    strays = _strays(sorted({one.stamp for one in odometry}))
-    timely = sorted((one for one in odometry if one.stamp not in strays), key=by_stamp)
-    within_reach = _within_reach(timely)
-    kept = {one.stamp for one in within_reach}
+            damaged.append(number)
+    kept, set_back = in_order(lines)
+    left_out = {line.number for line in lines} - {line.number for line in kept}
     return CarmenLog(
-        within_reach,
-        sorted((scan for scan in scans if scan.stamp in kept), key=by_stamp),
-        damaged + len(odometry) - len(within_reach),
-        is_cut=False,
+        odometry=[line.odometry for line in kept],
+        scans=[line.scan for line in kept if line.scan is not None],
+        damaged_lines=sorted([*damaged, *left_out]),
+        set_back=set_back,
+        is_cut=is_cut,
     )
+
+
+def first_of(what: str, lines: list[int]) -> str:
+    """How many lines, and where to look."""
+    return f"{what}: {len(lines)}, the first in line {lines[0]}"
 
 
 def _mounted(scans: list[Scan], base_laser: Pose) -> list[Scan]:
@@ -156,39 +165,6 @@ def _steady_place(places: list[Pose]) -> Pose:
     if is_there.mean() <= _MOSTLY:
         return Pose()
     return Pose(*middle.round(_DIGITS).tolist())
-
-
-def _strays(stamps: list[float]) -> set[float]:
-    """Those of ascending stamps that are far from all others, unless all are."""
-    gaps = [math.inf, *(later - earlier for earlier, later in pairwise(stamps)), math.inf]
-    nearest = map(min, pairwise(gaps))
-    found = {s for s, gap in zip(stamps, nearest, strict=False) if gap > _LONGEST_PAUSE_S}
-    return found if len(found) < len(stamps) else set()
-
-
-def _within_reach(odometry: list[Odometry]) -> list[Odometry]:
-    """Those to which a base can have driven, on and back from the longest way without a jump."""
-    pairs = enumerate(pairwise(odometry), start=1)
-    jumps = [k for k, (earlier, later) in pairs if not _can_reach(earlier, later)]
-    stretches = pairwise([0, *jumps, len(odometry)])
-    end = max(stretches, key=lambda stretch: stretch[1] - stretch[0])[1]
-    return [*_reached(odometry[:end][::-1])[::-1], *_reached(odometry[end - 1 :])[1:]]
-
-
-def _reached(odometry: list[Odometry]) -> list[Odometry]:
-    """Those that can be reached from the one before that can be, as the first is."""
-    reached = odometry[:1]
-    for one in odometry[1:]:
-        if _can_reach(reached[-1], one):
-            reached.append(one)
-    return reached
-
-
-def _can_reach(one: Odometry, other: Odometry) -> bool:
-    a, b = one.odom_base, other.odom_base
-    return math.hypot(b.x - a.x, b.y - a.y) <= max(
-        _JUMP_M, _JUMP_MPS * abs(other.stamp - one.stamp)
-    )
 
 
 def _lines(path: Path) -> Iterator[str | None]:
@@ -239,8 +215,8 @@ def _odometry(words: list[str]) -> Odometry:
     return Odometry(stamp, Pose(x, y, theta), STANDSTILL)
 
 
-def _sweep(words: list[str], no_echo_m: float) -> tuple[Scan, Odometry]:
-    """A scan, from where the line has the laser, and where the base was. Raises ValueError."""
+def _sweep(number: int, words: list[str], no_echo_m: float) -> Line:
+    """Its scan is from where it has the laser. Raises ValueError."""
     beams = int(words[0]) if words else 0
     if beams < 2 or len(words) != 1 + beams + _TAIL:
         raise ValueError(words)
@@ -250,10 +226,10 @@ def _sweep(words: list[str], no_echo_m: float) -> tuple[Scan, Odometry]:
     ranges = _ranges(words[1 : 1 + beams], no_echo_m)
     at = base.to(laser)
     scan = Scan(stamp, ranges, -field / 2, field / steps, 0.0, no_echo_m, base_laser=at)
-    return scan, Odometry(stamp, base, STANDSTILL)
+    return Line(number, Odometry(stamp, base, STANDSTILL), scan)
 
 
-def _robot_sweep(words: list[str], no_echo_m: float) -> tuple[Scan, Odometry]:
+def _robot_sweep(number: int, words: list[str], no_echo_m: float) -> Line:
     """The same of a line that says itself how the laser looks. Raises ValueError."""
     head, (found, rest) = words[:_HEAD], _listed(words[_HEAD:])
     _, tail = _listed(rest)
@@ -266,7 +242,7 @@ def _robot_sweep(words: list[str], no_echo_m: float) -> tuple[Scan, Odometry]:
     range_max = min(range_max, no_echo_m)
     ranges = _ranges(found, range_max)
     scan = Scan(stamp, ranges, start, step, 0.0, range_max, base_laser=base.to(laser))
-    return scan, Odometry(stamp, base, STANDSTILL)
+    return Line(number, Odometry(stamp, base, STANDSTILL), scan)
 
 
 def _poses(words: list[str], stamp: str) -> tuple[Pose, Pose, float]:
@@ -317,7 +293,7 @@ def _without_gaps(odometry: list[Odometry]) -> Iterator[Odometry]:
     yield from odometry[:1]
     for earlier, later in pairwise(odometry):
         gap = later.stamp - earlier.stamp
-        parts = max(1, math.ceil(gap / _LONGEST_GAP_S)) if gap <= _LONGEST_PAUSE_S else 1
+        parts = max(1, math.ceil(gap / _LONGEST_GAP_S)) if gap <= LONGEST_PAUSE_S else 1
         for part in range(1, parts):
             share = part / parts
             stamp = earlier.stamp + share * gap

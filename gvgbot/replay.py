@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from gvgbot.autonomy.loop import Cycle
-from gvgbot.carmen import messages, read_carmen
+from gvgbot.carmen import first_of, messages, read_carmen
 from gvgbot.config import Config, config_in, load_config
 from gvgbot.errors import ConfigError, UsageError
 from gvgbot.geometry import Pose
@@ -171,10 +171,12 @@ def _carmen(wanted: Wanted) -> Log:
     base_laser = Pose(mount.x_m, mount.y_m, math.radians(mount.yaw_deg))
     log = read_carmen(wanted.path, no_echo_m=wanted.no_echo_m or NO_ECHO_M, base_laser=base_laser)
     found = {
-        "damaged lines that were passed over": log.damaged,
-        "long pauses, or a clock that was set": log.pauses,
+        "damaged lines that were passed over": log.damaged_lines,
+        "a clock was set back, and later stamps moved on": log.set_back,
     }
-    flaws = [f"but:     {flaw}: {count}" for flaw, count in found.items() if count]
+    flaws = [f"but:     {first_of(flaw, lines)}" for flaw, lines in found.items() if lines]
+    if log.pauses:
+        flaws.append(f"but:     long pauses, or a clock that was set: {log.pauses}")
     if log.is_cut:
         flaws.append(
             "but:     the archive ends in the middle: copy it anew, if there is more of it"

@@ -218,6 +218,31 @@ def test_a_line_with_a_damaged_stamp_is_one_of_the_damaged(stray: float, tmp_pat
     assert (log.damaged, log.pauses) == (1, 0)
 
 
+def driving(*stamps: float) -> list[str]:
+    """Lines of a robot that drives on at 1 m/s, one a second, with these stamps."""
+    return [at(t).replace("1.1 2.1", f"{k:.1f} 2.1") for k, t in enumerate(stamps)]
+
+
+@pytest.mark.parametrize("seconds", [10.0, 30.0, 3000.0])
+def test_where_a_clock_was_set_back_what_follows_comes_later(
+    seconds: float, tmp_path: Path
+) -> None:
+    lines = driving(*[5000.0 + k - (seconds if k >= 40 else 0.0) for k in range(80)])
+    lines[20:22] = lines[21:19:-1]  # late by a second
+    log = read(written(tmp_path / "a.log", *lines))
+    assert [one.odom_base.x for one in log.odometry] == [float(k) for k in range(80)]
+    assert [one.stamp for one in log.odometry] == [scan.stamp for scan in log.scans]
+    assert np.diff([scan.stamp for scan in log.scans]).tolist() == [1.0] * 39 + [0.0] + [1.0] * 39
+    assert (log.set_back, log.damaged, log.pauses) == ([41], 0, 0)
+
+
+def test_many_lines_that_come_late_are_put_in_order_all_the_same(tmp_path: Path) -> None:
+    lines = driving(*[5000.0 + k for k in range(80)])
+    log = read(written(tmp_path / "a.log", *lines[:30], *lines[40:50], *lines[30:40], *lines[50:]))
+    assert [one.odom_base.x for one in log.odometry] == [float(k) for k in range(80)]
+    assert log.set_back == []
+
+
 def test_stamps_of_zero_here_and_there_are_damaged_ones(tmp_path: Path) -> None:
     stamps = [0.0 if k % 10 == 5 else 976052857.0 + k for k in range(50)]
     log = read(written(tmp_path / "a.log", *map(at, stamps)))
@@ -225,22 +250,22 @@ def test_stamps_of_zero_here_and_there_are_damaged_ones(tmp_path: Path) -> None:
     assert (log.damaged, log.pauses) == (5, 0)
 
 
-def standing_clock(*logger: float) -> list[str]:
-    """Lines of a robot that drives on, all with the stamp 0; the logger has its own."""
+def standing_clock(*logger: float, last: float = 0.0) -> list[str]:
+    """Lines of a robot that drives on, all but the last with the stamp 0, and the logger's own."""
+    stamps = [*[0.0] * (len(logger) - 1), last]
     return [
-        at(0.0).replace("1.1 2.1", f"{k:.1f} 2.1").replace("3.25", f"{stamp:.2f}")
-        for k, stamp in enumerate(logger)
+        line.replace("3.25", f"{stamp:.2f}")
+        for line, stamp in zip(driving(*stamps), logger, strict=True)
     ]
 
 
-def test_the_logger_says_when_it_was_where_nobody_else_does(tmp_path: Path) -> None:
-    log = read(written(tmp_path / "a.log", *standing_clock(1.0, 2.0, 3.5)))
-    assert [scan.stamp for scan in log.scans] == [1.0, 2.0, 3.5]
-    assert [(one.stamp, one.odom_base.x) for one in log.odometry] == [
-        (1.0, 0.0),
-        (2.0, 1.0),
-        (3.5, 2.0),
-    ]
+@pytest.mark.parametrize("last", [0.0, 100.0])
+def test_the_logger_says_when_it_was_where_nobody_else_does(last: float, tmp_path: Path) -> None:
+    stamps = [1.0, 2.0, 3.5, 4.0]
+    log = read(written(tmp_path / "a.log", *standing_clock(*stamps, last=last)))
+    assert [scan.stamp for scan in log.scans] == stamps
+    found = [(one.stamp, one.odom_base.x) for one in log.odometry]
+    assert found == list(zip(stamps, [0.0, 1.0, 2.0, 3.0], strict=True))
 
 
 def test_a_log_without_times_is_refused(tmp_path: Path) -> None:
@@ -294,6 +319,7 @@ def test_a_packed_log_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
     [
         (b"", "no FLASER"),
         (ODOM.encode(), "no FLASER"),
+        (f"# none\n{FLASER} 1 2\n{FLASER} 3".encode(), "damaged lines: 2, the first in line 2"),
         (b"\x7fELF\0\0\1\n", "neither a recording"),
         (b"\x1f\x8bnot gzip at all", "cannot read"),
         (b"BZhnot bzip2 at all", "cannot read"),
