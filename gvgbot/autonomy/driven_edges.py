@@ -24,6 +24,7 @@ _LEAST_LOST_M = 1.0  # less than before: it does not only go back over it
 _TIMES_MISSED = 3  # driven past without being found, a vertex is none
 _SHUTTLE_S = 3.0  # more often, it only looks as if it came from one end to the other
 _TIMES_TO_AND_FRO = 4  # an edge is believed that is not seen as one
+_BESIDE_M = 1.0  # beyond its disc: who stands there may take a way from it out of sight
 _IN_CLEAR_M = 2.0  # from a vertex, it is seen which departures it has
 
 
@@ -137,6 +138,8 @@ class DrivenEdges:
             return
         before = graph.edge_at(arrived)
         if before is not None and before.other(arrived).vertex == left.vertex:
+            if self._may_be_elsewhere(view, left.vertex):
+                return
             graph.remove_half_edge(left)  # it is the one by which that edge is known to leave
         are_seen = left in known.branch_of and passage.driven < LEAST_LOOP_M
         is_known = far.edge is not None
@@ -148,6 +151,12 @@ class DrivenEdges:
             self._mapper.join(view, left, arrived, passage.line, passage.narrowest, driven=True)
         elif graph.half_edge(left) is not None:
             self._join_fork(view, left, arrived, passage)
+
+    def _may_be_elsewhere(self, view: View, vertex: int) -> bool:
+        """Whether somebody beside a vertex may make it look as if it were, and edges with it."""
+        place = self._mapper.in_local_frame(view, vertex).position
+        within = self._mapper.graph.vertices[vertex].clearance + _BESIDE_M
+        return view.is_doubtful(place, within)
 
     def _goes_to_and_fro(self, stamp: float, left: HalfEdgeId, arrived: HalfEdgeId) -> bool:
         """Whether the robot has come from one end to the other again and again."""

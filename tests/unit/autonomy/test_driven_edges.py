@@ -51,6 +51,7 @@ class Drive:
             self.mapper.belief = ekf.add_vertex(belief, vertex, made.local, certain)
         self.where = Whereabouts(left, [np.zeros(2)])
         self.stamp = 0.0
+        self.somebody = np.empty((0, 2))  # where somebody stands
         self._driven = DrivenEdges(self.mapper)
 
     @property
@@ -64,16 +65,24 @@ class Drive:
             known.pair_branch(branch, end)
         for x, y in resampled(list(corners)):
             base = Pose(float(x), float(y), 0.0)
-            view = View(0, self.stamp, 0.0, base, gvg, LocalMap(LocalMapConfig()))
+            walls = LocalMap(LocalMapConfig())
+            view = View(0, self.stamp, 0.0, base, gvg, walls, doubtful=self.somebody)
             place = gvg.place(base.position)
             assert place is not None
             self._driven.learn(view, known, place, self.where)
         return self
 
 
-def test_a_departure_that_leads_where_another_is_known_to_lead_is_that_one() -> None:
-    """By the way on which the robot arrives, an edge comes from the vertex that it has left."""
+@pytest.mark.parametrize(("somebody_at_y", "is_one"), [(2.5, True), (1.5, False)])
+def test_a_departure_that_leads_where_another_is_known_to_lead_is_that_one(
+    somebody_at_y: float, *, is_one: bool
+) -> None:
+    """By the way on which the robot arrives, an edge comes from the vertex that it has left.
+
+    Not if somebody stands half a metre off its disc: then the way that it left by may be shut.
+    """
     drive = Drive(HalfEdgeId(1, NORTH))
+    drive.somebody = np.array([[0.0, somebody_at_y]])
     graph = drive.mapper.graph
     graph.join(
         HalfEdgeId(1, EAST),
@@ -84,7 +93,7 @@ def test_a_departure_that_leads_where_another_is_known_to_lead_is_that_one() -> 
     )
     beyond = {branch: end for branch, end in ALL_SEEN.items() if end.vertex == 2}
     drive.along(STREET, beyond, (0.0, 0.5), (2.0, 0.0), (6.0, 0.0))
-    assert sorted(graph.vertices[1].half_edges) == [EAST, WEST]
+    assert sorted(graph.vertices[1].half_edges) == [EAST, *([] if is_one else [NORTH]), WEST]
     assert len(graph.edges) == 1
 
 
