@@ -199,7 +199,7 @@ class Mission(Pursuit):
             self._progress.wait(view.stamp)
             if self.choice.waits_for_others:
                 self._progress.set_aside()
-            return self._path_following.make_way(view, here)
+            return self._path_following.draw_back(view, here)
         if graph.frontiers():
             return self._wait_for_a_way(view, here)
         if graph.vertices:

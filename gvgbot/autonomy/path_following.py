@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.control.edge_follower import Track
 from gvgbot.autonomy.control.orders import ARRIVED_M, Drive, LookAround, Order, Stand
@@ -13,10 +14,13 @@ from gvgbot.autonomy.gvg.local import Branch
 from gvgbot.autonomy.neighbours import Neighbours
 from gvgbot.autonomy.situation import Situation
 from gvgbot.autonomy.views import View
+from gvgbot.geometry import Array
 
 _MOST_LOOKS = 2  # around, before nothing more is to be seen
 _FACING_RAD = 1.0  # looking so far past a thing, one would not see it go
 _BEHIND_RAD, _AS_NEAR_M = 0.5, 0.3  # a wall that the robot turns its back to, or as good a one
+_LEFT_TO_OTHERS_M = 1.5  # between the middle of the robot and whom it waits for
+_NO_NEARER_M = 0.05  # does it come to them when it draws back
 _FACING_POINTS = 6  # of a polyline tell where its end points to
 
 
@@ -35,6 +39,13 @@ class PathFollowing:
         """Stand, where others can pass."""
         track = self._neighbours.track_aside(view, here)
         return Stand() if track is None else Drive(track)
+
+    def draw_back(self, view: View, here: Situation) -> Order:
+        """Wait for what stands in the way, and leave it the room to go: it may be held up, too."""
+        paths = () if here.in_team else (here.astern(), here.ahead())
+        tracks = (_track_away(view, *here.line_along(path)) for path in paths)
+        away = next((track for track in tracks if track is not None), None)
+        return self.make_way(view, here) if away is None else Drive(away)
 
     def stand_by(self, view: View, here: Situation) -> Order:
         """Stand where others can pass, with the back to a wall: nobody comes from there unseen."""
@@ -83,6 +94,18 @@ class PathFollowing:
             return None, []
         event = Recovery(stamp, "look around", "standing at the end of sight")
         return LookAround(math.tau), [event]
+
+
+def _track_away(view: View, line: Array, room: Array) -> Track | None:
+    """Along a line (N, 2) to where there is room for what may go; None if that is no farther."""
+    if not len(view.doubtful):
+        return None
+    away = np.asarray(cKDTree(view.doubtful).query(line)[0])
+    far = np.flatnonzero(away > _LEFT_TO_OTHERS_M)
+    count = 1 + (int(far[0]) if len(far) else int(away.argmax()))
+    track = Track.of(line[:count], room[:count])
+    comes_nearer = away[:count].min() < away[0] - _NO_NEARER_M
+    return None if track.length < ARRIVED_M or comes_nearer else track
 
 
 def _turn_of_the_back(view: View) -> float:

@@ -62,11 +62,20 @@ class Robot:
         self.events: list[Event] = []
         self.stamp = self.travelled = 0.0
         self.pose, self.walls = Pose(), NOTHING_SEEN
+        self.somebody = np.empty((0, 2))  # where somebody stands
         self._count = 0
 
     def look(self, gvg: LocalGvg, *, period: float = 0.5) -> Order:
         """The order after one more view from where the robot is."""
-        view = View(self._count, self.stamp, self.travelled, self.pose, gvg, self.walls)
+        view = View(
+            self._count,
+            self.stamp,
+            self.travelled,
+            self.pose,
+            gvg,
+            self.walls,
+            doubtful=self.somebody,
+        )
         known, seen = self.mapper.observe(view)
         order, done = self.decide(view, known)
         self.events += [*seen, *done]
@@ -662,6 +671,25 @@ def test_a_target_that_vanishes_when_patience_ends_costs_one_frontier_and_not_al
     assert robot.mission.outcome is None
     assert len(graph.blocked()) == 1
     assert graph.frontiers()
+
+
+@pytest.mark.parametrize(
+    ("somebody_at_x", "waits_at_x"),
+    [([], 1.0), ([2.0], 0.5), ([0.0], 1.5), ([2.9], 1.0), ([0.0, 2.0], 1.0)],
+)
+def test_who_waits_for_somebody_leaves_him_the_room_to_go(
+    somebody_at_x: list[float], waits_at_x: float
+) -> None:
+    """A metre and a half, either way along its corridor; between two it stays."""
+    robot = Robot()
+    robot.drive(TEE, (-2.0, 0.0), (1.0, 0.0))
+    robot.somebody = np.array([(x, 0.0) for x in somebody_at_x]).reshape(-1, 2)
+    order: Order = Stand()
+    while robot.mission.target is not None and robot.stamp < 100.0:
+        robot.mission.hold()
+        order = robot.look(TEE)
+    x = 1.0 if isinstance(order, Stand) else end_of(order)[0]
+    assert x == pytest.approx(waits_at_x, abs=0.11)
 
 
 def test_who_has_nowhere_to_go_but_past_another_robot_makes_way() -> None:
