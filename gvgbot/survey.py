@@ -10,6 +10,7 @@ from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.geometry import Array, Pose, resampled
 from gvgbot.maps.blanks import blanks
 from gvgbot.maps.gaps import gaps
+from gvgbot.maps.hollows import hollows
 from gvgbot.maps.narrows import narrows
 from gvgbot.maps.occupancy import OccupancyGrid, occupancy_grid
 from gvgbot.maps.passages import Way, passages
@@ -41,7 +42,8 @@ def survey(pipeline: Pipeline) -> Surveyed:
     beside = np.concatenate([_NONE, *(resampled(way.polyline, _STEP_M) for way in ways)])
     narrow = narrows(grid, beside, here, pipeline.radius, room)
     if ways:
-        found = np.concatenate([found, blanks(grid, beside, here, room)])
+        hollow = hollows(grid, beside, pipeline.sight.open_clearance)
+        found = np.concatenate([found, blanks(grid, beside, here, room), hollow])
     through = passages(grid, ways, here, room, pipeline.sight.open_clearance)
     off = np.repeat([_INTO_M, _TOWARDS_M], [len(found), len(through)])
     places = np.concatenate([found, through])
@@ -68,13 +70,10 @@ def _passed(pipeline: Pipeline, keyframes: list[Pose]) -> tuple[Array, Array]:
 
 
 def _ways(pipeline: Pipeline) -> list[Way]:
-    """All edges, map frame."""
-    mapper = pipeline.mapper
-    return [
-        Way(
-            edge.a.vertex,
-            edge.b.vertex,
-            mapper.belief.map_vertex(edge.a.vertex).transform(edge.polyline),
-        )
-        for edge in mapper.graph.edges.values()
-    ]
+    """All edges, map frame, from vertex to vertex."""
+    belief, found = pipeline.mapper.belief, []
+    for edge in pipeline.mapper.graph.edges.values():
+        start, end = (belief.map_vertex(one.vertex) for one in (edge.a, edge.b))
+        line = [start.position, *start.transform(edge.polyline), end.position]
+        found.append(Way(edge.a.vertex, edge.b.vertex, np.array(line)))
+    return found

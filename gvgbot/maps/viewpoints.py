@@ -31,7 +31,7 @@ def viewpoints(
     cell, corner = grid.resolution_m, np.array(grid.origin)
     walls = is_wall(grid.cells)
     has_room = metres_to(walls, cell) > passage_m
-    if not (_marked(ways, grid) & has_room).any():
+    if not (marked(ways, grid) & has_room).any():
         return None
     floor = reachable(is_floor(grid.cells) & has_room, (around - corner)[::-1] / cell)
     near_ways = cells_near(ways, grid, floor)
@@ -48,12 +48,12 @@ def viewpoints(
 
 def cells_near(ways: Array, grid: OccupancyGrid, floor: Mask) -> Mask:
     """The cells of the floor beside ways."""
-    near = _marked(ways, grid)
+    near = marked(ways, grid)
     near = ndimage.binary_dilation(near, iterations=round(_BESIDE_M / grid.resolution_m))
     return np.asarray(near & floor)
 
 
-def _marked(ways: Array, grid: OccupancyGrid) -> Mask:
+def marked(ways: Array, grid: OccupancyGrid) -> Mask:
     """The cells that ways (points (K, 2)) pass."""
     height, width = grid.cells.shape
     marked = np.zeros((height, width), np.bool_)

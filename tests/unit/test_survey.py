@@ -19,7 +19,7 @@ from gvgbot.geometry import STANDSTILL, Array, Pose
 from gvgbot.hal.messages import Odometry
 from gvgbot.survey import survey
 from gvgbot.worlds.canvas import Canvas
-from tests.unit.autonomy.graphs import streets
+from tests.unit.autonomy.graphs import STREET, streets
 from tests.unit.autonomy.sights import CELL, LASER_270, carved, sweep
 
 START = Pose(-3.0, 0.0, 0.0)  # in the world; the map begins there
@@ -68,9 +68,28 @@ def test_the_blurred_grid_of_who_drives_by_odometry_alone_lacks_nothing() -> Non
 def test_a_door_that_the_robot_leaves_alone_is_told_of() -> None:
     """42 cm wide, in the northern wall at x = 1.5; the robot wants 46."""
     door, room = (1.29, 0.9, 1.71, 1.6), (-1.0, 1.5, 4.0, 4.0)
-    narrow = survey(driven(carved([CORRIDOR, door, room]), 6.0)).narrows
-    assert START.transform(narrow) == pytest.approx(np.array([[1.5, 1.25]]), abs=0.2)
-    assert len(survey(driven(carved([CORRIDOR, room]), 6.0)).narrows) == 0
+    found = survey(driven(carved([CORRIDOR, door, room]), 6.0))
+    assert START.transform(found.narrows) == pytest.approx(np.array([[1.5, 1.25]]), abs=0.2)
+    closed = survey(driven(carved([CORRIDOR, room]), 6.0))
+    assert len(closed.narrows) == 0
+
+
+def test_edges_round_nothing_are_looked_at_again() -> None:
+    """A square of them, a metre wide, in the middle of the corridor: round somebody who has gone.
+
+    Their lines end a decimetre before the vertices.
+    """
+    pipeline = driven(carved([CORRIDOR]), 3.0)
+    graph, ids = streets(2, 2)
+    for edge in graph.edges.values():
+        edge.polyline = edge.polyline[-1] / STREET * np.array([[0.1], [0.9]])
+    x = np.array([(1.0 + column, row - 0.5, 0.0) for column, row in ids]).ravel()
+    pipeline.mapper.graph, pipeline.mapper.observations = graph, []
+    pipeline.mapper.belief = Belief(np.append(np.zeros(3), x), 1e-6 * np.eye(15), (*ids.values(),))
+    places = set(map(tuple, survey(pipeline).places.tolist()))
+    graph.unjoin(next(iter(graph.edges.values())))
+    (place,) = places - set(map(tuple, survey(pipeline).places.tolist()))
+    assert place == pytest.approx([1.5, 0.0], abs=0.3)
 
 
 def test_floor_in_sight_from_a_slot_is_missing_though_no_edge_leads_there() -> None:
