@@ -15,7 +15,7 @@ from gvgbot.maps.narrows import narrows
 from gvgbot.maps.occupancy import OccupancyGrid, occupancy_grid
 from gvgbot.maps.passages import Way, passages
 from gvgbot.maps.spots import spots
-from gvgbot.maps.viewpoints import viewpoints
+from gvgbot.maps.viewpoints import floor_beside, viewpoints
 
 _INTO_M = 2.0  # off its ways: through a door, and the robot faces what it looks at
 _TOWARDS_M = 1.0  # what seems to be a passage may be a pane of glass
@@ -50,7 +50,10 @@ def survey(pipeline: Pipeline) -> Surveyed:
     views = viewpoints(grid, beside, places, here, room, off)
     if views is None:
         return Surveyed(found, narrow, is_beside_floor=len(found) > 0)
-    return Surveyed(views, narrow)
+    before = floor_beside(grid, narrow, here, room)
+    into = np.full(len(before), _INTO_M)
+    doorsteps = viewpoints(grid, beside, before, here, room, into)
+    return Surveyed(views, narrow, doorsteps=_NONE if doorsteps is None else doorsteps)
 
 
 def _walled(grid: OccupancyGrid, points: Array) -> OccupancyGrid:

@@ -3,6 +3,8 @@
 from collections.abc import Callable, Collection
 from typing import Literal, NamedTuple
 
+import numpy as np
+
 from gvgbot.autonomy.exploration.unseen import places_in_words
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
 from gvgbot.geometry import Array
@@ -16,6 +18,7 @@ class Surveyed(NamedTuple):
     places: Array  # (N, 2), that are worth another look
     narrows: Array  # (N, 2), ways too narrow for the robot that lead to floor without another
     is_beside_floor: bool = False  # all edges are where it lacks the room it wants, places are not
+    doorsteps: Array = np.empty((0, 2))  # (M, 2), before these: somebody may have stood in them
 
 
 Survey = Callable[[], Surveyed | None]  # None: not yet told

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
+from scipy.spatial import cKDTree
 
 from gvgbot.geometry import Array
 from gvgbot.maps.distances import metres_to
@@ -44,6 +45,20 @@ def viewpoints(
             found.append(view - 1)
     views: Array = corner + (np.array(found).reshape(-1, 2)[:, ::-1] + 0.5) * cell
     return views
+
+
+def floor_beside(grid: OccupancyGrid, places: Array, around: Array, passage_m: float) -> Array:
+    """The floor (N, 2), m, map frame, nearest to places (N, 2) that the robot does not fit into.
+
+    The robot is at `around` (2,) and keeps `passage_m` from walls.
+    """
+    if not len(places):
+        return places
+    cell, corner = grid.resolution_m, np.array(grid.origin)
+    has_room = metres_to(is_wall(grid.cells), cell) > passage_m
+    floor = reachable(is_floor(grid.cells) & has_room, (around - corner)[::-1] / cell)
+    middles = corner + (np.argwhere(floor)[:, ::-1] + 0.5) * cell
+    return middles[cKDTree(middles).query(places)[1]] if len(middles) else np.empty((0, 2))
 
 
 def cells_near(ways: Array, grid: OccupancyGrid, floor: Mask) -> Mask:

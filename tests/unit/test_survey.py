@@ -70,8 +70,9 @@ def test_a_door_that_the_robot_leaves_alone_is_told_of() -> None:
     door, room = (1.29, 0.9, 1.71, 1.6), (-1.0, 1.5, 4.0, 4.0)
     found = survey(driven(carved([CORRIDOR, door, room]), 6.0))
     assert START.transform(found.narrows) == pytest.approx(np.array([[1.5, 1.25]]), abs=0.2)
+    assert START.transform(found.doorsteps) == pytest.approx(np.array([[1.5, 0.75]]), abs=0.2)
     closed = survey(driven(carved([CORRIDOR, room]), 6.0))
-    assert len(closed.narrows) == 0
+    assert len(closed.narrows) == len(closed.doorsteps) == 0
 
 
 def test_edges_round_nothing_are_looked_at_again() -> None:

@@ -104,9 +104,13 @@ class OwnTasks:
 
         self._arrived = None
         place = self._unseen.next(surveyed.places, metres_to, twice=self._has_met)
+        reason = "something may be missing there"
+        if place is None and self._has_met:
+            place = self._unseen.once_more(surveyed.doorsteps, metres_to)
+            reason = "somebody may have narrowed the way there"
         if place is None:
             return None
-        decision = Decision(view.stamp, None, None, "something may be missing there")
+        decision = Decision(view.stamp, None, None, reason)
         return Task(ToPoint(*place.round(2).tolist()), decision)
 
     def _is_hidden(self, view: View) -> bool:

@@ -46,16 +46,27 @@ class Unseen:
         A visit that came to nothing is worth a second one only where things may have changed.
         """
         self._stands_at = None
+        place = self._visit(places, metres_to, 1 + twice)
+        if place is None:
+            self.left = places
+        return place
+
+    def once_more(self, places: Array, metres_to: Callable[[Array], float | None]) -> Array | None:
+        """Which of these to visit when there are no others; nothing is missing there for sure."""
+        return self._visit(places, metres_to, 1)
+
+    def _visit(
+        self, places: Array, metres_to: Callable[[Array], float | None], most: int
+    ) -> Array | None:
         chances = [
             (tries, metres, place.tolist())
             for place in places
-            if (tries := self._tries(place)) < 1 + twice
+            if (tries := self._tries(place)) < most
             and (metres := metres_to(place)) is not None
             and len(self._visits) < _MOST
         ]
         self.is_done = not chances
         if not chances:
-            self.left = places
             return None
         self._visits.append(np.array(min(chances)[2]))
         return self._visits[-1]

@@ -34,12 +34,13 @@ class Explorer(Robot):
         self.errands = Errands(self.mission, self.mapper, CONFIG, room_m=0.2)
         self.left = list(surveys)
         self.mission.survey = self._survey
-        self.narrows = np.empty((0, 2))
+        self.narrows = self.doorsteps = np.empty((0, 2))
         self.somebody_until = 0.0  # s, that somebody is found
         self.hidden_until = 0.0  # s, that the branch may be there for a while only
 
     def _survey(self) -> Surveyed:
-        return Surveyed(np.array(self.left.pop(0)).reshape(-1, 2), self.narrows)
+        places = np.array(self.left.pop(0)).reshape(-1, 2)
+        return Surveyed(places, self.narrows, doorsteps=self.doorsteps)
 
     def decide(self, view: View, known: Correspondence) -> tuple[Order, list[Event]]:
         is_found = view.stamp < self.somebody_until
@@ -135,6 +136,23 @@ def test_what_is_too_narrow_is_told_of() -> None:
     robot.narrows = np.array([[3.04, -1.0]])
     robot.until_it_moves_or_ends()
     assert robot.mission.reason == "no frontier is left; too narrow for it near (3.0, -1.0)"
+
+
+@pytest.mark.parametrize(("somebody_until", "visits"), [(0.0, 0), (5.0, 1)])
+def test_a_narrow_way_is_looked_at_again_once_where_somebody_may_have_stood_in_it(
+    somebody_until: float, visits: int
+) -> None:
+    robot = Explorer(*[[]] * (visits + 1))
+    robot.narrows, robot.doorsteps = np.array([[2.0, -0.5]]), np.array([GAP])
+    robot.somebody_until = somebody_until
+    robot.until_it_moves_or_ends()
+    if visits:
+        robot.drive(CLOSED, (0.0, 0.0), (2.0, 0.0))
+        robot.until_it_moves_or_ends()
+    looks = [d for d in robot.said(Decision) if isinstance(d, Decision) and d.vertex is None]
+    assert [look.reason for look in looks] == ["somebody may have narrowed the way there"] * visits
+    assert not robot.left
+    assert robot.mission.reason == "no frontier is left; too narrow for it near (2.0, -0.5)"
 
 
 def test_who_asks_it_to_go_on_gets_another_look_at_every_gap() -> None:
