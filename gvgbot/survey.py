@@ -42,7 +42,7 @@ def survey(pipeline: Pipeline) -> Surveyed:
     beside = np.concatenate([_NONE, *(resampled(way.polyline, _STEP_M) for way in ways)])
     narrow = narrows(grid, beside, here, pipeline.radius, room)
     if ways:
-        hollow = hollows(grid, beside, pipeline.sight.open_clearance)
+        hollow = hollows(_walled(grid, _felt(pipeline)), beside, pipeline.sight.open_clearance)
         found = np.concatenate([found, blanks(grid, beside, here, room), hollow])
     through = passages(grid, ways, here, room, pipeline.sight.open_clearance)
     off = np.repeat([_INTO_M, _TOWARDS_M], [len(found), len(through)])
@@ -63,6 +63,15 @@ def _walled(grid: OccupancyGrid, points: Array) -> OccupancyGrid:
     inside = (row >= 0) & (row < cells.shape[0]) & (column >= 0) & (column < cells.shape[1])
     cells[row[inside], column[inside]] = _WALL
     return replace(grid, cells=cells, seen_s=None)
+
+
+def _felt(pipeline: Pipeline) -> Array:
+    """Where something was felt (N, 2), map frame, and virtual walls: the laser may not see it."""
+    last = pipeline.past.last
+    if last is None:
+        return _NONE
+    map_local = pipeline.mapper.map_in_local(last.local_base).inverse()
+    return map_local.transform(pipeline.sight.hazards.points)
 
 
 def _passed(pipeline: Pipeline, keyframes: list[Pose]) -> tuple[Array, Array]:

@@ -31,14 +31,14 @@ class Sight:
         self._reduction, self._half_width_m = config.reduction, config.local_map.half_width_m
         self._needed_m = robot_radius + config.passage_margin_m  # from its middle to walls
         self._noisy_walls = NoisyWalls(self._needed_m, config.local_map)
-        self._mapper, self._hazards, self._traffic = mapper, hazards, traffic
+        self._mapper, self.hazards, self._traffic = mapper, hazards, traffic
         self.virtual_walls = points_of(config.virtual_walls)  # map frame
         self.open_clearance = config.reduction.open_clearance_m  # from walls; farther is no edge
 
     def note(self, scan: Scan, position: Array, local_map: LocalMap, travelled: float) -> None:
         """Account for a scan, taken at a position (2,), local frame, after so many metres."""
         self._noisy_walls.note(scan, position, local_map, travelled)
-        self._hazards.forget(travelled)
+        self.hazards.forget(travelled)
 
     def view(
         self, scan: Scan, local_base: Pose, local_map: LocalMap, keyframe: int, travelled: float
@@ -47,9 +47,9 @@ class Sight:
         self.open_clearance = self._reduction.open_clearance(scan.range_max, self._half_width_m)
         self._mapper.heed(self.virtual_walls)
         virtual = self._mapper.map_in_local(local_base).transform(self.virtual_walls)
-        self._hazards.virtual_walls = virtual[local_map.covers(virtual)]
+        self.hazards.virtual_walls = virtual[local_map.covers(virtual)]
         gvg, marks = self._mapper.marked(self._local_gvg(local_base, local_map), local_base)
-        felt, newcomers = self._hazards.doubtful, self._traffic.newcomers
+        felt, newcomers = self.hazards.doubtful, self._traffic.newcomers
         doubtful = np.concatenate([felt, local_map.suspects(), *self._traffic.standing])
         return View(
             keyframe,
@@ -63,7 +63,7 @@ class Sight:
             marks=marks,
             is_somebody_found=newcomers.is_one_standing(scan.stamp, local_map),
             field_of_view=scan.field_of_view,
-            virtual_walls=self._hazards.virtual_walls,
+            virtual_walls=self.hazards.virtual_walls,
             felt=felt,
         )
 
@@ -75,8 +75,8 @@ class Sight:
             min_clearance=self._needed_m,
             roughness=self._reduction.roughness_m,
             open_clearance=self.open_clearance,
-            felt=np.concatenate([self._hazards.points, *self._traffic.in_the_way]),
-            virtual_walls=self._hazards.virtual_walls,
+            felt=np.concatenate([self.hazards.points, *self._traffic.in_the_way]),
+            virtual_walls=self.hazards.virtual_walls,
         )
         known = self._mapper.known_around(local_base, self._half_width_m)
         return reduce_graph(fine, self._reduction, known).rings_cut_far_from(local_base.position)
