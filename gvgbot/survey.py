@@ -7,7 +7,7 @@ import numpy as np
 from gvgbot.autonomy.ending import Surveyed
 from gvgbot.autonomy.estimate import scans_at, smoothed_keyframes
 from gvgbot.autonomy.pipeline import Pipeline
-from gvgbot.geometry import Array, Pose, resampled
+from gvgbot.geometry import Array, Pose, resampled, sampled
 from gvgbot.maps.blanks import blanks
 from gvgbot.maps.gaps import gaps
 from gvgbot.maps.hollows import hollows
@@ -42,7 +42,8 @@ def survey(pipeline: Pipeline) -> Surveyed:
     beside = np.concatenate([_NONE, *(resampled(way.polyline, _STEP_M) for way in ways)])
     narrow = narrows(grid, beside, here, pipeline.radius, room)
     if ways:
-        hollow = hollows(_walled(grid, _felt(pipeline)), beside, pipeline.sight.open_clearance)
+        joined, felt = _joined(pipeline, ways), _felt(pipeline)
+        hollow = hollows(_walled(grid, felt), joined, pipeline.sight.open_clearance)
         found = np.concatenate([found, blanks(grid, beside, here, room), hollow])
     through = passages(grid, ways, here, room, pipeline.sight.open_clearance)
     off = np.repeat([_INTO_M, _TOWARDS_M], [len(found), len(through)])
@@ -82,10 +83,22 @@ def _passed(pipeline: Pipeline, keyframes: list[Pose]) -> tuple[Array, Array]:
 
 
 def _ways(pipeline: Pipeline) -> list[Way]:
-    """All edges, map frame, from vertex to vertex."""
-    belief, found = pipeline.mapper.belief, []
-    for edge in pipeline.mapper.graph.edges.values():
-        start, end = (belief.map_vertex(one.vertex) for one in (edge.a, edge.b))
-        line = [start.position, *start.transform(edge.polyline), end.position]
-        found.append(Way(edge.a.vertex, edge.b.vertex, np.array(line)))
-    return found
+    """All edges, map frame."""
+    mapper = pipeline.mapper
+    return [
+        Way(
+            edge.a.vertex,
+            edge.b.vertex,
+            mapper.belief.map_vertex(edge.a.vertex).transform(edge.polyline),
+        )
+        for edge in mapper.graph.edges.values()
+    ]
+
+
+def _joined(pipeline: Pipeline, ways: list[Way]) -> Array:
+    """Points (N, 2) along ways, from vertex to vertex: their ends may lie beside these."""
+    place = pipeline.mapper.belief.map_vertex
+    return sampled(
+        (np.array([place(a).position, *line, place(b).position]) for a, b, line in ways),
+        _STEP_M / 2,
+    )
