@@ -1034,6 +1034,7 @@ def test_a_twin_that_explores_is_seen_doing_so(page: Page, tmp_path: Path) -> No
         assert np.abs(robot - floor).max() < 600
         page.click("#follow")
         page.until("document.querySelector('#follow').getAttribute('aria-pressed') === 'true'")
+        page.click("#zoom-out")
         page.until(f"{driven} > 2.0")
         assert stretch(page, "robot")[0] == pytest.approx(page.middle("#map"), abs=25)
         page.click("[data-request=pause]")

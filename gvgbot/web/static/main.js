@@ -16,7 +16,7 @@ let life = null, state = null, robotLink = null, events = [], healths = [], isCo
 let isMapDue = true, isPanelDue = true, panelAt = 0;
 
 const redraw = () => { isMapDue = true; };
-const view = new View($("map"), () => { setFollowing(false); redraw(); }, tap);
+const view = new View($("map"), redraw, () => setFollowing(false), tap);
 const picture = new MapPicture($("map"), view);
 const sigmaPlot = new Plot($("sigma-plot"), words.length);
 const batteryPlot = new Plot($("battery-plot"), words.percent, 1);

@@ -5,9 +5,10 @@ const MARGIN = 16, BUTTONS = 66; // pixels around the map, and below it
 const TAP = 6; // pixels that a finger may move and still have tapped
 
 export class View {
-  constructor(canvas, onChange, onTap) {
+  constructor(canvas, onChange, onMove, onTap) {
     this.canvas = canvas;
     this.onChange = onChange;
+    this.onMove = onMove; // by hand, elsewhere
     this.onTap = onTap;
     this.x = 0; // m, the point in the middle
     this.y = 0;
@@ -44,10 +45,15 @@ export class View {
     const [x, y] = this.toMap(px, py);
     this.scale = clamp(this.scale * factor, this.least);
     const [nowX, nowY] = this.toMap(px, py);
-    this.moved(x - nowX, y - nowY);
+    this.shift(x - nowX, y - nowY);
   }
 
-  moved(dx, dy) {
+  move(dx, dy) {
+    this.shift(dx, dy);
+    this.onMove();
+  }
+
+  shift(dx, dy) {
     this.x += dx;
     this.y += dy;
     this.isAutomatic = false;
@@ -85,19 +91,19 @@ export class View {
     const others = [...this.fingers].filter(([id]) => id !== event.pointerId);
     this.fingers.set(event.pointerId, now);
     if (others.length === 0) {
-      this.moved((before[0] - now[0]) / this.scale, (now[1] - before[1]) / this.scale);
+      this.move((before[0] - now[0]) / this.scale, (now[1] - before[1]) / this.scale);
       return;
     }
     const still = others[0][1];
     const factor = Math.hypot(now[0] - still[0], now[1] - still[1]) / Math.max(1, Math.hypot(before[0] - still[0], before[1] - still[1]));
-    this.moved((before[0] - now[0]) / 2 / this.scale, (now[1] - before[1]) / 2 / this.scale);
+    this.shift((before[0] - now[0]) / 2 / this.scale, (now[1] - before[1]) / 2 / this.scale);
     this.zoom(factor, (now[0] + still[0]) / 2, (now[1] + still[1]) / 2);
   }
 
   press(event) {
     const step = 60 / this.scale;
     const moves = { ArrowLeft: [-step, 0], ArrowRight: [step, 0], ArrowUp: [0, step], ArrowDown: [0, -step] };
-    if (event.key in moves) this.moved(...moves[event.key]);
+    if (event.key in moves) this.move(...moves[event.key]);
     else if (event.key === "+" || event.key === "=") this.zoom(1.4);
     else if (event.key === "-") this.zoom(1 / 1.4);
     else return;
