@@ -1037,6 +1037,11 @@ def test_a_twin_that_explores_is_seen_doing_so(page: Page, tmp_path: Path) -> No
         page.click("#zoom-out")
         page.until(f"{driven} > 2.0")
         assert stretch(page, "robot")[0] == pytest.approx(page.middle("#map"), abs=25)
+        key = "new KeyboardEvent('keydown', {key: 'ArrowLeft', cancelable: true, altKey: %s})"
+        press = f"!document.querySelector('#map').dispatchEvent({key})"
+        assert not page.look(press % "true")  # back, for the browser
+        assert page.look(press % "false")
+        page.until("document.querySelector('#follow').getAttribute('aria-pressed') === 'false'")
         page.click("[data-request=pause]")
         page.until("document.querySelector('#headline').innerText.includes('paused')")
         page.until("document.querySelector('#answer').dataset.tone === 'good'")

@@ -229,7 +229,7 @@ $("theme").addEventListener("click", () => {
   setTheme(THEMES[(now + 1) % THEMES.length]);
 });
 document.addEventListener("keydown", (event) => {
-  if (event.target instanceof HTMLInputElement || event.ctrlKey || event.metaKey) return;
+  if (event.target instanceof HTMLInputElement || event.ctrlKey || event.altKey || event.metaKey) return;
   if (event.key === "0") fit();
   else if (event.key === "f") follow();
   else if (event.key === "Escape") closePlace();

@@ -101,6 +101,7 @@ export class View {
   }
 
   press(event) {
+    if (event.ctrlKey || event.altKey || event.metaKey) return; // the browser's own
     const step = 60 / this.scale;
     const moves = { ArrowLeft: [-step, 0], ArrowRight: [step, 0], ArrowUp: [0, step], ArrowDown: [0, -step] };
     if (event.key in moves) this.move(...moves[event.key]);
