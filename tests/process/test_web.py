@@ -774,6 +774,15 @@ def test_no_word_of_an_event_sticks_out(page: Page) -> None:
             widths = "(({clientWidth, scrollWidth}) => [clientWidth, scrollWidth])"
             inner, needed = page.look(f"{widths}(document.querySelector('aside'))")
             assert needed == inner  # no bar to scroll sideways
+            play.state = msgspec.structs.replace(HERE, stamp=86_343.0)
+            play.until_read("23 h 58 min")
+            boxes = "[...document.querySelector('#events li:last-child').children].map((one) => {"
+            boxes += " const text = document.createRange(); text.selectNodeContents(one);"
+            boxes += " const box = text.getBoundingClientRect();"
+            boxes += " return [box.left, box.right, box.height] })"
+            (_, end, height), (begin, *_) = page.look(boxes)
+            assert end < begin
+            assert height < 25  # px: one line
 
 
 def test_all_layers_and_a_short_word_on_a_vertex_find_room_on_a_phone(page: Page) -> None:
