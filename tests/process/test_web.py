@@ -961,6 +961,11 @@ def test_a_robot_that_is_stuck_waits_is_silent_or_has_left_and_a_lost_server_are
             play.state = waits
             play.until(f"{headline} === 'paused'")
             page.until(f"{banner}.startsWith('quiet for 3 s')")
+            spoken = "document.querySelector('[role=alert]').textContent"
+            first = page.look(spoken)
+            assert first.startswith("quiet for")
+            page.until(f"{banner}.startsWith('quiet for 5 s')")
+            assert page.look(spoken) == first  # nobody is made to listen to seconds
             assert page.look("document.querySelector('[data-request=pause]').disabled")
             play.until("document.querySelector('#banner').hidden")
         page.until(f"{banner}.startsWith('robot gone for')")

@@ -13,7 +13,7 @@ const PANEL_EVERY = 150; // ms
 const THEMES = ["system", "dark", "light"];
 
 let life = null, state = null, robotLink = null, events = [], healths = [], isConnected = false, isStale = false, isFollowing = false;
-let isMapDue = true, isPanelDue = true, panelAt = 0;
+let isMapDue = true, isPanelDue = true, panelAt = 0, spoken = "";
 
 const redraw = () => { isMapDue = true; };
 const view = new View($("map"), redraw, () => setFollowing(false), tap);
@@ -96,6 +96,7 @@ function drawPanel() {
   $("headline").dataset.tone = tone;
   $("banner").hidden = !isStale;
   $("banner").textContent = text;
+  speak(text);
   document.body.classList.toggle("stale", isStale);
   if (state !== null) {
     fill($("facts"), words.facts(state, picture.plan), factLine);
@@ -117,6 +118,13 @@ function said() {
   if (isConnected && robotLink !== null) return words.headline(robotLink, state);
   if (link.refusal) return [`${link.refusal} (trying again)`, "bad", true];
   return robotLink === null ? ["connecting", "faint", false] : ["connection to gvgbot web lost, trying again", "bad", true];
+}
+
+// For screen readers, which would read a time that runs again each second.
+function speak(text) {
+  const news = text.replace(/\d+ (h|min|s)\b/g, "");
+  if (spoken !== news) $("spoken").textContent = text;
+  spoken = news;
 }
 
 // Make the children of a list say what they should, and touch only those that change.
