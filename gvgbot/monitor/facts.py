@@ -51,7 +51,7 @@ def facts(state: State, plan: Plan | None, health: Health | None) -> Iterator[Fa
     yield Fact("guard", *((state.guard, "warning") if state.guard else ("free", "plain")))
     yield from _place(state)
     for mate in state.team:
-        place = f"{mate.pose[0]:.2f} {mate.pose[1]:.2f} m"
+        place = f"{mate.pose[0]:z.2f} {mate.pose[1]:z.2f} m"
         yield Fact(shortened(mate.name, _MATE - len(place)), place)
     yield Fact("driven", f"{state.distance:.1f} m")
     yield Fact("laser", *_link(state.laser))
@@ -59,7 +59,7 @@ def facts(state: State, plan: Plan | None, health: Health | None) -> Iterator[Fa
     yield Fact("control", *_control(state, health))
     yield Fact("program", *_program(health))
     yield Fact("contacts", *_contacts(state))
-    yield Fact("speed", f"{state.twist[0]:.2f} m/s  {math.degrees(state.twist[1]):+.0f}°/s")
+    yield Fact("speed", f"{state.twist[0]:z.2f} m/s  {math.degrees(state.twist[1]):+z.0f}°/s")
     yield Fact("vertices", f"{state.vertices}, {counted(state.edges, 'edge')}")
 
 
@@ -104,7 +104,7 @@ def _place(state: State) -> Iterator[Fact]:
         yield Fact("pose", "not known", "warning")
         return
     x, y, theta = state.pose
-    yield Fact("pose", f"{x:.2f} {y:.2f} m  {_degrees(theta)}")
+    yield Fact("pose", f"{x:z.2f} {y:z.2f} m  {_degrees(theta)}")
     yield Fact("sigma", _sigma(state))
 
 

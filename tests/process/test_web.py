@@ -958,8 +958,11 @@ def test_a_robot_that_is_stuck_waits_is_silent_or_has_left_and_a_lost_server_are
             waits = msgspec.structs.replace(ended, phase="paused", base=there)
             play.state = msgspec.structs.replace(waits, cycle_age=5.0)
             play.until(f"{headline} === 'its control loop is stuck'")
-            play.state = waits
+            play.state = msgspec.structs.replace(waits, pose=(-0.001,) * 3, twist=(-0.001, -0.001))
             play.until(f"{headline} === 'paused'")
+            told = page.text()
+            assert "0.00, 0.00 m, 0°" in told
+            assert "-0.00" not in told
             page.until(f"{banner}.startsWith('quiet for 3 s')")
             spoken = "document.querySelector('[role=alert]').textContent"
             first = page.look(spoken)

@@ -167,7 +167,7 @@ function drawPlace() {
 }
 
 function placeText() {
-  if (place.vertex === undefined) return `${place.x.toFixed(2)}, ${place.y.toFixed(2)} m`;
+  if (place.vertex === undefined) return words.place(place.x, place.y);
   const vertex = picture.known?.vertices.find((one) => one.id === place.vertex);
   return vertex === undefined ? `vertex ${place.vertex} is no more` : words.ofVertex(vertex);
 }

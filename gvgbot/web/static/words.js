@@ -3,6 +3,8 @@
 export const LOW_BATTERY = 0.28, STUCK = 1.0, LATE = 0.1; // of a full charge; s; s
 
 export const degrees = (angle) => `${Math.round((angle * 180) / Math.PI) + 0}°`;
+const metres = (value) => (Math.round(100 * value) / 100 + 0).toFixed(2); // no -0.00
+export const place = (x, y) => `${metres(x)}, ${metres(y)} m`;
 export const percent = (share) => `${Math.round(100 * share)} %`;
 
 export function duration(seconds) {
@@ -28,8 +30,8 @@ export const size = (vertices, edges) => `${counted(vertices, "vertex", "vertice
 
 export function ofVertex(vertex) {
   const [x, y] = vertex.position, [xx, xy, , yy] = vertex.covariance, open = vertex.frontiers.length;
-  const place = `${vertex.kind} ${vertex.id} at ${x.toFixed(2)}, ${y.toFixed(2)} m; sigma ${length(axes(xx, xy, yy)[0])}`;
-  return `${place}, clearance ${vertex.clearance.toFixed(2)} m${open ? `, ${counted(open, "frontier", "frontiers")}` : ""}`;
+  const known = `${vertex.kind} ${vertex.id} at ${place(x, y)}; sigma ${length(axes(xx, xy, yy)[0])}`;
+  return `${known}, clearance ${vertex.clearance.toFixed(2)} m${open ? `, ${counted(open, "frontier", "frontiers")}` : ""}`;
 }
 
 const TONES = { exploring: "good", errand: "good", waiting: "good", finished: "good", paused: "warning", starting: "warning", halted: "bad" };
@@ -45,7 +47,7 @@ export function facts(state, plan) {
     ["outcome", state.outcome?.replaceAll("_", " ") ?? "none yet", state.outcome ? toneOfPhase(state) : "faint"],
     ...intention(state, plan),
     ...where(state),
-    ["speed", `${state.twist[0].toFixed(2)} m/s, ${degrees(state.twist[1])}/s`, "plain"],
+    ["speed", `${metres(state.twist[0])} m/s, ${degrees(state.twist[1])}/s`, "plain"],
     ["driven", `${state.distance.toFixed(1)} m`, "plain"],
     ["map", size(state.vertices, state.edges), "plain"],
     ["frontiers", frontiers(state), "plain"],
@@ -55,7 +57,7 @@ export function facts(state, plan) {
     ["control", ...control(state)],
     ["guard", state.guard ?? "free", state.guard ? "warning" : "plain"],
     ["contacts", contacts(state), state.contacts || state.slips ? "warning" : "plain"],
-    ...(state.team ?? []).map(({ name, pose }) => [name, `${pose[0].toFixed(2)}, ${pose[1].toFixed(2)} m`, "plain"]),
+    ...(state.team ?? []).map(({ name, pose }) => [name, place(pose[0], pose[1]), "plain"]),
   ];
 }
 
@@ -63,7 +65,7 @@ function where(state) {
   if (isLost(state)) return [["pose", "not known", "warning"]];
   const [x, y, theta] = state.pose, turn = Math.sqrt(Math.max(0, state.covariance[8]));
   return [
-    ["pose", `${x.toFixed(2)}, ${y.toFixed(2)} m, ${degrees(theta)}`, "plain"],
+    ["pose", `${place(x, y)}, ${degrees(theta)}`, "plain"],
     ["sigma", `${length(sigma(state))}, ${((turn * 180) / Math.PI).toFixed(1)}°`, "plain"],
   ];
 }

@@ -157,7 +157,8 @@ def test_troubles_of_links_are_counted() -> None:
             Fact("battery", "█░░░░░░░ 10% 13.2 V", "bad"),
         ),
         ({"phase": "halted"}, "phase", Fact("phase", "halted", "bad")),
-        ({"pose": (0.0, 0.0, -0.001)}, "pose", Fact("pose", "0.00 0.00 m  0°", "plain")),
+        ({"pose": (-0.001, -0.001, -0.001)}, "pose", Fact("pose", "0.00 0.00 m  0°", "plain")),
+        ({"twist": (-0.001, -0.001)}, "speed", Fact("speed", "0.00 m/s  +0°/s", "plain")),
     ],
 )
 def test_what_needs_a_look_is_toned(changes: dict[str, object], name: str, expected: Fact) -> None:
