@@ -28,6 +28,11 @@ class Written:
     purpose: str
     kept: bool = False
 
+    @property
+    def is_there(self) -> bool:
+        """Whether it stays as somebody has left it."""
+        return self.kept and self.path.exists()
+
 
 def install_service(
     config: Path | None, *, user: bool, dry_run: bool, say: Callable[[str], None]
@@ -35,8 +40,8 @@ def install_service(
     """Write the files of the service, or only say what would be written; the exit status.
 
     Raises ConfigError for a configuration with mistakes, or with files that the service would not
-    find, GvgbotError if the service could not run from where this program is, also of a dry run, or
-    if a file cannot be written.
+    find, be it one that is kept, GvgbotError if the service could not run from where this program
+    is, also of a dry run, or if a file cannot be written.
     """
     source = packaged("turtlebot2.yaml" if config is None else config)
     _check_paths(source, load_config(source), user=user)
@@ -50,8 +55,13 @@ def install_service(
         else system_files(source, Path("/"), programs, version)
     )
     for file in wanted:
+        if file.is_there:
+            _check_paths(file.path, load_config(file.path), user=user)
+    for file in wanted:
         done = _would(file) if dry_run else _write(file, "" if user else ": try sudo, or --user")
         say(f"{done} {file.path}: {file.purpose}")
+        if config is not None and file.is_there and _text(file.path) != file.content:
+            say(f"  {config} is not used: to have it, remove the one that is kept, and repeat this")
     say("then run:")
     for command in USER_COMMANDS if user else SYSTEM_COMMANDS:
         say(f"  {command}")
@@ -149,12 +159,12 @@ def _text(path: Path) -> str:
 
 def _would(file: Written) -> str:
     """What would be done with a file, in words."""
-    return "would keep" if file.kept and file.path.exists() else "would write"
+    return "would keep" if file.is_there else "would write"
 
 
 def _write(file: Written, remedy: str) -> str:
     """Write a file; what was done, in a word. Raises GvgbotError with what helps who may not."""
-    if file.kept and file.path.exists():
+    if file.is_there:
         return "kept"
     try:
         file.path.parent.mkdir(parents=True, exist_ok=True)

@@ -116,7 +116,24 @@ def test_what_is_written_can_be_used_and_a_configuration_is_kept(
     config.write_text("{robot: {name: mine}}")
     assert main(["install-service", "--user"]) == 0
     assert load_config(config).robot.name == "mine"
-    assert f"kept {config}" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert f"kept {config}" in said
+    assert "not used" not in said
+    assert main(["install-service", "--user", "turtlebot2.yaml"]) == 0
+    assert load_config(config).robot.name == "mine"
+    assert "turtlebot2.yaml is not used" in capsys.readouterr().out
+
+
+def test_a_kept_configuration_that_this_version_refuses_is_told_of(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    config = tmp_path / ".config/gvgbot/gvgbot.yaml"
+    config.parent.mkdir(parents=True)
+    config.write_text("{robot: {nam: mine}}")
+    assert main(["install-service", "--user"]) == 2
+    assert capsys.readouterr().err.startswith(f"gvgbot: {config}: robot.nam")
+    assert list(config.parent.parent.iterdir()) == [config.parent]
 
 
 def test_who_may_not_write_at_home_is_not_sent_there(
