@@ -16,7 +16,7 @@ from gvgbot.strict_yaml import packaged
 
 _BACK_OFF_SINCE = 254  # the version of systemd from which on restarts can be spaced out
 _BACK_OFF = "RestartSteps=6\nRestartMaxDelaySec=60\n"
-_HIDDEN = ("/home", "/root", "/run/user")  # from services, by ProtectHome
+_HIDDEN = ("/home", "/root", "/run/user", "/tmp", "/var/tmp")  # by ProtectHome and PrivateTmp
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,7 +207,7 @@ def _hidden(path: Path) -> str | None:
 
 
 def _check_place(executable: Path) -> None:
-    """Raises GvgbotError if the service, which sees no home, would not find its program."""
+    """Raises GvgbotError if the service, which sees neither homes nor /tmp, would not find it."""
     elsewhere = "install gvgbot elsewhere, for instance with python3 -m venv /opt/gvgbot"
     another = (
         "make its environment with a Python that is elsewhere, for instance with "

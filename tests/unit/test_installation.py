@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from gvgbot import installation
 from gvgbot.cli import main
 from gvgbot.config import load_config
 from gvgbot.installation import system_files, user_files
@@ -212,6 +213,9 @@ def test_a_configuration_with_files_that_the_service_cannot_see_is_not_installed
     (line,) = capsys.readouterr().err.splitlines()
     assert "sees nothing of /home" in line
     assert main(["install-service", "--dry-run", "--user", str(config)]) == 0
+    config.write_text(setting % "/tmp/mine")  # it has one of its own
+    assert main(["install-service", "--dry-run", str(config)]) == 2
+    assert "sees nothing of /tmp" in capsys.readouterr().err
     config.write_text(setting % "/etc/gvgbot/mine")
     assert main(["install-service", "--dry-run", str(config)]) == 0
 
@@ -230,6 +234,7 @@ def test_a_service_that_could_not_see_its_program_is_not_installed(
 def test_an_environment_whose_interpreter_the_service_could_not_see_is_to_be_made_anew(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    monkeypatch.setattr(installation, "_HIDDEN", ("/home",))  # not where this test makes its own
     python = tmp_path / "gvgbot/bin/python"
     python.parent.mkdir(parents=True)
     python.symlink_to("/home/me/.pyenv/bin/python3.11")
