@@ -45,6 +45,14 @@ def test_the_unit_starts_the_programs_of_this_installation() -> None:
     assert stop in unit
 
 
+def test_the_service_may_open_serial_ports_by_usb_and_of_the_board() -> None:
+    """Majors as in Documentation/admin-guide/devices.txt of Linux."""
+    majors = {"ttyS": 4, "ttyACM": 166, "ttyUSB": 188, "ttyAMA": 204}
+    unit = contents(252)["/etc/systemd/system/gvgbot.service"].splitlines()
+    allowed = {line for line in unit if line.startswith("DeviceAllow=")}
+    assert allowed == {f"DeviceAllow=char-{major} rw" for major in majors.values()}
+
+
 @pytest.mark.parametrize(("version", "spaced"), [(None, False), (253, False), (254, True)])
 def test_restarts_are_spaced_out_where_systemd_can(version: int | None, spaced: bool) -> None:
     unit = contents(version)["/etc/systemd/system/gvgbot.service"].splitlines()
