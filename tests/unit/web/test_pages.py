@@ -46,6 +46,28 @@ def test_every_file_that_the_page_names_is_there() -> None:
     assert set(named) == files.keys() - {"index.html"}
 
 
+def luminance(colour: str) -> float:
+    """Of #rrggbb, as WCAG 2 has it."""
+    parts = [int(colour[at : at + 2], 16) / 255 for at in (1, 3, 5)]
+    red, green, blue = (p / 12.92 if p <= 0.03928 else ((p + 0.055) / 1.055) ** 2.4 for p in parts)
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue
+
+
+def test_every_colour_stands_out_as_the_web_s_guidelines_want() -> None:
+    """WCAG 2.1: 4.5 to 1 for text, 3 to 1 for the parts of a picture."""
+    themes = (STATIC / "style.css").read_text().split("--paper: ")[1:]
+    assert len(themes) == 3  # light, dark by the system, dark by choice
+    for theme in themes:
+        colours = dict(re.findall(r"--(\w+): (#\w{6})", "--paper: " + theme.split("}")[0]))
+        text, back = ("ink", "faint", "good", "warning", "bad"), ("card", "paper")
+        drawn = ("wall", "edge", "vertex", "ellipse", "frontier", "plan", "trail", "scan", "robot")
+        wanted = [(one, on, 4.5) for one in text for on in back]
+        wanted += [(one, on, 3.0) for one in drawn for on in ("floor", "paper")]
+        for one, on, least in wanted:
+            dark, light = sorted(luminance(colours[name]) for name in (one, on))
+            assert (light + 0.05) / (dark + 0.05) >= least, (one, on)
+
+
 def request(host: str | None, origin: str | None) -> Request:
     fields = {"Host": host, "Origin": origin}
     return Request("/", Headers({name: text for name, text in fields.items() if text is not None}))
