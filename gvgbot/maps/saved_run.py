@@ -88,7 +88,7 @@ class SavedRun:
                 f"replay {directory} makes one"
             )
         if not (directory / "map.geojson").exists():
-            raise UsageError(f"{directory} is no run directory: there is no map.geojson in it")
+            raise UsageError(_why_there_is_no_map(directory))
         is_joined = bool(robots_in(directory)) and not (directory / "estimate.tum").exists()
         estimate, odometry = (
             decode_tum("") if is_joined else _decoded(directory / name, decode_tum)
@@ -103,6 +103,17 @@ class SavedRun:
             events=_events(directory / EVENTS),
             summary=_summary(directory / SUMMARY),
         )
+
+
+def _why_there_is_no_map(directory: Path) -> str:
+    if not directory.exists():
+        return f"there is no directory {directory}"
+    if (directory / EVENTS).exists():
+        return (
+            f"{directory} has no map.geojson yet: the robot saves its map with the first vertex, "
+            "when it ends, and when asked with gvgbot ctl save"
+        )
+    return f"{directory} is no run directory: there is no map.geojson in it"
 
 
 def robots_in(directory: Path) -> list[Path]:

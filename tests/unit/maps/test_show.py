@@ -56,6 +56,14 @@ def test_info_says_what_the_map_holds(run: Path, capsys: Captured) -> None:
     assert words["accuracy"].startswith("sigma of a vertex 0.050 m (median), 0.080 m at worst")
 
 
+def test_a_run_that_was_killed_before_its_first_vertex_has_no_map_yet(
+    tmp_path: Path, capsys: Captured
+) -> None:
+    (tmp_path / "events.jsonl").touch()
+    assert main(["map", "info", str(tmp_path)]) == 2
+    assert f"{tmp_path} has no map.geojson yet" in capsys.readouterr().err
+
+
 def test_a_run_that_was_killed_can_still_be_looked_at(run: Path, capsys: Captured) -> None:
     (run / "summary.json").unlink()
     with (run / "events.jsonl").open("a") as events:
