@@ -20,6 +20,7 @@ _APART_M, _TOGETHER_M = 0.5, 0.2  # two ways that are farther apart, or no farth
 _FROM_VERTEX_M = 1.0  # nearer to one there is no second one that was missed
 _SAME_RAD = 0.7  # a departure is the one that the robot left by
 _LEAST_PART_M, _MOST_STRAYS = 0.3, 100  # of an edge, that are worth telling
+_LEAST_LEFT_M = 1.0  # beyond a vertex's disc: through a door and out of it
 _LEAST_LOST_M = 1.0  # less than before: it does not only go back over it
 _TIMES_MISSED = 3  # driven past without being found, a vertex is none
 _SHUTTLE_S = 3.0  # more often, it only looks as if it came from one end to the other
@@ -94,9 +95,22 @@ class DrivenEdges:
             if half is None:  # its vertex was none
                 self._strays.append((part.map_line, part.narrowest))
             if half is None or half.edge is not None:
+                self._note_dead_end(end, part)
                 del self._parts[end]
             else:
                 part.map_line = belief.map_vertex(end.vertex).transform(part.line)
+
+    def _note_dead_end(self, end: HalfEdgeId, part: _Part) -> None:
+        """An edge to a dead end was driven, although its end was seen before the robot was there.
+
+        It turns back then. If it left by a door, that may be hard to see from outside.
+        """
+        graph = self._mapper.graph
+        edge = graph.edge_at(end)
+        if edge is None or graph.vertices[edge.other(end).vertex].degree > 1:
+            return
+        if length_of(part.line) > graph.vertices[end.vertex].clearance + _LEAST_LEFT_M:
+            edge.driven = True
 
     def _account_for(self, view: View, known: Correspondence, passage: Passage) -> None:
         """Count a traversal, or close the edge that was driven from a vertex now out of sight."""

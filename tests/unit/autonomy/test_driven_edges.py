@@ -110,6 +110,25 @@ def test_a_way_that_was_given_up_and_is_driven_is_an_edge(given_up: HalfEdgeId) 
     assert graph.blocked() == []
 
 
+@pytest.mark.parametrize(
+    ("metres", "degree", "is_driven"), [(3.0, 1, True), (1.5, 1, False), (3.0, 2, False)]
+)
+def test_a_dead_end_is_driven_by_who_is_well_in_it_when_its_end_is_seen(
+    metres: float, degree: int, *, is_driven: bool
+) -> None:
+    """The street is 2 m wide; nobody has been at what else there may be at that end."""
+    drive = Drive(HalfEdgeId(1, NORTH))
+    graph = drive.mapper.graph
+    graph.vertices[5] = Vertex(5, 1.0, Pose(0.0, 4.0, 0.0), 0.0, 0.0)
+    for bearing in (-np.pi / 2, 0.0)[:degree]:
+        graph.vertices[5].add_half_edge(bearing)
+    drive.along(STREET, ALL_SEEN, (0.0, 0.5), (0.0, metres))
+    way = np.array([[0.0, 0.0], [0.0, 4.0]])
+    edge = graph.join(HalfEdgeId(1, NORTH), HalfEdgeId(5, 0), way, 1.0, driven=False)
+    drive.along(STREET, ALL_SEEN, (0.0, metres), (0.0, metres - 0.1))
+    assert edge.driven == is_driven
+
+
 @pytest.mark.parametrize("is_seen", [True, False], ids=["seen", "gone"])
 def test_what_was_none_leads_nowhere(*, is_seen: bool) -> None:
     """To the north, where there seemed to be a way, and across to the east, before the vertex."""
