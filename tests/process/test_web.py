@@ -796,6 +796,9 @@ def test_all_layers_and_a_short_word_on_a_vertex_find_room_on_a_phone(page: Page
             ends += "one.getBoundingClientRect().right)"
             assert max(page.look(ends)) <= 390
             assert page.look("document.querySelector('#layers').offsetHeight") < 100
+            assert page.look("document.querySelector('header').offsetHeight") < 60
+            named = "document.querySelector('#robot').textContent = 'turtlebot2-of-the-third-floor'"
+            assert page.look(f"{named}, document.querySelector('#headline').offsetWidth") > 100
             play.until_drawn(lambda seen: seen["wall"][1] > 1000, "wall")
             play.drawn()
             x, y = stretch(page, "vertex")[0]
