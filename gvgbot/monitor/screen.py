@@ -9,7 +9,7 @@ from rich.text import Text
 from gvgbot.client import Event, Health, State
 from gvgbot.monitor.chart import LAYERS, Chart, Layer, Scene, chart
 from gvgbot.monitor.facts import Fact, Tone, facts, told
-from gvgbot.words import printable
+from gvgbot.words import printable, shortened
 
 _FACTS_WIDTH, _NAME_WIDTH = 31, 10
 _LEAST_MAP_WIDTH = 20
@@ -70,14 +70,15 @@ class Picture:
             beside = self._facts(middle)
             body = [_joined(a, b) for a, b in zip(self._map(drawn), beside, strict=False)]
             scale = drawn.scale
-        lines = [self._head(), *body[:middle], _ruled("events, how long ago", width)]
+        lines = [self._head(width), *body[:middle], _ruled("events, how long ago", width)]
         lines = [*lines, *self._events(listed), _foot(scale, width)][:height]
         for line in lines:
             line.truncate(width, overflow="ellipsis", pad=True)
         return lines
 
-    def _head(self) -> Text:
-        text = Text(f" {self.headline.name} ", "reverse bold")
+    def _head(self, width: int) -> Text:
+        name = shortened(self.headline.name, max(3, width // 2))
+        text = Text(f" {name} ", "reverse bold")
         return text.append(f" {self.headline.text}", _TONES[self.headline.tone])
 
     def _map(self, drawn: Chart) -> list[Text]:

@@ -113,6 +113,13 @@ def test_a_small_terminal_shows_what_matters_most() -> None:
         assert any(line.startswith(fact) for line in shown), fact
 
 
+def test_a_long_name_leaves_room_for_what_the_robot_does() -> None:
+    headline = Fact("turtlebot2-of-the-third-floor-in-the-east-wing", "robot gone", "bad")
+    head = Terminal(40, 12).show(replace(PICTURE, headline=headline))[0]
+    assert head.startswith(" turtlebot2")
+    assert head.rstrip().endswith("robot gone")
+
+
 def test_a_terminal_that_is_too_narrow_for_the_map_says_so() -> None:
     told = "the map needs 52 columns"
     assert Terminal(40, 12).show(PICTURE)[-1] == told.ljust(34) + "q quit"
