@@ -29,6 +29,7 @@ class Sight:
         traffic: Traffic,
     ) -> None:
         self._reduction, self._half_width_m = config.reduction, config.local_map.half_width_m
+        self._radius = robot_radius
         self._needed_m = robot_radius + config.passage_margin_m  # from its middle to walls
         self._noisy_walls = NoisyWalls(self._needed_m, config.local_map)
         self._mapper, self.hazards, self._traffic = mapper, hazards, traffic
@@ -65,6 +66,7 @@ class Sight:
             field_of_view=scan.field_of_view,
             virtual_walls=self.hazards.virtual_walls,
             felt=felt,
+            robot_radius=self._radius,
         )
 
     def _local_gvg(self, local_base: Pose, local_map: LocalMap) -> LocalGvg:

@@ -34,6 +34,7 @@ class View:
     field_of_view: tuple[float, float] = (-math.pi, math.pi)  # rad, base frame
     virtual_walls: Array = field(default_factory=lambda: np.empty((0, 2)))  # points (N, 2)
     felt: Array = field(default_factory=lambda: np.empty((0, 2)))  # doubtful, but never seen
+    robot_radius: float = 0.177  # m
     _obstacles: list[cKDTree] = field(default_factory=list, init=False)  # once they were asked for
 
     def obstacles(self) -> cKDTree:

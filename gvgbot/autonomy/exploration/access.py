@@ -215,6 +215,8 @@ def _straight_from(
     line = np.linspace(start, goal, math.ceil(distance / _SPACING_M) + 1)
     room = np.asarray(view.obstacles().query(line)[0])
     narrow = room < min(least_room, float(room[0]) - slack)  # where it stands, it may stand close
-    if narrow.any() or not view.local_map.known(line).all():
+    # Behind a laser at its front, nothing may have been seen of where the robot stands itself.
+    beyond = line[np.hypot(*(line - view.local_base.position).T) > view.robot_radius]
+    if narrow.any() or not view.local_map.known(beyond).all():
         return None
     return line, room

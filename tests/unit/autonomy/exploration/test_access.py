@@ -16,7 +16,7 @@ from gvgbot.autonomy.gvg.local import LocalGvg
 from gvgbot.autonomy.views import View
 from gvgbot.geometry import Pose
 from tests.unit.autonomy.local_graphs import Point, drawn
-from tests.unit.autonomy.sights import Rectangle, carved, looked
+from tests.unit.autonomy.sights import LASER_270, Rectangle, carved, looked
 
 ROOM_AND_CORRIDOR = carved([(-4.0, -2.0, 4.0, 2.0), (-4.0, -4.0, 4.0, -2.2)])
 NEAR: dict[int, tuple[int, int, list[Point]]] = {10: (1, 2, []), 11: (3, 4, [])}
@@ -68,6 +68,25 @@ def test_out_of_a_slot_there_is_a_way_whichever_way_one_looks(heading: float) ->
     line, room = way
     assert line[-1, 1] > 1.0
     assert room.min() > 0.19
+
+
+def test_a_robot_whose_laser_is_at_its_front_leaves_a_slot() -> None:
+    """Of where its middle is, nothing was seen: it is 1.2 m across and has not moved yet."""
+    here, front = Pose(), Pose(0.47, 0.0, 0.0)
+    slot = carved([(-0.7, -0.63, 1.7, 0.63), (1.7, -4.0, 6.0, 4.0)])
+    view = View(
+        0,
+        0.0,
+        0.0,
+        here,
+        LocalGvg(),
+        looked(slot, [front], field_of_view=LASER_270),
+        robot_radius=0.6,
+    )
+    assert not view.local_map.known(np.zeros((1, 2))).any()
+    way = way_into_the_open(view, [])
+    assert way is not None
+    assert way[1].min() > 0.6
 
 
 def test_who_has_come_between_things_gets_out_to_another_point_of_the_edge() -> None:
