@@ -175,10 +175,13 @@ def _scatter(residual: Array) -> float:
 
 
 def _weights(residual: Array, config: ScanMatchingConfig) -> Array:
-    """What pairs count, 1/m^2, by their residuals (K,): Huber's, less from two sigmas on."""
+    """What pairs count, 1/m^2, by their residuals (K,), less from two sigmas on.
+
+    By the square, as Cauchy's: what has changed, or just come into view, lets go in the end.
+    """
     sigma = config.pair_sigma_m
     far = np.maximum(1.0, np.abs(residual) * (0.5 / sigma))
-    weights: Array = config.independent_share / sigma**2 / far
+    weights: Array = config.independent_share / sigma**2 / far**2
     return weights
 
 

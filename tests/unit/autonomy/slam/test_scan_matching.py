@@ -170,6 +170,23 @@ def test_points_far_from_all_walls_are_no_match() -> None:
     assert register(points, cKDTree(walls), Pose(40.0, 0.0, 0.0), Q, CONFIG) is None
 
 
+def test_what_has_changed_pulls_the_less_the_farther_it_is_off() -> None:
+    """From two sigmas on by their square over the distance: half as far off, it pulls twice.
+
+    A third of a wall is where none was. It pulls as much as all that is there as before holds.
+    """
+    wide, aside = np.linspace(-3.0, 3.0, 600), np.linspace(-1.0, 1.0, 200)
+    ahead = np.stack([np.full(600, 4.0), wide], axis=1)
+    sides = np.concatenate([np.stack([aside, np.full(200, y)], axis=1) for y in (-3.0, 3.0)])
+    moved, knee = 0.12, 2.0 * CONFIG.pair_sigma_m
+    seen = ahead + np.where(np.arange(600) % 3 == 0, moved, 0.0)[:, None] * [1.0, 0.0]
+    points, walls = np.concatenate([seen, sides]), cKDTree(np.concatenate([ahead, sides]))
+    found = register(points, walls, Pose(), np.diag([1.0, 1.0, 1.0]), CONFIG)
+    assert found is not None
+    back = (moved - math.sqrt(moved**2 - 2.0 * knee**2)) / 2.0  # of 2 back = knee^2 / (moved - back)
+    assert found.pose.x == pytest.approx(-back, abs=1e-3)
+
+
 def test_too_few_points_are_no_match() -> None:
     walls = looked(CORNER, [Pose()]).points()
     points = hits(CORNER, Pose())[: CONFIG.min_pairs - 1]
