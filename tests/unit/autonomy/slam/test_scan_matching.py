@@ -183,7 +183,7 @@ def test_what_has_changed_pulls_the_less_the_farther_it_is_off() -> None:
     points, walls = np.concatenate([seen, sides]), cKDTree(np.concatenate([ahead, sides]))
     found = register(points, walls, Pose(), np.diag([1.0, 1.0, 1.0]), CONFIG)
     assert found is not None
-    back = (moved - math.sqrt(moved**2 - 2.0 * knee**2)) / 2.0  # of 2 back = knee^2 / (moved - back)
+    back = (moved - math.sqrt(moved**2 - 2.0 * knee**2)) / 2.0  # 2 back = knee^2 / (moved - back)
     assert found.pose.x == pytest.approx(-back, abs=1e-3)
 
 
