@@ -150,7 +150,7 @@ def a_robot(endpoint: str, name: str = "karl") -> Telemetry:
 @pytest.mark.parametrize("way_out", ["q", "Q", "\x03"])
 def test_a_person_watches_a_robot_and_leaves(endpoint: str, way_out: str) -> None:
     with a_robot(endpoint), monitor("karl", "--connect", endpoint) as seat:
-        wanted = ("go to vertex 1", "pose      3.00 2.00 m  0°", "⣿⣿")
+        wanted = ("go to vertex 1", "pose      3.00 2.00 m  0°", "⣿⣿", "●")
         text = seat.until(lambda text: all(words in text for words in wanted))
         (row,) = [
             line[:48] for line in text.split("\n") if "→" in line[:48] and "robot" not in line
