@@ -51,6 +51,8 @@ def survey(pipeline: Pipeline) -> Surveyed:
     views = viewpoints(grid, beside, places, here, room, off)
     if views is None:
         return Surveyed(found, narrow, is_beside_floor=len(found) > 0)
+    if not len(narrow):
+        return Surveyed(views, narrow)
     before = floor_beside(grid, narrow, here, room)
     into = np.full(len(before), _INTO_M)
     doorsteps = viewpoints(grid, beside, before, here, room, into)

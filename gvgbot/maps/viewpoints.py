@@ -30,11 +30,9 @@ def viewpoints(
     `passage_m` from walls. None if no way is so far from them, anywhere.
     """
     cell, corner = grid.resolution_m, np.array(grid.origin)
-    walls = is_wall(grid.cells)
-    has_room = metres_to(walls, cell) > passage_m
+    has_room, floor = _room(grid, around, passage_m)
     if not (marked(ways, grid) & has_room).any():
         return None
-    floor = reachable(is_floor(grid.cells) & has_room, (around - corner)[::-1] / cell)
     near_ways = cells_near(ways, grid, floor)
     floor, near_ways = np.pad(floor, 1), np.pad(near_ways, 1)  # every cell has four neighbours
     found = []
@@ -54,11 +52,16 @@ def floor_beside(grid: OccupancyGrid, places: Array, around: Array, passage_m: f
     """
     if not len(places):
         return places
-    cell, corner = grid.resolution_m, np.array(grid.origin)
-    has_room = metres_to(is_wall(grid.cells), cell) > passage_m
-    floor = reachable(is_floor(grid.cells) & has_room, (around - corner)[::-1] / cell)
-    middles = corner + (np.argwhere(floor)[:, ::-1] + 0.5) * cell
+    _, floor = _room(grid, around, passage_m)
+    middles = np.array(grid.origin) + (np.argwhere(floor)[:, ::-1] + 0.5) * grid.resolution_m
     return middles[cKDTree(middles).query(places)[1]] if len(middles) else np.empty((0, 2))
+
+
+def _room(grid: OccupancyGrid, around: Array, passage_m: float) -> tuple[Mask, Mask]:
+    """The cells that are so far from walls, and the floor of these that leads to `around` (2,)."""
+    has_room = metres_to(is_wall(grid.cells), grid.resolution_m) > passage_m
+    here = (around - np.array(grid.origin))[::-1] / grid.resolution_m
+    return has_room, reachable(is_floor(grid.cells) & has_room, here)
 
 
 def cells_near(ways: Array, grid: OccupancyGrid, floor: Mask) -> Mask:
