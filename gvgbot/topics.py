@@ -53,7 +53,7 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
     uptime: float = 0.0  # s since the robot's program began
     pose: tuple[float, float, float]  # map_base: x, y, theta
     covariance: tuple[float, ...]  # of the pose, 3x3 row-major; 1e6 on its diagonal: it is unknown
-    twist: tuple[float, float]  # as measured: m/s ahead, rad/s anticlockwise
+    twist: tuple[float, float]  # as measured: m/s ahead (of the last 0.1 s), rad/s anticlockwise
     battery_voltage: float | None
     battery_fraction: float | None  # of a full charge, 0..1
     vertices: int
@@ -237,7 +237,7 @@ class Odometry(msgspec.Struct, frozen=True, kw_only=True):
     stamp: float  # s, the robot's monotonic clock
     map_base: tuple[float, float, float]  # as believed: x, y, theta; see `covariance` of the state
     odom_base: tuple[float, float, float]  # by wheels and gyro alone, since the program began
-    twist: tuple[float, float]  # as measured: m/s ahead, rad/s anticlockwise
+    twist: tuple[float, float]  # as measured: m/s ahead (of the last 0.1 s), rad/s anticlockwise
 
 
 class Plan(msgspec.Struct, frozen=True, kw_only=True):

@@ -14,6 +14,7 @@ TICK_ANGLE = 0.002436916871363930  # rad of a wheel's turn per encoder count
 _WRAP = 65536  # encoder counts
 _ANGLE_SPAN = math.radians(655.36)  # of what 16 bits of a hundredth of a degree can tell
 _SLIP_MEMORY_S = 0.5  # time constant of the reported slip rate
+_SPEED_MEMORY_S = 0.1  # and of the speed: stamps of 1 ms alone make it jitter by a twentieth
 _IDLE_RAD = 0.001  # that the encoders of a base at rest may seem to turn it between two frames
 
 
@@ -42,9 +43,10 @@ class WheelReading:
 class WheelOdometry:
     """Where the base is, `odom_base`, how it moves, and the reading that this is based on.
 
-    `slip_rate` (rad/s, smoothed) is the turn rate of the gyro minus that of the wheels;
-    `implausible` counts readings in a row that jumped too far to be believed; `unfelt` is how far
-    the wheels have turned the base, to and fro (rad), since the gyro's heading last changed.
+    Its speed is smoothed, as is `slip_rate` (rad/s), the turn rate of the gyro minus that of the
+    wheels; `implausible` counts readings in a row that jumped too far to be believed; `unfelt` is
+    how far the wheels have turned the base, to and fro (rad), since the gyro's heading last
+    changed.
     """
 
     odom_base: Pose
@@ -77,13 +79,13 @@ def advance_odometry(
     turn = by_gyro if heading == "gyro" else by_wheels
     travel = (left + right) / 2
     rate = reading.rate if heading == "gyro" else by_wheels / dt
-    blend = dt / (dt + _SLIP_MEMORY_S)
-    slip_rate = state.slip_rate + blend * ((by_gyro - by_wheels) / dt - state.slip_rate)
+    slip_rate = _smoothed(state.slip_rate, (by_gyro - by_wheels) / dt, dt, _SLIP_MEMORY_S)
+    speed = _smoothed(state.twist.linear, travel / dt, dt, _SPEED_MEMORY_S)
     pose = _moved(state.odom_base, travel, turn)
     unfelt = state.unfelt + max(0.0, abs(by_wheels) - _IDLE_RAD)
     if reading.angle != state.reading.angle:
         unfelt = 0.0
-    return WheelOdometry(pose, Twist(travel / dt, rate), reading, slip_rate, unfelt=unfelt)
+    return WheelOdometry(pose, Twist(speed, rate), reading, slip_rate, unfelt=unfelt)
 
 
 def wheel_travels(
@@ -111,6 +113,11 @@ def turned(
 def doubt(state: WheelOdometry) -> WheelOdometry:
     """The state with one more unbelievable reading, which changes nothing else."""
     return replace(state, implausible=state.implausible + 1)
+
+
+def _smoothed(before: float, now: float, dt: float, memory: float) -> float:
+    """A value that follows what is measured now, after dt s, with a time constant (s)."""
+    return before - math.expm1(-dt / memory) * (now - before)
 
 
 def _moved(odom_base: Pose, travel: float, turn: float) -> Pose:
