@@ -12,6 +12,7 @@ from gvgbot.geometry import Twist
 from gvgbot.words import counted
 
 _MOST_NAMED = 40  # vertices, in an answer
+_SEEKS_A_WAY = "no known way leads there: it explores until it finds one"
 
 
 class Declined(Exception):
@@ -107,6 +108,8 @@ class Errands(Agenda):
             trouble = self._ground.no_way_to(ToVertex(vertex), here, f"to vertex {vertex}")
             self._check_explorable(ToVertex(vertex), here, trouble)
         self._take(ToVertex(vertex), stamp)
+        if route is None and here is not None:
+            return _SEEKS_A_WAY
         far = "" if route is None else f" {route.metres:.1f} m"
         return f"it drives{far} to vertex {vertex}"
 
@@ -178,6 +181,8 @@ class Errands(Agenda):
             self.closures.close_again(graph, opened)
             self._check_explorable(errand, here, trouble)
         self._take(errand, stamp)
+        if trouble is not None and away > DIRECT_M:
+            return _SEEKS_A_WAY
         where = "to where it started" if isinstance(errand, Home) else "there"
         return f"it drives {where}, {away:.1f} m away in a straight line"
 
