@@ -43,6 +43,7 @@ _LONGEST_GAP_S = 0.2  # between messages; logs leave some out
 _STEADY, _MOSTLY = 0.01, 0.9  # m and rad; of the sweeps
 _COARSE, _TIMELESS = 0.5, 0.95  # shares of the motion at stamps that are the same
 _DIGITS = 4  # of a place on the base
+_HITS = 0.01  # share of all beams that hit something at least; in millimetres hardly any does
 _MANY, _OFTEN = 3, 0.01  # beams of a sweep that have the same range; of the sweeps
 
 
@@ -71,6 +72,11 @@ class CarmenLog:
         return sum(later - earlier > LONGEST_PAUSE_S for earlier, later in stamps)
 
     @property
+    def hits(self) -> float:
+        """The share of all beams that hit something."""
+        return float(np.isfinite(np.concatenate([scan.ranges for scan in self.scans])).mean())
+
+    @property
     def likely_no_echo_m(self) -> float | None:
         """The greatest range, if so many beams have it that nothing can have been hit there."""
         sweeps = [scan.ranges[np.isfinite(scan.ranges)] for scan in self.scans]
@@ -95,7 +101,7 @@ def read_carmen(path: Path, *, no_echo_m: float, base_laser: Pose) -> CarmenLog:
     that nothing was hit. The base's pose at each scan counts as odometry too. The laser is at
     `base_laser`, or where the log has it if that is the middle of the base. The logger's stamps
     count where most others are the same. Raises UsageError for a file that cannot be read, is no
-    text, or has no sweep or no times in it.
+    text, or has no sweep, no times, or no ranges in metres in it.
     """
     log = _read(path, no_echo_m, by_logger=False)
     if log.timeless > _COARSE:
@@ -110,6 +116,11 @@ def read_carmen(path: Path, *, no_echo_m: float, base_laser: Pose) -> CarmenLog:
         raise UsageError(
             f"{path}: nearly all its lines have the same stamp as the next; give them their own, "
             "in s"
+        )
+    if log.hits < _HITS:
+        raise UsageError(
+            f"{path}: hardly any range is less than {no_echo_m:g} m: if they are in another unit, "
+            "make them metres; if its laser reaches farther, give --no-echo METRES"
         )
     return replace(log, scans=_mounted(log.scans, base_laser))
 

@@ -76,8 +76,8 @@ def test_ranges_may_be_inf_and_nan_as_in_logs_made_of_those_of_ros(
 ) -> None:
     """There inf is nothing in range, -inf something too near, and nan no measurement."""
     words = line.replace(" 1.5 ", " inf ").replace(" 0.0 2.5 ", " nan -inf ")
-    log = read(written(tmp_path / "a.log", words))
-    (scan,) = log.scans
+    log = read(written(tmp_path / "a.log", words, line))
+    scan, _ = log.scans
     assert log.damaged == 0
     np.testing.assert_array_equal(scan.ranges[:4], [math.inf, math.inf, math.nan, math.nan])
 
@@ -320,6 +320,7 @@ def test_a_packed_log_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
         (b"", "no FLASER"),
         (ODOM.encode(), "no FLASER"),
         (f"# none\n{FLASER} 1 2\n{FLASER} 3".encode(), "damaged lines: 2, the first in line 2"),
+        (f"FLASER 180{' 2500.0' * 180} 0 0 0 0 0 0 1 host 1".encode(), "make them metres"),
         (b"\x7fELF\0\0\1\n", "neither a recording"),
         (b"\x1f\x8bnot gzip at all", "cannot read"),
         (b"BZhnot bzip2 at all", "cannot read"),
