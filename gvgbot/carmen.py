@@ -77,6 +77,12 @@ class CarmenLog:
         return float(np.isfinite(np.concatenate([scan.ranges for scan in self.scans])).mean())
 
     @property
+    def spacing_m(self) -> float:
+        """How far it drove from one scan to the next, on average."""
+        way = pairwise(one.odom_base for one in self.odometry)
+        return sum(a.distance(b) for a, b in way) / len(self.scans)
+
+    @property
     def likely_no_echo_m(self) -> float | None:
         """The greatest range, if so many beams have it that nothing can have been hit there."""
         sweeps = [scan.ranges[np.isfinite(scan.ranges)] for scan in self.scans]

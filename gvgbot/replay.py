@@ -20,6 +20,7 @@ from gvgbot.words import counted
 MCAP = b"\x89MCAP"
 CARMEN_CONFIG = Path("carmen.yaml")
 NO_ECHO_M = 80.0  # of the lasers that CARMEN logs were made with
+_SPARSE_M = 1.0  # between two scans; what they show in common is too little to find slips by
 
 
 @dataclass(slots=True)
@@ -177,6 +178,11 @@ def _carmen(wanted: Wanted) -> Log:
     flaws = [f"but:     {first_of(flaw, lines)}" for flaw, lines in found.items() if lines]
     if log.pauses:
         flaws.append(f"but:     long pauses, or a clock that was set: {log.pauses}")
+    if log.spacing_m > _SPARSE_M:
+        flaws.append(
+            f"but:     scans are {log.spacing_m:.1f} m apart: where wheels slipped between two of "
+            "them, the map may be wrong"
+        )
     if log.is_cut:
         flaws.append(
             "but:     the archive ends in the middle: copy it anew, if there is more of it"

@@ -185,6 +185,16 @@ def test_a_laser_that_gives_its_own_greatest_range_for_no_echo_is_told(
     assert [flaw.endswith(f"give --no-echo {told}") for flaw in log.flaws()] == [True] * bool(told)
 
 
+@pytest.mark.parametrize(("step_m", "told"), [(0.9, []), (1.5, ["1.5 m apart"])])
+def test_it_says_so_if_scans_have_too_little_in_common(
+    step_m: float, told: list[str], tmp_path: Path
+) -> None:
+    lines = [at(7.5 + k).replace("1.1 2.1", f"{step_m * k:.1f} 2.1") for k in range(50)]
+    path = written(tmp_path / "a.log", *lines)
+    log = open_log(Wanted(path=path, config=None, overrides=[], no_echo_m=None))
+    assert [flaw.split(":")[1].removeprefix("     scans are ") for flaw in log.flaws()] == told
+
+
 @pytest.mark.parametrize(("no_echo_m", "last"), [(None, 2.5), (2.0, math.inf)])
 def test_a_log_is_replayed_as_one_of_carmen_with_what_is_asked_for(
     no_echo_m: float | None, last: float, tmp_path: Path
