@@ -11,8 +11,10 @@ from benchmarks.rigs.hokuyo_bench import PERFECT, Bench, Scripted, TiresOfTime, 
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.drivers.hokuyo.driver import HokuyoConfig, HokuyoLaser
 from gvgbot.drivers.hokuyo.twin import HokuyoTwin, HokuyoTwinConfig
+from gvgbot.drivers.kobuki.twin import KobukiTwin, KobukiTwinConfig
 from gvgbot.drivers.transport import ByteStream, pipe, serve_twin
 from gvgbot.errors import DeviceLost, DeviceRefused
+from tests.twin.kobuki_body import IdealBody
 
 pytestmark = pytest.mark.twin
 
@@ -83,6 +85,21 @@ def test_a_laser_that_goes_dead_while_it_is_asked_for_its_time_is_lost() -> None
             with pytest.raises(DeviceLost, match="does not answer"):
                 await HokuyoLaser(here, HokuyoConfig(), clock).run()
             assert clock.now() < 4.0
+            served.cancel()
+
+    run_in_virtual_time(main())
+
+
+def test_a_base_at_the_port_of_the_laser_is_told_from_silence() -> None:
+    base = KobukiTwin(KobukiTwinConfig(), IdealBody(), 0)
+
+    async def main() -> None:
+        here, there = pipe()
+        clock = LoopClock()
+        async with asyncio.TaskGroup() as tasks:
+            served = tasks.create_task(serve_twin(base, there, clock))
+            with pytest.raises(DeviceLost, match="not the base's port"):
+                await HokuyoLaser(here, HokuyoConfig(), clock).run()
             served.cancel()
 
     run_in_virtual_time(main())

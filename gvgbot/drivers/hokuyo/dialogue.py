@@ -43,6 +43,7 @@ class Dialogue:
         self.clock = clock
         self.stream = stream
         self.timeout = reply_timeout
+        self.received = 0  # bytes, of a laser or of whatever is there
         self.answered = 0.0  # when the first byte of the last reply arrived, s
         self._parser = ScipParser()
         self._began = 0.0
@@ -84,6 +85,7 @@ class Dialogue:
         """The messages that the next bytes complete; there may be none."""
         continues = self._parser.pending > 0
         data = await self.stream.read()
+        self.received += len(data)
         now = self.clock.now()
         first_began = self._began if continues else now
         messages = self._parser.feed(data)

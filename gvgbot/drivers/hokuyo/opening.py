@@ -36,17 +36,28 @@ async def quiet(dialogue: Dialogue, *, patience: float) -> None:
     DeviceRefused if it does not come to rest.
     """
     until = dialogue.clock.now() + patience
-    refusals = 0
+    received, refusals = dialogue.received, 0
     while True:
         status = await _stopped(dialogue)
         if status == ACCEPTED:
             return
         if status is None and dialogue.clock.now() >= until:
-            remedy = "check its power and cable, and that laser.port is its port"
-            raise DeviceLost(f"the laser does not answer: {remedy}")
+            raise DeviceLost(_no_answer(is_silent=dialogue.received == received))
         if status is not None:
             refusals += 1
             await _cure(dialogue, status, refusals)
+
+
+def _no_answer(*, is_silent: bool) -> str:
+    """What is the matter, and what to do about it."""
+    if is_silent:
+        return (
+            "the laser does not answer: check its power and cable, and that laser.port is its port"
+        )
+    return (
+        "what comes from laser.port is no laser's: check that it is not the base's port, and its "
+        "cable"
+    )
 
 
 async def _stopped(dialogue: Dialogue) -> str | None:
