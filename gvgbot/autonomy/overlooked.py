@@ -1,4 +1,4 @@
-"""What a laser with a narrow view leaves unseen of a vertex: it is behind the robot there."""
+"""What a laser with a narrow view leaves unseen, at the start and at a vertex: it is behind it."""
 
 import math
 from collections.abc import Iterator
@@ -6,9 +6,16 @@ from collections.abc import Iterator
 from gvgbot.autonomy.situation import Situation
 from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.autonomy.views import View
+from gvgbot.hal.messages import Scan
 
 _AT_M = 0.5  # from a vertex, all of it is to be seen by turning
-_OVERLAP_RAD = 0.2  # by which it is turned farther
+_OVERLAP_RAD = 0.2  # of what is seen before and after a turn
+
+
+def blind_angle(scan: Scan) -> float:
+    """How far to turn left so that every direction has been seen, with some overlap; rad."""
+    first, last = scan.field_of_view
+    return max(0.0, math.tau - (last - first)) + _OVERLAP_RAD
 
 
 class Overlooked:

@@ -1,6 +1,5 @@
 """Every stage from HAL messages to a twist, in the order of the flow. No I/O, clock or chance."""
 
-import math
 from dataclasses import replace
 from functools import partial
 
@@ -34,6 +33,8 @@ from gvgbot.autonomy.keyframes import Past, has_come_on
 from gvgbot.autonomy.localisation import Localisation
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.mission import Mission
+from gvgbot.autonomy.obedience import DOES_NOT_MOVE, Obedience
+from gvgbot.autonomy.overlooked import blind_angle
 from gvgbot.autonomy.placing import LATELY_M, search_near_by
 from gvgbot.autonomy.pose_tracking import PoseTracker
 from gvgbot.autonomy.sight import Sight
@@ -59,7 +60,6 @@ STANDS_CARRIED = (
     "no walls that it knows are around it, and it was lifted or its base has started anew: if it "
     "was carried, restart the program, and it looks for its place on the whole map",
 )
-_OVERLAP_RAD = 0.2  # of what is seen before and after the first turn
 _LED_EVERY_M, _LED_EVERY_RAD = 0.4, 2.0  # looks for the GVG, where nobody waits for a way
 
 
@@ -93,7 +93,8 @@ class Pipeline:
         self._hazards = Hazards(config.hazards)
         self.traffic = Traffic(config.newcomers)
         self.sight = Sight(config, robot_radius, self.mapper, self._hazards, self.traffic)
-        self._handedness, self._turning = Handedness(), 0.0  # the latter as it wished last, rad/s
+        self._handedness, self._obedience = Handedness(), Obedience()
+        self._told = STANDSTILL  # what the base is to do
         self._incidents: list[tuple[str, str]] = []  # action and reason, since the last scan
         self._look_now = False
         self._doubted: int | None = None  # keyframe since which somebody doubts the pose
@@ -178,9 +179,11 @@ class Pipeline:
             return happened
         if self.past.last is not None:
             self.mission.skip(max(0.0, scan.stamp - self.past.last.stamp - LONGEST_GAP_S))
-        self._handedness.note(scan, odom_base, self._turning)
+        self._handedness.note(scan, odom_base, self._told.angular)
         if self._handedness.is_mirrored:
             return [*happened, *self._halt(scan.stamp, what_to_set(scan))]
+        if self._obedience.is_lacking:
+            return [*happened, *self._halt(scan.stamp, DOES_NOT_MOVE)]
         motion = self.tracker.odometry.motion_during(scan)
         sweep = Sweep.of(without_mixed_pixels(scan), motion)
         local_base = self._localise(sweep.deskewed, odom_base)
@@ -233,7 +236,7 @@ class Pipeline:
         if len(self.past.keyframes) == 1:
             if not scan.looks_ahead:
                 return self._halt(scan.stamp, _LOOKS_ASIDE)
-            self._execution.turn(_blind_angle(scan))
+            self._execution.turn(blind_angle(scan))
             return []
         if self._doubted is not None and len(self.past.keyframes) > self._doubted + 1:
             placed = self._search_near_by(view)
@@ -329,8 +332,10 @@ class Pipeline:
             turned = wrap_angle(odometry.odom_base.theta - before.odom_base.theta)
             since_s = odometry.stamp - before.stamp
             is_free = not self._is_idle and felt.stopped_for not in WAITS
-            counts = is_free and since_s < LONGEST_GAP_S
-            self._execution.note_turn(turned, since_s if counts else 0.0)
+            free_s = since_s if is_free and since_s < LONGEST_GAP_S else 0.0
+            self._execution.note_turn(turned, free_s)
+            unhindered_s = 0.0 if felt.stopped_for else free_s
+            self._obedience.note(odometry.odom_base, self._told, unhindered_s)
         self.tracker.odometry.append(odometry)
         if self.past.last is None or self.led:
             return STANDSTILL
@@ -345,7 +350,7 @@ class Pipeline:
             incident, twist = incident if isinstance(incident, PutDown) else None, STANDSTILL
         if incident is not None:
             self._take_down(incident, local_base)
-        self._turning = twist.angular
+        self._told = twist
         return twist
 
     def _wish(self, local_base: Pose) -> Twist:
@@ -394,9 +399,3 @@ class Pipeline:
                 self.errands.note_lifted()
                 self._incidents.append(("look around", "the robot was lifted"))
                 self.tracker.was_lifted = True
-
-
-def _blind_angle(scan: Scan) -> float:
-    """How far to turn so that every direction has been seen, with some overlap; rad."""
-    first, last = scan.field_of_view
-    return max(0.0, math.tau - (last - first)) + _OVERLAP_RAD

@@ -17,9 +17,11 @@ from gvgbot.autonomy.passed import Passed
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.config import load_config
 from gvgbot.geometry import STANDSTILL, Pose, Twist, wrap_angle
+from gvgbot.hal.guard import Reason
 from gvgbot.hal.messages import Contact, Odometry
 from tests.unit.autonomy.sights import LASER_270, carved, sweep
 
+NOTHING = Felt()
 CLOSET = carved([(-0.6, -0.6, 0.6, 0.5)])
 ROOMS = carved([(-4.0, -1.0, 4.0, 1.0), (0.0, -1.0, 2.0, 4.0)])
 
@@ -68,10 +70,12 @@ def test_who_is_led_looks_for_the_gvg_only_after_some_way() -> None:
     assert looks(led=False) >= 10
 
 
-def looked(pipeline: Pipeline, stamp: float, theta: float = 0.0) -> tuple[Twist, list[Event]]:
+def looked(
+    pipeline: Pipeline, stamp: float, theta: float = 0.0, *, x: float = 0.0, felt: Felt = NOTHING
+) -> tuple[Twist, list[Event]]:
     """Stand between the walls, turned by an angle, and look: how it drives, and what it learns."""
-    twist = pipeline.control(Odometry(stamp, Pose(0.0, 0.0, theta), STANDSTILL))
-    scan = sweep(ROOMS, Pose(-1.5, 0.0, theta), field_of_view=LASER_270)
+    twist = pipeline.control(Odometry(stamp, Pose(x, 0.0, theta), STANDSTILL), felt)
+    scan = sweep(ROOMS, Pose(x - 1.5, 0.0, theta), field_of_view=LASER_270)
     return twist, pipeline.perceive(replace(scan, stamp=stamp, time_increment=0.0))
 
 
@@ -98,15 +102,30 @@ def test_it_decides_by_nothing_that_was_seen_before_it_had_turned_round() -> Non
     assert twists[decided[0]] == STANDSTILL
 
 
-def test_a_base_that_cannot_turn_is_told_of_and_keeps_the_robot_busy_for_no_longer() -> None:
+def test_a_base_that_does_not_move_is_told_of_and_keeps_the_robot_busy_for_no_longer() -> None:
     config = load_config()
     pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
-    happened = list[Event]()
-    for second in range(1000):
-        happened += looked(pipeline, float(second))[1]
+    happened, second = list[Event](), 0.0
+    while pipeline.mission.outcome is None:
+        happened += looked(pipeline, second)[1]
+        second += 1.0
     told = [event.reason for event in happened if isinstance(event, Recovery)]
     assert told[0] == "the base does not turn"
-    assert isinstance(happened[-1], Finished)
+    assert 20.0 < second < 40.0
+    assert pipeline.mission.reason.startswith("the base does not move when it is told to: ")
+
+
+@pytest.mark.parametrize("reason", [None, "obstacle"])
+def test_a_robot_that_comes_on_by_little_or_is_held_is_no_base_that_does_not_move(
+    reason: Reason | None,
+) -> None:
+    """One that is driven 2 cm every ten seconds is that of a wheel that slips, or is very slow."""
+    config = load_config()
+    pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
+    for second in range(50):
+        x = 0.0 if reason else 0.02 * (second // 10)
+        looked(pipeline, float(second), x=x, felt=Felt(stopped_for=reason))
+    assert pipeline.mission.outcome is None
 
 
 @pytest.mark.parametrize(("time_increment", "to_be_set"), [(2e-5, "true"), (-2e-5, "false")])
