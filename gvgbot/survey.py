@@ -52,7 +52,8 @@ def survey(pipeline: Pipeline) -> Surveyed:
     if views is None:
         return Surveyed(found, narrow, is_beside_floor=len(found) > 0)
     if not len(narrow):
-        return Surveyed(views, narrow)
+        is_whole = not len(places) and not len(pipeline.sight.virtual_walls)
+        return Surveyed(views, narrow, is_whole=is_whole)
     before = floor_beside(grid, narrow, here, room)
     into = np.full(len(before), _INTO_M)
     doorsteps = viewpoints(grid, beside, before, here, room, into)

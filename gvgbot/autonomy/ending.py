@@ -19,6 +19,7 @@ class Surveyed(NamedTuple):
     narrows: Array  # (N, 2), ways too narrow for the robot that lead to floor without another
     is_beside_floor: bool = False  # all edges are where it lacks the room it wants, places are not
     doorsteps: Array = np.empty((0, 2))  # (M, 2), before these: somebody may have stood in them
+    is_whole: bool = False  # all floor is seen, and edges lead wherever they should
 
 
 Survey = Callable[[], Surveyed | None]  # None: not yet told
@@ -82,11 +83,17 @@ def leading_nowhere(
     """Frontiers are left, and the robot does not come on there; None as long as the survey takes.
 
     The middle of a room that is nearly square looks like the end of an edge from where not all of
-    the room is in sight.
+    the room is in sight. Where the map is whole, frontiers are what somebody in the way made up.
     """
     left: tuple[Outcome, str] = ("explored_with_blocked", reason)
-    is_bare = not graph.edges and all(v.kind == "endpoint" for v in graph.vertices.values())
-    return left if survey is None or not is_bare else _closed_room_or(left, survey)
+    if survey is None:
+        return left
+    if not graph.edges and all(v.kind == "endpoint" for v in graph.vertices.values()):
+        return _closed_room_or(left, survey)
+    surveyed = survey()
+    if surveyed is None:
+        return None
+    return ("explored", "no frontier is left that leads anywhere") if surveyed.is_whole else left
 
 
 def without_target(

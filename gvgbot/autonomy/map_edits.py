@@ -128,6 +128,15 @@ class MapEdits(Knowledge):
         for vertex in strays(self.graph):
             self.remove(view, vertex, "nothing leads there")
 
+    def forget_frontiers(self, view: View) -> None:
+        """Take out departures without an edge, and vertices that have no others."""
+        for end in [*self.graph.frontiers(), *self.graph.blocked()]:
+            if self.graph.edge_at(end) is None:
+                self.graph.remove_half_edge(end)
+        for vertex in list(self.graph.vertices.values()):
+            if not vertex.half_edges:
+                self.remove(view, vertex, "it is on no edge")
+
     def forget_bends(self, view: View) -> None:
         """Take out meetpoints that have lost their other departures: one edge passes there."""
         for vertex in list(self.graph.vertices.values()):

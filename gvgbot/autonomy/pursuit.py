@@ -263,8 +263,7 @@ class Pursuit:
         """End with frontiers left, once it is told whether they are any."""
         verdict = leading_nowhere(self._mapper.graph, self.survey, reason)
         if verdict is not None and verdict[0] == "explored":
-            for vertex in list(self._mapper.graph.vertices.values()):
-                self._mapper.remove(view, vertex, "it is on no edge")
+            self._mapper.forget_frontiers(view)
         self._conclude(view, verdict)
 
     def _conclude(self, view: View, verdict: tuple[Outcome, str] | None) -> None:

@@ -51,9 +51,13 @@ def test_nothing_is_missing_of_what_can_be_seen_from_one_end() -> None:
 def test_what_lies_in_the_shadow_of_a_corner_is_a_gap_until_the_robot_looks_round_it() -> None:
     """Seen from the origin, the shadow begins between (2, 1) and (4, 2): halfway at (3, 1.5)."""
     building = carved([CORRIDOR, SIDE])
-    (place,) = places_after(building, 3.0)
+    surveyed = survey(driven(building, 3.0))
+    (place,) = START.transform(surveyed.places)
     assert place == pytest.approx([3.0, 1.5], abs=0.3)
-    assert len(places_after(building, 6.0)) == 0
+    assert not surveyed.is_whole
+    surveyed = survey(driven(building, 7.0))
+    assert len(surveyed.places) == 0
+    assert surveyed.is_whole
 
 
 def test_the_blurred_grid_of_who_drives_by_odometry_alone_lacks_nothing() -> None:

@@ -410,6 +410,33 @@ def test_an_end_that_is_none_from_nearer_leaves_a_room_without_edges(
     assert len(robot.mapper.graph.vertices) == len(unseen)
 
 
+@pytest.mark.parametrize(
+    ("is_whole", "outcome", "left"),
+    [(True, "explored", []), (False, "explored_with_blocked", ["meetpoint"])],
+)
+def test_a_departure_into_a_wall_is_none_in_the_end_if_the_map_lacks_nothing(
+    *, is_whole: bool, outcome: str, left: list[str]
+) -> None:
+    """Somebody who stood in a corridor made it; it is given up, and an edge passes there."""
+    none = np.empty((0, 2))
+    robot = Robot()
+    robot.mission.survey = lambda: Surveyed(none, none, is_whole=is_whole)
+    made_up = drawn(
+        {1: (-1.0, 0.0), 2: (1.5, 0.0), 3: (4.0, 0.0), 4: (1.5, -1.0)},
+        {10: (1, 2, []), 11: (2, 3, []), 12: (2, 4, [])},
+        unseen={4: -math.pi / 2},
+    )
+    robot.stand(made_up, 20)
+    (frontier,) = robot.mapper.graph.frontiers()
+    robot.mapper.graph.vertices[frontier.vertex].half_edges[frontier.key].blocked = True
+    while robot.mission.outcome is None and robot.stamp < 300.0:
+        robot.look(made_up)
+    vertices = robot.mapper.graph.vertices.values()
+    assert robot.mission.outcome == outcome
+    assert [vertex.kind for vertex in vertices if vertex.kind != "endpoint"] == left
+    assert len(robot.mapper.graph.edges) == 1 + len(left)
+
+
 SLOT: Rectangle = (-0.3, -0.23, 1.0, 0.23)
 HALL: Rectangle = (1.0, -3.0, 4.0, 3.0)
 IN_SLOT = drawn({1: (-0.1, 0.0), 2: (0.6, 0.0)}, {10: (1, 2, [])})
