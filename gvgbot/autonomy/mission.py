@@ -181,7 +181,7 @@ class Mission(Pursuit):
         if self.choice.sharing is not None:  # what was in the way may have been one that drives on
             self._reopen(view, "the way may be free again")
         if self._progress.finds_nothing_new:
-            self._give_all_up(view)
+            self._give_all_up(view, "they have not led anywhere new for a long time")
         target = self.target
         half = None if target is None else graph.half_edge(target)
         if target is None or half is None or not half.open:
@@ -232,7 +232,7 @@ class Mission(Pursuit):
                 if self._team_is_done(view):
                     self._end(view, *left_to_others(graph, self.choice.unfollowed))
                 elif not (self.choice.waits_for_others or self._retracing.is_on):
-                    self._finish(view)
+                    self._give_up_the_rest(view)
                 return None
             self._scouting.end()
             chosen = nearest[0]

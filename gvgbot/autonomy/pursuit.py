@@ -225,12 +225,11 @@ class Pursuit:
         self._obstructions.close(self._mapper.graph, [frontier], view.stamp, retries=retries)
         self._events.append(Recovery(view.stamp, "give up a frontier", reason))
 
-    def _give_all_up(self, view: View) -> None:
-        """Close all frontiers: they have not led anywhere new for a long time."""
+    def _give_all_up(self, view: View, reason: str) -> None:
+        """Close all frontiers, if there are any."""
         frontiers = self._mapper.graph.frontiers()
         if frontiers:
             self._obstructions.close(self._mapper.graph, frontiers, view.stamp, retries=0)
-            reason = "they have not led anywhere new for a long time"
             self._events.append(Recovery(view.stamp, "give all frontiers up", reason))
             self.target = None
 
@@ -249,15 +248,12 @@ class Pursuit:
 
         return min(self._mapper.graph.frontiers(), key=away, default=None)
 
-    def _finish(self, view: View) -> None:
-        """Some frontiers cannot be reached: that is the end, after having looked for a way."""
+    def _give_up_the_rest(self, view: View) -> None:
+        """Close frontiers that cannot be reached, after having looked for a way."""
         if self._scouting.lasted(view.stamp) < self._config.patience_s:
             return
-        if self._begins_to_retrace(view):
-            return
-        frontiers = len(self._mapper.graph.frontiers())
-        if frontiers:
-            self._end_before(view, f"frontiers that cannot be reached: {frontiers}")
+        if not self._begins_to_retrace(view):
+            self._give_all_up(view, "no way leads there")
 
     def _end_before(self, view: View, reason: str) -> None:
         """End with frontiers left, once it is told whether they are any."""

@@ -519,8 +519,13 @@ def test_what_hangs_together_with_nothing_is_forgotten_and_not_called_blocked() 
 
 
 def far_from_all_that_is_known() -> Robot:
-    """Two vertices behind the robot, beyond its corridor, that are joined to each other only."""
     robot = Robot()
+    join_out_of_reach(robot)
+    return robot
+
+
+def join_out_of_reach(robot: Robot) -> None:
+    """Two vertices behind the robot, beyond its corridor, that are joined to each other only."""
     graph = robot.mapper.graph
     beyond = [Vertex(graph.next_id(), 1.0, Pose(x), 0.0, 0.0) for x in (-7.0, -9.0)]
     for vertex in beyond:
@@ -531,7 +536,6 @@ def far_from_all_that_is_known() -> Robot:
     ends = [HalfEdgeId(vertex.id, vertex.add_half_edge(math.pi)) for vertex in beyond]
     graph.join(ends[0], ends[1], np.array([[0.0, 0.0], [-2.0, 0.0]]), 1.0, driven=True)
     beyond[1].add_half_edge(math.pi)
-    return robot
 
 
 def test_the_robot_goes_near_what_no_known_way_leads_to_before_it_gives_that_up() -> None:

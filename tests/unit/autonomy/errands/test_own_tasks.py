@@ -10,14 +10,14 @@ from gvgbot.autonomy.control.orders import Drive, Order, Stand
 from gvgbot.autonomy.ending import Surveyed
 from gvgbot.autonomy.errands import Errands
 from gvgbot.autonomy.errands.plans import Kept
-from gvgbot.autonomy.events import Decision, ErrandEnded, Event
+from gvgbot.autonomy.events import Decision, ErrandEnded, Event, Recovery
 from gvgbot.autonomy.exploration.certainty import CertaintyConfig, vertex_sigma
 from gvgbot.autonomy.gvg.local import LocalGvg
 from gvgbot.autonomy.views import Correspondence, View
 from gvgbot.geometry import Pose
 from tests.unit.autonomy.local_graphs import drawn
 from tests.unit.autonomy.sights import carved, looked
-from tests.unit.autonomy.test_mission import CLOSED, CONFIG, TEE, Robot
+from tests.unit.autonomy.test_mission import CLOSED, CONFIG, TEE, Robot, join_out_of_reach
 
 GAP = [2.0, 0.0]
 BRANCH = drawn(
@@ -50,7 +50,7 @@ class Explorer(Robot):
 
     def until_it_moves_or_ends(self, gvg: LocalGvg = CLOSED) -> Order:
         order: Order = Stand()
-        while self.mission.outcome is None and self.stamp < 60.0:
+        while self.mission.outcome is None and self.stamp < 200.0:
             order = self.look(gvg)
             if isinstance(order, Drive) and self.errands.errand is not None:
                 break
@@ -72,6 +72,17 @@ def test_it_drives_to_a_gap_before_all_is_explored() -> None:
     assert ended.outcome == "arrived"
     (decision,) = [d for d in robot.said(Decision) if isinstance(d, Decision) and d.vertex is None]
     assert decision.reason == "something may be missing there"
+
+
+def test_it_drives_to_a_gap_after_what_it_cannot_reach_has_been_given_up() -> None:
+    robot = Explorer([GAP])
+    join_out_of_reach(robot)
+    while not robot.mapper.graph.blocked() and robot.stamp < 5 * CONFIG.patience_s:
+        robot.drive(CLOSED, (0.0, 0.0), (3.8, 0.0), (-0.8, 0.0), (0.0, 0.0))
+    robot.until_it_moves_or_ends()
+    given_up = [e for e in robot.said(Recovery) if isinstance(e, Recovery)]
+    assert [recovery.reason for recovery in given_up][1:] == ["no way leads there"]
+    assert str(robot.errands.errand) == "goto 2 0"
 
 
 def test_who_is_sent_to_where_it_was_driving_unasked_waits_there() -> None:
