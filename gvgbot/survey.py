@@ -10,7 +10,7 @@ from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.geometry import Array, Pose, resampled, sampled
 from gvgbot.maps.blanks import blanks
 from gvgbot.maps.gaps import gaps
-from gvgbot.maps.hollows import hollows
+from gvgbot.maps.hollows import bodies, hollows
 from gvgbot.maps.narrows import narrows
 from gvgbot.maps.occupancy import OccupancyGrid, occupancy_grid
 from gvgbot.maps.passages import Way, passages
@@ -41,23 +41,35 @@ def survey(pipeline: Pipeline) -> Surveyed:
     found = np.concatenate([gaps(grid, here, room), stood])
     beside = np.concatenate([_NONE, *(resampled(way.polyline, _STEP_M) for way in ways)])
     narrow = narrows(grid, beside, here, pipeline.radius, room)
+    by_somebody = narrow
     if ways:
         joined, felt = _joined(pipeline, ways), _felt(pipeline)
         hollow = hollows(_walled(grid, felt), joined, pipeline.sight.open_clearance)
         found = np.concatenate([found, blanks(grid, beside, here, room), hollow])
+        by_somebody = np.concatenate([narrow, bodies(grid, joined)])
     through = passages(grid, ways, here, room, pipeline.sight.open_clearance)
     off = np.repeat([_INTO_M, _TOWARDS_M], [len(found), len(through)])
     places = np.concatenate([found, through])
     views = viewpoints(grid, beside, places, here, room, off)
     if views is None:
         return Surveyed(found, narrow, is_beside_floor=len(found) > 0)
-    if not len(narrow):
-        is_whole = not len(places) and not len(pipeline.sight.virtual_walls)
-        return Surveyed(views, narrow, is_whole=is_whole)
-    before = floor_beside(grid, narrow, here, room)
-    into = np.full(len(before), _INTO_M)
-    doorsteps = viewpoints(grid, beside, before, here, room, into)
-    return Surveyed(views, narrow, doorsteps=_NONE if doorsteps is None else doorsteps)
+    return Surveyed(
+        views,
+        narrow,
+        doorsteps=_doorsteps(grid, by_somebody, beside, here, room),
+        is_whole=not (len(places) or len(narrow) or len(pipeline.sight.virtual_walls)),
+    )
+
+
+def _doorsteps(
+    grid: OccupancyGrid, by_somebody: Array, ways: Array, here: Array, room: float
+) -> Array:
+    """From where to look (M, 2) whether somebody who may have stood at places (N, 2) has gone."""
+    if not len(by_somebody):
+        return _NONE
+    before = floor_beside(grid, by_somebody, here, room)
+    views = viewpoints(grid, ways, before, here, room, np.full(len(before), _INTO_M))
+    return _NONE if views is None else views
 
 
 def _walled(grid: OccupancyGrid, points: Array) -> OccupancyGrid:

@@ -18,7 +18,7 @@ class Surveyed(NamedTuple):
     places: Array  # (N, 2), that are worth another look
     narrows: Array  # (N, 2), ways too narrow for the robot that lead to floor without another
     is_beside_floor: bool = False  # all edges are where it lacks the room it wants, places are not
-    doorsteps: Array = np.empty((0, 2))  # (M, 2), before these: somebody may have stood in them
+    doorsteps: Array = np.empty((0, 2))  # (M, 2), before what may be somebody, or narrowed by him
     is_whole: bool = False  # all floor is seen, and edges lead wherever they should
 
 

@@ -1,4 +1,4 @@
-"""Hollows of a route graph: rings of its edges that go round nothing."""
+"""What rings of edges go round: nothing (hollows), or no more than somebody who stood there."""
 
 import numpy as np
 from scipy import ndimage
@@ -10,6 +10,7 @@ from gvgbot.maps.occupancy import OccupancyGrid
 from gvgbot.maps.viewpoints import marked
 
 _DEPTH_M = 0.35  # edges that lie side by side are one that is blurred; who is driven round is wider
+_BODY_M = 0.7  # no wider than this, it may be somebody
 _NOT_OPEN = 0.9  # of the clearance in the open: there edges go round the floor
 
 
@@ -30,3 +31,17 @@ def hollows(grid: OccupancyGrid, ways: Array, open_m: float) -> Array:
     numbers = numbers[(depth > _DEPTH_M) & (room < _NOT_OPEN * open_m)]
     places = np.array(ndimage.maximum_position(inside, areas, numbers)).reshape(-1, 2)
     return np.array(grid.origin) + (places[:, ::-1] + 0.5) * cell
+
+
+def bodies(grid: OccupancyGrid, ways: Array) -> Array:
+    """Places (N, 2), m, map frame, of what is small enough for somebody, and all that a ring holds.
+
+    Ways (points (M, 2), a cell or less apart) of a GVG go round columns likewise.
+    """
+    areas, _ = ndimage.label(~marked(ways, grid))
+    held = filter(None, ndimage.find_objects(areas * is_wall(grid.cells)))
+    edges = np.array([[(side.start, side.stop) for side in box] for box in held]).reshape(-1, 2, 2)
+    is_small = (np.ptp(edges, axis=2) * grid.resolution_m <= _BODY_M).all(axis=1)
+    middles = edges[is_small].mean(axis=2)
+    places: Array = np.array(grid.origin) + middles[:, ::-1] * grid.resolution_m
+    return places

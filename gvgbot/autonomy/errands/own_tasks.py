@@ -107,7 +107,7 @@ class OwnTasks:
         reason = "something may be missing there"
         if place is None and self._has_met:
             place = self._unseen.once_more(surveyed.doorsteps, metres_to)
-            reason = "somebody may have narrowed the way there"
+            reason = "somebody may have stood there"
         if place is None:
             return None
         decision = Decision(view.stamp, None, None, reason)

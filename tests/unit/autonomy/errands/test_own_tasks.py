@@ -161,7 +161,7 @@ def test_a_narrow_way_is_looked_at_again_once_where_somebody_may_have_stood_in_i
         robot.drive(CLOSED, (0.0, 0.0), (2.0, 0.0))
         robot.until_it_moves_or_ends()
     looks = [d for d in robot.said(Decision) if isinstance(d, Decision) and d.vertex is None]
-    assert [look.reason for look in looks] == ["somebody may have narrowed the way there"] * visits
+    assert [look.reason for look in looks] == ["somebody may have stood there"] * visits
     assert not robot.left
     assert robot.mission.reason == "no frontier is left; too narrow for it near (2.0, -0.5)"
 
