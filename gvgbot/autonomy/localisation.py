@@ -33,6 +33,7 @@ _AT_ALL = 0.01  # better agreement, where no place is likelier than another
 _UNKNOWN = 0.7
 _ON_WALLS = 0.8  # so near to walls, as a share of the reach, points are on them, lines or not
 _CLEARLY = 0.1  # better agreement of beams and walls than this is no chance
+_BEST = 0.97  # agreement, where all beams end on walls: they are off by noise all the same
 _SEARCH_M, _SEARCH_STEP_M = 1.0, 0.25  # around the pose by odometry
 _SEARCH_STEP_RAD, _SEARCH_PAIR_M = 0.05, 0.3
 _SEARCHED = 40  # points
@@ -280,7 +281,7 @@ class LocalMaps:
         best: tuple[Registration, Array] | None = None
         agreement, first = 0.0, Pose()  # the latter is where the first prior leads
         for i, (prior, Q) in enumerate(priors):
-            if agreement + clearly >= 1.0:
+            if agreement + clearly >= _BEST:
                 break  # nothing can be clearly better
             near = _turned(points, self._walls.tree, prior, turned) if turned else prior
             found = self._registered(scan, points, near, Q, None if best is None else best[0].pose)
