@@ -23,18 +23,18 @@ from gvgbot.links import Links
 from gvgbot.simulation import Simulation, open_place
 from gvgbot.words import counted
 
-PATIENCE = 10.0  # s for a device's first message
-LISTEN = 3.0  # s of messages that are judged
-SETTLE = 1.0  # s at the start that rates are not judged by
-RATE_TOLERANCE = 0.05
-CALM = 0.008  # s: a link that varies by more hands out its bytes late
-BASE_RATE = 50.0  # Hz
-MESSAGE_COUNTS = ("frames", "scans")
-OF_NEWER_FIRMWARE = "unknown_parts"  # checksums were right
-SEEN_SHARE = 0.2  # of the beams; a laser that sees less is covered or dirty
-FAR = 1e3  # m, for beams that measured nothing
-UNCOVER = "uncover and clean its window"
-UNCOVER_OR_MOVE = f"{UNCOVER}, or put the robot where there are walls"
+_PATIENCE = 10.0  # s for a device's first message
+_LISTEN = 3.0  # s of messages that are judged
+_SETTLE = 1.0  # s at the start that rates are not judged by
+_RATE_TOLERANCE = 0.05
+_CALM = 0.008  # s: a link that varies by more hands out its bytes late
+_BASE_RATE = 50.0  # Hz
+_MESSAGE_COUNTS = ("frames", "scans")
+_OF_NEWER_FIRMWARE = "unknown_parts"  # checksums were right
+_SEEN_SHARE = 0.2  # of the beams; a laser that sees less is covered or dirty
+_FAR = 1e3  # m, for beams that measured nothing
+_UNCOVER = "uncover and clean its window"
+_UNCOVER_OR_MOVE = f"{_UNCOVER}, or put the robot where there are walls"
 
 Verdict = Literal["ok", "warn", "fail"]
 
@@ -169,10 +169,10 @@ async def _listen(
 
     async def listen() -> None:
         with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(PATIENCE):
+            async with asyncio.timeout(_PATIENCE):
                 await next_stamp()
-            await clock.sleep_until(clock.now() + SETTLE)
-            async with asyncio.timeout(LISTEN):
+            await clock.sleep_until(clock.now() + _SETTLE)
+            async with asyncio.timeout(_LISTEN):
                 await next_stamp()  # came while nobody listened
                 while True:
                     heard.stamps.append(await next_stamp())
@@ -241,7 +241,7 @@ def _base_lines(base: KobukiBase, heard: Heard) -> Iterator[Line]:
         answered or "does not answer what it is",
         "check the wire from the computer to it",
     )
-    yield _steadiness("base rate", heard, BASE_RATE)
+    yield _steadiness("base rate", heard, _BASE_RATE)
     yield _link("base link", base.statistics)
     yield _timing("base clock", heard)
     if base.battery is not None:
@@ -262,17 +262,19 @@ def _view(scans: list[Scan]) -> Line:
     """Whether something covers the laser."""
     beams = f"{len(scans[-1].ranges)} beams"
     trusted = float(np.mean([np.mean(~np.isnan(scan.ranges)) for scan in scans]))
-    if trusted < SEEN_SHARE:
-        return Line("fail", "laser view", f"{beams}, {trusted:.0%} of them of use", UNCOVER)
+    if trusted < _SEEN_SHARE:
+        return Line("fail", "laser view", f"{beams}, {trusted:.0%} of them of use", _UNCOVER)
     if not any(np.isfinite(scan.ranges).any() for scan in scans):
-        return Line("warn", "laser view", f"{beams}, nothing within range", UNCOVER_OR_MOVE)
+        return Line("warn", "laser view", f"{beams}, nothing within range", _UNCOVER_OR_MOVE)
     return Line("ok", "laser view", f"{beams}, {trusted:.0%} of them of use")
 
 
 def _own_parts(scans: list[Scan], radius: float) -> Iterator[Line]:
     """What the laser sees within the robot's radius (m), again and again: parts of the robot."""
     mount = scans[-1].base_laser
-    ranges = np.median([np.nan_to_num(scan.ranges, nan=FAR, posinf=FAR) for scan in scans], axis=0)
+    ranges = np.median(
+        [np.nan_to_num(scan.ranges, nan=_FAR, posinf=_FAR) for scan in scans], axis=0
+    )
     near = np.flatnonzero(ranges < radius + math.hypot(mount.x, mount.y))
     bearings = mount.theta + scans[-1].bearings[near]
     x, y = mount.x + ranges[near] * np.cos(bearings), mount.y + ranges[near] * np.sin(bearings)
@@ -287,7 +289,7 @@ def _own_parts(scans: list[Scan], radius: float) -> Iterator[Line]:
 
 
 def _steadiness(subject: str, heard: Heard, nominal: float) -> Line:
-    is_right = abs(heard.rate / nominal - 1.0) <= RATE_TOLERANCE
+    is_right = abs(heard.rate / nominal - 1.0) <= _RATE_TOLERANCE
     return Line(
         "ok" if is_right else "fail",
         subject,
@@ -309,11 +311,11 @@ def _rareness(heard: Heard, limits: GuardConfig) -> Line:
 
 def _link(subject: str, statistics: Any) -> Line:
     counts = {key: value for key, value in asdict(statistics).items() if isinstance(value, int)}
-    good = sum(counts.pop(key, 0) for key in MESSAGE_COUNTS)
+    good = sum(counts.pop(key, 0) for key in _MESSAGE_COUNTS)
     odd = {key: value for key, value in counts.items() if value}
     told = ", ".join(_counted(value, key.replace("_", " ")) for key, value in odd.items())
     return Line(
-        "warn" if odd.keys() - {OF_NEWER_FIRMWARE} else "ok",
+        "warn" if odd.keys() - {_OF_NEWER_FIRMWARE} else "ok",
         subject,
         f"{counted(good, 'message')}, {told or 'no damage'}",
         "try another cable or port, away from motors",
@@ -329,7 +331,7 @@ def _counted(count: int, what: str) -> str:
 def _timing(subject: str, heard: Heard) -> Line:
     least, most = heard.delay
     return Line(
-        "ok" if most - least <= CALM else "warn",
+        "ok" if most - least <= _CALM else "warn",
         subject,
         f"messages arrive {1000 * least:.1f} to {1000 * most:.1f} ms after they were true",
         "set the port's latency_timer to 1, as systemd/60-gvgbot.rules does, "
