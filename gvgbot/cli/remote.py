@@ -21,9 +21,6 @@ def add_monitor(commands: Commands) -> None:
     monitor.add_argument(
         "robot", nargs="?", metavar="ROBOT", help="its robot.name (default: the only one there is)"
     )
-    monitor.add_argument(
-        "--robot", dest="named", metavar="NAME", help="another way to give its robot.name"
-    )
     add_connection(monitor)
     monitor.set_defaults(command=_monitor)
 
@@ -32,7 +29,7 @@ def _monitor(options: argparse.Namespace) -> int:
     with extra_for("the monitor needs rich", "tui", "rich"):
         from gvgbot.monitor.app import monitor
 
-    return monitor(options.robot or options.named, options.connect, options.zenoh_file)
+    return monitor(options.robot, options.connect, options.zenoh_file)
 
 
 def add_web(commands: Commands) -> None:

@@ -185,7 +185,7 @@ def test_the_only_robot_need_not_be_named_and_its_end_is_said(endpoint: str) -> 
 
 
 def test_a_robot_that_is_not_there_is_told_from_those_that_are(endpoint: str) -> None:
-    with a_robot(endpoint, "otto"), monitor("--robot", "karl", "--connect", endpoint) as seat:
+    with a_robot(endpoint, "otto"), monitor("karl", "--connect", endpoint) as seat:
         seat.until_shown("no robot named karl here; there is otto")
         os.write(seat.terminal, b"q")
         assert seat.left() == 0
