@@ -289,7 +289,7 @@ def test_devices_plugged_into_each_others_ports_are_told_to_be_looked_for_there(
         return [str(line) for line in await examine(CONFIG, simulation)]
 
     laser, base = run_in_virtual_time(main())
-    assert "laser.port is its port" in laser
+    assert "laser.port is no laser's: check that it is not the base's port" in laser
     assert "base.port is its port" in base
 
 
