@@ -21,19 +21,18 @@ from gvgbot.autonomy.control.reflexes import (
     Reflexes,
 )
 from gvgbot.autonomy.control.room import room_ahead
+from gvgbot.autonomy.defects import Defects
 from gvgbot.autonomy.errands import Errands
 from gvgbot.autonomy.errands.kinds import Look
 from gvgbot.autonomy.events import EdgeJoined, Event, Recovery, VertexAdded, WayForgotten
 from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.gvg.beams import without_mixed_pixels
 from gvgbot.autonomy.gvg.local import LocalGvg
-from gvgbot.autonomy.handedness import Handedness, what_to_set
 from gvgbot.autonomy.hazards import Hazards
 from gvgbot.autonomy.keyframes import Past, has_come_on
 from gvgbot.autonomy.localisation import Localisation
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.mission import Mission
-from gvgbot.autonomy.obedience import DOES_NOT_MOVE, Obedience
 from gvgbot.autonomy.overlooked import blind_angle
 from gvgbot.autonomy.placing import LATELY_M, search_near_by
 from gvgbot.autonomy.pose_tracking import PoseTracker
@@ -93,8 +92,7 @@ class Pipeline:
         self._hazards = Hazards(config.hazards)
         self.traffic = Traffic(config.newcomers)
         self.sight = Sight(config, robot_radius, self.mapper, self._hazards, self.traffic)
-        self._handedness, self._obedience = Handedness(), Obedience()
-        self._told = STANDSTILL  # what the base is to do
+        self._defects, self._told = Defects(), STANDSTILL  # the latter is what the base is to do
         self._incidents: list[tuple[str, str]] = []  # action and reason, since the last scan
         self._look_now = False
         self._doubted: int | None = None  # keyframe since which somebody doubts the pose
@@ -179,11 +177,9 @@ class Pipeline:
             return happened
         if self.past.last is not None:
             self.mission.skip(max(0.0, scan.stamp - self.past.last.stamp - LONGEST_GAP_S))
-        self._handedness.note(scan, odom_base, self._told.angular)
-        if self._handedness.is_mirrored:
-            return [*happened, *self._halt(scan.stamp, what_to_set(scan))]
-        if self._obedience.is_lacking:
-            return [*happened, *self._halt(scan.stamp, DOES_NOT_MOVE)]
+        defect = self._defects.note_scan(scan, odom_base, self._told)
+        if defect is not None:
+            return [*happened, *self._halt(scan.stamp, defect)]
         motion = self.tracker.odometry.motion_during(scan)
         sweep = Sweep.of(without_mixed_pixels(scan), motion)
         local_base = self._localise(sweep.deskewed, odom_base)
@@ -335,7 +331,7 @@ class Pipeline:
             free_s = since_s if is_free and since_s < LONGEST_GAP_S else 0.0
             self._execution.note_turn(turned, free_s)
             unhindered_s = 0.0 if felt.stopped_for else free_s
-            self._obedience.note(odometry.odom_base, self._told, unhindered_s)
+            self._defects.note_motion(odometry.odom_base, self._told, unhindered_s)
         self.tracker.odometry.append(odometry)
         if self.past.last is None or self.led:
             return STANDSTILL
@@ -387,6 +383,7 @@ class Pipeline:
         match incident:
             case Hit(cause=cause, bearings=bearings):
                 self._incidents.append(("back off", cause))
+                self._defects.note_hit(cause)
                 blocks = self._hazards.add(
                     local_base, bearings, self.radius, self.past.travelled, lasting=cause == "cliff"
                 )

@@ -149,7 +149,7 @@ def test_a_map_of_before_is_gone_on_with_when_it_is_set_right(
     before, unfit, _ = lives.sessions
     assert len(before.pipeline.mapper.graph.vertices) > 0
     assert before.pipeline.mission.outcome is None
-    assert before.pipeline._handedness.is_settled
+    assert before.pipeline._defects._handedness.is_settled
     assert unfit.pipeline.errands.unfit.startswith(why)
     assert isinstance(last.pipeline, ReturningPipeline)
     assert not last.pipeline.is_lost

@@ -115,6 +115,36 @@ def test_a_base_that_does_not_move_is_told_of_and_keeps_the_robot_busy_for_no_lo
     assert pipeline.mission.reason.startswith("the base does not move when it is told to: ")
 
 
+@pytest.mark.parametrize(
+    ("seen", "felt", "verdict"),
+    [
+        ("nothing", "bumper", "failed"),
+        ("nothing", "cliff", None),
+        ("nothing", None, None),
+        ("walls", "bumper", None),
+    ],
+)
+def test_who_runs_into_something_and_has_never_seen_anything_stands(
+    seen: str, felt: str | None, verdict: str | None
+) -> None:
+    """Who has seen walls may be in a hall by now, with a pane of glass in it."""
+    config = load_config()
+    pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
+    for k in range(3):
+        scan = sweep(ROOMS, Pose(-1.5, 0.0, 0.0), field_of_view=LASER_270)
+        is_seen = seen == "walls" and k == 0
+        ranges = scan.ranges if is_seen else np.full(len(scan.ranges), np.inf)
+        contact = Contact(
+            float(k), bumper_centre=k == 1 and felt == "bumper", cliff_centre=felt == "cliff"
+        )
+        pipeline.control(Odometry(float(k), Pose(), STANDSTILL), Felt(contact))
+        pipeline.perceive(replace(scan, stamp=float(k), ranges=ranges))
+    assert pipeline.mission.outcome == verdict
+    if verdict:
+        assert "uncover it" in pipeline.mission.reason
+        assert pipeline.control(Odometry(4.0, Pose(), STANDSTILL)) == STANDSTILL
+
+
 @pytest.mark.parametrize("reason", [None, "obstacle"])
 def test_a_robot_that_comes_on_by_little_or_is_held_is_no_base_that_does_not_move(
     reason: Reason | None,

@@ -1,0 +1,41 @@
+"""What is wrong with the laser or the base, so that no robot can drive by them; for people."""
+
+import numpy as np
+
+from gvgbot.autonomy.control.reflexes import Cause
+from gvgbot.autonomy.handedness import Handedness, what_to_set
+from gvgbot.autonomy.obedience import DOES_NOT_MOVE, Obedience
+from gvgbot.geometry import Pose, Twist
+from gvgbot.hal.cover import HARDLY_ANY
+from gvgbot.hal.messages import Scan
+
+_SEES_NOTHING = (
+    "the robot has run into something, and its laser has seen nothing so far: uncover it, clean "
+    "its window, and restart the program"
+)
+
+
+class Defects:
+    """Adds up what scans and motions tell of the laser and the base."""
+
+    def __init__(self) -> None:
+        self._handedness, self._obedience = Handedness(), Obedience()
+        self._has_seen = self._has_hit = False
+
+    def note_scan(self, scan: Scan, odom_base: Pose, told: Twist) -> str | None:
+        """What is wrong, and what to do; the base is told just now to move so."""
+        self._has_seen = self._has_seen or float(np.isfinite(scan.ranges).mean()) > HARDLY_ANY
+        self._handedness.note(scan, odom_base, told.angular)
+        if self._handedness.is_mirrored:
+            return what_to_set(scan)
+        if self._obedience.is_lacking:
+            return DOES_NOT_MOVE
+        return _SEES_NOTHING if self._has_hit and not self._has_seen else None
+
+    def note_motion(self, odom_base: Pose, told: Twist, free_s: float) -> None:
+        """Account for so many seconds in which nothing kept the base from what it was told."""
+        self._obedience.note(odom_base, told, free_s)
+
+    def note_hit(self, cause: Cause) -> None:
+        """Account for something that was felt; a laser that sees shows all but a cliff."""
+        self._has_hit = self._has_hit or cause != "cliff"
