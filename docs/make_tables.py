@@ -3,7 +3,7 @@
 What stands between these two lines is written from the file, by the view that is named in brackets
 with its arguments:
 
-    <!-- from: benchmarks/results/worlds.jsonl (runs 1) -->
+    <!-- from: benchmarks/results/worlds.jsonl (summary) -->
     <!-- end -->
 """
 
@@ -57,17 +57,12 @@ def _rows(path: Path) -> list[Row]:
     return found
 
 
-def runs(rows: list[Row], seed: str) -> str:
-    """A line for each run with a seed."""
-    shown = (row for row in rows if row["seed"] == int(seed))
-    return _block([explore_table.HEAD, *map(explore_table.line, shown)])
-
-
 def summary(rows: list[Row]) -> str:
     """What the runs with each laser have in common."""
     last = rows[-1]["world"].partition(":")[2]
+    where = f"the buildings 1 to {last}" if last else "the built-in worlds"
     told = "\n".join(explore_table.summary(rows)).strip().splitlines()
-    return f"Of {len(rows)} runs, in the buildings 1 to {last}:\n\n{_block(told)}"
+    return f"Of {len(rows)} runs, in {where}:\n\n{_block(told)}"
 
 
 def last_words(rows: list[Row], world: str, directory: str) -> str:
@@ -141,7 +136,6 @@ def _block(lines: list[str]) -> str:
 
 
 VIEWS: dict[str, Callable[..., str]] = {
-    "runs": runs,
     "summary": summary,
     "last_words": last_words,
     "mappers": mappers,
