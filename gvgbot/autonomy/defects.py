@@ -2,9 +2,11 @@
 
 import numpy as np
 
+from gvgbot.autonomy.aim import Aim, how_to_aim
 from gvgbot.autonomy.control.reflexes import Cause
 from gvgbot.autonomy.handedness import Handedness, what_to_set
 from gvgbot.autonomy.obedience import DOES_NOT_MOVE, Obedience
+from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
 from gvgbot.geometry import Pose, Twist
 from gvgbot.hal.cover import HARDLY_ANY
 from gvgbot.hal.messages import Scan
@@ -18,18 +20,21 @@ _SEES_NOTHING = (
 class Defects:
     """Adds up what scans and motions tell of the laser and the base."""
 
-    def __init__(self) -> None:
-        self._handedness, self._obedience = Handedness(), Obedience()
+    def __init__(self, matching: ScanMatchingConfig) -> None:
+        self._handedness, self._obedience, self._aim = Handedness(), Obedience(), Aim(matching)
         self._has_seen = self._has_hit = False
 
     def note_scan(self, scan: Scan, odom_base: Pose, told: Twist) -> str | None:
         """What is wrong, and what to do; the base is told just now to move so."""
         self._has_seen = self._has_seen or float(np.isfinite(scan.ranges).mean()) > HARDLY_ANY
         self._handedness.note(scan, odom_base, told.angular)
+        self._aim.note(scan, odom_base)
         if self._handedness.is_mirrored:
             return what_to_set(scan)
         if self._obedience.is_lacking:
             return DOES_NOT_MOVE
+        if self._aim.off is not None:
+            return how_to_aim(scan, self._aim.off)
         return _SEES_NOTHING if self._has_hit and not self._has_seen else None
 
     def note_motion(self, odom_base: Pose, told: Twist, free_s: float) -> None:

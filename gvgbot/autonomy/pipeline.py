@@ -92,7 +92,8 @@ class Pipeline:
         self._hazards = Hazards(config.hazards)
         self.traffic = Traffic(config.newcomers)
         self.sight = Sight(config, robot_radius, self.mapper, self._hazards, self.traffic)
-        self._defects, self._told = Defects(), STANDSTILL  # the latter is what the base is to do
+        self._defects = Defects(config.scan_matching)
+        self._told = STANDSTILL  # what the base is to do
         self._incidents: list[tuple[str, str]] = []  # action and reason, since the last scan
         self._look_now = False
         self._doubted: int | None = None  # keyframe since which somebody doubts the pose
@@ -178,7 +179,7 @@ class Pipeline:
         if self.past.last is not None:
             self.mission.skip(max(0.0, scan.stamp - self.past.last.stamp - LONGEST_GAP_S))
         defect = self._defects.note_scan(scan, odom_base, self._told)
-        if defect is not None:
+        if defect is not None and not self.led:
             return [*happened, *self._halt(scan.stamp, defect)]
         motion = self.tracker.odometry.motion_during(scan)
         sweep = Sweep.of(without_mixed_pixels(scan), motion)

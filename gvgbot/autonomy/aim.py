@@ -1,0 +1,82 @@
+"""Whether the laser looks where it is said to: a base that drives straight ahead tells.
+
+What a base drives past goes straight back. If it goes aside as well, in the frame that the laser's
+mount makes the base's, the mount is turned by that angle.
+"""
+
+import math
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig, register
+from gvgbot.geometry import Array, Pose, wrap_angle
+from gvgbot.hal.messages import Scan
+
+_PIECE_M, _STRAIGHT_RAD = 0.2, 0.04  # between two sweeps that tell
+_LONGEST_M = 1.0
+_PIECES = 5  # that have to agree
+_TURNED_RAD = math.radians(3.0)  # a mount that is off by less does no harm
+_FAR_M = 8.0  # what is farther has few beams on it
+_ANY_WAY = np.diag([0.3**2, 0.3**2, 0.05**2])
+_CLEAR_M, _SHARE = 0.02, 0.2  # sigma to the side, and share of a sweep that finds its walls
+
+
+class Aim:
+    """Adds up which way the base drives, as the laser has it."""
+
+    def __init__(self, matching: ScanMatchingConfig) -> None:
+        self._matching, self._is_settled = matching, False
+        self._before: tuple[cKDTree, Pose] | None = None  # what was seen, with odom_base
+        self._angles: list[float] = []
+
+    @property
+    def off(self) -> float | None:
+        """By how much the laser's yaw is too large, rad; None if it may be right."""
+        angles = np.array(self._angles)
+        if len(angles) < _PIECES or not (all(angles > _TURNED_RAD) or all(angles < -_TURNED_RAD)):
+            return None
+        return float(np.median(angles))
+
+    def note(self, scan: Scan, odom_base: Pose) -> None:
+        """Learn from a sweep; nothing more once enough of them are as they should be."""
+        if self._is_settled or self.off is not None:
+            return
+        motion = None if self._before is None else self._before[1].to(odom_base)
+        if motion is not None and 0.0 <= motion.x < _PIECE_M and abs(motion.theta) < _STRAIGHT_RAD:
+            return
+        points = _seen(scan)
+        if motion is not None and motion.x < _LONGEST_M and abs(motion.theta) < _STRAIGHT_RAD:
+            self._compare(points, motion)
+        is_enough = len(points) >= self._matching.min_pairs
+        self._before = (cKDTree(points), odom_base) if is_enough else None
+
+    def _compare(self, points: Array, motion: Pose) -> None:
+        if self._before is None or motion.x < 0.0:
+            return
+        some = points[:: max(1, len(points) // self._matching.points)]
+        found = register(some, self._before[0], motion, _ANY_WAY, self._matching)
+        if found is None or found.inliers < _SHARE or found.covariance[1, 1] > _CLEAR_M**2:
+            return
+        aside = found.pose.y - found.pose.x * found.pose.theta / 2  # beyond that of an arc
+        self._angles = [*self._angles[1 - _PIECES :], math.atan2(aside, found.pose.x)]
+        is_right = len(self._angles) == _PIECES and abs(np.median(self._angles)) < _TURNED_RAD / 2
+        self._is_settled = bool(is_right)
+
+
+def how_to_aim(scan: Scan, off: float) -> str:
+    """What is wrong with a laser whose yaw is too large by so much (rad), and what to set."""
+    yaw_deg = round(math.degrees(wrap_angle(scan.base_laser.theta - off)))
+    return (
+        f"the laser is turned by {abs(math.degrees(off)):.0f} degrees from where it is said to "
+        f"look: set laser.yaw_deg: {yaw_deg}, and restart the program"
+    )
+
+
+def _seen(scan: Scan) -> Array:
+    """What is not far away (N, 2), m, base frame."""
+    near = np.flatnonzero(scan.ranges < _FAR_M)
+    bearings = scan.base_laser.theta + scan.bearings[near]
+    ways = np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
+    points: Array = scan.base_laser.position + scan.ranges[near, None] * ways
+    return points

@@ -1,0 +1,51 @@
+"""A laser that is turned on its mount has the base drive aside."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gvgbot.autonomy.aim import Aim, how_to_aim
+from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
+from gvgbot.geometry import Pose
+from tests.unit.autonomy.sights import LASER_270, carved, sweep
+
+ROOMS = carved([(-4.0, -1.5, 8.0, 1.5), (1.0, 1.5, 3.0, 3.0)])
+WORN_RAD = 0.01  # by which wheels of unequal size turn the base from piece to piece
+
+
+def driven(turned_deg: float, *, said_deg: float = 0.0, pieces: int = 8) -> Aim:
+    """What a base learns that drives ahead, with its laser so far from where it is said to look."""
+    rng, aim = np.random.default_rng(4), Aim(ScanMatchingConfig())
+    world_base = Pose(-1.0, 0.1, -0.03)
+    for k in range(pieces):
+        seen_from = world_base.compose(Pose(theta=math.radians(said_deg - turned_deg)))
+        scan = sweep(ROOMS, seen_from, field_of_view=LASER_270, sigma=0.01, rng=rng)
+        scan = replace(scan, base_laser=Pose(theta=math.radians(said_deg)))
+        aim.note(scan, Pose(0.25 * k, 0.0, 0.0))
+        world_base = world_base.compose(Pose(0.25, 0.25 * WORN_RAD / 2, WORN_RAD))
+    return aim
+
+
+@pytest.mark.parametrize("said_deg", [0.0, 30.0])
+@pytest.mark.parametrize("turned_deg", [-40.0, -5.0, 5.0, 20.0])
+def test_who_drives_aside_learns_by_how_much_its_laser_is_turned(
+    turned_deg: float, said_deg: float
+) -> None:
+    aim = driven(turned_deg, said_deg=said_deg)
+    assert aim.off is not None
+    assert math.degrees(aim.off) == pytest.approx(turned_deg, abs=1.0)
+    scan = replace(sweep(ROOMS, Pose()), base_laser=Pose(theta=math.radians(said_deg)))
+    told = how_to_aim(scan, math.radians(turned_deg))
+    assert f"set laser.yaw_deg: {said_deg - turned_deg:.0f}, " in told
+
+
+@pytest.mark.parametrize("turned_deg", [0.0, -1.0, 1.0])
+def test_a_laser_that_looks_as_it_is_said_to_is_left_alone(turned_deg: float) -> None:
+    assert driven(turned_deg).off is None
+
+
+def test_four_pieces_of_a_way_are_too_few() -> None:
+    assert driven(5.0, pieces=5).off is None
+    assert driven(5.0, pieces=6).off is not None
