@@ -89,6 +89,7 @@ class Newcomers:
 
     def __init__(self, config: NewcomersConfig) -> None:
         self._config = config
+        self._has_met = False  # somebody who came, and went
         self._all: list[Newcomer] = []
         self.missed: list[Newcomer] = []  # in the last look, of those found that never moved
         self.gone: list[Newcomer] = []  # in the last look
@@ -259,6 +260,8 @@ class Newcomers:
             return 0.0
         if one.came or self._may_be_stranger(one):
             return self._config.came_after_s
+        if self._has_met and one.is_round:  # it may have come before it was found
+            return self._longest_patience
         found_after = self._config.found_after_s
         may_be = one.evidence > (-SURE if one.is_whole else 0.0)
         return found_after if may_be else min(_GLIMPSE_S, found_after)
@@ -271,6 +274,10 @@ class Newcomers:
         """Whether it may be a robot of the team that waits for something."""
         return one.is_round and any(abs(one.radius - r) < _ALIKE_M for r in self.strangers)
 
+    def _walked(self, one: Newcomer) -> bool:
+        """Whether one that has gone shows that people are about; robots of the team do not."""
+        return one.came and one.is_whole and one.is_round and not self._may_be_stranger(one)
+
     def _forget(self, scan: Scan, local_base: Pose, local_map: LocalMap) -> None:
         """Let those go that have gone or are far away; who may have gone is in nobody's way."""
         for one in self._all:
@@ -279,6 +286,7 @@ class Newcomers:
         self.gone = [
             one for one in self._all if is_seen_through(scan, local_base, (one.centre, one.radius))
         ]
+        self._has_met |= any(self._walked(one) for one in self.gone)
         for one in self.gone:
             if one.was_let_in:
                 local_map.doubt(one.centre, one.radius + BLUR_M)

@@ -37,12 +37,17 @@ class Watch:
         stamp: float = 0.0,
         *,
         person: Point | None = None,
+        passer: tuple[Point, float] | None = None,
         way: Point = (math.inf, math.inf),
     ) -> int:
-        """How many beams are kept out, if a way is known to lead past half a metre from `way`."""
+        """How many beams are kept out, if a way is known to lead past half a metre from `way`.
+
+        Who passes has another radius, m.
+        """
         scan = replace(sweep(world, HERE), stamp=stamp)
-        if person is not None:
-            scan = replace(scan, ranges=np.minimum(scan.ranges, to_disc(scan.bearings, person)))
+        people = [] if person is None else [(person, RADIUS)]
+        for one in people if passer is None else [*people, passer]:
+            scan = replace(scan, ranges=np.minimum(scan.ranges, to_disc(scan.bearings, *one)))
         errors = self._noise * self._rng.standard_normal(len(scan.ranges))
         scan = replace(scan, ranges=scan.ranges + errors)
         sifted = self.newcomers.sift(scan, HERE, self.map, lambda xy: math.dist(xy, way) < 0.5)
@@ -75,12 +80,12 @@ def lost_behind_a_screen() -> Watch:
     return watch
 
 
-def to_disc(bearings: Array, centre: Point) -> Array:
+def to_disc(bearings: Array, centre: Point, radius: float = RADIUS) -> Array:
     """Ranges (N,) from the origin to a person; inf beside."""
     along = np.cos(bearings) * centre[0] + np.sin(bearings) * centre[1]
     beside = centre[0] ** 2 + centre[1] ** 2 - along**2
-    hit = (beside < RADIUS**2) & (along > 0.0)
-    return np.where(hit, along - np.sqrt(np.maximum(RADIUS**2 - beside, 0.0)), np.inf)
+    hit = (beside < radius**2) & (along > 0.0)
+    return np.where(hit, along - np.sqrt(np.maximum(radius**2 - beside, 0.0)), np.inf)
 
 
 def test_there_is_floor_up_to_a_robot_that_says_where_it_is_and_less_for_sure_up_to_others() -> (
@@ -142,6 +147,21 @@ def test_what_stands_long_enough_is_a_part_of_the_building(
         assert watch.dropped(EMPTY, patience + later, person=(2.0, 0.0)) == 0
         assert len(watch.newcomers.points) == 0
     assert watch.inside() > 0
+
+
+@pytest.mark.parametrize(
+    ("radius", "patience"), [(RADIUS, CONFIG.came_after_s), (0.3, CONFIG.found_after_s)]
+)
+def test_where_somebody_walks_who_is_found_standing_may_have_come(
+    radius: float, patience: float
+) -> None:
+    """One passes the other, and is gone: he was no pillar. One as wide as a robot was that."""
+    watch = Watch()
+    watch.newcomers.strangers = [0.3]
+    for second in range(math.ceil(patience)):
+        passer = ((-2.0, second - 2.0), radius) if second < 4 else None
+        assert watch.dropped(EMPTY, second, person=(2.0, 0.0), passer=passer) > 0
+    assert watch.dropped(EMPTY, patience, person=(2.0, 0.0)) == 0
 
 
 def test_who_has_stood_there_since_before_the_clock_began_anew_is_waited_for_the_rest() -> None:
