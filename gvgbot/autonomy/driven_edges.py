@@ -237,7 +237,7 @@ class DrivenEdges:
         known_line = known_line if edge.a == arrived else known_line[::-1]
         at = _fork(passage.line, known_line + (passage.line[-1] - known_line[0]))
         if at is None:
-            mapper.part_edge_at(mapper.graph.vertices[left.vertex])
+            mapper.part_edge_at(mapper.graph.vertices[left.vertex], left.key)
             return
         place = passage.line[at]
         away = np.hypot(*(mapper.positions_from(view.local_base) - place).T)

@@ -102,14 +102,15 @@ class MapEdits(Knowledge):
         vertex.snapshot = vertex.local.inverse().transform(walls[near])
         vertex.sights = Pose(theta=-vertex.local.theta).transform(view.local_map.sights()[near])
 
-    def part_edge_at(self, vertex: Vertex) -> None:
-        """Make two edges of one that passes a vertex."""
+    def part_edge_at(self, vertex: Vertex, driven: int | None = None) -> None:
+        """Make two edges of one that passes a vertex, from which it was driven by a half-edge."""
         split_edge_at(
             self.graph,
             self.belief,
             vertex,
             reach=self._recognition.same_place_m,
             angle=math.radians(self._recognition.bearing_deg),
+            driven=driven,
         )
 
     def remove(self, view: View, vertex: Vertex, reason: str, *, is_passed: bool = False) -> None:

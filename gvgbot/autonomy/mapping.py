@@ -187,7 +187,10 @@ class Mapper(MapEdits):
             vertex.clearance += share * (sighting.clearance - vertex.clearance)
         if is_beside and vertex.visits == 1 and node.settled:
             self._picture(view, vertex)
+        departures = len(vertex.half_edges)
         self._evidence.weigh_departures(view, node, vertex, known)
+        if len(vertex.half_edges) > departures:  # an edge that was known before may leave by it
+            self.part_edge_at(vertex)
         if view.travelled - vertex.updated_at > self._config.update_every_m:
             vertex.updated_at = view.travelled
             self._look_again(view, vertex, view.local_base.to(vertex.local))

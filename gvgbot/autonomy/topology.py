@@ -20,12 +20,19 @@ _STRAYS = 3  # vertices that hang together with nothing else, though the robot h
 
 
 def split_edge_at(
-    graph: GvgGraph, belief: Belief, vertex: Vertex, *, reach: float, angle: float
+    graph: GvgGraph,
+    belief: Belief,
+    vertex: Vertex,
+    *,
+    reach: float,
+    angle: float,
+    driven: int | None = None,
 ) -> None:
     """Make two edges of one that was joined before a vertex on it was found.
 
     The edge must pass the vertex within `reach` m, where it is known as well as that, and leave it
-    within `angle` rad of two of its half-edges that have no edge.
+    within `angle` rad of two of its half-edges that have no edge. If the robot has driven all along
+    it, from the vertex by the `driven` half-edge, the other one may be missing: it is added.
     """
     map_vertex = belief.map_vertex(vertex.id)
     vertex_map, place = map_vertex.inverse(), map_vertex.position
@@ -40,8 +47,10 @@ def split_edge_at(
         _, S = apart(belief, vertex.id, [edge.a.vertex])
         if np.trace(S[0]) > reach**2:
             continue  # it may as well be elsewhere
-        known = {k: half.bearing for k, half in vertex.half_edges.items() if half.edge is None}
-        matched = match_bearings(tuple(direction(part) for part in parts), known, angle)
+        bearings = tuple(direction(part) for part in parts)
+        matched = _left_by(vertex, bearings, angle)
+        if list(matched.values()) == [driven]:
+            matched |= _added(vertex, {1 - i: bearings[1 - i] for i in matched}, angle)
         if len(matched) < 2:
             continue
         graph.unjoin(edge)
@@ -53,6 +62,22 @@ def split_edge_at(
             part_edge = graph.join(near, far, part, clearance, driven=edge.driven)
             part_edge.established, part_edge.is_part = edge.established, True
         return
+
+
+def _left_by(vertex: Vertex, bearings: tuple[float, ...], angle: float) -> dict[int, int]:
+    """By index of a bearing, rad, the key of the half-edge without an edge that it is."""
+    known = {key: half.bearing for key, half in vertex.half_edges.items() if half.edge is None}
+    return match_bearings(bearings, known, angle)
+
+
+def _added(vertex: Vertex, bearings: dict[int, float], angle: float) -> dict[int, int]:
+    """By index of a bearing, rad, the key of a new half-edge; none that is near to another one."""
+    known = {key: half.bearing for key, half in vertex.half_edges.items()}
+    return {
+        i: vertex.add_half_edge(bearing)
+        for i, bearing in bearings.items()
+        if not match_bearings((bearing,), known, angle)
+    }
 
 
 def clearance_between(line: Array, at_start: float, at_end: float) -> float:

@@ -237,9 +237,17 @@ def test_a_way_that_only_ends_at_a_known_edge_is_no_fork_of_it() -> None:
     assert len(drive.mapper.graph.edges) == 1
 
 
-def test_a_known_edge_that_passes_the_vertex_that_was_left_has_one_of_its_ends_there() -> None:
-    """From vertex 2 to a vertex in the west it was taken for one edge, past vertex 1."""
+@pytest.mark.parametrize("is_hidden", [False, True])
+def test_a_known_edge_that_passes_the_vertex_that_was_left_has_one_of_its_ends_there(
+    *, is_hidden: bool
+) -> None:
+    """From vertex 2 to a vertex in the west it was taken for one edge, past vertex 1.
+
+    Of that, somebody may have hidden the departure to the west so far.
+    """
     drive = Drive(HalfEdgeId(1, EAST))
+    if is_hidden:
+        drive.mapper.graph.remove_half_edge(HalfEdgeId(1, WEST))
     graph, west = drive.mapper.graph, Vertex(3, 1.0, Pose(-5.0, 0.0, 0.0), 0.0, 0.0)
     graph.vertices[3], graph.serial = west, 3
     ends = HalfEdgeId(2, WEST), HalfEdgeId(3, west.add_half_edge(0.0))
@@ -250,10 +258,12 @@ def test_a_known_edge_that_passes_the_vertex_that_was_left_has_one_of_its_ends_t
     beyond = {branch: end for branch, end in ALL_SEEN.items() if end.vertex == 2}
     drive.along(STREET, beyond, (4.0, 0.0))
     joined = {frozenset((edge.a, edge.b)) for edge in graph.edges.values()}
+    (beyond_it,) = (key for key in graph.vertices[1].half_edges if key not in (EAST, NORTH))
     assert joined == {
         frozenset((HalfEdgeId(1, EAST), HalfEdgeId(2, WEST))),
-        frozenset((HalfEdgeId(1, WEST), HalfEdgeId(3, 0))),
+        frozenset((HalfEdgeId(1, beyond_it), HalfEdgeId(3, 0))),
     }
+    assert abs(graph.vertices[1].half_edges[beyond_it].bearing) == pytest.approx(np.pi)
 
 
 def test_a_part_of_an_edge_is_kept_until_all_of_it_is_driven() -> None:

@@ -402,14 +402,26 @@ def test_a_departure_that_comes_and_goes_is_decided_upon_in_the_end() -> None:
     assert vertex.degree == 3
 
 
-def test_a_departure_seen_only_later_is_added() -> None:
+def test_a_departure_seen_only_later_is_added_and_an_edge_that_leaves_by_it_parted() -> None:
+    """From (9, 0) past the tee to (3, 8) the robot drove when it did not see that there is one."""
     seen = Seen().look(TEE, 20)
+    mapper = seen.mapper
+    ends: list[HalfEdgeId] = []
+    for x, y, bearing in ((9.0, 0.0, math.pi), (3.0, 8.0, -math.pi / 2)):
+        far = Vertex(mapper.graph.next_id(), 1.0, Pose(x, y), 0.0, 0.0)
+        mapper.graph.vertices[far.id] = far
+        ends.append(HalfEdgeId(far.id, far.add_half_edge(bearing)))
+        mapper.belief = ekf.add_vertex(mapper.belief, far.id, far.local, 1e-6 * np.eye(3))
+    passing = resampled([(0.0, 0.0), (-6.0, 0.0), (-6.0, 8.0)])
+    mapper.graph.join(ends[0], ends[1], passing, 1.0, driven=True)
     lines = {**TEE_LINES, 13: (2, 5, [])}
     crossing = drawn({**TEE_POINTS, 5: (3.0, 4.0)}, lines, unseen={**UNSEEN, 5: math.pi / 2})
     seen.look(crossing, 5)
     vertex = seen.mapper.graph.vertices[seen.known.vertex_of[2]]
     assert vertex.degree == 4
-    assert len(seen.mapper.graph.edges) == 1
+    joined = [{edge.a.vertex, edge.b.vertex} for edge in mapper.graph.edges.values()]
+    assert [vertex.id in both for both in joined] == [True] * 3
+    assert set.union(*joined) >= {end.vertex for end in ends}
 
 
 def test_a_departure_that_stays_unclear_from_where_it_leaves_becomes_a_frontier() -> None:
