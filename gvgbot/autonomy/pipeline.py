@@ -33,6 +33,7 @@ from gvgbot.autonomy.keyframes import Past, has_come_on
 from gvgbot.autonomy.localisation import Localisation
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.mission import Mission
+from gvgbot.autonomy.obedience import DOES_NOT_MOVE
 from gvgbot.autonomy.overlooked import blind_angle
 from gvgbot.autonomy.placing import LATELY_M, search_near_by
 from gvgbot.autonomy.pose_tracking import PoseTracker
@@ -180,7 +181,7 @@ class Pipeline:
             self.mission.skip(max(0.0, scan.stamp - self.past.last.stamp - LONGEST_GAP_S))
         defect = self._defects.note_scan(scan, odom_base, self._told)
         if defect is not None and not self.led:
-            return [*happened, *self._halt(scan.stamp, defect)]
+            return [*happened, *self._halt(scan.stamp, defect, spoils_map=defect != DOES_NOT_MOVE)]
         motion = self.tracker.odometry.motion_during(scan)
         sweep = Sweep.of(without_mixed_pixels(scan), motion)
         local_base = self._localise(sweep.deskewed, odom_base)
@@ -205,9 +206,9 @@ class Pipeline:
         happened += learnt + done  # what was done may have taught the mapper more
         return happened + self._forget(scan.stamp, happened)
 
-    def _halt(self, stamp: float, reason: str) -> list[Event]:
-        """Stand until it is started anew: it cannot drive by what it sees."""
-        self.errands.halt(stamp, reason)
+    def _halt(self, stamp: float, reason: str, *, spoils_map: bool = True) -> list[Event]:
+        """Stand until it is started anew: it cannot drive by what it sees, or not at all."""
+        self.errands.halt(stamp, reason, spoils_map=spoils_map)
         return [*self.errands.take_events(), self.mission.stop(stamp, reason, "failed")]
 
     def _glance(self, scan: Scan, odom_base: Pose) -> None:

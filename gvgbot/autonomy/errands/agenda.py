@@ -37,6 +37,7 @@ class Agenda:
         self.is_waiting = False  # after an errand, for what comes next
         self.unplaced = ""  # why it found no place on its map when it looked for that
         self.unfit = ""  # why it must not drive until it is started anew
+        self.is_map_spoilt = False  # by what makes it unfit
         self.is_lost = False  # somebody doubts the pose; whoever takes that into account resets it
         self.given_up: Errand | None = None  # in vain, until something else is asked for
         self.happened: list[Event] = []  # because of requests; whoever tells of it takes it out
@@ -133,9 +134,9 @@ class Agenda:
         """End the errand, if there is one: it is about a map that is forgotten."""
         self._end(stamp, "given up", reason)
 
-    def halt(self, stamp: float, reason: str) -> None:
+    def halt(self, stamp: float, reason: str, *, spoils_map: bool) -> None:
         """Do nothing any more, whatever is asked for, until it is started anew."""
-        self.unfit = reason
+        self.unfit, self.is_map_spoilt = reason, spoils_map
         self._end(stamp, "given up", reason)
 
     # -- what is done about it ---------------------------------------------------------------------

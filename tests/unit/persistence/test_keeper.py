@@ -78,7 +78,7 @@ def test_who_is_unfit_leaves_the_map_of_before_or_none(
         keeper = Keeper(session, files, files.read())
     keyframes = len(session.pipeline.past.keyframes)
     drive_on(session, 3)
-    session.pipeline.errands.halt(21.0, "its laser hangs upside down")
+    session.pipeline.errands.halt(21.0, "its laser hangs upside down", spoils_map=True)
     keeper.keeping(21.0)()
     keeper.finish()
     saved = MissionFiles(tmp_path).read()
@@ -88,6 +88,22 @@ def test_who_is_unfit_leaves_the_map_of_before_or_none(
         assert not saved.is_current
     else:
         assert saved is None
+
+
+def test_whose_base_does_not_move_goes_on_with_its_map_when_it_is_started_again(
+    session: Session, tmp_path: Path
+) -> None:
+    keeper = Keeper(session, MissionFiles(tmp_path))
+    keeper.keeping(20.0)()
+    keyframes = len(session.pipeline.past.keyframes)
+    session.pipeline.errands.halt(21.0, "the base does not move", spoils_map=False)
+    session.pipeline.mission.stop(21.0, "the base does not move", "failed")
+    keeper.keeping(21.0)()
+    keeper.finish()
+    saved = MissionFiles(tmp_path).read()
+    assert saved is not None
+    assert len(saved.past) == keyframes
+    assert saved.memory.intent.outcome is None
 
 
 def drive_on(session: Session, keyframes: int) -> None:
