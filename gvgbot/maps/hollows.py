@@ -10,7 +10,7 @@ from gvgbot.maps.occupancy import OccupancyGrid
 from gvgbot.maps.viewpoints import marked
 
 _DEPTH_M = 0.35  # edges that lie side by side are one that is blurred; who is driven round is wider
-_BODY_M = 0.7  # no wider than this, it may be somebody
+_BODY_M = 0.2, 0.7  # as wide as this, it may be somebody; legs of furniture are thinner
 _NOT_OPEN = 0.9  # of the clearance in the open: there edges go round the floor
 
 
@@ -34,14 +34,18 @@ def hollows(grid: OccupancyGrid, ways: Array, open_m: float) -> Array:
 
 
 def bodies(grid: OccupancyGrid, ways: Array) -> Array:
-    """Places (N, 2), m, map frame, of what is small enough for somebody, and all that a ring holds.
+    """Places (N, 2), m, map frame, of what is as wide as somebody, and all that a ring holds.
 
     Ways (points (M, 2), a cell or less apart) of a GVG go round columns likewise.
     """
     areas, _ = ndimage.label(~marked(ways, grid))
-    held = filter(None, ndimage.find_objects(areas * is_wall(grid.cells)))
-    edges = np.array([[(side.start, side.stop) for side in box] for box in held]).reshape(-1, 2, 2)
-    is_small = (np.ptp(edges, axis=2) * grid.resolution_m <= _BODY_M).all(axis=1)
-    middles = edges[is_small].mean(axis=2)
-    places: Array = np.array(grid.origin) + middles[:, ::-1] * grid.resolution_m
-    return places
+    least, most = np.array(_BODY_M) / grid.resolution_m
+    held = areas * is_wall(grid.cells)
+    boxes, found = ndimage.find_objects(held), []
+    for number in np.unique(held[held > 0]).tolist():
+        box = boxes[number - 1]
+        _, pieces = ndimage.label(held[box] == number, np.ones((3, 3)))
+        if pieces == 1 and least <= max(side.stop - side.start for side in box) <= most:
+            found.append([(side.start + side.stop) / 2 for side in box])
+    middles = np.array(found).reshape(-1, 2)[:, ::-1]
+    return np.array(grid.origin) + middles * grid.resolution_m

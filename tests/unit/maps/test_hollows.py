@@ -44,16 +44,18 @@ def test_in_the_open_edges_go_round_the_floor() -> None:
     assert len(hollows(drawn("###", "#.#", "###"), np.empty((0, 2)), OPEN)) == 0
 
 
-@pytest.mark.parametrize(("side_m", "count"), [(0.3, 1), (0.6, 1), (0.8, 0)])
+@pytest.mark.parametrize(("side_m", "count"), [(0.1, 0), (0.3, 1), (0.6, 1), (0.8, 0)])
 def test_what_a_ring_goes_round_may_be_somebody_if_it_is_small(side_m: float, count: int) -> None:
     """A square in the middle of a hall, at (2, 1)."""
     grid = drawn("######", "#....#", "#....#", "#....#", "#....#", "######")
     cells = grid.cells.copy()
-    row, column = ((np.array([1.0, 2.0]) - np.array(grid.origin)[::-1]) / grid.resolution_m).astype(
-        int
-    )
+    middle = (np.array([1.0, 2.0]) - np.array(grid.origin)[::-1]) / grid.resolution_m
+    row, column = middle.astype(int)
     half = round(side_m / 2 / grid.resolution_m)
     cells[row - half : row + half, column - half : column + half] = 100
     places = bodies(replace(grid, cells=cells), way(*CORNERS))
     assert places == pytest.approx(np.array([[2.0, 1.0]] * count).reshape(-1, 2), abs=0.1)
     assert len(bodies(replace(grid, cells=cells), way(*CORNERS[:-1]))) == 0
+    legs = grid.cells.copy()
+    legs[row, [column, column + 3]] = 100  # of a chair
+    assert len(bodies(replace(grid, cells=legs), way(*CORNERS))) == 0
