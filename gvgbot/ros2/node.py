@@ -14,7 +14,8 @@ from gvgbot.geometry import Twist
 from gvgbot.ros2 import messages
 from gvgbot.ros2.cdr import decode_twist
 from gvgbot.ros2.config import Ros2Config
-from gvgbot.ros2.topics import TOPICS, Node, Topic, attachment, gid
+from gvgbot.ros2.delays import Delays
+from gvgbot.ros2.topics import TOPICS, Node, Topic, attachment, gid, sent_by
 from gvgbot.sleep import Sleep
 from gvgbot.zenoh_config import addresses, has_listener, opened, reason, session_config
 
@@ -86,12 +87,14 @@ class Ros2Node:
     async def hear(self, drive: Callable[[Twist], None]) -> None:
         """Hand on the newest twist each time until cancelled, if the configuration permits that.
 
-        Not what has come while the program was suspended or hung: who sent it may have stopped.
+        Not what was held up on its way, or has come while the program was suspended or hung: who
+        sent it may have stopped.
         """
         kind = self._config.cmd_vel
         if kind is None:
             return
         loop, arrived, sleep = asyncio.get_running_loop(), asyncio.Event(), Sleep()
+        delays = Delays()
         newest: deque[zenoh.Sample] = deque(maxlen=1)
 
         def take(sample: zenoh.Sample) -> None:
@@ -108,7 +111,8 @@ class Ros2Node:
                     arrived.clear()
                     if newest:  # one that came while another was read has been read in its place
                         sample = newest.popleft()
-                        if not sleep.is_or_was:
+                        was_held_up = _was_held_up(sample, delays, loop.time())
+                        if not (was_held_up or sleep.is_or_was):
                             self._hand_on(sample, drive)
 
     def _hand_on(self, sample: zenoh.Sample, drive: Callable[[Twist], None]) -> None:
@@ -131,6 +135,12 @@ class Ros2Node:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def _was_held_up(sample: zenoh.Sample, delays: Delays, stamp: float) -> bool:
+    """As far as that can be told: nobody knows it of what has no attachment."""
+    sent = None if sample.attachment is None else sent_by(sample.attachment.to_bytes())
+    return sent is not None and delays.held_up(sent[1], sent=sent[0], stamp=stamp)
 
 
 class _Publisher:

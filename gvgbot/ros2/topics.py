@@ -8,6 +8,7 @@ from gvgbot.ros2.cdr import Message
 from gvgbot.ros2.messages import LaserScan, MarkerArray, OccupancyGrid, Odometry, TFMessage
 
 GID_BYTES = 16
+_ATTACHED = struct.Struct("<qqB")  # number, ns, and how long the id is that follows
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,4 +86,12 @@ def attachment(sequence: int, unix_ns: int, gid: bytes) -> bytes:
     """
     if len(gid) != GID_BYTES:
         raise ValueError(f"an id has {GID_BYTES} bytes, not {len(gid)}")
-    return struct.pack("<qqB", sequence, unix_ns, GID_BYTES) + gid
+    return _ATTACHED.pack(sequence, unix_ns, GID_BYTES) + gid
+
+
+def sent_by(attached: bytes) -> tuple[float, bytes] | None:
+    """When a message was sent, in s by the sender's clock, and the sender's id; None if unread."""
+    if len(attached) != _ATTACHED.size + GID_BYTES:
+        return None
+    _, unix_ns, _ = _ATTACHED.unpack_from(attached)
+    return unix_ns / 1e9, attached[_ATTACHED.size :]

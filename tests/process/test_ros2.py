@@ -23,7 +23,7 @@ from gvgbot.ros2 import messages
 from gvgbot.ros2.cdr import encode
 from gvgbot.ros2.config import Ros2Config
 from gvgbot.ros2.node import Ros2Node
-from gvgbot.ros2.topics import MAP, SCAN, TF_STATIC
+from gvgbot.ros2.topics import MAP, SCAN, TF_STATIC, attachment
 from gvgbot.ros2.translation import occupancy_grid
 from gvgbot.telemetry import Telemetry
 from gvgbot.telemetry_config import TelemetryConfig
@@ -159,8 +159,8 @@ def test_a_latecomer_gets_the_map(network: str, robot: Ros2Node) -> None:
     assert (topic, what) == ("/map", {"walls": 400 * 400, "cells": 400 * 400})
 
 
-def test_what_came_while_the_program_was_asleep_does_not_drive_the_robot(network: str) -> None:
-    """Who sent it may have stopped since."""
+def test_what_is_late_does_not_drive_the_robot(network: str) -> None:
+    """Who sent it may have stopped since: it came while the program slept, or a router kept it."""
     config = Ros2Config(enabled=True, connect=(network,), domain=DOMAIN, cmd_vel="Twist")
     driven: list[float] = []
 
@@ -172,12 +172,19 @@ def test_what_came_while_the_program_was_asleep_does_not_drive_the_robot(network
                 await asyncio.sleep(1.5)
                 others.put(key, encode(messages.Twist(linear=messages.Vector3(metres_per_s))))
                 time.sleep(sleeps_s)  # noqa: ASYNC251, TID251  # a loop that hangs
+            for metres_per_s, late_s in ((0.4, 0), (0.5, 3), (0.6, 0)):
+                await asyncio.sleep(0.2)
+                others.put(
+                    key,
+                    encode(messages.Twist(linear=messages.Vector3(metres_per_s))),
+                    attachment=attachment(1, time.time_ns() - late_s * 10**9, bytes(16)),
+                )
             await asyncio.sleep(0.5)
             hearing.cancel()
 
     with Ros2Node(config, "a-b") as robot, plain_session(network) as others:
         asyncio.run(story(robot, others))
-    assert driven == [0.1, 0.3]
+    assert driven == [0.1, 0.3, 0.4, 0.6]
 
 
 def test_an_advanced_subscriber_as_rmw_zenoh_has_it_gets_the_map_with_its_attachment(

@@ -10,7 +10,7 @@ from zenoh_ros2_sdk.utils import ros2_to_dds_type
 
 from gvgbot.ros2 import topics
 from gvgbot.ros2.messages import Twist
-from gvgbot.ros2.topics import MAP, SCAN, TOPICS, Node, Topic, attachment, gid
+from gvgbot.ros2.topics import MAP, SCAN, TOPICS, Node, Topic, attachment, gid, sent_by
 
 NODE = Node(7, "a1b2c3", "/robot1/base", "gvgbot_tester")
 PLAIN = Node(0, "a1b2c3", "", "gvgbot_tester")
@@ -86,6 +86,13 @@ def test_an_attachment_has_the_bytes_of_zenoh_s_own_serialisation(
 def test_an_attachment_is_read_by_an_independent_implementation(sequence: int, stamp: int) -> None:
     read = sdk_attachment.Attachment.from_bytes(attachment(sequence, stamp, gid("a token")))
     assert (read.sequence_id, read.timestamp_ns, read.gid) == (sequence, stamp, gid("a token"))
+
+
+@given(st.integers(0, 2**62), st.binary(min_size=16, max_size=16))
+def test_who_sent_something_and_when_is_read_as_others_write_it(stamp: int, own: bytes) -> None:
+    theirs = sdk_attachment.Attachment(sequence_id=7, timestamp_ns=stamp, gid=own).to_bytes()
+    assert sent_by(theirs) == (stamp / 1e9, own)
+    assert sent_by(theirs[:-1]) is None
 
 
 def test_every_endpoint_has_an_id_of_its_own() -> None:
