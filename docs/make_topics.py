@@ -37,7 +37,9 @@ Only the robot writes its topics; the files in `configs/zenoh` see to that. What
 is sent again to a subscriber that has lost it (`heartbeat` of an advanced subscriber).
 
 A queryable topic answers a `get` with its newest sample, and in JSON to `KEY?format=json`, where
-raw bytes are in base64. What is kept for latecomers is what an advanced subscriber gets when it
+raw bytes are in base64. While there is none yet, as of events at first, the reply is an error.
+
+What is kept for latecomers is what an advanced subscriber gets when it
 joins. `gvgbot.client` does all of this for programs in Python.
 
 Other programs set zenoh's `mode` to `client`: as a peer, which is zenoh's default, they hear a
