@@ -15,7 +15,7 @@ from gvgbot.hal.messages import Scan
 
 _PIECE_M, _STRAIGHT_RAD = 0.2, 0.04  # between two sweeps that tell
 _LONGEST_M = 1.0
-_PIECES = 5  # that have to agree
+_PIECES, _MOST = 5, 40  # that have to agree; that are looked at altogether
 _TURNED_RAD = math.radians(3.0)  # a mount that is off by less does no harm
 _FAR_M = 8.0  # what is farther has few beams on it
 _ANY_WAY = np.diag([0.3**2, 0.3**2, 0.05**2])
@@ -29,6 +29,7 @@ class Aim:
         self._matching, self._is_settled = matching, False
         self._before: tuple[cKDTree, Pose] | None = None  # what was seen, with odom_base
         self._angles: list[float] = []
+        self._left = _MOST  # pieces to be looked at
 
     @property
     def off(self) -> float | None:
@@ -39,21 +40,29 @@ class Aim:
         return float(np.median(angles))
 
     def note(self, scan: Scan, odom_base: Pose) -> None:
-        """Learn from a sweep; nothing more once enough of them are as they should be."""
-        if self._is_settled or self.off is not None:
+        """Learn from a sweep, until enough of them are as they should be, or enough were seen."""
+        if self._is_settled or not self._left or self.off is not None:
             return
-        motion = None if self._before is None else self._before[1].to(odom_base)
-        if motion is not None and 0.0 <= motion.x < _PIECE_M and abs(motion.theta) < _STRAIGHT_RAD:
+        motion = self._straight_to(odom_base)
+        if motion is not None and motion.x < _PIECE_M:
             return
         points = _seen(scan)
-        if motion is not None and motion.x < _LONGEST_M and abs(motion.theta) < _STRAIGHT_RAD:
+        if motion is not None:
             self._compare(points, motion)
         is_enough = len(points) >= self._matching.min_pairs
         self._before = (cKDTree(points), odom_base) if is_enough else None
 
+    def _straight_to(self, odom_base: Pose) -> Pose | None:
+        """The motion from the sweep before, if it went ahead and not far; None if not."""
+        if self._before is None:
+            return None
+        motion = self._before[1].to(odom_base)
+        is_ahead = 0.0 <= motion.x < _LONGEST_M and abs(motion.theta) < _STRAIGHT_RAD
+        return motion if is_ahead else None
+
     def _compare(self, points: Array, motion: Pose) -> None:
-        if self._before is None or motion.x < 0.0:
-            return
+        assert self._before is not None, "the motion is from there"
+        self._left -= 1
         some = points[:: max(1, len(points) // self._matching.points)]
         found = register(some, self._before[0], motion, _ANY_WAY, self._matching)
         if found is None or found.inliers < _SHARE or found.covariance[1, 1] > _CLEAR_M**2:
@@ -76,7 +85,4 @@ def how_to_aim(scan: Scan, off: float) -> str:
 def _seen(scan: Scan) -> Array:
     """What is not far away (N, 2), m, base frame."""
     near = np.flatnonzero(scan.ranges < _FAR_M)
-    bearings = scan.base_laser.theta + scan.bearings[near]
-    ways = np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
-    points: Array = scan.base_laser.position + scan.ranges[near, None] * ways
-    return points
+    return scan.base_laser.transform(scan.ranges[near, None] * scan.directions[near])

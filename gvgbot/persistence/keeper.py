@@ -186,9 +186,9 @@ class Keeper:
         before asking for the next.
         """
         pipeline = self._session.pipeline
-        if pipeline.errands.unfit and not pipeline.errands.is_map_spoilt:
-            return _nothing  # of the end that this makes: it goes on where it was
-        if pipeline.errands.unfit:  # what it has seen is no map to go on with
+        if pipeline.errands.unfit:
+            if not pipeline.errands.is_map_spoilt:
+                return _nothing  # of the end that this makes: it goes on where it was
             return self._files.forget if self._saved is None else self._files.fall_behind
         if pipeline.is_lost:
             return self._keeping_wish()

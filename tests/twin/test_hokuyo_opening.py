@@ -12,7 +12,7 @@ from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.drivers.hokuyo.driver import HokuyoConfig, HokuyoLaser
 from gvgbot.drivers.hokuyo.twin import HokuyoTwin, HokuyoTwinConfig
 from gvgbot.drivers.kobuki.twin import KobukiTwin, KobukiTwinConfig
-from gvgbot.drivers.transport import ByteStream, pipe, serve_twin
+from gvgbot.drivers.transport import ByteStream, TwinDevice, pipe, serve_twin
 from gvgbot.errors import DeviceLost, DeviceRefused
 from tests.twin.kobuki_body import IdealBody
 
@@ -75,49 +75,34 @@ def test_a_laser_that_keeps_its_time_to_itself_is_opened(mute: tuple[bytes, ...]
     on_bench(Scripted(dict.fromkeys(mute, b""), twin_of(world)), scenario)
 
 
-def test_a_laser_that_goes_dead_while_it_is_asked_for_its_time_is_lost() -> None:
-    async def main() -> None:
+def ends(twin: TwinDevice, error: type[Exception], match: str, **config: Any) -> float:
+    """When the driver ends by itself (s), as this error says."""
+
+    async def main() -> float:
         here, there = pipe()
         clock = LoopClock()
         async with asyncio.TaskGroup() as tasks:
-            twin = TiresOfTime(twin_of(), 5, dying=True)
             served = tasks.create_task(serve_twin(twin, there, clock))
-            with pytest.raises(DeviceLost, match="does not answer"):
-                await HokuyoLaser(here, HokuyoConfig(), clock).run()
-            assert clock.now() < 4.0
+            with pytest.raises(error, match=match):
+                await HokuyoLaser(here, HokuyoConfig(**config), clock).run()
             served.cancel()
+        return clock.now()
 
-    run_in_virtual_time(main())
+    return run_in_virtual_time(main())
+
+
+def test_a_laser_that_goes_dead_while_it_is_asked_for_its_time_is_lost() -> None:
+    twin = TiresOfTime(twin_of(), 5, dying=True)
+    assert ends(twin, DeviceLost, "does not answer") < 4.0
 
 
 def test_a_base_at_the_port_of_the_laser_is_told_from_silence() -> None:
-    base = KobukiTwin(KobukiTwinConfig(), IdealBody(), 0)
-
-    async def main() -> None:
-        here, there = pipe()
-        clock = LoopClock()
-        async with asyncio.TaskGroup() as tasks:
-            served = tasks.create_task(serve_twin(base, there, clock))
-            with pytest.raises(DeviceLost, match="not the base's port"):
-                await HokuyoLaser(here, HokuyoConfig(), clock).run()
-            served.cancel()
-
-    run_in_virtual_time(main())
+    ends(KobukiTwin(KobukiTwinConfig(), IdealBody(), 0), DeviceLost, "not the base's port")
 
 
 def test_a_laser_that_answers_but_part_of_what_it_is_asked_may_be_slow() -> None:
-    async def main() -> None:
-        here, there = pipe()
-        clock = LoopClock()
-        async with asyncio.TaskGroup() as tasks:
-            served = tasks.create_task(
-                serve_twin(Scripted({b"PP\n": b""}, twin_of()), there, clock)
-            )
-            with pytest.raises(DeviceLost, match=r"PP within 0\.7 s: .*laser\.reply_timeout_s"):
-                await HokuyoLaser(here, HokuyoConfig(reply_timeout_s=0.7), clock).run()
-            served.cancel()
-
-    run_in_virtual_time(main())
+    said = r"PP within 0\.7 s: .*laser\.reply_timeout_s"
+    ends(Scripted({b"PP\n": b""}, twin_of()), DeviceLost, said, reply_timeout_s=0.7)
 
 
 @pytest.mark.parametrize(
@@ -140,17 +125,7 @@ def test_an_abnormal_laser_is_rebooted_once() -> None:
 
 
 def test_a_laser_that_stays_abnormal_is_refused() -> None:
-    async def main() -> None:
-        here, there = pipe()
-        clock = LoopClock()
-        twin = Scripted({b"QT\n": b"QT\n0Ll\n\n"}, twin_of())
-        async with asyncio.TaskGroup() as tasks:
-            served = tasks.create_task(serve_twin(twin, there, clock))
-            with pytest.raises(DeviceRefused, match="status 0L"):
-                await HokuyoLaser(here, HokuyoConfig(), clock).run()
-            served.cancel()
-
-    run_in_virtual_time(main())
+    ends(Scripted({b"QT\n": b"QT\n0Ll\n\n"}, twin_of()), DeviceRefused, "status 0L")
 
 
 @pytest.mark.parametrize("wanted", ["", "H0000007"])
@@ -166,17 +141,8 @@ def test_a_laser_with_the_wanted_serial_number_is_used(wanted: str) -> None:
 )
 def test_another_laser_than_the_wanted_one_is_refused(told: str, named: str) -> None:
     """On USB all Hokuyos look alike, and may change places when they are plugged in."""
-
-    async def main() -> None:
-        here, there = pipe()
-        clock = LoopClock()
-        async with asyncio.TaskGroup() as tasks:
-            served = tasks.create_task(serve_twin(twin_of(serial_number=told), there, clock))
-            with pytest.raises(DeviceRefused, match=f"{named}, not H0000002: set laser.port"):
-                await HokuyoLaser(here, HokuyoConfig(serial="H0000002"), clock).run()
-            served.cancel()
-
-    run_in_virtual_time(main())
+    said = f"{named}, not H0000002: set laser.port"
+    ends(twin_of(serial_number=told), DeviceRefused, said, serial="H0000002")
 
 
 def test_a_stop_that_was_lost_is_sent_again() -> None:

@@ -15,9 +15,11 @@ ROOMS = carved([(-4.0, -1.5, 8.0, 1.5), (1.0, 1.5, 3.0, 3.0)])
 WORN_RAD = 0.01  # by which wheels of unequal size turn the base from piece to piece
 
 
-def driven(turned_deg: float, *, said_deg: float = 0.0, pieces: int = 8) -> Aim:
+def driven(
+    turned_deg: float, *, said_deg: float = 0.0, pieces: int = 8, aim: Aim | None = None
+) -> Aim:
     """What a base learns that drives ahead, with its laser so far from where it is said to look."""
-    rng, aim = np.random.default_rng(4), Aim(ScanMatchingConfig())
+    rng, aim = np.random.default_rng(4), aim or Aim(ScanMatchingConfig())
     world_base = Pose(-1.0, 0.1, -0.03)
     for k in range(pieces):
         seen_from = world_base.compose(Pose(theta=math.radians(said_deg - turned_deg)))
@@ -44,6 +46,13 @@ def test_who_drives_aside_learns_by_how_much_its_laser_is_turned(
 @pytest.mark.parametrize("turned_deg", [0.0, -1.0, 1.0])
 def test_a_laser_that_looks_as_it_is_said_to_is_left_alone(turned_deg: float) -> None:
     assert driven(turned_deg).off is None
+
+
+def test_a_way_that_leaves_it_open_is_watched_no_longer_than_forty_pieces() -> None:
+    aim = driven(2.25)
+    for _ in range(8):
+        aim = driven(2.25, aim=aim)
+    assert driven(20.0, aim=aim).off is None
 
 
 def test_four_pieces_of_a_way_are_too_few() -> None:
