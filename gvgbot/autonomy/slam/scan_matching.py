@@ -2,7 +2,9 @@
 
 The prior is the odometry's own covariance, so the direction that the walls do not constrain (along
 a bare corridor) is left to odometry. A point is laid onto a wall's face that was seen from its own
-side: what a room shows of a thin wall is not what the corridor showed of it.
+side: what a room shows of a thin wall is not what the corridor showed of it. A wall is a line only
+close by, so wall points count less the farther they are from a point: Cleveland, "Robust locally
+weighted regression", JASA 74(368), 1979.
 """
 
 import math
@@ -19,6 +21,7 @@ from gvgbot.ranges import Range
 
 _NEIGHBOURS = 5
 _FEWEST = 3  # of them make a line
+_BEYOND = 1.05  # of the square of the farthest one's distance: there a wall point would not count
 _FLATNESS = 0.08  # smallest over largest spread of the neighbours of a point on a wall
 _REACH_M = 0.35  # as far away as neighbours on one wall may be
 _ITERATIONS = 6
@@ -206,9 +209,9 @@ def _pairs(
     present = np.isfinite(distance)
     paired = (present[:, _FEWEST - 1] & (distance[:, 0] < reach)).nonzero()[0]
     present, points = present.take(paired, axis=0), points.take(paired, axis=0)
-    near = near.take(paired, axis=0)
+    distance, near = distance.take(paired, axis=0), near.take(paired, axis=0)
     near = np.where(present, near, near[:, :1])
-    beside, weight = walls.data.take(near, axis=0), present * hits[near]
+    beside, weight = walls.data.take(near, axis=0), hits[near] * _closeness(distance, present)
     x, y = beside[..., 0], beside[..., 1]
     centre, normal, flat = _lines(x, y, weight)
     if sides is not None:
@@ -230,6 +233,16 @@ def _pairs(
     return _Pairs(
         points.take(lines, axis=0).T, normal, (centre * normal).sum(axis=0), near[lines, 0]
     )
+
+
+def _closeness(distance: Array, present: NDArray[np.bool_]) -> Array:
+    """What neighbours (K, G) of points count by their distance, m, if they are `present`.
+
+    How far a point is from the wall makes no difference: it is in the squares of all of them.
+    """
+    square = np.where(present, distance, 0.0) ** 2
+    closeness: Array = present * (_BEYOND * square.max(axis=1)[:, None] - square) ** 2
+    return closeness
 
 
 def _linear(
