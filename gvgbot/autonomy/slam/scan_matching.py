@@ -204,14 +204,18 @@ def _pairs(
 ) -> _Pairs:
     """The points (N, 2) that are near to a wall when laid down at a pose, and its line there."""
     world = pose.transform(points)
-    found = walls.query(world, k=_NEIGHBOURS, distance_upper_bound=max(reach, _REACH_M))
+    farthest = max(reach, _REACH_M)
+    found = walls.query(world, k=_NEIGHBOURS, distance_upper_bound=farthest)
     distance, near = np.asarray(found[0]), np.asarray(found[1])
     present = np.isfinite(distance)
     paired = (present[:, _FEWEST - 1] & (distance[:, 0] < reach)).nonzero()[0]
     present, points = present.take(paired, axis=0), points.take(paired, axis=0)
     distance, near = distance.take(paired, axis=0), near.take(paired, axis=0)
     near = np.where(present, near, near[:, :1])
-    beside, weight = walls.data.take(near, axis=0), hits[near] * _closeness(distance, present)
+    # the distance from the wall is in all of these squares, and makes no difference
+    square = np.minimum(distance, farthest) ** 2
+    closeness = (_BEYOND * square[:, -1:] - square) ** 2
+    beside, weight = walls.data.take(near, axis=0), present * hits[near] * closeness
     x, y = beside[..., 0], beside[..., 1]
     centre, normal, flat = _lines(x, y, weight)
     if sides is not None:
@@ -233,16 +237,6 @@ def _pairs(
     return _Pairs(
         points.take(lines, axis=0).T, normal, (centre * normal).sum(axis=0), near[lines, 0]
     )
-
-
-def _closeness(distance: Array, present: NDArray[np.bool_]) -> Array:
-    """What neighbours (K, G) of points count by their distance, m, if they are `present`.
-
-    How far a point is from the wall makes no difference: it is in the squares of all of them.
-    """
-    square = np.where(present, distance, 0.0) ** 2
-    closeness: Array = present * (_BEYOND * square.max(axis=1)[:, None] - square) ** 2
-    return closeness
 
 
 def _linear(
