@@ -2,9 +2,9 @@
 
 The prior is the odometry's own covariance, so the direction that the walls do not constrain (along
 a bare corridor) is left to odometry. A point is laid onto a wall's face that was seen from its own
-side: what a room shows of a thin wall is not what the corridor showed of it. A wall is a line only
-close by, so wall points count less the farther they are from a point: Cleveland, "Robust locally
-weighted regression", JASA 74(368), 1979.
+side: what a room shows of a thin wall is not what the corridor showed of it. A wall is a parabola
+through the wall points near by, which count the less the farther they are, as in Cleveland, "Robust
+locally weighted regression", JASA 74(368), 1979: a line lies inside columns, and cuts corners.
 """
 
 import math
@@ -22,13 +22,17 @@ from gvgbot.ranges import Range
 _NEIGHBOURS = 5
 _FEWEST = 3  # of them make a line
 _BEYOND = 1.05  # of the square of the farthest one's distance: there a wall point would not count
+_BEND_M4 = 5e-6  # wall points that are spread by less tell no bend of a wall
+_CORNER = 0.4  # rad that a wall turns among them: it is no parabola
 _FLATNESS = 0.08  # smallest over largest spread of the neighbours of a point on a wall
-_REACH_M = 0.35  # as far away as neighbours on one wall may be
+_REACH_M = 0.35  # as far away as neighbours on one wall may be; from farther off it is but a line
 _ITERATIONS = 6
 _BATCH = 10  # neighbouring points, of which the mean distance from the walls is taken
 _GRAZING = 0.2  # of how steeply a wall was seen: what is seen less steeply may be its other face
 _CONVERGED, _ROUGHLY = 1e-4, 2e-2  # metres and radians
 _SAME_PAIRS_M, _SAME_PAIRS_RAD = 0.02, 0.005  # moved less, points are near to the same walls
+
+Complexes = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -204,39 +208,49 @@ def _pairs(
 ) -> _Pairs:
     """The points (N, 2) that are near to a wall when laid down at a pose, and its line there."""
     world = pose.transform(points)
-    farthest = max(reach, _REACH_M)
+    is_close, farthest = reach <= _REACH_M, max(reach, _REACH_M)
     found = walls.query(world, k=_NEIGHBOURS, distance_upper_bound=farthest)
     distance, near = np.asarray(found[0]), np.asarray(found[1])
     present = np.isfinite(distance)
     paired = (present[:, _FEWEST - 1] & (distance[:, 0] < reach)).nonzero()[0]
     present, points = present.take(paired, axis=0), points.take(paired, axis=0)
     distance, near = distance.take(paired, axis=0), near.take(paired, axis=0)
-    near = np.where(present, near, near[:, :1])
-    # the distance from the wall is in all of these squares, and makes no difference
-    square = np.minimum(distance, farthest) ** 2
-    closeness = (_BEYOND * square[:, -1:] - square) ** 2
-    beside, weight = walls.data.take(near, axis=0), present * hits[near] * closeness
-    x, y = beside[..., 0], beside[..., 1]
-    centre, normal, flat = _lines(x, y, weight)
+    at = world.view(np.complex128).ravel().take(paired)
+    z = walls.data.view(np.complex128).ravel().take(near, mode="clip")
+    weight = present * hits.take(near, mode="clip")  # those that are not present have no index
+    if is_close:  # the distance from the wall is in all squares, and makes no difference
+        square = np.minimum(distance, farthest) ** 2
+        weight *= (_BEYOND * square[:, -1:] - square) ** 2
+    centre, along, flat = _lines(z, weight)
     if sides is not None:
-        seen_from = sides.of_points.take(paired, axis=0)
-        now = np.einsum("kj,jk->k", seen_from, normal)
-        before = np.einsum("kgj,jk->kg", sides.of_walls.take(near, axis=0), normal)
-        least = _GRAZING * np.hypot(*seen_from.T)
-        facing = before * now[:, None] >= before**2 * least[:, None]
+        of_walls = sides.of_walls.take(near, axis=0, mode="clip")
+        facing = _facing(sides.of_points.take(paired, axis=0), of_walls, along)
         weight *= facing
         enough = np.einsum("kg->k", (weight > 0.0).astype(np.int8)) >= _FEWEST
         mixed = (enough & (present & ~facing).any(axis=1)).nonzero()[0]
         if len(mixed):
-            centre[:, mixed], normal[:, mixed], flat[mixed] = _lines(
-                x[mixed], y[mixed], weight[mixed]
-            )
+            centre[mixed], along[mixed], flat[mixed] = _lines(z[mixed], weight[mixed])
         flat &= enough
     lines = flat.nonzero()[0]
-    centre, normal = centre.take(lines, axis=1), normal.take(lines, axis=1)
-    return _Pairs(
-        points.take(lines, axis=0).T, normal, (centre * normal).sum(axis=0), near[lines, 0]
-    )
+    centre, along = centre.take(lines), along.take(lines)
+    normal = np.array([-along.imag, along.real])
+    to_wall = centre.real * normal[0] + centre.imag * normal[1]
+    if is_close:
+        z, weight = z.take(lines, axis=0), weight.take(lines, axis=0)
+        to_wall += _bulge(z, weight, centre, along, at.take(lines))
+    return _Pairs(points.take(lines, axis=0).T, normal, to_wall, near[lines, 0])
+
+
+def _facing(of_points: Array, of_walls: Array, along: Complexes) -> NDArray[np.bool_]:
+    """Which of the wall points (K, G) beside points (K,) were seen from the side these show.
+
+    Directions to there are (K, 2) from the points and (K, G, 2) from the walls.
+    """
+    normal = np.stack([-along.imag, along.real], axis=1)
+    now = np.einsum("kj,kj->k", of_points, normal)
+    before = np.einsum("kgj,kj->kg", of_walls, normal)
+    least = _GRAZING * np.hypot(*of_points.T)
+    return np.asarray(before * now[:, None] >= before**2 * least[:, None])
 
 
 def _linear(
@@ -256,15 +270,38 @@ def _linear(
     return (near, residual, J) if near.all() else (near, residual[near], J[:, near])
 
 
-def _lines(x: Array, y: Array, weight: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Centres (2, K) and normals (2, K) of groups of points (K, G), and which are lines (K,)."""
+def _lines(z: Complexes, weight: Array) -> tuple[Complexes, Complexes, NDArray[np.bool_]]:
+    """Centres (K,) of groups of points (K, G), directions of the lines there, and which are lines.
+
+    Of points as complex numbers the mean square of what is off the centre has twice the angle of
+    the line, and is as long as the variance along it is larger than the one across.
+    """
     weight = weight / np.einsum("kg->k", weight)[:, None]
-    centre = np.array([np.einsum("kg,kg->k", weight, p) for p in (x, y)])
-    dx, dy = x - centre[0, :, None], y - centre[1, :, None]
-    wx, wy = weight * dx, weight * dy
-    xx, yy, xy = (np.einsum("kg,kg->k", a, b) for a, b in ((wx, dx), (wy, dy), (wx, dy)))
-    more, mean = xx - yy, (xx + yy) / 2
-    angle = 0.5 * np.arctan2(2 * xy, more)  # of the wall
-    spread = np.hypot(more / 2, xy)
-    normal = np.array([-np.sin(angle), np.cos(angle)])
-    return centre, normal, mean - spread < _FLATNESS * (mean + spread)
+    centre = np.einsum("kg,kg->k", weight, z)
+    off = z - centre[:, None]
+    weighted = weight * off
+    more = np.einsum("kg,kg->k", weighted, off)
+    both = np.einsum("kg,kg->k", weighted, off.conj()).real
+    longer = np.abs(more)
+    along = np.exp(0.5j * np.angle(more))
+    return centre, along, both - longer < _FLATNESS * (both + longer)
+
+
+def _bulge(
+    z: Complexes, weight: Array, centre: Complexes, along: Complexes, at: Complexes
+) -> Array:
+    """How far (K,) walls are off the lines of groups of points (K, G), beside points (K,).
+
+    They are parabolas, bend (u^2 - spread) off the line, u m from its centre, and beyond the last
+    of the points as far off as there. At corners they are lines.
+    """
+    back = along.conj()
+    off = (z - centre[:, None]) * back[:, None]
+    square = off.real**2
+    weighted = weight / np.einsum("kg->k", weight)[:, None] * square
+    spread = np.einsum("kg->k", weighted)
+    told = np.einsum("kg,kg->k", weighted, square) - spread * spread
+    bend = np.einsum("kg,kg->k", weighted, off.imag) / (told + _BEND_M4)
+    u = ((at - centre) * back).real
+    bulge = bend * (np.minimum(u * u, 2.0 * spread) - spread)
+    return np.where(4.0 * bend * bend * spread < _CORNER**2, bulge, 0.0)
