@@ -24,7 +24,7 @@ _FEWEST = 3  # of them make a line
 _BEYOND = 1.05  # of the square of the farthest one's distance: there a wall point would not count
 _BEND_M4 = 5e-6  # wall points that are spread by less tell no bend of a wall
 _CORNER = 0.4  # rad that a wall turns among them: it is no parabola
-_FLATNESS = 0.08  # smallest over largest spread of the neighbours of a point on a wall
+_FLATNESS = 0.12  # of the variance along a wall, what the neighbours of a point may have across
 _REACH_M = 0.35  # as far away as neighbours on one wall may be; from farther off it is but a line
 _ITERATIONS = 6
 _BATCH = 10  # neighbouring points, of which the mean distance from the walls is taken
@@ -215,29 +215,34 @@ def _pairs(
     paired = (present[:, _FEWEST - 1] & (distance[:, 0] < reach)).nonzero()[0]
     present, points = present.take(paired, axis=0), points.take(paired, axis=0)
     distance, near = distance.take(paired, axis=0), near.take(paired, axis=0)
-    at = world.view(np.complex128).ravel().take(paired)
     z = walls.data.view(np.complex128).ravel().take(near, mode="clip")
-    weight = present * hits.take(near, mode="clip")  # those that are not present have no index
+    counts = present * hits.take(near, mode="clip")  # those that are not present have no index
+    closeness: Array | float = 1.0
     if is_close:  # the distance from the wall is in all squares, and makes no difference
         square = np.minimum(distance, farthest) ** 2
-        weight *= (_BEYOND * square[:, -1:] - square) ** 2
-    centre, along, flat = _lines(z, weight)
+        closeness = (_BEYOND * square[:, -1:] - square) ** 2
+    weight = counts * closeness
+    centre, along = _lines(z, weight)
     if sides is not None:
         of_walls = sides.of_walls.take(near, axis=0, mode="clip")
         facing = _facing(sides.of_points.take(paired, axis=0), of_walls, along)
-        weight *= facing
-        enough = np.einsum("kg->k", (weight > 0.0).astype(np.int8)) >= _FEWEST
+        enough = np.einsum("kg->k", (facing & present).astype(np.int8)) >= _FEWEST
+        counts *= facing & enough[:, None]
         mixed = (enough & (present & ~facing).any(axis=1)).nonzero()[0]
         if len(mixed):
-            centre[mixed], along[mixed], flat[mixed] = _lines(z[mixed], weight[mixed])
-        flat &= enough
-    lines = flat.nonzero()[0]
-    centre, along = centre.take(lines), along.take(lines)
-    normal = np.array([-along.imag, along.real])
-    to_wall = centre.real * normal[0] + centre.imag * normal[1]
+            weight[mixed] *= facing[mixed]
+            centre[mixed], along[mixed] = _lines(z[mixed], weight[mixed])
+    turned = along.conj()
+    off = (z - centre[:, None]) * turned[:, None]  # along the wall, and across
+    across, spread = (np.einsum("kg,kg->k", counts, d * d) for d in (off.imag, off.real))
+    lines = (across < _FLATNESS * spread).nonzero()[0]
+    centre, turned = centre.take(lines), turned.take(lines)
+    normal = np.array([turned.imag, turned.real])
+    to_wall = (centre * turned).imag
     if is_close:
-        z, weight = z.take(lines, axis=0), weight.take(lines, axis=0)
-        to_wall += _bulge(z, weight, centre, along, at.take(lines))
+        at = world.view(np.complex128).ravel().take(paired.take(lines))
+        beside = ((at - centre) * turned).real
+        to_wall += _bulge(off.take(lines, axis=0), weight.take(lines, axis=0), beside)
     return _Pairs(points.take(lines, axis=0).T, normal, to_wall, near[lines, 0])
 
 
@@ -270,38 +275,28 @@ def _linear(
     return (near, residual, J) if near.all() else (near, residual[near], J[:, near])
 
 
-def _lines(z: Complexes, weight: Array) -> tuple[Complexes, Complexes, NDArray[np.bool_]]:
-    """Centres (K,) of groups of points (K, G), directions of the lines there, and which are lines.
+def _lines(z: Complexes, weight: Array) -> tuple[Complexes, Complexes]:
+    """Centres (K,) of groups of points (K, G), and directions of the lines through them.
 
-    Of points as complex numbers the mean square of what is off the centre has twice the angle of
-    the line, and is as long as the variance along it is larger than the one across.
+    The mean square of what complex numbers are off their centre has twice the angle of the line.
     """
     weight = weight / np.einsum("kg->k", weight)[:, None]
     centre = np.einsum("kg,kg->k", weight, z)
     off = z - centre[:, None]
-    weighted = weight * off
-    more = np.einsum("kg,kg->k", weighted, off)
-    both = np.einsum("kg,kg->k", weighted, off.conj()).real
-    longer = np.abs(more)
-    along = np.exp(0.5j * np.angle(more))
-    return centre, along, both - longer < _FLATNESS * (both + longer)
+    return centre, np.exp(0.5j * np.angle(np.einsum("kg,kg->k", weight, off * off)))
 
 
-def _bulge(
-    z: Complexes, weight: Array, centre: Complexes, along: Complexes, at: Complexes
-) -> Array:
-    """How far (K,) walls are off the lines of groups of points (K, G), beside points (K,).
+def _bulge(off: Complexes, weight: Array, beside: Array) -> Array:
+    """How far (K,) walls are off lines through groups of points (K, G), at so many m along them.
 
-    They are parabolas, bend (u^2 - spread) off the line, u m from its centre, and beyond the last
-    of the points as far off as there. At corners they are lines.
+    Walls are parabolas, bend (u^2 - spread) off the line, u m from its centre, and beyond the last
+    of the points as far off as there; at corners they are lines. Points are where they are `off`
+    the centre, along the line and across.
     """
-    back = along.conj()
-    off = (z - centre[:, None]) * back[:, None]
     square = off.real**2
     weighted = weight / np.einsum("kg->k", weight)[:, None] * square
     spread = np.einsum("kg->k", weighted)
     told = np.einsum("kg,kg->k", weighted, square) - spread * spread
     bend = np.einsum("kg,kg->k", weighted, off.imag) / (told + _BEND_M4)
-    u = ((at - centre) * back).real
-    bulge = bend * (np.minimum(u * u, 2.0 * spread) - spread)
+    bulge = bend * (np.minimum(beside * beside, 2.0 * spread) - spread)
     return np.where(4.0 * bend * bend * spread < _CORNER**2, bulge, 0.0)
