@@ -171,6 +171,19 @@ def test_the_corners_of_a_room_do_not_hold_the_robot_back() -> None:
     assert believed.distance(Pose(1.0, 0.0, 0.0)) < 0.006
 
 
+def test_a_noisy_laser_does_not_make_the_wheels_slip() -> None:
+    """Points that find no line must not speak for a place where they are beyond all walls."""
+    rng, local, noise = np.random.default_rng(1), maps(), noise_of(0.01, 0.005, 0.003)
+    xs = np.concatenate([np.arange(-4.0, 4.0, 0.25), np.arange(4.0, -4.0, -0.25)] * 2)[:100]
+    believed = Pose(float(xs[0]))
+    local.insert(room(rng, believed.x, sigma=0.03), believed, 0.0)
+    for step, (before, x) in enumerate(itertools.pairwise(xs.tolist()), 1):
+        scan = room(rng, x, sigma=0.03)
+        believed, *_ = local.match(scan, believed, Pose(x - before), 1.0, noise)
+        local.insert(scan, believed, 0.25 * step)
+        assert believed.distance(Pose(x)) < 0.06
+
+
 def test_a_drive_errs_about_as_much_as_its_steps_say_together() -> None:
     """Twenty matched steps: the drift of the walls adds up, the error of a match counts once."""
     rng, noise = np.random.default_rng(6), noise_of(0.01, 0.005, 0.003)
