@@ -152,6 +152,7 @@ def test_a_paused_robot_is_not_driven_and_exploring_takes_it_back(
         await drive_for(1.0)
         phases["driven"] = daemon.network.states[-1].phase
         assert (await daemon.network.ask("pause")).done
+        assert (await daemon.network.ask("stop")).done  # which is no leave to move
         await drive_for(3.0)
         speeds["paused"] = daemon.newest.twist.angular
         assert (await daemon.network.ask("resume")).done

@@ -49,8 +49,7 @@ class Errands(Agenda):
         return "it goes on exploring"
 
     def stop(self, stamp: float) -> str:
-        """End the errand and the exploration."""
-        self.is_paused = False
+        """End the errand and the exploration; a paused robot stays so."""
         had_errand = self._plan is not None
         self._end(stamp, "stopped", "by a request")
         if self._mission.outcome is not None:

@@ -423,7 +423,7 @@ def turned_after_the_end(
 ) -> float:
     """The bearing of somebody who has finished in a corridor, another robot so far east of it.
 
-    If it is lifted, or told to stand still and then to stop, that is just after the end.
+    If it is lifted, or told to stop, that is just after the end.
     """
     config = load_config()
     pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
@@ -434,7 +434,6 @@ def turned_after_the_end(
             other = Companion("other", Pose(away_m), goes_first=True, radius=0.18)
             pipeline.traffic.company = [other]
             if told:
-                pipeline.errands.pause()
                 pipeline.errands.stop(0.1 * k)
         theta += 0.1 * twist.angular
         scan = sweep(CORRIDOR, Pose(0.0, 0.0, theta), field_of_view=LASER_270)
