@@ -238,7 +238,7 @@ class Telemetry:
         with query, contextlib.suppress(zenoh.ZError):  # who asked may have gone
             latest = self._latest.get(topic)
             if latest is None:
-                query.reply_err(f"there is no {topic.name} yet")
+                query.reply_err(f"no {topic.name} yet")
                 return
             encode, encoding = _form(topic, query.parameters.get("format"))
             query.reply(topic.key(self._robot), encode(latest), encoding=encoding)

@@ -404,7 +404,7 @@ def test_every_topic_answers_who_asks_for_its_newest_sample(endpoint: str) -> No
     plain = json.loads(as_json)
     assert zlib.decompress(base64.b64decode(plain["tiles"][0]["cells"]))[0] == 100  # of the whole
     assert json.loads(events)["events"][0]["details"] == {"reason": "ear"}
-    assert state == b"there is no state yet"
+    assert state == b"no state yet"
 
 
 def test_each_of_a_crowd_that_asks_at_once_gets_the_newest_sample(endpoint: str) -> None:
