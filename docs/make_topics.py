@@ -33,6 +33,10 @@ What a robot says over zenoh. `ROBOT` is its `robot.name`; `*` in that place lis
 them. A payload is one MessagePack map from field name to value; the encoding of each sample carries
 its type and version. Units are SI, angles are in radians.
 
+A `stamp` is of the robot's monotonic clock, the same for all topics, which begins anew when its
+computer is started. The time of day there is zenoh's timestamp of each sample, which replies lack;
+a router puts its own in its place if the robot's clock is more than half a second ahead of it.
+
 Only the robot writes its topics; the files in `configs/zenoh` see to that. What is sent on change
 is sent again to a subscriber that has lost it (`heartbeat` of an advanced subscriber).
 

@@ -407,6 +407,22 @@ def test_every_topic_answers_who_asks_for_its_newest_sample(endpoint: str) -> No
     assert state == b"no state yet"
 
 
+def test_a_sample_tells_the_time_of_day(endpoint: str) -> None:
+    with a_robot(endpoint) as robot, plain_session(endpoint) as session:
+        heard = session.declare_subscriber("gvgbot/near/state")
+        samples: list[zenoh.Sample] = []
+
+        def is_heard() -> bool:
+            robot.publish(numbered(1))
+            samples.extend(filter(None, [heard.try_recv()]))
+            return bool(samples)
+
+        until(is_heard)
+        now = session.new_timestamp().get_time()
+    assert samples[0].timestamp is not None
+    assert abs((samples[0].timestamp.get_time() - now).total_seconds()) < PATIENCE
+
+
 def test_each_of_a_crowd_that_asks_at_once_gets_the_newest_sample(endpoint: str) -> None:
     async def replies() -> list[zenoh.Reply]:
         with a_robot(endpoint) as robot, plain_session(endpoint) as session:
