@@ -6,24 +6,23 @@ from collections import deque
 from collections.abc import AsyncIterable, Callable
 from functools import partial
 from pathlib import Path
-from typing import TypeVar
+from typing import Any
 
 from gvgbot import client
-from gvgbot.client import Asking, Robot, State
+from gvgbot.client import Asking, Grid, Robot, State
+from gvgbot.client.newest import Newest
 from gvgbot.errors import GvgbotError, UsageError, reason_of, underlying
 from gvgbot.requests import Goto, Patrol, Set
 from gvgbot.tiles import Tile
-from gvgbot.topics import Events, Health, Map, Odometry, Plan, Scan, Trajectory
+from gvgbot.topics import Events
 from gvgbot.web.viewers import Audience
-from gvgbot.web.wire import Floor, History, Kind, Link, Reply, Wish
+from gvgbot.web.wire import Floor, History, Known, Link, Reply, Wish
 
 _PATIENCE = 1.0  # s for a connection, before the page says that there is none
 _BEAT = 0.5  # s between words on how things are
 _SILENT = 2.0  # s without such a word; a page gives up after four
 _PAUSE = 0.1  # s between two values of a kind: more often nobody sees
 _SAMPLE_EVERY, _SAMPLES = 2.0, 900  # s of the robot's clock, and how many: half an hour
-
-T = TypeVar("T", State, Map, Trajectory, Plan, Odometry, Scan, Health)
 
 
 class Feed:
@@ -45,6 +44,7 @@ class Feed:
         self._life: str | None = None  # of the robot, that the audience knows of
         self._began: float | None = None  # of its grid
         self._tiles: dict[tuple[int, int], Tile] = {}  # of its grid
+        self._told: Events | None = None  # of this life
         self._history = _Histories()
         self._lost_at: float | None = None  # by the loop's clock; None while connected
         self._trouble = f"looking for a robot at {endpoint}"  # why there is no connection
@@ -115,43 +115,49 @@ class Feed:
 
     async def _watch(self, robot: Robot) -> None:
         async with asyncio.TaskGroup() as tasks:
-            tasks.create_task(self._pass_on(robot, "state", robot.state()))
-            tasks.create_task(self._pass_on(robot, "map", robot.map()))
-            tasks.create_task(self._pass_on_tiles(robot))
-            tasks.create_task(self._pass_on(robot, "trajectory", robot.trajectory()))
-            tasks.create_task(self._pass_on(robot, "plan", robot.plan()))
-            tasks.create_task(self._pass_on(robot, "health", robot.health()))
-            tasks.create_task(self._pass_on(robot, "odometry", robot.odometry()))
-            tasks.create_task(self._pass_on(robot, "scan", robot.scan()))
+            for kind, newest in _said_by(robot).items():
+                tasks.create_task(self._pass_on(robot, kind, newest))
             tasks.create_task(self._remember(robot.state()))
             tasks.create_task(self._keep_telling(robot))
 
-    async def _pass_on(self, robot: Robot, kind: Kind, values: AsyncIterable[T]) -> None:
-        async for value in values:
-            self._note_life(robot)
-            self._audience.show(kind, value)
+    async def _pass_on(self, robot: Robot, kind: Known, newest: Newest[Any]) -> None:
+        async for value in newest:
+            if not self._has_begun_anew(robot):
+                self._show(kind, value)
             await asyncio.sleep(_PAUSE)
 
-    def _note_life(self, robot: Robot) -> None:
+    def _has_begun_anew(self, robot: Robot) -> bool:
+        """Whether another life of the robot speaks: then all that this one has said is shown.
+
+        What was read just before may be of the other one.
+        """
         life = robot.life
-        if life is not None and life != self._life:
-            self._life, self._began, self._tiles = life, None, {}
-            self._audience.begin_anew(life)
+        if life is None or life == self._life:
+            return False
+        self._life, self._began, self._tiles, self._told = life, None, {}, None
+        self._audience.begin_anew(life)
+        for kind, newest in _said_by(robot).items():
+            if (value := newest.latest) is not None:
+                self._show(kind, value)
+        return True
 
-    async def _pass_on_tiles(self, robot: Robot) -> None:
+    def _show(self, kind: Known, value: Any) -> None:
+        if isinstance(value, Grid):
+            self._show_tiles(value)
+        else:
+            self._audience.show(kind, value)
+
+    def _show_tiles(self, grid: Grid) -> None:
         """Send of each grid what is new in it."""
-        async for grid in robot.grid():
-            self._note_life(robot)
-            if grid.began != self._began:
-                self._began, self._tiles = grid.began, {}
-                self._audience.forget("tile")
-                self._audience.show("floor", Floor(resolution=grid.resolution, side=grid.side))
-            for tile in grid.tiles:
-                place = tile.row, tile.column
-                if self._tiles.get(place) != tile:
-                    self._tiles[place] = tile
-                    self._audience.show("tile", tile, place)
-            await asyncio.sleep(_PAUSE)
+        if grid.began != self._began:
+            self._began, self._tiles = grid.began, {}
+            self._audience.forget("tile")
+            self._audience.show("floor", Floor(resolution=grid.resolution, side=grid.side))
+        for tile in grid.tiles:
+            place = tile.row, tile.column
+            if self._tiles.get(place) != tile:
+                self._tiles[place] = tile
+                self._audience.show("tile", tile, place)
 
     async def _remember(self, states: AsyncIterable[State]) -> None:
         """Keep a history for those who come later."""
@@ -161,13 +167,12 @@ class Feed:
 
     async def _keep_telling(self, robot: Robot) -> None:
         """Say how things are with the robot, and what has happened."""
-        told: Events | None = None
         while True:
             self._show_link(await self._link(robot))
-            self._note_life(robot)
+            self._has_begun_anew(robot)
             happened = Events(events=robot.events().latest)
-            if happened != told:
-                told = happened
+            if happened != self._told:
+                self._told = happened
                 self._audience.show("events", happened)
             await asyncio.sleep(_BEAT)
 
@@ -207,6 +212,20 @@ class Feed:
             case _:
                 ask: Callable[[], Asking] = getattr(robot, wish.name)
                 return ask()
+
+
+def _said_by(robot: Robot) -> dict[Known, Newest[Any]]:
+    """What a robot says all the time; its grid goes on in tiles."""
+    return {
+        "state": robot.state(),
+        "map": robot.map(),
+        "tile": robot.grid(),
+        "trajectory": robot.trajectory(),
+        "plan": robot.plan(),
+        "health": robot.health(),
+        "odometry": robot.odometry(),
+        "scan": robot.scan(),
+    }
 
 
 class _Histories:

@@ -18,6 +18,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import ExitStack, asynccontextmanager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from threading import Event as Flag
 from typing import Any
 from urllib.error import HTTPError
 from urllib.request import Request, urlopen
@@ -34,6 +35,7 @@ from websockets.sync.client import connect as sync_connect
 from benchmarks.rigs.addresses import free_endpoint, plain_session, router
 from benchmarks.rigs.programs import gvgbot
 from gvgbot import client
+from gvgbot.client.newest import Newest
 from gvgbot.requests import REQUESTS, Answer, Asked, Goto, parse
 from gvgbot.telemetry import Telemetry
 from gvgbot.telemetry_config import TelemetryConfig
@@ -390,30 +392,42 @@ def test_a_robot_of_another_version_is_said_to_be_one() -> None:
             asyncio.run(story(address))
 
 
-def test_a_robot_has_its_walls_again_when_another_one_of_its_name_has_left() -> None:
-    endpoint, audience = free_endpoint(), Audience()
+def test_a_robot_has_its_walls_again_when_another_one_of_its_name_has_left(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Also when the two take turns while a reader is at it."""
+    endpoint, audience, swap = free_endpoint(), Audience(), Newest.swap
     there = TelemetryConfig(listen=(free_endpoint(),), connect=(endpoint,))
+    happened = Events(events=(Event(number=0, stamp=3.0, kind="meetpoint", details={}),))
 
-    def said() -> set[str]:
-        return {kind for kind, _ in audience._latest}
+    def slow_swap(box: Newest[Any], read: Callable[[], Any] | None) -> Callable[[], Any] | None:
+        before = swap(box, read)
+        Flag().wait(0.001)
+        return before
 
     async def until(robot: Telemetry, *kinds: str) -> None:
-        while not said() >= {"state", "link"} or said() & {"map", "tile"} != set(kinds):
+        while True:
+            latest = audience._latest.items()
+            said = {kind: value for (kind, _), value in latest if value != Events(events=())}
+            known = said.keys() & {"map", "tile", "events"}
+            if said.get("life") == robot.zid and known == set(kinds):
+                return
             robot.publish(EXAMPLE)
             await asyncio.sleep(0.01)
 
     async def story() -> None:
         with Telemetry(TelemetryConfig(listen=(endpoint,)), "karl") as karl:
-            karl.publish(ROOM)
-            karl.publish(GRAPH)
+            for one in (ROOM, GRAPH, happened):
+                karl.publish(one)
             async with asyncio.timeout(PATIENCE), asyncio.TaskGroup() as tasks:
                 watching = tasks.create_task(Feed("karl", endpoint, None, audience).run())
-                await until(karl, "map", "tile")
+                await until(karl, "map", "tile", "events")
                 with Telemetry(there, "karl") as other:
                     await until(other)
-                await until(karl, "map", "tile")
+                await until(karl, "map", "tile", "events")
                 watching.cancel()
 
+    monkeypatch.setattr(Newest, "swap", slow_swap)
     asyncio.run(story())
 
 
