@@ -62,9 +62,17 @@ def test_who_sees_without_being_seen_does_not_know_whom() -> None:
     assert frame(looks(0, EAST, WEST), looks(1, WEST)) is None
 
 
-def test_two_that_stand_before_each_other_may_be_any_two() -> None:
-    here, there = straight(0.0, 0.0, 0.0, 0.0), straight(2.0, 0.0, 0.0, 0.0)
+@pytest.mark.parametrize("metres", [2.0, 0.4])
+def test_two_that_stand_before_each_other_may_be_any_two(metres: float) -> None:
+    here, there = straight(0.0, 0.0, 0.0, 0.0), straight(metres, 0.0, 0.0, 0.0)
     assert frame(looks(0, here, there), looks(1, there, here)) is None
+
+
+def test_of_two_others_that_drive_off_alike_either_may_be_the_one_that_tells() -> None:
+    here = straight(0.0, 0.0, 0.0, 0.0)
+    east, north = straight(1.0, 0.0, 0.25, 0.0), straight(0.0, 1.0, 0.0, 0.25)
+    assert frame(looks(0, here, east), looks(1, east, here)) is not None
+    assert frame(looks(0, here, east, north), looks(1, east, here)) is None
 
 
 def test_two_that_only_move_to_and_fro_before_each_other_may_be_any_two() -> None:
