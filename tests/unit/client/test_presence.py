@@ -30,7 +30,9 @@ NOW = 100.0
         pytest.param(
             Signs(10.0, 88.0, False, 87.0, doubled_at=86.9), True, "gone", 12.0, id="both left"
         ),
-        pytest.param(Signs(10.0, 88.0, False, 87.0), True, "gone", 12.0, id="left the router"),
+        pytest.param(
+            Signs(10.0, 88.0, False, 87.0, via_router=True), True, "gone", 12.0, id="left a router"
+        ),
         pytest.param(Signs(10.0, 88.0, False, 87.0), False, "gone", 12.0, id="left, was direct"),
         pytest.param(
             Signs(10.0, 88.0, False, 87.0, via_router=True), False, "cut off", 12.0, id="no router"

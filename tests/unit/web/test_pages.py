@@ -81,6 +81,7 @@ def request(host: str | None, origin: str | None) -> Request:
         pytest.param("localhost:8080", "http://localhost:8080", False, id="by name"),
         pytest.param("[::1]:8080", "http://[::1]:8080", False, id="IPv6"),
         pytest.param("192.168.1.7", "http://192.168.1.7", False, id="the usual port"),
+        pytest.param("[::1]", "http://[::1]", False, id="IPv6, the usual port"),
         pytest.param("robot.lab:8080", "http://robot.lab:8080", False, id="as --host names it"),
         pytest.param("127.0.0.1:8080", "https://example.com", True, id="a page from elsewhere"),
         pytest.param("127.0.0.1:8080", "http://127.0.0.1:9000", True, id="another port"),
