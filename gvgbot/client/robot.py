@@ -283,9 +283,10 @@ class Robot:
     def _on_sample(
         self, topic: Topic, payload: type[T], newest: Newest[T], sample: zenoh.Sample
     ) -> None:
-        self._note_life(sample)
         encoding, data = str(sample.encoding), sample.payload.to_bytes()
-        newest.put(partial(decoded, topic, payload, encoding, data))
+        with self._life_gate:  # until it is put among what the same one has said
+            self._note_life(sample)
+            newest.put(partial(decoded, topic, payload, encoding, data))
         if topic is STATE:
             self._signs.heard_at = time.perf_counter()
 
@@ -297,25 +298,25 @@ class Robot:
         """
         if self._session is None or sample.source_info is None:
             return
-        with self._life_gate:
-            life = str(sample.source_info.source_id.zid)
-            if life == self._life:
-                return
-            earlier, said = self._earlier
-            if life == earlier:
-                self._signs.doubled_at = time.perf_counter()
-            known = said if life == earlier else [None] * len(self._all)
-            swapped = [box.swap(read) for box, read in zip(self._all, known, strict=True)]
-            self._earlier, self._life = (self._life, swapped), life
-            routers = {str(one) for one in self._session.info.routers_zid()}
-            self._signs.via_router = bool(routers) and life not in routers
+        life = str(sample.source_info.source_id.zid)
+        if life == self._life:
+            return
+        earlier, said = self._earlier
+        if life == earlier:
+            self._signs.doubled_at = time.perf_counter()
+        known = said if life == earlier else [None] * len(self._all)
+        swapped = [box.swap(read) for box, read in zip(self._all, known, strict=True)]
+        self._earlier, self._life = (self._life, swapped), life
+        routers = {str(one) for one in self._session.info.routers_zid()}
+        self._signs.via_router = bool(routers) and life not in routers
 
     def _on_tiles(self, sample: zenoh.Sample) -> None:
-        self._note_life(sample)
-        try:
-            self._tiles.take(_grid_in(sample))
-        except GvgbotError as error:
-            self._grid.put(partial(_fail, error))
+        with self._life_gate:
+            self._note_life(sample)
+            try:
+                self._tiles.take(_grid_in(sample))
+            except GvgbotError as error:
+                self._grid.put(partial(_fail, error))
 
     def _ask_for_tiles(self) -> None:
         """Ask the robot for its whole grid, without waiting."""

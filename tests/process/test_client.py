@@ -14,6 +14,7 @@ import tracemalloc
 import zlib
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack
+from functools import partial
 from itertools import permutations
 from pathlib import Path
 from socket import create_server
@@ -562,20 +563,33 @@ def test_what_a_robot_said_before_it_was_started_again_is_forgotten(endpoint: st
             assert next(maps) == another
 
 
-def test_of_two_robots_of_one_name_each_is_seen_with_its_own_map(endpoint: str) -> None:
+def test_of_two_robots_of_one_name_each_is_seen_with_its_own_map(
+    endpoint: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also if both speak at once: topics come in threads of their own."""
     there = TelemetryConfig(listen=(free_endpoint(),), connect=(endpoint,))
+    note_life = client.Robot._note_life
+
+    def note_slowly(seen: client.Robot, sample: zenoh.Sample) -> None:
+        note_life(seen, sample)
+        Flag().wait(0.001)
+
+    monkeypatch.setattr(client.Robot, "_note_life", note_slowly)
     with a_robot(endpoint) as here, client.connect("near", endpoint) as seen:
-        here.publish(numbered(1))
+
+        def is_seen(robot: Telemetry, number: int, own: Map | None) -> bool:
+            robot.publish(numbered(number))
+            return (seen.state().latest, seen.map().latest) == (numbered(number), own)
+
         here.publish(A_MAP)
-        until(lambda: seen.map().latest == A_MAP)
+        until(partial(is_seen, here, 1, A_MAP))
         for number in (2, 4):
+            grown = msgspec.structs.replace(A_MAP, stamp=float(number))
             with Telemetry(there, "near") as other:
                 other.publish(numbered(number))
-                until(lambda sent=number: seen.state().latest == numbered(sent))  # type: ignore[misc]
-                assert seen.map().latest is None
-            here.publish(numbered(number + 1))
-            until(lambda sent=number: seen.state().latest == numbered(sent + 1))  # type: ignore[misc]
-            assert seen.map().latest == A_MAP
+                here.publish(grown)
+                until(partial(is_seen, other, number, None))
+            until(partial(is_seen, here, number + 1, grown))
 
 
 def test_two_robots_of_one_name_are_told_from_one_that_was_started_again(endpoint: str) -> None:
