@@ -8,25 +8,34 @@ import pytest
 
 from gvgbot.autonomy.aim import Aim, how_to_aim
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
+from gvgbot.drivers.world import World
 from gvgbot.geometry import Pose
 from tests.unit.autonomy.sights import LASER_270, carved, sweep
 
 ROOMS = carved([(-4.0, -1.5, 8.0, 1.5), (1.0, 1.5, 3.0, 3.0)])
-WORN_RAD = 0.01  # by which wheels of unequal size turn the base from piece to piece
+HALL = carved([(-12.0, -12.0, 4.0, 12.0)])  # of which the wall ahead is near
+WORN = 0.04  # rad/m, by which wheels of unequal size turn the base
 
 
 def driven(
-    turned_deg: float, *, said_deg: float = 0.0, pieces: int = 8, aim: Aim | None = None
+    turned_deg: float,
+    *,
+    said_deg: float = 0.0,
+    pieces: int = 8,
+    step_m: float = 0.25,
+    aim: Aim | None = None,
+    world: World = ROOMS,
 ) -> Aim:
     """What a base learns that drives ahead, with its laser so far from where it is said to look."""
     rng, aim = np.random.default_rng(4), aim or Aim(ScanMatchingConfig())
     world_base = Pose(-1.0, 0.1, -0.03)
     for k in range(pieces):
         seen_from = world_base.compose(Pose(theta=math.radians(said_deg - turned_deg)))
-        scan = sweep(ROOMS, seen_from, field_of_view=LASER_270, sigma=0.01, rng=rng)
+        scan = sweep(world, seen_from, field_of_view=LASER_270, sigma=0.01, rng=rng)
         scan = replace(scan, base_laser=Pose(theta=math.radians(said_deg)))
-        aim.note(scan, Pose(0.25 * k, 0.0, 0.0))
-        world_base = world_base.compose(Pose(0.25, 0.25 * WORN_RAD / 2, WORN_RAD))
+        aim.note(scan, Pose(step_m * k, 0.0, 0.0))
+        turn = WORN * step_m
+        world_base = world_base.compose(Pose(step_m, step_m * turn / 2, turn))
     return aim
 
 
@@ -45,7 +54,20 @@ def test_who_drives_aside_learns_by_how_much_its_laser_is_turned(
 
 @pytest.mark.parametrize("turned_deg", [0.0, -1.0, 1.0])
 def test_a_laser_that_looks_as_it_is_said_to_is_left_alone(turned_deg: float) -> None:
-    assert driven(turned_deg).off is None
+    aim = driven(turned_deg)
+    assert aim.off is None
+    assert driven(20.0, aim=aim).off is None
+
+
+def test_sweeps_that_follow_each_other_closely_tell_no_less() -> None:
+    aim = driven(5.0, pieces=80, step_m=0.02)
+    assert aim.off is not None
+    assert math.degrees(aim.off) == pytest.approx(5.0, abs=1.0)
+
+
+@pytest.mark.parametrize("turned_deg", [0.0, 20.0])
+def test_a_wall_ahead_does_not_tell_what_is_driven_aside(turned_deg: float) -> None:
+    assert driven(turned_deg, world=HALL).off is None
 
 
 def test_a_way_that_leaves_it_open_is_watched_no_longer_than_forty_pieces() -> None:
