@@ -37,11 +37,24 @@ def test_after_its_retries_it_stays_closed() -> None:
     assert graph.blocked() == [end]
 
 
+def test_each_has_retries_of_its_own() -> None:
+    graph, end = graph_with_a_frontier()
+    other = HalfEdgeId(end.vertex, graph.vertices[end.vertex].add_half_edge(1.0))
+    obstructions = Obstructions(retries=1, retry_after=20.0, names=Names())
+    for k, one in enumerate((end, other)):
+        obstructions.close(graph, [one], 100.0 * k)
+        assert obstructions.open(graph, 100.0 * k + 50.0)
+    assert graph.frontiers() == [end, other]
+
+
 def test_an_end_that_is_gone_is_not_waited_for() -> None:
     graph, end = graph_with_a_frontier()
     obstructions = Obstructions(retries=2, retry_after=20.0, names=Names())
-    graph.remove_vertex(end.vertex)
     obstructions.close(graph, [end], 0.0)
+    graph.remove_vertex(end.vertex)
+    obstructions.open(graph, 50.0)
+    assert not obstructions.waiting
+    obstructions.close(graph, [end], 60.0)
     assert not obstructions.waiting
 
 
