@@ -96,6 +96,15 @@ def _text(replies: list[zenoh.Reply], robot: str) -> str:
     raise Refused(_answer(err.payload, err.encoding).text)
 
 
+def answer_of(life: str | None, replies: list[zenoh.Reply]) -> zenoh.Sample | None:
+    """What that life has answered, or anybody if none is known."""
+    for reply in replies:
+        who = reply.replier_id
+        if reply.ok is not None and (life is None or (who is not None and str(who.zid) == life)):
+            return reply.ok
+    return None
+
+
 def _answer(payload: zenoh.ZBytes, encoding: zenoh.Encoding) -> Answer:
     decode = msgspec.json.decode if str(encoding).startswith(JSON) else msgspec.msgpack.decode
     try:

@@ -12,7 +12,7 @@ from typing import Any, NoReturn, Self, TypeVar, overload
 
 import zenoh
 
-from gvgbot.client.asking import PATIENCE_S, Asking, ask
+from gvgbot.client.asking import PATIENCE_S, Asking, answer_of, ask
 from gvgbot.client.event_stream import EventStream
 from gvgbot.client.network import (
     DEFAULT_ENDPOINT,
@@ -101,11 +101,12 @@ class Robot:
             *(self._state, self._map, self._grid, self._trajectory, self._events, self._plan),
             *(self._health, self._odometry, self._scan),
         )
-        self._tiles = Tiles(self._grid, self._ask_for_tiles)
         self._heard: set[Topic] = set()  # that were subscribed to
         self._life: str | None = None
-        self._earlier: tuple[str | None, Sequence[Callable[[], Any] | None]] = (None, ())
-        self._life_gate = threading.Lock()  # samples come in several threads
+        self._tiles = self._tiles_of(None)  # of this life
+        self._earlier: tuple[str | None, Sequence[Callable[[], Any] | None], Tiles]
+        self._earlier = (None, (), self._tiles)
+        self._life_gate = threading.RLock()  # samples come in several threads
         self._signs = Signs(0.0)
         self._gate = threading.RLock()  # one of opening and closing at a time
         self._is_closed = False
@@ -301,12 +302,14 @@ class Robot:
         life = str(sample.source_info.source_id.zid)
         if life == self._life:
             return
-        earlier, said = self._earlier
+        earlier, said, tiles = self._earlier
         if life == earlier:
             self._signs.doubled_at = time.perf_counter()
-        known = said if life == earlier else [None] * len(self._all)
-        swapped = [box.swap(read) for box, read in zip(self._all, known, strict=True)]
-        self._earlier, self._life = (self._life, swapped), life
+        else:
+            said, tiles = [None] * len(self._all), self._tiles_of(life)
+        swapped = [box.swap(read) for box, read in zip(self._all, said, strict=True)]
+        self._earlier = self._life, swapped, self._tiles
+        self._life, self._tiles = life, tiles
         routers = {str(one) for one in self._session.info.routers_zid()}
         self._signs.via_router = bool(routers) and life not in routers
 
@@ -318,22 +321,23 @@ class Robot:
             except GvgbotError as error:
                 self._grid.put(partial(_fail, error))
 
-    def _ask_for_tiles(self) -> None:
-        """Ask the robot for its whole grid, without waiting."""
+    def _tiles_of(self, life: str | None) -> Tiles:
+        return Tiles(self._grid, partial(self._ask_for_tiles, life))
+
+    def _ask_for_tiles(self, life: str | None) -> None:
+        """Ask for the whole grid of a life, without waiting."""
         replies = list[zenoh.Reply]()
 
         def answered() -> None:
-            sample = replies[0].ok if replies else None
-            if sample is None:  # it may have been asked before it could answer
-                timer = threading.Timer(_ASK_AGAIN_S, self._ask_for_tiles)
-                timer.daemon = True
-                timer.start()
-                return
-            try:
-                self._tiles.take_all(_grid_in(sample))
-            except GvgbotError as error:
-                self._tiles.give_up()
-                self._grid.put(partial(_fail, error))
+            with self._life_gate:
+                sample = answer_of(life, replies) if life == self._life else None
+                if sample is not None:
+                    self._take_all(sample)
+                elif life in (self._life, self._earlier[0]):
+                    # it may have been asked before it could answer, or another speaks just now
+                    timer = threading.Timer(_ASK_AGAIN_S, self._ask_for_tiles, [life])
+                    timer.daemon = True
+                    timer.start()
 
         assert self._session is not None
         with contextlib.suppress(zenoh.ZError):  # closed meanwhile
@@ -341,7 +345,15 @@ class Robot:
                 GRID.key(self.name),
                 zenoh.handlers.Callback(replies.append, answered),
                 timeout=PATIENCE_S,
+                consolidation=zenoh.ConsolidationMode.NONE,  # each of those who have the name
             )
+
+    def _take_all(self, sample: zenoh.Sample) -> None:
+        try:
+            self._tiles.take_all(_grid_in(sample))
+        except GvgbotError as error:
+            self._tiles.give_up()
+            self._grid.put(partial(_fail, error))
 
     def _on_token(self, sample: zenoh.Sample) -> None:
         self._signs.has_token = sample.kind == zenoh.SampleKind.PUT

@@ -247,6 +247,34 @@ def test_the_grid_comes_though_the_robot_could_not_answer_at_first(endpoint: str
     asyncio.run(story())
 
 
+def test_who_comes_while_two_of_one_name_speak_has_the_walls_of_each(endpoint: str) -> None:
+    there = TelemetryConfig(listen=(free_endpoint(),), connect=(endpoint,))
+
+    def watch(*robots: Telemetry) -> None:
+        with client.connect("near", endpoint) as seen:
+            grid = seen.grid()
+
+            def is_seen(robot: Telemetry, number: int) -> bool:
+                robot.publish(EXAMPLE)
+                return (seen.life, seen_in(grid)) == (robot.zid, [number, number])
+
+            for number in (2, 3, 2, 3):
+                until(partial(is_seen, robots[number - 2], number))
+
+    async def story() -> None:
+        with a_robot(endpoint) as one, Telemetry(there, "near") as two:
+            for number, robot in ((2, one), (3, two)):
+                sent = [spread(number, *columns) for columns in ((0,), (0, 1))]
+                robot.publish(*(msgspec.structs.replace(g, began=float(number)) for g in sent))
+            async with asyncio.TaskGroup() as tasks:
+                answering = [tasks.create_task(robot.answer()) for robot in (one, two)]
+                await asyncio.to_thread(watch, one, two)
+                for task in answering:
+                    task.cancel()
+
+    asyncio.run(story())
+
+
 def test_scans_and_odometry_are_sent_to_those_who_ask_for_them(endpoint: str) -> None:
     with a_robot(endpoint) as robot, client.connect("near", endpoint) as seen:
         until(lambda: seen.presence.word == "alive")
