@@ -62,8 +62,8 @@ def test_a_loop_that_runs_is_left_alone_and_so_is_a_closed_port(ends: tuple[int,
 
     async def drive() -> None:
         stream = SerialStream(path, 115200)
-        stream.watch_over(LAST_WORDS, 20.0)
-        await asyncio.sleep(PATIENCE_S)
+        stream.watch_over(LAST_WORDS, 10 * PATIENCE_S)
+        await asyncio.sleep(3 * PATIENCE_S)  # while it looks, five times in its patience
         assert "deadman" in {thread.name for thread in threading.enumerate()}
         stream.close()
         assert "deadman" not in {thread.name for thread in threading.enumerate()}

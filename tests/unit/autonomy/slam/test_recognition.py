@@ -76,7 +76,7 @@ def test_bearings_turn_with_the_frame_of_the_vertex(turn: float) -> None:
 
 
 UNLIKE = {
-    "another kind": sighting(0.0, meetpoint=False),
+    "another kind": sighting(*TEE, meetpoint=False),
     "a tee the other way up": sighting(0.3, math.pi - 0.3, math.pi / 2),
     "much wider": sighting(*TEE, clearance=1.8),
     "much narrower": sighting(*TEE, clearance=0.7),
