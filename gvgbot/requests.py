@@ -25,7 +25,7 @@ MESSAGEPACK, JSON = "application/msgpack", "application/json"
 LONGEST_ARGUMENTS = 25_000  # bytes; of the most vertices, by the largest ids, in JSON
 _LONGEST_KEY = 100  # characters
 _FARTHEST_M = 1e5
-_MOST_VERTICES = 1000
+_VERTICES = msgspec.Meta(min_length=1, max_length=1000)  # if some are named
 
 
 class Nothing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -54,7 +54,7 @@ class Patrol(
 ):
     """Which vertices to visit, over and over."""
 
-    vertices: Annotated[tuple[int, ...], msgspec.Meta(max_length=_MOST_VERTICES)] = ()  # none: all
+    vertices: Annotated[tuple[int, ...], _VERTICES] = ()  # left out: all
 
 
 class Set(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

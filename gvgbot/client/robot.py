@@ -220,7 +220,10 @@ class Robot:
         return self._ask("goto", Goto(x=place, y=y))
 
     def patrol(self, *vertices: int) -> Asking:
-        """Drive from vertex to vertex by their ids, over and over; to all if none is named."""
+        """Drive from vertex to vertex by their ids, over and over; to all if none is named.
+
+        That includes `patrol(*chosen)` where nothing was chosen.
+        """
         return self._ask("patrol", Patrol(vertices=vertices))
 
     def coverage(self) -> Asking:

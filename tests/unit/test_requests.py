@@ -66,6 +66,7 @@ def test_nothing_at_all_stands_for_no_arguments() -> None:
         ("goto", '{"x": 1e300, "y": 0}', "100000"),
         ("goto", '{"vertix": 7}', "vertix"),
         ("patrol", '{"vertices": 7}', "vertices"),
+        ("patrol", '{"vertices": []}', "vertices"),  # a search without a hit shall not mean all
         ("patrol", '{"vertices": [1, "east"]}', "vertices"),
         ("patrol", json.dumps({"vertices": [1] * 1001}), "1000"),
         ("coverage", '{"vertices": [1]}', "vertices"),
