@@ -158,6 +158,7 @@ class Robot:
             serving = [tasks.create_task(task, name=name) for name, task in work.items()]
             log.info("stopping", signal=await stopped)
             self._notifier.stopping()
+            self._steering.close()
             for task in serving:
                 task.cancel()
 

@@ -93,6 +93,10 @@ class Steering:
         self._tell([*self._ledger.enter(happened), *self._errands.take_events()])
         return answer
 
+    def close(self) -> None:
+        """Write down what was left out of a crowd at the end: nothing comes any more."""
+        self._tell([*self._ledger.close()])
+
     def go_home(self, why: str) -> bool:
         """Let a robot that is busy drive home; it is written down as asked for by `why`.
 
@@ -235,6 +239,7 @@ class _Ledger:
 
     def __init__(self) -> None:
         self._newest: Requested | None = None
+        self._left_out: Requested | None = None  # the latest that was not written down
         self._room, self._since = _BURST, -math.inf  # for others, by when
         self._missing = 0
 
@@ -247,14 +252,25 @@ class _Ledger:
             self._since = asked.stamp
             if self._room < 1.0:
                 self._missing += 1
+                self._left_out = asked
                 return []
             self._room -= 1.0
-        self._newest, missing, self._missing = asked, self._missing, 0
-        if not missing:
-            return [asked]
-        were = counted(missing, "request before this one was", "requests before this one were")
-        answer = f"{asked.answer} ({were} not written down)"
-        return [dataclasses.replace(asked, answer=answer)]
+        self._newest, self._left_out = asked, None
+        missing, self._missing = self._missing, 0
+        return [_with_count(asked, missing)]
+
+    def close(self) -> list[Requested]:
+        """The latest request, if it was left out, with how many before it were."""
+        return [] if self._left_out is None else [_with_count(self._left_out, self._missing - 1)]
+
+
+def _with_count(asked: Requested, missing: int) -> Requested:
+    """The request, with how many before it were not written down."""
+    if not missing:
+        return asked
+    were = counted(missing, "request before this one was", "requests before this one were")
+    answer = f"{asked.answer} ({were} not written down)"
+    return dataclasses.replace(asked, answer=answer)
 
 
 def _are_alike(one: Requested, other: Requested) -> bool:

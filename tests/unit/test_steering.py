@@ -346,12 +346,21 @@ def test_who_is_refused_over_and_over_does_not_fill_the_disk() -> None:
 
 
 def test_the_same_over_and_over_is_written_down_a_few_times() -> None:
+    """Nobody asks any more: at the end of the run the latest is told, and how many are missing."""
     rig = Rig()
+    rig.steering.close()
+    assert rig.told == []
     for k in range(1500):
         rig.time = 10.0 + k / 1500
         assert rig.ask("pause").done
     assert rig.errands.did == ["pause"] * 1500
     assert 10 < len(rig.told) < 30
+    written, rig.time = len(rig.told), 99.0
+    rig.steering.close()
+    *_, last = rig.told
+    assert isinstance(last, Requested)
+    assert last.stamp == 10.0 + 1499 / 1500
+    assert f"({1499 - written} requests before this one were not written down)" in last.answer
 
 
 def test_whatever_does_something_else_than_before_is_written_down() -> None:
