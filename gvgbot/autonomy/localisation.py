@@ -210,13 +210,14 @@ class LocalMaps:
         return is_open or self._fits(scan, local_base, least, _FITTING_AMONG_PEOPLE)
 
     def _fits(self, scan: Scan, local_base: Pose, least: int, share: float) -> bool:
-        """Whether of `least` ends or more that lie where something is known a share is at walls."""
+        """Whether of `least` ends or more, at walls or on known ground, a share is at walls.
+
+        Noise lays half of the ends on a wall behind it, where nothing is known.
+        """
         ends = local_base.compose(scan.base_laser).transform(scan.ends)
-        ends = ends[self.near.known(ends)]
-        if not len(self.near.points()) or len(ends) < least:
-            return False
-        distance = np.asarray(self.near.tree().query(ends)[0])
-        return float((distance < _FITS_M).mean()) >= share
+        at_walls = np.asarray(self.near.tree().query(ends)[0]) < _FITS_M
+        told = at_walls | self.near.known(ends)
+        return int(told.sum()) >= least and float(at_walls[told].mean()) >= share
 
     def _drawn(self) -> _Walls:
         """The walls of the near map, and of the far one around it."""

@@ -87,7 +87,8 @@ def test_a_person_who_never_goes_leaves_a_frontier_blocked() -> None:
         run.put_person(0.0, 1.8)
 
     patience = ExplorationConfig(in_the_way_s=5.0, retry_after_s=5.0, retries=1)
-    run = play(WORLD, START, story=story, with_person=True, exploration=patience)
+    twin = TwinConfig(seed=4)
+    run = play(WORLD, START, story=story, with_person=True, exploration=patience, twin=twin)
     assert run.outcome == "explored_with_blocked", run.pipeline.mission.reason
     assert run.contacts == 0
     assert run.recoveries().count("try again") == 1

@@ -35,7 +35,7 @@ def test_what_was_found_since_is_found_again(
     monkeypatch.setattr(Unsettled, "note_closure", close_revocably)
     monkeypatch.setattr(Unsettled, "revoke", revoke_at_times)
     out = tmp_path / "run"
-    assert main(["explore", "--world", "rooms", "--seed", "1", "--out", str(out)]) == 0
+    assert main(["explore", "--world", "slopes", "--seed", "1", "--out", str(out)]) == 0
     happened = Counter(
         json.loads(line)["event"] for line in (out / "events.jsonl").read_text().splitlines()
     )
