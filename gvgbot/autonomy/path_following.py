@@ -13,7 +13,7 @@ from gvgbot.autonomy.exploration.hindrance import Hindrance
 from gvgbot.autonomy.gvg.local import Branch
 from gvgbot.autonomy.neighbours import Neighbours
 from gvgbot.autonomy.situation import Situation
-from gvgbot.autonomy.views import View
+from gvgbot.autonomy.views import View, beside
 from gvgbot.geometry import Array
 
 _MOST_LOOKS = 2  # around, before nothing more is to be seen
@@ -79,7 +79,7 @@ class PathFollowing:
             self.renew()
         if track.length < ARRIVED_M and end not in here.known.vertex_of and end in view.doubted:
             self._hindrance.hold()
-            away = _turn_to_face(view, path[-1])
+            away = _turn_to_doubt(view, path[-1], end)
             if min(away, math.tau - away) > _FACING_RAD:
                 return LookAround(away), []
         elif track.length < ARRIVED_M and waited > look_around_s:
@@ -121,7 +121,14 @@ def _turn_of_the_back(view: View) -> float:
     return float(turns[np.argmin(metres)])
 
 
-def _turn_to_face(view: View, branch: Branch) -> float:
-    """How far to turn left until the robot looks along the end of a branch, rad."""
-    dx, dy = np.diff(view.gvg.leaving(branch)[-_FACING_POINTS:][[0, -1]], axis=0)[0]
+def _turn_to_doubt(view: View, branch: Branch, end: int) -> float:
+    """How far to turn left to look at what makes the end of a branch doubtful, rad.
+
+    Bodies of a team are nothing to be seen: it looks along the end of the branch.
+    """
+    away = beside(view.gvg.nodes[end], view.doubtful) - view.local_base.position
+    if len(away):
+        dx, dy = away[np.hypot(*away.T).argmin()]
+    else:
+        dx, dy = np.diff(view.gvg.leaving(branch)[-_FACING_POINTS:][[0, -1]], axis=0)[0]
     return float((math.atan2(dy, dx) - view.local_base.theta) % math.tau)

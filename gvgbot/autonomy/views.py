@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial import cKDTree
 
-from gvgbot.autonomy.gvg.local import Branch, LocalEdge, LocalGvg
+from gvgbot.autonomy.gvg.local import Branch, LocalEdge, LocalGvg, LocalNode
 from gvgbot.autonomy.gvg.local_map import LocalMap
 from gvgbot.autonomy.slam.graph import HalfEdgeId, Vertex
 from gvgbot.geometry import Array, Pose
@@ -82,11 +82,12 @@ def touching(gvg: LocalGvg, points: Array) -> frozenset[int]:
     """The nodes that would be elsewhere, or not at all, without obstacles (N, 2)."""
     if not len(points):
         return frozenset()
-    return frozenset(
-        key
-        for key, node in gvg.nodes.items()
-        if (np.hypot(*(points - node.position).T) < node.clearance + _RIM_M).any()
-    )
+    return frozenset(key for key, node in gvg.nodes.items() if len(beside(node, points)))
+
+
+def beside(node: LocalNode, points: Array) -> Array:
+    """Of obstacles (N, 2) those without which the node would be elsewhere, or not at all."""
+    return np.asarray(points[np.hypot(*(points - node.position).T) < node.clearance + _RIM_M])
 
 
 def touches(edge: LocalEdge, points: Array) -> bool:
