@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig, register
-from gvgbot.geometry import Array, Pose, wrap_angle
+from gvgbot.geometry import Array, Pose, thinned, wrap_angle
 from gvgbot.hal.messages import Scan
 
 _PIECE_M, _STRAIGHT_RAD = 0.2, 0.04  # between two sweeps that tell
@@ -18,6 +18,7 @@ _LONGEST_M = 1.0
 _PIECES, _MOST = 5, 40  # that have to agree; that are looked at altogether
 _TURNED_RAD = math.radians(3.0)  # a mount that is off by less does no harm
 _FAR_M = 8.0  # what is farther has few beams on it
+_CELL_M = 0.1  # of walls: from beam to beam, noise would tell how they lie
 _ANY_WAY = np.diag([0.3**2, 0.3**2, 0.05**2])
 _CLEAR_M, _SHARE = 0.02, 0.2  # sigma to the side, and share of a sweep that finds its walls
 
@@ -50,7 +51,7 @@ class Aim:
         if motion is not None:
             self._compare(points, motion)
         is_enough = len(points) >= self._matching.min_pairs
-        self._before = (cKDTree(points), odom_base) if is_enough else None
+        self._before = (cKDTree(thinned(points, _CELL_M)), odom_base) if is_enough else None
 
     def _straight_to(self, odom_base: Pose) -> Pose | None:
         """The motion from the sweep before, if it went ahead and not far; None if not."""
