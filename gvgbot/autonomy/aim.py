@@ -1,7 +1,8 @@
-"""Whether the laser looks where it is said to: a base that drives straight ahead tells.
+"""Whether a base that drives straight ahead goes where, and as far as, it is said to.
 
 What a base drives past goes straight back. If it goes aside as well, in the frame that the laser's
-mount makes the base's, the mount is turned by that angle.
+mount makes the base's, the mount is turned by that angle. If it comes nearer by more or less than
+the wheels tell, they have another size.
 """
 
 import math
@@ -9,49 +10,63 @@ import math
 import numpy as np
 from scipy.spatial import cKDTree
 
-from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig, register
+from gvgbot.autonomy.agreement import Agreement
+from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig, register_coarsely
 from gvgbot.geometry import Array, Pose, thinned, wrap_angle
 from gvgbot.hal.messages import Scan
 
 _PIECE_M, _STRAIGHT_RAD = 0.2, 0.04  # between two sweeps that tell
 _LONGEST_M = 1.0
-_PIECES, _MOST = 5, 40  # that have to agree; that are looked at altogether
+_MOST = 40  # pieces that are looked at altogether
 _TURNED_RAD = math.radians(3.0)  # a mount that is off by less does no harm
+_STRETCHED = math.log(1.15)  # what wheels of nearly the right size err by is learnt on the way
+_BEHIND_RAD = 0.75 * math.pi  # a laser that looks astern is as likely off to either side
 _FAR_M = 8.0  # what is farther has few beams on it
-_CELL_M = 0.1  # of walls: from beam to beam, noise would tell how they lie
+_CELL_M = 0.1
 _ANY_WAY = np.diag([0.3**2, 0.3**2, 0.05**2])
 _CLEAR_M, _SHARE = 0.02, 0.2  # sigma to the side, and share of a sweep that finds its walls
+_COARSE_M = 0.5  # as far off as a sweep may lie at first
+_CLEAR_AHEAD_M = 0.012  # sigma along the way: side walls are rough, and seem to tell of it
 
 
 class Aim:
-    """Adds up which way the base drives, as the laser has it."""
+    """Adds up which way the base drives, and how far, as the laser has it."""
 
     def __init__(self, matching: ScanMatchingConfig) -> None:
-        self._matching, self._is_settled = matching, False
+        self._matching = matching
         self._before: tuple[cKDTree, Pose] | None = None  # what was seen, with odom_base
-        self._angles: list[float] = []
+        self._angle, self._stretch = Agreement(_TURNED_RAD), Agreement(_STRETCHED)
         self._left = _MOST  # pieces to be looked at
 
     @property
     def off(self) -> float | None:
         """By how much the laser's yaw is too large, rad; None if it may be right."""
-        angles = np.array(self._angles)
-        if len(angles) < _PIECES or not (all(angles > _TURNED_RAD) or all(angles < -_TURNED_RAD)):
-            return None
-        return float(np.median(angles))
+        return self._angle.off
+
+    @property
+    def stretch(self) -> float | None:
+        """How many times as far the base goes as its wheels tell; None if that may be right."""
+        off = self._stretch.off
+        return None if off is None else math.exp(off)
+
+    @property
+    def _is_done(self) -> bool:
+        both = self._angle, self._stretch
+        is_found = any(one.off is not None for one in both)
+        return is_found or not self._left or all(one.is_settled for one in both)
 
     def note(self, scan: Scan, odom_base: Pose) -> None:
         """Learn from a sweep, until enough of them are as they should be, or enough were seen."""
-        if self._is_settled or not self._left or self.off is not None:
+        if self._is_done:
             return
         motion = self._straight_to(odom_base)
         if motion is not None and motion.x < _PIECE_M:
             return
-        points = _seen(scan)
+        points = seen(scan)
         if motion is not None:
             self._compare(points, motion)
         is_enough = len(points) >= self._matching.min_pairs
-        self._before = (cKDTree(thinned(points, _CELL_M)), odom_base) if is_enough else None
+        self._before = (walls_of(points), odom_base) if is_enough else None
 
     def _straight_to(self, odom_base: Pose) -> Pose | None:
         """The motion from the sweep before, if it went ahead and not far; None if not."""
@@ -65,13 +80,16 @@ class Aim:
         assert self._before is not None, "the motion is from there"
         self._left -= 1
         some = points[:: max(1, len(points) // self._matching.points)]
-        found = register(some, self._before[0], motion, _ANY_WAY, self._matching)
+        found = register_coarsely(
+            some, self._before[0], motion, _ANY_WAY, self._matching, (_COARSE_M,)
+        )
         if found is None or found.inliers < _SHARE or found.covariance[1, 1] > _CLEAR_M**2:
             return
         aside = found.pose.y - found.pose.x * found.pose.theta / 2  # beyond that of an arc
-        self._angles = [*self._angles[1 - _PIECES :], math.atan2(aside, found.pose.x)]
-        is_right = len(self._angles) == _PIECES and abs(np.median(self._angles)) < _TURNED_RAD / 2
-        self._is_settled = bool(is_right)
+        angle = math.atan2(aside, found.pose.x)
+        self._angle.note((angle + _BEHIND_RAD) % math.tau - _BEHIND_RAD)
+        if found.covariance[0, 0] < _CLEAR_AHEAD_M**2:
+            self._stretch.note_scale(math.hypot(found.pose.x, found.pose.y), motion.x)
 
 
 def how_to_aim(scan: Scan, off: float) -> str:
@@ -83,7 +101,20 @@ def how_to_aim(scan: Scan, off: float) -> str:
     )
 
 
-def _seen(scan: Scan) -> Array:
+def how_to_measure(stretch: float) -> str:
+    """What is wrong with wheels on which a base goes so many times as far as they tell."""
+    return (
+        f"the base goes {stretch:.2f} times as far as its wheels tell: multiply "
+        f"base.wheel_radius_m by that, and restart the program"
+    )
+
+
+def seen(scan: Scan) -> Array:
     """What is not far away (N, 2), m, base frame."""
     near = np.flatnonzero(scan.ranges < _FAR_M)
     return scan.base_laser.transform(scan.ranges[near, None] * scan.directions[near])
+
+
+def walls_of(points: Array) -> cKDTree:
+    """The means in cells of points (N, 2), m: from beam to beam noise tells how walls lie."""
+    return cKDTree(thinned(points, _CELL_M))

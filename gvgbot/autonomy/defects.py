@@ -2,11 +2,12 @@
 
 import numpy as np
 
-from gvgbot.autonomy.aim import Aim, how_to_aim
+from gvgbot.autonomy.aim import Aim, how_to_aim, how_to_measure
 from gvgbot.autonomy.control.reflexes import Cause
 from gvgbot.autonomy.handedness import Handedness, what_to_set
 from gvgbot.autonomy.obedience import DOES_NOT_MOVE, Obedience
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
+from gvgbot.autonomy.swing import Swing, how_to_place, how_to_turn
 from gvgbot.geometry import Pose, Twist
 from gvgbot.hal.cover import HARDLY_ANY
 from gvgbot.hal.messages import Scan
@@ -21,7 +22,8 @@ class Defects:
     """Adds up what scans and motions tell of the laser and the base."""
 
     def __init__(self, matching: ScanMatchingConfig) -> None:
-        self._handedness, self._obedience, self._aim = Handedness(), Obedience(), Aim(matching)
+        self._handedness, self._obedience = Handedness(), Obedience()
+        self._aim, self._swing = Aim(matching), Swing(matching)
         self._has_seen = self._has_hit = False
 
     def note_scan(self, scan: Scan, odom_base: Pose, told: Twist) -> str | None:
@@ -29,12 +31,19 @@ class Defects:
         self._has_seen = self._has_seen or float(np.isfinite(scan.ranges).mean()) > HARDLY_ANY
         self._handedness.note(scan, odom_base, told.angular)
         self._aim.note(scan, odom_base)
+        self._swing.note(scan, odom_base)
         if self._handedness.is_mirrored:
             return what_to_set(scan)
         if self._obedience.is_lacking:
             return DOES_NOT_MOVE
         if self._aim.off is not None:
             return how_to_aim(scan, self._aim.off)
+        if self._aim.stretch is not None:
+            return how_to_measure(self._aim.stretch)
+        if self._swing.stretch is not None:
+            return how_to_turn(self._swing.stretch)
+        if self._swing.place is not None:
+            return how_to_place(scan, self._swing.place)
         return _SEES_NOTHING if self._has_hit and not self._has_seen else None
 
     def note_motion(self, odom_base: Pose, told: Twist, free_s: float) -> None:
