@@ -1,8 +1,8 @@
-"""Whether a base that drives straight ahead goes where, and as far as, it is said to.
+"""Whether the laser looks where it is said to: a base that drives straight ahead tells.
 
 What a base drives past goes straight back. If it goes aside as well, in the frame that the laser's
-mount makes the base's, the mount is turned by that angle. If it comes nearer by more or less than
-the wheels tell, they have another size.
+mount makes the base's, the mount is turned by that angle. That it goes less far than its wheels
+tell is no defect: they may spin for a while.
 """
 
 import math
@@ -19,23 +19,21 @@ _PIECE_M, _STRAIGHT_RAD = 0.2, 0.04  # between two sweeps that tell
 _LONGEST_M = 1.0
 _MOST = 40  # pieces that are looked at altogether
 _TURNED_RAD = math.radians(3.0)  # a mount that is off by less does no harm
-_STRETCHED = math.log(1.15)  # what wheels of nearly the right size err by is learnt on the way
 _BEHIND_RAD = 0.75 * math.pi  # a laser that looks astern is as likely off to either side
 _FAR_M = 8.0  # what is farther has few beams on it
 _CELL_M = 0.1
 _ANY_WAY = np.diag([0.3**2, 0.3**2, 0.05**2])
 _CLEAR_M, _SHARE = 0.02, 0.2  # sigma to the side, and share of a sweep that finds its walls
 _COARSE_M = 0.5  # as far off as a sweep may lie at first
-_CLEAR_AHEAD_M = 0.012  # sigma along the way: side walls are rough, and seem to tell of it
 
 
 class Aim:
-    """Adds up which way the base drives, and how far, as the laser has it."""
+    """Adds up which way the base drives, as the laser has it."""
 
     def __init__(self, matching: ScanMatchingConfig) -> None:
         self._matching = matching
         self._before: tuple[cKDTree, Pose] | None = None  # what was seen, with odom_base
-        self._angle, self._stretch = Agreement(_TURNED_RAD), Agreement(_STRETCHED)
+        self._angle = Agreement(_TURNED_RAD)
         self._left = _MOST  # pieces to be looked at
 
     @property
@@ -43,21 +41,9 @@ class Aim:
         """By how much the laser's yaw is too large, rad; None if it may be right."""
         return self._angle.off
 
-    @property
-    def stretch(self) -> float | None:
-        """How many times as far the base goes as its wheels tell; None if that may be right."""
-        off = self._stretch.off
-        return None if off is None else math.exp(off)
-
-    @property
-    def _is_done(self) -> bool:
-        both = self._angle, self._stretch
-        is_found = any(one.off is not None for one in both)
-        return is_found or not self._left or all(one.is_settled for one in both)
-
     def note(self, scan: Scan, odom_base: Pose) -> None:
         """Learn from a sweep, until enough of them are as they should be, or enough were seen."""
-        if self._is_done:
+        if self._angle.is_settled or not self._left or self.off is not None:
             return
         motion = self._straight_to(odom_base)
         if motion is not None and motion.x < _PIECE_M:
@@ -88,8 +74,6 @@ class Aim:
         aside = found.pose.y - found.pose.x * found.pose.theta / 2  # beyond that of an arc
         angle = math.atan2(aside, found.pose.x)
         self._angle.note((angle + _BEHIND_RAD) % math.tau - _BEHIND_RAD)
-        if found.covariance[0, 0] < _CLEAR_AHEAD_M**2:
-            self._stretch.note_scale(math.hypot(found.pose.x, found.pose.y), motion.x)
 
 
 def how_to_aim(scan: Scan, off: float) -> str:
@@ -98,14 +82,6 @@ def how_to_aim(scan: Scan, off: float) -> str:
     return (
         f"the laser is turned by {abs(math.degrees(off)):.0f} degrees from where it is said to "
         f"look: set laser.yaw_deg: {yaw_deg}, and restart the program"
-    )
-
-
-def how_to_measure(stretch: float) -> str:
-    """What is wrong with wheels on which a base goes so many times as far as they tell."""
-    return (
-        f"the base goes {stretch:.2f} times as far as its wheels tell: multiply "
-        f"base.wheel_radius_m by that, and restart the program"
     )
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gvgbot.autonomy.aim import Aim, how_to_aim, how_to_measure
+from gvgbot.autonomy.aim import Aim, how_to_aim
 from gvgbot.autonomy.control.reflexes import Cause
 from gvgbot.autonomy.handedness import Handedness, what_to_set
 from gvgbot.autonomy.obedience import DOES_NOT_MOVE, Obedience
@@ -38,8 +38,6 @@ class Defects:
             return DOES_NOT_MOVE
         if self._aim.off is not None:
             return how_to_aim(scan, self._aim.off)
-        if self._aim.stretch is not None:
-            return how_to_measure(self._aim.stretch)
         if self._swing.stretch is not None:
             return how_to_turn(self._swing.stretch)
         if self._swing.place is not None:
