@@ -104,8 +104,7 @@ class Robot:
         self._heard: set[Topic] = set()  # that were subscribed to
         self._life: str | None = None
         self._tiles = self._tiles_of(None)  # of this life
-        self._earlier: tuple[str | None, Sequence[Callable[[], Any] | None], Tiles]
-        self._earlier = (None, (), self._tiles)
+        self._earlier: tuple[str | None, Sequence[Any], Tiles] = None, (), self._tiles
         self._life_gate = threading.RLock()  # samples come in several threads
         self._signs = Signs(0.0)
         self._gate = threading.RLock()  # one of opening and closing at a time
@@ -220,10 +219,7 @@ class Robot:
         return self._ask("goto", Goto(x=place, y=y))
 
     def patrol(self, *vertices: int) -> Asking:
-        """Drive from vertex to vertex by their ids, over and over; to all if none is named.
-
-        That includes `patrol(*chosen)` where nothing was chosen.
-        """
+        """Drive from vertex to vertex, over and over; to all if none is named, as by `*[]`."""
         return self._ask("patrol", Patrol(vertices=vertices))
 
     def coverage(self) -> Asking:
@@ -336,8 +332,7 @@ class Robot:
                 sample = answer_of(life, replies) if life == self._life else None
                 if sample is not None:
                     self._take_all(sample)
-                elif life in (self._life, self._earlier[0]):
-                    # it may have been asked before it could answer, or another speaks just now
+                elif life in (self._life, self._earlier[0]):  # too early, or another speaks
                     timer = threading.Timer(_ASK_AGAIN_S, self._ask_for_tiles, [life])
                     timer.daemon = True
                     timer.start()

@@ -206,7 +206,7 @@ def _pairs(
     reach: float,
     sides: Sides | None,
 ) -> _Pairs:
-    """The points (N, 2) that are near to a wall when laid down at a pose, and its line there."""
+    """The points (N, 2) that are near to a wall when laid down at a pose, and where that is."""
     world = pose.transform(points)
     is_close, farthest = reach <= _REACH_M, max(reach, _REACH_M)
     found = walls.query(world, k=_NEIGHBOURS, distance_upper_bound=farthest)
