@@ -44,7 +44,7 @@ def laid(look: int) -> Laid:
     looks = np.arange(max(1, look - 40), look)
     gains = np.repeat(0.8 / len(looks) * np.eye(3)[None], len(looks), axis=0)
     noise, some = 1e-6 * np.eye(3), 0.01 * np.eye(3)
-    return Laid(Pose(0.25 * look), look, looks, gains, some, noise, np.eye(3), some)
+    return Laid(Pose(0.25 * look), look, looks, gains, some, noise, noise, np.eye(3), some)
 
 
 def cpu_ms(do: Callable[[], object]) -> float:

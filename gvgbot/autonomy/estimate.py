@@ -5,11 +5,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvgbot.autonomy.localisation import sampled
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.slam.revisits import Traverse, revisits
+from gvgbot.autonomy.slam.sampling import sampled
 from gvgbot.autonomy.slam.smoothing import Constraint, PoseGraph
 from gvgbot.autonomy.views import Observation
 from gvgbot.geometry import Array, Pose, rows_of

@@ -6,25 +6,22 @@ from itertools import chain
 from typing import Literal, NamedTuple
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
 from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
 from gvgbot.autonomy.slam.calibration import Calibration, per_unit
+from gvgbot.autonomy.slam.sampling import sampled
 from gvgbot.autonomy.slam.scan_matching import (
     Registration,
     ScanMatchingConfig,
     Sides,
     register_coarsely,
 )
-from gvgbot.autonomy.slam.trail import Laid
+from gvgbot.autonomy.slam.trail import Laid, shared_out
 from gvgbot.autonomy.small_systems import inverse
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
 
-_RANGE_M = 24.0  # of the beams that are matched
-_LONGEST_GAP_M = 0.5  # between two beams, for their even spacing
-_SMOOTHED = 9  # beams, to tell where the next point is due
 _ONE = np.eye(3)
 _LEAST_POINTS = 50  # fewer say nothing about a pose
 _AT_ALL = 0.01  # better agreement, where no place is likelier than another
@@ -63,12 +60,14 @@ class ScanMatch(NamedTuple):
 class _Walls(NamedTuple):
     """Points in a tree, the hits (N,) that each is made of, and where it was seen from (N, 2).
 
-    `looks` (N,) are the numbers of the looks at it, on average.
+    `looks` (N,) are the numbers of the looks at it, on average, and `spreads` (N,) the variances of
+    these.
     """
 
     hits: Array
     sights: Array
     looks: Array
+    spreads: Array
     tree: cKDTree
 
 
@@ -151,7 +150,7 @@ class LocalMaps:
         best = self._best(scan, priors, turned=searched, stays=True)
         calibration, per_error = self._calibration, per_unit(motion, duration)
         if best is None:
-            laid = self._laid(None, prior, per_error, Q)
+            laid = self._laid(None, prior, per_error, Q, np.zeros((3, 3)))
             return ScanMatch(prior, calibration.adds_up(motion, duration, _ONE, Q), laid)
         found, used = best
         expected = self._matching.pair_sigma_m**2 / self._matching.independent_share
@@ -161,10 +160,10 @@ class LocalMaps:
             self._lesson = motion, duration, prior.to(found.pose), noise, found.covariance, walls
             felt = calibration.as_felt(noise).sum(axis=0)
         g = _ONE - found.covariance @ inverse(used)
-        error = _error(found, g, felt, walls)
-        laid = self._laid(found, found.pose, (_ONE - g) @ per_error, error)
+        by_odometry, by_scan = _errors(found, g, felt, walls)
+        laid = self._laid(found, found.pose, (_ONE - g) @ per_error, by_odometry, by_scan)
         stays = inverse(_ONE + g * self._age(found))
-        drift = stays @ error @ stays.T
+        drift = stays @ by_odometry @ stays.T  # the next scan does not err as this one
         left = np.asarray(stays @ (_ONE - g), np.float64)
         return ScanMatch(found.pose, calibration.adds_up(motion, duration, left, drift), laid)
 
@@ -228,28 +227,32 @@ class LocalMaps:
             np.concatenate([self.near.hits(), self._far.hits()[around]]),
             np.concatenate([self.near.sights(), self._far.sights()[around]]),
             np.concatenate([self.near.looked_at(), self._far.looked_at()[around]]),
+            np.concatenate([self.near.looks_spread(), self._far.looks_spread()[around]]),
             cKDTree(points, balanced_tree=False),
         )
 
     def _laid(
-        self, found: Registration | None, local_base: Pose, by_odometry: Array, noise: Array
+        self,
+        found: Registration | None,
+        local_base: Pose,
+        by_odometry: Array,
+        noise: Array,
+        scan_noise: Array,
     ) -> Laid:
         """How the look that comes next was laid onto walls, if they were found.
 
-        The error of a look weighs by what the walls that it drew tell of the pose. Of a wall that
-        several looks have drawn it is the mean one of these.
+        The error of a look weighs by what the walls that it drew tell of the pose. A wall that
+        several looks have drawn errs by the mean of theirs.
         """
         looks, gains = np.empty(0, np.int64), np.empty((0, 3, 3))
         if found is not None:
             assert self._walls is not None
-            numbers = np.rint(self._walls.looks[found.walls]).astype(np.int64)
-            looks = np.unique(numbers)
-            at_each = (numbers == looks[:, None]).astype(np.float64)
-            told = (at_each @ found.information.reshape(-1, 9)).reshape(-1, 3, 3)
+            drawn, spread = self._walls.looks[found.walls], self._walls.spreads[found.walls]
+            looks, told = shared_out(found.information, drawn, np.sqrt(3.0 * spread))
             gains = found.covariance @ told
         left, self._left = self._left, _ONE
         look, P = self.near.looks + 1, self._calibration.P
-        return Laid(local_base, look, looks, gains, by_odometry, noise, left, P)
+        return Laid(local_base, look, looks, gains, by_odometry, noise, scan_noise, left, P)
 
     def _age(self, found: Registration) -> float:
         """How many looks before the newest one the walls that were found were seen, on average.
@@ -320,7 +323,7 @@ class LocalMaps:
     ) -> Registration | None:
         """Points (N, 2) of a scan, laid onto the walls near a pose; None as `register` has it."""
         assert self._walls is not None
-        hits, sights, _, walls = self._walls
+        hits, sights, _, _, walls = self._walls
         config, sides = self._matching, Sides(sights, scan.base_laser.position - points)
         coarse = (config.coarse_pair_m,) if config.coarse_pair_m else ()
         return register_coarsely(points, walls, near, Q, config, coarse, hits, sides, so_far)
@@ -349,16 +352,17 @@ class LocalMaps:
         return 1.0 - float(np.minimum(away, reach).mean()) / reach
 
 
-def _error(found: Registration, g: Array, felt: Array, walls: float) -> Array:
-    """Covariance (3, 3) of what is new in the error of a match, in the frame of the base.
+def _errors(found: Registration, g: Array, felt: Array, walls: float) -> tuple[Array, Array]:
+    """Covariances (3, 3) of what is new in the error of a match, in the frame of the base.
 
     Scans are laid onto walls. A pose errs by e = (1 - g) (e' + q) + g (m + v): the gain g weighs
     odometry with its noise q, which has the covariance `felt`, from the pose before, and walls with
-    the mean error m of the scans that drew them and the noise v of a match, which has `walls` times
-    the variance that the matcher expects. Of that e' and m are not new.
+    the mean error m of the scans that drew them and the noise v of the scan, which has `walls`
+    times the variance that the matcher expects. Of that e' and m are not new. The first covariance
+    is what q adds, the second what v adds.
     """
-    error = (_ONE - g) @ felt @ (_ONE - g).T + walls * (g @ found.covariance)
-    return np.asarray((error + error.T) / 2, np.float64)
+    by_odometry, by_scan = (_ONE - g) @ felt @ (_ONE - g).T, walls * (g @ found.covariance)
+    return by_odometry, np.asarray((by_scan + by_scan.T) / 2, np.float64)
 
 
 def _turned(points: Array, tree: cKDTree, prior: Pose, reach: float) -> Pose:
@@ -377,23 +381,3 @@ def _around(prior: Pose) -> list[Pose]:
     steps = np.arange(-_SEARCH_M, _SEARCH_M + 1e-9, _SEARCH_STEP_M)
     offsets = sorted((math.hypot(x, y), x, y) for x in steps for y in steps)
     return [prior.compose(Pose(x, y, 0.0)) for away, x, y in offsets if away <= _SEARCH_M]
-
-
-def sampled(scan: Scan, count: int) -> Array:
-    """About so many end points (N, 2), evenly spaced along what the beams hit; base frame.
-
-    Evenly in space, not in angle: far walls tell most about the heading, and have few beams. The
-    way along the walls is smoothed: where beams are dense, each point's own noise would decide
-    which is taken, in the order of the sweep, and turn the walls a little.
-    """
-    hit = (scan.ranges < _RANGE_M).nonzero()[0]
-    points = scan.ranges.take(hit)[:, None] * scan.directions.take(hit, axis=0)
-    if len(points) == 0:
-        return points
-    way = uniform_filter1d(points, _SMOOTHED, axis=0, mode="nearest")
-    gaps = np.hypot(*(way[1:] - way[:-1]).T)
-    along = np.concatenate([[0.0], np.minimum(gaps, _LONGEST_GAP_M).cumsum()])
-    step = max(float(along[-1]) / count, 1e-6)
-    due = np.floor(along / step)
-    is_next = np.concatenate([[True], due[1:] > due[:-1]])
-    return scan.base_laser.transform(points[is_next])

@@ -56,6 +56,8 @@ class Cells:
     echoes: NDArray[np.float32] = field(default_factory=lambda: np.empty(0, np.float32))
     looks: int = 0  # so far, and the mean number of those at each of the walls (M,)
     look: NDArray[np.float32] = field(default_factory=lambda: np.zeros(1, np.float32))
+    # the variance of these (M,)
+    spread: NDArray[np.float32] = field(default_factory=lambda: np.zeros(1, np.float32))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -208,6 +210,7 @@ def _cells(local_map: LocalMap) -> Cells:
         local_map._echoes.ravel()[glass],
         local_map.looks,
         local_map._look.ravel()[walls],
+        local_map._spread.ravel()[walls],
     )
 
 
@@ -310,6 +313,7 @@ def _recall_cells(local_map: LocalMap, cells: Cells) -> None:
     local_map._sight.reshape(-1, 2)[cells.walls] = cells.sight
     local_map._echoes.ravel()[cells.glass] = cells.echoes
     local_map.looks, local_map._look.ravel()[cells.walls] = cells.looks, cells.look
+    local_map._spread.ravel()[cells.walls] = cells.spread
     local_map._renew()
 
 

@@ -6,7 +6,7 @@ which never jumps: corrections of the global estimate do not move it.
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from gvgbot.autonomy.gvg.beams import (
     range_towards,
     without_single_dropouts,
 )
+from gvgbot.autonomy.gvg.walls import Walls, merged
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
 from gvgbot.ranges import Range
@@ -35,6 +36,7 @@ _EMPTY = (
     ("_hits", 0.0),
     ("_sight", 0.0),
     ("_look", 0.0),
+    ("_spread", 0.0),
     ("_echoes", 0.0),
     ("_seen_at", -np.inf),
 )
@@ -61,18 +63,6 @@ class LocalMapConfig:
     )
 
 
-class Walls(NamedTuple):
-    """Mean hits (N, 2), how many there were (N,), and directions (N, 2) to where they were seen.
-
-    `looks` (N,) are the numbers of the looks that hit, on average.
-    """
-
-    points: Array
-    hits: Array
-    sights: Array
-    looks: Array
-
-
 class LocalMap:
     """A square window of cells around the robot, addressed in the local frame.
 
@@ -91,6 +81,7 @@ class LocalMap:
         self._hits = np.zeros((n, n), np.float32)  # that the mean is made of
         self._sight = np.zeros((n, n, 2), np.float32)  # mean direction to where it was seen from
         self._look = np.zeros((n, n), np.float32)  # mean number of the looks at it
+        self._spread = np.zeros((n, n), np.float32)  # variance of these numbers
         self._echoes = np.zeros((n, n), np.float32)  # lone ones, of which old ones count less
         self._seen_at = np.full((n, n), -np.inf, np.float32)  # metres driven when last seen
         self.looks = 0  # so far
@@ -130,8 +121,9 @@ class LocalMap:
             self._hits.take(cells).astype(np.float64),
             self._sight.reshape(-1, 2).take(cells, axis=0).astype(np.float64),
             self._look.take(cells).astype(np.float64),
+            self._spread.take(cells).astype(np.float64),
         )
-        self._walls = _merged(cells, self._size, walls, _ONE_WALL * self._cell)
+        self._walls = merged(cells, self._size, walls, _ONE_WALL * self._cell)
         for drawn in self._walls:
             drawn.setflags(write=False)
         self._tree: cKDTree | None = None
@@ -164,6 +156,10 @@ class LocalMap:
     def looked_at(self) -> Array:
         """The mean number (N,) of the looks that hit each of `points`: the first look is 1."""
         return self._walls.looks
+
+    def looks_spread(self) -> Array:
+        """The variance (N,) of the numbers of these looks."""
+        return self._walls.spreads
 
     def suspects(self) -> Array:
         """Middles (N, 2) of free cells away from walls that send echoes: glass, perhaps."""
@@ -333,6 +329,7 @@ class LocalMap:
         x, y = (np.bincount(flat, points[:, k].take(inside))[cell] / count for k in (0, 1))
         mean, sight = self._mean.reshape(-1, 2), self._sight.reshape(-1, 2)
         votes, hits, look = (a.reshape(-1) for a in (self._votes, self._hits, self._look))
+        spread = self._spread.reshape(-1)
         old = np.maximum(votes.take(cell), 0)
         before = np.where(old > 0, hits.take(cell), 0.0)
         share = (count / (before + count))[:, None]
@@ -341,7 +338,9 @@ class LocalMap:
         towards /= np.maximum(np.hypot(*towards.T), 1e-6)[:, None]
         mean[cell] = (1 - share) * mean.take(cell, axis=0) + share * seen
         sight[cell] = (1 - share) * sight.take(cell, axis=0) + share * towards
-        look[cell] += share[:, 0] * (self.looks - look.take(cell))
+        newer, new = self.looks - look.take(cell), share[:, 0]
+        spread[cell] = (1.0 - new) * (spread.take(cell) + new * newer**2)
+        look[cell] += new * newer
         hits[cell] = np.minimum(before + count, _MOST_HITS)
         votes[cell] = np.minimum(old + _HIT, _MAX_VOTES)
         self._seen_at.reshape(-1)[cell] = travelled
@@ -365,32 +364,3 @@ def _shifted(
     target = tuple(slice(max(-s, 0), n + min(-s, 0)) for s in shift)
     out[target] = array[source]
     return out
-
-
-def _merged(cells: NDArray[np.intp], columns: int, walls: Walls, reach: float) -> Walls:
-    """The walls of ascending cells (N,), with one mean for two neighbours on the same face.
-
-    Where a wall lies on the border of two rows of cells, both means are off, and only together
-    they are right. With a reach of less than half a cell no mean has two others on one axis.
-    """
-    for step in (1, columns):
-        points, hits, sights, looks = walls
-        beside = np.minimum(cells.searchsorted(cells + step), len(cells) - 1)
-        low = (cells.take(beside) == cells + step).nonzero()[0]
-        high = beside.take(low)
-        dx, dy = (points.take(high, axis=0) - points.take(low, axis=0)).T
-        u, v = (sights.take(high, axis=0) * sights.take(low, axis=0)).T
-        one = ((dx * dx + dy * dy < reach * reach) & (u + v > 0.0)).nonzero()[0]
-        low, high = low.take(one), high.take(one)
-        share = (hits[high] / (hits[low] + hits[high]))[:, None]
-        for means in (points, sights):
-            first, second = means.take(low, axis=0), means.take(high, axis=0)
-            means[low] = first + share * (second - first)
-        looks[low] += share[:, 0] * (looks[high] - looks[low])
-        hits[low] += hits[high]
-        is_kept = np.ones(len(cells), bool)
-        is_kept[high] = False
-        kept = is_kept.nonzero()[0]
-        cells = cells.take(kept)
-        walls = Walls(*(values.take(kept, axis=0) for values in walls))
-    return walls

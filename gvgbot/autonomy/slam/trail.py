@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.ekf import Belief, Clone
-from gvgbot.geometry import Array, Pose, rows_of, wrap_angle
+from gvgbot.geometry import Array, Pose, rotated_covariance, rows_of, wrap_angle
 
 MOST = 16  # old poses
 _SIZE = 3 + 3 * MOST  # of the trail's part of the state
@@ -29,7 +29,9 @@ class Laid(NamedTuple):
 
     Its error is the sum of `gains` (M, 3, 3) times those of the poses from which walls were seen in
     some `looks` (M,), what these gains leave of the error before, `by_odometry` (3, 3) times the
-    three of odometry, and something new with covariance `noise` (3, 3).
+    three of odometry, and something new with covariance `noise` (3, 3), and the noise of the scan
+    with covariance `scan_noise` (3, 3). The walls that it draws do not err by the latter: a scan is
+    drawn where it lies on those that were there.
     """
 
     local_base: Pose
@@ -38,8 +40,25 @@ class Laid(NamedTuple):
     gains: Array
     by_odometry: Array
     noise: Array
+    scan_noise: Array
     left: Array  # (3, 3) of odometry's errors, by what has been learnt since the last motion,
     P: Array  # and their covariance (3, 3)
+
+
+def shared_out(told: Array, middle: Array, reach: Array) -> tuple[NDArray[np.int64], Array]:
+    """Numbers (M,) of looks, and what each has of what pairs tell (K, 3, 3): (M, 3, 3).
+
+    The looks of a pair are evenly spread, as far as its reach (K,) from the middle (K,) of them.
+    """
+    first = np.maximum(np.rint(middle - reach), 1.0).astype(np.int64)
+    after = np.maximum(np.rint(middle + reach).astype(np.int64), first) + 1
+    start = int(first.min())
+    each = told.reshape(-1, 9) / (after - first)[:, None]
+    changes = np.zeros((int(after.max()) - start + 1, 9))
+    np.add.at(changes, first - start, each)
+    np.add.at(changes, after - start, -each)
+    shares = changes[:-1].cumsum(axis=0).reshape(-1, 3, 3)
+    return start + np.arange(len(shares)), shares
 
 
 def move(belief: Belief, motion: Pose, covariance: Array, laid: Laid | None) -> Belief:
@@ -52,7 +71,9 @@ def move(belief: Belief, motion: Pose, covariance: Array, laid: Laid | None) -> 
         return ekf.predict_in_place(ekf.without_trail(belief), motion, covariance)
     if not belief.trail:
         belief = _begun(belief, laid.local_base.compose(motion.inverse()), laid.look - 1)
-    return _cloned(_followed(belief, motion, laid), laid.local_base, laid.look)
+    belief = _followed(belief, motion, laid)
+    scan_noise = rotated_covariance(laid.scan_noise, belief.map_base.theta)
+    return _cloned(belief, laid.local_base, laid.look, scan_noise)
 
 
 def _begun(belief: Belief, local_base: Pose, look: int) -> Belief:
@@ -60,7 +81,7 @@ def _begun(belief: Belief, local_base: Pose, look: int) -> Belief:
     n = len(belief.x)
     x, P = np.zeros(n + _SIZE), np.zeros((n + _SIZE, n + _SIZE))
     x[:n], P[:n, :n] = belief.x, belief.P
-    return _cloned(replace(belief, x=x, P=P), local_base, look)
+    return _cloned(replace(belief, x=x, P=P), local_base, look, np.zeros((3, 3)))
 
 
 def _followed(belief: Belief, motion: Pose, laid: Laid) -> Belief:
@@ -77,7 +98,8 @@ def _followed(belief: Belief, motion: Pose, laid: Laid) -> Belief:
     by_before = F - R @ laid.gains.sum(axis=0) @ R.T @ F
     by_trail = np.concatenate([R @ laid.by_odometry, _by_clones(belief, laid, R)], axis=1)
     row = by_before @ P[:3] + by_trail @ P[end:]
-    own = row[:, :3] @ by_before.T + row[:, end:] @ by_trail.T + R @ laid.noise @ R.T
+    own = row[:, :3] @ by_before.T + row[:, end:] @ by_trail.T
+    own += R @ (laid.noise + laid.scan_noise) @ R.T
     P[:3], P[:, :3] = row, row.T
     P[:3, :3] = (own + own.T) / 2
     x[:3] = moved.x, moved.y, moved.theta
@@ -105,9 +127,10 @@ def _by_clones(belief: Belief, laid: Laid, R: Array) -> Array:
     return by_slot.reshape(3, -1)
 
 
-def _cloned(belief: Belief, local_base: Pose, look: int) -> Belief:
+def _cloned(belief: Belief, local_base: Pose, look: int, scan_noise: Array) -> Belief:
     """The belief with the robot's pose as the newest of the trail, in its own mean and covariance.
 
+    What of its error is the noise of its scan, map frame, the new one does not have.
     If there are too many, two neighbours become one: those for the fewest looks by their age.
     """
     trail, slot = list(belief.trail), len(belief.trail)
@@ -121,6 +144,8 @@ def _cloned(belief: Belief, local_base: Pose, look: int) -> Belief:
     belief.x[at] = belief.x[:3]
     belief.P[at] = belief.P[:3]
     belief.P[:, at] = belief.P[:, :3]
+    for rows, columns in ((at, slice(3)), (slice(3), at), (at, at)):
+        belief.P[rows, columns] -= scan_noise
     return replace(belief, trail=(*trail, Clone(local_base, look, 1, slot)))
 
 

@@ -204,6 +204,9 @@ def test_when_walls_were_seen_is_told_by_the_looks_at_them() -> None:
     on_the_left = (x[:, 1] > 1.8) & (np.abs(x[:, 0]) < 1.0)
     assert np.allclose(looks[on_the_right], np.mean(range(11, 15)))
     assert np.allclose(looks[on_the_left], np.mean(range(1, 15)), rtol=0.02)  # old hits fade
+    spread = local_map.looks_spread()
+    assert np.allclose(spread[on_the_right], np.var(range(11, 15)))
+    assert np.allclose(spread[on_the_left], np.var(range(1, 15)), rtol=0.05)
 
 
 def test_standing_walls_survive_a_hundred_noisy_scans_from_all_over_the_room() -> None:
