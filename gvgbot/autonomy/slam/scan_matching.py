@@ -7,6 +7,7 @@ through the wall points near by, which count the less the farther they are, as i
 locally weighted regression", JASA 74(368), 1979: a line lies inside columns, and cuts corners.
 """
 
+import cmath
 import math
 from dataclasses import dataclass, replace
 from typing import Annotated, NamedTuple
@@ -82,10 +83,6 @@ class Sides(NamedTuple):
     of_walls: Array
     of_points: Array
 
-    def turned(self, angle: float) -> "Sides":
-        """With the points turned by an angle."""
-        return Sides(self.of_walls, Pose(theta=angle).transform(self.of_points))
-
 
 class _Pairs(NamedTuple):
     """Points (2, K) of the frame that is registered, and the walls they are near to.
@@ -118,12 +115,13 @@ def register(
     Q (3, 3) is the prior's covariance in its own frame. None when too few points find a wall, or
     when it comes to where another prior has led, which has been `found`: the pairs are the same.
     """
+    if found is not None and not _is_elsewhere(found, prior):
+        return None
     information = inverse(Q)
     counts = np.ones(walls.n) if hits is None else hits
 
     def paired(pose: Pose) -> _Pairs:
-        turned = None if sides is None else sides.turned(pose.theta)
-        return _pairs(points, pose, walls, counts, config.max_pair_m, turned)
+        return _pairs(points, pose, walls, counts, config.max_pair_m, sides)
 
     pose, step = prior, np.zeros(3)  # from the prior to the pose
     A, near, residual = information, np.empty(0, bool), np.empty(0)
@@ -215,24 +213,26 @@ def _pairs(
     paired = (present[:, _FEWEST - 1] & (distance[:, 0] < reach)).nonzero()[0]
     present, points = present.take(paired, axis=0), points.take(paired, axis=0)
     distance, near = distance.take(paired, axis=0), near.take(paired, axis=0)
-    z = walls.data.view(np.complex128).ravel().take(near, mode="clip")
+    z = _complex(walls.data).take(near, mode="clip")
     counts = present * hits.take(near, mode="clip")  # those that are not present have no index
     closeness: Array | float = 1.0
     if is_close:  # the distance from the wall is in all squares, and makes no difference
         square = np.minimum(distance, farthest) ** 2
         closeness = (_BEYOND * square[:, -1:] - square) ** 2
-    weight = counts * closeness
-    centre, along = _lines(z, weight)
+    raw = counts * closeness
+    weight, centre, turned = _lines(z, raw)
     if sides is not None:
-        of_walls = sides.of_walls.take(near, axis=0, mode="clip")
-        facing = _facing(sides.of_points.take(paired, axis=0), of_walls, along)
-        enough = np.einsum("kg->k", (facing & present).astype(np.int8)) >= _FEWEST
+        of_points = _complex(sides.of_points).take(paired)
+        of_walls = _complex(sides.of_walls).take(near, mode="clip")
+        facing = _facing(of_points * cmath.rect(1.0, pose.theta), of_walls, turned) & present
+        shown = np.einsum("kg->k", facing.view(np.int8))
+        enough = shown >= _FEWEST
         counts *= facing & enough[:, None]
-        mixed = (enough & (present & ~facing).any(axis=1)).nonzero()[0]
+        mixed = (enough & (shown < np.einsum("kg->k", present.view(np.int8)))).nonzero()[0]
         if len(mixed):
-            weight[mixed] *= facing[mixed]
-            centre[mixed], along[mixed] = _lines(z[mixed], weight[mixed])
-    turned = along.conj()
+            shown_only = raw.take(mixed, axis=0) * facing.take(mixed, axis=0)
+            fitted = _lines(z.take(mixed, axis=0), shown_only)
+            weight[mixed], centre[mixed], turned[mixed] = fitted
     off = (z - centre[:, None]) * turned[:, None]  # along the wall, and across
     across, spread = (np.einsum("kg,kg->k", counts, d * d) for d in (off.imag, off.real))
     lines = (across < _FLATNESS * spread).nonzero()[0]
@@ -240,21 +240,25 @@ def _pairs(
     normal = np.array([turned.imag, turned.real])
     to_wall = (centre * turned).imag
     if is_close:
-        at = world.view(np.complex128).ravel().take(paired.take(lines))
+        at = _complex(world).take(paired.take(lines))
         beside = ((at - centre) * turned).real
         to_wall += _bulge(off.take(lines, axis=0), weight.take(lines, axis=0), beside)
     return _Pairs(points.take(lines, axis=0).T, normal, to_wall, near[lines, 0])
 
 
-def _facing(of_points: Array, of_walls: Array, along: Complexes) -> NDArray[np.bool_]:
+def _complex(points: Array) -> Complexes:
+    """Points (N, 2) as x + iy (N,)."""
+    return points.view(np.complex128).ravel()
+
+
+def _facing(of_points: Complexes, of_walls: Complexes, turned: Complexes) -> NDArray[np.bool_]:
     """Which of the wall points (K, G) beside points (K,) were seen from the side these show.
 
-    Directions to there are (K, 2) from the points and (K, G, 2) from the walls.
+    Directions to there are `of_points` (K,) and `of_walls` (K, G); walls that are `turned` by (K,)
+    lie along x.
     """
-    normal = np.stack([-along.imag, along.real], axis=1)
-    now = np.einsum("kj,kj->k", of_points, normal)
-    before = np.einsum("kgj,kj->kg", of_walls, normal)
-    least = _GRAZING * np.hypot(*of_points.T)
+    now, before = (of_points * turned).imag, (of_walls * turned[:, None]).imag
+    least = _GRAZING * np.abs(of_points)
     return np.asarray(before * now[:, None] >= before**2 * least[:, None])
 
 
@@ -275,15 +279,15 @@ def _linear(
     return (near, residual, J) if near.all() else (near, residual[near], J[:, near])
 
 
-def _lines(z: Complexes, weight: Array) -> tuple[Complexes, Complexes]:
-    """Centres (K,) of groups of points (K, G), and directions of the lines through them.
+def _lines(z: Complexes, weight: Array) -> tuple[Array, Complexes, Complexes]:
+    """Groups of points (K, G): weights that add up to 1, centres (K,), what turns lines along x.
 
     The mean square of what complex numbers are off their centre has twice the angle of the line.
     """
     weight = weight / np.einsum("kg->k", weight)[:, None]
     centre = np.einsum("kg,kg->k", weight, z)
     off = z - centre[:, None]
-    return centre, np.exp(0.5j * np.angle(np.einsum("kg,kg->k", weight, off * off)))
+    return weight, centre, np.exp(-0.5j * np.angle(np.einsum("kg,kg->k", weight, off * off)))
 
 
 def _bulge(off: Complexes, weight: Array, beside: Array) -> Array:
@@ -294,7 +298,7 @@ def _bulge(off: Complexes, weight: Array, beside: Array) -> Array:
     the centre, along the line and across.
     """
     square = off.real**2
-    weighted = weight / np.einsum("kg->k", weight)[:, None] * square
+    weighted = weight * square
     spread = np.einsum("kg->k", weighted)
     told = np.einsum("kg,kg->k", weighted, square) - spread * spread
     bend = np.einsum("kg,kg->k", weighted, off.imag) / (told + _BEND_M4)
