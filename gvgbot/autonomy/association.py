@@ -52,7 +52,8 @@ def pair_tracked(
         np.array([vertex.local.position for vertex in vertices]),
         np.array([sighting.position for sighting in sightings.values()]),
     )
-    near = [(vertices[i], nodes[j], gaps[i, j]) for i, j in np.argwhere(gaps < config.same_place_m)]
+    close = zip(*(gaps < config.same_place_m).nonzero(), strict=True)
+    near = [(vertices[i], nodes[j], gaps[i, j]) for i, j in close]
     pairs = sorted(
         (sightings[node].kind != vertex.kind, float(metres), node, vertex.id)
         for vertex, node, metres in near

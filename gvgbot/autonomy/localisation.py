@@ -335,7 +335,7 @@ class LocalMaps:
         the rest, which is taken for a least share of all, must fit.
         """
         config = self._matching
-        known = float(self.near.known(found.pose.transform(points)).mean())
+        known = np.count_nonzero(self.near.known(found.pose.transform(points))) / len(points)
         if found.inliers < config.min_inliers * max(known, found.inliers, _SEEN_SHARE):
             return None
         fits = found.inliers * (1.0 - found.rms / config.max_pair_m)

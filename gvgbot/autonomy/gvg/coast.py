@@ -91,7 +91,8 @@ def _cuts(diagram: Diagram, walls: Array, radius: float) -> _Cuts:
     a, b = a.take(far), b.take(far)
     start, end = (_along(diagram.points.take(i, axis=0) - middle, direction) for i in (a, b))
     out = (b < 0).nonzero()[0]  # of the hull
-    end[out] = -np.copysign(np.inf, _along(walls.mean(axis=0) - middle[out], direction[out]))
+    inside = np.einsum("ij->j", walls) / len(walls)  # faster than mean()
+    end[out] = -np.copysign(np.inf, _along(inside - middle[out], direction[out]))
     low, high = np.minimum(start, end), np.maximum(start, end)
     away = np.sqrt(np.maximum(radius**2 - half**2, 0.0))
     cut, along = [], []

@@ -232,9 +232,11 @@ class LocalGvg:
     def _bearing(self, branch: Branch, clearance: float) -> float:
         line = self.leaving(branch)
         wanted = max(_LEAST_M, 0.9 * clearance) if clearance < _WIDE_M else _IN_WIDE_M
-        origin, passed = line[0], {branch.edge}
+        passed = {branch.edge}
         while True:
-            away = np.hypot(line[:, 0] - origin[0], line[:, 1] - origin[1])
+            z = line.view(np.complex128)[:, 0]
+            off = z - z[0]
+            away = np.abs(off)
             at = int((away >= wanted).argmax())
             onwards = None if away[at] >= wanted else self.onwards(branch)
             if onwards is None or onwards.edge in passed:
@@ -244,8 +246,7 @@ class LocalGvg:
             line = np.concatenate([line, self.leaving(branch)])
         if away[at] < wanted:
             at = int(away.argmax())
-        x, y = line[at] - origin
-        return float(np.arctan2(y, x))
+        return float(np.angle(off[at]))
 
     def onwards(self, branch: Branch) -> Branch | None:
         """The one certain way on where a branch arrives; None at a meetpoint or an end."""

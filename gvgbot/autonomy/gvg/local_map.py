@@ -186,8 +186,7 @@ class LocalMap:
     def _within(self, metres: Array, axis: int) -> Array:
         """Rows or columns of `_known` for coordinates of any shape, its rim for those outside."""
         cells = np.floor(metres / self._cell) - (self._corner[axis] - 1)
-        within: Array = np.minimum(np.maximum(cells, 0.0), self._size + 1)
-        return within
+        return np.asarray(cells.clip(0.0, self._size + 1))
 
     def is_bare(self, centre: Array, radius: float) -> bool:
         """Whether a disc, local frame, is free for certain, and all of it in the window."""

@@ -76,7 +76,7 @@ def fine_graph(
     rim = np.concatenate([links[here & ~there], links[there & ~here, ::-1]])
     rim = rim[clearance[rim[:, 1]] >= min_clearance]
     endless = endless[certain[diagram.a[endless]]]
-    away = _FARTHEST_M * _outwards(triangulation, diagram, endless)
+    away = _FARTHEST_M * _outwards(triangulation, diagram, endless) if len(endless) else _NOTHING
     rays = _Rays(
         np.concatenate([rim[:, 0], diagram.a[endless]]),
         np.concatenate([points[rim[:, 1]] - points[rim[:, 0]], away]),
@@ -286,8 +286,8 @@ def _unknown(local_map: Space, centres: Array, radii: Array, places: Array) -> N
     """How many of the places (K, 2) of a unit disc lie in unknown space, for each disc (N,)."""
     # the discs last, of which there are far more than places, so that NumPy's loops are long
     x_y = centres.T[:, None, :] + places.T[:, :, None] * radii
-    unknown: NDArray[np.int64] = (~local_map.known(x_y.transpose(1, 2, 0))).sum(axis=0)
-    return unknown
+    known = local_map.known(x_y.transpose(1, 2, 0)).sum(axis=0, dtype=np.uint8)
+    return np.asarray(len(places) - known.astype(np.int64))
 
 
 def _ridges(

@@ -72,7 +72,7 @@ class Calibration:
         added = before @ B.T
         self.shared = before + B @ self.P
         added = added + added.T + B @ self.P @ B.T
-        added += np.diag(np.maximum(-np.diag(added), 0.0))
+        added.flat[::4] = np.maximum(added.flat[::4], 0.0)  # its diagonal
         # in units of what is new, as metres and radians do not compare
         L = np.asarray(np.linalg.cholesky(drift), np.float64)
         values, axes = np.linalg.eigh(solved(L, solved(L, added).T))

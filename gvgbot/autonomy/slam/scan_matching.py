@@ -175,7 +175,7 @@ def _scatter(residual: Array) -> float:
 
     Neighbours that err together do not cancel (batch means).
     """
-    means = residual[: len(residual) // _BATCH * _BATCH].reshape(-1, _BATCH).mean(axis=1)
+    means = residual[: len(residual) // _BATCH * _BATCH].reshape(-1, _BATCH).sum(axis=1) / _BATCH
     return _BATCH * float(means @ means) / len(means)
 
 
