@@ -32,6 +32,7 @@ _BATCH = 10  # neighbouring points, of which the mean distance from the walls is
 _GRAZING = 0.2  # of how steeply a wall was seen: what is seen less steeply may be its other face
 _CONVERGED, _ROUGHLY = 1e-4, 2e-2  # metres and radians
 _SAME_PAIRS_M, _SAME_PAIRS_RAD = 0.02, 0.005  # moved less, points are near to the same walls
+_LED_ALIKE = 2.5  # times that from where another prior has led, no place is clearly better
 
 Complexes = NDArray[np.complex128]
 
@@ -113,9 +114,9 @@ def register(
     without `sides` a point may lie on either face of a wall. It is found when a step is less than
     `within`, m and rad.
     Q (3, 3) is the prior's covariance in its own frame. None when too few points find a wall, or
-    when it comes to where another prior has led, which has been `found`: the pairs are the same.
+    when it comes near to where another prior has led, which has been `found`.
     """
-    if found is not None and not _is_elsewhere(found, prior):
+    if found is not None and not _is_elsewhere(found, prior, _LED_ALIKE):
         return None
     information = inverse(Q)
     counts = np.ones(walls.n) if hits is None else hits
@@ -128,7 +129,7 @@ def register(
     J = JW = np.empty((3, 0))
     paired_at, pairs = pose, paired(pose)
     for _ in range(_ITERATIONS):
-        if found is not None and not _is_elsewhere(found, pose):
+        if found is not None and not _is_elsewhere(found, pose, _LED_ALIKE):
             return None
         if _is_elsewhere(paired_at, pose):
             paired_at, pairs = pose, paired(pose)
@@ -190,10 +191,10 @@ def _weights(residual: Array, config: ScanMatchingConfig) -> Array:
     return weights
 
 
-def _is_elsewhere(before: Pose, now: Pose) -> bool:
-    """Whether points have moved so far that they may be near to another part of the walls."""
+def _is_elsewhere(before: Pose, now: Pose, times: float = 1.0) -> bool:
+    """Whether points have moved some times as far as it takes to be near to other walls."""
     turned = abs(wrap_angle(now.theta - before.theta))
-    return before.distance(now) > _SAME_PAIRS_M or turned > _SAME_PAIRS_RAD
+    return before.distance(now) > times * _SAME_PAIRS_M or turned > times * _SAME_PAIRS_RAD
 
 
 def _pairs(

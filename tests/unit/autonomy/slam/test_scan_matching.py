@@ -89,10 +89,12 @@ def test_a_prior_that_leads_to_where_another_one_has_led_tells_nothing_more() ->
 
     first = led(Pose(0.1, 0.0, 0.0), None)
     assert first is not None
-    assert led(Pose(0.0, 0.1, 0.02), first.pose) is None
-    other = led(Pose(0.0, 0.1, 0.02), Pose(2.0, 0.0, 0.0))
-    assert other is not None
-    assert first.pose.distance(other.pose) < 0.01
+    for beside in (Pose(), Pose(0.03, 0.02, 0.01)):  # no place so near is clearly better
+        assert led(Pose(0.0, 0.1, 0.02), first.pose.compose(beside)) is None
+    for beside in (Pose(2.0, 0.0, 0.0), Pose(0.08, 0.0, 0.0)):
+        other = led(Pose(0.0, 0.1, 0.02), first.pose.compose(beside))
+        assert other is not None
+        assert first.pose.distance(other.pose) < 0.01
 
 
 @pytest.mark.parametrize("seed", range(5))
