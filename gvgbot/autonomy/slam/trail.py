@@ -53,11 +53,13 @@ def shared_out(told: Array, middle: Array, reach: Array) -> tuple[NDArray[np.int
     first = np.maximum(np.rint(middle - reach), 1.0).astype(np.int64)
     after = np.maximum(np.rint(middle + reach).astype(np.int64), first) + 1
     start = int(first.min())
-    each = told.reshape(-1, 9) / (after - first)[:, None]
-    changes = np.zeros((int(after.max()) - start + 1, 9))
-    np.add.at(changes, first - start, each)
-    np.add.at(changes, after - start, -each)
-    shares = changes[:-1].cumsum(axis=0).reshape(-1, 3, 3)
+    each = (told.reshape(-1, 9) / (after - first)[:, None]).ravel()
+    size = 9 * (int(after.max()) - start + 1)
+    begun, ended = (
+        np.bincount((9 * (look - start)[:, None] + np.arange(9)).ravel(), each, size)
+        for look in (first, after)
+    )
+    shares = (begun - ended).reshape(-1, 3, 3)[:-1].cumsum(axis=0)
     return start + np.arange(len(shares)), shares
 
 
