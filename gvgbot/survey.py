@@ -10,6 +10,7 @@ from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.geometry import Array, Pose, resampled, sampled
 from gvgbot.maps.blanks import blanks
 from gvgbot.maps.gaps import gaps
+from gvgbot.maps.hits import Scans, barred
 from gvgbot.maps.hollows import bodies, hollows
 from gvgbot.maps.narrows import narrows
 from gvgbot.maps.occupancy import OccupancyGrid, occupancy_grid
@@ -35,7 +36,8 @@ def survey(pipeline: Pipeline) -> Surveyed:
     if ways and not pipeline.matches_walls:
         return Surveyed(_NONE, _NONE)
     keyframes = smoothed_keyframes(pipeline)
-    grid = _walled(occupancy_grid(scans_at(keyframes, pipeline)), pipeline.sight.virtual_walls)
+    scans = scans_at(keyframes, pipeline)
+    grid = _walled(occupancy_grid(scans), pipeline.sight.virtual_walls)
     here, room = pipeline.map_base.position, pipeline.errands.room_m
     stood = spots(grid, *_passed(pipeline, keyframes), here, room)
     found = np.concatenate([gaps(grid, here, room), stood])
@@ -57,6 +59,7 @@ def survey(pipeline: Pipeline) -> Surveyed:
         views,
         narrow,
         doorsteps=_doorsteps(grid, by_somebody, beside, here, room),
+        barred=_barred(pipeline, scans, keyframes, grid),
         is_whole=not (len(places) or len(narrow) or len(pipeline.sight.virtual_walls)),
     )
 
@@ -108,6 +111,22 @@ def _ways(pipeline: Pipeline) -> list[Way]:
         )
         for edge in mapper.graph.edges.values()
     ]
+
+
+def _barred(
+    pipeline: Pipeline, scans: Scans, keyframes: list[Pose], grid: OccupancyGrid
+) -> tuple[int, ...]:
+    """The edges, by their ids, that nobody has driven, over floor that was a wall."""
+    mapper = pipeline.mapper
+    edges = [
+        edge
+        for edge in mapper.graph.edges.values()
+        if not (edge.driven or edge.traversals or edge.established)
+    ]
+    lines = [mapper.belief.map_vertex(edge.a.vertex).transform(edge.polyline) for edge in edges]
+    driven = np.array([base.position for base in keyframes])
+    found = barred(scans, lines, grid, driven)
+    return tuple(edge.id for edge, is_barred in zip(edges, found, strict=True) if is_barred)
 
 
 def _joined(pipeline: Pipeline, ways: list[Way]) -> Array:

@@ -17,6 +17,7 @@ from gvgbot.config import load_config
 from gvgbot.drivers.world import World
 from gvgbot.geometry import STANDSTILL, Array, Pose
 from gvgbot.hal.messages import Odometry
+from gvgbot.hal.packed_scan import PackedScan
 from gvgbot.survey import survey
 from gvgbot.worlds.canvas import Canvas
 from tests.unit.autonomy.graphs import STREET, streets
@@ -26,16 +27,18 @@ START = Pose(-3.0, 0.0, 0.0)  # in the world; the map begins there
 CORRIDOR, SIDE = (-4.0, -1.0, 4.0, 1.0), (2.0, -1.0, 4.0, 4.0)
 
 
-def driven(world: World, metres: float, localisation: Localisation = "full") -> Pipeline:
-    """A robot after so long a drive straight on."""
+def driven(
+    world: World, metres: float, localisation: Localisation = "full", every_s: float = 0.1
+) -> Pipeline:
+    """A robot after so long a drive straight on, with a look every 0.25 m."""
     config = load_config()
     pipeline = Pipeline(
         config.autonomy, config.exploration, config.robot.radius_m, localisation=localisation
     )
     for step, x in enumerate(np.arange(0.0, metres + 0.01, 0.25)):
         odom_base = Pose(float(x), 0.0, 0.0)
-        pipeline.control(Odometry(0.1 * step, odom_base, STANDSTILL))
-        pipeline.perceive(replace(sweep(world, START.compose(odom_base)), stamp=0.1 * step))
+        pipeline.control(Odometry(every_s * step, odom_base, STANDSTILL))
+        pipeline.perceive(replace(sweep(world, START.compose(odom_base)), stamp=every_s * step))
     return pipeline
 
 
@@ -152,6 +155,24 @@ def test_a_post_that_was_passed_before_anybody_knew_that_it_is_one_is_looked_at_
     pipeline.traffic.passed = []
     (place,) = places - set(map(tuple, survey(pipeline).places.tolist()))
     assert START.transform(np.array(place)) == pytest.approx([-1.5, 0.6], abs=2.0)
+
+
+def test_an_edge_over_floor_that_was_a_wall_is_told_of_unless_it_was_driven() -> None:
+    """Ten metres north from the middle of the corridor; from the east it is seen through glass."""
+    pipeline = driven(carved([CORRIDOR]), 6.0)
+    glazed, keyframes = carved([CORRIDOR, (-2.5, 0.9, -0.5, 4.0)]), pipeline.past.keyframes
+    for at, keyframe in enumerate(keyframes):
+        if keyframe.scan is not None and at > 9:
+            scan = replace(sweep(glazed, START.compose(keyframe.odom_base)), stamp=keyframe.stamp)
+            keyframes[at] = replace(keyframe, scan=PackedScan(scan))
+    graph, ids = streets(1, 2)
+    (edge,) = graph.edges.values()
+    pipeline.mapper.graph, pipeline.mapper.observations = graph, []
+    x = np.array([0.0, 0.0, 0.0, 1.5, 0.0, 0.0, 1.5, 10.0, 0.0])
+    pipeline.mapper.belief = Belief(x, 1e-6 * np.eye(9), tuple(ids.values()))
+    assert survey(pipeline).barred == ()
+    edge.driven, edge.traversals = False, 0
+    assert survey(pipeline).barred == (edge.id,)
 
 
 def test_a_daemon_makes_its_survey_off_the_loop_and_forgets_it_when_the_robot_drives_on() -> None:

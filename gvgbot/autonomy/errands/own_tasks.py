@@ -1,7 +1,7 @@
 """What the robot does unasked before exploring goes on, or ends: drives for a better map."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -42,6 +42,7 @@ class OwnTasks:
         self._surveyed_m = 0.0  # and `travelled`
         self._narrows = np.empty((0, 2))  # ways too narrow for the robot
         self._has_met = False  # somebody who stood: he may have hidden something, and gone
+        self._reopened: set[frozenset[int]] = set()  # ends of edges
         self._arrived: float | None = None  # stamp, where it went for a look
 
     def configure(self, config: CertaintyConfig) -> None:
@@ -94,6 +95,8 @@ class OwnTasks:
         surveyed = survey()
         if surveyed is None:
             return Stand()
+        if self._reopen(surveyed.barred):
+            return Stand()
         self._narrows = surveyed.narrows
         self._surveyed, self._surveyed_m, starts = edges, view.travelled, here.starts()
 
@@ -112,6 +115,16 @@ class OwnTasks:
             return None
         decision = Decision(view.stamp, None, None, reason)
         return Task(ToPoint(*place.round(2).tolist()), decision)
+
+    def _reopen(self, barred: Iterable[int]) -> bool:
+        """Take edges that may lead through glass for frontiers, once; whether there were any."""
+        graph, before = self._mapper.graph, len(self._reopened)
+        for edge in [graph.edges[key] for key in barred if key in graph.edges]:
+            ends = frozenset((edge.a.vertex, edge.b.vertex))
+            if ends not in self._reopened:
+                self._reopened.add(ends)
+                graph.unjoin(edge)
+        return len(self._reopened) > before
 
     def _is_hidden(self, view: View) -> bool:
         """Whether somebody makes up meetpoints where it has just come for a look: he may go."""

@@ -35,12 +35,14 @@ class Explorer(Robot):
         self.left = list(surveys)
         self.mission.survey = self._survey
         self.narrows = self.doorsteps = np.empty((0, 2))
+        self.is_barred = False  # all that is joined
         self.somebody_until = 0.0  # s, that somebody is found
         self.hidden_until = 0.0  # s, that the branch may be there for a while only
 
     def _survey(self) -> Surveyed:
         places = np.array(self.left.pop(0)).reshape(-1, 2)
-        return Surveyed(places, self.narrows, doorsteps=self.doorsteps)
+        barred = tuple(self.mapper.graph.edges) if self.is_barred else ()
+        return Surveyed(places, self.narrows, doorsteps=self.doorsteps, barred=barred)
 
     def decide(self, view: View, known: Correspondence) -> tuple[Order, list[Event]]:
         is_found = view.stamp < self.somebody_until
@@ -164,6 +166,22 @@ def test_a_narrow_way_is_looked_at_again_once_where_somebody_may_have_stood_in_i
     assert [look.reason for look in looks] == ["somebody may have stood there"] * visits
     assert not robot.left
     assert robot.mission.reason == "no frontier is left; too narrow for it near (2.0, -0.5)"
+
+
+def test_an_edge_that_may_lead_through_glass_is_a_frontier_once_more() -> None:
+    """Here it is seen again at once, and believed then."""
+    robot = Explorer([], [])
+    robot.is_barred = True
+    while not robot.mapper.graph.edges:
+        robot.look(CLOSED)
+    (edge,) = robot.mapper.graph.edges.values()
+    while len(robot.left) > 1:
+        robot.look(CLOSED)
+    assert robot.mapper.graph.frontiers() == sorted([edge.a, edge.b])
+    robot.until_it_moves_or_ends()
+    assert robot.mapper.graph.edge_at(edge.a) is not None
+    assert robot.mission.outcome == "explored"
+    assert not robot.left
 
 
 def test_who_asks_it_to_go_on_gets_another_look_at_every_gap() -> None:
