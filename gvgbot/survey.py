@@ -10,7 +10,7 @@ from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.geometry import Array, Pose, resampled, sampled
 from gvgbot.maps.blanks import blanks
 from gvgbot.maps.gaps import gaps
-from gvgbot.maps.hits import Scans, barred
+from gvgbot.maps.hits import Scans, barred, hits
 from gvgbot.maps.hollows import bodies, hollows
 from gvgbot.maps.narrows import narrows
 from gvgbot.maps.occupancy import OccupancyGrid, occupancy_grid
@@ -20,6 +20,7 @@ from gvgbot.maps.viewpoints import floor_beside, viewpoints
 
 _INTO_M = 2.0  # off its ways: through a door, and the robot faces what it looks at
 _TOWARDS_M = 1.0  # what seems to be a passage may be a pane of glass
+_BODY_M = 0.45  # from the middle of somebody to where beams end on him
 _STEP_M = 0.05  # between points of a way: a cell of the grid
 _WALL = 100  # percent
 _NONE = np.empty((0, 2))
@@ -48,7 +49,9 @@ def survey(pipeline: Pipeline) -> Surveyed:
         joined, felt = _joined(pipeline, ways), _felt(pipeline)
         hollow = hollows(_walled(grid, felt), joined, pipeline.sight.open_clearance)
         found = np.concatenate([found, blanks(grid, beside, here, room), hollow])
-        by_somebody = np.concatenate([narrow, bodies(grid, joined)])
+        lasting_s = pipeline.traffic.newcomers.longest_patience
+        may_go = _may_go(bodies(grid, joined), scans, lasting_s)
+        by_somebody = np.concatenate([narrow, may_go])
     through = passages(grid, ways, here, room, pipeline.sight.open_clearance)
     off = np.repeat([_INTO_M, _TOWARDS_M], [len(found), len(through)])
     places = np.concatenate([found, through])
@@ -111,6 +114,11 @@ def _ways(pipeline: Pipeline) -> list[Way]:
         )
         for edge in mapper.graph.edges.values()
     ]
+
+
+def _may_go(places: Array, scans: Scans, lasting_s: float) -> Array:
+    """Those bodies (M, 2) of some (N, 2) that were not in sight for so long that they stay."""
+    return np.asarray(places[hits(scans, places, _BODY_M).seconds < lasting_s])
 
 
 def _barred(

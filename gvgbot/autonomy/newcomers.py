@@ -113,7 +113,7 @@ class Newcomers:
 
         `is_way` tells of a place (2,), local frame, whether a way is known to lead over it.
         """
-        if not self._longest_patience:  # who comes, stays
+        if not self.longest_patience:  # who comes, stays
             return without(scan, local_base, self.company)
         self._forget(scan, local_base, local_map)
         scan = without_fringes(scan) if self.in_team else scan
@@ -241,7 +241,7 @@ class Newcomers:
             one = Newcomer(island.centre, island.radius, stamp, stamp, came, island.is_whole)
             one.was_wall = is_wall
             if is_near(island.centre, self.lasting):
-                one.came, one.first = False, stamp - self._longest_patience
+                one.came, one.first = False, stamp - self.longest_patience
             self._all.append(one)
         round_before = one.is_round
         one.look(island, stamp)
@@ -261,13 +261,14 @@ class Newcomers:
         if one.came or self._may_be_stranger(one):
             return self._config.came_after_s
         if self._has_met and one.is_round:  # it may have come before it was found
-            return self._longest_patience
+            return self.longest_patience
         found_after = self._config.found_after_s
         may_be = one.evidence > (-SURE if one.is_whole else 0.0)
         return found_after if may_be else min(_GLIMPSE_S, found_after)
 
     @property
-    def _longest_patience(self) -> float:
+    def longest_patience(self) -> float:
+        """What has stood for so long, s, is a part of the building for certain; 0 if all is."""
         return max(self._config.came_after_s, self._config.found_after_s)
 
     def _may_be_stranger(self, one: Newcomer) -> bool:

@@ -9,6 +9,7 @@ import pytest
 
 from gvgbot.autonomy.ending import Surveyed
 from gvgbot.autonomy.localisation import Localisation
+from gvgbot.autonomy.newcomers import Newcomers, NewcomersConfig
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.virtual_walls import points_of
@@ -155,6 +156,24 @@ def test_a_post_that_was_passed_before_anybody_knew_that_it_is_one_is_looked_at_
     pipeline.traffic.passed = []
     (place,) = places - set(map(tuple, survey(pipeline).places.tolist()))
     assert START.transform(np.array(place)) == pytest.approx([-1.5, 0.6], abs=2.0)
+
+
+@pytest.mark.parametrize(("came_after_s", "count"), [(15.0, 0), (25.0, 1)])
+def test_what_a_ring_goes_round_is_nobody_once_it_was_in_sight_for_long(
+    came_after_s: float, count: int
+) -> None:
+    """A box of 0.4 m beside the way, in sight for 20 s; what stands for longer is a wall."""
+    world = carved([CORRIDOR], [(-1.2, 0.3, -0.8, 0.7)])
+    pipeline = driven(world, 3.0, every_s=1.6)
+    patience = NewcomersConfig(came_after_s=came_after_s, found_after_s=5.0)
+    pipeline.traffic.newcomers = Newcomers(patience)
+    graph, ids = streets(2, 1)
+    (edge,) = graph.edges.values()
+    edge.polyline = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 0.8), (0.0, 0.8), (0.0, 0.0)])
+    pipeline.mapper.graph, pipeline.mapper.observations = graph, []
+    x = np.array([0.0, 0.0, 0.0, 1.5, 0.1, 0.0, 2.5, 0.1, 0.0])
+    pipeline.mapper.belief = Belief(x, 1e-6 * np.eye(9), tuple(ids.values()))
+    assert len(survey(pipeline).doorsteps) == count
 
 
 def test_an_edge_over_floor_that_was_a_wall_is_told_of_unless_it_was_driven() -> None:
