@@ -39,7 +39,8 @@ def is_seen_through(scan: Scan, local_base: Pose, disc: Disc) -> bool:
     """Whether most beams towards a disc get through it, and hardly any ends on it.
 
     Beside a post between two panes of glass most beams pass as well. What stands there is hit on
-    its near side: a wall close behind it does not hide that it has gone.
+    its near side: a wall close behind it does not hide that it has gone. A beam without an echo
+    gets no farther than the laser sees.
     """
     centre, radius = disc
     x, y = local_base.compose(scan.base_laser).inverse().transform(centre)
@@ -54,7 +55,7 @@ def is_seen_through(scan: Scan, local_base: Pose, disc: Disc) -> bool:
     off = (np.arange(first, last) - middle) * scan.angle_increment
     half_chord = np.sqrt(np.maximum(0.0, radius**2 - (away * np.sin(off)) ** 2))
     nearest = away * np.cos(off)  # to the centre, on each beam
-    told = scan.ranges[first:last]
+    told = np.minimum(scan.ranges[first:last], scan.range_max)
     beyond = told > nearest + half_chord
     ends = ~beyond & (told > nearest - half_chord - BLUR_M)
     beyond, ends = (hit[~np.isnan(told)] for hit in (beyond, ends))

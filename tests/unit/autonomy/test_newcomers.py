@@ -473,6 +473,18 @@ def test_who_stands_where_the_laser_hardly_reaches_is_kept_out() -> None:
     assert np.isnan(newcomers.sift(scan, HERE, local_map).ranges).any()
 
 
+def test_who_is_farther_off_than_the_laser_reaches_has_not_gone_for_all_it_sees() -> None:
+    local_map, newcomers = LocalMap(LocalMapConfig()), Newcomers(CONFIG)
+    hall, nearer, farther = carved([(-9.0, -9.0, 9.0, 9.0)]), Pose(-2.0), Pose(-6.0)
+    scan = sweep(hall, HERE, reach=5.6)
+    scan = replace(scan, ranges=np.minimum(scan.ranges, to_disc(scan.bearings, (3.0, 0.0))))
+    newcomers.sift(scan, HERE, local_map)
+    newcomers.sift(sweep(hall, farther, reach=5.6), farther, local_map)
+    assert not newcomers.gone
+    newcomers.sift(sweep(hall, nearer, reach=5.6), nearer, local_map)
+    assert newcomers.gone
+
+
 def test_in_noise_a_corner_is_a_wall_as_soon_as_without() -> None:
     """A cupboard, half behind a corner: in the end it stays in the map."""
     world = carved([ROOM], [(1.0, 0.0, 1.1, 3.0), (2.3, -0.3, 2.7, 0.1)])
