@@ -44,14 +44,13 @@ def survey(pipeline: Pipeline) -> Surveyed:
     found = np.concatenate([gaps(grid, here, room), stood])
     beside = np.concatenate([_NONE, *(resampled(way.polyline, _STEP_M) for way in ways)])
     narrow = narrows(grid, beside, here, pipeline.radius, room)
-    by_somebody = narrow
+    stood_at = _NONE
     if ways:
         joined, felt = _joined(pipeline, ways), _felt(pipeline)
         hollow = hollows(_walled(grid, felt), joined, pipeline.sight.open_clearance)
         found = np.concatenate([found, blanks(grid, beside, here, room), hollow])
         lasting_s = pipeline.traffic.newcomers.longest_patience
-        may_go = _may_go(bodies(grid, joined), scans, lasting_s)
-        by_somebody = np.concatenate([narrow, may_go])
+        stood_at = _may_go(bodies(grid, joined), scans, lasting_s)
     through = passages(grid, ways, here, room, pipeline.sight.open_clearance)
     off = np.repeat([_INTO_M, _TOWARDS_M], [len(found), len(through)])
     places = np.concatenate([found, through])
@@ -61,20 +60,25 @@ def survey(pipeline: Pipeline) -> Surveyed:
     return Surveyed(
         views,
         narrow,
-        doorsteps=_doorsteps(grid, by_somebody, beside, here, room),
+        doorsteps=_doorsteps(grid, narrow, stood_at, beside, here, room),
         barred=_barred(pipeline, scans, keyframes, grid),
         is_whole=not (len(places) or len(narrow) or len(pipeline.sight.virtual_walls)),
     )
 
 
 def _doorsteps(
-    grid: OccupancyGrid, by_somebody: Array, ways: Array, here: Array, room: float
+    grid: OccupancyGrid, narrow: Array, stood_at: Array, ways: Array, here: Array, room: float
 ) -> Array:
-    """From where to look (M, 2) whether somebody who may have stood at places (N, 2) has gone."""
+    """From where to look (M, 2) whether somebody has gone who stood in a narrow way or in a ring.
+
+    A ring goes round him: from there all is to be seen, and a column is better not driven up to.
+    """
+    by_somebody = np.concatenate([narrow, stood_at])
     if not len(by_somebody):
         return _NONE
     before = floor_beside(grid, by_somebody, here, room)
-    views = viewpoints(grid, ways, before, here, room, np.full(len(before), _INTO_M))
+    off = np.repeat([_INTO_M, 0.0], [len(narrow), len(stood_at)])[: len(before)]
+    views = viewpoints(grid, ways, before, here, room, off)
     return _NONE if views is None else views
 
 

@@ -12,6 +12,7 @@ from gvgbot.autonomy.localisation import Localisation
 from gvgbot.autonomy.newcomers import Newcomers, NewcomersConfig
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.ekf import Belief
+from gvgbot.autonomy.slam.graph import GvgGraph
 from gvgbot.autonomy.virtual_walls import points_of
 from gvgbot.beside_loop import BesideLoop
 from gvgbot.config import load_config
@@ -83,18 +84,24 @@ def test_a_door_that_the_robot_leaves_alone_is_told_of() -> None:
     assert len(closed.narrows) == len(closed.doorsteps) == 0
 
 
-def test_edges_round_nothing_are_looked_at_again() -> None:
-    """A square of them, a metre wide, in the middle of the corridor: round somebody who has gone.
+def with_ring(pipeline: Pipeline, side: float = 1.0) -> GvgGraph:
+    """The robot's graph, from now on a square of edges about (1.5, 0), so many metres wide.
 
-    Their lines end a decimetre before the vertices. What the robot has felt may be out of sight.
+    Their lines end before the vertices.
     """
-    pipeline = driven(carved([CORRIDOR]), 3.0)
     graph, ids = streets(2, 2)
     for edge in graph.edges.values():
-        edge.polyline = edge.polyline[-1] / STREET * np.array([[0.1], [0.9]])
-    x = np.array([(1.0 + column, row - 0.5, 0.0) for column, row in ids]).ravel()
+        edge.polyline = side * edge.polyline[-1] / STREET * np.array([[0.1], [0.9]])
+    x = np.array([(1.5 + side * (i - 0.5), side * (j - 0.5), 0.0) for i, j in ids]).ravel()
     pipeline.mapper.graph, pipeline.mapper.observations = graph, []
     pipeline.mapper.belief = Belief(np.append(np.zeros(3), x), 1e-6 * np.eye(15), (*ids.values(),))
+    return graph
+
+
+def test_edges_round_nothing_are_looked_at_again() -> None:
+    """Round somebody who has gone. What the robot has felt may be out of sight."""
+    pipeline = driven(carved([CORRIDOR]), 3.0)
+    graph = with_ring(pipeline)
     places = set(map(tuple, survey(pipeline).places.tolist()))
     felt_at = pipeline.mapper.map_in_local(Pose(3.0, 0.0)).transform(np.array([1.3, 0.0]))
     pipeline.sight.hazards.add(Pose(*felt_at.tolist()), (0.0,), 0.18, 0.0, lasting=True)
@@ -103,6 +110,14 @@ def test_edges_round_nothing_are_looked_at_again() -> None:
     graph.unjoin(next(iter(graph.edges.values())))
     (place,) = places - set(map(tuple, survey(pipeline).places.tolist()))
     assert place == pytest.approx([1.5, 0.0], abs=0.3)
+
+
+def test_what_a_ring_goes_round_is_looked_at_from_there() -> None:
+    hall, post = (-4.0, -3.0, 4.0, 3.0), (-1.62, -0.12, -1.38, 0.12)
+    pipeline = driven(carved([hall], [post]), 0.5)
+    with_ring(pipeline, 2.0)
+    (place,) = survey(pipeline).doorsteps
+    assert np.abs(place - [1.5, 0.0]).max() == pytest.approx(1.0, abs=0.3)
 
 
 def test_floor_in_sight_from_a_slot_is_missing_though_no_edge_leads_there() -> None:
