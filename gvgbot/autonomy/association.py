@@ -32,7 +32,12 @@ def _sighting(gvg: LocalGvg, node: LocalNode) -> Sighting:
         bearings.append(node.lead)
         unclear.append(node.lead)
     return Sighting(
-        node.position, node.clearance, tuple(bearings), not node.is_endpoint, tuple(unclear)
+        node.position,
+        node.clearance,
+        tuple(bearings),
+        not node.is_endpoint,
+        tuple(unclear),
+        node.settled,
     )
 
 

@@ -71,12 +71,14 @@ class MapEdits(Knowledge):
         vertex = Vertex(
             self.graph.next_id(), sighting.clearance, local, view.travelled, view.travelled
         )
+        vertex.settled = sighting.settled
         for bearing in sighting.bearings:
             vertex.add_half_edge(bearing)
         self.graph.vertices[vertex.id] = vertex
         base_vertex = view.local_base.to(local)
         R = np.zeros((3, 3))
-        R[:2, :2] = sight_covariance(math.hypot(base_vertex.x, base_vertex.y), self._recognition)
+        away = math.hypot(base_vertex.x, base_vertex.y)
+        R[:2, :2] = sight_covariance(away, self._recognition, settled=sighting.settled)
         R[2, 2] = _TURN_VARIANCE
         self.belief = ekf.add_vertex(self.belief, vertex.id, base_vertex, R)
         self.observations.append(Observation(view.keyframe, vertex.id, base_vertex, R))

@@ -174,6 +174,8 @@ class Mapper(MapEdits):
         self, view: View, sighting: Sighting, node: LocalNode, vertex: Vertex, known: Correspondence
     ) -> None:
         """Sharpen a vertex by a further sighting."""
+        if sighting.settled and not vertex.settled:  # what was seen of it before was too little
+            vertex.settled, vertex.sightings = True, 0
         share = 1.0 / min(vertex.sightings + 1, _MEAN_OF)
         position = (1 - share) * vertex.local.position + share * sighting.position
         vertex.local = Pose(float(position[0]), float(position[1]), vertex.local.theta)
@@ -203,11 +205,11 @@ class Mapper(MapEdits):
         they move it, too, so each counts less there. So does an odd one everywhere.
         """
         away = math.hypot(base_vertex.x, base_vertex.y)
-        R = detection_covariance(away, self._recognition)
+        R = detection_covariance(away, self._recognition, settled=vertex.settled)
         if self._by_position:
             self._measure(view, vertex, base_vertex, R)
             return
-        own = sight_covariance(away, self._recognition)
+        own = sight_covariance(away, self._recognition, settled=vertex.settled)
         r, S, _ = ekf.innovation(self.belief, vertex.id, base_vertex, own)
         odd = max(1.0, ekf.mahalanobis(r, S) / _ODD)
         before = self.belief.map_vertex(vertex.id)

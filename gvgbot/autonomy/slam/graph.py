@@ -59,6 +59,7 @@ class Vertex:
     unclear: int = 0  # sightings from it with a departure of which too little can be seen
     visits: int = 1
     reached: bool = False  # the robot has been there, and did not only see it
+    settled: bool = True  # it has been seen where nothing unseen could move it
     serial: int = 0
     established: bool = False  # part of a map that was finished
     doubted_since: float | None = None  # stamp; since when sight speaks against it

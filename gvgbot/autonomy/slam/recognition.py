@@ -18,6 +18,7 @@ from gvgbot.ranges import Range
 
 _SIGMA_PER_M = 0.015  # of a vertex's place, m per metre from which it is seen
 _SIGHT = 0.5  # of that is what a sight errs; on another visit the place may look another
+_UNSETTLED = 3.0  # times as far off where what is not seen yet may move it, at least
 _CLEARANCE_SHARE = 0.15  # by which two sightings may differ in a wide space
 _DEGREE_SHARE = 0.4  # by which degrees may differ
 _BESIDE_M = 0.4  # where a vertex is known to be, and where it is: as far apart as that may be
@@ -45,7 +46,8 @@ class RecognitionConfig:
 class Sighting:
     """A vertex as seen now: position (2,) and bearings in the local frame.
 
-    Of the edges that leave at bearings that are `unclear` as well, too little is seen.
+    Of the edges that leave at bearings that are `unclear` as well, too little is seen. Where it is
+    not `settled`, what is not seen yet may move it.
     """
 
     position: Array
@@ -53,6 +55,7 @@ class Sighting:
     bearings: tuple[float, ...]
     meetpoint: bool
     unclear: tuple[float, ...] = ()
+    settled: bool = True
 
     @property
     def kind(self) -> Kind:
@@ -60,14 +63,19 @@ class Sighting:
         return "meetpoint" if self.meetpoint else "endpoint"
 
 
-def detection_covariance(distance: float, config: RecognitionConfig) -> Array:
+def detection_covariance(
+    distance: float, config: RecognitionConfig, *, settled: bool = True
+) -> Array:
     """Covariance (2, 2) by which a vertex seen from a distance may be a known one, m^2."""
-    return np.eye(2) * (config.detection_sigma_m**2 + (_SIGMA_PER_M * distance) ** 2)
+    sigma = math.hypot(config.detection_sigma_m, _SIGMA_PER_M * distance)
+    return np.eye(2) * (sigma * (1.0 if settled else _UNSETTLED)) ** 2
 
 
-def sight_covariance(distance: float, config: RecognitionConfig) -> Array:
+def sight_covariance(distance: float, config: RecognitionConfig, *, settled: bool = True) -> Array:
     """Covariance (2, 2) of what one visit says of a vertex position from a distance, m^2."""
-    return np.asarray(_SIGHT**2 * detection_covariance(distance, config), np.float64)
+    return np.asarray(
+        _SIGHT**2 * detection_covariance(distance, config, settled=settled), np.float64
+    )
 
 
 def match_bearings(

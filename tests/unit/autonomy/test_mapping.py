@@ -668,6 +668,18 @@ def test_a_vertex_that_moves_as_more_of_it_is_seen_takes_the_robot_nowhere() -> 
     assert np.array_equal(belief.x[:3], before)
 
 
+def test_a_vertex_is_where_it_is_when_nothing_unseen_can_move_it_any_more() -> None:
+    """Seen from afar, walls are out of sight that draw it by a quarter of a metre."""
+    points = TEE_POINTS | {2: (2.8, 0.15)}
+    afar = drawn(points, TEE_LINES, unseen={**UNSEEN, 2: math.pi / 4})
+    seen = Seen().look(afar, 30)
+    (place,) = seen.places("meetpoint")
+    assert place == pytest.approx((2.8, 0.15), abs=0.01)
+    seen.look(TEE, 15)
+    (place,) = seen.places("meetpoint")
+    assert place == pytest.approx((3.0, 0.0), abs=0.07)
+
+
 def test_an_odd_sight_of_a_vertex_counts_less() -> None:
     """Seven times as far off, and once: a share of it, that is smaller."""
     shares = []
