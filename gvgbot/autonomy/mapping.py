@@ -24,6 +24,7 @@ from gvgbot.autonomy.views import Correspondence, Observation, View, touches
 from gvgbot.geometry import Array, Pose
 
 _ODD = 9.0  # squared Mahalanobis distance, 2 degrees of freedom, of a sight that counts less
+_TOGETHER = 1.2  # times the sigma of each sight of a visit: five or so, that err together
 _MEAN_OF = 10  # sightings, about, of which the place of a vertex is the mean
 _BESIDE_M = 1.0  # from so near, the walls around a vertex are seen well
 _AT_END_M = 0.5  # so near to the end of a dead end, it has been driven
@@ -205,9 +206,8 @@ class Mapper(MapEdits):
         they move it, too, so each counts less there. So does an odd one everywhere.
         """
         away = math.hypot(base_vertex.x, base_vertex.y)
-        R = detection_covariance(away, self._recognition, settled=vertex.settled)
         if self._by_position:
-            self._measure(view, vertex, base_vertex, R)
+            self._measure(view, vertex, base_vertex, detection_covariance(away, self._recognition))
             return
         own = sight_covariance(away, self._recognition, settled=vertex.settled)
         r, S, _ = ekf.innovation(self.belief, vertex.id, base_vertex, own)
@@ -215,7 +215,8 @@ class Mapper(MapEdits):
         before = self.belief.map_vertex(vertex.id)
         self.belief = ekf.update_vertex_in_place(self.belief, vertex.id, base_vertex, odd * own)
         self.redraw(vertex, before)
-        self.observations.append(Observation(view.keyframe, vertex.id, base_vertex, odd * R))
+        R = odd * _TOGETHER**2 * own
+        self.observations.append(Observation(view.keyframe, vertex.id, base_vertex, R))
 
     def _measure(self, view: View, vertex: Vertex, base_vertex: Pose, R: Array) -> None:
         """Correct the belief by a vertex seen again."""
