@@ -29,9 +29,8 @@ class Laid(NamedTuple):
 
     Its error is the sum of `gains` (M, 3, 3) times those of the poses from which walls were seen in
     some `looks` (M,), what these gains leave of the error before, `by_odometry` (3, 3) times the
-    three of odometry, and something new with covariance `noise` (3, 3), and the noise of the scan
-    with covariance `scan_noise` (3, 3). The walls that it draws do not err by the latter: a scan is
-    drawn where it lies on those that were there.
+    three of odometry, and what is new: odometry's `noise` and the scan's own, covariances (3, 3).
+    The walls that the scan draws do not err by its own noise: it lies on those that were there.
     """
 
     local_base: Pose
@@ -46,9 +45,9 @@ class Laid(NamedTuple):
 
 
 def shared_out(told: Array, middle: Array, reach: Array) -> tuple[NDArray[np.int64], Array]:
-    """Numbers (M,) of looks, and what each has of what pairs tell (K, 3, 3): (M, 3, 3).
+    """Numbers (M,) of looks, and what each has of what is told (K, 3, 3) by pairs: (M, 3, 3).
 
-    The looks of a pair are evenly spread, as far as its reach (K,) from the middle (K,) of them.
+    What a pair tells is shared by all looks as far as its reach (K,) from the middle (K,) of them.
     """
     first = np.maximum(np.rint(middle - reach), 1.0).astype(np.int64)
     after = np.maximum(np.rint(middle + reach).astype(np.int64), first) + 1

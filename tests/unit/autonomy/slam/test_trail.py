@@ -85,6 +85,14 @@ def test_a_step_that_no_walls_tell_of_is_a_prediction(seed: int) -> None:
     np.testing.assert_allclose(found.P, wanted.P, rtol=1e-9, atol=1e-9)
 
 
+def test_what_a_wall_tells_is_shared_out_among_the_looks_that_drew_it() -> None:
+    told = np.stack([np.eye(3), 6.0 * np.eye(3)])
+    looks, shares = trail.shared_out(told, np.array([5.0, 1.2]), np.array([0.0, 2.0]))
+    assert looks.tolist() == [1, 2, 3, 4, 5]  # the first look is 1
+    np.testing.assert_allclose(shares[:, 1, 1], [2.0, 2.0, 2.0, 0.0, 1.0], atol=1e-12)
+    np.testing.assert_allclose(shares.sum(axis=0), told.sum(axis=0))
+
+
 @given(seeds)
 def test_without_a_match_the_trail_ends(seed: int) -> None:
     rng = np.random.default_rng(seed)
