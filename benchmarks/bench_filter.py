@@ -41,7 +41,7 @@ def belief_of(vertices: int) -> Belief:
 
 def laid(look: int) -> Laid:
     """A look that is laid onto the walls of all looks before, at most forty."""
-    looks = np.arange(max(1, look - 40), look)
+    looks = np.arange(max(1, look - 40), look)[:, None] + (0, 1)
     gains = np.repeat(0.8 / len(looks) * np.eye(3)[None], len(looks), axis=0)
     noise, some = 1e-6 * np.eye(3), 0.01 * np.eye(3)
     return Laid(Pose(0.25 * look), look, looks, gains, some, noise, noise, np.eye(3), some)

@@ -17,7 +17,7 @@ from gvgbot.autonomy.slam.scan_matching import (
     Sides,
     register_coarsely,
 )
-from gvgbot.autonomy.slam.trail import Laid, shared_out
+from gvgbot.autonomy.slam.trail import Laid
 from gvgbot.autonomy.small_systems import inverse
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
@@ -244,12 +244,15 @@ class LocalMaps:
         The error of a look weighs by what the walls that it drew tell of the pose. A wall that
         several looks have drawn errs by the mean of theirs.
         """
-        looks, gains = np.empty(0, np.int64), np.empty((0, 3, 3))
+        looks, gains = np.empty((0, 2), np.int64), np.empty((0, 3, 3))
         if found is not None:
             assert self._walls is not None
-            drawn, spread = self._walls.looks[found.walls], self._walls.spreads[found.walls]
-            looks, told = shared_out(found.information, drawn, np.sqrt(3.0 * spread))
-            gains = found.covariance @ told
+            middle = self._walls.looks.take(found.walls)
+            reach = np.sqrt(3.0 * self._walls.spreads.take(found.walls))  # if they are even
+            first = np.maximum(np.rint(middle - reach), 1.0)
+            after = np.maximum(np.rint(middle + reach), first) + 1.0
+            looks = np.stack([first, after], axis=1).astype(np.int64)
+            gains = found.covariance @ found.information
         left, self._left = self._left, _ONE
         look, P = self.near.looks + 1, self._calibration.P
         return Laid(local_base, look, looks, gains, by_odometry, noise, scan_noise, left, P)

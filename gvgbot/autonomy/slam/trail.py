@@ -27,10 +27,11 @@ _SIZE = 3 + 3 * MOST  # of the trail's part of the state
 class Laid(NamedTuple):
     """How a scan was laid onto walls, in the frame of the base where that has put it.
 
-    Its error is the sum of `gains` (M, 3, 3) times those of the poses from which walls were seen in
-    some `looks` (M,), what these gains leave of the error before, `by_odometry` (3, 3) times the
-    three of odometry, and what is new: odometry's `noise` and the scan's own, covariances (3, 3).
-    The walls that the scan draws do not err by its own noise: it lies on those that were there.
+    Its error is the sum of `gains` (M, 3, 3) times the mean ones of the poses from which walls were
+    seen in some `looks`, the first of them and the next one after them (M, 2), what these gains
+    leave of the error before, `by_odometry` (3, 3) times the three of odometry, and what is new:
+    odometry's `noise` and the scan's own, covariances (3, 3). The walls that the scan draws do not
+    err by its own noise: it lies on those that were there.
     """
 
     local_base: Pose
@@ -42,24 +43,6 @@ class Laid(NamedTuple):
     scan_noise: Array
     left: Array  # (3, 3) of odometry's errors, by what has been learnt since the last motion,
     P: Array  # and their covariance (3, 3)
-
-
-def shared_out(told: Array, middle: Array, reach: Array) -> tuple[NDArray[np.int64], Array]:
-    """Numbers (M,) of looks, and what each has of what is told (K, 3, 3) by pairs: (M, 3, 3).
-
-    What a pair tells is shared by all looks as far as its reach (K,) from the middle (K,) of them.
-    """
-    first = np.maximum(np.rint(middle - reach), 1.0).astype(np.int64)
-    after = np.maximum(np.rint(middle + reach).astype(np.int64), first) + 1
-    start = int(first.min())
-    each = (told.reshape(-1, 9) / (after - first)[:, None]).ravel()
-    size = 9 * (int(after.max()) - start + 1)
-    begun, ended = (
-        np.bincount((9 * (look - start)[:, None] + np.arange(9)).ravel(), each, size)
-        for look in (first, after)
-    )
-    shares = (begun - ended).reshape(-1, 3, 3)[:-1].cumsum(axis=0)
-    return start + np.arange(len(shares)), shares
 
 
 def move(belief: Belief, motion: Pose, covariance: Array, laid: Laid | None) -> Belief:
@@ -110,10 +93,11 @@ def _followed(belief: Belief, motion: Pose, laid: Laid) -> Belief:
 def _by_clones(belief: Belief, laid: Laid, R: Array) -> Array:
     """How the pose after a match errs with each slot of the trail, (3, 3 MOST), map frame."""
     trail = belief.trail
-    first = np.array([clone.first for clone in trail])
-    of = np.maximum(first.searchsorted(laid.looks, side="right") - 1, 0)
-    at_all = (of == np.arange(len(trail))[:, None]).astype(np.float64)
-    gains = R @ (at_all @ laid.gains.reshape(-1, 9)).reshape(-1, 3, 3) @ R.T
+    borders = np.array([-np.inf, *(clone.first for clone in trail[1:]), np.inf])[:, None]
+    first, after = laid.looks.T.astype(np.float64)
+    shared = np.minimum(after, borders[1:]) - np.maximum(first, borders[:-1])
+    share = np.maximum(shared, 0.0) / (after - first)
+    gains = R @ (share @ laid.gains.reshape(-1, 9)).reshape(-1, 3, 3) @ R.T
     slots = [clone.slot for clone in trail]
     map_clone = belief.x[belief.end + 3 :].reshape(MOST, 3)[slots]
     local_clone = rows_of(clone.local_base for clone in trail)

@@ -46,7 +46,7 @@ OUT = 7  # steps, and as many back: no old pose is merged yet
 
 def laid_at(local_base: Pose, look: int, looks: Sequence[int], gains: Array, noise: Array) -> Laid:
     """A match that errors of odometry have nothing to do with."""
-    numbers = np.array(looks, np.int64)
+    numbers = np.array(looks, np.int64)[:, None] + (0, 1)
     return Laid(local_base, look, numbers, gains, NOTHING, noise, NOTHING, np.eye(3), NOTHING)
 
 
@@ -85,12 +85,20 @@ def test_a_step_that_no_walls_tell_of_is_a_prediction(seed: int) -> None:
     np.testing.assert_allclose(found.P, wanted.P, rtol=1e-9, atol=1e-9)
 
 
-def test_what_a_wall_tells_is_shared_out_among_the_looks_that_drew_it() -> None:
-    told = np.stack([np.eye(3), 6.0 * np.eye(3)])
-    looks, shares = trail.shared_out(told, np.array([5.0, 1.2]), np.array([0.0, 2.0]))
-    assert looks.tolist() == [1, 2, 3, 4, 5]  # the first look is 1
-    np.testing.assert_allclose(shares[:, 1, 1], [2.0, 2.0, 2.0, 0.0, 1.0], atol=1e-12)
-    np.testing.assert_allclose(shares.sum(axis=0), told.sum(axis=0))
+@given(seeds)
+def test_what_many_looks_drew_errs_as_their_mean(seed: int) -> None:
+    """Two spans of looks, or each look with its share; the first pose stands for all before it."""
+    rng = np.random.default_rng(seed)
+    belief, local = driven(rng, 30)
+    own, G = replace(belief, P=belief.P.copy()), 0.3 * random_covariance(rng, 3)
+    one = laid_at(local, 32, [-3, 20], np.array([G, 2.0 * G]), NOISE)
+    one.looks[:, 1] = 3, 31
+    each = laid_at(
+        local, 32, range(-3, 31), np.array([G / 6] * 6 + [0 * G] * 17 + [2.0 * G / 11] * 11), NOISE
+    )
+    np.testing.assert_allclose(
+        move(belief, STEP, NOISE, one).P, move(own, STEP, NOISE, each).P, rtol=1e-9, atol=1e-12
+    )
 
 
 @given(seeds)
