@@ -850,8 +850,8 @@ def test_the_button_that_opens_a_menu_neither_moves_the_map_nor_marks_a_place(pa
         play = Play(endpoint, page)
         with play.robot:
             desktop(page, address)
-            play.drawn()
-            before = stretch(page, "robot")[0]
+            walled = play.until_drawn(lambda seen: seen["wall"][1] > 1000, "wall", "robot")
+            before = walled["robot"][0]
             x, y = page.middle("#map")
             page.mouse("mousePressed", x, y, button="right", clickCount=1)
             page.mouse("mouseMoved", x - 40, y + 30)  # the menu has kept the end
