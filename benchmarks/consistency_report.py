@@ -101,10 +101,10 @@ def _mean_in_band(rows: list[Row], key: str, freedom: int) -> str:
 
 def plot(rows: list[Row], directory: Path) -> None:
     """NEES per run, error and sigma along the runs, vertices and NIS against chi-square."""
-    import matplotlib as mpl  # noqa: PLC0415
+    import matplotlib as mpl  # noqa: PLC0415  # an extra
 
     mpl.use("Agg")
-    from matplotlib import pyplot as plt  # noqa: PLC0415
+    from matplotlib import pyplot as plt  # noqa: PLC0415  # an extra
 
     figure, axes = plt.subplots(1, 4, figsize=(16, 3.8), layout="constrained")
     nees = sorted(row["pose_nees"] for row in rows)

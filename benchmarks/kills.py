@@ -93,7 +93,7 @@ def interrupted(world: str | None, number: int, kills: int) -> Row:
         row: Row = {"run": number, "kills": kills, "damage": damage.counts}
         try:
             last = lives.run([moments] * kills)
-        except Exception as error:  # noqa: BLE001
+        except Exception as error:  # noqa: BLE001  # each is a finding
             return row | {"outcome": "crashed", "reason": f"{type(error).__name__}: {error}"}
         return row | _ended(last, lives) | compared(wanted, vertices(Path(other)))
 

@@ -66,7 +66,7 @@ def wait_for(is_so: Callable[[], bool], patience_s: float = 60.0) -> float:
     while not is_so():
         if time.perf_counter() > begin + patience_s:
             raise TimeoutError
-        time.sleep(0.01)  # noqa: TID251
+        time.sleep(0.01)  # noqa: TID251  # a program of its own
     return time.perf_counter() - begin
 
 
@@ -79,7 +79,7 @@ def newest(robot: Robot) -> Health:
 def stretch(robot: Robot, name: str, seconds: float) -> None:
     """Report how the daemon fared for so long."""
     before = newest(robot)
-    time.sleep(seconds)  # noqa: TID251
+    time.sleep(seconds)  # noqa: TID251  # as above
     after = newest(robot)
     due = KOBUKI_HZ * (after.stamp - before.stamp)
     lost = 100 * (1 - (after.cycles - before.cycles) / due)
@@ -96,7 +96,7 @@ def main(seconds: float) -> None:
         near = stack.enter_context(client.connect("bench", own, patience_s=60.0))
         near.health()
         wait_for(lambda: near.health().latest is not None)
-        time.sleep(SETTLING_S)  # noqa: TID251
+        time.sleep(SETTLING_S)  # noqa: TID251  # as above
         near.pause().result()  # a map that grows takes memory of its own
         stretch(near, "nobody stalled", seconds / 2)
         with program(ROUTER, through) as router, ExitStack() as watchers:

@@ -341,7 +341,7 @@ def once(seed: int, faults: list[Fault], overrides: Sequence[str] = ()) -> Verdi
         tried = Trial(seed, faults, Path(out), overrides)
         try:
             run_in_virtual_time(tried.run())
-        except Exception as error:  # noqa: BLE001
+        except Exception as error:  # noqa: BLE001  # each is a finding
             tried.verdict.hurt("exception", _innermost(error))
         verdict = tried.verdict
     del tried

@@ -194,8 +194,7 @@ def with_room_of(graph: RouteGraph, grid: OccupancyGrid, parts: Collection[int] 
     `parts` are the places, among the edges, of those whose narrowest place may be in another part
     of an edge that was parted: they claim the room in which the grid knows the floor to be free.
     """
-    walls = np.argwhere(is_wall(grid.cells))[:, ::-1]
-    tree = cKDTree(np.array(grid.origin) + (walls + 0.5) * grid.resolution_m)
+    tree = cKDTree(grid.middles(is_wall(grid.cells)))
 
     def measured(number: int, edge: RouteEdge) -> RouteEdge:
         line, claimed = resampled(edge.polyline, grid.resolution_m), edge.min_clearance

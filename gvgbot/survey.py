@@ -61,7 +61,7 @@ def survey(pipeline: Pipeline) -> Surveyed:
         views,
         narrow,
         doorsteps=_doorsteps(grid, narrow, stood_at, beside, here, room),
-        barred=_barred(pipeline, scans, keyframes, grid),
+        barred=_barred(pipeline, ways, scans, keyframes, grid),
         is_whole=not (len(places) or len(narrow) or len(pipeline.sight.virtual_walls)),
     )
 
@@ -126,19 +126,20 @@ def _may_go(places: Array, scans: Scans, lasting_s: float) -> Array:
 
 
 def _barred(
-    pipeline: Pipeline, scans: Scans, keyframes: list[Pose], grid: OccupancyGrid
+    pipeline: Pipeline, ways: list[Way], scans: Scans, keyframes: list[Pose], grid: OccupancyGrid
 ) -> tuple[int, ...]:
-    """The edges, by their ids, that nobody has driven, over floor that was a wall."""
-    mapper = pipeline.mapper
-    edges = [
-        edge
-        for edge in mapper.graph.edges.values()
+    """The edges, by their ids, that nobody has driven, over floor that was a wall.
+
+    `ways` are all edges.
+    """
+    lines = {
+        edge.id: way.polyline
+        for edge, way in zip(pipeline.mapper.graph.edges.values(), ways, strict=True)
         if not (edge.driven or edge.traversals or edge.established)
-    ]
-    lines = [mapper.belief.map_vertex(edge.a.vertex).transform(edge.polyline) for edge in edges]
+    }
     driven = np.array([base.position for base in keyframes])
-    found = barred(scans, lines, grid, driven)
-    return tuple(edge.id for edge, is_barred in zip(edges, found, strict=True) if is_barred)
+    found = barred(scans, list(lines.values()), grid, driven)
+    return tuple(key for key, is_barred in zip(lines, found, strict=True) if is_barred)
 
 
 def _joined(pipeline: Pipeline, ways: list[Way]) -> Array:

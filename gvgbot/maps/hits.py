@@ -57,8 +57,7 @@ def barred(
     lines = [resampled(way, _STEP_M) for way in ways]
     number = np.repeat(np.arange(len(lines)), [len(line) for line in lines])
     points = np.concatenate([np.empty((0, 2)), *lines])
-    rows, columns = np.nonzero(is_wall(grid.cells))
-    walls = np.array(grid.origin) + (np.column_stack([columns, rows]) + 0.5) * grid.resolution_m
+    walls = grid.middles(is_wall(grid.cells))
     is_left = cKDTree(driven).query(points)[0] > _DRIVEN_M
     is_left &= cKDTree(walls).query(points)[0] > _ON_M
     is_hit = hits(scans, points[is_left], _ON_M).looks >= _LOOKS

@@ -50,6 +50,11 @@ class OccupancyGrid:
         if self.seen_s is not None:
             self.seen_s.setflags(write=False)
 
+    def middles(self, chosen: NDArray[np.bool_]) -> Array:
+        """The middles (N, 2), m, map frame, of the cells that are chosen (rows, columns)."""
+        x_y = np.argwhere(chosen)[:, ::-1] + 0.5
+        return np.asarray(np.array(self.origin) + x_y * self.resolution_m)
+
 
 def occupancy_grid(
     scans: Sequence[tuple[Pose, AnyScan]],

@@ -53,7 +53,7 @@ def floor_beside(grid: OccupancyGrid, places: Array, around: Array, passage_m: f
     if not len(places):
         return places
     _, floor = _room(grid, around, passage_m)
-    middles = np.array(grid.origin) + (np.argwhere(floor)[:, ::-1] + 0.5) * grid.resolution_m
+    middles = grid.middles(floor)
     return middles[cKDTree(middles).query(places)[1]] if len(middles) else np.empty((0, 2))
 
 

@@ -384,3 +384,9 @@ def test_a_damaged_grid_is_a_usage_error_in_one_line(
     with pytest.raises(UsageError, match=name) as caught:
         read_map_server(tmp_path)
     assert "\n" not in str(caught.value)
+
+
+def test_the_middle_of_a_cell_is_half_a_cell_from_its_corner() -> None:
+    grid = OccupancyGrid(np.array([[0, 0, 100], [0, -1, 0]], np.int8), 0.5, (-1.0, 2.0))
+    np.testing.assert_allclose(grid.middles(grid.cells > 0), [[0.25, 2.25]])
+    np.testing.assert_allclose(grid.middles(grid.cells < 0), [[-0.25, 2.75]])
