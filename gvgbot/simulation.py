@@ -1,6 +1,7 @@
 """The simulated robot: one world, one body, and the twins of both devices on in-memory streams."""
 
 import asyncio
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cache
@@ -20,11 +21,12 @@ from gvgbot.drivers.sight import Sight
 from gvgbot.drivers.start import check_start, warn_of_small_space
 from gvgbot.drivers.transport import serve_twin
 from gvgbot.drivers.world import World
-from gvgbot.geometry import Array, Pose
+from gvgbot.geometry import Array, Pose, wrap_angle
 from gvgbot.worlds import open_world
 
 _DOCK_IN_SIGHT = 6.0  # m; a dock's beams end before
-_SECTORS = 6  # of a sweep on the way, each seen from one pose
+_SECTOR_S = 0.03  # of a sweep, in which a body moves evenly,
+_DRIVEN_M, _TURNED_RAD = 0.1, 1.0  # and by no more than this, unless somebody puts it elsewhere
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,13 +55,15 @@ def _people_count(config: Config, world: World) -> int:
 
 
 @cache
-def _sectors(parameters: Parameters, count: int) -> list[tuple[float, Array]]:
-    """Of each sector how long after the beginning its middle is seen, s, and bearings (N,), rad."""
-    bearings, step_time = parameters.bearings, parameters.step_time
+def _sectors(parameters: Parameters, count: int) -> list[tuple[Array, Array]]:
+    """Of each sector of a sweep when its beams are seen, s after the beginning (N,).
+
+    And the bearings of these (N,), rad.
+    """
+    bearings = parameters.bearings
     bearings.setflags(write=False)
-    beams = np.array_split(np.arange(len(bearings)), count)
-    middles = [parameters.first_step + float(sector.mean()) for sector in beams]
-    return list(zip([m * step_time for m in middles], np.array_split(bearings, count), strict=True))
+    late = parameters.step_time * (parameters.first_step + np.arange(len(bearings)))
+    return list(zip(np.array_split(late, count), np.array_split(bearings, count), strict=True))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,22 +77,29 @@ class _Eye:
     is_flipped: bool
 
     def sweep(self, stamp: float) -> Array:
-        """Ranges (N,), m, of a sweep that begins at a stamp, the body going on as it moves then."""
-        self.body.advance(stamp)
-        seen = []
-        stands = self.body.linear == self.body.angular == 0.0
-        for late, bearings in _sectors(self.model.parameters, 1 if stands else _SECTORS):
-            moved = Pose(self.body.linear * late, 0.0, self.body.angular * late)
-            world_laser = self.body.pose.compose(moved).compose(self.base_laser)
-            seen.append(self._look(world_laser, bearings))
-        return np.concatenate(seen)
+        """Ranges (N,), m, of a sweep that begins at a stamp, the body going on meanwhile."""
+        ((late, _),) = _sectors(self.model.parameters, 1)
+        begin, end = stamp + float(late[0]), stamp + float(late[-1])
+        self.body.advance(end)
+        stands = self.body.pose_at(begin) == self.body.pose_at(end)
+        count = 1 if stands else math.ceil((end - begin) / _SECTOR_S)
+        sectors = _sectors(self.model.parameters, count)
+        return np.concatenate([self._look(stamp + late, bearings) for late, bearings in sectors])
 
-    def _look(self, world_laser: Pose, bearings: Array) -> Array:
-        """Ranges (N,), m, along bearings (N,), rad, of the laser."""
-        reach = self.model.usable_mm / 1000
+    def _look(self, stamps: Array, bearings: Array) -> Array:
+        """Ranges (N,), m, along bearings (N,), rad, of the laser, at these times (N,), s."""
+        begin, end = (self.body.pose_at(float(stamps[i])).compose(self.base_laser) for i in (0, -1))
+        turn = wrap_angle(end.theta - begin.theta)
+        if begin.distance(end) > _DRIVEN_M or abs(turn) > _TURNED_RAD:
+            begin, turn = end, 0.0
+        share = np.linspace(-0.5, 0.5, len(stamps))
+        turned = turn * share
+        moved = share[:, None] * (end.position - begin.position)
+        world_laser, reach = begin.towards(end, 0.5), self.model.usable_mm / 1000
         if not self.is_flipped:
-            return self.sight.look(world_laser, bearings, reach)
-        return self.sight.look(world_laser, -bearings[::-1], reach)[::-1]
+            return self.sight.look(world_laser, bearings + turned, reach, moved)
+        mirrored = (turned - bearings)[::-1]
+        return self.sight.look(world_laser, mirrored, reach, moved[::-1])[::-1]
 
 
 class Simulation:

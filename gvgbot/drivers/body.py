@@ -1,6 +1,7 @@
 """A round differential-drive robot in the simulated world: it accelerates, collides and slips."""
 
 import math
+from collections import deque
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -21,6 +22,7 @@ SNUG = 1e-4  # m: a robot as near as this cannot get nearer
 HALVINGS = 10  # of a blocked stride, to find the place of contact
 NOTHING = np.empty((0, 2))
 BUMPER_EDGE = math.pi / 6  # rad: the centre bumper reaches this far to either side
+REMEMBERED = 64  # steps: half a second
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,6 +64,7 @@ class RobotBody:
         self._linear = self._angular = 0.0
         self._target_linear = self._target_angular = 0.0
         self._in_contact = False
+        self._trail = deque([(stamp, start)], REMEMBERED)
 
     def command(self, linear: float, angular: float) -> None:
         """Head for this velocity (m/s, rad/s) from the time of the last `advance` on."""
@@ -76,16 +79,28 @@ class RobotBody:
         self._drive_until(now)
 
     def _drive_until(self, now: float) -> None:
-        gap = now - self.now
+        before, gap = self.now, now - self.now
         if gap <= 0.0:
             return
         self.now = now
         if not self._moves:
+            self._trail.append((now, self.pose))
             return
         fastest = max(abs(self._linear), abs(self._target_linear))
         steps = math.ceil(max(gap / MAX_STEP, gap * fastest / MAX_STRIDE))
-        for _ in range(steps):
+        for step in range(1, steps + 1):
             self._step(gap / steps)
+            self._trail.append((before + step * gap / steps, self.pose))
+
+    def pose_at(self, stamp: float) -> Pose:
+        """Where it was at a time of the last half second, s; at a later one, where it is."""
+        later, after = self.now, self.pose
+        for earlier, pose in reversed(self._trail):
+            if earlier <= stamp:
+                share = (stamp - earlier) / (later - earlier) if later > earlier else 0.0
+                return pose.towards(after, min(share, 1.0))
+            later, after = earlier, pose
+        return after
 
     @property
     def bumper(self) -> tuple[bool, bool, bool]:

@@ -70,9 +70,12 @@ class RayCaster:
         self._region_of_face, self._all_faces = self._trace(walls)
         self._faces: dict[int, Faces] = {}
 
-    def cast(self, x: float, y: float, directions: Array, reach: float) -> Array:
+    def cast(
+        self, x: float, y: float, directions: Array, reach: float, moved: Array | None = None
+    ) -> Array:
         """Ranges (N,) in metres along ascending directions (N,) in rad; inf beyond `reach`.
 
+        A beam may begin a few millimetres away, `moved` (N, 2), m: it ends on the same faces.
         Zeros when (x, y) is inside a wall. Raises ValueError unless the directions ascend and
         span at most one turn.
         """
@@ -85,7 +88,10 @@ class RayCaster:
         slopes = np.empty((2, len(directions)))
         np.cos(directions, out=slopes[0])
         np.sin(directions, out=slopes[1])
-        crossed = faces.plane[face] / slopes[(face >= faces.vertical).astype(np.intp), beam]
+        axis, depth = (face >= faces.vertical).astype(np.intp), faces.plane[face]
+        if moved is not None:
+            depth = depth - moved[beam, axis]
+        crossed = depth / slopes[axis, beam]
         ranges = np.full(len(directions), np.inf)
         np.minimum.at(ranges, beam, crossed)
         ranges[ranges > reach] = np.inf

@@ -26,11 +26,16 @@ class Sight:
         self._others = [] if others is None else others
         self._rng = np.random.default_rng(seed)
 
-    def look(self, pose: Pose, bearings: Array, max_range: float) -> Array:
-        """Ranges (N,) in m as `World.cast` gives them, but through glass and with people."""
-        ranges = self._world.cast(pose, bearings, max_range)
+    def look(
+        self, pose: Pose, bearings: Array, max_range: float, moved: Array | None = None
+    ) -> Array:
+        """Ranges (N,) in m as `World.cast` gives them, but through glass and with people.
+
+        People and robots are seen from the pose, wherever a beam is `moved` to.
+        """
+        ranges = self._world.cast(pose, bearings, max_range, moved)
         if self._world.glass is not None:
-            ranges = self._through_glass(pose, bearings, max_range, ranges)
+            ranges = self._through_glass(pose, bearings, max_range, ranges, moved)
         if self._people is not None:
             ranges = np.minimum(ranges, self._people.cast(pose, bearings))
         if self._others:
@@ -38,10 +43,10 @@ class Sight:
         return np.where(ranges <= max_range, ranges, np.inf)
 
     def _through_glass(
-        self, pose: Pose, bearings: Array, max_range: float, surface: Array
+        self, pose: Pose, bearings: Array, max_range: float, surface: Array, moved: Array | None
     ) -> Array:
         """A beam that passes the first pane passes all behind it."""
-        behind = self._world.without_glass.cast(pose, bearings, max_range)
+        behind = self._world.without_glass.cast(pose, bearings, max_range, moved)
         panes = np.flatnonzero(surface < behind)
         incidence = self._incidence(pose, bearings[panes], surface[panes])
         passed = panes[self._rng.random(len(panes)) >= echo_probability(incidence)]

@@ -63,13 +63,16 @@ class World:
         x0, y0, x1, y1 = self.extent
         return x0 <= x < x1 and y0 <= y < y1
 
-    def cast(self, pose: Pose, bearings: Array, max_range: float) -> Array:
+    def cast(
+        self, pose: Pose, bearings: Array, max_range: float, moved: Array | None = None
+    ) -> Array:
         """Ranges (N,) in m from a sensor at `pose` along ascending bearings (N,) in its frame.
 
+        A beam may begin a few millimetres away, `moved` (N, 2), m, in the world frame.
         inf where nothing is within `max_range`, zeros from inside a wall. Glass counts as a wall.
         Raises ValueError unless the bearings ascend and span at most one turn.
         """
-        return self._caster.cast(pose.x, pose.y, bearings + pose.theta, max_range)
+        return self._caster.cast(pose.x, pose.y, bearings + pose.theta, max_range, moved)
 
     def clear_of_walls(self, x: float, y: float) -> float:
         """A distance in m that surely holds no wall: short of the true one by about two cells."""

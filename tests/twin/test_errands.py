@@ -509,6 +509,6 @@ def test_who_stands_in_the_way_of_an_errand_is_left_alone_and_another_way_taken(
         daemon.run(tell)
     assert daemon.session.simulation is not None
     assert daemon.session.simulation.body.contacts == 0
-    assert 12.0 - 2 * NEAR < driven[1] < 12.0 + 5.0  # and as far into the bar as it could see
+    assert 12.0 - 2 * NEAR < driven[1] < 12.0 + 5.0 + NEAR  # and into the bar
     actions = [line["action"] for line in Tour(daemon).lines("recovery")]
     assert actions == ["try another way"]

@@ -26,7 +26,7 @@ class HokuyoTwin:
     """A laser without I/O, on a given world.
 
     `sense(stamp)` gives the true ranges (m) at a time, one per step from the model's first to its
-    last, inf where there is nothing. It is asked once per scan sent, when that time has come.
+    last, inf where there is nothing. It is asked once per scan sent, when the sweep is over.
     """
 
     def __init__(
@@ -86,10 +86,7 @@ class HokuyoTwin:
             return b""
         self._wake(now)
         while isinstance(phase := self._answers.phase, Streaming) and self._scan_due(phase) <= now:
-            if self._next_stamp(phase) <= self._scan_due(phase):
-                self._measure(phase)
-            else:
-                self._send(phase)
+            self._send(phase)
         self._send_newest(now)
         return self._out(now)
 
@@ -158,28 +155,31 @@ class HokuyoTwin:
 
     # -- scans -------------------------------------------------------------------------------------
 
-    def _next_stamp(self, phase: Streaming) -> float:
-        return math.inf if phase.is_complete else self._head.scan_start(phase.scan_number)
-
     def _scan_due(self, phase: Streaming) -> float:
-        return min(self._next_stamp(phase), phase.frames[0][0] if phase.frames else math.inf)
+        return self._head.scan_start(phase.scan_number) + self._head.latency(phase.request)
 
-    def _measure(self, phase: Streaming) -> None:
-        number, request = phase.scan_number, phase.request
-        phase.scan_number += request.skip + 1
+    def _send(self, phase: Streaming) -> None:
+        """Put a frame on the line; on a busy one it takes the place of another that waits."""
+        due, number = self._scan_due(phase), phase.scan_number
+        phase.scan_number += phase.request.skip + 1
         if self._mishaps.is_on("stalled"):
             return
-        if request.count:
-            phase.request = request = replace(request, count=request.count - 1)
-            phase.is_complete = request.count == 0
-        due = self._head.scan_start(number) + self._head.latency(request)
-        phase.frames.append((due, self._frame(phase, number)))
+        is_last = phase.request.count == 1
+        if phase.request.count:
+            phase.request = replace(phase.request, count=phase.request.count - 1)
+        frame = self._frame(phase, number)
+        if frame and self._line.free_at > due:
+            self._newest = (due, frame)
+        elif frame:
+            self._line.put(frame, due)
+        if is_last or self._answers.settings.is_broken:
+            self._answers.phase = Standby()
 
     def _frame(self, phase: Streaming, number: int) -> bytes:
         """What goes out for a scan, as the laser is just now."""
         status = self._answers.settings.instead_of_scan()
         if status == BROKEN:
-            self._answers.settings.is_broken = phase.is_complete = True
+            self._answers.settings.is_broken = True
         if self._mishaps.is_on("unstable"):
             status = UNSTABLE
         if status is not None:
@@ -189,16 +189,6 @@ class HokuyoTwin:
                 phase.request, SCAN_DATA, number, is_blind=self._mishaps.is_on("blind")
             )
         return self._last_frame
-
-    def _send(self, phase: Streaming) -> None:
-        """Put a frame on the line; on a busy one it takes the place of another that waits."""
-        due, frame = phase.frames.popleft()
-        if frame and self._line.free_at > due:
-            self._newest = (due, frame)
-        elif frame:
-            self._line.put(frame, due)
-        if phase.is_complete and not phase.frames:
-            self._answers.phase = Standby()
 
     def _send_newest(self, now: float) -> None:
         if self._newest is not None and self._line.free_at <= now:

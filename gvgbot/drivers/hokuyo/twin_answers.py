@@ -1,8 +1,7 @@
 """What a simulated laser answers to each command, and the state that this leaves it in."""
 
-from collections import deque
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 from gvgbot.drivers.hokuyo.scip import encode_reply
 from gvgbot.drivers.hokuyo.scip_codec import encode_number
@@ -48,12 +47,10 @@ class Asleep:
 
 @dataclass(slots=True)
 class Streaming:
-    """Sending scans; `frames` are the ones measured but not yet sent, each with its time."""
+    """Sending scans, of which `scan_number` is the next one."""
 
     request: ScanRequest
     scan_number: int
-    is_complete: bool = False
-    frames: deque[tuple[float, bytes]] = field(default_factory=deque)
 
 
 Phase = Standby | LaserOn | TimeMode | Asleep | Streaming

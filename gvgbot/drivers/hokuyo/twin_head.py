@@ -37,7 +37,7 @@ class Head:
         self.model = MODELS[config.model]
         self.period = self.model.parameters.period * (1.0 + config.motor_error_ppm * 1e-6)
         self.is_sensitive = False
-        self._full_speed_period = self.period
+        self._full_speed_period = self._former_period = self.period
         self._reference = (0, 0.0)  # number and time (s) of a scan, from which all others count
         self._config = config
         self._sense = sense
@@ -57,12 +57,13 @@ class Head:
         """Turn at this share of the full speed, from the next scan on."""
         number = self.next_scan(now)
         self._reference = number, self.scan_start(number)
-        self.period = self._full_speed_period / share
+        self._former_period, self.period = self.period, self._full_speed_period / share
 
     def scan_start(self, number: int) -> float:
         """When the scan of this number begins, s."""
         known, start = self._reference
-        return start + (number - known) * self.period
+        period = self.period if number >= known else self._former_period
+        return start + (number - known) * period
 
     def next_scan(self, now: float) -> int:
         """The number of the first scan that begins from now on."""
