@@ -2,6 +2,7 @@
 
 import asyncio
 
+import numpy as np
 import pytest
 
 from benchmarks.rigs.hokuyo_bench import CutsReply, Scripted, TiresOfTime, World
@@ -9,6 +10,8 @@ from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.drivers.hokuyo.clock_sync import Synchronisation
 from gvgbot.drivers.hokuyo.dialogue import Dialogue
 from gvgbot.drivers.hokuyo.opening import quiet
+from gvgbot.drivers.hokuyo.scip import ScipParser, decode_time
+from gvgbot.drivers.hokuyo.scip_messages import Reply
 from gvgbot.drivers.hokuyo.statistics import LinkStatistics
 from gvgbot.drivers.hokuyo.time_mode import synchronise
 from gvgbot.drivers.hokuyo.twin import HokuyoTwin, HokuyoTwinConfig
@@ -33,7 +36,7 @@ class LosesStops(Scripted):
 
 
 def laser_of() -> HokuyoTwin:
-    """A laser whose clock is the host's, but for what it rounds off."""
+    """A laser whose clock is the host's, but for what it rounds off and when it ticks."""
     return HokuyoTwin(HokuyoTwinConfig(clock_drift_ppm=0.0), World(), seed=18)
 
 
@@ -61,7 +64,17 @@ def told(
 
 def assert_right(sync: Synchronisation | None) -> None:
     assert sync is not None
-    assert abs(sync.host - sync.stamp_ms / 1000.0) <= sync.error < 0.001
+    assert abs(sync.host - sync.stamp_ms / 1000.0 - first_tick()) <= sync.error < 0.001
+
+
+def first_tick() -> float:
+    """How long before zero (s, negative) the laser's clock began its first millisecond."""
+    twin = laser_of()
+    twin.receive(b"TM0\n", 0.0)
+    asked = np.arange(0.0, 1e-3, 1e-5)
+    replies = b"".join(twin.receive(b"TM1\n", now) for now in asked.tolist())
+    stamps = [decode_time(m) for m in ScipParser().feed(replies) if isinstance(m, Reply)]
+    return float(asked[stamps.index(1)]) - 1e-3
 
 
 def test_clocks_are_known_to_within_the_error_that_is_told() -> None:

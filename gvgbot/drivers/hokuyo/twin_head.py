@@ -43,7 +43,9 @@ class Head:
         self._sense = sense
         self._rng = np.random.default_rng(seed)
         self._rate = 1000.0 * (1.0 + config.clock_drift_ppm * 1e-6)  # ms per s
-        self._start_ms = config.clock_start_ms - on_since * self._rate
+        # of a millisecond that is gone at power-up: no clock ticks as a turn of the motor begins
+        self._fraction = float(np.random.default_rng((seed, 7)).random())
+        self._start_ms = config.clock_start_ms + self._fraction - on_since * self._rate
 
     def device_ms(self, now: float) -> int:
         """The laser's clock at a time (s)."""
@@ -51,7 +53,7 @@ class Head:
 
     def reset_clock(self, now: float) -> None:
         """Let the clock begin again from zero."""
-        self._start_ms = -now * self._rate
+        self._start_ms = self._fraction - now * self._rate
 
     def set_speed(self, share: float, now: float) -> None:
         """Turn at this share of the full speed, from the next scan on."""

@@ -14,6 +14,7 @@ from gvgbot.drivers.hokuyo.models import MODELS, ModelName
 from gvgbot.drivers.hokuyo.scip import ScipParser, decode_time
 from gvgbot.drivers.hokuyo.scip_messages import Message, Reply, ScanReply
 from gvgbot.drivers.hokuyo.twin import HokuyoTwin, HokuyoTwinConfig
+from gvgbot.drivers.hokuyo.twin_head import Head
 from gvgbot.drivers.hokuyo.twin_readings import clustered, noisy_readings
 from gvgbot.drivers.serial_line import SerialLine
 from gvgbot.geometry import Array
@@ -140,9 +141,19 @@ def test_the_clock_counts_milliseconds_in_24_bits_until_reset() -> None:
         assert isinstance(message, Reply)
         return decode_time(message)
 
-    assert [time_at(0.0), time_at(0.9995), time_at(1.0)] == [2**24 - 1000, 2**24 - 1, 0]
+    assert [time_at(0.0), time_at(0.999), time_at(1.0)] == [2**24 - 1000, 2**24 - 1, 0]
     twin.receive(b"RS\nTM0\n", 5.0)
     assert time_at(5.25) == 250
+
+
+def test_a_millisecond_of_the_clock_begins_at_any_time_of_a_turn() -> None:
+    """So half a millisecond after a scan has begun the clocks of half of all lasers have ticked."""
+    config, begun = HokuyoTwinConfig(clock_drift_ppm=0.0), 4.0
+    heads = [Head(config, lambda stamp: RANGES, seed, 0.0) for seed in range(200)]
+    for head in heads:
+        head.reset_clock(2.0)
+    ticked = sum(head.device_ms(begun + 0.0005) - head.device_ms(begun) for head in heads)
+    assert ticked == pytest.approx(100, abs=35)  # five sigmas
 
 
 @pytest.mark.parametrize(
