@@ -11,6 +11,7 @@ from gvgbot.worlds.lattice import lattice_links
 from gvgbot.worlds.morphology import has_wide_passages, without_thin_walls
 
 SIDE = 30.0  # m
+RESOLUTION = 0.025  # m: where walls follow no axis, their steps must be small
 CHAMBERS = 5  # per side
 MARGIN = 3.2  # m from the edge to the outermost chambers
 JITTER = 0.8  # m by which a chamber leaves its regular place
@@ -19,6 +20,7 @@ LOOPS = 6  # closed ways around rock
 CHAMBER_RADII = (1.0, 1.7)  # m
 PASSAGE_RADII = (0.65, 0.95)  # m
 LEAST_PASSAGE = 1.0  # m
+WORN = 0.2  # m, sigma
 
 
 def cave(seed: int = 0) -> tuple[World, Pose]:
@@ -26,11 +28,11 @@ def cave(seed: int = 0) -> tuple[World, Pose]:
     rng = np.random.default_rng(seed)
     while True:
         chambers, radii = _chambers(rng)
-        canvas = Canvas(SIDE, SIDE)
+        canvas = Canvas(SIDE, SIDE, RESOLUTION)
         for a, b in lattice_links(CHAMBERS, LOOPS, rng):
             _carve_passage(canvas, chambers[[a, b]], radii[[a, b]], rng)
         canvas.occupied = _worn(canvas.occupied)
-        if has_wide_passages(canvas.occupied, LEAST_PASSAGE):
+        if has_wide_passages(canvas.occupied, LEAST_PASSAGE, RESOLUTION):
             return canvas.world("cave"), Pose(float(chambers[0, 0]), float(chambers[0, 1]), 0.0)
 
 
@@ -58,5 +60,5 @@ def _carve_passage(canvas: Canvas, ends: Array, radii: Array, rng: np.random.Gen
 
 def _worn(occupied: Mask) -> Mask:
     """The walls with their edges smoothed, and without thin or small pieces of rock."""
-    smooth = ndimage.gaussian_filter(occupied.astype(np.float64), 4.0, mode="nearest") > 0.5
-    return without_thin_walls(smooth)
+    smooth = ndimage.gaussian_filter(occupied.astype(np.float64), WORN / RESOLUTION, mode="nearest")
+    return without_thin_walls(smooth > 0.5, RESOLUTION)

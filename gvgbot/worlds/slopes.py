@@ -10,6 +10,7 @@ from gvgbot.worlds.canvas import Canvas
 from gvgbot.worlds.lattice import lattice_links
 from gvgbot.worlds.morphology import has_wide_passages, without_thin_walls
 
+RESOLUTION = 0.025  # m: where walls follow no axis, their steps must be small
 NODES = 3  # per side
 PITCH = 8.0  # m between nodes
 JITTER = 1.2  # m by which a node leaves its regular place
@@ -30,13 +31,14 @@ def slopes(seed: int = 0) -> tuple[World, Pose]:
     rng = np.random.default_rng(seed)
     while True:
         nodes = _nodes(rng)
-        canvas = Canvas(*(nodes.max(axis=0) + MARGIN).tolist())
+        width, height = (nodes.max(axis=0) + MARGIN).tolist()
+        canvas = Canvas(width, height, RESOLUTION)
         for a, b in lattice_links(NODES, LOOPS, rng):
             _carve_passage(canvas, nodes[a], nodes[b], rng)
         for node in nodes[rng.random(len(nodes)) < ROOMS]:
             _carve_room(canvas, node, rng)
-        canvas.occupied = without_thin_walls(canvas.occupied)
-        if has_wide_passages(canvas.occupied, LEAST_PASSAGE):
+        canvas.occupied = without_thin_walls(canvas.occupied, RESOLUTION)
+        if has_wide_passages(canvas.occupied, LEAST_PASSAGE, RESOLUTION):
             x, y = nodes[0].tolist()
             return canvas.world("slopes"), Pose(x, y, float(rng.uniform(-3, 3)))
 

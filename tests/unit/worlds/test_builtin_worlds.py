@@ -1,5 +1,6 @@
 """What every built-in world promises, by morphology and topology of its bitmap."""
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ DRAWN = (
     *("open_hall", "glass", "crowd", "large_plan"),
 )
 TIGHT = ("doors", "clutter")  # with gaps that a robot does not fit through
-RESOLUTIONS = {"doors": 0.025, "clutter": 0.02}  # m, where not 0.05
+RESOLUTIONS = {"doors": 0.025, "clutter": 0.02, "cave": 0.025, "slopes": 0.025}  # m, or 0.05
 KOBUKI = 0.354  # m across
 SEEDS = range(3)
 LOOPS = {
@@ -34,6 +35,7 @@ LOOPS = {
     "slopes": 2,
 }
 SAMPLES = [*NAMES, *(f"{name}:{seed}" for name in DRAWN for seed in (1, 2))]
+drawn = cache(builtin)  # nobody can change a world
 every_world = pytest.mark.parametrize("name", SAMPLES)
 
 
@@ -59,14 +61,14 @@ def topology(free: Mask) -> tuple[int, int]:
 
 @every_world
 def test_free_space_is_in_one_piece_with_the_promised_loops(name: str) -> None:
-    world, _ = builtin(name)
+    world, _ = drawn(name)
     pieces, loops = topology(~world.occupied)
     assert (pieces, loops) == (1, LOOPS.get(kind(name), loops))
 
 
 @pytest.mark.parametrize("name", [name for name in SAMPLES if kind(name) not in TIGHT])
 def test_a_passage_is_wide_or_there_is_none(name: str) -> None:
-    world, _ = builtin(name)
+    world, _ = drawn(name)
     whole = topology(~world.occupied)
     for width in (0.3, 0.6, 0.8):
         assert topology(shrunk(world, width)) == whole
@@ -74,7 +76,7 @@ def test_a_passage_is_wide_or_there_is_none(name: str) -> None:
 
 @every_world
 def test_the_outer_wall_is_closed_and_no_wall_is_thin(name: str) -> None:
-    world, _ = builtin(name)
+    world, _ = drawn(name)
     walls = np.pad(world.occupied, 2, constant_values=True)
     assert np.array_equal(ndimage.binary_opening(walls, np.ones((2, 2), dtype=np.bool_)), walls)
     inner = np.pad(world.occupied[2:-2, 2:-2], 2, constant_values=True)
@@ -83,13 +85,13 @@ def test_the_outer_wall_is_closed_and_no_wall_is_thin(name: str) -> None:
 
 @every_world
 def test_the_robot_fits_at_the_start(name: str) -> None:
-    world, start = builtin(name)
+    world, start = drawn(name)
     check_start(world, start, 0.25)
 
 
 @every_world
 def test_the_same_seed_draws_the_same_world(name: str) -> None:
-    (first, here), (second, there) = builtin(name), builtin(name)
+    (first, here), (second, there) = drawn(name), builtin(name)
     assert np.array_equal(first.occupied, second.occupied)
     assert here == there
     assert {type(value) for value in (here.x, here.y, here.theta)} == {float}  # fit for any encoder
@@ -98,14 +100,14 @@ def test_the_same_seed_draws_the_same_world(name: str) -> None:
 
 @pytest.mark.parametrize("name", DRAWN)
 def test_another_seed_draws_another_world(name: str) -> None:
-    worlds = [builtin(f"{name}:{seed}")[0] for seed in range(3)]
+    worlds = [drawn(f"{name}:{seed}")[0] for seed in range(3)]
     for a, b in ((0, 1), (1, 2), (0, 2)):
         assert not np.array_equal(worlds[a].occupied, worlds[b].occupied)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_narrow_corridors_are_a_metre_wide(seed: int) -> None:
-    world, start = builtin(f"narrow:{seed}")
+    world, start = drawn(f"narrow:{seed}")
     row, column = int(start.y / 0.05), int(start.x / 0.05)
     assert 0.5 <= depth(world)[row, column] <= 0.57  # half, and at most a cell's diagonal
 
@@ -113,7 +115,7 @@ def test_narrow_corridors_are_a_metre_wide(seed: int) -> None:
 def test_some_doors_are_narrower_than_the_robot_and_some_are_not() -> None:
     rooms_shut, rooms_open = 0, 0
     for seed in SEEDS:
-        world, _ = builtin(f"doors:{seed}")
+        world, _ = drawn(f"doors:{seed}")
         assert topology(~world.occupied)[0] == 1
         rooms_shut += topology(shrunk(world, KOBUKI))[0] - 1
         rooms_open += topology(shrunk(world, 1.0))[0] - topology(shrunk(world, KOBUKI))[0]
@@ -123,7 +125,7 @@ def test_some_doors_are_narrower_than_the_robot_and_some_are_not() -> None:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_furnished_room_has_thin_legs_that_the_robot_fits_between_or_not(seed: int) -> None:
-    world, _ = builtin(f"clutter:{seed}")
+    world, _ = drawn(f"clutter:{seed}")
     boxes = ndimage.find_objects(ndimage.label(world.occupied, np.ones((3, 3)))[0])
     sides = np.array([(part.stop - part.start) * 0.02 for box in boxes for part in box])
     legs = sides[sides < 0.2]  # of two legs that touch, not more
@@ -137,20 +139,20 @@ def test_a_furnished_room_has_thin_legs_that_the_robot_fits_between_or_not(seed:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_walls_on_slopes_follow_no_axis(seed: int) -> None:
-    assert share_along_axes(builtin(f"slopes:{seed}")[0]) < 0.25
-    assert share_along_axes(builtin(f"floor_plan:{seed}")[0]) > 0.8
+    assert share_along_axes(drawn(f"slopes:{seed}")[0]) < 0.25
+    assert share_along_axes(drawn(f"floor_plan:{seed}")[0]) > 0.8
 
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_in_the_middle_of_the_open_hall_a_short_laser_sees_nothing(seed: int) -> None:
-    world, _ = builtin(f"open_hall:{seed}")
+    world, _ = drawn(f"open_hall:{seed}")
     assert depth(world).max() > 5.6
     assert topology(~world.occupied)[1] >= 6  # round the pillars
 
 
 @every_world
 def test_glass_is_wall_and_stands_only_in_the_world_of_that_name(name: str) -> None:
-    world, _ = builtin(name)
+    world, _ = drawn(name)
     assert (world.glass is not None) == (kind(name) == "glass")
     if world.glass is not None:
         assert np.array_equal(world.glass & world.occupied, world.glass)
@@ -160,7 +162,7 @@ def test_glass_is_wall_and_stands_only_in_the_world_of_that_name(name: str) -> N
 
 @every_world
 def test_only_the_crowd_has_people_of_its_own(name: str) -> None:
-    assert (builtin(name)[0].people > 0) == (kind(name) == "crowd")
+    assert (drawn(name)[0].people > 0) == (kind(name) == "crowd")
 
 
 def share_along_axes(world: World) -> float:
@@ -174,21 +176,21 @@ def share_along_axes(world: World) -> float:
 
 
 def test_the_office_is_of_the_size_of_a_floor() -> None:
-    world, _ = builtin("office")
+    world, _ = drawn("office")
     rows, columns = np.nonzero(~world.occupied)
     assert 30.0 < np.ptp(columns) * 0.05 < 40.0
     assert 18.0 < np.ptp(rows) * 0.05 < 25.0
 
 
 def test_the_large_plan_covers_60_by_60_metres() -> None:
-    world, _ = builtin("large_plan")
+    world, _ = drawn("large_plan")
     free = np.argwhere(~world.occupied)
     assert np.ptp(free, axis=0) * 0.05 == pytest.approx([60.0, 60.0], abs=1.1)  # but outer walls
 
 
 def test_a_name_opens_a_built_in_world_and_a_path_a_file(tmp_path: Path) -> None:
     world, start = open_world("rooms")
-    assert start == builtin("rooms")[1]
+    assert start == drawn("rooms")[1]
     loaded, nowhere = open_world(str(save_world(world, tmp_path)))
     assert isinstance(loaded, World)
     assert np.array_equal(loaded.occupied, world.occupied)
@@ -197,7 +199,7 @@ def test_a_name_opens_a_built_in_world_and_a_path_a_file(tmp_path: Path) -> None
 
 def is_drawn(name: str) -> bool:
     """Whether any of three seeds makes another world than none, by its maker alone."""
-    plain = builtin(name)[0].occupied
+    plain = drawn(name)[0].occupied
     others = (_MAKERS[name](seed)[0].occupied for seed in (1, 2, 3))
     return any(not np.array_equal(plain, other) for other in others)
 
