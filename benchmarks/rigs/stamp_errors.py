@@ -84,7 +84,9 @@ def scan_stamp_errors(
     return np.array(errors)
 
 
-def odometry_stamp_errors(link: LinkFaultConfig, drift_ppm: float, seed: int = 41) -> Array:
+def odometry_stamp_errors(
+    link: LinkFaultConfig, drift_ppm: float, config: KobukiConfig | None = None, seed: int = 41
+) -> Array:
     """Stamp minus truth (s) of every odometry message once the driver has settled."""
     twin = KobukiTwin(KobukiTwinConfig(odometry="perfect"), RollingBody(), seed)
     drifting = OtherClock(twin, drift_ppm)
@@ -93,7 +95,7 @@ def odometry_stamp_errors(link: LinkFaultConfig, drift_ppm: float, seed: int = 4
     async def main() -> None:
         here, there = pipe()
         clock = LoopClock()
-        base = KobukiBase(here, KobukiConfig(), clock)
+        base = KobukiBase(here, config or KobukiConfig(), clock)
         async with asyncio.TaskGroup() as tasks:
             work = [
                 tasks.create_task(serve_twin(FaultyLink(drifting, link, seed), there, clock)),

@@ -1,9 +1,12 @@
 """Stamps tell when a value was true, however late it arrives and however fast a clock runs."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from benchmarks.rigs.stamp_errors import odometry_stamp_errors, rms, scan_stamp_errors
+from gvgbot.config import load_config
 from gvgbot.drivers.hokuyo.driver import HokuyoConfig
 from gvgbot.drivers.link_faults import LinkFaultConfig
 
@@ -40,3 +43,10 @@ def test_odometry_is_stamped_right_in_spite_of_jitter_and_drift(drift_ppm: float
 def test_a_constant_latency_is_the_error_of_stamps_that_know_none() -> None:
     errors = odometry_stamp_errors(LinkFaultConfig(latency_s=0.003), drift_ppm=0.0)
     assert errors == pytest.approx(0.003, abs=1e-6)
+
+
+def test_the_turtlebot_allows_for_the_time_that_a_frame_is_on_its_line() -> None:
+    """All that is left is the timer of its converter, which hands out the end of each frame."""
+    line = LinkFaultConfig(baud=115200, chip_timer_s=0.001)
+    errors = odometry_stamp_errors(line, 50.0, load_config(Path("turtlebot2.yaml")).base)
+    assert 0.0 < errors.min() < errors.max() < 0.0015
