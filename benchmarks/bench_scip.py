@@ -44,7 +44,7 @@ def parsed(frame: bytes) -> Callable[[], object]:
 
 
 def twin_scan() -> Callable[[], object]:
-    twin = HokuyoTwin(HokuyoTwinConfig(), lambda stamp: RANGES, seed=1)
+    twin = HokuyoTwin(HokuyoTwinConfig(), lambda *_: RANGES, seed=1)
     twin.receive(b"MD0000108001000\n", 0.0)
 
     def one_scan() -> None:
@@ -69,7 +69,7 @@ def driver_scan(frame: bytes, request: ScanRequest) -> Callable[[], object]:
 async def stream(scans: int) -> None:
     here, there = pipe()
     clock = LoopClock()
-    twin = HokuyoTwin(HokuyoTwinConfig(), lambda stamp: RANGES, seed=1)
+    twin = HokuyoTwin(HokuyoTwinConfig(), lambda *_: RANGES, seed=1)
     laser = HokuyoLaser(here, HokuyoConfig(rate_hz=40.0), clock)
     async with asyncio.TaskGroup() as tasks:
         running = [

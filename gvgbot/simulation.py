@@ -55,12 +55,12 @@ def _people_count(config: Config, world: World) -> int:
 
 
 @cache
-def _sectors(parameters: Parameters, count: int) -> list[tuple[Array, Array]]:
-    """Of each sector of a sweep when its beams are seen, s after the beginning (N,).
+def _sectors(parameters: Parameters, steps: int, count: int) -> list[tuple[Array, Array]]:
+    """Of each sector of a sweep's first steps when its beams are seen, s after the beginning (N,).
 
     And the bearings of these (N,), rad.
     """
-    bearings = parameters.bearings
+    bearings = parameters.bearings[:steps]
     bearings.setflags(write=False)
     late = parameters.step_time * (parameters.first_step + np.arange(len(bearings)))
     return list(zip(np.array_split(late, count), np.array_split(bearings, count), strict=True))
@@ -76,14 +76,17 @@ class _Eye:
     base_laser: Pose
     is_flipped: bool
 
-    def sweep(self, stamp: float) -> Array:
-        """Ranges (N,), m, of a sweep that begins at a stamp, the body going on meanwhile."""
-        ((late, _),) = _sectors(self.model.parameters, 1)
+    def sweep(self, stamp: float, steps: int) -> Array:
+        """Ranges (steps,), m, of a sweep that begins at a stamp, the body going on meanwhile.
+
+        No longer than until the last of them is seen: who looks at it then is not to see more.
+        """
+        ((late, _),) = _sectors(self.model.parameters, steps, 1)
         begin, end = stamp + float(late[0]), stamp + float(late[-1])
         self.body.advance(end)
         stands = self.body.pose_at(begin) == self.body.pose_at(end)
         count = 1 if stands else math.ceil((end - begin) / _SECTOR_S)
-        sectors = _sectors(self.model.parameters, count)
+        sectors = _sectors(self.model.parameters, steps, count)
         return np.concatenate([self._look(stamp + late, bearings) for late, bearings in sectors])
 
     def _look(self, stamps: Array, bearings: Array) -> Array:

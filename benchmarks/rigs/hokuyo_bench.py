@@ -29,7 +29,7 @@ class World:
     beams: int = 1081
     stamps: list[float] = field(default_factory=list)
 
-    def __call__(self, stamp: float) -> Array:
+    def __call__(self, stamp: float, steps: int) -> Array:
         self.stamps.append(stamp)
         return self.ranges(len(self.stamps) - 1)
 

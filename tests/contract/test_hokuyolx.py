@@ -21,7 +21,7 @@ STEPS = 1081
 STANDBY, TIME, SINGLE, ASLEEP = 0, 2, 3, 5  # its codes for the state of a laser
 
 
-def room(stamp: float) -> Array:
+def room(stamp: float, steps: int = STEPS) -> Array:
     """A square room of 4 m, seen from its middle."""
     bearings = np.radians(np.linspace(-135.0, 135.0, STEPS))
     return np.asarray(2.0 / np.maximum(np.abs(np.cos(bearings)), np.abs(np.sin(bearings))))

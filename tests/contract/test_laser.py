@@ -38,7 +38,7 @@ class Place:
     clock: Clock
 
 
-def room(stamp: float) -> Array:
+def room(stamp: float, steps: int) -> Array:
     """A square room of 4 m, seen from its middle."""
     bearings = np.radians(np.linspace(-135.0, 135.0, 1081))
     return np.asarray(2.0 / np.maximum(np.abs(np.cos(bearings)), np.abs(np.sin(bearings))))

@@ -29,7 +29,7 @@ MOMENTS = 500  # in which a laser that was stopped must be done
 
 def one_input(data: bytes) -> None:
     """Type the bytes into a laser, which must obey a stop afterwards."""
-    laser = HokuyoTwin(LASERS[len(data) % len(LASERS)], lambda stamp: RANGES, seed=1)
+    laser = HokuyoTwin(LASERS[len(data) % len(LASERS)], lambda *_: RANGES, seed=1)
     now = 0.0
     for chunk in chunks(data):
         now += HEARING

@@ -40,7 +40,7 @@ class CountedWorld:
         self._pattern = 1.0 + 1.5 * (k % 2) + (k * 7919 % 400) / 1000.0
         self._beams = beams
 
-    def __call__(self, stamp: float) -> Array:
+    def __call__(self, stamp: float, steps: int) -> Array:
         self.count += 1
         self._stamps.append(stamp)
         return np.repeat(self.truth(self.count - 1), self.group)[: self._beams]

@@ -22,7 +22,7 @@ pytestmark = pytest.mark.twin
 def twin_of(truth: Array | World, seed: int = 31, **config: Any) -> HokuyoTwin:
     quiet = {"range_sigma_m": 0.0, "dropout_fraction": 0.0, "double_echo_fraction": 0.0}
     settings = HokuyoTwinConfig(**{**quiet, **config})
-    sense = truth if isinstance(truth, World) else lambda stamp: truth
+    sense = truth if isinstance(truth, World) else lambda *_: truth
     return HokuyoTwin(settings, sense, seed)
 
 

@@ -59,8 +59,8 @@ def test_ranges_are_those_of_the_world_to_half_a_millimetre() -> None:
 def test_a_laser_whose_walls_vanish_at_once_is_not_trusted_to_see_a_hall() -> None:
     world = World()
 
-    def covered(stamp: float) -> Array:
-        ranges = world(stamp)
+    def covered(stamp: float, steps: int) -> Array:
+        ranges = world(stamp, steps)
         return ranges if len(world.stamps) <= 20 else np.full_like(ranges, math.inf)
 
     async def scenario(bench: Bench) -> None:
@@ -187,7 +187,7 @@ def test_clusters_point_to_their_middle_and_tell_the_range_there() -> None:
     ranges = World().ranges(0)
     is_hit = np.isfinite(ranges[:1080]).reshape(-1, 3).all(axis=1)
     whole = np.convolve(is_hit, np.ones(3), mode="same") == 3  # and so are those beside it
-    twin = HokuyoTwin(PERFECT, lambda stamp: ranges, seed=7)
+    twin = HokuyoTwin(PERFECT, lambda *_: ranges, seed=7)
     on_bench(twin, scenario, HokuyoConfig(cluster=3))
 
 
@@ -198,7 +198,7 @@ def test_noise_and_dropouts_are_as_configured() -> None:
         assert np.nanstd(ranges) == pytest.approx(0.01, rel=0.02)
         assert np.nanmean(ranges) == pytest.approx(3.0, abs=1e-3)
 
-    twin = HokuyoTwin(HokuyoTwinConfig(), lambda stamp: np.full(1081, 3.0), seed=8)
+    twin = HokuyoTwin(HokuyoTwinConfig(), lambda *_: np.full(1081, 3.0), seed=8)
     on_bench(twin, scenario)
 
 

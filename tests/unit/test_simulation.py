@@ -11,6 +11,7 @@ from gvgbot.simulation import _Eye
 from tests.unit.autonomy.sights import carved
 
 MODEL = MODELS["UTM-30LX"]
+STEPS = len(MODEL.parameters.bearings)
 BASE_LASER = Pose(0.1, 0.0, 0.0)
 ROOM = carved([(-3.0, -2.0, 3.0, 2.0)], [(1.0, -1.0, 1.5, 0.0)])
 
@@ -33,7 +34,7 @@ class Watched(Sight):
 def test_who_stands_looks_once_and_sees_the_world_all_around(*, is_flipped: bool) -> None:
     """A laser that hangs upside down begins on the other side; it sees as far to either side."""
     body, sight = RobotBody(ROOM, Pose(-1.0, 0.5, 0.3)), Watched()
-    ranges = _Eye(body, sight, MODEL, BASE_LASER, is_flipped=is_flipped).sweep(1.0)
+    ranges = _Eye(body, sight, MODEL, BASE_LASER, is_flipped=is_flipped).sweep(1.0, STEPS)
     world_laser = body.pose.compose(BASE_LASER)
     assert sight.poses == [world_laser]
     wanted = ROOM.cast(world_laser, MODEL.parameters.bearings, MODEL.usable_mm / 1000)
@@ -57,8 +58,8 @@ def test_each_beam_of_who_moves_is_seen_from_where_it_has_come_to(
     start, at_1_s = body.pose, 1.0
     eye = _Eye(body, Sight(ROOM, None, 0), laser, BASE_LASER, is_flipped=is_flipped)
     body.advance(1.2)  # others have looked at it since
-    seen = eye.sweep(at_1_s)
     bearings, wanted = laser.parameters.bearings, []
+    seen = eye.sweep(at_1_s, len(bearings))
     for i, bearing in enumerate(-bearings if is_flipped else bearings):
         late = (laser.parameters.first_step + i) * laser.parameters.step_time
         turn, way = angular * late, linear * late
@@ -79,7 +80,22 @@ def test_who_is_put_elsewhere_during_a_sweep_is_there_for_the_whole_of_it() -> N
     body.pose = elsewhere = Pose(2.0, -1.0, 3.0)
     eye = _Eye(body, Sight(ROOM, None, 0), MODEL, Pose(), is_flipped=False)
     wanted = ROOM.cast(elsewhere, MODEL.parameters.bearings, MODEL.usable_mm / 1000)
-    np.testing.assert_array_equal(eye.sweep(1.0), wanted)
+    np.testing.assert_array_equal(eye.sweep(1.0, STEPS), wanted)
+
+
+def test_beams_that_nobody_asked_for_move_no_body_on() -> None:
+    """Else the base, which is asked before they were due, would feel what is to come."""
+    part, whole = (RobotBody(ROOM, Pose(-1.0, 0.5, 0.0)) for _ in range(2))
+    seen = []
+    for body, steps in ((part, STEPS // 2), (whole, STEPS)):
+        body.command(0.0, 1.2)
+        body.advance(1.0)
+        eye = _Eye(body, Sight(ROOM, None, 0), MODEL, BASE_LASER, is_flipped=False)
+        seen.append(eye.sweep(1.0, steps))
+    parameters = MODEL.parameters
+    last = parameters.first_step + STEPS // 2 - 1
+    assert part.now == pytest.approx(1.0 + last * parameters.step_time)
+    np.testing.assert_allclose(seen[0], seen[1][: STEPS // 2], atol=0.002)
 
 
 def test_the_body_tells_where_it_was_while_it_began_to_turn() -> None:

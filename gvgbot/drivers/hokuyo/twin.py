@@ -25,14 +25,15 @@ UNSTABLE = "0M"
 class HokuyoTwin:
     """A laser without I/O, on a given world.
 
-    `sense(stamp)` gives the true ranges (m) at a time, one per step from the model's first to its
-    last, inf where there is nothing. It is asked once per scan sent, when the sweep is over.
+    `sense(stamp, steps)` gives the true ranges (m) of a sweep that begins then, one for each of so
+    many steps from the model's first on, inf where there is nothing; more do no harm. It is asked
+    once per scan sent, when the last of them has been seen.
     """
 
     def __init__(
         self,
         config: HokuyoTwinConfig,
-        sense: Callable[[float], Array],
+        sense: Callable[[float, int], Array],
         seed: int,
         plug: Callable[[bool], None] = lambda _: None,
         on_since: float = 0.0,

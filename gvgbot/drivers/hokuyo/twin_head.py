@@ -31,7 +31,11 @@ class Head:
     """Turns the world into frames, on the grid of its motor and the stamps of its clock."""
 
     def __init__(
-        self, config: HokuyoTwinConfig, sense: Callable[[float], Array], seed: int, on_since: float
+        self,
+        config: HokuyoTwinConfig,
+        sense: Callable[[float, int], Array],
+        seed: int,
+        on_since: float,
     ) -> None:
         """`on_since` is when its clock showed what it does at power-up, s."""
         self.model = MODELS[config.model]
@@ -96,7 +100,8 @@ class Head:
         stamp = self.scan_start(number)
         config, model = self._config, self.model
         first = model.parameters.first_step
-        ranges = self._sense(stamp)[request.start - first : request.end - first + 1]
+        steps = request.end - first + 1
+        ranges = self._sense(stamp, steps)[request.start - first : steps]
         dropouts = config.dropout_fraction * (LESS_DROPOUTS if self.is_sensitive else 1.0)
         ranges = with_mixed_pixels(ranges, config.mixed_pixel_fraction, self._rng)
         dropouts = 1.0 if is_blind else dropouts

@@ -49,7 +49,7 @@ def test_a_straight_wall_seen_at_a_low_angle_has_no_edges(increment: float) -> N
 
 def test_the_laser_sends_mixed_pixels_if_told_to() -> None:
     config = HokuyoTwinConfig(range_sigma_m=0.0, dropout_fraction=0.0, mixed_pixel_fraction=1.0)
-    twin = HokuyoTwin(config, lambda _: np.repeat([1.0, 3.0], [540, 541]), 0)
+    twin = HokuyoTwin(config, lambda *_: np.repeat([1.0, 3.0], [540, 541]), 0)
     twin.receive(b"MD0000108001001\n", 0.0)
     (scan,) = [
         message

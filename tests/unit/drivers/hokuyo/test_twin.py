@@ -30,7 +30,7 @@ RANGES = np.linspace(0.5, 4.0, 1081)
 
 def laser(**config: Any) -> HokuyoTwin:
     quiet = {"range_sigma_m": 0.0, "dropout_fraction": 0.0, "clock_drift_ppm": 0.0}
-    return HokuyoTwin(HokuyoTwinConfig(**{**quiet, **config}), lambda stamp: RANGES, 0)
+    return HokuyoTwin(HokuyoTwinConfig(**{**quiet, **config}), lambda *_: RANGES, 0)
 
 
 def status(twin: HokuyoTwin, command: str, now: float = 0.0) -> str:
@@ -149,7 +149,7 @@ def test_the_clock_counts_milliseconds_in_24_bits_until_reset() -> None:
 def test_a_millisecond_of_the_clock_begins_at_any_time_of_a_turn() -> None:
     """So half a millisecond after a scan has begun the clocks of half of all lasers have ticked."""
     config, begun = HokuyoTwinConfig(clock_drift_ppm=0.0), 4.0
-    heads = [Head(config, lambda stamp: RANGES, seed, 0.0) for seed in range(200)]
+    heads = [Head(config, lambda *_: RANGES, seed, 0.0) for seed in range(200)]
     for head in heads:
         head.reset_clock(2.0)
     ticked = sum(head.device_ms(begun + 0.0005) - head.device_ms(begun) for head in heads)
@@ -162,7 +162,7 @@ def test_a_millisecond_of_the_clock_begins_at_any_time_of_a_turn() -> None:
 def test_scans_leave_on_the_grid_of_the_motor(model: ModelName, period: float, last: int) -> None:
     ranges = RANGES if model == "UTM-30LX" else RANGES[:682]
     config = HokuyoTwinConfig(model=model, clock_drift_ppm=0.0)
-    twin = HokuyoTwin(config, lambda stamp: ranges, 0)
+    twin = HokuyoTwin(config, lambda *_: ranges, 0)
     first = MODELS[model].parameters.first_step
     assert status(twin, f"MD{first:04}{last:04}01200", 1.01) == "00"
     sent = frames(twin, 3.0)
@@ -182,20 +182,22 @@ def test_a_counted_stream_counts_down_and_switches_the_laser_off() -> None:
     assert status(twin, "GD0000108001", 1.0) == "10"
 
 
-def test_the_world_is_asked_once_per_scan_sent_when_its_sweep_is_over() -> None:
-    """From step 0 to 1080 of 1440, at 40 Hz."""
+@pytest.mark.parametrize("last", [1080, 540])
+def test_the_world_is_asked_once_per_scan_sent_when_its_beams_were_seen(last: int) -> None:
+    """From step 0 to 1080 of 1440 at most, at 40 Hz."""
     asked: list[float] = []
 
-    def sense(stamp: float) -> Array:
+    def sense(stamp: float, steps: int) -> Array:
+        assert steps == last + 1
         asked.append(stamp)
         return RANGES
 
     twin = HokuyoTwin(HokuyoTwinConfig(), sense, 0)
-    status(twin, "MD0000108001400")
+    status(twin, f"MD0000{last:04}01400")
     while (now := twin.next_due()) < 2.0:
         before = len(asked)
         twin.advance(now)
-        assert all(now >= stamp + 0.025 * 1080 / 1440 for stamp in asked[before:])
+        assert all(now >= stamp + 0.025 * last / 1440 for stamp in asked[before:])
     assert asked == pytest.approx(np.arange(0.0, 2.0, 0.125))
 
 
@@ -209,7 +211,7 @@ def test_a_sector_is_cut_out_of_the_full_turn() -> None:
 
 def test_two_character_ranges_end_at_4095_mm() -> None:
     config = HokuyoTwinConfig(dropout_fraction=0.0)
-    twin = HokuyoTwin(config, lambda stamp: np.full(1081, 9.0), 0)
+    twin = HokuyoTwin(config, lambda *_: np.full(1081, 9.0), 0)
     twin.receive(b"BM\n", 0.0)
     (message,) = ScipParser().feed(twin.receive(b"GS0100010701\n", 1.0))
     assert isinstance(message, ScanReply)
@@ -240,7 +242,7 @@ def test_noise_may_grow_with_the_range(metres: float, sigma_mm: float) -> None:
     config = HokuyoTwinConfig(
         range_sigma_m=0.01, range_sigma_share=0.01, dropout_fraction=0.0, clock_drift_ppm=0.0
     )
-    twin = HokuyoTwin(config, lambda _: np.full(1081, metres), 0)
+    twin = HokuyoTwin(config, lambda *_: np.full(1081, metres), 0)
     twin.receive(b"MD0000108001020\n", 0.0)
     read = np.concatenate([message.ranges for _, message in frames(twin, 1.0)])
     assert read.std() == pytest.approx(sigma_mm, rel=0.03)
@@ -275,7 +277,7 @@ def test_a_reboot_needs_two_commands_within_a_second() -> None:
 
 def test_a_reboot_is_told_to_the_link() -> None:
     told: list[bool] = []
-    twin = HokuyoTwin(HokuyoTwinConfig(reboot_s=2.0), lambda stamp: RANGES, 0, told.append)
+    twin = HokuyoTwin(HokuyoTwinConfig(reboot_s=2.0), lambda *_: RANGES, 0, told.append)
     twin.receive(b"RB\nRB\n", 0.0)
     twin.advance(1.0)
     assert told == [False]
@@ -293,7 +295,7 @@ def test_commands_during_booting_are_answered_together_afterwards() -> None:
 def test_a_laser_that_is_switched_on_late_boots_then_and_its_clock_begins_then() -> None:
     """As in real time, where the host has long been up."""
     config = HokuyoTwinConfig(boot_s=2.0, clock_start_ms=5000, clock_drift_ppm=0.0)
-    twin = HokuyoTwin(config, lambda stamp: RANGES, 0, on_since=1000.0)
+    twin = HokuyoTwin(config, lambda *_: RANGES, 0, on_since=1000.0)
     assert twin.receive(b"TM0\n", 1001.9) == b""
     assert twin.advance(1002.0) == b"TM0\n00P\n\n"
     (time,) = replies(twin, b"TM1\n", 1003.0)

@@ -26,9 +26,7 @@ STREAM = "MD0044072501000"
 def laser(model: ModelName = "URG-04LX", **config: Any) -> HokuyoTwin:
     quiet = {"range_sigma_m": 0.0, "dropout_fraction": 0.0, "clock_drift_ppm": 0.0}
     settings = HokuyoTwinConfig(model=model, **{**quiet, **config})
-    return HokuyoTwin(
-        settings, lambda stamp: np.full(len(MODELS[model].parameters.bearings), 2.0), 0
-    )
+    return HokuyoTwin(settings, lambda *_: np.full(len(MODELS[model].parameters.bearings), 2.0), 0)
 
 
 def ask(twin: HokuyoTwin, command: str, now: float = 0.0) -> Reply:
