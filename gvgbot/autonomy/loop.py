@@ -1,6 +1,8 @@
 """The task around the pipeline: scans and odometry in, twists out, a stop on every way out."""
 
 import asyncio
+import contextlib
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
@@ -13,6 +15,8 @@ from gvgbot.geometry import STANDSTILL, Twist
 from gvgbot.hal.devices import Base, Laser
 from gvgbot.hal.guard import Guard, GuardState, Reason
 from gvgbot.hal.messages import Battery, Odometry, Scan
+
+_LATEST_S = 0.1  # that odometry comes after a scan of its time; a slow link brings it 0.04 s late
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +63,7 @@ class Loop:
         self._goes_on = goes_on or (lambda: pipeline.mission.outcome is None)
         self._scan: Scan | None = None
         self._guard_state = GuardState()
+        self._heard, self._hearing = -math.inf, asyncio.Event()  # the newest odometry's stamp, s
         self.stopped_for: Reason | None = None
 
     def guard_by(self, guard: Guard) -> None:
@@ -81,12 +86,21 @@ class Loop:
             except DeviceLost:
                 self._scan = None  # the guard stops now, not when the last scan is too old
                 continue
+            self._scan = scan
+            await self._hear_until(scan.stamp)
             if self._log is not None:
                 self._log.on_scan(scan)
             events = self._pipeline.perceive(scan)
-            self._scan = scan
             if events:
                 self._on_events(events)
+
+    async def _hear_until(self, stamp: float) -> None:
+        """Wait for the odometry of a stamp (s), if it is still on its way."""
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(_LATEST_S):
+                while self._heard < stamp:
+                    self._hearing.clear()
+                    await self._hearing.wait()
 
     async def _control(self, perceiving: asyncio.Task[None]) -> None:
         while self._goes_on():
@@ -103,6 +117,8 @@ class Loop:
                 contact=contact,
             )
             self._base.drive(twist)
+            self._heard = odometry.stamp
+            self._hearing.set()
             if self._log is not None:
                 self._log.on_cycle(Cycle(odometry, felt, wish, twist), self._base.battery)
             self._on_cycle(odometry)
