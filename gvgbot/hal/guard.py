@@ -48,7 +48,7 @@ class GuardConfig:
     max_angular_acceleration_radps2: Annotated[float, Range(0.1, 20.0)] = 3.5
     max_scan_age_s: Annotated[float, Range(0.05, 2.0)] = 0.5  # older than this, the robot stops
     margin_m: Annotated[float, Range(0.0, 0.5)] = 0.02  # kept free around the footprint
-    # from a command to the first effect on the motors
+    # from a command until odometry shows its whole effect
     response_time_s: Annotated[float, Range(0.0, 1.0)] = 0.25
 
 
