@@ -36,6 +36,7 @@ from gvgbot.hal.messages import Scan
 __all__ = ["HokuyoConfig", "HokuyoLaser", "LinkStatistics"]
 
 SHORTEST_SILENCE = 0.2  # s; links deliver in bursts
+HUNG = 0.02  # s; so late, it was the host that did not listen, and not the laser that was silent
 UNKNOWN_COMMAND = frozenset({"0C", "0D", "0E", "0F"})  # firmware generations disagree on which
 UNSTABLE = "0M"  # in place of a scan: the motor is not at its speed
 HALTED = range(21, 50)  # statuses of a laser that looks into a fault, and is silent until it knows
@@ -80,11 +81,19 @@ class _Stream:
     is_fresh: bool = True  # no scan was handed on yet
     is_doubted: bool = False  # the first one fits no synchronisation
     instead: str = NO_SCANS  # what it has sent since it began
+    is_excused: bool = False  # the host hung since the last scan
 
     def note_scan(self, now: float) -> None:
         """One more scan has come."""
         self.last_scan = now
         self.until = now + self.silence
+        self.is_excused = False
+
+    def note_hanging(self, now: float) -> None:
+        """When nobody listened as it was to have stopped, what has come is read first."""
+        if now > self.until + HUNG and not self.is_excused:
+            self.until = now + self.silence
+            self.is_excused = True
 
     def note_damage(self) -> None:
         """Something has come, but not whole."""
@@ -288,6 +297,7 @@ class HokuyoLaser:
         """Hand on scans until they stop coming. Raises DeviceLost if not one came."""
         while stream.until > self._dialogue.clock.now():
             await self._listen(stream)
+            stream.note_hanging(self._dialogue.clock.now())
         if stream.is_fresh:
             self.link.fruitless += 1
             self._dialogue.send("RS")
