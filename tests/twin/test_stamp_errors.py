@@ -46,7 +46,7 @@ def test_a_constant_latency_is_the_error_of_stamps_that_know_none() -> None:
 
 
 def test_the_turtlebot_allows_for_the_time_that_a_frame_is_on_its_line() -> None:
-    """All that is left is the timer of its converter, which hands out the end of each frame."""
+    """So it does, on average, for the timer of its converter, which hands out a frame's end."""
     line = LinkFaultConfig(baud=115200, chip_timer_s=0.001)
     errors = odometry_stamp_errors(line, 50.0, load_config(Path("turtlebot2.yaml")).base)
-    assert 0.0 < errors.min() < errors.max() < 0.0015
+    assert np.abs(errors).max() < 0.001
