@@ -78,7 +78,8 @@ def _described(thing: Any) -> str:
     """The signature, and the docstring."""
     text = inspect.getdoc(thing) or ""
     if isinstance(thing, property):
-        returns = inspect.signature(thing.fget).return_annotation  # type: ignore[arg-type]
+        assert thing.fget is not None
+        returns = inspect.signature(thing.fget).return_annotation
         return f"A property: `{_short(inspect.formatannotation(returns))}`. {text}\n"
     return f"```py\n{_short(_signature(thing))}\n```\n\n{text}\n"
 

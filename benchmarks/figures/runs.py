@@ -53,7 +53,7 @@ class Watched(Session):
                 self._note(scan.stamp, before, happened)
             return happened
 
-        self.pipeline.perceive = watched  # type: ignore[method-assign]
+        self.pipeline.perceive = watched  # type: ignore[method-assign]  # in its place
 
     def _note(self, stamp: float, before: Row, happened: list[Event]) -> None:
         after, travelled = self._vertices(), self.pipeline.past.travelled

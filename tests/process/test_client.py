@@ -456,7 +456,7 @@ def test_each_of_a_crowd_that_asks_at_once_gets_the_newest_sample(endpoint: str)
     async def replies() -> list[zenoh.Reply]:
         with a_robot(endpoint) as robot, plain_session(endpoint) as session:
             robot.publish(A_MAP)
-            answering = asyncio.ensure_future(robot.answer())  # noqa: TID251
+            answering = asyncio.ensure_future(robot.answer())  # noqa: TID251  # cancelled below
             await asyncio.sleep(0)
             asked = [session.get("gvgbot/near/map", timeout=PATIENCE) for _ in range(300)]
             time.sleep(0.5)  # noqa: ASYNC251, TID251  # a busy loop

@@ -43,7 +43,7 @@ async def a_robot(
 ) -> AsyncIterator[None]:
     routers = () if connect is None else (connect,)
     with Telemetry(TelemetryConfig(listen=(endpoint,), connect=routers), name) as robot:
-        hearing = asyncio.ensure_future(robot.hear(handle))  # noqa: TID251
+        hearing = asyncio.ensure_future(robot.hear(handle))  # noqa: TID251  # cancelled below
         await asyncio.sleep(0)
         yield
         hearing.cancel()

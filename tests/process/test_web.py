@@ -92,7 +92,7 @@ async def received(viewer: ClientConnection) -> tuple[str, dict[str, object]]:
 
 async def so_many(audience: Audience, viewers: int) -> None:
     """Wait until there are so many."""
-    while len(audience) != viewers:  # noqa: ASYNC110
+    while len(audience) != viewers:  # noqa: ASYNC110  # it has no event for that
         await asyncio.sleep(0.01)
 
 

@@ -81,7 +81,7 @@ class Play:
         """Let something befall the base; `side` is 4 for left, 2 for centre, 1 for right."""
         twin = self.simulation.base_twin._device
         assert isinstance(twin, KobukiTwin)
-        twin.mishaps._rng = _Always(side)  # type: ignore[assignment]
+        twin.mishaps._rng = _Always(side)  # type: ignore[assignment]  # in its place
         twin.inject(mishap, duration)
 
     def put_person(self, x: float, y: float) -> None:
@@ -196,7 +196,7 @@ def _lose_grip(body: RobotBody, grip: Grip) -> None:
         share = grip(body.pose)
         roll(share * way, share * turn)
 
-    body._roll = slipping  # type: ignore[method-assign]
+    body._roll = slipping  # type: ignore[method-assign]  # in its place
 
 
 async def _told(story: Story, run: Play) -> None:

@@ -156,7 +156,7 @@ class Story:
                 self.tour.covered.append(self.place)
                 await asyncio.sleep(0.3)
 
-        watching = asyncio.ensure_future(watch())  # noqa: TID251
+        watching = asyncio.ensure_future(watch())  # noqa: TID251  # cancelled below
         await self.trip("coverage", "coverage")
         watching.cancel()
 

@@ -383,7 +383,7 @@ def test_a_motor_that_takes_longer_is_given_twice_the_time_when_opened_again(
         for _ in range(lost - 1):
             await until_lost(HokuyoLaser(bench.link, HokuyoConfig(), bench.clock, link))
         laser = HokuyoLaser(bench.link, HokuyoConfig(), bench.clock, link)
-        running = asyncio.ensure_future(until_lost(laser))  # noqa: TID251
+        running = asyncio.ensure_future(until_lost(laser))  # noqa: TID251  # cancelled below
         await laser.next_scan()
         assert twin.resets == lost
         assert link.fruitless == 0

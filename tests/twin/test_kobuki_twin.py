@@ -294,4 +294,4 @@ def test_buttons_have_the_bases_bits() -> None:
 @pytest.mark.parametrize("version", ["1.2", "1.2.0-rc", "1.300.0", "-1.0.0", ""])
 def test_a_version_that_no_reply_can_hold_is_refused(key: str, version: str) -> None:
     with pytest.raises(ValueError, match=f"{key} = "):
-        KobukiTwinConfig(**{key: version})  # type: ignore[arg-type]
+        KobukiTwinConfig(**{key: version})  # type: ignore[arg-type]  # keys are parameters

@@ -67,12 +67,10 @@ class Rig:
 
 def played(late: float, silent_from: float = 9.0) -> Rig:
     async def play() -> Rig:
-        rig: Any = Rig(late, silent_from)
+        rig = Rig(late, silent_from)
+        anything: Any = rig
         loop = Loop(
-            rig,
-            rig,
-            rig,
-            rig,
+            *[anything] * 4,
             on_events=lambda _: None,
             on_cycle=lambda _: None,
             goes_on=lambda: rig.now() < 2.0,
@@ -80,7 +78,7 @@ def played(late: float, silent_from: float = 9.0) -> Rig:
         with pytest.raises(TimeoutError):
             async with asyncio.timeout(1.5):
                 await loop.run()
-        return rig  # type: ignore[no-any-return]
+        return rig
 
     return run_in_virtual_time(play())
 

@@ -50,7 +50,7 @@ def test_the_terminal_is_raw_from_the_moment_its_name_is_there(tmp_path: Path) -
     """The name is made last: whoever sees it finds the settings made."""
     made = []
 
-    class Watched(type(tmp_path)):  # type: ignore[misc]
+    class Watched(type(tmp_path)):  # type: ignore[misc]  # the class depends on the system
         def replace(self, target: Path) -> Path:
             with opened(self) as client:
                 made.append(settings(client))

@@ -101,7 +101,7 @@ def test_a_slow_connection_is_made_though_every_reader_is_impatient() -> None:
             await is_through.wait()
             await connect(sock, address)
 
-        loop.sock_connect = slow  # type: ignore[assignment, method-assign]
+        loop.sock_connect = slow  # type: ignore[assignment, method-assign]  # in its place
         port = TcpPort("tcp://127.0.0.1:0")
         assert port.path is not None
         stream = TcpStream(port.path)
@@ -124,7 +124,7 @@ def test_a_slow_connection_is_made_though_every_reader_is_impatient() -> None:
 def test_silence_is_told_after_the_time_for_connecting_whoever_waits(patience: float) -> None:
     async def main() -> float:
         loop = asyncio.get_running_loop()
-        loop.sock_connect = hang  # type: ignore[assignment, method-assign]
+        loop.sock_connect = hang  # type: ignore[assignment, method-assign]  # in its place
         stream = TcpStream(NOWHERE)
         with pytest.raises(DeviceLost, match=f"{NOWHERE} does not answer: check address, cable"):
             await insistent_read(stream, patience)
@@ -149,7 +149,7 @@ def test_a_device_that_is_not_on_the_network_is_told_with_its_key(device: str) -
 def test_closing_ends_the_connecting_and_tells_who_waits_for_it() -> None:
     async def main() -> None:
         loop = asyncio.get_running_loop()
-        loop.sock_connect = hang  # type: ignore[assignment, method-assign]
+        loop.sock_connect = hang  # type: ignore[assignment, method-assign]  # in its place
         stream = TcpStream(NOWHERE)
         loop.call_later(1.0, stream.close)
         with pytest.raises(DeviceLost, match="closed"):

@@ -191,7 +191,7 @@ def test_where_another_has_been_that_made_the_map_is_no_way_driven(
     keyframes, pipeline.past.lent = pipeline.past.keyframes, 50
     pipeline.past.keyframes = keyframes[:at]
     if at:
-        live.update(pipeline, 0.0)()  # type: ignore[misc]
+        live.update(pipeline, 0.0)()  # type: ignore[misc]  # there is something to do
     pipeline.past.keyframes = keyframes
     if is_corrected:
         live.doubt()
@@ -210,7 +210,7 @@ def test_no_way_leads_to_where_the_robot_was_carried(at: int, *, is_corrected: b
     keyframes, there = pipeline.past.keyframes, Pose(20.0, 0.0)
     pipeline.past.keyframes = keyframes[:at]
     if at:
-        live.update(pipeline, 0.0)()  # type: ignore[misc]
+        live.update(pipeline, 0.0)()  # type: ignore[misc]  # there is something to do
     for i in range(50, COUNT):
         keyframes[i] = replace(keyframes[i], map_base=there.compose(keyframes[i].map_base))
     motion = keyframes[49].map_base.to(keyframes[50].map_base)
