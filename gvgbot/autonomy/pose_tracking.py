@@ -11,7 +11,7 @@ from gvgbot.autonomy.keyframes import Keyframe, Past, Step
 from gvgbot.autonomy.localisation import LocalMaps, ScanMatch
 from gvgbot.autonomy.map_edits import MapEdits
 from gvgbot.autonomy.odometry_log import OdometryLog
-from gvgbot.geometry import Pose, rotated_covariance
+from gvgbot.geometry import Array, Pose, rotated_covariance
 from gvgbot.hal.messages import Scan
 
 _LIFTED = np.diag([0.3**2, 0.3**2, 0.1**2])  # how far a robot is carried that is put down again
@@ -74,10 +74,8 @@ class PoseTracker:
         self, scan: Scan, last: Keyframe, motion: Pose, *, is_broken: bool, is_doubted: bool
     ) -> ScanMatch:
         """A scan on the walls, after a motion by odometry."""
-        unturned, self._unturned_s = self._unturned_s, self.odometry.unturned_s
-        duration = max(0.0, scan.stamp - last.stamp)
-        felt_s = max(0.0, duration - (self._unturned_s - unturned))  # in which the gyro may drift
-        noise = self._noise.parts(motion, duration)
+        felt_s, noise = self.expected_error(motion, scan.stamp - last.stamp)
+        self._unturned_s = self.odometry.unturned_s
         lost = self.was_lifted or self.odometry.has_gap_since(last.stamp)
         match = self.maps.match if self.matches_walls else self.maps.trust
         if lost or is_doubted:
@@ -85,8 +83,17 @@ class PoseTracker:
             match = partial(self.maps.find, turned=turned)
         if self.was_lifted or is_doubted:
             self.was_lifted, noise = False, np.append(noise, [_LIFTED], axis=0)
-        odometry_noise = rotated_covariance(noise, -motion.theta)
-        return match(scan, last.local_base, motion, felt_s, odometry_noise)
+        return match(scan, last.local_base, motion, felt_s, noise)
+
+    def expected_error(self, motion: Pose, duration: float) -> tuple[float, Array]:
+        """How odometry may have erred since the last look, so many seconds ago.
+
+        For how long, s, its gyro may have drifted, and the parts (4, 3, 3) of its noise, in the
+        frame of the base after the motion: what `LocalMaps.match` takes.
+        """
+        duration = max(0.0, duration)
+        felt_s = max(0.0, duration - (self.odometry.unturned_s - self._unturned_s))
+        return felt_s, rotated_covariance(self._noise.parts(motion, duration), -motion.theta)
 
     def take_over(self, other: Self) -> None:
         """Go on in the local frame of another one, with its walls and by its odometry."""

@@ -119,9 +119,8 @@ class ReturningPipeline(Pipeline):
         last = self.past.last
         assert last is not None
         before, motion = last.local_base, last.odom_base.to(odom_base)
-        duration = scan.stamp - last.stamp
-        noise = self._config.odometry_noise.parts(motion, duration)
-        local_base = self.tracker.maps.find(scan, before, motion, duration, noise).local_base
+        felt_s, noise = self.tracker.expected_error(motion, scan.stamp - last.stamp)
+        local_base = self.tracker.maps.find(scan, before, motion, felt_s, noise).local_base
         offset = before.compose(motion).to(local_base)
         if np.hypot(offset.x, offset.y) > _MOVED_M or abs(offset.theta) > _MOVED_RAD:
             return False

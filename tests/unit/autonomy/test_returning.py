@@ -1,5 +1,6 @@
 """A robot that comes back: what it says when it is lost, and what it knows when it is found."""
 
+import math
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -8,6 +9,8 @@ import numpy as np
 import pytest
 
 from gvgbot.autonomy.estimate import smoothed
+from gvgbot.autonomy.memory import growth, remember
+from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.relocalisation import Opinion
 from gvgbot.autonomy.returning import ReturningPipeline, _given_up
 from gvgbot.autonomy.slam import ekf
@@ -48,6 +51,26 @@ def test_who_is_lost_does_not_know_where_virtual_walls_are() -> None:
     robot = ReturningPipeline(*settings, saved.memory, saved.past, lambda: False)
     assert len(robot.sight.virtual_walls) > 30
     assert len(robot._new_mind().sight.virtual_walls) == 0
+
+
+def test_a_gyro_that_stood_still_for_an_hour_has_not_drifted_meanwhile() -> None:
+    """As it does on the move. Odometry has the heading that it had, and so has the robot."""
+    config = load_config()
+    settings = config.autonomy, config.exploration, config.robot.radius_m
+    scan = sweep(carved([(-4.0, -1.0, 4.0, 1.0), (0.0, -1.0, 2.0, 4.0)]), Pose(-1.5))
+    before = Pipeline(*settings)
+    before.control(Odometry(0.0, Pose(), STANDSTILL))
+    before.perceive(scan)
+    before.tracker.maps.calibration.x[2] = math.radians(0.03)  # rad/s
+    robot = ReturningPipeline(*settings, remember(before), growth(before), lambda: True)
+    robot.errands.pause()
+    for stamp in np.arange(1.0, 3601.0).tolist():
+        robot.control(Odometry(stamp, Pose(), STANDSTILL))
+    robot.errands.resume()
+    assert not robot.perceive(replace(scan, stamp=3600.0))
+    assert len(robot.past.keyframes) == 2
+    assert robot.map_base.distance(Pose()) < 0.01
+    assert robot.map_base.theta == pytest.approx(0.0, abs=0.01)
 
 
 def test_who_looks_for_its_place_does_so_as_it_is_told_meanwhile() -> None:
