@@ -25,7 +25,7 @@ class Headway:
         if self._place is None or np.hypot(*(place - self._place)) > _FAR_M:
             self._place, self._since = place, stamp
         unseen = max(0.0, stamp - self._last_view - _LONGEST_VIEW_S)
-        self._since += unseen
+        self._since = min(self._since + unseen, stamp)  # it may have begun to wait meanwhile
         self._stay.skip(unseen)
         self._last_view = stamp
         return max(self._stay.note(place, stamp), self.waited(stamp))

@@ -43,6 +43,20 @@ def test_an_outage_does_not_count_but_for_the_longest_usual_gap() -> None:
     assert headway.note(at(0.0), 101.0) == pytest.approx(3.0)
 
 
+def test_who_is_elsewhere_after_an_outage_waits_from_then_on() -> None:
+    """Somebody may have sent it there meanwhile."""
+    headway, _ = noted([0.0, 0.0])
+    assert headway.note(at(5.0), 300.0) == 0.0
+    assert headway.waited(304.0) == 4.0
+
+
+def test_who_begins_to_wait_in_an_outage_does_not_wait_longer_for_what_was_before() -> None:
+    headway, _ = noted([0.0, 0.0])
+    headway.restart(200.0)
+    headway.note(at(0.0), 202.0)
+    assert 4.0 <= headway.waited(206.0) <= 6.0
+
+
 def test_what_is_skipped_does_not_count() -> None:
     headway, _ = noted([0.0, 0.0])
     headway.skip(100.0)
