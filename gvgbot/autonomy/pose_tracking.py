@@ -56,7 +56,6 @@ class PoseTracker:
         last = past.last
         assert last is not None, "the local frame is where the first look was"
         motion = last.odom_base.to(odom_base)
-        past.travelled += math.hypot(motion.x, motion.y)
         is_carried = is_broken or self.was_lifted  # perhaps
         fits = self.maps.fits if is_broken else self.maps.may_fit
         match = self._matched(
@@ -67,6 +66,7 @@ class PoseTracker:
         moved = last.local_base.to(match.local_base)
         step = Step(moved, rotated_covariance(match.covariance, moved.theta))
         past.steps.append(step)
+        past.travelled += math.hypot(motion.x, motion.y)
         mapper.move(step.motion, step.covariance, match.laid)
         return match.local_base
 

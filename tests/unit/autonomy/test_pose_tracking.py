@@ -103,11 +103,12 @@ def test_who_sees_no_known_walls_after_the_base_started_anew_may_be_anywhere() -
 def test_who_sees_no_known_walls_after_it_was_lifted_may_be_anywhere() -> None:
     tracked = Tracked()
     tracked.tracker.was_lifted = True
-    assert tracked.look(Pose(), Pose(3.0, 3.0)) is None
+    assert tracked.look(Pose(0.2), Pose(3.0, 3.0)) is None
     assert not tracked.past.steps
-    again = tracked.look(Pose(), Pose(), is_doubted=True)  # it was put back
+    again = tracked.look(Pose(0.2), Pose(0.2), is_doubted=True)  # it was put back
     assert again is not None
-    assert again.distance(Pose()) < 0.05
+    assert again.distance(Pose(0.2)) < 0.05
+    assert tracked.past.travelled == pytest.approx(0.2)
 
 
 @pytest.mark.parametrize(
