@@ -97,5 +97,5 @@ class PoseTracker:
 
     def take_over(self, other: Self) -> None:
         """Go on in the local frame of another one, with its walls and by its odometry."""
-        self.maps, self.odometry = other.maps, other.odometry
+        self.maps, self.odometry, self.was_lifted = other.maps, other.odometry, other.was_lifted
         self._breaks, self._unturned_s = other._breaks, other._unturned_s

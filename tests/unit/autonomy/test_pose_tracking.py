@@ -133,6 +133,8 @@ def test_few_walls_in_the_open_are_no_reason_to_stand_after_a_lift() -> None:
 def test_who_takes_over_from_another_goes_on_by_its_walls_and_odometry() -> None:
     one, other = Tracked(), Tracked()
     other.look(Pose(), Pose(), breaks=3)
+    one.tracker.was_lifted = True  # before the other one began
     one.tracker.take_over(other.tracker)
+    assert not one.tracker.was_lifted
     assert one.tracker.maps is other.tracker.maps
     assert not one.tracker.notice_break()  # the other one has taken account of it
