@@ -295,9 +295,9 @@ class Pipeline:
         is_new = any(isinstance(event, VertexAdded | EdgeJoined) for event in happened)
         if is_new or self.errands.is_exploring:
             past.lasting = len(past.keyframes)
-        if len(past.keyframes) <= past.lasting + self._config.keyframe.latest:
-            return []
-        return [self._leave_out(stamp)]
+        is_long = len(past.keyframes) > past.lasting + self._config.keyframe.latest
+        # what was seen since somebody doubted the pose is yet to be compared with the map
+        return [self._leave_out(stamp)] if is_long and self._doubted is None else []
 
     def _leave_out(self, stamp: float) -> Event:
         past = self.past

@@ -224,6 +224,45 @@ def test_all_of_the_way_is_kept_while_it_explores_and_of_what_comes_later_the_en
     assert [one.keyframe for one in pipeline.traffic.passed] == [5, 10]
 
 
+def found_again(latest: int) -> tuple[float, int]:
+    """How far off, m, a robot is that was carried unnoticed, stood, and has looked for itself.
+
+    And how many keyframes there were before it looked, beside those that last.
+    """
+    config = load_config(None, [f"autonomy.keyframe.latest={latest}"])
+    pipeline = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
+    carried, theta, stamp = Pose(), 0.0, 0.0
+
+    def look() -> None:
+        nonlocal theta, stamp
+        stamp += 0.1
+        twist = pipeline.control(Odometry(stamp, Pose(theta=theta), STANDSTILL))
+        world_laser = Pose(-1.5).compose(carried).compose(Pose(theta=theta))
+        scan = sweep(ROOMS, world_laser, field_of_view=LASER_270)
+        pipeline.perceive(replace(scan, stamp=stamp, time_increment=0.0))
+        theta = wrap_angle(theta + 0.125 * (twist.angular > 0.0))
+
+    for _ in range(110):
+        look()
+    pipeline.errands.stop(stamp)
+    carried = Pose(0.7, 0.2, 0.1)
+    for _ in range(600):
+        pipeline.errands.drive(STANDSTILL, stamp)
+        look()
+    late = len(pipeline.past.keyframes) - pipeline.past.lasting
+    pipeline.errands.relocalise(stamp)
+    while pipeline.errands.errand is not None:
+        look()
+    return pipeline.map_base.distance(carried), late
+
+
+def test_who_looks_for_itself_forgets_nothing_of_what_it_sees_before_it_has_compared_that() -> None:
+    off, late = found_again(latest=1000)
+    assert off < 0.05
+    off, _ = found_again(latest=late + 3)  # the way is long enough in the midst of the look
+    assert off < 0.05
+
+
 @pytest.mark.parametrize(("felt", "is_kept"), [("bumper_centre", False), ("cliff_centre", True)])
 def test_a_cliff_is_in_the_way_for_ever_and_what_a_bumper_felt_for_some_metres(
     felt: str, *, is_kept: bool
