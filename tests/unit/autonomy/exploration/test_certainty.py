@@ -15,7 +15,7 @@ from gvgbot.autonomy.exploration.certainty import (
 from gvgbot.autonomy.exploration.paths import Approach
 from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
-from tests.unit.autonomy.graphs import between, streets
+from tests.unit.autonomy.graphs import STREET, between, streets
 
 FRONTIER = HalfEdgeId(0, 0)
 
@@ -90,6 +90,22 @@ def test_the_share_of_tasks_that_explore_is_as_configured(p_explore: float) -> N
             revisiting.note_target(FRONTIER)
             explored += 1
     assert explored == pytest.approx(1000 * p_explore, abs=2)
+
+
+@pytest.mark.parametrize(("share", "far"), [(0.9, False), (1.1, True)])
+def test_when_it_is_a_vertex_s_turn_each_twenty_metres_make_one_e_times_less_worth_while(
+    share: float, *, far: bool
+) -> None:
+    graph, ids = town(explored=False)
+    sigmas = dict.fromkeys(ids.values(), 1e-6)
+    near, away = ids[0, 1], ids[0, 2]
+    sigmas[near], sigmas[away] = 0.2, share * 0.2 * math.exp(STREET / 20.0)
+    revisiting = Revisiting(CertaintyConfig(p_explore=0.5, pose_sigma_m=9.0))
+    revisiting.note_target(FRONTIER)
+    starts = [Approach(0.0, HalfEdgeId(ids[0, 0], -1))]
+    wanted = revisiting.next(graph, believed(0.1, sigmas), starts)
+    assert wanted is not None
+    assert wanted.vertex == (away if far else near)
 
 
 def test_the_goal_is_pursued_while_it_helps_and_no_longer() -> None:
