@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -30,6 +31,7 @@ from gvgbot.geometry import Array, Pose, rotated_covariance, wrap_angle
 from tests.unit.autonomy.slam.beliefs import updated
 from tests.unit.autonomy.slam.test_ekf import (
     as_array,
+    moved,
     numerical_jacobian,
     random_belief,
     random_covariance,
@@ -99,6 +101,23 @@ def test_what_many_looks_drew_errs_as_their_mean(seed: int) -> None:
     np.testing.assert_allclose(
         move(belief, STEP, NOISE, one).P, move(own, STEP, NOISE, each).P, rtol=1e-9, atol=1e-12
     )
+
+
+@given(seeds)
+def test_walls_are_off_by_as_much_as_the_base_that_old_poses_have_before_them(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    belief, _ = driven(rng, 6)
+    local_base, turn = random_pose(rng), rng.uniform(-3.0, 3.0)
+    c, s = math.cos(turn), math.sin(turn)
+    R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    gains = np.array([random_covariance(rng, 3) for _ in belief.trail])
+    looks = [clone.first for clone in belief.trail]
+    by_clones = trail._by_clones(belief, laid_at(local_base, 8, looks, gains, NOISE), R)
+    for i, (clone, G) in enumerate(zip(belief.trail, gains, strict=True)):
+        seen = as_array(clone.local_base.to(local_base))
+        A = numerical_jacobian(partial(moved, motion=seen), belief.x[clone_rows(belief, i)])
+        slot = slice(3 * clone.slot, 3 * clone.slot + 3)
+        np.testing.assert_allclose(by_clones[:, slot], R @ G @ R.T @ A, rtol=1e-5, atol=1e-7)
 
 
 @given(seeds)
