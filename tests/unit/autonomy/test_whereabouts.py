@@ -1,11 +1,12 @@
 """Which edge the robot is on, drawn by hand: passing vertices, turning back, loops, late sight."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from gvgbot.autonomy.gvg.local import Branch
+from gvgbot.autonomy.gvg.local import Branch, LocalGvg
 from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.autonomy.views import Correspondence
 from gvgbot.autonomy.whereabouts import Whereabouts
@@ -60,6 +61,59 @@ def test_passing_a_meetpoint_is_a_passage_from_the_edge_before_it() -> None:
     assert passed.line[-1] == pytest.approx([6.0, 0.0])
     assert passed.driven == pytest.approx(6.0, abs=0.3)
     assert walk.where.on_edge == HalfEdgeId(2, EAST)
+
+
+def test_who_has_not_been_away_from_a_meetpoint_comes_by_where_it_left() -> None:
+    walk = Walk().along(CORRIDOR, ALL_KNOWN, (6.4, 0.0), (6.1, 0.0), (6.0, -0.3), (6.0, -2.0))
+    assert walk.passages[-1].left == walk.passages[-1].arrived == HalfEdgeId(2, EAST)
+    assert walk.where.on_edge == HalfEdgeId(2, 2)
+
+
+@pytest.mark.parametrize("is_vertex", [True, False])
+def test_by_which_half_edge_it_came_is_not_known_of_who_was_last_seen_before_another_vertex(
+    *, is_vertex: bool
+) -> None:
+    """From x = 5 on nothing is seen until it is at the far end; between them is a meetpoint."""
+    ends = {Branch(10, forward=True): HalfEdgeId(1, EAST)}
+    ends[Branch(11, forward=False)] = HalfEdgeId(3, WEST)
+    known = known_as(ends, {1: 1, 3: 3} | ({2: 2} if is_vertex else {}))
+    walk = Walk().along(CORRIDOR, known, (1.0, 0.0), (5.0, 0.0))
+    walk.along(CORRIDOR, known, (11.5, 0.0))
+    passed = walk.passages[-1]
+    arrived = None if is_vertex else HalfEdgeId(3, WEST)
+    assert (passed.left, passed.arrived) == (HalfEdgeId(1, EAST), arrived)
+
+
+def narrowed(x: float) -> LocalGvg:
+    """The corridor, with 0.4 m to the walls instead of a metre at so many metres from its end."""
+    edge = CORRIDOR.edges[10]
+    clearance = np.where(np.abs(edge.polyline[:, 0] - x) < 0.25, 0.4, edge.clearance)
+    return LocalGvg(CORRIDOR.nodes, CORRIDOR.edges | {10: replace(edge, clearance=clearance)})
+
+
+@pytest.mark.parametrize(
+    ("before", "there", "least"),
+    [(0.4, 99.0, 0.4), (99.0, 3.0, 0.4), (4.0, 99.0, 1.0), (99.0, 99.0, 1.0)],
+    ids=["behind the robot at first", "seen when it is there", "ahead, but was none", "nowhere"],
+)
+def test_an_edge_is_as_narrow_as_its_narrowest_place(
+    before: float, there: float, least: float
+) -> None:
+    walk = Walk().along(narrowed(before), ALL_KNOWN, (1.0, 0.0), (2.0, 0.0))
+    walk.along(narrowed(there), ALL_KNOWN, (2.0, 0.0), (5.0, 0.0))
+    walk.along(CORRIDOR, ALL_KNOWN, (5.0, 0.0), (11.0, 0.0))
+    assert walk.passages[-1].narrowest == pytest.approx(least)
+    assert walk.where.narrowest == pytest.approx(1.0)  # of the next edge
+
+
+def test_the_way_back_leads_over_where_the_robot_came_from_to_its_vertex() -> None:
+    trail = list(resampled([(0.0, 0.0), (3.0, 0.0), (3.0, 2.0)]))
+    where = Whereabouts(HalfEdgeId(1, EAST), trail)
+    way = where.way_back(np.array([3.2, 0.5]))
+    assert way[0] == pytest.approx([3.0, 0.5])
+    assert way[-1] == pytest.approx([0.0, 0.0])
+    assert length_of(way) == pytest.approx(3.5)
+    assert not len(Whereabouts().way_back(np.zeros(2)))
 
 
 def test_turning_at_a_meetpoint_is_a_passage_too() -> None:
