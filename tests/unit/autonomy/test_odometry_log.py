@@ -54,6 +54,27 @@ def test_of_the_time_before_the_clock_was_set_back_nothing_is_known() -> None:
     assert not log.has_gap_since(0.99)
 
 
+@pytest.mark.parametrize(
+    ("headings", "still_s"),
+    [
+        ({0.0: 0.3, 1.0: 0.3, 1.9: 0.3}, 0.0),
+        ({0.0: 0.3, 1.0: 0.3, 3.0: 0.3, 12.0: 0.3}, 10.0),
+        ({0.0: 0.3, 100.0: 0.3, 100.1: 0.3}, 98.1),
+        ({0.0: 0.3, 6.0: 0.4, 7.0: 0.4, 9.0: 0.4, 9.5: 0.5}, 1.0),
+        ({0.0: 0.3, 5.0: 0.3, 6.0: 0.31, 7.0: 0.31, 11.0: 0.31}, 6.0),
+        ({0.5 * i: 0.001 * i for i in range(100)}, 0.0),
+    ],
+    ids=["too short", "stands", "unheard", "turns between", "stands twice", "drifts"],
+)
+def test_a_gyro_whose_heading_stays_for_two_seconds_does_not_drift_from_then_on(
+    headings: dict[float, float], still_s: float
+) -> None:
+    log = OdometryLog()
+    for stamp, theta in headings.items():
+        log.append(Odometry(stamp + 40.0, Pose(0.0, 0.0, theta), Twist()))
+    assert log.unturned_s == pytest.approx(still_s)
+
+
 @pytest.mark.parametrize("duration", [0.1, 0.025, -0.1, -0.025])
 def test_a_sweep_is_driven_from_its_first_beam_to_its_last(duration: float) -> None:
     """A base that turns faster and faster; upside down, the last beam is the earlier one."""
