@@ -17,7 +17,7 @@ from gvgbot.autonomy.topology import (
     take_out,
     tied_to,
 )
-from gvgbot.geometry import Pose
+from gvgbot.geometry import Pose, wrap_angle
 from tests.unit.autonomy.graphs import (
     STREET,
     between,
@@ -48,20 +48,47 @@ def is_sound(graph: GvgGraph) -> bool:
     return paired and degrees == len(ends) + len(graph.frontiers()) and len(set(ends)) == len(ends)
 
 
-@pytest.mark.parametrize(("sigma", "edges"), [(0.1, 2), (2.0, 1)])
-def test_a_vertex_parts_an_edge_only_if_it_surely_stands_there(sigma: float, edges: int) -> None:
+def with_vertex_in_street(
+    sigma: float, *bearings: float
+) -> tuple[GvgGraph, Belief, Vertex, dict[tuple[int, int], int]]:
+    """A street with a vertex a decimetre beside its middle, and departures of that at bearings."""
     graph, ids = streets(2, 1)
     (street,) = graph.edges.values()
     street.polyline = np.linspace(street.polyline[0], street.polyline[-1], 11)
-    middle = doubled(graph, TURN, TURN + math.pi)
+    middle = doubled(graph, *(TURN + bearing for bearing in bearings))
     places = np.array([[0.0, 0.0], [STREET, 0.0], [STREET / 2, 0.1]])
     P = np.zeros((12, 12))
     P[9:11, 9:11] = sigma**2 / 2 * np.eye(2)
     x = np.hstack([np.zeros(3), np.pad(places, ((0, 0), (0, 1))).ravel()])
-    belief = Belief(x, P, (ids[0, 0], ids[1, 0], middle.id))
+    return graph, Belief(x, P, (ids[0, 0], ids[1, 0], middle.id)), middle, ids
+
+
+@pytest.mark.parametrize(("sigma", "edges"), [(0.1, 2), (2.0, 1)])
+def test_a_vertex_parts_an_edge_only_if_it_surely_stands_there(sigma: float, edges: int) -> None:
+    graph, belief, middle, _ = with_vertex_in_street(sigma, 0.0, math.pi)
     split_edge_at(graph, belief, middle, reach=0.8, angle=ANGLE)
     assert len(graph.edges) == edges
     assert [edge.is_part for edge in graph.edges.values()] == [edges == 2] * edges
+    lines = [belief.map_vertex(e.a.vertex).transform(e.polyline) for e in graph.edges.values()]
+    places = {tuple(point) for line in lines for point in line.round(6).tolist()}
+    assert places >= {(float(x), 0.0) for x in range(11)}  # all that it led over
+    assert is_sound(graph)
+
+
+@pytest.mark.parametrize("bearing", [0.0, math.pi])
+@pytest.mark.parametrize("is_driven", [True, False])
+def test_who_drove_all_along_an_edge_from_a_vertex_on_it_knows_that_it_leaves_both_ways(
+    bearing: float, *, is_driven: bool
+) -> None:
+    graph, belief, middle, ids = with_vertex_in_street(0.1, bearing)
+    driven = 0 if is_driven else None
+    split_edge_at(graph, belief, middle, reach=0.8, angle=ANGLE, driven=driven)
+    assert len(graph.edges) == 1 + is_driven
+    assert middle.degree == 1 + is_driven
+    if is_driven:
+        assert abs(wrap_angle(middle.half_edges[1].bearing - bearing)) > 3.0
+        for neighbour in ids.values():
+            assert between(graph, middle.id, neighbour)
     assert is_sound(graph)
 
 
@@ -228,6 +255,22 @@ def test_two_edges_of_what_is_none_become_one_unless_a_third_way_goes_straight_o
     assert len(graph.edges) == edges
     assert len(graph.frontiers()) == 2 * (2 - edges)  # to the far corner, and what was lost
     assert is_sound(graph)
+
+
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_what_was_made_of_two_edges_is_of_the_finished_map_if_both_were(count: int) -> None:
+    """And it is a part of another edge if both were: then it may have more room than it says."""
+    graph, ids = streets(3, 1)
+    for edge in list(graph.edges.values())[:count]:
+        edge.established = edge.is_part = True
+    places = np.array([[x * STREET, 0.0, 0.0] for x in range(3)])
+    belief = Belief(
+        np.hstack([np.zeros(3), places.ravel()]), np.zeros((12, 12)), tuple(ids.values())
+    )
+    take_out(graph, belief, graph.vertices[ids[1, 0]])
+    (edge,) = graph.edges.values()
+    assert edge.established == edge.is_part == (count == 2)
+    assert edge.length == pytest.approx(2 * STREET)
 
 
 @pytest.mark.parametrize("seed", range(20))
