@@ -88,10 +88,11 @@ class RayCaster:
         slopes = np.empty((2, len(directions)))
         np.cos(directions, out=slopes[0])
         np.sin(directions, out=slopes[1])
-        axis, depth = (face >= faces.vertical).astype(np.intp), faces.plane[face]
-        if moved is not None:
-            depth = depth - moved[beam, axis]
-        crossed = depth / slopes[axis, beam]
+        if moved is None:
+            axis = (face >= faces.vertical).astype(np.intp)
+            crossed = faces.plane[face] / slopes[axis, beam]
+        else:
+            crossed = _on_faces(faces, face, moved[beam], slopes[:, beam])
         ranges = np.full(len(directions), np.inf)
         np.minimum.at(ranges, beam, crossed)
         ranges[ranges > reach] = np.inf
@@ -173,6 +174,24 @@ def _crossings(faces: Faces, directions: Array) -> tuple[Index, Index]:
     low = directions.searchsorted(start - ANGLE_SLACK, side="left")
     high = directions.searchsorted(start + width[face] + ANGLE_SLACK, side="right")
     return _expanded(face, low, high - low)
+
+
+def _on_faces(faces: Faces, face: Index, moved: Array, slopes: Array) -> Array:
+    """Ranges (M,) to the faces (M,) that beams would meet, had they not begun `moved` (M, 2) away.
+
+    A beam that is almost along its face may meet the line of that far from it, or nowhere: it ends
+    where the face does.
+    """
+    beam, axis = np.arange(len(face)), (face >= faces.vertical).astype(np.intp)
+    depth = faces.plane[face] - moved[beam, axis]
+    ranges = depth / slopes[axis, beam]
+    aside = moved[beam, 1 - axis]
+    crossed = aside + ranges * slopes[1 - axis, beam]
+    first, last = faces.first[face], faces.last[face]
+    ends = np.clip(crossed, np.minimum(first, last), np.maximum(first, last))
+    off = ends != crossed
+    ranges[off] = np.hypot(depth[off], ends[off] - aside[off])
+    return np.asarray(ranges)
 
 
 def _expanded(face: Index, low: Index, count: Index) -> tuple[Index, Index]:

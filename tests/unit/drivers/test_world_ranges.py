@@ -96,6 +96,29 @@ def test_beams_that_graze_a_long_wall_stay_true(offset: float) -> None:
     np.testing.assert_allclose(ranges, np.where(slopes < 0, low, high), rtol=1e-4)
 
 
+@pytest.mark.parametrize("aside", [-0.005, 0.005])
+def test_a_moved_beam_along_a_square_ends_on_it(aside: float) -> None:
+    square = World(np.ones((1, 1), dtype=np.bool_), 0.1, (2.0, -0.1))
+    a_millimetre_above, moved = Pose(0.0, 0.001, 0.0), np.array([[0.0, aside]])
+    bearing = np.array([-0.001 / 2.05])  # from there, to the middle of its upper side
+    (metres,) = square.cast(a_millimetre_above, bearing, 30.0, moved)
+    assert 1.99 < metres < 2.11
+
+
+@given(seed=st.integers(0, 10**6), density=st.floats(0.01, 0.4))
+def test_moved_beams_end_as_near_to_a_wall_as_they_are_moved(seed: int, density: float) -> None:
+    rng = np.random.default_rng(seed)
+    world = World(rng.random((24, 31)) < density, 0.05)
+    x, y, theta = rng.uniform((0.0, 0.0, -10.0), (1.55, 1.2, 10.0))
+    moved = rng.uniform(-0.005, 0.005, (len(FAN), 2))
+    ranges = world.cast(Pose(x, y, theta), FAN, 50.0, moved)
+    seen = np.isfinite(ranges) & (ranges > 0.02)  # nearer, the beam may begin in the wall
+    directions = np.column_stack((np.cos(theta + FAN), np.sin(theta + FAN)))
+    ends = np.array([x, y]) + moved + ranges[:, None] * directions
+    for end_x, end_y in ends[seen].tolist():
+        assert len(world.wall_offsets(end_x, end_y, 0.008))
+
+
 def test_turning_the_sensor_one_way_is_turning_its_beams_the_other() -> None:
     world, turn = room(53, 41), 0.7
     turned = world.cast(Pose(1.0, 2.0, turn), FAN, 100.0)
