@@ -10,7 +10,7 @@ import numpy as np
 from gvgbot.autonomy.keyframes import Keyframe
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.graph import Vertex
-from gvgbot.geometry import Array, Pose, rows_of
+from gvgbot.geometry import Array, Pose, rows_of, stations_of
 from gvgbot.live.grid import LiveGrid
 from gvgbot.live.past import LivePast, Portion
 from gvgbot.topics import (
@@ -39,7 +39,6 @@ class Stretch(NamedTuple):
 
     start: int
     end: int
-    length: float
     points: Array
 
 
@@ -71,10 +70,7 @@ class LiveMap:
             _vertex(vertex, poses[vertex.id], belief.vertex_covariance(vertex.id))
             for vertex in graph.vertices.values()
         )
-        edges = [
-            Stretch(edge.a.vertex, edge.b.vertex, edge.length, edge.shown)
-            for edge in graph.edges.values()
-        ]
+        edges = [Stretch(edge.a.vertex, edge.b.vertex, edge.shown) for edge in graph.edges.values()]
 
         def graph_of_now() -> Map:
             lines, walls = bent(edges, poses), packed(pipeline.sight.virtual_walls)
@@ -184,18 +180,21 @@ def bent(edges: Sequence[Stretch], poses: Mapping[int, Pose]) -> tuple[MapEdge, 
     line = np.column_stack(
         [x + c * turned[:, 0] - s * turned[:, 1], y + s * turned[:, 0] + c * turned[:, 1]]
     )
-    along = np.append(0.0, np.cumsum(np.hypot(*(line[1:] - line[:-1]).T)))
-    lengths = np.maximum(along[last] - along[first], 1e-9)
-    share = ((along - along[first][which]) / lengths[which])[:, None]
+    along = stations_of(line)
+    seen = np.maximum(along[last] - along[first], 1e-9)
+    share = ((along - along[first][which]) / seen[which])[:, None]
     at_start, at_end = starts[:, :2] - line[first], ends[:, :2] - line[last]
     line += (1.0 - share) * at_start[which] + share * at_end[which]
-    data = packed(line)
+    along = stations_of(line)
+    lengths, data = along[last] - along[first], packed(line)
     return tuple(
         MapEdge(
             start=edge.start,
             end=edge.end,
-            length=edge.length,
+            length=length,
             points=data[_POINT * begin : _POINT * (end + 1)],
         )
-        for edge, begin, end in zip(edges, first.tolist(), last.tolist(), strict=True)
+        for edge, length, begin, end in zip(
+            edges, lengths.tolist(), first.tolist(), last.tolist(), strict=True
+        )
     )

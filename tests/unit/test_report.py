@@ -74,6 +74,20 @@ def test_an_edge_that_was_put_together_of_two_does_not_turn_back() -> None:
     assert length_of(told.polyline) == pytest.approx(4.0)
 
 
+def test_an_edge_is_as_long_as_its_line_whatever_was_measured_when_it_was_seen() -> None:
+    mind = pipeline([])
+    ends = []
+    for number, x in ((1, 0.0), (2, 4.0)):
+        vertex = mind.mapper.graph.vertices[number] = Vertex(number, 1.0, Pose(x), 0.0, 0.0)
+        ends.append(HalfEdgeId(number, vertex.add_half_edge(0.0)))
+    line = np.array([[0.0, 0.0], [2.0, 0.0], [4.0, 0.0]])
+    mind.mapper.graph.join(ends[0], ends[1], line, 1.0, driven=True)
+    now = {1: Pose(), 2: Pose(3.0, 4.0)}  # after a loop closed
+    (told,) = route_graph(mind, now, {1: np.eye(2), 2: np.eye(2)}).edges
+    assert told.polyline[-1].tolist() == [3.0, 4.0]
+    assert told.length == pytest.approx(5.0)
+
+
 def street(claimed: float, start: tuple[float, float], end: tuple[float, float]) -> RouteGraph:
     """A straight edge that claims so much room."""
     vertices = tuple(

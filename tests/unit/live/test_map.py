@@ -154,10 +154,11 @@ def test_standing_makes_a_trajectory_no_longer() -> None:
 def test_edges_are_turned_with_their_vertex_and_bent_to_end_on_the_other() -> None:
     poses = {1: Pose(1.0, 2.0, math.pi / 2), 2: Pose(1.0, 6.0, 0.3), 3: Pose(1.0, 2.5, 0.0)}
     line = np.array([[0.0, 0.0], [1.0, 0.5], [2.0, 0.0], [4.0, 0.0]])
-    fits = Stretch(1, 2, 4.2, line)  # four metres ahead of 1, which looks north: there is 2
-    short = Stretch(3, 2, 2.0, np.array([[0.0, 1.0], [0.0, 2.0], [0.0, 3.0]]))  # from 3.5 to 5.5
+    fits = Stretch(1, 2, line)  # four metres ahead of 1, which looks north: there is 2
+    short = Stretch(3, 2, np.array([[0.0, 1.0], [0.0, 2.0], [0.0, 3.0]]))  # from 3.5 to 5.5
     edges = bent([fits, short], poses)
-    assert [(edge.start, edge.end, edge.length) for edge in edges] == [(1, 2, 4.2), (3, 2, 2.0)]
+    assert [(edge.start, edge.end) for edge in edges] == [(1, 2), (3, 2)]
+    assert [edge.length for edge in edges] == pytest.approx([2.0 + 2.0 * math.hypot(0.5, 1.0), 3.5])
     expected = [[1.0, 2.0], [0.5, 3.0], [1.0, 4.0], [1.0, 6.0]]
     assert edges[0].polyline == pytest.approx(np.array(expected), abs=1e-6)
     moved = [[1.0, 2.5], [1.0, 4.25], [1.0, 6.0]]  # by -1 at the start, +0.5 at the end
@@ -169,7 +170,7 @@ def test_edges_are_bent_at_once_as_they_would_be_one_by_one(seed: int, counts: l
     rng = np.random.default_rng(seed)
     poses = {number: Pose(*rng.uniform(-9.0, 9.0, 3).tolist()) for number in range(4)}
     edges = [
-        Stretch(int(start), int(end), 1.0, rng.uniform(-5.0, 5.0, (count, 2)))
+        Stretch(int(start), int(end), rng.uniform(-5.0, 5.0, (count, 2)))
         for (start, end), count in zip(rng.integers(0, 4, (len(counts), 2)), counts, strict=True)
     ]
     for edge, told in zip(edges, bent(edges, poses), strict=True):
