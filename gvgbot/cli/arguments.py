@@ -31,8 +31,13 @@ class Parser(argparse.ArgumentParser):
         self._negative_number_matcher = NEGATIVE_NUMBER
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Refuse what is not known here, so that the help that is named is that of the command."""
+        """Refuse what is not known here, so that the help that is named is that of the command.
+
+        Words may go on behind an option: `ctl turtlebot2 --connect ADDRESS goto 7`.
+        """
         parsed, unknown = super().parse_known_args(args, namespace)
+        if "words" in parsed and all(_is_word(one) for one in unknown):
+            parsed.words, unknown = [*parsed.words, *unknown], []
         if unknown:
             self.error(f"unrecognized arguments: {' '.join(unknown)}{self._hint(unknown)}")
         return parsed, unknown
@@ -55,6 +60,10 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """End with the message and the status of wrong usage."""
         self.exit(BAD_USAGE, f"{self.prog}: {message} (see {self.prog} --help)\n")
+
+
+def _is_word(argument: str) -> bool:
+    return not argument.startswith("-") or NEGATIVE_NUMBER.match(argument) is not None
 
 
 Commands: TypeAlias = "argparse._SubParsersAction[Parser]"  # noqa: SLF001 the only name it has

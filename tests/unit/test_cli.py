@@ -57,6 +57,7 @@ BAD_ARGUMENTS = {
     "a port above the last": (["web", "--port", "65536"], "there are 0 to 65535"),
     "no host for the page": (["web", "--host", ""], "--host: it is empty: 127.0.0.1 is this"),
     "no request": (["ctl"], "REQUEST"),
+    "no such option of a request": (["ctl", "goto", "7", "--x"], "unrecognized arguments: --x"),
     "two configurations": (["run", "a.yaml", "b.yaml"], "b.yaml"),
 }
 

@@ -3,6 +3,7 @@
 import pytest
 
 from gvgbot.cli import main
+from gvgbot.cli.entry import parser
 from gvgbot.ctl import _split, _value
 
 NOBODY = ("--connect", "tcp/127.0.0.1:1")
@@ -23,6 +24,20 @@ def test_the_name_of_the_robot_can_be_left_out(
     words: list[str], name: str | None, request_: str, arguments: list[str]
 ) -> None:
     assert _split(words) == (name, request_, arguments)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["sim", *NOBODY, "goto", "1.5", "-2"],
+        ["sim", "goto", *NOBODY, "1.5", "-2"],
+        ["sim", "goto", "1.5", *NOBODY, "-2"],
+        [*NOBODY, "sim", "goto", "1.5", "-2"],
+    ],
+)
+def test_the_address_may_stand_anywhere_among_the_words(words: list[str]) -> None:
+    behind = parser().parse_args(["ctl", "sim", "goto", "1.5", "-2", *NOBODY])
+    assert vars(parser().parse_args(["ctl", *words])) == vars(behind)
 
 
 @pytest.mark.parametrize(
