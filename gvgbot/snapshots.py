@@ -112,7 +112,10 @@ def sign(now: State, *, is_lost: bool) -> Sign:
 
 
 def pose_covariance(pipeline: Pipeline, odometry: Odometry | None, noise: OdometryNoise) -> Array:
-    """Covariance (3, 3) of map_base: the belief's, grown by the motion since the last keyframe."""
+    """Covariance (3, 3) of map_base: the belief's, grown by the motion since the last keyframe.
+
+    While the heading stays the same no gyro drifts, however long the robot stands there.
+    """
     if pipeline.is_lost:
         return UNKNOWN * np.eye(3)
     robot = part(pipeline.mapper.belief, ())
@@ -120,7 +123,7 @@ def pose_covariance(pipeline: Pipeline, odometry: Odometry | None, noise: Odomet
     if odometry is None or last is None:
         return robot.P
     motion = last.odom_base.to(odometry.odom_base)
-    growth = noise.covariance(motion, max(0.0, odometry.stamp - last.stamp))
+    growth = noise.covariance(motion, pipeline.tracker.felt_s(odometry.stamp - last.stamp))
     return predict(robot, motion, growth).P
 
 

@@ -37,6 +37,10 @@ class PoseTracker:
         is_broken, self._breaks = newest.breaks != self._breaks, newest.breaks
         return is_broken
 
+    def felt_s(self, duration: float) -> float:
+        """How long the gyro may have drifted, s, since the last look, so many seconds ago."""
+        return max(0.0, duration - (self.odometry.unturned_s - self._unturned_s))
+
     def track(
         self,
         scan: Scan,
@@ -91,9 +95,8 @@ class PoseTracker:
         For how long, s, its gyro may have drifted, and the parts (4, 3, 3) of its noise, in the
         frame of the base after the motion: what `LocalMaps.match` takes.
         """
-        duration = max(0.0, duration)
-        felt_s = max(0.0, duration - (self.odometry.unturned_s - self._unturned_s))
-        return felt_s, rotated_covariance(self._noise.parts(motion, duration), -motion.theta)
+        noise = self._noise.parts(motion, max(0.0, duration))
+        return self.felt_s(duration), rotated_covariance(noise, -motion.theta)
 
     def take_over(self, other: Self) -> None:
         """Go on in the local frame of another one, with its walls and by its odometry."""

@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 import zenoh
 
+from gvgbot.autonomy.config import AutonomyConfig
 from gvgbot.autonomy.pipeline import Pipeline
+from gvgbot.autonomy.pose_tracking import PoseTracker
 from gvgbot.autonomy.slam.ekf import Belief, OdometryNoise
 from gvgbot.config import load_config
 from gvgbot.errors import ConfigError
@@ -195,7 +197,8 @@ def mind(belief: Belief, keyframe: Pose | None) -> Pipeline:
     """As much of a pipeline as its covariance needs."""
     last = None if keyframe is None else SimpleNamespace(odom_base=keyframe, stamp=1.0)
     mapper, past = SimpleNamespace(belief=belief), SimpleNamespace(last=last)
-    return cast(Pipeline, SimpleNamespace(mapper=mapper, past=past, is_lost=False))
+    tracker = PoseTracker(AutonomyConfig(), matches_walls=True)
+    return cast(Pipeline, SimpleNamespace(mapper=mapper, past=past, tracker=tracker, is_lost=False))
 
 
 def test_without_a_keyframe_the_covariance_is_the_belief_s() -> None:
@@ -233,8 +236,14 @@ def test_a_wrong_heading_puts_the_robot_to_the_side_as_it_goes_on() -> None:
     assert found == pytest.approx(sampled, rel=0.03, abs=2e-5)
 
 
-def test_the_covariance_grows_with_time_even_at_rest() -> None:
-    drifting = replace(NOISELESS, turn_rad_per_sqrt_s=0.01)
-    resting = Odometry(101.0, Pose(), STANDSTILL)
-    found = pose_covariance(mind(BELIEF, Pose()), resting, drifting)
-    assert math.sqrt(found[2, 2] - BELIEF.P[2, 2]) == pytest.approx(0.01 * 10.0, rel=1e-3)
+@pytest.mark.parametrize(("turns_rad", "sigma_rad"), [(1e-4, 0.01 * 10.0), (0.0, 0.01 * 2.0**0.5)])
+def test_the_covariance_grows_with_time_while_the_gyro_tells_of_turns(
+    turns_rad: float, sigma_rad: float
+) -> None:
+    """A gyro that drifts shows it within two seconds: one that shows nothing does not drift."""
+    drifting, robot = replace(NOISELESS, turn_rad_per_sqrt_s=0.01), mind(BELIEF, Pose())
+    for second in range(1, 102):
+        turned = Pose(0.0, 0.0, turns_rad * (second % 2))
+        robot.tracker.odometry.append(Odometry(float(second), turned, STANDSTILL))
+    found = pose_covariance(robot, robot.tracker.odometry.newest, drifting)
+    assert math.sqrt(found[2, 2] - BELIEF.P[2, 2]) == pytest.approx(sigma_rad, rel=1e-3)
