@@ -54,7 +54,6 @@ def graph() -> RouteGraph:
             start=number,
             end=number + 1,
             polyline=np.linspace(places[number], places[number + 1], 100),
-            length=20.0,
             min_clearance=0.5,
         )
         for number in range(VERTICES - 1)

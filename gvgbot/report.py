@@ -23,7 +23,6 @@ from gvgbot.geometry import (
     Poses,
     anchored,
     composed,
-    length_of,
     resampled,
     rows_of,
     seen_from,
@@ -174,14 +173,12 @@ def _route_node(vertex: Vertex, pose: Pose, covariance: Array) -> RouteNode:
 
 def _route_edge(edge: Edge, vertices: dict[int, Pose]) -> RouteEdge:
     """An edge whose polyline is bent so that it ends on its vertices."""
+    line = vertices[edge.a.vertex].transform(edge.shown)
     start, end = (vertices[half.vertex].position for half in (edge.a, edge.b))
-    seen = vertices[edge.a.vertex].transform(edge.shown)
-    line = without_spikes(anchored(seen, start, end))
     return RouteEdge(
         start=edge.a.vertex,
         end=edge.b.vertex,
-        polyline=line,
-        length=length_of(line),
+        polyline=without_spikes(anchored(line, start, end)),
         min_clearance=edge.min_clearance,
         traversals=edge.traversals,
     )

@@ -203,9 +203,11 @@ def _route_node(feature: _Vertex) -> RouteNode:
 def _route_edge(feature: _Edge) -> RouteEdge:
     properties = feature.properties
     (line,) = feature.geometry.coordinates
+    metadata = properties.metadata
     return RouteEdge(
         start=properties.startid,
         end=properties.endid,
         polyline=np.array(line, np.float64).reshape(-1, 2),
-        **msgspec.structs.asdict(properties.metadata),
+        min_clearance=metadata.min_clearance,
+        traversals=metadata.traversals,
     )

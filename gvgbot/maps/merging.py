@@ -241,17 +241,16 @@ def _split(edges: Iterable[RouteEdge], vertices: list[RouteNode]) -> Iterable[Ro
         start, first = edge.start, 0
         for i, middle in sorted(cuts):
             if i > first:
-                yield _piece(edge, start, middle, first, i, along)
+                yield _piece(edge, start, middle, first, i)
                 start, first = middle, i
-        yield _piece(edge, start, edge.end, first, len(line) - 1, along)
+        yield _piece(edge, start, edge.end, first, len(line) - 1)
 
 
-def _piece(edge: RouteEdge, start: int, end: int, first: int, last: int, along: Array) -> RouteEdge:
-    if (first, last) == (0, len(along) - 1):
+def _piece(edge: RouteEdge, start: int, end: int, first: int, last: int) -> RouteEdge:
+    if (first, last) == (0, len(edge.polyline) - 1):
         return edge
-    share = float((along[last] - along[first]) / max(along[-1], 1e-9))
     line = edge.polyline[first : last + 1].copy()
-    return replace(edge, start=start, end=end, polyline=line, length=share * edge.length)
+    return replace(edge, start=start, end=end, polyline=line)
 
 
 def _twin(edge: RouteEdge, own: Sequence[RouteEdge]) -> int | None:

@@ -38,7 +38,6 @@ def pieced(graph: RouteGraph, ways: Sequence[tuple[Array, float]]) -> RouteGraph
                 start=vertex.id,
                 end=vertices[walk.place].id,
                 polyline=_evened(walk.line),
-                length=walk.length,
                 min_clearance=walk.min_clearance,
                 traversals=1,
             )

@@ -2,12 +2,12 @@
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 
-from gvgbot.geometry import Array
+from gvgbot.geometry import Array, length_of
 
 VertexKind = Literal["meetpoint", "endpoint"]
 
@@ -37,13 +37,14 @@ class RouteEdge:
     """An edge between two vertices, which may be one and the same.
 
     `polyline` (N, 2) in m, map frame, runs from the vertex `start` to the vertex `end`; read-only.
-    `length` and `min_clearance` in m; `traversals` counts the times the robot drove along it.
+    `length`, its own, and `min_clearance` in m; `traversals` counts the times the robot drove
+    along it.
     """
 
     start: int
     end: int
     polyline: Array
-    length: float
+    length: float = field(init=False)
     min_clearance: float
     traversals: int = 0
 
@@ -51,6 +52,7 @@ class RouteEdge:
         if self.polyline.ndim != 2 or self.polyline.shape[1] != 2 or len(self.polyline) < 2:
             raise ValueError(f"edge from {self.start} to {self.end} needs two points or more")
         self.polyline.setflags(write=False)
+        object.__setattr__(self, "length", length_of(self.polyline))
 
 
 def lines_from(vertex: int, edges: Iterable[RouteEdge]) -> Iterator[Array]:

@@ -57,7 +57,6 @@ def _edge(edge: ChartEdge) -> RouteEdge:
         start=edge.a.vertex,
         end=edge.b.vertex,
         polyline=edge.polyline.copy(),
-        length=edge.length,
         min_clearance=edge.min_clearance,
         traversals=int(edge.traversed),
     )

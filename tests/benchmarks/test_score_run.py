@@ -50,7 +50,7 @@ def route(
             for node, place in places.items()
         ),
         tuple(
-            RouteEdge(start=a, end=b, polyline=np.zeros((2, 2)), length=1.0, min_clearance=1.0)
+            RouteEdge(start=a, end=b, polyline=np.zeros((2, 2)), min_clearance=1.0)
             for a, b in edges
         ),
     )

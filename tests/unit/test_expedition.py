@@ -36,7 +36,7 @@ def street(claimed: float) -> RouteGraph:
         for number, x, bearing in ((1, 0.0, 0.0), (2, 4.0, np.pi))
     )
     line = np.array([(0.0, 0.0), (4.0, 0.0)])
-    edge = RouteEdge(start=1, end=2, polyline=line, length=4.0, min_clearance=claimed)
+    edge = RouteEdge(start=1, end=2, polyline=line, min_clearance=claimed)
     return RouteGraph(vertices, (edge,))
 
 

@@ -102,8 +102,7 @@ def street(claimed: float, start: tuple[float, float], end: tuple[float, float])
         )
         for vertex, place in ((1, start), (2, end))
     )
-    line, length = np.array([start, end]), math.dist(start, end)
-    edge = RouteEdge(start=1, end=2, polyline=line, length=length, min_clearance=claimed)
+    edge = RouteEdge(start=1, end=2, polyline=np.array([start, end]), min_clearance=claimed)
     return RouteGraph(vertices, (edge,))
 
 

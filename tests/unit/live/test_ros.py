@@ -210,7 +210,7 @@ def vertex(number: int, x: float, kind: Any, frontiers: tuple[float, ...] = ()) 
 
 def test_markers_show_vertices_edges_and_frontiers() -> None:
     line = np.array([[0.0, 1.0], [2.0, 1.5], [4.0, 1.0]])
-    edge = RouteEdge(start=1, end=2, polyline=line, length=4.1, min_clearance=0.5)
+    edge = RouteEdge(start=1, end=2, polyline=line, min_clearance=0.5)
     ends = (vertex(1, 0.0, "meetpoint", (math.pi / 2,)), vertex(2, 4.0, "meetpoint"))
     told: Any = STORE.deserialize_cdr(
         encode(markers(RouteGraph(ends, (edge,)), 7.5)), "visualization_msgs/msg/MarkerArray"

@@ -41,8 +41,7 @@ def vertex(
 
 def edge(start: int, end: int, *points: tuple[float, float]) -> RouteEdge:
     line = np.array(points)
-    length = float(np.hypot(*np.diff(line, axis=0).T).sum())
-    return RouteEdge(start=start, end=end, polyline=line, length=length, min_clearance=0.9)
+    return RouteEdge(start=start, end=end, polyline=line, min_clearance=0.9)
 
 
 GRAPH = RouteGraph(

@@ -57,8 +57,7 @@ def town(
 
 def street(start: int, end: int, points: list[Array]) -> RouteEdge:
     line = np.array(points)
-    length = float(np.hypot(*np.diff(line, axis=0).T).sum())
-    return RouteEdge(start=start, end=end, polyline=line, length=length, min_clearance=1.0)
+    return RouteEdge(start=start, end=end, polyline=line, min_clearance=1.0)
 
 
 def without(graph: RouteGraph, *numbers: int) -> RouteGraph:

@@ -145,7 +145,7 @@ def test_parallel_edges_and_loops_stay_what_they_are(run: Path) -> None:
 
 def _loop() -> RouteEdge:
     line = np.array([[5.0, 0.0], [6.0, 1.0], [5.0, 0.0]])
-    return RouteEdge(start=2, end=2, polyline=line, length=2.8, min_clearance=0.5)
+    return RouteEdge(start=2, end=2, polyline=line, min_clearance=0.5)
 
 
 def test_geojson_is_for_the_route_server(run: Path) -> None:

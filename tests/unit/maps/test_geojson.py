@@ -27,12 +27,11 @@ def a_vertex(number: int, x: float = 0.0, y: float = 0.0, **changes: Any) -> Rou
     return RouteNode(**(fields | changes))
 
 
-def an_edge(start: int, end: int, *points: tuple[float, float], length: float = 3.0) -> RouteEdge:
+def an_edge(start: int, end: int, *points: tuple[float, float]) -> RouteEdge:
     return RouteEdge(
         start=start,
         end=end,
         polyline=np.array(points),
-        length=length,
         min_clearance=0.4,
         traversals=2,
     )
@@ -156,7 +155,6 @@ def graphs(draw: st.DrawFn) -> RouteGraph:
             start=draw(st.sampled_from(ids)),
             end=draw(st.sampled_from(ids)),
             polyline=np.array(draw(st.lists(points, min_size=2, max_size=4))),
-            length=draw(st.floats(0, 1e3)),
             min_clearance=draw(st.floats(0, 30)),
             traversals=draw(st.integers(0, 99)),
         )
@@ -236,8 +234,8 @@ def test_damage_is_named_in_one_line(old: str, new: str, complaint: str) -> None
 
 def test_the_largest_map_there_can_be_is_read() -> None:
     far = RouteGraph(
-        (a_vertex(0, 1e5, -1e5, covariance=(1e10, -1e10, -1e10, 1e10)), a_vertex(1)),
-        (an_edge(0, 1, (1e5, -1e5), (0.0, 0.0), length=1e5),),
+        (a_vertex(0, 1e5, -1e5, covariance=(1e10, -1e10, -1e10, 1e10)), a_vertex(1, 1e5)),
+        (an_edge(0, 1, (1e5, -1e5), (1e5, 0.0)),),
     )
     assert decode(encode(far)).vertices == far.vertices
 

@@ -36,7 +36,6 @@ def corridor(*, sees_door: bool, drove: bool = True) -> RouteGraph:
                 start=0,
                 end=1,
                 polyline=np.linspace((0, 0), (8, 0), 80),
-                length=8.0,
                 min_clearance=0.8,
                 traversals=int(drove),
             ),

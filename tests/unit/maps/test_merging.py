@@ -36,7 +36,6 @@ def seen(vertices: set[int], shift: int = 0) -> RouteGraph:
                 start=a + shift,
                 end=b + shift,
                 polyline=np.linspace(PLACES[a], PLACES[b], 30),
-                length=math.dist(PLACES[a], PLACES[b]),
                 min_clearance=0.8,
             )
             for a, b in edges
@@ -94,10 +93,7 @@ def positions(graph: RouteGraph) -> set[tuple[float, float]]:
 
 def way(start: int, end: int, line: Array) -> RouteEdge:
     """An edge that was driven."""
-    length = float(np.hypot(*np.diff(line, axis=0).T).sum())
-    return RouteEdge(
-        start=start, end=end, polyline=line, length=length, min_clearance=0.4, traversals=1
-    )
+    return RouteEdge(start=start, end=end, polyline=line, min_clearance=0.4, traversals=1)
 
 
 def driven(graph: RouteGraph) -> RouteGraph:
@@ -232,7 +228,6 @@ def test_a_vertex_that_one_map_lacks_splits_its_edge() -> None:
                 start=0,
                 end=2,
                 polyline=np.linspace(PLACES[0], PLACES[2], 60),
-                length=13.0,
                 min_clearance=0.8,
             ),
         ),

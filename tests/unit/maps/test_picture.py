@@ -161,7 +161,7 @@ def test_of_a_huge_map_no_thin_wall_is_lost() -> None:
 
 def test_edges_paths_and_frontiers_are_drawn_in_their_colours() -> None:
     edge = RouteEdge(
-        start=1, end=2, polyline=np.array([[0.0, 0.0], [20.0, 0.0]]), length=20.0, min_clearance=1.0
+        start=1, end=2, polyline=np.array([[0.0, 0.0], [20.0, 0.0]]), min_clearance=1.0
     )
     graph = RouteGraph(
         (vertex(1, 0.0, 0.0, frontiers=(math.pi / 2,)), vertex(2, 20.0, 0.0)), (edge,)

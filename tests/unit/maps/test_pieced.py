@@ -65,9 +65,7 @@ def test_a_way_that_leads_nowhere_changes_nothing() -> None:
 
 
 def test_an_edge_that_is_known_is_not_there_twice() -> None:
-    known = RouteEdge(
-        start=4, end=7, polyline=line(0.0, 10.0), length=10.0, min_clearance=0.5, traversals=1
-    )
+    known = RouteEdge(start=4, end=7, polyline=line(0.0, 10.0), min_clearance=0.5, traversals=1)
     joined = pieced(RouteGraph(GRAPH.vertices, (known,)), HALVES)
     assert [(edge.start, edge.end) for edge in joined.edges] == [(4, 7)]
 

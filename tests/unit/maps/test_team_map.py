@@ -58,6 +58,16 @@ def test_what_two_have_driven_from_both_ends_is_an_edge_of_the_team() -> None:
     assert not any(vertex.frontiers for vertex in joined.vertices)
 
 
+def test_an_edge_of_the_team_is_as_long_as_its_line_whatever_was_measured() -> None:
+    chart = BUILDING.chart(LEFT, HERE)
+    measured = {key: replace(edge, length=0.9 * edge.length) for key, edge in chart.edges.items()}
+    own = route_graph(replace(chart, edges=measured))
+    joined = geojson.decode(str(team_files(own, [], {}, "a building")["team.geojson"]))
+    for edge in joined.edges:
+        straight = math.dist(BUILDING.places[edge.start], BUILDING.places[edge.end])
+        assert edge.length == pytest.approx(straight, abs=1e-5)
+
+
 def test_who_is_alone_leaves_its_own_map() -> None:
     own = route_graph(BUILDING.chart(LEFT, HERE))
     joined = geojson.decode(str(team_files(own, [], {}, "a building")["team.geojson"]))
