@@ -21,7 +21,11 @@ def add_run(commands: Commands) -> None:
     )
     add_overrides(run)
     run.add_argument(
-        "--out", type=path, metavar="DIR", help="run directory (default: a new one in runs/)"
+        "--out",
+        type=path,
+        metavar="DIR",
+        help="a new run directory, with which no later start goes on (default: one in runs/, or in "
+        "that of the state directory)",
     )
     run.add_argument(
         "--map",
