@@ -33,7 +33,8 @@ _COMPARED = 12  # vertices elsewhere, to tell how many look like what is seen
 _PLACE_SIGMA_M = 0.15  # of a vertex laid onto what is seen, before its walls are
 _TURN_SIGMA_RAD = 0.02  # and of its turn, beside the robot's own
 _WALLS_M = 2.5  # from a vertex, about: turned by so much that these are missed, none are found
-_REGISTRATION_FLOOR = np.diag([1e-4, 1e-4, 4e-6])  # what registration cannot know of itself
+# what registration cannot know of itself: (5 mm)^2 and (1 mrad)^2
+_REGISTRATION_FLOOR = np.diag([25e-6, 25e-6, 1e-6])
 
 
 class GatedVertex(NamedTuple):
