@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial import cKDTree
 
-from gvgbot.autonomy.gvg.local import Place
+from gvgbot.autonomy.control.orders import ARRIVED_M
+from gvgbot.autonomy.gvg.local import Branch, Place
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.autonomy.start_edge import StartEdge, is_at_start
@@ -63,6 +64,7 @@ class DrivenEdges:
         passage = where.follow(view.gvg, place, known, view.local_base.position)
         if passage is not None:
             self._account_for(view, known, passage)
+        self._close_at_end(view, known, place, where)
         self._close_start_edge(view, where, clearance)
         self._note_part(view, where)
         self._mapper.driven_parts = [line for line, _ in self.parts()]
@@ -165,6 +167,26 @@ class DrivenEdges:
             self._mapper.join(view, left, arrived, passage.line, passage.narrowest, driven=True)
         elif graph.half_edge(left) is not None:
             self._join_fork(view, left, arrived, passage)
+
+    def _close_at_end(
+        self, view: View, known: Correspondence, place: Place, where: Whereabouts
+    ) -> None:
+        """Join the edge to a dead end in sight, when the robot has come from its vertex to the end.
+
+        There is no other edge that it could come onto there, and a lone echo beside this one, as of
+        glass, may keep sight from believing it.
+        """
+        left, graph, gvg = where.on_edge, self._mapper.graph, view.gvg
+        out = None if left is None else known.branch_of.get(left)
+        if left is None or out is None or out.edge != place.edge:
+            return
+        arrived, end = known.half_edge_of.get(Branch(out.edge, not out.forward)), gvg.end_of(out)
+        away = math.dist(gvg.nodes[end].position, view.local_base.position)
+        if not gvg.nodes[end].is_endpoint or arrived in (None, left) or away > ARRIVED_M:
+            return
+        if graph.edge_at(left) is None and graph.edge_at(arrived) is None:
+            narrowest = float(gvg.edges[out.edge].clearance.min())
+            self._mapper.join(view, left, arrived, gvg.leaving(out), narrowest, driven=True)
 
     def _may_be_elsewhere(self, view: View, vertex: int) -> bool:
         """Whether somebody beside a vertex may make it look as if it were, and edges with it."""

@@ -129,6 +129,24 @@ def test_a_dead_end_is_driven_by_who_is_well_in_it_when_its_end_is_seen(
     assert edge.driven == is_driven
 
 
+DEAD_END = drawn(
+    {1: (0.0, 0.0), 2: (5.0, 0.0), 3: (-4.0, 0.0), 5: (0.0, 4.0)},
+    {10: (1, 2, []), 11: (3, 1, []), 13: (1, 5, [])},
+)
+
+
+@pytest.mark.parametrize(("metres", "is_edge"), [(4.8, True), (4.0, False)])
+def test_who_has_come_to_a_dead_end_has_driven_the_edge_to_it(
+    metres: float, *, is_edge: bool
+) -> None:
+    """It is seen from end to end, whatever keeps sight from believing it."""
+    drive = Drive(HalfEdgeId(1, EAST))
+    seen = {branch: end for branch, end in ALL_SEEN.items() if branch.edge == 10}
+    drive.along(DEAD_END, seen, (0.5, 0.0), (metres, 0.0))
+    edges = drive.mapper.graph.edges.values()
+    assert [({e.a, e.b}, e.driven) for e in edges] == [(set(seen.values()), True)] * is_edge
+
+
 @pytest.mark.parametrize("is_seen", [True, False], ids=["seen", "gone"])
 def test_what_was_none_leads_nowhere(*, is_seen: bool) -> None:
     """To the north, where there seemed to be a way, and across to the east, before the vertex."""
