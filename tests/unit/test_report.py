@@ -61,29 +61,28 @@ def test_directions_in_the_map_are_within_half_a_turn_of_straight_on() -> None:
     assert told.frontiers == pytest.approx((2.5, 5.0 - math.tau))
 
 
-def test_an_edge_that_was_put_together_of_two_does_not_turn_back() -> None:
-    """Of a vertex that was none, seen a little beside the way that both its edges now are."""
+def told_edge(line: list[tuple[float, float]], end: Pose) -> RouteEdge:
+    """What is told of an edge that was driven from 0 to 4 m, when its far vertex is at `end`."""
     mind = pipeline([])
     ends = []
     for number, x in ((1, 0.0), (2, 4.0)):
         vertex = mind.mapper.graph.vertices[number] = Vertex(number, 1.0, Pose(x), 0.0, 0.0)
         ends.append(HalfEdgeId(number, vertex.add_half_edge(0.0)))
-    line = np.array([[0, 0], [1, 0], [2, 0], [2.05, 0.3], [2.1, 0], [3, 0], [4, 0]], float)
-    mind.mapper.graph.join(ends[0], ends[1], line, 1.0, driven=True)
-    (told,) = route_graph(mind, {1: Pose(), 2: Pose(4.0)}, {1: np.eye(2), 2: np.eye(2)}).edges
-    assert length_of(told.polyline) == pytest.approx(4.0)
+    mind.mapper.graph.join(ends[0], ends[1], np.array(line), 1.0, driven=True)
+    (told,) = route_graph(mind, {1: Pose(), 2: end}, {1: np.eye(2), 2: np.eye(2)}).edges
+    return told
+
+
+def test_an_edge_that_was_put_together_of_two_does_not_turn_back() -> None:
+    """Of a vertex that was none, seen a little beside the way that both its edges now are."""
+    spike = [(2.0, 0.0), (2.05, 0.3), (2.1, 0.0)]
+    line = [(0.0, 0.0), (1.0, 0.0), *spike, (3.0, 0.0), (4.0, 0.0)]
+    assert length_of(told_edge(line, Pose(4.0)).polyline) == pytest.approx(4.0)
 
 
 def test_an_edge_is_as_long_as_its_line_whatever_was_measured_when_it_was_seen() -> None:
-    mind = pipeline([])
-    ends = []
-    for number, x in ((1, 0.0), (2, 4.0)):
-        vertex = mind.mapper.graph.vertices[number] = Vertex(number, 1.0, Pose(x), 0.0, 0.0)
-        ends.append(HalfEdgeId(number, vertex.add_half_edge(0.0)))
-    line = np.array([[0.0, 0.0], [2.0, 0.0], [4.0, 0.0]])
-    mind.mapper.graph.join(ends[0], ends[1], line, 1.0, driven=True)
-    now = {1: Pose(), 2: Pose(3.0, 4.0)}  # after a loop closed
-    (told,) = route_graph(mind, now, {1: np.eye(2), 2: np.eye(2)}).edges
+    after_a_closure = Pose(3.0, 4.0)
+    told = told_edge([(0.0, 0.0), (2.0, 0.0), (4.0, 0.0)], after_a_closure)
     assert told.polyline[-1].tolist() == [3.0, 4.0]
     assert told.length == pytest.approx(5.0)
 
