@@ -14,6 +14,7 @@ from gvgbot.maps.hits import Scans, barred, hits
 from gvgbot.maps.hollows import bodies, hollows
 from gvgbot.maps.narrows import narrows
 from gvgbot.maps.occupancy import OccupancyGrid, occupancy_grid
+from gvgbot.maps.panes import past_panes
 from gvgbot.maps.passages import Way, passages
 from gvgbot.maps.spots import spots
 from gvgbot.maps.viewpoints import floor_beside, viewpoints
@@ -128,7 +129,7 @@ def _may_go(places: Array, scans: Scans, lasting_s: float) -> Array:
 def _barred(
     pipeline: Pipeline, ways: list[Way], scans: Scans, keyframes: list[Pose], grid: OccupancyGrid
 ) -> tuple[int, ...]:
-    """The edges, by their ids, that nobody has driven, over floor that was a wall.
+    """The edges, by their ids, that nobody has driven, over floor that was a wall or past glass.
 
     `ways` are all edges.
     """
@@ -139,6 +140,7 @@ def _barred(
     }
     driven = np.array([base.position for base in keyframes])
     found = barred(scans, list(lines.values()), grid, driven)
+    found |= past_panes(scans, list(lines.values()), grid)
     return tuple(key for key, is_barred in zip(lines, found, strict=True) if is_barred)
 
 

@@ -157,8 +157,9 @@ class DrivenEdges:
             if self._may_be_elsewhere(view, left.vertex):
                 return
             graph.remove_half_edge(left)  # it is the one by which that edge is known to leave
-        are_seen = left in known.branch_of and passage.driven < LEAST_LOOP_M
         is_known = far.edge is not None
+        are_seen = left in known.branch_of and passage.driven < LEAST_LOOP_M
+        are_seen &= is_known or not self._mapper.is_reopened(left, arrived)
         if are_seen and (is_known or not self._goes_to_and_fro(view.stamp, left, arrived)):
             return  # both ends, so that their edge will be, unless something keeps it from that
         if _has_gone(left, view, known):

@@ -56,6 +56,7 @@ class Mapper(MapEdits):
         self._unbelieved = Candidates(config.candidates)
         self._evidence = Evidence(self, self._unbelieved, config, recognition)
         self._rivals: dict[int, Recognition] = {}  # by nodes of this view that may be known ones
+        self._reopened: set[frozenset[int]] = set()  # ends of edges
 
     def explains(self, view: View, known: Correspondence, place: Array) -> bool:
         """Whether a vertex should stand at a place (2,), local frame, and is seen nowhere else."""
@@ -68,6 +69,22 @@ class Mapper(MapEdits):
         for vertex in self.graph.vertices.values():
             vertex.seen_at = min(vertex.seen_at, seen_at)
         self._unbelieved.forget()
+
+    def reopen(self, edge: Edge) -> bool:
+        """Take an edge for a frontier, until it is driven; only once, and whether it has done so.
+
+        Sight may go through glass.
+        """
+        ends = frozenset((edge.a.vertex, edge.b.vertex))
+        is_new = ends not in self._reopened
+        if is_new:
+            self._reopened.add(ends)
+            self.graph.unjoin(edge)
+        return is_new
+
+    def is_reopened(self, a: HalfEdgeId, b: HalfEdgeId) -> bool:
+        """Whether sight was not to be trusted between the vertices of two half-edges."""
+        return frozenset((a.vertex, b.vertex)) in self._reopened
 
     def observe(self, view: View) -> tuple[Correspondence, list[Event]]:
         """Match a view with the map and learn from it.
@@ -239,7 +256,7 @@ class Mapper(MapEdits):
             if self._drive_dead_ends and self._is_end_left(view, edge, a, b):
                 continue
             if here is None and there is None:
-                if not touches(edge, view.local_map.suspects()):
+                if not (self.is_reopened(a, b) or touches(edge, view.local_map.suspects())):
                     self.join(view, a, b, edge.polyline, float(edge.clearance.min()), driven=False)
             elif here is there or self._is_one_between(known, a, b):
                 for edge_seen in filter(None, (here, there)):

@@ -191,18 +191,32 @@ def test_what_a_ring_goes_round_is_nobody_once_it_was_in_sight_for_long(
     assert len(survey(pipeline).doorsteps) == count
 
 
-def test_an_edge_over_floor_that_was_a_wall_is_told_of_unless_it_was_driven() -> None:
-    """Ten metres north from the middle of the corridor; from the east it is seen through glass."""
+@pytest.mark.parametrize(
+    ("seen_later", "street", "start", "end"),
+    [
+        # ten metres north from the middle of the corridor; from the east seen through glass
+        (carved([CORRIDOR, (-2.5, 0.9, -0.5, 4.0)]), (1, 2), (1.5, 0.0), (1.5, 10.0)),
+        # along the corridor, close to what is seen from the east only, as if across the way
+        (carved([CORRIDOR], [(0.98, 0.48, 1.02, 0.52)]), (2, 1), (1.0, 0.0), (11.0, 0.0)),
+    ],
+)
+def test_an_edge_through_what_may_be_glass_or_past_it_is_told_of_unless_it_was_driven(
+    seen_later: World,
+    street: tuple[int, int],
+    start: tuple[float, float],
+    end: tuple[float, float],
+) -> None:
     pipeline = driven(carved([CORRIDOR]), 6.0)
-    glazed, keyframes = carved([CORRIDOR, (-2.5, 0.9, -0.5, 4.0)]), pipeline.past.keyframes
+    keyframes = pipeline.past.keyframes
     for at, keyframe in enumerate(keyframes):
         if keyframe.scan is not None and at > 9:
-            scan = replace(sweep(glazed, START.compose(keyframe.odom_base)), stamp=keyframe.stamp)
-            keyframes[at] = replace(keyframe, scan=PackedScan(scan))
-    graph, ids = streets(1, 2)
+            scan = sweep(seen_later, START.compose(keyframe.odom_base))
+            packed = PackedScan(replace(scan, stamp=keyframe.stamp))
+            keyframes[at] = replace(keyframe, scan=packed)
+    graph, ids = streets(*street)
     (edge,) = graph.edges.values()
     pipeline.mapper.graph, pipeline.mapper.observations = graph, []
-    x = np.array([0.0, 0.0, 0.0, 1.5, 0.0, 0.0, 1.5, 10.0, 0.0])
+    x = np.array([0.0, 0.0, 0.0, *start, 0.0, *end, 0.0])
     pipeline.mapper.belief = Belief(x, 1e-6 * np.eye(9), tuple(ids.values()))
     assert survey(pipeline).barred == ()
     edge.driven, edge.traversals = False, 0

@@ -42,7 +42,6 @@ class OwnTasks:
         self._surveyed_m = 0.0  # and `travelled`
         self._narrows = np.empty((0, 2))  # ways too narrow for the robot
         self._has_met = False  # somebody who stood: he may have hidden something, and gone
-        self._reopened: set[frozenset[int]] = set()  # ends of edges
         self._arrived: float | None = None  # stamp, where it went for a look
 
     def configure(self, config: CertaintyConfig) -> None:
@@ -118,13 +117,9 @@ class OwnTasks:
 
     def _reopen(self, barred: Iterable[int]) -> bool:
         """Take edges that may lead through glass for frontiers, once; whether there were any."""
-        graph, before = self._mapper.graph, len(self._reopened)
-        for edge in [graph.edges[key] for key in barred if key in graph.edges]:
-            ends = frozenset((edge.a.vertex, edge.b.vertex))
-            if ends not in self._reopened:
-                self._reopened.add(ends)
-                graph.unjoin(edge)
-        return len(self._reopened) > before
+        edges = self._mapper.graph.edges
+        reopened = [self._mapper.reopen(edges[key]) for key in barred if key in edges]
+        return any(reopened)
 
     def _is_hidden(self, view: View) -> bool:
         """Whether somebody makes up meetpoints where it has just come for a look: he may go."""

@@ -161,27 +161,41 @@ def test_what_was_none_leads_nowhere(*, is_seen: bool) -> None:
     assert len(drive.mapper.graph.edges) == int(is_seen)
 
 
+SEEN_SO = drawn(
+    {1: (0.0, 0.0), 7: (1.5, 0.0), 2: (3.0, 0.0), 8: (1.5, 2.0)},
+    {10: (1, 7, []), 11: (7, 2, []), 15: (7, 8, [])},
+)
+SEEN_ENDS = {
+    Branch(10, forward=True): HalfEdgeId(1, EAST),
+    Branch(11, forward=False): HalfEdgeId(2, WEST),
+}
+
+
 @pytest.mark.parametrize(("period", "is_edge"), [(5.0, True), (1.0, False)])
 def test_who_drives_to_and_fro_between_two_ends_has_driven_an_edge(
     period: float, *, is_edge: bool
 ) -> None:
     """What seems to be a vertex is between them. Once a second, that it drives so only seems so."""
-    seen_so = drawn(
-        {1: (0.0, 0.0), 7: (1.5, 0.0), 2: (3.0, 0.0), 8: (1.5, 2.0)},
-        {10: (1, 7, []), 11: (7, 2, []), 15: (7, 8, [])},
-    )
-    ends = {
-        Branch(10, forward=True): HalfEdgeId(1, EAST),
-        Branch(11, forward=False): HalfEdgeId(2, WEST),
-    }
     drive = Drive(HalfEdgeId(1, EAST))
     for _ in range(4):
         assert drive.mapper.graph.edges == {}
-        drive.along(seen_so, ends, (0.5, 0.0), (2.5, 0.0))
+        drive.along(SEEN_SO, SEEN_ENDS, (0.5, 0.0), (2.5, 0.0))
         drive.stamp += period
         drive.where = Whereabouts(HalfEdgeId(1, EAST), [np.zeros(2)])
     joined = [{edge.a, edge.b} for edge in drive.mapper.graph.edges.values()]
     assert joined == ([{HalfEdgeId(1, EAST), HalfEdgeId(2, WEST)}] if is_edge else [])
+
+
+def test_who_comes_along_an_edge_that_was_opened_again_has_driven_it() -> None:
+    """At once, and for good."""
+    drive, ends = Drive(HalfEdgeId(1, EAST)), (HalfEdgeId(1, EAST), HalfEdgeId(2, WEST))
+    graph, line = drive.mapper.graph, np.array([[0.0, 0.0], [3.0, 0.0]])
+    assert drive.mapper.reopen(graph.join(*ends, line, 1.0, driven=False))
+    drive.along(SEEN_SO, SEEN_ENDS, (0.5, 0.0), (2.5, 0.0))
+    (edge,) = graph.edges.values()
+    assert ({edge.a, edge.b}, edge.driven) == (set(ends), True)
+    assert not drive.mapper.reopen(edge)
+    assert graph.edges == {edge.id: edge}
 
 
 @pytest.mark.parametrize("all_seen", [False, True])
