@@ -15,6 +15,7 @@ from google.protobuf.message import DecodeError
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
+from mcap.reader import make_reader
 from mcap.records import Channel, Chunk, Message, Metadata
 from mcap.stream_reader import CRCValidationError, breakup_chunk
 from mcap.writer import MCAP0_MAGIC
@@ -33,6 +34,7 @@ from gvgbot.recording.messages import (
 )
 
 _HEAD = struct.Struct("<BQ")  # of a record: what it is, and the bytes that follow
+_KINDS = frozenset(Opcode)
 _DAMAGE = (
     McapError,
     CRCValidationError,
@@ -89,7 +91,7 @@ class Recording:
         self.missing = path if self._goes_on or _goes_on(first, number) else None
 
     def _messages(self, file: BinaryIO, path: Path) -> Iterator[tuple[float, Lived]]:
-        topics: dict[int, str] = {}
+        topics = _topics(file)
         opcode, self._goes_on = None, False
         for opcode, content in _records(file):
             self._goes_on |= opcode == Opcode.METADATA and GOES_ON.encode() in content
@@ -100,6 +102,8 @@ class Recording:
                     self.damaged += 1
                 else:
                     yield from messages
+            elif opcode not in _KINDS:
+                self.damaged += 1
         if opcode != Opcode.FOOTER:
             self.cut.append(path)
         elif file.read(1):
@@ -128,6 +132,20 @@ class Recording:
                 self.left_out += messages
             case {"event": "requested", "done": True}:
                 self.requests += 1
+
+
+def _topics(file: BinaryIO) -> dict[int, str]:
+    """Of each channel, as the index at the end repeats them; none where that is missing or wrong.
+
+    Else they are told in the first chunk only.
+    """
+    try:
+        index = make_reader(file).get_summary()
+    except (*_DAMAGE, MemoryError):
+        index = None
+    file.seek(0)
+    channels = () if index is None else index.channels.values()
+    return {channel.id: channel.topic for channel in channels}
 
 
 def _about(path: Path) -> About:
