@@ -17,7 +17,8 @@ _STEP_M = 0.05  # between points of a way: a cell
 _CLOSE_M = 1.0  # to a spot of it, there is more of a pane
 _SPOT_M = 0.3  # across, at most; what is wider is a wall
 _ON_M, _BEYOND_M = 0.12, 0.2  # off the middle of a spot, a beam ends on it; beyond, it has passed
-_BESIDE_M = 0.02  # the middle of a spot, beams still meet the leg of a chair
+_BESIDE_M = 0.06  # the middle of a spot, as poses err, beams still meet the leg of a chair
+_BEAMS = 7  # of them, two centimetres from each other
 _FINE_M = 0.03  # from beam to beam, at most: they cannot miss a leg
 _LOOKS, _SHARE = 4, 0.25  # so many, and of all so large a share, pass a pane at least
 
@@ -78,8 +79,8 @@ def _met(scan: Scan, spots: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]
     step = abs(scan.angle_increment)
     turn = (bearing - scan.angle_min) * math.copysign(1.0, scan.angle_increment)
     middle = ((turn + step / 2) % math.tau / step).astype(np.int64)
-    beside = np.maximum(1, _BESIDE_M / np.maximum(away * step, 1e-6)).astype(np.int64)
-    beams = middle[:, None] + beside[:, None] * np.array([-1, 0, 1])
+    beside = np.maximum(1.0, _BESIDE_M / np.maximum(away * step, 1e-6))[:, None]
+    beams = middle[:, None] + (beside * np.linspace(-1.0, 1.0, _BEAMS)).round().astype(np.int64)
     told = (beams.min(axis=1) >= 0) & (beams.max(axis=1) < len(scan.ranges))
     told &= away < min(_FINE_M / step, scan.range_max - _BEYOND_M)
     beyond = scan.ranges[np.where(told[:, None], beams, 0)] - away[:, None]

@@ -67,11 +67,12 @@ def test_one_look_that_a_leg_is_missed_by_makes_none_of_glass(
     assert not past_panes(scans, [AROUND], occupancy_grid(scans)).any()
 
 
-def test_legs_are_none_of_glass_where_poses_err_by_three_centimetres() -> None:
-    """From all round it, to the left and to the right by turns."""
+@pytest.mark.parametrize("error_m", [0.03, 0.06])
+def test_legs_are_none_of_glass_where_poses_err(error_m: float) -> None:
+    """Looks from all round it, every third pose too far to the left."""
     scans = []
     for at, angle in enumerate(np.arange(0.0, 2 * math.pi, 0.3)):
-        away, aside = np.array([math.cos(angle), math.sin(angle)]), 0.03 * (-1) ** at
+        away, aside = np.array([math.cos(angle), math.sin(angle)]), error_m * (at % 3 == 0)
         eye = np.array([0.0, 0.5]) + 0.6 * away
         x, y = eye + aside * np.array([-away[1], away[0]])
         scans.append((Pose(x, y), sweep(LEG, Pose(*eye.tolist()))))
