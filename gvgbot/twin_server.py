@@ -2,7 +2,8 @@
 
 import asyncio
 import contextlib
-from collections.abc import Awaitable, Callable
+import shlex
+from collections.abc import Awaitable, Callable, Sequence
 from pathlib import Path
 
 from gvgbot.clock import LoopClock
@@ -18,19 +19,22 @@ from gvgbot.stop_signals import StopSignals
 
 
 def serve(
-    config: Config, laser_link: str | None, base_link: str | None, announce: Callable[[str], None]
+    config: Config,
+    links: tuple[str | None, str | None],
+    same_robot: Sequence[str],
+    announce: Callable[[str], None],
 ) -> int:
     """Serve the twins until a signal comes, and tell where they are; the exit status.
 
+    `same_robot` is the configuration once more, as words of a command that finds them there.
     Raises UsageError for a world that cannot be used or a link that cannot be made.
     """
-    links = [link for link in (laser_link, base_link) if link is not None]
-    files = [Path(link).absolute() for link in links if not link.startswith(SCHEME)]
+    files = [Path(link).absolute() for link in links if link and not link.startswith(SCHEME)]
     if len(set(files)) < len(files):
-        raise UsageError(f"{laser_link} cannot be both the laser and the base: name two links")
+        raise UsageError(f"{links[0]} cannot be both the laser and the base: name two links")
     place = open_place(config)
     with StopSignals() as signals, asyncio.Runner() as runner:
-        runner.run(_serve(config, place, (laser_link, base_link), announce, signals.wait))
+        runner.run(_serve(config, place, links, same_robot, announce, signals.wait))
     return 0
 
 
@@ -38,13 +42,14 @@ async def _serve(
     config: Config,
     place: Place,
     links: tuple[str | None, str | None],
+    same_robot: Sequence[str],
     announce: Callable[[str], None],
     stopped: Callable[[], Awaitable[object]],
 ) -> None:
     simulation = Simulation(config, place, LoopClock())
     with contextlib.ExitStack() as stack:
         laser, base = (stack.enter_context(contextlib.closing(_port(link))) for link in links)
-        announce(_greeting(place, laser, base))
+        announce(_greeting(place, laser, base, same_robot))
         await serve_on(simulation, laser, base, stopped())
 
 
@@ -72,12 +77,13 @@ def _port(link: str | None) -> DevicePort:
     return PtyPort(None if link is None else Path(link))
 
 
-def _greeting(place: Place, laser: DevicePort, base: DevicePort) -> str:
+def _greeting(place: Place, laser: DevicePort, base: DevicePort, same_robot: Sequence[str]) -> str:
     start = place.start
+    found = ("twin.enabled=false", f"laser.port={laser.path}", f"base.port={base.path}")
+    words = [*same_robot, *(word for setting in found for word in ("--set", setting))]
     return (
         f"world: {place.world.name}, start {start.x:g} {start.y:g} {start.theta:g}\n"
         f"laser: {laser.path}\n"
         f"base:  {base.path}\n"
-        f"try: gvgbot check --set twin.enabled=false --set laser.port={laser.path} "
-        f"--set base.port={base.path}"
+        f"try: gvgbot check {shlex.join(words)}"
     )

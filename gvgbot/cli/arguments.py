@@ -89,6 +89,12 @@ def add_overrides(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def same_robot(options: argparse.Namespace) -> list[str]:
+    """The configuration that a command was given, in words for `gvgbot run` and its like."""
+    config = [] if options.config is None else [str(options.config)]
+    return [*config, *(word for override in options.overrides for word in ("--set", override))]
+
+
 def add_connection(parser: argparse.ArgumentParser) -> None:
     """Let the command say how to reach robots on the network."""
     parser.add_argument(

@@ -2,7 +2,7 @@
 
 import argparse
 
-from gvgbot.cli.arguments import Commands, add_config, say
+from gvgbot.cli.arguments import Commands, add_config, same_robot, say
 
 
 def add_twin(commands: Commands) -> None:
@@ -30,7 +30,8 @@ def _twin(options: argparse.Namespace) -> int:
     config = load_config(options.config, options.overrides)
     from gvgbot import twin_server
 
-    return twin_server.serve(config, options.laser_link, options.base_link, say)
+    links = (options.laser_link, options.base_link)
+    return twin_server.serve(config, links, same_robot(options), say)
 
 
 def add_check(commands: Commands) -> None:

@@ -3,7 +3,7 @@
 import argparse
 import shlex
 
-from gvgbot.cli.arguments import Commands, add_overrides, frames, path, positive, say
+from gvgbot.cli.arguments import Commands, add_overrides, frames, path, positive, same_robot, say
 from gvgbot.errors import UsageError, extra_for
 from gvgbot.words import counted
 
@@ -104,10 +104,10 @@ def _import(options: argparse.Namespace) -> int:
     config = load_config(options.config, options.overrides)
     vertices, edges = import_map(options.map, options.out, config)
     say(f"imported: {counted(vertices, 'vertex', 'vertices')}, {counted(edges, 'edge')}")
-    known = f"gvgbot run --map {shlex.quote(str(options.out))}"
+    words = ["gvgbot", "run", *same_robot(options), "--map", str(options.out)]
     if config.twin.enabled:
-        known += f" --set twin.world={shlex.quote(str(options.map))}"
-    say(f"to drive in it: {known}")
+        words += ["--set", f"twin.world={options.map}"]
+    say(f"to drive in it: {shlex.join(words)}")
     return 0
 
 

@@ -2,6 +2,7 @@
 
 import os
 import select
+import shlex
 import signal
 import socket
 import subprocess
@@ -155,6 +156,23 @@ def test_check_finds_the_twins_well_and_a_missing_port_not(tmp_path: Path) -> No
         assert process.returncode == 1
         (failed,) = [line for line in ill.splitlines() if line.startswith("fail")]
         assert "/no/base" in failed
+
+
+def test_what_the_twins_propose_to_try_finds_them_and_the_same_robot(tmp_path: Path) -> None:
+    here = tmp_path / "my robot"
+    here.mkdir()
+    links = ("--laser-link", "laser", "--base-link", str(here / "base"))
+    with gvgbot("twin", "husky.yaml", *links, "--set", "robot.name=karl", cwd=here) as process:
+        assert process.stdout is not None
+        while not (line := process.stdout.readline()).startswith("try: "):
+            assert line, "the twins did not start"
+        program, *words = shlex.split(line.removeprefix("try: "))
+        assert program == "gvgbot"
+        with gvgbot(*words, cwd=here) as checking:
+            said, _ = checking.communicate(timeout=PATIENCE)
+    assert f"robot karl, laser laser, base {here / 'base'}" in said
+    assert "UTM-30LX" in said
+    assert "firmware 1.2.0" in said
 
 
 def test_a_moving_robot_is_told_to_stand_as_its_daemon_ends(tmp_path: Path) -> None:

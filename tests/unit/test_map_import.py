@@ -152,9 +152,13 @@ def test_what_to_do_with_an_imported_map_can_be_pasted_into_a_shell(
     words = capsys.readouterr().out.splitlines()[-1].removeprefix("to drive in it: ")
     expected = ["gvgbot", "run", "--map", str(out), "--set", f"twin.world={place}"]
     assert shlex.split(words) == expected
-    real = ["--set", "twin.enabled=false", "--out", str(tmp_path / "real")]
-    assert main(["map", "import", str(place), *real]) == 0
-    assert "twin.world" not in capsys.readouterr().out
+    config, real = tmp_path / "my robot.yaml", tmp_path / "real"
+    config.write_text("twin: {enabled: false}")
+    robot = ["--set", "robot.name=lisa"]
+    given = ["--out", str(real), "--config", str(config), *robot]
+    assert main(["map", "import", str(place), *given]) == 0
+    words = capsys.readouterr().out.splitlines()[-1].removeprefix("to drive in it: ")
+    assert shlex.split(words) == ["gvgbot", "run", str(config), *robot, "--map", str(real)]
 
 
 def test_a_map_of_somebody_else_has_not_been_driven(
