@@ -35,6 +35,8 @@ _SEEN_SHARE = 0.2  # of the beams; a laser that sees less is covered or dirty
 _FAR = 1e3  # m, for beams that measured nothing
 _UNCOVER = "uncover and clean its window"
 _UNCOVER_OR_MOVE = f"{_UNCOVER}, or put the robot where there are walls"
+_BUSY = "see what else the computer is busy with"
+_LATENCY_TIMER = f"set the port's latency_timer to 1, as systemd/60-gvgbot.rules does, and {_BUSY}"
 
 Verdict = Literal["ok", "warn", "fail"]
 
@@ -212,7 +214,7 @@ def _laser_lines(
     else:
         yield _steadiness("laser rate", heard, 1.0 / interval)
     yield _link("laser link", laser.link)
-    yield _timing("laser clock", heard)
+    yield _timing("laser clock", heard, f"{_BUSY}, and the network if it is on Ethernet")
     yield _view(scans)
     yield from _own_parts(scans, robot.radius_m)
     if len(scans[-1].ranges) < FEWEST_BEAMS:
@@ -243,7 +245,7 @@ def _base_lines(base: KobukiBase, heard: Heard) -> Iterator[Line]:
     )
     yield _steadiness("base rate", heard, _BASE_RATE)
     yield _link("base link", base.statistics)
-    yield _timing("base clock", heard)
+    yield _timing("base clock", heard, _LATENCY_TIMER)
     if base.battery is not None:
         yield _battery(base.battery)
     if base.contact is not None:
@@ -328,14 +330,13 @@ def _counted(count: int, what: str) -> str:
     return counted(count, one, what)
 
 
-def _timing(subject: str, heard: Heard) -> Line:
+def _timing(subject: str, heard: Heard, remedy: str) -> Line:
     least, most = heard.delay
     return Line(
         "ok" if most - least <= _CALM else "warn",
         subject,
         f"messages arrive {1000 * least:.1f} to {1000 * most:.1f} ms after they were true",
-        "set the port's latency_timer to 1, as systemd/60-gvgbot.rules does, "
-        "and see what else the computer is busy with",
+        remedy,
     )
 
 

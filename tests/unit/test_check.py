@@ -116,6 +116,14 @@ def test_what_is_wrong_is_named_with_a_remedy(
     assert status == (1 if verdict == "fail" else 0)
 
 
+def test_a_late_laser_is_not_said_to_have_a_timer_of_converters() -> None:
+    """On its own USB plug it is a CDC-ACM device, which has none, and so has Ethernet."""
+    verdict, finding = said("twin.laser.link.jitter_s=0.03")[1]["laser clock"]
+    assert verdict == "warn"
+    assert "latency_timer" not in finding
+    assert finding.endswith("busy with, and the network if it is on Ethernet")
+
+
 def test_a_laser_that_does_not_look_where_the_robot_drives_is_not_ready() -> None:
     narrow = "laser.first_angle_deg=-60", "laser.last_angle_deg=60"
     assert said(*narrow)[0] == 0
