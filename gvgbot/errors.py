@@ -1,5 +1,6 @@
 """The errors a user or the daemon can do something about."""
 
+import shlex
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,7 +15,8 @@ class ExtraMissing(GvgbotError):
 
     def __init__(self, what: str, extra: str) -> None:
         """Say how to install it where this program is, whichever environment the shell is in."""
-        super().__init__(f"{what}: {sys.executable} -m pip install 'gvgbot[{extra}]'")
+        command = [sys.executable, "-m", "pip", "install", f"gvgbot[{extra}]"]
+        super().__init__(f"{what}: {shlex.join(command)}")
 
 
 class UsageError(GvgbotError):

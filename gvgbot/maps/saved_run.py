@@ -1,5 +1,6 @@
 """A run directory, read back."""
 
+import shlex
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -85,7 +86,7 @@ class SavedRun:
         if directory.is_file():
             raise UsageError(
                 f"{directory} is a file: give the directory of a run; of a recording, gvgbot "
-                f"replay {directory} makes one"
+                f"replay {shlex.quote(str(directory))} makes one"
             )
         if not (directory / "map.geojson").exists():
             raise UsageError(_why_there_is_no_map(directory))

@@ -2,6 +2,7 @@
 
 import fcntl
 import os
+import shlex
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
@@ -124,7 +125,7 @@ def _known(path: Path) -> Saved:
     try:
         saved = MissionFiles(path).read()
     except Damaged as error:
-        raise UsageError(f"cannot begin with {error}") from error
+        raise UsageError(f"cannot begin with {error}; {_other(path)}") from error
     if saved is None:
         raise UsageError(f"cannot begin with {path}: there is no {SNAPSHOT} in it; {_other(path)}")
     return replace(saved, known=_named(path))
@@ -134,15 +135,20 @@ def _beside(file: Path) -> str:
     """What may have been meant by a file."""
     if (file.parent / SNAPSHOT).exists():
         return f"give the directory of the run, {file.parent}"
-    return f"if it is the map of a map_server, try gvgbot map import {file} --out {file.stem}"
+    return f"if it is the map of a map_server, try {_importing(file, file.stem)}"
 
 
 def _other(path: Path) -> str:
-    """What may have been meant by a directory without a mission."""
+    """What may have been meant by a directory without a mission, or with one that is damaged."""
     if (path / DESCRIPTION).exists():
-        return f"try gvgbot map import {path / DESCRIPTION} --out {path}-imported"
+        return f"try {_importing(path / DESCRIPTION, f'{path}-imported')}"
     runs = sorted(found.parent for found in path.glob(f"*/{SNAPSHOT}"))
     return f"give the directory of a run{f', such as {runs[-1]}' if runs else ''}"
+
+
+def _importing(file: Path, out: str) -> str:
+    """The command that makes a run of a map, as a shell takes it."""
+    return shlex.join(["gvgbot", "map", "import", str(file), "--out", out])
 
 
 def _newest(state_dir: Path | None) -> Path | None:

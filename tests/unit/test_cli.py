@@ -2,6 +2,7 @@
 
 import errno
 import os
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -12,7 +13,7 @@ from PIL import Image
 
 from gvgbot import __version__
 from gvgbot.cli import main, status_of
-from gvgbot.errors import ConfigError, DeviceLost, UsageError, WorldError, extra_for
+from gvgbot.errors import ConfigError, DeviceLost, ExtraMissing, UsageError, WorldError, extra_for
 
 Captured = pytest.CaptureFixture[str]
 
@@ -89,7 +90,7 @@ BAD_CONFIGURATIONS = {
     "no run to show": (["map", "show", "absent"], "there is no directory absent"),
     "no run to tell of": (["map", "info", "/"], "/ is no run directory: there is no map"),
     "a file to show": (["map", "show", "/etc/passwd"], "is a file: give the dir"),
-    "a recording to show": (["map", "info", __file__], f"gvgbot replay {__file__} makes one"),
+    "a recording to show": (["map", "info", __file__], f"replay {shlex.quote(__file__)} makes one"),
     "seed out of range": (["explore", "--seed", str(2**40)], "twin.seed"),
 }
 
@@ -175,7 +176,20 @@ def test_a_missing_extra_is_one_line_to_copy_whatever_the_shell_knows(capsys: Ca
 
     assert status_of(lacking) == 1
     (line,) = said(capsys)
-    assert f": {sys.executable} -m pip install 'gvgbot[web]'" in line
+    assert f": {shlex.quote(sys.executable)} -m pip install 'gvgbot[web]'" in line
+
+
+def test_what_is_proposed_can_be_pasted_where_a_path_has_spaces(
+    tmp_path: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "executable", "/my robot/bin/python")
+    install = shlex.split(str(ExtraMissing("bags need rosbags", "ros2")).partition(": ")[2])
+    assert install == ["/my robot/bin/python", "-m", "pip", "install", "gvgbot[ros2]"]
+    recording = tmp_path / "my run.mcap"
+    recording.touch()
+    assert main(["map", "info", str(recording)]) == 2
+    words = shlex.split(capsys.readouterr().err)
+    assert words[words.index("replay") + 1] == str(recording)
 
 
 @pytest.mark.parametrize("error", [OSError(errno.EIO, "Input/output error"), PermissionError()])

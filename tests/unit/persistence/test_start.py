@@ -1,5 +1,6 @@
 """Where a run begins, by what was asked for and what is there."""
 
+import shlex
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -197,6 +198,23 @@ def test_of_a_directory_without_a_mission_what_may_have_been_meant_is_named(tmp_
     (floor / "map.yaml").touch()
     with pytest.raises(UsageError, match=f"try gvgbot map import {floor}/map.yaml --out"):
         begun(Wanted(known=floor))
+
+
+@pytest.mark.parametrize("is_damaged", [False, True])
+def test_what_to_do_without_a_mission_can_be_pasted_into_a_shell(
+    is_damaged: bool, tmp_path: Path
+) -> None:
+    """That of a later version, or one that is cut short, is no mission either."""
+    floor = tmp_path / "my floor"
+    floor.mkdir()
+    (floor / "map.yaml").touch()
+    if is_damaged:
+        (floor / SNAPSHOT).write_bytes(b"?")
+    with pytest.raises(UsageError, match="cannot begin with") as refused:
+        begun(Wanted(known=floor))
+    command = str(refused.value).partition("; try ")[2]
+    expected = ["gvgbot", "map", "import", f"{floor}/map.yaml", "--out", f"{floor}-imported"]
+    assert shlex.split(command) == expected
 
 
 def test_of_a_file_for_a_known_map_what_may_have_been_meant_is_named(tmp_path: Path) -> None:
