@@ -9,7 +9,7 @@ from gvgbot.maps.gaps import is_floor, is_wall
 from gvgbot.maps.occupancy import OccupancyGrid
 from gvgbot.maps.viewpoints import marked
 
-_DEPTH_M = 0.35  # edges that lie side by side are one that is blurred; who is driven round is wider
+_DEPTH_M = 0.2  # less: edges side by side are one that is blurred; more: who stood by one of them
 _BODY_M = 0.2, 0.7  # as wide as this, it may be somebody; legs of furniture are thinner
 _NOT_OPEN = 0.9  # of the clearance in the open: there edges go round the floor
 

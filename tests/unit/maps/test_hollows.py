@@ -39,6 +39,12 @@ def test_two_ways_side_by_side_enclose_nothing() -> None:
     assert len(found("..", (0.5, 0.4), (3.5, 0.4), (3.5, 0.6), (0.5, 0.6), (0.5, 0.4))) == 0
 
 
+def test_somebody_may_have_stood_beside_the_middle() -> None:
+    """One way leads round where he stood, the other one, driven later, straight on."""
+    (place,) = found("..", (0.5, 0.4), (3.5, 0.4), (3.5, 1.0), (0.5, 1.0), (0.5, 0.4))
+    assert place[1] == pytest.approx(0.7, abs=0.1)
+
+
 def test_in_the_open_edges_go_round_the_floor() -> None:
     assert len(found(open_m=2.0)) == 0
     assert len(hollows(drawn("###", "#.#", "###"), np.empty((0, 2)), OPEN)) == 0
