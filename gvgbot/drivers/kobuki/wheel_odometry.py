@@ -15,6 +15,7 @@ _WRAP = 65536  # encoder counts
 _ANGLE_SPAN = math.radians(655.36)  # of what 16 bits of a hundredth of a degree can tell
 _SLIP_MEMORY_S = 0.5  # time constant of the reported slip rate
 _SPEED_MEMORY_S = 0.1  # and of the speed: stamps of 1 ms alone make it jitter by a twentieth
+_NOTHING = 1e-6  # m/s and rad/s: slower than any wheel turns is standing still
 _IDLE_RAD = 0.001  # that the encoders of a base at rest may seem to turn it between two frames
 
 
@@ -117,7 +118,8 @@ def doubt(state: WheelOdometry) -> WheelOdometry:
 
 def _smoothed(before: float, now: float, dt: float, memory: float) -> float:
     """A value that follows what is measured now, after dt s, with a time constant (s)."""
-    return before - math.expm1(-dt / memory) * (now - before)
+    value = before - math.expm1(-dt / memory) * (now - before)
+    return value if abs(value) > _NOTHING else 0.0
 
 
 def _moved(odom_base: Pose, travel: float, turn: float) -> Pose:

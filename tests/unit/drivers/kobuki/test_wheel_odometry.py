@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -82,6 +83,15 @@ def test_stamps_of_a_millisecond_hardly_change_the_speed() -> None:
         state = advance_odometry(state, reading, DT - 0.001 * (-1) ** k, "gyro")
         speeds.append(state.twist.linear)
     assert speeds[50:] == pytest.approx([0.7] * len(speeds[50:]), abs=0.007)
+
+
+def test_who_stands_has_no_speed_at_all() -> None:
+    *_, last = readings(Twist(0.7, 0.0), 2.0, WheelReading(0, 0, 0.0, 0.0))
+    state = replace(start_odometry(last), twist=Twist(0.7, 0.0), slip_rate=0.3)
+    for _ in range(1000):
+        state = advance_odometry(state, replace(last, rate=0.0), DT, "gyro")
+    assert state.twist == Twist()
+    assert state.slip_rate == 0.0
 
 
 @given(st.integers(0, 65535), st.integers(0, 65535), st.floats(-math.pi, math.pi))
