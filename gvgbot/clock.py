@@ -42,6 +42,16 @@ class LoopClock:
         await asyncio.sleep(max(0.0, stamp - self.now()))
 
 
+def on_loop(clock: Clock, stamp: float) -> float:
+    """When it is the stamp by the running event loop's clock, of which the other may be ahead.
+
+    That is later than now in any case: with a timer for a time that has come, virtual time would
+    stand still.
+    """
+    now, on_loop_now = clock.now(), asyncio.get_running_loop().time()
+    return max(stamp - (now - on_loop_now), math.nextafter(on_loop_now, math.inf))
+
+
 class _JumpingSelector(selectors.SelectSelector):
     """Never waits: when the loop would sleep, its clock jumps instead."""
 

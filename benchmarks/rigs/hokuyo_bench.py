@@ -204,12 +204,16 @@ def on_bench(
     scenario: Callable[[Bench], Awaitable[None]],
     config: HokuyoConfig | None = None,
     first: Callable[[ByteStream, LoopClock], Awaitable[None]] | None = None,
+    ahead: float = 0.0,
 ) -> None:
-    """Run the scenario with the driver and the twin at work; `first` has the link before that."""
+    """Run the scenario with the driver and the twin at work; `first` has the link before that.
+
+    Their clock is `ahead` of the loop's, s.
+    """
 
     async def main() -> None:
         here, there = pipe()
-        clock = LoopClock()
+        clock = LoopClock(ahead)
         async with asyncio.TaskGroup() as tasks:
             served = tasks.create_task(serve_twin(twin, there, clock))
             if first is not None:

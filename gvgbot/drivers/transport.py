@@ -15,7 +15,7 @@ from typing import Protocol
 
 import serial
 
-from gvgbot.clock import Clock
+from gvgbot.clock import Clock, on_loop
 from gvgbot.drivers.deadman import Deadman
 from gvgbot.errors import DeviceLost
 
@@ -285,9 +285,8 @@ async def serve_twin(twin: TwinDevice, stream: ByteStream, clock: Clock) -> None
             if awaited <= clock.now():
                 await asyncio.sleep(0)
                 continue
-            at = awaited - (clock.now() - loop.time())  # the clock may be ahead of the loop's
-            at = max(at, math.nextafter(loop.time(), math.inf))  # or virtual time would stand still
-            timer = None if awaited == math.inf else loop.call_at(at, wake.set)
+            is_never = awaited == math.inf
+            timer = None if is_never else loop.call_at(on_loop(clock, awaited), wake.set)
             await wake.wait()
             wake.clear()
             if timer is not None:

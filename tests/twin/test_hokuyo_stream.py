@@ -214,6 +214,21 @@ def test_a_silent_laser_is_lost_within_a_few_seconds() -> None:
     on_bench(HokuyoTwin(PERFECT, World(), seed=9), scenario)
 
 
+@pytest.mark.parametrize("ahead", [5000.0, -5000.0])
+def test_silence_is_noticed_though_the_clock_goes_on_from_an_earlier_life(ahead: float) -> None:
+    """After a restart of the computer its clock, and so the loop's, is not the robot's."""
+
+    async def scenario(bench: Bench) -> None:
+        await bench.scans(3)
+        bench.served.cancel()
+        silent_since = bench.clock.now()
+        await bench.running
+        assert 0.3 < bench.clock.now() - silent_since < 4.0
+
+    twin = HokuyoTwin(PERFECT, World(), seed=9, on_since=ahead)
+    on_bench(twin, scenario, ahead=ahead)
+
+
 def test_a_laser_that_never_answers_is_lost() -> None:
     async def main() -> None:
         here, there = pipe()

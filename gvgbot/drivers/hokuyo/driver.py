@@ -9,7 +9,7 @@ from pathlib import Path
 
 import structlog
 
-from gvgbot.clock import Clock
+from gvgbot.clock import Clock, on_loop
 from gvgbot.drivers.hokuyo import clock_sync
 from gvgbot.drivers.hokuyo.clock_sync import ClockMap, Synchronisation
 from gvgbot.drivers.hokuyo.config import HokuyoConfig
@@ -308,7 +308,7 @@ class HokuyoLaser:
         """Hand on what comes; a timer for each scan would cost more than its checksums."""
         until = stream.until
         with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout_at(until):
+            async with asyncio.timeout_at(on_loop(self._dialogue.clock, until)):
                 while stream.until >= until:
                     self._hand_on(await self._dialogue.receive(), stream)
 

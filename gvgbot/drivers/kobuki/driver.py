@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Annotated
 
-from gvgbot.clock import Clock
+from gvgbot.clock import Clock, on_loop
 from gvgbot.drivers.kobuki.commands import (
     ALL_POWER,
     NO_OUTPUT,
@@ -258,7 +258,7 @@ class KobukiBase:
     async def _listen(self, until: float) -> None:
         """Take what the base sends; a timer for each frame would cost more than its reading."""
         with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout_at(until):
+            async with asyncio.timeout_at(on_loop(self._clock, until)):
                 while True:
                     self._take(await self._stream.read())
 

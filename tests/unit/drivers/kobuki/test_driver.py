@@ -59,8 +59,8 @@ def frame(*parts: FeedbackPart) -> bytes:
 class Bench:
     """A driver whose base is played by the test."""
 
-    def __init__(self, config: KobukiConfig | None = None) -> None:
-        self.clock = LoopClock()
+    def __init__(self, config: KobukiConfig | None = None, ahead: float = 0.0) -> None:
+        self.clock = LoopClock(ahead)
         stream, self.wire = pipe()
         self.base = KobukiBase(stream, config or KobukiConfig(), self.clock)
         self.sent: list[tuple[float, Command]] = []
@@ -88,11 +88,18 @@ class Bench:
             self.cycle += 1
 
 
-def play(script: Callable[[Bench], Awaitable[None]], config: KobukiConfig | None = None) -> Bench:
-    """Run the driver while the script plays the base, then cancel the driver."""
+def play(
+    script: Callable[[Bench], Awaitable[None]],
+    config: KobukiConfig | None = None,
+    ahead: float = 0.0,
+) -> Bench:
+    """Run the driver while the script plays the base, then cancel the driver.
+
+    Its clock is `ahead` of the loop's, s.
+    """
 
     async def main() -> Bench:
-        bench = Bench(config)
+        bench = Bench(config, ahead)
         async with asyncio.TaskGroup() as tasks:
             listening = tasks.create_task(bench.listen())
             running = tasks.create_task(bench.base.run())
@@ -212,6 +219,33 @@ def test_a_quarter_of_a_second_of_silence_stops_the_base_long_before_the_deadman
     bench = play(script, KobukiConfig(deadman_s=2.0))
     stops = [t for t, control in bench.controls(since=0.02) if control == STOP]
     assert stops[0] == pytest.approx(0.48 + 0.25)
+
+
+@pytest.mark.parametrize("ahead", [5000.0, -5000.0])
+@pytest.mark.parametrize(("streams", "allowed"), [(True, 0.5), (False, 0.25)])
+def test_a_stop_is_due_though_the_clock_goes_on_from_an_earlier_life(
+    ahead: float, allowed: float, *, streams: bool
+) -> None:
+    """After a restart of the computer its clock, and so the loop's, is not the robot's."""
+
+    async def script(bench: Bench) -> None:
+        await bench.stream(0.5, Twist(0.2, 0.0))
+        await (bench.stream(0.9) if streams else asyncio.sleep(0.9))
+
+    bench = play(script, ahead=ahead)
+    stops = [t - ahead for t, control in bench.controls(since=ahead + 0.02) if control == STOP]
+    assert stops[0] == pytest.approx(0.48 + allowed, abs=0.021)
+
+
+@pytest.mark.parametrize("ahead", [5000.0, -5000.0])
+def test_a_silent_base_is_lost_though_the_clock_goes_on_from_an_earlier_life(ahead: float) -> None:
+    async def main() -> float:
+        bench = Bench(ahead=ahead)
+        with pytest.raises(DeviceLost, match="cable"):
+            await bench.base.run()
+        return bench.clock.now() - ahead
+
+    assert run_in_virtual_time(main()) == pytest.approx(SILENCE_LOST_S)
 
 
 def test_a_link_that_is_cut_is_reported_by_run_alone() -> None:
