@@ -157,6 +157,11 @@ CONTACTS = {
     "over-current, turn in place": (MOTOR, TURN, STANDSTILL, "over-current"),
     "over-current, back off": (MOTOR, BACK, STANDSTILL, "over-current"),
 }
+STILL_ROLLING = {
+    "ahead, asked to back off": (CRUISE, BACK),
+    "ahead, asked to turn": (CRUISE, TURN),
+    "back, asked to cruise": (BACK, CRUISE),
+}
 
 
 @pytest.mark.parametrize(
@@ -166,6 +171,16 @@ def test_what_the_base_feels_stops_it_at_once(
     contact: Contact | None, asked: Twist, permitted: Twist, reason: Reason | None
 ) -> None:
     assert permit_once(asked, last=asked, contact=contact) == (permitted, reason)
+
+
+@pytest.mark.parametrize(("last", "asked"), STILL_ROLLING.values(), ids=STILL_ROLLING)
+@pytest.mark.parametrize(("contact", "reason"), [(BUMPER, "bumper"), (CLIFF, "cliff")])
+def test_what_is_felt_ahead_ends_all_rolling_at_once(
+    last: Twist, asked: Twist, contact: Contact, reason: Reason
+) -> None:
+    """By its ramp alone the robot would roll on for a while, or on backwards."""
+    permitted, why = permit_once(asked, last=last, contact=contact)
+    assert (permitted.linear, why) == (0.0, reason)
 
 
 @pytest.mark.parametrize(
@@ -187,6 +202,20 @@ def test_without_a_first_scan_nothing_moves_not_even_in_place() -> None:
         contact=None,
     )
     assert (permitted, reason) == (STANDSTILL, "no scan")
+
+
+def test_a_laser_that_is_lost_stops_the_robot_though_its_last_scan_is_not_old() -> None:
+    guard = Guard(GuardConfig(), RADIUS)
+    state, permitted = GuardState(), list[tuple[Twist, Reason | None]]()
+    for step, scan in enumerate([still_scan(0.0), None]):
+        stamp = step * PERIOD
+        odometry = Odometry(stamp, Pose(), STANDSTILL)
+        state, twist, reason = guard.permit(
+            state, CRUISE, stamp=stamp, odometry=odometry, scan=scan, contact=None
+        )
+        permitted.append((twist, reason))
+    assert permitted[0][1] is None
+    assert permitted[1] == (STANDSTILL, "no scan")
 
 
 def test_a_covered_laser_stops_the_robot_as_a_silent_one_does_and_is_called_so() -> None:
@@ -267,8 +296,10 @@ def test_the_robot_takes_a_second_to_reach_half_a_metre_per_second() -> None:
     assert speeds.index(max(speeds)) * PERIOD == pytest.approx(1.0, abs=0.12)
 
 
-def test_after_a_long_silence_the_robot_does_not_jump_to_full_speed() -> None:
-    state = GuardState(twist=STANDSTILL, stamp=0.0)
+@pytest.mark.parametrize("last", [0.0, 0.5], ids=["it stood", "it was rolling"])
+def test_after_a_long_silence_the_robot_does_not_jump_to_full_speed(last: float) -> None:
+    """Meanwhile nobody has driven the base, so that it stands."""
+    state = GuardState(twist=Twist(last, 0.0), stamp=0.0)
     _, permitted, _ = Guard(GuardConfig(), RADIUS).permit(
         state,
         Twist(0.5, 0.0),
@@ -377,6 +408,33 @@ def test_something_that_appears_within_the_stopping_distance_brakes_as_hard_as_i
     assert permitted.linear < 0.06
 
 
+def test_the_tighter_arc_of_a_robot_that_was_slowed_is_as_free_as_it_must_be() -> None:
+    """A post on the wide arc slows the robot, which then turns towards another, inside of that.
+
+    Where it touches a post is found by going along the arc in steps of a millimetre.
+    """
+    ranges, posts = np.full(len(BEARINGS), inf), []
+    for x, y in ((0.282, 0.087), (0.05, 0.205)):
+        beam = int(np.abs(BEARINGS - math.atan2(y, x)).argmin())
+        ranges[beam] = math.hypot(x, y)
+        posts.append(Pose(theta=BEARINGS[beam]).transform(np.array([ranges[beam], 0.0])))
+    asked, reach = Twist(0.5, 1.0), RADIUS + 0.02
+
+    def free(radius: float, post: Array) -> float:
+        angle = np.arange(0.0, 1.5, 0.001) / radius
+        along = radius * np.column_stack([np.sin(angle), 1.0 - np.cos(angle)])
+        return radius * float(angle[np.argmax(np.hypot(*(along - post).T) < reach)])
+
+    def stoppable(way: float) -> float:
+        return math.sqrt(0.25**2 + 2.0 * way) - 0.25
+
+    slowed = stoppable(free(0.5, posts[0]))
+    permitted, reason = permit_once(asked, last=asked, scan=still_scan(99.9, ranges))
+    assert (permitted.angular, reason) == (1.0, "obstacle near")
+    assert permitted.linear == pytest.approx(stoppable(free(slowed, posts[1])), abs=0.003)
+    assert permitted.linear < 0.8 * slowed
+
+
 @pytest.mark.parametrize("filler", [math.nan, inf], ids=["dropout", "nothing within range"])
 def test_a_beam_without_a_range_is_no_obstacle(filler: float) -> None:
     ranges = np.full(len(BEARINGS), 4.0)
@@ -420,20 +478,23 @@ def test_the_robot_stops_before_a_door_that_is_too_narrow() -> None:
 
 
 @pytest.mark.parametrize(
-    "mount", [Pose(0.1, 0.0, 0.0), Pose(-0.05, 0.03, pi / 4)], ids=["ahead", "turned"]
+    "mount",
+    [Pose(0.1, 0.0, 0.0), Pose(-0.05, 0.03, pi / 4), Pose(-0.8, 0.0, 0.0)],
+    ids=["ahead", "turned", "far behind"],
 )
 def test_the_mount_of_the_laser_is_taken_into_account(mount: Pose) -> None:
     drive = Drive(WALL_AHEAD, base_laser=mount).run(Twist(0.5, 0.0), 12.0)
     assert RADIUS < drive.clearance < RADIUS + 0.03
 
 
-def test_a_late_scan_is_placed_where_the_robot_was_when_it_was_taken() -> None:
-    """The wall was 0.5 m ahead; the robot has since driven 0.1 m towards it."""
+@pytest.mark.parametrize("cycles", [10, 24])
+def test_a_late_scan_is_placed_where_the_robot_was_when_it_was_taken(cycles: int) -> None:
+    """The wall was 0.5 m ahead; in each cycle since the robot has driven 0.01 m towards it."""
     ranges = 0.5 / np.maximum(np.cos(BEARINGS), 1e-3)
     guard = Guard(replace(GuardConfig(), response_time_s=0.0, margin_m=0.0), RADIUS)
     state, twist = GuardState(twist=Twist(0.5, 0.0), stamp=0.0), Twist(0.5, 0.0)
     permitted = twist
-    for step in range(11):
+    for step in range(cycles + 1):
         stamp = step * PERIOD
         odometry = Odometry(stamp, Pose(0.5 * stamp, 0.0), twist)
         scan = still_scan(0.0, ranges)
@@ -441,7 +502,9 @@ def test_a_late_scan_is_placed_where_the_robot_was_when_it_was_taken() -> None:
             state, twist, stamp=stamp, odometry=odometry, scan=scan, contact=None
         )
         state = replace(state, twist=twist)
-    assert permitted.linear == pytest.approx(min(0.5, math.sqrt(2 * (0.4 - RADIUS))))
+    assert permitted.linear == pytest.approx(
+        min(0.5, math.sqrt(2 * (0.5 - 0.01 * cycles - RADIUS))), abs=1e-3
+    )
 
 
 def test_a_bumper_hit_leads_to_a_slow_retreat() -> None:
