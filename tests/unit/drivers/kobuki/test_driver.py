@@ -134,6 +134,19 @@ def test_without_drive_for_half_a_second_zeros_are_sent() -> None:
     assert len(stops) > 2
 
 
+def test_after_such_a_stop_the_ramp_begins_from_rest() -> None:
+    """A tenth of a second of it, at most, for the first command."""
+    drove: list[Twist] = []
+
+    async def script(bench: Bench) -> None:
+        await bench.stream(3.0, Twist(0.4, 0.0))
+        await bench.stream(1.0)
+        drove.append(bench.base.drive(Twist(0.4, 0.0)))
+
+    play(script, KobukiConfig(max_acceleration_mps2=0.5))
+    assert drove == [Twist(0.05, 0.0)]
+
+
 def test_driving_goes_on_as_long_as_it_is_asked_for() -> None:
     async def script(bench: Bench) -> None:
         for _ in range(10):
