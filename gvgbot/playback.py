@@ -88,12 +88,12 @@ class PlayedRobot(Robot):
         self._played, self._speed = played, speed
 
     def _prepare(self, links: Links) -> None:
-        super()._prepare(links)
-        self._steering.declines = "this is a recording: it can only be watched"
         first = list(islice(self._played.messages, 1))
         self._messages = chain(first, self._played.messages)
         start = first[0][0] if first else 0.0
         self._clock = PlayedClock(LoopClock(), start, self._speed)
+        super()._prepare(links)
+        self._steering.declines = "this is a recording: it can only be watched"
         self._base = _PlayedBase(links.open_base, self._clock)
         self._devices = _PlayedDevices(links, self._base)
 

@@ -176,6 +176,7 @@ def played(path: Path, out: Path, speed: float, seconds: float) -> Network:
             await robot.serve(told(), Links(log.config, clock, None))
 
         run_in_virtual_time(live())
+        session.write_events()
     deque(log.messages, maxlen=0)  # a file that is read to its end is closed
     return network
 
@@ -193,6 +194,14 @@ def test_a_recording_is_played_at_the_pace_of_life_or_faster(
         k = int(np.abs(online.stamps - state.stamp).argmin())
         assert np.hypot(*(online.positions[k] - state.pose[:2])) < 0.15
     assert sum(state.phase == "exploring" for state in states) > 0.8 * len(states)
+
+
+def test_what_is_asked_of_a_recording_is_told_by_its_own_time(cut: Path, tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    last = played(cut, out, speed=2.0, seconds=5.0).states[-1]
+    events = map(json.loads, (out / "events.jsonl").read_text(encoding="utf-8").splitlines())
+    (asked,) = (event for event in events if event["event"] == "requested")
+    assert asked["stamp"] == pytest.approx(last.stamp, abs=0.3)
 
 
 def test_when_a_recording_is_over_the_robot_stands_and_is_still_there(
