@@ -89,6 +89,21 @@ def test_all_that_was_written_is_read(tmp_path: Path) -> None:
     assert saved.beat.stamp == 5.0  # the journal is younger
 
 
+def test_a_batch_that_takes_the_place_of_others_leaves_nothing_of_them(tmp_path: Path) -> None:
+    files = written(tmp_path)
+    files.append(batch(2), sync=True, after=2)
+    data = (tmp_path / JOURNAL).read_bytes()
+    assert [end for _, end in records(data)][-1] == len(data)
+    assert places(tmp_path) == [0.0, 1.0, 2.0]
+
+
+def test_a_batch_that_does_not_follow_the_one_before_ends_the_past(tmp_path: Path) -> None:
+    files = written(tmp_path, batches=2)
+    for first in (3, 4, 2):
+        files.append(batch(first), sync=True)
+    assert places(tmp_path) == [0.0, 1.0]
+
+
 @pytest.mark.parametrize("cut", [1, 8, 40])
 def test_a_journal_that_was_cut_has_lost_its_last_batch_only(tmp_path: Path, cut: int) -> None:
     written(tmp_path)

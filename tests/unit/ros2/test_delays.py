@@ -31,6 +31,14 @@ def test_a_clock_that_is_set_back_costs_two_seconds() -> None:
     assert driven == [not 4.95 < c < 6.95 for c in came]
 
 
+def test_what_is_held_up_for_a_moment_now_and_then_is_passed_over_each_time() -> None:
+    """Not only the first time: two seconds of it must be on end to be a longer way."""
+    sent = [0.1 * n for n in range(100)]
+    late = {20, 21, 45, 70, 71, 72}
+    came = [s + 0.8 if n in late else s for n, s in enumerate(sent)]
+    assert heard(Delays(), sent, came, 0.0) == [n not in late for n in range(100)]
+
+
 def test_clocks_that_go_apart_cost_nothing() -> None:
     came = [0.1 * n for n in range(40_000)]
     assert all(heard(Delays(), [0.9995 * c for c in came], came, 0.0))

@@ -156,3 +156,12 @@ def test_a_restart_keeps_the_pose() -> None:
     state = start_odometry(WheelReading(7, 9, 1.0, 0.2), pose)
     assert state.odom_base == pose
     assert state.twist == Twist()
+
+
+def test_encoders_that_flicker_at_rest_do_not_cast_doubt_on_a_gyro_that_stands() -> None:
+    """Either wheel to and fro between two counts, for ten minutes."""
+    flicker = [WheelReading(k % 2, (k // 2) % 2, 0.5, 0.0) for k in range(4)]
+    state = start_odometry(flicker[0])
+    for k in range(round(600.0 / DT)):
+        state = advance_odometry(state, flicker[k % 4], DT, "gyro")
+    assert state.unfelt < math.tau
