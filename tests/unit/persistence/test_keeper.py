@@ -503,12 +503,17 @@ class Wheels:
 
 
 @pytest.mark.parametrize(
-    ("goes_on", "away_s", "counting"),
-    [(True, 59.0, True), (True, 61.0, False), (False, 1.0, False)],
-    ids=["soon", "late", "from elsewhere"],
+    ("goes_on", "is_current", "away_s", "counting"),
+    [
+        (True, True, 59.0, True),
+        (True, True, 61.0, False),
+        (True, False, 59.0, False),
+        (False, True, 1.0, False),
+    ],
+    ids=["soon", "late", "something was not kept", "from elsewhere"],
 )
 def test_a_base_vouches_for_the_place_of_its_own_robot_alone_and_that_for_a_minute(
-    tmp_path: Path, *, goes_on: bool, away_s: float, counting: bool
+    tmp_path: Path, *, goes_on: bool, is_current: bool, away_s: float, counting: bool
 ) -> None:
     with RunDirectory(tmp_path) as directory:
         session = Session(load_config(), directory, None)
@@ -521,7 +526,8 @@ def test_a_base_vouches_for_the_place_of_its_own_robot_alone_and_that_for_a_minu
     async def come_back() -> bool:
         stamp = LoopClock().now() - away_s
         beat = msgspec.structs.replace(saved.beat, stamp=stamp, boot="this one", ahead=0.0)
-        keeper = Keeper(session, files, replace(saved, beat=beat), boot="this one")
+        last = replace(saved, beat=beat, is_current=is_current)
+        keeper = Keeper(session, files, last, boot="this one")
         keeper.clock()
         keeper.attach(cast(FeedbackReader, wheels))
         return keeper._is_vouched()
@@ -552,3 +558,21 @@ def test_time_goes_on_where_a_map_from_elsewhere_ended(tmp_path: Path) -> None:
         return keeper.clock().now()
 
     assert asyncio.run(begins()) == pytest.approx(2.0, abs=1.0)
+
+
+@pytest.mark.parametrize("boot", ["another one", ""], ids=["known to be another", "not told"])
+def test_time_goes_on_after_a_restart_of_the_computer(tmp_path: Path, boot: str) -> None:
+    """Some computers do not tell their starts apart, and the clock of each begins with zero."""
+    with RunDirectory(tmp_path) as directory:
+        session = Session(load_config(), directory, None)
+    shutil.copytree(MISSION, tmp_path, dirs_exist_ok=True)
+    files = MissionFiles(tmp_path)
+    saved = files.read()
+    assert saved is not None
+    beat = msgspec.structs.replace(saved.beat, stamp=5000.0, boot="", ahead=0.0)
+    keeper = Keeper(session, files, replace(saved, beat=beat), boot=boot)
+
+    async def begins() -> float:
+        return keeper.clock().now()
+
+    assert run_in_virtual_time(begins()) > 5000.0
