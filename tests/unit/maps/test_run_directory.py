@@ -10,6 +10,7 @@ import pytest
 from gvgbot.autonomy.events import Recovery
 from gvgbot.errors import GvgbotError, UsageError
 from gvgbot.maps.run_directory import RunDirectory
+from tests.unit.persistence.test_mission_files import full_disk
 
 
 @dataclass(frozen=True)
@@ -107,6 +108,17 @@ def test_every_event_is_a_line_that_is_there_at_once(tmp_path: Path) -> None:
                 "offset_m": 0.04,
             }
         assert (tmp_path / "events.jsonl").read_text().count("\n") == 2
+
+
+def test_a_disk_that_was_full_for_a_while_has_no_half_of_an_event(tmp_path: Path) -> None:
+    with RunDirectory(tmp_path) as directory:
+        directory.append_event(Recovery(1.0, "turn round", "before"))
+        size = (tmp_path / "events.jsonl").stat().st_size
+        with full_disk(size + 20), pytest.raises(GvgbotError, match="too large"):
+            directory.append_event(Recovery(2.0, "turn round", "no room for all of it"))
+        directory.append_event(Recovery(3.0, "turn round", "after"))
+    lines = (tmp_path / "events.jsonl").read_text(encoding="utf-8").splitlines()
+    assert [json.loads(line)["stamp"] for line in lines] == [1.0, 3.0]
 
 
 def test_an_opened_run_goes_on(tmp_path: Path) -> None:
