@@ -51,6 +51,24 @@ def test_where_a_wall_ends_no_range_is_moved_towards_what_is_behind() -> None:
     assert there[5] == gone
 
 
+@pytest.mark.parametrize("upside_down", [False, True])
+def test_a_beam_of_three_steps_was_measured_with_the_step_in_its_middle(
+    *, upside_down: bool
+) -> None:
+    """A URG-04LX turns once in 0.1 s, with 1024 steps in a turn, of which 384 looks ahead."""
+    request = ScanRequest("MD", 44, 725 - 1, 3)
+    geometry = scan_geometry(
+        HokuyoConfig(upside_down=upside_down), MODELS["URG-04LX"].parameters, request
+    )
+    scan = geometry.scan(np.full(227, 1000, np.int32), 1.0)
+    steps = 45.0 + 3.0 * np.arange(227)
+    steps = steps[::-1] if upside_down else steps
+    stamps = scan.stamp + scan.time_increment * np.arange(227)
+    assert stamps == pytest.approx(1.0 + steps * 0.1 / 1024, abs=1e-9)
+    left = -1.0 if upside_down else 1.0
+    assert scan.bearings == pytest.approx(left * (steps - 384.0) * math.tau / 1024)
+
+
 def test_ranges_of_groups_are_whole_millimetres_as_well() -> None:
     """So a scan that is kept takes no more for a beam of many steps than for one of one."""
     parameters = MODELS["URG-04LX"].parameters
