@@ -11,6 +11,11 @@ from gvgbot.topics import State
 from gvgbot.words import counted
 
 PASSING_S = 1.0  # an obstacle that holds the robot for less is part of driving
+LASTING_S = 10.0  # what is felt for so long is not got rid of by backing off
+REMEDIES = {
+    "bumper": "free the robot; if nothing touches it, its bumper is jammed: tap it",
+    "cliff": "move the robot from the edge; if there is floor below it, clean its cliff sensors",
+}
 SAGGING_S = 10.0  # a voltage that is low for less may be that of a motor that starts
 CHARGED = 0.35  # of a full charge: a battery with more is low no longer
 
@@ -56,8 +61,12 @@ def log_event(event: events.Event) -> None:
 
 @dataclass(slots=True)
 class GuardJournal:
-    """Says when the guard holds the robot, and when it lets go again."""
+    """Says when the guard holds the robot, and when it lets go again.
 
+    `needs_somebody` while something is felt for so long that the robot does not get away by itself.
+    """
+
+    needs_somebody: bool = False
     _reason: str | None = None
     _since: float = 0.0  # stamp
     _said: str | None = None
@@ -68,6 +77,7 @@ class GuardJournal:
             reason = None
         if reason != self._reason:
             self._reason, self._since = reason, stamp
+        self._call_somebody(stamp)
         if reason == self._said or (
             reason in (None, "obstacle") and stamp - self._since < PASSING_S
         ):
@@ -77,6 +87,14 @@ class GuardJournal:
         else:
             log.warning("guard stopped", reason=reason)
         self._said = reason
+
+    def _call_somebody(self, stamp: float) -> None:
+        """Say once what to do about what is felt and does not go away."""
+        remedy = REMEDIES.get(self._reason or "")
+        before = self.needs_somebody
+        self.needs_somebody = remedy is not None and stamp - self._since > LASTING_S
+        if self.needs_somebody and not before:
+            log.warning("robot is stuck", reason=self._reason, remedy=remedy)
 
 
 @dataclass(slots=True)
@@ -106,13 +124,14 @@ class BatteryJournal:
         log.warning(what, volts=round(battery.voltage, 1), remedy="charge it")
 
 
-def status_line(state: State) -> str:
+def status_line(state: State, *, needs_somebody: bool = False) -> str:
     """The state in a few words, for the service manager."""
     if state.phase == "starting":
         return f"starting: {state.reason}" if state.reason else "starting"
     vertices = counted(state.vertices, "vertex", "vertices")
     graph = f"{vertices}, {counted(state.frontiers, 'frontier')}"
     what = state.outcome if state.phase == "finished" else state.errand or state.phase
-    is_held = state.phase != "halted" and state.guard in NEEDS_SOMEBODY
+    needs_somebody |= state.guard in NEEDS_SOMEBODY
+    is_held = state.phase != "halted" and needs_somebody
     why = state.guard if is_held else state.reason
     return f"{what}: {why}; {graph}" if why else f"{what}: {graph}"

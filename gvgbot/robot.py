@@ -325,9 +325,11 @@ class Robot:
             happened = self._events.news()
             if happened is not None:
                 self._network.publish(happened)
-        self._notifier.status(status_line(now))
+        needs_somebody = self._guard.needs_somebody
+        self._notifier.status(status_line(now, needs_somebody=needs_somebody))
         self._heed_battery(now.stamp)
-        self._devices.base.show(sign(now, is_lost=self._pipeline.is_lost))
+        shown = sign(now, is_lost=self._pipeline.is_lost, needs_somebody=needs_somebody)
+        self._devices.base.show(shown)
         stuck = now.cycle_age is not None and now.cycle_age > STUCK_AFTER
         if not stuck or self._devices.base.away is not None:
             self._notifier.alive()

@@ -98,11 +98,11 @@ def _phase(pipeline: Pipeline, away: str | None) -> Phase:
     return "waiting" if errands.is_waiting else "exploring"
 
 
-def sign(now: State, *, is_lost: bool) -> Sign:
+def sign(now: State, *, is_lost: bool, needs_somebody: bool = False) -> Sign:
     """What people beside the robot are shown of its state."""
     if now.phase == "starting":
         return "starting"
-    if now.phase == "halted" or now.guard in NEEDS_SOMEBODY:
+    if now.phase == "halted" or now.guard in NEEDS_SOMEBODY or needs_somebody:
         return "trouble"
     if now.phase == "finished":
         return "trouble" if now.outcome == "failed" else "finished"

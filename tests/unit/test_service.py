@@ -241,6 +241,22 @@ def test_a_stop_and_its_end_are_a_line_each_however_long_it_lasts() -> None:
     assert guard_lines(cycles) == [("guard stopped", "bumper"), ("guard released", "bumper")]
 
 
+@pytest.mark.parametrize("reason", ["bumper", "cliff"])
+def test_what_is_felt_and_does_not_go_away_needs_somebody(reason: str) -> None:
+    journal, needed = GuardJournal(), []
+    cycles = [*every_cycle(0, 12, reason), *every_cycle(12, 14, None), *every_cycle(14, 20, reason)]
+    with structlog.testing.capture_logs() as logs:
+        for stamp, now in cycles:
+            journal.note(now, stamp)
+            needed.append(journal.needs_somebody)
+    stuck = [log for log in logs if log["event"] == "robot is stuck"]
+    assert [log["log_level"] for log in stuck] == ["warning"]
+    assert reason in stuck[0]["remedy"]
+    assert [stamp for (stamp, _), is_so in zip(cycles, needed, strict=True) if is_so] == (
+        pytest.approx([stamp for stamp, _ in cycles if 10 < stamp < 12], abs=0.02)
+    )
+
+
 def test_slowing_down_and_short_stops_before_obstacles_are_no_news() -> None:
     cycles = [
         *every_cycle(0, 5, "obstacle near"),
@@ -319,6 +335,12 @@ def test_the_status_says_what_counts() -> None:
 )
 def test_the_status_says_why_the_robot_needs_somebody(now: dict[str, Any], said: str) -> None:
     assert status_line(msgspec.structs.replace(EXAMPLE, **now)).startswith(said)
+
+
+def test_the_status_says_what_is_felt_and_does_not_go_away() -> None:
+    now = msgspec.structs.replace(EXAMPLE, guard="bumper")
+    assert status_line(now, needs_somebody=False).startswith("exploring: 3 vertices")
+    assert status_line(now, needs_somebody=True).startswith("exploring: bumper; 3 vertices")
 
 
 _LARGE_ARRAYS = """

@@ -37,3 +37,9 @@ def state(phase: str, outcome: str | None = None, guard: str | None = None) -> A
 )
 def test_each_state_has_its_sign(now: Any, is_lost: bool, shown: Sign) -> None:
     assert sign(now, is_lost=is_lost) == shown
+
+
+def test_what_is_felt_and_does_not_go_away_is_trouble() -> None:
+    now = state("exploring", guard="bumper")
+    assert sign(now, is_lost=False, needs_somebody=False) == "busy"
+    assert sign(now, is_lost=False, needs_somebody=True) == "trouble"
