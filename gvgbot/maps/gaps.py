@@ -31,7 +31,8 @@ def gaps(grid: OccupancyGrid, around: Array, passage_m: float) -> Array:
     if not wall.any():
         return np.empty((0, 2))
     has_room = metres_to(wall, cell) > passage_m
-    floor = reachable(seen & has_room, (around - corner)[::-1] / cell)
+    here = (around - corner)[::-1] / cell
+    floor = reachable(seen & has_room, here)
     unseen = has_room & ~seen & ~wall
     brink = unseen & ndimage.binary_dilation(floor)
     joined = ndimage.binary_dilation(brink, iterations=max(1, round(_JOINED_M / cell)))
@@ -41,7 +42,8 @@ def gaps(grid: OccupancyGrid, around: Array, passage_m: float) -> Array:
         wide = tuple(slice(max(0, s.start - margin), s.stop + margin) for s in box)
         own = brink[wide] & (labels[wide] == number)
         if _is_worth(own, unseen[wide], cell):
-            found.append(_beside(own, floor[wide]) + [s.start for s in wide])
+            first = [s.start for s in wide]
+            found.append(_beside(own, floor[wide], here - 0.5 - first, margin) + first)
     return corner + (np.array(found).reshape(-1, 2)[:, ::-1] + 0.5) * cell
 
 
@@ -77,9 +79,19 @@ def _is_worth(brink: Mask, unseen: Mask, cell: float) -> bool:
     return bool(behind.sum() * cell**2 >= _AREA_M2)
 
 
-def _beside(brink: Mask, floor: Mask) -> Array:
-    """The (row, column) of seen floor that is nearest to the middle of the brink."""
-    places = np.argwhere(floor)
-    middle = np.argwhere(brink).mean(axis=0)
-    nearest: Array = places[np.argmin(np.hypot(*(places - middle).T))].astype(np.float64)
+def _beside(brink: Mask, floor: Mask, here: Array, far: float) -> Array:
+    """The (row, column) of seen floor that is nearest to the middle of the brink.
+
+    A brink that bends may have that `far` inside, as all round an island in a hall: then it is the
+    floor at the brink that is nearest to the robot.
+    """
+    nearest = _nearest(np.argwhere(floor), np.argwhere(brink).mean(axis=0))
+    rim = np.argwhere(floor & ndimage.binary_dilation(brink))
+    if np.hypot(*(rim - nearest).T).min() > far:
+        nearest = _nearest(rim, here)
+    return nearest
+
+
+def _nearest(places: NDArray[np.intp], here: Array) -> Array:
+    nearest: Array = places[np.argmin(np.hypot(*(places - here).T))].astype(np.float64)
     return nearest

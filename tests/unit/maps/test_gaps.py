@@ -75,6 +75,17 @@ def test_two_gaps_are_told_apart(cell: float) -> None:
     assert places[:, 0] == pytest.approx([2.5, 2.5], abs=0.1)
 
 
+def test_where_floor_ends_all_round_the_gap_is_where_it_ends_next_to_the_robot() -> None:
+    """A laser of short range has been driven round a pillar in the middle of a hall."""
+    cells = np.full((100, 120), UNKNOWN, np.int8)
+    cells[10:80, 20:100] = 0
+    cells[42:48, 57:63] = 100
+    grid = OccupancyGrid(cells, 0.1, (-1.0, -2.0))
+    # The floor spans x from 1 to 9 and y from -1 to 6.
+    assert found(grid, x=4.0, y=0.0) == pytest.approx(np.array([[4.0, -1.0]]), abs=0.15)
+    assert found(grid, x=8.0, y=3.0) == pytest.approx(np.array([[9.0, 3.0]]), abs=0.15)
+
+
 def test_without_any_wall_there_is_no_gap() -> None:
     assert len(found(drawn(".....", ".....", "....."))) == 0
     assert len(found(drawn("     "))) == 0
