@@ -65,18 +65,21 @@ def test_a_multi_echo_laser_sees_the_pane_or_the_wall_behind_it(echo: Echo) -> N
     assert walls + panes == pytest.approx(1.0)
 
 
-def test_intensities_come_with_the_ranges_where_they_are_wanted() -> None:
+@pytest.mark.parametrize("upside_down", [False, True])
+def test_intensities_come_with_the_ranges_where_they_are_wanted(*, upside_down: bool) -> None:
+    """In the order of the beams, also where that is not the order of the steps."""
     truth = np.linspace(0.5, 10.0, 1081)
 
     async def scenario(bench: Bench) -> None:
         (scan,) = await bench.scans(1)
-        assert near(scan.ranges, truth)
+        assert near(scan.ranges, truth[::-1] if upside_down else truth)
         intensities = bench.laser.intensities
         assert intensities is not None
-        assert (np.diff(intensities) <= 0).all()  # the further, the weaker
-        assert intensities[0] > 4 * intensities[-1]
+        by_range = intensities[np.argsort(scan.ranges)]
+        assert (np.diff(by_range) <= 0).all()  # the further, the weaker
+        assert by_range[0] > 4 * by_range[-1]
 
-    on_bench(twin_of(truth), scenario, HokuyoConfig(intensities=True))
+    on_bench(twin_of(truth), scenario, HokuyoConfig(intensities=True, upside_down=upside_down))
 
 
 def test_a_laser_without_multi_echo_is_asked_for_simple_scans() -> None:
