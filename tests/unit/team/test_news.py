@@ -109,11 +109,13 @@ def test_an_edge_that_ends_nowhere_is_refused() -> None:
         decode(encode(damaged))
 
 
-def test_two_edges_that_leave_by_one_departure_are_refused() -> None:
+@pytest.mark.parametrize("is_last", [True, False])
+def test_two_edges_that_leave_by_one_departure_are_refused(*, is_last: bool) -> None:
     told = news(CHART)
     twice = msgspec.structs.replace(told.edges[0], id=1000)
+    edges = (*told.edges, twice) if is_last else (twice, *told.edges)
     with pytest.raises(GvgbotError, match="do not belong together"):
-        decode(encode(msgspec.structs.replace(told, edges=(*told.edges, twice))))
+        decode(encode(msgspec.structs.replace(told, edges=edges)))
 
 
 def test_a_departure_that_is_told_twice_is_refused() -> None:
