@@ -23,6 +23,7 @@ from gvgbot.team.chart import Chart
 from gvgbot.team.encounter import WINDOW_S, frame_of
 from gvgbot.team.mate import Mate, is_same_frame, remember
 from gvgbot.team.news import (
+    MOST_MATES,
     Claim,
     Course,
     Frame,
@@ -38,7 +39,6 @@ _SPARSE = 4  # every so manieth point of a track is told
 _RECOGNISE_S = 1.0  # between two attempts to recognise a robot by how it moves
 _SURE_BY_SIGHT = 0.999  # that the robot met is the one that says so
 _KNOWN_M = 0.4  # from where a robot says it is, a body is that robot
-_MOST_MATES = 64  # that are known at a time
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -225,11 +225,11 @@ class Member:
 
     def _has_room(self) -> bool:
         """Whether one more robot can be known; forgets those that were of no use and are lost."""
-        if len(self._mates) >= _MOST_MATES:
+        if len(self._mates) >= MOST_MATES:
             frames = self.frames
             for name in [n for n in self._mates if self.is_lost(n) and n not in frames]:
                 del self._mates[name]
-        return len(self._mates) < _MOST_MATES
+        return len(self._mates) < MOST_MATES
 
     def look(self, stamp: float) -> None:
         """Try to lay the maps of others onto the own one, where that is due."""

@@ -17,6 +17,7 @@ _MOST_BYTES = 2_000_000  # of a message: more than a thousand vertices
 _MOST_M = 1e5  # from the origin of a map
 _MOST_WAY_M = 2e4  # of all edges together
 _MOST_OPEN = 1000  # departures without an edge: each is looked for in all other maps
+MOST_MATES = 64  # that a robot knows at a time
 _ROUNDED = 1e-9  # share of its variances by which a covariance may be
 
 # Whoever tells may be broken, or no robot at all.
@@ -118,7 +119,7 @@ class News(msgspec.Struct, frozen=True, kw_only=True, tag="news"):
     finished: bool  # it does not drive any more
     # it knows of nothing that is left to do, but waits for what others find, or is on an errand
     idle: bool = False
-    frames: tuple[Frame, ...]
+    frames: Annotated[tuple[Frame, ...], msgspec.Meta(max_length=MOST_MATES)]
     vertices: Annotated[tuple[TeamVertex, ...], msgspec.Meta(max_length=1000)]
     edges: Annotated[tuple[TeamEdge, ...], msgspec.Meta(max_length=3000)]
     ways: Annotated[tuple[TeamWay, ...], msgspec.Meta(max_length=1000)] = ()

@@ -166,6 +166,14 @@ def test_news_with_a_number_that_is_none_are_refused(part: str, number: float) -
         decode(encode(msgspec.structs.replace(told, vertices=(vertex, *told.vertices[1:]))))
 
 
+def test_more_frames_than_a_robot_knows_others_are_refused() -> None:
+    """All of them are gone through several times a second, and a robot knows 64 others."""
+    frames = tuple(Frame(f"robot-{number}", 0, (0.0, 0.0, 0.0)) for number in range(65))
+    decode(encode(msgspec.structs.replace(news(CHART), frames=frames[:64])))
+    with pytest.raises(GvgbotError, match="damaged"):
+        decode(encode(msgspec.structs.replace(news(CHART), frames=frames)))
+
+
 @pytest.mark.parametrize("changes", [{"radius": 0.0}, {"pose": (0.0, math.nan, 0.0)}])
 def test_news_of_an_impossible_robot_are_refused(changes: dict[str, object]) -> None:
     with pytest.raises(GvgbotError, match="damaged"):
