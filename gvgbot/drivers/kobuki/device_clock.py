@@ -66,11 +66,11 @@ def advance_clock(
         started = start_clock(raw_ms, max(arrival, clock.stamp + _SHORTEST_STEP_S))
         return replace(started, resets=clock.resets + 1)
     is_slewed = behind_since is not None and arrival - behind_since > _BEHIND_BELIEVED_S
-    highest = clock.offset + (_SLEW if is_slewed else _DRIFT) * step
-    offset = min(highest, arrival - elapsed)
-    stamp = elapsed + offset
-    if step > 0.0:
-        stamp = max(stamp, clock.stamp + _SHORTEST_STEP_S)
+    offset, stamp = clock.offset, clock.stamp
+    if step > 0.0:  # a frame that is repeated tells nothing of the time
+        highest = clock.offset + (_SLEW if is_slewed else _DRIFT) * step
+        offset = min(highest, arrival - elapsed)
+        stamp = max(elapsed + offset, clock.stamp + _SHORTEST_STEP_S)
     return DeviceClock(
         raw_ms, offset, elapsed, stamp, step, clock.resets, late_since, arrival, behind_since
     )

@@ -77,6 +77,15 @@ def test_a_repeated_frame_takes_no_time() -> None:
     assert twice.stamp == pytest.approx(once.stamp)
 
 
+def test_a_frame_that_comes_again_moves_no_stamp() -> None:
+    """Of frames that are read together, all but the last count as made a while before that."""
+    clock = advance_clock(start_clock(0, 10.0), 20, 10.02)
+    for arrival in (9.98, 10.0, 10.02):
+        clock = advance_clock(clock, 20, arrival)
+        assert clock.stamp == pytest.approx(10.02, abs=1e-4)
+    assert advance_clock(clock, 40, 10.04).stamp == pytest.approx(10.04, abs=1e-4)
+
+
 @pytest.mark.parametrize("last_ms", [500, 5000, 60_000, 64_600, 65_500])
 def test_a_restart_in_a_silence_is_noticed_whatever_the_counter_was(last_ms: int) -> None:
     """Truth: after 1 s without frames the base has been on for 40 ms."""
