@@ -7,7 +7,7 @@ import numpy as np
 from gvgbot.autonomy.ending import Surveyed
 from gvgbot.autonomy.estimate import scans_at, smoothed_keyframes
 from gvgbot.autonomy.pipeline import Pipeline
-from gvgbot.geometry import Array, Pose, resampled, sampled
+from gvgbot.geometry import Array, Pose, anchored, resampled, sampled
 from gvgbot.maps.blanks import blanks
 from gvgbot.maps.gaps import gaps
 from gvgbot.maps.hits import Scans, barred, hits
@@ -109,16 +109,13 @@ def _passed(pipeline: Pipeline, keyframes: list[Pose]) -> tuple[Array, Array]:
 
 
 def _ways(pipeline: Pipeline) -> list[Way]:
-    """All edges, map frame."""
-    mapper = pipeline.mapper
-    return [
-        Way(
-            edge.a.vertex,
-            edge.b.vertex,
-            mapper.belief.map_vertex(edge.a.vertex).transform(edge.polyline),
-        )
-        for edge in mapper.graph.edges.values()
-    ]
+    """All edges, map frame, from vertex to vertex: odometry has bent the lines of long ones."""
+    place, ways = pipeline.mapper.belief.map_vertex, []
+    for edge in pipeline.mapper.graph.edges.values():
+        start, end = place(edge.a.vertex), place(edge.b.vertex)
+        line = anchored(start.transform(edge.polyline), start.position, end.position)
+        ways.append(Way(edge.a.vertex, edge.b.vertex, line))
+    return ways
 
 
 def _may_go(places: Array, scans: Scans, lasting_s: float) -> Array:
