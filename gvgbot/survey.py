@@ -113,7 +113,7 @@ def _ways(pipeline: Pipeline) -> list[Way]:
     place, ways = pipeline.mapper.belief.map_vertex, []
     for edge in pipeline.mapper.graph.edges.values():
         start, end = place(edge.a.vertex), place(edge.b.vertex)
-        line = anchored(start.transform(edge.polyline), start.position, end.position)
+        line = anchored(start.transform(edge.shown), start.position, end.position)
         ways.append(Way(edge.a.vertex, edge.b.vertex, line))
     return ways
 
