@@ -24,6 +24,7 @@ _FAR_M = 8.0  # what is farther has few beams on it
 _CELL_M = 0.1
 _ANY_WAY = np.diag([0.3**2, 0.3**2, 0.05**2])
 _CLEAR_M, _SHARE = 0.02, 0.2  # sigma to the side, and share of a sweep that finds its walls
+_CAME_ON = 0.5  # of what its wheels tell; a base that stands while they spin goes no way at all
 _COARSE_M = 0.5  # as far off as a sweep may lie at first
 
 
@@ -70,6 +71,8 @@ class Aim:
             some, self._before[0], motion, _ANY_WAY, self._matching, (_COARSE_M,)
         )
         if found is None or found.inliers < _SHARE or found.covariance[1, 1] > _CLEAR_M**2:
+            return
+        if math.hypot(found.pose.x, found.pose.y) < _CAME_ON * motion.x:
             return
         aside = found.pose.y - found.pose.x * found.pose.theta / 2  # beyond that of an arc
         angle = math.atan2(aside, found.pose.x)

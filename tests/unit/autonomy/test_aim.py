@@ -23,19 +23,24 @@ def driven(
     said_deg: float = 0.0,
     pieces: int = 8,
     step_m: float = 0.25,
+    comes_on: float = 1.0,
     aim: Aim | None = None,
     world: World = ROOMS,
+    seed: int = 4,
 ) -> Aim:
-    """What a base learns that drives ahead, with its laser so far from where it is said to look."""
-    rng, aim = np.random.default_rng(4), aim or Aim(ScanMatchingConfig())
+    """What a base learns that drives ahead, with its laser so far from where it is said to look.
+
+    It comes on by this share of what its wheels tell.
+    """
+    rng, aim = np.random.default_rng(seed), aim or Aim(ScanMatchingConfig())
     world_base = Pose(-1.0, 0.1, -0.03)
     for k in range(pieces):
         seen_from = world_base.compose(Pose(theta=math.radians(said_deg - turned_deg)))
         scan = sweep(world, seen_from, field_of_view=LASER_270, sigma=0.01, rng=rng)
         scan = replace(scan, base_laser=Pose(theta=math.radians(said_deg)))
         aim.note(scan, Pose(step_m * k, 0.0, 0.0))
-        turn = WORN * step_m
-        world_base = world_base.compose(Pose(step_m, step_m * turn / 2, turn))
+        metres, turn = comes_on * step_m, WORN * comes_on * step_m
+        world_base = world_base.compose(Pose(metres, metres * turn / 2, turn))
     return aim
 
 
@@ -64,6 +69,11 @@ def test_sweeps_that_follow_each_other_closely_tell_no_less() -> None:
     aim = driven(5.0, pieces=80, step_m=0.02)
     assert aim.off is not None
     assert math.degrees(aim.off) == pytest.approx(5.0, abs=1.0)
+
+
+def test_a_base_that_stands_while_its_wheels_spin_has_not_driven_aside() -> None:
+    told = [driven(0.0, pieces=12, comes_on=0.0, seed=seed).off for seed in range(8)]
+    assert told == 8 * [None]
 
 
 @pytest.mark.parametrize("turned_deg", [0.0, 20.0])
