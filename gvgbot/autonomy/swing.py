@@ -22,6 +22,7 @@ _ANY_SWING = np.diag([0.3**2, 0.3**2, 0.3**2])
 _COARSE_M = 0.5  # as far off as a sweep may lie at first
 _CLEAR_M, _CLEAR_RAD = 0.015, 0.01  # sigmas of a motion that tells
 _SHARE = 0.3  # share of a sweep that finds its walls
+_CAME_ROUND = 1 / 3  # of what its wheels tell; a base that stands while they spin has no middle
 
 
 class Swing:
@@ -70,10 +71,12 @@ class Swing:
         )
         if found is None or found.inliers < _SHARE:
             return
+        if found.pose.theta / motion.theta < _CAME_ROUND:
+            return
         spread = np.sqrt(np.diag(found.covariance))
         if spread[2] < _CLEAR_RAD:
             self._turned.note_scale(found.pose.theta, motion.theta)
-        if max(spread[:2]) < _CLEAR_M and found.pose.theta:
+        if max(spread[:2]) < _CLEAR_M:
             x, y = _centre(found.pose)
             self._ahead.note(x)
             self._aside.note(y)

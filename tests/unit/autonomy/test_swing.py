@@ -15,18 +15,26 @@ CORRIDOR = carved([(-20.0, -1.0, 20.0, 1.0)])
 
 
 def turned(
-    by: float = 1.0, *, world: World = ROOM, true: Pose | None = None, said: Pose | None = None
+    by: float = 1.0,
+    *,
+    world: World = ROOM,
+    true: Pose | None = None,
+    said: Pose | None = None,
+    turns: int = 5,
+    seed: int = 4,
 ) -> Swing:
     """What a base learns on the spot that turns so many times as far as it tells.
 
     Its laser is at a `true` pose, and `said` to be at another one.
     """
-    rng, swing = np.random.default_rng(4), Swing(ScanMatchingConfig())
-    for k in range(6):
+    rng, swing = np.random.default_rng(seed), Swing(ScanMatchingConfig())
+    for k in range(turns + 1):
         world_base = Pose(-1.0, 0.1, by * 0.26 * k)
         seen_from = world_base.compose(true or Pose())
         scan = sweep(world, seen_from, field_of_view=LASER_270, sigma=0.01, rng=rng)
         swing.note(replace(scan, base_laser=said or Pose()), Pose(theta=0.26 * k))
+        if swing.place is not None or swing.stretch is not None:
+            break  # it stands then
     return swing
 
 
@@ -65,5 +73,12 @@ def test_who_turns_as_it_should_or_nearly_so_is_left_alone(
     by: float, off_m: float, world: World
 ) -> None:
     swing = turned(by, world=world, said=Pose(off_m))
+    assert swing.stretch is None
+    assert swing.place is None
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_base_that_stands_while_its_wheels_spin_has_not_swung(seed: int) -> None:
+    swing = turned(0.0, turns=12, seed=seed)
     assert swing.stretch is None
     assert swing.place is None
