@@ -17,7 +17,10 @@ from gvgbot.hal.messages import Scan
 
 _PIECE_M, _STRAIGHT_RAD = 0.2, 0.04  # between two sweeps that tell
 _LONGEST_M = 1.0
-_MOST = 40  # pieces that are looked at altogether
+_CURVE_RAD = 0.4  # likewise, of a laser that looks quite elsewhere:
+_ELSEWHERE_RAD = 0.4  # farther off than one seems on curves that is a little beside its place
+_FIRST = 3  # pieces that show it, before the robot runs into what it does not see
+_MOST, _MOST_CURVED = 40, 10  # pieces that are looked at altogether
 _TURNED_RAD = math.radians(3.0)  # a mount that is off by less does no harm
 _BEHIND_RAD = 0.75 * math.pi  # a laser that looks astern is as likely off to either side
 _FAR_M = 8.0  # what is farther has few beams on it
@@ -35,18 +38,19 @@ class Aim:
         self._matching = matching
         self._before: tuple[cKDTree, Pose] | None = None  # what was seen, with odom_base
         self._angle = Agreement(_TURNED_RAD)
-        self._left = _MOST  # pieces to be looked at
+        self._rough = Agreement(_ELSEWHERE_RAD, _FIRST)  # by curves, too
+        self._left, self._curves_left = _MOST, _MOST_CURVED  # pieces to be looked at
 
     @property
     def off(self) -> float | None:
         """By how much the laser's yaw is too large, rad; None if it may be right."""
-        return self._angle.off
+        return self._rough.off if self._angle.off is None else self._angle.off
 
     def note(self, scan: Scan, odom_base: Pose) -> None:
         """Learn from a sweep, until enough of them are as they should be, or enough were seen."""
         if self._angle.is_settled or not self._left or self.off is not None:
             return
-        motion = self._straight_to(odom_base)
+        motion = self._ahead_to(odom_base)
         if motion is not None and motion.x < _PIECE_M:
             return
         points = seen(scan)
@@ -55,17 +59,23 @@ class Aim:
         is_enough = len(points) >= self._matching.min_pairs
         self._before = (walls_of(points), odom_base) if is_enough else None
 
-    def _straight_to(self, odom_base: Pose) -> Pose | None:
+    def _ahead_to(self, odom_base: Pose) -> Pose | None:
         """The motion from the sweep before, if it went ahead and not far; None if not."""
         if self._before is None:
             return None
         motion = self._before[1].to(odom_base)
-        is_ahead = 0.0 <= motion.x < _LONGEST_M and abs(motion.theta) < _STRAIGHT_RAD
+        minds_curves = self._curves_left > 0 and not self._rough.is_settled
+        most = _CURVE_RAD if minds_curves else _STRAIGHT_RAD
+        is_ahead = 0.0 <= motion.x < _LONGEST_M and abs(motion.theta) < most
         return motion if is_ahead else None
 
     def _compare(self, points: Array, motion: Pose) -> None:
         assert self._before is not None, "the motion is from there"
-        self._left -= 1
+        is_straight = abs(motion.theta) < _STRAIGHT_RAD
+        if is_straight:
+            self._left -= 1
+        else:
+            self._curves_left -= 1
         some = points[:: max(1, len(points) // self._matching.points)]
         found = register_coarsely(
             some, self._before[0], motion, _ANY_WAY, self._matching, (_COARSE_M,)
@@ -74,9 +84,11 @@ class Aim:
             return
         if math.hypot(found.pose.x, found.pose.y) < _CAME_ON * motion.x:
             return
-        aside = found.pose.y - found.pose.x * found.pose.theta / 2  # beyond that of an arc
-        angle = math.atan2(aside, found.pose.x)
-        self._angle.note((angle + _BEHIND_RAD) % math.tau - _BEHIND_RAD)
+        angle = math.atan2(found.pose.y, found.pose.x) - math.atan2(motion.y, motion.x)
+        angle = (angle + _BEHIND_RAD) % math.tau - _BEHIND_RAD
+        self._rough.note(angle)
+        if is_straight:
+            self._angle.note(angle)
 
 
 def how_to_aim(scan: Scan, off: float) -> str:

@@ -71,6 +71,37 @@ def test_sweeps_that_follow_each_other_closely_tell_no_less() -> None:
     assert math.degrees(aim.off) == pytest.approx(5.0, abs=1.0)
 
 
+def driven_round(turned_deg: float, *, side: float, beside: Pose | None = None) -> Aim:
+    """What a base learns on a circle, with its laser turned, or beside its place, by so much."""
+    rng, aim = np.random.default_rng(4), Aim(ScanMatchingConfig())
+    mount = (beside or Pose()).compose(Pose(theta=-math.radians(turned_deg)))
+    step = Pose(0.25, side * 0.25 * 0.15, side * 0.3)  # along a chord
+    odom_base = Pose()
+    for _ in range(4):
+        seen_from = Pose(-1.0, 0.1, -0.03).compose(odom_base).compose(mount)
+        aim.note(sweep(ROOMS, seen_from, field_of_view=LASER_270, sigma=0.01, rng=rng), odom_base)
+        odom_base = odom_base.compose(step)
+    return aim
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize("turned_deg", [-90.0, -40.0, 60.0, 180.0])
+def test_one_that_looks_quite_elsewhere_is_found_out_on_three_pieces_of_a_curve(
+    turned_deg: float, side: float
+) -> None:
+    off = driven_round(turned_deg, side=side).off
+    assert off is not None
+    assert math.degrees(off) == pytest.approx(turned_deg, abs=3.0)
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize("beside", [Pose(), Pose(0.15), Pose(-0.15), Pose(0.0, 0.15)])
+def test_one_that_is_a_little_beside_its_place_is_not_accused_on_a_curve(
+    beside: Pose, side: float
+) -> None:
+    assert driven_round(0.0, side=side, beside=beside).off is None
+
+
 def test_a_base_that_stands_while_its_wheels_spin_has_not_driven_aside() -> None:
     told = [driven(0.0, pieces=12, comes_on=0.0, seed=seed).off for seed in range(8)]
     assert told == 8 * [None]
