@@ -224,6 +224,8 @@ class KobukiBase:
     def _loss(self) -> str:
         config = self._config
         if self._feedback.spoke > self._heard:
+            if config.heading == "gyro" and self._feedback.has_no_gyro:
+                return f"the base tells of no gyro: set base.heading=wheels ({config.port})"
             return (
                 f"the base talks, but has told nothing new of its wheels and gyro for "
                 f"{config.silence_lost_s:g} s: switch it off and on ({config.port})"

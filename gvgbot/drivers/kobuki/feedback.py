@@ -1,7 +1,7 @@
 """The base's byte stream made into HAL messages, without I/O: bytes and their arrival time in."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from gvgbot.drivers.kobuki.device_clock import DeviceClock, advance_clock, start_clock
@@ -30,6 +30,7 @@ from gvgbot.drivers.kobuki.wheel_odometry import (
     turned,
     wheel_travels,
 )
+from gvgbot.geometry import wrap_angle
 from gvgbot.hal.messages import Battery, Contact, DockBeam, Docking, Odometry
 
 FRAME_PERIOD = 0.02  # s, of the base's stream
@@ -116,6 +117,7 @@ class FeedbackReader:
         self.docking: Docking | None = None
         self._slips = 0
         self._is_slipping = False
+        self._has_gyro = False  # a frame has told of one
         self._felt: list[tuple[float, CoreSensors]] = []  # what the last frames felt, and when
         self.spoke = -math.inf  # arrival of the last frame, s
         self.heard = -math.inf  # and of the last one that told how far the wheels have turned
@@ -172,6 +174,11 @@ class FeedbackReader:
         return self._heading == "gyro" and state is not None and state.unfelt > math.tau
 
     @property
+    def has_no_gyro(self) -> bool:
+        """Whether the base tells of its wheels, and has never told of a gyro."""
+        return self.contact is not None and not self._has_gyro
+
+    @property
     def is_unbroken(self) -> bool:
         """Whether no motion has been missed since `recall`."""
         return self._breaks == 0
@@ -211,6 +218,7 @@ class FeedbackReader:
                     core = part
                 case Inertia():
                     inertia = part
+                    self._has_gyro = True
                 case DockIr():
                     dock = part
                 case HardwareVersion(version) | FirmwareVersion(version):
@@ -244,13 +252,25 @@ class FeedbackReader:
             self._felt.append((arrival, core))
         self.contact = _contact([felt for _, felt in self._felt], core, clock.stamp)
         self.battery = _battery(core, clock.stamp)
-        if inertia is None:
+        if inertia is None and self._heading == "gyro":
             return None
-        reading = WheelReading(core.left_encoder, core.right_encoder, inertia.angle, inertia.rate)
+        reading = self._reading(core, inertia)
         is_new = clock.resets != self._odometry_resets  # a frame before may have told of no motion
         if is_new or clock.elapsed > self._odometry_elapsed:
             self.heard = arrival
         return self._take_reading(reading, clock, is_new=is_new)
+
+    def _reading(self, core: CoreSensors, inertia: Inertia | None) -> WheelReading:
+        """What a frame tells of motion; one without a gyro's angle, as if it had turned alike."""
+        left, right = core.left_encoder, core.right_encoder
+        if inertia is not None:
+            return WheelReading(left, right, inertia.angle, inertia.rate)
+        before = WheelReading(left, right, 0.0, 0.0)
+        if self._odometry is not None:
+            before = self._odometry.reading
+        now = replace(before, left_encoder=left, right_encoder=right)
+        by_wheels = turned(before, now, "wheels", self._geometry)
+        return replace(now, angle=wrap_angle(before.angle + by_wheels), rate=0.0)
 
     def _take_reading(
         self, reading: WheelReading, clock: DeviceClock, *, is_new: bool
