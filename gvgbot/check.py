@@ -5,7 +5,6 @@ The robot is told to stand, and nothing else.
 
 import asyncio
 import contextlib
-import math
 from collections.abc import Awaitable, Callable, Coroutine, Iterator
 from dataclasses import asdict, astuple, dataclass, field
 from typing import Any, Literal
@@ -19,6 +18,7 @@ from gvgbot.drivers.kobuki.driver import KobukiBase
 from gvgbot.errors import DeviceLost, DeviceRefused, GvgbotError
 from gvgbot.hal.guard import GuardConfig
 from gvgbot.hal.messages import EMPTY_BATTERY, LOW_BATTERY, Battery, Contact, Scan
+from gvgbot.hal.own_parts import how_to_clear, own_ranges
 from gvgbot.links import Links
 from gvgbot.simulation import Simulation, open_place
 from gvgbot.words import counted
@@ -32,7 +32,6 @@ _BASE_RATE = 50.0  # Hz
 _MESSAGE_COUNTS = ("frames", "scans")
 _OF_NEWER_FIRMWARE = "unknown_parts"  # checksums were right
 _SEEN_SHARE = 0.2  # of the beams; a laser that sees less is covered or dirty
-_FAR = 1e3  # m, for beams that measured nothing
 _UNCOVER = "uncover and clean its window"
 _UNCOVER_OR_MOVE = f"{_UNCOVER}, or put the robot where there are walls"
 _BUSY = "see what else the computer is busy with"
@@ -273,20 +272,13 @@ def _view(scans: list[Scan]) -> Line:
 
 def _own_parts(scans: list[Scan], radius: float) -> Iterator[Line]:
     """What the laser sees within the robot's radius (m), again and again: parts of the robot."""
-    mount = scans[-1].base_laser
-    ranges = np.median(
-        [np.nan_to_num(scan.ranges, nan=_FAR, posinf=_FAR) for scan in scans], axis=0
-    )
-    near = np.flatnonzero(ranges < radius + math.hypot(mount.x, mount.y))
-    bearings = mount.theta + scans[-1].bearings[near]
-    x, y = mount.x + ranges[near] * np.cos(bearings), mount.y + ranges[near] * np.sin(bearings)
-    own = ranges[near][np.hypot(x, y) < radius]
+    own = own_ranges(scans, radius)
     if len(own):
         yield Line(
             "warn",
             "laser view",
             f"{len(own)} beams end within the robot, {own.min():.2f} to {own.max():.2f} m away",
-            f"clear its view, or set laser.min_range_m={own.max() + 0.02:.2f}",
+            how_to_clear(own),
         )
 
 

@@ -18,6 +18,7 @@ from gvgbot.config import Config
 from gvgbot.geometry import STANDSTILL, Twist
 from gvgbot.hal.guard import Guard, Reason
 from gvgbot.hal.messages import Contact, Odometry, Scan
+from gvgbot.hal.own_parts import OwnParts, how_to_clear
 from gvgbot.journal import BatteryJournal, GuardJournal, log_event, status_line
 from gvgbot.links import Devices, Links
 from gvgbot.live.events import LiveEvents
@@ -121,6 +122,7 @@ class Robot:
             rate_hz = session.config.telemetry.scan_rate_hz
             self._feed = LiveFeed(network, session.pipeline, rate_hz)
         self._guard, self._battery = GuardJournal(), BatteryJournal()
+        self._own_parts = OwnParts(session.config.robot.radius_m)
         self._healths, self._calls_home = Pace(HEALTH.rate_hz), Pace(1.0 / CALL_EVERY)
         self._ros: LiveRos | None = None
 
@@ -208,6 +210,10 @@ class Robot:
         )
 
     def _show_scan(self, scan: Scan) -> None:
+        own = self._own_parts.note(scan)
+        if own is not None and len(own):
+            remedy = how_to_clear(own)
+            log.warning("laser sees a part of the robot", beams=len(own), remedy=remedy)
         for shown in (self._feed, self._ros):
             if shown is not None:
                 shown.on_scan(scan)
