@@ -51,7 +51,7 @@ class Journey:
     keyframes: "array[int]" = field(default_factory=lambda: array("q"))  # the last before each row
     odom_base: Poses = field(default_factory=Poses)
     map_base: Poses = field(default_factory=Poses)
-    world_base: Poses = field(default_factory=Poses)  # simulation only
+    world_base: Poses = field(default_factory=Poses)  # simulation only; none unless of each row
 
     @property
     def began(self) -> float | None:
@@ -68,8 +68,10 @@ class Journey:
         self.keyframes.append(len(pipeline.past.keyframes) - 1)
         self.odom_base.append(odometry.odom_base)
         self.map_base.append(pipeline.map_base)
-        if world_base is not None:
+        if world_base is not None and len(self.world_base) == len(self.stamps) - 1:
             self.world_base.append(world_base)
+        else:  # the robot was simulated in another life, or is now
+            self.world_base.cut(0)
 
     def forget(self, keyframe: int) -> None:
         """Leave out the rows from a keyframe on."""

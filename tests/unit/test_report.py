@@ -10,10 +10,11 @@ from gvgbot.autonomy.keyframes import Keyframe
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.graph import HalfEdgeId, Vertex
 from gvgbot.config import Config
-from gvgbot.geometry import Pose, Poses, length_of
+from gvgbot.geometry import Pose, Poses, Twist, length_of
+from gvgbot.hal.messages import Odometry
 from gvgbot.maps.occupancy import UNKNOWN, OccupancyGrid
 from gvgbot.maps.route_graph import RouteEdge, RouteGraph, RouteNode
-from gvgbot.report import Journey, _corrected, route_graph, with_room_of
+from gvgbot.report import Journey, _corrected, map_files, route_graph, with_room_of
 
 
 def pipeline(keyframes: list[Keyframe]) -> Pipeline:
@@ -21,6 +22,24 @@ def pipeline(keyframes: list[Keyframe]) -> Pipeline:
     mind = Pipeline(config.autonomy, config.exploration, config.robot.radius_m)
     mind.past.keyframes = keyframes
     return mind
+
+
+@pytest.mark.parametrize(
+    ("simulated", "truths"),
+    [([True, True, True], 3), ([True, True, False], 0), ([False, True, True], 0)],
+    ids=["simulated", "real since", "simulated since"],
+)
+def test_the_truth_is_told_of_the_whole_way_or_not_at_all(
+    simulated: list[bool], truths: int
+) -> None:
+    """Whoever tries a configuration with the twins goes on in the same directory without them."""
+    journey, mind = Journey(), pipeline([Keyframe(0.0, Pose(), Pose(), Pose(), None)])
+    for row, is_simulated in enumerate(simulated):
+        odometry = Odometry(float(row), Pose(), Twist(0.0, 0.0))
+        journey.record(odometry, mind, Pose() if is_simulated else None)
+    files = map_files(mind, journey, "try")
+    assert len(journey.stamps) == len(simulated)
+    assert str(files.get("truth.tum", "")).count("\n") == truths
 
 
 def test_what_odometry_is_wrong_by_is_spread_over_the_time_between_keyframes() -> None:
