@@ -114,14 +114,13 @@ class Keeper:
         )
         if self._goes_on:
             self._counts = list(saved.counts)
-        else:
-            session.pipeline.mission.outcome, session.pipeline.mission.reason = None, ""
-            session.pipeline.errands.is_waiting = False
         if self._files.is_read:
             session.count_on(saved.beat.tally)
             session.journey = saved.journey
             session.pipeline.errands.is_paused |= config.service.resume == "paused"
         else:  # another has lived so far
+            session.pipeline.mission.outcome, session.pipeline.mission.reason = None, ""
+            session.pipeline.errands.is_waiting = False
             past = session.pipeline.past
             past.lent, past.lent_m, past.sought_m = len(past.keyframes), past.travelled, 0.0
             session.pipeline.errands.forget()
@@ -250,7 +249,7 @@ class Keeper:
         self._settled = False
         memory = remember(pipeline)
         if memory.intent.outcome == "failed":
-            outcome = saved.memory.intent.outcome if self._goes_on else None
+            outcome = saved.memory.intent.outcome if self._files.is_read else None
             memory = replace(memory, intent=replace(memory.intent, outcome=outcome))
         snapshot = packed(Snapshot(memory=memory, beat=saved.beat, known=self._known))
         past, journey = None, self._session.journey

@@ -24,7 +24,7 @@ from gvgbot.drivers.kobuki.feedback import FeedbackMemory, FeedbackReader
 from gvgbot.maps.run_directory import RunDirectory
 from gvgbot.persistence.keeper import BEAT_EVERY, KEEP_EVERY, MOST, RETRY_WITHIN, Keeper
 from gvgbot.persistence.mission_files import JOURNAL, SNAPSHOT, MissionFiles
-from gvgbot.persistence.mission_state import Saved, boot_id
+from gvgbot.persistence.mission_state import Saved, Snapshot, boot_id
 from gvgbot.persistence.records import packed
 from gvgbot.session import Session
 from tests.unit.persistence.test_mission_files import full_disk
@@ -479,6 +479,25 @@ def test_an_interrupted_run_waits_if_the_configuration_says_so(tmp_path: Path, r
     Keeper(session, files, files.read())
     assert session.pipeline.past.keyframes
     assert session.pipeline.errands.is_paused == (resume == "paused")
+
+
+@pytest.mark.parametrize("journal", [None, b""], ids=["removed", "damaged"])
+def test_who_had_finished_stands_though_the_journal_is_lost(
+    tmp_path: Path, journal: bytes | None
+) -> None:
+    ended = found(MISSION).memory
+    ended = replace(ended, intent=replace(ended.intent, outcome="stopped", is_waiting=True))
+    snapshot = Snapshot(memory=ended, beat=found(MISSION).beat)
+    MissionFiles(tmp_path).save(packed(snapshot))
+    if journal is not None:
+        (tmp_path / JOURNAL).write_bytes(journal)
+    files = MissionFiles(tmp_path)
+    with RunDirectory(tmp_path) as directory:
+        session = Session(load_config(), directory, None)
+    Keeper(session, files, files.read())
+    assert session.pipeline.mission.outcome == "stopped"
+    assert session.pipeline.errands.is_waiting
+    assert session.pipeline.errands.is_resting
 
 
 def test_a_first_start_with_a_known_map_was_not_interrupted(tmp_path: Path) -> None:
