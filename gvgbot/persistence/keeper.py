@@ -311,6 +311,8 @@ class Keeper:
             self._settled = self._settled or snapshot is not None
             if self._counts is not counts:
                 self._stay = min(self._stay, counts[-2].keyframes if len(counts) > 1 else 0)
+            if not self._files.is_begun:  # somebody has removed the journal
+                self._counts = []
             self._files.fall_behind()
             self._files.note_rest(rests=rests)
 

@@ -5,6 +5,7 @@ the snapshot or the one before. Functions that write raise OSError, and may be c
 """
 
 import contextlib
+import io
 import os
 from collections.abc import Iterator
 from dataclasses import replace
@@ -41,6 +42,7 @@ class MissionFiles:
         self._ends: list[int] = []  # of the whole records of the journal: its head, the batches
         self._is_whole = True  # the newest snapshot, as far as that is known
         self._is_read = False  # the mission that is here goes on
+        self._is_ours = False  # what is here was written here
 
     @property
     def is_begun(self) -> bool:
@@ -123,25 +125,26 @@ class MissionFiles:
 
     def begin(self) -> None:
         """Begin an empty journal, and forget a mission that does not go on. Raises OSError."""
-        if not self._is_read:
+        if not (self._is_read or self._is_ours):
             for path in (self._snapshot, self._before):
                 path.unlink(missing_ok=True)
         start = record(packed(Header("gvgbot journal", VERSION)))
         replace_file(self._journal, start)
-        self._ends = [len(start)]
+        self._ends, self._is_ours = [len(start)], True
 
     def append(self, batch: bytes, *, sync: bool, after: int | None = None) -> None:
         """Add a batch (MessagePack) to the journal; `sync` if it must outlive a power cut.
 
         It takes the place of all but the first `after` batches, if that is given. Raises OSError;
-        then it may be tried again, and nothing before it is lost.
+        then it may be tried again, and nothing before it is lost. Where somebody has removed the
+        journal, it is not begun any more then, and has to be told all.
         """
         if not self.is_begun:
             self.begin()
         if after is not None:
             del self._ends[after + 1 :]
         framed, end = record(batch), self._ends[-1]
-        with self._journal.open("r+b", buffering=0) as journal:
+        with self._opened() as journal:
             journal.truncate(end)  # what an earlier attempt may have left
             journal.seek(end)
             try:
@@ -153,6 +156,15 @@ class MissionFiles:
                     journal.truncate(end)  # the map may have room there
                 raise
         self._ends.append(end + len(framed))
+
+    def _opened(self) -> io.FileIO:
+        """The journal. Raises OSError; whether it was removed, or its disk pulled out, is noted."""
+        try:
+            return self._journal.open("r+b", buffering=0)
+        except FileNotFoundError:
+            if self._journal.parent.is_dir():
+                self._ends.clear()
+            raise
 
     def fall_behind(self) -> None:
         """Note that the robot lives through what is not kept, until something is added again.

@@ -67,6 +67,42 @@ def test_a_full_disk_is_said_once_and_all_is_kept_when_there_is_room_again(
     assert packed(saved.memory) == packed(remember(session.pipeline))
 
 
+def test_a_journal_that_somebody_removes_is_written_anew(session: Session, tmp_path: Path) -> None:
+    """It is the largest file of a run: whoever makes room on a disk finds it first."""
+    keeper, begins = Keeper(session, MissionFiles(tmp_path)), 20.0
+    keeper.keeping(begins)()
+    (tmp_path / JOURNAL).unlink()
+    with structlog.testing.capture_logs() as logs:
+        keeper.keeping(begins + BEAT_EVERY)()
+        killed = found(tmp_path)
+        keeper.keeping(begins + 2 * BEAT_EVERY)()
+    assert [log["event"] for log in logs] == [
+        "mission not kept, exploring on",
+        "mission kept again",
+    ]
+    assert packed(killed.memory) == packed(remember(session.pipeline))
+    saved = found(tmp_path)
+    assert packed(saved.past) == packed(growth(session.pipeline))
+    assert saved.journey.stamps == session.journey.stamps
+    assert saved.is_current
+
+
+def test_of_a_disk_that_was_pulled_out_the_journal_goes_on(
+    session: Session, tmp_path: Path
+) -> None:
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    keeper, begins = Keeper(session, MissionFiles(disk)), 20.0
+    keeper.keeping(begins)()
+    written = (disk / JOURNAL).read_bytes()
+    disk.rename(tmp_path / "pulled out")
+    keeper.keeping(begins + BEAT_EVERY)()
+    (tmp_path / "pulled out").rename(disk)
+    keeper.keeping(begins + 2 * BEAT_EVERY)()
+    assert (disk / JOURNAL).read_bytes().startswith(written)
+    assert packed(found(disk).past) == packed(growth(session.pipeline))
+
+
 @pytest.mark.parametrize("is_old", [False, True])
 def test_who_is_unfit_leaves_the_map_of_before_or_none(
     session: Session, tmp_path: Path, *, is_old: bool
