@@ -91,7 +91,8 @@ def test_a_room_has_walls_where_geometry_says_free_inside_and_unknown_outside() 
 def test_scans_that_come_one_by_one_draw_the_same_grid_as_all_at_once() -> None:
     rng = np.random.default_rng(5)
     poses = [Pose(x, y, 0.3) for x, y in rng.uniform(-40.0, 40.0, (12, 2))]  # mostly out of reach
-    scans = [(pose, replace(open_hall(np.full(90, 3.0)), stamp=i)) for i, pose in enumerate(poses)]
+    scan = replace(open_hall(np.full(90, 3.0)), base_laser=Pose(0.9, -0.7, 1.0))
+    scans = [(pose, replace(scan, stamp=float(i))) for i, pose in enumerate(poses)]
     growing = GrowingGrid(0.2, 8.0)
     for pose, scan in scans:
         growing.add(pose, scan)
@@ -114,9 +115,10 @@ def test_a_growing_grid_keeps_a_byte_for_each_cell() -> None:
 
 
 def test_squares_of_a_growing_grid_are_cut_out_of_it_and_all_changes_lie_around_the_scan() -> None:
-    growing, pose = GrowingGrid(CELL, 8.0), Pose(3.0, -2.0, 0.3)
-    growing.add(pose, a_scan(pose))
-    low, high = growing.around(pose, a_scan(pose))
+    growing, pose, mount = GrowingGrid(CELL, 0.5), Pose(1.0, 1.0, 0.3), Pose(0.9, -0.7, 1.0)
+    scan = a_scan(pose, base_laser=mount)
+    growing.add(pose, scan)
+    low, high = growing.around(pose, scan)
     grid = growing.grid()
     left, bottom = (round(x / CELL) for x in grid.origin)
     rows, columns = np.nonzero(grid.cells >= 0)
@@ -227,6 +229,16 @@ def test_somebody_who_went_away_is_forgotten() -> None:
     at_person = occupancy_grid(with_person, CELL)
     assert percent_at(at_person, 2.0, 0.0) > 95
     assert percent_at(occupancy_grid(with_person + without, CELL), 2.0, 0.0) < 19
+
+
+def test_a_cell_that_a_beam_ends_in_is_a_wall_though_others_pass_it() -> None:
+    """The lower right corner of a cell three metres ahead; its middle is some beams to the left."""
+    ranges = np.full(2880, 5.0)
+    x, y = 3.02, -0.024  # from the laser, which is in the middle of its own cell
+    ranges[1440] = math.hypot(x, y)
+    scan = replace(open_hall(ranges), angle_min=-math.pi + math.atan2(y, x))
+    middle = Pose(CELL / 2, CELL / 2)
+    assert percent_at(occupancy_grid([(middle, scan)], CELL), middle.x + x, middle.y + y) > 65
 
 
 def percent_at(grid: OccupancyGrid, x: float, y: float) -> int:
@@ -384,6 +396,15 @@ def test_a_damaged_grid_is_a_usage_error_in_one_line(
     with pytest.raises(UsageError, match=name) as caught:
         read_map_server(tmp_path)
     assert "\n" not in str(caught.value)
+
+
+def test_an_image_of_when_that_is_of_another_map_is_a_usage_error(tmp_path: Path) -> None:
+    cells, seen_s = np.zeros((2, 3), np.int8), np.zeros((2, 3), np.float32)
+    other = OccupancyGrid(cells.T.copy(), 0.05, (0.0, 0.0), seen_s.T.copy())
+    write_files(tmp_path, encode_map_server(OccupancyGrid(cells, 0.05, (0.0, 0.0), seen_s)))
+    write_files(tmp_path, {"seen.png": encode_map_server(other)["seen.png"]})
+    with pytest.raises(UsageError, match=r"seen.png is not as large as map.pgm"):
+        read_map_server(tmp_path)
 
 
 def test_the_middle_of_a_cell_is_half_a_cell_from_its_corner() -> None:
