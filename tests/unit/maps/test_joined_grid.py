@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import pytest
 
 from gvgbot.geometry import Pose
 from gvgbot.maps.joined_grid import joined_grid
@@ -24,8 +25,9 @@ def drawn(joined: OccupancyGrid) -> list[str]:
     return ["".join(marks[int(value)] for value in row) for row in joined.cells[::-1]]
 
 
-def test_one_grid_is_itself() -> None:
-    one = grid(["##?", "..#"], origin=(-0.35, 1.0))
+@pytest.mark.parametrize("x", [-0.35, 0.35])  # which is no seven times 0.05 to a computer
+def test_one_grid_is_itself(x: float) -> None:
+    one = grid(["##?", "..#"], origin=(x, 1.0))
     joined = joined_grid([(one, Pose())])
     assert drawn(joined) == ["##?", "..#"]
     assert np.allclose(joined.origin, one.origin)
@@ -42,3 +44,11 @@ def test_what_one_robot_has_not_seen_is_as_the_other_one_saw_it() -> None:
 
 def test_where_two_differ_it_is_a_wall() -> None:
     assert drawn(joined_grid([(grid(["#.?"]), Pose()), (grid([".#?"]), Pose())])) == ["##?"]
+
+
+def test_cells_of_another_size_lie_where_they_were_measured() -> None:
+    """A cell of 10 cm is four of the first one's, twice as far from the corner in cells."""
+    coarse = OccupancyGrid(np.array([[0, 100]], np.int8), 2 * CELL, (0.0, 0.0))
+    joined = joined_grid([(grid(["??????"]), Pose()), (coarse, Pose(2 * CELL, 0.0))])
+    assert drawn(joined) == ["??..##", "??..##"]
+    assert joined.resolution_m == CELL
