@@ -124,9 +124,11 @@ def test_a_vertex_beside_somebody_who_stood_there_goes_with_both_ways_round_him(
     template = seen({0}).vertices[0]
     vertices = tuple(replace(template, id=i, position=p, frontiers=()) for i, p in points.items())
     past, theirs = passage(0, 1, 2), RouteGraph(vertices, edges)
-    assert positions(merged(past, theirs, Pose())) == {PLACES[0], PLACES[2]}
     only_seen = replace(past, edges=tuple(replace(edge, traversals=0) for edge in past.edges))
-    assert positions(merged(only_seen, theirs, Pose())) == set(points.values())
+    for one, other in permutations([past, theirs]):
+        assert positions(merged(one, other, Pose())) == {PLACES[0], PLACES[2]}
+    for one, other in permutations([only_seen, theirs]):
+        assert positions(merged(one, other, Pose())) == set(points.values())
 
 
 @pytest.mark.parametrize("is_first", [True, False])
@@ -241,6 +243,22 @@ def test_a_vertex_that_one_map_lacks_splits_its_edge() -> None:
         frozenset({PLACES[1], PLACES[4]}),
     }
     assert sum(e.length for e in whole.edges) == pytest.approx(13.0 + 5.0, abs=0.3)
+
+
+def test_two_vertices_beside_one_point_of_an_edge_split_it_once() -> None:
+    """It has a point but each 1.3 m, and they are as near to the same one as may be."""
+    ends = tuple(replace(v, frontiers=()) for v in seen({0, 2}).vertices)
+    line = np.linspace(PLACES[0], PLACES[2], 11)
+    coarse = RouteGraph(ends, (replace(way(0, 2, line), traversals=0),))
+    places = [(6.25, 0.3), (6.75, -0.3)]
+    pair = tuple(
+        replace(ends[0], id=n, position=place, bearings=(side,), frontiers=(side,), degree=1)
+        for n, (place, side) in enumerate(zip(places, (math.pi / 2, -math.pi / 2), strict=True))
+    )
+    whole = merged(coarse, RouteGraph(pair, ()), Pose())
+    assert positions(whole) == {PLACES[0], PLACES[2], *places}
+    assert all(edge.start != edge.end for edge in whole.edges)
+    assert len(whole.edges) == 2
 
 
 @given(seed=st.integers(0, 2**32 - 1))
