@@ -129,7 +129,8 @@ def test_graphml_is_the_graph_to_networkx(run: Path) -> None:
         3: (10.0, 0.0, "meetpoint", 1),
         4: (10.0, 1.0, "endpoint", 0),
     }
-    assert graph.nodes[3]["covariance_xx"] == pytest.approx(0.0036)
+    spread = [graph.nodes[3][f"covariance_{name}"] for name in ("xx", "xy", "yy")]
+    assert spread == pytest.approx([0.0036, 0.0, 0.0001])
     assert nx.shortest_path_length(graph, 1, 4, weight="length") == pytest.approx(11.0)
     assert graph.edges[3, 4]["line"] == "LINESTRING (10.000000 0.000000, 10.000000 1.000000)"
 

@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -73,6 +74,26 @@ def test_a_way_round_a_corner_is_as_long_from_node_to_node() -> None:
     for way in ((3, 7), (7, 3)):
         assert nx.shortest_path_length(graph, *way, weight="metres") == pytest.approx(3.0)
     assert sorted(loaded.nodes.values()) == [(0.0, 0.0), (2.0, 0.0), (2.0, 1.0)]
+
+
+@pytest.mark.parametrize(("off", "nodes"), [(0.045, 2), (0.055, 3)])
+def test_a_bend_is_straightened_if_it_is_no_wider_than_a_cell(off: float, nodes: int) -> None:
+    """Of five centimetres, as those of the grid that is saved."""
+    line = np.array([(0.0, 0.0), (1.0, off), (2.0, 1.0)])
+    line[1] = np.array([1.0, 0.5]) + off * np.array([-1.0, 2.0]) / math.sqrt(5.0)  # off the chord
+    bent = replace(CORNER, edges=(replace(CORNER.edges[0], polyline=line),))
+    assert len(load(route_server.encode(bent)).nodes) == nodes
+
+
+def test_a_way_back_begins_where_the_way_there_ends_and_both_cost_metres_of_driving() -> None:
+    """From node to node it is straight, so a bow that is left out costs nothing."""
+    flat = np.array([(0.0, 0.0), (0.6, 0.8), (0.63, 0.78), (1.2, 1.6)])
+    bow = replace(CORNER.edges[0], polyline=flat)
+    text = route_server.encode(replace(CORNER, edges=(bow,)))
+    there, back = (f for f in json.loads(text)["features"] if f["geometry"]["type"] != "Point")
+    assert there["geometry"]["coordinates"] == [[[0.0, 0.0], [1.2, 1.6]]]
+    assert back["geometry"]["coordinates"] == [[[1.2, 1.6], [0.0, 0.0]]]
+    assert there["properties"]["cost"] == back["properties"]["cost"] == 2.0
 
 
 def test_an_export_that_is_taken_for_the_map_of_a_run_is_told_to_be_one() -> None:
