@@ -89,6 +89,16 @@ def test_the_grid_is_known_as_far_as_it_had_been_seen(growth: Growth) -> None:
     assert (growth.grid(10.0).cells >= 0).all()
 
 
+def test_what_was_seen_after_the_last_row_is_there_at_the_end(tmp_path: Path) -> None:
+    directory = write_run(tmp_path / "run")
+    lines = (directory / "estimate.tum").read_text().splitlines(keepends=True)
+    (directory / "estimate.tum").write_text("".join(lines[:51]))  # (10, 0) was seen after 8 s
+    growth = Growth.of(SavedRun.read(directory))
+    assert growth.duration == pytest.approx(5.0)
+    assert (growth.grid(4.9).cells < 0).any()
+    assert (growth.grid(5.0).cells >= 0).all()
+
+
 def test_without_a_record_of_what_was_seen_the_whole_grid_is_there(tmp_path: Path) -> None:
     directory = write_run(tmp_path / "run")
     (directory / "seen.png").unlink()
