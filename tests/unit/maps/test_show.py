@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import networkx as nx
@@ -10,8 +11,9 @@ import structlog
 from PIL import Image
 
 from gvgbot.cli import main
+from gvgbot.maps import geojson
 from gvgbot.maps.saved_run import SavedRun
-from tests.unit.maps.small_run import write_run
+from tests.unit.maps.small_run import GRAPH, write_run
 
 Captured = pytest.CaptureFixture[str]
 
@@ -54,6 +56,15 @@ def test_info_says_what_the_map_holds(run: Path, capsys: Captured) -> None:
     assert words["narrowest"] == "0.90 m to the walls"
     assert words["extent"] == "12.0 m x 4.0 m, 46 m^2 of it free"  # 38 of 40 rows
     assert words["accuracy"].startswith("sigma of a vertex 0.050 m (median), 0.080 m at worst")
+
+
+def test_the_narrowest_edge_is_the_one_with_the_least_clearance(
+    run: Path, capsys: Captured
+) -> None:
+    edges = (replace(GRAPH.edges[0], min_clearance=0.31), *GRAPH.edges[1:])
+    (run / "map.geojson").write_text(geojson.encode(replace(GRAPH, edges=edges)))
+    assert main(["map", "info", str(run)]) == 0
+    assert "narrowest  0.31 m to the walls" in capsys.readouterr().out
 
 
 def test_a_run_that_was_killed_before_its_first_vertex_has_no_map_yet(

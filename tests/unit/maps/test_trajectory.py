@@ -20,6 +20,7 @@ HALF_ROOT = math.sqrt(0.5)
         (-math.pi / 2, -HALF_ROOT, HALF_ROOT),
         (math.pi / 3, 0.5, math.sqrt(0.75)),
         (math.pi / 3 + 8 * math.pi, 0.5, math.sqrt(0.75)),
+        (math.pi / 3 - 2 * math.pi, 0.5, math.sqrt(0.75)),  # not the same rotation, upside down
     ],
 )
 def test_a_line_is_the_stamp_the_place_and_the_quaternion(
