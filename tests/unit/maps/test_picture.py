@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from gvgbot.geometry import Array
+from gvgbot.maps.canvas import Ink
+from gvgbot.maps.drawing import Drawing, Stroke
 from gvgbot.maps.legend import round_length
 from gvgbot.maps.occupancy import OccupancyGrid
-from gvgbot.maps.picture import counts, draw_map, widest_gap
+from gvgbot.maps.picture import counts, draw_map, draw_map_on, draw_vertex, widest_gap
 from gvgbot.maps.route_graph import RouteEdge, RouteGraph, RouteNode
 from gvgbot.maps.trajectory import Trajectory
 from gvgbot.maps.view import View, box_around
@@ -143,6 +145,48 @@ def test_walls_lie_where_the_graph_says() -> None:
     x, y = round(x1 + 17.0 * scale), round(y1 - 9.0 * scale)
     assert part[y, x].tolist() == list(UNKNOWN)
     assert part[round(y1 - 5.0 * scale), x].tolist() == [255, 255, 255]
+
+
+def test_a_grid_is_not_upside_down() -> None:
+    cells = np.zeros((100, 200), np.int8)
+    cells[:20] = 100  # the lowest two metres
+    picture = pixels(draw_map(TRIANGLE, grid=OccupancyGrid(cells, 0.1, (0.0, 0.0))))
+    part = map_part(picture)
+    _, (x1, y1), (x2, _) = discs(picture)
+    scale = (x2 - x1) / 20.0
+    x = round(x1 + 10.0 * scale)
+    shades = [part[round(y1 - y * scale), x].tolist() for y in (1.0, 5.0, 9.0)]
+    assert shades == [list(WALL), [255, 255, 255], [255, 255, 255]]
+
+
+def test_the_scale_bar_is_as_long_as_it_says() -> None:
+    """Four fields between the map and the signs, the first one black; its length is before it."""
+    drawing = draw_map_on(
+        Drawing,
+        TRIANGLE,
+        grid=None,
+        estimate=None,
+        odometry=None,
+        virtual_walls=np.empty((0, 2)),
+        title="",
+    )
+    boxes = [one for one in drawing.shapes if isinstance(one, Stroke) and one.ink == Ink.BLACK]
+    ends = np.concatenate([box.points for box in boxes if len(box.points) == 4])
+    (metres,) = [float(w.words[:-2]) for w in drawing.words if w.words in ("1 m", "2 m", "5 m")]
+    (one, two) = (w.at[0] for w in drawing.words if w.words in ("1", "2"))
+    assert len(boxes) == 4
+    assert np.ptp(ends[:, 0]) == pytest.approx(metres / 20.0 * (two - one), rel=0.02)
+
+
+def test_the_name_of_a_vertex_stands_beside_it_where_no_edge_leaves() -> None:
+    """Its edges leave downwards and to the sides."""
+    below = (0.0, math.pi, -math.pi / 2, -math.pi / 4, -3 * math.pi / 4)
+    drawing = Drawing(100, 100)
+    draw_vertex(drawing, vertex(7, 0.0, 0.0, bearings=below), (50.0, 50.0))
+    (name,) = drawing.words
+    assert name.words == "7"
+    assert name.at[0] == pytest.approx(50.0)
+    assert 30.0 < name.at[1] < 44.0  # over the disc
 
 
 def test_of_a_huge_map_no_thin_wall_is_lost() -> None:

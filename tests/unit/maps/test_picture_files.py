@@ -50,6 +50,18 @@ def test_a_pdf_is_rendered_to_what_the_png_shows(arguments: list[str]) -> None:
     assert rough[1].std() > 10.0  # not an empty page
 
 
+def test_a_pdf_has_its_objects_where_its_table_says(arguments: list[str]) -> None:
+    """Viewers find them all the same, and then say that the file was damaged (ISO 32000-1, 7.5)."""
+    file = drawn(arguments, ".pdf").read_bytes()
+    (start,) = re.findall(rb"startxref\n(\d+)\n%%EOF\n$", file)
+    head, count, *entries = file[int(start) :].partition(b"trailer")[0].splitlines()
+    assert (head, count) == (b"xref", b"0 %d" % len(entries))
+    assert all(len(entry) == 19 for entry in entries)  # and a line's end of two bytes, with a blank
+    for number, entry in enumerate(entries[1:], start=1):
+        assert file[int(entry[:10]) :].startswith(b"%d 0 obj\n" % number)
+    assert f"/Size {len(entries)} ".encode() in file
+
+
 def test_an_svg_has_the_words_of_the_pdf_at_their_places(arguments: list[str]) -> None:
     tree = ET.parse(drawn(arguments, ".svg")).getroot()
     (page,) = pypdfium2.PdfDocument(drawn(arguments, ".pdf"))
