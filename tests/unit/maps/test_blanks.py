@@ -46,6 +46,14 @@ def test_a_niche_that_the_largest_disc_beside_it_reaches_into_is_none() -> None:
     assert len(found(*niche, ways=way((0.5, 0.0), (6.5, 0.0)))) == 0
 
 
+def test_what_was_seen_through_a_door_is_no_wider_than_that() -> None:
+    """Beside it may be walls, for all that is known: who stops in the door leaves some of it."""
+    seen = ("#########", "#...#   #", "#.......#", "#...#   #", "#########")
+    assert len(found(*seen, ways=way((0.5, -0.5), LEFT, (6.5, 0.5)))) == 0
+    first, *_ = found(*seen, ways=way((0.5, -0.5), LEFT, (4.4, 0.5)))
+    assert 4.9 < first[0] < 7.0
+
+
 def test_the_middle_of_a_hall_is_none_where_a_wall_is_followed() -> None:
     hall = ("###########", *(["#.........#"] * 9), "###########")
     assert len(found(*hall, ways=way((0.5, 0.0), (0.5, 6.0)))) == 0

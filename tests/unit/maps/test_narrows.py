@@ -23,7 +23,9 @@ def found(*doors: tuple[float, float], ways: Array | None = None, beyond: float 
     return narrows(grid, HERE[None] if ways is None else ways, HERE, RADIUS, PASSAGE)
 
 
-@pytest.mark.parametrize(("width", "is_told_of"), [(0.3, False), (0.4, True), (0.55, False)])
+@pytest.mark.parametrize(
+    ("width", "is_told_of"), [(0.3, False), (0.33, True), (0.4, True), (0.55, False)]
+)
 def test_a_door_that_the_robot_just_fits_through_is_told_of(
     width: float, *, is_told_of: bool
 ) -> None:

@@ -30,6 +30,16 @@ def test_who_has_gone_or_is_in_the_map_makes_none() -> None:
     assert len(found(100)) == 0
 
 
+def test_a_glance_at_its_rim_is_not_enough_to_know_that_it_has_gone() -> None:
+    """The floor of a third of the disc was seen, where the rest is not known."""
+    cells = drawn(*ROOM).cells.copy()
+    cells[23:27, 33:37] = UNKNOWN
+    cells[23:27, 33] = 0
+    grid = OccupancyGrid(cells, 0.1, drawn(*ROOM).origin)
+    places, radii = np.array([PLACE]), np.array([RADIUS])
+    assert len(spots(grid, places, radii, np.array([0.5, 0.5]), PASSAGE)) == 1
+
+
 def test_what_stands_where_the_robot_cannot_drive_makes_none() -> None:
     assert len(found(UNKNOWN, place=(9.0, 9.0))) == 0
     assert len(found(UNKNOWN, place=(-1.0, -2.0))) == 0
