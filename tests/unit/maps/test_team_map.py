@@ -89,6 +89,15 @@ def test_a_chart_keeps_its_frontiers_and_lengths() -> None:
         assert edge.length == pytest.approx(straight)
 
 
+def test_an_edge_that_its_robot_only_saw_was_driven_by_nobody() -> None:
+    chart = BUILDING.chart(LEFT, HERE)
+    seen = min(chart.edges)
+    edges = {key: replace(edge, traversed=key != seen) for key, edge in chart.edges.items()}
+    graph = route_graph(replace(chart, edges=edges))
+    driven = dict(zip(edges, (edge.traversals for edge in graph.edges), strict=True))
+    assert driven == {key: int(key != seen) for key in edges}
+
+
 def test_a_robot_of_a_team_saves_where_the_others_maps_lie_and_what_is_on_them(
     tmp_path: Path,
 ) -> None:
