@@ -78,6 +78,16 @@ def test_a_certificate_that_is_kept_is_said_to_be(certificates: Path) -> None:
     assert (certificates / "robot.crt").read_bytes() == before
 
 
+@pytest.mark.parametrize("address", ["192.168.1.7", "fd00::7"])
+def test_a_certificate_is_for_addresses_as_well(certificates: Path, address: str) -> None:
+    place = certificates / address.replace(":", "-")
+    script = [str(PACKAGED / "make_certificates.sh"), str(place), f"robot.local,{address}", "you"]
+    subprocess.run(script, check=True, capture_output=True, timeout=30)
+    ask = ["openssl", "x509", "-noout", "-in", str(place / "robot.crt"), "-checkip", address]
+    said = subprocess.run(ask, check=True, capture_output=True, text=True, timeout=30).stdout
+    assert "does match certificate" in said
+
+
 def tls(certificates: Path, tmp_path: Path) -> Network:
     endpoint = free_endpoint().replace("tcp/", "tls/")
 

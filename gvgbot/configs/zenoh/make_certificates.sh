@@ -39,6 +39,7 @@ issue() {
 alternatives=
 for name in $(echo "$names" | tr , ' '); do
   case $name in
+    *:*) kind=IP ;;
     *[!0-9.]*) kind=DNS ;;
     *) kind=IP ;;
   esac
