@@ -113,14 +113,20 @@ class Relocaliser:
     """Forms an opinion, a little work at a time."""
 
     def __init__(
-        self, scans: Sequence[tuple[Pose, AnyScan]], matching: ScanMatchingConfig, *, is_whole: bool
+        self,
+        scans: Sequence[tuple[Pose, AnyScan]],
+        matching: ScanMatchingConfig,
+        *,
+        seen_at: Pose,
+        is_whole: bool,
     ) -> None:
-        """`scans` were taken at map_base poses, the last one where the robot was seen last.
+        """`scans` were taken at map_base poses, the robot was seen last at `seen_at`.
 
         What they show is gathered by the first steps. `is_whole`: the building ends where the map
         does.
         """
         self._scans, self._matching, self._is_whole = scans, matching, is_whole
+        self._seen_at = seen_at
         self._chance = _CHANCE if is_whole else _CHANCE_OUTSIDE
         self._known: KnownWalls
         self._look: Look
@@ -246,7 +252,7 @@ class Relocaliser:
 
     def _stayed(self, hypothesis: Hypothesis) -> float:
         """Log of how much likelier it is for beginning where the robot was seen last."""
-        off = self._scans[-1][0].to(hypothesis.map_local)
+        off = self._seen_at.to(hypothesis.map_local)
         if math.hypot(off.x, off.y) > _STAYED_M:
             return 0.0
         return max(0.0, _STAYED - abs(off.theta) / _STAYED_RAD)

@@ -148,10 +148,12 @@ class ReturningPipeline(Pipeline):
         if estimate is None:
             return []
         self._estimate, self._is_doubted = estimate, False
-        scans = scans_at(self._estimate.keyframes, self)
-        graph = self.mapper.graph
+        keyframes, graph = self._estimate.keyframes, self.mapper.graph
+        scans = scans_at(keyframes, self)  # of the last keyframes they may be lost
         is_whole = bool(graph.edges) and not graph.frontiers()
-        self._relocaliser = Relocaliser(scans, self._matching, is_whole=is_whole)
+        self._relocaliser = Relocaliser(
+            scans, self._matching, seen_at=keyframes[-1], is_whole=is_whole
+        )
         self._seeker, self._tour = self._new_mind(), None
         self._seeker.tracker.odometry = self.tracker.odometry
         self.errands.unplaced = ""

@@ -83,7 +83,7 @@ def opinions(
     rng = np.random.default_rng(3)
     tour = tour or [*CORNERS, CORNERS[0]]
     known = [(pose, sweep(world, pose)) for pose in along(tour)[::2]]
-    relocaliser = Relocaliser(known, ScanMatchingConfig(), is_whole=is_whole)
+    relocaliser = Relocaliser(known, ScanMatchingConfig(), seen_at=known[-1][0], is_whole=is_whole)
     local_map, formed = LocalMap(LocalMapConfig(half_width_m=10.0)), []
     for number, pose in enumerate(path):
         view = LASER_270 if number else math.tau  # it turns before it drives
@@ -161,7 +161,7 @@ def test_it_is_sure_when_it_has_seen_the_branch_and_not_before() -> None:
 
 def test_who_sees_no_wall_thinks_nothing_until_it_has_driven_to_one() -> None:
     known = [(pose, sweep(ALIKE, pose)) for pose in along([*CORNERS, CORNERS[0]])[::2]]
-    relocaliser = Relocaliser(known, ScanMatchingConfig(), is_whole=True)
+    relocaliser = Relocaliser(known, ScanMatchingConfig(), seen_at=Pose(), is_whole=True)
     local_map = LocalMap(LocalMapConfig(half_width_m=10.0))
     opinion = [relocaliser.step(Look.around(Pose(), local_map)) for _ in range(WORK)][-1]
     assert opinion.map_local is None

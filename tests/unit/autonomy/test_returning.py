@@ -11,7 +11,7 @@ import pytest
 from gvgbot.autonomy.estimate import smoothed
 from gvgbot.autonomy.memory import growth, remember
 from gvgbot.autonomy.pipeline import Pipeline
-from gvgbot.autonomy.relocalisation import Opinion
+from gvgbot.autonomy.relocalisation import _STAYED_M, Hypothesis, Opinion
 from gvgbot.autonomy.returning import ReturningPipeline, _given_up
 from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.ekf import Belief
@@ -86,6 +86,21 @@ def test_who_looks_for_its_place_does_so_as_it_is_told_meanwhile() -> None:
     robot.configure(told)
     for mind in (robot, seeker, robot._new_mind()):
         assert mind.mission._config == told
+
+
+def test_who_has_lost_its_latest_scans_was_not_where_the_older_ones_were_taken() -> None:
+    """Nobody carries a robot whose journal is damaged: it is where it was when it was kept last."""
+    saved, config = MissionFiles(MISSION).read(), load_config()
+    assert saved is not None
+    assert saved.memory.last is not None
+    first, last = saved.past[0].keyframe.map_base, saved.memory.last.map_base
+    assert first.distance(last) > _STAYED_M
+    settings = config.autonomy, config.exploration, config.robot.radius_m
+    robot = ReturningPipeline(*settings, saved.memory, saved.past[:1], lambda: False)
+    robot.control(Odometry(0.0, Pose(), STANDSTILL))
+    robot.perceive(sweep(carved([(-4.0, -1.0, 6.0, 1.0)]), Pose()))
+    stayed = [robot._relocaliser._stayed(Hypothesis(where)) for where in (first, last)]
+    assert stayed[0] == 0.0 < stayed[1]
 
 
 def test_who_has_found_its_place_on_a_map_knows_no_better_where_that_map_lies() -> None:
