@@ -58,7 +58,8 @@ class ReturningPipeline(Pipeline):
         self._is_doubted = False  # the place where it was: it may have been moved
         self._matching = config.scan_matching
         self._is_back = not self.past.keyframes
-        self._is_bare = not self.mapper.graph.vertices and self.mission.outcome is None
+        is_explored = self.mission.outcome in ("explored", "explored_with_blocked")  # a mere room
+        self._is_bare = not (self.mapper.graph.vertices or is_explored)
         self._seeker: Pipeline | None = None
         self._tour: list[int] | None = None  # vertices of its own that it still drives to
         self._relocaliser: Relocaliser

@@ -8,7 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gvgbot.autonomy.ending import Outcome
 from gvgbot.autonomy.estimate import smoothed
+from gvgbot.autonomy.events import Recovery
 from gvgbot.autonomy.memory import growth, remember
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.relocalisation import _STAYED_M, Hypothesis, Opinion
@@ -101,6 +103,35 @@ def test_who_has_lost_its_latest_scans_was_not_where_the_older_ones_were_taken()
     robot.perceive(sweep(carved([(-4.0, -1.0, 6.0, 1.0)]), Pose()))
     stayed = [robot._relocaliser._stayed(Hypothesis(where)) for where in (first, last)]
     assert stayed[0] == 0.0 < stayed[1]
+
+
+@pytest.mark.parametrize(
+    ("outcome", "action"),
+    [
+        (None, "begin a new map"),
+        ("stopped", "begin a new map"),
+        ("failed", "begin a new map"),
+        ("explored", "look for its place on the map"),
+    ],
+)
+def test_who_ended_before_its_first_vertex_has_no_map_to_be_lost_on(
+    outcome: Outcome | None, action: str
+) -> None:
+    """It was started in the wrong place, told to stop, and carried; a room without edges is one."""
+    config = load_config()
+    settings = config.autonomy, config.exploration, config.robot.radius_m
+    corridor = carved([(-4.0, -1.0, 6.0, 1.0)])
+    before = Pipeline(*settings)
+    before.control(Odometry(0.0, Pose(), STANDSTILL))
+    before.perceive(sweep(corridor, Pose()))
+    before.mission.outcome = outcome
+    robot = ReturningPipeline(*settings, remember(before), growth(before), lambda: False)
+    robot.control(Odometry(1.0, Pose(), STANDSTILL))
+    if outcome is not None:
+        robot.errands.explore(1.0)
+    happened = robot.perceive(replace(sweep(corridor, Pose(4.0, 0.5, 2.0)), stamp=1.0))
+    assert [event.action for event in happened if isinstance(event, Recovery)] == [action]
+    assert robot.is_lost == (outcome == "explored")
 
 
 def test_who_has_found_its_place_on_a_map_knows_no_better_where_that_map_lies() -> None:
