@@ -23,12 +23,16 @@ log = structlog.get_logger()
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """What was asked for: a directory for the run, a run whose map is known, a new map."""
+    """What was asked for: a directory for the run, a run whose map is known, a new map.
+
+    And whether the robot is simulated; None if that makes no difference.
+    """
 
     out: Path | None = None
     known: Path | None = None
     anew: bool = False
     state_dir: Path | None = None
+    simulated: bool | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,19 +59,31 @@ def wanted(
     anew: bool = False,
 ) -> Wanted:
     """What options ask for, and the configuration where they say nothing."""
-    return Wanted(out, known or config.service.map, anew, state_directory(config, environment))
+    state_dir, known = state_directory(config, environment), known or config.service.map
+    return Wanted(out, known, anew, state_dir, config.twin.enabled)
 
 
 def begin(wanted: Wanted, *, world: str, stack: ExitStack) -> Start:
     """Where to begin; until the stack is left, no other program may write to that directory.
 
     What was begun with a known map goes on when that is asked for again. A mission that cannot be
-    read is left where it is, and a new one begun: nobody may be there to decide. Raises UsageError
-    if a directory cannot be used or has no map to begin with.
+    read is left where it is, and a new one begun: nobody may be there to decide. So is one of a
+    simulated robot if this one is real, or the other way round, but for an older one of its kind.
+    Raises UsageError if a directory cannot be used or has no map to begin with.
     """
+    again = None if wanted.anew or wanted.out is not None else _resumed(wanted, stack)
+    if again is not None:
+        return again
+    known = None if wanted.known is None else _known(wanted.known)
+    directory = stack.enter_context(_new(wanted, world))
+    stack.enter_context(held(directory.path))
+    return Start(directory, MissionFiles(directory.path), known)
+
+
+def _resumed(wanted: Wanted, stack: ExitStack) -> Start | None:
+    """The newest mission of this kind of robot, if it is to go on."""
     begun_with = None if wanted.known is None else _named(wanted.known)
-    path = None if wanted.anew or wanted.out is not None else _newest(wanted.state_dir)
-    if path is not None:
+    for path in _newest_first(wanted.state_dir):
         with ExitStack() as held_here:
             held_here.enter_context(held(path))  # first: what is read may still grow otherwise
             files = MissionFiles(path)
@@ -75,15 +91,17 @@ def begin(wanted: Wanted, *, world: str, stack: ExitStack) -> Start:
                 saved = files.read()
             except Damaged as error:
                 log.warning("mission cannot be read, a new one begins", reason=str(error))
-            else:
-                if begun_with is None or (saved is not None and saved.known == begun_with):
-                    directory = held_here.enter_context(RunDirectory(path))
-                    stack.enter_context(held_here.pop_all())
-                    return Start(directory, files, saved)
-    known = None if wanted.known is None else _known(wanted.known)
-    directory = stack.enter_context(_new(wanted, world))
-    stack.enter_context(held(directory.path))
-    return Start(directory, MissionFiles(directory.path), known)
+                return None
+            if saved is not None and _is_of_the_other_kind(saved, wanted):
+                kind = "a real" if wanted.simulated else "a simulated"
+                log.warning("mission passed over", reason=f"it is of {kind} robot", path=str(path))
+                continue
+            if begun_with is not None and (saved is None or saved.known != begun_with):
+                return None
+            directory = held_here.enter_context(RunDirectory(path))
+            stack.enter_context(held_here.pop_all())
+            return Start(directory, files, saved)
+    return None
 
 
 def _named(path: Path) -> str:
@@ -151,16 +169,27 @@ def _importing(file: Path, out: str) -> str:
     return shlex.join(["gvgbot", "map", "import", str(file), "--out", out])
 
 
-def _newest(state_dir: Path | None) -> Path | None:
-    """The run that was begun last of those that have left a mission: it has the highest number.
+def _is_of_the_other_kind(saved: Saved, wanted: Wanted) -> bool:
+    """Whether a mission is of a simulated robot and a real one is to go on, or the other way round.
+
+    The truth is known of a simulated one. Of a mission without a journey nobody can tell.
+    """
+    journey = saved.journey
+    if wanted.simulated is None or not journey.stamps:
+        return False
+    return bool(journey.world_base) != wanted.simulated
+
+
+def _newest_first(state_dir: Path | None) -> list[Path]:
+    """The runs that have left a mission; the one that was begun last has the highest number.
 
     Times of files would not tell: the clock of a robot may go back when its power is cut.
     """
     if state_dir is None:
-        return None
+        return []
     found = [
         (number, path)
         for path, number in numbers(state_dir / "runs").items()
         if any((path / name).exists() for name in (SNAPSHOT, SNAPSHOT_BEFORE))
     ]
-    return max(found)[1] if found else None
+    return [path for _, path in sorted(found, reverse=True)]

@@ -1,6 +1,7 @@
 """Where a run begins, by what was asked for and what is there."""
 
 import shlex
+import shutil
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from gvgbot.persistence.start import Start, Wanted, begin, held, state_directory
 from gvgbot.session import Session
 from tests.unit.persistence.test_mission_files import written
 
+STORED = Path(__file__).parents[2] / "data" / "mission_v1"
 ELSEWHERE = {"STATE_DIRECTORY": "/var/lib/gvgbot:/var/lib/other"}
 
 
@@ -83,6 +85,23 @@ def test_a_new_mission_goes_on_after_a_restart_whatever_the_robot_was_called(
     assert new.name.startswith("office-")
     written(new)
     assert begun(Wanted(state_dir=tmp_path)).directory.path == new
+
+
+def test_a_real_robot_does_not_go_on_with_the_map_of_a_simulated_one(tmp_path: Path) -> None:
+    """Who tries the service with the twins first finds no office in the building."""
+    runs = tmp_path / "runs"
+    real, simulated = mission(runs / "office-1"), runs / "office-2"
+    shutil.copytree(STORED, simulated)  # of a twin
+    for is_simulated, expected in ((None, simulated), (True, simulated), (False, real)):
+        start = begun(Wanted(state_dir=tmp_path, simulated=is_simulated))
+        assert start.directory.path == expected
+        assert start.saved is not None
+    shutil.rmtree(real)
+    with structlog.testing.capture_logs() as logs:
+        start = begun(Wanted(state_dir=tmp_path, simulated=False))
+    assert start.saved is None
+    assert start.directory.path == runs / "office-3"
+    assert [log["event"] for log in logs] == ["mission passed over"]
 
 
 def test_only_one_mission_is_begun_because_another_cannot_be_read(tmp_path: Path) -> None:
