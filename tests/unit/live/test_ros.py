@@ -105,11 +105,15 @@ def test_a_scan_comes_as_it_was_with_the_place_of_the_laser() -> None:
     to = live(heard)
     to.on_scan(scan(5.0, mount))
     to.on_scan(scan(5.1, mount))
+    to.on_scan(scan(5.2, Pose(0.1, -0.02, 2.9)))  # where it looks has been learnt
+    *before, learnt = heard.got[topics.TF_STATIC]
+    heard.got[topics.TF_STATIC] = before
+    assert matrix(learnt.transforms[0].transform) == pytest.approx(planar(Pose(0.1, -0.02, 2.9)))
     (static,) = heard.got[topics.TF_STATIC]  # once, and first: transforms that stay
     (laser,) = static.transforms
     assert (laser.header.frame_id, laser.child_frame_id) == ("base_link", "laser")
     assert matrix(laser.transform) == pytest.approx(planar(mount))
-    first, second = heard.got[topics.SCAN]
+    first, second, _ = heard.got[topics.SCAN]
     assert first.header.frame_id == "laser"
     assert first.ranges == pytest.approx([1.0, math.nan, math.inf, 2.5], nan_ok=True)
     assert [first.angle_min, first.angle_max, first.angle_increment] == [-0.5, 0.25, 0.25]
@@ -134,6 +138,22 @@ def test_odometry_comes_with_pose_and_twist() -> None:
     assert (pose.position.x, pose.position.y) == (1.0, 2.0)
     assert 2 * math.atan2(pose.orientation.z, pose.orientation.w) == pytest.approx(0.5)
     assert (twist.linear.x, twist.angular.z) == (0.3, -0.2)
+
+
+def test_the_speed_is_as_uncertain_as_the_way_of_a_second_at_that_speed_in_that_time() -> None:
+    """What is known of a tenth of a second is known of ten times the way."""
+    heard, motion = Heard(topics.ODOM), Pose(0.03, 0.0, 0.02)
+    to = live(heard)
+    to.on_odometry(Odometry(7.0, Pose(), Twist(0.3, 0.2)))
+    to.on_odometry(Odometry(7.1, motion, Twist(0.3, 0.2)))
+    to.on_odometry(Odometry(7.1, motion, Twist(0.3, 0.2)))  # again: no time has passed
+    first, second, again = (
+        np.asarray(one.twist.covariance).reshape(6, 6)[np.ix_([0, 1, 5], [0, 1, 5])]
+        for one in heard.got[topics.ODOM]
+    )
+    assert second == pytest.approx(100.0 * NOISE.covariance(motion, 0.1))
+    assert not first.any()
+    assert not again.any()
 
 
 def test_the_covariance_is_that_of_many_robots_that_err_as_the_noise_says() -> None:
@@ -193,6 +213,24 @@ def test_the_map_is_drawn_anew_when_a_loop_has_closed() -> None:
     whole = 2 * (RADIUS_M + 3.0) + 1.0  # with a margin of half a metre
     assert np.multiply(corrected, 0.05) == pytest.approx([whole, whole], abs=0.3)
     assert np.abs(np.multiply(believed, 0.05) - whole).max() > 0.6
+    late = Heard(topics.MAP)
+    draw = LiveRos([late], pipeline, NOISE, lambda stamp: stamp + LATER).draw(20.0)
+    assert draw is not None
+    draw()
+    (anew,), latest = late.got[topics.MAP], heard.got[topics.MAP][-1]
+    assert latest.data.tolist() == anew.data.tolist()  # nothing of what was believed is left
+    for told in (
+        latest.header,
+        latest.info.map_load_time,
+        heard.got[topics.MARKERS][-1].markers[0],
+    ):
+        assert seconds(told) == 1_700_000_020
+
+
+def seconds(told: Any) -> int:
+    """Of a time, or of the time of a header or a marker."""
+    stamp = getattr(getattr(told, "header", told), "stamp", told)
+    return int(stamp.sec)
 
 
 def vertex(number: int, x: float, kind: Any, frontiers: tuple[float, ...] = ()) -> RouteNode:
