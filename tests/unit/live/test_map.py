@@ -53,9 +53,11 @@ def percent_at(raster: Raster, points: NDArray[np.float64]) -> list[int]:
     return found
 
 
-def test_what_has_changed_adds_up_to_the_grid_of_all_scans() -> None:
-    changes, wholes = zip(*sent(DRIVE), strict=True)
-    scans = [(one.map_base, one.scan) for one in DRIVE if one.scan is not None]
+@pytest.mark.parametrize("reach", [3.0, 7.9])
+def test_what_has_changed_adds_up_to_the_grid_of_all_scans(reach: float) -> None:
+    drive = [keyframe(0.5 * i, -0.3 * i, reach) for i in range(20)]
+    changes, wholes = zip(*sent(drive), strict=True)
+    scans = [(one.map_base, one.scan) for one in drive if one.scan is not None]
     made = occupancy_grid(scans, 0.05, 8.0)
     rows, columns = np.nonzero(made.cells >= 0)
     points = np.column_stack([columns + 0.5, rows + 0.5]) * 0.05 + made.origin

@@ -11,11 +11,13 @@ import pytest
 
 from gvgbot.autonomy.keyframes import Keyframe, Past, Step
 from gvgbot.autonomy.slam.ekf import Belief
-from gvgbot.autonomy.slam.graph import GvgGraph
+from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex
 from gvgbot.autonomy.views import Observation
 from gvgbot.geometry import Array, Pose
+from gvgbot.hal.messages import Scan
 from gvgbot.live.map import LiveMap
 from gvgbot.live.past import TOLERANCE_M, LivePast
+from gvgbot.tiles import Grid
 from gvgbot.topics import Map, Trajectory
 
 COUNT, RADIUS_M = 101, 8.0
@@ -163,6 +165,55 @@ def test_virtual_walls_are_told_with_the_map() -> None:
     assert draw is not None
     (told,) = [one.value for one in draw() if isinstance(one.value, Map)]
     assert told.forbidden.tolist() == FORBIDDEN.tolist()
+
+
+def test_the_graph_is_told_with_kinds_and_frontiers_where_they_are_in_the_map() -> None:
+    """A vertex of two ways, of which one was followed to a dead end; it is turned by 1 rad."""
+    pipeline, ends = drive(), []
+    for number, bearings in ((1, (0.25, -2.0)), (2, (3.0,))):
+        vertex = Vertex(number, 0.8, Pose(), 0.0, 0.0)
+        ends.append([HalfEdgeId(number, vertex.add_half_edge(one)) for one in bearings])
+        pipeline.mapper.graph.vertices[number] = vertex
+    line = np.array([(0.0, 0.0), (5.0, 0.0)])
+    pipeline.mapper.graph.join(ends[0][0], ends[1][0], line, 0.6, driven=True)
+    x = np.array([0.0, 0.0, 0.0, 4.0, -2.0, 1.0, 6.7, 2.2, 0.0])
+    pipeline.mapper.belief = Belief(x, np.diag(np.arange(9.0)), (1, 2))
+    draw = LiveMap(began=0.0).update(pipeline, 0.0)
+    assert draw is not None
+    (told,) = [one.value for one in draw() if isinstance(one.value, Map)]
+    assert [(v.id, v.kind) for v in told.vertices] == [(1, "meetpoint"), (2, "endpoint")]
+    assert [v.frontiers for v in told.vertices] == [(pytest.approx(-1.0),), ()]
+    assert told.vertices[0].position == (4.0, -2.0)
+    assert told.vertices[0].covariance == (3.0, 0.0, 0.0, 4.0)
+    assert [(e.start, e.end) for e in told.edges] == [(1, 2)]
+
+
+def test_of_a_grid_that_is_too_large_for_one_message_the_rest_follows_without_news() -> None:
+    """And whoever asks gets all of it, not what has changed last."""
+    pipeline, around = drive(led=True), np.full(360, 7.5)
+    pipeline.past.keyframes = [
+        replace(
+            one,
+            map_base=Pose(40.0 * i, 0.0),
+            scan=Scan(one.stamp, around, -math.pi, math.tau / 360, 0.1, 30.0),
+        )
+        for i, one in enumerate(pipeline.past.keyframes[:10])
+    ]
+    live, stamp = LiveMap(began=0.0), 0.0
+    told: list[Grid] = []
+    asked: Any = None
+    while (draw := live.update(pipeline, stamp)) is not None:
+        stamp += 1.0
+        for update in draw():
+            if isinstance(update.value, Grid):
+                told.append(update.value)
+                asked = update.latest
+    assert isinstance(asked, Grid)
+    assert len(told) > 1
+    tiles = {(tile.row, tile.column) for grid in told for tile in grid.tiles}
+    assert {(tile.row, tile.column) for tile in asked.tiles} == tiles
+    cells = asked.raster().cells
+    assert (cells >= 0).sum() * 0.05**2 == pytest.approx(10 * math.pi * 7.5**2, rel=0.02)
 
 
 def from_centre(way: Array) -> Array:
