@@ -116,6 +116,14 @@ def test_unknown_floor_is_told_from_known() -> None:
     assert not room.floor[:, 4:].any()
 
 
+def test_floor_is_where_it_is_however_far_its_corner_is_from_the_middle_of_the_map() -> None:
+    """The northern half of sixteen metres, from (0, 8) on; the map begins at its origin."""
+    floor = a_floor("\n".join(["." * 16] * 8), origin=(-0.5, 7.5))
+    room = chart(Scene(a_map((vertex((15.0, 0.0)),)), floor), 8, 4)
+    assert room.floor[:2].all()
+    assert not room.floor[2:].any()
+
+
 EMPTY = "\n".join(["." * 16] * 16)
 
 

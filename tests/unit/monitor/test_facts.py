@@ -210,6 +210,14 @@ def test_a_control_loop_that_is_stuck_makes_the_headline() -> None:
     assert headline("karl", Presence("alive", 1.0), stuck, []).tone == "bad"
 
 
+def test_a_robot_without_its_base_says_why_it_stands_and_not_that_it_is_stuck() -> None:
+    """Its cycles are those of odometry."""
+    away = msgspec.structs.replace(EXAMPLE.base, connected=False)
+    waits = {"phase": "halted", "reason": "the base is away", "errand": None}
+    state = msgspec.structs.replace(EXAMPLE, cycle_age=7.0, base=away, **waits)
+    assert headline("karl", Presence("alive", 1.0), state, []).text == "the base is away"
+
+
 def test_an_event_is_a_sentence_with_its_age() -> None:
     assert told(DECISION, 13.5) == Fact("    12 s", "go to vertex 7, 90°: nearest frontier")
 
