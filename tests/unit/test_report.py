@@ -66,6 +66,23 @@ def test_a_row_at_the_stamp_of_a_keyframe_that_came_later_is_that_keyframe() -> 
     assert pose == pytest.approx([true[1].x, true[1].y, true[1].theta])
 
 
+def test_of_a_way_that_is_forgotten_no_row_is_left_and_the_next_ones_go_on_behind_it() -> None:
+    poses = [Pose(float(k), 0.5 * k, 0.1 * k) for k in range(6)]
+    journey = Journey(
+        stamps=array("d", range(6)),
+        keyframes=array("q", [0, 0, 1, 2, 2, 3]),
+        odom_base=Poses(poses),
+        map_base=Poses(poses[::-1]),
+        world_base=Poses(poses),
+    )
+    journey.forget(2)
+    assert list(journey.stamps) == [0.0, 1.0, 2.0]
+    assert list(journey.keyframes) == [0, 0, 1]
+    assert journey.odom_base.rows().tolist() == [[p.x, p.y, p.theta] for p in poses[:3]]
+    assert journey.map_base.rows().tolist() == [[p.x, p.y, p.theta] for p in poses[:2:-1]]
+    assert journey.world_base.rows().tolist() == journey.odom_base.rows().tolist()
+
+
 def test_directions_in_the_map_are_within_half_a_turn_of_straight_on() -> None:
     """A vertex that is turned by 3 rad, whose way ahead is known, and one half right is not."""
     mind = pipeline([])
