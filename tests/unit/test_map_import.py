@@ -92,6 +92,20 @@ def test_beyond_the_edge_of_the_image_nothing_is_known(tmp_path: Path) -> None:
     assert -0.1 < x.min() < 0.1  # the file still says that the image begins at 0
 
 
+def test_there_is_a_wall_on_every_side_of_what_is_free(tmp_path: Path) -> None:
+    """The arms of the cross are 1.4 m wide and end at 0.8 and 14.2 m, and at 0.8 and 8.2 m."""
+    import_map(painted(tmp_path), tmp_path / "run", Config())
+    grid = SavedRun.read(tmp_path / "run").grid
+    walls = grid.middles(grid.cells == 100)
+    beside, ahead = ((1.0, 3.7), (4.0, 5.0)), ((0.8, 14.2), (0.8, 8.2))
+    sides = [(axis, at, *beside[0]) for axis in (0, 1) for at in (3.8, 5.2)]
+    ends = [(axis, at, *beside[1]) for axis in (0, 1) for at in ahead[axis]]
+    for axis, at, low, high in sides + ends:
+        along = walls[np.abs(walls[:, axis] - at) < 0.08][:, 1 - axis]
+        seen = np.histogram(along, np.arange(low, high + 1e-9, 0.1))[0]
+        assert (seen > 0).mean() > 0.8, (axis, at)
+
+
 def test_a_plan_on_white_paper_is_imported_from_inside(tmp_path: Path) -> None:
     """More of the paper lies around the walls, of 10 cm, than within them."""
     path = painted(tmp_path)

@@ -108,6 +108,8 @@ def test_an_edge_leads_to_its_vertices_however_odometry_has_bent_its_line() -> N
     x = np.array([0.0, 0.0, 0.0, -0.5, 0.0, 0.0, 6.5, 0.0, 0.0])
     pipeline.mapper.belief = Belief(x, 1e-6 * np.eye(9), tuple(ids.values()))
     assert survey(pipeline).is_whole
+    pipeline.sight.virtual_walls = points_of([((90.0, 0.0), (90.0, 1.0))])
+    assert not survey(pipeline).is_whole  # what is beyond is a part of the building, too
 
 
 def test_edges_round_nothing_are_looked_at_again() -> None:
