@@ -719,6 +719,24 @@ def test_vertices_have_their_numbers_wherever_there_is_room(page: Page) -> None:
     assert kept == [0, 30]
 
 
+def test_the_view_of_all_ends_where_the_floor_does_after_a_correction(page: Page) -> None:
+    """Tiles of two metres: one from the origin on, and for a while one from (10, -4) on."""
+    steps = [(0, 0, [0, 0, -1, 0]), (5, -2, [-1, 100, -1, -1]), (5, -2, [-1, -1, -1, -1])]
+    with web("--connect", free_endpoint()) as address:
+        desktop(page, address)
+        boxes = page.look(
+            "import('/floor.js').then(async ({ Floor }) => {"
+            "const floor = new Floor(1, 2, { floor: '#ffffff', wall: '#000000' });"
+            "const packed = (cells) => new Response(new Blob([new Int8Array(cells)]).stream()"
+            ".pipeThrough(new CompressionStream('deflate'))).arrayBuffer();"
+            "const boxes = [floor.box];"
+            f"for (const [column, row, cells] of {json.dumps(steps)}) {{"
+            "await floor.take({ column, row, cells: await packed(cells) });"
+            "boxes.push(floor.box) } return boxes })"
+        )
+    assert boxes == [None, [0, 0, 2, 2], [0, -4, 12, 2], [0, 0, 2, 2]]
+
+
 def test_what_a_robot_showed_before_it_was_started_again_is_shown_no_more(page: Page) -> None:
     endpoint, label = free_endpoint(), "document.querySelector('#map').ariaLabel"
     with web("karl", "--connect", endpoint) as address:

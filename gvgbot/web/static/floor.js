@@ -10,7 +10,6 @@ export class Floor {
     this.orders = new Map();
     this.order = 0;
     this.picture = null;
-    this.box = null; // left, bottom, right, top, m, of what is known
     this.setColours(colours);
   }
 
@@ -27,10 +26,17 @@ export class Floor {
     const unpacked = await inflated(cells);
     if (this.orders.get(name) !== order) return;
     const tile = { column, row, cells: new Int8Array(unpacked) };
+    tile.box = this.boxOf(tile);
     this.tiles.set(name, tile);
     this.makeRoom(tile);
     this.paint(tile);
-    this.widen(tile);
+  }
+
+  // Left, bottom, right, top, m, of what is known; null as long as nothing is.
+  get box() {
+    const boxes = [...this.tiles.values()].flatMap(({ box }) => (box === null ? [] : [box]));
+    return boxes.length === 0 ? null : boxes.reduce(([left, bottom, right, top], box) => (
+      [Math.min(left, box[0]), Math.min(bottom, box[1]), Math.max(right, box[2]), Math.max(top, box[3])]));
   }
 
   // The picture's upper left corner, m.
@@ -62,14 +68,17 @@ export class Floor {
     this.picture.getContext("2d").putImageData(image, (column - this.columns[0]) * side, (this.rows[1] - 1 - row) * side);
   }
 
-  widen({ column, row, cells }) {
+  // The same of a tile; where a loop has closed, nothing may be left of it.
+  boxOf({ column, row, cells }) {
     const side = this.side, cell = this.resolution;
+    let [left, bottom, right, top] = [side, side, 0, 0];
     for (let at = 0; at < cells.length; at++) {
       if (cells[at] < 0) continue;
-      const x = (column * side + (at % side)) * cell, y = (row * side + Math.floor(at / side)) * cell;
-      const [left, bottom, right, top] = this.box ?? [x, y, x, y];
-      this.box = [Math.min(left, x), Math.min(bottom, y), Math.max(right, x + cell), Math.max(top, y + cell)];
+      const x = at % side, y = Math.floor(at / side);
+      [left, bottom, right, top] = [Math.min(left, x), Math.min(bottom, y), Math.max(right, x + 1), Math.max(top, y + 1)];
     }
+    const [x, y] = [column * side, row * side];
+    return right === 0 ? null : [(x + left) * cell, (y + bottom) * cell, (x + right) * cell, (y + top) * cell];
   }
 }
 
