@@ -4,8 +4,10 @@ Chunks are small and go out at once, so that whatever ends the program costs the
 and a power failure a megabyte.
 """
 
+import errno
 import glob
 import os
+import shutil
 from collections import deque
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -21,6 +23,7 @@ CHUNK_BYTES = 65_536
 METADATA = "gvgbot"  # the name of the record that says what a file belongs to
 GOES_ON = "gvgbot.goes_on"  # the name of the one that says that another file follows
 SYNC_EVERY_BYTES = 1_000_000  # that a power failure may cost
+SPARE_BYTES = 50_000_000  # of its disk: the mission takes some 30 MB an hour, and its map a few
 _EVENT_SCHEMA = {
     "type": "object",
     "properties": {"event": {"type": "string"}, "stamp": {"type": "number"}},
@@ -51,7 +54,10 @@ def free_path(wanted: Path) -> Path:
 
 
 class McapFiles:
-    """Files of limited size, of which the oldest go when there are too many bytes in all."""
+    """Files of limited size, of which the oldest go when there are too many bytes in all.
+
+    So they do when the disk is nearly full; then the last one ends, too.
+    """
 
     def __init__(
         self, first: Path, about: Mapping[str, str], *, file_bytes: float, total_bytes: float
@@ -94,12 +100,14 @@ class McapFiles:
         if size - self._synced > SYNC_EVERY_BYTES:
             os.fsync(self._file.fileno())
             self._synced = size
+            self._spare_disk()
         if size > self._file_bytes:
             self._writer.add_metadata(GOES_ON, {})
             self.finish()
             self._make_room()
             self._part += 1
             self._open()
+            self._spare_disk()
 
     def finish(self) -> None:
         """End the file with its index. Raises OSError."""
@@ -113,6 +121,14 @@ class McapFiles:
         while len(sizes) > 1 and sum(sizes) + self._file_bytes > self._total_bytes:
             self._done.popleft()[0].unlink(missing_ok=True)
             sizes.pop(0)
+
+    def _spare_disk(self) -> None:
+        """Leave room for the mission. Raises OSError if that is the end of this file."""
+        while shutil.disk_usage(self.path.parent).free < SPARE_BYTES:
+            if not self._done:
+                self.finish()
+                raise OSError(errno.ENOSPC, f"less than {SPARE_BYTES / 1e6:.0f} MB are left")
+            self._done.popleft()[0].unlink(missing_ok=True)
 
     def abandon(self) -> None:
         """Let go of the file as it is."""

@@ -1,7 +1,7 @@
 """Takes down a run as it happens, and leaves the writing to a thread of its own.
 
-The robot comes first: when the disk is too slow some messages are left out, when it is full the
-recording ends, and the log says so.
+The robot comes first: when the disk is too slow some messages are left out, when it is nearly full
+the recording ends, and the log says so.
 """
 
 from collections.abc import Callable

@@ -2,9 +2,11 @@
 
 import errno
 import os
+import shutil
 import threading
 from collections.abc import Sequence
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -21,7 +23,7 @@ from gvgbot.geometry import Pose, Twist
 from gvgbot.hal.messages import Battery, Odometry, Scan
 from gvgbot.recording import Lived, extra_needed, recorder
 from gvgbot.recording.config import RecordingConfig
-from gvgbot.recording.files import Entry, McapFiles, free_path
+from gvgbot.recording.files import SPARE_BYTES, Entry, McapFiles, free_path
 from gvgbot.recording.messages import RAW
 from gvgbot.recording.reader import Recording
 from gvgbot.recording.recorder import Recorder
@@ -352,6 +354,35 @@ def test_where_there_is_room_for_two_files_the_one_before_the_last_stays(tmp_pat
     assert before.stat().st_size > 0.1e6
     assert before.stat().st_size + last.stat().st_size < 0.3e6
     assert_begins_as(read(before)[::-1], lived[::-1])
+
+
+@pytest.mark.parametrize("others", [0, 7])
+def test_what_room_is_left_on_a_disk_is_the_missions(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, others: int
+) -> None:
+    """Of a disk with room for seven pieces of a megabyte, seven of which others may take later."""
+    data, noise, taken = 250_000, np.random.default_rng(1), 0.0  # no packing makes it smaller
+
+    def disk_usage(path: Path) -> SimpleNamespace:
+        held = sum(file.stat().st_size for file in path.iterdir())
+        return SimpleNamespace(free=int(SPARE_BYTES + 7.5e6 - held - taken))
+
+    monkeypatch.setattr(shutil, "disk_usage", disk_usage)
+    files = McapFiles(tmp_path / "run.mcap", ABOUT, file_bytes=1e6, total_bytes=1e9)
+    for k in range(60):
+        files.write([Entry(RAW["laser"][False], k, k, noise.bytes(data))])
+    kept = sorted(file.name for file in tmp_path.iterdir())
+    assert 6 <= len(kept) <= 8
+    assert "run.mcap" not in kept
+    taken = 1e6 * others
+    if others:
+        with pytest.raises(OSError, match="less than 50 MB are left"):
+            files.write([Entry(RAW["laser"][False], 60, 60, noise.bytes(1_100_000))])
+    else:
+        files.finish()
+    (last, *_) = sorted(tmp_path.iterdir(), key=lambda file: int(file.suffixes[0][1:]))[::-1]
+    with last.open("rb") as stream:
+        assert make_reader(stream).get_summary() is not None  # it has its index
 
 
 def test_an_earlier_recording_stays(tmp_path: Path) -> None:
