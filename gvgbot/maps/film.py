@@ -109,12 +109,10 @@ class _Scene:
 def _draw_vertex(canvas: Surface, view: View, vertex: RouteNode, edges: list[RouteEdge]) -> None:
     """The vertex, with the frontiers that it has as long as there are only these edges."""
     at = view.pixel(vertex.position)
-    if vertex.kind == "endpoint":
-        symbols.draw_endpoint(canvas, at)
-        return
     for bearing in frontiers(vertex, edges):
         symbols.draw_frontier(canvas, at, bearing)
-    symbols.draw_meetpoint(canvas, at)
+    draw = symbols.draw_meetpoint if vertex.kind == "meetpoint" else symbols.draw_endpoint
+    draw(canvas, at)
 
 
 def _footer(sheet: Callable[[int, int], S], caption: str, width: int, scale: float) -> S:

@@ -2,6 +2,7 @@
 
 import io
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,12 +11,14 @@ from numpy.typing import NDArray
 from PIL import Image
 from scipy import ndimage
 
-from gvgbot.maps.canvas import Canvas
-from gvgbot.maps.drawing import Drawing
+from gvgbot.maps import geojson
+from gvgbot.maps.canvas import Canvas, Ink
+from gvgbot.maps.drawing import Drawing, Stroke
 from gvgbot.maps.film import clock, draw_strip, gif
 from gvgbot.maps.growth import Growth
+from gvgbot.maps.route_graph import RouteGraph
 from gvgbot.maps.saved_run import SavedRun
-from tests.unit.maps.small_run import write_run
+from tests.unit.maps.small_run import GRAPH, UP, write_run
 
 BLACK, BLUE, SKY, ORANGE = (20, 20, 20), (0, 90, 150), (86, 180, 233), (230, 159, 0)
 GREEN = (0, 120, 85)
@@ -83,6 +86,19 @@ def test_graph_and_frontiers_appear_when_they_were_found(growth: Growth) -> None
     assert np.ptp(columns_of(start, ORANGE)) < 0.1 * end.shape[1]  # about the first vertex
     assert np.ptp(columns_of(before, BLUE)) > 0.8 * end.shape[1]  # the first and the last
     assert len(columns_of(before, ORANGE)) > len(columns_of(end, ORANGE)) > 0
+
+
+def test_a_dead_end_that_was_only_seen_has_its_frontier_as_on_the_map(tmp_path: Path) -> None:
+    """Nobody has driven from the last meetpoint to the dead end."""
+    directory = write_run(tmp_path / "run")
+    others, last, end = GRAPH.vertices[:2], *GRAPH.vertices[2:]
+    last, end = replace(last, frontiers=(UP, -UP)), replace(end, frontiers=(-UP,))
+    graph = RouteGraph((*others, last, end), GRAPH.edges[:2])
+    (directory / "map.geojson").write_text(geojson.encode(graph))
+    sheet = draw_strip(Drawing, Growth.of(SavedRun.read(directory)), 2)
+    shapes = [one for one in sheet.windows[-1].shapes if isinstance(one, Stroke)]
+    arrows = [one for one in shapes if one.is_closed and one.fill == Ink.ORANGE]
+    assert len(arrows) == sum(len(vertex.frontiers) for vertex in graph.vertices) == 6
 
 
 def test_the_last_frame_says_what_the_summary_says(tmp_path: Path) -> None:
