@@ -15,7 +15,7 @@ from gvgbot.maps import geojson
 from gvgbot.maps.map_server import read_map_server
 from gvgbot.maps.occupancy import OccupancyGrid
 from gvgbot.maps.route_graph import RouteGraph
-from gvgbot.maps.run_directory import EVENTS, SUMMARY
+from gvgbot.maps.run_directory import EVENTS, EVENTS_BEFORE, SUMMARY
 from gvgbot.maps.trajectory import Trajectory, decode_tum
 
 T = TypeVar("T")
@@ -101,7 +101,7 @@ class SavedRun:
             grid=read_map_server(directory),
             estimate=estimate,
             odometry=odometry,
-            events=_events(directory / EVENTS),
+            events=_earlier_events(directory) + _events(directory / EVENTS),
             summary=_summary(directory / SUMMARY),
         )
 
@@ -138,6 +138,12 @@ def _decoded(path: Path, decode: Callable[[str], T]) -> T:
         return decode(text)
     except UsageError as error:
         raise UsageError(f"{path}: {error}") from error
+
+
+def _earlier_events(directory: Path) -> tuple[Happening, ...]:
+    """Those of before the list of events began anew, if it did."""
+    path = directory / EVENTS_BEFORE
+    return _events(path) if path.exists() else ()
 
 
 def _events(path: Path) -> tuple[Happening, ...]:

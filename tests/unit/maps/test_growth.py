@@ -35,6 +35,20 @@ def test_vertices_and_edges_are_there_from_their_events_on(
     assert {(e.start, e.end) for e in found[1]} == edges
 
 
+def test_what_was_found_before_the_list_of_events_began_anew_was_found_then(
+    tmp_path: Path,
+) -> None:
+    """As it does in a run of weeks: the older events are in a file beside it."""
+    directory = write_run(tmp_path / "run")
+    whole = Growth.of(SavedRun.read(directory))
+    lines = (directory / "events.jsonl").read_text().splitlines(keepends=True)
+    (directory / "events-before.jsonl").write_text("".join(lines[:4]))
+    (directory / "events.jsonl").write_text("".join(lines[4:]))
+    parted = Growth.of(SavedRun.read(directory))
+    assert parted.vertex_found == whole.vertex_found
+    assert parted.edge_found == whole.edge_found
+
+
 def test_what_was_found_after_the_last_row_is_there_at_the_end(tmp_path: Path) -> None:
     directory = write_run(tmp_path / "run")
     events = (directory / "events.jsonl").read_text().replace("1009.0", "1010.05")
