@@ -5,7 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from gvgbot.geometry import Array, Pose
-from gvgbot.maps.occupancy import UNKNOWN, OccupancyGrid
+from gvgbot.maps.occupancy import UNKNOWN, Cells, OccupancyGrid, Seconds
+
+_STRIP = 64  # rows that are worked on at a time
 
 
 def joined_grid(grids: Sequence[tuple[OccupancyGrid, Pose]]) -> OccupancyGrid:
@@ -21,18 +23,32 @@ def joined_grid(grids: Sequence[tuple[OccupancyGrid, Pose]]) -> OccupancyGrid:
     columns, rows = np.ceil(corners.max(axis=0) / cell - 1e-6).astype(int) - (column, row)
     cells = np.full((rows, columns), UNKNOWN, np.int8)
     seen_s = np.full((rows, columns), np.inf, np.float32)
-    x, y = np.meshgrid((column + np.arange(columns) + 0.5), (row + np.arange(rows) + 0.5))
-    middles = cell * np.stack([x.ravel(), y.ravel()], axis=1)
+    x = cell * (column + np.arange(columns) + 0.5)
+    for first in range(0, rows, _STRIP):
+        strip = slice(first, first + _STRIP)
+        y = cell * (row + np.arange(rows)[strip] + 0.5)
+        _lay(grids, (x, y), cells[strip], seen_s[strip])
+    return OccupancyGrid(cells, cell, (column * cell, row * cell), seen_s)
+
+
+def _lay(
+    grids: Sequence[tuple[OccupancyGrid, Pose]],
+    at: tuple[Array, Array],
+    cells: Cells,
+    seen: Seconds,
+) -> None:
+    """Note what the grids say in cells, and since when, whose middles are at x and y, m."""
+    x, y = np.meshgrid(*at)
+    middles = np.stack([x.ravel(), y.ravel()], axis=1)
     for grid, pose in grids:
         local = (pose.inverse().transform(middles) - grid.origin) / grid.resolution_m
         j, i = np.floor(local).astype(int).T
         inside = (i >= 0) & (i < grid.cells.shape[0]) & (j >= 0) & (j < grid.cells.shape[1])
-        there = inside.reshape(rows, columns)
+        there = inside.reshape(cells.shape)
         i, j = i[inside], j[inside]
         cells[there] = np.maximum(cells[there], grid.cells[i, j])
         if grid.seen_s is not None:
-            seen_s[there] = np.minimum(seen_s[there], grid.seen_s[i, j])
-    return OccupancyGrid(cells, cell, (column * cell, row * cell), seen_s)
+            seen[there] = np.minimum(seen[there], grid.seen_s[i, j])
 
 
 def _corners(grid: OccupancyGrid) -> Array:

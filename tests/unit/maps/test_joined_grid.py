@@ -1,6 +1,7 @@
 """Two halves of a room, seen in different frames, are one room in the joined grid."""
 
 import math
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -52,3 +53,15 @@ def test_cells_of_another_size_lie_where_they_were_measured() -> None:
     joined = joined_grid([(grid(["??????"]), Pose()), (coarse, Pose(2 * CELL, 0.0))])
     assert drawn(joined) == ["??..##", "??..##"]
     assert joined.resolution_m == CELL
+
+
+def test_a_grid_as_large_as_two_buildings_is_joined_in_little_memory() -> None:
+    """A cell of the result takes five bytes, and those that are worked on at a time few more."""
+    one = OccupancyGrid(np.zeros((600, 500), np.int8), CELL, (0.0, 0.0))
+    tracemalloc.start()
+    joined = joined_grid([(one, Pose()), (one, Pose(20.0, 30.0))])
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert joined.cells.shape == (1200, 900)
+    assert (joined.cells == 0).sum() == 2 * one.cells.size
+    assert peak < 20 * joined.cells.size
