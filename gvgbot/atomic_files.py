@@ -1,6 +1,7 @@
 """Files that are either the old one or the new one, never half of each, even after a power cut."""
 
 import contextlib
+import errno
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -47,6 +48,11 @@ def write_all(file: int, content: bytes) -> None:
     left = memoryview(content)
     while left:
         left = left[os.write(file, left) :]
+
+
+def is_disk_full(error: BaseException | None) -> bool:
+    """Whether that is what was wrong: there is no room, or none for this user."""
+    return isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
 
 
 def sync_directory(path: Path) -> None:

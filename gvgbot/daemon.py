@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import structlog
 
 from gvgbot import __version__
+from gvgbot.atomic_files import is_disk_full
 from gvgbot.clock import LoopClock, VirtualTimeLoop
 from gvgbot.config import Config
 from gvgbot.driving import CARRIED, drive
@@ -184,6 +185,7 @@ async def _serve(robot: Robot, signals: StopSignals) -> None:
 def recorded(session: Session, *, patient: bool) -> AbstractContextManager[object]:
     """What records a session, if that is wanted, until it is left.
 
+    Who is not `patient` does without where the disk is full: a robot goes on after a power cut.
     Raises UsageError if nothing can be written there, GvgbotError without the packages for it.
     """
     if session.config.recording.path is None:
@@ -197,7 +199,13 @@ def recorded(session: Session, *, patient: bool) -> AbstractContextManager[objec
     with session.directory.emptied_by_failure(), extra_needed():
         from gvgbot.recording.recorder import Recorder
 
-        session.recorder = Recorder(session.config.recording, about, patient=patient)
+        try:
+            session.recorder = Recorder(session.config.recording, about, patient=patient)
+        except UsageError as error:
+            if patient or not is_disk_full(error.__cause__):
+                raise
+            log.warning("not recorded, exploring on", reason=str(error))
+            return contextlib.nullcontext()
     session.recorder.map_base = lambda: session.pipeline.map_base
     log.info("recording", path=str(session.recorder.first))
     return session.recorder

@@ -53,6 +53,12 @@ def free_path(wanted: Path) -> Path:
     return path
 
 
+def check_room(folder: Path) -> None:
+    """Raises OSError unless there is more room on the disk of a folder than the mission needs."""
+    if shutil.disk_usage(folder).free < SPARE_BYTES:
+        raise OSError(errno.ENOSPC, f"less than {SPARE_BYTES / 1e6:.0f} MB are left")
+
+
 class McapFiles:
     """Files of limited size, of which the oldest go when there are too many bytes in all.
 
@@ -71,7 +77,13 @@ class McapFiles:
 
     def _open(self) -> None:
         self.path = part_path(self._first, self._part)
-        self._start(self.path.open("xb"))
+        file = self.path.open("xb")
+        try:
+            self._start(file)
+        except OSError:
+            self.abandon()
+            self.path.unlink()  # it holds nothing
+            raise
 
     def _start(self, file: BinaryIO) -> None:
         self._file, self._synced = file, 0
@@ -124,11 +136,16 @@ class McapFiles:
 
     def _spare_disk(self) -> None:
         """Leave room for the mission. Raises OSError if that is the end of this file."""
-        while shutil.disk_usage(self.path.parent).free < SPARE_BYTES:
-            if not self._done:
-                self.finish()
-                raise OSError(errno.ENOSPC, f"less than {SPARE_BYTES / 1e6:.0f} MB are left")
-            self._done.popleft()[0].unlink(missing_ok=True)
+        while True:
+            try:
+                check_room(self.path.parent)
+            except OSError:
+                if not self._done:
+                    self.finish()
+                    raise
+                self._done.popleft()[0].unlink(missing_ok=True)
+            else:
+                return
 
     def abandon(self) -> None:
         """Let go of the file as it is."""

@@ -18,7 +18,7 @@ from gvgbot.errors import UsageError
 from gvgbot.geometry import Pose
 from gvgbot.hal.messages import Battery, Scan
 from gvgbot.recording.config import RecordingConfig
-from gvgbot.recording.files import Entry, McapFiles, free_path
+from gvgbot.recording.files import Entry, McapFiles, check_room, free_path
 from gvgbot.recording.messages import (
     BATTERY,
     CYCLE,
@@ -179,6 +179,7 @@ def _opened(
     if config.path.is_dir():
         raise UsageError(f"recording.path: {config.path} is a directory; name a file in it")
     try:
+        check_room(config.path.parent)
         return files(
             free_path(config.path),
             about,

@@ -4,7 +4,7 @@ import errno
 import os
 import shutil
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -13,14 +13,17 @@ import numpy as np
 import pytest
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
-from mcap.writer import MCAP0_MAGIC
+from mcap.writer import MCAP0_MAGIC, Writer
 from structlog.testing import capture_logs
 
 from gvgbot.autonomy.control.reflexes import Felt
 from gvgbot.autonomy.loop import Cycle
+from gvgbot.config import load_config
+from gvgbot.daemon import recorded
 from gvgbot.errors import GvgbotError, UsageError
 from gvgbot.geometry import Pose, Twist
 from gvgbot.hal.messages import Battery, Odometry, Scan
+from gvgbot.maps.run_directory import RunDirectory
 from gvgbot.recording import Lived, extra_needed, recorder
 from gvgbot.recording.config import RecordingConfig
 from gvgbot.recording.files import SPARE_BYTES, Entry, McapFiles, free_path
@@ -28,6 +31,7 @@ from gvgbot.recording.messages import RAW
 from gvgbot.recording.reader import Recording
 from gvgbot.recording.recorder import Recorder
 from gvgbot.replay import Wanted, open_log
+from gvgbot.session import Session
 
 ABOUT = {"title": "ring", "config": "{}"}
 STILL = Twist(0.0, 0.0)
@@ -383,6 +387,40 @@ def test_what_room_is_left_on_a_disk_is_the_missions(
     (last, *_) = sorted(tmp_path.iterdir(), key=lambda file: int(file.suffixes[0][1:]))[::-1]
     with last.open("rb") as stream:
         assert make_reader(stream).get_summary() is not None  # it has its index
+
+
+@pytest.fixture
+def on_full_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Session]:
+    nearly_full = SimpleNamespace(free=SPARE_BYTES - 1)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: nearly_full)
+    settings = load_config(overrides=[f"recording.path={tmp_path / 'run.mcap'}"])
+    with RunDirectory(tmp_path / "run") as directory:
+        yield Session(settings, directory, None)
+    assert not (tmp_path / "run.mcap").exists()
+
+
+def test_a_robot_that_starts_on_a_full_disk_does_without_a_recording(on_full_disk: Session) -> None:
+    """It is switched on again in a corridor, and nobody is there."""
+    with capture_logs() as logged, recorded(on_full_disk, patient=False):
+        assert on_full_disk.recorder is None
+    assert [line["event"] for line in logged] == ["not recorded, exploring on"]
+
+
+def test_a_simulation_that_cannot_be_recorded_does_not_begin(on_full_disk: Session) -> None:
+    with pytest.raises(UsageError, match="less than 50 MB are left"):
+        recorded(on_full_disk, patient=True)
+
+
+def test_a_file_that_cannot_be_begun_is_not_left_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Writer, "start", full)
+    with pytest.raises(UsageError, match="No space left on device"):
+        Recorder(config(tmp_path / "run.mcap"), ABOUT)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_an_earlier_recording_stays(tmp_path: Path) -> None:
