@@ -7,7 +7,7 @@ import numpy as np
 from gvgbot.autonomy.ending import Surveyed
 from gvgbot.autonomy.estimate import scans_at, smoothed_keyframes
 from gvgbot.autonomy.pipeline import Pipeline
-from gvgbot.geometry import Array, Pose, anchored, resampled, sampled
+from gvgbot.geometry import Array, Pose, anchored, sampled
 from gvgbot.maps.blanks import blanks
 from gvgbot.maps.gaps import gaps
 from gvgbot.maps.hits import Scans, barred, hits
@@ -43,12 +43,13 @@ def survey(pipeline: Pipeline) -> Surveyed:
     here, room = pipeline.map_base.position, pipeline.errands.room_m
     stood = spots(grid, *_passed(pipeline, keyframes), here, room)
     found = np.concatenate([gaps(grid, here, room), stood])
-    beside = np.concatenate([_NONE, *(resampled(way.polyline, _STEP_M) for way in ways)])
+    beside = sampled((way.polyline for way in ways), _STEP_M)
     narrow = narrows(grid, beside, here, pipeline.radius, room)
     stood_at = _NONE
     if ways:
-        joined, felt = _joined(pipeline, ways), _felt(pipeline)
-        hollow = hollows(_walled(grid, felt), joined, pipeline.sight.open_clearance)
+        joined = sampled((way.polyline for way in ways), _STEP_M / 2)
+        felt_too = _walled(grid, _felt(pipeline))
+        hollow = hollows(felt_too, joined, pipeline.sight.open_clearance)
         found = np.concatenate([found, blanks(grid, beside, here, room), hollow])
         lasting_s = pipeline.traffic.newcomers.longest_patience
         stood_at = _may_go(bodies(grid, joined), scans, lasting_s)
@@ -139,12 +140,3 @@ def _barred(
     found = barred(scans, list(lines.values()), grid, driven)
     found |= past_panes(scans, list(lines.values()), grid)
     return tuple(key for key, is_barred in zip(lines, found, strict=True) if is_barred)
-
-
-def _joined(pipeline: Pipeline, ways: list[Way]) -> Array:
-    """Points (N, 2) along ways, from vertex to vertex: their ends may lie beside these."""
-    place = pipeline.mapper.belief.map_vertex
-    return sampled(
-        (np.array([place(a).position, *line, place(b).position]) for a, b, line in ways),
-        _STEP_M / 2,
-    )

@@ -11,6 +11,7 @@ from pathlib import Path
 from types import FrameType
 
 from gvgbot import __version__
+from gvgbot.atomic_files import is_disk_full
 from gvgbot.cli.arguments import BAD_USAGE, Parser
 from gvgbot.cli.devices import add_check, add_twin
 from gvgbot.cli.explore import add_explore
@@ -106,7 +107,7 @@ def status_of(command: Callable[[], int]) -> int:
             raise
         return _fail(f"{error.filename}: permission denied: choose another, or sudo", FAILURE)
     except OSError as error:
-        if error.errno == errno.ENOSPC:
+        if is_disk_full(error):
             return _fail(f"{error.filename or 'output'}: no space left: make room", FAILURE)
         if error.errno != errno.ENAMETOOLONG:
             raise

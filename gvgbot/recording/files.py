@@ -55,8 +55,12 @@ def free_path(wanted: Path) -> Path:
 
 def check_room(folder: Path) -> None:
     """Raises OSError unless there is more room on the disk of a folder than the mission needs."""
-    if shutil.disk_usage(folder).free < SPARE_BYTES:
+    if not _has_room(folder):
         raise OSError(errno.ENOSPC, f"less than {SPARE_BYTES / 1e6:.0f} MB are left")
+
+
+def _has_room(folder: Path) -> bool:
+    return shutil.disk_usage(folder).free >= SPARE_BYTES
 
 
 class McapFiles:
@@ -136,16 +140,13 @@ class McapFiles:
 
     def _spare_disk(self) -> None:
         """Leave room for the mission. Raises OSError if that is the end of this file."""
-        while True:
-            try:
-                check_room(self.path.parent)
-            except OSError:
-                if not self._done:
-                    self.finish()
-                    raise
-                self._done.popleft()[0].unlink(missing_ok=True)
-            else:
-                return
+        while self._done and not _has_room(self.path.parent):
+            self._done.popleft()[0].unlink(missing_ok=True)
+        try:
+            check_room(self.path.parent)
+        except OSError:
+            self.finish()
+            raise
 
     def abandon(self) -> None:
         """Let go of the file as it is."""

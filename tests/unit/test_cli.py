@@ -263,10 +263,11 @@ def test_a_world_that_no_memory_can_hold_is_one_line(text: str, capsys: Captured
     assert text in line
 
 
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EDQUOT])
 def test_what_a_task_met_with_is_said_and_not_that_a_task_met_with_something(
-    capsys: Captured,
+    number: int, capsys: Captured
 ) -> None:
-    full = OSError(errno.ENOSPC, "No space left on device", "events.jsonl")
+    full = OSError(number, "No space left on device", "events.jsonl")
     tasks = ExceptionGroup("tasks", [ExceptionGroup("more", [full]), ValueError("later")])
     assert status_of(lambda: raising(tasks)) == 1
     assert said(capsys) == ["gvgbot: events.jsonl: no space left: make room"]
