@@ -81,13 +81,13 @@ def _described(thing: Any) -> str:
         assert thing.fget is not None
         returns = inspect.signature(thing.fget).return_annotation
         return f"A property: `{_short(inspect.formatannotation(returns))}`. {text}\n"
-    return f"```py\n{_short(_signature(thing))}\n```\n\n{text}\n"
+    return f"```py\n{_signature(thing)}\n```\n\n{text}\n"
 
 
 def _signature(function: Callable[..., Any]) -> str:
     signature = inspect.signature(function)
     unbound = [p for name, p in signature.parameters.items() if name != "self"]
-    whole = f"{function.__name__}{signature.replace(parameters=unbound)}"
+    whole = _short(f"{function.__name__}{signature.replace(parameters=unbound)}")
     return (
         whole
         if len(whole) < WIDEST

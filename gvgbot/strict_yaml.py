@@ -78,12 +78,17 @@ def _loaded(
     convert(cls, content, (), in_file)
     result = convert(cls, _merged(content, assigned), (), in_all)
     lines += _lost(assigned)
-    lines += [f"{source}: {one}" for one in in_file if not one.missing or one in in_all]
-    blamed = [_blame(cls, content, one, assigned) for one in in_all if one not in in_file]
+    lines += [f"{source}: {one}" for one in in_file if not one.missing or _has(in_all, one)]
+    blamed = [_blame(cls, content, one, assigned) for one in in_all if not _has(in_file, one)]
     if lines + blamed:
         raise ConfigError("\n".join(lines + blamed))
     assert isinstance(result, cls)
     return result
+
+
+def _has(problems: Sequence[Problem], wanted: Problem) -> bool:
+    """Whether one of them reads the same: a value may be NaN, which does not equal itself."""
+    return str(wanted) in map(str, problems)
 
 
 def _lost(assigned: Sequence[_Override]) -> list[str]:
@@ -108,7 +113,7 @@ def _blame(
     for number in reversed(range(len(assigned))):
         before: list[Problem] = []
         convert(cls, _merged(content, assigned[:number]), (), before)
-        if problem not in before:
+        if not _has(before, problem):
             return f"--set {assigned[number].text}: {problem}"
     return str(problem)
 
