@@ -6,6 +6,7 @@ A vertex of the map and one of the reference are paired if they are near enough,
 as many pairs as can be and they are as close as can be. `recall` is the share of the required
 vertices that have a partner, `precision` the share of the map's vertices that have one, and
 `edge_recall` the share of the edges between required vertices that join their partners in the map.
+`roomy_recall` is the recall of what a robot would reach that had 3 cm to spare everywhere.
 `path_ratio` is the way driven over the shortest open tour of all edges from the start. What there
 is nothing to tell of is null.
 """
@@ -24,7 +25,7 @@ from scipy.spatial import KDTree
 
 from benchmarks.reference_gvg import Node, Reference, reference_gvg
 from gvgbot.drivers.world import World, load_world
-from gvgbot.errors import GvgbotError
+from gvgbot.errors import GvgbotError, WorldError
 from gvgbot.geometry import Array, Pose
 from gvgbot.maps import geojson
 from gvgbot.maps.route_graph import RouteGraph
@@ -32,6 +33,7 @@ from gvgbot.worlds import open_world
 
 MATCH = 1.5  # m: vertices that are further apart are not the same
 FAR = 1e3  # m: what is worse than any pair
+SPARE = 0.03  # m on each side of the robot, in ways that are wide enough
 
 Score = dict[str, float | None]
 
@@ -46,6 +48,7 @@ def score_run(run: Path) -> Score:
     driven = score_trajectory(_read_tum(run / "truth.tum"), world)
     return {
         **score_map(route, reference, start),
+        "roomy_recall": _roomy_recall(route, world, start, config["robot"]["radius_m"]),
         **driven,
         "ate_m": _ate(_read_tum(run / "truth.tum"), _read_tum(run / "estimate.tum"), start),
         "gvg_m": reference.length,
@@ -77,6 +80,15 @@ def score_map(route: RouteGraph, reference: Reference, start: Pose) -> Score:
         "edge_recall": _share((wanted & mapped).total(), wanted.total()),
         "vertex_rmse_m": _rms(np.array([gaps[i, j] for i, j in pairs])),
     }
+
+
+def _roomy_recall(route: RouteGraph, world: World, start: Pose, radius: float) -> float | None:
+    """The recall of what a robot of this radius, m, reaches with room to spare; None of nothing."""
+    try:
+        roomy = reference_gvg(world, (start.x, start.y), radius + SPARE)
+    except WorldError:  # it starts in a narrower place
+        return None
+    return score_map(route, roomy, start)["recall"]
 
 
 def score_trajectory(truth: Array, world: World) -> Score:

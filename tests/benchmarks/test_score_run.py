@@ -132,6 +132,29 @@ def corridor_run(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.parametrize(("door", "expected"), [(0.4, 1.0), (0.5, 0.5)])
+def test_what_lies_behind_a_door_without_room_to_spare_is_told_apart(
+    door: float, expected: float, corridor_run: Path
+) -> None:
+    canvas = Canvas(20.0, 11.0)
+    canvas.carve(1.0, 2.0, 19.0, 4.0)
+    canvas.carve(10.0, 4.0, 10.0 + door, 4.3)  # the robot is 0.354 m wide
+    canvas.carve(7.0, 4.3, 13.5, 9.3)
+    save_world(canvas.world("world"), corridor_run)
+    score = score_run(corridor_run)
+    assert score["vertices_ref"] == 4  # both ends, before the door, and in the room
+    assert (score["recall"], score["roomy_recall"]) == (0.5, expected)
+
+
+def test_a_run_that_starts_where_there_is_no_room_to_spare_has_no_such_recall(
+    corridor_run: Path,
+) -> None:
+    summary = json.loads((corridor_run / "summary.json").read_text())
+    summary["config"]["twin"]["start"][1] = 2.19
+    (corridor_run / "summary.json").write_text(json.dumps(summary))
+    assert score_run(corridor_run)["roomy_recall"] is None
+
+
 def test_a_run_is_scored_from_its_directory_alone(corridor_run: Path) -> None:
     score = score_run(corridor_run)
     assert (score["recall"], score["precision"], score["edge_recall"]) == (1.0, 1.0, 1.0)
