@@ -1,6 +1,5 @@
 """A recorded run, or a log of somebody else's robot, through the robot's mind once more."""
 
-import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -9,7 +8,6 @@ from gvgbot.autonomy.loop import Cycle
 from gvgbot.carmen import first_of, messages, read_carmen
 from gvgbot.config import Config, config_in, load_config
 from gvgbot.errors import ConfigError, UsageError
-from gvgbot.geometry import Pose
 from gvgbot.hal.messages import Scan
 from gvgbot.maps.picture import counts
 from gvgbot.maps.run_directory import RunDirectory
@@ -168,9 +166,8 @@ def _recorded_config(text: str, wanted: Wanted) -> Config:
 
 def _carmen(wanted: Wanted) -> Log:
     config = load_config(wanted.config or CARMEN_CONFIG, wanted.overrides)
-    mount = config.laser
-    base_laser = Pose(mount.x_m, mount.y_m, math.radians(mount.yaw_deg))
-    log = read_carmen(wanted.path, no_echo_m=wanted.no_echo_m or NO_ECHO_M, base_laser=base_laser)
+    no_echo_m, base_laser = wanted.no_echo_m or NO_ECHO_M, config.laser.base_laser
+    log = read_carmen(wanted.path, no_echo_m=no_echo_m, base_laser=base_laser)
     found = {
         "damaged lines that were passed over": log.damaged_lines,
         "a clock was set back, and later stamps moved on": log.set_back,
