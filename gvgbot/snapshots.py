@@ -6,7 +6,8 @@ from gvgbot import topics
 from gvgbot.autonomy.exploration.paths import Approach, shortest_path
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.autonomy.slam.ekf import OdometryNoise, part, predict
-from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
+from gvgbot.autonomy.slam.graph import HalfEdgeId
+from gvgbot.autonomy.topology import outwards
 from gvgbot.geometry import STANDSTILL, Array, Pose, wrap_angle
 from gvgbot.hal.guard import NEEDS_SOMEBODY
 from gvgbot.hal.messages import Battery, Odometry, Scan, Sign
@@ -202,12 +203,7 @@ def _route(pipeline: Pipeline, target: HalfEdgeId) -> Array:
         starts.append(Approach(ahead, edge.other(where.on_edge)))
     approach = shortest_path(graph, starts, target.vertex)
     departures = () if approach is None else approach.departures
-    return np.concatenate([np.zeros((0, 2)), *(_line(pipeline, graph, end) for end in departures)])
-
-
-def _line(pipeline: Pipeline, graph: GvgGraph, end: HalfEdgeId) -> Array:
-    """An edge (N, 2), m, map frame, away from one of its ends."""
-    edge = graph.edge_at(end)
-    assert edge is not None, "paths lead over edges"
-    line = pipeline.mapper.belief.map_vertex(edge.a.vertex).transform(edge.polyline)
-    return line if end == edge.a else line[::-1]
+    ways = ((graph.edge_at(end), end) for end in departures)
+    belief = pipeline.mapper.belief
+    lines = (outwards(belief, edge, end) for edge, end in ways if edge is not None)
+    return np.concatenate([np.zeros((0, 2)), *lines])
