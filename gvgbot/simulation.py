@@ -171,11 +171,7 @@ class Simulation:
     async def run(self) -> None:
         """Let the devices work until cancelled."""
         async with asyncio.TaskGroup() as tasks:
-            tasks.create_task(self._serve_laser(), name="laser twin")
-            tasks.create_task(self._serve_base(), name="base twin")
-
-    async def _serve_laser(self) -> None:
-        await serve_twin(self.laser_twin, self._laser_end, self._clock)
-
-    async def _serve_base(self) -> None:
-        await serve_twin(self.base_twin, self._base_end, self._clock)
+            laser = serve_twin(self.laser_twin, self._laser_end, self._clock)
+            base = serve_twin(self.base_twin, self._base_end, self._clock)
+            tasks.create_task(laser, name="laser twin")
+            tasks.create_task(base, name="base twin")
