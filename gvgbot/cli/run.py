@@ -3,7 +3,7 @@
 import argparse
 import sys
 
-from gvgbot.cli.arguments import Commands, add_overrides, path, say
+from gvgbot.cli.arguments import Commands, add_config, path, say
 
 
 def add_run(commands: Commands) -> None:
@@ -16,10 +16,7 @@ def add_run(commands: Commands) -> None:
         "or $STATE_DIRECTORY) it goes on with the map that it was making when it ended.",
         epilog="example: gvgbot run turtlebot2.yaml --set service.state_dir=/var/lib/gvgbot",
     )
-    run.add_argument(
-        "config", nargs="?", type=path, metavar="CONFIG", help="default: sim.yaml, no hardware"
-    )
-    add_overrides(run)
+    add_config(run)
     run.add_argument(
         "--out",
         type=path,
