@@ -1,16 +1,15 @@
 """How a map grew: which of its parts had been found by when."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 
-from gvgbot.geometry import Array, wrap_angle
+from gvgbot.geometry import Array, direction_of, wrap_angle
 from gvgbot.maps.edge_history import edges_found
 from gvgbot.maps.occupancy import UNKNOWN, OccupancyGrid
-from gvgbot.maps.route_graph import RouteEdge, RouteNode
+from gvgbot.maps.route_graph import RouteEdge, RouteNode, lines_from
 from gvgbot.maps.saved_run import SavedRun
 from gvgbot.maps.trajectory import Trajectory
 
@@ -88,22 +87,8 @@ class Growth:
 def frontiers(vertex: RouteNode, edges: Sequence[RouteEdge]) -> list[float]:
     """The bearings (rad, map frame) of a vertex that none of these edges leaves along."""
     left = list(vertex.bearings)
-    for direction in _departures(vertex, edges):
+    for line in lines_from(vertex.id, edges):
+        direction = direction_of(line, _DEPARTURE_M)
         if left:
             left.remove(min(left, key=lambda bearing: abs(wrap_angle(bearing - direction))))
     return left
-
-
-def _departures(vertex: RouteNode, edges: Sequence[RouteEdge]) -> list[float]:
-    """The directions (rad, map frame) in which edges leave a vertex, twice for a loop."""
-    lines = [edge.polyline for edge in edges if edge.start == vertex.id]
-    lines += [edge.polyline[::-1] for edge in edges if edge.end == vertex.id]
-    ways = [_point_along(line, _DEPARTURE_M) - line[0] for line in lines]
-    return [math.atan2(way[1], way[0]) for way in ways]
-
-
-def _point_along(line: Array, distance: float) -> Array:
-    """The point (2,) of a line (N, 2) so far (m) from its start, its end if it is shorter."""
-    far = np.hypot(*(line - line[0]).T) >= distance
-    point: Array = line[np.argmax(far)] if far.any() else line[-1]
-    return point
