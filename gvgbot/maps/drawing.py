@@ -10,6 +10,9 @@ from gvgbot.geometry import Array
 from gvgbot.maps.canvas import Ink, Point
 from gvgbot.maps.surface import Anchor
 
+MIDDLE = 0.35  # of a text's size: from its baseline to the middle of its capitals
+HALO = 4.0  # pixels, both sides together
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stroke:

@@ -6,12 +6,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from gvgbot.maps.canvas import COLOURS, Ink, Point, palette, text_width
-from gvgbot.maps.drawing import Drawing, Raster, Stroke, Window, Words
+from gvgbot.maps.drawing import HALO, MIDDLE, Drawing, Raster, Stroke, Window, Words
 
 _POINTS = 0.4  # of a page (1/72 inch) per pixel: a map 1400 pixels wide fits on A4
 _SHARES = {"lm": 0.0, "mm": 0.5, "rm": 1.0}  # of the words that stand left of where they are put
-_MIDDLE = 0.35  # of a text's size: from its baseline to the middle of its capitals
-_HALO = 4.0  # pixels, both sides together
 _FIRST_IMAGE = 6  # number of its object
 _FONT = b"<< /Type /Font /Subtype /Type1 /BaseFont /Helvetica /Encoding /WinAnsiEncoding >>"
 
@@ -85,9 +83,9 @@ def _stroke(stroke: Stroke) -> Iterator[str]:
 def _words(words: Words) -> Iterator[str]:
     """First the halo, then the words; the font has y upwards."""
     x = words.at[0] - _SHARES[words.anchor] * text_width(words.words, words.size)
-    place = f"1 0 0 -1 {_at((x, words.at[1] + _MIDDLE * words.size))} Tm"
+    place = f"1 0 0 -1 {_at((x, words.at[1] + MIDDLE * words.size))} Tm"
     escaped = words.words.translate({ord(sign): f"\\{sign}" for sign in "\\()"})
-    yield f"{_colour(Ink.WHITE)} RG {_colour(words.ink)} rg {_HALO:.2f} w"
+    yield f"{_colour(Ink.WHITE)} RG {_colour(words.ink)} rg {HALO:.2f} w"
     yield f"BT /F {words.size} Tf {place} 1 Tr ({escaped}) Tj {place} 0 Tr ({escaped}) Tj ET"
 
 

@@ -6,12 +6,10 @@ from xml.etree import ElementTree as ET
 from PIL import Image
 
 from gvgbot.maps.canvas import COLOURS, Ink, palette, png, text_width
-from gvgbot.maps.drawing import Drawing, Raster, Stroke, Window, Words
+from gvgbot.maps.drawing import HALO, MIDDLE, Drawing, Raster, Stroke, Window, Words
 from gvgbot.words import printable
 
 _ANCHORS = {"lm": "start", "mm": "middle", "rm": "end"}
-_MIDDLE = 0.35  # of a text's size: from its baseline to the middle of its capitals
-_HALO = 4.0  # pixels, both sides together
 
 
 def svg(drawing: Drawing) -> bytes:
@@ -70,7 +68,7 @@ def _sampling(raster: Raster) -> str:
 def _add_words(parent: ET.Element, words: Words) -> None:
     attributes = {
         "x": f"{words.at[0]:.2f}",
-        "y": f"{words.at[1] + _MIDDLE * words.size:.2f}",
+        "y": f"{words.at[1] + MIDDLE * words.size:.2f}",
         "textLength": f"{text_width(words.words, words.size):.2f}",  # whatever font there is
         "lengthAdjust": "spacingAndGlyphs",
         "text-anchor": _ANCHORS[words.anchor],
@@ -78,7 +76,7 @@ def _add_words(parent: ET.Element, words: Words) -> None:
         "font-size": str(words.size),
         "fill": _colour(words.ink),
         "stroke": _colour(Ink.WHITE),
-        "stroke-width": f"{_HALO:g}",
+        "stroke-width": f"{HALO:g}",
         "stroke-linejoin": "round",
         "paint-order": "stroke",
     }
