@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +16,7 @@ from gvgbot.topics import Map, Plan
 
 Layer = Literal["empty", "wall", "trail", "edge", "plan", "frontier", "vertex", "mate", "robot"]
 
-LAYERS: tuple[Layer, ...] = (
-    *("empty", "wall", "trail", "edge", "plan", "frontier", "vertex", "mate", "robot"),
-)
+LAYERS: tuple[Layer, ...] = get_args(Layer)
 _OCCUPIED = 65  # percent, as map_server has it
 _ARROWS = "→↗↑↖←↙↓↘"
 _SIGNS = {"meetpoint": "●", "endpoint": "○"}
