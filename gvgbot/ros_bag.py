@@ -26,6 +26,7 @@ from gvgbot.live.ros import MAP_EVERY, LiveRos
 from gvgbot.replay import Log, Wanted, open_log
 from gvgbot.ros2.cdr import definition
 from gvgbot.ros2.topics import Topic
+from gvgbot.session import new_mind
 from gvgbot.survey import survey
 
 _VERSION: Final = 9  # of the format, as Iron and later write it
@@ -79,14 +80,7 @@ def _play(log: Log, bag: "_Bag", *, sensors_only: bool) -> None:
 
 def _mind(log: Log) -> Pipeline:
     """The mind that is to live through a log, as that of a replay."""
-    config = log.config
-    pipeline = Pipeline(
-        config.mind,
-        config.exploration,
-        config.robot.radius_m,
-        led=log.led,
-        localisation=config.localisation,
-    )
+    pipeline = new_mind(log.config, led=log.led)
     pipeline.mission.survey = partial(survey, pipeline)
     return pipeline
 

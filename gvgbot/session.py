@@ -43,6 +43,12 @@ class Tally:
     recoveries: int
 
 
+def new_mind(config: Config, *, led: bool) -> Pipeline:
+    """A robot's mind that knows nothing yet; `led` if somebody else drives."""
+    localisation, radius = config.localisation, config.robot.radius_m
+    return Pipeline(config.mind, config.exploration, radius, led=led, localisation=localisation)
+
+
 class Session:
     """What an exploration knows and has counted. `place` is None where the robot is real.
 
@@ -53,15 +59,7 @@ class Session:
         self, config: Config, directory: RunDirectory, place: Place | None, *, led: bool = False
     ) -> None:
         self.config, self.directory, self.place = config, directory, place
-        self.begin_with(
-            Pipeline(
-                config.mind,
-                config.exploration,
-                config.robot.radius_m,
-                led=led,
-                localisation=config.localisation,
-            )
-        )
+        self.begin_with(new_mind(config, led=led))
         self.journey = Journey(period=0.0) if led else Journey()
         self.title = config.robot.name if place is None else place.world.name  # of the picture
         self.simulation: Simulation | None = None
