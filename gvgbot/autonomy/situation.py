@@ -56,7 +56,8 @@ class Situation:
     def _out_of_sight(self, in_sight: set[HalfEdgeId], closed: HalfEdgeId | None) -> list[Approach]:
         """The ends of the robot's edge that the local map no longer, or not yet, shows."""
         end = self.where.on_edge
-        if end is None or self.graph.half_edge(end) is None:
+        half = None if end is None else self.graph.half_edge(end)
+        if end is None or half is None:
             return []
         driven, edge = self.where.trail_length, self.graph.edge_at(end)
         found = (
@@ -64,8 +65,7 @@ class Situation:
             if self._is_walled(edge, end, 0.0, max(0.0, driven - _PAST_M))
             else [Approach(driven, end)]
         )
-        half = self.graph.half_edge(end)
-        is_shut = half is None or (closed != end and half.blocked)
+        is_shut = closed != end and half.blocked
         if edge is not None and not is_shut and not self._is_walled(edge, end, driven, math.inf):
             found.append(Approach(max(0.0, edge.length - driven), edge.other(end)))
         if self._loop_ends():
