@@ -18,7 +18,7 @@ from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.gvg.local_map import LocalMap
 from gvgbot.autonomy.islands import Island, islands, slivers, without_fringes
-from gvgbot.autonomy.on_bodies import BLUR_M, end_in, is_seen_through, without
+from gvgbot.autonomy.on_bodies import BLUR_M, Disc, end_in, is_seen_through, without
 from gvgbot.autonomy.roundness import SURE, body_of, with_look
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
@@ -96,11 +96,11 @@ class Newcomers:
         self.lasting: Array = np.empty((0, 2))  # where bodies have proved to be of the building
         self.in_team = False  # bodies of robots pass by so close that slivers of them are seen
         self.strangers: list[float] = []  # radii of other robots that may be anywhere, m
-        self.company: list[tuple[Array, float]] = []  # other robots: where they say they are,
-        self._met: list[tuple[Array, float]] = []  # and where they are seen
+        self.company: list[Disc] = []  # other robots: where they say they are,
+        self._met: list[Disc] = []  # and where they are seen
         self.bodies: Array = np.empty((0, 3))  # in the last look: x, y, radius, m
         self._lately: list[tuple[float, Array]] = []  # when, s, and where somebody was seen
-        self._glanced: list[tuple[Array, float]] | None = None  # where those are that move on
+        self._glanced: list[Disc] | None = None  # where those are that move on
 
     def sift(
         self,
@@ -152,12 +152,8 @@ class Newcomers:
         return free
 
     def _rests(
-        self,
-        scan: Scan,
-        local_base: Pose,
-        seen: list[tuple[Array, float]],
-        local_map: LocalMap,
-    ) -> list[tuple[Array, float]]:
+        self, scan: Scan, local_base: Pose, seen: list[Disc], local_map: LocalMap
+    ) -> list[Disc]:
         """What may be the last that is seen of those who go behind something, as discs.
 
         It is too little to be anybody, but somebody was near by just before. In a team it may be
@@ -193,7 +189,7 @@ class Newcomers:
         ]
 
     @property
-    def discs(self) -> list[tuple[Array, float]]:
+    def discs(self) -> list[Disc]:
         """Centres (2,), local frame, and radii of those not in the map, m.
 
         Who was found half hidden is left out, for nobody knows how wide that is.
@@ -221,7 +217,7 @@ class Newcomers:
         return [one for one in self._all if one.is_let_in and one.is_round]
 
     @property
-    def latest(self) -> list[tuple[Array, float]]:
+    def latest(self) -> list[Disc]:
         """As `discs`, but by the last glance."""
         return self.discs if self._glanced is None else self._glanced
 
@@ -320,7 +316,7 @@ class Newcomers:
         )
 
 
-def _rims(bodies: list[tuple[Array, float]]) -> Array:
+def _rims(bodies: list[Disc]) -> Array:
     """Points (N, 2) around discs."""
     return np.concatenate([np.empty((0, 2)), *(c + radius * _RIM for c, radius in bodies)])
 

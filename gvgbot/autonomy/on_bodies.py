@@ -12,7 +12,7 @@ from gvgbot.hal.messages import Scan
 BLUR_M = 0.1  # beyond its rim, beams may still end on something
 _STRAY = 0.1  # of the beams towards a place: so many may end there though nothing is there
 
-Disc = tuple[Array, float]  # centre (2,), local frame, and radius, m
+Disc = tuple[Array, float]  # centre (2,), local frame unless said otherwise, and radius, m
 
 
 def without(scan: Scan, local_base: Pose, discs: list[Disc]) -> Scan:

@@ -15,6 +15,7 @@ from gvgbot.autonomy.control.edge_follower import Track
 from gvgbot.autonomy.gvg.local_map import LocalMap
 from gvgbot.autonomy.knowledge import Knowledge
 from gvgbot.autonomy.newcomers import Newcomers, NewcomersConfig, is_near
+from gvgbot.autonomy.on_bodies import Disc
 from gvgbot.autonomy.passed import Passed
 from gvgbot.autonomy.views import View
 from gvgbot.geometry import Array, Pose, Twist
@@ -24,8 +25,6 @@ _MOST_PASSED = 100  # places, the latest ones
 _ROUND_M = 2.5  # a body farther away is elsewhere when the robot is there
 _ABOUT_M = 3.0  # so near, another robot may soon want to be where this one is
 _ELSEWHERE_M = 0.15  # by which another robot may be elsewhere than it says
-
-Disc = tuple[Array, float]  # centre (2,) and radius, m
 
 
 class Traffic:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from gvgbot.autonomy.gvg.local import Branch, LocalGvg, Place
+from gvgbot.autonomy.on_bodies import Disc
 from gvgbot.geometry import Array, Pose, Twist, length_of, stations_of
 from gvgbot.hal.sweep import free_distance
 
@@ -59,9 +60,7 @@ def moved(companion: Companion, pose: Pose) -> Companion:
     return replace(companion, pose=pose.compose(companion.pose), course=course)
 
 
-def careful(
-    twist: Twist, discs: list[tuple[Array, float]], radius: float, least_speed: float
-) -> Twist:
+def careful(twist: Twist, discs: list[Disc], radius: float, least_speed: float) -> Twist:
     """The twist, slow enough to stop with room for whoever is ahead and comes as fast.
 
     `discs` are others by centre (2,), base frame, and radius, m. With room beside them it is not

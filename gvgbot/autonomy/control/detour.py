@@ -6,10 +6,9 @@ from collections.abc import Callable
 import numpy as np
 
 from gvgbot.autonomy.control.edge_follower import Track
+from gvgbot.autonomy.on_bodies import Disc
 from gvgbot.autonomy.views import View
 from gvgbot.geometry import Array, resampled, stations_of
-
-Disc = tuple[Array, float]  # centre (2,) and radius, m
 
 _PASSES_M = (0.32, 0.22, 0.17)  # between two bodies: the more, the more room there is
 _TOO_NEAR_M = 0.14  # between two bodies: one does not pass the other
