@@ -29,6 +29,12 @@ class Chain:
             self.known_length = float(steps_of(self.points).sum())
         return self.known_length
 
+    def towards(self, *, forward: bool) -> "Chain":
+        """The same from node a to node b if `forward`, else the other way."""
+        if forward:
+            return self
+        return Chain(self.b, self.a, self.points[::-1], self.clearance[::-1], self.length())
+
 
 @dataclass(slots=True, eq=False)
 class Draft:
@@ -72,34 +78,23 @@ class Draft:
 
     def reach_along(self, key: int, *, forward: bool) -> float:
         """Reach of a chain from its node a to its node b if `forward`, else the other way."""
-        chain = self.chains[key]
-        base, tip = (chain.a, chain.b) if forward else (chain.b, chain.a)
-        room = self.clearance[base]
-        if room <= _WIDE_M:
-            return (chain.length() + self.clearance[tip]) / room
-        clearance = chain.clearance if forward else chain.clearance[::-1]
-        points = chain.points if forward else chain.points[::-1]
-        within, room = _out_of_the_wide(points, clearance)
-        return (chain.length() - within + self.clearance[tip]) / room
+        chain, within = self.chains[key].towards(forward=forward), 0.0
+        room = self.clearance[chain.a]
+        if room > _WIDE_M:
+            within, room = _out_of_the_wide(chain.points, chain.clearance)
+        return (chain.length() - within + self.clearance[chain.b]) / room
 
     def splice(self, node: int) -> None:
         """Make one chain of the two that meet at a node."""
         (first, out_a), (second, out_b) = self.ends[node]
         if first == second:
             return
-        one, two = self.remove(first), self.remove(second)
-        points, room = (
-            (one.points[::-1], one.clearance[::-1]) if out_a else (one.points, one.clearance)
-        )
-        start = one.b if out_a else one.a
-        more, wide = (
-            (two.points, two.clearance) if out_b else (two.points[::-1], two.clearance[::-1])
-        )
-        end = two.b if out_b else two.a
+        one = self.remove(first).towards(forward=not out_a)
+        two = self.remove(second).towards(forward=out_b)
+        points = np.concatenate([one.points, two.points[1:]])
+        clearance = np.concatenate([one.clearance, two.clearance[1:]])
         del self.ends[node]
-        self.add(
-            Chain(start, end, np.concatenate([points, more[1:]]), np.concatenate([room, wide[1:]]))
-        )
+        self.add(Chain(one.a, two.b, points, clearance))
 
 
 def _out_of_the_wide(points: Array, clearance: Array) -> tuple[float, float]:
