@@ -269,7 +269,7 @@ class DrivenEdges:
         on = int(np.argmin(np.hypot(*(known_line - place).T)))
         ways = (known_line[on::-1], known_line[on:], passage.line[at::-1])
         vertex = mapper.add_driven(view, place, *(direction(way - place) for way in ways))
-        *known_ends, end = (HalfEdgeId(vertex.id, key) for key in vertex.half_edges)
+        *known_ends, end = vertex.ends
         if any(mapper.graph.edge_at(known_end) is None for known_end in known_ends):
             mapper.remove(view, vertex, "it is on no edge")
             return

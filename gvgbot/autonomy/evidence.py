@@ -232,8 +232,7 @@ class Evidence:
 
     def _driven_ways(self, vertex: Vertex) -> Iterator[Array]:
         """The first metres of edges that were driven from or to a vertex (N, 2), map frame."""
-        for key in vertex.half_edges:
-            end = HalfEdgeId(vertex.id, key)
+        for end in vertex.ends:
             edge = self._known.graph.edge_at(end)
             if edge is not None and self._weight(edge, end) == math.inf:
                 line = outwards(self._known.belief, edge, end)

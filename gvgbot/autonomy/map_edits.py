@@ -176,8 +176,7 @@ class MapEdits(Knowledge):
         It was believed at a pose `before`, map frame, which it proved to be beside.
         """
         moved = self.belief.map_vertex(vertex.id).position - before.position
-        ends = [HalfEdgeId(vertex.id, key) for key in vertex.half_edges]
-        edges = {edge.id: edge for edge in map(self.graph.edge_at, ends) if edge is not None}
+        edges = {edge.id: edge for edge in map(self.graph.edge_at, vertex.ends) if edge is not None}
         for edge in edges.values():
             if edge.drawn is None:
                 continue
@@ -199,5 +198,5 @@ class MapEdits(Knowledge):
         line = np.concatenate([here[None], line, here[None]])
         ways = (line[[at]] - here for at in (len(line) // 8, -len(line) // 8))
         vertex = self.add_driven(view, here, *map(direction, ways))
-        ends = [HalfEdgeId(vertex.id, key) for key in vertex.half_edges]
-        self.join(view, ends[0], ends[1], line, min_clearance, driven=True)
+        a, b = vertex.ends
+        self.join(view, a, b, line, min_clearance, driven=True)

@@ -314,6 +314,5 @@ class Mapper(MapEdits):
 
     def _is_passed(self, view: View, vertex: Vertex) -> bool:
         """Whether sight shows that the two edges of a vertex are one, whatever else leaves it."""
-        ends = (HalfEdgeId(vertex.id, key) for key in vertex.half_edges)
-        followed = {end for end in ends if self.graph.edge_at(end) is not None}
+        followed = {end for end in vertex.ends if self.graph.edge_at(end) is not None}
         return len(followed) == 2 and followed == set(self._evidence.passed_along(view, vertex))

@@ -113,11 +113,7 @@ def take_out(graph: GvgGraph, belief: Belief, vertex: Vertex, *, is_passed: bool
     sight must show that an edge passes, along both, or they must lead in opposite directions. If
     not, their other ends become frontiers.
     """
-    meeting = [
-        (HalfEdgeId(vertex.id, key), graph.edges[half.edge])
-        for key, half in vertex.half_edges.items()
-        if half.edge is not None
-    ]
+    meeting = [(end, edge) for end in vertex.ends if (edge := graph.edge_at(end)) is not None]
     departures = [vertex.half_edges[end.key] for end, _ in meeting]
     is_line = is_passed or vertex.degree == 2 or _are_opposite(departures)
     graph.remove_vertex(vertex.id)
@@ -195,11 +191,10 @@ def loose_ends(
     the polyline (N, 2), map frame, from there to the vertex. Who still stands at the vertex is on
     any of its edges, if there are several.
     """
-    ends = [HalfEdgeId(vertex.id, key) for key in vertex.half_edges]
-    edges = {end: edge for end in ends if (edge := graph.edge_at(end)) is not None}
+    edges = {end: edge for end in vertex.ends if (edge := graph.edge_at(end)) is not None}
     is_at_it = belief.map_base.distance(belief.map_vertex(vertex.id)) < _AT_VERTEX_M
     found = {}
-    for end in ends:
+    for end in vertex.ends:
         serves = end not in edges and (len(edges) == 1 or (edges and is_at_it))
         near = next(iter(edges)) if serves else end
         if near in edges and edges[near].other(near).vertex != vertex.id:

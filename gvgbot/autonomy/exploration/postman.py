@@ -102,7 +102,7 @@ def _matched(metres: dict[Pair, float]) -> list[Pair]:
 
 def _in_one_go(graph: GvgGraph, start: int, times: dict[int, int]) -> list[HalfEdgeId]:
     """A walk from a vertex over each edge so many times (Hierholzer's algorithm)."""
-    ways = {v.id: [HalfEdgeId(v.id, key) for key in v.half_edges] for v in graph.vertices.values()}
+    ways = {vertex.id: vertex.ends for vertex in graph.vertices.values()}
     walk: list[tuple[int, HalfEdgeId | None]] = [(start, None)]
     finished: list[HalfEdgeId] = []
     while walk:

@@ -5,6 +5,7 @@ rather than vertices makes self-loops and parallel edges ordinary.
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
 
@@ -63,6 +64,11 @@ class Vertex:
     serial: int = 0
     established: bool = False  # part of a map that was finished
     doubted_since: float | None = None  # stamp; since when sight speaks against it
+
+    @property
+    def ends(self) -> list[HalfEdgeId]:
+        """Its half-edges, oldest first."""
+        return [HalfEdgeId(self.id, key) for key in self.half_edges]
 
     def add_half_edge(self, bearing: float) -> int:
         """The key of a new half-edge."""
@@ -194,7 +200,7 @@ class GvgGraph:
 
     def reach(self, vertex: Vertex) -> float:
         """How far around a vertex, m, there is surely no other: half its shortest edge."""
-        edges = (self.edge_at(HalfEdgeId(vertex.id, key)) for key in vertex.half_edges)
+        edges = map(self.edge_at, vertex.ends)
         return min((e.length / 2 for e in edges if e is not None), default=vertex.clearance)
 
     def join(
@@ -230,18 +236,13 @@ class GvgGraph:
 
     def remove_vertex(self, vertex: int) -> None:
         """Take a vertex out; the edges that ended there become frontiers at their other ends."""
-        for key in list(self.vertices[vertex].half_edges):
-            self.remove_half_edge(HalfEdgeId(vertex, key))
+        for end in self.vertices[vertex].ends:
+            self.remove_half_edge(end)
         del self.vertices[vertex]
 
     def frontiers(self) -> list[HalfEdgeId]:
         """All open half-edges."""
-        return [
-            HalfEdgeId(v.id, key)
-            for v in self.vertices.values()
-            for key, half in v.half_edges.items()
-            if half.open
-        ]
+        return [end for end, half in self._half_edges() if half.open]
 
     def rings(self) -> list[Vertex]:
         """The vertices of edges without an end, at which there is nothing but the edge to see."""
@@ -269,20 +270,19 @@ class GvgGraph:
 
         Without it nothing would be left of an edge that ends where it began.
         """
-        away = [key for key, half in vertex.half_edges.items() if half.edge is None]
+        away = [end for end in vertex.ends if self.edge_at(end) is None]
         edges = {half.edge for half in vertex.half_edges.values()} - {None}
         if not away or len(edges) != 1 or vertex.degree - len(away) != 2:
             return False
-        for key in away:
-            self.remove_half_edge(HalfEdgeId(vertex.id, key))
+        for end in away:
+            self.remove_half_edge(end)
         vertex.misses = 0
         return True
 
     def blocked(self) -> list[HalfEdgeId]:
         """All half-edges that were given up."""
-        return [
-            HalfEdgeId(v.id, key)
-            for v in self.vertices.values()
-            for key, half in v.half_edges.items()
-            if half.blocked
-        ]
+        return [end for end, half in self._half_edges() if half.blocked]
+
+    def _half_edges(self) -> Iterator[tuple[HalfEdgeId, HalfEdge]]:
+        for vertex in self.vertices.values():
+            yield from zip(vertex.ends, vertex.half_edges.values(), strict=True)
