@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gvgbot.autonomy.config import AutonomyConfig
 from gvgbot.autonomy.ending import Outcome
 from gvgbot.autonomy.estimate import smoothed
 from gvgbot.autonomy.events import Recovery
@@ -21,10 +22,25 @@ from gvgbot.config import load_config
 from gvgbot.geometry import STANDSTILL, Pose
 from gvgbot.hal.messages import Odometry
 from gvgbot.persistence.mission_files import MissionFiles
+from gvgbot.persistence.mission_state import Saved
 from tests.unit.autonomy.sights import carved, sweep
 from tests.unit.autonomy.slam.beliefs import updated
 
 MISSION = Path(__file__).parents[2] / "data" / "mission_v1"
+CONFIG = load_config()
+SETTINGS = CONFIG.autonomy, CONFIG.exploration, CONFIG.robot.radius_m
+
+
+def mission() -> Saved:
+    saved = MissionFiles(MISSION).read()
+    assert saved is not None
+    return saved
+
+
+def lost(autonomy: AutonomyConfig = CONFIG.autonomy) -> ReturningPipeline:
+    """A robot that does not know where it is on the map that it has kept."""
+    saved = mission()
+    return ReturningPipeline(autonomy, *SETTINGS[1:], saved.memory, saved.past, lambda: False)
 
 
 @pytest.mark.parametrize(
@@ -46,25 +62,19 @@ def test_a_robot_that_gives_up_says_what_to_do(opinion: Opinion, says: str) -> N
 
 
 def test_who_is_lost_does_not_know_where_virtual_walls_are() -> None:
-    saved, config = MissionFiles(MISSION).read(), load_config()
-    assert saved is not None
-    walled = replace(config.autonomy, virtual_walls=(((0.0, 1.0), (3.0, 1.0)),))
-    settings = walled, config.exploration, config.robot.radius_m
-    robot = ReturningPipeline(*settings, saved.memory, saved.past, lambda: False)
+    robot = lost(replace(CONFIG.autonomy, virtual_walls=(((0.0, 1.0), (3.0, 1.0)),)))
     assert len(robot.sight.virtual_walls) > 30
     assert len(robot._new_mind().sight.virtual_walls) == 0
 
 
 def test_a_gyro_that_stood_still_for_an_hour_has_not_drifted_meanwhile() -> None:
     """As it does on the move. Odometry has the heading that it had, and so has the robot."""
-    config = load_config()
-    settings = config.autonomy, config.exploration, config.robot.radius_m
     scan = sweep(carved([(-4.0, -1.0, 4.0, 1.0), (0.0, -1.0, 2.0, 4.0)]), Pose(-1.5))
-    before = Pipeline(*settings)
+    before = Pipeline(*SETTINGS)
     before.control(Odometry(0.0, Pose(), STANDSTILL))
     before.perceive(scan)
     before.tracker.maps.calibration.x[2] = math.radians(0.03)  # rad/s
-    robot = ReturningPipeline(*settings, remember(before), growth(before), lambda: True)
+    robot = ReturningPipeline(*SETTINGS, remember(before), growth(before), lambda: True)
     robot.errands.pause()
     for stamp in np.arange(1.0, 3601.0).tolist():
         robot.control(Odometry(stamp, Pose(), STANDSTILL))
@@ -76,15 +86,12 @@ def test_a_gyro_that_stood_still_for_an_hour_has_not_drifted_meanwhile() -> None
 
 
 def test_who_looks_for_its_place_does_so_as_it_is_told_meanwhile() -> None:
-    saved, config = MissionFiles(MISSION).read(), load_config()
-    assert saved is not None
-    settings = config.autonomy, config.exploration, config.robot.radius_m
-    robot = ReturningPipeline(*settings, saved.memory, saved.past, lambda: False)
+    robot = lost()
     robot.control(Odometry(0.0, Pose(), STANDSTILL))
     robot.perceive(sweep(carved([(-4.0, -1.0, 6.0, 1.0)]), Pose()))
     seeker = robot._seeker
     assert seeker is not None
-    told = replace(config.exploration, in_the_way_s=99.0)
+    told = replace(CONFIG.exploration, in_the_way_s=99.0)
     robot.configure(told)
     for mind in (robot, seeker, robot._new_mind()):
         assert mind.mission._config == told
@@ -92,13 +99,11 @@ def test_who_looks_for_its_place_does_so_as_it_is_told_meanwhile() -> None:
 
 def test_who_has_lost_its_latest_scans_was_not_where_the_older_ones_were_taken() -> None:
     """Nobody carries a robot whose journal is damaged: it is where it was when it was kept last."""
-    saved, config = MissionFiles(MISSION).read(), load_config()
-    assert saved is not None
+    saved = mission()
     assert saved.memory.last is not None
     first, last = saved.past[0].keyframe.map_base, saved.memory.last.map_base
     assert first.distance(last) > _STAYED_M
-    settings = config.autonomy, config.exploration, config.robot.radius_m
-    robot = ReturningPipeline(*settings, saved.memory, saved.past[:1], lambda: False)
+    robot = ReturningPipeline(*SETTINGS, saved.memory, saved.past[:1], lambda: False)
     robot.control(Odometry(0.0, Pose(), STANDSTILL))
     robot.perceive(sweep(carved([(-4.0, -1.0, 6.0, 1.0)]), Pose()))
     stayed = [robot._relocaliser._stayed(Hypothesis(where)) for where in (first, last)]
@@ -118,14 +123,12 @@ def test_who_ended_before_its_first_vertex_has_no_map_to_be_lost_on(
     outcome: Outcome | None, action: str
 ) -> None:
     """It was started in the wrong place, told to stop, and carried; a room without edges is one."""
-    config = load_config()
-    settings = config.autonomy, config.exploration, config.robot.radius_m
     corridor = carved([(-4.0, -1.0, 6.0, 1.0)])
-    before = Pipeline(*settings)
+    before = Pipeline(*SETTINGS)
     before.control(Odometry(0.0, Pose(), STANDSTILL))
     before.perceive(sweep(corridor, Pose()))
     before.mission.outcome = outcome
-    robot = ReturningPipeline(*settings, remember(before), growth(before), lambda: False)
+    robot = ReturningPipeline(*SETTINGS, remember(before), growth(before), lambda: False)
     robot.control(Odometry(1.0, Pose(), STANDSTILL))
     if outcome is not None:
         robot.errands.explore(1.0)
@@ -139,10 +142,7 @@ def test_who_has_found_its_place_on_a_map_knows_no_better_where_that_map_lies() 
 
     What it sees next to it, again and again, is where the map has it, wherever that is.
     """
-    saved, config = MissionFiles(MISSION).read(), load_config()
-    assert saved is not None
-    settings = config.autonomy, config.exploration, config.robot.radius_m
-    robot = ReturningPipeline(*settings, saved.memory, saved.past, lambda: False)
+    robot = lost()
     belief, aside = robot.mapper.belief, np.diag([2.0**2, 2.0**2, 0.0])
     shift = np.kron(np.ones((1 + len(belief.ids),) * 2), aside)
     robot.mapper.belief = Belief(belief.x, belief.P + shift, belief.ids)
@@ -162,10 +162,7 @@ def test_who_has_found_its_place_on_a_map_knows_no_better_where_that_map_lies() 
 
 def test_who_finds_its_place_between_two_vertices_knows_the_ways_to_both() -> None:
     """In a corridor so long that neither of them is in sight."""
-    saved, config = MissionFiles(MISSION).read(), load_config()
-    assert saved is not None
-    settings = config.autonomy, config.exploration, config.robot.radius_m
-    robot = ReturningPipeline(*settings, saved.memory, saved.past, lambda: False)
+    robot = lost()
     robot._estimate, seeker = smoothed(robot), robot._new_mind()
     corridor = carved([(-25.0, -1.0, 25.0, 1.0)])
     seeker.control(Odometry(0.0, Pose(), STANDSTILL))
