@@ -44,6 +44,10 @@ class Robot:
         start = Approach(0.0, HalfEdgeId(self.at, -1))
         return self.auction.choose(graph_of(self.chart), [start])
 
+    def outlook(self) -> tuple[tuple[HalfEdgeId, Approach] | None, bool, bool]:
+        """What it chooses, whether it waits for others, and whether it is done."""
+        return self.choose(), self.auction.is_waiting, self.auction.is_done
+
     def tell(
         self, stamp: float, *others: "Robot", finished: bool = False, at: Pose | None = None
     ) -> None:
@@ -456,18 +460,10 @@ def test_two_that_have_given_up_do_not_wait_for_each_other() -> None:
     one.member._own_chart = lambda: one.chart
     two.member._own_chart = lambda: two.chart
     two.tell(2.0, one, at=Pose(1.0, 0.0, 0.0))  # it drives, and may find another way
-    assert (one.choose(), one.auction.is_waiting, one.auction.is_done) == (
-        None,
-        True,
-        False,
-    )
+    assert one.outlook() == (None, True, False)
     two.choose()
     two.tell(4.0, one, at=Pose(1.0, 0.0, 0.0))
-    assert (one.choose(), one.auction.is_waiting, one.auction.is_done) == (
-        None,
-        False,
-        True,
-    )
+    assert one.outlook() == (None, False, True)
     nobody_s = one.auction.unfollowed  # nobody knows the edges of these, and all were given up
     assert nobody_s
     for end in nobody_s:
@@ -482,17 +478,9 @@ def test_who_only_stops_to_think_is_waited_for_but_not_for_ever() -> None:
     one.member._own_chart = lambda: one.chart
     for stamp in np.arange(2.0, 30.0, 2.0):
         two.tell(stamp, one)
-        assert (one.choose(), one.auction.is_waiting, one.auction.is_done) == (
-            None,
-            True,
-            False,
-        )
+        assert one.outlook() == (None, True, False)
     two.tell(62.0, one)
-    assert (one.choose(), one.auction.is_waiting, one.auction.is_done) == (
-        None,
-        False,
-        True,
-    )
+    assert one.outlook() == (None, False, True)
 
 
 def all_followed(chart: Chart) -> Chart:
@@ -511,17 +499,9 @@ def test_who_has_nothing_left_waits_while_another_one_drives_and_may_want_to_pas
     one.member._own_chart = lambda: one.chart
     two.member._own_chart = lambda: two.chart
     two.tell(2.0, one, at=Pose(1.0, 0.0, 0.0))
-    assert (one.choose(), one.auction.is_waiting, one.auction.is_done) == (
-        None,
-        True,
-        False,
-    )
+    assert one.outlook() == (None, True, False)
     two.tell(4.0, one, at=Pose(1.0, 0.0, 0.0), finished=True)
-    assert (one.choose(), one.auction.is_waiting, one.auction.is_done) == (
-        None,
-        False,
-        True,
-    )
+    assert one.outlook() == (None, False, True)
 
 
 def passed(one: Robot, two: Robot, off: float = 0.0, since: float = 0.0) -> float:
