@@ -1,7 +1,7 @@
 """What the robot says on the network: the table of topics, and the types that travel."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import msgspec
 import numpy as np
@@ -319,7 +319,7 @@ HEALTH = Topic("health", Health, 1, 1.0, "data", 1, queryable=True)
 ODOMETRY = Topic("odometry", Odometry, 1, 20.0, "data_high", 0, queryable=False)
 SCAN = Topic("scan", Scan, 1, 40.0, "data", 0, queryable=False)
 TOPICS = (STATE, MAP, GRID, TRAJECTORY, EVENTS, PLAN, HEALTH, ODOMETRY, SCAN)
-TEAM_PARTS: tuple[TeamPart, ...] = ("team", "course")
+TEAM_PARTS: tuple[TeamPart, ...] = get_args(TeamPart)
 HEARTBEAT = 2.0  # s, how often a topic that is sent on change says which sample was its last
 UNKNOWN = 1e6  # m^2 and rad^2, the variances of a pose that is not known
 EVENTS_KEPT = 64  # in a message

@@ -109,7 +109,7 @@ class KnownWalls:
 
     def is_seen(self, points: Array) -> Bools:
         """Whether the map has seen anything where points (N, 2) are."""
-        i, j = ((points - self._corner) / CELL_M).astype(np.int64).T
+        i, j = self._cells(points, CELL_M)
         rows, columns = self._seen.shape
         inside = (i >= 0) & (j >= 0) & (i < rows) & (j < columns)
         found: Bools = inside & self._seen[np.where(inside, i, 0), np.where(inside, j, 0)]

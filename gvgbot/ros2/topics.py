@@ -49,7 +49,7 @@ class Node:
 
     def token(self) -> str:
         """The liveliness token that says that the node is there."""
-        return f"{self._begin(0, 'NN')}"
+        return self._begin(0, "NN")
 
     def endpoint_token(self, number: int, topic: Topic, *, hears: bool = False) -> str:
         """The token of a publisher, or of a subscription; the number is its own."""
