@@ -108,6 +108,7 @@ class Mission(Pursuit):
             half.blocked = False
         self._obstructions = self._no_obstructions()
         self._scouting, self._progress = Scouting(), Progress(self._mapper)
+        self._path_following = self._new_path_following()
         self.set_aside()
 
     def set_aside(self) -> None:

@@ -53,9 +53,7 @@ class Pursuit:
         self._neighbours = Neighbours()
         self._scouting, self._backtracking = Scouting(), Backtracking()
         self._retracing = Retracing()
-        self._path_following = PathFollowing(
-            self._neighbours, self._hindrance, self._progress.headway
-        )
+        self._path_following = self._new_path_following()
         self._examination = Examination(mapper)
         self._events: list[Event] = []
 
@@ -75,6 +73,10 @@ class Pursuit:
         """End the exploration, because somebody wants that or it cannot even begin."""
         self.outcome, self.reason = outcome, reason
         return Finished(stamp, outcome, reason)
+
+    def _new_path_following(self) -> PathFollowing:
+        """As at the beginning; it waits by the headway of the progress that there is now."""
+        return PathFollowing(self._neighbours, self._hindrance, self._progress.headway)
 
     # -- something in the way ----------------------------------------------------------------------
 

@@ -647,6 +647,23 @@ def test_who_explores_anew_looks_for_ways_also_where_it_has_been() -> None:
     assert not robot.mission._scouting._gone_near
 
 
+def test_who_explores_anew_looks_around_at_the_end_of_sight_no_sooner_than_before() -> None:
+    """It stands there for a while first, as more may come into view by itself."""
+    robot = Robot()
+    robot.stand(TEE, 8)
+    robot.mission.stop(robot.stamp, "stopped by a request")
+    robot.mission.reopen()
+    (vertex,) = robot.mapper.graph.vertices.values()
+    east = next(key for key, h in vertex.half_edges.items() if math.cos(h.bearing) > 0.9)
+    robot.mission.target = HalfEdgeId(vertex.id, east)
+    robot.drive(TEE, (0.0, 0.0), (8.0, 0.0))
+    there = robot.stamp
+    robot.stand(TEE, 20)
+    first = next(e for e in robot.said(Recovery) if isinstance(e, Recovery))
+    assert first.action == "look around"
+    assert first.stamp - there > CONFIG.look_around_s - 1.0
+
+
 def test_a_robot_that_drives_to_and_fro_gives_up_its_target_after_its_patience() -> None:
     """Between two places a metre apart, which it may do when two ways look equally good."""
     robot = Robot()
