@@ -9,6 +9,7 @@ import pytest
 
 from gvgbot.autonomy.control.edge_follower import Track
 from gvgbot.autonomy.control.orders import Drive, Order, Stand
+from gvgbot.autonomy.ending import Outcome
 from gvgbot.autonomy.errands import Declined
 from gvgbot.autonomy.errands.plans import Kept
 from gvgbot.autonomy.events import ErrandEnded, Recovery
@@ -17,7 +18,7 @@ from gvgbot.geometry import Pose, Twist, wrap_angle
 from tests.unit.autonomy.errands.test_own_tasks import Explorer
 from tests.unit.autonomy.local_graphs import drawn
 from tests.unit.autonomy.sights import carved, looked
-from tests.unit.autonomy.test_mission import CLOSED, CONFIG
+from tests.unit.autonomy.test_mission import CLOSED, CONFIG, TEE
 
 
 def test_a_coverage_promises_no_edge_that_no_known_way_leads_to() -> None:
@@ -166,6 +167,27 @@ def test_who_drives_the_robot_ends_its_errand_and_it_waits_where_it_is_left(is_s
     assert robot.errands.is_resting
 
 
+def test_who_waits_after_an_errand_goes_on_exploring_when_it_is_asked_to() -> None:
+    robot = Explorer()
+    robot.stand(TEE, 8)
+    robot.errands.goto_point(0.0, 0.0, robot.stamp)
+    robot.look(TEE)
+    assert robot.errands.is_resting
+    assert "it explores" in robot.errands.explore(robot.stamp)
+    assert robot.errands.is_exploring
+    assert isinstance(robot.look(TEE), Drive)
+
+
+@pytest.mark.parametrize("outcome", [None, "explored", "stopped"])
+def test_who_lifts_a_robot_that_stands_by_wants_it_somewhere_else(outcome: Outcome | None) -> None:
+    """It would go back out of the way of others; one that explores goes on where it is put."""
+    robot = Explorer()
+    robot.stand(TEE, 8)
+    robot.mission.outcome = outcome
+    robot.errands.note_lifted()
+    assert robot.errands.is_waiting == (outcome == "explored")
+
+
 def in_a_hall() -> Explorer:
     """A robot at one end of an edge of 5 m that has a wide space on its left."""
     robot = Explorer()
@@ -210,6 +232,24 @@ def test_who_stands_on_a_point_has_as_long_to_go_as_in_any_other_way() -> None:
     assert since + patience < robot.stamp < since + patience + 2.0
 
 
+@pytest.mark.parametrize("x", [0.0, 3.5])
+def test_a_time_without_a_view_is_no_time_that_it_stood_in_vain(x: float) -> None:
+    """Whoever paused the robot, half a metre before its goal or on the way, did not hold it up."""
+    robot = Explorer()
+    while not robot.mapper.graph.edges:
+        robot.look(CLOSED)
+    (edge,) = robot.mapper.graph.edges.values()
+    far = max((edge.a, edge.b), key=lambda end: robot.mapper.belief.map_vertex(end.vertex).x)
+    robot.errands.goto_vertex(far.vertex, robot.stamp)
+    robot.drive(CLOSED, (-0.25, 0.0), (x, 0.0))
+    robot.stamp += 10 * CONFIG.in_the_way_s
+    order = robot.look(CLOSED)
+    assert isinstance(order, Drive)
+    assert order.track.polyline[-1].tolist() == [4.0, 0.0]
+    assert not robot.said(ErrandEnded)
+    assert not robot.said(Recovery)
+
+
 def test_who_meets_something_on_the_straight_way_to_a_point_comes_by_the_edge() -> None:
     """Half way up to the left; the way round is along the edge, and a right angle to the left."""
     robot, goal, corner = in_a_hall(), (2.0, 2.4), (2.0, 0.0)
@@ -224,6 +264,54 @@ def test_who_meets_something_on_the_straight_way_to_a_point_comes_by_the_edge() 
     assert isinstance(ended, ErrandEnded)
     assert ended.outcome == "arrived", ended.reason
     assert off_corner < 0.2
+
+
+ROUND = drawn(  # a straight way of 6 m, and one of 12 m beside it from the one end to the other
+    {1: (-3.0, 0.0), 2: (3.0, 0.0), 3: (-5.0, 0.0), 4: (5.0, 0.0)},
+    {10: (1, 2, []), 11: (1, 2, [(-3.0, 3.0), (3.0, 3.0)]), 12: (3, 1, []), 13: (2, 4, [])},
+)
+
+
+def on_a_round(x: float) -> Explorer:
+    """A robot on the straight way, sent to its east end, of which it is told that it is shut."""
+    robot = Explorer()
+    robot.mission.survey = None
+    robot.stand(ROUND, 12)
+    belief = robot.mapper.belief
+    ends = {belief.map_vertex(v).x: v for v, one in robot.mapper.graph.vertices.items()}
+    robot.drive(ROUND, (0.0, 0.0), (-2.75, 0.0), (x, 0.0))
+    robot.errands.goto_vertex(ends[3.0], robot.stamp)
+    order = robot.look(ROUND)
+    assert isinstance(order, Drive)
+    assert order.track.polyline[-1].tolist() == [3.0, 0.0]
+    robot.errands.obstruct("bumper again and again")
+    return robot
+
+
+def test_who_goes_a_long_way_round_is_not_said_to_come_no_nearer() -> None:
+    """It has 2 m to go, and then 16 m, at a decimetre a second."""
+    robot = on_a_round(1.0)
+    robot.look(ROUND)
+    for x in np.arange(1.0, -2.0, -0.1):
+        robot.stamp += 0.5
+        robot.drive(ROUND, (float(x), 0.0), (float(x) - 0.1, 0.0))
+    assert not robot.said(ErrandEnded)
+    (said,) = robot.said(Recovery)
+    assert "try another way" in str(said)
+
+
+def test_who_is_shut_in_between_both_ends_of_its_edge_gives_up() -> None:
+    """It would go to and fro between them."""
+    robot = on_a_round(1.0)
+    order = robot.look(ROUND)
+    assert isinstance(order, Drive)
+    assert order.track.polyline[:, 0].min() == -3.0  # by the west end
+    robot.drive(ROUND, (1.0, 0.0), (-1.0, 0.0))
+    robot.errands.obstruct("bumper again and again")
+    robot.look(ROUND)
+    (ended,) = robot.said(ErrandEnded)
+    assert isinstance(ended, ErrandEnded)
+    assert (ended.outcome, ended.reason) == ("given up", "something stands in the way")
 
 
 def turned(robot: Explorer, headings: Iterable[float]) -> bool:

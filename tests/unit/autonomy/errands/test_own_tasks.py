@@ -98,6 +98,23 @@ def test_who_is_sent_to_where_it_was_driving_unasked_waits_there() -> None:
     assert robot.errands.is_waiting
 
 
+def test_a_drive_that_nobody_asked_for_leaves_nothing_behind_when_it_is_over() -> None:
+    """No errand to go on with after a restart, no wait for the next one, and no way closed."""
+    robot = Explorer([GAP], [])
+    robot.until_it_moves_or_ends()
+    errands, graph = robot.errands, robot.mapper.graph
+    assert str(errands.errand) == "goto 2 0"
+    assert errands.kept() is None
+    assert not errands.will_wait
+    robot.drive(CLOSED, (0.0, 0.0), (1.75, 0.0))
+    (edge,) = graph.edges.values()
+    errands.closures.close(graph, [edge.a, edge.b], until=robot.stamp + 1000.0)
+    robot.drive(CLOSED, (1.75, 0.0), (2.0, 0.0))
+    assert errands.errand is None
+    assert not errands.is_waiting
+    assert not graph.blocked()
+
+
 def test_who_has_driven_on_since_the_survey_makes_another_one_before_the_end() -> None:
     """It went to look at something, and saw more of the floor on the way."""
     robot = Explorer([], [GAP])
