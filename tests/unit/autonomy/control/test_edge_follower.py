@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from gvgbot.autonomy.control.edge_follower import EdgeFollowerConfig, Track, follow
@@ -139,6 +139,7 @@ def test_a_narrow_place_ahead_slows_the_robot_before_it_is_there() -> None:
 lengths = st.floats(-4.0, 4.0)
 
 
+@example([(0.1 * i, 0.0) for i in range(30)], 3.0, Pose(1.0, 0.0, 0.8), 0.0)  # a sharp arc
 @given(
     st.lists(st.tuples(lengths, lengths), min_size=2, max_size=30),
     st.floats(0.0, 3.0),

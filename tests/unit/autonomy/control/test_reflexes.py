@@ -217,6 +217,17 @@ def test_who_runs_into_something_on_the_way_out_backs_off_from_it() -> None:
     assert twist.linear <= 0.0
 
 
+def test_turning_to_the_opening_ends_even_if_the_robot_does_not_move() -> None:
+    reflexes, told, twist = Reflexes(CONFIG), list[Incident](), AHEAD
+    for i in range(round(20.0 / CYCLE)):
+        held = Felt(NOTHING, None if told else "obstacle")
+        moment = Moment(i * CYCLE, Pose(), STANDSTILL if told else AHEAD, held)
+        twist, incident = reflexes.act(moment, lambda bearing: 0.5 if abs(bearing) < 1.6 else 0.02)
+        told += [] if incident is None else [incident]
+    assert told == [Held("turn away")]
+    assert twist == STANDSTILL
+
+
 def test_a_robot_that_is_held_on_all_sides_stands_until_that_changes() -> None:
     robot = Robot(room_behind=0.0)
     robot.feel(NOTHING, 20.0, grip=0.0, stopped_for="obstacle")
