@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from gvgbot.autonomy.errands.closures import Closures
+from gvgbot.autonomy.events import DoubtSettled
 from gvgbot.autonomy.exploration.obstructions import Obstructions
 from gvgbot.autonomy.knowledge import Knowledge
 from gvgbot.autonomy.recogniser import Recognition
@@ -14,6 +15,7 @@ from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId, Vertex
 from gvgbot.autonomy.slam.names import Names
 from gvgbot.autonomy.unsettled import Unsettled
+from gvgbot.autonomy.views import Observation
 from gvgbot.geometry import Pose
 from tests.unit.autonomy.graphs import STREET, between, streets
 
@@ -83,13 +85,20 @@ def test_what_leaves_a_vertex_that_proves_to_be_a_known_one_turns_as_its_frame_w
         for vertex, bearing in ((again, seen), (north, seen - math.pi))
     ]
     graph.join(ends[0], ends[1], np.array([[0.0, 0.0], way]), 1.0, driven=True)
-    unsettled = Unsettled(Knowledge(belief, graph), margin=2.0, same_bearing=math.radians(40))
+    again.local, again.seen_at = belief.map_vertex(again.id), 2 * STREET
+    known = Knowledge(belief, graph, [Observation(2, again.id, Pose(theta=error - math.pi), sure)])
+    unsettled = Unsettled(known, margin=2.0, same_bearing=math.radians(40))
     unsettled.doubt(again, Recognition(None, (west.id,), (1.0,), 1e-4, 9.0), 0.0)
     assert unsettled.settle(1.0)
     (edge,) = graph.edges.values()
     (departure,) = west.half_edges.values()
     assert departure.bearing == pytest.approx(math.pi / 2, abs=0.02)
     assert edge.polyline[-1] == pytest.approx((0.0, STREET), abs=0.2)
+    # the way to the north is still where it is seen, and its frame was not that of the first visit
+    assert west.local.position == pytest.approx(again.local.position)
+    assert west.local.theta + departure.bearing == pytest.approx(again.local.theta + seen)
+    (sight,) = known.observations
+    assert (sight.vertex, sight.R.shape) == (west.id, (2, 2))
 
 
 def test_what_is_closed_for_a_while_is_opened_again_though_its_vertex_has_another_name() -> None:
@@ -163,6 +172,34 @@ def test_a_closure_that_is_revoked_takes_no_earlier_one_with_it() -> None:
     assert known.graph.blocked() == []
 
 
+def test_what_proved_not_to_be_one_is_not_taken_for_one_again() -> None:
+    """By the same reading as before: it would be closed and taken back for ever."""
+    known, unsettled, (_, then) = entered_twice()
+    assert unsettled.settle(1.0)
+    assert then.vertex not in known.graph.vertices
+    (edge,) = known.graph.edges.values()
+    unsettled.note_way(edge, arrived=99)  # not at its far end
+    assert unsettled.revoke(2.0)
+    assert not unsettled.settle(3.0)
+    assert then.vertex in known.graph.vertices
+
+
+def test_who_took_a_closure_back_is_wary_until_something_is_certain_again() -> None:
+    known, unsettled, (frontier, then) = entered_twice()
+    assert unsettled.settle(1.0)
+    (edge,) = known.graph.edges.values()
+    unsettled.note_way(edge, arrived=99)  # not at its far end
+    assert unsettled.revoke(2.0)
+    assert unsettled.is_wary
+    (far,) = {edge.a.vertex, edge.b.vertex} - {frontier.vertex}  # a street away: it is not that
+    rival = Recognition(None, (far,), (1.0,), 0.02, 9.0)
+    unsettled.doubt(known.graph.vertices[then.vertex], rival, 3.0)
+    (settled,) = unsettled.settle(3.0)
+    assert isinstance(settled, DoubtSettled)
+    assert settled.known is None
+    assert not unsettled.is_wary
+
+
 class Contradicted:
     """A town in which the latest closure is about to prove wrong."""
 
@@ -219,12 +256,14 @@ def test_what_is_closed_after_a_closure_that_is_taken_back_stays_closed_until_it
     assert town.known.graph.blocked() == []
 
 
-def test_no_departure_gets_the_name_of_one_that_went_with_a_closure() -> None:
+def test_nothing_gets_the_name_of_what_went_with_a_closure() -> None:
     """Who has closed that, or goes there, would mean the other one."""
     town = Contradicted()
     town.close_a_loop()
     west = town.ids[0, 0]
     gone = town.known.graph.vertices[west].add_half_edge(1.0)
+    vertex = town.known.graph.next_id()
     town.take_it_back()
+    assert town.known.graph.next_id() > vertex
     assert gone not in town.known.graph.vertices[west].half_edges
     assert town.known.graph.vertices[west].add_half_edge(2.0) != gone
