@@ -10,6 +10,7 @@ from gvgbot.autonomy.evidence import MappingConfig
 from gvgbot.autonomy.gvg.local import LocalGvg
 from gvgbot.autonomy.gvg.local_map import LocalMap, LocalMapConfig
 from gvgbot.autonomy.map_edits import MapEdits
+from gvgbot.autonomy.recogniser import Recognition
 from gvgbot.autonomy.slam.graph import Edge, HalfEdgeId
 from gvgbot.autonomy.slam.recognition import RecognitionConfig
 from gvgbot.autonomy.views import View
@@ -126,3 +127,33 @@ def test_a_line_for_maps_follows_a_vertex_only_near_to_it(
     assert moved[0] == pytest.approx(math.hypot(0.2, 0.3))
     near = max(vertex.clearance, 2 * moved[0])
     assert moved[np.arange(81) * 0.1 > near] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_who_takes_a_closure_back_is_where_it_has_driven_since(edits: MapEdits, view: View) -> None:
+    edge = joined(edits, view, np.array([[-1.0, 0.0], [2.0, 0.0]]))
+    edits.unsettled.note_closure(edits.graph.vertices[edge.a.vertex], is_surprising=True)
+    edits.move(Pose(2.0, 1.0, 0.5), 1e-6 * np.eye(3))
+    edits.unsettled.note_way(edge, arrived=99)  # not at its far end
+    assert edits.unsettled.revoke(1.0)
+    here = edits.belief.map_base
+    assert (here.x, here.y, here.theta) == pytest.approx((2.0, 1.0, 0.5))
+
+
+def test_a_vertex_that_is_no_more_is_in_no_doubt(edits: MapEdits, view: View) -> None:
+    known, new = (edits.add_driven(view, np.array([x, 0.0]), 0.0) for x in (0.0, 0.5))
+    rival = Recognition(None, (known.id,), (1.0,), 0.02, 9.0)
+    edits.unsettled.doubt(new, rival, 0.0)
+    edits.remove(view, new, "an edge passes here")
+    assert edits.unsettled.settle(1.0) == []
+    assert list(edits.graph.vertices) == [known.id]
+
+
+def test_the_ways_back_to_where_one_comes_from_lead_round_in_no_circle(
+    edits: MapEdits, view: View
+) -> None:
+    """A vertex may be taken out, and come back with a closure that is taken back."""
+    line = np.array([[-1.0, 0.0], [2.0, 0.0]])
+    edge = joined(edits, view, line)
+    edits.came_from[edge.b] = edge.a, line
+    edits.remove(view, edits.graph.vertices[edge.a.vertex], "an edge passes here")
+    assert [(end, far) for end, (far, _) in edits.came_from.items()] == [(edge.a, edge.b)]
