@@ -13,7 +13,7 @@ from gvgbot.autonomy.map_edits import MapEdits
 from gvgbot.autonomy.recogniser import Recognition
 from gvgbot.autonomy.slam.graph import Edge, HalfEdgeId
 from gvgbot.autonomy.slam.recognition import RecognitionConfig
-from gvgbot.autonomy.views import View
+from gvgbot.autonomy.views import Observation, View
 from gvgbot.geometry import Array, Pose
 from tests.unit.autonomy.sights import carved, sweep
 
@@ -127,6 +127,15 @@ def test_a_line_for_maps_follows_a_vertex_only_near_to_it(
     assert moved[0] == pytest.approx(math.hypot(0.2, 0.3))
     near = max(vertex.clearance, 2 * moved[0])
     assert moved[np.arange(81) * 0.1 > near] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_what_was_seen_on_a_way_that_is_forgotten_goes_with_it_but_for_the_last_look(
+    edits: MapEdits,
+) -> None:
+    sights = [Observation(number, 1, Pose(), np.eye(2)) for number in (2, 3, 4, 9, 10, 10)]
+    edits.observations.extend(sights)
+    edits.forget_between(4, 10)
+    assert [seen.keyframe for seen in edits.observations] == [2, 3, 4, 4]
 
 
 def test_who_takes_a_closure_back_is_where_it_has_driven_since(edits: MapEdits, view: View) -> None:

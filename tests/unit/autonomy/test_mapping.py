@@ -799,6 +799,28 @@ def test_what_stays_away_for_longer_than_a_day_was_walled_up() -> None:
     assert seen.places("meetpoint") == []
 
 
+def test_what_is_shut_every_day_and_open_in_between_was_not_walled_up() -> None:
+    """Sight must have spoken against it all that time; now and then it is where it was."""
+    seen = Seen().look(TEE, 20)
+    seen.mapper.establish()
+    for _ in range(3):
+        seen.look_near(PLAIN, 20)
+        seen.look_near(TEE, 20)
+        seen.drive_elsewhere(CONFIG.changed_after_s / 10.0)
+    assert of_type(seen.events, VertexRemoved) == []
+    assert seen.places("meetpoint") == [pytest.approx((3.0, 0.0), abs=0.1)]
+
+
+def test_who_was_elsewhere_believes_nothing_by_what_it_saw_there() -> None:
+    """It has been pushed: it knows no vertex by its place alone, and counts its sights anew."""
+    seen = Seen().look(TEE, CONFIG.candidates.meetpoint_sightings)
+    (vertex,) = seen.mapper.graph.vertices.values()
+    seen.mapper.lose_sight(-1.0)
+    assert vertex.seen_at == -1.0
+    seen.look(TEE, CONFIG.candidates.endpoint_sightings - CONFIG.candidates.meetpoint_sightings)
+    assert seen.places("endpoint") == []
+
+
 def test_before_it_is_finished_a_map_learns_as_fast_as_ever() -> None:
     seen = Seen().look(TEE, 20).look_near(PLAIN, 20)
     assert len(of_type(seen.events, VertexRemoved)) >= 1
