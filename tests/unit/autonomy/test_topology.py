@@ -273,6 +273,17 @@ def test_what_was_made_of_two_edges_is_of_the_finished_map_if_both_were(count: i
     assert edge.length == pytest.approx(2 * STREET)
 
 
+@pytest.mark.parametrize("narrow", [0, 1])
+def test_what_was_made_of_two_edges_is_as_narrow_as_the_narrower_one(narrow: int) -> None:
+    graph, ids = streets(3, 1)
+    list(graph.edges.values())[narrow].min_clearance = 0.3
+    places = np.array([[x * STREET, 0.0, 0.0] for x in range(3)])
+    x = np.hstack([np.zeros(3), places.ravel()])
+    take_out(graph, Belief(x, np.zeros((12, 12)), tuple(ids.values())), graph.vertices[ids[1, 0]])
+    (edge,) = graph.edges.values()
+    assert edge.min_clearance == 0.3
+
+
 @pytest.mark.parametrize("seed", range(20))
 def test_what_hangs_together_with_a_vertex_is_what_edges_lead_to(seed: int) -> None:
     graph = random_multigraph(np.random.default_rng(seed))
