@@ -16,6 +16,7 @@ from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.graph import HalfEdgeId, Vertex
 from gvgbot.autonomy.slam.recognition import RecognitionConfig
 from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
+from gvgbot.autonomy.start_edge import StartEdge
 from gvgbot.autonomy.views import Correspondence, View
 from gvgbot.autonomy.whereabouts import Whereabouts
 from gvgbot.geometry import Array, Pose
@@ -53,6 +54,14 @@ class Drive:
         self.stamp = 0.0
         self.somebody = np.empty((0, 2))  # where somebody stands
         self._driven = DrivenEdges(self.mapper)
+
+    @property
+    def start(self) -> StartEdge | None:
+        return self._driven.start
+
+    @start.setter
+    def start(self, edge: StartEdge) -> None:
+        self._driven.start = edge
 
     @property
     def parts(self) -> list[tuple[Array, float]]:
@@ -472,3 +481,38 @@ def test_past_a_vertex_that_it_did_not_find_it_came_by_the_way_on_from_there(
         assert edge is not None
         assert edge.other(HalfEdgeId(2, WEST)) == HalfEdgeId(3, way_on)
         assert edge.length == pytest.approx(3.0, abs=0.3)
+
+
+@pytest.mark.parametrize("narrow_at_first", [True, False])
+def test_who_comes_round_to_where_it_started_need_not_drive_the_first_half_of_that_edge_again(
+    *, narrow_at_first: bool
+) -> None:
+    """A way of 33 m leads from vertex 2 round to vertex 1; the robot has begun 3 m before that.
+
+    One half of it is narrower than the other one.
+    """
+    corners = [(9.0, 0.0), (9.0, -6.0), (-4.0, -6.0), (-4.0, 0.0)]
+    ring = drawn(
+        {1: (0.0, 0.0), 2: (5.0, 0.0), 5: (0.0, 4.0), 6: (5.0, 4.0)},
+        {10: (1, 2, []), 13: (1, 5, []), 14: (2, 6, []), 20: (2, 1, corners)},
+    )
+    drive = Drive(HalfEdgeId(1, EAST))
+    drive.where = Whereabouts()
+    west, east = HalfEdgeId(1, WEST), HalfEdgeId(2, EAST)
+    first = {Branch(20, forward=False): west, Branch(10, forward=True): HalfEdgeId(1, EAST)}
+    second = {Branch(10, forward=False): HalfEdgeId(2, WEST), Branch(20, forward=True): east}
+    drive.along(ring, {}, (-3.0, 0.0), (-1.0, 0.0)).along(ring, first, (-1.0, 0.0), (2.0, 0.0))
+    assert drive.start is not None
+    drive.start = replace(drive.start, narrowest=0.3 if narrow_at_first else 0.8)
+    drive.along(ring, second, (2.0, 0.0), (7.0, 0.0))
+    drive.where.narrowest = 0.8 if narrow_at_first else 0.3
+    drive.along(ring, {}, (7.0, 0.0), *corners[:3], (-4.0, -0.6))
+    graph = drive.mapper.graph
+    assert {graph.edge_at(west), graph.edge_at(east)} == {None}
+    drive.mapper.belief.x[:2] = -3.0, 0.0
+    drive.along(ring, {}, (-4.0, 0.0), (-3.0, 0.0))
+    edge = graph.edge_at(west)
+    assert edge is not None
+    assert edge is graph.edge_at(east)
+    assert edge.length == pytest.approx(33.0, abs=1.0)
+    assert edge.min_clearance == 0.3

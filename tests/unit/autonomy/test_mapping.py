@@ -365,6 +365,18 @@ def test_a_departure_that_a_clear_view_keeps_not_showing_is_dropped() -> None:
     assert vertex.degree == 3
 
 
+def test_a_departure_that_is_missed_now_and_then_stays() -> None:
+    """However often that is: half of the time it is there."""
+    lines = {**TEE_LINES, 13: (2, 5, [])}
+    crossing = drawn({**TEE_POINTS, 5: (3.0, 4.0)}, lines, unseen={**UNSEEN, 5: math.pi / 2})
+    seen = Seen().look(crossing, CONFIG.candidates.meetpoint_sightings)
+    (vertex,) = seen.mapper.graph.vertices.values()
+    for _ in range(10):
+        seen.look(TEE, CONFIG.misses - 1).look(crossing, CONFIG.misses - 1)
+    assert vertex.degree == 4
+    assert vertex.gone == []
+
+
 @pytest.mark.parametrize(("beyond", "stays"), [("ways on", False), ("a dead end", True)])
 def test_a_driven_edge_that_is_gone_stays_only_if_more_than_ways_on_hangs_on_it(
     beyond: str, *, stays: bool

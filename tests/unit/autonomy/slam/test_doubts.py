@@ -118,6 +118,14 @@ def test_a_place_that_becomes_certain_needs_no_further_vertex() -> None:
     assert tees().go(0.0, 3 * STREET).see(3, 1).weighed() == (3, None)
 
 
+def test_only_the_latest_are_weighed_together() -> None:
+    """Each costs a reading of all others; what is older counts as new."""
+    doubts = Doubts()
+    for vertex in range(2, 40):
+        doubts.note(Doubt(vertex, (1,), NEW_PER_M2))
+    assert [doubt.vertex for doubt in doubts.recent] == list(range(32, 40))
+
+
 def thrice(sigma: float, again: float, *rivals: int) -> Walk:
     """At vertex 1; lost for a while, there as 5; at 7, and lost once more; there as 9."""
     walk = Walk().see(1).go(0.0, 0.0, sigma=sigma).see(5, 1).go(0.0, STREET).see(7)
