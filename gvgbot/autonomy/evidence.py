@@ -114,7 +114,7 @@ class Evidence:
         for key in matched.values():
             vertex.half_edges[key].misses = 0
         if node.lead is None and len(matched) == len(branches):
-            self._doubt_departures(view, vertex, set(matched.values()), len(branches))
+            self._doubt_departures(view, vertex, set(matched.values()))
 
     def _believed(
         self, view: View, vertex: Vertex, new: list[int], certain: list[int]
@@ -136,11 +136,11 @@ class Evidence:
         vertex.surplus = vertex.unclear = 0
         return believed
 
-    def _doubt_departures(self, view: View, vertex: Vertex, seen: set[int], degree: int) -> None:
+    def _doubt_departures(self, view: View, vertex: Vertex, seen: set[int]) -> None:
         """Drop departures that a clear view keeps not showing."""
         graph, misses = self._known.graph, self._config.misses * vertex.hesitation
         for key, half in list(vertex.half_edges.items()):
-            if key in seen or vertex.degree <= degree:
+            if key in seen:
                 continue
             half.misses += 1
             end = HalfEdgeId(vertex.id, key)
