@@ -20,7 +20,7 @@ from gvgbot.autonomy.overlooked import Overlooked
 from gvgbot.autonomy.progress import Progress
 from gvgbot.autonomy.pursuit import Pursuit
 from gvgbot.autonomy.scouting import Scouting
-from gvgbot.autonomy.search import NO_EDGE
+from gvgbot.autonomy.search import NO_EDGE, Search
 from gvgbot.autonomy.situation import Situation
 from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.autonomy.views import Correspondence, View
@@ -107,8 +107,10 @@ class Mission(Pursuit):
             assert half is not None
             half.blocked = False
         self._obstructions = self._no_obstructions()
-        self._scouting, self._progress = Scouting(), Progress(self._mapper)
+        self._scouting, self._search = Scouting(), Search()
+        self._progress = Progress(self._mapper)
         self._path_following = self._new_path_following()
+        self._retracing.renew()
         self.set_aside()
 
     def set_aside(self) -> None:

@@ -75,6 +75,10 @@ class Retracing:
         """Go back no farther."""
         self._back = None
 
+    def renew(self) -> None:
+        """Allow to go back to every vertex once more."""
+        self._been.clear()
+
 
 def _without_detours(way: Array) -> Array:
     """The way (N, 2) without its loops."""

@@ -474,6 +474,19 @@ def test_who_knows_only_the_slot_it_is_in_drives_out_and_begins_anew() -> None:
     assert not robot.mapper.graph.vertices
 
 
+def test_who_is_asked_to_explore_tries_to_leave_a_slot_however_often_that_was_in_vain() -> None:
+    """Somebody may have freed it; it has stood there all the time before."""
+    robot = in_a_slot(SLOT, HALL, is_beside_floor=True)
+    for _ in range(5):
+        order: Order = Stand()
+        while not isinstance(order, Drive) or end_of(order)[0] < 1.2:
+            assert robot.mission.outcome is None
+            order = robot.look(IN_SLOT)
+        while robot.mission.outcome is None:
+            robot.look(IN_SLOT)
+        robot.mission.reopen()
+
+
 def test_who_has_lost_sight_of_all_that_is_known_goes_back_over_the_way_it_came() -> None:
     """Five metres past the tee, nothing but a stretch that leads away from there is in sight."""
     elsewhere = drawn({5: (8.0, 0.0), 6: (9.0, 1.0)}, {20: (5, 6, [])}, unseen={5: 2.0, 6: 0.8})
@@ -643,8 +656,10 @@ def test_what_no_known_way_leads_to_any_more_is_gone_back_to_over_the_way_that_w
 def test_who_explores_anew_looks_for_ways_also_where_it_has_been() -> None:
     robot = Robot()
     robot.mission._scouting._gone_near.add((1, 2))
+    robot.mission._retracing._been.add(1)
     robot.mission.reopen()
     assert not robot.mission._scouting._gone_near
+    assert not robot.mission._retracing._been
 
 
 def test_who_explores_anew_looks_around_at_the_end_of_sight_no_sooner_than_before() -> None:

@@ -77,6 +77,8 @@ def test_to_each_vertex_it_goes_back_once_and_to_none_that_was_never_near() -> N
     assert retracing.begin({7})
     retracing.end()
     assert not retracing.begin({7})
+    retracing.renew()
+    assert retracing.begin({7})
 
 
 def test_what_was_long_ago_is_forgotten() -> None:
