@@ -104,10 +104,11 @@ class Mapper(MapEdits):
                 self._evidence.pair_departures(view, view.gvg.nodes[node], vertex, known)
             else:
                 self._refresh(view, sightings[node], view.gvg.nodes[node], vertex, known)
-        for node, vertex in view.marks.items():
-            if vertex.id not in known.node_of:
-                known.pair(node, vertex.id)
-                self._evidence.pair_departures(view, view.gvg.nodes[node], vertex, known)
+        for node, marked in view.marks.items():  # as the map was before this look
+            present = self.graph.vertices.get(self.unsettled.names.vertex(marked.id))
+            if present is not None and present.id not in known.node_of:
+                known.pair(node, present.id)
+                self._evidence.pair_departures(view, view.gvg.nodes[node], present, known)
         for vertex, reason in self._evidence.refuted(view, known):
             self._refute(view, vertex, reason)
         self._join(view, known)

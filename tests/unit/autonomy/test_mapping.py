@@ -1020,3 +1020,23 @@ def test_a_meetpoint_that_a_virtual_wall_moves_along_is_there_once() -> None:
     view = View(30, 30.0, 3.0, NEAR, gvg, NOTHING_SEEN, marks=marks)
     known, _ = seen.mapper.observe(view)
     assert [node for node, vertex in known.vertex_of.items() if vertex == tee.id] == [2]
+
+
+def test_a_meetpoint_behind_a_virtual_wall_may_prove_to_be_a_known_one() -> None:
+    """It was to be drawn where it is before this look told that; the edge beside it is joined."""
+    seen = Seen()
+    mapper, graph = seen.mapper, seen.mapper.graph
+    known, again, end = (Vertex(graph.next_id(), 1.0, Pose(x), 0.0, 0.0) for x in (0.0, 0.1, 3.0))
+    for vertex, bearings in ((known, ()), (again, (0.0, math.pi, 1.5)), (end, (math.pi,))):
+        graph.vertices[vertex.id] = vertex
+        mapper.belief = ekf.add_vertex(mapper.belief, vertex.id, vertex.local, 1e-4 * np.eye(3))
+        for bearing in bearings:
+            vertex.add_half_edge(bearing)
+    mapper.unsettled.doubt(again, Recognition(None, (known.id,), (1.0,), 0.02, 9.0), 0.0)
+    gvg = drawn({1: (-3.0, 0.0), 2: (0.1, 0.0), 3: (3.0, 0.0)}, {10: (1, 2, []), 11: (2, 3, [])})
+    view = View(1, 1.0, 0.1, Pose(1.5), gvg, NOTHING_SEEN, marks={2: again})
+    here, _ = mapper.observe(view)
+    assert list(graph.vertices) == [known.id, end.id]
+    assert here.vertex_of[2] == known.id
+    (edge,) = graph.edges.values()
+    assert {edge.a.vertex, edge.b.vertex} == {known.id, end.id}
