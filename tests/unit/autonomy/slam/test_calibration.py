@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from gvgbot.autonomy.slam.calibration import Calibration
+from gvgbot.autonomy.slam.calibration import Calibration, _seen_after, per_unit
 from gvgbot.autonomy.slam.ekf import OdometryNoise
 from gvgbot.geometry import Array, Pose, rotated_covariance
 
@@ -236,3 +236,23 @@ def test_on_the_way_back_nothing_more_adds_up() -> None:
     added = [(covariance - OWN)[0, 0] for covariance in whole]
     assert sum(added[:50]) == pytest.approx((0.02 * 10.0) ** 2)
     assert sum(added[50:]) == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("motion", [Pose(0.3, -0.2, 0.7), Pose(-0.1, 0.4, -2.0), Pose(0.25)])
+def test_errors_before_a_motion_and_in_it_move_the_base_after_it_as_their_jacobians_say(
+    motion: Pose,
+) -> None:
+    """By finite differences, in the frame of the base after the motion."""
+    duration, h = 0.5, 1e-6
+
+    def off(after: Pose) -> Array:
+        seen = motion.to(after)
+        return np.array([seen.x, seen.y, seen.theta]) / h
+
+    for i, axis in enumerate(np.eye(3)):
+        before = Pose.from_array(h * axis).compose(motion)
+        assert off(before) == pytest.approx(_seen_after(motion)[:, i], abs=1e-5)
+        distance, turn, rate = h * axis
+        moved = Pose(motion.x * (1.0 + distance), motion.y * (1.0 + distance), motion.theta)
+        turned = Pose(moved.x, moved.y, motion.theta * (1.0 + turn) + rate * duration)
+        assert off(turned) == pytest.approx(per_unit(motion, duration)[:, i], abs=1e-5)
