@@ -180,3 +180,36 @@ def test_who_finds_its_place_between_two_vertices_knows_the_ways_to_both() -> No
         found = re.fullmatch(rf"it drives (\S+) m to vertex {vertex}", answer)
         assert found is not None
         assert float(found[1]) == pytest.approx(metres, abs=0.2)
+
+
+def test_what_was_seen_and_felt_before_and_meanwhile_is_where_it_was_when_the_place_is_found() -> (
+    None
+):
+    """Stairs that were felt long ago, 100 m of driving, and a post just before it was found."""
+    saved, config = MissionFiles(MISSION).read(), load_config()
+    assert saved is not None
+    settings = config.autonomy, config.exploration, config.robot.radius_m
+    robot = ReturningPipeline(*settings, saved.memory, saved.past, lambda: False)
+    robot._estimate, seeker = smoothed(robot), robot._new_mind()
+    room = sweep(carved([(-4.0, -1.0, 6.0, 1.0)]), Pose())
+    seeker.control(Odometry(0.0, Pose(), STANDSTILL))
+    seeker.perceive(room)
+    last, robot.past.travelled, seeker.past.travelled = robot.past.last, 100.0, 3.0
+    assert last is not None
+    robot._hazards.add(Pose(2.0, 1.0, 2.0), (0.0,), 0.2, 0.0, lasting=True)
+    seeker._hazards.add(Pose(0.5), (0.0,), 0.2, 2.0, lasting=False)
+    before = robot.mapper.belief.map_base.compose(last.local_base.inverse())
+    stairs = before.transform(robot._hazards._all[-1].points)
+    post = seeker._hazards._all[0].points.copy()
+    robot._arrive(seeker, Pose(1.0, 0.5, 0.3))
+    found = robot.past.last
+    assert found is not None
+    now = robot.mapper.belief.map_base.compose(found.local_base.inverse())
+    *_, first, second = robot._hazards._all
+    assert now.transform(first.points) == pytest.approx(stairs)
+    assert second.points == pytest.approx(post)
+    assert robot.past.travelled - second.travelled == pytest.approx(1.0)
+    walls = len(robot.tracker.maps.near.points())
+    blind = replace(room, ranges=np.full(len(room.ranges), np.nan))
+    robot.tracker.maps.near.insert(blind, found.local_base, robot.past.travelled)
+    assert len(robot.tracker.maps.near.points()) == walls > 0
