@@ -220,6 +220,31 @@ def test_no_way_leads_over_a_virtual_wall_ahead(wall: float | None, ends: dict[i
     assert found == pytest.approx(ends, abs=0.2)
 
 
+@pytest.mark.parametrize("wall", [1.0, 2.2, 3.5, 5.0])
+def test_which_end_of_an_edge_is_its_first_makes_no_difference_to_virtual_walls(
+    wall: float,
+) -> None:
+    """3 m along an edge of 6 m, of which no end is in sight; the wall is so far along it, too."""
+    found = []
+    for is_turned in (False, True):
+        here = situation(3.0, known_as({}, {}))
+        (edge,) = here.graph.edges.values()
+        if is_turned:
+            edge.a, edge.b, edge.polyline = edge.b, edge.a, edge.polyline[::-1]
+        here.graph.walled[edge.id] = (6.0 - wall if is_turned else wall,)
+        starts = here.starts()
+        ways = [{start.arrival.vertex: round(start.metres, 6) for start in starts}]
+        for x in (0.5, 2.0, 4.0, 5.5):
+            foot = foot_at(here.graph, HalfEdgeId(1, EAST), x)
+            assert foot is not None
+            route = route_to_foot(here, starts, foot)
+            ways.append({} if route is None else {route.first.vertex: round(route.metres, 6)})
+            is_between = min(3.0, x) < wall < max(3.0, x)
+            assert (route is None) == is_between
+        found.append(ways)
+    assert found[0] == found[1]
+
+
 @pytest.mark.parametrize(("wall", "metres"), [(2.0, 26.0), (4.0, 2.0), (14.0, 2.0), (0.5, 2.0)])
 def test_the_way_to_a_point_is_the_one_without_a_virtual_wall(wall: float, metres: float) -> None:
     here = on_a_ring(is_in_sight=False)
