@@ -246,6 +246,21 @@ POSTS += [(x, 0.5 * k, x + 0.1, 0.5 * k + 0.1) for k in range(1, 18) for x in (0
 YARD = carved([(-3.0, -3.0, 15.0, 12.0)], [*POSTS, (5.0, 4.0, 7.0, 5.0)])
 
 
+def test_what_a_match_has_taught_is_told_once() -> None:
+    """In a fog after it there is no match that teaches anything."""
+    rng, local = np.random.default_rng(6), maps()
+    for x in np.arange(-2.0, 0.0, 0.25):
+        local.insert(room(rng, x), Pose(x, 0.0), x + 2.0)
+    blind = Scan(0.0, np.full(1081, np.nan), float(BEARINGS[0]), math.radians(0.25), 0.1, 30.0)
+    left = []
+    for scan in (room(rng, 0.0), blind, blind):
+        laid = local.match(scan, Pose(-0.25), Pose(0.25), 1.0, LOOSE).laid
+        assert laid is not None
+        left.append(laid.left)
+    assert not np.array_equal(left[1], np.eye(3))
+    assert np.array_equal(left[2], np.eye(3))
+
+
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_between_posts_the_robot_does_not_take_its_wheels_for_slipping(seed: int) -> None:
     """Few points of a fence lie on lines; many do where the robot is not, from post to post."""
