@@ -292,6 +292,21 @@ def test_who_is_lifted_neither_drives_nor_looks_whoever_wants_it_to_drive() -> N
         stamp += 4.0
 
 
+def test_who_touches_a_robot_that_rests_is_no_obstacle_to_it_later() -> None:
+    """It does not move by itself either, however the bumper is pressed."""
+    pipeline, theta, stamp = about_to_drive()
+    pipeline.errands.pause()
+    for contact in (Contact(0.0, bumper_left=True), Contact(0.0), Contact(0.0, bumper_centre=True)):
+        for _ in range(20):
+            stamp += 0.05
+            odometry = Odometry(stamp, Pose(theta=theta), STANDSTILL)
+            assert pipeline.control(odometry, Felt(contact)) == STANDSTILL
+    assert len(pipeline._hazards.points) == 0
+    pipeline.errands.resume()
+    _, happened = looked(pipeline, stamp + 10.0, theta)
+    assert not [event for event in happened if isinstance(event, Recovery)]
+
+
 @pytest.mark.parametrize(("covered", "looks"), [(0.6, 0), (0.4, 10)])
 def test_who_sees_next_to_nothing_waits_as_for_a_laser_that_is_silent(
     covered: float, looks: int
