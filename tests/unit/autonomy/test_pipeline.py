@@ -15,6 +15,7 @@ from gvgbot.autonomy.localisation import Localisation
 from gvgbot.autonomy.memory import remember
 from gvgbot.autonomy.passed import Passed
 from gvgbot.autonomy.pipeline import Pipeline
+from gvgbot.autonomy.views import Observation
 from gvgbot.config import load_config
 from gvgbot.geometry import STANDSTILL, Pose, Twist, wrap_angle
 from gvgbot.hal.guard import Reason
@@ -216,12 +217,16 @@ def test_all_of_the_way_is_kept_while_it_explores_and_of_what_comes_later_the_en
     assert not any(isinstance(one, WayForgotten) for some in happened for one in some)
     assert len(pipeline.past.keyframes) == 10
     pipeline.traffic.passed = [Passed(k, np.zeros(2), 0.2) for k in (5, 11)]
+    sights = [Observation(k, 99, Pose(), np.eye(2)) for k in (5, 11)]
+    pipeline.mapper.observations[:] = sights
     for stamp in np.arange(10.0, 14.0).tolist():
         pipeline.errands.drive(STANDSTILL, stamp)
         happened.append(looked(pipeline, stamp, 0.4 * stamp)[1])
     assert WayForgotten(13.0, 10, 3) in happened[-1]
     assert len(pipeline.past.keyframes) == 11
     assert [one.keyframe for one in pipeline.traffic.passed] == [5, 10]
+    assert [seen for seen in pipeline.mapper.observations if seen.vertex == 99] == sights[:1]
+    assert all(seen.keyframe < 11 for seen in pipeline.mapper.observations)
 
 
 def found_again(latest: int) -> tuple[float, int]:
@@ -452,6 +457,7 @@ def test_a_base_that_was_carried_away_before_it_started_anew_stands_and_says_so(
     assert pipeline.errands.is_paused == stands
     assert not remember(pipeline).intent.is_paused  # when it is started anew, it looks
     if stands:
+        assert pipeline.errands.is_lost  # it looks around where it is asked to resume
         assert len(pipeline.past.keyframes) == known  # and spoils no map
         assert (pipeline.tracker.maps.near.points() == walls).all()
 
