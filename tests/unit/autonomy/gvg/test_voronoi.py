@@ -142,6 +142,24 @@ class Drawn:
         return np.ones(points.shape[:-1], bool)
 
 
+def test_behind_what_is_unknown_the_graph_does_not_go_on() -> None:
+    """A corridor ends in the open; discs that are wide enough to lie round a strip are known."""
+
+    class Stripped(Drawn):
+        def known(self, points: Array) -> NDArray[np.bool_]:
+            x, y = points[..., 0], points[..., 1]
+            is_in_strip = (x > 1.6) & (x < 2.0) & (np.abs(y) < 2.0)
+            return np.asarray(~is_in_strip)
+
+    space = Stripped(((-4.0, 1.0), (0.0, 1.0)), ((-4.0, -1.0), (0.0, -1.0)))
+    graph = fine_graph(space, np.array([-2.0, 0.0]), min_clearance=RADIUS, roughness=0.03)
+    steps = graph.points[graph.ridges[:, 0]] - graph.points[graph.ridges[:, 1]]
+    assert np.hypot(*steps.T).max() < 0.3
+    assert 0.2 < graph.points[:, 0].max() < 1.6
+    (lead,) = np.flatnonzero(graph.points[:, 0] == graph.points[:, 0].max())
+    assert graph.lead[lead] == pytest.approx(0.0, abs=0.05)
+
+
 def test_no_place_is_asked_for_twice_to_draw_one_graph() -> None:
     """The ridges of a door's rough posts are asked for first, and then all that lead on."""
 
