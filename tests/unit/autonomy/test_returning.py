@@ -196,6 +196,9 @@ def test_what_was_seen_and_felt_before_and_meanwhile_is_where_it_was_when_the_pl
     seeker.perceive(room)
     last, robot.past.travelled, seeker.past.travelled = robot.past.last, 100.0, 3.0
     assert last is not None
+    vertices = robot.mapper.graph.vertices.values()
+    for vertex in vertices:
+        vertex.seen_at = 99.0
     robot._hazards.add(Pose(2.0, 1.0, 2.0), (0.0,), 0.2, 0.0, lasting=True)
     seeker._hazards.add(Pose(0.5), (0.0,), 0.2, 2.0, lasting=False)
     before = robot.mapper.belief.map_base.compose(last.local_base.inverse())
@@ -213,3 +216,7 @@ def test_what_was_seen_and_felt_before_and_meanwhile_is_where_it_was_when_the_pl
     blind = replace(room, ranges=np.full(len(room.ranges), np.nan))
     robot.tracker.maps.near.insert(blind, found.local_base, robot.past.travelled)
     assert len(robot.tracker.maps.near.points()) == walls > 0
+    # none of them is told by its place in the local frame, which is another one
+    assert {100.0 - vertex.seen_at for vertex in vertices} == {
+        config.autonomy.recognition.tracked_m
+    }

@@ -57,6 +57,16 @@ def test_with_walls_before_every_edge_there_is_no_way() -> None:
     assert way_to_edge(view_of(gvg)) is None
 
 
+@pytest.mark.parametrize("has_turned", [False, True])
+def test_no_straight_way_leads_over_floor_that_nobody_has_seen(*, has_turned: bool) -> None:
+    """Behind a laser that sees three quarters of all directions there may be anything."""
+    looks = [HERE, Pose(HERE.x, HERE.y, np.pi)][: 1 + has_turned]
+    walls = looked(ROOM_AND_CORRIDOR, looks, field_of_view=LASER_270)
+    view = View(0, 0.0, 0.0, HERE, LocalGvg(), walls)
+    assert straight_way(view, np.array([2.0, -1.2]), 0.35) is not None
+    assert (straight_way(view, np.array([-2.0, -1.2]), 0.35) is not None) == has_turned
+
+
 @pytest.mark.parametrize("heading", [1.4, -0.7])
 def test_out_of_a_slot_there_is_a_way_whichever_way_one_looks(heading: float) -> None:
     """One of 43 cm, narrower than an edge may be, whose mouth is a metre away."""
