@@ -110,8 +110,9 @@ class ReturningPipeline(Pipeline):
     def control(self, odometry: Odometry, felt: Felt = _NOTHING_FELT) -> Twist:
         """The twist to drive now."""
         if self._seeker is not None:
-            twist = self._seeker.control(odometry, felt)
-            return STANDSTILL if self.errands.is_resting else twist
+            # else it would take its base, or what is before it, for what keeps it from driving
+            self._seeker.errands.is_paused = self.errands.is_resting
+            return self._seeker.control(odometry, felt)
         twist = super().control(odometry, felt)
         return twist if self._is_back else STANDSTILL
 
@@ -165,6 +166,7 @@ class ReturningPipeline(Pipeline):
 
         If it is carried meanwhile it stands, as ever then, and all it has seen is of elsewhere.
         """
+        seeker.errands.is_paused = False
         seeker.perceive(scan)
         if seeker.errands.is_carried:
             self.errands.pause()

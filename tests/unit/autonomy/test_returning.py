@@ -97,6 +97,34 @@ def test_who_looks_for_its_place_does_so_as_it_is_told_meanwhile() -> None:
         assert mind.mission._config == told
 
 
+def test_who_is_paused_while_it_looks_for_its_place_goes_on_with_that_afterwards() -> None:
+    """It stands because it is told to; nothing is in its way, and its base is in order."""
+    saved, config = MissionFiles(MISSION).read(), load_config()
+    assert saved is not None
+    settings = config.autonomy, config.exploration, config.robot.radius_m
+    robot = ReturningPipeline(*settings, saved.memory, saved.past, lambda: False)
+    world = carved([(-4.0, -1.0, 4.0, 1.0), (0.0, -1.0, 2.0, 4.0)])
+    theta, stamp, twist, scan = 0.0, 0.0, STANDSTILL, sweep(world, Pose(-1.5))
+    while twist.linear == 0.0:
+        twist = robot.control(Odometry(stamp, Pose(theta=theta), STANDSTILL))
+        robot.perceive(replace(scan, stamp=stamp, time_increment=0.0))
+        theta, stamp = theta + 0.1 * twist.angular, stamp + 0.1
+        scan = sweep(world, Pose(-1.5, 0.0, theta))
+    robot.errands.pause()
+    for _ in range(600):
+        stamp += 0.1
+        assert robot.control(Odometry(stamp, Pose(theta=theta), STANDSTILL)) == STANDSTILL
+        assert not robot.perceive(replace(scan, stamp=stamp, time_increment=0.0))
+    robot.errands.resume()
+    assert not robot.perceive(replace(scan, stamp=stamp, time_increment=0.0))
+    twist = robot.control(Odometry(stamp + 0.1, Pose(theta=theta), STANDSTILL))
+    assert twist != STANDSTILL
+    assert not robot.errands.unfit
+    assert robot.is_seeking
+    assert robot._seeker is not None
+    assert not len(robot._seeker._hazards.points)
+
+
 def test_who_has_lost_its_latest_scans_was_not_where_the_older_ones_were_taken() -> None:
     """Nobody carries a robot whose journal is damaged: it is where it was when it was kept last."""
     saved = mission()
