@@ -655,9 +655,14 @@ def test_what_no_known_way_leads_to_any_more_is_gone_back_to_over_the_way_that_w
 
 def test_who_explores_anew_looks_for_ways_also_where_it_has_been() -> None:
     robot = Robot()
+    robot.stand(TEE, 8)
+    graph = robot.mapper.graph
+    robot.mission._obstructions.close(graph, graph.frontiers(), robot.stamp)
     robot.mission._scouting._gone_near.add((1, 2))
     robot.mission._retracing._been.add(1)
     robot.mission.reopen()
+    assert len(graph.frontiers()) == 3
+    assert not robot.mission.is_waiting
     assert not robot.mission._scouting._gone_near
     assert not robot.mission._retracing._been
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from gvgbot.autonomy.config import AutonomyConfig
+from gvgbot.autonomy.control.reflexes import Felt
 from gvgbot.autonomy.ending import Outcome
 from gvgbot.autonomy.estimate import smoothed
 from gvgbot.autonomy.events import Recovery
@@ -20,7 +21,7 @@ from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.config import load_config
 from gvgbot.geometry import STANDSTILL, Pose
-from gvgbot.hal.messages import Odometry
+from gvgbot.hal.messages import Contact, Odometry
 from gvgbot.persistence.mission_files import MissionFiles
 from gvgbot.persistence.mission_state import Saved
 from tests.unit.autonomy.sights import carved, sweep
@@ -83,6 +84,35 @@ def test_a_gyro_that_stood_still_for_an_hour_has_not_drifted_meanwhile() -> None
     assert len(robot.past.keyframes) == 2
     assert robot.map_base.distance(Pose()) < 0.01
     assert robot.map_base.theta == pytest.approx(0.0, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("x", "is_other_building", "is_there"),
+    [(-1.5, False, True), (-1.3, False, True), (-0.7, False, False), (-1.5, True, False)],
+)
+def test_a_base_that_has_counted_on_is_believed_only_if_the_walls_are_as_they_should_be(
+    x: float, *, is_other_building: bool, is_there: bool
+) -> None:
+    """Its wheels tell of no way, but somebody may have lifted it; some slip is no matter."""
+    here = carved([(-4.0, -1.0, 4.0, 1.0), (0.0, -1.0, 2.0, 4.0)])
+    other = carved([(-2.5, -3.0, 0.5, 0.6), (-9.0, -3.0, 0.5, -2.0)])
+    before = Pipeline(*SETTINGS)
+    before.control(Odometry(0.0, Pose(), STANDSTILL))
+    before.perceive(sweep(here, Pose(-1.5)))
+    robot = ReturningPipeline(*SETTINGS, remember(before), growth(before), lambda: True)
+    robot.control(Odometry(1.0, Pose(), STANDSTILL))
+    scan = replace(sweep(other if is_other_building else here, Pose(x)), stamp=1.0)
+    actions = [e.action for e in robot.perceive(scan) if isinstance(e, Recovery)]
+    assert actions == ([] if is_there else ["begin a new map"])
+
+
+def test_who_is_lost_does_not_drive_back_from_what_it_runs_into() -> None:
+    """It does not know what is behind it."""
+    robot = lost()
+    assert not robot.errands.is_resting
+    for k in range(20):
+        odometry = Odometry(0.1 * k, Pose(), STANDSTILL)
+        assert robot.control(odometry, Felt(Contact(0.0, bumper_centre=k == 1))) == STANDSTILL
 
 
 def test_who_looks_for_its_place_does_so_as_it_is_told_meanwhile() -> None:
