@@ -15,13 +15,19 @@ from gvgbot.autonomy.estimate import smoothed
 from gvgbot.autonomy.events import Recovery
 from gvgbot.autonomy.memory import growth, remember
 from gvgbot.autonomy.pipeline import Pipeline
-from gvgbot.autonomy.relocalisation import _STAYED_M, Hypothesis, Opinion
+from gvgbot.autonomy.relocalisation import (
+    _STAYED_M,
+    Hypothesis,
+    Look,
+    Opinion,
+    Relocaliser,
+)
 from gvgbot.autonomy.returning import ReturningPipeline, _given_up
 from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.ekf import Belief
 from gvgbot.config import load_config
 from gvgbot.geometry import STANDSTILL, Pose
-from gvgbot.hal.messages import Contact, Odometry
+from gvgbot.hal.messages import Contact, Odometry, Scan
 from gvgbot.persistence.mission_files import MissionFiles
 from gvgbot.persistence.mission_state import Saved
 from tests.unit.autonomy.sights import carved, sweep
@@ -127,8 +133,8 @@ def test_who_looks_for_its_place_does_so_as_it_is_told_meanwhile() -> None:
         assert mind.mission._config == told
 
 
-def test_who_is_paused_while_it_looks_for_its_place_goes_on_with_that_afterwards() -> None:
-    """It stands because it is told to; nothing is in its way, and its base is in order."""
+def seeking() -> tuple[ReturningPipeline, Scan, float]:
+    """A robot that is about to drive to find its place, its next scan, and its heading, rad."""
     saved, config = MissionFiles(MISSION).read(), load_config()
     assert saved is not None
     settings = config.autonomy, config.exploration, config.robot.radius_m
@@ -140,6 +146,13 @@ def test_who_is_paused_while_it_looks_for_its_place_goes_on_with_that_afterwards
         robot.perceive(replace(scan, stamp=stamp, time_increment=0.0))
         theta, stamp = theta + 0.1 * twist.angular, stamp + 0.1
         scan = sweep(world, Pose(-1.5, 0.0, theta))
+    return robot, replace(scan, stamp=stamp, time_increment=0.0), theta
+
+
+def test_who_is_paused_while_it_looks_for_its_place_goes_on_with_that_afterwards() -> None:
+    """It stands because it is told to; nothing is in its way, and its base is in order."""
+    robot, scan, theta = seeking()
+    stamp = scan.stamp
     robot.errands.pause()
     for _ in range(600):
         stamp += 0.1
@@ -153,6 +166,23 @@ def test_who_is_paused_while_it_looks_for_its_place_goes_on_with_that_afterwards
     assert robot.is_seeking
     assert robot._seeker is not None
     assert not len(robot._seeker._hazards.points)
+
+
+@pytest.mark.parametrize(("sure_looks", "is_found"), [(2, False), (3, True)])
+def test_who_looks_for_its_place_goes_on_until_it_is_sure(
+    sure_looks: int, *, is_found: bool
+) -> None:
+    robot, scan, _ = seeking()
+    opinion = Opinion(Pose(1.0, 0.5, 0.3), 0.999, 1, 9, sure_looks=sure_looks)
+
+    class Certain(Relocaliser):
+        def step(self, look: Look) -> Opinion:
+            return opinion
+
+    robot._relocaliser = Certain([], robot.matching, seen_at=Pose(), is_whole=True)
+    happened = [event.action for event in robot.perceive(scan) if isinstance(event, Recovery)]
+    assert happened == ["go on from its place on the map"] * is_found
+    assert robot.is_seeking != is_found
 
 
 def test_who_has_lost_its_latest_scans_was_not_where_the_older_ones_were_taken() -> None:
