@@ -13,7 +13,15 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
-from gvgbot.geometry import Array, Pose, anchored, direction_of, stations_of, wrap_angle
+from gvgbot.geometry import (
+    Array,
+    Pose,
+    anchored,
+    direction_of,
+    stations_of,
+    wrap_angle,
+    wrap_angles,
+)
 from gvgbot.maps.moved import moved_graph
 from gvgbot.maps.route_graph import RouteEdge, RouteGraph, RouteNode, lines_from
 from gvgbot.registration import assigned
@@ -175,7 +183,8 @@ def _fused(ours: RouteNode, theirs: RouteNode) -> RouteNode:
     position, covariance = covariance_intersection(
         np.array(ours.position), _matrix(ours), np.array(theirs.position), _matrix(theirs)
     )
-    bearings = list(ours.bearings)
+    twice = _seen_twice(ours, theirs)
+    bearings = [b for b in ours.bearings if b not in twice]
     bearings += [b for b in theirs.bearings if not is_among(b, ours.bearings)]
     frontiers = [
         *(f for f in ours.frontiers if not _is_followed(f, theirs)),
@@ -193,6 +202,13 @@ def _fused(ours: RouteNode, theirs: RouteNode) -> RouteNode:
         frontiers=tuple(frontiers),
         visits=ours.visits + theirs.visits,
     )
+
+
+def _seen_twice(ours: RouteNode, theirs: RouteNode) -> set[float]:
+    """Frontiers of which the other robot followed one, where this one saw several from afar."""
+    off = np.abs(wrap_angles(np.subtract.outer(ours.bearings, theirs.bearings)))
+    paired = {ours.bearings[i] for i, _ in assigned(off, _SAME_RAD)}
+    return {f for f in ours.frontiers if f not in paired and _is_followed(f, theirs)}
 
 
 def covariance_intersection(a: Array, of_a: Array, b: Array, of_b: Array) -> tuple[Array, Array]:

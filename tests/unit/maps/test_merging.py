@@ -222,6 +222,21 @@ def test_what_nobody_followed_stays_a_frontier() -> None:
     assert len(whole.edges) == 4
 
 
+@pytest.mark.parametrize("is_first", [True, False])
+def test_what_one_saw_twice_from_afar_is_the_one_departure_by_which_the_other_left(
+    is_first: bool,
+) -> None:
+    known, guessed = seen({0, 1, 2, 4}), seen({0, 1})
+    afar = replace(
+        guessed.vertices[1], degree=3, bearings=(math.pi, 0.4, -0.4), frontiers=(0.4, -0.4)
+    )
+    guessed = replace(guessed, vertices=(guessed.vertices[0], afar))
+    both = merged(*((guessed, known) if is_first else (known, guessed)), Pose())
+    crossing = next(v for v in both.vertices if math.dist(v.position, PLACES[1]) < 0.1)
+    assert crossing.degree == len(crossing.bearings) == 3
+    assert not crossing.frontiers
+
+
 def test_a_vertex_that_one_map_lacks_splits_its_edge() -> None:
     without = RouteGraph(
         tuple(v for v in seen(set(PLACES)).vertices if v.id in (0, 2)),
