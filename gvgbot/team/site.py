@@ -15,7 +15,7 @@ from scipy.spatial.distance import cdist
 from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.geometry import Array, direction_of, length_of, wrap_angle
 from gvgbot.registration import assigned
-from gvgbot.team.chart import Chart, Departure
+from gvgbot.team.chart import Chart, ChartEdge, Departure
 from gvgbot.team.ways import BESIDE_M, WELL_ON_M, Ways, leads_over
 
 _SAME_M = 0.6  # vertices nearer to each other are one
@@ -45,11 +45,27 @@ class Onward:
     metres: float
 
 
+class _Edges:
+    """The edges of a chart, to be found by where they are: there may be hundreds."""
+
+    def __init__(self, chart: Chart) -> None:
+        self._edges = list(chart.edges.values())
+        corners = [(e.polyline.min(axis=0), e.polyline.max(axis=0)) for e in self._edges]
+        low, high = np.array(corners).reshape(-1, 2, 2).transpose(1, 0, 2)
+        self._low, self._high = low - BESIDE_M, high + BESIDE_M
+
+    def about(self, point: Array) -> list[ChartEdge]:
+        """Those that may lie beside a point (2,): no others do."""
+        is_about = ((self._low <= point) & (point <= self._high)).all(axis=1)
+        return [self._edges[i] for i in np.flatnonzero(is_about)]
+
+
 class Site:
     """Charts in one frame, the own one first."""
 
     def __init__(self, charts: list[Chart]) -> None:
         self._charts = charts
+        self._edges = [_Edges(chart) for chart in charts]
         self._place: dict[tuple[int, int], int] = {}  # chart and vertex -> place
         self._members: list[dict[int, int]] = []  # by place: chart -> vertex
         self._points: list[Array] = []
@@ -156,7 +172,7 @@ class Site:
         return bool(drivers) or len(passers) >= len(holders)
 
     def _has_an_edge_over(self, number: int, point: Array) -> bool:
-        edges = self._charts[number].edges.values()
+        edges = self._edges[number].about(point)
         return any(e.traversed and leads_over(e.polyline, point, _AHEAD_M) for e in edges)
 
     def _has_driven_over(self, number: int, point: Array) -> bool:
@@ -166,14 +182,14 @@ class Site:
     def _followed(self, number: int, vertex: int, bearing: float) -> Onward | None:
         """What another chart has behind a departure, or several have together."""
         place = self._place[number, vertex]
-        for other, chart in enumerate(self._charts):
+        for other in range(len(self._charts)):
             if other == number:
                 continue
             known = self._members[place].get(other)
             if known is not None:
                 found = self._behind(other, known, bearing)
             else:
-                found = self._along(other, chart, self._points[place], bearing)
+                found = self._along(other, self._points[place], bearing)
             if found is not None:
                 return found
         if self._ways is None:
@@ -203,9 +219,9 @@ class Site:
         far = edge.b if edge.a == (vertex, nearest.key) else edge.a
         return Onward(self._place[number, far.vertex], edge.length)
 
-    def _along(self, number: int, chart: Chart, point: Array, bearing: float) -> Onward | None:
+    def _along(self, number: int, point: Array, bearing: float) -> Onward | None:
         """Along the edge of a chart that passes a point in a direction."""
-        for edge in chart.edges.values():
+        for edge in self._edges[number].about(point):
             away = np.hypot(*(edge.polyline - point).T)
             i = int(np.argmin(away))
             if away[i] > BESIDE_M:

@@ -1,4 +1,5 @@
 import math
+import time
 from dataclasses import replace
 from itertools import permutations
 
@@ -6,8 +7,9 @@ import networkx as nx
 import numpy as np
 import pytest
 
+from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.geometry import Pose, resampled
-from gvgbot.team.chart import Chart, ChartWay
+from gvgbot.team.chart import Chart, ChartEdge, ChartVertex, ChartWay, Departure
 from gvgbot.team.site import Site
 from tests.unit.team.building import Building, irregular, lattice
 
@@ -187,3 +189,28 @@ def test_what_two_have_seen_is_not_refuted_by_one() -> None:
     )
     site = Site([with_side, with_side, passing])
     assert any(abs(f.bearing - 1.57) < 0.1 for many in site.open.values() for f in many)
+
+
+def crossroads(number: int, x: float, y: float, *departures: Departure) -> ChartVertex:
+    return ChartVertex(number, np.array([x, y]), 0.001 * np.eye(2), 0.8, departures)
+
+
+def test_a_large_building_is_looked_through_while_the_robot_drives() -> None:
+    """At every frontier each edge of all others may matter, and hardly one does."""
+    frontiers, corridors = range(100), range(1500)
+    ours = {i: crossroads(i, 9.0 * i, 0.0, Departure(0, 1.0, None)) for i in frontiers}
+    theirs = {
+        i: crossroads(i, 9.0 * i, 50.0, *(Departure(k, 0.0, i - 1 + k) for k in (0, 1)))
+        for i in range(len(corridors) + 1)
+    }
+    edges = {
+        i: ChartEdge(
+            *(i, HalfEdgeId(i, 1), HalfEdgeId(i + 1, 0), 9.0, 0.8),
+            *(np.linspace((9.0 * i, 50.0), (9.0 * i + 9.0, 50.0), 90), True),
+        )
+        for i in corridors
+    }
+    before = time.process_time()
+    site = Site([Chart(ours), Chart(theirs, edges)])
+    assert time.process_time() - before < 1.0
+    assert len(site.own) == len(frontiers)
