@@ -5,12 +5,14 @@ import secrets
 from collections.abc import Callable
 from typing import Protocol
 
+import numpy as np
 import structlog
 
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.clock import Clock, OffLoop
 from gvgbot.config import RobotConfig
 from gvgbot.errors import GvgbotError
+from gvgbot.registration import assigned
 from gvgbot.team.alignment import Alignment
 from gvgbot.team.chart import Chart, chart_of
 from gvgbot.team.member import Comparison, Member, TeamConfig
@@ -44,6 +46,7 @@ class LiveTeam:
         life = secrets.randbits(31)
         self._lives = {life}  # of robots by this name
         self._complaints: set[tuple[str, str]] = set()  # under which key, and why
+        assigned(np.empty((0, 0)), 0.0)  # loads its solver now, and not while the robot drives
         self.member = member_of(robot, config, pipeline, life)
 
     async def take_part(self, clock: Clock, off_loop: OffLoop) -> None:

@@ -5,6 +5,7 @@ import contextlib
 import json
 import signal
 import subprocess
+import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -95,3 +96,30 @@ def test_daemons_at_a_router_hear_each_other(tmp_path: Path) -> None:
     assert "Traceback" not in log
     assert json.loads((tmp_path / "one" / "summary.json").read_text())["frames"] == {}
     assert json.loads((tmp_path / "one" / "team.geojson").read_text())["features"] is not None
+
+
+def test_a_robot_in_a_team_has_loaded_all_that_it_needs_before_it_drives() -> None:
+    """What robots that meet need first takes a small computer a second, by which it would stand."""
+    code = """
+import sys
+from gvgbot.autonomy.config import AutonomyConfig
+from gvgbot.autonomy.exploration.config import ExplorationConfig
+from gvgbot.autonomy.pipeline import Pipeline
+from gvgbot.config import RobotConfig
+from gvgbot.geometry import Pose
+from gvgbot.live.team import LiveTeam
+from gvgbot.team.chart import moved
+from gvgbot.team.member import TeamConfig
+from gvgbot.team.site import Site
+from tests.unit.team.building import irregular
+
+LiveTeam(RobotConfig(), TeamConfig(), Pipeline(AutonomyConfig(), ExplorationConfig(), 0.2), None)
+before = set(sys.modules)
+chart = irregular(1).chart({0, 1, 5, 6}, Pose())
+Site([chart, moved(chart, Pose(0.1))])
+print(set(sys.modules) - before)
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=40
+    )
+    assert done.stdout == "set()\n"
