@@ -15,7 +15,7 @@ from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.config import RobotConfig
 from gvgbot.live.team import LiveTeam
 from gvgbot.team.member import TeamConfig
-from gvgbot.team.news import Claim, News, decode
+from gvgbot.team.news import Claim, Course, News, decode
 from gvgbot.topics import TeamPart, team_key
 
 CONFIG = TeamConfig(enabled=True)
@@ -110,6 +110,49 @@ def test_who_is_sent_on_a_patrol_claims_no_frontier_that_others_would_wait_for()
 
     run_in_virtual_time(play())
     assert (told[0], told[-1]) == ((claim, False, False), (None, True, False))
+
+
+class Lost(Pipeline):
+    """A mind that may not know where it is."""
+
+    lost = True
+
+    @property
+    def is_lost(self) -> bool:
+        return self.lost
+
+
+def test_who_does_not_know_where_it_is_tells_nobody_a_place() -> None:
+    pipeline = Lost(AutonomyConfig(), ExplorationConfig(), 0.2)
+    air, told = Air(), set[type]()
+
+    async def play() -> None:
+        part = LiveTeam(RobotConfig(name="one"), CONFIG, pipeline, air)
+        async with asyncio.TaskGroup() as tasks:
+            running = [
+                tasks.create_task(part.take_part(LoopClock(), at_once)),
+                tasks.create_task(air.hear_team(lambda _, data: told.add(type(decode(data))))),
+            ]
+            await asyncio.sleep(5.0)
+            assert not told
+            pipeline.lost = False
+            await asyncio.sleep(5.0)
+            for task in running:
+                task.cancel()
+
+    run_in_virtual_time(play())
+    assert told == {News, Course}
+
+
+def test_who_is_heard_and_may_be_anywhere_is_looked_out_for() -> None:
+    """By its size: a body as wide may be that robot."""
+
+    async def scene(_: Air, parts: list[LiveTeam]) -> None:
+        await asyncio.sleep(5.0)
+        for part in parts:
+            assert part._pipeline.traffic.strangers == [RobotConfig().radius_m]
+
+    together(scene)
 
 
 @pytest.mark.parametrize("noise", [b"", b"\xff" * 40, b"\x80", NESTED])
