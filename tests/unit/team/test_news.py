@@ -16,6 +16,7 @@ from gvgbot.team.news import (
     News,
     TeamVertex,
     TeamWay,
+    ToldLook,
     decode,
     encode,
     told_edges,
@@ -231,3 +232,35 @@ def test_a_damaged_course_is_refused(line: bytes) -> None:
     course = Course(robot="one", life=3, sequence=7, pose=(1.0, 2.0, 0.5), line=line)
     with pytest.raises(GvgbotError, match="damaged"):
         decode(encode(course))
+
+
+@pytest.mark.parametrize(
+    ("age", "bodies"),
+    [
+        (-1.0, ((1.0, 2.0, 0.2),)),  # what is yet to be seen
+        (math.nan, ((1.0, 2.0, 0.2),)),
+        (0.1, ((math.nan, 2.0, 0.2),)),
+        (0.1, ((1.0, 2.0, 0.0),)),
+        (0.1, 1001 * ((1.0, 2.0, 0.2),)),
+    ],
+)
+def test_a_look_that_no_robot_can_have_had_is_refused(
+    age: float, bodies: tuple[tuple[float, float, float], ...]
+) -> None:
+    pose = 1.0, 2.0, 0.5
+    look = ToldLook(age, pose, bodies)
+    course = Course(robot="one", life=3, sequence=7, pose=pose, line=b"", look=look)
+    possible = ToldLook(0.1, pose, ((1.0, 2.0, 0.2),))
+    assert decode(encode(msgspec.structs.replace(course, look=possible))) is not None
+    with pytest.raises(GvgbotError, match="damaged"):
+        decode(encode(course))
+
+
+def test_more_vertices_than_a_building_has_are_refused() -> None:
+    """Maps are laid on each other in time that grows with the square of their vertices."""
+    lone = TeamVertex(0, (0.0, 0.0), (1.0, 0.0, 0.0, 1.0), 1.0, (), b"")
+    crowd = tuple(msgspec.structs.replace(lone, id=k) for k in range(1001))
+    told = msgspec.structs.replace(news(CHART), vertices=crowd[:1000], edges=(), ways=())
+    assert decode(encode(told)) == told
+    with pytest.raises(GvgbotError, match="damaged"):
+        decode(encode(msgspec.structs.replace(told, vertices=crowd)))
