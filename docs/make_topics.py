@@ -34,14 +34,17 @@ them. A payload is one MessagePack map from field name to value; the encoding of
 its type and version. Units are SI, angles are in radians.
 
 A `stamp` is of the robot's monotonic clock, the same for all topics, which begins anew when its
-computer is started. The time of day there is zenoh's timestamp of each sample, which replies lack;
-a router puts its own in its place if the robot's clock is more than half a second ahead of it.
+computer is started. The time of day there is zenoh's timestamp of each sample, and of a reply, when
+it was given; a router puts its own in its place if the robot's clock is more than half a second
+ahead of it.
 
 Only the robot writes its topics; the files in `configs/zenoh` see to that. What is sent on change
 is sent again to a subscriber that has lost it (`heartbeat` of an advanced subscriber).
 
 A queryable topic answers a `get` with its newest sample, and in JSON to `KEY?format=json`, where
 raw bytes are in base64. While there is none yet, as of events at first, the reply is an error.
+A router that keeps maps and states ([Several robots on one network](fleet.md)) answers for a robot
+that is away or has only just begun: always in MessagePack, as the encoding of its reply says.
 
 What is kept for latecomers is what an advanced subscriber gets when it
 joins. `gvgbot.client` does all of this for programs in Python.

@@ -241,7 +241,9 @@ class Telemetry:
                 query.reply_err(f"no {topic.name} yet")
                 return
             encode, encoding = _form(topic, query.parameters.get("format"))
-            query.reply(topic.key(self._robot), encode(latest), encoding=encoding)
+            # without a time of its own, it would give way to what a router has in store
+            now = self._session.new_timestamp()
+            query.reply(topic.key(self._robot), encode(latest), encoding=encoding, timestamp=now)
 
     async def hear(self, handle: Handle) -> None:
         """Put requests to the handler as they come, and send its answers, until cancelled.

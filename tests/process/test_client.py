@@ -436,6 +436,39 @@ def test_every_topic_answers_who_asks_for_its_newest_sample(endpoint: str) -> No
     assert state == b"no state yet"
 
 
+def test_the_robot_s_answer_counts_where_a_storage_answers_as_well(endpoint: str) -> None:
+    """One as in `configs/zenoh/router.json5` knows no formats, and what it keeps has a time."""
+    config = TelemetryConfig(listen=(free_endpoint(),), connect=(endpoint,))
+    kept = list[zenoh.Sample]()
+
+    def recall(query: zenoh.Query) -> None:
+        with query:
+            map_ = kept[-1]
+            query.reply(
+                map_.key_expr, map_.payload, encoding=map_.encoding, timestamp=map_.timestamp
+            )
+
+    async def answer(robot: Telemetry, session: zenoh.Session) -> list[zenoh.Reply]:
+        async with asyncio.timeout(PATIENCE), asyncio.TaskGroup() as tasks:
+            answering = tasks.create_task(robot.answer())
+            await asyncio.sleep(0.1)
+            asked = session.get("gvgbot/near/map?format=json", timeout=PATIENCE)
+            got = await asyncio.to_thread(list, asked)
+            answering.cancel()
+        return got
+
+    with router(endpoint) as between:
+        between.declare_subscriber("gvgbot/near/map", kept.append)
+        between.declare_queryable("gvgbot/near/map", recall, complete=True)
+        with Telemetry(config, "near") as robot, plain_session(endpoint) as session:
+            robot.publish(A_MAP)
+            until(lambda: bool(kept))
+            (reply,) = asyncio.run(answer(robot, session))
+    assert reply.ok is not None
+    assert reply.ok.encoding == zenoh.Encoding.APPLICATION_JSON
+    assert msgspec.json.decode(reply.ok.payload.to_bytes(), type=Map) == A_MAP
+
+
 def test_a_sample_tells_the_time_of_day(endpoint: str) -> None:
     with a_robot(endpoint) as robot, plain_session(endpoint) as session:
         heard = session.declare_subscriber("gvgbot/near/state")
