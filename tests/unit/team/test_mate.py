@@ -78,3 +78,8 @@ def test_what_a_lost_robot_has_found_outlasts_a_crowd_of_names(one: Member) -> N
         one.hear(msgspec.structs.replace(TOLD, robot=f"n{number}"), 100.0 + 30.0 * number)
     assert one.is_lost("two")
     assert one.frames == {"two": Pose(3.0)}
+
+
+def test_who_bears_the_own_name_is_not_believed(one: Member) -> None:
+    one.hear(msgspec.structs.replace(TOLD, robot="one", life=5, radius=0.3), 0.1)
+    assert one.strangers() == [0.2]  # of the other one alone
