@@ -217,8 +217,11 @@ class Member:
         if mate is None and not self._has_room():
             return
         if mate is None or mate.news.life != news.life:
-            there = Pose(*news.pose)
-            self._mates[news.robot] = Mate(news, news.chart, stamp, there, there, stamp, stamp)
+            there, before = Pose(*news.pose), mate
+            mate = Mate(news, news.chart, stamp, there, there, stamp, stamp)
+            if before is not None:  # which may be another robot by this name, and still be there
+                mate.tried = before.tried
+            self._mates[news.robot] = mate
         elif news.sequence > mate.news.sequence or self.is_lost(news.robot):
             mate.learn(news, stamp)
         self.auction.renew()

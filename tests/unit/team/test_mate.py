@@ -83,3 +83,12 @@ def test_what_a_lost_robot_has_found_outlasts_a_crowd_of_names(one: Member) -> N
 def test_who_bears_the_own_name_is_not_believed(one: Member) -> None:
     one.hear(msgspec.structs.replace(TOLD, robot="one", life=5, radius=0.3), 0.1)
     assert one.strangers() == [0.2]  # of the other one alone
+
+
+def test_two_by_one_name_cost_no_more_comparisons_than_one(one: Member) -> None:
+    """Each word of either is of another life than the one before; a comparison takes seconds."""
+    compared = 0
+    for number in range(60):
+        one.hear(msgspec.structs.replace(TOLD, life=number % 2, sequence=number), 2.0 * number)
+        compared += len(one.due(2.0 * number))
+    assert 1 <= compared <= 1 + 120.0 / TeamConfig().align_every_s
