@@ -56,9 +56,7 @@ def state(
         reason=_reason(pipeline, away),
         errand=pipeline.errands.progress,
         requests=requests,
-        team=tuple(
-            Mate(name=one.name, pose=_triple(one.pose)) for one in pipeline.traffic.company or ()
-        ),
+        team=tuple(Mate(name=one.name, pose=_triple(one.pose)) for one in pipeline.traffic.present),
         uptime=uptime,
         pose=(map_base.x, map_base.y, map_base.theta),
         covariance=tuple(pose_covariance(pipeline, odometry, noise).ravel().tolist()),

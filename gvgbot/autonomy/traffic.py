@@ -15,7 +15,7 @@ from gvgbot.autonomy.control.edge_follower import Track
 from gvgbot.autonomy.gvg.local_map import LocalMap
 from gvgbot.autonomy.knowledge import Knowledge
 from gvgbot.autonomy.newcomers import Newcomers, NewcomersConfig, is_near
-from gvgbot.autonomy.on_bodies import Disc
+from gvgbot.autonomy.on_bodies import Disc, is_seen_through
 from gvgbot.autonomy.passed import Passed
 from gvgbot.autonomy.views import View
 from gvgbot.geometry import Array, Pose, Twist
@@ -36,6 +36,7 @@ class Traffic:
         self.lasting: list[Array] = []  # where bodies proved to be of the building, map frame
         # other robots as they tell of themselves, map frame; None if there are surely none
         self.company: list[Companion] | None = None
+        self._left: set[str] = set()  # of them, who fell silent and stands there no more
         self.strangers: list[float] = []  # radii of others that may be anywhere, m
         self.seen: BodiesSeen | None = None  # what may be robots of a team, in the last look
 
@@ -47,8 +48,13 @@ class Traffic:
     def is_somebody_about(self, map_base: Pose) -> bool:
         """Whether another robot is near to where this one is, or may be."""
         return bool(self.strangers) or any(
-            one.pose.distance(map_base) < _ABOUT_M for one in self.company or ()
+            one.pose.distance(map_base) < _ABOUT_M for one in self.present
         )
+
+    @property
+    def present(self) -> list[Companion]:
+        """The company without those that were carried away when they had fallen silent."""
+        return [one for one in self.company or () if one.name not in self._left]
 
     @property
     def standing(self) -> list[Array]:
@@ -62,7 +68,7 @@ class Traffic:
 
     def nearby(self, map_in_local: Pose) -> list[Companion]:
         """Other robots, where they say that they are, or are seen close to that; local frame."""
-        return [self._as_seen(company.moved(one, map_in_local)) for one in self.company or ()]
+        return [self._as_seen(company.moved(one, map_in_local)) for one in self.present]
 
     def _as_seen(self, one: Companion) -> Companion:
         """The companion, and what it drives along, where a body is seen close to it.
@@ -98,13 +104,24 @@ class Traffic:
         newcomers.in_team, newcomers.strangers = self.is_in_team, self.strangers
         newcomers.company = _discs(self.nearby(map_in_local), _ELSEWHERE_M)
         newcomers.lasting = map_in_local.transform(np.array(self.lasting).reshape(-1, 2))
+        whole = scan
         scan = newcomers.sift(scan, local_base, walls, partial(known.is_way, local_base))
+        self._note_left(whole, local_base, map_in_local)
         self._note_lasting(map_in_local.inverse())
         missed = [Passed(keyframe, one.centre, one.radius) for one in newcomers.missed]
         self.passed = (self.passed + missed)[-_MOST_PASSED:]
         if self.is_in_team:
             self.seen = self._bodies_seen(scan.stamp, local_base, known.belief.map_base)
         return scan
+
+    def _note_left(self, scan: Scan, local_base: Pose, map_in_local: Pose) -> None:
+        """Find out who stands no more where it fell silent; who is heard again is there again."""
+        silent = {one.name for one in self.company or () if one.is_silent}
+        self._left &= silent
+        for one in self.nearby(map_in_local):
+            disc = one.pose.position, one.radius
+            if one.name in silent and is_seen_through(scan, local_base, disc):
+                self._left.add(one.name)
 
     def _note_lasting(self, map_local: Pose) -> None:
         """Keep in mind what has been let in, as long as it is not seen to be gone."""

@@ -349,8 +349,10 @@ class Member:
             mate = self._mates[name]
             is_fresh = self._stamp - mate.seen <= _FRESH_S
             if is_fresh or mate.stands > 0.0 or mate.news.finished:
-                first, radius = name < self.name, mate.news.radius
-                one = Companion(name, mate.map_base, first, mate.course, radius=radius)
+                first, radius, is_lost = name < self.name, mate.news.radius, self.is_lost(name)
+                one = Companion(
+                    name, mate.map_base, first, mate.course, radius=radius, is_silent=is_lost
+                )
                 found.append(company.moved(one, frames[name]))
         return found
 

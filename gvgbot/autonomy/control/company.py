@@ -32,7 +32,8 @@ _ASIDE_M = 0.5  # beyond the disc of a vertex, another robot can pass it
 class Companion:
     """Another robot: where it is, and what it drives along (N, 2), m; both in one frame.
 
-    `radius` is that of its body, m.
+    `radius` is that of its body, m. Of one that `is_silent` nothing has been heard for long: it had
+    finished there.
     """
 
     name: str
@@ -40,6 +41,7 @@ class Companion:
     goes_first: bool  # by a rule that both know
     course: Array = field(default_factory=lambda: np.empty((0, 2)))
     radius: float = field(kw_only=True)
+    is_silent: bool = field(default=False, kw_only=True)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

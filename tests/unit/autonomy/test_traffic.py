@@ -56,6 +56,26 @@ def test_another_robot_is_where_it_is_seen_and_not_a_little_aside(
     assert (lisa.pose.x, lisa.pose.y) == pytest.approx((2.0, aside))
 
 
+def test_who_fell_silent_and_was_carried_away_is_in_nobody_s_way() -> None:
+    """One that had finished stays where it was, unless somebody sees that it does not."""
+    room, told = Room(), MAP_BASE.compose(Pose(2.0, 0.0, np.pi))
+    heard = Companion("lisa", told, True, radius=RADIUS)
+    silent = replace(heard, is_silent=True)
+    for second, (one, stands, is_there) in enumerate(
+        [
+            (heard, False, True),  # its own word is surer than a look
+            (silent, True, True),
+            (silent, False, False),
+            (heard, True, True),
+            (silent, True, True),
+        ]
+    ):
+        room.traffic.company = [one]
+        room.look(EMPTY, second, column=stands)
+        assert bool(room.traffic.nearby(MAP_BASE.inverse())) == is_there
+        assert room.traffic.is_somebody_about(MAP_BASE) == is_there
+
+
 def test_a_body_that_was_let_in_is_remembered_where_it_is_in_the_map_until_it_has_gone() -> None:
     room = Room()
     for second in range(20):

@@ -399,8 +399,9 @@ def test_who_drives_and_falls_silent_is_not_believed_to_be_there_for_long() -> N
     one.tell(9.0)
     assert len(one.member.company()) == 1
     two.tell(10.0, one, finished=True, at=Pose(1.0, 0.0, 0.0))
+    assert [other.is_silent for other in one.member.company()] == [False]
     one.tell(100.0)
-    assert len(one.member.company()) == 1
+    assert [other.is_silent for other in one.member.company()] == [True]
 
 
 def test_strangers_are_those_whose_map_lies_nobody_knows_where() -> None:
