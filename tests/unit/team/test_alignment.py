@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gvgbot.geometry import Pose, wrap_angle
-from gvgbot.team.alignment import Alignment, align, refined
+from gvgbot.team.alignment import Alignment, _Evidence, align, refined
 from gvgbot.team.likeness import likeness
 from gvgbot.team.side import Side
 from tests.unit.team.building import Building, irregular, lattice
@@ -154,3 +154,32 @@ def test_equal_corridors_without_number_do_not_fill_the_memory() -> None:
     finally:
         tracemalloc.stop()
     assert peak < 12e6
+
+
+@pytest.mark.parametrize(
+    "doubt",
+    [
+        {"pairs": ((0, 0), (1, 1), (2, 2))},
+        {"connected": 2},  # the rest may lie so by chance
+        {"meetpoints": 2},  # dead ends look alike
+        {"against": 2},
+        {"missed": 5},  # vertices where the other robot drove along and saw none
+        {"crossed": 3.0},  # of the metres that robots drove, so many through walls
+    ],
+)
+def test_however_much_speaks_for_a_transform_it_is_not_possible_if_something_is_wrong(
+    doubt: dict[str, object],
+) -> None:
+    good = _Evidence(
+        pose=Pose(),
+        pairs=tuple((i, i) for i in range(10)),
+        partners=10,
+        connected=10,
+        against=0,
+        missed=0,
+        meetpoints=8,
+        judged=100.0,
+        crossed=0.0,
+    )
+    assert good.is_possible
+    assert not replace(good, **doubt).is_possible  # type: ignore[arg-type]
