@@ -91,6 +91,16 @@ def test_an_answer_that_is_older_than_the_last_message_is_not_the_last_word() ->
     assert listener.known() == robot.tiles
 
 
+def test_an_answer_that_is_older_than_what_is_known_takes_nothing_back() -> None:
+    robot, listener = Robot(), Listener()
+    listener.tiles.take(robot.changes(0))
+    old = robot.whole()
+    listener.tiles.take(robot.changes(0))
+    listener.tiles.take_all(old)
+    assert listener.known() == robot.tiles
+    assert listener.asked == 0
+
+
 def test_a_robot_that_begins_anew_has_a_new_grid() -> None:
     robot, listener = Robot(), Listener()
     for column in (0, 1, 2):
