@@ -233,6 +233,31 @@ def test_the_trajectory_that_is_shown_closes_with_the_loop() -> None:
     assert way == pytest.approx(RADIUS_M, abs=2 * TOLERANCE_M)
 
 
+def test_no_floor_is_shown_any_more_where_it_was_before_the_loop_closed() -> None:
+    pipeline, live, reach_m = drive(), LiveMap(began=0.0), 2.0
+    ranges = np.full(180, reach_m)
+    keyframes = [
+        replace(one, scan=Scan(one.stamp, ranges, -math.pi, math.tau / 180, 0.1, 30.0))
+        for one in pipeline.past.keyframes
+    ]
+    farthest = []
+    for stamp, known in enumerate((keyframes[:1], keyframes, keyframes)):
+        pipeline.past.keyframes = known
+        if stamp == 2:
+            live.doubt()
+        draw = live.update(pipeline, float(stamp))
+        assert draw is not None
+        (floor,) = [one.latest for one in draw() if isinstance(one.value, Grid)]
+        assert isinstance(floor, Grid)
+        raster = floor.raster()
+        rows, columns = np.nonzero(raster.cells >= 0)
+        cells = np.column_stack([columns, rows]).astype(np.float64)
+        at: Array = raster.origin + raster.resolution * (cells + 0.5)
+        farthest.append(float(np.abs(from_centre(at) - RADIUS_M).max()))
+    assert farthest[1] > reach_m + 0.8
+    assert farthest[2] < reach_m + 3 * TOLERANCE_M
+
+
 @pytest.mark.parametrize("at", [0, 30, 60])
 @pytest.mark.parametrize("is_corrected", [False, True])
 def test_where_another_has_been_that_made_the_map_is_no_way_driven(
