@@ -118,7 +118,9 @@ async def _send(connection: ServerConnection, viewer: Viewer) -> None:
 
 
 def _why(error: OSError | UnicodeError) -> str:
-    if isinstance(error, socket.gaierror | UnicodeError) or error.errno == errno.EADDRNOTAVAIL:
+    # asyncio says the latter by a number, or without one, as in Python 3.13
+    no_address = errno.EADDRNOTAVAIL, None
+    if isinstance(error, socket.gaierror | UnicodeError) or error.errno in no_address:
         return "this machine has no such address; choose one of its own with --host"
     if error.errno == errno.EADDRINUSE:
         return "the port is taken, perhaps by another gvgbot web; choose another with --port"
