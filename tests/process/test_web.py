@@ -572,36 +572,6 @@ def decoded_by(page: Page, value: object, then: str) -> Any:
     )
 
 
-def test_tiles_are_unpacked_as_fast_as_the_browser_can(page: Page) -> None:
-    """Who opens the page on a large building gets a thousand of them at once."""
-    times = """(async () => {
-      const { Floor } = await import("./floor.js"), many = Array.from({ length: 300 });
-      const cells = new Uint8Array(64 * 64), packing = new Response(cells).body;
-      const packed = new Uint8Array(
-        await new Response(packing.pipeThrough(new CompressionStream("deflate"))).arrayBuffer());
-      const bare = async () => {
-        const stream = new DecompressionStream("deflate"), writer = stream.writable.getWriter();
-        writer.write(packed);
-        writer.close();
-        for (const reader = stream.readable.getReader(); !(await reader.read()).done;);
-      };
-      const floor = new Floor(0.05, 64, { floor: "#ffffff", wall: "#000000" });
-      const taken = () => floor.take({ column: 0, row: 0, cells: packed });
-      const timed = async (work) => {
-        const began = performance.now();
-        await Promise.all(many.map(work));
-        return performance.now() - began;
-      };
-      await timed(bare);
-      return [await timed(bare), await timed(taken), floor.tiles.size];
-    })()"""
-    with web("karl", "--connect", free_endpoint()) as address:
-        desktop(page, address)
-        bare, taken, tiles = page.look(times)
-    assert tiles == 1
-    assert taken < 5 * bare
-
-
 def test_the_page_shows_a_robot_on_its_map_that_can_be_moved_and_zoomed(page: Page) -> None:
     endpoint = free_endpoint()
     with web("--connect", endpoint) as address:

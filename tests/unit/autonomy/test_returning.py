@@ -135,10 +135,7 @@ def test_who_looks_for_its_place_does_so_as_it_is_told_meanwhile() -> None:
 
 def seeking() -> tuple[ReturningPipeline, Scan, float]:
     """A robot that is about to drive to find its place, its next scan, and its heading, rad."""
-    saved, config = MissionFiles(MISSION).read(), load_config()
-    assert saved is not None
-    settings = config.autonomy, config.exploration, config.robot.radius_m
-    robot = ReturningPipeline(*settings, saved.memory, saved.past, lambda: False)
+    robot = lost()
     world = carved([(-4.0, -1.0, 4.0, 1.0), (0.0, -1.0, 2.0, 4.0)])
     theta, stamp, twist, scan = 0.0, 0.0, STANDSTILL, sweep(world, Pose(-1.5))
     while twist.linear == 0.0:
@@ -274,10 +271,7 @@ def test_what_was_seen_and_felt_before_and_meanwhile_is_where_it_was_when_the_pl
     None
 ):
     """Stairs that were felt long ago, 100 m of driving, and a post just before it was found."""
-    saved, config = MissionFiles(MISSION).read(), load_config()
-    assert saved is not None
-    settings = config.autonomy, config.exploration, config.robot.radius_m
-    robot = ReturningPipeline(*settings, saved.memory, saved.past, lambda: False)
+    robot = lost()
     robot._estimate, seeker = smoothed(robot), robot._new_mind()
     room = sweep(carved([(-4.0, -1.0, 6.0, 1.0)]), Pose())
     seeker.control(Odometry(0.0, Pose(), STANDSTILL))
@@ -306,5 +300,5 @@ def test_what_was_seen_and_felt_before_and_meanwhile_is_where_it_was_when_the_pl
     assert len(robot.tracker.maps.near.points()) == walls > 0
     # none of them is told by its place in the local frame, which is another one
     assert {100.0 - vertex.seen_at for vertex in vertices} == {
-        config.autonomy.recognition.tracked_m
+        CONFIG.autonomy.recognition.tracked_m
     }

@@ -1,6 +1,7 @@
 import math
 import tracemalloc
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -168,7 +169,7 @@ def test_equal_corridors_without_number_do_not_fill_the_memory() -> None:
     ],
 )
 def test_however_much_speaks_for_a_transform_it_is_not_possible_if_something_is_wrong(
-    doubt: dict[str, object],
+    doubt: dict[str, Any],
 ) -> None:
     good = _Evidence(
         pose=Pose(),
@@ -182,4 +183,4 @@ def test_however_much_speaks_for_a_transform_it_is_not_possible_if_something_is_
         crossed=0.0,
     )
     assert good.is_possible
-    assert not replace(good, **doubt).is_possible  # type: ignore[arg-type]
+    assert not replace(good, **doubt).is_possible
