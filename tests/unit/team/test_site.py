@@ -1,5 +1,4 @@
 import math
-import time
 from dataclasses import replace
 from itertools import permutations
 
@@ -9,8 +8,9 @@ import pytest
 
 from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.geometry import Pose, resampled
-from gvgbot.team.chart import Chart, ChartEdge, ChartVertex, ChartWay, Departure
-from gvgbot.team.site import Site
+from gvgbot.team.chart import Chart, ChartEdge, ChartWay
+from gvgbot.team.site import Site, _Edges
+from gvgbot.team.ways import BESIDE_M
 from tests.unit.team.building import Building, irregular, lattice
 
 HERE = Pose()
@@ -191,26 +191,20 @@ def test_what_two_have_seen_is_not_refuted_by_one() -> None:
     assert any(abs(f.bearing - 1.57) < 0.1 for many in site.open.values() for f in many)
 
 
-def crossroads(number: int, x: float, y: float, *departures: Departure) -> ChartVertex:
-    return ChartVertex(number, np.array([x, y]), 0.001 * np.eye(2), 0.8, departures)
-
-
-def test_a_large_building_is_looked_through_while_the_robot_drives() -> None:
-    """At every frontier each edge of all others may matter, and hardly one does."""
-    frontiers, corridors = range(100), range(1500)
-    ours = {i: crossroads(i, 9.0 * i, 0.0, Departure(0, 1.0, None)) for i in frontiers}
-    theirs = {
-        i: crossroads(i, 9.0 * i, 50.0, *(Departure(k, 0.0, i - 1 + k) for k in (0, 1)))
-        for i in range(len(corridors) + 1)
-    }
+@pytest.mark.parametrize("y", [0.0, 49.0, 49.7, 50.0, 50.7])
+def test_of_a_large_building_only_the_edges_beside_a_place_are_looked_at(y: float) -> None:
+    """A street of 1,500 corridors along y = 50: three at most come near a place on it."""
     edges = {
         i: ChartEdge(
             *(i, HalfEdgeId(i, 1), HalfEdgeId(i + 1, 0), 9.0, 0.8),
             *(np.linspace((9.0 * i, 50.0), (9.0 * i + 9.0, 50.0), 90), True),
         )
-        for i in corridors
+        for i in range(1500)
     }
-    before = time.process_time()
-    site = Site([Chart(ours), Chart(theirs, edges)])
-    assert time.process_time() - before < 1.0
-    assert len(site.own) == len(frontiers)
+    about = _Edges(Chart({}, edges)).about
+    for x in np.linspace(0.0, 90.0, 61):
+        found = {edge.a.vertex for edge in about(np.array([x, y]))}
+        is_beside = abs(y - 50.0) <= BESIDE_M
+        beside = {i for i in range(11) if 9.0 * i <= x <= 9.0 * (i + 1)} if is_beside else set()
+        assert beside <= found
+        assert len(found) <= 3 * is_beside
