@@ -70,28 +70,39 @@ class Evidence:
     ) -> None:
         self._known, self._unbelieved = known, unbelieved
         self._config, self._recognition = config, recognition
+        self._same_bearing = math.radians(recognition.bearing_deg)
 
     # -- departures --------------------------------------------------------------------------
 
     def pair_departures(
-        self, view: View, node: LocalNode, vertex: Vertex, known: Correspondence
+        self,
+        view: View,
+        node: LocalNode,
+        vertex: Vertex,
+        known: Correspondence,
+        *,
+        is_mark: bool = False,
     ) -> tuple[list[Branch], tuple[float, ...], dict[int, int]]:
         """Note which branches of a node are which half-edges of its vertex.
 
         The branches, weak ones last; their bearings, rad, local frame; and by index of the branch
-        the key of its half-edge.
+        the key of its half-edge. At a mark that two ways leave they are the two of its vertex,
+        however they turn: it may have been put beyond a bend.
         """
         branches = sorted(node.branches, key=lambda branch: branch in node.weak)
         bearings = tuple(view.gvg.bearing(b, node.clearance) for b in branches)
-        matched = self._matched(bearings, vertex, vertex.local.theta)
+        limit = math.pi if is_mark and len(branches) == vertex.degree == 2 else self._same_bearing
+        matched = self._matched(bearings, vertex, vertex.local.theta, limit)
         for i, key in matched.items():
             known.pair_branch(branches[i], HalfEdgeId(vertex.id, key))
         return branches, bearings, matched
 
-    def _matched(self, bearings: tuple[float, ...], vertex: Vertex, theta: float) -> dict[int, int]:
+    def _matched(
+        self, bearings: tuple[float, ...], vertex: Vertex, theta: float, limit: float
+    ) -> dict[int, int]:
         """By index of a bearing, rad, the key of the half-edge of a vertex turned by theta, rad."""
         turned = {key: half.bearing + theta for key, half in vertex.half_edges.items()}
-        return match_bearings(bearings, turned, math.radians(self._recognition.bearing_deg))
+        return match_bearings(bearings, turned, limit)
 
     def weigh_departures(
         self, view: View, node: LocalNode, vertex: Vertex, known: Correspondence
@@ -258,7 +269,7 @@ class Evidence:
             return []
         gvg, node = view.gvg.divided(place)
         bearings = tuple(gvg.bearing(b, vertex.clearance) for b in gvg.nodes[node].branches)
-        matched = self._matched(bearings, vertex, pose.theta)
+        matched = self._matched(bearings, vertex, pose.theta, self._same_bearing)
         return [HalfEdgeId(vertex.id, key) for key in matched.values()]
 
     def is_well_known(self, vertex: Vertex) -> bool:

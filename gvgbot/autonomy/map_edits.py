@@ -196,7 +196,7 @@ class MapEdits(Knowledge):
         """
         here = view.local_base.position
         line = np.concatenate([here[None], line, here[None]])
-        ways = (line[[at]] - here for at in (len(line) // 8, -len(line) // 8))
+        ways = (line - here, line[::-1] - here)
         vertex = self.add_driven(view, here, *map(direction, ways))
         a, b = vertex.ends
         self.join(view, a, b, line, min_clearance, driven=True)

@@ -108,7 +108,8 @@ class Mapper(MapEdits):
             present = self.graph.vertices.get(self.unsettled.names.vertex(marked.id))
             if present is not None and present.id not in known.node_of:
                 known.pair(node, present.id)
-                self._evidence.pair_departures(view, view.gvg.nodes[node], present, known)
+                there = view.gvg.nodes[node]
+                self._evidence.pair_departures(view, there, present, known, is_mark=True)
         for vertex, reason in self._evidence.refuted(view, known):
             self._refute(view, vertex, reason)
         self._join(view, known)

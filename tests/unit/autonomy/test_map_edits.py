@@ -14,7 +14,7 @@ from gvgbot.autonomy.recogniser import Recognition
 from gvgbot.autonomy.slam.graph import Edge, HalfEdgeId
 from gvgbot.autonomy.slam.recognition import RecognitionConfig
 from gvgbot.autonomy.views import Observation, View
-from gvgbot.geometry import Array, Pose
+from gvgbot.geometry import Array, Pose, resampled
 from tests.unit.autonomy.sights import carved, sweep
 
 
@@ -106,6 +106,16 @@ def test_the_vertex_of_a_ring_has_the_room_that_is_around_it(edits: MapEdits, vi
     assert vertex.clearance == pytest.approx(1.5, abs=0.03)
     (edge,) = edits.graph.edges.values()
     assert edge.min_clearance == 1.0
+
+
+def test_the_ways_round_a_ring_set_out_as_they_are_seen_from_its_vertex(
+    edits: MapEdits, view: View
+) -> None:
+    """Two metres before a corner of a ring of 80 m: the one way is not that round the corner."""
+    corners = [(0.0, 0.0), (2.0, 0.0), (2.0, 20.0), (-18.0, 20.0), (-18.0, 0.0), (0.0, 0.0)]
+    edits.close_ring(view, resampled(np.array(corners), 0.5), 1.0)
+    (vertex,) = edits.graph.vertices.values()
+    assert sorted(vertex.bearings(vertex.local.theta)) == pytest.approx([0.0, math.pi])
 
 
 @pytest.mark.parametrize("is_end", [False, True])

@@ -1006,6 +1006,23 @@ def test_a_meetpoint_at_a_door_that_a_virtual_wall_shuts_is_where_it_was() -> No
     assert seen.mapper.marked(TEE, NEAR) == (TEE, {})  # where the wall does not hide it
 
 
+def test_the_ways_from_a_ring_s_vertex_are_known_where_it_is_taken_to_be_at_a_corner() -> None:
+    """It was put onto the ring before the corner, whose one way is straight on there."""
+    seen = Seen()
+    ring = Vertex(seen.mapper.graph.next_id(), 1.0, Pose(3.0), 0.0, 0.0)
+    seen.mapper.graph.vertices[ring.id] = ring
+    seen.mapper.belief = ekf.add_vertex(seen.mapper.belief, ring.id, ring.local, 1e-4 * np.eye(3))
+    on, back = (HalfEdgeId(ring.id, ring.add_half_edge(bearing)) for bearing in (0.0, math.pi))
+    seen.mapper.graph.join(
+        on, back, np.array([[0.0, 0.0], [9.0, 9.0], [0.0, 0.0]]), 1.0, driven=True
+    )
+    gvg = drawn({1: (-3.0, 0.0), 2: (3.0, 0.0), 3: (3.0, 4.0)}, {10: (1, 2, []), 11: (2, 3, [])})
+    view = View(1, 1.0, 0.1, Pose(), gvg, NOTHING_SEEN, marks={2: ring})
+    known, _ = seen.mapper.observe(view)
+    assert known.branch_of[back].edge == 10
+    assert known.branch_of[on].edge == 11
+
+
 def test_a_meetpoint_that_a_virtual_wall_moves_along_is_there_once() -> None:
     tight = drawn(TEE_POINTS, TEE_LINES, clearance=0.5, unseen=UNSEEN)
     moved = drawn(
