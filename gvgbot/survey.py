@@ -20,6 +20,7 @@ from gvgbot.maps.spots import spots
 from gvgbot.maps.viewpoints import floor_beside, viewpoints
 
 _INTO_M = 2.0  # off its ways: through a door, and the robot faces what it looks at
+_NEARER = 0.75  # of the clearance in the open: a coast is seen from so near
 _TOWARDS_M = 1.0  # what seems to be a passage may be a pane of glass
 _BODY_M = 0.45  # from the middle of somebody to where beams end on him
 _STEP_M = 0.05  # between points of a way: a cell of the grid
@@ -56,7 +57,8 @@ def survey(pipeline: Pipeline) -> Surveyed:
     through = passages(grid, ways, here, room, pipeline.sight.open_clearance)
     off = np.repeat([_INTO_M, _TOWARDS_M], [len(found), len(through)])
     places = np.concatenate([found, through])
-    views = viewpoints(grid, beside, places, here, room, off)
+    within = _NEARER * pipeline.sight.open_clearance
+    views = viewpoints(grid, beside, places, here, room, off, within)
     if views is None:
         return Surveyed(found, narrow, is_beside_floor=len(found) > 0)
     return Surveyed(

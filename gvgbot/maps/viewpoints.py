@@ -22,12 +22,14 @@ def viewpoints(
     around: Array,
     passage_m: float,
     off_m: Array,
+    within_m: float = np.inf,
 ) -> Array | None:
     """Where to go (M, 2), m, map frame, for a look at places (N, 2) to which the floor leads.
 
     That is on the shortest path over the floor from the nearest way (points (K, 2), a cell or less
-    apart) to the place, `off_m` (N,) off that way at most. The robot is at `around` (2,) and keeps
-    `passage_m` from walls. None if no way is so far from them, anywhere.
+    apart) to the place, `off_m` (N,) off that way at most, or farther, to within `within_m` of the
+    place. The robot is at `around` (2,) and keeps `passage_m` from walls. None if no way is so far
+    from them, anywhere.
     """
     cell, corner = grid.resolution_m, np.array(grid.origin)
     has_room, floor = _room(grid, around, passage_m)
@@ -37,8 +39,8 @@ def viewpoints(
     floor, near_ways = np.pad(floor, 1), np.pad(near_ways, 1)  # every cell has four neighbours
     found = []
     cells = ((places - corner)[:, ::-1] / cell).astype(np.int64) + 1
-    for place, off in zip(cells, np.rint(off_m / cell).astype(int).tolist(), strict=True):
-        view = _on_the_way_there(place, floor, near_ways, off)
+    for place, off in zip(cells, (off_m / cell).tolist(), strict=True):
+        view = _on_the_way_there(place, floor, near_ways, off, within_m / cell)
         if view is not None:
             found.append(view - 1)
     views: Array = corner + (np.array(found).reshape(-1, 2)[:, ::-1] + 0.5) * cell
@@ -81,8 +83,10 @@ def marked(ways: Array, grid: OccupancyGrid) -> Mask:
     return marked
 
 
-def _on_the_way_there(place: Cell, floor: Mask, near_ways: Mask, off: int) -> Cell | None:
-    """The (row, column) at most so many cells off the nearest way, on the path to a place."""
+def _on_the_way_there(
+    place: Cell, floor: Mask, near_ways: Mask, off: float, within: float
+) -> Cell | None:
+    """The (row, column) on the path to a place that is so far off the nearest way, in cells."""
     width, is_floor_at, is_near = floor.shape[1], floor.ravel(), near_ways.ravel()
     beside = np.array([1, width, -1, -width])
     steps = np.full(floor.size, -1, np.int32)
@@ -95,7 +99,7 @@ def _on_the_way_there(place: Cell, floor: Mask, near_ways: Mask, off: int) -> Ce
         around = np.unique(front[:, None] + beside)
         front, count = around[is_floor_at[around] & (steps[around] < 0)], count + 1
     here = front[is_near[front]][0]
-    for _ in range(min(off, count)):
+    for _ in range(min(round(max(off, count - within)), count)):
         count -= 1
         here = next(there for there in here + beside if steps[there] == count)
     return np.array(np.divmod(here, width))

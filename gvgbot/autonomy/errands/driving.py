@@ -34,6 +34,7 @@ from gvgbot.autonomy.views import Correspondence, View
 from gvgbot.geometry import Array, Pose, length_of, wrap_angle
 
 DIRECT_M = 4.0  # off a point, one drives there straight, or with one bend
+_ACROSS_M, _OPEN_M = 8.0, 1.0  # as far from where the edges end, with so much room on both sides
 _THERE_M = 0.15  # from a destination, one has arrived
 _PAST_M = 0.5  # from a stop at which one does not stop
 _ALMOST_M = 0.6  # as well, where one cannot come nearer
@@ -260,14 +261,12 @@ class Driving:
         away = float(np.hypot(*(local_goal - view.local_base.position)))
         if away < _THERE_M:
             return Ended("arrived", "")
-        way, room_m = None, self._ground.room_m
-        if away < DIRECT_M:
-            way = straight_way(view, local_goal, room_m) or bent_way(view, local_goal, room_m)
+        foot = foot_of(self._mapper, goal)
+        way = self._straight_to(view, local_goal, away, foot)
         if way is not None and length_of(way[0]) < self._straight_m and not self._stands(view):
             self._route, track = None, Track.of(*way)
             self._come_nearer(view, track.length, straight=True)
             return Drive(track)
-        foot = foot_of(self._mapper, goal)
         if foot is None:
             if self._looks < _LOOKS:  # the way may only be out of sight
                 return self._look_around(view)
@@ -285,6 +284,17 @@ class Driving:
             return self._find_edge(view)
         route = route_to_foot(here, here.starts(self._closed), foot, self._closed)
         return self._drive(view, here, route, at_foot)
+
+    def _straight_to(
+        self, view: View, local_goal: Array, away: float, foot: Foot | None
+    ) -> tuple[Array, Array] | None:
+        """The way without the edges to a point (2,) so many metres off, if there is one."""
+        if away < DIRECT_M:
+            room_m = self._ground.room_m
+            return straight_way(view, local_goal, room_m) or bent_way(view, local_goal, room_m)
+        if foot is None or away > min(foot.away + _ALMOST_M, _ACROSS_M):
+            return None
+        return straight_way(view, local_goal, _OPEN_M)
 
     # -- on the way --------------------------------------------------------------------------------
 

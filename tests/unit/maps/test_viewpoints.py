@@ -64,6 +64,20 @@ def test_however_far_off_the_nearest_way_is_the_robot_goes_from_there(
     assert 1.7 < side * (ways[0, 0] - view[0]) < 2.3  # from the way towards the place
 
 
+@pytest.mark.parametrize(("within", "gone"), [(1.0, 7.0), (3.0, 5.0), (7.0, 2.0)])
+def test_so_far_from_all_ways_the_robot_goes_as_near_as_what_is_there_can_be_seen(
+    within: float, gone: float
+) -> None:
+    """To the middle of a hall, eight metres from the way."""
+    hall = drawn("#" * 30, "#" + "." * 28 + "#", "#" * 30)
+    place, ways = np.array([[14.05, -0.45]]), np.array([[6.05, -0.45]])
+    here, off = np.array([14.0, -0.5]), np.array([OFF_M])
+    views = viewpoints(hall, ways, place, here, 0.25, off, within)
+    assert views is not None
+    ((x, _),) = views
+    assert x - ways[0, 0] == pytest.approx(gone, abs=0.3)
+
+
 def test_where_no_floor_leads_there_is_no_viewpoint() -> None:
     assert len(found((1.5, 1.5))) == 0  # in the wall
     assert len(found()) == 0

@@ -17,7 +17,7 @@ from gvgbot.autonomy.slam.graph import HalfEdgeId, Vertex
 from gvgbot.geometry import Pose, Twist, wrap_angle
 from tests.unit.autonomy.errands.test_own_tasks import Explorer
 from tests.unit.autonomy.local_graphs import drawn
-from tests.unit.autonomy.sights import carved, looked
+from tests.unit.autonomy.sights import Rectangle, carved, looked
 from tests.unit.autonomy.test_mission import CLOSED, CONFIG, TEE
 
 
@@ -188,10 +188,10 @@ def test_who_lifts_a_robot_that_stands_by_wants_it_somewhere_else(outcome: Outco
     assert robot.errands.is_waiting == (outcome == "explored")
 
 
-def in_a_hall() -> Explorer:
+def in_a_hall(width: float = 4.0, walls: Iterable[Rectangle] = ()) -> Explorer:
     """A robot at one end of an edge of 5 m that has a wide space on its left."""
     robot = Explorer()
-    robot.walls = looked(carved([(-2.0, -2.0, 5.0, 4.0)]), [Pose()])
+    robot.walls = looked(carved([(-2.0, -2.0, 5.0, width)], walls), [Pose()])
     robot.pose = Pose(-1.0, 0.0)
     robot.mapper.move(robot.pose, np.zeros((3, 3)))
     while not robot.mapper.graph.edges:
@@ -220,6 +220,29 @@ def test_a_slow_robot_leaves_its_edge_for_a_point_far_beside_it() -> None:
     assert ended.outcome == "arrived", ended.reason
     assert math.dist((robot.pose.x, robot.pose.y), goal) < 0.2
     assert robot.travelled < math.hypot(4.0, 2.4) + 0.5
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "goes"), [(-1.0, 5.0, True), (0.5, 5.0, False), (-1.0, 8.5, False)]
+)
+def test_across_an_open_hall_it_drives_straight_to_what_it_goes_to_see(
+    x: float, y: float, *, goes: bool
+) -> None:
+    """From where its edge is nearest to that; not beside a post, nor beyond all measure."""
+    robot = in_a_hall(10.0, [(1.2, 2.5, 1.4, 2.7)])
+    robot.mission.survey = None
+    robot.errands.recall(Kept("point", x=x, y=y))
+    robot.drive(CLOSED, (-1.0, 0.0), (x, 0.0))
+    order = robot.look(CLOSED)
+    if not goes:
+        (ended,) = robot.said(ErrandEnded)
+        assert "the way is not free" in str(ended)
+        return
+    assert isinstance(order, Drive)
+    assert order.track.polyline[-1] == pytest.approx((x, y))
+    halfway = creep(robot, order.track)
+    assert isinstance(halfway, Drive)
+    assert halfway.track.polyline[-1] == pytest.approx((x, y))
 
 
 def test_who_stands_on_a_point_has_as_long_to_go_as_in_any_other_way() -> None:
