@@ -74,7 +74,8 @@ pages: .venv/dev
 clean:
 	rm -rf .venv site .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 
-# The stamps: what is installed for running, and for developing. A changed pyproject.toml renews them.
+# The stamps: what is installed for running, and for developing. A changed pyproject.toml renews them. For developing, what is
+# never imported need not be compiled: that is a third of the time.
 .venv/core: pyproject.toml
 	@$(call make_venv)
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[tui,web,record]'
@@ -82,15 +83,15 @@ clean:
 
 .venv/dev: pyproject.toml
 	@$(call make_venv)
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile --editable '.[dev]'
 	@touch .venv/core $@
 
 .venv/fuzz: .venv/dev
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[fuzz]'
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile --editable '.[fuzz]'
 	@touch $@
 
 .venv/docs: .venv/dev
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile --editable '.[docs]'
 	@touch $@
 
 define make_venv
