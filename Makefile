@@ -2,6 +2,8 @@
 PYTHON ?= python3
 BIN := .venv/bin
 SHELL := /bin/sh
+# What is compiled is kept, whatever the environment says: the tests start some hundred programs.
+export PYTHONDONTWRITEBYTECODE :=
 
 .PHONY: help explore test check static quick bench bench-explore reliability figures keep fuzz docs pages clean
 
@@ -21,10 +23,9 @@ explore: .venv/core
 	@$(BIN)/gvgbot explore $(ARGS)
 
 # A file's tests stay together, since they share what is slow to make. Those of whole processes wait a lot: one worker
-# more than there are cores. The files are taken as they are listed, so that the last ones are short. What is compiled
-# is kept, whatever the environment says: some hundred programs are started.
+# more than there are cores. The files are taken as they are listed, so that the last ones are short.
 test: .venv/dev
-	@PYTHONDONTWRITEBYTECODE= $(BIN)/pytest --numprocesses $$(($$(getconf _NPROCESSORS_ONLN) + 1)) --dist loadfile --no-loadscope-reorder $(ARGS)
+	@$(BIN)/pytest --numprocesses $$(($$(getconf _NPROCESSORS_ONLN) + 1)) --dist loadfile --no-loadscope-reorder $(ARGS)
 
 quick: .venv/dev
 	@$(BIN)/pytest -m "not slow and not hardware and not bench" $(ARGS)
