@@ -9,6 +9,7 @@ import subprocess
 import sys
 import tty
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from queue import Queue
 from threading import Event
@@ -18,7 +19,7 @@ import msgspec
 import pytest
 import zenoh
 
-from benchmarks.rigs.addresses import plain_session
+from benchmarks.rigs.addresses import free_endpoint, plain_session
 from benchmarks.rigs.programs import gvgbot, until
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(60)]
@@ -58,9 +59,9 @@ def until_kept(state: Path) -> None:
     until(lambda: bool(list(state.glob("runs/*/snapshot.gvg"))), patience_s=PATIENCE)
 
 
-def until_joined(events: Path, edges: int, process: "subprocess.Popen[str]") -> None:
-    """Wait until an exploration has found so many edges."""
-    while not (events.exists() and events.read_text().count("edge_joined") >= edges):
+def until_found(events: Path, vertices: int, process: "subprocess.Popen[str]") -> None:
+    """Wait until an exploration has found so many vertices: the comb has the first nearby."""
+    while not (events.exists() and events.read_text().count("vertex_added") >= vertices):
         assert process.poll() is None
         select.select([], [], [], 0.1)
 
@@ -72,44 +73,88 @@ def ask(session: zenoh.Session, selector: str) -> tuple[str, bytes]:
     return str(reply.ok.encoding), reply.ok.payload.to_bytes()
 
 
-def test_a_running_robot_is_watched_asked_and_stopped(endpoint: str, tmp_path: Path) -> None:
-    out = tmp_path / "run"
-    arguments = ["--out", str(out), "--set", f"telemetry.listen=[{endpoint}]"]
+@dataclass(frozen=True)
+class Life:
+    """What a robot did that was watched, asked and stopped, and what came of a second one."""
+
+    status: int
+    log: str
+    out: Path
+    encoding: str
+    states: list[dict[str, Any]]
+    tokens: list[zenoh.Reply]
+    as_json: tuple[str, bytes]
+    as_msgpack: tuple[str, bytes]
+    second: tuple[int, str]
+    goes_on: bool  # the first one, when there was a second one
+
+
+@pytest.fixture(scope="module")
+def life(tmp_path_factory: pytest.TempPathFactory) -> Life:
+    endpoint, where = free_endpoint(), tmp_path_factory.mktemp("life")
+    (where / "robot.yaml").write_text("")
+    settings = [f"--set=service.state_dir={where / 'state'}", "--set=robot.name=sim"]
     with (
-        gvgbot("run", *arguments, cwd=tmp_path) as process,
+        gvgbot(
+            "run", "robot.yaml", *settings, f"--set=telemetry.listen=[{endpoint}]", cwd=where
+        ) as process,
         plain_session(endpoint, patience_s=PATIENCE) as session,
     ):
         samples: Queue[zenoh.Sample] = Queue()
         with session.declare_subscriber("gvgbot/*/state", samples.put):
             encoding, states = until_driving(samples)
-            token = list(session.liveliness().get("gvgbot/*/alive"))
-            as_json, as_msgpack = (
-                ask(session, "gvgbot/sim/state?format=json"),
-                ask(session, "gvgbot/sim/state"),
-            )
+            tokens = list(session.liveliness().get("gvgbot/*/alive"))
+            as_json = ask(session, "gvgbot/sim/state?format=json")
+            as_msgpack = ask(session, "gvgbot/sim/state")
+        until_kept(where / "state")
+        with gvgbot("run", *settings, "--set=telemetry.enabled=false", cwd=where) as second:
+            said, _ = second.communicate(timeout=PATIENCE)
+        goes_on = process.poll() is None
         process.send_signal(signal.SIGINT)
         process.send_signal(signal.SIGINT)  # as impatient people do
         log, _ = process.communicate(timeout=PATIENCE)
-    assert process.returncode == 0, log
-    assert encoding == as_msgpack[0] == "application/msgpack;gvgbot.State.v1"
-    numbers = [state["sequence"] for state in states]
+    (out,) = (where / "state" / "runs").iterdir()
+    return Life(
+        status=process.returncode,
+        log=log,
+        out=out,
+        encoding=encoding,
+        states=states,
+        tokens=tokens,
+        as_json=as_json,
+        as_msgpack=as_msgpack,
+        second=(second.returncode, said),
+        goes_on=goes_on,
+    )
+
+
+def test_a_running_robot_is_watched_asked_and_stopped(life: Life) -> None:
+    assert life.status == 0, life.log
+    assert life.encoding == life.as_msgpack[0] == "application/msgpack;gvgbot.State.v1"
+    numbers = [state["sequence"] for state in life.states]
     assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
-    assert [str(reply.ok.key_expr) for reply in token if reply.ok] == ["gvgbot/sim/alive"]
-    assert as_json[0] == "application/json"
-    assert json.loads(as_json[1])["sequence"] >= numbers[-1]
-    assert msgspec.msgpack.decode(as_msgpack[1])["phase"] == "exploring"
-    assert {path.name for path in out.iterdir()} >= RUN
-    assert json.loads((out / "summary.json").read_text())["outcome"] == "stopped"
-    assert "signal=SIGINT" in log
-    assert "Traceback" not in log
+    tokens = [str(reply.ok.key_expr) for reply in life.tokens if reply.ok]
+    assert tokens == ["gvgbot/sim/alive"]
+    assert life.as_json[0] == "application/json"
+    assert json.loads(life.as_json[1])["sequence"] >= numbers[-1]
+    assert msgspec.msgpack.decode(life.as_msgpack[1])["phase"] == "exploring"
+    assert {path.name for path in life.out.iterdir()} >= RUN
+    assert json.loads((life.out / "summary.json").read_text())["outcome"] == "stopped"
+    assert "signal=SIGINT" in life.log
+    assert "Traceback" not in life.log
 
 
-def test_a_configuration_that_was_cut_short_is_said_to_tell_of_no_devices(tmp_path: Path) -> None:
+def test_a_mission_that_another_program_goes_on_with_is_left_to_it(life: Life) -> None:
+    status, said = life.second
+    assert (status, life.goes_on) == (2, True)
+    assert said.startswith("gvgbot: ")
+    assert "in use" in said
+    assert len(said.splitlines()) == 1
+
+
+def test_a_configuration_that_was_cut_short_is_said_to_tell_of_no_devices(life: Life) -> None:
     """After a power cut, say. A robot that stands is a riddle to who does not know of the twins."""
-    (tmp_path / "robot.yaml").write_text("")
-    with gvgbot("run", "robot.yaml", "--set", "telemetry.enabled=false", cwd=tmp_path) as process:
-        assert process.stdout is not None
-        line = next(line for line in process.stdout if "simulated" in line)
+    line = next(line for line in life.log.splitlines() if "simulated" in line)
     assert "warning" in line
     assert "robot.yaml has no section twin" in line
     assert "enabled: false" in line
@@ -117,8 +162,8 @@ def test_a_configuration_that_was_cut_short_is_said_to_tell_of_no_devices(tmp_pa
 
 def test_a_simulated_exploration_whose_terminal_is_closed_leaves_its_map(tmp_path: Path) -> None:
     events = tmp_path / "run" / "events.jsonl"
-    with gvgbot("explore", "--world", "narrow", "--out", "run", cwd=tmp_path) as process:
-        until_joined(events, 1, process)
+    with gvgbot("explore", "--world", "comb", "--out", "run", cwd=tmp_path) as process:
+        until_found(events, 1, process)
         process.send_signal(signal.SIGHUP)
         log, _ = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130
@@ -132,8 +177,8 @@ def test_an_exploration_that_is_stopped_twice_ends_as_after_once(
 ) -> None:
     """As people press Ctrl-C again who see that something goes on."""
     events = tmp_path / "run" / "events.jsonl"
-    with gvgbot("explore", "--world", "narrow", "--out", "run", cwd=tmp_path) as process:
-        until_joined(events, 1, process)
+    with gvgbot("explore", "--world", "comb", "--out", "run", cwd=tmp_path) as process:
+        until_found(events, 1, process)
         process.send_signal(signal.SIGINT)
         Event().wait(pause_s)
         process.send_signal(signal.SIGINT)
@@ -148,11 +193,11 @@ def test_an_exploration_that_a_script_left_in_the_background_is_stopped_as_any(
     """There `&` has Ctrl-C ignored, and that it stays. Of several robots, as of one above."""
     events = tmp_path / "run" / "robot-1" / "events.jsonl"
     deaf = ["sh", "-c", 'trap "" INT; exec "$0" "$@"', sys.executable]
-    arguments = ["explore", "--world", "narrow", "--out", "run", "--robots", "2"]
+    arguments = ["explore", "--world", "comb", "--out", "run", "--robots", "2"]
     with gvgbot(*arguments, cwd=tmp_path, python=deaf) as process:
-        until_joined(events, 1, process)
+        until_found(events, 1, process)
         process.send_signal(signal.SIGINT)
-        until_joined(events, 2, process)
+        until_found(events, 2, process)
         process.send_signal(signal.SIGTERM)
         log, _ = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130
@@ -221,20 +266,6 @@ def test_an_address_in_use_is_one_line_and_leaves_nothing(endpoint: str, tmp_pat
     assert "in use" in line
     assert f"--set 'telemetry.listen=[tcp/{host}:{int(port) + 1}]'" in line
     assert not list(tmp_path.iterdir())
-
-
-def test_a_mission_that_another_program_goes_on_with_is_left_to_it(tmp_path: Path) -> None:
-    state = f"service.state_dir={tmp_path / 'state'}"
-    arguments = ["run", "--set", state, "--set", "telemetry.enabled=false"]
-    with gvgbot(*arguments, cwd=tmp_path) as first:
-        until_kept(tmp_path / "state")
-        with gvgbot(*arguments, cwd=tmp_path) as second:
-            said, _ = second.communicate(timeout=PATIENCE)
-        assert first.poll() is None
-    assert second.returncode == 2
-    assert said.startswith("gvgbot: ")
-    assert "in use" in said
-    assert len(said.splitlines()) == 1
 
 
 def test_a_missing_port_is_named_and_waited_for(tmp_path: Path) -> None:
