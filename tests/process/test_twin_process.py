@@ -18,9 +18,11 @@ import pytest
 
 from benchmarks.rigs.programs import gvgbot
 from benchmarks.rigs.run_rig import base_commands
+from gvgbot.cli import main
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(90)]
 PATIENCE = 30.0  # s, for a busy machine
+START_MS, BOOT_MS = 0x500000, 2000  # of the laser's clock
 GET_GAIN = bytes.fromhex("aa55 03 0e 01 00 0c")
 GAINS = bytes.fromhex("150d 00 a0860100 64000000 d0070000")
 
@@ -68,30 +70,41 @@ def frames(data: bytes) -> list[bytes]:
     return found
 
 
-def test_the_laser_boots_when_it_is_started_and_its_clock_begins_then(tmp_path: Path) -> None:
-    start_ms, boot_ms = 0x500000, 2000
-    settings = (f"twin.laser.clock_start_ms={start_ms}", f"twin.laser.boot_s={boot_ms / 1000}")
-    with twins(tmp_path, *settings), opened(tmp_path / "laser") as client:
+@pytest.fixture(scope="module")
+def both(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """The directory of twins that several tests talk to."""
+    where = tmp_path_factory.mktemp("twins")
+    settings = (f"twin.laser.clock_start_ms={START_MS}", f"twin.laser.boot_s={BOOT_MS / 1000}")
+    with twins(where, *settings) as process:
+        yield where
+        process.send_signal(signal.SIGTERM)
+        log, _ = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0, log
+    assert "Traceback" not in log
+    assert not list(where.iterdir())  # stopped twins leave no links
+
+
+def test_the_laser_boots_when_it_is_started_and_its_clock_begins_then(both: Path) -> None:
+    with opened(both / "laser") as client:
         os.write(client, b"II\n")
         answer = collect(client, lambda data: data.endswith(b"\n\n"))
     (shown,) = (line[5:11] for line in answer.split(b"\n") if line.startswith(b"TIME:"))
-    assert boot_ms <= int(shown, 16) - start_ms < boot_ms + 1000 * PATIENCE
+    assert BOOT_MS <= int(shown, 16) - START_MS < BOOT_MS + 1000 * PATIENCE
 
 
-def test_any_program_can_talk_to_the_base_and_come_and_go(tmp_path: Path) -> None:
-    with twins(tmp_path):
-        for _ in range(2):
-            with opened(tmp_path / "base") as client:
-                stream = frames(collect(client, lambda data: len(data) > 2000))
-                stamps = [int.from_bytes(frame[5:7], "little") for frame in stream]
-                assert {(b - a) % 65536 for a, b in pairwise(stamps[5:])} == {20}
-                os.write(client, GET_GAIN)
-                answer = collect(client, lambda data: GAINS in data)
-                assert GET_GAIN not in answer  # it would be, if the terminal echoed
+def test_any_program_can_talk_to_the_base_and_come_and_go(both: Path) -> None:
+    for _ in range(2):
+        with opened(both / "base") as client:
+            stream = frames(collect(client, lambda data: len(data) > 2000))
+            stamps = [int.from_bytes(frame[5:7], "little") for frame in stream]
+            assert {(b - a) % 65536 for a, b in pairwise(stamps[5:])} == {20}
+            os.write(client, GET_GAIN)
+            answer = collect(client, lambda data: GAINS in data)
+            assert GET_GAIN not in answer  # it would be, if the terminal echoed
 
 
-def test_a_client_that_does_not_read_loses_whole_frames_only(tmp_path: Path) -> None:
-    with twins(tmp_path), opened(tmp_path / "base") as client:
+def test_a_client_that_does_not_read_loses_whole_frames_only(both: Path) -> None:
+    with opened(both / "base") as client:
         collect(client, lambda data: len(data) > 1000)
         select.select([], [], [], 2.0)  # which makes 8 kB, and the terminal holds 4
         stream = frames(collect(client, lambda data: len(data) > 12_000))
@@ -114,65 +127,53 @@ def test_a_laser_on_ethernet_is_reached_by_its_address(tmp_path: Path) -> None:
                 assert client.recv(100) == b"QT\n00P\n\n"
 
 
-def test_stopped_twins_leave_no_links(tmp_path: Path) -> None:
-    with twins(tmp_path) as process:
-        process.send_signal(signal.SIGTERM)
-        log, _ = process.communicate(timeout=PATIENCE)
-    assert process.returncode == 0, log
-    assert not list(tmp_path.iterdir())
-    assert "Traceback" not in log
-
-
-def test_a_file_in_the_place_of_a_link_is_left_alone(tmp_path: Path) -> None:
+def test_a_file_in_the_place_of_a_link_is_left_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
     (tmp_path / "base").write_text("precious")
-    with gvgbot("twin", "--base-link", "base", cwd=tmp_path) as process:
-        log, _ = process.communicate(timeout=PATIENCE)
-    assert process.returncode == 2
-    assert len(log.splitlines()) == 1
-    assert "base" in log
+    assert main(["twin", "--base-link", "base"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "base" in line
     assert (tmp_path / "base").read_text() == "precious"
 
 
-def test_both_twins_cannot_have_one_name(tmp_path: Path) -> None:
-    with gvgbot("twin", "--laser-link", "port", "--base-link", "./port", cwd=tmp_path) as process:
-        output, _ = process.communicate(timeout=PATIENCE)
-    assert process.returncode == 2
-    assert output == "gvgbot: port cannot be both the laser and the base: name two links\n"
+def test_both_twins_cannot_have_one_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["twin", "--laser-link", "port", "--base-link", "./port"]) == 2
+    told = "gvgbot: port cannot be both the laser and the base: name two links\n"
+    assert capsys.readouterr() == ("", told)
     assert not (tmp_path / "port").exists()
 
 
-def test_check_finds_the_twins_well_and_a_missing_port_not(tmp_path: Path) -> None:
-    ports = [f"laser.port={tmp_path / 'laser'}", f"base.port={tmp_path / 'base'}"]
-    arguments = [word for setting in ["twin.enabled=false", *ports] for word in ("--set", setting)]
-    with twins(tmp_path, "twin.base.firmware_version=1.1.4"):
-        with gvgbot("check", *arguments, cwd=tmp_path) as process:
-            well, _ = process.communicate(timeout=PATIENCE)
-        assert process.returncode == 0, well
-        assert "UTM-30LX" in well
-        assert "firmware 1.1.4" in well
-        assert "16.1 V" in well
-        with gvgbot("check", *arguments, "--set", "base.port=/no/base", cwd=tmp_path) as process:
-            ill, _ = process.communicate(timeout=PATIENCE)
-        assert process.returncode == 1
-        (failed,) = [line for line in ill.splitlines() if line.startswith("fail")]
-        assert "/no/base" in failed
-
-
-def test_what_the_twins_propose_to_try_finds_them_and_the_same_robot(tmp_path: Path) -> None:
+def test_what_the_twins_propose_to_try_finds_them_well_and_a_missing_port_not(
+    tmp_path: Path,
+) -> None:
+    """And the same robot as theirs."""
     here = tmp_path / "my robot"
     here.mkdir()
     links = ("--laser-link", "laser", "--base-link", str(here / "base"))
-    with gvgbot("twin", "husky.yaml", *links, "--set", "robot.name=karl", cwd=here) as process:
+    settings = ("--set", "robot.name=karl", "--set", "twin.base.firmware_version=1.1.4")
+    with gvgbot("twin", "husky.yaml", *links, *settings, cwd=here) as process:
         assert process.stdout is not None
         while not (line := process.stdout.readline()).startswith("try: "):
             assert line, "the twins did not start"
         program, *words = shlex.split(line.removeprefix("try: "))
         assert program == "gvgbot"
         with gvgbot(*words, cwd=here) as checking:
-            said, _ = checking.communicate(timeout=PATIENCE)
-    assert f"robot karl, laser laser, base {here / 'base'}" in said
-    assert "UTM-30LX" in said
-    assert "firmware 1.2.0" in said
+            well, _ = checking.communicate(timeout=PATIENCE)
+        with gvgbot(*words, "--set", "base.port=/no/base", cwd=here) as checking_in_vain:
+            ill, _ = checking_in_vain.communicate(timeout=PATIENCE)
+    assert checking.returncode == 0, well
+    assert f"robot karl, laser laser, base {here / 'base'}" in well
+    assert "UTM-30LX" in well
+    assert "firmware 1.1.4" in well
+    assert "16.1 V" in well
+    assert checking_in_vain.returncode == 1
+    (failed,) = [line for line in ill.splitlines() if line.startswith("fail")]
+    assert "/no/base" in failed
 
 
 def test_a_moving_robot_is_told_to_stand_as_its_daemon_ends(tmp_path: Path) -> None:
