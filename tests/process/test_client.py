@@ -118,14 +118,14 @@ with Telemetry(TelemetryConfig(listen=(sys.argv[1],)), "far") as robot:
 """
 
 STUCK = """
-import select, sys
+import ctypes, select, sys
 from gvgbot.telemetry import Telemetry
 from gvgbot.telemetry_config import TelemetryConfig
 from tests.unit.test_telemetry import EXAMPLE
 with Telemetry(TelemetryConfig(listen=(sys.argv[1],)), "far") as robot:
     while not select.select([sys.stdin], [], [], 0.1)[0]:
         robot.publish(EXAMPLE)
-    sum(range(10**12))  # one call, during which no other Python runs
+    ctypes.PyDLL(None).sleep(600)  # one call, during which no other Python runs
 """
 WATCHER = """
 import sys
