@@ -103,9 +103,10 @@ def bend(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 @pytest.fixture(scope="module")
 def explored(bend: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The directory of a run that ended by itself."""
+    """The directory of a run that ended by itself, with its recording beside it."""
     where = tmp_path_factory.mktemp("explored")
-    done = carry_out(["sh"], where, f"gvgbot explore {bend} --out run")
+    recorded = f"gvgbot explore {bend} --set recording.path=run.mcap --out run"
+    done = carry_out(["sh"], where, recorded)
     assert done.returncode == 0, done.stderr
     return where / "run"
 
@@ -115,12 +116,17 @@ def explored(bend: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize("page", WITH_SAMPLES, ids=lambda page: page.stem)
 def test_marked_samples_run(page: Path, tmp_path: Path, bend: str, explored: Path) -> None:
     (tmp_path / "runs").mkdir()
+    ring, recorded = "gvgbot explore --world ring", "--set recording.path=runs/ros2.mcap"
+    copies = {  # most pages begin with that
+        f"{ring} --out": f"cp -r {explored}",
+        f"{ring} {recorded} --out": f"cp {explored}.mcap runs/ros2.mcap; cp -r {explored}",
+    }
     for block in blocks(page):
         if block["run"]:
             program = {"sh": ["sh", "-e"], "python": [sys.executable, "-"]}[block["language"]]
-            text = block["text"].replace(
-                "gvgbot explore --world ring --out", f"cp -r {explored}"
-            )  # several pages begin with that
+            text = block["text"]
+            for one, copied in copies.items():
+                text = text.replace(one, copied)
             done = carry_out(program, tmp_path, text.replace("--world ring", bend))
             assert done.returncode == 0, f"{text}\n{done.stderr}"
 

@@ -21,6 +21,7 @@ import zenoh
 
 from benchmarks.rigs.addresses import free_endpoint, plain_session
 from benchmarks.rigs.programs import gvgbot, until
+from gvgbot.cli import main
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(60)]
 
@@ -254,14 +255,18 @@ def test_a_request_that_nobody_answers_can_be_stopped(tmp_path: Path) -> None:
     assert process.returncode == -signal.SIGINT  # ended by it, and not by the end of its patience
 
 
-def test_an_address_in_use_is_one_line_and_leaves_nothing(endpoint: str, tmp_path: Path) -> None:
+def test_an_address_in_use_is_one_line_and_leaves_nothing(
+    endpoint: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
     host, _, port = endpoint.removeprefix("tcp/").partition(":")
     with socket.create_server((host, int(port))):
-        arguments = ["--out", "run", "--set", f"telemetry.listen=[{endpoint}]"]
-        with gvgbot("run", *arguments, cwd=tmp_path) as process:
-            log, _ = process.communicate(timeout=PATIENCE)
-    assert process.returncode == 1
-    (line,) = log.splitlines()
+        assert main(["run", "--out", "run", "--set", f"telemetry.listen=[{endpoint}]"]) == 1
+    said = capsys.readouterr()
+    (line,) = (said.out + said.err).splitlines()
     assert endpoint in line
     assert "in use" in line
     assert f"--set 'telemetry.listen=[tcp/{host}:{int(port) + 1}]'" in line
