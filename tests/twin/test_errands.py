@@ -467,7 +467,7 @@ def test_without_permission_nothing_is_done(tmp_path: Path) -> None:
 def test_who_stands_in_the_way_of_an_errand_is_left_alone_and_another_way_taken(
     tmp_path: Path,
 ) -> None:
-    """In the bar, 1.4 m before its end; it is too narrow to pass: 3.6 m become 8.6 m round the ring.
+    """In the bar, 1.4 m before its end; it is too narrow to pass: 3.6 m become 8.6 m around.
 
     The robot looks nowhere else first: all that is hidden is behind the person.
     """

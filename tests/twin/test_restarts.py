@@ -23,7 +23,7 @@ from gvgbot.persistence.records import packed
 from gvgbot.session import Session
 from gvgbot.simulation import Place, open_place
 from gvgbot.topics import Trajectory
-from tests.replay.test_pipeline import LOLLIPOP, START
+from tests.twin.lollipop_rig import IN_RING, LOLLIPOP, START, STICK_END
 from tests.unit.autonomy.sights import carved
 
 pytestmark = [pytest.mark.slow, pytest.mark.twin, pytest.mark.timeout(180)]
@@ -68,7 +68,7 @@ def torn(world: GoingWorld, out: Path) -> None:
 def test_the_map_of_several_lives_is_that_of_one(
     config: Config, whole: Path, tmp_path: Path
 ) -> None:
-    moments = sorted(np.random.default_rng(4).uniform(5.0, 60.0, 3).tolist())
+    moments = sorted(np.random.default_rng(4).uniform(5.0, 25.0, 3).tolist())
     lives = Lives(config, Place(LOLLIPOP, START), tmp_path, between=torn)
     last = lives.run([at(moment) for moment in moments])
     assert summary(tmp_path)["outcome"] == summary(whole)["outcome"] == "explored"
@@ -102,7 +102,7 @@ def test_on_a_known_map_it_finds_its_place_and_says_nothing_before(
 ) -> None:
     """The corridors of the ring are all alike: only where it branches can it be told."""
     before = vertices(whole)
-    lives = Lives(config, Place(LOLLIPOP, Pose(8.0, 4.0, -1.2)), tmp_path, known=whole)
+    lives = Lives(config, Place(LOLLIPOP, IN_RING), tmp_path, known=whole)
     last = lives.run([])
     assert summary(tmp_path)["outcome"] == "explored"
     assert summary(tmp_path)["contacts"] == 0
@@ -129,7 +129,7 @@ def assert_only_its_own_way_is_told(way: Trajectory, out: Path) -> None:
     rows = {name: np.loadtxt(out / f"{name}.tum") for name in ("truth", "estimate", "odometry")}
     truth, here = rows["truth"], START.transform(way.map_base[:, :2].astype(float))
     really = [np.interp(way.times, truth[:, 0], truth[:, k]) for k in (1, 2)]
-    assert np.hypot(*(here.T - really)).max() < 0.15
+    assert np.hypot(*(here.T - really)).max() < 0.25  # the truth may begin 0.4 s after the way
     for name in ("estimate", "odometry"):
         assert START.transform(rows[name][:1, 1:3]) == pytest.approx(truth[:1, 1:3], abs=0.15)
     closed = (out / "events.jsonl").read_text().count('"event": "loop_closed"')
@@ -148,7 +148,7 @@ def test_who_is_carried_while_it_looks_for_its_place_stands_and_then_looks_anew(
         assert isinstance(pipeline, ReturningPipeline)
         seeker = pipeline._seeker
         if not stood and seeker is not None and len(seeker.past.keyframes) > 6:
-            lives.world.body.pose = Pose(-5.2, 0.3, 3.1)  # where the stick ends
+            lives.world.body.pose = STICK_END
             seeker.tracker._breaks -= 1
         stood += pipeline.errands.is_paused
         if stood == 20:
@@ -156,9 +156,7 @@ def test_who_is_carried_while_it_looks_for_its_place_stands_and_then_looks_anew(
             assert "it goes on" in pipeline.errands.resume()
         return stood > 20 and not pipeline.is_lost
 
-    lives = Lives(
-        config, Place(LOLLIPOP, Pose(8.0, 4.0, -1.2)), tmp_path, known=whole, over=is_over
-    )
+    lives = Lives(config, Place(LOLLIPOP, IN_RING), tmp_path, known=whole, over=is_over)
     last = lives.run([])
     assert pose_error(lives, last) < 0.1
     events = [json.loads(line) for line in (tmp_path / "events.jsonl").read_text().splitlines()]
@@ -170,8 +168,8 @@ def test_who_is_carried_while_it_looks_for_its_place_stands_and_then_looks_anew(
 def test_in_another_building_it_claims_no_place_and_spoils_no_map(
     config: Config, whole: Path, tmp_path: Path
 ) -> None:
-    elsewhere = carved([(-5.0, -0.7, 4.0, 0.7), (0.0, -0.7, 1.8, 4.0)])
-    lives = Lives(config, Place(elsewhere, Pose(-4.0, 0.0, 0.0)), tmp_path, known=whole)
+    elsewhere = carved([(-3.0, -0.7, 3.0, 0.7), (0.0, -0.7, 1.8, 3.0)])
+    lives = Lives(config, Place(elsewhere, Pose(-2.0, 0.0, 0.0)), tmp_path, known=whole)
     last = lives.run([])
     assert last.pipeline.is_lost
     assert summary(tmp_path)["outcome"] == "failed"
@@ -190,7 +188,7 @@ def test_after_each_power_cut_in_a_building_it_finds_its_place_and_keeps_it(tmp_
 
     A while later it still knows its place. How well is decided by little: by how floats are
     added up on one kind of computer it was 0.1 m off, and on another one 0.18 and 0.38 m. So is how
-    far it drives until then: 10 to 48 m in the seeds 1 to 3.
+    far it drives until then: 7 to 59 m, by the seed and by when the power was cut.
     """
     settings = ["twin.seed=2", "twin.world=floor_plan:5", "twin.base.odometry=worn"]
     config = load_config(None, settings)
@@ -214,13 +212,13 @@ def test_after_each_power_cut_in_a_building_it_finds_its_place_and_keeps_it(tmp_
         body = lives.world.body
         if len(lives.sessions) == len(found) + 2 and not session.pipeline.is_lost:
             found.append((body.distance_m, body.now))
-        return len(found) == 2 and body.now > found[1][1] + 20.0
+        return len(found) == 2 and body.now > found[1][1] + 10.0
 
     def take_down(world: GoingWorld, out: Path) -> None:
         cut.append(world.body.distance_m)
 
     lives = Lives(config, place, tmp_path, over=is_over, between=take_down, reboots=True)
-    note_error(lives.run([power_cut(40.0), power_cut(120.0)]))
+    note_error(lives.run([power_cut(25.0), power_cut(60.0)]))
     assert max(errors) < 0.5
     for before, (after, _) in zip(cut, found, strict=True):
         assert after - before < 60.0
@@ -276,7 +274,7 @@ def test_a_robot_goes_on_controlling_while_its_known_map_is_made_ready(
         sought.append(now)
         return True
 
-    place = Place(LOLLIPOP, Pose(8.0, 4.0, -1.2))
+    place = Place(LOLLIPOP, IN_RING)
     lives = Lives(config, place, tmp_path, known=whole, over=is_over, off_loop=slowly)
     lives.run([])
     assert takes_s < sought[0] < takes_s + 3.0
@@ -299,6 +297,6 @@ def test_a_robot_that_was_paused_while_it_looked_for_its_place_stays_paused(tmp_
         return len(lives.sessions) > 2 and session.pipeline.past.keyframes != []
 
     lives = Lives(config, open_place(config), tmp_path, over=is_over, reboots=True)
-    last = lives.run([at(40.0), is_paused_for_long])
+    last = lives.run([at(25.0), is_paused_for_long])
     assert last.pipeline.errands.is_paused
     assert len(last.pipeline.mapper.graph.vertices) > 1
