@@ -20,9 +20,9 @@ from gvgbot.worlds.canvas import Canvas
 pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(300)]
 
 START = Pose(3.5, 2.1, 0.2)
-RING = [(2.0, 2.0), (9.0, 2.0), (9.0, 7.0), (2.0, 7.0), (2.0, 2.0)]
-SOUTH, NORTH = (5.5, 2.0), (5.5, 7.0)  # the ends of a bar across the ring
-EAST = (9.0, 4.5)
+RING = [(2.0, 2.0), (8.5, 2.0), (8.5, 6.0), (2.0, 6.0), (2.0, 2.0)]
+SOUTH, NORTH = (5.5, 2.0), (5.5, 6.0)  # the ends of a bar across the ring
+EAST = (8.5, 4.0)
 NEAR = 0.3  # m
 REMEMBERED = 25.0  # s
 
@@ -88,25 +88,25 @@ class Walker:
 def test_who_cannot_go_back_goes_on_to_an_end_of_the_corridor_that_is_out_of_sight(
     tmp_path: Path,
 ) -> None:
-    """From the middle of the east side, 6 m from either end of the bar, which is 5 m long."""
+    """From the middle of the east side, 5 m from either end of the bar, which is 4 m long."""
     walker = Walker(tmp_path / "run", [RING, [SOUTH, NORTH]])
     driven: list[float] = []
 
     async def story(clock: Clock) -> None:
         await walker.go(clock, SOUTH)
         await walker.go(clock, EAST)
-        walker.put_person(9.0, 2.8)
+        walker.put_person(8.5, 2.6)
         driven.append(await walker.go(clock, SOUTH))
 
     walker.tell(story)
-    assert 11.0 - 2 * NEAR < driven[0] < 11.0 + 4.0  # and to the person and back
+    assert 9.0 - 2 * NEAR < driven[0] < 9.0 + 3.0  # and to the person and back
 
 
 def test_on_a_ring_that_comes_back_to_its_only_vertex_the_other_way_round_is_taken(
     tmp_path: Path,
 ) -> None:
-    """18 m around, the vertex is anywhere, and somebody stands on the shorter way of 5 m."""
-    ring, east = [(2.0, 2.0), (7.0, 2.0), (7.0, 6.0), (2.0, 6.0), (2.0, 2.0)], (7.0, 4.0)
+    """14 m around, the vertex is anywhere, and somebody stands on the shorter way of 4 m."""
+    ring, east = [(2.0, 2.0), (6.0, 2.0), (6.0, 5.0), (2.0, 5.0), (2.0, 2.0)], (6.0, 3.5)
     walker = Walker(tmp_path / "run", [ring])
     driven: list[float] = []
 
@@ -116,15 +116,15 @@ def test_on_a_ring_that_comes_back_to_its_only_vertex_the_other_way_round_is_tak
         x, y = START.transform(belief.map_vertex(vertex).position).tolist()
         assert math.dist((x, y), (4.0, 2.0)) < 1.0
         await walker.go(clock, (x, y))
-        walker.put_person(6.0, 2.0)
+        walker.put_person(5.5, 2.0)
         driven.append(await walker.go(clock, east))
         await clock.sleep_until(clock.now() + REMEMBERED)
-        walker.put_person(7.0, 2.5)
+        walker.put_person(6.0, 2.3)
         driven.append(await walker.go(clock, (x, y)))
 
     walker.tell(story)
     for metres in driven:
-        assert 18.0 - 6.0 < metres < 18.0 - 4.0 + 4.0  # and to the person and back
+        assert 14.0 - 5.0 < metres < 14.0 - 3.0 + 3.0  # and to the person and back
 
 
 def test_a_near_point_is_driven_to_when_somebody_asks_again_after_the_way_was_closed(
@@ -152,8 +152,8 @@ def test_a_near_point_is_driven_to_when_somebody_asks_again_after_the_way_was_cl
 
 def test_who_asks_opens_ways_that_were_closed_while_the_robot_explored(tmp_path: Path) -> None:
     """Somebody stood behind it in an arm whose end is out of sight, and has gone."""
-    west: list[Point] = [(6.5, 2.0), (1.5, 2.0), (1.5, 7.0), (4.0, 7.0)]
-    arm: list[Point] = [(6.5, 2.0), (6.5, 7.0), (9.0, 7.0)]
+    west: list[Point] = [(6.5, 2.0), (2.5, 2.0), (2.5, 5.0), (4.0, 5.0)]
+    arm: list[Point] = [(6.5, 2.0), (6.5, 6.0), (9.0, 6.0)]
     walker = Walker(tmp_path / "run", [[(6.5, 2.0), (9.0, 2.0)], west, arm])
     ask, pipeline = walker.daemon.network.ask, walker.pipeline
     covered: list[str] = []
@@ -167,8 +167,8 @@ def test_who_asks_opens_ways_that_were_closed_while_the_robot_explored(tmp_path:
 
         await clock.sleep_until(0.5)
         walker.put_person(1000.0, 1000.0)
-        await until(lambda: walker.daemon.place.y > 6.5)
-        walker.put_person(6.5, 4.5)
+        await until(lambda: walker.daemon.place.y > 5.5)
+        walker.put_person(6.5, 4.0)
         await until(lambda: bool(pipeline.mapper.graph.blocked()))
         walker.put_person(1000.0, 1000.0)
         await ask("stop")
