@@ -5,6 +5,8 @@ the middle of the bar, another one shuts it off flush with the wall of the ring,
 meetpoint there is none any more.
 """
 
+from collections.abc import Callable
+
 from gvgbot.drivers.world import World
 from gvgbot.geometry import Pose
 from gvgbot.worlds.canvas import Canvas
@@ -16,18 +18,25 @@ MIDDLE = (4.7, 6.3, 4.4, 4.6)  # x, x, y, y of a door in the middle of the bar
 FLUSH = (4.7, 6.3, 2.0 + WIDTH / 2, 2.2 + WIDTH / 2)  # and of one where it leaves the ring
 
 
-def theta() -> World:
-    canvas = Canvas(11.0, 9.0)
-    ring = [(2.0, 2.0), (9.0, 2.0), (9.0, 7.0), (2.0, 7.0), (2.0, 2.0)]
+def theta(east: float = 9.0, north: float = 7.0) -> World:
+    """The world, or a smaller one whose ring ends at this x and y, m."""
+    canvas = Canvas(east + 2.0, north + 2.0)
+    ring = [(2.0, 2.0), (east, 2.0), (east, north), (2.0, north), (2.0, 2.0)]
     canvas.carve_path(ring, WIDTH)
-    canvas.carve_path([SOUTH, NORTH], WIDTH)
+    canvas.carve_path([SOUTH, (NORTH[0], north)], WIDTH)
     return canvas.world("theta")
 
 
-def swing(world: World, door: tuple[float, float, float, float], *, shut: bool) -> None:
+def swing(
+    world: World,
+    door: tuple[float, float, float, float],
+    *,
+    shut: bool,
+    built: Callable[[], World] = theta,
+) -> None:
     """Shut or open a door in the world that everybody looks at."""
     x0, x1, y0, y1 = (round(at / world.resolution_m) for at in door)
-    before = theta().occupied[y0:y1, x0:x1]
+    before = built().occupied[y0:y1, x0:x1]
     world.occupied.setflags(write=True)
     world.occupied[y0:y1, x0:x1] = True if shut else before
     world.occupied.setflags(write=False)
