@@ -14,7 +14,7 @@ from gvgbot.team.troubles import Troubles, TroublesConfig
 
 RADIUS = 0.177  # m, of either
 LEAST_GAP = 0.1  # m between both
-SECONDS = 8.0  # as much as a test can afford
+SECONDS = 11.0  # as much as a test can afford
 LATE = 6.0  # s
 
 
