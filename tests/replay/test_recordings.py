@@ -14,6 +14,7 @@ from gvgbot.autonomy.loop import Cycle
 from gvgbot.cli import main
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.drivers.world import save_world
+from gvgbot.geometry import Pose
 from gvgbot.hal.messages import Scan
 from gvgbot.links import Links
 from gvgbot.maps.run_directory import RunDirectory
@@ -25,9 +26,21 @@ from gvgbot.recording.recorder import Recorder
 from gvgbot.replay import Wanted, open_log
 from gvgbot.session import Session
 from gvgbot.tiles import Grid
-from tests.replay.test_pipeline import LOLLIPOP, START
+from tests.unit.autonomy.sights import carved
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(120)]
+
+# A dead end that leads to a ring of corridors.
+LOLLIPOP = carved(
+    [
+        (-4.5, -0.8, 0.0, 0.8),
+        (-0.8, -0.8, 5.2, 0.8),
+        (-0.8, 3.6, 5.2, 5.2),
+        (-0.8, -0.8, 0.8, 5.2),
+        (3.6, -0.8, 5.2, 5.2),
+    ]
+)
+START = Pose(-2.5, -0.1, 0.2)
 
 SAME = ["map.geojson", "map.pgm", "map.yaml", "map.png", "seen.png", "events.jsonl"]
 SAME += ["estimate.tum", "online.tum", "odometry.tum"]
@@ -43,7 +56,7 @@ class Recorded:
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
-    """An exploration that bumps into nothing, but closes a loop; with what was on the wires."""
+    """An exploration that bumps into nothing, but goes round a ring; with what was on the wires."""
     directory = tmp_path_factory.mktemp("recorded")
     save_world(LOLLIPOP, directory)
     run, recording = directory / "run", directory / "run.mcap"
