@@ -28,18 +28,32 @@ RADIUS = CONFIG.robot.radius_m
 LEAST_GAP = 0.1  # m between both bodies
 TOLD_EVERY = 0.2  # s
 SOON = 5.0  # s
-WEST, EAST = 4.0, 9.0  # the ends of the narrow corridor, m along x
 STARTS = Pose(2.0, 2.5, 1.57), Pose(11.0, 6.5, -1.57)
 
 
-def twin_tees() -> World:
-    """Two tees of corridors, joined by one that is a metre wide and five long."""
-    canvas = Canvas(13.0, 9.0)
-    for x, mouth in ((2.0, WEST), (11.0, EAST)):
-        canvas.carve_path([(x, 1.5), (x, 7.5)], 1.6)
-        canvas.carve_path([(min(x, mouth), 4.5), (max(x, mouth), 4.5)], 1.6)
-    canvas.carve_path([(WEST, 4.5), (EAST, 4.5)], 1.0)
-    return canvas.world("twin tees")
+@dataclass(frozen=True)
+class Tees:
+    """Two tees of corridors, joined by one that is a metre wide, from west to east."""
+
+    west: float  # the ends of the narrow corridor, m along x
+    east: float
+    mouths: float  # m that the wide corridors between it and the arms are long
+    arms: float  # m to north and south
+
+    def world(self) -> World:
+        canvas = Canvas(self.east + self.mouths + 2.0, 9.0)
+        for x, mouth in (
+            (self.west - self.mouths, self.west),
+            (self.east + self.mouths, self.east),
+        ):
+            canvas.carve_path([(x, 4.5 - self.arms), (x, 4.5 + self.arms)], 1.6)
+            canvas.carve_path([(min(x, mouth), 4.5), (max(x, mouth), 4.5)], 1.6)
+        canvas.carve_path([(self.west, 4.5), (self.east, 4.5)], 1.0)
+        return canvas.world("twin tees")
+
+
+FAR_APART = Tees(4.0, 9.0, mouths=2.0, arms=3.0)
+NEAR = Tees(3.6, 6.6, mouths=1.6, arms=2.0)
 
 
 @dataclass(eq=False)
@@ -47,6 +61,7 @@ class Explorer:
     """One of the two, and where it has been."""
 
     start: Pose
+    tees: Tees
     simulation: Simulation
     pipeline: Pipeline
     member: Member
@@ -60,7 +75,7 @@ class Explorer:
     @property
     def has_crossed(self) -> bool:
         x = [pose.x for pose in self.way]
-        return bool(x) and min(x) < WEST and max(x) > EAST
+        return bool(x) and min(x) < self.tees.west and max(x) > self.tees.east
 
     def hear(self, other: "Explorer", *, goes_first: bool) -> None:
         """Be told where the other one is and what it drives along, and what it sees."""
@@ -74,7 +89,7 @@ class Explorer:
 
 @cache
 def met() -> tuple["Explorer", "Explorer"]:
-    both: tuple[Explorer, Explorer] = run_in_virtual_time(_met())
+    both: tuple[Explorer, Explorer] = run_in_virtual_time(_met(FAR_APART, STARTS))
     return both
 
 
@@ -106,8 +121,8 @@ def test_two_robots_that_met_know_how_their_maps_lie() -> None:
 @pytest.mark.timeout(300)
 def test_a_robot_that_has_finished_lets_another_one_pass() -> None:
     """It stands in the narrow corridor, where the other one has to come through."""
-    starts = STARTS[0], Pose(6.0, 4.5, np.pi)
-    passer, finished = run_in_virtual_time(_met(starts, has_finished=True))
+    starts = Pose(2.0, 3.4, 1.57), Pose(5.0, 4.5, np.pi)
+    passer, finished = run_in_virtual_time(_met(NEAR, starts, has_finished=True))
     assert passer.has_crossed
     gaps = [a.distance(b) - 2 * RADIUS for a, b in zip(passer.way, finished.way, strict=True)]
     assert LEAST_GAP <= min(gaps) < 2.0  # they did meet
@@ -115,15 +130,16 @@ def test_a_robot_that_has_finished_lets_another_one_pass() -> None:
 
 
 async def _met(
-    starts: tuple[Pose, Pose] = STARTS, *, has_finished: bool = False
+    tees: Tees, starts: tuple[Pose, Pose], *, has_finished: bool = False
 ) -> tuple[Explorer, Explorer]:
     """Both, until each has crossed; or, if the second one has finished soon, the first one has."""
-    clock, world = LoopClock(), twin_tees()
+    clock, world = LoopClock(), tees.world()
     laser = HokuyoTwinConfig(model="URG-04LX")
     config = replace(CONFIG, twin=replace(CONFIG.twin, laser=laser))
     both = [
         Explorer(
             start,
+            tees,
             Simulation(config, Place(world, start), clock),
             Pipeline(config.autonomy, config.exploration, RADIUS),
             Member(name, TeamConfig(), Chart, radius=RADIUS),
