@@ -123,7 +123,7 @@ def play(
     exploration: ExplorationConfig | None = None,
     virtual_walls: tuple[VirtualWall, ...] = (),
     grip: Grip | None = None,
-    goes_on: Callable[[], bool] | None = None,
+    goes_on: Callable[[Play], bool] | None = None,
 ) -> Play:
     """Explore a world while a story happens to the robot, for at most so many seconds.
 
@@ -144,7 +144,7 @@ async def _played(
     story: Story | None,
     limit: float,
     grip: Grip | None,
-    goes_on: Callable[[], bool] | None,
+    goes_on: Callable[[Play], bool] | None,
 ) -> Play:
     clock = LoopClock()
     walkways = Walkways(world, start) if config.twin.people else None
@@ -171,7 +171,7 @@ async def _played(
         guard,
         on_events=run.events.extend,
         on_cycle=on_cycle,
-        goes_on=goes_on,
+        goes_on=None if goes_on is None else partial(goes_on, run),
     )
     async with asyncio.TaskGroup() as tasks:
         serving = [tasks.create_task(part.run()) for part in (laser, base, simulation)]

@@ -23,7 +23,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.twin, pytest.mark.timeout(120)]
 
 # A T: a corridor of 1.4 m from west to east, and one to the south.
 TEE = carved([(-3.5, -0.7, 3.5, 0.7), (-0.7, -4.0, 0.7, 0.0)])
-IMPATIENT = ExplorationConfig(retries=0)
+IMPATIENT = ExplorationConfig(retries=0, patience_s=10.0)
 MEETPOINT = (0.0, -(1.4**2) / (8 * 1.4))  # as far from the wall opposite as from both corners
 ENDS = [(-2.8, 0.0), (2.8, 0.0), (0.0, -3.3)]
 STARTS = {
