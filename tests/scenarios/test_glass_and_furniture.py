@@ -77,7 +77,7 @@ def test_a_robot_gets_away_only_over_what_it_knows_to_be_free(heading: float) ->
     """Between three legs that it hardly fits through, one of which is always behind it."""
     between = legs((0.12, -0.2), (0.12, 0.25), (-0.25, 0.0))
     world = carved([(-3.0, -2.0, 3.0, 2.0), (3.0, -0.6, 6.0, 0.6)], between)
-    run = play(world, Pose(0.0, 0.0, heading), limit=40.0)
+    run = play(world, Pose(0.0, 0.0, heading), limit=14.0)
     assert {"back off", "turn away"} & set(run.recoveries())
     assert run.contacts == 0
 
