@@ -1,7 +1,6 @@
 """Shapes of free space that are easily taken for something else, explored to the end."""
 
 import math
-from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -301,24 +300,6 @@ def test_an_edge_through_a_door_leads_through_its_middle_wherever_its_end_was_se
     assert np.abs(y[in_door] - 3.3).max() < 0.05  # of 0.3 m to either jamb
     ends = [estimate.vertices[vertex].position for vertex in (edge.start, edge.end)]
     np.testing.assert_allclose(edge.polyline[[0, -1]], ends, atol=1e-9)
-
-
-def test_what_was_seen_from_near_to_be_no_fork_is_not_driven_to_again_from_afar() -> None:
-    """Four rooms in a row, and the far corners of two out of sight: an edge may seem to fork."""
-    free: list[Rectangle] = [
-        (0.5, 0.5, 5.9, 6.5),
-        (6.1, 0.5, 11.5, 6.5),
-        (6.1, 6.7, 11.5, 11.5),
-        (11.7, 0.5, 17.5, 11.5),
-        (5.9, 5.0, 6.1, 5.7),  # doors
-        (8.0, 6.5, 8.8, 6.7),
-        (11.5, 9.0, 11.7, 9.7),
-    ]
-    twin = replace(SHORT_SIGHTED, seed=4)
-    run = play(carved(free), Pose(1.0, 1.0, 1.0), twin=twin, limit=400.0)
-    assert_explored(run)
-    lengths = [edge.length for edge in run.pipeline.mapper.graph.edges.values()]
-    assert run.pipeline.past.travelled < 3 * sum(lengths)
 
 
 def test_with_a_view_of_190_degrees_a_round_of_rooms_is_driven_once() -> None:
