@@ -14,7 +14,6 @@ from gvgbot.autonomy.loop import Cycle
 from gvgbot.cli import main
 from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.drivers.world import save_world
-from gvgbot.geometry import Pose
 from gvgbot.hal.messages import Scan
 from gvgbot.links import Links
 from gvgbot.maps.run_directory import RunDirectory
@@ -26,21 +25,9 @@ from gvgbot.recording.recorder import Recorder
 from gvgbot.replay import Wanted, open_log
 from gvgbot.session import Session
 from gvgbot.tiles import Grid
-from tests.unit.autonomy.sights import carved
+from tests.twin.lollipop_rig import LOLLIPOP, START
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(120)]
-
-# A dead end that leads to a ring of corridors.
-LOLLIPOP = carved(
-    [
-        (-4.5, -0.8, 0.0, 0.8),
-        (-0.8, -0.8, 5.2, 0.8),
-        (-0.8, 3.6, 5.2, 5.2),
-        (-0.8, -0.8, 0.8, 5.2),
-        (3.6, -0.8, 5.2, 5.2),
-    ]
-)
-START = Pose(-2.5, -0.1, 0.2)
 
 SAME = ["map.geojson", "map.pgm", "map.yaml", "map.png", "seen.png", "events.jsonl"]
 SAME += ["estimate.tum", "online.tum", "odometry.tum"]
