@@ -5,7 +5,7 @@ SHELL := /bin/sh
 # What is compiled is kept, whatever the environment says: the tests start some hundred programs.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: help explore test check static quick bench bench-explore reliability figures keep fuzz docs pages clean
+.PHONY: help explore test check static quick bench bench-explore reliability figures keep fuzz docs site pages clean
 
 help:
 	@echo "make explore   a simulated robot maps the built-in office; prints where the map is"
@@ -66,6 +66,9 @@ fuzz: .venv/fuzz
 
 docs: .venv/docs
 	@$(BIN)/pytest -q tests/unit/test_reference_pages.py tests/unit/test_quotes.py
+	@$(MAKE) --no-print-directory site
+
+site: .venv/docs
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 	@echo "site: site/index.html"
 
