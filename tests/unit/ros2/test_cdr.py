@@ -13,7 +13,7 @@ from gvgbot.ros2 import messages
 from gvgbot.ros2.cdr import Message, decode_twist, definition, encode
 from tests.unit.ros2.oracle import STORE, STORES, by_rosbags, random_message
 
-CONTENTS = 1000
+CONTENTS = 100
 TRAVELLING = [
     messages.LaserScan,
     messages.Odometry,
