@@ -86,7 +86,10 @@ def marked(ways: Array, grid: OccupancyGrid) -> Mask:
 def _on_the_way_there(
     place: Cell, floor: Mask, near_ways: Mask, off: float, within: float
 ) -> Cell | None:
-    """The (row, column) on the path to a place that is so far off the nearest way, in cells."""
+    """The (row, column) on the path to a place, `off` the nearest way at most, or `within` of it.
+
+    Both are in cells.
+    """
     width, is_floor_at, is_near = floor.shape[1], floor.ravel(), near_ways.ravel()
     beside = np.array([1, width, -1, -width])
     steps = np.full(floor.size, -1, np.int32)

@@ -26,7 +26,7 @@ from gvgbot.maps import geojson
 from gvgbot.persistence.records import packed, unpacked
 from gvgbot.report import route_graph
 from gvgbot.simulation import Place, Simulation
-from tests.unit.autonomy.sights import carved
+from tests.twin.lollipop_rig import lollipop
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(60)]
 
@@ -36,15 +36,7 @@ NOTHING_FELT = Felt()
 SILENCE = 1.2  # s, longer than any keyframe interval
 MOMENTS = (0.2, 0.7)  # shares of the drive
 # A dead end that leads to a ring of corridors: a meetpoint, an endpoint, and a loop to close.
-LOLLIPOP = carved(
-    [
-        (-6.0, -1.0, 0.0, 1.0),
-        (-1.0, -1.0, 9.0, 1.0),
-        (-1.0, 7.0, 9.0, 9.0),
-        (-1.0, -1.0, 1.0, 9.0),
-        (7.0, -1.0, 9.0, 9.0),
-    ]
-)
+LOLLIPOP = lollipop(1.0, -6.0, 9.0)
 START = Pose(-3.5, -0.1, 0.2)
 
 
@@ -71,6 +63,15 @@ class RecordedPipeline(Pipeline):
 
 def events_of(pipeline: RecordedPipeline) -> list[Event]:
     return [event for answer in pipeline.answers if isinstance(answer, list) for event in answer]
+
+
+def fed(pipeline: Pipeline, messages: list[Message]) -> Pipeline:
+    for message in messages:
+        if isinstance(message, Scan):
+            pipeline.perceive(message)
+        else:
+            pipeline.control(*message)
+    return pipeline
 
 
 @dataclass(frozen=True)
@@ -100,13 +101,9 @@ def drive() -> Drive:
 @pytest.fixture(scope="module")
 def again(drive: Drive) -> RecordedPipeline:
     """The same messages, to a fresh mind."""
-    fresh = RecordedPipeline(drive.config)
-    for message in drive.pipeline.messages:
-        if isinstance(message, Scan):
-            fresh.perceive(message)
-        else:
-            fresh.control(*message)
-    return fresh
+    pipeline = RecordedPipeline(drive.config)
+    fed(pipeline, drive.pipeline.messages)
+    return pipeline
 
 
 def test_the_recorded_drive_is_a_whole_exploration(drive: Drive) -> None:
@@ -185,15 +182,6 @@ def test_no_twist_is_beyond_the_limits_of_the_follower(drive: Drive) -> None:
 
 def stamp(message: Message) -> float:
     return message.stamp if isinstance(message, Scan) else message[0].stamp
-
-
-def fed(pipeline: Pipeline, messages: list[Message]) -> Pipeline:
-    for message in messages:
-        if isinstance(message, Scan):
-            pipeline.perceive(message)
-        else:
-            pipeline.control(*message)
-    return pipeline
 
 
 def fresh(config: Config) -> Pipeline:

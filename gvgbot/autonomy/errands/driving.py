@@ -261,12 +261,13 @@ class Driving:
         away = float(np.hypot(*(local_goal - view.local_base.position)))
         if away < _THERE_M:
             return Ended("arrived", "")
-        foot = foot_of(self._mapper, goal)
+        foot = None if away < DIRECT_M else foot_of(self._mapper, goal)
         way = self._straight_to(view, local_goal, away, foot)
         if way is not None and length_of(way[0]) < self._straight_m and not self._stands(view):
             self._route, track = None, Track.of(*way)
             self._come_nearer(view, track.length, straight=True)
             return Drive(track)
+        foot = foot or foot_of(self._mapper, goal)
         if foot is None:
             if self._looks < _LOOKS:  # the way may only be out of sight
                 return self._look_around(view)
@@ -288,7 +289,10 @@ class Driving:
     def _straight_to(
         self, view: View, local_goal: Array, away: float, foot: Foot | None
     ) -> tuple[Array, Array] | None:
-        """The way without the edges to a point (2,) so many metres off, if there is one."""
+        """The way without the edges to a point (2,) so many metres off, if there is one.
+
+        From DIRECT_M on only from about where the edges are nearest to the point, its foot.
+        """
         if away < DIRECT_M:
             room_m = self._ground.room_m
             return straight_way(view, local_goal, room_m) or bent_way(view, local_goal, room_m)
