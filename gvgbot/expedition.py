@@ -242,12 +242,12 @@ def _on_cycle(robot: _Robot, air: _Air, devices: Devices, odometry: Odometry) ->
     if odometry.stamp >= robot.steered + config.steer_every_s:
         robot.steered = odometry.stamp
         air.send(steered(robot.member, pipeline, odometry.stamp), robot)
-    if odometry.stamp >= robot.told + config.tell_every_s:
-        _tell(robot, air, odometry.stamp)
         robot.member.look(odometry.stamp)
         for met in robot.member.met:
             log.info("maps joined", robot=robot.member.name, other=met.robot)
         robot.member.met.clear()
+    if odometry.stamp >= robot.told + config.tell_every_s:
+        _tell(robot, air, odometry.stamp)
 
 
 def _tell(robot: _Robot, air: _Air, stamp: float) -> None:

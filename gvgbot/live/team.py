@@ -107,7 +107,7 @@ class LiveTeam:
                 confidence = round(met.alignment.confidence, 4)
                 log.info("maps joined", other=met.robot, confidence=confidence)
             self.member.met.clear()
-            await self._clock.sleep_until(self._clock.now() + self._config.tell_every_s)
+            await self._clock.sleep_until(self._clock.now() + self._config.steer_every_s)
 
 
 def member_of(robot: RobotConfig, config: TeamConfig, pipeline: Pipeline, life: int = 0) -> Member:

@@ -37,6 +37,7 @@ class Mate:
     sizes: tuple[int, ...] = ()  # of both charts then
     looks: deque[BodiesSeen] = field(default_factory=deque)  # lately; stamps of the own clock
     recognised: float = float("-inf")  # stamp of the last attempt to
+    by_sight: Alignment | None = None  # how its frame lies by that; to be compared with the maps
     # when, and how, its frame seemed to lie by sight, though maps or a known frame spoke against it
     doubted: tuple[float, Pose] | None = None
 

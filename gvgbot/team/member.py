@@ -64,12 +64,14 @@ class Comparison:
     ours: Chart
     theirs: Chart
     before: Alignment | None
+    by_sight: Alignment | None = None  # how they lie by what either robot has seen of the other
 
     def made(self) -> Alignment | None:
         """How they lie; None if that is not certain, or not any more."""
-        if self.before is None:
+        about = self.by_sight or self.before
+        if about is None:
             return align(self.ours, self.theirs)
-        return refined(self.ours, self.theirs, self.before)
+        return refined(self.ours, self.theirs, about)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -197,16 +199,23 @@ class Member:
         found = frame_of(self._looks, mate.looks, self._radius, mate.news.radius)
         if found is None:
             return
-        met, told = Alignment(*found, (), _SURE_BY_SIGHT), self.frames.get(name)
-        is_other = told is not None and not is_same_frame(met.pose, told, mate.map_base)
-        if mate.alignment is not None and not is_other:
-            return
-        alignment = refined(self._chart, mate.chart, met)
-        if alignment is None or is_other:
-            if not mate.is_seen_again(met.pose, stamp):
+        by_sight = Alignment(*found, (), _SURE_BY_SIGHT)
+        if mate.alignment is None or self._is_elsewhere(name, mate, by_sight):
+            mate.by_sight = by_sight
+
+    def _is_elsewhere(self, name: str, mate: Mate, by_sight: Alignment) -> bool:
+        told = self.frames.get(name)
+        return told is not None and not is_same_frame(by_sight.pose, told, mate.map_base)
+
+    def _settle_by_sight(
+        self, name: str, mate: Mate, by_sight: Alignment, alignment: Alignment | None
+    ) -> None:
+        """Believe what was seen, if maps bear it out as `alignment`, or it is seen again."""
+        if alignment is None or self._is_elsewhere(name, mate, by_sight):
+            if not mate.is_seen_again(by_sight.pose, self._stamp):
                 return  # a third robot may have moved in the same way
-            if alignment is None and told is None:
-                alignment = replace(met, by_sight=True)
+            if alignment is None and name not in self.frames:
+                alignment = replace(by_sight, by_sight=True)
             elif alignment is None and (mate.alignment is None or mate.alignment.pairs):
                 return  # maps bear out what was known, or are not known to
             mate.alignment = None  # either of the two is wrong
@@ -249,21 +258,25 @@ class Member:
                 for chart in (self._chart, mate.chart)
                 for part in (chart.vertices, chart.edges)
             )
-            if stamp - mate.tried >= self._config.align_every_s and sizes != mate.sizes:
+            by_sight, mate.by_sight = mate.by_sight, None
+            if by_sight is None:
+                if stamp - mate.tried < self._config.align_every_s or sizes == mate.sizes:
+                    continue
                 mate.tried, mate.sizes = stamp, sizes
-                life = mate.news.life
-                found.append(Comparison(name, life, self._chart, mate.chart, mate.alignment))
+            life, before = mate.news.life, mate.alignment
+            found.append(Comparison(name, life, self._chart, mate.chart, before, by_sight))
         return found
 
     def settle(self, comparison: "Comparison", alignment: Alignment | None) -> None:
         """Take in what a comparison has shown, unless the other has begun anew meanwhile."""
-        mate = self._mates.get(comparison.robot)
-        if (
-            mate is not None
-            and mate.news.life == comparison.life
-            and mate.alignment is comparison.before  # it was not recognised meanwhile
-        ):
-            self._lay(comparison.robot, mate, alignment)
+        name = comparison.robot
+        mate = self._mates.get(name)
+        if mate is None or mate.news.life != comparison.life:
+            return
+        if comparison.by_sight is None:
+            self._lay(name, mate, alignment)
+        else:
+            self._settle_by_sight(name, mate, comparison.by_sight, alignment)
 
     def _lay(self, name: str, mate: Mate, alignment: Alignment | None) -> None:
         if alignment is not None and mate.alignment is None:

@@ -82,6 +82,7 @@ class Explorer:
         mind = other.pipeline
         course = other.member.course(other.told, mind.map_base, mind.track, mind.traffic.seen)
         self.member.hear(decode(encode(course)), other.told)
+        self.member.look(other.told)
         companion = Companion("other", mind.map_base, goes_first, mind.track, radius=0.177)
         map_map = self.start.inverse().compose(other.here).compose(mind.map_base.inverse())
         self.pipeline.traffic.company = [moved(companion, map_map)]

@@ -57,13 +57,6 @@ def test_what_a_comparison_shows_is_void_once_the_other_has_begun_anew(one: Memb
     assert one.frames == {}
 
 
-def test_what_a_comparison_shows_is_void_once_the_other_was_met(one: Member) -> None:
-    slow = Comparison("two", 1, Chart(), Chart(), None)
-    one.settle(Comparison("two", 1, Chart(), Chart(), None), laid(Pose(3.0)))
-    one.settle(slow, None)
-    assert one.frames == {"two": Pose(3.0)}
-
-
 def test_what_was_seen_long_ago_is_forgotten() -> None:
     """Either map may have been bent since."""
     looks = deque[BodiesSeen]()
