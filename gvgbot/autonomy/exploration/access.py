@@ -44,8 +44,9 @@ class Access:
 def access(view: View) -> Access | None:
     """The access to the nearest edge, or to another one if walls are in the way; None without any.
 
-    Beside a wall the robot drives away from it first. With walls before all edges it is the
-    nearest one, straight ahead: the guard stops the robot, and what is then tried is the mission's.
+    Beside a wall the robot drives away from it first. With walls before all edges near by it is one
+    farther off, and without any the nearest one, straight ahead: the guard stops the robot, and
+    what is then tried is the mission's.
     """
     base = view.local_base.position
     nearest = view.gvg.place(base, view.virtual_walls)
@@ -61,6 +62,7 @@ def access(view: View) -> Access | None:
         or straight
         or _between_things(view)
         or _between_walls(view)
+        or _farther_off(view)
         or Access(nearest, base[None], np.atleast_1d(view.obstacles().query(base)[0]))
     )
 
@@ -116,6 +118,17 @@ def _between_walls(view: View) -> Access | None:
     """To the nearest edge near by to which no wall is in the way."""
     near = (place for place in _places(view) if place.distance <= NEAR_M)
     return next(filter(None, (_straight(view, place, _BETWEEN_M) for place in near)), None)
+
+
+def _farther_off(view: View) -> Access | None:
+    """To an edge that is not near, as all that are near are behind walls."""
+    way = way_to_edge(view)
+    if way is None:
+        return None
+    base, goal = view.local_base.position, way[0][-1]
+    place = view.gvg.place(goal)
+    assert place is not None, "there is an edge"
+    return Access(place._replace(distance=math.dist(base, goal)), *way)
 
 
 def is_tight(view: View) -> bool:

@@ -40,6 +40,22 @@ def test_the_edge_behind_a_wall_is_not_the_way_although_it_is_nearer() -> None:
     assert np.all(room > 0.7)
 
 
+def test_who_is_near_an_edge_behind_a_wall_goes_to_one_that_is_farther_off() -> None:
+    """Ahead the guard would stop it, however often it tried."""
+    corridor = {1: (-3.0, -3.1), 2: (3.0, -3.1)}  # 1.45 m away, the room's middle 2.85 m
+    gvg = drawn(corridor | {3: (-2.0, 1.2), 4: (2.0, 1.2)}, NEAR)
+    here = Pose(0.0, -1.65, -np.pi / 2)
+    walls = looked(ROOM_AND_CORRIDOR, [here])
+    found = access(View(0, 0.0, 0.0, here, gvg, walls))
+    assert found is not None
+    assert found.place.distance == pytest.approx(2.85, abs=0.06)
+    assert found.line[-1] == pytest.approx((0.0, 1.2), abs=0.06)
+    corridor_alone = drawn(corridor, {10: (1, 2, [])})
+    stands = access(View(0, 0.0, 0.0, here, corridor_alone, walls))
+    assert stands is not None
+    assert stands.place.distance == pytest.approx(1.45)
+
+
 def test_a_virtual_wall_is_before_an_edge_as_well() -> None:
     gvg = drawn({1: (-3.0, 1.2), 2: (3.0, 1.2)}, {10: (1, 2, [])})
     view = view_of(gvg)
