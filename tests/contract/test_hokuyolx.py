@@ -101,7 +101,7 @@ def test_it_measures_the_room_once() -> None:
     with_client(use)
 
 
-@pytest.mark.parametrize(("skips", "step"), [(0, 25), (3, 100)])
+@pytest.mark.parametrize(("skips", "step"), [(1, 50), (3, 100)])  # it cannot read two at once
 def test_it_measures_the_room_again_and_again(skips: int, step: int) -> None:
     def use(client: HokuyoLX) -> None:
         seen = list(client.iter_dist(scans=8, skips=skips))
