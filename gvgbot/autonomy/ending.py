@@ -101,8 +101,15 @@ def without_target(
     graph: GvgGraph, survey: Survey | None, reason: str
 ) -> tuple[Outcome, str] | None:
     """There is nothing to go for, and no way on; None as long as the survey takes."""
-    failed = cut_short(graph, f"no vertex found, perhaps no way out: {reason}", reason)
-    return failed if survey is None or graph.vertices else _closed_room_or(failed, survey)
+    without_map = f"no vertex found, perhaps no way out: {reason}"
+    return unless_closed_room(graph, survey, cut_short(graph, without_map, reason))
+
+
+def unless_closed_room(
+    graph: GvgGraph, survey: Survey | None, other: tuple[Outcome, str]
+) -> tuple[Outcome, str] | None:
+    """How else it ends, if something is mapped or to be seen; None as long as the survey takes."""
+    return other if survey is None or graph.vertices else _closed_room_or(other, survey)
 
 
 def _closed_room_or(other: tuple[Outcome, str], survey: Survey) -> tuple[Outcome, str] | None:

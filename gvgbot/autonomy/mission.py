@@ -5,9 +5,11 @@ from gvgbot.autonomy.control.edge_follower import Track
 from gvgbot.autonomy.control.orders import Drive, LookAround, Order, Stand
 from gvgbot.autonomy.driven_edges import DrivenEdges
 from gvgbot.autonomy.ending import (
+    Outcome,
     all_examined,
     cut_short,
     left_to_others,
+    unless_closed_room,
     unless_shut_in,
 )
 from gvgbot.autonomy.events import Decision, Event, Recovery
@@ -365,8 +367,12 @@ class Mission(Pursuit):
         self._events += done
         if isinstance(order, Stand):
             reason = f"{NO_EDGE}: there are no walls within range, or no way out"
-            verdict = cut_short(self._mapper.graph, reason, NO_EDGE)
-            self._end(view, *(self._otherwise if self._search.leaves_slot else verdict))
+            verdict: tuple[Outcome, str] | None = self._otherwise
+            if not self._search.leaves_slot:
+                verdict = cut_short(self._mapper.graph, reason, NO_EDGE)
+                verdict = unless_closed_room(self._mapper.graph, self.survey, verdict)
+            if verdict is not None:
+                self._end(view, *verdict)
         return order
 
     def _examine(self, view: View, here: Situation) -> Order:

@@ -302,6 +302,29 @@ def test_who_has_a_map_and_sees_no_edge_any_more_has_not_failed() -> None:
     assert robot.mission.reason == "frontiers left: 3; no edge in sight"
 
 
+@pytest.mark.parametrize(
+    ("unseen", "end"),
+    [
+        (np.empty((0, 2)), ("explored", "a space without edges, and no way out")),
+        (
+            np.array([[5.0, 5.0]]),
+            ("failed", "no edge in sight: there are no walls within range, or no way out"),
+        ),
+    ],
+    ids=["a round room", "a field"],
+)
+def test_without_an_edge_it_ends_by_what_the_survey_tells(
+    unseen: Array, end: tuple[str, str]
+) -> None:
+    """Which takes a moment."""
+    robot, told = Robot(), [None, None, Surveyed(unseen, np.empty((0, 2)))]
+    robot.mission.survey = lambda: told.pop(0)
+    while robot.mission.outcome is None and robot.stamp < 100.0:
+        robot.look(LocalGvg())
+    assert (robot.mission.outcome, robot.mission.reason) == end
+    assert not told
+
+
 def test_an_outage_costs_no_patience() -> None:
     """As if the robot had been asleep: it searches for as long as it would have without."""
     robot, outage = Robot(), 300.0
