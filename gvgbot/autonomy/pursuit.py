@@ -280,6 +280,8 @@ class Pursuit:
 
     def _end(self, view: View, outcome: Outcome, reason: str) -> None:
         self.outcome, self.reason = outcome, reason
+        if outcome == "explored":
+            self._mapper.forget_strays(view)
         self._mapper.forget_bends(view)
         self._mapper.establish()
         self._events.append(Finished(view.stamp, outcome, reason))

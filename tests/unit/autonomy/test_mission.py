@@ -460,6 +460,18 @@ def test_a_departure_into_a_wall_is_none_in_the_end_if_the_map_lacks_nothing(
     assert len(robot.mapper.graph.edges) == 1 + len(left)
 
 
+def test_what_nothing_leads_to_is_not_left_in_the_map() -> None:
+    """The rest of a way through a gap, which is too narrow to be seen from beyond it."""
+    corridor = {1: (-2.0, 0.0), 2: (4.0, 0.0), 3: (0.0, 4.0), 4: (1.2, 4.0)}
+    robot, seen = Robot(), drawn(corridor, {10: (1, 2, []), 11: (3, 4, [])})
+    robot.stand(seen, 6)
+    assert len(robot.mapper.graph.vertices) == 4
+    while robot.mission.outcome is None and robot.stamp < 300.0:
+        robot.look(seen)
+    assert robot.mission.outcome == "explored"
+    assert len(robot.mapper.graph.vertices) == 2
+
+
 SLOT: Rectangle = (-0.3, -0.23, 1.0, 0.23)
 HALL: Rectangle = (1.0, -3.0, 4.0, 3.0)
 IN_SLOT = drawn({1: (-0.1, 0.0), 2: (0.6, 0.0)}, {10: (1, 2, [])})
