@@ -5,7 +5,6 @@ from gvgbot.autonomy.control.edge_follower import Track
 from gvgbot.autonomy.control.orders import Drive, LookAround, Order, Stand
 from gvgbot.autonomy.driven_edges import DrivenEdges
 from gvgbot.autonomy.ending import (
-    Outcome,
     all_examined,
     cut_short,
     left_to_others,
@@ -360,20 +359,28 @@ class Mission(Pursuit):
         self._search.end()
 
     def _look_for_an_edge(self, view: View) -> Order:
-        """No edge in sight: look around, here and where there is more room, and then give up."""
+        """No edge in sight: look around, here and where there is more room, and go back."""
         if self._search.is_driving:
             self._watch_progress(view)
         order, done = self._search.advance(view, self._progress.headway, self._config)
         self._events += done
         if isinstance(order, Stand):
-            reason = f"{NO_EDGE}: there are no walls within range, or no way out"
-            verdict: tuple[Outcome, str] | None = self._otherwise
-            if not self._search.leaves_slot:
-                verdict = cut_short(self._mapper.graph, reason, NO_EDGE)
-                verdict = unless_closed_room(self._mapper.graph, self.survey, verdict)
-            if verdict is not None:
-                self._end(view, *verdict)
+            self._end_search_in_vain(view)
         return order
+
+    def _end_search_in_vain(self, view: View) -> None:
+        graph, verdict = self._mapper.graph, self._otherwise
+        if not self._search.leaves_slot:
+            if self._retraces(view, set(graph.vertices), NO_EDGE):
+                self._search.end()
+                return
+            reason = f"{NO_EDGE}: there are no walls within range, or no way out"
+            nowhere = cut_short(graph, reason, NO_EDGE)
+            found = unless_closed_room(graph, self.survey, nowhere)
+            if found is None:
+                return
+            verdict = found
+        self._end(view, *verdict)
 
     def _examine(self, view: View, here: Situation) -> Order:
         """Look at what may be a vertex, give others a chance to know more to do, and end."""

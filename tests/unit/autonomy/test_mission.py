@@ -302,6 +302,20 @@ def test_who_has_a_map_and_sees_no_edge_any_more_has_not_failed() -> None:
     assert robot.mission.reason == "frontiers left: 3; no edge in sight"
 
 
+def test_who_sees_no_edge_any_more_goes_back_to_where_it_saw_some() -> None:
+    """It has come into a gap that it just fits into, which looks too narrow from within."""
+    robot = Robot()
+    robot.stand(TEE, 8)
+    robot.drive(TEE, (0.0, 0.0), (3.0, 0.0), (3.0, -3.0))
+    order: Order = Stand()
+    while not isinstance(order, Drive) and robot.stamp < 100.0:
+        order = robot.look(LocalGvg())
+    assert end_of(order) == pytest.approx((3.0, 0.0), abs=0.8)  # a little beyond the vertex
+    robot.drive(TEE, (3.0, -3.0), (3.0, 0.0))
+    assert robot.mission.outcome is None
+    assert isinstance(robot.look(TEE), Drive)
+
+
 @pytest.mark.parametrize(
     ("unseen", "end"),
     [
