@@ -87,10 +87,8 @@ def leading_nowhere(
     the room is in sight. Where the map is whole, frontiers are what somebody in the way made up.
     """
     left: tuple[Outcome, str] = ("explored_with_blocked", reason)
-    if survey is None:
-        return left
-    if not graph.edges and all(v.kind == "endpoint" for v in graph.vertices.values()):
-        return _closed_room_or(left, survey)
+    if survey is None or not _has_ways(graph):
+        return unless_closed_room(graph, survey, left)
     surveyed = survey()
     if surveyed is None:
         return None
@@ -108,8 +106,13 @@ def without_target(
 def unless_closed_room(
     graph: GvgGraph, survey: Survey | None, other: tuple[Outcome, str]
 ) -> tuple[Outcome, str] | None:
-    """How else it ends, if something is mapped or to be seen; None as long as the survey takes."""
-    return other if survey is None or graph.vertices else _closed_room_or(other, survey)
+    """How else it ends, if an edge is mapped or floor unseen; None as long as the survey takes."""
+    return other if survey is None or _has_ways(graph) else _closed_room_or(other, survey)
+
+
+def _has_ways(graph: GvgGraph) -> bool:
+    """Whether an edge is known, or where some begin, and not the end of one at most."""
+    return bool(graph.edges) or has_meetpoints(graph)
 
 
 def _closed_room_or(other: tuple[Outcome, str], survey: Survey) -> tuple[Outcome, str] | None:

@@ -259,10 +259,7 @@ class Pursuit:
 
     def _end_before(self, view: View, reason: str) -> None:
         """End with frontiers left, once it is told whether they are any."""
-        verdict = leading_nowhere(self._mapper.graph, self.survey, reason)
-        if verdict is not None and verdict[0] == "explored":
-            self._mapper.forget_frontiers(view)
-        self._conclude(view, verdict)
+        self._conclude(view, leading_nowhere(self._mapper.graph, self.survey, reason))
 
     def _conclude(self, view: View, verdict: tuple[Outcome, str] | None) -> None:
         """End, once it is told how; from a slot the robot goes into the open first."""
@@ -280,7 +277,8 @@ class Pursuit:
 
     def _end(self, view: View, outcome: Outcome, reason: str) -> None:
         self.outcome, self.reason = outcome, reason
-        if outcome == "explored":
+        if outcome == "explored" and not self.choice.is_left_to_others:
+            self._mapper.forget_frontiers(view)
             self._mapper.forget_strays(view)
         self._mapper.forget_bends(view)
         self._mapper.establish()

@@ -339,6 +339,17 @@ def test_without_an_edge_it_ends_by_what_the_survey_tells(
     assert not told
 
 
+def test_the_end_of_an_edge_that_was_none_is_forgotten_in_a_round_room() -> None:
+    robot, nothing = Robot(), np.empty((0, 2))
+    robot.mission.survey = lambda: Surveyed(nothing, nothing)
+    robot.stand(drawn({1: (0.3, 0.0), 2: (3.0, 0.0)}, {10: (1, 2, [])}, unseen={2: 0.0}), 10)
+    assert len(robot.mapper.graph.frontiers()) == 1
+    while robot.mission.outcome is None and robot.stamp < 100.0:
+        robot.look(LocalGvg())
+    assert robot.mission.outcome == "explored"
+    assert not robot.mapper.graph.vertices
+
+
 def test_an_outage_costs_no_patience() -> None:
     """As if the robot had been asleep: it searches for as long as it would have without."""
     robot, outage = Robot(), 300.0
