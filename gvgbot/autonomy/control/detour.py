@@ -42,7 +42,7 @@ def led_round(
         return bool(not narrow.any() and view.local_map.known(way).all())
 
     line = detour(track.polyline, bodies, radius, is_free)
-    line = stepping_off(line, bodies, radius, is_free)
+    line = stepping_off(line, view.local_base.position, bodies, radius, is_free)
     if is_hidden:
         line = peek(line, bodies, radius, is_free)
     if line is track.polyline:
@@ -51,21 +51,22 @@ def led_round(
 
 
 def stepping_off(
-    line: Array, bodies: list[Disc], radius: float, is_free: Callable[[Array], bool]
+    line: Array, base: Array, bodies: list[Disc], radius: float, is_free: Callable[[Array], bool]
 ) -> Array:
-    """The line (N, 2), begun by a step away from a body that is too near to pass; see `detour`."""
+    """A step (N, 2) from the base (2,) away from a body that is too near to pass; see `detour`.
+
+    The line itself if there is none. Looking ahead on what comes after it, one would not turn.
+    """
     for number, (centre, size) in enumerate(bodies):
-        away = max(math.dist(line[0], centre), 1e-6)
+        away = max(math.dist(base, centre), 1e-6)
         if away >= radius + size + _TOO_NEAR_M:
             continue
         others = bodies[:number] + bodies[number + 1 :]
         for gap in _PASSES_M:
-            off = centre + (line[0] - centre) * (radius + size + gap) / away
-            step = resampled(np.stack([line[0], off]), _SPACING_M)
+            off = centre + (base - centre) * (radius + size + gap) / away
+            step = resampled(np.stack([base, off]), _SPACING_M)
             if len(step) > 1 and is_free(step) and _keeps_off(step, others, radius, line):
-                near = np.hypot(*(line - line[0]).T) <= math.dist(off, line[0])
-                rest = line[:0] if near.all() else line[int(np.argmin(near)) :]
-                return np.concatenate([step, rest])
+                return step
     return line
 
 

@@ -123,16 +123,14 @@ def test_where_there_is_no_room_it_looks_from_as_near_as_is_free() -> None:
 
 def test_who_stands_too_near_to_pass_steps_off_first() -> None:
     beside, behind = disc(0.12, 0.46), disc(-0.3, 2.0)
-    line = stepping_off(EAST, [behind, beside], RADIUS, anywhere)
-    away = np.hypot(*(line - [0.12, 0.46]).T)
-    stepped = int(np.argmax(away > TOUCH + ROOM - 0.02))
-    assert (line[0] == EAST[0]).all()
-    assert np.diff(away[: stepped + 1]).min() > 0.0
-    assert length(line[: stepped + 1]) < 0.25
-    assert (line[-1] == EAST[-1]).all()
-    assert length(line) < 6.4
-    some = stepping_off(EAST, [beside], RADIUS, between(-0.12, 2.0))
+    step = stepping_off(EAST, EAST[0], [behind, beside], RADIUS, anywhere)
+    away = np.hypot(*(step - [0.12, 0.46]).T)
+    assert (step[0] == EAST[0]).all()
+    assert np.diff(away).min() > 0.0
+    assert away[-1] == pytest.approx(TOUCH + ROOM, abs=0.02)
+    assert length(step) < 0.25
+    some = stepping_off(EAST, EAST[0], [beside], RADIUS, between(-0.12, 2.0))
     stands = math.hypot(0.12, 0.46)
     assert some[:, 1].min() == pytest.approx((stands - TOUCH - SOME) * 0.46 / stands, abs=0.01)
-    assert stepping_off(EAST, [beside], RADIUS, between(-0.01, 2.0)) is EAST
-    assert stepping_off(EAST, [disc(0.12, 0.6)], RADIUS, anywhere) is EAST
+    assert stepping_off(EAST, EAST[0], [beside], RADIUS, between(-0.01, 2.0)) is EAST
+    assert stepping_off(EAST, EAST[0], [disc(0.12, 0.6)], RADIUS, anywhere) is EAST
