@@ -6,9 +6,7 @@ from gvgbot.autonomy.control.orders import Drive, LookAround, Order, Stand
 from gvgbot.autonomy.driven_edges import DrivenEdges
 from gvgbot.autonomy.ending import (
     all_examined,
-    cut_short,
     left_to_others,
-    unless_closed_room,
     unless_shut_in,
 )
 from gvgbot.autonomy.events import Decision, Event, Recovery
@@ -21,7 +19,7 @@ from gvgbot.autonomy.overlooked import Overlooked
 from gvgbot.autonomy.progress import Progress
 from gvgbot.autonomy.pursuit import Pursuit
 from gvgbot.autonomy.scouting import Scouting
-from gvgbot.autonomy.search import NO_EDGE, Search
+from gvgbot.autonomy.search import Search
 from gvgbot.autonomy.situation import Situation
 from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.autonomy.views import Correspondence, View
@@ -362,25 +360,13 @@ class Mission(Pursuit):
         """No edge in sight: look around, here and where there is more room, and go back."""
         if self._search.is_driving:
             self._watch_progress(view)
+        elif self._search.has_looked and self._ends_in_closed_room(view):
+            return Stand()
         order, done = self._search.advance(view, self._progress.headway, self._config)
         self._events += done
         if isinstance(order, Stand):
             self._end_search_in_vain(view)
         return order
-
-    def _end_search_in_vain(self, view: View) -> None:
-        graph, verdict = self._mapper.graph, self._otherwise
-        if not self._search.leaves_slot:
-            if self._retraces(view, set(graph.vertices), NO_EDGE):
-                self._search.end()
-                return
-            reason = f"{NO_EDGE}: there are no walls within range, or no way out"
-            nowhere = cut_short(graph, reason, NO_EDGE)
-            found = unless_closed_room(graph, self.survey, nowhere)
-            if found is None:
-                return
-            verdict = found
-        self._end(view, *verdict)
 
     def _examine(self, view: View, here: Situation) -> Order:
         """Look at what may be a vertex, give others a chance to know more to do, and end."""

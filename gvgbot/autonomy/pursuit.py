@@ -5,8 +5,10 @@ from gvgbot.autonomy.choice import Choice
 from gvgbot.autonomy.ending import (
     Outcome,
     Survey,
+    cut_short,
     has_meetpoints,
     leading_nowhere,
+    unless_closed_room,
     without_target,
 )
 from gvgbot.autonomy.events import Event, Finished, Recovery
@@ -21,7 +23,7 @@ from gvgbot.autonomy.path_following import PathFollowing
 from gvgbot.autonomy.progress import Progress
 from gvgbot.autonomy.retracing import Retracing
 from gvgbot.autonomy.scouting import Scouting
-from gvgbot.autonomy.search import Search
+from gvgbot.autonomy.search import NO_EDGE, Search
 from gvgbot.autonomy.situation import Situation
 from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.autonomy.topology import piece_of
@@ -269,6 +271,30 @@ class Pursuit:
         if is_hopeful and self._search.begin_in_slot():
             self._otherwise = verdict
             return
+        self._end(view, *verdict)
+
+    def _ends_in_closed_room(self, view: View) -> bool:
+        """End if all floor is in sight, and no edge; whether it does, or has to wait for that."""
+        graph = self._mapper.graph
+        found = unless_closed_room(graph, self.survey, cut_short(graph, NO_EDGE, NO_EDGE))
+        if found is not None and found[0] == "explored":
+            self._end(view, *found)
+        self._search.has_looked = found is None
+        return found is None or self.outcome is not None
+
+    def _end_search_in_vain(self, view: View) -> None:
+        """No edge is in sight from here: go back to where some were, once, or end."""
+        graph, verdict = self._mapper.graph, self._otherwise
+        if not self._search.leaves_slot:
+            if self._retraces(view, set(graph.vertices), NO_EDGE):
+                self._search.end()
+                return
+            reason = f"{NO_EDGE}: there are no walls within range, or no way out"
+            nowhere = cut_short(graph, reason, NO_EDGE)
+            found = unless_closed_room(graph, self.survey, nowhere)
+            if found is None:
+                return
+            verdict = found
         self._end(view, *verdict)
 
     def _knows_a_slot(self, view: View) -> bool:

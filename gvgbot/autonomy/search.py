@@ -24,6 +24,7 @@ class Search:
         self._sought: list[Array] = []  # places to see an edge from, local frame
         self._track: Track | None = None  # to the last of them
         self.leaves_slot, self._left = False, 0  # now, and how often it was tried
+        self.has_looked = False  # around, just now: perhaps there is nothing more to be seen
 
     @property
     def is_driving(self) -> bool:
@@ -32,7 +33,7 @@ class Search:
 
     def end(self) -> None:
         """Search anew next time: an edge is in sight, or something else is to be done."""
-        self._since, self._track, self.leaves_slot = None, None, False
+        self._since, self._track, self.leaves_slot, self.has_looked = None, None, False, False
 
     def begin_in_slot(self) -> bool:
         """Search although an edge is in sight; whether that is worth another try."""
@@ -51,7 +52,7 @@ class Search:
     ) -> tuple[Order, list[Event]]:
         """The order for the next keyframe interval: stand, if nothing is left to be tried."""
         if self._since is None:
-            self._since, self._sought = view.stamp, []
+            self._since, self._sought, self.has_looked = view.stamp, [], True
             return LookAround(math.tau), [Recovery(view.stamp, "look around", NO_EDGE)]
         if self._track is not None:
             away = math.dist(view.local_base.position, self._track.polyline[-1])
