@@ -26,6 +26,15 @@ class VertexRemoved:
 
 
 @dataclass(frozen=True, slots=True)
+class VertexMoved:
+    """A vertex proved to stand so many metres elsewhere: somebody stood there as it was found."""
+
+    stamp: float
+    vertex: int
+    metres: float
+
+
+@dataclass(frozen=True, slots=True)
 class EdgeJoined:
     """Two half-edges proved to be the ends of one edge, by driving it or by seeing all of it."""
 
@@ -160,6 +169,7 @@ class WayForgotten:
 Event = (
     VertexAdded
     | VertexRemoved
+    | VertexMoved
     | EdgeJoined
     | LoopClosed
     | PlaceDoubted

@@ -24,7 +24,7 @@ from gvgbot.autonomy.unsettled import Unsettled
 from gvgbot.autonomy.views import Observation, View
 from gvgbot.geometry import Array, Pose
 
-_TURN_VARIANCE = 1e-6  # rad^2; a new vertex's frame is turned as the local one is
+TURN_VARIANCE = 1e-6  # rad^2; a new vertex's frame is turned as the local one is
 _BEHIND_M = 2.5  # the nearest walls of a vertex, others tell what it looks like
 
 
@@ -79,7 +79,7 @@ class MapEdits(Knowledge):
         R = np.zeros((3, 3))
         away = math.hypot(base_vertex.x, base_vertex.y)
         R[:2, :2] = sight_covariance(away, self._recognition, settled=sighting.settled)
-        R[2, 2] = _TURN_VARIANCE
+        R[2, 2] = TURN_VARIANCE
         self.belief = ekf.add_vertex(self.belief, vertex.id, base_vertex, R)
         self.observations.append(Observation(view.keyframe, vertex.id, base_vertex, R))
         self._picture(view, vertex)
@@ -170,24 +170,29 @@ class MapEdits(Knowledge):
         a, b = (self.graph.vertices[end.vertex].clearance for end in (edge.a, edge.b))
         return a, b
 
-    def redraw(self, vertex: Vertex, before: Pose) -> None:
+    def redraw(self, vertex: Vertex, before: Pose, *, polylines: bool = False) -> None:
         """Let lines for maps end where a vertex is believed now, and else stay where they were.
 
-        It was believed at a pose `before`, map frame, which it proved to be beside.
+        It was believed at a pose `before`, map frame, which it proved to be beside. So do the
+        `polylines` of edges if that is far off.
         """
-        moved = self.belief.map_vertex(vertex.id).position - before.position
         edges = {edge.id: edge for edge in map(self.graph.edge_at, vertex.ends) if edge is not None}
         for edge in edges.values():
-            if edge.drawn is None:
-                continue
-            frame = self.belief.map_vertex(edge.a.vertex)
-            line = (before if edge.a.vertex == vertex.id else frame).transform(edge.drawn)
-            start, end = (
-                place + moved * (half.vertex == vertex.id)
-                for place, half in ((line[0], edge.a), (line[-1], edge.b))
-            )
-            tied = tied_to(line, start, end, self._room_at_ends(edge))
-            edge.drawn = frame.inverse().transform(tied)
+            if edge.drawn is not None:
+                edge.drawn = self._tied(edge, edge.drawn, vertex, before)
+            if polylines:
+                edge.polyline = self._tied(edge, edge.polyline, vertex, before)
+
+    def _tied(self, edge: Edge, drawn: Array, vertex: Vertex, before: Pose) -> Array:
+        """A line of an edge (N, 2), in the frame of its first vertex, as `redraw` has it."""
+        moved = self.belief.map_vertex(vertex.id).position - before.position
+        frame = self.belief.map_vertex(edge.a.vertex)
+        line = (before if edge.a.vertex == vertex.id else frame).transform(drawn)
+        start, end = (
+            place + moved * (half.vertex == vertex.id)
+            for place, half in ((line[0], edge.a), (line[-1], edge.b))
+        )
+        return frame.inverse().transform(tied_to(line, start, end, self._room_at_ends(edge)))
 
     def close_ring(self, view: View, line: Array, min_clearance: float) -> None:
         """Make a vertex here on an edge without an end that has been driven round.

@@ -6,10 +6,10 @@ import numpy as np
 
 from gvgbot.autonomy.association import is_crowded, pair_tracked, sightings_of
 from gvgbot.autonomy.candidates import Candidates, Mistake
-from gvgbot.autonomy.events import Event, LoopClosed
+from gvgbot.autonomy.events import Event, LoopClosed, VertexMoved
 from gvgbot.autonomy.evidence import Evidence, MappingConfig
 from gvgbot.autonomy.gvg.local import Branch, LocalEdge, LocalNode
-from gvgbot.autonomy.map_edits import MapEdits
+from gvgbot.autonomy.map_edits import TURN_VARIANCE, MapEdits
 from gvgbot.autonomy.recogniser import CLOSE_M, Match, Recogniser, Recognition
 from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.graph import Edge, HalfEdgeId, Vertex
@@ -24,6 +24,7 @@ from gvgbot.autonomy.views import Correspondence, Observation, View, touches
 from gvgbot.geometry import Array, Pose
 
 _ODD = 9.0  # squared Mahalanobis distance, 2 degrees of freedom, of a sight that counts less
+_ELSEWHERE, _IN_A_ROW = 18.0, 3  # of so many from near by that show it stands elsewhere
 _TOGETHER = 1.6  # times the sigma of each, as the sights of one visit err together
 _MEAN_OF = 10  # sightings, about, of which the place of a vertex is the mean
 _BESIDE_M = 1.0  # from so near, the walls around a vertex are seen well
@@ -230,12 +231,35 @@ class Mapper(MapEdits):
             return
         own = sight_covariance(away, self._recognition, settled=vertex.settled)
         r, S, _ = ekf.innovation(self.belief, vertex.id, base_vertex, own)
-        odd = max(1.0, ekf.mahalanobis(r, S) / _ODD)
+        off = ekf.mahalanobis(r, S)
+        if vertex.settled and away < self._config.trust_m:
+            vertex.elsewhere = vertex.elsewhere + 1 if off > _ELSEWHERE else 0
+        if vertex.elsewhere >= _IN_A_ROW:
+            self._place_anew(view, vertex, base_vertex, own)
+            return
+        odd = max(1.0, off / _ODD)
         before = self.belief.map_vertex(vertex.id)
         self.belief = ekf.update_vertex_in_place(self.belief, vertex.id, base_vertex, odd * own)
         self.redraw(vertex, before)
         R = odd * _TOGETHER**2 * own
         self.observations.append(Observation(view.keyframe, vertex.id, base_vertex, R))
+
+    def _place_anew(self, view: View, vertex: Vertex, base_vertex: Pose, sight: Array) -> None:
+        """Believe a vertex where it is seen now, with covariance `sight` (2, 2), and never before.
+
+        Somebody stood near by when it was found: what it lay between was not the building.
+        """
+        before, vertex.elsewhere = self.belief.map_vertex(vertex.id), 0
+        R = np.zeros((3, 3))
+        R[:2, :2], R[2, 2] = sight, TURN_VARIANCE
+        belief = ekf.remove_vertex(self.belief, vertex.id)
+        self.belief = ekf.add_vertex(belief, vertex.id, base_vertex, R)
+        self.observations[:] = [seen for seen in self.observations if seen.vertex != vertex.id]
+        self.observations.append(Observation(view.keyframe, vertex.id, base_vertex, R))
+        self._picture(view, vertex)
+        self.redraw(vertex, before, polylines=True)
+        metres = before.distance(self.belief.map_vertex(vertex.id))
+        self._events.append(VertexMoved(view.stamp, vertex.id, metres))
 
     def _measure(self, view: View, vertex: Vertex, base_vertex: Pose, R: Array) -> None:
         """Correct the belief by a vertex seen again."""

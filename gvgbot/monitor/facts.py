@@ -200,6 +200,8 @@ def _words(event: Event) -> str:
             return f"found {get('kind')} {get('vertex')} of degree {get('degree')}"
         case "vertex_removed":
             return f"vertex {get('vertex')} is none: {get('reason')}"
+        case "vertex_moved":
+            return f"vertex {get('vertex')} proves to stand elsewhere"
         case "loop_closed":
             away = get("away_m")
             far = f" after {away:.0f} m" if isinstance(away, float) else ""

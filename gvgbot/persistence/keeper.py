@@ -45,6 +45,7 @@ _COUNTING_S = 60.0  # away for longer, the base's counters may have come round
 _SETTLED = (
     events.VertexAdded,
     events.VertexRemoved,
+    events.VertexMoved,
     events.EdgeJoined,
     events.LoopClosed,
     events.DoubtSettled,
@@ -54,6 +55,7 @@ _SETTLED = (
     events.Finished,
     events.WayForgotten,
 )
+_RETELLING = (events.VertexMoved, events.ClosureRevoked, events.DoubtSettled)
 
 log = structlog.get_logger()
 
@@ -159,7 +161,7 @@ class Keeper:
         self._settled = self._settled or isinstance(event, _SETTLED)
         if isinstance(event, events.Requested) and event.done:
             self._is_asked = self._is_urgent = True
-        self._is_retold |= isinstance(event, events.ClosureRevoked | events.DoubtSettled)
+        self._is_retold |= isinstance(event, _RETELLING)
         if isinstance(event, events.WayForgotten):
             self._stay = min(self._stay, event.kept)
 

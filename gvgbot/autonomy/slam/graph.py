@@ -58,6 +58,7 @@ class Vertex:
     misses: int = 0
     surplus: int = 0  # sightings in a row with a departure that is not known
     unclear: int = 0  # sightings from it with a departure of which too little can be seen
+    elsewhere: int = 0  # corrections in a row that say it is not where it is believed to be
     visits: int = 1
     reached: bool = False  # the robot has been there, and did not only see it
     settled: bool = True  # it has been seen where nothing unseen could move it

@@ -164,6 +164,7 @@ export function told(event) {
     }
     case "vertex_added": return [`found ${d.kind} ${d.vertex} of degree ${d.degree}`, "plain"];
     case "vertex_removed": return [`vertex ${d.vertex} is none: ${d.reason}`, "plain"];
+    case "vertex_moved": return [`vertex ${d.vertex} proves to stand elsewhere`, "plain"];
     case "loop_closed": {
       const far = typeof d.away_m === "number" ? ` after ${d.away_m.toFixed(0)} m` : "";
       return [`loop closed at vertex ${d.vertex}${far}`, "good"];

@@ -18,6 +18,7 @@ from gvgbot.autonomy.events import (
     LoopClosed,
     PlaceDoubted,
     VertexAdded,
+    VertexMoved,
     VertexRemoved,
 )
 from gvgbot.autonomy.evidence import MappingConfig
@@ -170,6 +171,25 @@ def test_the_line_of_an_edge_for_maps_ends_where_its_vertex_proves_to_be() -> No
     np.testing.assert_allclose(line[[0, -1]], [start.position, end.position], atol=1e-9)
     assert max(start.y, end.y) > 0.1
     assert np.abs(line[len(line) // 2, 1]) < 0.01
+
+
+def test_a_vertex_beside_which_somebody_stood_is_placed_where_it_is_seen_later() -> None:
+    """What was seen of it before tells nothing, and the lines of its edges end where it is."""
+    seen, first = Seen(), 30
+    seen.look(TEE, first)
+    aside = TEE_POINTS | {2: (3.5, 0.0), 4: (3.5, -4.0)}
+    seen.look(drawn(aside, TEE_LINES, unseen=UNSEEN), 60)
+    assert seen.places("meetpoint") == [pytest.approx((3.5, 0.0), abs=0.06)]
+    assert seen.places("endpoint") == [pytest.approx((3.5, -4.0), abs=0.06)]
+    moved = [event for event in seen.events if isinstance(event, VertexMoved)]
+    assert len(moved) == 2
+    assert all(0.3 < event.metres < 0.6 for event in moved)
+    assert min(one.keyframe for one in seen.mapper.observations) > first
+    (edge,) = seen.mapper.graph.edges.values()
+    start, end = (seen.mapper.belief.map_vertex(half.vertex) for half in (edge.a, edge.b))
+    for line in (edge.polyline, edge.shown):
+        ends = start.transform(line)[[0, -1]]
+        np.testing.assert_allclose(ends, [start.position, end.position], atol=0.06)
 
 
 def test_what_lies_on_an_edge_nearer_than_its_walls_lies_on_a_way() -> None:

@@ -257,6 +257,7 @@ def test_the_age_of_an_event_fits_its_column(seconds: float, age: str) -> None:
         ("doubt_settled", {"vertex": 9, "known": 2}, "vertex 9 is 2"),
         ("doubt_settled", {"vertex": 9, "known": None}, "vertex 9 is a new one"),
         ("closure_revoked", {"vertex": 2}, "closure at vertex 2 taken back"),
+        ("vertex_moved", {"vertex": 2, "metres": 0.4}, "vertex 2 proves to stand elsewhere"),
     ],
 )
 def test_what_happened_is_told_in_words(

@@ -15,7 +15,13 @@ import numpy as np
 import pytest
 import structlog
 
-from gvgbot.autonomy.events import DoubtSettled, LoopClosed, Requested, WayForgotten
+from gvgbot.autonomy.events import (
+    DoubtSettled,
+    LoopClosed,
+    Requested,
+    VertexMoved,
+    WayForgotten,
+)
 from gvgbot.autonomy.memory import growth, recall, remember
 from gvgbot.autonomy.returning import ReturningPipeline
 from gvgbot.clock import LoopClock, run_in_virtual_time
@@ -472,6 +478,20 @@ def test_what_was_seen_of_a_vertex_that_proved_to_be_another_is_kept_as_that_one
     assert saved is not None
     assert {seen.vertex for grown in saved.past for seen in grown.observations} == {one}
     assert packed(saved.past) == packed(growth(session.pipeline))
+
+
+def test_what_was_seen_of_a_vertex_before_it_proved_to_stand_elsewhere_is_not_kept(
+    session: Session, tmp_path: Path
+) -> None:
+    keeper, mapper = Keeper(session, MissionFiles(tmp_path)), session.pipeline.mapper
+    keeper.keeping(20.0)()
+    stays, moved = sorted(mapper.graph.vertices)
+    latest = [seen for seen in mapper.observations if seen.vertex == moved][-1]
+    mapper.observations[:] = [seen for seen in mapper.observations if seen.vertex == stays]
+    mapper.observations.append(replace(latest, keyframe=len(session.pipeline.past.keyframes) - 1))
+    keeper.on_event(VertexMoved(21.0, moved, 0.4))
+    keeper.keeping(21.0)()
+    assert packed(found(tmp_path).past) == packed(growth(session.pipeline))
 
 
 def test_a_robot_that_saw_nothing_leaves_no_mission(tmp_path: Path) -> None:
