@@ -24,7 +24,7 @@ from gvgbot.autonomy.views import Correspondence, Observation, View, touches
 from gvgbot.geometry import Array, Pose
 
 _ODD = 9.0  # squared Mahalanobis distance, 2 degrees of freedom, of a sight that counts less
-_ELSEWHERE, _IN_A_ROW = 18.0, 3  # of so many from near by that show it stands elsewhere
+_ELSEWHERE, _IN_A_ROW = 18.0, 3  # the same of sights that show, so many, that it stands elsewhere
 _TOGETHER = 1.6  # times the sigma of each, as the sights of one visit err together
 _MEAN_OF = 10  # sightings, about, of which the place of a vertex is the mean
 _BESIDE_M = 1.0  # from so near, the walls around a vertex are seen well

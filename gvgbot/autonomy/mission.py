@@ -4,11 +4,7 @@ from gvgbot.autonomy.control.company import Companion
 from gvgbot.autonomy.control.edge_follower import Track
 from gvgbot.autonomy.control.orders import Drive, LookAround, Order, Stand
 from gvgbot.autonomy.driven_edges import DrivenEdges
-from gvgbot.autonomy.ending import (
-    all_examined,
-    left_to_others,
-    unless_shut_in,
-)
+from gvgbot.autonomy.ending import all_examined, left_to_others, unless_shut_in
 from gvgbot.autonomy.events import Decision, Event, Recovery
 from gvgbot.autonomy.exploration.access import NEAR_M, Access, access, is_tight, way_to_edge
 from gvgbot.autonomy.exploration.config import ExplorationConfig
