@@ -9,7 +9,7 @@ from gvgbot.autonomy.estimate import scans_at, smoothed_keyframes
 from gvgbot.autonomy.pipeline import Pipeline
 from gvgbot.geometry import Array, Pose, anchored, sampled
 from gvgbot.maps.blanks import blanks
-from gvgbot.maps.gaps import gaps
+from gvgbot.maps.gaps import gaps, is_wall
 from gvgbot.maps.hits import Scans, barred, hits
 from gvgbot.maps.hollows import bodies, hollows
 from gvgbot.maps.narrows import narrows
@@ -60,7 +60,8 @@ def survey(pipeline: Pipeline) -> Surveyed:
     within = _NEARER * pipeline.sight.open_clearance
     views = viewpoints(grid, beside, places, here, room, off, within)
     if views is None:
-        return Surveyed(found, narrow, is_beside_floor=len(found) > 0)
+        is_walled = bool(is_wall(grid.cells).any())
+        return Surveyed(found, narrow, is_beside_floor=len(found) > 0, is_walled=is_walled)
     return Surveyed(
         views,
         narrow,

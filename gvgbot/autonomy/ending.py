@@ -21,6 +21,7 @@ class Surveyed(NamedTuple):
     doorsteps: Array = np.empty((0, 2))  # (M, 2), before what may be somebody, or narrowed by him
     barred: Sequence[int] = ()  # edges over what looked like a wall, not driven
     is_whole: bool = False  # all floor is seen, and edges lead wherever they should
+    is_walled: bool = True  # a wall was seen at all
 
 
 Survey = Callable[[], Surveyed | None]  # None: not yet told
@@ -123,6 +124,6 @@ def _closed_room_or(other: tuple[Outcome, str], survey: Survey) -> tuple[Outcome
     surveyed = survey()
     if surveyed is None:
         return None
-    if len(surveyed.places):
+    if len(surveyed.places) or not surveyed.is_walled:
         return other
     return "explored", f"a space without edges, and no way out{too_narrow(surveyed.narrows)}"

@@ -53,6 +53,15 @@ def test_nothing_is_missing_of_what_can_be_seen_from_one_end() -> None:
     assert len(places_after(carved([CORRIDOR]), 1.0)) == 0
 
 
+@pytest.mark.parametrize(("metres", "is_walled"), [(3.0, True), (70.0, False)])
+def test_whether_a_wall_is_in_sight_is_told_of_where_no_edge_is(
+    metres: float, *, is_walled: bool
+) -> None:
+    surveyed = survey(driven(carved([(-metres, -metres, metres, metres)]), 0.0))
+    assert surveyed.is_walled == is_walled
+    assert len(surveyed.places) == 0
+
+
 def test_what_lies_in_the_shadow_of_a_corner_is_a_gap_until_the_robot_looks_round_it() -> None:
     """Seen from the origin, the shadow begins between (2, 1) and (4, 2): halfway at (3, 1.5)."""
     building = carved([CORRIDOR, SIDE])

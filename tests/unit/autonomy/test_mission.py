@@ -316,28 +316,30 @@ def test_who_sees_no_edge_any_more_goes_back_to_where_it_saw_some() -> None:
     assert isinstance(robot.look(TEE), Drive)
 
 
+NONE = np.empty((0, 2))
+NO_EDGE = "failed", "no edge in sight: there are no walls within range, or no way out"
+
+
 @pytest.mark.parametrize(
-    ("unseen", "end"),
+    ("surveyed", "end"),
     [
-        (np.empty((0, 2)), ("explored", "a space without edges, and no way out")),
-        (
-            np.array([[5.0, 5.0]]),
-            ("failed", "no edge in sight: there are no walls within range, or no way out"),
-        ),
+        (Surveyed(NONE, NONE), ("explored", "a space without edges, and no way out")),
+        (Surveyed(np.array([[5.0, 5.0]]), NONE), NO_EDGE),
+        (Surveyed(NONE, NONE, is_walled=False), NO_EDGE),
     ],
-    ids=["a round room", "a field"],
+    ids=["a round room", "a hall", "a field"],
 )
 def test_without_an_edge_it_ends_by_what_the_survey_tells(
-    unseen: Array, end: tuple[str, str]
+    surveyed: Surveyed, end: tuple[str, str]
 ) -> None:
     """Which takes a moment. In a closed room it need not look for an edge from elsewhere."""
-    robot, told = Robot(), [None, None, Surveyed(unseen, np.empty((0, 2)))]
+    robot, told = Robot(), [None, None, surveyed]
     robot.mission.survey = lambda: told.pop(0) if len(told) > 1 else told[0]
     while robot.mission.outcome is None and robot.stamp < 100.0:
         robot.look(LocalGvg())
     assert (robot.mission.outcome, robot.mission.reason) == end
     assert len(told) == 1
-    assert (robot.stamp < 5.0) == (not len(unseen))
+    assert (robot.stamp < 5.0) == (end != NO_EDGE)
 
 
 def test_the_end_of_an_edge_that_was_none_is_forgotten_in_a_round_room() -> None:
