@@ -24,7 +24,7 @@ from gvgbot.autonomy.unsettled import Unsettled
 from gvgbot.autonomy.views import Observation, View
 from gvgbot.geometry import Array, Pose
 
-TURN_VARIANCE = 1e-6  # rad^2; a new vertex's frame is turned as the local one is
+_TURN_VARIANCE = 1e-6  # rad^2; a new vertex's frame is turned as the local one is
 _BEHIND_M = 2.5  # the nearest walls of a vertex, others tell what it looks like
 
 
@@ -75,14 +75,7 @@ class MapEdits(Knowledge):
         for bearing in sighting.bearings:
             vertex.add_half_edge(bearing)
         self.graph.vertices[vertex.id] = vertex
-        base_vertex = view.local_base.to(local)
-        R = np.zeros((3, 3))
-        away = math.hypot(base_vertex.x, base_vertex.y)
-        R[:2, :2] = sight_covariance(away, self._recognition, settled=sighting.settled)
-        R[2, 2] = TURN_VARIANCE
-        self.belief = ekf.add_vertex(self.belief, vertex.id, base_vertex, R)
-        self.observations.append(Observation(view.keyframe, vertex.id, base_vertex, R))
-        self._picture(view, vertex)
+        self._believe(view, vertex)
         place = self.belief.map_vertex(vertex.id)
         self.part_edge_at(vertex)
         kind, degree = sighting.kind, vertex.degree
@@ -90,6 +83,17 @@ class MapEdits(Knowledge):
             VertexAdded(view.stamp, vertex.id, kind, place.x, place.y, degree, vertex.clearance)
         )
         return vertex
+
+    def _believe(self, view: View, vertex: Vertex) -> None:
+        """Take a vertex into the belief where it is seen, as one that was never seen before."""
+        base_vertex = view.local_base.to(vertex.local)
+        R = np.zeros((3, 3))
+        away = math.hypot(base_vertex.x, base_vertex.y)
+        R[:2, :2] = sight_covariance(away, self._recognition, settled=vertex.settled)
+        R[2, 2] = _TURN_VARIANCE
+        self.belief = ekf.add_vertex(self.belief, vertex.id, base_vertex, R)
+        self.observations.append(Observation(view.keyframe, vertex.id, base_vertex, R))
+        self._picture(view, vertex)
 
     def add_driven(self, view: View, place: Array, *bearings: float) -> Vertex:
         """Make a vertex of a place (2,) that was driven over, with departures; local frame."""

@@ -9,7 +9,7 @@ from gvgbot.autonomy.candidates import Candidates, Mistake
 from gvgbot.autonomy.events import Event, LoopClosed, VertexMoved
 from gvgbot.autonomy.evidence import Evidence, MappingConfig
 from gvgbot.autonomy.gvg.local import Branch, LocalEdge, LocalNode
-from gvgbot.autonomy.map_edits import TURN_VARIANCE, MapEdits
+from gvgbot.autonomy.map_edits import MapEdits
 from gvgbot.autonomy.recogniser import CLOSE_M, Match, Recogniser, Recognition
 from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.graph import Edge, HalfEdgeId, Vertex
@@ -235,7 +235,7 @@ class Mapper(MapEdits):
         if vertex.settled and away < self._config.trust_m:
             vertex.elsewhere = vertex.elsewhere + 1 if off > _ELSEWHERE else 0
         if vertex.elsewhere >= _IN_A_ROW:
-            self._place_anew(view, vertex, base_vertex, own)
+            self._place_anew(view, vertex)
             return
         odd = max(1.0, off / _ODD)
         before = self.belief.map_vertex(vertex.id)
@@ -244,19 +244,15 @@ class Mapper(MapEdits):
         R = odd * _TOGETHER**2 * own
         self.observations.append(Observation(view.keyframe, vertex.id, base_vertex, R))
 
-    def _place_anew(self, view: View, vertex: Vertex, base_vertex: Pose, sight: Array) -> None:
-        """Believe a vertex where it is seen now, with covariance `sight` (2, 2), and never before.
+    def _place_anew(self, view: View, vertex: Vertex) -> None:
+        """Believe a vertex where it is seen now, and forget what was seen of it before.
 
         Somebody stood near by when it was found: what it lay between was not the building.
         """
         before, vertex.elsewhere = self.belief.map_vertex(vertex.id), 0
-        R = np.zeros((3, 3))
-        R[:2, :2], R[2, 2] = sight, TURN_VARIANCE
-        belief = ekf.remove_vertex(self.belief, vertex.id)
-        self.belief = ekf.add_vertex(belief, vertex.id, base_vertex, R)
+        self.belief = ekf.remove_vertex(self.belief, vertex.id)
         self.observations[:] = [seen for seen in self.observations if seen.vertex != vertex.id]
-        self.observations.append(Observation(view.keyframe, vertex.id, base_vertex, R))
-        self._picture(view, vertex)
+        self._believe(view, vertex)
         self.redraw(vertex, before, polylines=True)
         metres = before.distance(self.belief.map_vertex(vertex.id))
         self._events.append(VertexMoved(view.stamp, vertex.id, metres))

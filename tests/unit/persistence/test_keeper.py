@@ -474,8 +474,7 @@ def test_what_was_seen_of_a_vertex_that_proved_to_be_another_is_kept_as_that_one
     ]
     keeper.on_event(DoubtSettled(21.0, other, one, 12.0, 0.1))
     keeper.keeping(21.0)()
-    saved = MissionFiles(tmp_path).read()
-    assert saved is not None
+    saved = found(tmp_path)
     assert {seen.vertex for grown in saved.past for seen in grown.observations} == {one}
     assert packed(saved.past) == packed(growth(session.pipeline))
 
