@@ -1,5 +1,6 @@
 """What a robot that has explored all may have missed, by the grid of all its scans."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -46,7 +47,7 @@ def survey(pipeline: Pipeline) -> Surveyed:
     found = np.concatenate([gaps(grid, here, room), stood])
     beside = sampled((way.polyline for way in ways), _STEP_M)
     narrow = narrows(grid, beside, here, pipeline.radius, room)
-    stood_at = _NONE
+    stood_at = awaited = _NONE
     if ways:
         joined = sampled((way.polyline for way in ways), _STEP_M / 2)
         felt_too = _walled(grid, _felt(pipeline))
@@ -54,6 +55,7 @@ def survey(pipeline: Pipeline) -> Surveyed:
         found = np.concatenate([found, blanks(grid, beside, here, room), hollow])
         lasting_s = pipeline.traffic.newcomers.longest_patience
         stood_at = _may_go(bodies(grid, joined), scans, lasting_s)
+        awaited = np.concatenate([narrow, _may_go(_at_ends(pipeline), scans, lasting_s)])
     through = passages(grid, ways, here, room, pipeline.sight.open_clearance)
     off = np.repeat([_INTO_M, _TOWARDS_M], [len(found), len(through)])
     places = np.concatenate([found, through])
@@ -65,24 +67,25 @@ def survey(pipeline: Pipeline) -> Surveyed:
     return Surveyed(
         views,
         narrow,
-        doorsteps=_doorsteps(grid, narrow, stood_at, beside, here, room),
+        doorsteps=_doorsteps(grid, awaited, stood_at, beside, here, room),
+        awaited=awaited,
         barred=_barred(pipeline, ways, scans, keyframes, grid),
         is_whole=not (len(places) or len(narrow) or len(pipeline.sight.virtual_walls)),
     )
 
 
 def _doorsteps(
-    grid: OccupancyGrid, narrow: Array, stood_at: Array, ways: Array, here: Array, room: float
+    grid: OccupancyGrid, awaited: Array, stood_at: Array, ways: Array, here: Array, room: float
 ) -> Array:
-    """From where to look (M, 2) whether somebody has gone who stood in a narrow way or in a ring.
+    """From where to look (M, 2) whether somebody has gone who stood in a way or in a ring.
 
     A ring goes round him: from there all is to be seen, and a column is better not driven up to.
     """
-    by_somebody = np.concatenate([narrow, stood_at])
+    by_somebody = np.concatenate([awaited, stood_at])
     if not len(by_somebody):
         return _NONE
     before = floor_beside(grid, by_somebody, here, room)
-    off = np.repeat([_INTO_M, 0.0], [len(narrow), len(stood_at)])[: len(before)]
+    off = np.repeat([_INTO_M, 0.0], [len(awaited), len(stood_at)])[: len(before)]
     views = viewpoints(grid, ways, before, here, room, off)
     return _NONE if views is None else views
 
@@ -120,6 +123,22 @@ def _ways(pipeline: Pipeline) -> list[Way]:
         line = anchored(start.transform(edge.shown), start.position, end.position)
         ways.append(Way(edge.a.vertex, edge.b.vertex, line))
     return ways
+
+
+def _at_ends(pipeline: Pipeline) -> Array:
+    """Bodies (N, 2), map frame, that were let into the map and make the ends of edges."""
+    graph, place = pipeline.mapper.graph, pipeline.mapper.belief.map_vertex
+    ends = [
+        (place(vertex.id).position, vertex.clearance + _BODY_M)
+        for vertex in graph.vertices.values()
+        if vertex.kind == "endpoint"
+    ]
+    found = [
+        body
+        for body in pipeline.traffic.lasting
+        if any(math.dist(body, end) < reach for end, reach in ends)
+    ]
+    return np.array(found).reshape(-1, 2)
 
 
 def _may_go(places: Array, scans: Scans, lasting_s: float) -> Array:

@@ -19,6 +19,7 @@ class Surveyed(NamedTuple):
     narrows: Array  # (N, 2), ways too narrow for the robot that lead to floor without another
     is_beside_floor: bool = False  # all edges are where it lacks the room it wants, places are not
     doorsteps: Array = np.empty((0, 2))  # (M, 2), before what may be somebody, or narrowed by him
+    awaited: Array = np.empty((0, 2))  # (K, 2), ways that he may stand in, narrow or closed
     barred: Sequence[int] = ()  # edges over what looked like a wall, not driven
     is_whole: bool = False  # all floor is seen, and edges lead wherever they should
     is_walled: bool = True  # a wall was seen at all

@@ -63,6 +63,7 @@ class Newcomer:
     was_round: bool = False  # and then enough: since that first look it is waited for
     evidence: float = 0.0  # that it is round: log-likelihood ratio of the last looks
     is_lost: bool = False  # out of sight for so long that it may have gone
+    core: float = math.inf  # m, radius by the slimmest look that showed it to be round
 
     @property
     def is_round(self) -> bool:
@@ -80,6 +81,8 @@ class Newcomer:
             self.centre, self.radius = island.centre, island.radius
         self.last = stamp
         self.radius = max(self.radius, island.radius)
+        if island.is_round:
+            self.core = min(self.core, island.radius)
         self.is_whole |= island.is_whole
         self.evidence = with_look(self.evidence, island.evidence)
 
@@ -211,6 +214,17 @@ class Newcomers:
             for one in self._all
         )
 
+    def passing(self, stamp: float) -> Array:
+        """Where bodies (N, 2), local frame, have not stood for long enough to stay for certain."""
+        centres = [
+            one.centre
+            for one in self._all
+            if (one.core < math.inf or one.came)
+            and not one.is_lost
+            and stamp - one.first < self.longest_patience
+        ]
+        return np.array(centres).reshape(-1, 2)
+
     @property
     def let_in(self) -> list[Newcomer]:
         """Bodies that have stood for so long that they are parts of the building."""
@@ -281,7 +295,9 @@ class Newcomers:
             if one.last > scan.stamp:  # kept from a time before the clock began anew
                 one.first, one.last = one.first + scan.stamp - one.last, scan.stamp
         self.gone = [
-            one for one in self._all if is_seen_through(scan, local_base, (one.centre, one.radius))
+            one
+            for one in self._all
+            if is_seen_through(scan, local_base, (one.centre, min(one.core, one.radius)))
         ]
         self._has_met |= any(self._walked(one) for one in self.gone)
         for one in self.gone:

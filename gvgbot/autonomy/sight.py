@@ -63,6 +63,7 @@ class Sight:
             doubted=self._doubted(gvg, doubtful),
             marks=marks,
             is_somebody_found=newcomers.is_one_standing(scan.stamp, local_map),
+            passing=newcomers.passing(scan.stamp),
             field_of_view=scan.field_of_view,
             virtual_walls=self.hazards.virtual_walls,
             felt=felt,

@@ -31,6 +31,7 @@ class View:
     # nodes that were made where the vertex of a ring should be: there is nothing to be seen of it
     marks: dict[int, Vertex] = field(default_factory=dict)
     is_somebody_found: bool = False  # who will be let into the map if he stays
+    passing: Array = field(default_factory=lambda: np.empty((0, 2)))  # bodies that may yet go
     field_of_view: tuple[float, float] = (-math.pi, math.pi)  # rad, base frame
     virtual_walls: Array = field(default_factory=lambda: np.empty((0, 2)))  # points (N, 2)
     felt: Array = field(default_factory=lambda: np.empty((0, 2)))  # doubtful, but never seen

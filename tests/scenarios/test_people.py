@@ -130,6 +130,22 @@ def test_a_person_who_stands_there_at_the_first_look_is_no_pillar() -> None:
     assert added == ["endpoint", "endpoint"]
 
 
+def test_a_person_who_stands_in_a_corridor_at_the_first_look_is_not_its_end() -> None:
+    """A pillar would be, for there is no way past it; the rest is known long before he goes."""
+    world = carved([(-4.0, -0.5, 3.0, 0.5), (2.0, -0.5, 3.0, 2.5)])
+
+    async def story(run: Play) -> None:
+        run.put_person(1.0, 0.0)
+        await run.sleep(50.0)
+        run.put_person(*FAR_AWAY)
+
+    run = play(world, START, story=story, with_person=True)
+    assert run.outcome == "explored", run.pipeline.mission.reason
+    assert run.contacts == 0
+    assert_found(run, "endpoint", [(-3.5, 0.0), (2.5, 2.0)])
+    assert len(run.pipeline.mapper.graph.vertices) == 2
+
+
 def test_a_person_half_hidden_at_first_is_no_pillar() -> None:
     """Round the corner of a bend, less of a person is seen than can be told from furniture."""
     world = carved([(-4.0, -1.1, 6.0, 1.1), (3.8, -1.1, 6.0, 5.0)])

@@ -30,13 +30,19 @@ CORRIDOR, SIDE = (-4.0, -1.0, 4.0, 1.0), (2.0, -1.0, 4.0, 4.0)
 
 
 def driven(
-    world: World, metres: float, localisation: Localisation = "full", every_s: float = 0.1
+    world: World,
+    metres: float,
+    localisation: Localisation = "full",
+    every_s: float = 0.1,
+    newcomers: NewcomersConfig | None = None,
 ) -> Pipeline:
     """A robot after so long a drive straight on, with a look every 0.25 m."""
     config = load_config()
     pipeline = Pipeline(
         config.autonomy, config.exploration, config.robot.radius_m, localisation=localisation
     )
+    if newcomers is not None:
+        pipeline.traffic.newcomers = Newcomers(newcomers)
     for step, x in enumerate(np.arange(0.0, metres + 0.01, 0.25)):
         odom_base = Pose(float(x), 0.0, 0.0)
         pipeline.control(Odometry(every_s * step, odom_base, STANDSTILL))
@@ -91,6 +97,25 @@ def test_a_door_that_the_robot_leaves_alone_is_told_of() -> None:
     assert START.transform(found.doorsteps) == pytest.approx(np.array([[1.5, 0.75]]), abs=0.2)
     closed = survey(driven(carved([CORRIDOR, room]), 6.0))
     assert len(closed.narrows) == len(closed.doorsteps) == 0
+
+
+@pytest.mark.parametrize(("came_after_s", "count"), [(2.0, 0), (60.0, 1)])
+def test_who_makes_the_end_of_an_edge_is_awaited_until_he_was_in_sight_for_long(
+    came_after_s: float, count: int
+) -> None:
+    """In a corridor of 1.1 m, which goes on behind him: 0.3 m beside him are too narrow."""
+    canvas = Canvas(10.0, 3.0, CELL)
+    canvas.carve(0.5, 0.95, 9.5, 2.05)
+    canvas.build_disc(7.0, 1.5, 0.25)
+    world = replace(canvas.world("corridor"), origin=(-5.0, -1.5))
+    patience = NewcomersConfig(found_after_s=2.0, came_after_s=came_after_s)
+    pipeline = driven(world, 3.5, every_s=1.0, newcomers=patience)
+    (body,) = START.transform(np.array(pipeline.traffic.lasting))
+    assert body == pytest.approx([2.0, 0.0], abs=0.1)
+    found = survey(pipeline)
+    assert START.transform(found.awaited) == pytest.approx(np.array([body] * count).reshape(-1, 2))
+    before = np.array([[1.4, 0.0]] * count).reshape(-1, 2)
+    assert START.transform(found.doorsteps) == pytest.approx(before, abs=0.4)
 
 
 def with_ring(pipeline: Pipeline, side: float = 1.0) -> GvgGraph:
@@ -202,8 +227,8 @@ def test_what_a_ring_goes_round_is_nobody_once_it_was_in_sight_for_long(
 ) -> None:
     """A box of 0.4 m beside the way, in sight for 20 s; what stands for longer is a wall."""
     world = carved([CORRIDOR], [(-1.2, 0.3, -0.8, 0.7)])
-    pipeline = driven(world, 3.0, every_s=1.6)
     patience = NewcomersConfig(came_after_s=came_after_s, found_after_s=5.0)
+    pipeline = driven(world, 3.0, every_s=1.6)
     pipeline.traffic.newcomers = Newcomers(patience)
     graph, ids = streets(2, 1)
     (edge,) = graph.edges.values()

@@ -23,6 +23,9 @@ from gvgbot.words import counted
 
 _DRIVEN_ON_M = 0.5  # what can be seen there is new
 _AWAITED_S = 30.0  # that somebody goes who hides what it has come to see
+_IN_THE_WAY_S = 120.0  # that he goes who stands in a narrow way that it has come to see
+_BESIDE_M = 1.2  # from the middle of somebody to where a way is narrowed by him
+_SETTLED_S = 10.0  # after he has gone, what was behind him has been seen
 
 
 class Task(NamedTuple):
@@ -41,8 +44,10 @@ class OwnTasks:
         self._surveyed: set[int] = set()  # edges that there were,
         self._surveyed_m = 0.0  # and `travelled`
         self._narrows = np.empty((0, 2))  # ways too narrow for the robot
+        self._awaited = np.empty((0, 2))  # and those that somebody may stand in
         self._has_met = False  # somebody who stood: he may have hidden something, and gone
         self._arrived: float | None = None  # stamp, where it went for a look
+        self._watched = -math.inf  # stamp, when somebody was last waited for
 
     def configure(self, config: CertaintyConfig) -> None:
         """Use another configuration from now on."""
@@ -55,7 +60,7 @@ class OwnTasks:
     def next(self, view: View, whereabouts: Callable[[], Situation | None]) -> Task | Stand | None:
         """What to do now; None to go on with the mission. Stand: a survey is to come."""
         mission = self._mission
-        self._has_met |= view.is_somebody_found
+        self._has_met |= view.is_somebody_found or len(view.passing) > 0
         if not mission.is_choosing:
             self._revisiting.note_target(mission.target)
             self._unseen.begin_anew()
@@ -88,15 +93,17 @@ class OwnTasks:
         )
         if self._mission.is_waiting or (self._unseen.is_done and not has_news):
             return None
+        if self._has_met and not self._unseen.judge(self._mapper.belief.map_base.position):
+            self._watched = view.stamp
         is_standing = self._unseen.is_standing(view.travelled)
-        if not is_standing or view.is_somebody_found or self._is_hidden(view):
+        if not is_standing or self._watches(view):
             return Stand()
         surveyed = survey()
         if surveyed is None:
             return Stand()
         if self._reopen(surveyed.barred):
             return Stand()
-        self._narrows = surveyed.narrows
+        self._narrows, self._awaited = surveyed.narrows, surveyed.awaited
         self._surveyed, self._surveyed_m, starts = edges, view.travelled, here.starts()
 
         def metres_to(place: Array) -> float | None:
@@ -121,17 +128,27 @@ class OwnTasks:
         reopened = [self._mapper.reopen(edges[key]) for key in barred if key in edges]
         return any(reopened)
 
-    def _is_hidden(self, view: View) -> bool:
-        """Whether somebody makes up meetpoints where it has just come for a look: he may go."""
+    def _watches(self, view: View) -> bool:
+        """Whether there will be more to be seen: somebody stands here who may go, or has gone."""
+        if view.is_somebody_found or self._is_awaited(view):
+            self._watched = view.stamp
+        return view.stamp - self._watched < _SETTLED_S
+
+    def _is_awaited(self, view: View) -> bool:
+        """Whether somebody hides what it has just come to see."""
         if not self._unseen.is_visited(self._mapper.belief.map_base.position):
             return False
         self._arrived = view.stamp if self._arrived is None else self._arrived
-        nodes = [view.gvg.nodes[key] for key in view.doubted]
-        return view.stamp - self._arrived < _AWAITED_S and any(
-            math.dist(node.position, view.local_base.position) < IN_FULL_VIEW_M
-            for node in nodes
-            if node.degree > 2
+        waited_s = view.stamp - self._arrived
+        return (waited_s < _AWAITED_S and _is_hidden(view)) or (
+            waited_s < _IN_THE_WAY_S and self._is_narrowed(view)
         )
+
+    def _is_narrowed(self, view: View) -> bool:
+        """Whether somebody stands in a way, and leaves the robot no room in it."""
+        map_local = self._mapper.map_in_local(view.local_base).inverse()
+        aside = map_local.transform(view.passing)[:, None] - self._awaited
+        return bool((np.hypot(*aside.T) < _BESIDE_M).any())
 
     def _remark(self) -> str:
         """What there is to say about the map, if that is the end."""
@@ -140,3 +157,13 @@ class OwnTasks:
         remark = f"; {stay} less certain than wanted" if doubtful else ""
         remark += f"; something may be missing near {unseen}" if unseen else ""
         return remark + too_narrow(self._narrows)
+
+
+def _is_hidden(view: View) -> bool:
+    """Whether somebody makes up meetpoints near by."""
+    nodes = [view.gvg.nodes[key] for key in view.doubted]
+    return any(
+        math.dist(node.position, view.local_base.position) < IN_FULL_VIEW_M
+        for node in nodes
+        if node.degree > 2
+    )

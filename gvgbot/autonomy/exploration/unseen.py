@@ -15,6 +15,7 @@ _SAME_M = 1.0  # places nearer to each other are one
 _STILL_M = 0.01  # from look to look, at most
 _TOLD = 3  # places that are told of one by one
 _MOST = 30  # visits altogether: where walls cannot be seen there is no end of unseen floor
+_MOST_IN_VAIN = 6  # that do not count, as somebody stood in the way
 
 
 class Unseen:
@@ -22,6 +23,8 @@ class Unseen:
 
     def __init__(self) -> None:
         self._visits: list[Array] = []
+        self._is_sent = False  # to the last of them
+        self._in_vain = 0  # visits that did not get there
         self._stands_at: float | None = None  # `travelled` when it was asked to stand
         self.is_done = False  # there is nothing to be gained
         self.left = np.empty((0, 2))  # places that are of no use, m, map frame
@@ -69,7 +72,17 @@ class Unseen:
         if not chances:
             return None
         self._visits.append(np.array(min(chances)[2]))
+        self._is_sent = True
         return self._visits[-1]
+
+    def judge(self, position: Array) -> bool:
+        """Whether the last visit counts, which has led to a position (2,), m, map frame."""
+        is_vain = self._is_sent and not self.is_visited(position) and self._in_vain < _MOST_IN_VAIN
+        self._is_sent = False
+        if is_vain:
+            self._visits.pop()
+            self._in_vain += 1
+        return not is_vain
 
     def is_visited(self, place: Array) -> bool:
         """Whether this (2,), m, map frame, is where it was sent to last."""

@@ -277,6 +277,31 @@ def test_who_stood_for_long_and_goes_is_forgotten_at_the_next_look() -> None:
     assert watch.inside() == 0
 
 
+def test_who_was_let_in_may_yet_go_until_he_has_stood_for_very_long() -> None:
+    """Who is as round as people are; a box never may, but while nobody knows what it is."""
+    watch = Watch()
+    for second in range(130):
+        watch.dropped(EMPTY, second, person=(2.0, 0.0))
+        passing = watch.newcomers.passing(float(second))
+        assert len(passing) == (second < CONFIG.came_after_s)
+        assert np.allclose(passing, [2.0, 0.0], atol=0.05)
+    box = Watch()
+    for second in range(5):
+        box.dropped(carved([ROOM], [(1.8, -0.2, 2.2, 0.2)]), second)
+        assert len(box.newcomers.passing(float(second))) == 0
+
+
+def test_who_seemed_wide_beside_a_wall_is_forgotten_as_soon_as_he_has_gone() -> None:
+    """Once, somebody else hid in part what there was to be seen of him."""
+    watch, place = Watch(EMPTY), (2.0, 2.65)
+    for second in range(3):
+        watch.dropped(EMPTY, second, person=place)
+    (one,) = watch.newcomers._all
+    one.radius = 0.45  # the wall is 0.35 m off
+    watch.dropped(EMPTY, 3.0)
+    assert len(watch.newcomers.gone) == 1
+
+
 def test_who_goes_is_forgotten_as_soon_as_that_is_seen() -> None:
     watch = Watch(EMPTY)
     watch.dropped(EMPTY, 0.0, person=(2.0, 0.0))

@@ -34,20 +34,25 @@ class Explorer(Robot):
         self.errands = Errands(self.mission, self.mapper, CONFIG, room_m=0.2)
         self.left = list(surveys)
         self.mission.survey = self._survey
-        self.narrows = self.doorsteps = np.empty((0, 2))
+        self.narrows = self.doorsteps = self.awaited = np.empty((0, 2))
         self.is_barred = False  # all that is joined
         self.somebody_until = 0.0  # s, that somebody is found
         self.hidden_until = 0.0  # s, that the branch may be there for a while only
+        self.passing, self.passing_until = np.empty((0, 2)), 0.0
 
     def _survey(self) -> Surveyed:
         places = np.array(self.left.pop(0)).reshape(-1, 2)
         barred = tuple(self.mapper.graph.edges) if self.is_barred else ()
-        return Surveyed(places, self.narrows, doorsteps=self.doorsteps, barred=barred)
+        return Surveyed(
+            places, self.narrows, doorsteps=self.doorsteps, awaited=self.awaited, barred=barred
+        )
 
     def decide(self, view: View, known: Correspondence) -> tuple[Order, list[Event]]:
         is_found = view.stamp < self.somebody_until
         if view.stamp < self.hidden_until:
             view = replace(view, gvg=BRANCH, doubted=frozenset({3}))
+        if view.stamp < self.passing_until:
+            view = replace(view, passing=self.passing)
         return self.errands.advance(replace(view, is_somebody_found=is_found), known)
 
     def until_it_moves_or_ends(self, gvg: LocalGvg = CLOSED) -> Order:
@@ -135,7 +140,7 @@ def test_who_stands_in_sight_is_watched_before_the_survey_is_made() -> None:
     assert robot.travelled == 0.0
 
 
-@pytest.mark.parametrize(("hidden_s", "waits_s"), [(0.0, 0.0), (12.0, 12.0), (50.0, 30.0)])
+@pytest.mark.parametrize(("hidden_s", "waits_s"), [(0.0, 0.0), (12.0, 22.0), (50.0, 40.0)])
 def test_what_somebody_hides_where_it_went_for_a_look_is_waited_for(
     hidden_s: float, waits_s: float
 ) -> None:
@@ -146,6 +151,38 @@ def test_what_somebody_hides_where_it_went_for_a_look_is_waited_for(
     while robot.left:
         robot.look(CLOSED)
     assert robot.stamp - came == pytest.approx(waits_s, abs=1.5)
+
+
+@pytest.mark.parametrize(
+    ("body", "stands_s", "waits_s"),
+    [([2.0, -0.5], 50.0, 60.0), ([2.0, -0.5], 300.0, 130.0), ([3.5, 0.0], 50.0, 0.0)],
+)
+def test_who_stands_in_a_narrow_way_is_waited_for_before_it(
+    body: list[float], stands_s: float, waits_s: float
+) -> None:
+    """In vain after two minutes; and not at all who stands elsewhere."""
+    robot = Explorer([], [])
+    robot.awaited, robot.doorsteps = np.array([[2.0, -0.7]]), np.array([GAP])
+    robot.passing, robot.passing_until = np.array([body]), math.inf
+    robot.until_it_moves_or_ends()
+    robot.drive(CLOSED, (0.0, 0.0), (2.0, 0.0))
+    came, robot.passing_until = robot.stamp, robot.stamp + stands_s
+    while robot.left:
+        robot.look(CLOSED)
+    assert robot.stamp - came == pytest.approx(waits_s, abs=1.5)
+
+
+def test_who_was_kept_from_a_gap_by_somebody_tries_again() -> None:
+    """It does not come off the spot for as long as he stands there, and gives up."""
+    robot = Explorer([GAP], [GAP], [GAP], [])
+    robot.passing, robot.passing_until = np.array([GAP]), 20.0
+    for _ in range(3):
+        robot.until_it_moves_or_ends()
+        assert str(robot.errands.errand) == "goto 2 0"
+        while robot.errands.errand is not None:
+            robot.look(CLOSED)
+    robot.until_it_moves_or_ends()
+    assert robot.mission.reason == "no frontier is left"
 
 
 @pytest.mark.parametrize(("somebody_until", "visits"), [(0.0, 1), (5.0, 2)])

@@ -90,3 +90,18 @@ def test_a_robot_stands_when_two_looks_find_it_at_the_same_place() -> None:
     assert not unseen.is_standing(10.0)
     assert not unseen.is_standing(10.3)
     assert unseen.is_standing(10.3)
+
+
+def test_a_visit_that_did_not_get_there_does_not_count_but_so_often() -> None:
+    unseen, at_home, there = Unseen(), np.array([0.0, 0.0]), np.array(FAR)
+    visits = 0
+    while unseen.next(places(FAR), metres_to, twice=False) is not None:
+        visits += 1
+        unseen.judge(at_home)
+        assert unseen.judge(at_home)  # it was not sent anywhere since
+        assert visits < 100
+    assert visits > 2
+    unseen = Unseen()
+    assert unseen.next(places(FAR), metres_to, twice=False) is not None
+    assert unseen.judge(there)
+    assert unseen.next(places(FAR), metres_to, twice=False) is None
