@@ -85,9 +85,12 @@ class Sight:
         return reduce_graph(fine, self._reduction, known).rings_cut_far_from(local_base.position)
 
     def _doubted(self, gvg: LocalGvg, doubtful: Array) -> frozenset[int]:
-        """The nodes that may be there for a while only, because of obstacles (N, 2)."""
-        doubted = touching(gvg, doubtful)
-        if self._traffic.is_in_team:  # bodies lead the GVG nowhere, but hide how it goes on
-            ends = (key for key, node in gvg.nodes.items() if node.degree == 1)
-            doubted |= touching(gvg, self._traffic.newcomers.points) & frozenset(ends)
-        return doubted
+        """The nodes that may be there for a while only, because of obstacles (N, 2).
+
+        Of who is out of sight for long, so may be the end that he makes of a way; in a team, bodies
+        lead the GVG nowhere, but hide how it goes on.
+        """
+        newcomers = self._traffic.newcomers
+        hiding = [newcomers.lost, *([newcomers.points] if self._traffic.is_in_team else [])]
+        ends = frozenset(key for key, node in gvg.nodes.items() if node.degree == 1)
+        return touching(gvg, doubtful) | (touching(gvg, np.concatenate(hiding)) & ends)

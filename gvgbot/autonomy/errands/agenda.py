@@ -6,7 +6,7 @@ from gvgbot.autonomy.control.orders import Order, Stand
 from gvgbot.autonomy.errands.driving import Driving, Ended
 from gvgbot.autonomy.errands.ground import Ground
 from gvgbot.autonomy.errands.kinds import Errand
-from gvgbot.autonomy.errands.own_tasks import OwnTasks
+from gvgbot.autonomy.errands.own_tasks import OwnTasks, Task
 from gvgbot.autonomy.errands.plans import Here, Kept, Plan, plan_for, recalled
 from gvgbot.autonomy.events import ErrandEnded, Event
 from gvgbot.autonomy.exploration.config import ExplorationConfig
@@ -153,7 +153,7 @@ class Agenda:
             task = self.own_tasks.next(view, self.whereabouts)
             if task is None:
                 return self._mission.advance(view, known)
-            if isinstance(task, Stand):
+            if not isinstance(task, Task):
                 return task, self._mission.witness(view, known)
             self._take(task.errand, view.stamp)
             self._is_own = True

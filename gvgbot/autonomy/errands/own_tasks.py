@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvgbot.autonomy.control.orders import Stand
+from gvgbot.autonomy.control.orders import LookAround, Order, Stand
 from gvgbot.autonomy.destinations import foot_of, route_to_foot
 from gvgbot.autonomy.ending import too_narrow
 from gvgbot.autonomy.errands.kinds import ToPoint, ToVertex
@@ -22,8 +22,7 @@ from gvgbot.geometry import Array
 from gvgbot.words import counted
 
 _DRIVEN_ON_M = 0.5  # what can be seen there is new
-_AWAITED_S = 30.0  # that somebody goes who hides what it has come to see
-_IN_THE_WAY_S = 120.0  # that he goes who stands in a narrow way that it has come to see
+_AWAITED_S = 120.0  # that somebody goes who hides what it has come to see, or stands in it
 _BESIDE_M = 1.2  # from the middle of somebody to where a way is narrowed by him
 _SETTLED_S = 10.0  # after he has gone, what was behind him has been seen
 
@@ -57,8 +56,8 @@ class OwnTasks:
         """Look at every place once more: somebody wants the exploration to go on after its end."""
         self._unseen = Unseen()
 
-    def next(self, view: View, whereabouts: Callable[[], Situation | None]) -> Task | Stand | None:
-        """What to do now; None to go on with the mission. Stand: a survey is to come."""
+    def next(self, view: View, whereabouts: Callable[[], Situation | None]) -> Task | Order | None:
+        """What to do now; None to go on with the mission. An order: a survey is to come."""
         mission = self._mission
         self._has_met |= view.is_somebody_found or len(view.passing) > 0
         if not mission.is_choosing:
@@ -81,7 +80,7 @@ class OwnTasks:
         decision = Decision(view.stamp, wanted.vertex, None, wanted.reason)
         return Task(ToVertex(wanted.vertex), decision)
 
-    def _look_again(self, view: View, here: Situation) -> Task | Stand | None:
+    def _look_again(self, view: View, here: Situation) -> Task | Order | None:
         """To where the map may lack something, when all frontiers are explored."""
         is_alone = self._mission.choice.sharing is None  # others may have seen it
         survey = self._mission.survey
@@ -95,6 +94,8 @@ class OwnTasks:
             return None
         if self._has_met and not self._unseen.judge(self._mapper.belief.map_base.position):
             self._watched = view.stamp
+        if self._arrives(view) and self._has_met:
+            return LookAround(math.tau)
         is_standing = self._unseen.is_standing(view.travelled)
         if not is_standing or self._watches(view):
             return Stand()
@@ -111,7 +112,6 @@ class OwnTasks:
             route = None if foot is None else route_to_foot(here, starts, foot)
             return None if route is None else route.metres
 
-        self._arrived = None
         place = self._unseen.next(surveyed.places, metres_to, twice=self._has_met)
         reason = "something may be missing there"
         if place is None and self._has_met:
@@ -119,6 +119,7 @@ class OwnTasks:
             reason = "somebody may have stood there"
         if place is None:
             return None
+        self._arrived = None
         decision = Decision(view.stamp, None, None, reason)
         return Task(ToPoint(*place.round(2).tolist()), decision)
 
@@ -134,15 +135,20 @@ class OwnTasks:
             self._watched = view.stamp
         return view.stamp - self._watched < _SETTLED_S
 
+    def _arrives(self, view: View) -> bool:
+        """Whether it has just come to where it went for a look; who has gone may be behind it."""
+        is_there = self._unseen.is_visited(self._mapper.belief.map_base.position)
+        if self._arrived is not None or not is_there:
+            return False
+        self._arrived = view.stamp
+        return True
+
     def _is_awaited(self, view: View) -> bool:
         """Whether somebody hides what it has just come to see."""
-        if not self._unseen.is_visited(self._mapper.belief.map_base.position):
+        if self._arrived is None:
             return False
-        self._arrived = view.stamp if self._arrived is None else self._arrived
-        waited_s = view.stamp - self._arrived
-        return (waited_s < _AWAITED_S and _is_hidden(view)) or (
-            waited_s < _IN_THE_WAY_S and self._is_narrowed(view)
-        )
+        is_patient = view.stamp - self._arrived < _AWAITED_S
+        return is_patient and (_is_hidden(view) or self._is_narrowed(view))
 
     def _is_narrowed(self, view: View) -> bool:
         """Whether somebody stands in a way, and leaves the robot no room in it."""

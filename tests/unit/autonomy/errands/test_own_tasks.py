@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gvgbot.autonomy.control.orders import Drive, Order, Stand
+from gvgbot.autonomy.control.orders import Drive, LookAround, Order, Stand
 from gvgbot.autonomy.ending import Surveyed
 from gvgbot.autonomy.errands import Errands
 from gvgbot.autonomy.errands.plans import Kept
@@ -140,7 +140,7 @@ def test_who_stands_in_sight_is_watched_before_the_survey_is_made() -> None:
     assert robot.travelled == 0.0
 
 
-@pytest.mark.parametrize(("hidden_s", "waits_s"), [(0.0, 0.0), (12.0, 22.0), (50.0, 40.0)])
+@pytest.mark.parametrize(("hidden_s", "waits_s"), [(0.0, 0.0), (12.0, 22.0), (200.0, 130.0)])
 def test_what_somebody_hides_where_it_went_for_a_look_is_waited_for(
     hidden_s: float, waits_s: float
 ) -> None:
@@ -167,9 +167,12 @@ def test_who_stands_in_a_narrow_way_is_waited_for_before_it(
     robot.until_it_moves_or_ends()
     robot.drive(CLOSED, (0.0, 0.0), (2.0, 0.0))
     came, robot.passing_until = robot.stamp, robot.stamp + stands_s
+    orders = list[Order]()
     while robot.left:
-        robot.look(CLOSED)
+        orders.append(robot.look(CLOSED))
     assert robot.stamp - came == pytest.approx(waits_s, abs=1.5)
+    turns = [order for order in orders if isinstance(order, LookAround)]
+    assert turns == [LookAround(math.tau)]  # he may be behind it
 
 
 def test_who_was_kept_from_a_gap_by_somebody_tries_again() -> None:
