@@ -94,7 +94,7 @@ class OwnTasks:
             return None
         if self._has_met and not self._unseen.judge(self._mapper.belief.map_base.position):
             self._watched = view.stamp
-        if self._arrives(view) and self._has_met:
+        if self._arrives(view) and self._has_met and _may_overlook(view):
             return LookAround(math.tau)
         is_standing = self._unseen.is_standing(view.travelled)
         if not is_standing or self._watches(view):
@@ -136,16 +136,18 @@ class OwnTasks:
         return view.stamp - self._watched < _SETTLED_S
 
     def _arrives(self, view: View) -> bool:
-        """Whether it has just come to where it went for a look; who has gone may be behind it."""
-        is_there = self._unseen.is_visited(self._mapper.belief.map_base.position)
-        if self._arrived is not None or not is_there:
+        """Whether it has just come to where it went for a look."""
+        if self._arrived is not None or not self._is_there():
             return False
         self._arrived = view.stamp
         return True
 
+    def _is_there(self) -> bool:
+        return self._unseen.is_visited(self._mapper.belief.map_base.position)
+
     def _is_awaited(self, view: View) -> bool:
         """Whether somebody hides what it has just come to see."""
-        if self._arrived is None:
+        if self._arrived is None or not self._is_there():
             return False
         is_patient = view.stamp - self._arrived < _AWAITED_S
         return is_patient and (_is_hidden(view) or self._is_narrowed(view))
@@ -163,6 +165,12 @@ class OwnTasks:
         remark = f"; {stay} less certain than wanted" if doubtful else ""
         remark += f"; something may be missing near {unseen}" if unseen else ""
         return remark + too_narrow(self._narrows)
+
+
+def _may_overlook(view: View) -> bool:
+    """Whether something may be behind the robot that somebody hid; who stands there still does."""
+    away = np.hypot(*(view.passing - view.local_base.position).T)
+    return _is_hidden(view) or not (away < IN_FULL_VIEW_M).any()
 
 
 def _is_hidden(view: View) -> bool:
