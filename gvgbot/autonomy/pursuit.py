@@ -12,6 +12,7 @@ from gvgbot.autonomy.ending import (
     without_target,
 )
 from gvgbot.autonomy.events import Event, Finished, Recovery
+from gvgbot.autonomy.evidence import IN_FULL_VIEW_M
 from gvgbot.autonomy.examination import Examination
 from gvgbot.autonomy.exploration.access import is_tight
 from gvgbot.autonomy.exploration.config import ExplorationConfig
@@ -206,13 +207,16 @@ class Pursuit:
         self._give_up(view, reason)
 
     def _give_up(self, view: View, reason: str) -> None:
-        """Mark the target as blocked, after having gone back; without one, that is the end."""
+        """Mark the target as blocked, after having gone back; without one, that is the end.
+
+        Not where somebody stands who may go: then there may be more to be seen.
+        """
         self._path_following.renew()
         half = None if self.target is None else self._mapper.graph.half_edge(self.target)
         if half is None:
             is_going_back = self._begins_to_retrace(view)
             is_done = self._mapper.graph.vertices and not self._mapper.graph.frontiers()
-            if is_going_back or is_done:
+            if is_going_back or is_done or view.is_somebody_within(IN_FULL_VIEW_M):
                 return
             self._conclude(view, without_target(self._mapper.graph, self.survey, reason))
             return
@@ -221,7 +225,9 @@ class Pursuit:
             self._events.append(Recovery(view.stamp, "go back", reason))
             return
         assert self.target is not None, "it has a half-edge"
-        self._leave(view, self.target, reason, retries=_SECOND)
+        may_go = view.is_somebody_within(IN_FULL_VIEW_M)
+        retries = self._config.retries if may_go else _SECOND
+        self._leave(view, self.target, reason, retries=retries)
         self.target = None
 
     def _leave(self, view: View, frontier: HalfEdgeId, reason: str, *, retries: int) -> None:

@@ -51,6 +51,11 @@ class View:
         """Whether something that may go stands so near to a place (2,)."""
         return bool((np.hypot(*(self.doubtful - place).T) < within_m).any())
 
+    def is_somebody_within(self, metres: float) -> bool:
+        """Whether a body that may yet go is so near to the robot."""
+        away = np.hypot(*(self.passing - self.local_base.position).T)
+        return bool((away < metres).any())
+
     def is_end_doubted(self, place: Array) -> bool:
         """Whether the GVG ends at a place (2,) only because something that may go is there."""
         ends = (self.gvg.nodes[key] for key in self.doubted)

@@ -169,8 +169,7 @@ class OwnTasks:
 
 def _may_overlook(view: View) -> bool:
     """Whether something may be behind the robot that somebody hid; who stands there still does."""
-    away = np.hypot(*(view.passing - view.local_base.position).T)
-    return _is_hidden(view) or not (away < IN_FULL_VIEW_M).any()
+    return _is_hidden(view) or not view.is_somebody_within(IN_FULL_VIEW_M)
 
 
 def _is_hidden(view: View) -> bool:

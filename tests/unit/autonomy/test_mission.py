@@ -63,6 +63,7 @@ class Robot:
         self.stamp = self.travelled = 0.0
         self.pose, self.walls = Pose(), NOTHING_SEEN
         self.somebody = np.empty((0, 2))  # where somebody stands
+        self.passing = np.empty((0, 2))  # who has not stood for so long that he stays for certain
         self._count = 0
 
     def look(self, gvg: LocalGvg, *, period: float = 0.5) -> Order:
@@ -75,6 +76,7 @@ class Robot:
             gvg,
             self.walls,
             doubtful=self.somebody,
+            passing=self.passing,
         )
         known, seen = self.mapper.observe(view)
         order, done = self.decide(view, known)
@@ -392,6 +394,45 @@ def test_the_end_of_sight_is_looked_around_at_twice_before_a_frontier_is_given_u
     assert robot.mission.outcome is None  # there are others
     assert robot.mission.target is not None
     assert robot.mission.target.key != east
+
+
+@pytest.mark.parametrize(("away", "tries"), [(2.0, 1 + CONFIG.retries), (5.0, 2)])
+def test_a_frontier_is_tried_more_often_where_somebody_stands_who_may_go(
+    away: float, tries: int
+) -> None:
+    """Whenever it is tried, nothing more comes into view at the end of sight."""
+    robot = Robot()
+    robot.stand(TEE, 8)
+    graph = robot.mapper.graph
+    (vertex,) = graph.vertices.values()
+    halves = vertex.half_edges
+    east = next(key for key, half in halves.items() if math.cos(half.bearing) > 0.9)
+    robot.drive(TEE, (0.0, 0.0), (8.0, 0.0))
+    robot.passing = np.array([(8.0, away)])
+    tried, is_opened = 0, True
+    while is_opened:
+        robot.mission.target = HalfEdgeId(vertex.id, east)
+        while not halves[east].blocked:
+            robot.look(TEE)
+        tried += 1
+        later = robot.stamp + 2 * CONFIG.retry_after_s
+        is_opened = robot.mission._obstructions.open(graph, later)
+    assert tried == tries
+
+
+@pytest.mark.parametrize(("away", "ends"), [(2.0, False), (5.0, True)])
+def test_who_knows_no_vertex_does_not_give_up_while_somebody_is_there_who_may_go(
+    away: float, *, ends: bool
+) -> None:
+    robot = Robot()
+    robot.passing = np.array([(0.0, away)])
+    while robot.mission.outcome is None and robot.stamp < 2.5 * CONFIG.patience_s:
+        robot.look(PLAIN)
+    assert (robot.mission.outcome is not None) == ends
+    robot.passing = np.empty((0, 2))
+    while robot.mission.outcome is None and robot.stamp < 5 * CONFIG.patience_s:
+        robot.look(PLAIN)
+    assert robot.mission.outcome == "failed"
 
 
 def test_an_edge_that_is_not_to_be_seen_from_its_vertex_is_closed_and_not_what_lies_beyond() -> (
