@@ -10,6 +10,7 @@ from gvgbot.autonomy.control.company import (
     in_front,
     patience,
     refuge,
+    way_off,
     wide_place,
 )
 from gvgbot.autonomy.control.edge_follower import Track
@@ -39,15 +40,21 @@ class Neighbours:
         """How far to drive along a line (N, 2) before one has to come through a narrow place."""
         return _free_metres(view, line, self.company)
 
-    def track_aside(self, view: View, here: Situation) -> Track | None:
+    def track_aside(
+        self, view: View, here: Situation, *, is_at_leisure: bool = False
+    ) -> Track | None:
         """To where to wait: in no door, and aside of one that is near and may want to pass.
 
-        A way that leads away from who goes first is nothing to wait for: to stay is in its way.
+        A way that leads away from who goes first is nothing to wait for: to stay is in its way. Who
+        is at leisure goes before it where no such place is in sight.
         """
         others = self.company
         way = wide_place(here.gvg, here.place, others) if others else None
         if way is None and self._in_front is not None:
-            way = refuge(here.gvg, here.place, self._in_front.pose.position)
+            other = self._in_front.pose.position
+            way = refuge(here.gvg, here.place, other)
+            if way is None and is_at_leisure and self._in_front.goes_first:
+                way = way_off(here.gvg, here.place, other)
             others = [one for one in others if one is not self._in_front]
         if way is None:
             return None

@@ -35,9 +35,9 @@ class PathFollowing:
         """Let it look around anew: it goes somewhere else, or has come on."""
         self._looked_around = 0
 
-    def make_way(self, view: View, here: Situation) -> Order:
+    def make_way(self, view: View, here: Situation, *, is_at_leisure: bool = False) -> Order:
         """Stand, where others can pass."""
-        track = self._neighbours.track_aside(view, here)
+        track = self._neighbours.track_aside(view, here, is_at_leisure=is_at_leisure)
         return Stand() if track is None else Drive(track)
 
     def draw_back(self, view: View, here: Situation) -> Order:
@@ -49,7 +49,7 @@ class PathFollowing:
 
     def stand_by(self, view: View, here: Situation) -> Order:
         """Stand where others can pass, with the back to a wall: nobody comes from there unseen."""
-        order = self.make_way(view, here)
+        order = self.make_way(view, here, is_at_leisure=True)
         turn = _turn_of_the_back(view) if isinstance(order, Stand) else 0.0
         return LookAround(turn) if turn else order
 

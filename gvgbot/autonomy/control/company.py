@@ -161,12 +161,23 @@ def refuge(gvg: LocalGvg, place: Place, other: Array) -> tuple[Branch, ...] | No
             if branch == Branch(path[-1].edge, not path[-1].forward):
                 continue
             way = (*path, branch)
-            line, _ = gvg.line_from(place, way)
-            away = np.hypot(*(line - other).T)
             is_deep = gvg.edges[branch.edge].length > gvg.nodes[node].clearance + _ASIDE_M
-            if is_deep and away.min() > away[0] - 2 * _KEPT_M:
+            if is_deep and _leads_away(gvg.line_from(place, way)[0], other):
                 ways.append((metres, _straightness(gvg, way), way))
     return min(ways)[2] if ways else None
+
+
+def way_off(gvg: LocalGvg, place: Place, other: Array) -> tuple[Branch, ...] | None:
+    """The longest way that leads away from another robot (2,); None if none does."""
+    ways = gvg.routes(place).values()
+    away = [way for way in ways if _leads_away(gvg.line_from(place, way[1])[0], other)]
+    return max(away, key=lambda way: way[0])[1] if away else None
+
+
+def _leads_away(line: Array, other: Array) -> bool:
+    """Whether a line (N, 2) hardly comes nearer to another robot (2,) than where it begins."""
+    away = np.hypot(*(line - other).T)
+    return bool(away.min() > away[0] - 2 * _KEPT_M)
 
 
 def wide_place(gvg: LocalGvg, place: Place, company: list[Companion]) -> tuple[Branch, ...] | None:

@@ -883,6 +883,25 @@ def test_who_has_nowhere_to_go_but_past_another_robot_makes_way() -> None:
     assert isinstance(robot.look(TEE), Stand)
 
 
+@pytest.mark.parametrize("goes_first", [True, False])
+def test_who_is_done_goes_before_another_one_where_two_cannot_pass(*, goes_first: bool) -> None:
+    """From the east, in a corridor of which no side branch is in sight; it looks at its end."""
+    robot = Robot()
+    robot.stand(TEE, 8)
+    robot.drive(CLOSED, (0.0, 0.0), (2.0, 0.0))
+    robot.mission.outcome = "explored"
+    order: Order = Stand()
+    for _ in range(3):
+        other = Companion("other", Pose(2.8, 0.0, math.pi), goes_first=goes_first, radius=0.2)
+        robot.mission.meet(robot.pose, [other])
+        view = View(99, robot.stamp, robot.travelled, robot.pose, CLOSED, robot.walls)
+        known, _ = robot.mapper.observe(view)
+        order, _ = robot.mission.make_way(view, known)
+    assert isinstance(order, Drive) == goes_first
+    if goes_first:
+        assert end_of(order) == pytest.approx((-1.0, 0.0))
+
+
 def test_who_has_to_wait_where_another_one_wants_to_come_through_goes_out_of_its_way() -> None:
     """In a corridor that both only fit through one by one, before a tee that lies behind it."""
     robot = Robot()

@@ -13,6 +13,7 @@ from gvgbot.autonomy.control.company import (
     in_front,
     patience,
     refuge,
+    way_off,
     wide_place,
 )
 from gvgbot.autonomy.gvg.local import Branch
@@ -148,6 +149,19 @@ def test_the_refuge_is_the_side_branch_of_the_next_junction_away_from_the_other(
 
 def test_there_is_no_refuge_beyond_the_other() -> None:
     assert way_out(1.0, 1.9) is None
+
+
+def test_the_way_off_is_the_longest_one_that_leads_away() -> None:
+    street = drawn({1: (-6.0, 0.0), 2: (3.0, 0.0), 3: (7.0, 0.0)}, {10: (1, 2, []), 11: (2, 3, [])})
+    place = street.place(np.array([1.0, 0.0]))
+    assert place is not None
+    east, west = Branch(10, forward=True), Branch(10, forward=False)
+    assert way_off(street, place, np.array([0.4, 0.0])) == (east, Branch(11, forward=True))
+    assert way_off(street, place, np.array([1.6, 0.0])) == (west,)
+    bend = drawn({1: (1.0, 0.0), 2: (0.0, 0.0), 3: (0.0, 0.5)}, {10: (1, 2, []), 11: (2, 3, [])})
+    place = bend.place(np.array([0.9, 0.0]))
+    assert place is not None
+    assert way_off(bend, place, np.array([0.0, 0.7])) == (Branch(10, forward=False),)
 
 
 def out_of_the_door(x: float, *others: float) -> tuple[Branch, ...] | None:
