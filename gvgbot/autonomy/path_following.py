@@ -41,9 +41,13 @@ class PathFollowing:
         return Stand() if track is None else Drive(track)
 
     def draw_back(self, view: View, here: Situation) -> Order:
-        """Wait for what stands in the way, and leave it the room to go: it may be held up, too."""
-        paths = () if here.in_team else (here.astern(), here.ahead())
-        tracks = (_track_away(view, *here.line_along(path)) for path in paths)
+        """Wait for what stands in the way, and leave it the room to go: it may be held up, too.
+
+        In a team, so may a robot of which nobody knows yet where it is.
+        """
+        paths = () if self._neighbours.company else (here.astern(), here.ahead())
+        bodies = view.passing if here.in_team else view.doubtful
+        tracks = (_track_away(bodies, *here.line_along(path)) for path in paths)
         away = next((track for track in tracks if track is not None), None)
         return self.make_way(view, here) if away is None else Drive(away)
 
@@ -96,11 +100,11 @@ class PathFollowing:
         return LookAround(math.tau), [event]
 
 
-def _track_away(view: View, line: Array, room: Array) -> Track | None:
-    """Along a line (N, 2) to where there is room for what may go; None if that is no farther."""
-    if not len(view.doubtful):
+def _track_away(bodies: Array, line: Array, room: Array) -> Track | None:
+    """Along a line (N, 2) to where there is room for bodies (M, 2); None if that is no farther."""
+    if not len(bodies):
         return None
-    away = np.asarray(cKDTree(view.doubtful).query(line)[0])
+    away = np.asarray(cKDTree(bodies).query(line)[0])
     far = np.flatnonzero(away > _LEFT_TO_OTHERS_M)
     count = 1 + (int(far[0]) if len(far) else int(away.argmax()))
     track = Track.of(line[:count], room[:count])

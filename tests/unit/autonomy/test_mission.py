@@ -864,6 +864,19 @@ def test_who_waits_for_somebody_leaves_him_the_room_to_go(
     assert x == pytest.approx(waits_at_x, abs=0.11)
 
 
+def test_a_robot_of_a_team_draws_back_from_who_may_be_another_one() -> None:
+    """A metre and a half: both may wait for each other, and each knows the other as it moves."""
+    robot = Robot()
+    robot.mission.choice.sharing = Alone()
+    robot.drive(TEE, (-2.0, 0.0), (1.0, 0.0))
+    robot.passing = np.array([(1.5, 0.0)])
+    order: Order = Stand()
+    while robot.mission.target is not None and robot.stamp < 100.0:
+        robot.mission.hold()
+        order = robot.look(TEE)
+    assert end_of(order) == pytest.approx((0.0, 0.0), abs=0.11)
+
+
 def test_who_has_nowhere_to_go_but_past_another_robot_makes_way() -> None:
     """Held up west of the tee by a robot behind it, until every way is closed for a while."""
     robot = Robot()
