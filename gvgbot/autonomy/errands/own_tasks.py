@@ -92,7 +92,8 @@ class OwnTasks:
         )
         if self._mission.is_waiting or (self._unseen.is_done and not has_news):
             return None
-        if self._has_met and not self._unseen.judge(self._mapper.belief.map_base.position):
+        position = self._mapper.belief.map_base.position
+        if not self._unseen.judge(position, has_met=self._has_met):
             self._watched = view.stamp
         if self._arrives(view) and self._has_met and _may_overlook(view):
             return LookAround(math.tau)

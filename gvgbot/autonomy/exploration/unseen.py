@@ -75,14 +75,18 @@ class Unseen:
         self._is_sent = True
         return self._visits[-1]
 
-    def judge(self, position: Array) -> bool:
-        """Whether the last visit counts, which has led to a position (2,), m, map frame."""
-        is_vain = self._is_sent and not self.is_visited(position) and self._in_vain < _MOST_IN_VAIN
+    def judge(self, position: Array, *, has_met: bool) -> bool:
+        """Whether the last visit counts, which has led to a position (2,), m, map frame.
+
+        Where somebody was met who may have been in the way, one that did not get there does not.
+        """
+        is_vain = self._is_sent and not self.is_visited(position)
         self._is_sent = False
-        if is_vain:
-            self._visits.pop()
-            self._in_vain += 1
-        return not is_vain
+        if not (is_vain and has_met and self._in_vain < _MOST_IN_VAIN):
+            return True
+        self._visits.pop()
+        self._in_vain += 1
+        return False
 
     def is_visited(self, place: Array) -> bool:
         """Whether this (2,), m, map frame, is where it was sent to last."""

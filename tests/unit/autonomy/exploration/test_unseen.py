@@ -92,16 +92,20 @@ def test_a_robot_stands_when_two_looks_find_it_at_the_same_place() -> None:
     assert unseen.is_standing(10.3)
 
 
-def test_a_visit_that_did_not_get_there_does_not_count_but_so_often() -> None:
-    unseen, at_home, there = Unseen(), np.array([0.0, 0.0]), np.array(FAR)
+@pytest.mark.parametrize("has_met", [True, False])
+def test_a_visit_from_which_somebody_kept_it_does_not_count_but_so_often(*, has_met: bool) -> None:
+    unseen, at_home = Unseen(), np.array([0.0, 0.0])
     visits = 0
     while unseen.next(places(FAR), metres_to, twice=False) is not None:
         visits += 1
-        unseen.judge(at_home)
-        assert unseen.judge(at_home)  # it was not sent anywhere since
+        unseen.judge(at_home, has_met=has_met)
+        assert unseen.judge(at_home, has_met=has_met)  # it was not sent anywhere since
         assert visits < 100
-    assert visits > 2
+    assert (visits > 2) == has_met
+
+
+def test_a_visit_counts_whoever_was_met() -> None:
     unseen = Unseen()
     assert unseen.next(places(FAR), metres_to, twice=False) is not None
-    assert unseen.judge(there)
+    assert unseen.judge(np.array(FAR), has_met=True)
     assert unseen.next(places(FAR), metres_to, twice=False) is None
