@@ -38,7 +38,7 @@ class Explorer(Robot):
         self.is_barred = False  # all that is joined
         self.somebody_until = 0.0  # s, that somebody is found
         self.hidden_until = 0.0  # s, that the branch may be there for a while only
-        self.passing, self.passing_until = np.empty((0, 2)), 0.0
+        self.passing_until = math.inf  # s, that bodies may yet go
 
     def _survey(self) -> Surveyed:
         places = np.array(self.left.pop(0)).reshape(-1, 2)
@@ -51,8 +51,8 @@ class Explorer(Robot):
         is_found = view.stamp < self.somebody_until
         if view.stamp < self.hidden_until:
             view = replace(view, gvg=BRANCH, doubted=frozenset({3}))
-        if view.stamp < self.passing_until:
-            view = replace(view, passing=self.passing)
+        if view.stamp >= self.passing_until:
+            view = replace(view, passing=np.empty((0, 2)))
         return self.errands.advance(replace(view, is_somebody_found=is_found), known)
 
     def until_it_moves_or_ends(self, gvg: LocalGvg = CLOSED) -> Order:
@@ -163,7 +163,7 @@ def test_who_stands_in_a_narrow_way_is_waited_for_before_it(
     """In vain after two minutes; and not at all who stands elsewhere."""
     robot = Explorer([], [])
     robot.awaited, robot.doorsteps = np.array([[2.0, -0.7]]), np.array([GAP])
-    robot.passing, robot.passing_until = np.array([body]), math.inf
+    robot.passing = np.array([body])
     robot.until_it_moves_or_ends()
     robot.drive(CLOSED, (0.0, 0.0), (2.0, 0.0))
     came, robot.passing_until = robot.stamp, robot.stamp + stands_s
@@ -177,7 +177,7 @@ def test_who_stands_in_a_narrow_way_is_waited_for_before_it(
 def test_who_comes_to_where_somebody_has_gone_looks_round_for_what_he_hid() -> None:
     robot = Explorer([], [])
     robot.awaited, robot.doorsteps = np.array([[2.0, -0.7]]), np.array([GAP])
-    robot.passing, robot.passing_until = np.array([[2.0, -0.5]]), math.inf
+    robot.passing = np.array([[2.0, -0.5]])
     robot.until_it_moves_or_ends()
     robot.passing_until = 0.0
     order = robot.drive(CLOSED, (0.0, 0.0), (2.0, 0.0))
