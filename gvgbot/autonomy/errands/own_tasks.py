@@ -93,7 +93,8 @@ class OwnTasks:
         if self._mission.is_waiting or (self._unseen.is_done and not has_news):
             return None
         position = self._mapper.belief.map_base.position
-        if not self._unseen.judge(position, has_met=self._has_met):
+        is_somebody_there = view.is_somebody_within(IN_FULL_VIEW_M)
+        if not self._unseen.judge(position, is_somebody_there=is_somebody_there):
             self._watched = view.stamp
         if self._arrives(view) and self._has_met and _may_overlook(view):
             return LookAround(math.tau)

@@ -75,14 +75,14 @@ class Unseen:
         self._is_sent = True
         return self._visits[-1]
 
-    def judge(self, position: Array, *, has_met: bool) -> bool:
+    def judge(self, position: Array, *, is_somebody_there: bool) -> bool:
         """Whether the last visit counts, which has led to a position (2,), m, map frame.
 
-        Where somebody was met who may have been in the way, one that did not get there does not.
+        Where somebody may have been in the way, one that did not get there does not.
         """
         is_vain = self._is_sent and not self.is_visited(position)
         self._is_sent = False
-        if not (is_vain and has_met and self._in_vain < _MOST_IN_VAIN):
+        if not (is_vain and is_somebody_there and self._in_vain < _MOST_IN_VAIN):
             return True
         self._visits.pop()
         self._in_vain += 1

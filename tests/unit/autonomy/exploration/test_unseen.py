@@ -92,20 +92,20 @@ def test_a_robot_stands_when_two_looks_find_it_at_the_same_place() -> None:
     assert unseen.is_standing(10.3)
 
 
-@pytest.mark.parametrize("has_met", [True, False])
-def test_a_visit_from_which_somebody_kept_it_does_not_count_but_so_often(*, has_met: bool) -> None:
+@pytest.mark.parametrize("somebody", [True, False])
+def test_a_visit_from_which_somebody_kept_it_does_not_count_but_so_often(*, somebody: bool) -> None:
     unseen, at_home = Unseen(), np.array([0.0, 0.0])
     visits = 0
     while unseen.next(places(FAR), metres_to, twice=False) is not None:
         visits += 1
-        unseen.judge(at_home, has_met=has_met)
-        assert unseen.judge(at_home, has_met=has_met)  # it was not sent anywhere since
+        unseen.judge(at_home, is_somebody_there=somebody)
+        assert unseen.judge(at_home, is_somebody_there=somebody)  # it was not sent anywhere since
         assert visits < 100
-    assert (visits > 2) == has_met
+    assert (visits > 2) == somebody
 
 
-def test_a_visit_counts_whoever_was_met() -> None:
+def test_a_visit_counts_whoever_is_there() -> None:
     unseen = Unseen()
     assert unseen.next(places(FAR), metres_to, twice=False) is not None
-    assert unseen.judge(np.array(FAR), has_met=True)
+    assert unseen.judge(np.array(FAR), is_somebody_there=True)
     assert unseen.next(places(FAR), metres_to, twice=False) is None
