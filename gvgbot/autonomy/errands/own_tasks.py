@@ -8,7 +8,7 @@ import numpy as np
 
 from gvgbot.autonomy.control.orders import LookAround, Order, Stand
 from gvgbot.autonomy.destinations import foot_of, route_to_foot
-from gvgbot.autonomy.ending import too_narrow
+from gvgbot.autonomy.ending import Surveyed, too_narrow
 from gvgbot.autonomy.errands.kinds import ToPoint, ToVertex
 from gvgbot.autonomy.events import Decision
 from gvgbot.autonomy.evidence import IN_FULL_VIEW_M
@@ -102,12 +102,15 @@ class OwnTasks:
         if not is_standing or self._watches(view):
             return Stand()
         surveyed = survey()
-        if surveyed is None:
-            return Stand()
-        if self._reopen(surveyed.barred):
+        if surveyed is None or self._reopen(surveyed.barred):
             return Stand()
         self._narrows, self._awaited = surveyed.narrows, surveyed.awaited
-        self._surveyed, self._surveyed_m, starts = edges, view.travelled, here.starts()
+        self._surveyed, self._surveyed_m = edges, view.travelled
+        return self._visit(view, here, surveyed)
+
+    def _visit(self, view: View, here: Situation, surveyed: Surveyed) -> Task | None:
+        """To what a survey has found, if that is worth it."""
+        starts = here.starts()
 
         def metres_to(place: Array) -> float | None:
             foot = foot_of(self._mapper, place)
