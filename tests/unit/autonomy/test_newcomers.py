@@ -278,17 +278,17 @@ def test_who_stood_for_long_and_goes_is_forgotten_at_the_next_look() -> None:
 
 
 def test_who_was_let_in_may_yet_go_until_he_has_stood_for_very_long() -> None:
-    """Who is as round as people are; a box never may, but while nobody knows what it is."""
+    """Who is as round as people are; a post with edges never may."""
     watch = Watch()
     for second in range(130):
         watch.dropped(EMPTY, second, person=(2.0, 0.0))
         passing = watch.newcomers.passing(float(second))
         assert len(passing) == (second < CONFIG.came_after_s)
         assert np.allclose(passing, [2.0, 0.0], atol=0.05)
-    box = Watch()
-    for second in range(5):
-        box.dropped(carved([ROOM], [(1.8, -0.2, 2.2, 0.2)]), second)
-        assert len(box.newcomers.passing(float(second))) == 0
+    post, watch = carved([ROOM], [(1.6, 0.6, 2.0, 1.0)]), Watch()
+    for second in range(3):
+        assert watch.dropped(post, second) > 0
+        assert len(watch.newcomers.passing(float(second))) == 0
 
 
 def test_who_seemed_wide_beside_a_wall_is_forgotten_as_soon_as_he_has_gone() -> None:
