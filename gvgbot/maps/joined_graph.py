@@ -4,21 +4,26 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from gvgbot.geometry import Pose
 from gvgbot.maps.merging import SAME_M, is_among, merged
 from gvgbot.maps.moved import moved_graph
-from gvgbot.maps.route_graph import RouteGraph, RouteNode
+from gvgbot.maps.route_graph import RouteEdge, RouteGraph, RouteNode, lines_from
 
 
 def joined_graph(graphs: Sequence[tuple[RouteGraph, Pose]]) -> RouteGraph:
     """One map of all, each with the pose of its frame in the frame of the result.
 
-    A frontier that most robots at its place did not see is none: somebody may have stood there.
+    A frontier that most robots at its place did not see is none: somebody may have stood there. If
+    no more than two edges are left of a meetpoint, it is none either.
     """
     laid = [moved_graph(graph, pose) for graph, pose in graphs]
     whole, *others = (_agreed(graph, laid) for graph in laid)
     for other in others:
         whole = merged(whole, other, Pose())
+    for vertex in whole.vertices:
+        whole = _without_bend(whole, vertex)
     return whole
 
 
@@ -53,3 +58,23 @@ def _visited(graph: RouteGraph, vertex: RouteNode) -> RouteNode | None:
     if nearest is None or math.dist(nearest.position, vertex.position) >= SAME_M:
         return None
     return nearest
+
+
+def _without_bend(graph: RouteGraph, vertex: RouteNode) -> RouteGraph:
+    """The map, with one edge over a vertex if two are all that is left of its departures."""
+    ending = [edge for edge in graph.edges if vertex.id in (edge.start, edge.end)]
+    lines = list(lines_from(vertex.id, ending))
+    if vertex.frontiers or vertex.degree < 3 or not len(ending) == len(lines) == 2:
+        return graph
+    start, end = (edge.end if edge.start == vertex.id else edge.start for edge in ending)
+    passing = RouteEdge(
+        start=start,
+        end=end,
+        polyline=np.concatenate([lines[0][::-1], lines[1][1:]]),
+        min_clearance=min(edge.min_clearance for edge in ending),
+        traversals=min(edge.traversals for edge in ending),
+    )
+    return RouteGraph(
+        tuple(one for one in graph.vertices if one is not vertex),
+        (*(edge for edge in graph.edges if edge not in ending), passing),
+    )

@@ -61,3 +61,53 @@ def test_what_most_did_not_see_that_have_been_there_is_no_frontier(
         (end,) = (v for v in whole.vertices if math.dist(v.position, (8, 0)) < 0.1)
         assert end.degree == 2 + is_left
         assert sorted(end.frontiers) == pytest.approx([-1.0, *([math.pi / 2] if is_left else [])])
+
+
+def with_somebody(*, is_followed: bool) -> RouteGraph:
+    """The way of 8 m, seen from one end to somebody who made a meetpoint of its middle."""
+    left = -0.6 if is_followed else -1.5
+    middle = vertex(2, 4.0, (math.pi, 0.6, left), math.pi)
+    first = vertex(0, 0.0, (0.0, 3.0), 0.0)
+    line = np.linspace((0, 0), (4, 0), 40)
+    return RouteGraph(
+        (first, middle), (RouteEdge(start=0, end=2, polyline=line, min_clearance=0.5),)
+    )
+
+
+@pytest.mark.parametrize("is_followed", [True, False])
+@pytest.mark.parametrize("is_first", [True, False])
+def test_where_one_robot_saw_a_way_go_on_round_somebody_another_one_has_it_pass(
+    *, is_followed: bool, is_first: bool
+) -> None:
+    """Neither drove all of it. What nobody has followed is left as it is."""
+    told = [(with_somebody(is_followed=is_followed), FRAMES[0])]
+    plain = moved_graph(corridor(sees_door=False, drove=False), FRAMES[1].inverse()), FRAMES[1]
+    whole = joined_graph([*told, plain] if is_first else [plain, *told])
+    places = sorted(v.position[0] for v in whole.vertices)
+    assert places == pytest.approx([0.0, 8.0] if is_followed else [0.0, 4.0, 8.0], abs=0.01)
+    if is_followed:
+        (edge,) = whole.edges
+        assert edge.length == pytest.approx(8.0, abs=0.01)
+        ends = [vertex.position for vertex in whole.vertices if vertex.id in (edge.start, edge.end)]
+        assert sorted(x for x, _ in ends) == pytest.approx([0.0, 8.0], abs=0.01)
+        assert edge.min_clearance == 0.5
+        assert {len(edge.polyline[np.hypot(*(edge.polyline - end).T) < 1e-6]) for end in ends} == {
+            1
+        }
+
+
+def test_a_ring_keeps_the_one_vertex_that_it_has() -> None:
+    angles = np.linspace(0.0, math.tau, 60)
+    ring = np.column_stack([np.cos(angles), np.sin(angles)])
+    only = RouteNode(
+        id=0,
+        kind="meetpoint",
+        position=(1.0, 0.0),
+        degree=2,
+        bearings=(math.pi / 2, -math.pi / 2),
+        clearance=0.5,
+        covariance=(0.01, 0.0, 0.0, 0.01),
+    )
+    loop = RouteEdge(start=0, end=0, polyline=ring, min_clearance=0.5, traversals=1)
+    whole = joined_graph([(RouteGraph((only,), (loop,)), Pose())] * 2)
+    assert len(whole.vertices) == len(whole.edges) == 1
