@@ -63,10 +63,13 @@ def survey(pipeline: Pipeline) -> Surveyed:
     views = viewpoints(grid, beside, places, here, room, off, within)
     if views is None:
         is_walled = bool(is_wall(grid.cells).any())
-        return Surveyed(found, narrow, is_beside_floor=len(found) > 0, is_walled=is_walled)
+        is_beside_floor = len(found) > 0
+        return Surveyed(found, narrow, is_beside_floor, sights=found, is_walled=is_walled)
+    is_led_to = np.isfinite(views[:, 0])
     return Surveyed(
-        views,
+        views[is_led_to],
         narrow,
+        sights=places[is_led_to],
         doorsteps=_doorsteps(grid, awaited, stood_at, beside, here, room),
         awaited=awaited,
         barred=_barred(pipeline, ways, scans, keyframes, grid),
@@ -87,7 +90,7 @@ def _doorsteps(
     before = floor_beside(grid, by_somebody, here, room)
     off = np.repeat([_INTO_M, 0.0], [len(awaited), len(stood_at)])[: len(before)]
     views = viewpoints(grid, ways, before, here, room, off)
-    return _NONE if views is None else views
+    return _NONE if views is None else views[np.isfinite(views[:, 0])]
 
 
 def _walled(grid: OccupancyGrid, points: Array) -> OccupancyGrid:

@@ -16,8 +16,9 @@ class Surveyed(NamedTuple):
     """What the grid of all scans shows in the end, m, map frame."""
 
     places: Array  # (N, 2), that are worth another look
-    narrows: Array  # (N, 2), ways too narrow for the robot that lead to floor without another
+    narrows: Array  # (L, 2), ways too narrow for the robot that lead to floor without another
     is_beside_floor: bool = False  # all edges are where it lacks the room it wants, places are not
+    sights: Array = np.empty((0, 2))  # (N, 2), what there is to be seen from the places
     doorsteps: Array = np.empty((0, 2))  # (M, 2), before what may be somebody, or narrowed by him
     awaited: Array = np.empty((0, 2))  # (K, 2), ways that he may stand in, narrow or closed
     barred: Sequence[int] = ()  # edges over what looked like a wall, not driven
@@ -64,12 +65,17 @@ def unless_shut_in(
     return shut_in if surveyed.is_beside_floor else explored
 
 
-def left_to_others(graph: GvgGraph, unfollowed: Collection[HalfEdgeId]) -> tuple[Outcome, str]:
+def left_to_others(
+    graph: GvgGraph, unfollowed: Collection[HalfEdgeId], remark: str
+) -> tuple[Outcome, str]:
     """Robots of a team have followed all, but for what this one gave up and nobody followed."""
     blocked = len(set(graph.blocked()) & set(unfollowed))
     if blocked:
-        return "explored_with_blocked", f"frontiers given up: {blocked}; no other one is left"
-    return "explored", "no frontier of the team is left"
+        return (
+            "explored_with_blocked",
+            f"frontiers given up: {blocked}; no other one is left{remark}",
+        )
+    return "explored", f"no frontier of the team is left{remark}"
 
 
 def cut_short(graph: GvgGraph, without_map: str, reason: str) -> tuple[Outcome, str]:

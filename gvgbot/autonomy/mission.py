@@ -76,7 +76,8 @@ class Mission(Pursuit):
     @property
     def is_ending(self) -> bool:
         """Whether there is nothing more to be done but to say so."""
-        return self._examination.is_over
+        is_new = not self._frontiers.issuperset(self._mapper.graph.frontiers())
+        return self._examination.is_over and not is_new
 
     def witness(self, view: View, known: Correspondence) -> list[Event]:
         """Learn from where somebody else drives the robot."""
@@ -193,6 +194,8 @@ class Mission(Pursuit):
     def _go_without_target(self, view: View, here: Situation) -> Order:
         """Wait, look for a way to what is left, or examine what is in sight; at first, go on."""
         graph = self._mapper.graph
+        if self._examination.is_over and self.choice.is_left_to_others:
+            return Stand()
         if self._obstructions.waiting or self.choice.waits_for_others:
             self._progress.wait(view.stamp)
             if self.choice.waits_for_others:
@@ -228,7 +231,7 @@ class Mission(Pursuit):
                 nearest = self.choice.nearest(here.starts())
             if nearest is None:
                 if self._team_is_done(view):
-                    self._end(view, *left_to_others(graph, self.choice.unfollowed))
+                    self._end_with_team(view)
                 elif not (self.choice.waits_for_others or self._retracing.is_on):
                     self._give_up_the_rest(view)
                 return None
@@ -239,6 +242,13 @@ class Mission(Pursuit):
             return None
         self._commit(view, here, chosen, reason)
         return chosen
+
+    def _end_with_team(self, view: View) -> None:
+        """End at the second look: the robot may have something else to do."""
+        if self._examination.is_over:
+            graph, unfollowed = self._mapper.graph, self.choice.unfollowed
+            self._end(view, *left_to_others(graph, unfollowed, self.remark))
+        self._examination.is_over = True
 
     def _team_is_done(self, view: View) -> bool:
         """Whether all is left to others, and no way is worth a wait, or to be looked for."""

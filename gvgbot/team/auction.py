@@ -5,6 +5,7 @@ which of its own frontiers leads to where nobody has been.
 """
 
 from collections.abc import Callable, Collection
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -113,11 +114,7 @@ class Auction:
 
         A whole edge does not tell in which direction it was driven.
         """
-        ways = [
-            pose.transform(polyline)
-            for name, pose in self._team.frames.items()
-            for polyline in _driven(self._team.chart(name), edges=either_way)
-        ]
+        ways = self._ways(partial(_driven, edges=either_way))
         if not ways or len(line) < 2:
             return False
         away, nearest = cKDTree(np.concatenate(ways)).query(line)
@@ -125,6 +122,13 @@ class Auction:
         is_same_way = (onwards * np.gradient(line, axis=0)).sum(axis=1) > 0.0
         is_on_way = np.max(away) < BESIDE_M
         return bool(is_on_way and (either_way or is_same_way.mean() > _MOSTLY))
+
+    def metres_from(self, places: Array) -> Array:
+        """How far places (N, 2) are from all that others have told of; see `Sharing`."""
+        lines = self._ways(_lines)
+        if not lines:
+            return np.full(len(places), np.inf)
+        return np.asarray(cKDTree(np.concatenate(lines)).query(places)[0])
 
     @property
     def is_waiting(self) -> bool:
@@ -145,6 +149,13 @@ class Auction:
     def unfollowed(self) -> Collection[HalfEdgeId]:
         """Own departures that nobody has followed; see `Sharing`."""
         return self._current_site().own
+
+    def _ways(self, lines_of: Callable[[Chart], list[Array]]) -> list[Array]:
+        """Lines (N, 2) of the charts of others, own map frame."""
+        frames = self._team.frames
+        return [
+            p.transform(line) for n, p in frames.items() for line in lines_of(self._team.chart(n))
+        ]
 
     def _claim(self, frontier: Frontier, cost: float, end: HalfEdgeId) -> None:
         self.claim = Claim(frontier.x, frontier.y, frontier.bearing, cost)
@@ -175,3 +186,8 @@ def _driven(chart: Chart, *, edges: bool) -> list[Array]:
     """The lines (N, 2) of the parts of edges that a robot has driven, and of whole edges."""
     whole = [edge.polyline for edge in chart.edges.values() if edges and edge.traversed]
     return whole + [way.polyline for way in chart.ways]
+
+
+def _lines(chart: Chart) -> list[Array]:
+    """The lines (N, 2) of all edges, also of those that were only seen, and of parts of them."""
+    return [edge.polyline for edge in chart.edges.values()] + [way.polyline for way in chart.ways]

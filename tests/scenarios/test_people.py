@@ -6,9 +6,11 @@ import pytest
 
 from gvgbot.autonomy.events import VertexAdded
 from gvgbot.autonomy.exploration.config import ExplorationConfig
-from gvgbot.config import TwinConfig
+from gvgbot.config import RobotConfig, TwinConfig
 from gvgbot.drivers.hokuyo.twin_config import HokuyoTwinConfig
 from gvgbot.geometry import Pose
+from gvgbot.live.team import member_of
+from gvgbot.team.member import TeamConfig
 from tests.scenarios.rig import (
     FAR_AWAY,
     ROBOT_RADIUS,
@@ -130,11 +132,16 @@ def test_a_person_who_stands_there_at_the_first_look_is_no_pillar() -> None:
     assert added == ["endpoint", "endpoint"]
 
 
-def test_a_person_who_stands_in_a_corridor_at_the_first_look_is_not_its_end() -> None:
+@pytest.mark.parametrize("in_team", [False, True])
+def test_a_person_who_stands_in_a_corridor_at_the_first_look_is_not_its_end(
+    *, in_team: bool
+) -> None:
     """A pillar would be, for there is no way past it; the rest is known long before he goes."""
     world = carved([(-4.0, -0.5, 3.0, 0.5), (2.0, -0.5, 3.0, 2.5)])
 
     async def story(run: Play) -> None:
+        if in_team:
+            member_of(RobotConfig(), TeamConfig(), run.pipeline)
         run.put_person(1.0, 0.0)
         await run.sleep(50.0)
         run.put_person(*FAR_AWAY)

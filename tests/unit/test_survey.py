@@ -72,8 +72,9 @@ def test_what_lies_in_the_shadow_of_a_corner_is_a_gap_until_the_robot_looks_roun
     """Seen from the origin, the shadow begins between (2, 1) and (4, 2): halfway at (3, 1.5)."""
     building = carved([CORRIDOR, SIDE])
     surveyed = survey(driven(building, 3.0))
-    (place,) = START.transform(surveyed.places)
+    (place,), (sight,) = START.transform(surveyed.places), START.transform(surveyed.sights)
     assert place == pytest.approx([3.0, 1.5], abs=0.3)
+    assert sight == pytest.approx([3.0, 1.5], abs=0.3)
     assert not surveyed.is_whole
     surveyed = survey(driven(building, 7.0))
     assert len(surveyed.places) == 0

@@ -20,11 +20,7 @@ from gvgbot.autonomy.destinations import (
 from gvgbot.autonomy.errands.ground import AT_VERTEX_M, Ground
 from gvgbot.autonomy.errands.kinds import Home, Look, Rest, Stop, ToPoint, ToVertex, Waypoint
 from gvgbot.autonomy.events import Event, Recovery
-from gvgbot.autonomy.exploration.access import (
-    bent_way,
-    straight_way,
-    way_to_edge,
-)
+from gvgbot.autonomy.exploration.access import bent_way, straight_way, way_to_edge
 from gvgbot.autonomy.exploration.certainty import robot_sigma
 from gvgbot.autonomy.exploration.config import ExplorationConfig
 from gvgbot.autonomy.keyframes import has_come_on
@@ -43,6 +39,7 @@ _PROGRESS_M = 0.3
 _TURNED_RAD, _AHEAD_M = 0.3, 0.4  # less to turn to where its track leads, so far ahead
 _STIRS_M, _STIRS_RAD = 0.05, 0.1  # who moves less stands
 _SURE_M = 0.4  # of a place that was found again
+_BESIDE_RAD = 0.5  # who stands before a place hides no more on either side of it
 _LOOKS = 2  # around, before giving up
 _UNSEEN_LOOKS = 3, 15  # at where an edge should leave: before it waits, and gives that up
 _THROUGH_RAD = 0.8  # an edge that leaves so near to where one is seen is that one
@@ -277,6 +274,10 @@ class Driving:
             if way is not None and isinstance(stop, ToPoint):  # who stands in it may go
                 self._route, self._straight_m, self._goes_round = None, math.inf, True
                 return Drive(Track.of(*way))
+            dx, dy = local_goal - view.local_base.position
+            turn = view.turn_to_see(math.atan2(dy, dx))
+            if turn and self._looks < _LOOKS:  # who stood there may have gone behind its back
+                return self._look_around(view, turn + _BESIDE_RAD)
             short = f"{away:.1f} m from there, where the known ways end"
             if isinstance(stop, Home):
                 return Ended("arrived", short)
@@ -384,11 +385,11 @@ class Driving:
             return Ended("given up", "no edge is in sight")
         return self._look_around(view)
 
-    def _look_around(self, view: View) -> Order:
+    def _look_around(self, view: View, turn: float = math.tau) -> Order:
         self._looks += 1
         self._is_looking = True
         self.happened.append(Recovery(view.stamp, "look around", f"on the way: {self.stop}"))
-        return LookAround(math.tau)
+        return LookAround(turn)
 
     def _is_there(self, view: View, there: Array) -> bool:
         """Whether the robot is at a place (2,), local frame, or as near as it comes."""

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gvgbot.autonomy.control.orders import LookAround, Order, Stand
 from gvgbot.autonomy.destinations import foot_of, route_to_foot
@@ -24,6 +25,8 @@ from gvgbot.words import counted
 _DRIVEN_ON_M = 0.5  # what can be seen there is new
 _AWAITED_S = 120.0  # that somebody goes who hides what it has come to see, or stands in it
 _BESIDE_M = 1.2  # from the middle of somebody to where a way is narrowed by him
+_SEEN_FROM_M = 1.5  # where others of the team drive, they see what is there
+_NEARER_M = 0.25  # who is that much nearer looks
 _SETTLED_S = 10.0  # after he has gone, what was behind him has been seen
 
 
@@ -82,15 +85,14 @@ class OwnTasks:
 
     def _look_again(self, view: View, here: Situation) -> Task | Order | None:
         """To where the map may lack something, when all frontiers are explored."""
-        is_alone = self._mission.choice.sharing is None  # others may have seen it
         survey = self._mission.survey
-        if survey is None or self._mapper.graph.frontiers() or not is_alone:
+        if survey is None or not self._is_explored():
             return None
         edges = set(self._mapper.graph.edges)
         has_news = edges != self._surveyed or (
             self._mission.is_ending and view.travelled > self._surveyed_m + _DRIVEN_ON_M
         )
-        if self._mission.is_waiting or (self._unseen.is_done and not has_news):
+        if self._unseen.is_done and not has_news:
             return None
         position = self._mapper.belief.map_base.position
         is_somebody_there = view.is_somebody_within(IN_FULL_VIEW_M)
@@ -104,9 +106,17 @@ class OwnTasks:
         surveyed = survey()
         if surveyed is None or self._reopen(surveyed.barred):
             return Stand()
-        self._narrows, self._awaited = surveyed.narrows, surveyed.awaited
+        self._awaited = surveyed.awaited
+        if self._mission.choice.sharing is None:  # else others may have come there by another way
+            self._narrows = surveyed.narrows
         self._surveyed, self._surveyed_m = edges, view.travelled
         return self._visit(view, here, surveyed)
+
+    def _is_explored(self) -> bool:
+        """Whether all frontiers are; in a team those of the others, too."""
+        if self._mission.choice.sharing is not None:
+            return self._mission.is_ending
+        return not (self._mapper.graph.frontiers() or self._mission.is_waiting)
 
     def _visit(self, view: View, here: Situation, surveyed: Surveyed) -> Task | None:
         """To what a survey has found, if that is worth it."""
@@ -117,16 +127,27 @@ class OwnTasks:
             route = None if foot is None else route_to_foot(here, starts, foot)
             return None if route is None else route.metres
 
-        place = self._unseen.next(surveyed.places, metres_to, twice=self._has_met)
+        places = surveyed.places[self._is_left_to_this(surveyed.sights)]
+        doorsteps = surveyed.doorsteps[self._is_left_to_this(surveyed.doorsteps)]
+        place = self._unseen.next(places, metres_to, twice=self._has_met)
         reason = "something may be missing there"
         if place is None and self._has_met:
-            place = self._unseen.once_more(surveyed.doorsteps, metres_to)
+            place = self._unseen.once_more(doorsteps, metres_to)
             reason = "somebody may have stood there"
         if place is None:
             return None
         self._arrived = None
         decision = Decision(view.stamp, None, None, reason)
         return Task(ToPoint(*place.round(2).tolist()), decision)
+
+    def _is_left_to_this(self, sights: Array) -> NDArray[np.bool_]:
+        """Which of some places (N, 2), map frame, no other robot sees that is nearer to them."""
+        sharing = self._mission.choice.sharing
+        if sharing is None or not len(sights):
+            return np.ones(len(sights), np.bool_)
+        feet = [foot_of(self._mapper, sight) for sight in sights]
+        own = np.array([math.inf if foot is None else foot.away for foot in feet])
+        return sharing.metres_from(sights) > np.minimum(own - _NEARER_M, _SEEN_FROM_M)
 
     def _reopen(self, barred: Iterable[int]) -> bool:
         """Take edges that may lead through glass for frontiers, once; whether there were any."""

@@ -29,6 +29,9 @@ class Sharing(Protocol):
         With `either_way` that may have been against it.
         """
 
+    def metres_from(self, places: Array) -> Array:
+        """From places (N, 2), m, map frame, to the nearest of the others' edges (N,); inf: none."""
+
     @property
     def is_waiting(self) -> bool:
         """Whether others are on their way to all that is left: it may come back to this robot."""

@@ -64,6 +64,7 @@ class Robot:
         self.pose, self.walls = Pose(), NOTHING_SEEN
         self.somebody = np.empty((0, 2))  # where somebody stands
         self.passing = np.empty((0, 2))  # who has not stood for so long that he stays for certain
+        self.field_of_view = -math.pi, math.pi
         self._count = 0
 
     def look(self, gvg: LocalGvg, *, period: float = 0.5) -> Order:
@@ -77,6 +78,7 @@ class Robot:
             self.walls,
             doubtful=self.somebody,
             passing=self.passing,
+            field_of_view=self.field_of_view,
         )
         known, seen = self.mapper.observe(view)
         order, done = self.decide(view, known)
@@ -977,6 +979,9 @@ class Alone:
     def has_driven(self, line: Array, *, either_way: bool = False) -> bool:
         return False
 
+    def metres_from(self, places: Array) -> Array:
+        return np.full(len(places), np.inf)
+
 
 class Claimed(Alone):
     """Another robot follows all that is open, a metre beyond its vertex."""
@@ -1047,7 +1052,7 @@ def test_who_knows_no_vertex_where_others_have_driven_all_waits_for_them_and_end
     assert isinstance(robot.look(PLAIN), Drive)
     assert robot.mission.outcome is None
     others.is_led = True
-    robot.look(PLAIN)
+    robot.stand(PLAIN, 2)
     assert robot.mission.outcome == "explored"
 
 
@@ -1103,7 +1108,7 @@ def test_what_a_robot_of_a_team_gave_up_and_nobody_followed_is_not_explored(
     robot, closed = before_a_closed_way(Alone())
     robot.mission.choice.sharing, robot.mission.target = last, None
     last.is_explored, last.unfollowed = True, () if is_followed else (closed,)
-    robot.look(TEE)
+    robot.stand(TEE, 2)
     assert robot.mission.outcome == ("explored" if is_followed else "explored_with_blocked")
 
 
@@ -1114,7 +1119,7 @@ def test_for_a_way_that_was_closed_one_waits_only_if_nobody_has_driven_it(
     robot, _ = before_a_closed_way(Alone())
     robot.mission.choice.sharing = last = Last()
     last.is_explored, robot.mission.target = is_explored, None
-    robot.look(TEE)
+    robot.stand(TEE, 2)
     assert robot.mission.outcome == ("explored" if is_explored else None)
 
 

@@ -1,13 +1,16 @@
 """Who takes which frontier, by what another robot says that it is on its way to."""
 
+import math
+
 import msgspec
+import numpy as np
 import pytest
 
 from gvgbot.autonomy.exploration.paths import Approach
 from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.geometry import Pose
 from gvgbot.team.auction import Auction
-from gvgbot.team.chart import Chart
+from gvgbot.team.chart import Chart, ChartEdge, ChartWay
 from gvgbot.team.news import Claim
 from tests.unit.team.building import irregular
 from tests.unit.team.test_member import graph_of
@@ -21,12 +24,13 @@ class Others:
 
     may_find_more = True
 
-    def __init__(self, *claims: Claim) -> None:
-        self.frames: dict[str, Pose] = {}
+    def __init__(self, *claims: Claim, charts: dict[str, tuple[Chart, Pose]] | None = None) -> None:
+        self.charts = charts or {}
+        self.frames = {name: pose for name, (_, pose) in self.charts.items()}
         self.told = [("two", claim) for claim in claims]
 
     def chart(self, name: str) -> Chart:
-        raise KeyError(name)
+        return self.charts[name][0]
 
     def claims(self) -> list[tuple[str, Claim]]:
         return self.told
@@ -47,3 +51,19 @@ def test_who_is_hardly_nearer_leaves_a_frontier_to_whom_is_on_its_way(
     alone = chosen()
     theirs = msgspec.structs.replace(alone, metres=alone.metres + nearer)
     assert (chosen(theirs) == alone) == takes_over
+
+
+def test_how_far_others_are_is_told_by_their_edges_and_by_what_they_have_driven_of_others() -> None:
+    """In the own frame: theirs is a quarter turn to the left, 10 m ahead."""
+    (a, b) = (HalfEdgeId(0, 0), HalfEdgeId(1, 0))
+    edge = ChartEdge(0, a, b, 4.0, 0.5, np.array([[0.0, 0.0], [2.0, 0.0], [4.0, 0.0]]))
+    way = ChartWay(np.array([[0.0, 5.0], [0.0, 6.0]]), 0.5)
+    two = Chart(edges={0: edge}, ways=(way,)), Pose(10.0, 0.0, math.pi / 2)
+    auction = Auction("one", lambda: CHART, Others(charts={"two": two}))
+    places = np.array([[10.0, 2.0], [10.3, 4.0], [4.0, -1.0]])
+    assert auction.metres_from(places) == pytest.approx([0.0, 0.3, 1.0])
+
+
+def test_whose_maps_lie_nobody_knows_where_are_infinitely_far() -> None:
+    auction = Auction("one", lambda: CHART, Others())
+    assert auction.metres_from(np.zeros((2, 2))).tolist() == [math.inf, math.inf]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gvgbot.autonomy.control.edge_follower import Track
-from gvgbot.autonomy.control.orders import Drive, Order, Stand
+from gvgbot.autonomy.control.orders import Drive, LookAround, Order, Stand
 from gvgbot.autonomy.ending import Outcome
 from gvgbot.autonomy.errands import Declined
 from gvgbot.autonomy.errands.plans import Kept
@@ -206,6 +206,24 @@ def creep(robot: Explorer, track: Track) -> Order:
     x, y = (float(np.interp(station, track.stations, line)) for line in track.polyline.T)
     robot.stamp += 0.5
     return robot.drive(CLOSED, (robot.pose.x, robot.pose.y), (x, y))
+
+
+def test_it_turns_to_a_place_behind_it_before_it_says_that_the_way_there_is_not_free() -> None:
+    """Who stood there may have gone since it saw him."""
+    robot = in_a_hall(10.0, [(1.2, 2.5, 1.4, 2.7)])
+    robot.mission.survey = None
+    robot.field_of_view = (-1.0, 1.0)
+    robot.errands.recall(Kept("point", x=0.5, y=5.0))
+    order = robot.drive(CLOSED, (-1.0, 0.0), (0.5, 0.0))
+    assert isinstance(order, LookAround)
+    assert math.pi / 2 < 1.0 + order.angle < math.pi
+    assert not robot.said(ErrandEnded)
+    turned = Pose(0.5, 0.0, order.angle)
+    robot.mapper.move(robot.pose.to(turned), np.zeros((3, 3)))
+    robot.pose = turned
+    robot.look(CLOSED)
+    (ended,) = robot.said(ErrandEnded)
+    assert "the way is not free" in str(ended)
 
 
 def test_a_slow_robot_leaves_its_edge_for_a_point_far_beside_it() -> None:

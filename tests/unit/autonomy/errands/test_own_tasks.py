@@ -14,10 +14,10 @@ from gvgbot.autonomy.events import Decision, ErrandEnded, Event, Recovery
 from gvgbot.autonomy.exploration.certainty import CertaintyConfig, vertex_sigma
 from gvgbot.autonomy.gvg.local import LocalGvg
 from gvgbot.autonomy.views import Correspondence, View
-from gvgbot.geometry import Pose
+from gvgbot.geometry import Array, Pose
 from tests.unit.autonomy.local_graphs import drawn
 from tests.unit.autonomy.sights import carved, looked
-from tests.unit.autonomy.test_mission import CLOSED, CONFIG, TEE, Robot, join_out_of_reach
+from tests.unit.autonomy.test_mission import CLOSED, CONFIG, TEE, Last, Robot, join_out_of_reach
 
 GAP = [2.0, 0.0]
 BRANCH = drawn(
@@ -44,7 +44,12 @@ class Explorer(Robot):
         places = np.array(self.left.pop(0)).reshape(-1, 2)
         barred = tuple(self.mapper.graph.edges) if self.is_barred else ()
         return Surveyed(
-            places, self.narrows, doorsteps=self.doorsteps, awaited=self.awaited, barred=barred
+            places,
+            self.narrows,
+            sights=places,
+            doorsteps=self.doorsteps,
+            awaited=self.awaited,
+            barred=barred,
         )
 
     def decide(self, view: View, known: Correspondence) -> tuple[Order, list[Event]]:
@@ -344,3 +349,56 @@ def test_vertices_that_stay_less_certain_than_wanted_are_counted(share: float, t
     robot.errands = Errands(robot.mission, robot.mapper, config, room_m=0.2)
     robot.until_it_moves_or_ends()
     assert robot.mission.reason == f"no frontier is left; {told} less certain than wanted"
+
+
+# one of three edges has been driven, the others are left to the rest of the team
+SHARED = drawn(
+    {1: (-1.0, 0.0), 2: (3.0, 0.0), 3: (8.0, 0.0), 4: (3.0, -4.0)},
+    {10: (1, 2, []), 11: (2, 3, []), 12: (2, 4, [])},
+    unseen={3: 0.0, 4: -math.pi / 2},
+)
+
+
+class Beside(Last):
+    """Others of a team have followed all, so far from where something may be missing."""
+
+    def __init__(self, metres: float) -> None:
+        self.metres = metres
+
+    def metres_from(self, places: Array) -> Array:
+        return np.full(len(places), self.metres)
+
+
+def of_a_team(metres: float, *surveys: list[list[float]]) -> Explorer:
+    robot = Explorer(*surveys)
+    robot.drive(SHARED, (0.0, 0.0), (3.0, 0.0))
+    robot.mission.choice.sharing, robot.mission.target = Beside(metres), None
+    return robot
+
+
+# 1.1 m beside the edge that this robot has driven
+@pytest.mark.parametrize(("metres", "goes"), [(0.8, False), (0.9, True), (math.inf, True)])
+def test_when_its_team_has_followed_all_it_looks_where_no_other_robot_sees_to_it(
+    *, metres: float, goes: bool
+) -> None:
+    robot = of_a_team(metres, [[1.5, 1.1]])
+    robot.until_it_moves_or_ends(SHARED)
+    assert (robot.errands.errand is not None) == goes
+    assert robot.mission.outcome == (None if goes else "explored")
+    assert not robot.left
+
+
+def test_who_stands_as_near_to_it_as_others_of_its_team_looks_too() -> None:
+    """Each of them would leave it to the other one."""
+    robot = of_a_team(0.3, [[1.5, 0.3]])
+    robot.until_it_moves_or_ends(SHARED)
+    assert str(robot.errands.errand) == "goto 1.5 0.3"
+
+
+def test_who_finds_a_frontier_while_it_stands_for_a_survey_explores_it_first() -> None:
+    robot = of_a_team(math.inf, [[1.5, 1.1]])
+    robot.look(SHARED)
+    assert robot.mission.is_ending
+    (meetpoint, *_) = robot.mapper.graph.vertices.values()
+    meetpoint.add_half_edge(2.0)
+    assert not robot.mission.is_ending
