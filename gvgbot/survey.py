@@ -47,29 +47,33 @@ def survey(pipeline: Pipeline) -> Surveyed:
     found = np.concatenate([gaps(grid, here, room), stood])
     beside = sampled((way.polyline for way in ways), _STEP_M)
     narrow = narrows(grid, beside, here, pipeline.radius, room)
-    stood_at = awaited = _NONE
+    hollow = stood_at = awaited = _NONE
     if ways:
         joined = sampled((way.polyline for way in ways), _STEP_M / 2)
         felt_too = _walled(grid, _felt(pipeline))
         hollow = hollows(felt_too, joined, pipeline.sight.open_clearance)
-        found = np.concatenate([found, blanks(grid, beside, here, room), hollow])
+        found = np.concatenate([found, blanks(grid, beside, here, room)])
         lasting_s = pipeline.traffic.newcomers.longest_patience
         stood_at = _may_go(bodies(grid, joined), scans, lasting_s)
         awaited = np.concatenate([narrow, _may_go(_at_ends(pipeline), scans, lasting_s)])
     through = passages(grid, ways, here, room, pipeline.sight.open_clearance)
-    off = np.repeat([_INTO_M, _TOWARDS_M], [len(found), len(through)])
-    places = np.concatenate([found, through])
+    parts = found, hollow, through
+    places, counts = np.concatenate(parts), [len(part) for part in parts]
+    off = np.repeat([_INTO_M, _INTO_M, _TOWARDS_M], counts)
+    is_hollow = np.repeat([False, True, False], counts)
     within = _NEARER * pipeline.sight.open_clearance
     views = viewpoints(grid, beside, places, here, room, off, within)
     if views is None:
         is_walled = bool(is_wall(grid.cells).any())
-        is_beside_floor = len(found) > 0
-        return Surveyed(found, narrow, is_beside_floor, sights=found, is_walled=is_walled)
+        return Surveyed(
+            places, narrow, places, is_hollow, is_beside_floor=len(found) > 0, is_walled=is_walled
+        )
     is_led_to = np.isfinite(views[:, 0])
     return Surveyed(
         views[is_led_to],
         narrow,
-        sights=places[is_led_to],
+        places[is_led_to],
+        is_hollow[is_led_to],
         doorsteps=_doorsteps(grid, awaited, stood_at, beside, here, room),
         awaited=awaited,
         barred=_barred(pipeline, ways, scans, keyframes, grid),

@@ -4,6 +4,7 @@ from collections.abc import Callable, Collection, Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gvgbot.autonomy.exploration.unseen import places_in_words
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
@@ -17,8 +18,9 @@ class Surveyed(NamedTuple):
 
     places: Array  # (N, 2), that are worth another look
     narrows: Array  # (L, 2), ways too narrow for the robot that lead to floor without another
-    is_beside_floor: bool = False  # all edges are where it lacks the room it wants, places are not
     sights: Array = np.empty((0, 2))  # (N, 2), what there is to be seen from the places
+    hollow: NDArray[np.bool_] = np.zeros(0, np.bool_)  # (N,), it is nothing, with edges round it
+    is_beside_floor: bool = False  # all edges are where it lacks the room it wants, places are not
     doorsteps: Array = np.empty((0, 2))  # (M, 2), before what may be somebody, or narrowed by him
     awaited: Array = np.empty((0, 2))  # (K, 2), ways that he may stand in, narrow or closed
     barred: Sequence[int] = ()  # edges over what looked like a wall, not driven

@@ -76,8 +76,7 @@ class Mission(Pursuit):
     @property
     def is_ending(self) -> bool:
         """Whether there is nothing more to be done but to say so."""
-        is_new = not self._frontiers.issuperset(self._mapper.graph.frontiers())
-        return self._examination.is_over and not is_new
+        return self._examination.is_over
 
     def witness(self, view: View, known: Correspondence) -> list[Event]:
         """Learn from where somebody else drives the robot."""
@@ -248,7 +247,7 @@ class Mission(Pursuit):
         if self._examination.is_over:
             graph, unfollowed = self._mapper.graph, self.choice.unfollowed
             self._end(view, *left_to_others(graph, unfollowed, self.remark))
-        self._examination.is_over = True
+        self._examination.is_over = self.choice.is_left_to_others
 
     def _team_is_done(self, view: View) -> bool:
         """Whether all is left to others, and no way is worth a wait, or to be looked for."""

@@ -124,8 +124,8 @@ class Auction:
         return bool(is_on_way and (either_way or is_same_way.mean() > _MOSTLY))
 
     def metres_from(self, places: Array) -> Array:
-        """How far places (N, 2) are from all that others have told of; see `Sharing`."""
-        lines = self._ways(_lines)
+        """How far places (N, 2) are from what the team knows as edges; see `Sharing`."""
+        lines = [way.polyline for way in self._own_chart().ways] + self._ways(_lines)
         if not lines:
             return np.full(len(places), np.inf)
         return np.asarray(cKDTree(np.concatenate(lines)).query(places)[0])

@@ -75,6 +75,7 @@ def test_what_lies_in_the_shadow_of_a_corner_is_a_gap_until_the_robot_looks_roun
     (place,), (sight,) = START.transform(surveyed.places), START.transform(surveyed.sights)
     assert place == pytest.approx([3.0, 1.5], abs=0.3)
     assert sight == pytest.approx([3.0, 1.5], abs=0.3)
+    assert not surveyed.hollow.any()
     assert not surveyed.is_whole
     surveyed = survey(driven(building, 7.0))
     assert len(surveyed.places) == 0

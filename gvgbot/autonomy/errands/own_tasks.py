@@ -127,12 +127,11 @@ class OwnTasks:
             route = None if foot is None else route_to_foot(here, starts, foot)
             return None if route is None else route.metres
 
-        places = surveyed.places[self._is_left_to_this(surveyed.sights)]
-        doorsteps = surveyed.doorsteps[self._is_left_to_this(surveyed.doorsteps)]
-        place = self._unseen.next(places, metres_to, twice=self._has_met)
+        is_own = surveyed.hollow | self._is_left_to_this(surveyed.sights)
+        place = self._unseen.next(surveyed.places[is_own], metres_to, twice=self._has_met)
         reason = "something may be missing there"
         if place is None and self._has_met:
-            place = self._unseen.once_more(doorsteps, metres_to)
+            place = self._unseen.once_more(surveyed.doorsteps, metres_to)
             reason = "somebody may have stood there"
         if place is None:
             return None

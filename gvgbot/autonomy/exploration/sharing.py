@@ -30,7 +30,10 @@ class Sharing(Protocol):
         """
 
     def metres_from(self, places: Array) -> Array:
-        """From places (N, 2), m, map frame, to the nearest of the others' edges (N,); inf: none."""
+        """From places (N, 2), m, map frame, to the nearest edge that others know (N,); inf: none.
+
+        So is one that this robot has driven in part, and others the rest.
+        """
 
     @property
     def is_waiting(self) -> bool:

@@ -553,7 +553,9 @@ def in_a_slot(*free: Rectangle, is_beside_floor: bool) -> Robot:
     robot = Robot()
     robot.walls = looked(carved(list(free)), [robot.pose])
     places = np.array([[2.0, 1.0]])
-    robot.mission.survey = lambda: Surveyed(places, np.empty((0, 2)), is_beside_floor)
+    robot.mission.survey = lambda: Surveyed(
+        places, np.empty((0, 2)), is_beside_floor=is_beside_floor
+    )
     return robot
 
 
@@ -1081,7 +1083,7 @@ def test_a_robot_whose_team_is_done_leaves_no_vertex_that_hangs_on_nothing(
     )
     while not graph.edges:
         robot.mapper.observe(View(0, 0.0, 0.0, Pose(), CLOSED, NOTHING_SEEN))
-    robot.look(CLOSED)
+    robot.stand(CLOSED, 2)
     assert robot.mission.outcome == "explored"
     assert {v.kind for v in graph.vertices.values()} == {"endpoint"}
     assert stray.id not in graph.vertices

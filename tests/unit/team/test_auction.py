@@ -64,6 +64,12 @@ def test_how_far_others_are_is_told_by_their_edges_and_by_what_they_have_driven_
     assert auction.metres_from(places) == pytest.approx([0.0, 0.3, 1.0])
 
 
+def test_what_one_has_driven_of_an_edge_is_known_as_one() -> None:
+    own = Chart(ways=(ChartWay(np.array([[0.0, 0.0], [2.0, 0.0]]), 0.5),))
+    auction = Auction("one", lambda: own, Others())
+    assert auction.metres_from(np.array([[2.0, 1.0]])).tolist() == [1.0]
+
+
 def test_whose_maps_lie_nobody_knows_where_are_infinitely_far() -> None:
     auction = Auction("one", lambda: CHART, Others())
     assert auction.metres_from(np.zeros((2, 2))).tolist() == [math.inf, math.inf]

@@ -36,6 +36,7 @@ class Explorer(Robot):
         self.mission.survey = self._survey
         self.narrows = self.doorsteps = self.awaited = np.empty((0, 2))
         self.is_barred = False  # all that is joined
+        self.is_hollow = False  # all that is found
         self.somebody_until = 0.0  # s, that somebody is found
         self.hidden_until = 0.0  # s, that the branch may be there for a while only
         self.passing_until = math.inf  # s, that bodies may yet go
@@ -46,7 +47,8 @@ class Explorer(Robot):
         return Surveyed(
             places,
             self.narrows,
-            sights=places,
+            places,
+            np.full(len(places), self.is_hollow),
             doorsteps=self.doorsteps,
             awaited=self.awaited,
             barred=barred,
@@ -395,10 +397,8 @@ def test_who_stands_as_near_to_it_as_others_of_its_team_looks_too() -> None:
     assert str(robot.errands.errand) == "goto 1.5 0.3"
 
 
-def test_who_finds_a_frontier_while_it_stands_for_a_survey_explores_it_first() -> None:
-    robot = of_a_team(math.inf, [[1.5, 1.1]])
-    robot.look(SHARED)
-    assert robot.mission.is_ending
-    (meetpoint, *_) = robot.mapper.graph.vertices.values()
-    meetpoint.add_half_edge(2.0)
-    assert not robot.mission.is_ending
+def test_its_own_edges_round_nothing_it_looks_at_whoever_is_near() -> None:
+    robot = of_a_team(0.1, [[1.5, 1.1]])
+    robot.is_hollow = True
+    robot.until_it_moves_or_ends(SHARED)
+    assert str(robot.errands.errand) == "goto 1.5 1.1"
