@@ -204,7 +204,7 @@ class Agenda:
         if isinstance(stop, Ended):
             self._end(view.stamp, stop.outcome, stop.reason)
             return None
-        self._driving = Driving(stop, self._ground, self._config)
+        self._driving = Driving(stop, self._ground, self._config, explores=not self._is_own)
         return self._driving
 
     def _here(self, view: View) -> Here:

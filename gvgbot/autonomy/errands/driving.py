@@ -55,9 +55,11 @@ class Ended:
 
 
 class Driving:
-    """The way to one stop."""
+    """The way to one stop; one that `explores` looks for it where no known way leads there."""
 
-    def __init__(self, stop: Stop, ground: Ground, config: ExplorationConfig) -> None:
+    def __init__(
+        self, stop: Stop, ground: Ground, config: ExplorationConfig, *, explores: bool
+    ) -> None:
         self.stop, self._ground, self.config = stop, ground, config
         self._mapper = ground.mapper
         self.happened: list[Event] = []  # whoever tells of it takes it out
@@ -72,7 +74,7 @@ class Driving:
         self._unseen = 0  # looks at where the route goes on, without seeing that
         self._is_looking = self._is_obstructed = False
         self._is_off = True  # the ways it knows, and looks for one; else coming nearer counts
-        self._explores = False  # as no known way leads there
+        self._may_explore, self._explores = explores, False
         self._progress = self._stood = -math.inf  # stamps: since when it has made none, and stands
         self._place: Pose | None = None  # where it stands
         self._last_view = -math.inf  # stamp
@@ -349,7 +351,8 @@ class Driving:
 
     def _explore(self, view: View, here: Situation) -> Route | None:
         """On where nobody has been, if no known way leads there: whatever it drives counts."""
-        route = self._ground.way_to_explore(self.stop, here, self._closed)
+        may, way_to_explore = self._may_explore, self._ground.way_to_explore
+        route = way_to_explore(self.stop, here, self._closed) if may else None
         if route is not None and not self._explores:
             self.happened.append(Recovery(view.stamp, "explore", "no known way leads there"))
         self._explores = self._is_off = route is not None

@@ -402,3 +402,19 @@ def test_its_own_edges_round_nothing_it_looks_at_whoever_is_near() -> None:
     robot.is_hollow = True
     robot.until_it_moves_or_ends(SHARED)
     assert str(robot.errands.errand) == "goto 1.5 1.1"
+
+
+@pytest.mark.parametrize("is_asked", [False, True])
+def test_it_explores_nothing_to_find_a_way_there_unless_somebody_asks_it_to_go(
+    *, is_asked: bool
+) -> None:
+    """Others have followed all that it might explore."""
+    robot = of_a_team(math.inf, [[-0.5, 0.6]])
+    robot.until_it_moves_or_ends(SHARED)
+    if is_asked:
+        robot.errands.goto_point(-0.5, 0.6, robot.stamp)
+        robot.look(SHARED)
+    robot.errands.obstruct("no way on")
+    robot.stand(SHARED, 2)
+    actions = [event.action for event in robot.said(Recovery) if isinstance(event, Recovery)]
+    assert ("explore" in actions) == is_asked
