@@ -43,13 +43,16 @@ class PathFollowing:
     def draw_back(self, view: View, here: Situation) -> Order:
         """Wait for what stands in the way, and leave it the room to go: it may be held up, too.
 
-        In a team, so may a robot of which nobody knows yet where it is.
+        In a team, so may a robot of which nobody knows yet where it is; known ones are no bodies.
         """
-        paths = () if self._neighbours.company else (here.astern(), here.ahead())
         bodies = view.passing if here.in_team else view.doubtful
-        tracks = (_track_away(bodies, *here.line_along(path)) for path in paths)
-        away = next((track for track in tracks if track is not None), None)
-        return self.make_way(view, here) if away is None else Drive(away)
+        for path in (here.astern(), here.ahead()):
+            line, room = here.line_along(path)
+            free = self._neighbours.free_metres(view, line)
+            away = None if free < ARRIVED_M else _track_away(bodies, line, room)
+            if away is not None:
+                return Drive(away.until(free))
+        return self.make_way(view, here)
 
     def stand_by(self, view: View, here: Situation) -> Order:
         """Stand where others can pass, with the back to a wall: nobody comes from there unseen."""

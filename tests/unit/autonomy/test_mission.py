@@ -868,9 +868,18 @@ def test_who_waits_for_somebody_leaves_him_the_room_to_go(
     assert x == pytest.approx(waits_at_x, abs=0.11)
 
 
-def test_a_robot_of_a_team_draws_back_from_who_may_be_another_one() -> None:
-    """A metre and a half: both may wait for each other, and each knows the other as it moves."""
+@pytest.mark.parametrize("is_another_known", [False, True])
+def test_a_robot_of_a_team_draws_back_from_who_may_be_another_one(
+    *, is_another_known: bool
+) -> None:
+    """A metre and a half: both may wait for each other, and each knows the other as it moves.
+
+    A third one is known, and nowhere near.
+    """
     robot = Robot()
+    if is_another_known:
+        third = Companion("third", Pose(3.0, -3.0), goes_first=True, radius=0.2)
+        robot.mission.meet(robot.pose, [third])
     robot.mission.choice.sharing = Alone()
     robot.drive(TEE, (-2.0, 0.0), (1.0, 0.0))
     robot.passing = np.array([(1.5, 0.0)])
