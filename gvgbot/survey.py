@@ -1,9 +1,11 @@
 """What a robot that has explored all may have missed, by the grid of all its scans."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.ending import Surveyed
 from gvgbot.autonomy.estimate import scans_at, smoothed_keyframes
@@ -24,6 +26,8 @@ _INTO_M = 2.0  # off its ways: through a door, and the robot faces what it looks
 _NEARER = 0.75  # of the clearance in the open: a coast is seen from so near
 _TOWARDS_M = 1.0  # what seems to be a passage may be a pane of glass
 _BODY_M = 0.45  # from the middle of somebody to where beams end on him
+_SEEN_FROM_M = 1.5  # from where another robot drives, it sees what is there
+_NEARER_M = 0.25  # who is that much nearer looks
 _STEP_M = 0.05  # between points of a way: a cell of the grid
 _WALL = 100  # percent
 _NONE = np.empty((0, 2))
@@ -35,6 +39,7 @@ def survey(pipeline: Pipeline) -> Surveyed:
     From a place that is worth it the robot could drive onto floor that nobody has seen, or sees
     some that was seen but that no edge leads to, or where no edge leads through; or something stood
     there that may be a part of the building. Who drives by odometry alone blurs the grid too much.
+    In a team, what others have seen is left to them.
     """
     ways = _ways(pipeline)
     if ways and not pipeline.matches_walls:
@@ -44,36 +49,32 @@ def survey(pipeline: Pipeline) -> Surveyed:
     grid = _walled(occupancy_grid(scans), pipeline.sight.virtual_walls)
     here, room = pipeline.map_base.position, pipeline.errands.room_m
     stood = spots(grid, *_passed(pipeline, keyframes), here, room)
-    found = np.concatenate([gaps(grid, here, room), stood])
     beside = sampled((way.polyline for way in ways), _STEP_M)
-    narrow = narrows(grid, beside, here, pipeline.radius, room)
-    hollow = stood_at = awaited = _NONE
+    others = sampled(_known_to_others(pipeline), _STEP_M)
+    known = np.concatenate([beside, others])
+    found = _left_by(others, np.concatenate([gaps(grid, here, room), stood]), beside)
+    narrow = narrows(grid, known, here, pipeline.radius, room)
+    stood_at = awaited = _NONE
     if ways:
         joined = sampled((way.polyline for way in ways), _STEP_M / 2)
         felt_too = _walled(grid, _felt(pipeline))
         hollow = hollows(felt_too, joined, pipeline.sight.open_clearance)
-        found = np.concatenate([found, blanks(grid, beside, here, room)])
+        found = np.concatenate([found, blanks(grid, known, here, room), hollow])
         lasting_s = pipeline.traffic.newcomers.longest_patience
         stood_at = _may_go(bodies(grid, joined), scans, lasting_s)
         awaited = np.concatenate([narrow, _may_go(_at_ends(pipeline), scans, lasting_s)])
     through = passages(grid, ways, here, room, pipeline.sight.open_clearance)
-    parts = found, hollow, through
-    places, counts = np.concatenate(parts), [len(part) for part in parts]
-    off = np.repeat([_INTO_M, _INTO_M, _TOWARDS_M], counts)
-    is_hollow = np.repeat([False, True, False], counts)
+    through = _left_by(others, through, beside)
+    off = np.repeat([_INTO_M, _TOWARDS_M], [len(found), len(through)])
+    places = np.concatenate([found, through])
     within = _NEARER * pipeline.sight.open_clearance
     views = viewpoints(grid, beside, places, here, room, off, within)
     if views is None:
         is_walled = bool(is_wall(grid.cells).any())
-        return Surveyed(
-            places, narrow, places, is_hollow, is_beside_floor=len(found) > 0, is_walled=is_walled
-        )
-    is_led_to = np.isfinite(views[:, 0])
+        return Surveyed(found, narrow, is_beside_floor=len(found) > 0, is_walled=is_walled)
     return Surveyed(
-        views[is_led_to],
+        views,
         narrow,
-        places[is_led_to],
-        is_hollow[is_led_to],
         doorsteps=_doorsteps(grid, awaited, stood_at, beside, here, room),
         awaited=awaited,
         barred=_barred(pipeline, ways, scans, keyframes, grid),
@@ -94,7 +95,23 @@ def _doorsteps(
     before = floor_beside(grid, by_somebody, here, room)
     off = np.repeat([_INTO_M, 0.0], [len(awaited), len(stood_at)])[: len(before)]
     views = viewpoints(grid, ways, before, here, room, off)
-    return _NONE if views is None else views[np.isfinite(views[:, 0])]
+    return _NONE if views is None else views
+
+
+def _known_to_others(pipeline: Pipeline) -> Sequence[Array]:
+    """The lines (N, 2) that other robots of a team know as edges."""
+    sharing = pipeline.mission.choice.sharing
+    return () if sharing is None else sharing.known_to_others
+
+
+def _left_by(others: Array, places: Array, ways: Array) -> Array:
+    """Those places (M, 2) of some (N, 2) to which others (points (K, 2)) are no nearer than ways.
+
+    From a way somebody sees what is there. What is as near to both, both go to see, or each would
+    leave it to the other.
+    """
+    (away, _), (own, _) = cKDTree(others).query(places), cKDTree(ways).query(places)
+    return places[away > np.minimum(own - _NEARER_M, _SEEN_FROM_M)]
 
 
 def _walled(grid: OccupancyGrid, points: Array) -> OccupancyGrid:

@@ -4,7 +4,6 @@ from collections.abc import Callable, Collection, Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gvgbot.autonomy.exploration.unseen import places_in_words
 from gvgbot.autonomy.slam.graph import GvgGraph, HalfEdgeId
@@ -17,9 +16,7 @@ class Surveyed(NamedTuple):
     """What the grid of all scans shows in the end, m, map frame."""
 
     places: Array  # (N, 2), that are worth another look
-    narrows: Array  # (L, 2), ways too narrow for the robot that lead to floor without another
-    sights: Array = np.empty((0, 2))  # (N, 2), what there is to be seen from the places
-    hollow: NDArray[np.bool_] = np.zeros(0, np.bool_)  # (N,), it is nothing, with edges round it
+    narrows: Array  # (N, 2), ways too narrow for the robot that lead to floor without another
     is_beside_floor: bool = False  # all edges are where it lacks the room it wants, places are not
     doorsteps: Array = np.empty((0, 2))  # (M, 2), before what may be somebody, or narrowed by him
     awaited: Array = np.empty((0, 2))  # (K, 2), ways that he may stand in, narrow or closed
@@ -73,10 +70,8 @@ def left_to_others(
     """Robots of a team have followed all, but for what this one gave up and nobody followed."""
     blocked = len(set(graph.blocked()) & set(unfollowed))
     if blocked:
-        return (
-            "explored_with_blocked",
-            f"frontiers given up: {blocked}; no other one is left{remark}",
-        )
+        reason = f"frontiers given up: {blocked}; no other one is left"
+        return "explored_with_blocked", reason + remark
     return "explored", f"no frontier of the team is left{remark}"
 
 

@@ -24,7 +24,7 @@ def viewpoints(
     off_m: Array,
     within_m: float = np.inf,
 ) -> Array | None:
-    """Where to go (N, 2), m, map frame, for a look at places (N, 2); nan where no floor leads to.
+    """Where to go (M, 2), m, map frame, for a look at places (N, 2) to which the floor leads.
 
     That is on the shortest path over the floor from the nearest way (points (K, 2), a cell or less
     apart) to the place, `off_m` (N,) off that way at most, or farther, to within `within_m` of the
@@ -37,13 +37,14 @@ def viewpoints(
         return None
     near_ways = cells_near(ways, grid, floor)
     floor, near_ways = np.pad(floor, 1), np.pad(near_ways, 1)  # every cell has four neighbours
-    found = np.full((len(places), 2), np.nan)
+    found = []
     cells = ((places - corner)[:, ::-1] / cell).astype(np.int64) + 1
-    for i, (place, off) in enumerate(zip(cells, (off_m / cell).tolist(), strict=True)):
+    for place, off in zip(cells, (off_m / cell).tolist(), strict=True):
         view = _on_the_way_there(place, floor, near_ways, off, within_m / cell)
         if view is not None:
-            found[i] = view - 1
-    return np.asarray(corner + (found[:, ::-1] + 0.5) * cell)
+            found.append(view - 1)
+    views: Array = corner + (np.array(found).reshape(-1, 2)[:, ::-1] + 0.5) * cell
+    return views
 
 
 def floor_beside(grid: OccupancyGrid, places: Array, around: Array, passage_m: float) -> Array:

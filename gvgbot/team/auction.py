@@ -5,7 +5,6 @@ which of its own frontiers leads to where nobody has been.
 """
 
 from collections.abc import Callable, Collection
-from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -52,6 +51,7 @@ class Auction:
         self._site: Site | None = None
         self._frontiers = frozenset[HalfEdgeId]()  # own ones at the last choice
         self._others_claim_all = self._nothing_left = False
+        self.known_to_others: list[Array] = []  # lines (N, 2); see `Sharing`
 
     def renew(self) -> None:
         """Look anew at what is open: a chart, or how it lies, has changed."""
@@ -85,6 +85,8 @@ class Auction:
         self.is_idle = is_placed and not costs
         self._nothing_left = self.is_idle and not may_come
         self._others_claim_all = is_placed and not mine and (bool(costs) or may_come)
+        if self._nothing_left:
+            self.known_to_others = site.known_to_others
         if not mine:
             self.claim = self._claimed_end = None
             return None
@@ -114,7 +116,11 @@ class Auction:
 
         A whole edge does not tell in which direction it was driven.
         """
-        ways = self._ways(partial(_driven, edges=either_way))
+        ways = [
+            pose.transform(polyline)
+            for name, pose in self._team.frames.items()
+            for polyline in _driven(self._team.chart(name), edges=either_way)
+        ]
         if not ways or len(line) < 2:
             return False
         away, nearest = cKDTree(np.concatenate(ways)).query(line)
@@ -122,13 +128,6 @@ class Auction:
         is_same_way = (onwards * np.gradient(line, axis=0)).sum(axis=1) > 0.0
         is_on_way = np.max(away) < BESIDE_M
         return bool(is_on_way and (either_way or is_same_way.mean() > _MOSTLY))
-
-    def metres_from(self, places: Array) -> Array:
-        """How far places (N, 2) are from what the team knows as edges; see `Sharing`."""
-        lines = [way.polyline for way in self._own_chart().ways] + self._ways(_lines)
-        if not lines:
-            return np.full(len(places), np.inf)
-        return np.asarray(cKDTree(np.concatenate(lines)).query(places)[0])
 
     @property
     def is_waiting(self) -> bool:
@@ -149,13 +148,6 @@ class Auction:
     def unfollowed(self) -> Collection[HalfEdgeId]:
         """Own departures that nobody has followed; see `Sharing`."""
         return self._current_site().own
-
-    def _ways(self, lines_of: Callable[[Chart], list[Array]]) -> list[Array]:
-        """Lines (N, 2) of the charts of others, own map frame."""
-        frames = self._team.frames
-        return [
-            p.transform(line) for n, p in frames.items() for line in lines_of(self._team.chart(n))
-        ]
 
     def _claim(self, frontier: Frontier, cost: float, end: HalfEdgeId) -> None:
         self.claim = Claim(frontier.x, frontier.y, frontier.bearing, cost)
@@ -186,8 +178,3 @@ def _driven(chart: Chart, *, edges: bool) -> list[Array]:
     """The lines (N, 2) of the parts of edges that a robot has driven, and of whole edges."""
     whole = [edge.polyline for edge in chart.edges.values() if edges and edge.traversed]
     return whole + [way.polyline for way in chart.ways]
-
-
-def _lines(chart: Chart) -> list[Array]:
-    """The lines (N, 2) of all edges, also of those that were only seen, and of parts of them."""
-    return [edge.polyline for edge in chart.edges.values()] + [way.polyline for way in chart.ways]

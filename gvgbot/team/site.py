@@ -92,6 +92,12 @@ class Site:
         """Whether there are places, and no departure from any of them is open."""
         return bool(self._points) and not self.open
 
+    @property
+    def known_to_others(self) -> list[Array]:
+        """All lines (N, 2) but those of own edges: what this robot drove of others is no edge."""
+        others = [edge.polyline for c in self._charts[1:] for edge in c.edges.values()]
+        return others + [way.polyline for chart in self._charts for way in chart.ways]
+
     def own_at(self, vertex: int) -> list[Frontier]:
         """What is open of the departures of an own vertex."""
         return [frontier for end, frontier in self.own.items() if end.vertex == vertex]

@@ -24,6 +24,7 @@ from gvgbot.survey import survey
 from gvgbot.worlds.canvas import Canvas
 from tests.unit.autonomy.graphs import STREET, streets
 from tests.unit.autonomy.sights import CELL, LASER_270, carved, sweep
+from tests.unit.autonomy.test_mission import Last
 
 START = Pose(-3.0, 0.0, 0.0)  # in the world; the map begins there
 CORRIDOR, SIDE = (-4.0, -1.0, 4.0, 1.0), (2.0, -1.0, 4.0, 4.0)
@@ -72,14 +73,21 @@ def test_what_lies_in_the_shadow_of_a_corner_is_a_gap_until_the_robot_looks_roun
     """Seen from the origin, the shadow begins between (2, 1) and (4, 2): halfway at (3, 1.5)."""
     building = carved([CORRIDOR, SIDE])
     surveyed = survey(driven(building, 3.0))
-    (place,), (sight,) = START.transform(surveyed.places), START.transform(surveyed.sights)
+    (place,) = START.transform(surveyed.places)
     assert place == pytest.approx([3.0, 1.5], abs=0.3)
-    assert sight == pytest.approx([3.0, 1.5], abs=0.3)
-    assert not surveyed.hollow.any()
     assert not surveyed.is_whole
     surveyed = survey(driven(building, 7.0))
     assert len(surveyed.places) == 0
     assert surveyed.is_whole
+
+
+@pytest.mark.parametrize(("x", "is_left"), [(3.0, False), (4.6, True)])
+def test_a_gap_is_left_to_who_drives_by_it(x: float, *, is_left: bool) -> None:
+    """Another robot of a team has come down the side corridor, in which the gap begins at x = 3."""
+    pipeline = driven(carved([CORRIDOR, SIDE]), 3.0)
+    pipeline.mission.choice.sharing = others = Last()
+    others.known_to_others = [START.inverse().transform(np.array([(x, 6.0), (x, 1.0)]))]
+    assert len(survey(pipeline).places) == int(is_left)
 
 
 def test_the_blurred_grid_of_who_drives_by_odometry_alone_lacks_nothing() -> None:

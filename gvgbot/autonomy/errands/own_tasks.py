@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gvgbot.autonomy.control.orders import LookAround, Order, Stand
 from gvgbot.autonomy.destinations import foot_of, route_to_foot
@@ -25,8 +24,6 @@ from gvgbot.words import counted
 _DRIVEN_ON_M = 0.5  # what can be seen there is new
 _AWAITED_S = 120.0  # that somebody goes who hides what it has come to see, or stands in it
 _BESIDE_M = 1.2  # from the middle of somebody to where a way is narrowed by him
-_SEEN_FROM_M = 1.5  # where others of the team drive, they see what is there
-_NEARER_M = 0.25  # who is that much nearer looks
 _SETTLED_S = 10.0  # after he has gone, what was behind him has been seen
 
 
@@ -106,9 +103,7 @@ class OwnTasks:
         surveyed = survey()
         if surveyed is None or self._reopen(surveyed.barred):
             return Stand()
-        self._awaited = surveyed.awaited
-        if self._mission.choice.sharing is None:  # else others may have come there by another way
-            self._narrows = surveyed.narrows
+        self._narrows, self._awaited = surveyed.narrows, surveyed.awaited
         self._surveyed, self._surveyed_m = edges, view.travelled
         return self._visit(view, here, surveyed)
 
@@ -127,8 +122,7 @@ class OwnTasks:
             route = None if foot is None else route_to_foot(here, starts, foot)
             return None if route is None else route.metres
 
-        is_own = surveyed.hollow | self._is_left_to_this(surveyed.sights)
-        place = self._unseen.next(surveyed.places[is_own], metres_to, twice=self._has_met)
+        place = self._unseen.next(surveyed.places, metres_to, twice=self._has_met)
         reason = "something may be missing there"
         if place is None and self._has_met:
             place = self._unseen.once_more(surveyed.doorsteps, metres_to)
@@ -138,15 +132,6 @@ class OwnTasks:
         self._arrived = None
         decision = Decision(view.stamp, None, None, reason)
         return Task(ToPoint(*place.round(2).tolist()), decision)
-
-    def _is_left_to_this(self, sights: Array) -> NDArray[np.bool_]:
-        """Which of some places (N, 2), map frame, no other robot sees that is nearer to them."""
-        sharing = self._mission.choice.sharing
-        if sharing is None or not len(sights):
-            return np.ones(len(sights), np.bool_)
-        feet = [foot_of(self._mapper, sight) for sight in sights]
-        own = np.array([math.inf if foot is None else foot.away for foot in feet])
-        return sharing.metres_from(sights) > np.minimum(own - _NEARER_M, _SEEN_FROM_M)
 
     def _reopen(self, barred: Iterable[int]) -> bool:
         """Take edges that may lead through glass for frontiers, once; whether there were any."""

@@ -1,6 +1,6 @@
 """What a mission asks of somebody who knows what other robots do."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from typing import Protocol
 
 from gvgbot.autonomy.exploration.paths import Approach
@@ -29,12 +29,6 @@ class Sharing(Protocol):
         With `either_way` that may have been against it.
         """
 
-    def metres_from(self, places: Array) -> Array:
-        """From places (N, 2), m, map frame, to the nearest edge that others know (N,); inf: none.
-
-        So is one that this robot has driven in part, and others the rest.
-        """
-
     @property
     def is_waiting(self) -> bool:
         """Whether others are on their way to all that is left: it may come back to this robot."""
@@ -46,6 +40,13 @@ class Sharing(Protocol):
     @property
     def is_explored(self) -> bool:
         """Whether no departure that any robot knows of is open, also none that is closed now."""
+
+    @property
+    def known_to_others(self) -> Sequence[Array]:
+        """Lines (N, 2), m, map frame, of the others' edges, when the robot was done last.
+
+        So are those of edges that it has driven in part, and others the rest.
+        """
 
     @property
     def unfollowed(self) -> Collection[HalfEdgeId]:

@@ -1,7 +1,7 @@
 """What the robot decides in small hand-drawn situations, and how each of them ends."""
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -980,6 +980,7 @@ class Alone:
 
     is_waiting = is_done = is_explored = False
     unfollowed: Collection[HalfEdgeId] = ()
+    known_to_others: Sequence[Array] = ()
 
     def choose(self, graph: GvgGraph, starts: list[Approach]) -> tuple[HalfEdgeId, Approach] | None:
         return nearest_frontier(graph, starts)
@@ -989,9 +990,6 @@ class Alone:
 
     def has_driven(self, line: Array, *, either_way: bool = False) -> bool:
         return False
-
-    def metres_from(self, places: Array) -> Array:
-        return np.full(len(places), np.inf)
 
 
 class Claimed(Alone):

@@ -1,6 +1,7 @@
 """Who takes which frontier, by what another robot says that it is on its way to."""
 
 import math
+from dataclasses import replace
 
 import msgspec
 import numpy as np
@@ -10,7 +11,7 @@ from gvgbot.autonomy.exploration.paths import Approach
 from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.geometry import Pose
 from gvgbot.team.auction import Auction
-from gvgbot.team.chart import Chart, ChartEdge, ChartWay
+from gvgbot.team.chart import Chart, ChartEdge, ChartVertex, ChartWay
 from gvgbot.team.news import Claim
 from tests.unit.team.building import irregular
 from tests.unit.team.test_member import graph_of
@@ -53,23 +54,19 @@ def test_who_is_hardly_nearer_leaves_a_frontier_to_whom_is_on_its_way(
     assert (chosen(theirs) == alone) == takes_over
 
 
-def test_how_far_others_are_is_told_by_their_edges_and_by_what_they_have_driven_of_others() -> None:
+def test_when_nothing_is_left_it_tells_what_others_know_and_what_it_has_driven_in_part() -> None:
     """In the own frame: theirs is a quarter turn to the left, 10 m ahead."""
-    (a, b) = (HalfEdgeId(0, 0), HalfEdgeId(1, 0))
-    edge = ChartEdge(0, a, b, 4.0, 0.5, np.array([[0.0, 0.0], [2.0, 0.0], [4.0, 0.0]]))
+    a, b = HalfEdgeId(0, 0), HalfEdgeId(1, 0)
+    edge = ChartEdge(0, a, b, 4.0, 0.5, np.array([[0.0, 0.0], [4.0, 0.0]]))
     way = ChartWay(np.array([[0.0, 5.0], [0.0, 6.0]]), 0.5)
-    two = Chart(edges={0: edge}, ways=(way,)), Pose(10.0, 0.0, math.pi / 2)
-    auction = Auction("one", lambda: CHART, Others(charts={"two": two}))
-    places = np.array([[10.0, 2.0], [10.3, 4.0], [4.0, -1.0]])
-    assert auction.metres_from(places) == pytest.approx([0.0, 0.3, 1.0])
-
-
-def test_what_one_has_driven_of_an_edge_is_known_as_one() -> None:
-    own = Chart(ways=(ChartWay(np.array([[0.0, 0.0], [2.0, 0.0]]), 0.5),))
-    auction = Auction("one", lambda: own, Others())
-    assert auction.metres_from(np.array([[2.0, 1.0]])).tolist() == [1.0]
-
-
-def test_whose_maps_lie_nobody_knows_where_are_infinitely_far() -> None:
-    auction = Auction("one", lambda: CHART, Others())
-    assert auction.metres_from(np.zeros((2, 2))).tolist() == [math.inf, math.inf]
+    own = Chart(edges={0: edge}, ways=(ChartWay(np.array([[0.0, 0.0], [-1.0, 0.0]]), 0.5),))
+    ends = {i: ChartVertex(i, np.array([4.0 * i, 0.0]), np.eye(2), 0.5, ()) for i in (0, 1)}
+    theirs = Chart(ends, {0: edge}, (way,))
+    others = Others(charts={"two": (theirs, Pose(10.0, 0.0, math.pi / 2))})
+    auction = Auction("one", lambda: replace(own, vertices=ends), others)
+    auction.choose(graph_of(replace(own, vertices=ends)), STARTS)
+    assert not auction.known_to_others
+    others.may_find_more = False
+    auction.choose(graph_of(replace(own, vertices=ends)), STARTS)
+    told = [[[10, 0], [10, 4]], [[0, 0], [-1, 0]], [[5, 0], [4, 0]]]
+    assert [line.round(6).tolist() for line in auction.known_to_others] == told

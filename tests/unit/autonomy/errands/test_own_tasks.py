@@ -14,7 +14,7 @@ from gvgbot.autonomy.events import Decision, ErrandEnded, Event, Recovery
 from gvgbot.autonomy.exploration.certainty import CertaintyConfig, vertex_sigma
 from gvgbot.autonomy.gvg.local import LocalGvg
 from gvgbot.autonomy.views import Correspondence, View
-from gvgbot.geometry import Array, Pose
+from gvgbot.geometry import Pose
 from tests.unit.autonomy.local_graphs import drawn
 from tests.unit.autonomy.sights import carved, looked
 from tests.unit.autonomy.test_mission import CLOSED, CONFIG, TEE, Last, Robot, join_out_of_reach
@@ -36,7 +36,6 @@ class Explorer(Robot):
         self.mission.survey = self._survey
         self.narrows = self.doorsteps = self.awaited = np.empty((0, 2))
         self.is_barred = False  # all that is joined
-        self.is_hollow = False  # all that is found
         self.somebody_until = 0.0  # s, that somebody is found
         self.hidden_until = 0.0  # s, that the branch may be there for a while only
         self.passing_until = math.inf  # s, that bodies may yet go
@@ -47,8 +46,6 @@ class Explorer(Robot):
         return Surveyed(
             places,
             self.narrows,
-            places,
-            np.full(len(places), self.is_hollow),
             doorsteps=self.doorsteps,
             awaited=self.awaited,
             barred=barred,
@@ -361,47 +358,23 @@ SHARED = drawn(
 )
 
 
-class Beside(Last):
-    """Others of a team have followed all, so far from where something may be missing."""
-
-    def __init__(self, metres: float) -> None:
-        self.metres = metres
-
-    def metres_from(self, places: Array) -> Array:
-        return np.full(len(places), self.metres)
-
-
-def of_a_team(metres: float, *surveys: list[list[float]]) -> Explorer:
+def of_a_team(*surveys: list[list[float]]) -> Explorer:
+    """A robot whose team is done."""
     robot = Explorer(*surveys)
     robot.drive(SHARED, (0.0, 0.0), (3.0, 0.0))
-    robot.mission.choice.sharing, robot.mission.target = Beside(metres), None
+    robot.mission.choice.sharing, robot.mission.target = Last(), None
     return robot
 
 
-# 1.1 m beside the edge that this robot has driven
-@pytest.mark.parametrize(("metres", "goes"), [(0.8, False), (0.9, True), (math.inf, True)])
-def test_when_its_team_has_followed_all_it_looks_where_no_other_robot_sees_to_it(
-    *, metres: float, goes: bool
-) -> None:
-    robot = of_a_team(metres, [[1.5, 1.1]])
-    robot.until_it_moves_or_ends(SHARED)
-    assert (robot.errands.errand is not None) == goes
-    assert robot.mission.outcome == (None if goes else "explored")
-    assert not robot.left
-
-
-def test_who_stands_as_near_to_it_as_others_of_its_team_looks_too() -> None:
-    """Each of them would leave it to the other one."""
-    robot = of_a_team(0.3, [[1.5, 0.3]])
-    robot.until_it_moves_or_ends(SHARED)
-    assert str(robot.errands.errand) == "goto 1.5 0.3"
-
-
-def test_its_own_edges_round_nothing_it_looks_at_whoever_is_near() -> None:
-    robot = of_a_team(0.1, [[1.5, 1.1]])
-    robot.is_hollow = True
+def test_when_its_team_has_followed_all_it_looks_for_what_is_missing_before_it_ends() -> None:
+    robot = of_a_team([[1.5, 1.1]], [])
     robot.until_it_moves_or_ends(SHARED)
     assert str(robot.errands.errand) == "goto 1.5 1.1"
+    robot.drive(SHARED, (3.0, 0.0), (1.5, 0.0), (1.5, 1.1))
+    assert robot.errands.errand is None
+    robot.until_it_moves_or_ends(SHARED)
+    assert robot.mission.outcome == "explored"
+    assert not robot.left
 
 
 @pytest.mark.parametrize("is_asked", [False, True])
@@ -409,7 +382,7 @@ def test_it_explores_nothing_to_find_a_way_there_unless_somebody_asks_it_to_go(
     *, is_asked: bool
 ) -> None:
     """Others have followed all that it might explore."""
-    robot = of_a_team(math.inf, [[-0.5, 0.6]])
+    robot = of_a_team([[-0.5, 0.6]])
     robot.until_it_moves_or_ends(SHARED)
     if is_asked:
         robot.errands.goto_point(-0.5, 0.6, robot.stamp)
