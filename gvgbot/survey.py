@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.ending import Surveyed
 from gvgbot.autonomy.estimate import scans_at, smoothed_keyframes
@@ -15,6 +14,7 @@ from gvgbot.maps.blanks import blanks
 from gvgbot.maps.gaps import gaps, is_wall
 from gvgbot.maps.hits import Scans, barred, hits
 from gvgbot.maps.hollows import bodies, hollows
+from gvgbot.maps.in_sight import metres_in_sight
 from gvgbot.maps.narrows import narrows
 from gvgbot.maps.occupancy import OccupancyGrid, occupancy_grid
 from gvgbot.maps.panes import past_panes
@@ -26,9 +26,9 @@ _INTO_M = 2.0  # off its ways: through a door, and the robot faces what it looks
 _NEARER = 0.75  # of the clearance in the open: a coast is seen from so near
 _TOWARDS_M = 1.0  # what seems to be a passage may be a pane of glass
 _BODY_M = 0.45  # from the middle of somebody to where beams end on him
-_SEEN_FROM_M = 1.5  # from where another robot drives, it sees what is there
-_NEARER_M = 0.25  # who is that much nearer looks
+_NEARER_M = 0.25  # who sees it from so much nearer need not be followed
 _STEP_M = 0.05  # between points of a way: a cell of the grid
+_EVERY = 4  # of them, from which somebody looked
 _WALL = 100  # percent
 _NONE = np.empty((0, 2))
 
@@ -52,19 +52,23 @@ def survey(pipeline: Pipeline) -> Surveyed:
     beside = sampled((way.polyline for way in ways), _STEP_M)
     others = sampled(_known_to_others(pipeline), _STEP_M)
     known = np.concatenate([beside, others])
-    found = _left_by(others, np.concatenate([gaps(grid, here, room), stood]), beside)
+    found = np.concatenate([gaps(grid, here, room), stood])
     narrow = narrows(grid, known, here, pipeline.radius, room)
-    stood_at = awaited = _NONE
+    hollow = stood_at = awaited = _NONE
     if ways:
         joined = sampled((way.polyline for way in ways), _STEP_M / 2)
         felt_too = _walled(grid, _felt(pipeline))
         hollow = hollows(felt_too, joined, pipeline.sight.open_clearance)
-        found = np.concatenate([found, blanks(grid, known, here, room), hollow])
+        found = np.concatenate([found, blanks(grid, known, here, room)])
         lasting_s = pipeline.traffic.newcomers.longest_patience
         stood_at = _may_go(bodies(grid, joined), scans, lasting_s)
         awaited = np.concatenate([narrow, _may_go(_at_ends(pipeline), scans, lasting_s)])
     through = passages(grid, ways, here, room, pipeline.sight.open_clearance)
-    through = _left_by(others, through, beside)
+    found, through = (
+        _left_by(others, some, beside, grid, pipeline.sight.open_clearance)
+        for some in (found, through)
+    )
+    found = np.concatenate([found, hollow])
     off = np.repeat([_INTO_M, _TOWARDS_M], [len(found), len(through)])
     places = np.concatenate([found, through])
     within = _NEARER * pipeline.sight.open_clearance
@@ -104,14 +108,18 @@ def _known_to_others(pipeline: Pipeline) -> Sequence[Array]:
     return () if sharing is None else sharing.known_to_others
 
 
-def _left_by(others: Array, places: Array, ways: Array) -> Array:
-    """Those places (M, 2) of some (N, 2) to which others (points (K, 2)) are no nearer than ways.
+def _left_by(
+    others: Array, places: Array, ways: Array, grid: OccupancyGrid, within_m: float
+) -> Array:
+    """Those places (M, 2) of some (N, 2) that others do not see from nearer than this robot does.
 
-    From a way somebody sees what is there. What is as near to both, both go to see, or each would
-    leave it to the other.
+    Each from its ways (points (K, 2)), from `within_m`. What is as near to both, both go to see, or
+    each would leave it to the other.
     """
-    (away, _), (own, _) = cKDTree(others).query(places), cKDTree(ways).query(places)
-    return places[away > np.minimum(own - _NEARER_M, _SEEN_FROM_M)]
+    if not (len(others) and len(places)):
+        return places
+    away, own = (metres_in_sight(grid, one[::_EVERY], places, within_m) for one in (others, ways))
+    return places[~(away < own - _NEARER_M)]
 
 
 def _walled(grid: OccupancyGrid, points: Array) -> OccupancyGrid:
