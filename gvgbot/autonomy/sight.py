@@ -64,6 +64,7 @@ class Sight:
             marks=marks,
             is_somebody_found=newcomers.is_one_standing(scan.stamp, local_map),
             passing=newcomers.passing(scan.stamp),
+            may_be_robots=bool(self._traffic.strangers),
             field_of_view=scan.field_of_view,
             virtual_walls=self.hazards.virtual_walls,
             felt=felt,

@@ -32,6 +32,7 @@ class View:
     marks: dict[int, Vertex] = field(default_factory=dict)
     is_somebody_found: bool = False  # who will be let into the map if he stays
     passing: Array = field(default_factory=lambda: np.empty((0, 2)))  # bodies that may yet go
+    may_be_robots: bool = False  # of a team: some of them are about, and nobody knows where
     field_of_view: tuple[float, float] = (-math.pi, math.pi)  # rad, base frame
     virtual_walls: Array = field(default_factory=lambda: np.empty((0, 2)))  # points (N, 2)
     felt: Array = field(default_factory=lambda: np.empty((0, 2)))  # doubtful, but never seen

@@ -39,6 +39,7 @@ class Explorer(Robot):
         self.somebody_until = 0.0  # s, that somebody is found
         self.hidden_until = 0.0  # s, that the branch may be there for a while only
         self.passing_until = math.inf  # s, that bodies may yet go
+        self.may_be_robots = False  # whoever is seen
 
     def _survey(self) -> Surveyed:
         places = np.array(self.left.pop(0)).reshape(-1, 2)
@@ -57,7 +58,8 @@ class Explorer(Robot):
             view = replace(view, gvg=BRANCH, doubted=frozenset({3}))
         if view.stamp >= self.passing_until:
             view = replace(view, passing=np.empty((0, 2)))
-        return self.errands.advance(replace(view, is_somebody_found=is_found), known)
+        view = replace(view, is_somebody_found=is_found, may_be_robots=self.may_be_robots)
+        return self.errands.advance(view, known)
 
     def until_it_moves_or_ends(self, gvg: LocalGvg = CLOSED) -> Order:
         order: Order = Stand()
@@ -223,13 +225,16 @@ def test_what_is_too_narrow_is_told_of() -> None:
     assert robot.mission.reason == "no frontier is left; too narrow for it near (3.0, -1.0)"
 
 
-@pytest.mark.parametrize(("somebody_until", "visits"), [(0.0, 0), (5.0, 1)])
+@pytest.mark.parametrize(
+    ("somebody_until", "may_be_robots", "visits"),
+    [(0.0, False, 0), (5.0, False, 1), (5.0, True, 0)],
+)
 def test_a_narrow_way_is_looked_at_again_once_where_somebody_may_have_stood_in_it(
-    somebody_until: float, visits: int
+    *, somebody_until: float, may_be_robots: bool, visits: int
 ) -> None:
     robot = Explorer(*[[]] * (visits + 1))
     robot.narrows, robot.doorsteps = np.array([[2.0, -0.5]]), np.array([GAP])
-    robot.somebody_until = somebody_until
+    robot.somebody_until, robot.may_be_robots = somebody_until, may_be_robots
     robot.until_it_moves_or_ends()
     if visits:
         robot.drive(CLOSED, (0.0, 0.0), (2.0, 0.0))
