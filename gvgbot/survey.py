@@ -28,7 +28,7 @@ _TOWARDS_M = 1.0  # what seems to be a passage may be a pane of glass
 _BODY_M = 0.45  # from the middle of somebody to where beams end on him
 _NEARER_M = 0.25  # who sees it from so much nearer need not be followed
 _STEP_M = 0.05  # between points of a way: a cell of the grid
-_EVERY = 4  # of them, from which another robot looked
+_EVERY = 4  # of them, from which a robot looks
 _WALL = 100  # percent
 _NONE = np.empty((0, 2))
 
@@ -64,9 +64,9 @@ def survey(pipeline: Pipeline) -> Surveyed:
         stood_at = _may_go(bodies(grid, joined), scans, lasting_s)
         awaited = np.concatenate([narrow, _may_go(_at_ends(pipeline), scans, lasting_s)])
     through = passages(grid, ways, here, room, pipeline.sight.open_clearance)
-    looks = np.array([base.position for base in keyframes])
+    own = beside[::_EVERY], np.array([base.position for base in keyframes])
     found, through = (
-        _left_by(others[::_EVERY], some, looks, grid, pipeline.sight.open_clearance)
+        _left_by(others[::_EVERY], some, own, grid, pipeline.sight.open_clearance)
         for some in (found, through)
     )
     found = np.concatenate([found, hollow])
@@ -110,17 +110,18 @@ def _known_to_others(pipeline: Pipeline) -> Sequence[Array]:
 
 
 def _left_by(
-    others: Array, places: Array, looks: Array, grid: OccupancyGrid, within_m: float
+    others: Array, places: Array, own: Sequence[Array], grid: OccupancyGrid, within_m: float
 ) -> Array:
-    """Those places (M, 2) of some (N, 2) that others do not see from nearer than this robot did.
+    """Those places (M, 2) of some (N, 2) that others do not see from nearer than this robot.
 
-    Others do from their ways (points (K, 2)), this one from where it looked (L, 2), within some
-    metres. What both see from as near they both go to see, or each would leave it to the other.
+    Others see from their ways (points (K, 2)), within some metres, this one if it has looked from
+    near by, and from its own ways (points (L, 2)): it is sent to no others. What both see from as
+    near they both go to see, or each would leave it to the other.
     """
     if not (len(others) and len(places)):
         return places
-    away, own = (metres_in_sight(grid, points, places, within_m) for points in (others, looks))
-    return places[~(away < own - _NEARER_M)]
+    away, *seen = (metres_in_sight(grid, some, places, within_m) for some in (others, *own))
+    return places[~(away < np.maximum(*seen) - _NEARER_M)]
 
 
 def _walled(grid: OccupancyGrid, points: Array) -> OccupancyGrid:

@@ -226,15 +226,16 @@ def test_what_is_too_narrow_is_told_of() -> None:
 
 
 @pytest.mark.parametrize(
-    ("somebody_until", "may_be_robots", "visits"),
-    [(0.0, False, 0), (5.0, False, 1), (5.0, True, 0)],
+    ("somebody_until", "passing_until", "may_be_robots", "visits"),
+    [(0.0, 0.0, False, 0), (5.0, 0.0, True, 1), (0.0, 5.0, False, 1), (0.0, 5.0, True, 0)],
 )
 def test_a_narrow_way_is_looked_at_again_once_where_somebody_may_have_stood_in_it(
-    *, somebody_until: float, may_be_robots: bool, visits: int
+    *, somebody_until: float, passing_until: float, may_be_robots: bool, visits: int
 ) -> None:
     robot = Explorer(*[[]] * (visits + 1))
     robot.narrows, robot.doorsteps = np.array([[2.0, -0.5]]), np.array([GAP])
     robot.somebody_until, robot.may_be_robots = somebody_until, may_be_robots
+    robot.passing, robot.passing_until = np.array([[0.0, 2.0]]), passing_until
     robot.until_it_moves_or_ends()
     if visits:
         robot.drive(CLOSED, (0.0, 0.0), (2.0, 0.0))
