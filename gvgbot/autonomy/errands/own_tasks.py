@@ -59,8 +59,8 @@ class OwnTasks:
     def next(self, view: View, whereabouts: Callable[[], Situation | None]) -> Task | Order | None:
         """What to do now; None to go on with the mission. An order: a survey is to come."""
         mission = self._mission
-        has_passed = len(view.passing) > 0 and not view.may_be_robots
-        self._has_met |= view.is_somebody_found or has_passed
+        is_somebody_met = view.is_somebody_found or len(view.passing) > 0
+        self._has_met |= is_somebody_met and not view.may_be_robots
         if not mission.is_choosing:
             self._revisiting.note_target(mission.target)
             self._unseen.begin_anew()

@@ -227,7 +227,13 @@ def test_what_is_too_narrow_is_told_of() -> None:
 
 @pytest.mark.parametrize(
     ("somebody_until", "passing_until", "may_be_robots", "visits"),
-    [(0.0, 0.0, False, 0), (5.0, 0.0, True, 1), (0.0, 5.0, False, 1), (0.0, 5.0, True, 0)],
+    [
+        (0.0, 0.0, False, 0),
+        (5.0, 0.0, False, 1),
+        (5.0, 0.0, True, 0),
+        (0.0, 5.0, False, 1),
+        (0.0, 5.0, True, 0),
+    ],
 )
 def test_a_narrow_way_is_looked_at_again_once_where_somebody_may_have_stood_in_it(
     *, somebody_until: float, passing_until: float, may_be_robots: bool, visits: int
