@@ -48,6 +48,7 @@ def survey(pipeline: Pipeline) -> Surveyed:
     scans = scans_at(keyframes, pipeline)
     grid = _walled(occupancy_grid(scans), pipeline.sight.virtual_walls)
     here, room = pipeline.map_base.position, pipeline.errands.room_m
+    open_m = pipeline.sight.open_clearance
     stood = spots(grid, *_passed(pipeline, keyframes), here, room)
     beside = sampled((way.polyline for way in ways), _STEP_M)
     others = sampled(_known_to_others(pipeline), _STEP_M)
@@ -58,22 +59,17 @@ def survey(pipeline: Pipeline) -> Surveyed:
     if ways:
         joined = sampled((way.polyline for way in ways), _STEP_M / 2)
         felt_too = _walled(grid, _felt(pipeline))
-        hollow = hollows(felt_too, joined, pipeline.sight.open_clearance)
+        hollow = hollows(felt_too, joined, open_m)
         found = np.concatenate([found, blanks(grid, known, here, room)])
-        lasting_s = pipeline.traffic.newcomers.longest_patience
-        stood_at = _may_go(bodies(grid, joined), scans, lasting_s)
-        awaited = np.concatenate([narrow, _may_go(_at_ends(pipeline), scans, lasting_s)])
-    through = passages(grid, ways, here, room, pipeline.sight.open_clearance)
+        stood_at = _may_go(bodies(grid, joined), scans, pipeline)
+        awaited = np.concatenate([narrow, _may_go(_at_ends(pipeline), scans, pipeline)])
+    through = passages(grid, ways, here, room, open_m)
     own = beside[::_EVERY], np.array([base.position for base in keyframes])
-    found, through = (
-        _left_by(others[::_EVERY], some, own, grid, pipeline.sight.open_clearance)
-        for some in (found, through)
-    )
+    found, through = (_left_by(others, some, own, grid, open_m) for some in (found, through))
     found = np.concatenate([found, hollow])
     off = np.repeat([_INTO_M, _TOWARDS_M], [len(found), len(through)])
     places = np.concatenate([found, through])
-    within = _NEARER * pipeline.sight.open_clearance
-    views = viewpoints(grid, beside, places, here, room, off, within)
+    views = viewpoints(grid, beside, places, here, room, off, _NEARER * open_m)
     if views is None:
         is_walled = bool(is_wall(grid.cells).any())
         return Surveyed(found, narrow, is_beside_floor=len(found) > 0, is_walled=is_walled)
@@ -120,7 +116,8 @@ def _left_by(
     """
     if not (len(others) and len(places)):
         return places
-    away, *seen = (metres_in_sight(grid, some, places, within_m) for some in (others, *own))
+    points = others[::_EVERY], *own
+    away, *seen = (metres_in_sight(grid, some, places, within_m) for some in points)
     return places[~(away < np.maximum(*seen) - _NEARER_M)]
 
 
@@ -175,8 +172,9 @@ def _at_ends(pipeline: Pipeline) -> Array:
     return np.array(found).reshape(-1, 2)
 
 
-def _may_go(places: Array, scans: Scans, lasting_s: float) -> Array:
+def _may_go(places: Array, scans: Scans, pipeline: Pipeline) -> Array:
     """Those bodies (M, 2) of some (N, 2) that were not in sight for so long that they stay."""
+    lasting_s = pipeline.traffic.newcomers.longest_patience
     return np.asarray(places[hits(scans, places, _BODY_M).seconds < lasting_s])
 
 

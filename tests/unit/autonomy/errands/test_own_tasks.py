@@ -45,11 +45,7 @@ class Explorer(Robot):
         places = np.array(self.left.pop(0)).reshape(-1, 2)
         barred = tuple(self.mapper.graph.edges) if self.is_barred else ()
         return Surveyed(
-            places,
-            self.narrows,
-            doorsteps=self.doorsteps,
-            awaited=self.awaited,
-            barred=barred,
+            places, self.narrows, doorsteps=self.doorsteps, awaited=self.awaited, barred=barred
         )
 
     def decide(self, view: View, known: Correspondence) -> tuple[Order, list[Event]]:
