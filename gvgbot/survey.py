@@ -14,7 +14,7 @@ from gvgbot.maps.blanks import blanks
 from gvgbot.maps.gaps import gaps, is_wall
 from gvgbot.maps.hits import Scans, barred, hits
 from gvgbot.maps.hollows import bodies, hollows
-from gvgbot.maps.in_sight import metres_in_sight
+from gvgbot.maps.in_sight import are_nearer_to
 from gvgbot.maps.narrows import narrows
 from gvgbot.maps.occupancy import OccupancyGrid, occupancy_grid
 from gvgbot.maps.panes import past_panes
@@ -26,7 +26,6 @@ _INTO_M = 2.0  # off its ways: through a door, and the robot faces what it looks
 _NEARER = 0.75  # of the clearance in the open: a coast is seen from so near
 _TOWARDS_M = 1.0  # what seems to be a passage may be a pane of glass
 _BODY_M = 0.45  # from the middle of somebody to where beams end on him
-_NEARER_M = 0.25  # who sees it from so much nearer need not be followed
 _STEP_M = 0.05  # between points of a way: a cell of the grid
 _EVERY = 4  # of them, from which a robot looks
 _WALL = 100  # percent
@@ -65,7 +64,9 @@ def survey(pipeline: Pipeline) -> Surveyed:
         awaited = np.concatenate([narrow, _may_go(_at_ends(pipeline), scans, pipeline)])
     through = passages(grid, ways, here, room, open_m)
     own = beside[::_EVERY], np.array([base.position for base in keyframes])
-    found, through = (_left_by(others, some, own, grid, open_m) for some in (found, through))
+    found, through = (
+        some[~are_nearer_to(others[::_EVERY], own, some, grid, open_m)] for some in (found, through)
+    )
     found = np.concatenate([found, hollow])
     off = np.repeat([_INTO_M, _TOWARDS_M], [len(found), len(through)])
     places = np.concatenate([found, through])
@@ -103,22 +104,6 @@ def _known_to_others(pipeline: Pipeline) -> Sequence[Array]:
     """The lines (N, 2) that other robots of a team know as edges."""
     sharing = pipeline.mission.choice.sharing
     return () if sharing is None else sharing.known_to_others
-
-
-def _left_by(
-    others: Array, places: Array, own: Sequence[Array], grid: OccupancyGrid, within_m: float
-) -> Array:
-    """Those places (M, 2) of some (N, 2) that others do not see from nearer than this robot.
-
-    Others see from their ways (points (K, 2)), within some metres, this one if it has looked from
-    near by, and from its own ways (points (L, 2)): it is sent to no others. What both see from as
-    near they both go to see, or each would leave it to the other.
-    """
-    if not (len(others) and len(places)):
-        return places
-    points = others[::_EVERY], *own
-    away, *seen = (metres_in_sight(grid, some, places, within_m) for some in points)
-    return places[~(away < np.maximum(*seen) - _NEARER_M)]
 
 
 def _walled(grid: OccupancyGrid, points: Array) -> OccupancyGrid:

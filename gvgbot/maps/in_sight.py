@@ -1,13 +1,33 @@
-"""From how near something on a grid is in sight of ways."""
+"""Who sees something on a grid from nearer by."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from gvgbot.geometry import Array
 from gvgbot.maps.gaps import is_wall
 from gvgbot.maps.occupancy import OccupancyGrid
+
+_NEARER_M = 0.25  # who sees it from so much nearer need not be followed
+
+
+def are_nearer_to(
+    others: Array, own: Sequence[Array], places: Array, grid: OccupancyGrid, within_m: float
+) -> NDArray[np.bool_]:
+    """Which of places (N, 2), map frame, others see from nearer by than this robot.
+
+    `others` are points (M, 2) that they see from, and `own` several such of this robot: what one of
+    them sees from farther off only is theirs. What is seen from as near by all is not, or each
+    would leave it to the other.
+    """
+    if not (len(others) and len(places)):
+        return np.zeros(len(places), bool)
+    theirs, *ours = (metres_in_sight(grid, some, places, within_m) for some in (others, *own))
+    nearer: NDArray[np.bool_] = theirs < np.max(ours, axis=0) - _NEARER_M
+    return nearer
 
 
 def metres_in_sight(grid: OccupancyGrid, ways: Array, places: Array, within_m: float) -> Array:

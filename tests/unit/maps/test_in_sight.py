@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gvgbot.geometry import Array
-from gvgbot.maps.in_sight import metres_in_sight
+from gvgbot.maps.in_sight import are_nearer_to, metres_in_sight
 from tests.unit.maps.test_gaps import drawn
 
 # A metre for each letter; the corner of the map is at (-1, -2). A room along y = 1.5, a corridor
@@ -49,3 +49,24 @@ def test_without_places_or_ways_there_is_nothing_to_tell() -> None:
     none: Array = np.empty((0, 2))
     assert len(metres_in_sight(drawn(*HOUSE), np.array([IN_ROOM]), none, 6.0)) == 0
     assert away(within_m=6.0) == math.inf
+
+
+@pytest.mark.parametrize(
+    ("others", "ways", "looks", "is_nearer"),
+    [
+        (2.5, 1.5, 1.5, False),  # it is where one has looked from, and where one drives
+        (2.5, 2.6, 2.7, False),  # both are as near
+        (1.5, 2.5, 1.0, True),  # one has looked from near by, which has not sufficed
+        (1.5, 1.0, 2.5, True),  # one's ways lead there; one has not been there
+        (1.5, 2.5, 2.5, True),
+        (9.0, 2.5, 2.5, False),  # nobody else is near
+        (9.0, 9.0, 9.0, False),  # nor oneself
+    ],
+)
+def test_what_others_see_from_nearer_by_is_theirs(
+    others: float, ways: float, looks: float, *, is_nearer: bool
+) -> None:
+    """All are so far east of the place in the room."""
+    theirs, *own = (np.array([np.add(IN_ROOM, (east, 0.0))]) for east in (others, ways, looks))
+    found = are_nearer_to(theirs, own, np.array([IN_ROOM]), drawn(*HOUSE), 3.0)
+    assert found.tolist() == [is_nearer]
