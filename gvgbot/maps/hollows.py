@@ -18,15 +18,19 @@ def hollows(grid: OccupancyGrid, ways: Array, open_m: float) -> Array:
     """Places (N, 2), m, map frame, in the middle of hollows.
 
     Ways (points (M, 2), a cell or less apart) of a GVG go round walls. What they go round is gone
-    if there is nothing but floor. Farther than `open_m` from walls there are no edges.
+    if there is nothing but floor, and no more that nobody has seen than somebody hides who stands
+    there. Farther than `open_m` from walls there are no edges.
     """
-    cell, drawn = grid.resolution_m, marked(ways, grid)
+    cell, drawn, is_walled = grid.resolution_m, marked(ways, grid), is_wall(grid.cells)
     areas, count = ndimage.label(~drawn)
-    is_full = np.bincount(areas[~is_floor(grid.cells)], minlength=count + 1) > 0
+    walls, others = (
+        np.bincount(areas[some], minlength=count + 1) for some in (is_walled, ~is_floor(grid.cells))
+    )
+    is_full = (walls > 0) | (others * cell**2 > _BODY_M[1] ** 2)
     numbers = np.flatnonzero(~is_full[1:]) + 1
     if not len(numbers):
         return np.empty((0, 2))
-    inside, clearance = metres_to(drawn, cell), metres_to(is_wall(grid.cells), cell)
+    inside, clearance = metres_to(drawn, cell), metres_to(is_walled, cell)
     depth, room = (ndimage.maximum(away, areas, numbers) for away in (inside, clearance))
     numbers = numbers[(depth > _DEPTH_M) & (room < _NOT_OPEN * open_m)]
     places = np.array(ndimage.maximum_position(inside, areas, numbers)).reshape(-1, 2)
