@@ -45,6 +45,7 @@ class Draft:
     lead: dict[int, float | None]
     chains: dict[int, Chain] = field(default_factory=dict)
     ends: dict[int, list[tuple[int, bool]]] = field(default_factory=dict)  # (chain, leaves its a)
+    beyond: dict[int, float] = field(default_factory=dict)  # m, from where leaves were dropped
     serial: int = 0
 
     def add(self, chain: Chain) -> None:
@@ -60,6 +61,15 @@ class Draft:
         self.ends[chain.a].remove((key, True))
         self.ends[chain.b].remove((key, False))
         return chain
+
+    def drop_leaf(self, leaf: int, key: int, base: int) -> None:
+        """Take out a leaf and its chain to a base, which is as deep as what forked beyond it."""
+        deep = self.depth(base)
+        if leaf in self.beyond:
+            deep = max(deep, self.chains[key].length() + self.depth(leaf))
+        self.beyond[base] = deep
+        self.remove(key)
+        del self.ends[leaf]
 
     def degree(self, node: int) -> int:
         """The number of chain ends at a node, with the way on into the unseen."""
@@ -82,7 +92,11 @@ class Draft:
         room = self.clearance[chain.a]
         if room > _WIDE_M:
             within, room = _out_of_the_wide(chain.points, chain.clearance)
-        return (chain.length() - within + self.clearance[chain.b]) / room
+        return (chain.length() - within + self.depth(chain.b)) / room
+
+    def depth(self, tip: int) -> float:
+        """Metres from a tip to walls: it goes on to forks that have been dropped, but no corner."""
+        return max(self.clearance[tip], self.beyond.get(tip, 0.0))
 
     def splice(self, node: int) -> None:
         """Make one chain of the two that meet at a node."""

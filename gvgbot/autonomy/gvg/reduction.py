@@ -103,9 +103,9 @@ def _prune(draft: Draft, min_reach: float, endpoints: Array) -> None:
         forks = [fork for base in doomed for fork in _forks(draft, base, doomed)]
         least = min((draft.clearance[fork] for fork in forks), default=math.inf)
         ready = [base for base in doomed if draft.clearance[base] <= least]
-        for node, key in [leaf for base in ready for leaf in doomed[base]]:
-            draft.remove(key)
-            del draft.ends[node]
+        for base in ready:
+            for node, key in doomed[base]:
+                draft.drop_leaf(node, key, base)
         for base in ready:
             if base in draft.ends and len(draft.ends[base]) == 2 and not draft.open(base):
                 draft.splice(base)

@@ -194,6 +194,22 @@ def test_a_recess_much_deeper_than_the_clearance_before_it_is_a_dead_end() -> No
     assert is_near(ends[ends[:, 1] < -1.0], [(0.0, -3.4)], NOISY)
 
 
+@pytest.mark.parametrize("with_desk", [False, True])
+def test_a_recess_is_as_deep_with_a_desk_in_its_corner(with_desk: bool) -> None:
+    """Up to (0, -1.98), as far from its sides as from its back; or as from the desk before it."""
+    desk = (-1.18, -3.16, -0.38, -2.36)
+    rooms = [(-6.0, -0.8, 6.0, 0.8), (-1.18, -3.16, 1.18, 0.8)]
+    world = carved(rooms, [desk] if with_desk else [])
+    gvg = seen(looked(world, line(-2.0, 0.0, 2.0, 0.0, 0.0)), (0.0, 0.0))
+    assert is_near(meetpoints(gvg), [(0.0, -(2.36**2) / (8 * 1.6))], NOISY)
+    (end,) = (tip for tip in endpoints(gvg) if tip[1] < -0.9)
+    if with_desk:
+        side, front = 1.18, -2.36  # its corner is at x = -0.38
+        assert end == pytest.approx([0.0, front + math.sqrt(side**2 - 0.38**2)], abs=NOISY)
+    else:
+        assert end == pytest.approx([0.0, -3.16 + 1.18], abs=NOISY)
+
+
 # -- doors ----------------------------------------------------------------------------------------
 
 
