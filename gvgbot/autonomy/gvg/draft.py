@@ -95,7 +95,7 @@ class Draft:
         return (chain.length() - within + self.depth(chain.b)) / room
 
     def depth(self, tip: int) -> float:
-        """Metres from a tip to walls: it goes on to forks that have been dropped, but no corner."""
+        """Metres from a tip to the walls beyond it, past dropped forks, but into no corner."""
         return max(self.clearance[tip], self.beyond.get(tip, 0.0))
 
     def splice(self, node: int) -> None:

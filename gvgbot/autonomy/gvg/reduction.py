@@ -4,6 +4,8 @@ A dangling branch from vertex v to tip t has reach (length(v, t) + clearance(t))
 a right-angled corner it is 1.41; a dead end worth a visit has more. Reach only grows while more of
 a branch is seen, so for a branch that ends in unseen space it is a lower bound. In a wide space it
 counts from where the branch is no longer in it: what is worth a visit does not grow with the space.
+Where branches beyond a tip have been dropped and forked themselves, its depth, up to their tips and
+the walls there, stands for its clearance: a desk in its corner makes a room no less deep.
 """
 
 import math
