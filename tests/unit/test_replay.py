@@ -130,7 +130,7 @@ def test_a_replay_that_fails_leaves_what_was_there_before_and_nothing_else(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The map cannot be written: something is in the place of its picture."""
-    write_log(tmp_path / "ring.log", drive()[:70])
+    write_log(tmp_path / "ring.log", drive()[:20])
     words = ["replay", str(tmp_path / "ring.log"), "--out", str(tmp_path / "run")]
     (tmp_path / "run" / "map.png" / "mine").mkdir(parents=True)
     for _ in range(2):

@@ -60,7 +60,7 @@ def test_nothing_is_missing_of_what_can_be_seen_from_one_end() -> None:
     assert len(places_after(carved([CORRIDOR]), 1.0)) == 0
 
 
-@pytest.mark.parametrize(("metres", "is_walled"), [(3.0, True), (70.0, False)])
+@pytest.mark.parametrize(("metres", "is_walled"), [(3.0, True), (31.0, False)])
 def test_whether_a_wall_is_in_sight_is_told_of_where_no_edge_is(
     metres: float, *, is_walled: bool
 ) -> None:
