@@ -16,14 +16,18 @@ def joined_graph(graphs: Sequence[tuple[RouteGraph, Pose]]) -> RouteGraph:
     """One map of all, each with the pose of its frame in the frame of the result.
 
     A frontier that most robots at its place did not see is none: somebody may have stood there. If
-    no more than two edges are left of a meetpoint, it is none either.
+    no more than two edges are left of a meetpoint that had frontiers, it is none either.
     """
     laid = [moved_graph(graph, pose) for graph, pose in graphs]
     whole, *others = (_agreed(graph, laid) for graph in laid)
     for other in others:
         whole = merged(whole, other, Pose())
+    unfinished = [
+        vertex.position for graph in laid for vertex in graph.vertices if vertex.frontiers
+    ]
     for vertex in whole.vertices:
-        whole = _without_bend(whole, vertex)
+        if any(math.dist(vertex.position, place) < SAME_M for place in unfinished):
+            whole = _without_bend(whole, vertex)
     return whole
 
 
@@ -64,7 +68,7 @@ def _without_bend(graph: RouteGraph, vertex: RouteNode) -> RouteGraph:
     """The map, with one edge over a vertex if two are all that is left of its departures."""
     ending = [edge for edge in graph.edges if vertex.id in (edge.start, edge.end)]
     lines = list(lines_from(vertex.id, ending))
-    if vertex.frontiers or vertex.degree < 3 or not len(ending) == len(lines) == 2:
+    if vertex.frontiers or not len(ending) == len(lines) == 2:
         return graph
     start, end = (edge.end if edge.start == vertex.id else edge.start for edge in ending)
     passing = RouteEdge(

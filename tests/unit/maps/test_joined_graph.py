@@ -63,10 +63,9 @@ def test_what_most_did_not_see_that_have_been_there_is_no_frontier(
         assert sorted(end.frontiers) == pytest.approx([-1.0, *([math.pi / 2] if is_left else [])])
 
 
-def with_somebody(*, is_followed: bool) -> RouteGraph:
+def with_somebody(*ahead: float) -> RouteGraph:
     """The way of 8 m, seen from one end to somebody who made a meetpoint of its middle."""
-    left = -0.6 if is_followed else -1.5
-    middle = vertex(2, 4.0, (math.pi, 0.6, left), math.pi)
+    middle = vertex(2, 4.0, (math.pi, *ahead), math.pi)
     first = vertex(0, 0.0, (0.0, 3.0), 0.0)
     line = np.linspace((0, 0), (4, 0), 40)
     return RouteGraph(
@@ -74,13 +73,15 @@ def with_somebody(*, is_followed: bool) -> RouteGraph:
     )
 
 
-@pytest.mark.parametrize("is_followed", [True, False])
+@pytest.mark.parametrize(
+    ("ahead", "is_followed"), [((0.6, -0.6), True), ((0.6, -1.5), False), ((0.6,), True)]
+)
 @pytest.mark.parametrize("is_first", [True, False])
 def test_where_one_robot_saw_a_way_go_on_round_somebody_another_one_has_it_pass(
-    *, is_followed: bool, is_first: bool
+    ahead: tuple[float, ...], *, is_followed: bool, is_first: bool
 ) -> None:
-    """Neither drove all of it. What nobody has followed is left as it is."""
-    told = [(with_somebody(is_followed=is_followed), FRAMES[0])]
+    """On both sides, or on one; neither drove all of it. What nobody has followed is left."""
+    told = [(with_somebody(*ahead), FRAMES[0])]
     plain = moved_graph(corridor(sees_door=False, drove=False), FRAMES[1].inverse()), FRAMES[1]
     whole = joined_graph([*told, plain] if is_first else [plain, *told])
     places = sorted(v.position[0] for v in whole.vertices)

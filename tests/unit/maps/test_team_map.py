@@ -18,7 +18,7 @@ from gvgbot.team.chart import ChartWay
 from tests.unit.team.building import Building, irregular
 from tests.unit.team.test_member import START, team
 
-BUILDING = irregular(1)
+BUILDING = irregular(5)  # at no junction that both know only two corridors meet
 HERE, THERE = Pose(3.0, -2.0, 0.7), Pose(11.0, 6.0, -2.4)
 LEFT, RIGHT = {0, 1, 2, 5, 6, 7, 10, 11, 12}, {2, 3, 4, 7, 8, 9, 12, 13, 14}
 
