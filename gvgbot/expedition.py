@@ -29,7 +29,6 @@ from gvgbot.maps.joined_grid import joined_grid
 from gvgbot.maps.map_server import encode_map_server, read_map_server
 from gvgbot.maps.occupancy import OccupancyGrid
 from gvgbot.maps.picture import draw_map
-from gvgbot.maps.pieced import pieced
 from gvgbot.maps.route_graph import RouteGraph
 from gvgbot.maps.run_directory import RunDirectory
 from gvgbot.report import with_room_of, world_files
@@ -288,7 +287,7 @@ def joined_map(
     `ways` are the parts of edges that they have driven, in the result: lines (N, 2) and their
     least clearances, m. The graph claims no more room than there is in the grid of all.
     """
-    graph = pieced(joined_graph([(graph, pose) for graph, _, pose in maps]), ways)
+    graph = joined_graph([(graph, pose) for graph, _, pose in maps], ways)
     grid = joined_grid([(grid, pose) for _, grid, pose in maps])
     return with_room_of(graph, grid), grid
 

@@ -6,15 +6,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from gvgbot.geometry import Pose
+from gvgbot.geometry import Array, Pose
 from gvgbot.maps.merging import SAME_M, is_among, merged
 from gvgbot.maps.moved import moved_graph
+from gvgbot.maps.pieced import pieced
 from gvgbot.maps.route_graph import RouteEdge, RouteGraph, RouteNode, lines_from
 
 
-def joined_graph(graphs: Sequence[tuple[RouteGraph, Pose]]) -> RouteGraph:
+def joined_graph(
+    graphs: Sequence[tuple[RouteGraph, Pose]], ways: Sequence[tuple[Array, float]] = ()
+) -> RouteGraph:
     """One map of all, each with the pose of its frame in the frame of the result.
 
+    `ways` are the parts of edges that robots have driven, in the result: lines (N, 2) and their
+    least clearances, m. They are pieced together where they lead from frontier to frontier.
     A frontier that most robots at its place did not see is none: somebody may have stood there. If
     no more than two edges are left of a meetpoint that had frontiers, it is none either.
     """
@@ -22,6 +27,7 @@ def joined_graph(graphs: Sequence[tuple[RouteGraph, Pose]]) -> RouteGraph:
     whole, *others = (_agreed(graph, laid) for graph in laid)
     for other in others:
         whole = merged(whole, other, Pose())
+    whole = pieced(whole, ways)
     unfinished = [
         vertex.position for graph in laid for vertex in graph.vertices if vertex.frontiers
     ]

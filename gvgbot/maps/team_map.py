@@ -6,7 +6,6 @@ from gvgbot.geometry import Array, Pose
 from gvgbot.maps import geojson
 from gvgbot.maps.joined_graph import joined_graph
 from gvgbot.maps.picture import draw_map
-from gvgbot.maps.pieced import pieced
 from gvgbot.maps.route_graph import RouteEdge, RouteGraph, RouteNode
 from gvgbot.team.chart import Chart, ChartEdge, ChartVertex
 
@@ -25,7 +24,7 @@ def team_files(
     for chart, pose in others.values():
         ways += [(pose.transform(way.polyline), way.min_clearance) for way in chart.ways]
     charts = [(route_graph(chart), pose) for chart, pose in others.values()]
-    graph = pieced(joined_graph([(own, Pose()), *charts]), ways)
+    graph = joined_graph([(own, Pose()), *charts], ways)
     return {"team.geojson": geojson.encode(graph), "team.png": draw_map(graph, title=title)}
 
 

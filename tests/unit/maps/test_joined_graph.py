@@ -97,6 +97,18 @@ def test_where_one_robot_saw_a_way_go_on_round_somebody_another_one_has_it_pass(
         }
 
 
+def test_where_two_drove_up_to_somebody_from_both_sides_an_edge_passes() -> None:
+    """One took him for a fork of which it followed nothing; the other one came from beyond him."""
+    here = with_somebody(0.0)
+    beyond = RouteGraph((vertex(1, 8.0, (math.pi, 0.0), 0.0),))
+    way = np.linspace((8, 0), (4.1, 0), 40)
+    whole = joined_graph([(here, Pose()), (beyond, Pose())], [(way, 0.6)])
+    (edge,) = whole.edges
+    assert edge.length == pytest.approx(8.0, abs=0.01)
+    assert edge.min_clearance == 0.5
+    assert sorted(v.position[0] for v in whole.vertices) == [0.0, 8.0]
+
+
 def test_a_ring_keeps_the_one_vertex_that_it_has() -> None:
     angles = np.linspace(0.0, math.tau, 60)
     ring = np.column_stack([np.cos(angles), np.sin(angles)])

@@ -42,19 +42,21 @@ def test_what_two_know_is_one_map_in_the_frame_of_the_first() -> None:
 
 
 def test_what_two_have_driven_from_both_ends_is_an_edge_of_the_team() -> None:
-    places = np.array([(0.0, 0.0), (10.0, 0.0), (0.0, 6.0), (10.0, 6.0)])
-    building = Building(places, ((0, 1), (0, 2), (1, 3)))
+    places = np.array([(x, y) for y in (0.0, 6.0, -6.0) for x in (0.0, 10.0)])
+    building = Building(places, ((0, 1), (0, 2), (1, 3), (0, 4), (1, 5)))
 
     def part(start: float, end: float) -> np.ndarray:
         return np.stack([np.linspace(start, end, 40), np.zeros(40)], axis=1)
 
-    own = route_graph(building.chart({0, 2}, HERE))
-    theirs = building.chart({1, 3}, THERE)
+    own = route_graph(building.chart({0, 2, 4}, HERE))
+    theirs = building.chart({1, 3, 5}, THERE)
     theirs = replace(theirs, ways=(ChartWay(THERE.inverse().transform(part(10.0, 5.4)), 0.5),))
     parts = [(HERE.inverse().transform(part(0.0, 4.8)), 0.6)]
     files = team_files(own, parts, {"two": (theirs, HERE.to(THERE))}, "a building")
     joined = geojson.decode(str(files["team.geojson"]))
-    assert sorted(edge.length for edge in joined.edges) == pytest.approx([6.0, 6.0, 10.0], abs=0.1)
+    assert sorted(edge.length for edge in joined.edges) == pytest.approx(
+        [6.0] * 4 + [10.0], abs=0.1
+    )
     assert not any(vertex.frontiers for vertex in joined.vertices)
 
 
