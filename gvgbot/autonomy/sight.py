@@ -1,6 +1,7 @@
 """What there is to be seen of the GVG from a keyframe, and what of that is doubtful."""
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from gvgbot.autonomy.config import AutonomyConfig
 from gvgbot.autonomy.gvg.local import LocalGvg
@@ -51,7 +52,7 @@ class Sight:
         self.hazards.virtual_walls = virtual[local_map.covers(virtual)]
         gvg, marks = self._mapper.marked(self._local_gvg(local_base, local_map), local_base)
         felt, newcomers = self.hazards.doubtful, self._traffic.newcomers
-        doubtful = np.concatenate([felt, local_map.suspects(), *self._traffic.standing])
+        may_go = np.concatenate([felt, local_map.suspects()])
         return View(
             keyframe,
             scan.stamp,
@@ -59,8 +60,8 @@ class Sight:
             local_base,
             gvg,
             local_map,
-            doubtful=doubtful,
-            doubted=self._doubted(gvg, doubtful),
+            doubtful=np.concatenate([may_go, self._traffic.standing]),
+            doubted=self._doubted(gvg, may_go, local_map.tree()),
             marks=marks,
             is_somebody_found=newcomers.is_one_standing(scan.stamp, local_map),
             passing=newcomers.passing(scan.stamp),
@@ -79,19 +80,20 @@ class Sight:
             min_clearance=self._needed_m,
             roughness=self._reduction.roughness_m,
             open_clearance=self.open_clearance,
-            felt=np.concatenate([self.hazards.points, *self._traffic.in_the_way]),
+            felt=np.concatenate([self.hazards.points, self._traffic.in_the_way]),
             virtual_walls=self.hazards.virtual_walls,
         )
         known = self._mapper.known_around(local_base, self._half_width_m)
         return reduce_graph(fine, self._reduction, known).rings_cut_far_from(local_base.position)
 
-    def _doubted(self, gvg: LocalGvg, doubtful: Array) -> frozenset[int]:
-        """The nodes that may be there for a while only, because of obstacles (N, 2).
+    def _doubted(self, gvg: LocalGvg, may_go: Array, walls: cKDTree) -> frozenset[int]:
+        """The nodes that may be there for a while only, because of obstacles (N, 2) or bodies.
 
         Of who is out of sight for long, so may be the end that he makes of a way; in a team, bodies
-        lead the GVG nowhere, but hide how it goes on.
+        lead the GVG nowhere, but hide how it goes on. Nobody does that from behind a wall.
         """
         newcomers = self._traffic.newcomers
-        hiding = [newcomers.lost, *([newcomers.points] if self._traffic.is_in_team else [])]
+        hiding = np.concatenate([newcomers.lost, newcomers.points])
         ends = frozenset(key for key, node in gvg.nodes.items() if node.degree == 1)
-        return touching(gvg, doubtful) | (touching(gvg, np.concatenate(hiding)) & ends)
+        at_ends = touching(gvg, hiding, walls) & ends
+        return touching(gvg, may_go) | touching(gvg, self._traffic.standing, walls) | at_ends

@@ -57,14 +57,14 @@ class Traffic:
         return [one for one in self.company or () if one.name not in self._left]
 
     @property
-    def standing(self) -> list[Array]:
+    def standing(self) -> Array:
         """Rims (N, 2) of who stands in the way for a while; in a team all drive about."""
-        return [] if self.is_in_team else [self.newcomers.points]
+        return np.empty((0, 2)) if self.is_in_team else self.newcomers.points
 
     @property
-    def in_the_way(self) -> list[Array]:
+    def in_the_way(self) -> Array:
         """Rims (N, 2) of what stands in the way, seen or not."""
-        return [*self.standing, self.newcomers.lost]
+        return np.concatenate([self.standing, self.newcomers.lost])
 
     def nearby(self, map_in_local: Pose) -> list[Companion]:
         """Other robots, where they say that they are, or are seen close to that; local frame."""

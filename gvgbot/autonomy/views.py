@@ -67,10 +67,7 @@ class View:
 
         What is known of places out of sight does not grow: only parts of it are forgotten.
         """
-        base = self.local_base.position
-        line = np.linspace(base, place, math.ceil(math.dist(base, place) / _STEP_M) + 1)
-        gaps, _ = self.local_map.tree().query(line, distance_upper_bound=_BESIDE_M)
-        return bool(np.isinf(gaps).all())
+        return _is_clear(self.local_map.tree(), self.local_base.position, place)
 
     def turn_to_see(self, bearing: float) -> float:
         """How far to turn left until a bearing, rad, local frame, is in view; 0 if it is."""
@@ -85,11 +82,26 @@ class View:
         return not is_walled and self.local_map.is_bare(place, within_m)
 
 
-def touching(gvg: LocalGvg, points: Array) -> frozenset[int]:
-    """The nodes that would be elsewhere, or not at all, without obstacles (N, 2)."""
+def touching(gvg: LocalGvg, points: Array, walls: cKDTree | None = None) -> frozenset[int]:
+    """The nodes that would be elsewhere, or not at all, without obstacles (N, 2).
+
+    What stands behind one of the `walls` has no part in a node.
+    """
     if not len(points):
         return frozenset()
-    return frozenset(key for key, node in gvg.nodes.items() if len(beside(node, points)))
+    return frozenset(key for key, node in gvg.nodes.items() if _is_shaped(node, points, walls))
+
+
+def _is_shaped(node: LocalNode, points: Array, walls: cKDTree | None) -> bool:
+    near = beside(node, points)
+    return any(walls is None or _is_clear(walls, node.position, point) for point in near)
+
+
+def _is_clear(walls: cKDTree, start: Array, end: Array) -> bool:
+    """Whether no wall is on the line from a place (2,) to another one."""
+    line = np.linspace(start, end, math.ceil(math.dist(start, end) / _STEP_M) + 1)
+    gaps, _ = walls.query(line, distance_upper_bound=_BESIDE_M)
+    return bool(np.isinf(gaps).all())
 
 
 def beside(node: LocalNode, points: Array) -> Array:
