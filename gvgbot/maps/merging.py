@@ -30,7 +30,7 @@ SAME_M = 0.6  # vertices nearer to each other are one
 _SAME_RAD = 0.7  # departures nearer to each other are one
 _KINK_RAD = 1.2  # at most, from the bearing of an edge to where it sets out
 _ON_EDGE_M = 0.4  # from an edge, a vertex that the edge's own map does not know splits it
-_FROM_ENDS_M = 0.8  # but not so near to its ends
+_FROM_ENDS_M = SAME_M  # but not so near to its ends: there it is one of them
 _BESIDE_M = 1.0  # edges between the same vertices that stay nearer to each other are one
 AHEAD_M = 0.8  # along an edge, its direction is taken
 _SHARES = np.linspace(0.02, 0.98, 25)  # of the first covariance in an intersection
@@ -53,16 +53,17 @@ def merged(ours: RouteGraph, theirs: RouteGraph, pose: Pose) -> RouteGraph:
         _drawn_together(theirs, {theirs.vertices[j].id for _, j in pairs}),
     )
     pairs = _pairs(ours, theirs)
+    here, there = {ours.vertices[i].id for i, _ in pairs}, {theirs.vertices[j].id for _, j in pairs}
+    ours, theirs = _seen_once(ours, here, theirs), _seen_once(theirs, there, ours)
     free_id = max((vertex.id for vertex in ours.vertices), default=-1) + 1
     names = {theirs.vertices[j].id: ours.vertices[i].id for i, j in pairs}
     lone = [vertex for vertex in theirs.vertices if vertex.id not in names]
     names |= {vertex.id: free_id + k for k, vertex in enumerate(lone)}
     new = [replace(vertex, id=names[vertex.id]) for vertex in lone]
-    known = {ours.vertices[i].id for i, _ in pairs}
     own = list(_split(ours.edges, new))
     edges = list(own)
     others = [replace(e, start=names[e.start], end=names[e.end]) for e in theirs.edges]
-    others = list(_split(others, [v for v in ours.vertices if v.id not in known]))
+    others = list(_split(others, [v for v in ours.vertices if v.id not in here]))
     for number, edge in enumerate(others):
         twin = _twin(edge, own)
         if twin is None or _twin(own[twin], others) != number:
@@ -178,16 +179,41 @@ def _turned_from(vertex: RouteNode, bearing: float) -> RouteNode:
     )
 
 
+def _seen_once(graph: RouteGraph, paired: set[int], other: RouteGraph) -> RouteGraph:
+    """The graph, with each departure once where the other map has an edge and no vertex."""
+    return replace(
+        graph,
+        vertices=tuple(
+            vertex if vertex.id in paired else _passed(vertex, other.edges)
+            for vertex in graph.vertices
+        ),
+    )
+
+
+def _passed(vertex: RouteNode, edges: Iterable[RouteEdge]) -> RouteNode:
+    """A vertex that edges of another map pass, without what it has beside their directions."""
+    twice = set[float]()
+    for edge in edges:
+        i = _cut_at(edge, vertex)
+        if i is not None:
+            line = edge.polyline
+            ways = [direction_of(part, AHEAD_M) for part in (line[i:], line[i::-1])]
+            twice |= _seen_twice(vertex, ways, ways)
+    bearings = tuple(b for b in vertex.bearings if b not in twice)
+    frontiers = tuple(f for f in vertex.frontiers if f not in twice)
+    return replace(vertex, degree=len(bearings), bearings=bearings, frontiers=frontiers)
+
+
 def _fused(ours: RouteNode, theirs: RouteNode) -> RouteNode:
     """One vertex of two, with the departures of both."""
     position, covariance = covariance_intersection(
         np.array(ours.position), _matrix(ours), np.array(theirs.position), _matrix(theirs)
     )
-    twice = _seen_twice(ours, theirs)
+    twice = _seen_twice(ours, theirs.bearings, _followed(theirs))
     bearings = [b for b in ours.bearings if b not in twice]
     bearings += [b for b in theirs.bearings if not is_among(b, ours.bearings)]
     frontiers = [
-        *(f for f in ours.frontiers if not _is_followed(f, theirs)),
+        *(f for f in ours.frontiers if not is_among(f, _followed(theirs))),
         *(f for f in theirs.frontiers if not is_among(f, ours.bearings)),
     ]
     x, y = position.tolist()
@@ -204,11 +230,14 @@ def _fused(ours: RouteNode, theirs: RouteNode) -> RouteNode:
     )
 
 
-def _seen_twice(ours: RouteNode, theirs: RouteNode) -> set[float]:
-    """Frontiers of which the other robot followed one, where this one saw several from afar."""
-    off = np.abs(wrap_angles(np.subtract.outer(ours.bearings, theirs.bearings)))
+def _seen_twice(ours: RouteNode, theirs: Sequence[float], followed: Sequence[float]) -> set[float]:
+    """Frontiers of which the other robot followed one, where this one saw several from afar.
+
+    `theirs` are the bearings of all departures that the other one saw there, rad.
+    """
+    off = np.abs(wrap_angles(np.subtract.outer(ours.bearings, theirs)))
     paired = {ours.bearings[i] for i, _ in assigned(off, _SAME_RAD)}
-    return {f for f in ours.frontiers if f not in paired and _is_followed(f, theirs)}
+    return {f for f in ours.frontiers if f not in paired and is_among(f, followed)}
 
 
 def covariance_intersection(a: Array, of_a: Array, b: Array, of_b: Array) -> tuple[Array, Array]:
@@ -237,29 +266,30 @@ def is_among(bearing: float, bearings: Iterable[float]) -> bool:
     return any(abs(wrap_angle(bearing - other)) < _SAME_RAD for other in bearings)
 
 
-def _is_followed(bearing: float, vertex: RouteNode) -> bool:
-    """Whether a vertex has an edge in a direction."""
-    return is_among(bearing, [b for b in vertex.bearings if b not in vertex.frontiers])
+def _followed(vertex: RouteNode) -> list[float]:
+    """In which directions a vertex has edges, rad."""
+    return [b for b in vertex.bearings if b not in vertex.frontiers]
 
 
 def _split(edges: Iterable[RouteEdge], vertices: list[RouteNode]) -> Iterable[RouteEdge]:
     """The edges, cut where vertices lie on them that their map does not know."""
     for edge in edges:
-        line = edge.polyline
-        along = stations_of(line)
-        cuts = []
-        for vertex in vertices:
-            away = np.hypot(*(line - vertex.position).T)
-            i = int(np.argmin(away))
-            inside = _FROM_ENDS_M < along[i] < along[-1] - _FROM_ENDS_M
-            if away[i] < _ON_EDGE_M and inside:
-                cuts.append((i, vertex.id))
+        cuts = [(i, v.id) for v in vertices if (i := _cut_at(edge, v)) is not None]
         start, first = edge.start, 0
         for i, middle in sorted(cuts):
             if i > first:
                 yield _piece(edge, start, middle, first, i)
                 start, first = middle, i
-        yield _piece(edge, start, edge.end, first, len(line) - 1)
+        yield _piece(edge, start, edge.end, first, len(edge.polyline) - 1)
+
+
+def _cut_at(edge: RouteEdge, vertex: RouteNode) -> int | None:
+    """The point of an edge's line at which a vertex that its map does not know lies on it."""
+    along = stations_of(edge.polyline)
+    away = np.hypot(*(edge.polyline - vertex.position).T)
+    i = int(np.argmin(away))
+    is_inside = _FROM_ENDS_M < along[i] < along[-1] - _FROM_ENDS_M
+    return i if away[i] < _ON_EDGE_M and is_inside else None
 
 
 def _piece(edge: RouteEdge, start: int, end: int, first: int, last: int) -> RouteEdge:

@@ -1,6 +1,7 @@
 """Robots that have been at a place agree on what leaves it."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -95,6 +96,27 @@ def test_where_one_robot_saw_a_way_go_on_round_somebody_another_one_has_it_pass(
         assert {len(edge.polyline[np.hypot(*(edge.polyline - end).T) < 1e-6]) for end in ends} == {
             1
         }
+
+
+@pytest.mark.parametrize(("beside", "is_left"), [(-0.6, False), (-1.5, True)])
+@pytest.mark.parametrize("is_first", [True, False])
+def test_what_one_saw_fork_a_little_where_an_edge_of_another_one_passes_is_no_fork(
+    beside: float, *, is_left: bool, is_first: bool
+) -> None:
+    """Somebody stood there. What leads off the edge is another matter; neither drove there."""
+    start, end = vertex(0, 0.0, (0.0, 3.0), 0.0), vertex(1, 8.0, (math.pi, -1.0), math.pi)
+    middle = replace(vertex(2, 4.0, (math.pi, 0.0, beside), 0.0), frontiers=(beside,))
+    lines = [((0, 2), (0, 4)), ((2, 1), (4, 8))]
+    edges = tuple(
+        RouteEdge(start=a, end=b, polyline=np.linspace((x, 0), (to, 0), 40), min_clearance=0.5)
+        for (a, b), (x, to) in lines
+    )
+    forked = RouteGraph((start, end, middle), edges), Pose()
+    plain = corridor(sees_door=False, drove=False), Pose()
+    whole = joined_graph([forked, plain] if is_first else [plain, forked])
+    assert len(whole.edges) == 1 + is_left
+    assert sum(len(v.frontiers) for v in whole.vertices) == 2 + is_left
+    assert len(whole.vertices) == 2 + is_left
 
 
 def test_where_two_drove_up_to_somebody_from_both_sides_an_edge_passes() -> None:
