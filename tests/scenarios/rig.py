@@ -207,11 +207,11 @@ async def _told(story: Story, run: Play) -> None:
 
 
 def gap_to_walls(run: Play) -> float:
-    """The least distance from the robot's centre to a wall on its way, m; 1 at most."""
+    """The least distance from the robot's centre to a wall on its way, m; 0.3 at most."""
     world = run.simulation.place.world
     places = {(round(p.x, 2), round(p.y, 2)) for p in run.truth}
     return min(
-        float(np.hypot(*world.wall_offsets(x, y, 1.0).T).min(initial=1.0)) for x, y in places
+        float(np.hypot(*world.wall_offsets(x, y, 0.3).T).min(initial=0.3)) for x, y in places
     )
 
 
