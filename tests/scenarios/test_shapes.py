@@ -31,7 +31,9 @@ SHORT_SIGHTED = TwinConfig(laser=HokuyoTwinConfig(model="URG-04LX"))  # sees 5.6
 
 
 def test_a_field_without_a_wall_in_sight_ends_the_run_with_a_reason() -> None:
-    run = play(carved([(-30.0, -30.0, 30.0, 30.0)]), Pose(), twin=SHORT_SIGHTED, limit=150.0)
+    field = Canvas(46.0, 46.0)
+    field.carve(1.0, 1.0, 45.0, 45.0)
+    run = play(field.world("field"), Pose(23.0, 23.0, 0.0), twin=SHORT_SIGHTED, limit=150.0)
     assert run.outcome == "failed"
     assert "no walls within range" in run.pipeline.mission.reason
     assert run.contacts == 0
@@ -83,16 +85,16 @@ def test_a_square_closet_is_explored_without_an_edge() -> None:
 def test_a_crossing_is_one_meetpoint_of_four(offset: float) -> None:
     """Arms that face each other, or are a little off: far less than half the robot apart."""
     free: list[Rectangle] = [
-        (-3.5, -0.7, 3.5, 0.7),
-        (-0.7, 0.0, 0.7, 3.5),
-        (-0.7 + offset, -3.5, 0.7 + offset, 0.0),
+        (-2.6, -0.7, 2.6, 0.7),
+        (-0.7, 0.0, 0.7, 2.6),
+        (-0.7 + offset, -2.6, 0.7 + offset, 0.0),
     ]
-    run = play(carved(free), Pose(-2.0, 0.1, 0.2))
+    run = play(carved(free), Pose(-1.6, 0.1, 0.2))
     assert_explored(run)
     middle = (offset / 2, 0.0)
     assert_found(run, "meetpoint", [middle])
     assert_degrees(run, {middle: 4})
-    assert_found(run, "endpoint", [(-2.8, 0.0), (2.8, 0.0), (0.0, 2.8), (offset, -2.8)])
+    assert_found(run, "endpoint", [(-1.9, 0.0), (1.9, 0.0), (0.0, 1.9), (offset, -1.9)])
 
 
 def test_alcoves_less_deep_than_the_corridor_is_wide_are_no_vertices() -> None:
@@ -116,10 +118,10 @@ def test_a_pillar_in_a_dead_end_makes_an_edge_from_a_vertex_to_itself() -> None:
 
 
 def test_a_ring_is_closed_where_the_robot_came_onto_it() -> None:
-    """A metre and a half from where it was put down, beside the wall."""
+    """A metre and more from where it was put down, beside the wall."""
     run = play(
-        carved([(-5.0, -5.0, 5.0, 5.0)], [(-1.2, -1.2, 1.2, 1.2)]),
-        Pose(-4.5, 0.0, math.pi / 2),
+        carved([(-3.5, -3.5, 3.5, 3.5)], [(-0.7, -0.7, 0.7, 0.7)]),
+        Pose(-3.2, 0.0, math.pi / 2),
         limit=150.0,
     )
     assert_explored(run)
@@ -232,12 +234,12 @@ def test_a_narrow_door_stays_open_for_a_noisy_laser(
     model: Literal["UTM-30LX", "URG-04LX"], seed: int
 ) -> None:
     """Two rooms with doors of 0.52 m; sigma is 3 cm, and 8 cm are to spare on either side."""
-    rooms: list[Rectangle] = [(-5.0, 0.9, -1.0, 4.0), (1.0, -4.0, 5.0, -0.9)]
-    doors: list[Rectangle] = [(-3.26, 0.7, -2.74, 1.0), (2.74, -1.0, 3.26, -0.7)]
+    rooms: list[Rectangle] = [(-3.2, 0.9, -0.2, 3.4), (0.2, -3.4, 3.2, -0.9)]
+    doors: list[Rectangle] = [(-1.96, 0.7, -1.44, 1.0), (1.44, -1.0, 1.96, -0.7)]
     laser = HokuyoTwinConfig(model=model, range_sigma_m=0.03)
     run = play(
-        carved([(-6.0, -0.8, 6.0, 0.8), *rooms, *doors]),
-        Pose(-5.0, 0.0, 0.0),
+        carved([(-3.2, -0.8, 3.2, 0.8), *rooms, *doors]),
+        Pose(-2.6, 0.0, 0.0),
         twin=TwinConfig(seed=seed, laser=laser),
     )
     assert_explored(run)
