@@ -1,6 +1,7 @@
 """People stand in the way: the robot waits, goes round them or elsewhere, and comes back."""
 
 import math
+from dataclasses import dataclass
 
 import pytest
 
@@ -41,22 +42,54 @@ def distances_to_person(run: Play, x: float, y: float, *, since: float) -> list[
     return [math.dist((p.x, p.y), (x, y)) for p in run.truth[round(since * 50) :]]
 
 
-def test_a_person_who_steps_aside_soon_is_waited_for() -> None:
-    spot = (0.0, 1.8)
+@dataclass(eq=False)
+class Met:
+    """A run in which somebody jumps into the way, and later stands in the branch for a while."""
+
+    run: Play
+    jumped_to: tuple[float, float]
+    jumped_at: float  # stamp
+
+
+@pytest.fixture(scope="module")
+def met() -> Met:
+    jumps: list[tuple[float, float, float]] = []
 
     async def story(run: Play) -> None:
+        await run.until(lambda: run.here.x > -1.5)
+        jumps.append((run.here.x + 1.0, run.here.y, run.clock.now()))
+        run.put_person(*jumps[0][:2])
+        await run.sleep(6.0)
+        run.put_person(*FAR_AWAY)
         await run.until(lambda: run.here.y > 0.3)
-        run.put_person(*spot)
+        run.put_person(0.0, 1.8)
         await run.sleep(8.0)
         run.put_person(*FAR_AWAY)
 
     run = play(WORLD, START, story=story, with_person=True)
+    ((x, y, when),) = jumps
+    return Met(run, (x, y), when)
+
+
+def test_a_person_who_steps_aside_soon_is_waited_for(met: Met) -> None:
+    run = met.run
     assert run.outcome == "explored", run.pipeline.mission.reason
     assert run.contacts == 0
     assert "try another way" not in run.recoveries()
     assert_found(run, "meetpoint", [MEETPOINT])
     assert_degrees(run, {MEETPOINT: 3})
     assert_found(run, "endpoint", ENDS)
+
+
+def test_a_person_who_jumps_into_the_way_is_not_touched(met: Met) -> None:
+    """A metre ahead of a robot at half a metre a second; it stops and does not brush past."""
+    run, when = met.run, met.jumped_at
+    near = distances_to_person(run, *met.jumped_to, since=when)[:300]
+    assert min(near) > ROBOT_RADIUS + 0.2
+    assert run.contacts == 0
+    stood = run.truth[round((when + 4.0) * 50) : round((when + 5.0) * 50)]
+    assert math.dist((stood[0].x, stood[0].y), (stood[-1].x, stood[-1].y)) < 0.02
+    assert run.outcome == "explored", run.pipeline.mission.reason
 
 
 def test_a_person_who_stays_for_a_while_is_left_alone_and_the_branch_explored_later() -> None:
@@ -99,37 +132,52 @@ def test_a_person_who_never_goes_leaves_a_frontier_blocked() -> None:
     assert len(run.vertices("endpoint")) == 2  # the person is none
 
 
-def test_a_person_in_a_wide_corridor_is_passed() -> None:
-    """Between the person, 0.25 m in radius at most, and either wall there is 0.85 m."""
+@dataclass(eq=False)
+class Passed:
+    """A run in a wide corridor with somebody at the first look, and somebody in the way later."""
+
+    run: Play
+    added_at_first: list[str]  # kinds of vertices, until the second one came
+
+
+def kinds_added(run: Play) -> list[str]:
+    return [event.kind for event in run.events if isinstance(event, VertexAdded)]
+
+
+@pytest.fixture(scope="module")
+def passed() -> Passed:
     world = carved([(-4.0, -1.1, 6.0, 1.1), (3.8, -1.1, 6.0, 5.0)])
+    added_at_first: list[str] = []
 
     async def story(run: Play) -> None:
-        await run.until(lambda: run.here.x > -1.5)
-        run.put_person(1.5, 0.0)
+        run.put_person(0.5, 0.0)
+        await run.sleep(15.0)
+        run.put_person(*FAR_AWAY)
+        await run.until(lambda: run.here.x > -1.2)
+        added_at_first.extend(kinds_added(run))
+        run.put_person(1.8, 0.0)
         await run.until(lambda: run.here.x > 3.0)
         run.put_person(*FAR_AWAY)
 
-    run = play(world, START, story=story, with_person=True)
+    return Passed(play(world, START, story=story, with_person=True), added_at_first)
+
+
+def test_a_person_in_a_wide_corridor_is_passed(passed: Passed) -> None:
+    """Between the person, 0.25 m in radius at most, and either wall there is 0.85 m."""
+    run = passed.run
     assert run.outcome == "explored", run.pipeline.mission.reason
     assert run.contacts == 0
     assert_found(run, "endpoint", [(-2.9, 0.0), (4.9, 3.9)])
     assert len(run.vertices("meetpoint")) == 0
 
 
-def test_a_person_who_stands_there_at_the_first_look_is_no_pillar() -> None:
+def test_a_person_who_stands_there_at_the_first_look_is_no_pillar(passed: Passed) -> None:
     """A pillar in the middle of a wide corridor makes two meetpoints; whoever goes makes none."""
-    world = carved([(-4.0, -1.1, 6.0, 1.1), (3.8, -1.1, 6.0, 5.0)])
-
-    async def story(run: Play) -> None:
-        run.put_person(0.5, 0.0)
-        await run.sleep(15.0)
-        run.put_person(*FAR_AWAY)
-
-    run = play(world, START, story=story, with_person=True)
+    run = passed.run
     assert run.outcome == "explored", run.pipeline.mission.reason
     assert run.contacts == 0
-    added = [event.kind for event in run.events if isinstance(event, VertexAdded)]
-    assert added == ["endpoint", "endpoint"]
+    assert passed.added_at_first == ["endpoint"]
+    assert kinds_added(run) == ["endpoint", "endpoint"]
 
 
 @pytest.mark.parametrize("in_team", [False, True])
@@ -143,7 +191,7 @@ def test_a_person_who_stands_in_a_corridor_at_the_first_look_is_not_its_end(
         if in_team:
             member_of(RobotConfig(), TeamConfig(), run.pipeline)
         run.put_person(1.0, 0.0)
-        await run.sleep(50.0)
+        await run.sleep(38.0)
         run.put_person(*FAR_AWAY)
 
     run = play(world, START, story=story, with_person=True)
@@ -165,8 +213,7 @@ def test_a_person_half_hidden_at_first_is_no_pillar() -> None:
     run = play(world, START, story=story, with_person=True)
     assert run.outcome == "explored", run.pipeline.mission.reason
     assert run.contacts == 0
-    added = [event.kind for event in run.events if isinstance(event, VertexAdded)]
-    assert added == ["endpoint", "endpoint"]
+    assert kinds_added(run) == ["endpoint", "endpoint"]
 
 
 @pytest.mark.parametrize("seed", [0, 2])
@@ -184,29 +231,7 @@ def test_a_person_half_hidden_from_a_noisy_laser_is_no_pillar(seed: int) -> None
     run = play(world, START, story=story, with_person=True, twin=twin)
     assert run.outcome == "explored", run.pipeline.mission.reason
     assert run.contacts == 0
-    added = [event.kind for event in run.events if isinstance(event, VertexAdded)]
-    assert added == ["endpoint", "endpoint"]
-
-
-def test_a_person_who_jumps_into_the_way_is_not_touched() -> None:
-    """A metre ahead of a robot at half a metre a second; it stops and does not brush past."""
-    spots: list[tuple[float, float, float]] = []
-
-    async def story(run: Play) -> None:
-        await run.until(lambda: run.here.x > -1.5)
-        spots.append((run.here.x + 1.0, run.here.y, run.clock.now()))
-        run.put_person(*spots[0][:2])
-        await run.sleep(6.0)
-        run.put_person(*FAR_AWAY)
-
-    run = play(WORLD, START, story=story, with_person=True)
-    x, y, when = spots[0]
-    near = distances_to_person(run, x, y, since=when)[:300]
-    assert min(near) > ROBOT_RADIUS + 0.2
-    assert run.contacts == 0
-    stood = run.truth[round((when + 4.0) * 50) : round((when + 5.0) * 50)]
-    assert math.dist((stood[0].x, stood[0].y), (stood[-1].x, stood[-1].y)) < 0.02
-    assert run.outcome == "explored", run.pipeline.mission.reason
+    assert kinds_added(run) == ["endpoint", "endpoint"]
 
 
 def test_a_room_is_found_though_somebody_stood_before_its_door_as_the_robot_passed() -> None:
