@@ -1,6 +1,7 @@
 """The robot hits, falls off, is lifted or overloaded: it gets away, and explores to the end."""
 
 import math
+from dataclasses import dataclass
 
 import pytest
 
@@ -66,47 +67,63 @@ def test_a_place_where_there_is_no_floor_is_never_driven_over() -> None:
     assert run.outcome == "explored", run.pipeline.mission.reason
 
 
-def test_a_robot_that_is_lifted_stands_until_its_wheels_are_down_again() -> None:
-    sigma: list[float] = []
+@dataclass(eq=False)
+class Interrupted:
+    """A run in which the robot is lifted once, and later its motor is overloaded twice."""
 
-    async def story(run: Play) -> None:
-        await run.until(lambda: run.here.x > 0.3)
-        run.mishap("wheel drop", 6.0)
+    run: Play
+    moved_in_the_air: float  # m
+    moved_at_rest: float  # m, after the first overload
+    before_the_second: list[str]  # recoveries
+
+
+@pytest.fixture(scope="module")
+def interrupted() -> Interrupted:
+    moved: list[float] = []
+    recoveries: list[str] = []
+
+    async def stand(run: Play, seconds: float) -> None:
         await run.sleep(1.0)
         here = run.here
-        await run.sleep(4.5)
-        assert run.here.distance(here) < 0.01
+        await run.sleep(seconds)
+        moved.append(run.here.distance(here))
+
+    async def story(run: Play) -> None:
+        await run.until(lambda: run.here.x > -1.2)
+        run.mishap("wheel drop", 6.0)
+        await stand(run, 4.5)
+        await run.until(lambda: run.here.x > 0.3)
+        run.mishap("over-current", 0.5)
+        await stand(run, 0.8)
+        await run.sleep(2.2)
+        recoveries.extend(run.recoveries())
+        run.mishap("over-current", 0.5)
 
     run = play(CORRIDOR, START, story=story)
+    in_the_air, at_rest = moved
+    return Interrupted(run, in_the_air, at_rest, recoveries)
+
+
+def test_a_robot_that_is_lifted_stands_until_its_wheels_are_down_again(
+    interrupted: Interrupted,
+) -> None:
+    run = interrupted.run
+    assert interrupted.moved_in_the_air < 0.01
     assert "look around" in run.recoveries()
     assert run.outcome == "explored", run.pipeline.mission.reason
     assert_found(run, "endpoint", ENDS)
-    assert not sigma
 
 
-def test_an_overloaded_motor_rests_and_the_robot_goes_on() -> None:
-    async def story(run: Play) -> None:
-        await run.until(lambda: run.here.x > 0.3)
-        run.mishap("over-current", 0.5)
-        await run.sleep(1.0)
-        here = run.here
-        await run.sleep(0.8)
-        assert run.here.distance(here) < 0.01
-
-    run = play(CORRIDOR, START, story=story)
+def test_an_overloaded_motor_rests_and_the_robot_goes_on(interrupted: Interrupted) -> None:
+    run = interrupted.run
+    assert interrupted.moved_at_rest < 0.01
+    assert "back off" not in interrupted.before_the_second
     assert run.outcome == "explored", run.pipeline.mission.reason
-    assert "back off" not in run.recoveries()
     assert_found(run, "endpoint", ENDS)
 
 
-def test_a_motor_overloaded_again_makes_the_robot_back_off() -> None:
-    async def story(run: Play) -> None:
-        await run.until(lambda: run.here.x > 0.3)
-        run.mishap("over-current", 0.5)
-        await run.sleep(4.0)
-        run.mishap("over-current", 0.5)
-
-    run = play(CORRIDOR, START, story=story)
+def test_a_motor_overloaded_again_makes_the_robot_back_off(interrupted: Interrupted) -> None:
+    run = interrupted.run
     assert run.recoveries().count("back off") == 1
     assert run.outcome == "explored", run.pipeline.mission.reason
 
