@@ -24,10 +24,10 @@ from tests.unit.autonomy.sights import carved
 pytestmark = [pytest.mark.slow, pytest.mark.twin, pytest.mark.timeout(120)]
 
 # A T: a corridor of 1.4 m from west to east, and one to the south.
-TEE = carved([(-2.7, -0.7, 2.7, 0.7), (-0.7, -4.6, 0.7, 0.0)])
-START = Pose(-1.5, 0.0, 0.3)
+TEE = carved([(-2.2, -0.7, 2.2, 0.7), (-0.7, -4.6, 0.7, 0.0)])
+START = Pose(-1.2, 0.0, 0.3)
 MEETPOINT = (0.0, -(1.4**2) / (8 * 1.4))  # as far from the wall opposite as from both corners
-ENDS = [(-2.0, 0.0), (2.0, 0.0)]
+ENDS = [(-1.5, 0.0), (1.5, 0.0)]
 # A room of 6 m by 6 m, and a corridor that leads out of it to the west.
 ROOM = carved([(-3.0, -1.0, 3.0, 5.0), (-4.5, 0.5, -2.9, 1.5)])
 ACROSS_M = -2.4  # the wall is here, from side to side of the arm to the south
@@ -90,7 +90,7 @@ def test_who_is_shut_in_closely_stays_there() -> None:
 
 def test_on_a_known_map_no_way_leads_over_it_as_long_as_it_is_there() -> None:
     """The map keeps what is beyond; who is asked to go there says at once what is in the way."""
-    goals = np.array([(1.7, 0.0), (-1.7, 0.0), (0.0, -3.9)])
+    goals = np.array([(1.2, 0.0), (-1.2, 0.0), (0.0, -3.9)])
     east, west, far = START.inverse().transform(goals)
 
     async def story(run: Play) -> None:
