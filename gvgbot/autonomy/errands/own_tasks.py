@@ -98,8 +98,8 @@ class OwnTasks:
             self._watched = view.stamp
         if self._arrives(view) and self._has_met and _may_overlook(view):
             return LookAround(math.tau)
-        is_standing = self._unseen.is_standing(view.travelled)
-        if not is_standing or self._watches(view):
+        is_watching, is_standing = self._watches(view), self._unseen.is_standing(view.travelled)
+        if is_watching or not is_standing:
             return Stand()
         surveyed = survey()
         if surveyed is None or self._reopen(surveyed.barred):

@@ -142,10 +142,13 @@ def test_who_stands_in_sight_is_watched_before_the_survey_is_made() -> None:
     assert robot.travelled == 0.0
 
 
-@pytest.mark.parametrize(("hidden_s", "waits_s"), [(0.0, 0.0), (12.0, 22.0), (200.0, 130.0)])
+@pytest.mark.parametrize(
+    ("hidden_s", "waits_s"), [(0.0, 0.0), (0.4, 10.5), (12.0, 22.0), (200.0, 130.0)]
+)
 def test_what_somebody_hides_where_it_went_for_a_look_is_waited_for(
     hidden_s: float, waits_s: float
 ) -> None:
+    """He may go as soon as it has come there, and before it stands still."""
     robot = Explorer([GAP], [])
     robot.until_it_moves_or_ends()
     robot.drive(CLOSED, (0.0, 0.0), (2.0, 0.0))
