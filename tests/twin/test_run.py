@@ -29,6 +29,7 @@ from gvgbot.hal.messages import Contact, Odometry, Scan, Sign
 from gvgbot.links import Close, Links
 from gvgbot.maps import run_directory
 from gvgbot.robot import Robot
+from gvgbot.saving import SAVE_EVERY
 from gvgbot.simulation import Place
 from gvgbot.stop_signals import StopSignals
 from gvgbot.tiles import Grid
@@ -37,6 +38,7 @@ from gvgbot.worlds.canvas import Canvas
 pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(120)]
 
 MAP = {"map.geojson", "map.yaml", "map.pgm", "map.png", "summary.json", "events.jsonl"}
+WATCHED_S = 40.0
 WAYS = {"estimate.tum", "online.tum", "odometry.tum", "truth.tum"}
 
 
@@ -173,7 +175,7 @@ def test_a_finished_daemon_saves_the_map_and_stands_until_it_is_stopped(tmp_path
         await clock.sleep_until(clock.now() + 3.0)
         seen.append(json.loads((path / "summary.json").read_text())["outcome"])
         seen.append(daemon.place)
-        await clock.sleep_until(clock.now() + 30.0)
+        await clock.sleep_until(clock.now() + 20.0)
         seen.append(daemon.place)
 
     with daemon.session.directory, structlog.testing.capture_logs() as logs:
@@ -198,15 +200,15 @@ def test_a_map_that_could_not_be_saved_is_saved_as_soon_as_that_is_possible(
     reasons: list[str] = []
 
     async def story(clock: Clock) -> None:
-        await clock.sleep_until(10.0)
+        await clock.sleep_until(4.0)
         path.rename(away)
         monkeypatch.setattr(run_directory, "_append", full)
         answer = await daemon.network.ask("stop")
         assert "map not saved" in answer.text
-        await clock.sleep_until(50.0)
+        await clock.sleep_until(4.0 + SAVE_EVERY + 2.0)  # it has tried once more
         away.rename(path)
         monkeypatch.undo()
-        await clock.sleep_until(81.0)
+        await clock.sleep_until(4.0 + 2 * SAVE_EVERY + 2.0)
         reasons.append(json.loads((path / "summary.json").read_text())["reason"])
         *_, ended, _ = map(json.loads, (path / "events.jsonl").read_text().splitlines())
         reasons.append(ended["reason"])
@@ -292,31 +294,41 @@ def test_a_robot_stands_while_its_laser_is_unplugged_and_then_goes_on(daemon: Da
     assert (last.phase, last.laser.connected, last.laser.reconnects) == ("exploring", True, 1)
 
 
-def test_a_robot_on_an_errand_does_not_say_that_it_stands(daemon: Daemon) -> None:
+@pytest.fixture(scope="module")
+def sent_home(tmp_path_factory: pytest.TempPathFactory) -> tuple[Daemon, str, list[str]]:
+    """A daemon without a laser on its way home, its phase before, and what it had logged then."""
+    rig, phases = Daemon(tmp_path_factory.mktemp("sent_home") / "run"), list[str]()
+    logged: list[str] = []
+
     async def story(clock: Clock) -> None:
-        await clock.sleep_until(10.0)
+        await clock.sleep_until(8.0)
         for request in ("stop", "home"):
-            assert (await daemon.network.ask(request)).done
+            assert (await rig.network.ask(request)).done
+        await clock.sleep_until(10.0)
+        phases.append(rig.network.states[-1].phase)
+        logged.extend(log["event"] for log in logs)
+        assert rig.session.simulation is not None
+        rig.session.simulation.laser_twin.inject("unplug", 6.0)
         await clock.sleep_until(12.0)
 
-    with structlog.testing.capture_logs() as logs:
-        daemon.run(story)
-    assert daemon.network.states[-1].phase == "errand"
-    assert "standing still until stopped" not in [log["event"] for log in logs]
+    with rig.session.directory, structlog.testing.capture_logs() as logs:
+        rig.run(story)
+    return rig, phases[0], logged
+
+
+def test_a_robot_on_an_errand_does_not_say_that_it_stands(
+    sent_home: tuple[Daemon, str, list[str]],
+) -> None:
+    _, phase, logged = sent_home
+    assert phase == "errand"
+    assert "base is there" in logged
+    assert "standing still until stopped" not in logged
 
 
 def test_on_an_errand_it_says_what_it_waits_for_and_not_how_the_exploration_ended(
-    daemon: Daemon,
+    sent_home: tuple[Daemon, str, list[str]],
 ) -> None:
-    async def story(clock: Clock) -> None:
-        await clock.sleep_until(10.0)
-        for request in ("stop", "home"):
-            assert (await daemon.network.ask(request)).done
-        assert daemon.session.simulation is not None
-        daemon.session.simulation.laser_twin.inject("unplug", 6.0)
-        await clock.sleep_until(13.0)
-
-    daemon.run(story)
+    daemon, *_ = sent_home
     last = daemon.network.states[-1]
     assert (last.phase, last.outcome, last.errand) == ("halted", "stopped", "home")
     assert last.reason.startswith("no laser")
@@ -386,11 +398,21 @@ def test_a_control_loop_that_is_stuck_gives_no_sign_of_life(daemon: Daemon) -> N
     assert daemon.network.states[-1].cycle_age == pytest.approx(30.0, abs=0.5)
 
 
-def test_those_who_watch_get_the_map_and_each_event_of_the_list(daemon: Daemon) -> None:
-    async def story(clock: Clock) -> None:
-        await clock.sleep_until(40.0)
+@pytest.fixture(scope="module")
+def watched(tmp_path_factory: pytest.TempPathFactory) -> Daemon:
+    """A daemon that has explored for a while."""
+    rig = Daemon(tmp_path_factory.mktemp("watched") / "run")
 
-    daemon.run(story)
+    async def story(clock: Clock) -> None:
+        await clock.sleep_until(WATCHED_S)
+
+    with rig.session.directory:
+        rig.run(story)
+    return rig
+
+
+def test_those_who_watch_get_the_map_and_each_event_of_the_list(watched: Daemon) -> None:
+    daemon = watched
     path = daemon.session.directory.path
     lines = [json.loads(line) for line in (path / "events.jsonl").read_text().splitlines()]
     told = {event.number: event for sent in daemon.network.events for event in sent.events}
@@ -400,7 +422,10 @@ def test_those_who_watch_get_the_map_and_each_event_of_the_list(daemon: Daemon) 
     assert len(lines) - len(told) in (0, 1)  # one may have come too late for the last message
     last = daemon.network.maps[-1]
     assert [vertex.id for vertex in last.vertices] == [
-        line["vertex"] for line in lines if line["event"] == "vertex_added" if line["stamp"] < 38.0
+        line["vertex"]
+        for line in lines
+        if line["event"] == "vertex_added"
+        if line["stamp"] < WATCHED_S - 2.0
     ]
     for vertex in last.vertices:
         (line,) = [x for x in lines if x["event"] == "vertex_added" and x["vertex"] == vertex.id]
@@ -411,11 +436,8 @@ def test_those_who_watch_get_the_map_and_each_event_of_the_list(daemon: Daemon) 
     )
 
 
-def test_the_walls_that_are_shown_are_those_of_the_world(daemon: Daemon) -> None:
-    async def story(clock: Clock) -> None:
-        await clock.sleep_until(20.0)
-
-    daemon.run(story)
+def test_the_walls_that_are_shown_are_those_of_the_world(watched: Daemon) -> None:
+    daemon = watched
     assert daemon.session.place is not None
     world, start = daemon.session.place.world, daemon.session.place.start
     assert isinstance(daemon.network.whole_grid, Grid)
