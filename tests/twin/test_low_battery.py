@@ -161,8 +161,8 @@ def test_who_could_not_go_home_before_it_was_charged_stands_in_the_end(tmp_path:
 
 def test_it_drives_home_once_there_is_a_way(tmp_path: Path) -> None:
     """In a long corridor no edge is known before its end is in sight."""
-    canvas = Canvas(18.0, 8.0)
-    canvas.carve_path([(1.0, 1.5), (16.0, 1.5), (16.0, 6.0)], 1.4)
+    canvas = Canvas(15.0, 7.0)
+    canvas.carve_path([(1.0, 1.5), (13.0, 1.5), (13.0, 5.0)], 1.4)
     place = Place(canvas.world("long"), Pose(2.0, 1.5))
     base = replace(BASE, battery_v=13.98, battery_drain_v_per_h=10.0)  # 13.9 after a while
     twin = TwinConfig(base=base, laser=HokuyoTwinConfig(model="URG-04LX"))
