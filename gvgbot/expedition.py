@@ -261,6 +261,8 @@ def _save(directory: RunDirectory, robots: list[_Robot]) -> list[_Robot]:
 
     It is the map of who knows most others, and of these the one with most vertices.
     """
+    for robot in robots:
+        robot.member.look(robot.told, at_last=True)
     first = max(robots, key=lambda r: (len(r.member.frames), len(_graph(r).vertices)))
     poses = {first.member.name: Pose()} | first.member.frames
     others = [robot for robot in robots if robot is not first and robot.member.name in poses]

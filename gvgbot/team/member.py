@@ -243,13 +243,16 @@ class Member:
                 del self._mates[name]
         return len(self._mates) < MOST_MATES
 
-    def look(self, stamp: float) -> None:
+    def look(self, stamp: float, *, at_last: bool = False) -> None:
         """Try to lay the maps of others onto the own one, where that is due."""
-        for comparison in self.due(stamp):
+        for comparison in self.due(stamp, at_last=at_last):
             self.settle(comparison, comparison.made())
 
-    def due(self, stamp: float) -> list["Comparison"]:
-        """Which maps are to be laid on the own one now: long work that may be done elsewhere."""
+    def due(self, stamp: float, *, at_last: bool = False) -> list["Comparison"]:
+        """Which maps are to be laid on the own one now: long work that may be done elsewhere.
+
+        `at_last` all are, by what is known in the end, whenever they were before.
+        """
         self._stamp = max(self._stamp, stamp)
         found = []
         for name, mate in sorted(self._mates.items()):
@@ -260,7 +263,8 @@ class Member:
             )
             by_sight, mate.by_sight = mate.by_sight, None
             if by_sight is None:
-                if stamp - mate.tried < self._config.align_every_s or sizes == mate.sizes:
+                is_early = stamp - mate.tried < self._config.align_every_s
+                if not at_last and (is_early or sizes == mate.sizes):
                     continue
                 mate.tried, mate.sizes = stamp, sizes
             life, before = mate.news.life, mate.alignment

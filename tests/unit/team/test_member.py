@@ -126,6 +126,17 @@ def test_robots_find_each_others_frames() -> None:
     assert two.member.frames["one"].distance(true.inverse()) < 0.05
 
 
+def test_at_last_maps_are_laid_on_each_other_anew_though_none_has_grown() -> None:
+    one, _ = team()
+    true = START["one"].to(START["two"])
+    aside = Alignment(Pose(0.15, -0.1).compose(true), np.eye(3) * 0.01, (), 1.0)
+    one.member.settle(Comparison("two", 0, Chart(), Chart(), None), aside)
+    one.member.look(2.0)
+    assert one.member.frames["two"].distance(true) > 0.1
+    one.member.look(2.0, at_last=True)
+    assert one.member.frames["two"].distance(true) < 0.05
+
+
 def test_a_crowd_of_names_is_not_remembered_for_ever() -> None:
     one, two = team()
     stranger = msgspec.structs.replace(two.member.news(2.0, Pose(), finished=False), frames=())
