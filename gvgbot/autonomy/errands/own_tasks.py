@@ -125,7 +125,9 @@ class OwnTasks:
 
         place = self._unseen.next(surveyed.places, metres_to, twice=self._has_met)
         reason = "something may be missing there"
-        if place is None and self._has_met:
+        if place is not None:
+            self._awaited = np.concatenate([surveyed.awaited, place[None]])
+        elif self._has_met:
             place = self._unseen.once_more(surveyed.doorsteps, metres_to)
             reason = "somebody may have stood there"
         if place is None:
@@ -161,10 +163,10 @@ class OwnTasks:
         if self._arrived is None or not self._is_there():
             return False
         is_patient = view.stamp - self._arrived < _AWAITED_S
-        return is_patient and (_is_hidden(view) or self._is_narrowed(view))
+        return is_patient and (_is_hidden(view) or self._is_in_use(view))
 
-    def _is_narrowed(self, view: View) -> bool:
-        """Whether somebody stands in a way, and leaves the robot no room in it."""
+    def _is_in_use(self, view: View) -> bool:
+        """Whether somebody stands where it came for a look, or leaves it no room in a way."""
         map_local = self._mapper.map_in_local(view.local_base).inverse()
         aside = map_local.transform(view.passing)[:, None] - self._awaited
         return bool((np.hypot(*aside.T) < _BESIDE_M).any())

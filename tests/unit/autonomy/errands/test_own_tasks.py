@@ -179,6 +179,19 @@ def test_who_stands_in_a_narrow_way_is_waited_for_before_it(
     assert not any(isinstance(order, LookAround) for order in orders)
 
 
+@pytest.mark.parametrize(("body", "waits_s"), [([2.4, 0.3], 60.0), ([2.0, 1.5], 0.0)])
+def test_who_stands_in_what_may_be_missing_is_waited_for(body: list[float], waits_s: float) -> None:
+    """Edges may lead round him: when he has gone, it is to be seen that there is nothing."""
+    robot = Explorer([GAP], [])
+    robot.passing = np.array([body])
+    robot.until_it_moves_or_ends()
+    robot.drive(CLOSED, (0.0, 0.0), (2.0, 0.0))
+    came, robot.passing_until = robot.stamp, robot.stamp + 50.0
+    while robot.left:
+        robot.look(CLOSED)
+    assert robot.stamp - came == pytest.approx(waits_s, abs=1.5)
+
+
 def test_who_comes_to_where_somebody_has_gone_looks_round_for_what_he_hid() -> None:
     robot = Explorer([], [])
     robot.awaited, robot.doorsteps = np.array([[2.0, -0.7]]), np.array([GAP])
