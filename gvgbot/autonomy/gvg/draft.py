@@ -11,6 +11,7 @@ from gvgbot.autonomy.gvg.voronoi import FineGraph
 from gvgbot.geometry import Array
 
 _WIDE_M = 4.0  # from the walls
+_INTO_CORNER = 0.55  # of a metre, by which clearance falls in one: by 0.71 in a right corner
 
 
 @dataclass(slots=True, eq=False)
@@ -63,10 +64,14 @@ class Draft:
         return chain
 
     def drop_leaf(self, leaf: int, key: int, base: int) -> None:
-        """Take out a leaf and its chain to a base, which is as deep as what forked beyond it."""
-        deep = self.depth(base)
-        if leaf in self.beyond:
-            deep = max(deep, self.chains[key].length() + self.depth(leaf))
+        """Take out a leaf and its chain to a base, which is as deep as what forked beyond it.
+
+        What forks in a corner does not: there is something small in it.
+        """
+        length, deep = self.chains[key].length(), self.depth(base)
+        is_corner = self.clearance[base] - self.clearance[leaf] > _INTO_CORNER * length
+        if leaf in self.beyond and not is_corner:
+            deep = max(deep, length + self.depth(leaf))
         self.beyond[base] = deep
         self.remove(key)
         del self.ends[leaf]

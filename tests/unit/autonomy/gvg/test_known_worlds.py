@@ -210,6 +210,17 @@ def test_a_recess_is_as_deep_with_a_desk_in_its_corner(with_desk: bool) -> None:
         assert end == pytest.approx([0.0, -3.16 + 1.18], abs=NOISY)
 
 
+@pytest.mark.parametrize("with_box", [False, True])
+def test_a_box_in_its_corner_makes_a_recess_no_deeper(with_box: bool) -> None:
+    """It is hardly deeper than wide: no more than a wide place of the corridor."""
+    box = (-1.18, -2.45, -0.94, -2.21)
+    rooms = [(-6.0, -0.8, 6.0, 0.8), (-1.18, -2.45, 1.18, 0.8)]
+    world = carved(rooms, [box] if with_box else [])
+    gvg = seen(looked(world, line(-2.0, 0.0, 2.0, 0.0, 0.0)), (0.0, 0.0))
+    assert not any(tip[1] < -0.9 for tip in endpoints(gvg))
+    assert len(meetpoints(gvg)) == 0
+
+
 # -- doors ----------------------------------------------------------------------------------------
 
 
