@@ -214,9 +214,11 @@ class DrivenEdges:
     ) -> None:
         """Count that the robot found no vertex where the known way has one between its ends.
 
-        Seen from elsewhere, through glass, there was one; who drives there again and again knows.
+        Seen from elsewhere, through glass, there was one; who drives there again and again knows,
+        unless somebody stands there.
         """
-        if not self._leads_past(between, arrived) or between in known.node_of:
+        is_seen = between in known.node_of or self._may_be_elsewhere(view, between)
+        if is_seen or not self._leads_past(between, arrived):
             return
         self._missed[between] += 1
         if self._missed[between] >= _TIMES_MISSED:

@@ -17,6 +17,8 @@ from gvgbot.autonomy.virtual_walls import points_of
 from gvgbot.geometry import Array, Pose
 from gvgbot.hal.messages import Scan
 
+_NOBODY = np.empty((0, 2))
+
 
 class Sight:
     """Makes a view of the local map, and of what the laser does not see."""
@@ -53,6 +55,7 @@ class Sight:
         gvg, marks = self._mapper.marked(self._local_gvg(local_base, local_map), local_base)
         felt, newcomers = self.hazards.doubtful, self._traffic.newcomers
         may_go = np.concatenate([felt, local_map.suspects()])
+        passing = newcomers.passing(scan.stamp)
         return View(
             keyframe,
             scan.stamp,
@@ -64,7 +67,8 @@ class Sight:
             doubted=self._doubted(gvg, may_go, local_map.tree()),
             marks=marks,
             is_somebody_found=newcomers.is_one_standing(scan.stamp, local_map),
-            passing=newcomers.passing(scan.stamp),
+            passing=passing,
+            aside=passing if self._traffic.is_in_team else _NOBODY,
             may_be_robots=bool(self._traffic.strangers),
             field_of_view=scan.field_of_view,
             virtual_walls=self.hazards.virtual_walls,

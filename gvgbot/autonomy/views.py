@@ -32,6 +32,7 @@ class View:
     marks: dict[int, Vertex] = field(default_factory=dict)
     is_somebody_found: bool = False  # who will be let into the map if he stays
     passing: Array = field(default_factory=lambda: np.empty((0, 2)))  # bodies that may yet go
+    aside: Array = field(default_factory=lambda: np.empty((0, 2)))  # of these, who leads no edges
     may_be_robots: bool = False  # of a team: some of them are about, and nobody knows where
     field_of_view: tuple[float, float] = (-math.pi, math.pi)  # rad, base frame
     virtual_walls: Array = field(default_factory=lambda: np.empty((0, 2)))  # points (N, 2)
@@ -49,8 +50,9 @@ class View:
         return self._obstacles[0]
 
     def is_doubtful(self, place: Array, within_m: float) -> bool:
-        """Whether something that may go stands so near to a place (2,)."""
-        return bool((np.hypot(*(self.doubtful - place).T) < within_m).any())
+        """Whether something or somebody that may go stands so near to a place (2,)."""
+        may_go = np.concatenate([self.doubtful, self.aside])
+        return bool((np.hypot(*(may_go - place).T) < within_m).any())
 
     def is_somebody_within(self, metres: float) -> bool:
         """Whether a body that may yet go is so near to the robot."""

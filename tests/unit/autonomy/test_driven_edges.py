@@ -37,6 +37,8 @@ ALL_SEEN = {
     Branch(14, forward=True): HalfEdgeId(2, NORTH),
 }
 
+NOBODY = np.empty((0, 2))
+
 
 class Drive:
     """A robot that has left vertex 1 by an edge, and where that leads."""
@@ -52,7 +54,8 @@ class Drive:
             self.mapper.belief = ekf.add_vertex(belief, vertex, made.local, certain)
         self.where = Whereabouts(left, [np.zeros(2)])
         self.stamp = 0.0
-        self.somebody = np.empty((0, 2))  # where somebody stands
+        self.somebody = NOBODY  # where somebody stands
+        self.aside = NOBODY  # and where in a team
         self._driven = DrivenEdges(self.mapper)
 
     @property
@@ -75,7 +78,9 @@ class Drive:
         for x, y in resampled(list(corners)):
             base = Pose(float(x), float(y), 0.0)
             walls = LocalMap(LocalMapConfig())
-            view = View(0, self.stamp, 0.0, base, gvg, walls, doubtful=self.somebody)
+            view = View(
+                0, self.stamp, 0.0, base, gvg, walls, doubtful=self.somebody, aside=self.aside
+            )
             place = gvg.place(base.position)
             assert place is not None
             self._driven.learn(view, known, place, self.where)
@@ -373,6 +378,20 @@ def test_a_vertex_that_it_drives_past_again_and_again_is_none(*, established: bo
     if not established:
         (edge,) = graph.edges.values()
         assert {edge.a, edge.b} == {HalfEdgeId(1, EAST), HalfEdgeId(2, WEST)}
+
+
+@pytest.mark.parametrize("in_team", [False, True])
+def test_a_vertex_at_which_somebody_stands_is_not_driven_past(*, in_team: bool) -> None:
+    """He hides it; in a team he is nothing that edges lead round."""
+    drive = Drive(HalfEdgeId(1, EAST))
+    between = with_one_between(drive)
+    somebody = between.local.position[None] + [0.3, 0.5]
+    drive.aside, drive.somebody = (somebody, NOBODY) if in_team else (NOBODY, somebody)
+    beyond = {branch: end for branch, end in ALL_SEEN.items() if end.vertex == 2}
+    for _ in range(5):
+        drive.where = Whereabouts(HalfEdgeId(1, EAST), [np.zeros(2)])
+        drive.along(STREET, beyond, (0.5, 0.0), (6.0, 0.0))
+    assert 3 in drive.mapper.graph.vertices
 
 
 def has_driven_past(drive: Drive) -> Drive:
