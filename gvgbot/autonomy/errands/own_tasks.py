@@ -125,13 +125,13 @@ class OwnTasks:
 
         place = self._unseen.next(surveyed.places, metres_to, twice=self._has_met)
         reason = "something may be missing there"
-        if place is not None:
-            self._awaited = np.concatenate([surveyed.awaited, place[None]])
-        elif self._has_met:
+        if place is None and self._has_met:
             place = self._unseen.once_more(surveyed.doorsteps, metres_to)
             reason = "somebody may have stood there"
         if place is None:
             return None
+        if self._mission.choice.sharing is not None:  # bodies shape no edges there
+            self._awaited = np.concatenate([surveyed.awaited, place[None]])
         self._arrived = None
         decision = Decision(view.stamp, None, None, reason)
         return Task(ToPoint(*place.round(2).tolist()), decision)

@@ -179,11 +179,21 @@ def test_who_stands_in_a_narrow_way_is_waited_for_before_it(
     assert not any(isinstance(order, LookAround) for order in orders)
 
 
-@pytest.mark.parametrize(("body", "waits_s"), [([2.4, 0.3], 60.0), ([2.0, 1.5], 0.0)])
-def test_who_stands_in_what_may_be_missing_is_waited_for(body: list[float], waits_s: float) -> None:
-    """Edges may lead round him: when he has gone, it is to be seen that there is nothing."""
+@pytest.mark.parametrize(
+    ("body", "in_team", "waits_s"),
+    [([2.4, 0.3], True, 60.0), ([2.0, 1.5], True, 0.0), ([2.4, 0.3], False, 0.0)],
+)
+def test_a_team_waits_for_who_stands_in_what_may_be_missing(
+    body: list[float], waits_s: float, *, in_team: bool
+) -> None:
+    """Edges may lead round where he was: that nothing is there is to be seen when he has gone.
+
+    Alone, a robot has its map shaped by him, and waits for that.
+    """
     robot = Explorer([GAP], [])
     robot.passing = np.array([body])
+    if in_team:
+        robot.mission.choice.sharing = Last()
     robot.until_it_moves_or_ends()
     robot.drive(CLOSED, (0.0, 0.0), (2.0, 0.0))
     came, robot.passing_until = robot.stamp, robot.stamp + 50.0
