@@ -15,12 +15,12 @@ from benchmarks.rigs.programs import gvgbot, until
 from gvgbot import client
 from gvgbot.client import State
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(240)]
 
 PATIENCE = 60.0  # s, for a busy machine
 WATCHERS = 10
 KOBUKI_HZ = 50.0  # of its feedback, and so of the control loop
-WINDOW = 150  # cycles over which the rate is taken
+WINDOW = 50  # cycles over which the rate is taken
 
 
 @contextmanager
