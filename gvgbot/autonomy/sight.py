@@ -97,7 +97,8 @@ class Sight:
         lead the GVG nowhere, but hide how it goes on. Nobody does that from behind a wall.
         """
         newcomers = self._traffic.newcomers
-        hiding = np.concatenate([newcomers.lost, newcomers.points])
         ends = frozenset(key for key, node in gvg.nodes.items() if node.degree == 1)
-        at_ends = touching(gvg, hiding, walls) & ends
-        return touching(gvg, may_go) | touching(gvg, self._traffic.standing, walls) | at_ends
+        by_bodies = touching(gvg, newcomers.points, walls)
+        if self._traffic.is_in_team:
+            by_bodies &= ends
+        return touching(gvg, may_go) | by_bodies | (touching(gvg, newcomers.lost, walls) & ends)

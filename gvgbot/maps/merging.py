@@ -126,12 +126,7 @@ def _refuted(graph: RouteGraph, paired: set[int], other: RouteGraph) -> set[int]
 
 def _is_inside(vertex: RouteNode, edge: RouteEdge) -> bool:
     """Whether a vertex lies on an edge that was driven, away from its ends."""
-    line = edge.polyline
-    away = np.hypot(*(line - vertex.position).T)
-    along = stations_of(line)
-    i = int(np.argmin(away))
-    from_ends = min(float(along[i]), float(along[-1] - along[i]))
-    return edge.traversals > 0 and away[i] < _BESIDE_M and from_ends > _FROM_ENDS_M
+    return edge.traversals > 0 and _cut_at(edge, vertex, _BESIDE_M) is not None
 
 
 def _without(graph: RouteGraph, wrong: set[int]) -> RouteGraph:
@@ -283,13 +278,13 @@ def _split(edges: Iterable[RouteEdge], vertices: list[RouteNode]) -> Iterable[Ro
         yield _piece(edge, start, edge.end, first, len(edge.polyline) - 1)
 
 
-def _cut_at(edge: RouteEdge, vertex: RouteNode) -> int | None:
+def _cut_at(edge: RouteEdge, vertex: RouteNode, within_m: float = _ON_EDGE_M) -> int | None:
     """The point of an edge's line at which a vertex that its map does not know lies on it."""
     along = stations_of(edge.polyline)
     away = np.hypot(*(edge.polyline - vertex.position).T)
     i = int(np.argmin(away))
     is_inside = _FROM_ENDS_M < along[i] < along[-1] - _FROM_ENDS_M
-    return i if away[i] < _ON_EDGE_M and is_inside else None
+    return i if away[i] < within_m and is_inside else None
 
 
 def _piece(edge: RouteEdge, start: int, end: int, first: int, last: int) -> RouteEdge:
