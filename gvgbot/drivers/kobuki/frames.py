@@ -63,7 +63,7 @@ class FrameParser:
         while (end := _frame_end(buffer, start)) is not None:
             if end == start:  # no frame has such a length: a false header
                 start = self._seek(buffer, start, skip=1)
-            elif checksum(buffer[start + 2 : end]):
+            elif checksum(buffer[start + 2 : end - 1]) != buffer[end - 1]:
                 self.bad_frames += 1
                 found.append(BadFrame(buffer[start:end]))
                 start = self._seek(buffer, start, skip=1)

@@ -4,10 +4,17 @@ from functools import reduce
 from operator import xor
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
-from gvgbot.drivers.kobuki.frames import BadFrame, Frame, FrameParser, checksum, encode_frame
+from gvgbot.drivers.kobuki.frames import (
+    MAX_PAYLOAD,
+    BadFrame,
+    Frame,
+    FrameParser,
+    checksum,
+    encode_frame,
+)
 
 payloads = st.binary(min_size=3, max_size=255)
 STOP = bytes.fromhex("aa 55 06 01 04 00 00 00 00 03")
@@ -19,6 +26,7 @@ def test_the_checksum_is_the_xor_of_all_bytes(data: bytes) -> None:
 
 
 @given(payloads)
+@example(bytes(MAX_PAYLOAD))
 def test_a_frame_reads_back_as_its_payload(payload: bytes) -> None:
     assert FrameParser().feed(encode_frame(payload)) == [Frame(payload)]
 
