@@ -10,7 +10,7 @@ import numpy as np
 from gvgbot.drivers.fault_schedule import FaultSchedule
 from gvgbot.drivers.hokuyo.scip_messages import SCAN_DATA
 from gvgbot.drivers.hokuyo.twin_answers import Answers, LaserOn, Standby, Streaming, status_reply
-from gvgbot.drivers.hokuyo.twin_commands import CommandReader
+from gvgbot.drivers.hokuyo.twin_commands import CommandReader, repeated
 from gvgbot.drivers.hokuyo.twin_config import HokuyoTwinConfig, LaserMishap, LaserMishapConfig
 from gvgbot.drivers.hokuyo.twin_head import Head
 from gvgbot.drivers.hokuyo.twin_settings import BROKEN
@@ -20,6 +20,7 @@ from gvgbot.geometry import Array
 __all__ = ["HokuyoTwin", "HokuyoTwinConfig", "LaserMishapConfig"]
 
 UNSTABLE = "0M"
+REPEATED = "0B"
 
 
 class HokuyoTwin:
@@ -139,14 +140,22 @@ class HokuyoTwin:
             self._plug(True)
         if self._heard_early:
             early, self._heard_early = self._heard_early, b""
-            self._listen(early, now)
+            for text in self._reader.feed(early):
+                self._serve(text, now)
 
     def _listen(self, data: bytes, now: float) -> None:
-        for text in self._reader.feed(data):
-            due = self._answer_due(now)
-            self._line.put(self._answers.answer(text, now), due)
-            if not isinstance(self._answers.phase, Streaming):
-                self._newest = None
+        texts = self._reader.feed(data)
+        for text, is_repeated in zip(texts, repeated(texts), strict=True):
+            if is_repeated:
+                self._line.put(status_reply(text, REPEATED), self._answer_due(now))
+            else:
+                self._serve(text, now)
+
+    def _serve(self, text: str, now: float) -> None:
+        due = self._answer_due(now)
+        self._line.put(self._answers.answer(text, now), due)
+        if not isinstance(self._answers.phase, Streaming):
+            self._newest = None
 
     def _answer_due(self, now: float) -> float:
         measures = isinstance(self._answers.phase, Streaming | LaserOn)

@@ -31,6 +31,15 @@ class CommandReader:
         return [line.decode("latin-1") for line in lines if line]
 
 
+def repeated(texts: list[str]) -> list[bool]:
+    """Which of the commands that came in one go are refused: of each type the first is served.
+
+    Whoever wants a reboot has to say so twice.
+    """
+    types = [text[: 3 if text[:1] in "%$T" else 2] for text in texts]
+    return [kind != "RB" and kind in types[:place] for place, kind in enumerate(types)]
+
+
 def string_fault(string: str) -> str | None:
     """The status that refuses this user string; None if it is good."""
     if len(string) > STRING_LIMIT:

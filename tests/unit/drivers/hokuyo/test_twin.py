@@ -275,6 +275,14 @@ def test_a_reboot_needs_two_commands_within_a_second() -> None:
     assert slow.receive(b"RB\n", 0.0) == slow.receive(b"RB\n", 1.5) == b"RB\n01Q\n\n"
 
 
+def test_of_two_commands_of_a_type_in_one_go_the_first_is_served() -> None:
+    twin = laser()
+    sent = b"VV;a\nQT\nVV;b\nTM0\nTM1\nTM2\nQT\n"
+    statuses = [answer.split(b"\n")[1] for answer in twin.receive(sent, 0.0).split(b"\n\n")[:-1]]
+    assert statuses == [b"00P", b"00P", b"0Bb", b"00P", b"00P", b"00P", b"0Bb"]
+    assert status(twin, "QT", 0.1) == "00"
+
+
 def test_a_reboot_is_told_to_the_link() -> None:
     told: list[bool] = []
     twin = HokuyoTwin(HokuyoTwinConfig(reboot_s=2.0), lambda *_: RANGES, 0, told.append)
