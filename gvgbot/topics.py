@@ -215,7 +215,7 @@ class Scan(msgspec.Struct, frozen=True, kw_only=True):
     time_increment: float  # s from one beam to the next
     angle_min: float  # rad
     angle_increment: float  # rad
-    range_max: float  # m
+    range_max: float  # m; what reflects well may be seen from farther off
     base_laser: tuple[float, float, float]  # the laser on the robot: x, y, theta
     map_base: tuple[float, float, float] | None  # at the middle of the sweep; None if not known
     ranges: bytes  # little-endian uint16, mm; 0: nothing trusted, 65535: nothing within range

@@ -25,6 +25,8 @@ class Scan:
     `ranges` (N,) in metres, read-only; NaN = nothing trusted, inf = nothing within range.
     Beam i points to `angle_min + i * angle_increment` (rad) in the laser frame, anticlockwise.
     `stamp` is the time of the first beam (s, monotonic); beam i is `i * time_increment` later.
+    Where nothing is within range, all is free up to `range_max` (m); what reflects well may be seen
+    from farther off.
     """
 
     stamp: float

@@ -18,6 +18,9 @@ from gvgbot.hal.messages import Scan
 class ScanGeometry:
     """What is the same in every scan of a stream: frames, limits (mm) and times (s).
 
+    A reading up to `longest_mm` is a range. Where nothing is hit, the way is free for `free_mm`, as
+    the maker guarantees: only what reflects well is seen from farther off.
+
     Beams count anticlockwise seen from above. A laser that hangs upside down turns the other way:
     its first beam is its last step, and `time_increment` is negative.
     """
@@ -29,6 +32,7 @@ class ScanGeometry:
     first_beam_delay: float  # step 0 to the first beam
     shortest_mm: int
     longest_mm: int
+    free_mm: int
     nothing_code: int | None
     is_reversed: bool = False
     group: int = 1  # steps per beam
@@ -41,7 +45,7 @@ class ScanGeometry:
             angle_min=self.angle_min,
             angle_increment=self.angle_increment,
             range_min=self.shortest_mm / 1000.0,
-            range_max=self.longest_mm / 1000.0,
+            range_max=self.free_mm / 1000.0,
             time_increment=self.time_increment,
             base_laser=self.base_laser,
         )
@@ -79,11 +83,10 @@ def scan_geometry(
 
     Old firmware of a listed model may reach less far than its maker says today.
     """
-    usable_mm = parameters.range_max_mm
-    if (model := find_model(parameters.model)) is not None:
-        usable_mm = min(usable_mm, model.usable_mm)
+    longest_mm = min(parameters.range_max_mm, round(config.max_range_m * 1000))
     if request.width == 2:
-        usable_mm = min(usable_mm, LONGEST_IN_TWO_CHARACTERS)
+        longest_mm = min(longest_mm, LONGEST_IN_TWO_CHARACTERS)
+    model = find_model(parameters.model)
     lowest = request.start + (request.group - 1) / 2
     highest = lowest + (request.values - 1) * request.group
     first = highest if config.upside_down else lowest
@@ -95,7 +98,8 @@ def scan_geometry(
         time_increment=sign * request.group * parameters.step_time,
         first_beam_delay=first * parameters.step_time,
         shortest_mm=max(parameters.range_min_mm, round(config.min_range_m * 1000)),
-        longest_mm=min(usable_mm, round(config.max_range_m * 1000)),
+        longest_mm=longest_mm,
+        free_mm=longest_mm if model is None else min(longest_mm, model.usable_mm),
         nothing_code=nothing_code(parameters),
         is_reversed=config.upside_down,
         group=request.group,

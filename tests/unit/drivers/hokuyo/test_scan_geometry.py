@@ -99,6 +99,12 @@ def ranges_of(parameters: Parameters, readings: list[int], **config: Any) -> Arr
             id="UTM-30LX",
         ),
         pytest.param(
+            MODELS["UST-10LX"].parameters,
+            [0, 19, 20, 10000, 10001, 29999, 30000, 65533],
+            [math.nan] * 2 + [0.02, 10.0, 10.001, 29.999, 30.0, math.inf],
+            id="a UST-10LX, which is sure of 10 m and tells of up to 30",
+        ),
+        pytest.param(
             replace(MODELS["URG-04LX"].parameters, model="URG-04LX[Classic](Hokuyo)"),
             [0, 1, 19, 20],
             [math.inf] + [math.nan] * 2 + [0.02],
@@ -139,6 +145,8 @@ def test_codes_and_ranges_are_told_apart(
 def test_nothing_hit_means_free_no_farther_than_the_laser_itself_reaches() -> None:
     parameters = replace(MODELS["URG-04LX"].parameters, range_max_mm=4095)
     assert scan_of(parameters, [0], HokuyoConfig()).range_max == 4.095
+    surely = scan_of(MODELS["UST-10LX"].parameters, [65533, 12000], HokuyoConfig())
+    assert surely.range_max == 10.0  # though it sees something farther off
 
 
 def test_configured_limits_narrow_those_of_the_laser() -> None:
