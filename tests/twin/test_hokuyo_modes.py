@@ -82,14 +82,18 @@ def test_intensities_come_with_the_ranges_where_they_are_wanted(*, upside_down: 
     on_bench(twin_of(truth), scenario, HokuyoConfig(intensities=True, upside_down=upside_down))
 
 
-def test_a_laser_without_multi_echo_is_asked_for_simple_scans() -> None:
+@pytest.mark.parametrize(("intensities", "command"), [(False, "MD"), (True, "ME")])
+def test_a_laser_without_multi_echo_is_asked_for_simple_scans(
+    *, intensities: bool, command: str
+) -> None:
     async def scenario(bench: Bench) -> None:
         await bench.scans(2)
         assert bench.laser.mode is not None
-        assert bench.laser.mode.request.command == "MD"
+        assert bench.laser.mode.request.command == command
         assert "does not know" in (bench.laser.mode.adapted or "")
+        assert (bench.laser.intensities is not None) == intensities
 
-    config = HokuyoConfig(echo="strongest")
+    config = HokuyoConfig(echo="strongest", intensities=intensities)
     on_bench(twin_of(np.full(1081, 3.0)), scenario, config)
 
 

@@ -2,6 +2,7 @@
 
 import asyncio
 import math
+from collections import deque
 from typing import Any
 
 import pytest
@@ -122,6 +123,60 @@ def test_an_abnormal_laser_is_rebooted_once() -> None:
         assert bench.laser.link.reboots == 1
 
     on_bench(twin_of(starts_abnormal=True), scenario)
+
+
+def test_a_laser_that_declines_to_stop_what_it_does_not_do_is_opened() -> None:
+    async def scenario(bench: Bench) -> None:
+        await opens_within(bench, 1.0)
+
+    on_bench(Scripted({b"QT\n": b"QT\n10Q\n\n"}, twin_of()), scenario)
+
+
+def test_a_laser_whose_motor_gains_speed_is_asked_again() -> None:
+    class SpinsUp(Scripted):
+        def answer(self, command: bytes, now: float) -> bytes:
+            if command.startswith(b"MD") and now < 3.0:
+                return command + b"0Mm\n\n"
+            return super().answer(command, now)
+
+    async def scenario(bench: Bench) -> None:
+        await opens_within(bench, 3.7)
+
+    on_bench(SpinsUp({}, twin_of()), scenario)
+
+
+def test_a_laser_whose_motor_stays_slow_is_refused() -> None:
+    slow = Scripted({b"MD0000108001300\n": b"MD0000108001300\n0Mm\n\n"}, twin_of())
+    assert ends(slow, DeviceRefused, "check its power", opening_patience_s=2.0) < 3.2
+
+
+class Slow(Scripted):
+    """A laser that takes its time to answer, but not to send scans."""
+
+    def __init__(self, twin: HokuyoTwin, seconds: float) -> None:
+        super().__init__({}, twin)
+        self.seconds, self.answers = seconds, deque[tuple[float, bytes]]()
+
+    def receive(self, data: bytes, now: float) -> bytes:
+        self.answers.append((now + self.seconds, super().receive(data, now)))
+        return b""
+
+    def advance(self, now: float) -> bytes:
+        sent = super().advance(now)
+        while self.answers and self.answers[0][0] <= now:
+            sent = self.answers.popleft()[1] + sent
+        return sent
+
+    def next_due(self) -> float:
+        return min(super().next_due(), self.answers[0][0] if self.answers else math.inf)
+
+
+def test_a_laser_that_takes_nine_tenths_of_a_second_to_answer_is_opened() -> None:
+    async def scenario(bench: Bench) -> None:
+        await bench.scans(30)
+        assert (bench.laser.link.restarts, bench.laser.link.refused_scans) == (0, 0)
+
+    on_bench(Slow(twin_of(), 0.9), scenario)
 
 
 def test_a_laser_that_stays_abnormal_is_refused() -> None:

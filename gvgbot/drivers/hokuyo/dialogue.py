@@ -43,6 +43,7 @@ class Dialogue:
         self.clock = clock
         self.stream = stream
         self.timeout = reply_timeout
+        self.patience = ASK_ATTEMPTS * reply_timeout
         self.received = 0  # bytes, of a laser or of whatever is there
         self.answered = 0.0  # when the first byte of the last reply arrived, s
         self._parser = ScipParser()

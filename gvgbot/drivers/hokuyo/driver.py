@@ -16,7 +16,7 @@ from gvgbot.drivers.hokuyo.config import HokuyoConfig
 from gvgbot.drivers.hokuyo.dialogue import Arrival, Dialogue, Refusal, Silence
 from gvgbot.drivers.hokuyo.models import Identity, Parameters
 from gvgbot.drivers.hokuyo.modes import Mode, choose_mode, link_rate
-from gvgbot.drivers.hokuyo.opening import ABNORMAL, quiet, reboot, tune
+from gvgbot.drivers.hokuyo.opening import ABNORMAL, DENIED, quiet, reboot, tune
 from gvgbot.drivers.hokuyo.scan_geometry import (
     ScanGeometry,
     arrival_delay,
@@ -24,9 +24,16 @@ from gvgbot.drivers.hokuyo.scan_geometry import (
     scan_geometry,
 )
 from gvgbot.drivers.hokuyo.scip_codec import Values
-from gvgbot.drivers.hokuyo.scip_messages import BadReply, Message, Reply, ScanReply, ScanRequest
+from gvgbot.drivers.hokuyo.scip_messages import (
+    ACCEPTED,
+    BadReply,
+    Message,
+    Reply,
+    ScanReply,
+    ScanRequest,
+)
 from gvgbot.drivers.hokuyo.statistics import LinkStatistics
-from gvgbot.drivers.hokuyo.time_mode import DENIED, synchronise
+from gvgbot.drivers.hokuyo.time_mode import synchronise
 from gvgbot.drivers.transport import ByteStream
 from gvgbot.errors import DeviceLost, DeviceRefused
 from gvgbot.hal.cover import Cover
@@ -53,6 +60,7 @@ CHECK_CABLE = "try another cable or port, away from motors"
 FEWEST_BEAMS = 100  # of a scan; with fewer the place is lost
 FINER = "lower laser.cluster, or widen laser.first_angle_deg and laser.last_angle_deg"
 FASTER = "raise robot.limits.max_scan_age_s, laser.rate_hz or laser.baud, or lower laser.skip"
+SPINS_UP = 0.5  # s until a laser whose motor does not turn as it must is asked again
 LONGEST_WITHOUT_SCAN = 5.0  # s, for a motor to reach its speed or a laser to check itself
 MOST_DOUBLINGS = 3  # of that: a laser that needed longer must not be reset for ever
 SIMPLER = {"NE": "ND", "ND": "MD", "ME": "MD"}  # what to ask for when a command is unknown
@@ -195,7 +203,7 @@ class HokuyoLaser:
                 await self._stream_until_silence(stream)
                 before = stream.clock_map
                 self.link.restarts += 1
-                await quiet(self._dialogue, patience=2 * self._config.reply_timeout_s)
+                await quiet(self._dialogue, patience=self._dialogue.patience)
         except Refusal as refusal:
             remedy = REMEDIES.get(refusal.status, OFF_AND_ON)
             raise DeviceRefused(f"{refusal}: {remedy}") from refusal
@@ -247,18 +255,25 @@ class HokuyoLaser:
         """Start the scans, simpler ones if the laser does not know those that were asked for."""
         assert self._mode is not None
         self._is_switched_on = False
+        until = self._dialogue.clock.now() + self._config.opening_patience_s
         while True:
             request = self._mode.request
             try:
                 await self._dialogue.ask(request.text())
             except Refusal as refusal:
-                await self._give_way(refusal, request)
+                await self._give_way(refusal, request, until)
             else:
                 return self._stream(request, parameters)
 
-    async def _give_way(self, refusal: Refusal, request: ScanRequest) -> None:
-        """Ask for less, reboot the laser or switch it on. Raises the refusal if nothing helps."""
+    async def _give_way(self, refusal: Refusal, request: ScanRequest, until: float) -> None:
+        """Ask for less, reboot the laser, switch it on or wait until then (s) for its motor.
+
+        Raises the refusal if nothing helps.
+        """
+        clock = self._dialogue.clock
         simpler = SIMPLER.get(request.command)
+        if request.command == "NE" and self._config.intensities:
+            simpler = "ME"  # whoever knows no NE knows no ND either
         if refusal.status == ABNORMAL and self.link.reboots == self._reboots_before:
             await reboot(self._dialogue)
             await quiet(self._dialogue, patience=self._config.opening_patience_s)
@@ -270,6 +285,8 @@ class HokuyoLaser:
             self._is_switched_on = True  # as a rule, asking for scans is enough
             with contextlib.suppress(Refusal):
                 await self._dialogue.ask("BM")
+        elif refusal.status == UNSTABLE and clock.now() < until:
+            await clock.sleep_until(clock.now() + SPINS_UP)
         else:
             raise refusal
 
@@ -325,7 +342,7 @@ class HokuyoLaser:
         match message:
             case ScanReply(request=stream.request):
                 return self._timed_scan(message, arrival, stream)
-            case Reply(echo=echo, status=status) if echo == stream.request.text():
+            case Reply(echo, status) if echo == stream.request.text() and status != ACCEPTED:
                 self._no_scan(status, stream)
             case BadReply():  # counted as it was heard
                 stream.note_damage()

@@ -5,14 +5,14 @@ from typing import Protocol, runtime_checkable
 
 import structlog
 
-from gvgbot.drivers.hokuyo.dialogue import Dialogue
+from gvgbot.drivers.hokuyo.dialogue import ASK_ATTEMPTS, Dialogue
 from gvgbot.drivers.hokuyo.scip_messages import ACCEPTED
 from gvgbot.errors import DeviceLost, DeviceRefused
 
 BIT_RATES = (19200, 115200, 57600, 38400, 250000, 500000, 750000)  # bit/s, likely ones first
-TRIES_AT_A_RATE = 2
 SCIP_1 = "E"  # what a laser that still speaks SCIP 1.1 answers
 ABNORMAL = "0L"
+DENIED = "10"  # in this state
 UPDATING = "0I"  # waits for firmware; a reset ends it
 MAX_REFUSALS = 3
 REBOOT_TAKES = 1.0  # s from the second RB until the link drops
@@ -45,6 +45,8 @@ async def quiet(dialogue: Dialogue, *, patience: float) -> None:
             raise DeviceLost(_no_answer(is_silent=dialogue.received == received))
         if status is not None:
             refusals += 1
+            if status == DENIED and refusals > MAX_REFUSALS:
+                return  # there is nothing to stop, says newer firmware
             await _cure(dialogue, status, refusals)
 
 
@@ -114,7 +116,7 @@ async def _tuned(dialogue: Dialogue, wanted: int, patience: float) -> int:
     # On USB a rate means nothing: a laser that was silent for a while is found at any.
     if found == wanted or await _rests_at(dialogue, stream, wanted, 1):
         return wanted
-    await _rests_at(dialogue, stream, found, TRIES_AT_A_RATE)
+    await _rests_at(dialogue, stream, found, ASK_ATTEMPTS)
     return await _set_rate(dialogue, stream, found, wanted)
 
 
@@ -129,7 +131,7 @@ async def _search(dialogue: Dialogue, stream: Tunable, wanted: int, patience: fl
 
 
 def _rates(wanted: int) -> Iterator[tuple[int, int]]:
-    yield wanted, TRIES_AT_A_RATE
+    yield wanted, ASK_ATTEMPTS
     yield from ((baud, 1) for baud in BIT_RATES if baud != wanted)
 
 
@@ -161,7 +163,7 @@ async def _set_rate(dialogue: Dialogue, stream: Tunable, found: int, wanted: int
         log.warning("laser keeps its bit rate", baud=found, wanted=wanted)
         return found
     stream.set_baud(wanted)
-    await quiet(dialogue, patience=2 * dialogue.timeout)  # it changes after its reply
+    await quiet(dialogue, patience=dialogue.patience)  # it changes after its reply
     log.info("laser changed its bit rate", before=found, baud=wanted)
     return wanted
 

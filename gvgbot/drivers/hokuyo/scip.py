@@ -38,6 +38,7 @@ MESSAGE_LIMIT = 65536  # bytes; the largest multi-echo frame takes a third of it
 
 _END = re.compile(re.escape(END))  # a regular expression finds it sooner than `find` does
 _KEY_COMMANDS = frozenset({"VV", "PP", "II"})
+_STATUS = re.compile(rb"[0-9A-Z]{1,2}")
 _STAMP_CHARACTERS = frozenset({4, 11})
 _ECHO = re.compile(rf"(?:[%$]?[A-Z]{{2}}|SCIP)[0-9.]*(?:;{USER_STRING})?".encode())
 # A message that begins inside a damaged one: a scan anywhere, a short reply on a line of its own.
@@ -124,7 +125,7 @@ def _parse_or_recover(message: bytes) -> list[Message]:
 def _status(line: bytes) -> str:
     # Before SCIP 2 a status is one character without checksum.
     status = line if len(line) == 1 else checked(line)
-    if not status.isalnum() or len(status) > 2:
+    if not _STATUS.fullmatch(status):
         raise DamagedError("status")
     return status.decode("ascii")
 

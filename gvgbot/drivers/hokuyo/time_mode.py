@@ -5,14 +5,13 @@ import structlog
 from gvgbot.drivers.hokuyo import clock_sync
 from gvgbot.drivers.hokuyo.clock_sync import Synchronisation, TimeSample
 from gvgbot.drivers.hokuyo.dialogue import Dialogue, Refusal, Silence
-from gvgbot.drivers.hokuyo.opening import quiet
+from gvgbot.drivers.hokuyo.opening import DENIED, quiet
 from gvgbot.drivers.hokuyo.scip import decode_time
 from gvgbot.drivers.hokuyo.scip_codec import DamagedError
 
 SAMPLES = 12  # of the laser's clock
 CONVERTER_BEAT = 0.016  # s; a serial converter's usual latency timer
 GOLDEN = 0.618034  # its multiples spread evenly over a beat
-DENIED = "10"  # in this state; of TM0: the laser still measures
 ALREADY_ON = "02"  # what a laser says to TM0 when its reply to an earlier one was lost
 LOST_STOPS = 3  # in a row; a stop that comes as a scan begins can be lost
 
@@ -40,7 +39,11 @@ async def _sample(dialogue: Dialogue, samples: list[TimeSample]) -> None:
     """Raises Refusal, DamagedError or Silence; the samples until then count."""
     await _enter(dialogue)
     while len(samples) < SAMPLES:
-        samples.append(await _time_sample(dialogue))
+        unanswered = dialogue.link.unanswered
+        sample = await _time_sample(dialogue)
+        if dialogue.link.unanswered > unanswered:
+            return  # what answers now may answer an earlier question
+        samples.append(sample)
         await _pause(dialogue, len(samples))
 
 
@@ -52,9 +55,9 @@ async def _enter(dialogue: Dialogue) -> None:
         except Refusal as refusal:
             if refusal.status == ALREADY_ON:
                 return
-            if refusal.status != DENIED:
+            if refusal.status != DENIED:  # as long as the laser measures
                 raise
-            await quiet(dialogue, patience=2 * dialogue.timeout)
+            await quiet(dialogue, patience=dialogue.patience)
         else:
             return
     raise Refusal("TM0", DENIED)
@@ -64,7 +67,7 @@ async def _leave(dialogue: Dialogue) -> None:
     """A laser that does not answer that has to come to rest. Raises DeviceLost if it cannot."""
     dialogue.send("TM2")
     if await dialogue.reply_to("TM2") is None:
-        await quiet(dialogue, patience=2 * dialogue.timeout)
+        await quiet(dialogue, patience=dialogue.patience)
 
 
 async def _time_sample(dialogue: Dialogue) -> TimeSample:

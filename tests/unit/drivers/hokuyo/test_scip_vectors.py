@@ -1,6 +1,7 @@
 """The example messages of SCIP 2, read and written."""
 
 import json
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -95,6 +96,16 @@ def test_a_number_reads_and_writes_as_specified(data: bytes, expect: dict[str, i
 def test_a_status_line_reads_and_writes_as_specified(data: bytes, expect: dict[str, str]) -> None:
     assert checked(data) == expect["status"].encode()
     assert with_checksum(expect["status"].encode()) == data
+
+
+@pytest.mark.parametrize("data", [each.values[0] for each in named("status")])
+def test_a_flipped_bit_makes_no_other_status(data: bytes) -> None:
+    """Bits 6 and 7 do not count in the sum."""
+    for place, bit in product(range(len(data)), range(8)):
+        flipped = bytearray(data)
+        flipped[place] ^= 1 << bit
+        messages = ScipParser().feed(b"QT\n" + flipped + b"\n\n")
+        assert not any(isinstance(message, Reply) for message in messages)
 
 
 @pytest.mark.parametrize(("data", "expect"), named("reply", scan=False))
