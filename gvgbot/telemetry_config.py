@@ -9,7 +9,8 @@ from gvgbot.ranges import Range
 from gvgbot.requests import RequestName
 
 LAST_PORT = 65535
-_HAVE_PORTS = ("tcp", "udp", "tls", "quic", "ws")
+_HAVE_PORTS = frozenset({"tcp", "udp", "tls", "quic", "ws"})
+_PROTOCOLS = _HAVE_PORTS | {"unixsock-stream"}  # that zenoh's package has been built with
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,9 +47,9 @@ def check_endpoints(key: str, endpoints: tuple[str, ...]) -> None:
 
 
 def is_endpoint(text: str) -> bool:
-    """Whether the text has the form of an address: protocol/address, or protocol/host:port."""
+    """Whether the text is an address: a protocol that zenoh has/address, or protocol/host:port."""
     protocol, _, address = text.partition("/")
-    if not protocol or not address or "/" in address:
+    if protocol not in _PROTOCOLS or not address.isprintable() or not address or "/" in address:
         return False
     host, _, port = re.split("[?#]", address)[0].rpartition(":")
     has_port = host != "" and re.fullmatch("[0-9]{1,5}", port) and int(port) <= LAST_PORT

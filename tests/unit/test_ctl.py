@@ -86,7 +86,13 @@ def test_a_point_can_have_negative_coordinates(capsys: pytest.CaptureFixture[str
     assert "cannot read no such file" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("address", ["127.0.0.1:7447", "tcp/127.0.0.1", "tcp/127.0.0.1:74470"])
+@pytest.mark.parametrize(
+    "address",
+    [
+        *("127.0.0.1:7447", "tcp/127.0.0.1", "tcp/127.0.0.1:74470", "tpc/127.0.0.1:7447"),
+        "tcp/\udcff:7447",  # a byte that is no UTF-8
+    ],
+)
 def test_what_is_no_address_with_a_port_is_bad_usage(
     address: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
