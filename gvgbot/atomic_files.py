@@ -18,13 +18,16 @@ def write_files(directory: Path, contents: Mapping[str, bytes | str]) -> None:
     aside = {directory / name: _aside(directory / name) for name in contents}
     try:
         for path, content in zip(aside.values(), contents.values(), strict=True):
-            _write_through(path, content.encode() if isinstance(content, str) else content)
+            _write_through(path, _encoded(content) if isinstance(content, str) else content)
         for path, temporary in aside.items():
             temporary.replace(path)
         sync_directory(directory)
     except OSError as error:
         names = ", ".join(contents)
-        raise GvgbotError(f"cannot write {names} to {directory}: {error.strerror}") from error
+        remedy = "; make room" if is_disk_full(error) else ""
+        raise GvgbotError(
+            f"cannot write {names} to {directory}: {error.strerror}{remedy}"
+        ) from error
     finally:
         for temporary in aside.values():
             _remove(temporary)
@@ -63,6 +66,11 @@ def sync_directory(path: Path) -> None:
             os.fsync(directory)
         finally:
             os.close(directory)
+
+
+def _encoded(text: str) -> bytes:
+    """In UTF-8; a byte of a file's name that is none is spelt as JSON does it."""
+    return text.encode(errors="backslashreplace")
 
 
 def _aside(path: Path) -> Path:

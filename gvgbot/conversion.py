@@ -152,9 +152,7 @@ def _record(kind: Any, value: Any, path: KeyPath, problems: list[Problem]) -> An
         return None
     before = len(problems)
     fields = {field.name: field for field in dataclasses.fields(kind) if field.init}
-    problems += [
-        _unknown(key, value[key], path, kind, list(fields)) for key in value if key not in fields
-    ]
+    problems += _unknown(value, path, kind, list(fields))
     problems += [
         Problem((*path, name), None, "is missing", missing=True)
         for name, field in fields.items()
@@ -178,13 +176,18 @@ def _is_required(field: "dataclasses.Field[Any]") -> bool:
     return field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
 
 
-def _unknown(key: Any, value: Any, path: KeyPath, kind: Any, names: list[str]) -> Problem:
-    """The mistake of a key that does not exist, with those that do and may be meant."""
-    near = nearest(str(key), names)
-    inside = list(_places(kind, str(key))) or ([] if near is None else [near])
-    meant = " or ".join(".".join((*path, one)) for one in inside)
-    hint = f"did you mean {meant}?" if meant else f"here are {', '.join(names)}"
-    return Problem((*path, str(key)), value, f"no such key; {hint}")
+def _unknown(
+    value: Mapping[Any, Any], path: KeyPath, kind: Any, names: list[str]
+) -> Iterator[Problem]:
+    """The mistakes of keys that do not exist, with those that do and may be meant."""
+    hint = f"; here are {', '.join(names)}"
+    for key in (key for key in value if key not in names):
+        near = nearest(str(key), names)
+        inside = list(_places(kind, str(key))) or ([] if near is None else [near])
+        meant = " or ".join(".".join((*path, one)) for one in inside)
+        help_ = f"; did you mean {meant}?" if meant else hint
+        hint = hint if meant else ""  # once is enough
+        yield Problem((*path, str(key)), value[key], f"no such key{help_}")
 
 
 def _places(kind: Any, name: str) -> Iterator[str]:

@@ -1,6 +1,7 @@
 """`gvgbot explore`."""
 
 import argparse
+import json
 
 from gvgbot.cli.arguments import Commands, add_overrides, number, path, say, seed
 
@@ -91,6 +92,5 @@ def _overrides(options: argparse.Namespace) -> list[str]:
 
 
 def _quoted(text: str) -> str:
-    """The text as a YAML string, so that a world named 7 stays a name."""
-    escaped = text.replace("'", "''")
-    return f"'{escaped}'"
+    """The text as a YAML string: a world named 7 stays a name, and any file's name can be told."""
+    return json.dumps(text)

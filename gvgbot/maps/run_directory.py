@@ -118,13 +118,13 @@ class RunDirectory:
 
     @contextlib.contextmanager
     def emptied_by_failure(self) -> Iterator[None]:
-        """Remove what was written if an error ends the work on it, and nothing else."""
+        """Remove what was written if an error or Ctrl-C ends the work on it, and nothing else."""
         before = set(self.path.iterdir())
         if not self._events.tell():
             before.discard(self.path / EVENTS)
         try:
             yield
-        except Exception:
+        except BaseException:
             self.close()
             with contextlib.suppress(OSError):  # the first error is the one to tell
                 for path in set(self.path.iterdir()) - before:

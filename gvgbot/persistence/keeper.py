@@ -332,7 +332,7 @@ class Keeper:
         """Say once that nothing can be written, and once that it can again."""
         path = str(self._session.directory.path)
         if trouble is not None and self.trouble is None:
-            log.warning("mission not kept, exploring on", reason=trouble, path=path)
+            log.warning("mission not kept", reason=trouble, path=path)
         elif trouble is None and self.trouble is not None:
             log.info("mission kept again", path=path)
         self.trouble = trouble

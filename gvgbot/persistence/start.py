@@ -140,6 +140,8 @@ def _known(path: Path) -> Saved:
     """The mission of a run, to begin with. Raises UsageError if there is none to be read."""
     if path.is_file():
         raise UsageError(f"cannot begin with {path}: it is a file; {_beside(path)}")
+    if not path.exists():
+        raise UsageError(f"cannot begin with {path}: there is no such directory")
     try:
         saved = MissionFiles(path).read()
     except Damaged as error:

@@ -310,7 +310,7 @@ def test_a_speed_limit_holds_and_can_only_be_lowered_below_the_configured_one(to
     ("title", "says"),
     [
         ("too early", "not seen enough"),
-        ("unknown", "no vertex 999; there are 1, 2"),
+        ("unknown", "no vertex 999; known are 1, 2"),
         ("outside", "the nearest known way ends"),
     ],
 )

@@ -13,7 +13,9 @@ from PIL import Image
 
 from gvgbot import __version__
 from gvgbot.cli import main, status_of
+from gvgbot.drivers.world import save_world
 from gvgbot.errors import ConfigError, DeviceLost, ExtraMissing, UsageError, WorldError, extra_for
+from gvgbot.worlds import open_world
 
 Captured = pytest.CaptureFixture[str]
 
@@ -127,6 +129,19 @@ def test_a_missing_file_to_replay_is_taken_for_no_directory(
     assert main(["replay", str(tmp_path / "absent.mcap")]) == 2
     (line,) = said(capsys)
     assert line.endswith("absent.mcap: No such file or directory")
+
+
+@pytest.mark.parametrize("name", ["k\udcfcche.yaml", "two\nlines.yaml", "it's a 'map'.yaml"])
+def test_a_world_is_looked_for_under_whatever_name_a_file_may_have(
+    name: str, tmp_path: Path
+) -> None:
+    hall, start = open_world("hall")
+    assert start is not None
+    world = save_world(hall, tmp_path).rename(tmp_path / name)
+    where = [str(start.x), str(start.y), str(start.theta)]
+    out = ["--out", str(tmp_path / "run"), "--set", "twin.time_limit_s=1"]
+    main(["explore", "--world", str(world), "--start", *where, *out])
+    assert (tmp_path / "run" / "summary.json").exists()
 
 
 def test_a_team_that_shall_be_recorded_is_refused(tmp_path: Path, capsys: Captured) -> None:

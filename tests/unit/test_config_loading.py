@@ -159,6 +159,12 @@ def test_every_mistake_of_a_file_and_of_the_overrides_is_listed_at_once(tmp_path
     assert sources[3:] == ["animal.yaml"] * 6
 
 
+def test_a_file_of_something_else_is_told_once_which_keys_there_are(tmp_path: Path) -> None:
+    lines = mistakes("{q: 3, '?': 4, nmae: x}", tmp_path)
+    assert ["; here are name, " in line for line in lines] == [True, False, False]
+    assert all("no such key" in line for line in lines)
+
+
 UNREADABLE = {
     "a list": ("- 1\n- 2\n", "must be a mapping"),
     "a scalar": ("hello\n", "must be a mapping"),

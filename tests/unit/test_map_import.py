@@ -1,6 +1,7 @@
 """A map that somebody else has made becomes a run, or one line that says why not."""
 
 import itertools
+import json
 import shlex
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from gvgbot.drivers.world import World, load_map, save_world
 from gvgbot.map_import import import_map
 from gvgbot.maps.saved_run import SavedRun
 from gvgbot.persistence.mission_files import MissionFiles
+from gvgbot.session import Session
 from gvgbot.worlds import open_world
 from gvgbot.worlds.canvas import Canvas
 
@@ -155,6 +157,25 @@ def test_the_run_holds_a_mission_on_which_a_daemon_can_begin(tmp_path: Path) -> 
     assert len(saved.past) == saved.memory.keyframes == saved.memory.lasting
     assert saved.memory.intent.outcome is None
     assert main(["map", "show", str(tmp_path / "run")]) == 0
+
+
+def test_a_map_whose_name_is_no_utf_8_is_imported(tmp_path: Path) -> None:
+    """As old archives have them; Python has such a byte as half of a surrogate pair."""
+    path = painted(tmp_path).rename(tmp_path / "k\udcfcche.yaml")
+    assert main(["map", "import", str(path), "--out", str(tmp_path / "run")]) == 0
+    summary = json.loads((tmp_path / "run" / "summary.json").read_bytes())
+    assert summary["reason"] == "imported from k\udcfcche.yaml"
+
+
+def test_an_import_that_is_interrupted_leaves_no_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupt(session: Session) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Session, "save", interrupt)
+    assert main(["map", "import", str(painted(tmp_path)), "--out", str(tmp_path / "run")]) == 130
+    assert not (tmp_path / "run").exists()
 
 
 def test_what_to_do_with_an_imported_map_can_be_pasted_into_a_shell(

@@ -227,4 +227,4 @@ class Errands(Agenda):
         if not ids:
             return "none is known yet"
         named = ", ".join(str(vertex) for vertex in sorted(ids)[:_MOST_NAMED])
-        return f"there are {named}" + (" and others" if len(ids) > _MOST_NAMED else "")
+        return f"known are {named}" + (" and others" if len(ids) > _MOST_NAMED else "")
