@@ -3,6 +3,7 @@
 import argparse
 import contextlib
 import re
+import sys
 from collections.abc import Callable, Sequence
 from math import inf, isfinite
 from pathlib import Path
@@ -56,6 +57,10 @@ class Parser(argparse.ArgumentParser):
                 said = f"there is no {value!r}: did you mean {near}?"
                 raise argparse.ArgumentError(action, said)
         super()._check_value(action, value)
+
+    def _print_message(self, message: str, file: Any = None) -> None:
+        """Print help at once; argparse would hide that there is no room for it."""
+        print(message, end="", file=file or sys.stderr, flush=True)
 
     def error(self, message: str) -> NoReturn:
         """End with the message and the status of wrong usage."""

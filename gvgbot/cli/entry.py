@@ -27,11 +27,16 @@ FAILURE, INTERRUPTED = 1, 130
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status; wrong arguments raise SystemExit(2)."""
     _fill_streams()
-    options = parser().parse_args(arguments)
     with _ctrl_c_shut_out_if_ignored(), _any_stop_as_by_ctrl_c():
-        status = status_of(lambda: options.command(options))
+        status = status_of(lambda: _done(arguments))
     if status == INTERRUPTED:  # once more would break into what Python does at its end
         signal.signal(signal.SIGINT, signal.SIG_IGN)
+    return status
+
+
+def _done(arguments: Sequence[str] | None) -> int:
+    options = parser().parse_args(arguments)
+    status: int = options.command(options)
     return status
 
 

@@ -269,6 +269,14 @@ def test_a_full_disk_to_print_to_is_one_line(capsys: Captured) -> None:
     assert said(capsys) == ["gvgbot: output: no space left: make room"]
 
 
+@pytest.mark.parametrize("asked", ["--version", "explore --help"])
+def test_help_that_finds_no_room_is_not_lost_in_silence(asked: str) -> None:
+    with Path("/dev/full").open("wb") as full:
+        words = [sys.executable, "-m", "gvgbot", *asked.split()]
+        ended = subprocess.run(words, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert (ended.returncode, ended.stderr) == (1, "gvgbot: output: no space left: make room\n")
+
+
 @pytest.mark.parametrize("text", ["", "Unable to allocate 452. MiB"])
 def test_a_world_that_no_memory_can_hold_is_one_line(text: str, capsys: Captured) -> None:
     tasks = ExceptionGroup("tasks", [MemoryError(text)])
