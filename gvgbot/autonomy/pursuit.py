@@ -99,6 +99,7 @@ class Pursuit:
 
     def _block(self, view: View, reason: str) -> None:
         """Close the edge under the wheels, or else the target, for a while."""
+        self.where.leave()
         end = self.where.on_edge if self.target is not None else None
         edge = None if end is None else self._mapper.graph.edge_at(end)
         ends = (self.target,) if edge is None else (edge.a, edge.b)

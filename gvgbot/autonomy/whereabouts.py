@@ -40,11 +40,21 @@ class Whereabouts:
     on_edge: HalfEdgeId | None = None
     trail: list[Array] = field(default_factory=list)  # local frame, without detours
     narrowest: float = math.inf  # least clearance since the vertex, m
+    _round_at: Array | None = None  # where the trail has come back to itself, local frame
+
+    @property
+    def has_come_round(self) -> bool:
+        """Whether the robot has just driven round something, and so past a fork, on its edge."""
+        return self._round_at is not None
 
     @property
     def trail_length(self) -> float:
         """Metres driven along the edge since its vertex."""
         return length_of(np.array(self.trail).reshape(-1, 2))
+
+    def leave(self) -> None:
+        """Go another way from where it has come round."""
+        self._round_at = None
 
     def has_come_by(self, point: Array) -> bool:
         """Whether the trail passes a point (2,), local frame."""
@@ -76,7 +86,7 @@ class Whereabouts:
             _, end, out = min(ends)
             passage = self._passage(gvg, place, known, edge.a if out.forward else edge.b)
             line, rooms = gvg.line_from(place, (Branch(place.edge, not out.forward),))
-            self.on_edge, self.trail = end, list(line[::-1])
+            self.on_edge, self.trail, self._round_at = end, list(line[::-1]), None
             self.narrowest = float(rooms.min())
         station = int(np.searchsorted(edge.stations, place.station))
         foot = edge.polyline[min(station, len(edge.polyline) - 1)]
@@ -188,7 +198,11 @@ class Whereabouts:
             d = np.hypot(*(np.array(self.trail) - point).T)
             back = int(np.argmax(d < _LOOP_M))
             if d[back] < _LOOP_M and back < len(self.trail) - 3:
+                if length_of(np.array(self.trail[back:])) > LEAST_LOOP_M:
+                    self._round_at = point
                 del self.trail[back + 1 :]
+        if self._round_at is not None and np.hypot(*(self._round_at - point)) > _STEP_M:
+            self._round_at = None
         if not self.trail or np.hypot(*(self.trail[-1] - point)) > 0.1:
             self.trail.append(point)
 

@@ -2,7 +2,9 @@
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
+import numpy as np
 import pytest
 
 from gvgbot.autonomy.events import VertexAdded
@@ -253,3 +255,30 @@ def test_a_room_is_found_though_somebody_stood_before_its_door_as_the_robot_pass
         run.world(vertex)[0] < 3.0 and run.world(vertex)[1] > 1.3
         for vertex in run.pipeline.mapper.graph.vertices
     )
+
+
+def test_who_stands_in_the_middle_of_a_room_is_driven_round_but_once() -> None:
+    """There is no vertex on the way round him, as long as he may go."""
+    room, rooms = (0.0, 0.0, 6.1, 5.2), [(2.2, 5.5, 6.1, 9.4), (-3.0, 5.5, 1.9, 9.4)]
+    doors = [(3.25, 5.0, 4.4, 5.7), (0.7, 5.0, 1.55, 5.7)]
+    corridor = [(-3.0, 9.7, 6.1, 11.7), (2.4, 9.2, 3.6, 9.9), (0.3, 9.2, 1.5, 9.9)]
+    driven: list[float] = []
+
+    async def story(run: Play) -> None:
+        await run.until(lambda: 5.7 < run.here.y < 9.0)
+        x = 3.95 if run.here.x > 2.0 else 1.1
+        for y in np.arange(min(5.2, run.here.y - 1.5), 3.6, -0.1).tolist():
+            run.put_person(x, y)
+            await run.sleep(0.1)
+        before = len(run.truth)
+        await run.sleep(70.0)
+        there = [(p.x, p.y) for p in run.truth[before:] if p.y < 5.2]
+        driven.append(sum(math.dist(*pair) for pair in pairwise(there)))
+        run.put_person(*FAR_AWAY)
+
+    twin = TwinConfig(seed=3, laser=HokuyoTwinConfig(model="URG-04LX"))
+    world = carved([room, *rooms, *doors, *corridor])
+    run = play(world, Pose(-1.0, 10.6, 0.1), story=story, with_person=True, twin=twin)
+    assert run.outcome == "explored", run.pipeline.mission.reason
+    assert run.contacts == 0
+    assert driven[0] < 1.5 * math.tau * 1.8
