@@ -33,8 +33,10 @@ What a robot says over zenoh. `ROBOT` is its `robot.name`; `*` in that place lis
 them. A payload is one MessagePack map from field name to value; the encoding of each sample carries
 its type and version. Units are SI, angles are in radians.
 
-A `stamp` is of the robot's monotonic clock, the same for all topics, which begins anew when its
-computer is started. The time of day there is zenoh's timestamp of each sample, and of a reply, when
+A `stamp` is of the robot's monotonic clock, the same for all topics. A robot that goes on with a
+mission, or begins with a map, goes on where the clock of that had stopped: from one start of the
+program to another stamps may jump, also back, and `uptime` of the state begins anew. The time of
+day there is zenoh's timestamp of each sample, and of a reply, when
 it was given; a router puts its own in its place if the robot's clock is more than half a second
 ahead of it.
 

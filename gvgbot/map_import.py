@@ -114,9 +114,13 @@ def _largest_inside(labels: NDArray[np.signedinteger], margin: int) -> int:
 
 
 def _walls(world: World, known: Mask) -> Array:
-    """Points (N, 2), m, on the faces of walls that look onto free space, not too many of them."""
-    free = known & ~world.occupied
-    beside = ndimage.binary_dilation(free, np.ones((3, 3), np.bool_))
+    """Points (N, 2), m, on the faces of walls that look onto free space, not too many of them.
+
+    A pixel in between may be unknown: beams have ended there and farther on.
+    """
+    free, around = known & ~world.occupied, np.ones((3, 3), np.bool_)
+    doubtful = ndimage.binary_dilation(free, around) & ~known
+    beside = ndimage.binary_dilation(free | doubtful, around)
     points = _centres(world, *np.nonzero(world.occupied & beside))
     return thinned(points, max(_MERGE_M, world.resolution_m))
 

@@ -79,7 +79,7 @@ class Steering:
 
         Not so what changes nothing, if there is much of it: whoever can ask could fill the disk.
         """
-        words = asked.name
+        stamp, words = self._now(), asked.name
         try:
             arguments = parse(asked.name, asked.data, asked.encoding)
             words = in_words(asked.name, arguments)
@@ -89,7 +89,7 @@ class Steering:
             answer = Answer(done=False, text=str(error))
         answer = Answer(done=answer.done, text=printable(answer.text))
         words = printable(words)[:_LONGEST_WORDS]
-        happened = Requested(self._now(), words, asked.origin, answer.done, answer.text)
+        happened = Requested(stamp, words, asked.origin, answer.done, answer.text)
         self._tell([*self._ledger.enter(happened), *self._errands.take_events()])
         return answer
 

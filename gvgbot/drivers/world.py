@@ -25,6 +25,7 @@ OWN_MAP = "map.yaml"  # in the directory of a run
 FREE_GREY, OCCUPIED_GREY, UNKNOWN_GREY = SAVED_GREYS = 254, 0, 205  # what map_saver writes
 OPAQUE = 255
 _MOST_PIXELS = 60_000_000  # of a map: a square of 390 m by 5 cm; each takes some 30 bytes to read
+_FINEST_M, _COARSEST_M = 1e-4, 10.0  # a pixel of a map
 _FARTHEST_M = 1e6  # from the origin of the world to a map of it
 
 log = structlog.get_logger()
@@ -132,8 +133,9 @@ def load_map(path: Path) -> tuple[World, Mask]:
     """The same world, and which of its squares are known: walls, or below `free_thresh`."""
     entries = _Entries(path, _read_yaml(path))
     resolution = entries.number("resolution")
-    if resolution <= 0.0:
-        raise entries.error("resolution", "must be greater than 0 (metres per pixel)")
+    if not _FINEST_M <= resolution <= _COARSEST_M:
+        allowed = f"must be from {_FINEST_M:g} to {_COARSEST_M:g} (metres per pixel)"
+        raise entries.error("resolution", allowed)
     origin = entries.origin()
     negate = entries.negate()
     threshold = entries.fraction("occupied_thresh", OCCUPIED_THRESHOLD)

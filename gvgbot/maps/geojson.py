@@ -105,7 +105,7 @@ def decode(text: str) -> RouteGraph:
     """The graph in a text that `encode` wrote. Raises UsageError if the text is damaged."""
     try:
         collection = msgspec.json.decode(text, type=_Collection[msgspec.Raw])
-    except msgspec.MsgspecError as error:
+    except (msgspec.MsgspecError, RecursionError) as error:
         raise UsageError(f"not a route graph in GeoJSON: {error}") from error
     features = [_feature(raw, number) for number, raw in enumerate(collection.features)]
     vertices = [_route_node(feature) for feature in features if isinstance(feature, _Vertex)]
@@ -170,7 +170,7 @@ def _feature(raw: msgspec.Raw, number: int) -> _Vertex | _Edge:
         if isinstance(geometry, _Point):
             return msgspec.json.decode(raw, type=_Vertex)
         return msgspec.json.decode(raw, type=_Edge)
-    except msgspec.MsgspecError as error:
+    except (msgspec.MsgspecError, RecursionError) as error:
         if b'"waypoint"' in bytes(raw):
             raise UsageError(
                 "an export for Nav2's route server, and no run's map.geojson: give the run itself"

@@ -4,7 +4,7 @@ import shlex
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self, TypeVar
+from typing import Annotated, Self, TypeVar
 
 import msgspec
 import structlog
@@ -36,10 +36,13 @@ class Happening(msgspec.Struct, frozen=True):
     length: float = 0.0  # m
 
 
+_Line = Annotated[tuple[tuple[float, float], ...], msgspec.Meta(min_length=2)]
+
+
 class Autonomy(msgspec.Struct, frozen=True):
     """What a map shows of this section of the configuration; corners in m, map frame."""
 
-    virtual_walls: tuple[tuple[tuple[float, float], ...], ...] = ()
+    virtual_walls: tuple[_Line, ...] = ()
 
 
 class Settings(msgspec.Struct, frozen=True):
@@ -166,7 +169,7 @@ def _events(path: Path) -> tuple[Happening, ...]:
 def _happening(line: str) -> Happening | None:
     try:
         return msgspec.json.decode(line, type=Happening)
-    except msgspec.MsgspecError:
+    except (msgspec.MsgspecError, RecursionError):
         return None
 
 
@@ -175,5 +178,5 @@ def _summary(path: Path) -> Summary | None:
         return None
     try:
         return msgspec.json.decode(_text(path), type=Summary)
-    except msgspec.MsgspecError as error:
+    except (msgspec.MsgspecError, RecursionError) as error:
         raise UsageError(f"{path} is no summary of a run: {error}") from error

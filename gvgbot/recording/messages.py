@@ -13,6 +13,7 @@ from gvgbot.hal.guard import Reason
 from gvgbot.hal.messages import Battery, Contact, Odometry, Scan
 from gvgbot.recording.schemas import decoded, message
 
+_FARTHEST_M = 1000.0  # no laser sees as far
 _BOOLS = [field.name for field in fields(Contact) if field.name != "stamp"]
 
 
@@ -59,17 +60,27 @@ def encode_scan(scan: Scan) -> bytes:
 
 
 def decode_scan(data: bytes) -> Scan:
-    """The inverse of `encode_scan`. Raises google.protobuf.message.DecodeError."""
+    """The inverse of `encode_scan`.
+
+    Raises google.protobuf.message.DecodeError, or ValueError for what no laser sends.
+    """
     m = decoded(SCAN.schema, data)
+    base_laser = _to_pose(m.base_laser)
+    ranges = np.array(m.ranges, np.float64)
+    angles, limits = (m.start_angle, m.angle_increment), (m.range_min, m.range_max)
+    _check_finite(m.stamp, *angles, *limits, m.time_increment, *_pose(base_laser).values())
+    farthest = ranges.max(initial=m.range_max, where=np.isfinite(ranges))
+    if len(ranges) < 2 or not m.angle_increment or farthest > _FARTHEST_M:
+        raise ValueError(f"no scan: {len(ranges)} beams, {m.angle_increment} rad, {farthest} m")
     return Scan(
         stamp=m.stamp,
-        ranges=np.array(m.ranges, np.float64),
+        ranges=ranges,
         angle_min=m.start_angle,
         angle_increment=m.angle_increment,
         range_min=m.range_min,
         range_max=m.range_max,
         time_increment=m.time_increment,
-        base_laser=_to_pose(m.base_laser),
+        base_laser=base_laser,
     )
 
 
@@ -91,8 +102,14 @@ def encode_cycle(cycle: Cycle) -> bytes:
 
 
 def decode_cycle(data: bytes) -> Cycle:
-    """The inverse of `encode_cycle`. Raises google.protobuf.message.DecodeError."""
+    """The inverse of `encode_cycle`.
+
+    Raises google.protobuf.message.DecodeError, or ValueError for numbers that are none.
+    """
     m = decoded(CYCLE.schema, data)
+    _check_finite(m.stamp, m.odom_base.x, m.odom_base.y, m.odom_base.theta)
+    for twist in (m.measured, m.wish, m.permitted):
+        _check_finite(twist.linear, twist.angular)
     contact = None
     if m.HasField("contact"):
         felt = {name: getattr(m.contact, name) for name in _BOOLS}
@@ -134,6 +151,11 @@ def encode_transform(stamp: float, map_base: Pose) -> bytes:
         rotation=_quaternion(map_base),
     )
     return cast(bytes, encoded.SerializeToString())
+
+
+def _check_finite(*numbers: float) -> None:
+    if not all(map(math.isfinite, numbers)):
+        raise ValueError("a number that is none")
 
 
 def nanoseconds(stamp: float) -> int:

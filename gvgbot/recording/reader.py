@@ -3,7 +3,7 @@
 import os
 import re
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -16,7 +16,7 @@ from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
-from mcap.records import Channel, Chunk, Message, Metadata
+from mcap.records import Channel, Chunk, McapRecord, Message, Metadata
 from mcap.stream_reader import CRCValidationError, breakup_chunk
 from mcap.writer import MCAP0_MAGIC
 
@@ -35,6 +35,7 @@ from gvgbot.recording.messages import (
 
 _HEAD = struct.Struct("<BQ")  # of a record: what it is, and the bytes that follow
 _KINDS = frozenset(Opcode)
+_OF_MESSAGES = frozenset({Opcode.CHUNK, Opcode.CHANNEL, Opcode.MESSAGE})
 _DAMAGE = (
     McapError,
     CRCValidationError,
@@ -53,7 +54,7 @@ class About:
     """What a recording says of itself."""
 
     title: str  # of the world, or of the robot
-    config: str  # JSON
+    config: str  # YAML
     part: int  # files of the same recording that came before
     resumed: bool  # whether the run went on with a map that was there before
 
@@ -95,9 +96,9 @@ class Recording:
         opcode, self._goes_on = None, False
         for opcode, content in _records(file):
             self._goes_on |= opcode == Opcode.METADATA and GOES_ON.encode() in content
-            if opcode == Opcode.CHUNK:
+            if opcode in _OF_MESSAGES:
                 try:
-                    messages = list(self._of_chunk(content, topics))
+                    messages = list(self._lived(_parts(opcode, content), topics))
                 except _DAMAGE:
                     self.damaged += 1
                 else:
@@ -109,10 +110,11 @@ class Recording:
         elif file.read(1):
             self.joined.append(path)
 
-    def _of_chunk(self, content: bytes, topics: dict[int, str]) -> Iterator[tuple[float, Lived]]:
-        """The messages of a chunk, none if a part of it is missing or wrong."""
-        chunk = Chunk.read(ReadDataStream(BytesIO(content)))
-        for record in breakup_chunk(chunk, validate_crc=True):
+    def _lived(
+        self, records: Iterable[McapRecord], topics: dict[int, str]
+    ) -> Iterator[tuple[float, Lived]]:
+        """The messages among records."""
+        for record in records:
             if isinstance(record, Channel):
                 topics[record.id] = record.topic
             elif isinstance(record, Message):
@@ -132,6 +134,14 @@ class Recording:
                 self.left_out += messages
             case {"event": "requested", "done": True}:
                 self.requests += 1
+
+
+def _parts(opcode: int, content: bytes) -> Iterable[McapRecord]:
+    """The records of a chunk, all or none, or one that is in no chunk."""
+    data = ReadDataStream(BytesIO(content))
+    if opcode == Opcode.CHUNK:
+        return breakup_chunk(Chunk.read(data), validate_crc=True)
+    return [Channel.read(data) if opcode == Opcode.CHANNEL else Message.read(data, len(content))]
 
 
 def _topics(file: BinaryIO) -> dict[int, str]:

@@ -68,6 +68,20 @@ def painted(directory: Path, hidden: tuple[slice, slice] | None = None) -> Path:
     return path
 
 
+def test_walls_behind_a_pixel_that_nobody_knows_are_walls(tmp_path: Path) -> None:
+    """A robot's own grid has such pixels wherever beams have ended now here and now there."""
+    path = painted(tmp_path)
+    picture = tmp_path / "cross.png"
+    grey = np.asarray(Image.open(picture)).copy()
+    free = grey == GREY["free"]
+    grey[free & binary_dilation(~free, np.ones((3, 3), np.bool_))] = GREY["unknown"]
+    Image.fromarray(grey).save(picture)
+    import_map(path, tmp_path / "run", Config())
+    graph = SavedRun.read(tmp_path / "run").graph
+    assert sorted(vertex.kind for vertex in graph.vertices) == ["endpoint"] * 4 + ["meetpoint"]
+    assert not any(vertex.frontiers for vertex in graph.vertices)
+
+
 def test_what_is_unknown_becomes_a_frontier_and_no_wall(tmp_path: Path) -> None:
     rows, columns = cross().occupied.shape
     eastern = np.s_[0:rows, columns * 10 // 15 : columns]

@@ -62,10 +62,11 @@ class Errands(Agenda):
 
     def explore(self, stamp: float) -> str:
         """Go on exploring, even if that had ended; after a restart by finding its place first."""
+        is_asked_to_stand = self.is_resting or self.is_paused or self.unfit
+        if self._plan is None and self._command is None and not is_asked_to_stand:
+            return "it is exploring already"
         if not self.is_resting or self.is_paused or self.unfit:
             self._check_going(stamp)
-        if self._plan is None and self._command is None and not self.is_resting:
-            return "it is exploring already"
         self._end(stamp, "replaced", "by explore")
         self.is_waiting, self.unplaced = False, ""
         self.closures.open_all(self._mapper.graph)
@@ -212,7 +213,7 @@ class Errands(Agenda):
         if self._seen is None and self.is_resting and self.unplaced:
             raise Declined(self._unplaced_for())
         if self._seen is None and self.is_resting:
-            raise Declined("it has not looked for its place since its start: ask it to explore")
+            raise Declined("it does not know its place: ask it to explore, which looks for it")
         if self._seen is None:
             raise Declined("it has not seen enough yet to know where it is")
         self.closures.open_due(self._mapper.graph, stamp)

@@ -134,7 +134,9 @@ def _inverse_blocks(factors: SuperLU, poses: list[int]) -> Array:
     columns = np.zeros((factors.shape[0], rows.size))
     columns[rows.ravel(), np.arange(rows.size)] = 1.0
     P = factors.solve(columns).reshape(len(columns), len(poses), 3)
-    return np.array([P[row, i] for i, row in enumerate(rows)])
+    found: Array = np.array([P[row, i] for i, row in enumerate(rows)])
+    found += found.swapaxes(1, 2).copy()  # rounding has made it a little less than symmetrical
+    return found / 2
 
 
 def _residuals(x: Array, a: Index, b: Index, z: Array) -> tuple[Array, Array, Array]:

@@ -240,7 +240,9 @@ def test_the_largest_map_there_can_be_is_read() -> None:
     assert decode(encode(far)).vertices == far.vertices
 
 
-@pytest.mark.parametrize("text", ["", "null", "[1, 2]", "not json", '{"features": 3}', "\0"])
+@pytest.mark.parametrize(
+    "text", ["", "null", "[1, 2]", "not json", '{"features": 3}', "\0", 5000 * "["]
+)
 def test_what_is_no_graph_at_all_is_refused(text: str) -> None:
     with pytest.raises(UsageError, match="not a route graph"):
         decode(text)

@@ -2,9 +2,11 @@
 
 import math
 import struct
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import pytest
 from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
 from foxglove_schemas_protobuf.LaserScan_pb2 import LaserScan
 from google.protobuf.descriptor_pb2 import FileDescriptorSet
@@ -32,14 +34,17 @@ cycles = st.builds(
     twists,
     twists,
 )
+unseen = st.sampled_from([math.nan, math.inf])
 scans = st.builds(
     Scan,
     stamps,
-    st.lists(st.floats(), max_size=8).map(lambda r: np.array(r, np.float64)),
+    st.lists(st.floats(max_value=1e3) | unseen, min_size=2, max_size=8).map(
+        lambda r: np.array(r, np.float64)
+    ),
     number,
+    number.filter(bool),
     number,
-    number,
-    number,
+    st.floats(0.0, 1e3),
     number,
     poses,
 )
@@ -57,6 +62,33 @@ def test_a_scan_comes_back_bit_by_bit(scan: Scan) -> None:
         assert bits(getattr(again, name)) == bits(getattr(scan, name))
     assert bits(again.time_increment) == bits(scan.time_increment)
     assert again.base_laser == scan.base_laser
+
+
+IMPOSSIBLE = {
+    "no beams": {"ranges": np.empty(0)},
+    "all beams in one direction": {"angle_increment": 0.0},
+    "no direction": {"angle_min": math.nan},
+    "a place that is none": {"base_laser": Pose(math.nan)},
+    "walls beyond the horizon": {"ranges": np.array([1.0, 1e300])},
+}
+
+
+@pytest.mark.parametrize("wrong", IMPOSSIBLE.values(), ids=IMPOSSIBLE)
+def test_a_scan_that_no_laser_sends_is_refused(wrong: dict[str, Any]) -> None:
+    scan = replace(Scan(1.0, np.array([1.0, 2.0]), -0.1, 0.2, 0.0, 5.0), **wrong)
+    with pytest.raises(ValueError, match=r"no scan|a number that is none"):
+        messages.decode_scan(messages.encode_scan(scan))
+
+
+@pytest.mark.parametrize("wrong", [math.nan, math.inf])
+def test_a_cycle_of_numbers_that_are_none_is_refused(wrong: float) -> None:
+    for odometry, wish in [
+        (Odometry(1.0, Pose(wrong), Twist(0.0, 0.0)), Twist(0.0, 0.0)),
+        (Odometry(1.0, Pose(), Twist(0.0, 0.0)), Twist(0.0, wrong)),
+    ]:
+        cycle = Cycle(odometry, Felt(), wish, wish)
+        with pytest.raises(ValueError, match="a number that is none"):
+            messages.decode_cycle(messages.encode_cycle(cycle))
 
 
 @given(cycles)

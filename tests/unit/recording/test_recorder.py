@@ -96,6 +96,29 @@ def test_what_is_recorded_is_read_in_the_same_order(tmp_path: Path) -> None:
     assert (recording.cut, recording.damaged, recording.missing) == ([], 0, None)
 
 
+def test_messages_that_another_program_has_taken_out_of_their_chunks_are_read(
+    tmp_path: Path,
+) -> None:
+    with Recorder(config(tmp_path / "run.mcap"), ABOUT) as to:
+        lived = record(to, 100)
+    with (tmp_path / "run.mcap").open("rb") as file, (tmp_path / "flat.mcap").open("wb") as flat:
+        reader, writer = make_reader(file), Writer(flat, use_chunking=False)
+        writer.start()
+        for metadata in reader.iter_metadata():
+            writer.add_metadata(metadata.name, metadata.metadata)
+        ids: dict[str, int] = {}
+        for _, channel, message in reader.iter_messages(log_time_order=False):
+            if channel.topic not in ids:
+                ids[channel.topic] = writer.register_channel(channel.topic, "protobuf", 0)
+            at = message.log_time
+            writer.add_message(ids[channel.topic], at, message.data, at)
+        writer.finish()
+    recording = Recording(tmp_path / "flat.mcap")
+    found = [message for _, message in recording.messages()]
+    assert_begins_as(found, lived)
+    assert (len(found), recording.damaged) == (len(lived), 0)
+
+
 def test_the_battery_is_taken_down_when_it_changes_and_once_a_minute(tmp_path: Path) -> None:
     """A base tells of it fifty times a second, with a stamp of its own each time."""
     stamps = np.arange(0.0, 100.0, 0.5).tolist()
