@@ -51,14 +51,20 @@ def _corners(line: Array) -> list[int]:
 
     By the farthest point, again and again (Douglas and Peucker, 1973).
     """
-    chord = line[-1] - line[0]
-    along = np.clip((line - line[0]) @ chord / max(chord @ chord, 1e-12), 0.0, 1.0)
-    off = np.hypot(*(line - line[0] - along[:, None] * chord).T)
+    off = _from_chord(line)
     farthest = int(np.argmax(off))
     if off[farthest] <= TOLERANCE_M:
         return [0, len(line) - 1]
     before, after = _corners(line[: farthest + 1]), _corners(line[farthest:])
     return before[:-1] + [farthest + i for i in after]
+
+
+def _from_chord(line: Array) -> Array:
+    """How far each point of a line (N, 2) is from the straight way between its ends, m."""
+    chord = line[-1] - line[0]
+    along = np.clip((line - line[0]) @ chord / max(chord @ chord, 1e-12), 0.0, 1.0)
+    off: Array = np.hypot(*(line - line[0] - along[:, None] * chord).T)
+    return off
 
 
 def _waypoint(number: int, place: Array) -> Feature:
@@ -71,9 +77,10 @@ def _waypoint(number: int, place: Array) -> Feature:
 
 def _straight(edge: RouteEdge, number: int, start: int, end: int, line: Array) -> Feature:
     length = round(length_of(line[[0, -1]]), geojson.DECIMALS)
+    room = max(0.0, edge.min_clearance - float(_from_chord(line).max()))  # beside the straight way
     metadata = {
         "length": length,
-        "min_clearance": round(edge.min_clearance, geojson.DECIMALS),
+        "min_clearance": round(room, geojson.DECIMALS),
         "traversals": edge.traversals,
         "edge": [edge.start, edge.end],
     }

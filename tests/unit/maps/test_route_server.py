@@ -85,6 +85,20 @@ def test_a_bend_is_straightened_if_it_is_no_wider_than_a_cell(off: float, nodes:
     assert len(load(route_server.encode(bent)).nodes) == nodes
 
 
+def test_a_straight_way_past_a_pillar_has_no_more_room_than_it_says() -> None:
+    """The edge keeps half a metre from a pillar of half a metre, in an arc; chords come nearer."""
+    angles = np.linspace(0.0, 2.0, 2001)
+    arc = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    bow = replace(CORNER.edges[0], polyline=arc, min_clearance=0.5)
+    for feature in json.loads(route_server.encode(replace(CORNER, edges=(bow,))))["features"]:
+        if feature["geometry"]["type"] == "Point":
+            continue
+        a, b = map(np.array, feature["geometry"]["coordinates"][0])
+        nearest = np.hypot(*((a + b) / 2)) - 0.5  # a chord is nearest in its middle
+        told = feature["properties"]["metadata"]["min_clearance"]
+        assert told == pytest.approx(nearest, abs=1e-5)
+
+
 def test_a_way_back_begins_where_the_way_there_ends_and_both_cost_metres_of_driving() -> None:
     """From node to node it is straight, so a bow that is left out costs nothing."""
     flat = np.array([(0.0, 0.0), (0.6, 0.8), (0.63, 0.78), (1.2, 1.6)])
