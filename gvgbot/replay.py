@@ -129,6 +129,7 @@ def _recordings(path: Path) -> str:
 
 def _recording(wanted: Wanted) -> Log:
     with extra_needed():
+        from gvgbot.recording.messages import CYCLE, SCAN
         from gvgbot.recording.reader import Recording
     recording = Recording(wanted.path)
     if wanted.config is None:
@@ -142,6 +143,8 @@ def _recording(wanted: Wanted) -> Log:
             f"left out: {counted(recording.requests, 'request')} to the robot": recording.requests,
             f"{counted(recording.left_out, 'message')} lost to a slow disk": recording.left_out,
             f"damaged pieces that were passed over: {recording.damaged}": recording.damaged,
+            "there is not one scan in it": SCAN.topic not in recording.topics,
+            "there is nothing in it of how the robot moved": CYCLE.topic not in recording.topics,
             f"{recording.missing} is missing, and what follows it left out": recording.missing,
         }
         cut = [f"{path} ends in the middle, as when a program is killed" for path in recording.cut]

@@ -72,6 +72,7 @@ class Recording:
         self.damaged = 0  # chunks of messages, of a second or so, that were passed over
         self.left_out = 0  # messages that the disk was too slow for
         self.requests = 0  # that were granted
+        self.topics = set[str]()  # of the messages so far
         self._goes_on = False  # as the last file says
 
     def messages(self) -> Iterator[tuple[float, Lived]]:
@@ -119,6 +120,7 @@ class Recording:
                 topics[record.id] = record.topic
             elif isinstance(record, Message):
                 topic, at = topics[record.channel_id], record.log_time / 1e9
+                self.topics.add(topic)
                 if topic == SCAN.topic:
                     yield at, decode_scan(record.data)
                 elif topic == CYCLE.topic:

@@ -318,6 +318,15 @@ def test_a_recording_behind_another_in_one_file_is_told(tmp_path: Path) -> None:
         assert log.flaws() == flaws
 
 
+def test_a_recording_of_which_no_map_can_be_made_says_what_it_lacks(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with Recorder(config(path), ABOUT) as to:
+        to.on_cycle(cycle(1.0), None)
+    log = open_log(Wanted(path=path, config=None, overrides=[], no_echo_m=None))
+    assert len(list(log.messages)) == 1
+    assert log.flaws() == ["but:     there is not one scan in it"]
+
+
 def test_a_power_failure_costs_a_megabyte_at_most(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
