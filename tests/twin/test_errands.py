@@ -113,6 +113,7 @@ class Story:
     async def explore(self) -> None:
         await a_while(self.clock, 1.5)
         await self.ask("too early", "home")
+        await self.ask("explore at once", "explore")
         await a_while(self.clock, 8.0)
         await self.pause()
         await until(self.clock, lambda: self.states[-1].phase == "finished")
@@ -240,6 +241,8 @@ def test_a_paused_robot_stands_and_goes_on_when_it_is_told_to(tour: Tour) -> Non
 
 
 def test_asking_twice_does_no_harm(tour: Tour) -> None:
+    assert tour.answers["explore at once"].done  # though it knows nothing yet
+    assert "already" in tour.answers["explore at once"].text
     assert tour.answers["pause again"].done
     assert "already" in tour.answers["pause again"].text
     assert tour.answers["resume again"].done

@@ -62,10 +62,11 @@ class Errands(Agenda):
 
     def explore(self, stamp: float) -> str:
         """Go on exploring, even if that had ended; after a restart by finding its place first."""
-        is_asked_to_stand = self.is_resting or self.is_paused or self.unfit
-        if self._plan is None and self._command is None and not is_asked_to_stand:
+        may_go = not (self.is_paused or self.unfit)
+        explores = self._plan is None and self._command is None and not self.is_resting
+        if may_go and explores:
             return "it is exploring already"
-        if not self.is_resting or self.is_paused or self.unfit:
+        if not (may_go and self.is_resting):
             self._check_going(stamp)
         self._end(stamp, "replaced", "by explore")
         self.is_waiting, self.unplaced = False, ""
