@@ -76,8 +76,10 @@ class PathFollowing:
         """
         line, room = here.line_along(path)
         free = self._neighbours.free_metres(view, line)
-        is_doubtful = any(view.gvg.end_of(branch) in view.doubted for branch in path)
-        if free < ARRIVED_M or (here.where.has_come_round and is_doubtful):
+        is_round_somebody = here.where.has_come_round and any(
+            view.gvg.end_of(branch) in view.doubted for branch in path
+        )
+        if free < ARRIVED_M or is_round_somebody:
             self._hindrance.hold()
             return self.make_way(view, here), []
         track = Track.of(line, room).until(free)

@@ -65,10 +65,9 @@ def decode_scan(data: bytes) -> Scan:
     Raises google.protobuf.message.DecodeError, or ValueError for what no laser sends.
     """
     m = decoded(SCAN.schema, data)
-    base_laser = _to_pose(m.base_laser)
     ranges = np.array(m.ranges, np.float64)
     angles, limits = (m.start_angle, m.angle_increment), (m.range_min, m.range_max)
-    _check_finite(m.stamp, *angles, *limits, m.time_increment, *_pose(base_laser).values())
+    _check_finite(m.stamp, *angles, *limits, m.time_increment)
     farthest = ranges.max(initial=m.range_max, where=np.isfinite(ranges))
     if len(ranges) < 2 or not m.angle_increment or farthest > _FARTHEST_M:
         raise ValueError(f"no scan: {len(ranges)} beams, {m.angle_increment} rad, {farthest} m")
@@ -80,7 +79,7 @@ def decode_scan(data: bytes) -> Scan:
         range_min=m.range_min,
         range_max=m.range_max,
         time_increment=m.time_increment,
-        base_laser=base_laser,
+        base_laser=_to_pose(m.base_laser),
     )
 
 
@@ -107,9 +106,7 @@ def decode_cycle(data: bytes) -> Cycle:
     Raises google.protobuf.message.DecodeError, or ValueError for numbers that are none.
     """
     m = decoded(CYCLE.schema, data)
-    _check_finite(m.stamp, m.odom_base.x, m.odom_base.y, m.odom_base.theta)
-    for twist in (m.measured, m.wish, m.permitted):
-        _check_finite(twist.linear, twist.angular)
+    _check_finite(m.stamp)
     contact = None
     if m.HasField("contact"):
         felt = {name: getattr(m.contact, name) for name in _BOOLS}
@@ -173,6 +170,7 @@ def _pose(pose: Pose) -> dict[str, float]:
 
 
 def _to_pose(m: Any) -> Pose:
+    _check_finite(m.x, m.y, m.theta)
     return Pose(m.x, m.y, m.theta)
 
 
@@ -181,6 +179,7 @@ def _twist(twist: Twist) -> dict[str, float]:
 
 
 def _to_twist(m: Any) -> Twist:
+    _check_finite(m.linear, m.angular)
     return Twist(m.linear, m.angular)
 
 

@@ -2,7 +2,6 @@
 
 import asyncio
 import math
-from collections import deque
 from typing import Any
 
 import pytest
@@ -13,6 +12,7 @@ from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.drivers.hokuyo.driver import HokuyoConfig, HokuyoLaser
 from gvgbot.drivers.hokuyo.twin import HokuyoTwin, HokuyoTwinConfig
 from gvgbot.drivers.kobuki.twin import KobukiTwin, KobukiTwinConfig
+from gvgbot.drivers.link_faults import FaultyLink, LinkFaultConfig
 from gvgbot.drivers.transport import ByteStream, TwinDevice, pipe, serve_twin
 from gvgbot.errors import DeviceLost, DeviceRefused
 from tests.twin.kobuki_body import IdealBody
@@ -148,35 +148,6 @@ def test_a_laser_whose_motor_gains_speed_is_asked_again() -> None:
 def test_a_laser_whose_motor_stays_slow_is_refused() -> None:
     slow = Scripted({b"MD0000108001300\n": b"MD0000108001300\n0Mm\n\n"}, twin_of())
     assert ends(slow, DeviceRefused, "check its power", opening_patience_s=2.0) < 3.2
-
-
-class Slow(Scripted):
-    """A laser that takes its time to answer, but not to send scans."""
-
-    def __init__(self, twin: HokuyoTwin, seconds: float) -> None:
-        super().__init__({}, twin)
-        self.seconds, self.answers = seconds, deque[tuple[float, bytes]]()
-
-    def receive(self, data: bytes, now: float) -> bytes:
-        self.answers.append((now + self.seconds, super().receive(data, now)))
-        return b""
-
-    def advance(self, now: float) -> bytes:
-        sent = super().advance(now)
-        while self.answers and self.answers[0][0] <= now:
-            sent = self.answers.popleft()[1] + sent
-        return sent
-
-    def next_due(self) -> float:
-        return min(super().next_due(), self.answers[0][0] if self.answers else math.inf)
-
-
-def test_a_laser_that_takes_nine_tenths_of_a_second_to_answer_is_opened() -> None:
-    async def scenario(bench: Bench) -> None:
-        await bench.scans(30)
-        assert (bench.laser.link.restarts, bench.laser.link.refused_scans) == (0, 0)
-
-    on_bench(Slow(twin_of(), 0.9), scenario)
 
 
 def test_a_laser_that_stays_abnormal_is_refused() -> None:
@@ -324,6 +295,28 @@ def test_a_rate_that_the_port_lacks_is_passed_over(lacks: tuple[int, ...], agree
         assert laser.link.scans == 3
 
     run_in_virtual_time(main())
+
+
+def test_a_laser_that_takes_nine_tenths_of_a_second_to_answer_is_opened_as_it_is() -> None:
+    """At a port whose rate can be set, though that means nothing on USB."""
+
+    async def main() -> None:
+        here, there = pipe()
+        clock = LoopClock()
+        slow = FaultyLink(twin_of(), LinkFaultConfig(command_latency_s=0.9), seed=22)
+        laser = HokuyoLaser(HostPort(here, 115200), HokuyoConfig(), clock)
+        async with asyncio.TaskGroup() as tasks:
+            served = tasks.create_task(serve_twin(slow, there, clock))
+            running = tasks.create_task(laser.run())
+            for _ in range(30):
+                await laser.next_scan()
+            running.cancel()
+            served.cancel()
+        assert (laser.link.restarts, laser.link.refused_scans) == (0, 0)
+
+    with structlog.testing.capture_logs() as logs:
+        run_in_virtual_time(main())
+    assert "laser keeps its bit rate" not in [entry["event"] for entry in logs]
 
 
 @pytest.mark.parametrize("boot_s", [0.0, 0.7, 1.1, 1.5, 2.5])

@@ -92,6 +92,19 @@ class Rig:
         return asyncio.run(self.steering.handle(Asked(name, data, MESSAGEPACK, "ana")))
 
 
+def test_a_request_comes_before_what_it_leads_to() -> None:
+    rig = Rig()
+
+    def home(*_: object) -> str:
+        rig.time += 0.5
+        rig.errands.happened.append(Finished(rig.time, "stopped", "by a request"))
+        return "did home"
+
+    rig.errands.__dict__["home"] = home
+    rig.ask("home")
+    assert [event.stamp for event in rig.told] == [12.5, 13.0]
+
+
 FITTING: dict[str, dict[str, object]] = {
     "goto": {"vertex": 3},
     "set": {"key": "exploration.patience_s", "value": 30},

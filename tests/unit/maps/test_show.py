@@ -13,7 +13,7 @@ from PIL import Image
 from gvgbot.cli import main
 from gvgbot.maps import geojson
 from gvgbot.maps.saved_run import SavedRun
-from tests.unit.maps.small_run import GRAPH, write_run
+from tests.unit.maps.small_run import GRAPH, SUMMARY, write_run
 
 Captured = pytest.CaptureFixture[str]
 
@@ -90,6 +90,7 @@ BROKEN = [
     b"\xff\xfe",
     b"[]",
     b'{"event": "finished"}',
+    b'{"event": "finished", "stamp": 1006.0, "deep": ' + 5000 * b"[",
 ]
 
 
@@ -111,7 +112,12 @@ DAMAGES: dict[str, tuple[str, str]] = {
     "no trajectory": ("estimate.tum", "1 2 3\n"),
     "no odometry": ("odometry.tum", "1 2 3 0 0 0 0 nan\n"),
     "no summary": ("summary.json", "{}"),
-    "no grid": ("map.pgm", "P5"),
+    "a deep graph": ("map.geojson", '{"type": "FeatureCollection", "features": [' + 5000 * "["),
+    "a deep summary": ("summary.json", '{"deep": ' + 5000 * "["),
+    "a wall of no corners": (
+        "summary.json",
+        json.dumps(SUMMARY | {"config": {"autonomy": {"virtual_walls": [[]]}}}),
+    ),
 }
 
 
