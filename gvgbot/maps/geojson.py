@@ -23,6 +23,8 @@ _FARTHEST_M = 1e5  # from the origin, in any map
 
 T = TypeVar("T")
 Metres = Annotated[float, msgspec.Meta(ge=-_FARTHEST_M, le=_FARTHEST_M)]
+Length = Annotated[float, msgspec.Meta(ge=0.0, le=_FARTHEST_M)]  # m
+Count = Annotated[int, msgspec.Meta(ge=0)]
 SquareMetres = Annotated[float, msgspec.Meta(ge=-(_FARTHEST_M**2), le=_FARTHEST_M**2)]
 XY = tuple[Metres, Metres]
 Matrix = tuple[SquareMetres, SquareMetres, SquareMetres, SquareMetres]
@@ -30,12 +32,12 @@ Matrix = tuple[SquareMetres, SquareMetres, SquareMetres, SquareMetres]
 
 class _VertexMetadata(msgspec.Struct):
     kind: VertexKind
-    degree: int
+    degree: Count
     bearings: tuple[float, ...]
-    clearance: Metres
+    clearance: Length
     covariance: Matrix
     frontiers: tuple[float, ...]
-    visits: int
+    visits: Count
 
 
 class _VertexProperties(msgspec.Struct):
@@ -45,16 +47,16 @@ class _VertexProperties(msgspec.Struct):
 
 
 class _EdgeMetadata(msgspec.Struct):
-    length: Metres
-    min_clearance: Metres
-    traversals: int
+    length: Length
+    min_clearance: Length
+    traversals: Count
 
 
 class _EdgeProperties(msgspec.Struct):
     id: int
     startid: int
     endid: int
-    cost: Metres
+    cost: Length
     metadata: _EdgeMetadata
 
 

@@ -44,6 +44,7 @@ def encode_map_server(grid: OccupancyGrid) -> dict[str, bytes | str]:
 def read_map_server(directory: Path) -> OccupancyGrid:
     """The grid that `encode_map_server` made the files of, with cells of 0, 100 and -1 percent.
 
+    Greys that were drawn into the image by hand count as map_server takes them.
     Raises UsageError, in one line, if a file is missing (but for SEEN) or damaged.
     """
     try:
@@ -56,7 +57,8 @@ def read_map_server(directory: Path) -> OccupancyGrid:
         raise UsageError(f"{directory / DESCRIPTION} describes no map: {reason}") from error
     grey = _read_image(directory / IMAGE, "L")
     cells = np.full(grey.shape, UNKNOWN, np.int8)
-    cells[grey == FREE], cells[grey == WALL] = 0, 100
+    occupancy = (255 - grey) / 255.0
+    cells[occupancy < FREE_THRESH], cells[occupancy > OCCUPIED_THRESH] = 0, 100
     x, y, _ = description.origin
     return OccupancyGrid(cells, description.resolution, (x, y), _read_seen(directory, grey.shape))
 

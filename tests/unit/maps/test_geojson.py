@@ -222,6 +222,10 @@ def test_a_number_that_is_not_finite_is_not_saved() -> None:
         ("[0.01,", "[1e308,", r"feature 0.*covariance\[0\]"),
         ('"clearance":1.25', '"clearance":1000000', "feature 0.*clearance"),
         ('"length":3.0', '"length":1e300', "feature 2.*length"),
+        ('"clearance":1.25', '"clearance":-1.25', "feature 0.*clearance"),
+        ('"visits":', '"visits":-', "feature 0.*visits"),
+        ('"degree":', '"degree":-', "feature 0.*degree"),
+        ('"min_clearance":', '"min_clearance":-', "feature 2.*min_clearance"),
     ],
 )
 def test_damage_is_named_in_one_line(old: str, new: str, complaint: str) -> None:

@@ -339,6 +339,14 @@ def test_a_grid_that_was_written_can_be_read(tmp_path: Path) -> None:
     assert grid.seen_s.tolist() == [[0.0, 3.0, 65534.0], [math.inf, 65534.0, 12.0]]
 
 
+def test_greys_drawn_by_hand_count_as_map_server_takes_them(tmp_path: Path) -> None:
+    write_files(
+        tmp_path, encode_map_server(OccupancyGrid(np.zeros((2, 3), np.int8), 0.05, (0.0, 0.0)))
+    )
+    (tmp_path / "map.pgm").write_bytes(b"P5\n3 2\n255\n" + bytes([255, 206, 205, 90, 89, 20]))
+    assert read_map_server(tmp_path).cells.tolist() == [[-1, 100, 100], [0, 0, -1]]
+
+
 def test_a_grid_without_a_record_of_what_was_seen_can_be_read(tmp_path: Path) -> None:
     write_files(
         tmp_path, encode_map_server(OccupancyGrid(np.zeros((2, 3), np.int8), 0.05, (0.0, 0.0)))
