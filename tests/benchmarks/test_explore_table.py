@@ -124,7 +124,6 @@ def test_a_failure_is_listed_with_the_command_that_repeats_it(changes: Row) -> N
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(120)
 def test_the_workers_of_a_cluster_run_what_threads_would(tmp_path: Path) -> None:
     """A process of its own; a world that does not exist takes it no time."""
     (wanted,) = commands(_options(["--worlds", "nowhere", "--seeds", "2"]))
@@ -144,7 +143,6 @@ def test_a_scheduler_that_is_not_there_is_said_in_a_line() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)
 def test_runs_are_scored_and_kept_and_not_run_again(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -52,7 +52,6 @@ def test_a_log_is_of_one_seed(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)
 def test_a_base_that_drives_on_when_nobody_commands_it_any_more_is_found_out(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

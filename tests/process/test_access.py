@@ -31,7 +31,7 @@ from gvgbot.zenoh_config import session_config
 from tests.unit.monitor.maps import a_grid
 from tests.unit.test_telemetry import EXAMPLE
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(60)]
+pytestmark = pytest.mark.slow
 
 PACKAGED = Path(str(files("gvgbot") / "configs" / "zenoh"))
 INSTALLED = "/etc/gvgbot/zenoh"

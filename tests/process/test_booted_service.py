@@ -10,7 +10,7 @@ from benchmarks.rigs.programs import until
 from gvgbot.installation import system_files
 from tests.process.machine import Machine, NoMachine, machine
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(240)]
+pytestmark = pytest.mark.slow
 
 CONFIG = "{twin: {enabled: true, world: ring}, telemetry: {enabled: false}}\n"
 PATIENCE = 60.0  # s, for a busy machine

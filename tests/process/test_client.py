@@ -50,7 +50,7 @@ from gvgbot.topics import (
 from tests.unit.monitor.maps import SIDE, a_grid
 from tests.unit.test_telemetry import EXAMPLE
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(60)]
+pytestmark = pytest.mark.slow
 
 A_MAP = Map(
     stamp=3.0,

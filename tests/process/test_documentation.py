@@ -112,7 +112,6 @@ def explored(bend: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(120)
 @pytest.mark.parametrize("page", WITH_SAMPLES, ids=lambda page: page.stem)
 def test_marked_samples_run(page: Path, tmp_path: Path, bend: str, explored: Path) -> None:
     (tmp_path / "runs").mkdir()

@@ -26,7 +26,7 @@ from gvgbot.stop_signals import StopSignals
 from gvgbot.telemetry_config import TelemetryConfig
 from tests.unit.ros2.oracle import STORE
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(120)]
+pytestmark = pytest.mark.slow
 
 PATIENCE = 60.0  # s, for a busy machine
 NS = 1_700_000_000_000_000_000

@@ -39,7 +39,7 @@ from tests.process.browser import browser, chromium
 from tests.unit.monitor.maps import a_grid, a_map, vertex
 from tests.unit.test_telemetry import EXAMPLE
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(90)]
+pytestmark = pytest.mark.slow
 
 PATIENCE = 30.0  # s, for a busy machine
 ALTERNATE_ON, ALTERNATE_OFF = "\x1b[?1049h", "\x1b[?1049l"

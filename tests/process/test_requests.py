@@ -25,7 +25,7 @@ from gvgbot.telemetry_config import TelemetryConfig
 from gvgbot.topics import Events
 from tests.unit.test_telemetry import EXAMPLE
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(60)]
+pytestmark = pytest.mark.slow
 
 
 async def obliging(asked: Asked) -> Answer:

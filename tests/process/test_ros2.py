@@ -28,7 +28,7 @@ from gvgbot.ros2.translation import occupancy_grid
 from gvgbot.telemetry import Telemetry
 from gvgbot.telemetry_config import TelemetryConfig
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(180)]
+pytestmark = pytest.mark.slow
 
 NS = 1_700_000_000_123_456_789
 DOMAIN = 3

@@ -23,7 +23,7 @@ from benchmarks.rigs.addresses import free_endpoint, plain_session
 from benchmarks.rigs.programs import gvgbot, until
 from gvgbot.cli import main
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(60)]
+pytestmark = pytest.mark.slow
 
 RUN = {
     "map.geojson",

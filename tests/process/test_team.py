@@ -17,7 +17,7 @@ from benchmarks.rigs.programs import gvgbot
 from gvgbot.telemetry import Telemetry
 from gvgbot.telemetry_config import TelemetryConfig
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(60)]
+pytestmark = pytest.mark.slow
 
 NAMES = ("one", "two", "three")
 
@@ -71,7 +71,6 @@ def test_all_robots_of_a_team_hear_all_others(
         assert others == {b"\x00 by " + n.encode() + b"\xff" for n in NAMES if n != name}
 
 
-@pytest.mark.timeout(120)
 def test_daemons_at_a_router_hear_each_other(tmp_path: Path) -> None:
     """Two by one name say so as soon as they do, and neither minds that the other one is killed."""
     meeting = free_endpoint()

@@ -20,7 +20,7 @@ from benchmarks.rigs.programs import gvgbot
 from benchmarks.rigs.run_rig import base_commands
 from gvgbot.cli import main
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(90)]
+pytestmark = pytest.mark.slow
 PATIENCE = 30.0  # s, for a busy machine
 START_MS, BOOT_MS = 0x500000, 2000  # of the laser's clock
 GET_GAIN = bytes.fromhex("aa55 03 0e 01 00 0c")

@@ -15,7 +15,7 @@ from benchmarks.rigs.programs import gvgbot, until
 from gvgbot import client
 from gvgbot.client import State
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(240)]
+pytestmark = pytest.mark.slow
 
 PATIENCE = 60.0  # s, for a busy machine
 WATCHERS = 10

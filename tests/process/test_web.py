@@ -58,7 +58,7 @@ from tests.process.test_requests import a_robot
 from tests.unit.monitor.maps import a_grid, a_map, vertex
 from tests.unit.test_telemetry import EXAMPLE, NOWHERE
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(180)]
+pytestmark = pytest.mark.slow
 
 PATIENCE = 30.0  # s, for a busy machine
 

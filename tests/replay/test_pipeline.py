@@ -28,7 +28,7 @@ from gvgbot.report import route_graph
 from gvgbot.simulation import Place, Simulation
 from tests.twin.lollipop_rig import lollipop
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(60)]
+pytestmark = pytest.mark.slow
 
 Message = Scan | tuple[Odometry, Felt]
 Answer = list[Event] | Twist

@@ -27,7 +27,7 @@ from gvgbot.session import Session
 from gvgbot.tiles import Grid
 from tests.twin.lollipop_rig import LOLLIPOP, START
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(120)]
+pytestmark = pytest.mark.slow
 
 SAME = ["map.geojson", "map.pgm", "map.yaml", "map.png", "seen.png", "events.jsonl"]
 SAME += ["estimate.tum", "online.tum", "odometry.tum"]

@@ -9,7 +9,7 @@ from gvgbot.geometry import Pose
 from tests.scenarios.rig import assert_explored, play
 from tests.unit.autonomy.sights import carved
 
-pytestmark = [pytest.mark.slow, pytest.mark.twin, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.slow, pytest.mark.twin]
 
 BLOCKS = [(x, -0.8, x + 1.6, 0.8) for x in (-2.2, 0.6)]
 TOWN = carved([(-3.4, -2.0, 3.4, 2.0)], BLOCKS)  # two blocks side by side

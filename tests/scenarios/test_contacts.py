@@ -11,7 +11,7 @@ from gvgbot.worlds.canvas import Canvas
 from tests.scenarios.rig import Play, assert_found, graph_shape, play
 from tests.unit.autonomy.sights import carved
 
-pytestmark = [pytest.mark.slow, pytest.mark.twin, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.slow, pytest.mark.twin]
 
 # A corridor to the east that bends to the north: one has to go there to see its end.
 CORRIDOR = carved([(-3.0, -0.7, 3.0, 0.7), (1.6, -0.7, 3.0, 4.0)])

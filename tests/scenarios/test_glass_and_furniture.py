@@ -12,7 +12,7 @@ from gvgbot.worlds.canvas import Canvas
 from tests.scenarios.rig import assert_explored, assert_found, play
 from tests.unit.autonomy.sights import carved
 
-pytestmark = [pytest.mark.slow, pytest.mark.twin, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.slow, pytest.mark.twin]
 
 
 def test_a_room_behind_glass_is_entered_by_its_door() -> None:

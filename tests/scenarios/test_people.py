@@ -24,7 +24,7 @@ from tests.scenarios.rig import (
 )
 from tests.unit.autonomy.sights import carved
 
-pytestmark = [pytest.mark.slow, pytest.mark.twin, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.slow, pytest.mark.twin]
 
 # A corridor from west to east, with a branch to the north whose end cannot be seen from its mouth.
 NARROW = 1.0  # m: no way past a person of 0.4 m or more

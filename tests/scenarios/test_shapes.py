@@ -24,7 +24,7 @@ from tests.scenarios.rig import (
 )
 from tests.unit.autonomy.sights import Rectangle, carved
 
-pytestmark = [pytest.mark.slow, pytest.mark.twin, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.slow, pytest.mark.twin]
 
 
 SHORT_SIGHTED = TwinConfig(laser=HokuyoTwinConfig(model="URG-04LX"))  # sees 5.6 m

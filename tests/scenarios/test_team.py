@@ -94,7 +94,6 @@ def met() -> tuple["Explorer", "Explorer"]:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)
 def test_two_robots_that_meet_in_a_narrow_corridor_both_get_to_the_other_side() -> None:
     one, two = met()
     assert one.has_crossed
@@ -105,7 +104,6 @@ def test_two_robots_that_meet_in_a_narrow_corridor_both_get_to_the_other_side() 
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)
 def test_two_robots_that_met_know_how_their_maps_lie() -> None:
     """By their lasers and by what they told each other, as they have no vertex in common yet."""
     one, two = met()
@@ -118,7 +116,6 @@ def test_two_robots_that_met_know_how_their_maps_lie() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)
 def test_a_robot_that_has_finished_lets_another_one_pass() -> None:
     """It stands in the narrow corridor, where the other one has to come through."""
     starts = Pose(2.0, 3.4, 1.57), Pose(5.0, 4.5, np.pi)

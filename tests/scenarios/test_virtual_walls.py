@@ -21,7 +21,7 @@ from tests.scenarios.rig import (
 )
 from tests.unit.autonomy.sights import carved
 
-pytestmark = [pytest.mark.slow, pytest.mark.twin, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.slow, pytest.mark.twin]
 
 # A T: a corridor of 1.4 m from west to east, and one to the south.
 TEE = carved([(-2.2, -0.7, 2.2, 0.7), (-0.7, -4.6, 0.7, 0.0)])

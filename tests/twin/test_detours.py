@@ -18,7 +18,7 @@ from gvgbot.geometry import Pose
 from gvgbot.simulation import Place
 from gvgbot.worlds.canvas import Canvas
 
-pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.twin, pytest.mark.slow]
 
 START = Pose(3.5, 2.1, 0.2)
 RING = [(2.0, 2.0), (8.0, 2.0), (8.0, 5.6), (2.0, 5.6), (2.0, 2.0)]

@@ -15,7 +15,7 @@ from gvgbot.drivers.kobuki.twin import KobukiTwinConfig
 from gvgbot.drivers.world import World
 from gvgbot.simulation import Place
 
-pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.twin, pytest.mark.slow]
 
 REMEMBERED = 25.0  # s
 NORTH, MIDDLE = (5.5, 5.6), (4.7, 6.3, 3.7, 3.9)  # in a world that is smaller than the rig's

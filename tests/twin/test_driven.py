@@ -15,7 +15,7 @@ from gvgbot.robot import Robot
 from gvgbot.ros2.topics import MAP, ODOM, SCAN, TF, TF_STATIC, Topic
 from tests.unit.ros2.oracle import STORE
 
-pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.twin, pytest.mark.slow]
 
 EVERY = 0.1  # s between commands
 HOLD = 0.5  # s that a command holds

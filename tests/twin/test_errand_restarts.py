@@ -28,7 +28,7 @@ from gvgbot.simulation import Place
 from gvgbot.snapshots import _phase
 from gvgbot.worlds.canvas import Canvas
 
-pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.twin, pytest.mark.slow]
 
 TWIN = TwinConfig(base=KobukiTwinConfig(odometry="perfect"))
 START = Pose(2.5, 1.5, 0.1)

@@ -22,7 +22,7 @@ from gvgbot.requests import REQUESTS, Answer
 from gvgbot.simulation import Place
 from gvgbot.worlds.canvas import Canvas
 
-pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.twin, pytest.mark.slow]
 
 MEETPOINTS = ((5.5, 2.0), (5.5, 5.6))
 START = Pose(3.5, 2.1, 0.2)

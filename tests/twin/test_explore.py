@@ -29,7 +29,7 @@ from gvgbot.session import Session
 from gvgbot.worlds.canvas import Canvas
 from tests.unit.autonomy.sights import carved
 
-pytestmark = [pytest.mark.slow, pytest.mark.twin, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.slow, pytest.mark.twin]
 
 ROBOT_RADIUS = 0.177  # m
 WALL = 0.2  # m that a map may be off
@@ -379,7 +379,6 @@ def two_rooms() -> Case:
     return Case(world, Pose(6.5, 1.4, -0.7))
 
 
-@pytest.mark.timeout(300)
 def test_a_laser_that_sees_no_farther_than_a_room_finds_all_of_a_building(tmp_path: Path) -> None:
     """A URG-04LX, 5.6 m: where none of its beams comes back, there may be a wall all the same.
 

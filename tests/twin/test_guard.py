@@ -15,7 +15,7 @@ from gvgbot.hal.messages import Scan
 from gvgbot.links import Devices, Links
 from gvgbot.simulation import Simulation, open_place
 
-pytestmark = [pytest.mark.twin, pytest.mark.timeout(120)]
+pytestmark = pytest.mark.twin
 
 DEAD_TIME_S = 0.2  # of a Kobuki's firmware 1.2.0, from a command to the first change of odometry
 LONG_ENOUGH_S = 60.0  # to cross the hall

@@ -23,7 +23,7 @@ from gvgbot.session import Session
 from gvgbot.simulation import Place, Simulation
 from tests.twin.test_errand_restarts import tee
 
-pytestmark = [pytest.mark.slow, pytest.mark.twin, pytest.mark.timeout(180)]
+pytestmark = [pytest.mark.slow, pytest.mark.twin]
 
 Kill = Callable[[Session, float], bool]
 MOVING = ("explore", "home", "goto", "patrol", "coverage", "relocalise")

@@ -18,7 +18,7 @@ from gvgbot.session import Session
 from gvgbot.simulation import Place
 from gvgbot.worlds.canvas import Canvas
 
-pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.twin, pytest.mark.slow]
 
 FAR = (9.5, 5.5)  # the end of the long arm
 START = Pose(2.6, 2.1, 0.4)

@@ -11,7 +11,7 @@ from gvgbot.drivers.link_faults import LinkFaultConfig
 from gvgbot.geometry import Twist, wrap_angle
 from tests.twin.kobuki_rig import Robot, play
 
-pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.twin, pytest.mark.slow]
 
 SPEED, TURN = 0.2, 0.3
 SECONDS = 240.0

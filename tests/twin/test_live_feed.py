@@ -9,7 +9,7 @@ from gvgbot.geometry import Pose
 
 SECONDS = 25.0
 
-pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.twin, pytest.mark.slow]
 
 
 @pytest.fixture(scope="module")

@@ -26,7 +26,7 @@ from tests.twin.lollipop_rig import IN_RING, LOLLIPOP
 from tests.twin.lollipop_rig import START as HOME
 from tests.twin.test_errands import NEAR, START, a_while, theta, until
 
-pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.twin, pytest.mark.slow]
 
 DOORS = (2.8, 3.0, 1.2, 2.8), (4.0, 4.2, 1.2, 2.8)  # x, x, y, y; to either side of the start
 BASE = KobukiTwinConfig(odometry="perfect", battery_v=13.8)  # a Kobuki is low below 14 V

@@ -19,7 +19,7 @@ from gvgbot.links import Devices, Links
 from gvgbot.simulation import Simulation, open_place
 from tests.twin.test_explore import Case, Point, Run, explore, lollipop, matched
 
-pytestmark = [pytest.mark.slow, pytest.mark.twin, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.slow, pytest.mark.twin]
 
 AT, AWAY = (12.0, 32.0), 8.0  # s: when the device is lost, and for how long
 DEAD_TIME, FRAME, BRAKING = 0.06, 0.02, 1.0  # s, s, m/s2 of the simulated base

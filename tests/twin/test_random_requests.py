@@ -17,7 +17,7 @@ from gvgbot.geometry import Pose
 from gvgbot.requests import JSON, MESSAGEPACK, REQUESTS, Answer, Asked
 from gvgbot.steering import SETTABLE
 
-pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.twin, pytest.mark.slow]
 
 RUNS, REQUESTS_A_RUN = 2, 200  # ten a second
 BRAKING_S = 2.0

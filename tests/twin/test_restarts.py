@@ -26,7 +26,7 @@ from gvgbot.topics import Trajectory
 from tests.twin.lollipop_rig import IN_RING, LOLLIPOP, START, STICK_END
 from tests.unit.autonomy.sights import carved
 
-pytestmark = [pytest.mark.slow, pytest.mark.twin, pytest.mark.timeout(180)]
+pytestmark = [pytest.mark.slow, pytest.mark.twin]
 
 Points = dict[str, list[tuple[float, float]]]
 

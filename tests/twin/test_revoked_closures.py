@@ -12,7 +12,7 @@ from gvgbot.autonomy.slam.graph import Vertex
 from gvgbot.autonomy.unsettled import Unsettled
 from tests.twin.test_explore import explore, four_blocks
 
-pytestmark = [pytest.mark.slow, pytest.mark.twin, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.slow, pytest.mark.twin]
 
 AFTER = 20  # keyframes at least, a closure is taken back
 

@@ -35,7 +35,7 @@ from gvgbot.stop_signals import StopSignals
 from gvgbot.tiles import Grid
 from gvgbot.worlds.canvas import Canvas
 
-pytestmark = [pytest.mark.twin, pytest.mark.slow, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.twin, pytest.mark.slow]
 
 MAP = {"map.geojson", "map.yaml", "map.pgm", "map.png", "summary.json", "events.jsonl"}
 WATCHED_S = 40.0

@@ -50,7 +50,6 @@ def gap(one: Array, two: Array) -> float:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)
 def test_equal_seeds_leave_equal_maps_to_the_byte(tmp_path: Path) -> None:
     """Also where the interpreter orders its sets otherwise."""
     first, second = tmp_path / "first", tmp_path / "second"
@@ -69,7 +68,6 @@ def test_equal_seeds_leave_equal_maps_to_the_byte(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)
 def test_one_robot_may_come_late_and_one_break_down(tmp_path: Path) -> None:
     run = tmp_path / "run"
     troubles = [f"twin.team.late_s={LATE}", "twin.team.breaks_down=true", "twin.team.within_s=9"]
@@ -89,7 +87,6 @@ def test_one_robot_may_come_late_and_one_break_down(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)
 def test_who_comes_late_breaks_down_no_later_for_it(tmp_path: Path) -> None:
     run, seed = tmp_path / "run", 5  # with which the late one breaks down on its way
     troubles = ["twin.team.late_s=3", "twin.team.breaks_down=true", "twin.team.within_s=9"]

@@ -281,7 +281,6 @@ def test_a_port_that_is_not_ours_to_open_says_which_group_to_join() -> None:
     assert "dialout" in _obstacle(PermissionError(errno.EACCES, "Permission denied"))
 
 
-@pytest.mark.timeout(60)
 def test_a_port_where_nobody_answers_is_told_from_one_that_is_not_there(tmp_path: Path) -> None:
     with terminal(is_busy=False) as path:
         verdict, finding = at_ports(str(tmp_path), path)["base"]

@@ -29,7 +29,6 @@ def vertices(run: Path) -> np.ndarray:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(120)
 @pytest.mark.parametrize("name", ["office", "ring", "rooms"])
 def test_the_graph_of_an_imported_world_is_that_of_the_world(name: str, tmp_path: Path) -> None:
     """By the exact Voronoi diagram of the bitmap, which shares no code with the robot's."""

@@ -70,7 +70,6 @@ def write_log(path: Path, way: list[Pose]) -> list[Pose]:
     return heard
 
 
-@pytest.mark.timeout(120)
 def test_a_log_becomes_a_map_that_is_truer_than_its_odometry(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -175,7 +175,6 @@ def test_a_terminal_that_is_gone_does_not_end_the_robot() -> None:
 
 
 @pytest.mark.usefixtures("_fresh_log")
-@pytest.mark.timeout(10)
 def test_a_log_that_nobody_reads_does_not_hold_up_the_robot() -> None:
     """As after Ctrl-S in its terminal, or behind a pager. What was left out is owned up to."""
     reading, writing = os.pipe()

@@ -171,7 +171,6 @@ def test_who_sees_no_wall_thinks_nothing_until_it_has_driven_to_one() -> None:
     assert [relocaliser.step(look) for _ in range(WORK)][-1].possible > 0
 
 
-@pytest.mark.timeout(60)
 def test_it_is_not_wrong_where_more_places_look_alike_than_it_can_follow() -> None:
     """Along five corridors of 40 m most places are alike; two have a branch near the end."""
     corridors: list[Rectangle] = [(-1.0, 10.0 * k - 1.0, 41.0, 10.0 * k + 1.0) for k in range(5)]

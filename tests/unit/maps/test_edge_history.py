@@ -43,7 +43,6 @@ def found(length: float, others: float = 9.0) -> dict[tuple[int, int], float]:
     return {(e.start, e.end): time for e, time in zip(graph.edges, times, strict=True)}
 
 
-@pytest.mark.timeout(10)
 def test_the_trail_that_is_as_long_as_the_edge_was_is_found_among_many() -> None:
     early = {ends for ends, time in found(2 * CELL_M + 0.1).items() if time == 1.0}
     assert early == {(0, 1), (1, 2)}
