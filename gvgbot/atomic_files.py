@@ -4,6 +4,7 @@ import contextlib
 import errno
 import os
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from gvgbot.errors import GvgbotError
@@ -18,7 +19,9 @@ def write_files(directory: Path, contents: Mapping[str, bytes | str]) -> None:
     aside = {directory / name: _aside(directory / name) for name in contents}
     try:
         for path, content in zip(aside.values(), contents.values(), strict=True):
-            _write_through(path, _encoded(content) if isinstance(content, str) else content)
+            path.write_bytes(_encoded(content) if isinstance(content, str) else content)
+        with ThreadPoolExecutor(len(aside) or 1) as threads:  # a slow disk takes them together
+            list(threads.map(_sync, aside.values()))
         for path, temporary in aside.items():
             temporary.replace(path)
         sync_directory(directory)
@@ -37,7 +40,8 @@ def replace_file(path: Path, content: bytes, keep: Path | None = None) -> None:
     """Put content in the place of a file, and the file in the place of `keep`. Raises OSError."""
     aside = _aside(path)
     try:
-        _write_through(aside, content)
+        aside.write_bytes(content)
+        _sync(aside)
         if keep is not None and path.exists():
             path.replace(keep)
         aside.replace(path)
@@ -78,10 +82,9 @@ def _aside(path: Path) -> Path:
     return path.with_name(f".{path.name}.tmp")
 
 
-def _write_through(path: Path, content: bytes) -> None:
-    """Write a file, and wait until it is on the disk. Raises OSError."""
-    with path.open("wb", buffering=0) as file:
-        write_all(file.fileno(), content)
+def _sync(path: Path) -> None:
+    """Wait until a file is on the disk. Raises OSError."""
+    with path.open("rb") as file:
         os.fsync(file.fileno())
 
 

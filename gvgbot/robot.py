@@ -149,7 +149,7 @@ class Robot:
         if self._network is not None:
             work["network"] = self._network.answer()
             work["map"] = self._keep_shown(self._network)
-            work["requests"] = self._network.hear(self._steering.handle)
+            work["requests"] = self._network.hear(self._answer)
         if self._ros is not None:
             work["neighbours"] = self._ros.keep_shown(self._clock, self._off_loop)
         if self._team is not None:
@@ -163,6 +163,13 @@ class Robot:
             self._steering.close()
             for task in serving:
                 task.cancel()
+
+    async def _answer(self, asked: Asked) -> Answer:
+        """Do what is asked for, and keep it before that is answered."""
+        answer = await self._steering.handle(asked)
+        if answer.done and self._keeper is not None:
+            await self._keeper.wish_kept()
+        return answer
 
     def stand(self) -> None:
         """Tell the base to stand, until the next control cycle."""

@@ -7,6 +7,8 @@ disk before. A disk that is full, read-only or slow holds up nothing: what was n
 written later, bit by bit, and then the snapshot, which never knows more than the journal.
 """
 
+import asyncio
+import contextlib
 import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable
@@ -39,6 +41,7 @@ KEEP_EVERY = 0.5  # s between two batches
 RETRY_WITHIN = 30.0  # s between two attempts, at most, while the disk refuses
 MOST = 500  # keyframes in a batch: it is packed on the loop, and in memory
 SNAPSHOT_EVERY = 5.0  # s between two snapshots, if nothing but the robot's place has changed
+KEPT_WITHIN = 1.0  # s that who asks for something waits, at most, until it is kept
 BEAT_EVERY = 20.0  # s between two signs of life, while nothing is new
 _PAUSE_S = 1.0  # that the robot's clock is said to have stood while the computer was off
 _COUNTING_S = 60.0  # away for longer, the base's counters may have come round
@@ -91,7 +94,8 @@ class Keeper:
         self._snapshot_of = -1  # keyframes in it
         self._settled = False  # the map has changed since the last snapshot
         self._is_asked = False  # for something, in this life
-        self._is_urgent = False  # to keep what it was asked for last
+        self._urgent = asyncio.Event()  # to keep what it was asked for last
+        self._wish_kept = asyncio.Event()  # or tried to be
         self._goes_on = files.is_begun  # in the files in which it ended
         self._same_life = False  # the computer and its clock have gone on since
         self.trouble: str | None = None  # why nothing can be written just now
@@ -160,7 +164,9 @@ class Keeper:
         """Note what happened: a map that has changed is kept at once, and so is a wish."""
         self._settled = self._settled or isinstance(event, _SETTLED)
         if isinstance(event, events.Requested) and event.done:
-            self._is_asked = self._is_urgent = True
+            self._is_asked = True
+            self._wish_kept.clear()
+            self._urgent.set()
         self._is_retold |= isinstance(event, _RETELLING)
         if isinstance(event, events.WayForgotten):
             self._stay = min(self._stay, event.kept)
@@ -172,13 +178,29 @@ class Keeper:
         """
         pause, due = KEEP_EVERY, clock.now()
         while True:
-            await clock.sleep_until(clock.now() + KEEP_EVERY)
-            if clock.now() < due and not self._is_urgent:
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(KEEP_EVERY):
+                    await self._urgent.wait()
+            is_urgent = self._urgent.is_set()
+            if clock.now() < due and not is_urgent:
                 continue
-            self._is_urgent = False
+            self._urgent.clear()
+            if is_urgent and self._session.pipeline.errands.is_paused:
+                await off_loop(partial(self._files.note_rest, rests=True))  # until all is written
             await off_loop(self.keeping(clock.now()))
+            if not self._urgent.is_set():
+                self._wish_kept.set()
             pause = KEEP_EVERY if self.trouble is None else min(2.0 * pause, RETRY_WITHIN)
             due = clock.now() + pause
+
+    async def wish_kept(self) -> None:
+        """Wait until what was asked for is on the disk, but not long for one that is slow or full.
+
+        Who was told that the robot stands does not expect it to drive after a power cut.
+        """
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(KEPT_WITHIN):
+                await self._wish_kept.wait()
 
     def keeping(self, stamp: float) -> Callable[[], None]:
         """A function that writes what is new at a stamp, in a thread or later.

@@ -12,17 +12,20 @@ import pytest
 
 from benchmarks.kills import vertices
 from benchmarks.rigs.lives_rig import Lives, explored
+from benchmarks.rigs.run_rig import Daemon, at_once
 from gvgbot.autonomy.config import AutonomyConfig
 from gvgbot.autonomy.errands import Declined
 from gvgbot.autonomy.errands.kinds import Patrol
 from gvgbot.autonomy.keyframes import KeyframeConfig
 from gvgbot.autonomy.memory import growth, remember
+from gvgbot.clock import Clock
 from gvgbot.config import Config, TwinConfig
 from gvgbot.drivers.kobuki.twin import KobukiTwinConfig
 from gvgbot.geometry import Pose
-from gvgbot.persistence.keeper import _COUNTING_S, SNAPSHOT_EVERY
+from gvgbot.persistence.keeper import _COUNTING_S, SNAPSHOT_EVERY, Keeper
 from gvgbot.persistence.mission_files import MissionFiles
 from gvgbot.persistence.records import packed
+from gvgbot.robot import Robot
 from gvgbot.session import Session
 from gvgbot.simulation import Place
 from gvgbot.snapshots import _phase
@@ -236,3 +239,21 @@ def test_a_robot_that_waits_and_looks_for_its_place_waits_after_a_restart(tmp_pa
     last = robot.run([pulls_the_plug])
     assert last.pipeline.errands.is_waiting
     assert last.pipeline.mission.outcome is None
+
+
+def test_who_is_told_that_the_robot_stands_can_pull_the_plug_at_once(tmp_path: Path) -> None:
+    daemon = Daemon(tmp_path, tee())
+    keeper = Keeper(daemon.session, MissionFiles(tmp_path))
+    daemon.robot = Robot(
+        daemon.session, daemon.manager, daemon.network, off_loop=at_once, keeper=keeper
+    )
+
+    async def story(clock: Clock) -> None:
+        await clock.sleep_until(4.1)
+        assert (await daemon.network.ask("pause")).done
+        saved = MissionFiles(tmp_path).read()
+        assert saved is not None
+        assert saved.memory.intent.is_paused
+
+    with daemon.session.directory:
+        daemon.run(story)

@@ -28,7 +28,14 @@ from gvgbot.clock import LoopClock, run_in_virtual_time
 from gvgbot.config import load_config
 from gvgbot.drivers.kobuki.feedback import FeedbackMemory, FeedbackReader
 from gvgbot.maps.run_directory import RunDirectory
-from gvgbot.persistence.keeper import BEAT_EVERY, KEEP_EVERY, MOST, RETRY_WITHIN, Keeper
+from gvgbot.persistence.keeper import (
+    BEAT_EVERY,
+    KEEP_EVERY,
+    KEPT_WITHIN,
+    MOST,
+    RETRY_WITHIN,
+    Keeper,
+)
 from gvgbot.persistence.mission_files import JOURNAL, SNAPSHOT, MissionFiles
 from gvgbot.persistence.mission_state import Saved, Snapshot, boot_id
 from gvgbot.persistence.records import packed
@@ -325,6 +332,33 @@ def test_who_was_told_to_stand_stands_after_a_power_cut_though_the_disk_is_full(
         run_in_virtual_time(story())
     keeper.keeping(200.0)()
     assert packed(found(tmp_path).memory) == packed(remember(session.pipeline))
+
+
+@pytest.mark.parametrize("takes_s", [0.0, 3.0], ids=["quick disk", "slow disk"])
+def test_who_hears_that_the_robot_stands_finds_it_so_after_a_power_cut(
+    session: Session, tmp_path: Path, takes_s: float
+) -> None:
+    keeper = Keeper(session, MissionFiles(tmp_path))
+    keeper.keeping(20.0)()
+
+    async def off_loop(work: Callable[[], None]) -> None:
+        work()
+        await asyncio.sleep(takes_s)
+
+    async def story() -> None:
+        clock = LoopClock()
+        async with asyncio.TaskGroup() as tasks:
+            keeping = tasks.create_task(keeper.keep(clock, off_loop))
+            await clock.sleep_until(clock.now() + 0.1)  # and for long nothing is due
+            session.pipeline.errands.pause()
+            keeper.on_event(Requested(60.0, "pause", "ana", True, ""))
+            asked = clock.now()
+            await keeper.wish_kept()
+            assert clock.now() - asked == pytest.approx(min(takes_s, KEPT_WITHIN))
+            assert found(tmp_path).memory.intent.is_paused
+            keeping.cancel()
+
+    run_in_virtual_time(story())
 
 
 def test_what_did_not_change_is_not_written_again(session: Session, tmp_path: Path) -> None:
