@@ -14,7 +14,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from gvgbot.atomic_files import write_all, write_files
+from gvgbot.atomic_files import is_disk_full, write_all, write_files
 from gvgbot.errors import GvgbotError, UsageError
 from gvgbot.maps.map_server import DESCRIPTION, IMAGE, SEEN
 
@@ -266,4 +266,5 @@ def _unfit(path: Path, error: OSError) -> UsageError:
         why = f"{found} is a link to {found.readlink()}, which is not there"
     elif isinstance(error, FileExistsError | NotADirectoryError):
         why = "it is a file"
-    return UsageError(f"cannot write a run to {path}: {why}, choose another directory")
+    remedy = "make room" if is_disk_full(error) else "choose another directory"
+    return UsageError(f"cannot write a run to {path}: {why}, {remedy}")

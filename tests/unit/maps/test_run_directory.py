@@ -1,3 +1,4 @@
+import errno
 import json
 import math
 import shutil
@@ -200,6 +201,17 @@ def test_a_directory_with_other_files_will_do(tmp_path: Path) -> None:
     for _ in range(2):
         RunDirectory.create(tmp_path, world="office").close()
     assert names(tmp_path) == {"floor.yaml", "events.jsonl"}
+
+
+def test_where_no_directory_can_be_made_for_want_of_room_that_is_the_remedy(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Path, "mkdir", full)
+    with pytest.raises(UsageError, match=r"No space left on device, make room$"):
+        RunDirectory(tmp_path / "run")
 
 
 @pytest.mark.parametrize(
