@@ -82,7 +82,7 @@ class PoseTracker:
         self._unturned_s = self.odometry.unturned_s
         lost = self.was_lifted or self.odometry.has_gap_since(last.stamp)
         match = self.maps.match if self.matches_walls else self.maps.trust
-        if lost or is_doubted:
+        if self.matches_walls and (lost or is_doubted):
             turned = math.pi if is_broken else _TURNED_RAD if is_doubted else None
             match = partial(self.maps.find, turned=turned)
         if self.was_lifted or is_doubted:

@@ -23,8 +23,8 @@ START = Pose(-1.5, 0.0)
 class Tracked:
     """A tracker that has looked round once, and what hangs on it; a second from look to look."""
 
-    def __init__(self) -> None:
-        self.tracker = PoseTracker(AutonomyConfig(), matches_walls=True)
+    def __init__(self, *, matches_walls: bool = True) -> None:
+        self.tracker = PoseTracker(AutonomyConfig(), matches_walls=matches_walls)
         self.past, self.mapper = Past(), MapEdits(MappingConfig(), RecognitionConfig())
         self._stamp = 0.0
         self._keep(Pose(), Pose())
@@ -91,6 +91,13 @@ def test_who_was_lifted_is_looked_for_around_and_once_only(*, lifted: bool) -> N
     assert found is not None
     assert (found.distance(aside) < 0.05) == lifted
     assert not tracked.tracker.was_lifted
+
+
+def test_who_drives_by_odometry_alone_does_so_after_it_was_lifted_too() -> None:
+    tracked = Tracked(matches_walls=False)
+    tracked.tracker.was_lifted = True
+    assert tracked.look(Pose(0.1), Pose(0.6, 0.3)) == Pose(0.1)
+    assert np.linalg.eigvalsh(tracked.past.steps[-1].covariance)[1] > 0.25**2  # and knows of it
 
 
 def test_who_sees_no_known_walls_after_the_base_started_anew_may_be_anywhere() -> None:
