@@ -11,8 +11,6 @@ from gvgbot.geometry import Array, Pose, Twist
 
 _AHEAD = math.radians(30.0)  # to either side: what is there comes into the way of a body soon
 
-DockBeam = Literal["near left", "near centre", "near right", "far left", "far centre", "far right"]
-
 # what a base shows to people beside it: the robot drives, looks for its place, stands until it is
 # asked for something, is done, or needs somebody
 Sign = Literal["off", "starting", "busy", "searching", "standing", "finished", "trouble"]
@@ -146,13 +144,3 @@ class Battery:
     voltage: float
     fraction: float
     charging: bool
-
-
-@dataclass(frozen=True, slots=True)
-class Docking:
-    """Which of the charging dock's beams each receiver of the base sees."""
-
-    stamp: float
-    left: frozenset[DockBeam] = frozenset()
-    centre: frozenset[DockBeam] = frozenset()
-    right: frozenset[DockBeam] = frozenset()

@@ -258,17 +258,3 @@ def test_a_slip_is_counted_and_a_turn_is_none() -> None:
         assert robot.feedback.statistics.slips == 1
 
     play(script, twist=Twist(0.2, 1.0))
-
-
-def test_the_docks_beams_reach_the_hal() -> None:
-    async def script(robot: Robot) -> None:
-        robot.twin.show_dock(left=0x01, centre=0x0A, right=0x34)
-        await robot.clock.sleep_until(0.5)
-        docking = robot.feedback.docking
-        assert docking is not None
-        assert docking.left == {"near left"}
-        assert docking.centre == {"near centre", "far centre"}
-        assert docking.right == {"near right", "far left", "far right"}
-        assert docking.stamp == pytest.approx(0.5, abs=0.021)
-
-    play(script)

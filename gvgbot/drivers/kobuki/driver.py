@@ -28,7 +28,7 @@ from gvgbot.drivers.transport import ByteStream
 from gvgbot.errors import DeviceLost, DeviceRefused
 from gvgbot.geometry import STANDSTILL, Twist
 from gvgbot.hal.latest import Latest
-from gvgbot.hal.messages import Battery, Contact, Docking, Odometry, Sign
+from gvgbot.hal.messages import Battery, Contact, Odometry, Sign
 from gvgbot.ranges import Range
 
 _STOP_REPEAT_S = 0.1  # while the base is to stand, it is told so again this often
@@ -179,11 +179,6 @@ class KobukiBase:
         return self._feedback.battery
 
     @property
-    def docking(self) -> Docking | None:
-        """The newest sight of the charging dock, None before the first."""
-        return self._feedback.docking
-
-    @property
     def identity(self) -> Identity:
         """What the base has answered so far about itself."""
         return self._feedback.identity
@@ -192,11 +187,6 @@ class KobukiBase:
     def statistics(self) -> LinkStatistics:
         """Counters of the link."""
         return self._feedback.statistics
-
-    @property
-    def slip_rate(self) -> float:
-        """Turn rate by the gyro minus by the wheels, smoothed, rad/s; large when a wheel slips."""
-        return self._feedback.slip_rate
 
     def _permitted(self, twist: Twist, last_driven: float) -> Twist:
         config = self._config

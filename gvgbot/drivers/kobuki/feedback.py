@@ -2,14 +2,12 @@
 
 import math
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 from gvgbot.drivers.kobuki.device_clock import DeviceClock, advance_clock, start_clock
 from gvgbot.drivers.kobuki.frames import BadFrame, FrameParser
 from gvgbot.drivers.kobuki.payloads import (
     DIAGNOSTICS,
     CoreSensors,
-    DockIr,
     FeedbackPart,
     FirmwareVersion,
     HardwareVersion,
@@ -31,7 +29,7 @@ from gvgbot.drivers.kobuki.wheel_odometry import (
     wheel_travels,
 )
 from gvgbot.geometry import wrap_angle
-from gvgbot.hal.messages import Battery, Contact, DockBeam, Docking, Odometry
+from gvgbot.hal.messages import Battery, Contact, Odometry
 
 FRAME_PERIOD = 0.02  # s, of the base's stream
 _PROMPT = 2  # frames that come together at most if none had to wait to be read
@@ -41,14 +39,6 @@ _JUMP_SPEED = 2.0  # m/s, nor this fast over a longer gap
 _JUMP_TURN = 0.35  # rad between two frames that no base turns,
 _JUMP_TURN_RATE = 6.0  # rad/s, nor this fast over a longer gap
 _SLIP_RATE, _GRIP_RATE = 0.2, 0.1  # rad/s: a slip begins above the one and ends below the other
-_DOCK_BEAMS: tuple[DockBeam, ...] = (
-    "near left",
-    "near centre",
-    "near right",
-    "far centre",
-    "far left",
-    "far right",
-)  # from bit 0
 _JUMPS_BELIEVED = 3  # readings in a row that agree against the old one
 
 
@@ -96,7 +86,7 @@ class FeedbackMemory:
 
 
 class FeedbackReader:
-    """What the base has reported so far: contact, battery, dock, identity, counters, odometry."""
+    """What the base has reported so far: contact, battery, identity, counters, odometry."""
 
     def __init__(
         self, heading: Heading, link_delay: float, geometry: DriveGeometry = KOBUKI
@@ -114,7 +104,6 @@ class FeedbackReader:
         self._missed = self._malformed = self._unknown = self._doubted = 0
         self.contact: Contact | None = None
         self.battery: Battery | None = None
-        self.docking: Docking | None = None
         self._slips = 0
         self._is_slipping = False
         self._has_gyro = False  # a frame has told of one
@@ -163,11 +152,6 @@ class FeedbackReader:
             self._odometry_resets = memory.clock.resets
 
     @property
-    def slip_rate(self) -> float:
-        """Turn rate by the gyro minus by the wheels, smoothed, rad/s."""
-        return 0.0 if self._odometry is None else self._odometry.slip_rate
-
-    @property
     def lacks_gyro(self) -> bool:
         """Whether the heading is to be the gyro's, which tells nothing while the wheels turn."""
         state = self._odometry
@@ -211,7 +195,6 @@ class FeedbackReader:
             return None
         core: CoreSensors | None = None
         inertia: Inertia | None = None
-        dock: DockIr | None = None
         for part in parts:
             match part:
                 case CoreSensors():
@@ -219,8 +202,6 @@ class FeedbackReader:
                 case Inertia():
                     inertia = part
                     self._has_gyro = True
-                case DockIr():
-                    dock = part
                 case HardwareVersion(version) | FirmwareVersion(version):
                     self._extras[type(part)] = str(version)
                 case Udid():
@@ -232,10 +213,7 @@ class FeedbackReader:
         if core is None:
             return None
         clock = self._clock_at(core.stamp_ms, arrival - self._link_delay, is_prompt=is_prompt)
-        odometry = self._take_core(core, inertia, arrival, clock)
-        if dock is not None and self.contact is not None:
-            self.docking = _docking(dock, self.contact.stamp)
-        return odometry
+        return self._take_core(core, inertia, arrival, clock)
 
     def _clock_at(self, raw_ms: int, arrival: float, *, is_prompt: bool) -> DeviceClock:
         """The base's clock at a frame with this counter that arrived then (s)."""
@@ -337,12 +315,3 @@ def _battery(core: CoreSensors, stamp: float) -> Battery:
     slope = (1.0 - low_fraction) / (full_v - low_v)
     fraction = low_fraction + slope * (core.voltage - low_v)
     return Battery(stamp, core.voltage, min(1.0, max(0.0, fraction)), core.charging)
-
-
-def _docking(dock: DockIr, stamp: float) -> Docking:
-    return Docking(stamp, _beams(dock.left), _beams(dock.centre), _beams(dock.right))
-
-
-@lru_cache(maxsize=256)
-def _beams(bits: int) -> frozenset[DockBeam]:
-    return frozenset(beam for bit, beam in enumerate(_DOCK_BEAMS) if bits >> bit & 1)

@@ -91,7 +91,6 @@ class KobukiTwin:
         self._mishaps = Mishaps(config.mishaps, seed)
         self._dock = None if config.dock is None else Dock(Pose(*config.dock))
         self._look = look
-        self._shown = DockIr(0, 0, 0)
         self._power = Power(
             config.battery_v, config.battery_drain_v_per_h, config.battery_charge_v_per_h
         )
@@ -116,11 +115,6 @@ class KobukiTwin:
         return self._output
 
     @property
-    def sensors(self) -> ErringSensors:
-        """The errors drawn for this base."""
-        return self._sensors
-
-    @property
     def received(self) -> FrameParser:
         """The parser of the host's bytes, with its counters."""
         return self._parser
@@ -133,10 +127,6 @@ class KobukiTwin:
     def inject(self, mishap: Mishap, duration: float) -> None:
         """Let a mishap begin with the next frame, for so long (s)."""
         self._mishaps.inject(mishap, duration)
-
-    def show_dock(self, *, left: int, centre: int, right: int) -> None:
-        """Let a dock's beams fall on the receivers, one bit per beam, wherever the base is."""
-        self._shown = DockIr(right, centre, left)
 
     def hold_buttons(self, bits: int) -> None:
         """Hold the buttons down whose bits are set (B0 is bit 0), and let go of the others."""
@@ -222,9 +212,8 @@ class KobukiTwin:
 
     def _dock_beams(self) -> DockIr:
         if self._dock is None:
-            return self._shown
-        seen, shown = self._dock.shines_on(self._body.pose, self._look), self._shown
-        return DockIr(seen.right | shown.right, seen.centre | shown.centre, seen.left | shown.left)
+            return DockIr(0, 0, 0)
+        return self._dock.shines_on(self._body.pose, self._look)
 
     def _obey(self, command: Command, now: float) -> None:
         match command:
