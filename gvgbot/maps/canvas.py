@@ -61,11 +61,11 @@ class Canvas:
     """A white image of `width` by `height` pixels; y grows downwards, and sizes are in pixels."""
 
     def __init__(self, width: int, height: int) -> None:
-        self.width, self.height = width, height
+        self.height = height
         self._large = Image.new("P", (width * OVERSAMPLING, height * OVERSAMPLING), Ink.WHITE)
         self._large.putpalette(palette())
         self._pen = ImageDraw.Draw(self._large)
-        self._texts: list[tuple[Point, str, int, Ink, str]] = []
+        self._texts: list[tuple[Point, str, int, str]] = []
         self._pasted: list[tuple[Image.Image, tuple[int, int]]] = []
 
     def raster(self, shades: NDArray[np.uint8], corner: Point, size: Point) -> None:
@@ -122,11 +122,9 @@ class Canvas:
         x, y = centre
         self._pen.ellipse(_flat([(x - radius, y - radius), (x + radius, y + radius)]), fill)
 
-    def text(
-        self, at: Point, words: str, size: int, ink: Ink = Ink.BLACK, anchor: str = "lm"
-    ) -> None:
+    def text(self, at: Point, words: str, size: int, anchor: str = "lm") -> None:
         """Words with a white halo; the anchor is Pillow's (horizontal l m r, vertical t m b)."""
-        self._texts.append((at, words, size, ink, anchor))
+        self._texts.append((at, words, size, anchor))
 
     def paste(self, other: Self, corner: Point, *, shrunk: int = 1) -> None:
         """Put another picture on this one, so many times smaller, over all that is drawn."""
@@ -142,11 +140,11 @@ class Canvas:
         for picture, corner in self._pasted:
             image.paste(picture, corner)
         pen = ImageDraw.Draw(image)
-        for at, words, size, ink, anchor in self._texts:
+        for at, words, size, anchor in self._texts:
             pen.text(
                 at,
                 words,
-                COLOURS[ink],
+                COLOURS[Ink.BLACK],
                 _font(size),
                 anchor,
                 stroke_width=2,

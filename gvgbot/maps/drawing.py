@@ -41,7 +41,6 @@ class Words:
     at: Point
     words: str
     size: float
-    ink: Ink
     anchor: Anchor
 
 
@@ -94,11 +93,9 @@ class Drawing:
         """A filled circle: where a round pen touches the paper once."""
         self._shapes.append(Stroke(np.array([centre, centre]), 2.0 * radius, fill))
 
-    def text(
-        self, at: Point, words: str, size: int, ink: Ink = Ink.BLACK, anchor: Anchor = "lm"
-    ) -> None:
+    def text(self, at: Point, words: str, size: int, anchor: Anchor = "lm") -> None:
         """Words with a white halo, over all that is drawn."""
-        self.words.append(Words(at, words, size, ink, anchor))
+        self.words.append(Words(at, words, size, anchor))
 
     def paste(self, other: Self, corner: Point, *, shrunk: int = 1) -> None:
         """Put another drawing on this one, so many times smaller, over all that is drawn."""

@@ -85,7 +85,7 @@ def _words(words: Words) -> Iterator[str]:
     x = words.at[0] - _SHARES[words.anchor] * text_width(words.words, words.size)
     place = f"1 0 0 -1 {_at((x, words.at[1] + MIDDLE * words.size))} Tm"
     escaped = words.words.translate({ord(sign): f"\\{sign}" for sign in "\\()"})
-    yield f"{_colour(Ink.WHITE)} RG {_colour(words.ink)} rg {HALO:.2f} w"
+    yield f"{_colour(Ink.WHITE)} RG {_colour(Ink.BLACK)} rg {HALO:.2f} w"
     yield f"BT /F {words.size} Tf {place} 1 Tr ({escaped}) Tj {place} 0 Tr ({escaped}) Tj ET"
 
 

@@ -14,7 +14,6 @@ Anchor = Literal["lm", "mm", "rm"]  # left end, middle or right end of words, at
 class Surface(Protocol):
     """White at first; y grows downwards, and sizes are in pixels."""
 
-    width: int
     height: int
 
     def raster(self, shades: NDArray[np.uint8], corner: Point, size: Point) -> None:
@@ -35,9 +34,7 @@ class Surface(Protocol):
     def disc(self, centre: Point, radius: float, *, fill: Ink) -> None:
         """A filled circle."""
 
-    def text(
-        self, at: Point, words: str, size: int, ink: Ink = Ink.BLACK, anchor: Anchor = "lm"
-    ) -> None:
+    def text(self, at: Point, words: str, size: int, anchor: Anchor = "lm") -> None:
         """Words with a white halo, over all that is drawn."""
 
     def paste(self, other: Self, corner: Point, *, shrunk: int = 1) -> None:

@@ -74,7 +74,7 @@ def _add_words(parent: ET.Element, words: Words) -> None:
         "text-anchor": _ANCHORS[words.anchor],
         "font-family": "Helvetica, Arial, sans-serif",
         "font-size": str(words.size),
-        "fill": _colour(words.ink),
+        "fill": _colour(Ink.BLACK),
         "stroke": _colour(Ink.WHITE),
         "stroke-width": f"{HALO:g}",
         "stroke-linejoin": "round",

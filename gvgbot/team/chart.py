@@ -26,11 +26,6 @@ class Departure:
     edge: int | None
     blocked: bool = False
 
-    @property
-    def is_open(self) -> bool:
-        """Whether it is a frontier."""
-        return self.edge is None and not self.blocked
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ChartVertex:

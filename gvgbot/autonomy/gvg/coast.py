@@ -54,11 +54,10 @@ class Diagram:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Cuts:
-    """Where ridges reach the coast: points (K, 2), and the ridge (K,) and place on it of each."""
+    """Where ridges reach the coast: points (K, 2), and the ridge (K,) of each."""
 
     points: Array
     ridge: Indices
-    along: Array  # m from the middle between the generators
 
 
 def with_coast(
@@ -101,7 +100,7 @@ def _cuts(diagram: Diagram, walls: Array, radius: float) -> _Cuts:
         cut.append(hit)
         along.append(side[hit])
     cuts, places = np.concatenate(cut), np.concatenate(along)
-    return _Cuts(middle[cuts] + places[:, None] * direction[cuts], far[cuts], places)
+    return _Cuts(middle[cuts] + places[:, None] * direction[cuts], far[cuts])
 
 
 def _along(ways: Array, directions: Array) -> Array:

@@ -34,10 +34,6 @@ class LocalEdge:
         """Clearance so many metres along the edge."""
         return float(np.interp(station, self.stations, self.clearance))
 
-    def other(self, node: int) -> int:
-        """The node at the far end."""
-        return self.b if node == self.a else self.a
-
     def cut_far_from(self, point: Array) -> "LocalEdge":
         """The same ring, begun half way round from where it is nearest to a point (2,)."""
         nearest = int(np.hypot(*(self.polyline - point).T).argmin())
