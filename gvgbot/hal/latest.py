@@ -24,8 +24,3 @@ class Latest(Generic[T]):
         self._fresh.clear()
         assert self._value is not None
         return self._value
-
-    @property
-    def value(self) -> T | None:
-        """The newest value, taken or not; None before the first."""
-        return self._value

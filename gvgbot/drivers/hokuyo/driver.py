@@ -165,11 +165,6 @@ class HokuyoLaser:
         return self._parameters
 
     @property
-    def status(self) -> Mapping[str, str]:
-        """The laser's own account of its state, by the keys of its II reply; empty until open."""
-        return self._status
-
-    @property
     def mode(self) -> Mode | None:
         """The scans that are asked for, and what was changed to fit the link; None until open."""
         return self._mode
