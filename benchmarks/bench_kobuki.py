@@ -12,6 +12,7 @@ from gvgbot.drivers.kobuki.feedback import FeedbackReader
 from gvgbot.drivers.kobuki.frames import Frame, FrameParser, encode_frame
 from gvgbot.drivers.kobuki.payloads import decode_feedback, encode_feedback
 from gvgbot.drivers.kobuki.twin import KobukiTwin, KobukiTwinConfig
+from gvgbot.drivers.kobuki.wheel_odometry import KOBUKI
 from gvgbot.drivers.transport import pipe, serve_twin
 from gvgbot.geometry import Twist
 
@@ -38,7 +39,7 @@ def protocol() -> None:
                 decode_feedback(frame.payload)
 
     parts = decode_feedback(frames[0][3:-1])
-    reader = FeedbackReader("gyro", 0.0)
+    reader = FeedbackReader("gyro", 0.0, KOBUKI)
     works = {
         "framing and decoding": decode,
         "encoding and framing": lambda: [

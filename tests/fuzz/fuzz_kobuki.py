@@ -15,6 +15,7 @@ with atheris.instrument_imports(include=["gvgbot"]):
     from gvgbot.drivers.kobuki.frames import Frame, FrameParser, encode_frame
     from gvgbot.drivers.kobuki.payloads import decode_feedback, encode_feedback
     from gvgbot.drivers.kobuki.sub_payloads import Truncated
+    from gvgbot.drivers.kobuki.wheel_odometry import KOBUKI
 
 STOP = bytes.fromhex("aa55 06 01 04 0000 0000 03")
 LONGEST = 259  # bytes of a frame
@@ -30,7 +31,7 @@ def one_input(data: bytes) -> None:
 
 def read(data: bytes) -> None:
     """Feed the bytes, and then frames that must be found."""
-    parser, reader = FrameParser(), FeedbackReader("gyro", 0.0)
+    parser, reader = FrameParser(), FeedbackReader("gyro", 0.0, KOBUKI)
     fed = used = 0
     for moment, chunk in enumerate(chunks(data)):
         odometry = reader.take(chunk, 0.02 * moment)

@@ -8,6 +8,7 @@ from gvgbot.clock import LoopClock
 from gvgbot.drivers.kobuki.driver import KobukiBase, KobukiConfig
 from gvgbot.drivers.kobuki.feedback import FeedbackReader
 from gvgbot.drivers.kobuki.twin import KobukiTwin, KobukiTwinConfig
+from gvgbot.drivers.kobuki.wheel_odometry import KOBUKI
 from gvgbot.drivers.link_faults import FaultyLink
 from gvgbot.drivers.transport import TwinDevice
 from gvgbot.geometry import Twist
@@ -64,7 +65,7 @@ class Robot:
         self.twin = KobukiTwin(config, self.body, seed)
         self.frames = Logged(OtherClock(self.twin, drift_ppm))
         self.wire = Wire(self.frames, config.link, seed)
-        self.feedback = FeedbackReader("gyro", 0.0)
+        self.feedback = FeedbackReader("gyro", 0.0, KOBUKI)
         self.base = ReopeningBase(self.open, self.clock)
         self.heard: list[tuple[float, Odometry]] = []
         self.contacts: list[Contact] = []

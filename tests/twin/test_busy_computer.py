@@ -14,6 +14,7 @@ from gvgbot.drivers.hokuyo.twin import HokuyoTwinConfig
 from gvgbot.drivers.kobuki.driver import KobukiBase
 from gvgbot.drivers.kobuki.feedback import FeedbackReader
 from gvgbot.drivers.kobuki.twin import KobukiTwinConfig
+from gvgbot.drivers.kobuki.wheel_odometry import KOBUKI
 from gvgbot.drivers.transport import pipe
 from gvgbot.errors import DeviceLost
 from gvgbot.geometry import Pose, Twist, wrap_angle
@@ -45,7 +46,7 @@ class Turning:
         laser = HokuyoTwinConfig(range_sigma_m=0.0, dropout_fraction=0.0)
         self.config = Config(twin=TwinConfig(base=base, laser=laser))
         self.simulation = Simulation(self.config, self.place, self.clock)
-        self.feedback = FeedbackReader("gyro", 0.0)
+        self.feedback = FeedbackReader("gyro", 0.0, KOBUKI)
         self.base = KobukiBase(self.simulation.base, self.config.base, self.clock, self.feedback)
         self.laser = HokuyoLaser(self.simulation.laser, self.config.laser, self.clock)
         self.log = OdometryLog()

@@ -18,7 +18,6 @@ from gvgbot.drivers.kobuki.sub_payloads import (
 )
 from gvgbot.geometry import Twist
 
-WHEEL_BASE_MM = 230.0
 _EPSILON = 1e-4  # m/s and rad/s: less counts as zero
 _S16_MAX = 32767
 
@@ -34,7 +33,7 @@ class BaseControl:
     radius_mm: int
 
     @classmethod
-    def from_twist(cls, twist: Twist, wheel_base_mm: float = WHEEL_BASE_MM) -> Self:
+    def from_twist(cls, twist: Twist, wheel_base_mm: float) -> Self:
         """The command nearest to the twist; numbers are cut towards zero, so it is never faster.
 
         An arc too wide for the field is sent as straight ahead: the widest arc that fits would
@@ -50,11 +49,6 @@ class BaseControl:
         if abs(radius) > _S16_MAX:
             return cls(_s16(v), 0)
         return cls(_s16((radius + math.copysign(half_base, radius)) * w), int(radius))
-
-    @property
-    def twist(self) -> Twist:
-        """What a Kobuki does on this command, m/s and rad/s."""
-        return self.twist_on(WHEEL_BASE_MM)
 
     def twist_on(self, wheel_base_mm: float) -> Twist:
         """What a base with its wheels so far apart does on this command, m/s and rad/s."""

@@ -17,7 +17,6 @@ from gvgbot.drivers.kobuki.payloads import (
 )
 from gvgbot.drivers.kobuki.sub_payloads import Truncated, Unknown
 from gvgbot.drivers.kobuki.wheel_odometry import (
-    KOBUKI,
     DriveGeometry,
     Heading,
     WheelOdometry,
@@ -88,9 +87,7 @@ class FeedbackMemory:
 class FeedbackReader:
     """What the base has reported so far: contact, battery, identity, counters, odometry."""
 
-    def __init__(
-        self, heading: Heading, link_delay: float, geometry: DriveGeometry = KOBUKI
-    ) -> None:
+    def __init__(self, heading: Heading, link_delay: float, geometry: DriveGeometry) -> None:
         """`link_delay` (s) is the least time from measuring to arrival."""
         self._heading = heading
         self._geometry = geometry

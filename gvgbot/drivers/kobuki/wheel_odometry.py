@@ -68,7 +68,7 @@ def advance_odometry(
     reading: WheelReading,
     dt: float,
     heading: Heading,
-    geometry: DriveGeometry = KOBUKI,
+    geometry: DriveGeometry,
 ) -> WheelOdometry:
     """The state after `dt` seconds (> 0) at whose end the wheels and the gyro read this.
 
@@ -89,9 +89,7 @@ def advance_odometry(
     return WheelOdometry(pose, Twist(speed, rate), reading, slip_rate, unfelt=unfelt)
 
 
-def wheel_travels(
-    before: WheelReading, after: WheelReading, tick: float = TICK
-) -> tuple[float, float]:
+def wheel_travels(before: WheelReading, after: WheelReading, tick: float) -> tuple[float, float]:
     """Metres that the left and the right wheel went, each less than half an encoder turn-over."""
     return (
         tick * _signed(after.left_encoder - before.left_encoder),
@@ -100,7 +98,7 @@ def wheel_travels(
 
 
 def turned(
-    before: WheelReading, after: WheelReading, heading: Heading, geometry: DriveGeometry = KOBUKI
+    before: WheelReading, after: WheelReading, heading: Heading, geometry: DriveGeometry
 ) -> float:
     """How far the base has turned, rad: by the gyro, in (-π, π], or by the wheels."""
     if heading == "gyro":

@@ -27,6 +27,7 @@ from gvgbot.drivers.kobuki.frames import MIN_PAYLOAD
 from gvgbot.geometry import Twist
 
 HALF_BASE = 0.115  # m
+WHEEL_BASE_MM = 230.0
 u8, u16, u32 = (st.integers(0, 2**bits - 1) for bits in (8, 16, 32))
 s16 = st.integers(-32768, 32767)
 
@@ -64,7 +65,7 @@ def wheels(twist: Twist) -> tuple[float, float]:
 @example(0.0, 0.0)
 def test_a_twist_survives_within_what_cutting_costs(linear: float, angular: float) -> None:
     """Geometry: 1 mm/s of a wheel, 1 mm of radius, and 1 mm/s for small terms left out."""
-    got = BaseControl.from_twist(Twist(linear, angular)).twist
+    got = BaseControl.from_twist(Twist(linear, angular), WHEEL_BASE_MM).twist_on(WHEEL_BASE_MM)
     radius = abs(linear / angular) if angular else math.inf
     by_radius = 0.001 / (radius + HALF_BASE) * (abs(linear) + HALF_BASE * abs(angular))
     for ours, theirs in zip(wheels(got), wheels(Twist(linear, angular)), strict=True):
@@ -73,7 +74,7 @@ def test_a_twist_survives_within_what_cutting_costs(linear: float, angular: floa
 
 @given(st.floats(-1.0, 1.0), st.floats(-4.0, 4.0))
 def test_what_is_sent_is_never_faster_than_asked(linear: float, angular: float) -> None:
-    got = BaseControl.from_twist(Twist(linear, angular)).twist
+    got = BaseControl.from_twist(Twist(linear, angular), WHEEL_BASE_MM).twist_on(WHEEL_BASE_MM)
     asked = abs(linear) + HALF_BASE * abs(angular)
     assert abs(got.linear) + HALF_BASE * abs(got.angular) <= asked + 1e-4 + 0.0015
 
@@ -81,7 +82,7 @@ def test_what_is_sent_is_never_faster_than_asked(linear: float, angular: float) 
 @pytest.mark.parametrize("radius", [2, -2, 115, -115, 1000, -30000])
 @pytest.mark.parametrize("speed", [100, -250])
 def test_the_arcs_radius_and_outer_wheel_are_as_commanded(speed: int, radius: int) -> None:
-    twist = BaseControl(speed, radius).twist
+    twist = BaseControl(speed, radius).twist_on(WHEEL_BASE_MM)
     assert twist.linear / twist.angular == pytest.approx(radius / 1000)
     left, right = wheels(twist)
     assert (right if radius > 0 else left) == pytest.approx(speed / 1000)
@@ -97,23 +98,24 @@ def test_the_arcs_radius_and_outer_wheel_are_as_commanded(speed: int, radius: in
     ],
 )
 def test_special_radii_mean_straight_and_on_the_spot(control: BaseControl, twist: Twist) -> None:
-    assert control.twist.linear == pytest.approx(twist.linear)
-    assert control.twist.angular == pytest.approx(twist.angular)
+    got = control.twist_on(WHEEL_BASE_MM)
+    assert got.linear == pytest.approx(twist.linear)
+    assert got.angular == pytest.approx(twist.angular)
 
 
 @pytest.mark.parametrize("speed", [0.01, -0.3, 0.7])
 def test_an_arc_too_wide_to_send_becomes_straight(speed: float) -> None:
-    control = BaseControl.from_twist(Twist(speed, speed / 40.0))
+    control = BaseControl.from_twist(Twist(speed, speed / 40.0), WHEEL_BASE_MM)
     assert control == BaseControl(round(1000 * speed), 0)
 
 
 def test_speeds_beyond_the_field_saturate() -> None:
-    assert BaseControl.from_twist(Twist(40.0, 0.0)) == BaseControl(32767, 0)
-    assert BaseControl.from_twist(Twist(-40.0, 0.0)) == BaseControl(-32768, 0)
+    assert BaseControl.from_twist(Twist(40.0, 0.0), WHEEL_BASE_MM) == BaseControl(32767, 0)
+    assert BaseControl.from_twist(Twist(-40.0, 0.0), WHEEL_BASE_MM) == BaseControl(-32768, 0)
 
 
 def test_a_radius_that_means_a_turn_on_the_spot_is_sent_as_one() -> None:
-    assert BaseControl.from_twist(Twist(0.001, 1.0)) == BaseControl(115, 1)
+    assert BaseControl.from_twist(Twist(0.001, 1.0), WHEEL_BASE_MM) == BaseControl(115, 1)
 
 
 def test_the_bits_of_the_outputs_are_those_of_the_protocol() -> None:

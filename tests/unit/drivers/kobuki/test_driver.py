@@ -32,7 +32,7 @@ from gvgbot.drivers.kobuki.payloads import (
     encode_feedback,
 )
 from gvgbot.drivers.kobuki.sub_payloads import Truncated, Unknown
-from gvgbot.drivers.kobuki.wheel_odometry import Heading
+from gvgbot.drivers.kobuki.wheel_odometry import KOBUKI, Heading
 from gvgbot.drivers.transport import pipe
 from gvgbot.errors import DeviceLost, DeviceRefused
 from gvgbot.geometry import STANDSTILL, Twist
@@ -319,7 +319,7 @@ def test_drive_slows_down_on_the_same_arc_and_says_what_it_sent(asked: Twist, se
     controls = play(script).controls(since=0.04)
     (_, control) = controls[0]
     assert isinstance(control, BaseControl)
-    assert told == [control.twist]
+    assert told == [control.twist_on(230.0)]
     assert told[0].linear == pytest.approx(sent.linear, abs=0.002)
     assert told[0].angular == pytest.approx(sent.angular, abs=0.01)
 
@@ -407,7 +407,7 @@ def test_encoders_that_start_anew_do_not_move_the_robot_but_count_from_there() -
 
 @pytest.mark.parametrize("late", [0, 1, 20])
 def test_a_base_that_starts_anew_may_tell_of_its_gyro_a_few_frames_later(late: int) -> None:
-    reader, back, odometry = FeedbackReader("gyro", 0.0), 12.0, None
+    reader, back, odometry = FeedbackReader("gyro", 0.0, KOBUKI), 12.0, None
     for k in range(500):
         reader.take(frame(core(k, 60 * k, 60 * k), Inertia(0, 0)), 0.02 * k)
     for k in range(100):

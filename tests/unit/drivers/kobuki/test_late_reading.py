@@ -7,6 +7,7 @@ import pytest
 
 from gvgbot.drivers.kobuki.feedback import FeedbackReader
 from gvgbot.drivers.kobuki.payloads import Inertia
+from gvgbot.drivers.kobuki.wheel_odometry import KOBUKI
 from gvgbot.geometry import wrap_angle
 from gvgbot.hal.messages import Odometry
 from tests.unit.drivers.kobuki.test_driver import core, frame
@@ -33,7 +34,7 @@ def read_late(
     What one pass took from the port is looked at `lag` s later.
     """
     rng = np.random.default_rng(seed)
-    reader = FeedbackReader("gyro", 0.0)
+    reader = FeedbackReader("gyro", 0.0, KOBUKI)
     heard: list[tuple[int, Odometry]] = []
     sent, now = 0, 0.0
     while now < 60.0:

@@ -140,7 +140,7 @@ def test_a_twist_becomes_this_speed_and_radius(vector: Fields) -> None:
     fields = vector["fields"]
     straight_instead = abs(fields["radius"]) == 32767  # too wide an arc is not sent as a narrower
     expected = BaseControl(fields["speed"], 0 if straight_instead else fields["radius"])
-    assert BaseControl.from_twist(twist) == expected
+    assert BaseControl.from_twist(twist, 230.0) == expected
 
 
 def test_a_wrong_checksum_makes_a_bad_frame() -> None:

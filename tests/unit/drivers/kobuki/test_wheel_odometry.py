@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gvgbot.drivers.kobuki.wheel_odometry import (
+    KOBUKI,
     Heading,
     WheelOdometry,
     WheelReading,
@@ -47,7 +48,7 @@ def reckon(twist: Twist, seconds: float, start: WheelReading, heading: Heading) 
     first, *rest = readings(twist, seconds, start)
     state = start_odometry(first)
     for reading in rest:
-        state = advance_odometry(state, reading, DT, heading)
+        state = advance_odometry(state, reading, DT, heading, KOBUKI)
     return state
 
 
@@ -80,7 +81,7 @@ def test_stamps_of_a_millisecond_hardly_change_the_speed() -> None:
     first, *rest = readings(Twist(0.7, 0.0), 2.0, WheelReading(0, 0, 0.0, 0.0))
     state, speeds = start_odometry(first), []
     for k, reading in enumerate(rest):
-        state = advance_odometry(state, reading, DT - 0.001 * (-1) ** k, "gyro")
+        state = advance_odometry(state, reading, DT - 0.001 * (-1) ** k, "gyro", KOBUKI)
         speeds.append(state.twist.linear)
     assert speeds[50:] == pytest.approx([0.7] * len(speeds[50:]), abs=0.007)
 
@@ -89,7 +90,7 @@ def test_who_stands_has_no_speed_at_all() -> None:
     *_, last = readings(Twist(0.7, 0.0), 2.0, WheelReading(0, 0, 0.0, 0.0))
     state = replace(start_odometry(last), twist=Twist(0.7, 0.0), slip_rate=0.3)
     for _ in range(1000):
-        state = advance_odometry(state, replace(last, rate=0.0), DT, "gyro")
+        state = advance_odometry(state, replace(last, rate=0.0), DT, "gyro", KOBUKI)
     assert state.twist == Twist()
     assert state.slip_rate == 0.0
 
@@ -115,8 +116,8 @@ def test_a_gyro_that_counts_on_past_half_a_turn_tells_the_same_as_one_that_does_
     for k in range(1, 1 + round(5 * math.tau / abs(rate * DT))):
         angle = as_16_bits(math.radians(begins_deg + k * turned_deg))
         reading = WheelReading(-k * ticks % 65536, k * ticks % 65536, angle, rate)
-        assert abs(turned(state.reading, reading, "gyro")) < 0.05
-        state = advance_odometry(state, reading, DT, "gyro")
+        assert abs(turned(state.reading, reading, "gyro", KOBUKI)) < 0.05
+        state = advance_odometry(state, reading, DT, "gyro", KOBUKI)
     truth = wrap_angle(k * rate * DT)
     assert abs(wrap_angle(state.odom_base.theta - truth)) < 1e-3
     assert abs(state.slip_rate) < 0.02
@@ -126,7 +127,7 @@ def test_a_gyro_that_counts_on_past_half_a_turn_tells_the_same_as_one_that_does_
 def test_encoders_wrap_in_both_directions(start: int, counts: int) -> None:
     before = WheelReading(start, start, 0.0, 0.0)
     after = WheelReading((start + counts) % 65536, (start - counts) % 65536, 0.0, 0.0)
-    left, right = wheel_travels(before, after)
+    left, right = wheel_travels(before, after, KOBUKI.tick)
     assert left == pytest.approx(counts / TICKS_PER_M)
     assert right == pytest.approx(-counts / TICKS_PER_M)
 
@@ -135,8 +136,8 @@ def test_only_the_gyro_notices_a_wheel_that_spins_in_place() -> None:
     """One wheel spins 5 cm while the base stands: no turn, and a slip rate that shows it."""
     before = WheelReading(0, 0, 0.0, 0.0)
     after = WheelReading(0, round(0.05 * TICKS_PER_M), 0.0, 0.0)
-    by_gyro = advance_odometry(start_odometry(before), after, DT, "gyro")
-    by_wheels = advance_odometry(start_odometry(before), after, DT, "wheels")
+    by_gyro = advance_odometry(start_odometry(before), after, DT, "gyro", KOBUKI)
+    by_wheels = advance_odometry(start_odometry(before), after, DT, "wheels", KOBUKI)
     assert by_gyro.odom_base.theta == 0.0
     assert by_wheels.odom_base.theta == pytest.approx(0.05 / 0.23, rel=1e-3)
     assert by_gyro.slip_rate < 0.0
@@ -144,8 +145,10 @@ def test_only_the_gyro_notices_a_wheel_that_spins_in_place() -> None:
 
 def test_two_steps_and_one_long_step_agree_on_a_straight_line() -> None:
     a, b, c = (WheelReading(k * 100, k * 100, 0.3, 0.0) for k in range(3))
-    twice = advance_odometry(advance_odometry(start_odometry(a), b, DT, "gyro"), c, DT, "gyro")
-    once = advance_odometry(start_odometry(a), c, 2 * DT, "gyro")
+    twice = advance_odometry(
+        advance_odometry(start_odometry(a), b, DT, "gyro", KOBUKI), c, DT, "gyro", KOBUKI
+    )
+    once = advance_odometry(start_odometry(a), c, 2 * DT, "gyro", KOBUKI)
     assert twice.odom_base.distance(once.odom_base) < 1e-12
     assert twice.twist.linear == pytest.approx(once.twist.linear, rel=1e-12)
     assert twice.twist.angular == once.twist.angular
@@ -163,5 +166,5 @@ def test_encoders_that_flicker_at_rest_do_not_cast_doubt_on_a_gyro_that_stands()
     flicker = [WheelReading(k % 2, (k // 2) % 2, 0.5, 0.0) for k in range(4)]
     state = start_odometry(flicker[0])
     for k in range(round(600.0 / DT)):
-        state = advance_odometry(state, flicker[k % 4], DT, "gyro")
+        state = advance_odometry(state, flicker[k % 4], DT, "gyro", KOBUKI)
     assert state.unfelt < math.tau

@@ -6,6 +6,7 @@ import pytest
 
 from gvgbot.drivers.kobuki.driver import KobukiConfig
 from gvgbot.drivers.kobuki.feedback import FeedbackReader
+from gvgbot.drivers.kobuki.wheel_odometry import KOBUKI
 from gvgbot.errors import DeviceLost
 from gvgbot.geometry import wrap_angle
 from gvgbot.hal.messages import Odometry
@@ -18,7 +19,7 @@ RADIUS = (RIGHT + LEFT) / (RIGHT - LEFT) * 0.115  # m
 
 
 def test_its_wheels_tell_the_heading_where_they_are_to() -> None:
-    reader, odometry = FeedbackReader("wheels", 0.0), None
+    reader, odometry = FeedbackReader("wheels", 0.0, KOBUKI), None
     for k in range(FRAMES):
         odometry = reader.take(frame(core(k, LEFT * k, RIGHT * k)), 0.02 * k)
     assert isinstance(odometry, Odometry)
