@@ -33,8 +33,8 @@ def are_nearer_to(
 def metres_in_sight(grid: OccupancyGrid, ways: Array, places: Array, within_m: float) -> Array:
     """How far places (N, 2) are from the nearest point of ways (M, 2) that sees them, m, map frame.
 
-    That is (N,), inf where no wall of the grid hides it from none within `within_m`. What the grid
-    says nothing of hides nothing.
+    That is (N,), inf where walls of the grid hide it from all of them within `within_m`. What the
+    grid says nothing of hides nothing.
     """
     found, wall = np.full(len(places), np.inf), np.pad(is_wall(grid.cells), 1)
     shares = np.linspace(0.0, 1.0, math.ceil(within_m / grid.resolution_m) + 1)[:, None, None]
