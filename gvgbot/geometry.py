@@ -153,10 +153,15 @@ class Twist:
 STANDSTILL = Twist()
 
 
+def turn_matrix(angle: float) -> Array:
+    """What turns x, y and a heading (3, 3) anticlockwise by an angle, rad."""
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
 def rotated_covariance(covariance: Array, angle: float) -> Array:
     """Pose covariances (..., 3, 3) of a frame, from one against which that frame is turned."""
-    c, s = math.cos(angle), math.sin(angle)
-    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    turn = turn_matrix(angle)
     rotated: Array = turn @ covariance @ turn.T
     return rotated
 

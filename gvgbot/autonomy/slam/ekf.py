@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvgbot.autonomy.small_systems import solved
-from gvgbot.geometry import Array, Pose, wrap_angle, wrap_angles
+from gvgbot.geometry import Array, Pose, turn_matrix, wrap_angle, wrap_angles
 from gvgbot.ranges import Range
 
 Index = NDArray[np.intp]
@@ -103,17 +103,18 @@ class Belief:
         """The size of the part of the state that is the robot and the vertices."""
         return 3 + 3 * len(self.ids)
 
-    def _at(self, vertex: int) -> int:
+    def row_of(self, vertex: int) -> int:
+        """The first of the three rows of a vertex in the state."""
         return 3 + 3 * self.ids.index(vertex)
 
     def map_vertex(self, vertex: int) -> Pose:
         """The pose of a vertex's frame."""
-        i = self._at(vertex)
+        i = self.row_of(vertex)
         return Pose.from_array(self.x[i : i + 3])
 
     def vertex_covariance(self, vertex: int) -> Array:
         """Position covariance (2, 2) of a vertex, m^2."""
-        i = self._at(vertex)
+        i = self.row_of(vertex)
         return self.P[i : i + 2, i : i + 2].copy()  # an old belief's P may be that of a later one
 
 
@@ -162,7 +163,7 @@ def place_robot(belief: Belief, vertex: int, vertex_base: Pose, R: Array) -> Bel
 
     Pose and covariance are in the vertex's frame. What it believed of its own place is forgotten.
     """
-    belief, i = without_trail(belief), 3 + 3 * belief.ids.index(vertex)
+    belief, i = without_trail(belief), belief.row_of(vertex)
     placed, J_v, J_z = composed(belief.map_vertex(vertex), vertex_base)
     x, P = belief.x.copy(), belief.P.copy()
     x[:3] = placed.x, placed.y, placed.theta
@@ -174,7 +175,8 @@ def place_robot(belief: Belief, vertex: int, vertex_base: Pose, R: Array) -> Bel
 
 def composed(a_b: Pose, b_c: Pose) -> tuple[Pose, Array, Array]:
     """The pose a_c, and its Jacobians (3, 3) by either pose."""
-    c, s = math.cos(a_b.theta), math.sin(a_b.theta)
+    by_second = turn_matrix(a_b.theta)
+    c, s = by_second[:2, 0]
     by_first = np.array(
         [
             [1.0, 0.0, -s * b_c.x - c * b_c.y],
@@ -182,13 +184,12 @@ def composed(a_b: Pose, b_c: Pose) -> tuple[Pose, Array, Array]:
             [0.0, 0.0, 1.0],
         ]
     )
-    by_second = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     return a_b.compose(b_c), by_first, by_second
 
 
 def remove_vertex(belief: Belief, vertex: int) -> Belief:
     """The belief without a vertex that proved to be none."""
-    i = 3 + 3 * belief.ids.index(vertex)
+    i = belief.row_of(vertex)
     keep = np.delete(np.arange(len(belief.x)), slice(i, i + 3))
     ids = tuple(v for v in belief.ids if v != vertex)
     return replace(belief, x=belief.x[keep], P=belief.P[np.ix_(keep, keep)], ids=ids)
@@ -196,7 +197,7 @@ def remove_vertex(belief: Belief, vertex: int) -> Belief:
 
 def expected(belief: Belief, vertex: int) -> tuple[Pose, Array]:
     """Pose of a vertex in the base frame, and its Jacobian H (3, 3 + 3n)."""
-    i = 3 + 3 * belief.ids.index(vertex)
+    i = belief.row_of(vertex)
     base_vertex = belief.map_base.to(belief.map_vertex(vertex))
     c, s = math.cos(belief.x[2]), math.sin(belief.x[2])
     H = np.zeros((3, len(belief.x)))
@@ -222,7 +223,7 @@ def innovation(
 
 def _used(belief: Belief, vertex: int) -> Index:
     """The part (6,) of the state that a sight of a vertex depends on: H is 0 elsewhere."""
-    i = 3 + 3 * belief.ids.index(vertex)
+    i = belief.row_of(vertex)
     used: Index = np.array([0, 1, 2, i, i + 1, i + 2])
     return used
 
@@ -268,8 +269,8 @@ def offsets(belief: Belief, base_point: Array, R: Array) -> tuple[Array, Array]:
 
 def apart(belief: Belief, vertex: int, others: Sequence[int]) -> tuple[Array, Array]:
     """A vertex as seen from others, map frame: offsets (N, 2) and their covariances (N, 2, 2)."""
-    i = 3 + 3 * belief.ids.index(vertex)
-    at = np.array([3 + 3 * belief.ids.index(other) for other in others], int)
+    i = belief.row_of(vertex)
+    at = np.array([belief.row_of(other) for other in others], int)
     j = at[:, None] + np.arange(2)
     P, here = belief.P, slice(i, i + 2)
     across = P[here][:, j].transpose(1, 0, 2)
@@ -284,7 +285,7 @@ def unite(belief: Belief, kept: int, gone: int, R: Array) -> Belief:
 
 def coincide(belief: Belief, one: int, other: int, R: Array) -> Belief:
     """The belief when two vertices stand in one place, which was seen with R (2, 2) both times."""
-    i, j = (3 + 3 * belief.ids.index(vertex) for vertex in (one, other))
+    i, j = (belief.row_of(vertex) for vertex in (one, other))
     H = np.zeros((2, len(belief.x)))
     H[:, i : i + 2], H[:, j : j + 2] = np.eye(2), -np.eye(2)
     S = H @ belief.P @ H.T + R
@@ -296,7 +297,7 @@ def coincide(belief: Belief, one: int, other: int, R: Array) -> Belief:
 
 def part(belief: Belief, vertices: Sequence[int]) -> Belief:
     """The belief of the robot and of some of the vertices, all else left out."""
-    at = [3 + 3 * belief.ids.index(vertex) for vertex in vertices]
+    at = [belief.row_of(vertex) for vertex in vertices]
     rows = np.concatenate([np.arange(3), *(np.arange(i, i + 3) for i in at)])
     return Belief(belief.x[rows], belief.P[np.ix_(rows, rows)], tuple(vertices))
 

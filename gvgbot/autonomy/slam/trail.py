@@ -8,7 +8,6 @@ of odometry that `Calibration` learns: no closure tells anything of these, but t
 them at every step (Schmidt).
 """
 
-import math
 from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
@@ -18,7 +17,7 @@ from numpy.typing import NDArray
 
 from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.ekf import Belief, Clone
-from gvgbot.geometry import Array, Pose, rotated_covariance, rows_of, wrap_angle
+from gvgbot.geometry import Array, Pose, rotated_covariance, rows_of, turn_matrix, wrap_angle
 
 MOST = 16  # old poses
 _SIZE = 3 + 3 * MOST  # of the trail's part of the state
@@ -77,8 +76,7 @@ def _followed(belief: Belief, motion: Pose, laid: Laid) -> Belief:
     P[:, odometry] = P[odometry].T
     P[odometry, odometry] = laid.P
     moved, F, _ = ekf.composed(belief.map_base, motion)
-    c, s = math.cos(moved.theta), math.sin(moved.theta)
-    R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    R = turn_matrix(moved.theta)
     by_before = F - R @ laid.gains.sum(axis=0) @ R.T @ F
     by_trail = np.concatenate([R @ laid.by_odometry, _by_clones(belief, laid, R)], axis=1)
     row = by_before @ P[:3] + by_trail @ P[end:]
