@@ -16,7 +16,7 @@ from gvgbot.autonomy.slam.graph import Edge, HalfEdgeId, Vertex
 from gvgbot.autonomy.slam.recognition import RecognitionConfig, Sighting, match_bearings
 from gvgbot.autonomy.topology import outwards
 from gvgbot.autonomy.views import Correspondence, View
-from gvgbot.geometry import Array, Pose
+from gvgbot.geometry import Array, Pose, stations_of
 from gvgbot.ranges import Range
 
 _MADE_BY_M = 0.15  # beyond its disc: what made a vertex is nearer, wherever exactly that is
@@ -247,8 +247,7 @@ class Evidence:
             edge = self._known.graph.edge_at(end)
             if edge is not None and self._weight(edge, end) == math.inf:
                 line = outwards(self._known.belief, edge, end)
-                along = np.cumsum(np.hypot(*np.diff(line, axis=0, prepend=line[:1]).T))
-                yield line[along < vertex.clearance + _ASIDE_M]
+                yield line[stations_of(line) < vertex.clearance + _ASIDE_M]
 
     def _passing(self, view: View, point: Array, known: Correspondence) -> Place | None:
         """Where an edge is seen at the place of a vertex, or at its end there another vertex."""

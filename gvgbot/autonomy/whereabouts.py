@@ -9,7 +9,7 @@ from gvgbot.autonomy.gvg.local import Branch, LocalGvg, Place
 from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.autonomy.slam.recognition import match_bearings
 from gvgbot.autonomy.views import Correspondence
-from gvgbot.geometry import Array, Pose, length_of, wrap_angle
+from gvgbot.geometry import Array, Pose, length_of, stations_of, wrap_angle
 
 LEAST_LOOP_M = 4.0  # a shorter way is none round anything
 _STEP_M = 1.0  # from view to view, at most
@@ -50,7 +50,12 @@ class Whereabouts:
     @property
     def trail_length(self) -> float:
         """Metres driven along the edge since its vertex."""
-        return length_of(np.array(self.trail).reshape(-1, 2))
+        return length_of(self._points)
+
+    @property
+    def _points(self) -> Array:
+        """The trail (N, 2), local frame."""
+        return np.array(self.trail).reshape(-1, 2)
 
     def leave(self) -> None:
         """Go another way from where it has come round."""
@@ -58,11 +63,11 @@ class Whereabouts:
 
     def has_come_by(self, point: Array) -> bool:
         """Whether the trail passes a point (2,), local frame."""
-        return bool((np.hypot(*(np.array(self.trail).reshape(-1, 2) - point).T) < _LOOP_M).any())
+        return bool((np.hypot(*(self._points - point).T) < _LOOP_M).any())
 
     def way_back(self, base: Array) -> Array:
         """The way (N, 2) back over where the robot came from, from beside it to its vertex."""
-        points = np.array(self.trail).reshape(-1, 2)
+        points = self._points
         return points[np.argmin(np.hypot(*(points - base).T)) :: -1] if len(points) else points
 
     def follow(
@@ -102,12 +107,11 @@ class Whereabouts:
 
         None if it has not come round, or not along the trail. The base (2,) is in the local frame.
         """
-        points = np.array(self.trail).reshape(-1, 2)
+        points = self._points
         away = np.hypot(*(points - base).T)
         if len(points) < 2 or away[-1] > _STEP_M:
             return None
-        lengths = np.hypot(*np.diff(points, axis=0).T)
-        since = np.append(lengths[::-1].cumsum()[::-1], 0.0)
+        since = stations_of(points[::-1])[::-1]
         found = np.flatnonzero((since > LEAST_LOOP_M) & (away < _LOOP_M))
         return int(found[np.argmin(away[found])]) if len(found) else None
 
@@ -128,7 +132,7 @@ class Whereabouts:
         if self.on_edge is not None or not self.trail:
             return False
         base = self.trail[-1]
-        away = np.hypot(*(np.array(self.trail) - base).T)
+        away = np.hypot(*(self._points - base).T)
         came = self.trail[int(np.argmin(np.abs(away - _BACK_M)))]
         if len(self.trail) < 2:
             if heading is None:
@@ -148,7 +152,7 @@ class Whereabouts:
 
     def _passage(self, gvg: LocalGvg, place: Place, known: Correspondence, node: int) -> Passage:
         centre = gvg.nodes[node].position
-        trail = np.array(self.trail).reshape(-1, 2)
+        trail = self._points
         d = np.hypot(*(trail - centre).T)
         is_loop = len(trail) > 0 and d[0] < _AWAY_M  # it starts at the node, too
         farthest = int(np.argmax(d)) if is_loop else 0
@@ -195,7 +199,7 @@ class Whereabouts:
 
     def _extend(self, point: Array) -> None:
         if len(self.trail) > 3:
-            d = np.hypot(*(np.array(self.trail) - point).T)
+            d = np.hypot(*(self._points - point).T)
             back = int(np.argmax(d < _LOOP_M))
             if d[back] < _LOOP_M and back < len(self.trail) - 3:
                 if length_of(np.array(self.trail[back:])) > LEAST_LOOP_M:
@@ -217,8 +221,8 @@ class Whereabouts:
         i = min(int(np.searchsorted(edge.stations, place.station)), len(edge.polyline) - 2)
         along = edge.polyline[i + 1] - edge.polyline[i]
         if len(self.trail) > 1:
-            points = np.array(self.trail)
-            back = np.cumsum(np.hypot(*np.diff(points[::-1], axis=0).T))
+            points = self._points
+            back = stations_of(points[::-1])[1:]
             came = points[len(points) - 2 - min(int(np.searchsorted(back, _BACK_M)), len(back) - 1)]
             d = np.hypot(*(edge.polyline - came).T)
             offset = float(edge.stations[int(np.argmin(d))]) - place.station
