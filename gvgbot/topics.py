@@ -1,5 +1,6 @@
 """What the robot says on the network: the table of topics, and the types that travel."""
 
+import math
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -76,6 +77,12 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
     def is_lost(self) -> bool:
         """Whether the robot does not know where it is: its pose means nothing."""
         return self.covariance[0] >= UNKNOWN
+
+    @property
+    def position_sigma(self) -> float:
+        """Standard deviation of the position, m, in the direction in which it is largest."""
+        xx, xy, _, _, yy = self.covariance[:5]
+        return math.sqrt(max(0.0, (xx + yy) / 2 + math.hypot((xx - yy) / 2, xy)))
 
 
 def _check_whole(data: bytes, size: int) -> None:

@@ -126,11 +126,8 @@ def _degrees(angle: float) -> str:
 
 def _sigma(state: State) -> str:
     """The standard deviations of the pose: the larger one of the position, and of the heading."""
-    xx, xy, _, _, yy, _, _, _, tt = state.covariance
-    largest = (xx + yy) / 2 + math.hypot((xx - yy) / 2, xy)
-    return (
-        f"{100 * math.sqrt(max(0.0, largest)):.1f} cm  {math.degrees(math.sqrt(max(0.0, tt))):.1f}°"
-    )
+    heading = math.sqrt(max(0.0, state.covariance[-1]))
+    return f"{100 * state.position_sigma:.1f} cm  {math.degrees(heading):.1f}°"
 
 
 def _contacts(state: State) -> tuple[str, Tone]:

@@ -241,20 +241,10 @@ class _Histories:
             self._samples.clear()
         elif state.stamp < last + _SAMPLE_EVERY:
             return False
-        self._samples.append((state.stamp, sigma(state), state.battery_fraction))
+        sigma = None if state.is_lost else state.position_sigma
+        self._samples.append((state.stamp, sigma, state.battery_fraction))
         return True
 
     def columns(self) -> History:
         stamps, sigmas, batteries = zip(*self._samples, strict=True)
         return History(stamps=stamps, sigmas=sigmas, batteries=batteries)
-
-
-def sigma(state: State) -> float | None:
-    """The standard deviation of the position, m, in the direction in which it is largest.
-
-    None while the position is not known.
-    """
-    if state.is_lost:
-        return None
-    xx, xy, _, _, yy = state.covariance[:5]
-    return math.sqrt(max(0.0, (xx + yy) / 2 + math.hypot((xx - yy) / 2, xy)))

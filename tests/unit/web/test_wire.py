@@ -9,7 +9,7 @@ import pytest
 
 from gvgbot.requests import Goto, Nothing
 from gvgbot.topics import Events
-from gvgbot.web.feed import _Histories, sigma
+from gvgbot.web.feed import _Histories
 from gvgbot.web.viewers import Audience, Viewer
 from gvgbot.web.wire import Link, Reply, frame, wish
 from tests.unit.test_telemetry import EXAMPLE, NOWHERE
@@ -132,10 +132,3 @@ def test_a_history_has_no_sigma_of_a_place_that_is_not_known() -> None:
     unknown, known = histories.columns().sigmas
     assert unknown is None
     assert known == pytest.approx(math.sqrt(2.0))
-
-
-def test_sigma_is_the_half_axis_of_the_ellipse_whatever_its_direction() -> None:
-    c, s = math.cos(0.6), math.sin(0.6)
-    xx, xy, yy = 9 * c * c + s * s, 8 * c * s, 9 * s * s + c * c  # half axes 3 and 1, turned
-    turned = msgspec.structs.replace(EXAMPLE, covariance=(xx, xy, 0.0, xy, yy, 0.0, 0.0, 0.0, 1.0))
-    assert sigma(turned) == pytest.approx(3.0)
