@@ -32,7 +32,7 @@ from gvgbot.drivers.hokuyo.twin import HokuyoTwin
 from gvgbot.drivers.kobuki.twin import KobukiTwin
 from gvgbot.drivers.link_faults import FaultyLink, LinkFaultConfig
 from gvgbot.drivers.people import Walkways
-from gvgbot.errors import GvgbotError
+from gvgbot.errors import GvgbotError, underlying
 from gvgbot.geometry import STANDSTILL, Pose, Twist
 from gvgbot.maps import geojson
 from gvgbot.persistence.keeper import Keeper
@@ -356,8 +356,7 @@ def _blocks() -> int:
 
 
 def _innermost(error: BaseException) -> str:
-    while isinstance(error, BaseExceptionGroup):
-        error = error.exceptions[0]
+    error = underlying(error)
     trace = error.__traceback__
     while trace is not None and trace.tb_next is not None:
         trace = trace.tb_next

@@ -15,7 +15,7 @@ from gvgbot.clock import Clock, LoopClock, VirtualTimeLoop
 from gvgbot.config import Config, RobotConfig
 from gvgbot.drivers.hokuyo.driver import FEWEST_BEAMS, FINER, HokuyoLaser
 from gvgbot.drivers.kobuki.driver import KobukiBase
-from gvgbot.errors import DeviceLost, DeviceRefused, GvgbotError
+from gvgbot.errors import DeviceLost, DeviceRefused, GvgbotError, underlying
 from gvgbot.hal.guard import GuardConfig
 from gvgbot.hal.messages import EMPTY_BATTERY, LOW_BATTERY, Battery, Contact, Scan
 from gvgbot.hal.own_parts import how_to_clear, own_ranges
@@ -186,7 +186,7 @@ async def _listen(
             await listen()
             serving.cancel()
     except* (DeviceLost, DeviceRefused) as failures:
-        heard.failure = str(failures.exceptions[0])
+        heard.failure = str(underlying(failures))
     return heard
 
 

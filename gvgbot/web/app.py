@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from gvgbot import client
-from gvgbot.errors import GvgbotError, UsageError
+from gvgbot.errors import GvgbotError, UsageError, underlying
 from gvgbot.stop_signals import StopSignals
 from gvgbot.web.feed import Feed
 from gvgbot.web.server import Web
@@ -34,7 +34,7 @@ def web(
         try:
             asyncio.run(_serve(signals, robot, endpoint, zenoh_file, (host, port), say))
         except* GvgbotError as errors:
-            raise errors.exceptions[0] from None
+            raise underlying(errors) from None
     return 0
 
 
