@@ -146,7 +146,7 @@ class Tour:
             self.note(goal, f"WRONG: {off:.2f} m off; {way}")
             return
         self.score.reached += 1
-        if shortest == shortest:
+        if not math.isnan(shortest):
             self.score.driven += driven
             self.score.shortest += shortest
             if shortest > LONG_M:

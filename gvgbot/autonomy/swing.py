@@ -45,7 +45,7 @@ class Swing:
     def place(self) -> tuple[float, float] | None:
         """How far ahead and to the left of the laser it is said to be, m; None if it may be."""
         x, y = self._ahead.off, self._aside.off
-        return None if x is y is None else (x or 0.0, y or 0.0)
+        return None if x is None and y is None else (x or 0.0, y or 0.0)
 
     def note(self, scan: Scan, odom_base: Pose) -> None:
         """Learn from a sweep, until enough of them are as they should be, or enough were seen."""
