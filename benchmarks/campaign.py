@@ -5,6 +5,9 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
 
+ONE_CORE = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}  # so that --jobs counts cores
+DIGITS = 5  # that are kept of a number
+
 Row = dict[str, Any]
 Case = TypeVar("Case")
 
@@ -37,6 +40,15 @@ def read(results: Path | None) -> list[Row]:
     if results is None or not results.exists():
         return []
     return [json.loads(line) for line in results.read_text(encoding="utf-8").splitlines()]
+
+
+def short(row: Row) -> Row:
+    """A row with no more digits than are kept."""
+    return {key: _short(value) for key, value in row.items()}
+
+
+def _short(value: object) -> object:
+    return float(f"{value:.{DIGITS}g}") if isinstance(value, float) else value
 
 
 def _append(results: Path, row: Row) -> None:

@@ -17,7 +17,6 @@ them. --plot needs matplotlib (the extra `plot`).
 
 import argparse
 import contextlib
-import json
 import sys
 import time
 from collections.abc import Iterator, Sequence
@@ -29,6 +28,7 @@ from typing import cast
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from benchmarks import campaign
 from benchmarks.consistency_report import Row, line, plot, summary
 from benchmarks.reference_gvg import reference_gvg
 from gvgbot.autonomy.estimate import smoothed
@@ -263,17 +263,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
     worlds = [(world, seed) for world in options.worlds for seed in options.seeds]
     low, high = options.plans or (1, 0)
     worlds += [(f"floor_plan:{number}", number) for number in range(low, high + 1)]
-    known = known_rows(options.out, options.overrides)
-    rows = []
     profiles = [_profile(*both) for both in product(options.odometry, options.worse)]
-    for (world, seed), odometry, laser in product(worlds, profiles, options.lasers):
-        name = f"{world} {seed} {odometry} {laser}"
-        row = known.get(name) or _row(name, options.overrides)
+    names = [
+        f"{world} {seed} {odometry} {laser}"
+        for (world, seed), odometry, laser in product(worlds, profiles, options.lasers)
+    ]
+    rows = []
+    for row in campaign.rows(
+        options.out,
+        names,
+        lambda some: (_row(name, options.overrides) for name in some),
+        case_of=lambda row: str(row["name"]),
+        is_good=lambda row: row.get("settings", []) == options.overrides,
+    ):
         rows.append(row)
         print(line(row), flush=True)
-        if options.out is not None and name not in known:
-            with options.out.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(row) + "\n")
+    rows.sort(key=lambda row: names.index(row["name"]))
     print("\n".join(summary(rows)))
     if options.plot is not None:
         plot(rows, options.plot)
@@ -309,14 +314,6 @@ def made_worse(odometry: str, times: float) -> Iterator[None]:
         yield
     finally:
         PROFILES[name] = usual
-
-
-def known_rows(out: Path | None, overrides: Sequence[str]) -> dict[str, Row]:
-    """The runs with these overrides that a file holds, by name."""
-    if out is None or not out.exists():
-        return {}
-    rows = [json.loads(text) for text in out.read_text(encoding="utf-8").splitlines()]
-    return {row["name"]: row for row in rows if row.get("settings", []) == list(overrides)}
 
 
 def _options(arguments: Sequence[str] | None) -> argparse.Namespace:

@@ -46,7 +46,6 @@ ROUGH = ["twin.laser.range_sigma_m=0.03", "twin.laser.dropout_fraction=0.02"]
 PEOPLE_EVERY = 10  # runs
 INTERRUPTED = 130
 CRASHED = "crashed"
-ONE_CORE = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}  # so that --jobs counts cores
 COLUMNS = (
     ("recall", "recall", "{:.3f}"),
     ("precision", "prec", "{:.3f}"),
@@ -203,7 +202,7 @@ def run(command: Command, directory: Path) -> Row:
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
-            env=os.environ | ONE_CORE,
+            env=os.environ | campaign.ONE_CORE,
             check=False,
         )
         row = _named(command) | {"status": done.returncode, "memory_mb": _peak_mb(peak.read())}

@@ -14,14 +14,13 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks.campaign import Row
+from benchmarks.campaign import Row, short
 from benchmarks.explore_table import ROUGH
 from gvgbot.worlds import NAMES
 
 RESULTS = Path(__file__).parent / "results"
 PLANS = "floor_plan"
 LONG = "UTM-30LX"  # the laser that comes first
-DIGITS = 5  # that are kept of a number
 PLAIN = ["gvgbot", "explore", "--world", "", "--seed", "", "--set", ""]  # as many words
 PEOPLE = "twin.people="
 
@@ -38,7 +37,7 @@ def keep(rows: list[Row], to: Path = RESULTS) -> dict[str, int]:
     }
     for name, some in kept.items():
         if some:
-            lines = (json.dumps({key: _short(value) for key, value in row.items()}) for row in some)
+            lines = (json.dumps(short(row)) for row in some)
             (to / name).write_text("\n".join(lines) + "\n", encoding="utf-8")
     return {name: len(some) for name, some in kept.items()}
 
@@ -63,10 +62,6 @@ def _order(row: Row) -> tuple[int, int, int, bool]:
     number = row["world"].partition(":")[2]
     is_short = row["laser"] != LONG
     return NAMES.index(_family(row)), int(number or 0), row["seed"], is_short
-
-
-def _short(value: object) -> object:
-    return float(f"{value:.{DIGITS}g}") if isinstance(value, float) else value
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -13,15 +13,16 @@ its, with the standard error of that difference.
 """
 
 import argparse
-import json
 import sys
 from collections.abc import Iterator, Sequence
+from itertools import product
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from benchmarks.consistency import known_rows, run
+from benchmarks import campaign
+from benchmarks.campaign import Row
+from benchmarks.consistency import run
 from gvgbot.errors import GvgbotError
 
 CHOICES = {  # the default comes first: the others are compared with it
@@ -41,8 +42,6 @@ COLUMNS = (
     ("vertex_sigma_m", "vertices' sigma at the end, m", "{:.3f}"),
     ("vertex_rmse_m", "vertex RMSE, m", "{:.3f}"),
 )
-
-Row = dict[str, Any]
 
 
 def line(row: Row) -> str:
@@ -97,16 +96,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run, print a line for each and the table."""
     options = _options(arguments)
     low, high = options.plans
-    kept, rows = known_rows(options.out, options.overrides), []
-    for plan in range(low, high + 1):
-        for choice in options.choices:
-            name = f"floor_plan:{plan} {choice} {options.laser}"
-            row = kept.get(name) or _row(name, plan, choice, options)
-            rows.append(row)
-            print(line(row), flush=True)
-            if options.out is not None and name not in kept:
-                with options.out.open("a", encoding="utf-8") as file:
-                    file.write(json.dumps(row) + "\n")
+    cases = {
+        f"floor_plan:{plan} {choice} {options.laser}": (plan, choice)
+        for plan, choice in product(range(low, high + 1), options.choices)
+    }
+    names, rows = list(cases), []
+    for row in campaign.rows(
+        options.out,
+        names,
+        lambda some: (_row(name, *cases[name], options) for name in some),
+        case_of=lambda row: str(row["name"]),
+        is_good=lambda row: row.get("settings", []) == options.overrides,
+    ):
+        rows.append(row)
+        print(line(row), flush=True)
+    rows.sort(key=lambda row: names.index(row["name"]))
     print("\n".join(table(rows)))
     return 0
 

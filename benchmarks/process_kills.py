@@ -35,7 +35,6 @@ SHORTEST_S = 2.0  # from a start to the next kill
 DEAD_S = 1.0  # from a kill to the next start
 LOOK_S = 0.2
 PATIENCE_S = 900.0
-ONE_CORE = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -146,7 +145,7 @@ async def _gvgbot(
             *(sys.executable, "-m", "gvgbot", command, *more, *words),
             stdout=log,
             stderr=log,
-            env=os.environ | ONE_CORE,
+            env=os.environ | campaign.ONE_CORE,
         )
 
 

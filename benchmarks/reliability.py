@@ -32,7 +32,6 @@ from benchmarks.faults import FAULTS, Fault, draw
 from benchmarks.trial import once, trial
 
 RESULTS = "reliability.jsonl"
-DIGITS = 5  # that are kept of a number
 ORACLES = {
     "contact at speed": "is driven against a wall or a person faster than 0.12 m/s",
     "does not stop": "moves, though it is blind, deaf, dead, lifted, touched or asked to stand",
@@ -46,7 +45,6 @@ ORACLES = {
     "memory": "leaves memory behind, or a journal longer than its way is worth",
     "cycles late": "gives its service manager no sign of life for 5 s",
 }
-ONE_CORE = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -108,7 +106,7 @@ def _run(seeds: list[int], jobs: int) -> Iterator[Row]:
     if jobs == 1 or len(seeds) < 2:
         yield from map(one, seeds)
         return
-    os.environ.update(ONE_CORE)
+    os.environ.update(campaign.ONE_CORE)
     with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:  # loads numpy with those
         yield from pool.map(one, seeds)
 
@@ -126,11 +124,7 @@ def one(seed: int) -> Row:
         "faults": [fault.name for fault in faults],
         "shortest": [str(fault) for fault in least],
     }
-    return {key: _short(value) for key, value in row.items()}
-
-
-def _short(value: object) -> object:
-    return float(f"{value:.{DIGITS}g}") if isinstance(value, float) else value
+    return campaign.short(row)
 
 
 def shrunk(seed: int, faults: list[Fault], oracles: set[str]) -> list[Fault]:

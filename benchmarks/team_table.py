@@ -29,7 +29,7 @@ from statistics import fmean, median
 
 from benchmarks import campaign
 from benchmarks.campaign import Row
-from benchmarks.explore_table import CRASHED, ONE_CORE
+from benchmarks.explore_table import CRASHED
 from benchmarks.keep_results import RESULTS as KEPT
 from benchmarks.score_team import score_team
 from gvgbot.errors import GvgbotError
@@ -108,7 +108,7 @@ def run(command: tuple[str, ...], out: Path) -> Row:
         capture_output=True,
         text=True,
         check=False,
-        env=os.environ | ONE_CORE,
+        env=os.environ | campaign.ONE_CORE,
     )
     world, seed, robots = (
         command[command.index(key) + 1] for key in ("--world", "--seed", "--robots")

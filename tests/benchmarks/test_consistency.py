@@ -10,14 +10,15 @@ from benchmarks.consistency import (
     Watched,
     _mean_nees,
     explore,
-    known_rows,
     made_worse,
+    main,
     revisits,
 )
-from benchmarks.consistency_report import Row, summary, table
+from benchmarks.consistency_report import Row, line, summary, table
 from gvgbot.clock import run_in_virtual_time
 from gvgbot.config import load_config
 from gvgbot.drivers.kobuki.odometry_error import PROFILES, ErringSensors
+from gvgbot.errors import ConfigError
 from gvgbot.geometry import Pose
 
 
@@ -84,13 +85,24 @@ def test_the_table_has_a_line_for_each_kind_of_world_laser_and_odometry() -> Non
     assert streets.endswith("| 3, 1 | 2 | – | 0.300, 0.300 | 0.200 |")
 
 
-def test_a_run_with_other_settings_is_another_one(tmp_path: Path) -> None:
+def test_a_run_with_other_settings_is_another_one(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     out, settings = tmp_path / "out.jsonl", ["localisation=paper"]
-    rows = [ROW | {"settings": settings}, ROW]  # older rows do not say that there were none
-    out.write_text("".join(json.dumps(row) + "\n" for row in rows))
-    assert known_rows(out, settings) == {str(ROW["name"]): rows[0]}
-    assert known_rows(out, []) == {str(ROW["name"]): rows[1]}
-    assert known_rows(out, ["localisation=full"]) == {}
+    row = ROW | {"outcome": "explored", "cpu_s": 9.0}
+    with_settings = row | {"settings": settings, "closures": 7}
+    rows = [with_settings, row]  # older rows do not say that there were none
+    out.write_text("".join(json.dumps(one) + "\n" for one in rows))
+    world, seed, odometry, laser = str(ROW["name"]).split()
+    usual = ["--worlds", world, "--seeds", seed, "--odometry", odometry, "--lasers", laser]
+    usual += ["--out", str(out)]
+    main([*usual, "--set", *settings])
+    assert capsys.readouterr().out.startswith(line(with_settings))
+    main(usual)
+    assert capsys.readouterr().out.startswith(line(row))
+    with pytest.raises(ConfigError):  # it is run, as it was not yet
+        main([*usual, "--set", "localisation=none"])
+    assert out.read_text().count("\n") == len(rows)
 
 
 def driven(*settings: str) -> list[Pose]:
