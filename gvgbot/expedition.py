@@ -30,7 +30,7 @@ from gvgbot.maps.map_server import encode_map_server, read_map_server
 from gvgbot.maps.occupancy import OccupancyGrid
 from gvgbot.maps.picture import draw_map
 from gvgbot.maps.route_graph import RouteGraph
-from gvgbot.maps.run_directory import RunDirectory
+from gvgbot.maps.run_directory import MAP, PICTURE, RunDirectory
 from gvgbot.report import with_room_of, world_files
 from gvgbot.service import set_up_logging
 from gvgbot.session import Session, Tally
@@ -273,9 +273,9 @@ def _save(directory: RunDirectory, robots: list[_Robot]) -> list[_Robot]:
     )
     world = _place(first.session).world
     files = world_files(world)
-    files["map.geojson"] = geojson.encode(graph)
+    files[MAP] = geojson.encode(graph)
     files |= encode_map_server(grid)
-    files["map.png"] = draw_map(graph, grid=grid, title=world.name)
+    files[PICTURE] = draw_map(graph, grid=grid, title=world.name)
     directory.write(files)
     directory.write_summary(_summary(robots, joined, poses, graph))
     return joined
@@ -302,7 +302,7 @@ def _ways(robot: _Robot, poses: dict[str, Pose]) -> list[tuple[Array, float]]:
 
 
 def _graph(robot: _Robot) -> RouteGraph:
-    path = robot.session.directory.path / "map.geojson"
+    path = robot.session.directory.path / MAP
     return geojson.decode(path.read_text(encoding="utf-8"))
 
 

@@ -36,6 +36,7 @@ from gvgbot.maps.map_server import encode_map_server
 from gvgbot.maps.occupancy import OccupancyGrid, occupancy_grid
 from gvgbot.maps.picture import draw_map
 from gvgbot.maps.route_graph import RouteEdge, RouteGraph, RouteNode
+from gvgbot.maps.run_directory import ESTIMATE, MAP, ODOMETRY, ONLINE, PICTURE, TRUTH
 from gvgbot.maps.trajectory import Trajectory, encode_tum
 
 _TICK_S = 1e-6  # from one row to the next; files tell no less
@@ -95,8 +96,8 @@ def map_files(pipeline: Pipeline, journey: Journey, title: str) -> dict[str, byt
     estimate = _trajectory(journey, _corrected(journey, pipeline, keyframes))
     odometry = _trajectory(journey, _by_odometry(journey, pipeline))
     files: dict[str, bytes | str] = {
-        "map.geojson": geojson.encode(graph),
-        "map.png": draw_map(
+        MAP: geojson.encode(graph),
+        PICTURE: draw_map(
             graph,
             grid=grid,
             estimate=estimate,
@@ -104,12 +105,12 @@ def map_files(pipeline: Pipeline, journey: Journey, title: str) -> dict[str, byt
             virtual_walls=pipeline.sight.virtual_walls,
             title=title,
         ),
-        "estimate.tum": encode_tum(estimate),
-        "online.tum": encode_tum(_trajectory(journey, journey.map_base.rows())),
-        "odometry.tum": encode_tum(odometry),
+        ESTIMATE: encode_tum(estimate),
+        ONLINE: encode_tum(_trajectory(journey, journey.map_base.rows())),
+        ODOMETRY: encode_tum(odometry),
     }
     if journey.world_base:
-        files["truth.tum"] = encode_tum(_trajectory(journey, journey.world_base.rows()))
+        files[TRUTH] = encode_tum(_trajectory(journey, journey.world_base.rows()))
     return files | encode_map_server(grid)
 
 

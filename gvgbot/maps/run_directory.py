@@ -20,6 +20,8 @@ from gvgbot.maps.map_server import DESCRIPTION, IMAGE, SEEN
 
 EVENTS, EVENTS_BEFORE = "events.jsonl", "events-before.jsonl"
 SUMMARY, MAP, PICTURE = "summary.json", "map.geojson", "map.png"
+ESTIMATE, ONLINE = "estimate.tum", "online.tum"  # at the end, and as it was thought on the way
+ODOMETRY, TRUTH = "odometry.tum", "truth.tum"
 _REPLACED = (MAP, PICTURE, DESCRIPTION, IMAGE, SEEN, "world.yaml", "world.png")  # when it is saved
 _MOST_EVENTS = 10_000_000  # bytes, of each of these files
 

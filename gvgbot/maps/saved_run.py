@@ -15,7 +15,7 @@ from gvgbot.maps import geojson
 from gvgbot.maps.map_server import read_map_server
 from gvgbot.maps.occupancy import OccupancyGrid
 from gvgbot.maps.route_graph import RouteGraph
-from gvgbot.maps.run_directory import EVENTS, EVENTS_BEFORE, SUMMARY
+from gvgbot.maps.run_directory import ESTIMATE, EVENTS, EVENTS_BEFORE, MAP, ODOMETRY, SUMMARY
 from gvgbot.maps.trajectory import Trajectory, decode_tum
 
 T = TypeVar("T")
@@ -91,16 +91,16 @@ class SavedRun:
                 f"{directory} is a file: give the directory of a run; of a recording, gvgbot "
                 f"replay {shlex.quote(str(directory))} makes one"
             )
-        if not (directory / "map.geojson").exists():
+        if not (directory / MAP).exists():
             raise UsageError(_why_there_is_no_map(directory))
-        is_joined = bool(robots_in(directory)) and not (directory / "estimate.tum").exists()
+        is_joined = bool(robots_in(directory)) and not (directory / ESTIMATE).exists()
         estimate, odometry = (
             decode_tum("") if is_joined else _decoded(directory / name, decode_tum)
-            for name in ("estimate.tum", "odometry.tum")
+            for name in (ESTIMATE, ODOMETRY)
         )
         return cls(
             name=directory.resolve().name,
-            graph=_decoded(directory / "map.geojson", geojson.decode),
+            graph=_decoded(directory / MAP, geojson.decode),
             grid=read_map_server(directory),
             estimate=estimate,
             odometry=odometry,
@@ -114,15 +114,15 @@ def _why_there_is_no_map(directory: Path) -> str:
         return f"there is no directory {directory}"
     if (directory / EVENTS).exists():
         return (
-            f"{directory} has no map.geojson yet: the robot saves its map with the first vertex, "
+            f"{directory} has no {MAP} yet: the robot saves its map with the first vertex, "
             "when it ends, and when asked with gvgbot ctl save"
         )
-    return f"{directory} is no run directory: there is no map.geojson in it"
+    return f"{directory} is no run directory: there is no {MAP} in it"
 
 
 def robots_in(directory: Path) -> list[Path]:
     """The directories of the robots of a run of several, in order."""
-    return sorted(path.parent for path in directory.glob("*/map.geojson"))
+    return sorted(path.parent for path in directory.glob(f"*/{MAP}"))
 
 
 def _text(path: Path, errors: str = "strict") -> str:
