@@ -4,6 +4,9 @@ import numpy as np
 
 from gvgbot.geometry import Array, Pose
 
+SAME_M = 0.6  # vertices of a building nearer to each other are one
+SAME_RAD = 0.7  # departures from a vertex nearer to each other are one
+AHEAD_M = 0.8  # along an edge, its direction is taken
 _LEAST_VARIANCE_M2 = 1e-4  # of points: that they lie on each other exactly may be by chance
 _LEAST_SPREAD_M2 = 1e-6  # squared distance from their middle: one point alone has none
 

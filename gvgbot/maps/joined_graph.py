@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from gvgbot.geometry import Array, Pose
-from gvgbot.maps.merging import SAME_M, is_among, merged
+from gvgbot.maps.merging import is_among, merged
 from gvgbot.maps.moved import moved_graph
 from gvgbot.maps.pieced import pieced
 from gvgbot.maps.route_graph import RouteEdge, RouteGraph, RouteNode, lines_from
+from gvgbot.registration import SAME_M
 
 
 def joined_graph(

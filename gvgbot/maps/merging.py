@@ -24,15 +24,12 @@ from gvgbot.geometry import (
 )
 from gvgbot.maps.moved import moved_graph
 from gvgbot.maps.route_graph import RouteEdge, RouteGraph, RouteNode, lines_from
-from gvgbot.registration import assigned
+from gvgbot.registration import AHEAD_M, SAME_M, SAME_RAD, assigned
 
-SAME_M = 0.6  # vertices nearer to each other are one
-_SAME_RAD = 0.7  # departures nearer to each other are one
 _KINK_RAD = 1.2  # at most, from the bearing of an edge to where it sets out
 _ON_EDGE_M = 0.4  # from an edge, a vertex that the edge's own map does not know splits it
 _FROM_ENDS_M = SAME_M  # but not so near to its ends: there it is one of them
 _BESIDE_M = 1.0  # edges between the same vertices that stay nearer to each other are one
-AHEAD_M = 0.8  # along an edge, its direction is taken
 _SHARES = np.linspace(0.02, 0.98, 25)  # of the first covariance in an intersection
 
 
@@ -231,7 +228,7 @@ def _seen_twice(ours: RouteNode, theirs: Sequence[float], followed: Sequence[flo
     `theirs` are the bearings of all departures that the other one saw there, rad.
     """
     off = np.abs(wrap_angles(np.subtract.outer(ours.bearings, theirs)))
-    paired = {ours.bearings[i] for i, _ in assigned(off, _SAME_RAD)}
+    paired = {ours.bearings[i] for i, _ in assigned(off, SAME_RAD)}
     return {f for f in ours.frontiers if f not in paired and is_among(f, followed)}
 
 
@@ -258,7 +255,7 @@ def _matrix(vertex: RouteNode) -> Array:
 
 def is_among(bearing: float, bearings: Iterable[float]) -> bool:
     """Whether one of the bearings, rad, is this one."""
-    return any(abs(wrap_angle(bearing - other)) < _SAME_RAD for other in bearings)
+    return any(abs(wrap_angle(bearing - other)) < SAME_RAD for other in bearings)
 
 
 def _followed(vertex: RouteNode) -> list[float]:
@@ -352,7 +349,7 @@ def _unexplained(leaving: list[float], followed: list[float]) -> list[float]:
         return leaving
     off = np.array([[abs(wrap_angle(d - b)) for b in followed] for d in leaving])
     explained = {i for i, _ in assigned(off, _KINK_RAD)}
-    return [d for i, d in enumerate(leaving) if i not in explained and off[i].min() > _SAME_RAD / 2]
+    return [d for i, d in enumerate(leaving) if i not in explained and off[i].min() > SAME_RAD / 2]
 
 
 def _anchored(edge: RouteEdge, vertices: Sequence[RouteNode]) -> RouteEdge:

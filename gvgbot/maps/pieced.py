@@ -6,8 +6,9 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from gvgbot.geometry import Array, direction_of
-from gvgbot.maps.merging import AHEAD_M, is_among, is_same, settled
+from gvgbot.maps.merging import is_among, is_same, settled
 from gvgbot.maps.route_graph import RouteEdge, RouteGraph, RouteNode, lines_from
+from gvgbot.registration import AHEAD_M
 from gvgbot.team.ways import WELL_ON_M, Ways, leads_over
 
 _EVENED = 7  # points of a line, 0.1 m apart

@@ -6,12 +6,11 @@ import numpy as np
 
 from gvgbot.autonomy.slam.recognition import match_bearings
 from gvgbot.geometry import Array, Pose, wrap_angle
-from gvgbot.registration import rigid_fit
+from gvgbot.registration import SAME_RAD, rigid_fit
 from gvgbot.team.chart import ChartVertex
 from gvgbot.team.side import Side
 from gvgbot.team.stretches import as_clear
 
-_BEARING_RAD = 0.7
 _BEYOND_M = 1.2  # of a vertex's disc, walls must agree
 _SECTORS, _THICK_M = 90, 0.3  # around a vertex; in each, walls farther behind the first are hidden
 _WALL_M = 0.15  # a point so near to a wall lies on it
@@ -30,7 +29,7 @@ def likeness(a: Side, b: Side, i: int, j: int, pose: Pose) -> float:
     ours, theirs = a.vertices[i], b.vertices[j]
     known = {d.key: d.bearing for d in ours.departures}
     seen = tuple(bearing + pose.theta for bearing in theirs.bearings)
-    paired = match_bearings(seen, known, _BEARING_RAD)
+    paired = match_bearings(seen, known, SAME_RAD)
     apart = math.hypot(*(pose.transform(theirs.position) - ours.position))
     if not as_clear(np.array(ours.clearance), np.array(theirs.clearance), apart):
         return 0.0

@@ -14,13 +14,9 @@ from scipy.spatial.distance import cdist
 
 from gvgbot.autonomy.slam.graph import HalfEdgeId
 from gvgbot.geometry import Array, direction_of, length_of, wrap_angle
-from gvgbot.registration import assigned
+from gvgbot.registration import AHEAD_M, SAME_M, SAME_RAD, assigned
 from gvgbot.team.chart import Chart, ChartEdge, Departure
 from gvgbot.team.ways import BESIDE_M, WELL_ON_M, Ways, leads_over
-
-_SAME_M = 0.6  # vertices nearer to each other are one
-_SAME_RAD = 0.7  # departures nearer to each other are one
-_AHEAD_M = 0.8  # along an edge, its direction is taken
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +30,7 @@ class Frontier:
     def is_at(self, x: float, y: float, bearing: float) -> bool:
         """Whether another frontier is this one."""
         away = math.hypot(self.x - x, self.y - y)
-        return away < 2 * _SAME_M and abs(wrap_angle(self.bearing - bearing)) < _SAME_RAD
+        return away < 2 * SAME_M and abs(wrap_angle(self.bearing - bearing)) < SAME_RAD
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +104,7 @@ class Site:
         points = np.array([chart.vertices[i].position for i in ids]).reshape(-1, 2)
         if ids and self._points:
             away = cdist(points, np.array(self._points))
-            for row, place in assigned(away, _SAME_M):
+            for row, place in assigned(away, SAME_M):
                 self._place[number, ids[row]] = place
                 self._members[place][number] = ids[row]
         for i, point in zip(ids, points, strict=True):
@@ -155,7 +151,7 @@ class Site:
         for other, vertex in self._members[place].items():
             if self._has_been_at(other, vertex):
                 departures = self._charts[other].vertices[vertex].departures
-                near = any(abs(wrap_angle(d.bearing - bearing)) < _SAME_RAD for d in departures)
+                near = any(abs(wrap_angle(d.bearing - bearing)) < SAME_RAD for d in departures)
                 (saw if near else missed).add(other)
         return len(missed) > len(saw) or (number > 0 and 0 in missed)
 
@@ -179,7 +175,7 @@ class Site:
 
     def _has_an_edge_over(self, number: int, point: Array) -> bool:
         edges = self._edges[number].about(point)
-        return any(e.traversed and leads_over(e.polyline, point, _AHEAD_M) for e in edges)
+        return any(e.traversed and leads_over(e.polyline, point, AHEAD_M) for e in edges)
 
     def _has_driven_over(self, number: int, point: Array) -> bool:
         ways = self._charts[number].ways
@@ -219,7 +215,7 @@ class Site:
         nearest = min(departures, key=lambda d: abs(wrap_angle(d.bearing - bearing)), default=None)
         if nearest is None or nearest.edge is None:
             return None
-        if abs(wrap_angle(nearest.bearing - bearing)) > _SAME_RAD:
+        if abs(wrap_angle(nearest.bearing - bearing)) > SAME_RAD:
             return None
         edge = chart.edges[nearest.edge]
         far = edge.b if edge.a == (vertex, nearest.key) else edge.a
@@ -234,9 +230,9 @@ class Site:
                 continue
             for end, line in ((edge.b, edge.polyline[i:]), (edge.a, edge.polyline[i::-1])):
                 metres = length_of(line)
-                if metres < _AHEAD_M:
+                if metres < AHEAD_M:
                     continue
-                if abs(wrap_angle(direction_of(line, _AHEAD_M) - bearing)) < _SAME_RAD:
+                if abs(wrap_angle(direction_of(line, AHEAD_M) - bearing)) < SAME_RAD:
                     return Onward(self._place[number, end.vertex], metres)
         return None
 

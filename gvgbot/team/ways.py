@@ -14,13 +14,12 @@ from scipy.spatial.distance import cdist
 
 from gvgbot.autonomy.whereabouts import LEAST_LOOP_M
 from gvgbot.geometry import Array, direction_of, length_of, resampled, stations_of, wrap_angle
+from gvgbot.registration import AHEAD_M, SAME_RAD
 
 WELL_ON_M = 3.0  # beyond a vertex, who did not see it is as right as who did
 BESIDE_M = 0.45  # from a line, a place lies on it
 _GAP_M = 1.0  # between two ways: robots that meet keep so far apart
-_AHEAD_M = 0.8  # along a line, its direction is taken
 _APART_M = 1.5  # from a vertex, two ways that leave it are apart
-_SAME_RAD = 0.7  # directions nearer to each other are one
 _LEAST_M = 0.3  # of a way that is gone on with
 _MOST = 16  # pieces
 _SPACING_M = 0.1
@@ -91,10 +90,10 @@ class Ways:
         as long as what is left tells the direction.
         """
         last = pieces[-1]
-        least = max(len(last) - _ASTRAY, round(_AHEAD_M / _SPACING_M))
+        least = max(len(last) - _ASTRAY, round(AHEAD_M / _SPACING_M))
         for count in range(len(last), min(least, len(last) - 1), -_CUT):
             here = last[count - 1 :: -1]
-            ahead = direction_of(here, _AHEAD_M) + math.pi
+            ahead = direction_of(here, AHEAD_M) + math.pi
             found = self._onwards(here[0], ahead, used, _GAP_M, taken)
             if found is not None:
                 pieces[-1] = last[:count]
@@ -144,8 +143,8 @@ class Ways:
 
 def _leads(line: Array, ahead: float, taken: Sequence[Array]) -> bool:
     """Whether a line (N, 2) sets out in a direction, rad, and along no other one."""
-    turned = abs(wrap_angle(direction_of(line, _AHEAD_M) - ahead))
-    return turned < _SAME_RAD and not any(_begins_along(line, other) for other in taken)
+    turned = abs(wrap_angle(direction_of(line, AHEAD_M) - ahead))
+    return turned < SAME_RAD and not any(_begins_along(line, other) for other in taken)
 
 
 def _begins_along(line: Array, other: Array) -> bool:
