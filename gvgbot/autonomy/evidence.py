@@ -15,14 +15,13 @@ from gvgbot.autonomy.slam import ekf
 from gvgbot.autonomy.slam.graph import Edge, HalfEdgeId, Vertex
 from gvgbot.autonomy.slam.recognition import RecognitionConfig, Sighting, match_bearings
 from gvgbot.autonomy.topology import outwards
-from gvgbot.autonomy.views import Correspondence, View
+from gvgbot.autonomy.views import IN_FULL_VIEW_M, Correspondence, View
 from gvgbot.geometry import Array, Pose, stations_of
 from gvgbot.ranges import Range
 
 _MADE_BY_M = 0.15  # beyond its disc: what made a vertex is nearer, wherever exactly that is
 _HIDES_M = 1.0  # what stands so near to a vertex's disc may close a branch
 _FRESH_M = 6.0  # driven since a vertex was seen: the local frame still tells its place
-IN_FULL_VIEW_M = 4.0  # from so near, it would be seen that a vertex is none
 _IN_CLEAR_M = 2.0  # and from so near, that it has no departure where one was seen
 _WELL_KNOWN_M = 0.2  # the uncertainty of its place with which that can be told
 _PASSES_M = 0.3  # so near to a vertex's place, an edge that is seen passes through it

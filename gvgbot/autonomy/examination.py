@@ -2,11 +2,10 @@
 
 import math
 
-from gvgbot.autonomy.evidence import IN_FULL_VIEW_M
 from gvgbot.autonomy.gvg.local import Branch
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.situation import Situation
-from gvgbot.autonomy.views import View, touching
+from gvgbot.autonomy.views import IN_FULL_VIEW_M, View, touching
 from gvgbot.geometry import Array
 
 _SAME_M = 1.0  # what may be a vertex is seen elsewhere from elsewhere, by less than that

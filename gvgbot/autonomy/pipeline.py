@@ -42,7 +42,6 @@ from gvgbot.autonomy.slam.scan_matching import ScanMatchingConfig
 from gvgbot.autonomy.traffic import Traffic
 from gvgbot.autonomy.views import Correspondence, View
 from gvgbot.geometry import STANDSTILL, Array, Pose, Twist, wrap_angle
-from gvgbot.hal.guard import TRUSTED_SHARE
 from gvgbot.hal.messages import Odometry, Scan
 from gvgbot.hal.packed_scan import Sweep
 from gvgbot.hal.sweep import has_sight
@@ -258,7 +257,7 @@ class Pipeline:
                 return False
             is_due = self._look_now or scan.stamp - last.stamp >= c.interval_s
             is_due |= has_come_on(last.odom_base, odom_base, c.distance_m, c.turn_rad)
-            if not (is_due and (self.led or has_sight(scan, share=TRUSTED_SHARE))):
+            if not (is_due and (self.led or has_sight(scan))):
                 return False  # covered, it does not drive either
         self._look_now = False
         return True

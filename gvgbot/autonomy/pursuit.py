@@ -12,7 +12,6 @@ from gvgbot.autonomy.ending import (
     without_target,
 )
 from gvgbot.autonomy.events import Event, Finished, Recovery
-from gvgbot.autonomy.evidence import IN_FULL_VIEW_M
 from gvgbot.autonomy.examination import Examination
 from gvgbot.autonomy.exploration.access import is_tight
 from gvgbot.autonomy.exploration.config import ExplorationConfig
@@ -217,7 +216,7 @@ class Pursuit:
         if half is None:
             is_going_back = self._begins_to_retrace(view)
             is_done = self._mapper.graph.vertices and not self._mapper.graph.frontiers()
-            if is_going_back or is_done or view.is_somebody_within(IN_FULL_VIEW_M):
+            if is_going_back or is_done or view.is_somebody_near():
                 return
             self._conclude(view, without_target(self._mapper.graph, self.survey, reason))
             return
@@ -226,7 +225,7 @@ class Pursuit:
             self._events.append(Recovery(view.stamp, "go back", reason))
             return
         assert self.target is not None, "it has a half-edge"
-        may_go = view.is_somebody_within(IN_FULL_VIEW_M)
+        may_go = view.is_somebody_near()
         retries = self._config.retries if may_go else _SECOND
         self._leave(view, self.target, reason, retries=retries)
         self.target = None

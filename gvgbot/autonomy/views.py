@@ -11,6 +11,7 @@ from gvgbot.autonomy.gvg.local_map import LocalMap
 from gvgbot.autonomy.slam.graph import HalfEdgeId, Vertex
 from gvgbot.geometry import Array, Pose
 
+IN_FULL_VIEW_M = 4.0  # from so near, it would be seen that a vertex is none
 _AT_M = 0.2  # from a node, a line ends there
 _RIM_M = 0.25  # a point so near to a disc of the GVG may shape it
 _BESIDE_M, _STEP_M = 0.1, 0.05  # from a line of sight, a wall is on it; and from point to point
@@ -54,10 +55,10 @@ class View:
         may_go = np.concatenate([self.doubtful, self.aside])
         return bool((np.hypot(*(may_go - place).T) < within_m).any())
 
-    def is_somebody_within(self, metres: float) -> bool:
-        """Whether a body that may yet go is so near to the robot."""
+    def is_somebody_near(self) -> bool:
+        """Whether a body that may yet go is where vertices are in full view."""
         away = np.hypot(*(self.passing - self.local_base.position).T)
-        return bool((away < metres).any())
+        return bool((away < IN_FULL_VIEW_M).any())
 
     def is_end_doubted(self, place: Array) -> bool:
         """Whether the GVG ends at a place (2,) only because something that may go is there."""

@@ -10,7 +10,6 @@ from gvgbot.hal.sweep import free_distance, has_sight, no_points, obstacle_point
 from gvgbot.ranges import Range
 
 LONGEST_STEP = 0.1  # s; after a longer silence the ramps go on as if it had been this long
-TRUSTED_SHARE = 0.5  # a scan with a smaller share of trusted beams sees nothing: a covered laser
 CREEP = 0.01  # m/s; slower than this is a stop
 
 Reason = Literal[
@@ -106,7 +105,7 @@ class Guard:
             too_old = odometry.stamp - self.config.max_scan_age_s - LONGEST_STEP
             kept = track[1:] if track and track[0].stamp < too_old else track
             track = (*kept, odometry)
-        if scan is None or scan is state.scan or not has_sight(scan, share=TRUSTED_SHARE):
+        if scan is None or scan is state.scan or not has_sight(scan):
             return replace(state, track=track)
         points = obstacle_points(scan, track, reach=self._reach())
         return replace(state, track=track, scan=scan, points=points)

@@ -13,6 +13,7 @@ STRAIGHT = 1e-3  # 1/m; a flatter arc departs less than a millimetre from a line
 SAME_M = 0.05  # in range from beam to beam, on one surface
 _SAME_SIGMAS = 6.0  # and for all noise that is more than usual
 _MOST_SAME_M = 0.15  # whatever the noise
+_TRUSTED_SHARE = 0.5  # a scan with a smaller share of trusted beams sees nothing: a covered laser
 LEAST = 1.0 / 3.0  # share of the margin that is kept when the robot is within it already
 
 
@@ -21,10 +22,10 @@ def no_points() -> Array:
     return np.empty((0, 2))
 
 
-def has_sight(scan: Scan, *, share: float) -> bool:
-    """Whether at least this share of the beams is trusted (a range, or nothing within range)."""
+def has_sight(scan: Scan) -> bool:
+    """Whether enough of the beams are trusted (a range, or nothing within range)."""
     trusted = len(scan.ranges) - int(np.count_nonzero(np.isnan(scan.ranges)))
-    return trusted > 0 and trusted >= share * len(scan.ranges)
+    return trusted > 0 and trusted >= _TRUSTED_SHARE * len(scan.ranges)
 
 
 def obstacle_points(scan: Scan, track: Sequence[Odometry], *, reach: float) -> Array:

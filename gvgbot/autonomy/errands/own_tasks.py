@@ -11,13 +11,12 @@ from gvgbot.autonomy.destinations import foot_of, route_to_foot
 from gvgbot.autonomy.ending import Surveyed, too_narrow
 from gvgbot.autonomy.errands.kinds import ToPoint, ToVertex
 from gvgbot.autonomy.events import Decision
-from gvgbot.autonomy.evidence import IN_FULL_VIEW_M
 from gvgbot.autonomy.exploration.certainty import CertaintyConfig, Revisiting
 from gvgbot.autonomy.exploration.unseen import Unseen
 from gvgbot.autonomy.mapping import Mapper
 from gvgbot.autonomy.mission import Mission
 from gvgbot.autonomy.situation import Situation
-from gvgbot.autonomy.views import View
+from gvgbot.autonomy.views import IN_FULL_VIEW_M, View
 from gvgbot.geometry import Array
 from gvgbot.words import counted
 
@@ -93,7 +92,7 @@ class OwnTasks:
         if self._unseen.is_done and not has_news:
             return None
         position = self._mapper.belief.map_base.position
-        is_somebody_there = view.is_somebody_within(IN_FULL_VIEW_M)
+        is_somebody_there = view.is_somebody_near()
         if not self._unseen.judge(position, is_somebody_there=is_somebody_there):
             self._watched = view.stamp
         if self._arrives(view) and self._has_met and _may_overlook(view):
@@ -182,7 +181,7 @@ class OwnTasks:
 
 def _may_overlook(view: View) -> bool:
     """Whether something may be behind the robot that somebody hid; who stands there still does."""
-    return _is_hidden(view) or not view.is_somebody_within(IN_FULL_VIEW_M)
+    return _is_hidden(view) or not view.is_somebody_near()
 
 
 def _is_hidden(view: View) -> bool:

@@ -268,4 +268,4 @@ def test_a_heading_is_interpolated_the_short_way_round() -> None:
     ids=["all", "open hall", "one dropout", "mostly dropouts", "covered", "no beams"],
 )
 def test_a_laser_that_trusts_few_beams_sees_nothing(ranges: list[float], sees: bool) -> None:
-    assert has_sight(Scan(0.0, np.array(ranges), 0.0, 0.1, 0.02, 30.0), share=0.5) is sees
+    assert has_sight(Scan(0.0, np.array(ranges), 0.0, 0.1, 0.02, 30.0)) is sees
