@@ -91,17 +91,10 @@ class Evidence:
         branches = sorted(node.branches, key=lambda branch: branch in node.weak)
         bearings = tuple(view.gvg.bearing(b, node.clearance) for b in branches)
         limit = math.pi if is_mark and len(branches) == vertex.degree == 2 else self._same_bearing
-        matched = self._matched(bearings, vertex, vertex.local.theta, limit)
+        matched = _matched(bearings, vertex, vertex.local.theta, limit)
         for i, key in matched.items():
             known.pair_branch(branches[i], HalfEdgeId(vertex.id, key))
         return branches, bearings, matched
-
-    def _matched(
-        self, bearings: tuple[float, ...], vertex: Vertex, theta: float, limit: float
-    ) -> dict[int, int]:
-        """By index of a bearing, rad, the key of the half-edge of a vertex turned by theta, rad."""
-        turned = {key: half.bearing + theta for key, half in vertex.half_edges.items()}
-        return match_bearings(bearings, turned, limit)
 
     def weigh_departures(
         self, view: View, node: LocalNode, vertex: Vertex, known: Correspondence
@@ -267,7 +260,7 @@ class Evidence:
             return []
         gvg, node = view.gvg.divided(place)
         bearings = tuple(gvg.bearing(b, vertex.clearance) for b in gvg.nodes[node].branches)
-        matched = self._matched(bearings, vertex, pose.theta, self._same_bearing)
+        matched = _matched(bearings, vertex, pose.theta, self._same_bearing)
         return [HalfEdgeId(vertex.id, key) for key in matched.values()]
 
     def is_well_known(self, vertex: Vertex) -> bool:
@@ -348,3 +341,11 @@ class Evidence:
             at = self._known.belief.map_base.transform(view.local_base.inverse().transform(place))
             gaps += [float(np.hypot(*(line - at).T).min()) for line in self._known.driven_parts]
         return any(gap < ON_EDGE_M for gap in gaps)
+
+
+def _matched(
+    bearings: tuple[float, ...], vertex: Vertex, theta: float, limit: float
+) -> dict[int, int]:
+    """By index of a bearing, rad, the key of the half-edge of a vertex turned by theta, rad."""
+    turned = {key: half.bearing + theta for key, half in vertex.half_edges.items()}
+    return match_bearings(bearings, turned, limit)

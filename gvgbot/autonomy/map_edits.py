@@ -147,7 +147,7 @@ class MapEdits(Knowledge):
     def forget_bends(self, view: View) -> None:
         """Take out meetpoints that have lost their other departures: one edge passes there."""
         for vertex in list(self.graph.vertices.values()):
-            if self.graph.is_bend(vertex):
+            if vertex.is_bend:
                 self.remove(view, vertex, "an edge passes here")
 
     # -- edges -------------------------------------------------------------------------------

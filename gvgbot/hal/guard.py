@@ -89,7 +89,7 @@ class Guard:
         Call it once per odometry.
         """
         state = self._observe(state, odometry, scan)
-        reason = self._fault(twist, contact)
+        reason = _fault(twist, contact)
         if reason is None and (scan is None or self._is_old(state.scan, stamp)):
             reason = "no scan" if self._is_old(scan, stamp) else "laser sees nothing"
         permitted = STANDSTILL
@@ -120,18 +120,6 @@ class Guard:
 
     def _is_old(self, scan: Scan | None, stamp: float) -> bool:
         return scan is None or stamp - scan.stamp > self.config.max_scan_age_s
-
-    def _fault(self, twist: Twist, contact: Contact | None) -> Reason | None:
-        """What forbids any motion at all, whatever the laser sees."""
-        if not (isfinite(twist.linear) and isfinite(twist.angular)):
-            return "bad command"
-        if contact is not None and contact.wheel_drop:
-            return "wheel drop"
-        if contact is not None and contact.over_current:
-            return "over-current"
-        if contact is not None and contact.charger_cable:
-            return "charger cable"
-        return None
 
     def _limit(self, twist: Twist) -> Twist:
         """The twist on the same arc within the speed limits."""
@@ -199,3 +187,16 @@ def felt_ahead(contact: Contact | None) -> Reason | None:
     if contact.bumper:
         return "bumper"
     return "cliff" if contact.cliff else None
+
+
+def _fault(twist: Twist, contact: Contact | None) -> Reason | None:
+    """What forbids any motion at all, whatever the laser sees."""
+    if not (isfinite(twist.linear) and isfinite(twist.angular)):
+        return "bad command"
+    if contact is not None and contact.wheel_drop:
+        return "wheel drop"
+    if contact is not None and contact.over_current:
+        return "over-current"
+    if contact is not None and contact.charger_cable:
+        return "charger cable"
+    return None

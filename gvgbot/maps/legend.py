@@ -88,14 +88,7 @@ class Legend:
         canvas.text((left, top + _ROW / 2), fitted(self.caption, TEXT_SIZE, room), TEXT_SIZE)
         self._draw_bar(canvas, (left + width, top + _ROW / 2))
         for number, row in enumerate(self.rows, start=1):
-            self._draw_row(canvas, row, (left, top + _ROW * (number + 0.5)))
-
-    def _draw_row(self, canvas: Surface, row: Sequence[Entry], at: Point) -> None:
-        x, y = at
-        for entry in row:
-            entry.draw(canvas, (x + _SIGN / 2 - 6.0, y))
-            canvas.text((x + _SIGN, y), entry.label, TEXT_SIZE)
-            x += entry.width
+            _draw_row(canvas, row, (left, top + _ROW * (number + 0.5)))
 
     def _draw_bar(self, canvas: Surface, end: Point) -> None:
         """Four alternating fields that end at a point, and their length before them."""
@@ -127,3 +120,11 @@ def round_length(longest: float) -> float:
     """The largest of 1, 2, 5, 10, 20, ... (and of 0.5, 0.2, ...) that is not longer."""
     power = 10.0 ** math.floor(math.log10(longest))
     return max(digit * power for digit in (1.0, 2.0, 5.0) if digit * power <= longest)
+
+
+def _draw_row(canvas: Surface, row: Sequence[Entry], at: Point) -> None:
+    x, y = at
+    for entry in row:
+        entry.draw(canvas, (x + _SIGN / 2 - 6.0, y))
+        canvas.text((x + _SIGN, y), entry.label, TEXT_SIZE)
+        x += entry.width

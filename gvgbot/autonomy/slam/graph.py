@@ -71,6 +71,12 @@ class Vertex:
         """Its half-edges, oldest first."""
         return [HalfEdgeId(self.id, key) for key in self.half_edges]
 
+    @property
+    def is_bend(self) -> bool:
+        """Whether there is nothing to it but two edges, which might as well be one."""
+        edges = {half.edge for half in self.half_edges.values()}
+        return self.degree == len(edges) == 2 and None not in edges
+
     def add_half_edge(self, bearing: float) -> int:
         """The key of a new half-edge."""
         key, self.serial = self.serial, self.serial + 1
@@ -260,11 +266,6 @@ class GvgGraph:
                 if any(abs(at - begin) < _BESIDE * vertex.clearance for at in crossings):
                     found[vertex.id] = vertex
         return list(found.values())
-
-    def is_bend(self, vertex: Vertex) -> bool:
-        """Whether there is nothing to a vertex but two edges, which might as well be one."""
-        edges = {half.edge for half in vertex.half_edges.values()}
-        return vertex.degree == len(edges) == 2 and None not in edges
 
     def leave_ring(self, vertex: Vertex) -> bool:
         """Take out what leads away from a ring's vertex; False if there is more than that, or less.
