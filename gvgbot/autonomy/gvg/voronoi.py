@@ -21,6 +21,7 @@ _WITHIN = np.concatenate([0.5 * _RING[::2], np.zeros((1, 2))])
 _SIDES = (1, 2, 2, 0, 0, 1)  # corners of a triangle's sides, of which each lies opposite to one
 _RIM_M = 0.2  # of a maximal disc, two cells: its walls may hide that
 _MAX_UNKNOWN = 1  # of the sampled points of a disc
+_CRUMB, _CRUMB_LOSES_M = 4, 2.0  # fewer points lose against a real piece so much farther off
 _INFINITE_M = 1e6  # to the centre of a circle around three points on a line
 _NOTHING: Array = np.empty((0, 2))
 _LONG_RIDGE_M, _STEP_M, _FARTHEST_M = 1.0, 0.2, 8.0  # of ridges that end in the unknown
@@ -336,7 +337,7 @@ def _piece_of_robot(
     places = centres.take(nodes, axis=0)
     distance = np.hypot(*(places - robot).T)
     size = np.bincount(piece)
-    distance[size[piece] < 4] += 2.0  # crumbs lose against a real piece nearby
+    distance[size[piece] < _CRUMB] += _CRUMB_LOSES_M
     nearest = nearest_before(virtual_walls, robot, places, distance)
     if nearest is None:
         return EMPTY
