@@ -22,10 +22,9 @@ from gvgbot.geometry import Array, Pose, wrap_angle, wrap_angles
 from gvgbot.hal.packed_scan import AnyScan
 
 # Walls so near to each other are one, and so far off are two, m: maps are a little bent. Corridors
-# may differ by less, so one looks closely before one is sure. Then 0.13 of the walls disagree at
-# most where the robot is, and 0.32 or more where it is not, because that is not on the map.
+# may differ by less, so one looks closely before one is sure.
 _APART_BY_AND_LARGE, _APART_CLOSELY = (0.2, 0.4), (0.1, 0.2)
-_CLOSE = 0.2  # share of the walls that may disagree then
+_CLOSE = 0.2  # share of the walls that may disagree then; many more do elsewhere
 _HEADINGS = 120  # that are tried at each place
 _TRIED = 100  # places in one go
 _ROUGH_POINTS, _POINTS = 80, 300  # of the walls, for a rough guess and for a close look
