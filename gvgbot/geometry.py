@@ -68,6 +68,10 @@ class Pose:
         """Metres between the two origins."""
         return math.hypot(other.x - self.x, other.y - self.y)
 
+    def is_near(self, other: "Pose", metres: float, radians: float) -> bool:
+        """Whether another pose is nearer than so much, and turned by less."""
+        return self.distance(other) < metres and abs(wrap_angle(self.theta - other.theta)) < radians
+
     def transform(self, points: Array) -> Array:
         """Points (N, 2) or (2,) of the child frame, in the parent frame."""
         c, s = math.cos(self.theta), math.sin(self.theta)

@@ -87,7 +87,9 @@ def misplaced(
     best = max(fits, key=lambda fit: fit.share, default=None)
     if best is None or best.share < _FITS:
         return None
-    elsewhere = [fit.share for fit in fits if not _same(fit.map_base, best.map_base)]
+    elsewhere = [
+        fit.share for fit in fits if not fit.map_base.is_near(best.map_base, _APART_M, _APART_RAD)
+    ]
     if best.share <= _share(base_walls, known, map_base) + _CLEARLY:
         return None
     return best._replace(is_clear=best.share > max(elsewhere, default=0.0) + _CLEARLY)
@@ -103,7 +105,7 @@ def _guesses(base_walls: Array, known: KnownWalls, map_base: Pose) -> list[Pose]
     found: list[Pose] = []
     for x, y, theta in tried[np.argsort(-scores, kind="stable")].tolist():
         pose = Pose(x, y, wrap_angle(theta))
-        if not any(_same(pose, other) for other in found):
+        if not any(pose.is_near(other, _APART_M, _APART_RAD) for other in found):
             found.append(pose)
         if len(found) == _TRIED:
             break
@@ -124,8 +126,3 @@ def _share(base_walls: Array, known: KnownWalls, map_base: Pose) -> float:
     """How many of the walls agree with those of the map."""
     away = np.asarray(known.tree.query(map_base.transform(base_walls))[0])
     return 1.0 - float(np.clip((away - _ON_M) / (_OFF_M - _ON_M), 0.0, 1.0).mean())
-
-
-def _same(one: Pose, other: Pose) -> bool:
-    turn = abs(wrap_angle(one.theta - other.theta))
-    return one.distance(other) < _APART_M and turn < _APART_RAD

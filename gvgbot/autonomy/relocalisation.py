@@ -292,8 +292,7 @@ class Relocaliser:
 
     def _same(self, one: Hypothesis, other: Hypothesis) -> bool:
         here = self._look.local_base
-        a, b = one.map_local.compose(here), other.map_local.compose(here)
-        return a.distance(b) < _ONE_M and abs(wrap_angle(a.theta - b.theta)) < _ONE_RAD
+        return one.map_local.compose(here).is_near(other.map_local.compose(here), _ONE_M, _ONE_RAD)
 
     def _fit(self, look: Look, hypothesis: Hypothesis, Q: Array) -> bool:
         """Lay a look onto the map near a hypothesis and weigh it; whether that is possible."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from gvgbot.autonomy.control.company import BodiesSeen
-from gvgbot.geometry import Array, Pose, wrap_angle
+from gvgbot.geometry import Array, Pose
 from gvgbot.team.alignment import Alignment
 from gvgbot.team.chart import Chart
 from gvgbot.team.encounter import WINDOW_S
@@ -87,8 +87,7 @@ class Mate:
 
 def is_same_frame(pose: Pose, other: Pose, place: Pose) -> bool:
     """Whether two frames lay a place of the other robot's map at the same place of the own one."""
-    one, two = pose.compose(place), other.compose(place)
-    return one.distance(two) < _SAME_M and abs(wrap_angle(one.theta - two.theta)) < _SAME_RAD
+    return pose.compose(place).is_near(other.compose(place), _SAME_M, _SAME_RAD)
 
 
 def remember(looks: deque[BodiesSeen], seen: BodiesSeen) -> None:

@@ -146,6 +146,14 @@ def test_distance_is_between_origins_whatever_the_headings() -> None:
     assert Pose(1.0, 1.0, 3.0).distance(Pose(4.0, 5.0, -1.0)) == pytest.approx(5.0)
 
 
+def test_a_pose_is_near_another_only_if_place_and_heading_are() -> None:
+    here, there = Pose(1.0, 1.0, 3.1), Pose(4.0, 5.0, -3.1)  # 5 m off, 0.083 rad over the seam
+    for one, other in ((here, there), (there, here)):
+        assert one.is_near(other, 5.01, 0.09)
+        assert not one.is_near(other, 4.99, 0.09)
+        assert not one.is_near(other, 5.01, 0.08)
+
+
 def test_a_pose_is_read_from_an_array() -> None:
     assert Pose.from_array(np.array([1.0, 2.0, 0.5])) == Pose(1.0, 2.0, 0.5)
 
