@@ -24,6 +24,13 @@ def pytest_configure() -> None:
 
 
 @pytest.fixture(autouse=True)
+def _ctrl_c_is_heard() -> Iterator[None]:
+    """A command that was interrupted ignores it in the end, and so would programs started later."""
+    yield
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.fixture(autouse=True)
 def _fresh_log() -> Iterator[None]:
     """A command sets up the log for its process; the next test starts from nothing."""
     yield

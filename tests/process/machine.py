@@ -40,8 +40,9 @@ mknod -m 666 dev/full c 1 7
 mknod -m 666 dev/random c 1 8
 mknod -m 666 dev/urandom c 1 9
 for program in python gvgbot; do
-    printf '#!/bin/sh\\nexport PYTHONPATH=/opt/source:/opt/site\\nexec /opt/python/bin/python3 ' \
-        > "opt/gvgbot/bin/$program"
+    printf '#!/bin/sh\\nexport PYTHONPATH=/opt/source:/opt/site\\n' > "opt/gvgbot/bin/$program"
+    printf 'LD_LIBRARY_PATH=/opt/python/lib exec /opt/python/bin/python3 ' \
+        >> "opt/gvgbot/bin/$program"
     chmod 755 "opt/gvgbot/bin/$program"
 done
 echo '"$@"' >> opt/gvgbot/bin/python
