@@ -176,7 +176,7 @@ class Keeper:
 
         What the robot is asked for does not wait.
         """
-        pause, due = KEEP_EVERY, clock.now()
+        pause, due, next_wish = KEEP_EVERY, clock.now(), clock.now()
         while True:
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(KEEP_EVERY):
@@ -184,6 +184,9 @@ class Keeper:
             is_urgent = self._urgent.is_set()
             if clock.now() < due and not is_urgent:
                 continue
+            if is_urgent:
+                await clock.sleep_until(next_wish)  # of a crowd all are kept at once
+                next_wish = clock.now() + KEEP_EVERY
             self._urgent.clear()
             if is_urgent and self._session.pipeline.errands.is_paused:
                 await off_loop(partial(self._files.note_rest, rests=True))  # until all is written

@@ -361,6 +361,26 @@ def test_who_hears_that_the_robot_stands_finds_it_so_after_a_power_cut(
     run_in_virtual_time(story())
 
 
+def test_a_crowd_of_requests_is_kept_at_once(session: Session, tmp_path: Path) -> None:
+    keeper, times = Keeper(session, MissionFiles(tmp_path)), 0
+
+    async def off_loop(work: Callable[[], None]) -> None:
+        nonlocal times
+        times += 1
+
+    async def story() -> None:
+        clock = LoopClock()
+        async with asyncio.TaskGroup() as tasks:
+            keeping = tasks.create_task(keeper.keep(clock, off_loop))
+            for number in range(1000):
+                keeper.on_event(Requested(60.0, f"goto {number}", "ana", True, ""))
+                await clock.sleep_until(clock.now() + 0.01)
+            keeping.cancel()
+
+    run_in_virtual_time(story())
+    assert times <= 2 * 10.0 / KEEP_EVERY + 2
+
+
 def test_what_did_not_change_is_not_written_again(session: Session, tmp_path: Path) -> None:
     keeper = Keeper(session, MissionFiles(tmp_path))
     keeper.keeping(20.0)()
