@@ -171,9 +171,13 @@ def run(
             session.failure = reason_of(failures)
             raise
         finally:
-            keeper.finish()
-            session.save()
-            log.info("map saved", path=str(directory.path))
+            if session.is_blank:  # or each start without devices would leave one
+                directory.remove_blank()
+                log.info("no map saved", reason="nothing was seen")
+            else:
+                keeper.finish()
+                session.save()
+                log.info("map saved", path=str(directory.path))
     return 0
 
 

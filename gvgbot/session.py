@@ -87,6 +87,12 @@ class Session:
             return None
         return self.recorder.on_bytes
 
+    @property
+    def is_blank(self) -> bool:
+        """Whether nothing was seen, nothing has happened and nothing went wrong."""
+        is_told_of = bool(self._untold) or not self.directory.is_blank or self.failure is not None
+        return not (self.pipeline.past.keyframes or self.recorder or is_told_of)
+
     def on_events(self, happened: list[events.Event]) -> None:
         """Take down what happened, and write it."""
         self.note_events(happened)

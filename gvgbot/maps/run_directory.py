@@ -103,6 +103,18 @@ class RunDirectory:
             before.close()
 
     @property
+    def is_blank(self) -> bool:
+        """Whether no event was ever written here."""
+        return self._events.tell() == 0
+
+    def remove_blank(self) -> None:
+        """Remove the directory, if nothing is in it but a list of events that is blank."""
+        self.close()
+        with contextlib.suppress(OSError):
+            (self.path / EVENTS).unlink()
+            self.path.rmdir()
+
+    @property
     def whereabouts(self) -> list[str]:
         """Where the map is, for people."""
         return [f"map:     {self.path / MAP}", f"picture: {self.path / PICTURE}"]
@@ -122,7 +134,7 @@ class RunDirectory:
     def emptied_by_failure(self) -> Iterator[None]:
         """Remove what was written if an error or Ctrl-C ends the work on it, and nothing else."""
         before = set(self.path.iterdir())
-        if not self._events.tell():
+        if self.is_blank:
             before.discard(self.path / EVENTS)
         try:
             yield

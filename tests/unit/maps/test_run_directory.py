@@ -203,6 +203,17 @@ def test_a_directory_with_other_files_will_do(tmp_path: Path) -> None:
     assert names(tmp_path) == {"floor.yaml", "events.jsonl"}
 
 
+@pytest.mark.parametrize("others", [set(), {"floor.yaml"}])
+def test_a_blank_directory_goes_and_nobody_else_s_files(tmp_path: Path, others: set[str]) -> None:
+    directory = RunDirectory(tmp_path / "run")
+    for name in others:
+        (tmp_path / "run" / name).write_text("mine")
+    assert directory.is_blank
+    directory.remove_blank()
+    assert {path.name for path in tmp_path.glob("run/*")} == others
+    assert (tmp_path / "run").exists() == bool(others)
+
+
 def test_where_no_directory_can_be_made_for_want_of_room_that_is_the_remedy(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
