@@ -3,11 +3,12 @@
 import asyncio
 import json
 import signal
+import socket
 import subprocess
 import sys
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import asynccontextmanager
+from contextlib import ExitStack, asynccontextmanager
 from pathlib import Path
 
 import msgspec
@@ -227,6 +228,25 @@ def test_what_would_fill_the_memory_is_not_let_in_and_holds_up_nothing(endpoint:
     (reply,) = asyncio.run(story())
     assert reply.ok is not None
     assert asked == ["pause"]
+
+
+def test_connections_that_say_nothing_keep_nobody_out(endpoint: str) -> None:
+    """Zenoh lets go of them after ten seconds."""
+    host, _, port = endpoint.removeprefix("tcp/").partition(":")
+
+    def ask() -> list[zenoh.Reply]:
+        with ExitStack() as silent:
+            for _ in range(150):
+                silent.enter_context(socket.create_connection((host, int(port))))
+            with plain_session(endpoint, patience_s=5.0) as session:
+                return get(session, "ctl/pause")
+
+    async def story() -> list[zenoh.Reply]:
+        async with a_robot(endpoint, obliging):
+            return await asyncio.to_thread(ask)
+
+    (reply,) = asyncio.run(story())
+    assert reply.ok is not None
 
 
 def test_a_crowd_of_requests_is_refused_and_a_pause_among_them_is_done(endpoint: str) -> None:
